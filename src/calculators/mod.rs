@@ -1,0 +1,1 @@
+//! The IESNA methods and the closed forms they rest on.

@@ -1,0 +1,5 @@
+//! Rooms, surfaces and the configuration factors between them.
+
+mod room;
+
+pub use room::{Reflectances, Room, Surface};

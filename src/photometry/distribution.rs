@@ -1,0 +1,423 @@
+//! The luminous intensity distribution: a table over (C, gamma), bilinear in degrees, zero outside its gamma range.
+//!
+//! Conventions (IES LM-63 Type C, CIE 121): gamma 0 is the nadir, -z, and 180 the zenith; C 0 is +x and C 90 is +y,
+//! counted from +x towards +y when seen from above. Bilinear interpolation in degrees *defines* the luminaire for
+//! every engine: one that interpolates otherwise differs, and the report says so.
+
+use glam::DVec3;
+
+use crate::units::{Candela, Lumen};
+
+/// Intensity over all directions of one luminaire, in the luminaire's own frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LuminousIntensityDistribution {
+    symmetry: Symmetry,
+    c_deg: Vec<f64>,
+    gamma_deg: Vec<f64>,
+    /// `candela[c][gamma]`, one run of gamma a C plane.
+    candela: Vec<f64>,
+}
+
+/// How the stored C planes stand for the full circle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Symmetry {
+    /// One plane, the same for every C.
+    Axial,
+    /// C 0 to 90, mirrored in both vertical planes.
+    Quadrant,
+    /// C 0 to 180, mirrored in the C0-C180 plane.
+    BilateralC0,
+    /// C 90 to 270, mirrored in the C90-C270 plane.
+    BilateralC90,
+    /// C 0 to 360, the last plane equal to the first.
+    None,
+}
+
+/// Why a table is not a luminous intensity distribution.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DistributionError {
+    /// Wrong number of values.
+    #[error("the table holds {found} values where {planes} C planes of {gammas} angles need {}", planes * gammas)]
+    Count {
+        /// Values given.
+        found: usize,
+        /// C planes given.
+        planes: usize,
+        /// Gamma angles given.
+        gammas: usize,
+    },
+    /// Angles that do not rise strictly.
+    #[error("the {axis} angles must rise strictly: {after} follows {before}")]
+    NotRising {
+        /// `C` or `gamma`.
+        axis: &'static str,
+        /// The earlier angle.
+        before: f64,
+        /// The angle after it.
+        after: f64,
+    },
+    /// Angles outside what the symmetry or the sphere allows.
+    #[error("{axis} angles run from {first} to {last}; {expected}")]
+    Range {
+        /// `C` or `gamma`.
+        axis: &'static str,
+        /// First angle.
+        first: f64,
+        /// Last angle.
+        last: f64,
+        /// What was expected.
+        expected: &'static str,
+    },
+    /// A value that is no intensity.
+    #[error("the intensity at C {c_deg} gamma {gamma_deg} is {value}; it must be finite and not negative")]
+    Intensity {
+        /// C angle.
+        c_deg: f64,
+        /// Gamma angle.
+        gamma_deg: f64,
+        /// The offending value.
+        value: f64,
+    },
+}
+
+impl LuminousIntensityDistribution {
+    /// Builds a distribution from C planes, gamma angles (degrees) and intensities `candela[c * gammas + gamma]`.
+    ///
+    /// `c_deg` is `[0]` for axial symmetry and otherwise spans exactly the range of its [`Symmetry`]; the symmetry
+    /// is deduced from that range. `gamma_deg` may be any rising part of 0..=180; outside it the intensity is 0.
+    pub fn new(c_deg: Vec<f64>, gamma_deg: Vec<f64>, candela: Vec<f64>) -> Result<Self, DistributionError> {
+        rising("C", &c_deg)?;
+        rising("gamma", &gamma_deg)?;
+        let (planes, gammas) = (c_deg.len(), gamma_deg.len());
+        if planes == 0 || gammas < 2 || candela.len() != planes * gammas {
+            return Err(DistributionError::Count { found: candela.len(), planes, gammas });
+        }
+        let (first, last) = (gamma_deg[0], gamma_deg[gammas - 1]);
+        if first < 0.0 || last > 180.0 {
+            let expected = "gamma lies within 0 (nadir) and 180 (zenith)";
+            return Err(DistributionError::Range { axis: "gamma", first, last, expected });
+        }
+        let symmetry = Symmetry::of_planes(&c_deg)?;
+        for (k, &value) in candela.iter().enumerate() {
+            if !value.is_finite() || value < 0.0 {
+                let (c_deg, gamma_deg) = (c_deg[k / gammas], gamma_deg[k % gammas]);
+                return Err(DistributionError::Intensity { c_deg, gamma_deg, value });
+            }
+        }
+        Ok(Self { symmetry, c_deg, gamma_deg, candela })
+    }
+
+    /// A distribution with axial symmetry.
+    pub fn axial(gamma_deg: Vec<f64>, candela: Vec<f64>) -> Result<Self, DistributionError> {
+        Self::new(vec![0.0], gamma_deg, candela)
+    }
+
+    /// Intensity at (C, gamma) in degrees, any real C; zero where the table says nothing of gamma.
+    pub fn intensity(&self, c_deg: f64, gamma_deg: f64) -> Candela {
+        let last = self.gamma_deg.len() - 1;
+        if !(gamma_deg >= self.gamma_deg[0] && gamma_deg <= self.gamma_deg[last]) {
+            return Candela(0.0);
+        }
+        let (g, t) = bracket(&self.gamma_deg, gamma_deg);
+        let along = |plane: usize| {
+            let row = &self.candela[plane * (last + 1)..][..=last];
+            row[g] + t * (row[g + 1] - row[g])
+        };
+        if self.c_deg.len() == 1 {
+            return Candela(along(0));
+        }
+        let (c, s) = bracket(&self.c_deg, self.symmetry.fold(c_deg));
+        let (low, high) = (along(c), along(c + 1));
+        Candela(low + s * (high - low))
+    }
+
+    /// Intensity towards `direction`, in the luminaire's own frame, of any length but zero.
+    ///
+    /// Angles come from `atan2`, which keeps full precision at both poles.
+    pub fn intensity_towards(&self, direction: DVec3) -> Candela {
+        let (c, gamma) = angles_deg(direction);
+        self.intensity(c, gamma)
+    }
+
+    /// Total flux, exact for the bilinear interpolation (closed form per cell).
+    pub fn flux(&self) -> Lumen {
+        self.flux_between(0.0, 180.0)
+    }
+
+    /// Flux within `from_deg <= gamma <= to_deg`, exact for the bilinear interpolation.
+    ///
+    /// Per gamma interval with I = a + m g (g in radians): ∫ I sin g dg = `[-I cos g + m sin g]`; over C the trapezoid
+    /// rule is exact.
+    pub fn flux_between(&self, from_deg: f64, to_deg: f64) -> Lumen {
+        let average = self.azimuth_average();
+        let mut sum = 0.0;
+        for (g, i) in self.gamma_deg.windows(2).zip(average.windows(2)) {
+            let (a, b) = (g[0].max(from_deg), g[1].min(to_deg));
+            if b <= a {
+                continue;
+            }
+            let slope = (i[1] - i[0]) / (g[1] - g[0]);
+            let (ia, ib) = (i[0] + slope * (a - g[0]), i[0] + slope * (b - g[0]));
+            let (a, b, m) = (a.to_radians(), b.to_radians(), slope.to_degrees());
+            sum += ia * a.cos() - ib * b.cos() + m * (b.sin() - a.sin());
+        }
+        Lumen(std::f64::consts::TAU * sum)
+    }
+
+    /// Mean intensity over C at each tabulated gamma, in candela.
+    pub fn azimuth_average(&self) -> Vec<f64> {
+        let gammas = self.gamma_deg.len();
+        if self.c_deg.len() == 1 {
+            return self.candela.clone();
+        }
+        let span = self.c_deg[self.c_deg.len() - 1] - self.c_deg[0];
+        let mut average = vec![0.0; gammas];
+        for (p, c) in self.c_deg.windows(2).enumerate() {
+            let weight = 0.5 * (c[1] - c[0]) / span;
+            for (g, mean) in average.iter_mut().enumerate() {
+                *mean += weight * (self.candela[p * gammas + g] + self.candela[(p + 1) * gammas + g]);
+            }
+        }
+        average
+    }
+
+    /// The same distribution with its planes written out over the full circle, C 0 to 360.
+    ///
+    /// Axial distributions keep one plane times two (0 and 360), so that every consumer can interpolate in C.
+    #[must_use]
+    pub fn full_circle(&self) -> Self {
+        let mut c_deg = match self.symmetry {
+            Symmetry::Axial => vec![0.0, 360.0],
+            Symmetry::None => self.c_deg.clone(),
+            Symmetry::BilateralC0 => self.c_deg.iter().copied().chain(self.c_deg.iter().map(|c| 360.0 - c)).collect(),
+            Symmetry::BilateralC90 => {
+                let mirrored = self.c_deg.iter().map(|c| (540.0 - c).rem_euclid(360.0));
+                self.c_deg.iter().copied().chain(mirrored).chain([0.0, 360.0]).collect()
+            }
+            Symmetry::Quadrant => {
+                let folds = |c: &f64| [*c, 180.0 - c, 180.0 + c, 360.0 - c];
+                self.c_deg.iter().flat_map(folds).collect()
+            }
+        };
+        c_deg.sort_by(f64::total_cmp);
+        c_deg.dedup();
+        let candela =
+            c_deg.iter().flat_map(|&c| self.gamma_deg.iter().map(move |&g| self.intensity(c, g).value())).collect();
+        Self { symmetry: Symmetry::None, c_deg, gamma_deg: self.gamma_deg.clone(), candela }
+    }
+
+    /// The same distribution with a table over the whole of gamma 0 to 180, for renderers that extrapolate.
+    ///
+    /// Where the table ends short of a pole with light at its edge, it falls to zero within `step_deg`.
+    #[must_use]
+    pub fn padded(&self, step_deg: f64) -> Self {
+        let gammas = self.gamma_deg.len();
+        let (first, last) = (self.gamma_deg[0], self.gamma_deg[gammas - 1]);
+        let mut below = vec![];
+        let mut above = vec![];
+        if first > 0.0 {
+            below.extend([0.0, first - step_deg].into_iter().filter(|g| *g >= 0.0 && *g < first));
+            below.dedup();
+        }
+        if last < 180.0 {
+            above.extend([last + step_deg, 180.0].into_iter().filter(|g| *g <= 180.0 && *g > last));
+            above.dedup();
+        }
+        let mut gamma_deg = below.clone();
+        gamma_deg.extend(&self.gamma_deg);
+        gamma_deg.extend(&above);
+        let candela = self
+            .candela
+            .chunks(gammas)
+            .flat_map(|row| {
+                let zeros = |n: usize| std::iter::repeat_n(0.0, n);
+                zeros(below.len()).chain(row.iter().copied()).chain(zeros(above.len())).collect::<Vec<_>>()
+            })
+            .collect();
+        Self { symmetry: self.symmetry, c_deg: self.c_deg.clone(), gamma_deg, candela }
+    }
+
+    /// The same distribution with every intensity multiplied by `factor`.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let candela = self.candela.iter().map(|i| i * factor).collect();
+        Self { candela, ..self.clone() }
+    }
+
+    /// How the stored planes stand for the full circle.
+    pub fn symmetry(&self) -> Symmetry {
+        self.symmetry
+    }
+
+    /// The stored C planes in degrees.
+    pub fn c_deg(&self) -> &[f64] {
+        &self.c_deg
+    }
+
+    /// The gamma angles in degrees.
+    pub fn gamma_deg(&self) -> &[f64] {
+        &self.gamma_deg
+    }
+
+    /// The stored intensities of plane `c`, one a gamma angle, in candela.
+    pub fn plane(&self, c: usize) -> &[f64] {
+        let gammas = self.gamma_deg.len();
+        &self.candela[c * gammas..][..gammas]
+    }
+
+    /// The largest intensity of the table, which bilinear interpolation never exceeds.
+    pub fn max_intensity(&self) -> Candela {
+        Candela(self.candela.iter().copied().fold(0.0, f64::max))
+    }
+}
+
+impl Symmetry {
+    fn of_planes(c_deg: &[f64]) -> Result<Self, DistributionError> {
+        let (first, last) = (c_deg[0], c_deg[c_deg.len() - 1]);
+        match (first, last) {
+            _ if c_deg == [0.0] => Ok(Self::Axial),
+            (0.0, 90.0) => Ok(Self::Quadrant),
+            (0.0, 180.0) => Ok(Self::BilateralC0),
+            (90.0, 270.0) => Ok(Self::BilateralC90),
+            (0.0, 360.0) => Ok(Self::None),
+            _ => {
+                let expected = "they must be 0 alone, 0-90, 0-180, 90-270 or 0-360";
+                Err(DistributionError::Range { axis: "C", first, last, expected })
+            }
+        }
+    }
+
+    /// The angle within the stored planes that stands for `c_deg`.
+    fn fold(self, c_deg: f64) -> f64 {
+        let c = c_deg.rem_euclid(360.0);
+        match self {
+            Self::Axial => 0.0,
+            Self::None => c,
+            Self::BilateralC0 => c.min(360.0 - c),
+            Self::BilateralC90 => {
+                if (90.0..=270.0).contains(&c) {
+                    c
+                } else {
+                    (540.0 - c).rem_euclid(360.0)
+                }
+            }
+            Self::Quadrant => {
+                let half = c.min(360.0 - c);
+                half.min(180.0 - half)
+            }
+        }
+    }
+}
+
+/// (C, gamma) in degrees of a direction in the luminaire's frame; C in 0..360.
+pub fn angles_deg(direction: DVec3) -> (f64, f64) {
+    let c = direction.y.atan2(direction.x).to_degrees();
+    let gamma = direction.x.hypot(direction.y).atan2(-direction.z).to_degrees();
+    (if c < 0.0 { c + 360.0 } else { c }, gamma)
+}
+
+/// The unit direction of (C, gamma) in degrees, in the luminaire's frame.
+pub fn direction(c_deg: f64, gamma_deg: f64) -> DVec3 {
+    let (sin_c, cos_c) = c_deg.to_radians().sin_cos();
+    let (sin_g, cos_g) = gamma_deg.to_radians().sin_cos();
+    DVec3::new(sin_g * cos_c, sin_g * sin_c, -cos_g)
+}
+
+/// The interval of `nodes` that holds `x` and the fraction of it that `x` lies along.
+fn bracket(nodes: &[f64], x: f64) -> (usize, f64) {
+    let k = nodes.partition_point(|n| *n <= x).clamp(1, nodes.len() - 1) - 1;
+    let t = (x - nodes[k]) / (nodes[k + 1] - nodes[k]);
+    (k, t.clamp(0.0, 1.0))
+}
+
+fn rising(axis: &'static str, angles: &[f64]) -> Result<(), DistributionError> {
+    for w in angles.windows(2) {
+        // Written so that NaN fails too.
+        if !matches!(w[0].partial_cmp(&w[1]), Some(std::cmp::Ordering::Less)) {
+            return Err(DistributionError::NotRising { axis, before: w[0], after: w[1] });
+        }
+    }
+    match angles {
+        [one] if !one.is_finite() => Err(DistributionError::NotRising { axis, before: *one, after: *one }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Case S1 of the engine tests: axial uplight, flux 1817.2814559 lm.
+    pub(crate) fn s1() -> LuminousIntensityDistribution {
+        let gamma = vec![0.0, 89.0, 90.0, 95.0, 115.0, 135.0, 155.0, 175.0, 180.0];
+        let candela = vec![0.0, 0.0, 4.5, 35.7, 218.3, 421.6, 576.4, 662.3, 664.4];
+        LuminousIntensityDistribution::axial(gamma, candela).unwrap()
+    }
+
+    #[test]
+    fn isotropic_flux_is_four_pi() {
+        let isotropic = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![1.0, 1.0]).unwrap();
+        assert_relative_eq!(isotropic.flux().value(), 4.0 * std::f64::consts::PI, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn s1_flux_is_the_converged_value() {
+        assert_relative_eq!(s1().flux().value(), 1817.2814559, max_relative = 1e-9);
+        assert_relative_eq!(s1().full_circle().flux().value(), s1().flux().value(), max_relative = 1e-13);
+    }
+
+    #[test]
+    fn symmetry_folds_every_direction_onto_the_stored_planes() {
+        let planes = |c: Vec<f64>| {
+            let candela = c.iter().flat_map(|c| [100.0 + c, 200.0 + c]).collect();
+            LuminousIntensityDistribution::new(c, vec![0.0, 180.0], candela).unwrap()
+        };
+        let quadrant = planes(vec![0.0, 45.0, 90.0]);
+        let c0 = planes(vec![0.0, 60.0, 180.0]);
+        let c90 = planes(vec![90.0, 180.0, 270.0]);
+        for (table, c, stored) in [
+            (&quadrant, 135.0, 45.0),
+            (&quadrant, 200.0, 20.0),
+            (&quadrant, -30.0, 30.0),
+            (&c0, 300.0, 60.0),
+            (&c90, 0.0, 180.0),
+            (&c90, 30.0, 150.0),
+            (&c90, 330.0, 210.0),
+        ] {
+            assert_relative_eq!(table.intensity(c, 0.0).value(), 100.0 + stored, max_relative = 1e-14);
+        }
+        for table in [&quadrant, &c0, &c90] {
+            let full = table.full_circle();
+            assert_eq!(full.symmetry(), Symmetry::None);
+            for c in (0..720).map(|c| 0.5 * f64::from(c)) {
+                assert_relative_eq!(
+                    full.intensity(c, 77.0).value(),
+                    table.intensity(c, 77.0).value(),
+                    max_relative = 1e-13
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn outside_the_table_there_is_no_light_and_padding_says_so_too() {
+        let up = LuminousIntensityDistribution::axial(vec![90.0, 180.0], vec![5.0, 10.0]).unwrap();
+        assert_eq!(up.intensity(0.0, 89.999).value(), 0.0);
+        let padded = up.padded(1e-4);
+        assert_eq!(padded.gamma_deg(), [0.0, 90.0 - 1e-4, 90.0, 180.0]);
+        assert_eq!(padded.intensity(0.0, 45.0).value(), 0.0);
+        assert_eq!(padded.intensity(0.0, 135.0).value(), 7.5);
+    }
+
+    #[test]
+    fn directions_and_angles_are_inverse() {
+        for (c, gamma) in [(0.0, 90.0), (90.0, 45.0), (213.0, 135.0), (359.0, 1e-7)] {
+            let (c2, gamma2) = angles_deg(direction(c, gamma));
+            assert_relative_eq!(c2, c, epsilon = 1e-6);
+            assert_relative_eq!(gamma2, gamma, epsilon = 1e-12);
+        }
+        assert_eq!(angles_deg(DVec3::NEG_Z).1, 0.0);
+        assert_eq!(angles_deg(DVec3::Z).1, 180.0);
+    }
+}

@@ -1,0 +1,148 @@
+//! What is simulated and exported: a room (or none), obstacles, luminaires; and the meters that read it.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+
+use crate::geometry::Room;
+use crate::photometry::Photometry;
+use crate::units::Candela;
+
+/// Everything that emits, blocks or reflects light.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// The closed room; `None` is free field: nothing reflects, nothing blocks.
+    pub room: Option<Room>,
+    /// Opaque diffuse bodies inside the room.
+    pub obstacles: Vec<Obstacle>,
+    /// The luminaires, each with its own photometry.
+    pub luminaires: Vec<Luminaire>,
+}
+
+/// An opaque diffuse body.
+#[derive(Clone, Debug)]
+pub struct Obstacle {
+    /// Its shape in world coordinates, metres.
+    pub shape: Shape,
+    /// Diffuse reflectance, 0..=1.
+    pub reflectance: f64,
+}
+
+/// The shape of an obstacle.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// An axis-aligned box.
+    Box {
+        /// Lower corner.
+        min_m: DVec3,
+        /// Upper corner.
+        max_m: DVec3,
+    },
+    /// A triangle mesh; both sides of every triangle reflect.
+    Mesh {
+        /// Vertices.
+        vertices_m: Vec<DVec3>,
+        /// Vertex indices, counter-clockwise seen from outside.
+        triangles: Vec<[u32; 3]>,
+    },
+}
+
+/// A luminaire in its place.
+#[derive(Clone, Debug)]
+pub struct Luminaire {
+    /// Its name in the spec.
+    pub id: String,
+    /// What its photometric file says.
+    pub photometry: Arc<Photometry>,
+    /// Photometric centre in metres.
+    pub position_m: DVec3,
+    /// Rotation from the luminaire's own frame (C0 = +x, nadir = -z) to the world.
+    pub orientation: DMat3,
+    /// Dimming or maintenance factor on every intensity.
+    pub flux_scale: f64,
+    /// How its extent is modelled.
+    pub model: LuminaireModel,
+}
+
+/// How much of a luminaire's body is modelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LuminaireModel {
+    /// All light from the photometric centre.
+    Point,
+    /// Light from the file's luminous opening.
+    Area,
+    /// An impostor surface that a renderer samples for the light behind it (Radiance's illum).
+    Impostor,
+}
+
+impl LuminaireModel {
+    /// The name used in specs and reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Point => "point",
+            Self::Area => "area",
+            Self::Impostor => "impostor",
+        }
+    }
+}
+
+/// A point that reads illuminance on the side its normal points to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meter {
+    /// Position in metres.
+    pub position_m: DVec3,
+    /// Unit normal.
+    pub normal: DVec3,
+}
+
+/// Which light a meter is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Transport {
+    /// Straight from the luminaires.
+    Direct,
+    /// Reflected at least once.
+    Indirect(Bounces),
+    /// Both together.
+    Total(Bounces),
+}
+
+/// How many diffuse reflections count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Bounces {
+    /// All of them.
+    Converged,
+    /// Light reflected at most this often.
+    AtMost(u32),
+}
+
+/// Azimuth about z, then tilt about the turned y axis, then roll about the luminaire's own axis; right-handed, degrees.
+///
+/// The result takes directions of the luminaire's frame to the world: a positive tilt moves the nadir towards -x.
+pub fn orientation(azimuth_deg: f64, tilt_deg: f64, roll_deg: f64) -> DMat3 {
+    DMat3::from_rotation_z(azimuth_deg.to_radians())
+        * DMat3::from_rotation_y(tilt_deg.to_radians())
+        * DMat3::from_rotation_z(roll_deg.to_radians())
+}
+
+impl Luminaire {
+    /// Intensity towards a world direction of any length, flux scale included.
+    pub fn intensity_towards(&self, direction: DVec3) -> Candela {
+        self.photometry.distribution.intensity_towards(self.orientation.transpose() * direction) * self.flux_scale
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn rotations_are_right_handed_and_intrinsic() {
+        let nadir = orientation(0.0, 90.0, 0.0) * DVec3::NEG_Z;
+        assert_relative_eq!(nadir.x, -1.0, epsilon = 1e-15);
+        let turned = orientation(90.0, 90.0, 0.0) * DVec3::NEG_Z;
+        assert_relative_eq!(turned.y, -1.0, epsilon = 1e-15);
+        let c0 = orientation(30.0, 0.0, 15.0) * DVec3::X;
+        assert_relative_eq!(c0.y.atan2(c0.x).to_degrees(), 45.0, epsilon = 1e-12);
+    }
+}
