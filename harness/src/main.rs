@@ -1,2 +1,3 @@
-//! placeholder
+//! The `luxproof` program.
+
 fn main() {}

@@ -1,0 +1,336 @@
+//! Engines: everything that yields readings, renderers and our own solvers alike, behind one seam.
+//!
+//! Adding one: write `engines/<name>.rs` with a type that implements [`Engine`], and add its line to [`all`].
+
+mod site;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use luminaire::scene::{Meter, Scene, Transport};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::process::{Invocation, ProcessError};
+use crate::reading::MeterId;
+
+pub use site::{Site, SiteError};
+
+/// Every engine that luxproof knows, in the order of reports.
+pub fn all() -> Vec<Box<dyn Engine>> {
+    vec![]
+}
+
+/// The name of an engine in specs, on the command line and in reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[serde(transparent)]
+pub struct EngineId(pub &'static str);
+
+impl fmt::Display for EngineId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.0)
+    }
+}
+
+/// Something that reads illuminance at meters of a scene.
+pub trait Engine: Send + Sync {
+    /// Its name.
+    fn id(&self) -> EngineId;
+
+    /// Whether it can run here, and its version.
+    fn probe(&self, site: &Site) -> Result<Version, Absent>;
+
+    /// Whether it can do this job, exactly or nearly; decided from the job alone, before anything starts.
+    fn supports(&self, job: &Job) -> Support;
+
+    /// The job as native files, runnable by hand; pure. Our own solvers have none.
+    fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError>;
+
+    /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
+    fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError>;
+}
+
+/// One procedure of one case, as an engine is asked for it.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// The case, for comments in exported scenes.
+    pub case: String,
+    /// The procedure's name, likewise.
+    pub procedure: String,
+    /// Room, obstacles and the luminaires that are on. No room means free field.
+    pub scene: Scene,
+    /// Where illuminance is read.
+    pub stations: Vec<Station>,
+    /// Which light counts.
+    pub transport: Transport,
+    /// When to stop.
+    pub budget: Budget,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// The engine's own settings from the spec, e.g. `variant: llvm_ad_mono`.
+    pub settings: BTreeMap<String, serde_json::Value>,
+}
+
+/// A meter with its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Station {
+    /// Its name in reports.
+    pub id: MeterId,
+    /// Where it is and which way it looks.
+    pub meter: Meter,
+    /// What it is expected to read at most, in lux, if known: lets engines choose a read-out scale. Never copied to a result.
+    pub expected_lx: Option<f64>,
+}
+
+/// When an engine may stop: at whichever comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Budget {
+    /// Standard error relative to the reading.
+    #[serde(default = "Budget::default_relative_error")]
+    pub relative_error: f64,
+    /// Wall-clock seconds an engine and procedure.
+    #[serde(default = "Budget::default_seconds")]
+    pub seconds: f64,
+}
+
+impl Budget {
+    fn default_relative_error() -> f64 {
+        0.002
+    }
+
+    fn default_seconds() -> f64 {
+        60.0
+    }
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self { relative_error: Self::default_relative_error(), seconds: Self::default_seconds() }
+    }
+}
+
+/// An engine's version, as it names itself.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Version(pub String);
+
+/// Why an engine is not there, and how to get it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{reason}; {remedy}")]
+pub struct Absent {
+    /// What is missing.
+    pub reason: String,
+    /// What to do.
+    pub remedy: String,
+}
+
+/// Whether an engine can do a job.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Support {
+    /// To its full accuracy.
+    Yes,
+    /// With a known approximation.
+    Approximate {
+        /// What is approximated.
+        why: String,
+        /// Its size, relative.
+        size: Option<f64>,
+    },
+    /// Not at all.
+    No(String),
+}
+
+/// A file of an exported scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneFile {
+    /// Its name within the scene's folder.
+    pub name: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+}
+
+impl SceneFile {
+    /// A text file.
+    pub fn text(name: &str, text: impl Into<String>) -> Self {
+        Self { name: name.to_owned(), bytes: text.into().into_bytes() }
+    }
+}
+
+/// Where an engine works: its installation, its folders and what it may use.
+#[derive(Clone, Debug)]
+pub struct Workbench {
+    /// Where engines are installed.
+    pub site: Site,
+    /// The folder of this job's scene files; exists, belongs to this job alone.
+    pub scene_dir: PathBuf,
+    /// The log that every process of this job appends its messages to.
+    pub log: PathBuf,
+    /// Threads or processes at a time.
+    pub jobs: usize,
+    /// Past this the job is killed.
+    pub limit: Duration,
+}
+
+impl Workbench {
+    /// An invocation in the scene's folder with this job's log and limit.
+    pub fn invoke(&self, program: impl Into<PathBuf>) -> Invocation {
+        Invocation::new(program, &self.scene_dir, self.limit, &self.log)
+    }
+
+    /// Writes exported files into the scene's folder.
+    pub fn write(&self, files: &[SceneFile]) -> Result<(), EngineError> {
+        for file in files {
+            let path = self.scene_dir.join(&file.name);
+            std::fs::write(&path, &file.bytes).map_err(|source| EngineError::io(&path, source))?;
+        }
+        Ok(())
+    }
+}
+
+/// What an engine gives for a job.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Measurement {
+    /// One a station, in the stations' order.
+    pub estimates: Vec<Estimate>,
+    /// What was set, for whoever repeats it: samples, seeds, arguments, variant.
+    pub settings: BTreeMap<String, String>,
+    /// What the reader of the report should know of this run.
+    pub notes: Vec<String>,
+}
+
+/// An illuminance with what is known of its error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Illuminance in lux.
+    pub value_lx: f64,
+    /// Standard error of a Monte Carlo mean, in lux.
+    pub std_error_lx: Option<f64>,
+    /// Distance within which the true value lies, in lux, for deterministic methods.
+    pub error_bound_lx: Option<f64>,
+}
+
+/// Why an engine that was there gave no reading.
+#[derive(Debug, thiserror::Error)]
+pub enum EngineError {
+    /// A process failed.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
+    /// A file could not be written or read.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The program ended well but what it gave is not a result.
+    #[error("{engine} exited without an error, but {what}")]
+    Output {
+        /// The engine.
+        engine: EngineId,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A setting from the spec makes no sense to the engine.
+    #[error("engines.{engine}.{key}: {what}")]
+    Setting {
+        /// The engine.
+        engine: EngineId,
+        /// The setting.
+        key: String,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// Our own solver gave up.
+    #[error("{engine}: {what}")]
+    Solver {
+        /// The engine.
+        engine: EngineId,
+        /// Why.
+        what: String,
+    },
+}
+
+impl EngineError {
+    /// A file error with its path.
+    pub fn io(path: &Path, source: std::io::Error) -> Self {
+        Self::Io { path: path.display().to_string(), source }
+    }
+}
+
+/// Checks what every engine must hold: one finite, non-negative value a station.
+pub fn checked(engine: EngineId, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
+    let (found, wanted) = (measurement.estimates.len(), job.stations.len());
+    if found != wanted {
+        return Err(EngineError::Output { engine, what: format!("gave {found} readings for {wanted} meters") });
+    }
+    for (estimate, station) in measurement.estimates.iter().zip(&job.stations) {
+        let errors = [estimate.std_error_lx, estimate.error_bound_lx];
+        let sound = |v: f64| v.is_finite() && v >= 0.0;
+        if !sound(estimate.value_lx) || !errors.into_iter().flatten().all(sound) {
+            let what = format!("read {} lx (error {errors:?}) at {}", estimate.value_lx, station.id);
+            return Err(EngineError::Output { engine, what });
+        }
+    }
+    Ok(measurement)
+}
+
+/// Mean and standard error of `K` independent estimates; the error is `None` for fewer than two.
+pub fn mean_and_std_error(values: &[f64]) -> (f64, Option<f64>) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    if values.len() < 2 {
+        return (mean, None);
+    }
+    let sum_of_squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    (mean, Some((sum_of_squares / (n - 1.0) / n).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use luminaire::scene::Scene;
+
+    const ENGINE: EngineId = EngineId("test");
+
+    fn job(stations: usize) -> Job {
+        let meter = Meter { position_m: DVec3::ONE, normal: DVec3::Z };
+        let station = |k| Station { id: MeterId::new("m", k), meter, expected_lx: None };
+        Job {
+            case: "case".into(),
+            procedure: "direct_illuminance".into(),
+            scene: Scene::default(),
+            stations: (0..stations).map(station).collect(),
+            transport: Transport::Direct,
+            budget: Budget::default(),
+            seed: 1,
+            settings: BTreeMap::new(),
+        }
+    }
+
+    fn measurement(values: &[f64]) -> Measurement {
+        let estimate = |&value_lx| Estimate { value_lx, std_error_lx: Some(0.0), error_bound_lx: None };
+        Measurement { estimates: values.iter().map(estimate).collect(), ..Measurement::default() }
+    }
+
+    #[test]
+    fn missing_rows_nan_infinity_and_negative_readings_are_errors() {
+        assert!(checked(ENGINE, &job(2), measurement(&[1.0, 0.0])).is_ok());
+        for bad in [&[1.0][..], &[1.0, f64::NAN], &[1.0, f64::INFINITY], &[-1e-9, 1.0], &[1.0, 1.0, 1.0]] {
+            assert!(checked(ENGINE, &job(2), measurement(bad)).is_err(), "{bad:?}");
+        }
+        let mut odd = measurement(&[1.0]);
+        odd.estimates[0].std_error_lx = Some(f64::NAN);
+        assert!(checked(ENGINE, &job(1), odd).is_err());
+    }
+
+    #[test]
+    fn standard_error_is_that_of_the_mean() {
+        assert_eq!(mean_and_std_error(&[1.0, 3.0]), (2.0, Some(1.0)));
+        assert_eq!(mean_and_std_error(&[5.0]), (5.0, None));
+    }
+}

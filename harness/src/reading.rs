@@ -1,0 +1,61 @@
+//! Readings: what one engine says at one meter, with its uncertainty.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Identifies a meter within a case: `<set>[k]`, or `<luminaire>[k]` for readings of luminous intensity.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct MeterId(pub String);
+
+impl MeterId {
+    /// The `k`-th meter of a set.
+    pub fn new(set: &str, k: usize) -> Self {
+        Self(format!("{set}[{k}]"))
+    }
+}
+
+impl fmt::Display for MeterId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.0)
+    }
+}
+
+/// The physical quantity of a reading and its unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub enum Quantity {
+    /// Illuminance in lux.
+    #[serde(rename = "illuminance_lx")]
+    Illuminance,
+    /// Luminous intensity in candela.
+    #[serde(rename = "luminous_intensity_cd")]
+    LuminousIntensity,
+}
+
+impl Quantity {
+    /// The unit's symbol.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Illuminance => "lx",
+            Self::LuminousIntensity => "cd",
+        }
+    }
+}
+
+/// One value at one meter. At most one of `std_error` and `error_bound` is set by an honest engine; both may be absent
+/// where an engine is deterministic and knows nothing better.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Reading {
+    /// Where.
+    pub meter: MeterId,
+    /// What.
+    pub quantity: Quantity,
+    /// How much, in the quantity's unit.
+    pub value: f64,
+    /// Standard error of a Monte Carlo mean.
+    pub std_error: Option<f64>,
+    /// Distance within which the true value lies, for deterministic methods.
+    pub error_bound: Option<f64>,
+}
