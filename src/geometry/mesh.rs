@@ -1,0 +1,147 @@
+//! Triangle meshes in `f64`, read from Wavefront OBJ files.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+/// A triangle mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertices in metres.
+    pub vertices_m: Vec<DVec3>,
+    /// Vertex indices, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Why a file gave no mesh.
+#[derive(Debug, thiserror::Error)]
+pub enum MeshError {
+    /// The file cannot be opened or is no OBJ file.
+    #[error("{path}: {reason}; check the path and that it is a Wavefront OBJ file", path = path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the reader says.
+        reason: String,
+    },
+    /// A vertex with a coordinate that is no finite number.
+    #[error("{path}: vertex {vertex} (counted from 0) is {at}, which is not finite; repair the file", path = path.display())]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// Index of the vertex.
+        vertex: usize,
+        /// What it is.
+        at: DVec3,
+    },
+    /// No face at all.
+    #[error("{path} holds no face; export the mesh with its faces", path = path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+impl Mesh {
+    /// Reads the faces of every object of an OBJ file, one unit a metre, polygons split into fans of triangles.
+    ///
+    /// Axes are taken as they stand, x, y, z with z up. Materials, normals, texture, points and lines are passed over.
+    pub fn read_obj(path: &Path) -> Result<Self, MeshError> {
+        let unreadable = |reason: String| MeshError::Unreadable { path: path.into(), reason };
+        let file = File::open(path).map_err(|e| unreadable(e.to_string()))?;
+        Self::parse_obj(&mut BufReader::new(file), path)
+    }
+
+    /// The same from a reader; `path` stands in messages only.
+    pub fn parse_obj(reader: &mut impl BufRead, path: &Path) -> Result<Self, MeshError> {
+        let options =
+            tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+        // A material library that is not there must not keep the shape from being read.
+        let (models, _) = tobj::load_obj_buf(reader, &options, |_| Ok(Default::default()))
+            .map_err(|e| MeshError::Unreadable { path: path.into(), reason: e.to_string() })?;
+        let mut mesh = Self::default();
+        for model in &models {
+            let first = mesh.vertices_m.len() as u32;
+            mesh.vertices_m.extend(model.mesh.positions.as_chunks().0.iter().copied().map(DVec3::from_array));
+            let corners = model.mesh.indices.as_chunks().0;
+            mesh.triangles.extend(corners.iter().map(|t: &[u32; 3]| t.map(|v| first + v)));
+        }
+        if let Some((vertex, &at)) = mesh.vertices_m.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+            return Err(MeshError::NotFinite { path: path.into(), vertex, at });
+        }
+        if mesh.triangles.is_empty() {
+            return Err(MeshError::Empty { path: path.into() });
+        }
+        Ok(mesh)
+    }
+
+    /// The same mesh moved by `offset_m`.
+    #[must_use]
+    pub fn moved(mut self, offset_m: DVec3) -> Self {
+        self.vertices_m.iter_mut().for_each(|v| *v += offset_m);
+        self
+    }
+
+    /// The twelve triangles of an axis-aligned box, facing outwards.
+    pub fn cuboid(min_m: DVec3, max_m: DVec3) -> Self {
+        let corner = |k: u32| DVec3::select(glam::BVec3::new(k & 1 != 0, k & 2 != 0, k & 4 != 0), max_m, min_m);
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        Self {
+            vertices_m: (0..8).map(corner).collect(),
+            triangles: quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect(),
+        }
+    }
+
+    /// The volume that a closed mesh encloses, in cubic metres; negative where its faces look inwards.
+    pub fn volume_m3(&self) -> f64 {
+        let corner = |v: u32| self.vertices_m[v as usize] - self.vertices_m[0];
+        self.triangles.iter().map(|[a, b, c]| corner(*a).cross(corner(*b)).dot(corner(*c)) / 6.0).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn parse(text: &str) -> Result<Mesh, MeshError> {
+        Mesh::parse_obj(&mut text.as_bytes(), Path::new("desk.obj"))
+    }
+
+    #[test]
+    fn a_cuboid_encloses_its_volume_facing_outwards() {
+        let mesh = Mesh::cuboid(DVec3::new(1.0, 1.0, 0.0), DVec3::new(2.6, 1.8, 0.75));
+        assert_relative_eq!(mesh.volume_m3(), 1.6 * 0.8 * 0.75, max_relative = 1e-12);
+        let moved = mesh.clone().moved(DVec3::new(100.0, -3.0, 7.0));
+        assert_relative_eq!(moved.volume_m3(), mesh.volume_m3(), max_relative = 1e-11);
+        assert_eq!(moved.vertices_m[0], DVec3::new(101.0, -2.0, 7.0));
+    }
+
+    #[test]
+    fn coordinates_keep_double_precision_and_polygons_become_triangles() {
+        let text = "# two objects\nmtllib missing.mtl\no a\nv 0 0 0.1234567890123456\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl red\n\
+                    f 1 2 3 4\no b\nv 0 0 5\nf 5 -4 2\n";
+        let mesh = parse(text).unwrap();
+        assert_eq!(mesh.triangles.len(), 3);
+        assert_eq!(mesh.vertices_m[0].z, 0.1234567890123456);
+        let last = mesh.triangles[2].map(|v| mesh.vertices_m[v as usize]);
+        assert_eq!(last, [DVec3::new(0.0, 0.0, 5.0), DVec3::X, DVec3::X]);
+    }
+
+    #[test]
+    fn what_is_no_mesh_is_refused_with_the_file_named() {
+        for (text, expected) in [
+            ("v 0 0 0\n", "holds no face"),
+            ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "check the path"),
+            ("v 0 0 x\n", "check the path"),
+        ] {
+            let message = parse(text).unwrap_err().to_string();
+            assert!(message.contains(expected) && message.contains("desk.obj"), "{text}: {message}");
+        }
+        let absent = Mesh::read_obj(Path::new("no/such.obj")).unwrap_err().to_string();
+        assert!(absent.contains("no/such.obj"), "{absent}");
+    }
+}
