@@ -1,11 +1,22 @@
 //! Luminous intensity distributions and the files that carry them.
 
 mod distribution;
+mod error;
+mod lint;
+pub mod lm63;
+mod text;
+
+use std::path::Path;
 
 pub use distribution::{DistributionError, LuminousIntensityDistribution, Symmetry, angles_deg, direction};
+pub use error::{Problem, ReadError};
+pub use lint::{Lint, Severity};
+
+use lint::Lints;
+use text::Text;
 
 /// What a photometric file says of a luminaire: its distribution and the few numbers that go with it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Photometry {
     /// The file's format and version, as printed in reports: `LM-63-2002`, `EULUMDAT`, `TM-33-18`.
     pub format: String,
@@ -18,7 +29,97 @@ pub struct Photometry {
     /// Input power in watts, where the file states it.
     pub input_watts: Option<f64>,
     /// Header keywords in file order, e.g. `("MANUFAC", "Ledalite")`.
+    ///
+    /// The lines that `[MORE]` joined to a keyword are divided by line feeds; a label line has an empty keyword.
     pub keywords: Vec<(String, String)>,
+    /// What only this kind of file says, kept so that writing it again loses nothing.
+    pub details: Details,
+    /// What the reader tolerated or found doubtful.
+    pub lints: Vec<Lint>,
+}
+
+/// What only one kind of file says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Details {
+    /// The photometry was not read from a file.
+    #[default]
+    None,
+    /// An LM-63 file.
+    Lm63(lm63::Lm63Details),
+}
+
+/// Reads a photometric file of any kind: by its content, then by its extension (.ies, .ldt, .xml).
+pub fn read_file(path: &Path) -> Result<Photometry, ReadError> {
+    let located = |error: ReadError| ReadError { file: path.to_path_buf(), ..error };
+    let bytes = std::fs::read(path).map_err(|error| {
+        located(ReadError { file: path.into(), line: 0, column: 0, problem: Problem::Io { reason: error.to_string() } })
+    })?;
+    let read = match Kind::of(path, &bytes) {
+        Some(Kind::Lm63) => lm63::parse_with(&bytes, lm63::tilt_file_beside(path)),
+        None => Err(Text::new(&bytes).error(0, Problem::Unrecognised)),
+    };
+    read.map_err(located)
+}
+
+/// The kinds of file.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Lm63,
+}
+
+impl Kind {
+    fn of(path: &Path, bytes: &[u8]) -> Option<Self> {
+        let text = Text::new(bytes);
+        let named = text.lines().next().is_some_and(|line| lm63::is_edition_line(line.bytes));
+        if named || text.lines().any(|line| lm63::is_tilt_line(line.bytes)) {
+            return Some(Self::Lm63);
+        }
+        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        match extension.as_deref() {
+            Some("ies") => Some(Self::Lm63),
+            _ => None,
+        }
+    }
+}
+
+impl Photometry {
+    /// A distribution with nothing else known: a point, absolute photometry, no keywords.
+    pub fn of(distribution: LuminousIntensityDistribution) -> Self {
+        Self {
+            format: "none".into(),
+            distribution,
+            lamp_lumens: None,
+            opening: LuminousOpening::Point,
+            input_watts: None,
+            keywords: vec![],
+            details: Details::None,
+            lints: vec![],
+        }
+    }
+
+    /// The value of the first keyword of this name.
+    pub fn keyword(&self, name: &str) -> Option<&str> {
+        self.keywords.iter().find(|(key, _)| key.eq_ignore_ascii_case(name)).map(|(_, value)| value.as_str())
+    }
+
+    /// Takes over a reader's lints, after those that concern every kind of file.
+    fn with_lints(self, mut lints: Lints) -> Self {
+        let flux = self.distribution.flux().value();
+        if flux == 0.0 {
+            lints.warn("dark", 0, "every intensity is zero");
+        }
+        if let Some(lamp_lumens) = self.lamp_lumens {
+            let ratio = flux / lamp_lumens;
+            // A luminaire cannot give more than its lamps; a hundredth for rounding and the interpolation.
+            if ratio > 1.01 {
+                let message = format!(
+                    "the intensities integrate to {flux:.1} lm, {ratio:.3} times the {lamp_lumens} lm of the lamps; nothing was rescaled"
+                );
+                lints.warn("flux", 0, message);
+            }
+        }
+        Self { lints: lints.into_sorted(), ..self }
+    }
 }
 
 /// The luminous opening of a luminaire, in metres, in its own frame (C0 along +x, nadir along -z).

@@ -1,0 +1,345 @@
+//! Reader of IES LM-63 files, editions 1986 to 2019.
+//!
+//! Sources: IESNA LM-63-1986/1991/1995, ANSI/IESNA LM-63-02, ANSI/IES LM-63-19. Every candela value is multiplied by
+//! the candela multiplier and the ballast factor, up to 1995 also by the ballast-lamp photometric factor (that field
+//! is "future use" in 2002 and "file generation type" in 2019).
+
+mod header;
+mod numbers;
+mod opening;
+mod planes;
+
+use std::path::Path;
+
+use self::header::TiltLine;
+use self::numbers::{Number, Numbers};
+use super::error::{Problem, ReadError};
+use super::lint::Lints;
+use super::text::Text;
+use super::{Details, LuminousIntensityDistribution, Photometry};
+
+#[cfg(test)]
+mod tests;
+
+pub(crate) use self::header::{is_edition_line, is_tilt_line};
+
+/// Metres in a foot, exactly.
+const METRES_PER_FOOT: f64 = 0.3048;
+
+/// An edition of LM-63.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Edition {
+    /// LM-63-1986: no first line, free labels.
+    Lm63_1986,
+    /// LM-63-1991: `IESNA91`.
+    Lm63_1991,
+    /// LM-63-1995.
+    Lm63_1995,
+    /// ANSI/IESNA LM-63-02.
+    Lm63_2002,
+    /// ANSI/IES LM-63-19.
+    Lm63_2019,
+}
+
+/// What an LM-63 file says beyond [`Photometry`]'s common fields.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lm63Details {
+    /// The edition.
+    pub edition: Edition,
+    /// How the luminaire was measured; the distribution is always type C.
+    pub goniometer: Goniometer,
+    /// Number of lamps.
+    pub lamps: u32,
+    /// Rated lumens of one lamp, -1 for absolute photometry.
+    pub lumens_per_lamp: f64,
+    /// "Future use" of 1995 and 2002 or "file generation type" of 2019; 1 in earlier editions.
+    pub file_generation_type: f64,
+    /// How the lamp's flux depends on the luminaire's tilt; kept, never applied.
+    pub tilt: Option<Tilt>,
+}
+
+/// The goniometer type of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goniometer {
+    /// Vertical axis, angles from the horizon: automotive.
+    A,
+    /// Horizontal axis: floodlights.
+    B,
+    /// Vertical axis, angles from the nadir: everything else.
+    C,
+}
+
+/// Relative lamp flux against the tilt of the luminaire.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tilt {
+    /// Lamp-to-luminaire geometry: 1 lamp vertical, 2 lamp horizontal and turned with the tilt, 3 horizontal, unturned.
+    pub geometry: u8,
+    /// Tilt angles in degrees.
+    pub angles_deg: Vec<f64>,
+    /// Multiplying factor at each angle.
+    pub factors: Vec<f64>,
+}
+
+/// Reads an LM-63 file; `TILT=<file>` is refused, since bytes have no folder.
+pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
+    parse_with(bytes, |_| Err("the bytes come without a folder in which to look for it".into()))
+}
+
+/// Reads an LM-63 file whose tilt factors, if they are in a file of their own, `tilt_file` finds by name.
+pub fn parse_with(
+    bytes: &[u8],
+    tilt_file: impl FnOnce(&str) -> Result<Vec<u8>, String>,
+) -> Result<Photometry, ReadError> {
+    let text = Text::new(bytes);
+    let mut lints = Lints::default();
+    if text.has_byte_order_mark {
+        lints.note("lm63/byte-order-mark", 1, "the file begins with a byte order mark");
+    }
+    let head = header::read(&text, &mut lints)?;
+    let mut numbers = Numbers { text: &text, at: head.numbers_at, lints: &mut lints };
+    let tilt = match head.tilt {
+        TiltLine::None => None,
+        TiltLine::Include => Some(read_tilt(&mut numbers)?),
+        TiltLine::File { name, at } => {
+            let found = tilt_file(&name).and_then(|bytes| parse_tilt(&bytes));
+            Some(found.map_err(|reason| text.error(at, Problem::Tilt { name, reason }))?)
+        }
+    };
+    let lamps = read_lamps(&mut numbers, head.edition)?;
+    let table = read_table(numbers, &lamps)?;
+    let distribution = planes::distribution(&text, lamps.goniometer, table, &mut lints)?;
+    let (width_m, length_m, height_m) = lamps.dimensions_m;
+    let (opening, odd) = opening::from_dimensions(head.edition, width_m, length_m, height_m);
+    if let Some(message) = odd {
+        lints.warn("lm63/opening", lamps.opening_line, message);
+    }
+    let absolute = lamps.lumens_per_lamp < 0.0;
+    let photometry = Photometry {
+        format: head.edition.name().into(),
+        distribution,
+        lamp_lumens: (!absolute).then_some(f64::from(lamps.count) * lamps.lumens_per_lamp),
+        opening,
+        input_watts: (lamps.input_watts > 0.0).then_some(lamps.input_watts),
+        keywords: head.keywords,
+        details: Details::Lm63(Lm63Details {
+            edition: head.edition,
+            goniometer: lamps.goniometer,
+            lamps: lamps.count,
+            lumens_per_lamp: lamps.lumens_per_lamp,
+            file_generation_type: lamps.file_generation_type,
+            tilt,
+        }),
+        lints: vec![],
+    };
+    Ok(photometry.with_lints(lints))
+}
+
+/// The two records before the angles.
+struct Lamps {
+    count: u32,
+    lumens_per_lamp: f64,
+    /// Everything that multiplies the candela values.
+    factor: f64,
+    vertical: Number,
+    horizontal: Number,
+    goniometer: Goniometer,
+    /// Width, length, height, signed.
+    dimensions_m: (f64, f64, f64),
+    opening_line: usize,
+    file_generation_type: f64,
+    input_watts: f64,
+}
+
+fn read_lamps(numbers: &mut Numbers, edition: Edition) -> Result<Lamps, ReadError> {
+    let text = numbers.text;
+    let whole = |n: f64| n.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&n);
+    let first = numbers.checked(format_args!("the number of lamps"), "a whole number, one at least", whole)?;
+    let lumens =
+        numbers.checked(format_args!("the lumens per lamp"), "positive, or -1 for absolute photometry", |n| {
+            n > 0.0 || n == -1.0
+        })?;
+    let multiplier = numbers.checked(format_args!("the candela multiplier"), "positive", |n| n > 0.0)?;
+    let vertical = numbers.count(format_args!("the number of vertical angles"), 2.0)?;
+    let horizontal = numbers.count(format_args!("the number of horizontal angles"), 1.0)?;
+    let claimed = Number { value: vertical.value * horizontal.value, at: vertical.at };
+    numbers.fits(format_args!("the number of vertical times horizontal angles"), claimed)?;
+    let one_to_three = |n: f64| [1.0, 2.0, 3.0].contains(&n);
+    let kind = numbers.checked(format_args!("the photometric type"), "1 (C), 2 (B) or 3 (A)", one_to_three)?;
+    let goniometer = [Goniometer::C, Goniometer::B, Goniometer::A][kind.value as usize - 1];
+    let units = numbers.checked(format_args!("the units type"), "1 (feet) or 2 (metres)", |n| n == 1.0 || n == 2.0)?;
+    let metres = if units.value == 1.0 { METRES_PER_FOOT } else { 1.0 };
+    let width = numbers.number(format_args!("the width of the luminous opening"))?;
+    let length = numbers.number(format_args!("the length of the luminous opening"))?;
+    let height = numbers.number(format_args!("the height of the luminous opening"))?;
+    if text.bytes[first.at..height.at].contains(&b'\n') {
+        let line = text.line_of(first.at);
+        numbers.lints.note(
+            "lm63/broken-record",
+            line,
+            "the ten numbers of the lamp record are spread over several lines",
+        );
+    }
+    let ballast = numbers.checked(format_args!("the ballast factor"), "positive", |n| n > 0.0)?;
+    let third = numbers.number(format_args!("the number behind the ballast factor"))?;
+    let watts = numbers.checked(format_args!("the input watts"), "zero or more", |n| n >= 0.0)?;
+    let ballast_lamp = ballast_lamp_factor(numbers, edition, third)?;
+    let factor = multiplier.value * ballast.value * ballast_lamp;
+    if !factor.is_finite() || factor <= 0.0 {
+        let (what, found) = ("the product of the multipliers".into(), factor);
+        return Err(text.error(multiplier.at, Problem::OutOfRange { what, found, expected: "finite and positive" }));
+    }
+    Ok(Lamps {
+        count: first.value as u32,
+        lumens_per_lamp: lumens.value,
+        factor,
+        vertical,
+        horizontal,
+        goniometer,
+        dimensions_m: (width.value * metres, length.value * metres, height.value * metres),
+        opening_line: text.line_of(width.at),
+        file_generation_type: if edition <= Edition::Lm63_1991 { 1.0 } else { third.value },
+        input_watts: watts.value,
+    })
+}
+
+/// The factor that the number behind the ballast factor stands for in this edition.
+fn ballast_lamp_factor(numbers: &mut Numbers, edition: Edition, third: Number) -> Result<f64, ReadError> {
+    let line = numbers.text.line_of(third.at);
+    let value = third.value;
+    match edition {
+        Edition::Lm63_1986 | Edition::Lm63_1991 if value > 0.0 => Ok(value),
+        Edition::Lm63_1986 | Edition::Lm63_1991 => {
+            let (what, expected) = ("the ballast-lamp photometric factor".into(), "positive");
+            Err(numbers.text.error(third.at, Problem::OutOfRange { what, found: value, expected }))
+        }
+        Edition::Lm63_1995 if value > 0.0 => {
+            if value != 1.0 {
+                let message = format!(
+                    "the number behind the ballast factor, {value}, was read as a ballast-lamp factor as in LM-63-1991 \
+                     and multiplies every intensity; LM-63-1995 reserves it"
+                );
+                numbers.lints.warn("lm63/ballast-lamp-factor", line, message);
+            }
+            Ok(value)
+        }
+        _ => {
+            if value != 1.0 && edition != Edition::Lm63_2019 {
+                let message =
+                    format!("the number behind the ballast factor is reserved and must be 1; {value} was ignored");
+                numbers.lints.warn("lm63/ballast-lamp-factor", line, message);
+            }
+            Ok(1.0)
+        }
+    }
+}
+
+/// Angles and candela values as they stand in the file, the values multiplied by the factor.
+struct Table {
+    vertical_deg: Vec<f64>,
+    vertical_at: usize,
+    horizontal_deg: Vec<f64>,
+    horizontal_at: usize,
+    /// `candela[horizontal][vertical]`.
+    candela: Vec<f64>,
+    candela_at: usize,
+}
+
+fn read_table(mut numbers: Numbers, lamps: &Lamps) -> Result<Table, ReadError> {
+    let (vertical_deg, vertical_at) = numbers.angles("vertical", lamps.vertical)?;
+    let (horizontal_deg, horizontal_at) = numbers.angles("horizontal", lamps.horizontal)?;
+    let (vertical, expected) = (vertical_deg.len(), vertical_deg.len() * horizontal_deg.len());
+    let claimed = Number { value: expected as f64, at: lamps.vertical.at };
+    numbers.fits(format_args!("the number of candela values"), claimed)?;
+    let mut candela = Vec::with_capacity(expected);
+    let candela_at = numbers.at;
+    for (h, &angle) in horizontal_deg.iter().enumerate() {
+        let before = numbers.at;
+        for v in 0..vertical {
+            let what = format_args!("candela value {} of {vertical} at horizontal angle {angle}", v + 1);
+            let number = numbers.checked(what, "zero or more", |n| n >= 0.0)?;
+            if v == 0 && h > 0 && !numbers.text.bytes[before..number.at].iter().any(|b| matches!(b, b'\n' | b'\r')) {
+                let line = numbers.text.line_of(number.at);
+                numbers.lints.note("lm63/broken-record", line, "the values of a horizontal angle do not begin a line");
+            }
+            let scaled = number.value * lamps.factor;
+            if !scaled.is_finite() {
+                let found = format!("{} x {}", number.value, lamps.factor);
+                let problem = Problem::NotFinite { what: what.to_string(), found };
+                return Err(numbers.text.error(number.at, problem));
+            }
+            candela.push(scaled);
+        }
+    }
+    numbers.finish("candela values", expected)?;
+    Ok(Table { vertical_deg, vertical_at, horizontal_deg, horizontal_at, candela, candela_at })
+}
+
+fn read_tilt(numbers: &mut Numbers) -> Result<Tilt, ReadError> {
+    let legal = |n: f64| [1.0, 2.0, 3.0].contains(&n);
+    let geometry = numbers.checked(format_args!("the lamp-to-luminaire geometry"), "1, 2 or 3", legal)?.value as u8;
+    let pairs = numbers.count(format_args!("the number of tilt angles"), 1.0)?;
+    let (angles_deg, at) = numbers.angles("tilt", pairs)?;
+    let pairs = angles_deg.len();
+    let mut factors = Vec::with_capacity(pairs);
+    for k in 1..=pairs {
+        let factor = numbers.checked(format_args!("tilt factor {k} of {pairs}"), "zero or more", |n| n >= 0.0)?;
+        factors.push(factor.value);
+    }
+    let line = numbers.text.line_of(at);
+    numbers.lints.note("lm63/tilt", line, "the tilt factors were kept but are not applied to the intensities");
+    Ok(Tilt { geometry, angles_deg, factors })
+}
+
+/// A file of tilt factors: the four records of TILT=INCLUDE.
+fn parse_tilt(bytes: &[u8]) -> Result<Tilt, String> {
+    let text = Text::new(bytes);
+    let mut lints = Lints::default();
+    let mut numbers = Numbers { text: &text, at: 0, lints: &mut lints };
+    let tilt =
+        read_tilt(&mut numbers).and_then(|tilt| numbers.finish("tilt factors", tilt.factors.len()).map(|()| tilt));
+    tilt.map_err(|error| format!("in it, {error}"))
+}
+
+/// Reads the tilt file that an LM-63 file names, beside it and nowhere else.
+pub(super) fn tilt_file_beside(path: &Path) -> impl FnOnce(&str) -> Result<Vec<u8>, String> {
+    move |name| {
+        let plain = Path::new(name).file_name().is_some_and(|last| last == name);
+        if !plain {
+            return Err("only a file in the same folder is looked for".into());
+        }
+        let beside = path.with_file_name(name);
+        std::fs::read(&beside).map_err(|error| format!("{}: {error}", beside.display()))
+    }
+}
+
+impl Edition {
+    /// All of them, oldest first.
+    pub const ALL: [Self; 5] = [Self::Lm63_1986, Self::Lm63_1991, Self::Lm63_1995, Self::Lm63_2002, Self::Lm63_2019];
+
+    /// The name used in reports, e.g. `LM-63-2002`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Lm63_1986 => "LM-63-1986",
+            Self::Lm63_1991 => "LM-63-1991",
+            Self::Lm63_1995 => "LM-63-1995",
+            Self::Lm63_2002 => "LM-63-2002",
+            Self::Lm63_2019 => "LM-63-2019",
+        }
+    }
+
+    /// The first line that the edition asks for.
+    pub const fn first_line(self) -> Option<&'static str> {
+        match self {
+            Self::Lm63_1986 => None,
+            Self::Lm63_1991 => Some("IESNA91"),
+            Self::Lm63_1995 => Some("IESNA:LM-63-1995"),
+            Self::Lm63_2002 => Some("IESNA:LM-63-2002"),
+            Self::Lm63_2019 => Some("IES:LM-63-2019"),
+        }
+    }
+
+    /// The year, four digits.
+    fn year(self) -> &'static str {
+        &self.name()[6..]
+    }
+}

@@ -1,0 +1,124 @@
+//! From the angles of an LM-63 file to the C planes of a distribution.
+
+use super::{Goniometer, LuminousIntensityDistribution, Table};
+use crate::photometry::error::{Problem, ReadError};
+use crate::photometry::lint::Lints;
+use crate::photometry::text::Text;
+
+/// The distribution that a table means.
+pub(super) fn distribution(
+    text: &Text,
+    goniometer: Goniometer,
+    table: Table,
+    lints: &mut Lints,
+) -> Result<LuminousIntensityDistribution, ReadError> {
+    match goniometer {
+        Goniometer::C => type_c(text, table, lints),
+        Goniometer::A => Err(text.error(table.vertical_at, Problem::Unsupported { what: "type A photometry".into() })),
+        Goniometer::B => Err(text.error(table.vertical_at, Problem::Unsupported { what: "type B photometry".into() })),
+    }
+}
+
+fn type_c(text: &Text, mut table: Table, lints: &mut Lints) -> Result<LuminousIntensityDistribution, ReadError> {
+    let gammas = table.vertical_deg.len();
+    let (first, last) = (table.vertical_deg[0], table.vertical_deg[gammas - 1]);
+    if first < 0.0 || last > 180.0 {
+        let expected = "those of type C lie within 0 (nadir) and 180 (zenith)";
+        return Err(text.error(table.vertical_at, Problem::AngleRange { axis: "vertical", first, last, expected }));
+    }
+    if ![(0.0, 90.0), (90.0, 180.0), (0.0, 180.0)].contains(&(first, last)) {
+        let message =
+            format!("the vertical angles run from {first} to {last}; beyond them the intensity counts as zero");
+        lints.note("lm63/vertical-range", text.line_of(table.vertical_at), message);
+    }
+    normalise_planes(text, &mut table, lints)?;
+    poles_agree(text, &table, lints);
+    LuminousIntensityDistribution::new(table.horizontal_deg, table.vertical_deg, table.candela)
+        .map_err(|error| text.error(table.candela_at, Problem::Distribution(error)))
+}
+
+/// Brings the horizontal angles to 0, 0-90, 0-180, 90-270 or 0-360, where that is what they mean.
+fn normalise_planes(text: &Text, table: &mut Table, lints: &mut Lints) -> Result<(), ReadError> {
+    let gammas = table.vertical_deg.len();
+    let c = &mut table.horizontal_deg;
+    let planes = c.len();
+    let (first, last) = (c[0], c[planes - 1]);
+    let line = || text.line_of(table.horizontal_at);
+    if planes == 1 {
+        if first != 0.0 {
+            lints.note("lm63/single-plane", line(), format!("the only plane, {first}, was taken for every C"));
+            c[0] = 0.0;
+        }
+        return Ok(());
+    }
+    match (first, last) {
+        (0.0, 90.0 | 180.0) | (90.0, 270.0) => {}
+        (0.0, 360.0) => {
+            let differs = (0..gammas).any(|g| table.candela[g] != table.candela[(planes - 1) * gammas + g]);
+            if differs {
+                lints.warn("lm63/open-circle", line(), "the planes 0 and 360 differ");
+            }
+        }
+        (-90.0, 90.0) => {
+            // Mirrored in C90-C270: C and 180 - C are one, so that the planes become 270 down to 90.
+            lints.note("lm63/negative-planes", line(), "the planes from -90 to 90 were mirrored to 90 to 270");
+            *c = c.iter().map(|c| 180.0 - c).collect();
+            reverse(table, gammas);
+        }
+        (180.0, 360.0) => {
+            lints.note("lm63/second-half", line(), "the planes from 180 to 360 were mirrored to 0 to 180");
+            *c = c.iter().map(|c| 360.0 - c).collect();
+            reverse(table, gammas);
+        }
+        (-180.0, 180.0) if c.contains(&0.0) => {
+            lints.note("lm63/negative-planes", line(), "the planes from -180 to 180 were turned to 0 to 360");
+            let zero = c.iter().position(|c| *c == 0.0).unwrap_or(0);
+            let positive: Vec<f64> = c[zero..].to_vec();
+            let negative = c[1..=zero].iter().map(|c| c + 360.0);
+            *c = positive.into_iter().chain(negative).collect();
+            let front = table.candela[zero * gammas..].to_vec();
+            let back = &table.candela[gammas..(zero + 1) * gammas];
+            table.candela = front.into_iter().chain(back.iter().copied()).collect();
+        }
+        (0.0, _) if planes > 2 && last < 360.0 && closes(c) => {
+            lints.warn("lm63/open-circle", line(), "the plane 360 is missing; it was taken equal to plane 0");
+            c.push(360.0);
+            table.candela.extend_from_within(..gammas);
+        }
+        _ => {
+            let expected = "those of type C are 0 alone, 0-90, 0-180, 90-270 or 0-360";
+            let problem = Problem::AngleRange { axis: "horizontal", first, last, expected };
+            return Err(text.error(table.horizontal_at, problem));
+        }
+    }
+    Ok(())
+}
+
+/// Whether evenly spaced planes lack only the one at 360.
+fn closes(c: &[f64]) -> bool {
+    let step = c[1] - c[0];
+    let even = c.windows(2).all(|w| (w[1] - w[0] - step).abs() < 1e-6);
+    even && (c[c.len() - 1] + step - 360.0).abs() < 1e-6
+}
+
+fn reverse(table: &mut Table, gammas: usize) {
+    table.horizontal_deg.reverse();
+    table.candela = table.candela.chunks(gammas).rev().flatten().copied().collect();
+}
+
+/// At a pole every plane looks in the same direction.
+fn poles_agree(text: &Text, table: &Table, lints: &mut Lints) {
+    let gammas = table.vertical_deg.len();
+    for (name, pole, g) in [("nadir", 0.0, 0), ("zenith", 180.0, gammas - 1)] {
+        if table.vertical_deg[g] != pole {
+            continue;
+        }
+        let values = table.candela.iter().skip(g).step_by(gammas).copied();
+        let (least, most) = values.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), v| (a.min(v), b.max(v)));
+        // A hundredth: what rounding to whole candelas and the repeatability of goniometers explain.
+        if most - least > 0.01 * most {
+            let message = format!("the planes disagree about the {name}: {least} to {most} cd");
+            lints.warn("lm63/pole", text.line_of(table.candela_at), message);
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! What an LM-63 file means, and which files are refused, where and why.
+
+use super::*;
+use crate::photometry::{LuminousOpening, Problem, Symmetry};
+
+/// A whole file of this first line, ten numbers, three numbers and table.
+fn file(first: &str, ten: &str, three: &str, table: &str) -> String {
+    let keywords = "[TEST] 1\n[TESTLAB] Lab\n[ISSUEDATE] 2024-01-02\n[MANUFAC] Maker\n";
+    format!("{first}\n{keywords}TILT=NONE\n{ten}\n{three}\n{table}\n")
+}
+
+const AXIAL: &str = "0 90 180\n0\n100 50 25";
+
+fn codes(photometry: &Photometry) -> Vec<&str> {
+    photometry.lints.iter().map(|lint| lint.code).collect()
+}
+
+/// Line, column and problem of the refusal.
+fn refusal(text: &str) -> (usize, usize, Problem) {
+    let error = parse(text.as_bytes()).expect_err("the file must be refused");
+    (error.line, error.column, error.problem)
+}
+
+#[test]
+fn a_plain_file_is_read_without_remark() {
+    let text = file("IESNA:LM-63-2002", "2 1500 1 3 1 1 2 0.3 1.2 0", "1 1 36", AXIAL);
+    let read = parse(text.as_bytes()).unwrap();
+    assert_eq!(read.format, "LM-63-2002");
+    assert_eq!(read.lints, []);
+    assert_eq!(read.lamp_lumens, Some(3000.0));
+    assert_eq!(read.input_watts, Some(36.0));
+    assert_eq!(read.opening, LuminousOpening::Box { x_m: 1.2, y_m: 0.3, height_m: 0.0 });
+    assert_eq!(read.keyword("manufac"), Some("Maker"));
+    assert_eq!(read.distribution.symmetry(), Symmetry::Axial);
+    assert_eq!(read.distribution.plane(0), [100.0, 50.0, 25.0]);
+}
+
+#[test]
+fn each_edition_multiplies_by_its_own_factors() {
+    let intensity = |first: &str| {
+        let text = file(first, "1 -1 2 3 1 1 2 0 0 0", "0.5 3 0", AXIAL);
+        parse(text.as_bytes()).unwrap().distribution.plane(0)[0]
+    };
+    assert_eq!(intensity("a label"), 300.0);
+    assert_eq!(intensity("IESNA91"), 300.0);
+    assert_eq!(intensity("IESNA:LM-63-1995"), 300.0);
+    assert_eq!(intensity("IESNA:LM-63-2002"), 100.0);
+    assert_eq!(intensity("IES:LM-63-2019"), 100.0);
+}
+
+#[test]
+fn feet_become_metres_and_minus_one_is_absolute_photometry() {
+    let text = file("IESNA:LM-63-2002", "1 -1 1 3 1 1 1 -10 -10 0", "1 1 0", AXIAL);
+    let read = parse(text.as_bytes()).unwrap();
+    assert_eq!(read.lamp_lumens, None);
+    assert_eq!(read.input_watts, None);
+    assert_eq!(read.opening, LuminousOpening::Ellipse { x_m: 3.048, y_m: 3.048, height_m: 0.0 });
+}
+
+#[test]
+fn quirks_are_tolerated_and_each_is_named() {
+    let ten = "1 -1 1 3 1 1 2 0 0 0";
+    let read = |text: &str| parse(text.as_bytes()).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    for (first, edition) in [
+        ("IESNA95", "LM-63-1995"),
+        ("IESNA: LM-63-2002", "LM-63-2002"),
+        ("IESNA:LM-63-91", "LM-63-1991"),
+        (" IESNA:LM-63-1995", "LM-63-1995"),
+        ("IES:LM-63-19", "LM-63-2019"),
+    ] {
+        let found = read(&file(first, ten, "1 1 0", AXIAL));
+        assert_eq!(found.format, edition);
+        let code = if first.starts_with(' ') { "lm63/leading-blanks" } else { "lm63/edition" };
+        assert!(codes(&found).contains(&code), "{first}: {:?}", found.lints);
+    }
+    let plain = file("IESNA:LM-63-2002", ten, "1 1 0", AXIAL);
+    let expected = read(&plain).distribution;
+    for (from, to, code) in [
+        ("1 -1 1 3 1 1 2 0 0 0", "1 -1 1\n3 1\n1 2 0 0 0", "lm63/broken-record"),
+        ("100 50 25", "100. 50. 25.", "lm63/bare-point"),
+        ("100 50 25", "100,50, 25", "lm63/commas"),
+        ("100 50 25", "100 50 25\nEND OF FILE", "lm63/trailing-text"),
+        ("[TEST] 1", "[TEST] 1\n[MORE] and more", "lm63/more"),
+        ("[TEST] 1", "[TEST] 1\n[LAMP CAT] x", "lm63/keyword-blank"),
+        ("[TEST] 1", "[TEST] 1\n no bracket", "lm63/label"),
+        ("[TEST] 1", "", "lm63/keywords"),
+        ("TILT=NONE", "Tilt = none", "lm63/tilt-spelling"),
+        ("IESNA", "\u{feff}IESNA", "lm63/byte-order-mark"),
+        ("\n0\n100", "\n45\n100", "lm63/single-plane"),
+        ("0 90 180", "0 90 179", "lm63/vertical-range"),
+    ] {
+        let found = read(&plain.replacen(from, to, 1));
+        assert!(codes(&found).contains(&code), "{code}: {:?}", found.lints);
+        if code != "lm63/vertical-range" {
+            assert_eq!(found.distribution, expected, "{code}");
+        }
+    }
+    let latin = plain.replacen("Maker", "Müller", 1).chars().map(|c| c as u8).collect::<Vec<u8>>();
+    let found = parse(&latin).unwrap();
+    assert_eq!(found.keyword("MANUFAC"), Some("Müller"));
+    assert_eq!(found.lints[0].code, "lm63/not-ascii");
+    assert_eq!(found.lints[0].line, 5);
+}
+
+#[test]
+fn more_lines_belong_to_the_keyword_before_them() {
+    let text = file("IESNA:LM-63-2002", "1 -1 1 3 1 1 2 0 0 0", "1 1 0", AXIAL);
+    let text = text.replacen("[TEST] 1", "[TEST] 1\n[OTHER] a\n[MORE]   b\n[MORE]c", 1);
+    assert_eq!(parse(text.as_bytes()).unwrap().keyword("OTHER"), Some("a\nb\nc"));
+}
+
+#[test]
+fn refusals_name_the_place() {
+    let ten = "1 -1 1 3 1 1 2 0 0 0";
+    let plain = file("IESNA:LM-63-2002", ten, "1 1 0", AXIAL);
+    // Lines: 1 edition, 2-5 keywords, 6 TILT, 7 ten, 8 three, 9 vertical, 10 horizontal, 11 candela.
+    for (from, to, line, column, word) in [
+        ("100 50 25", "100 50", 12, 1, "candela value 3 of 3"),
+        ("100 50 25", "100 50 25 12", 11, 11, "more numbers"),
+        ("100 50 25", "100 NaN 25", 11, 5, "not finite"),
+        ("100 50 25", "100 1e999 25", 11, 5, "not finite"),
+        ("100 50 25", "100 -50 25", 11, 5, "zero or more"),
+        ("100 50 25", "100 fifty 25", 11, 5, "should be a number"),
+        ("0 90 180", "0 90 90", 9, 6, "rise strictly"),
+        ("0 90 180", "0 90 181", 9, 1, "within 0"),
+        ("3 1 1 2 0", "3 1 4 2 0", 7, 12, "1 (C), 2 (B) or 3 (A)"),
+        ("3 1 1 2 0", "3 1 1 3 0", 7, 14, "feet"),
+        ("3 1 1 2 0", "1 1 1 2 0", 7, 8, "at least 2"),
+        ("3 1 1 2 0", "2.5 1 1 2 0", 7, 8, "whole number"),
+        ("3 1 1 2 0", "1e9 1 1 2 0", 7, 8, "bytes follow"),
+        ("3 1 1 2 0", "3 1e300 1 2 0", 7, 10, "bytes follow"),
+        ("1 -1 1", "1 -2 1", 7, 3, "-1 for absolute"),
+        ("1 -1 1", "0 -1 1", 7, 1, "whole number"),
+        ("1 -1 1", "1 -1 0", 7, 6, "positive"),
+        ("1 -1 1", "1 -1 1e-300 3 1 1 2 0 0 0 1e-300 1 0 ", 7, 6, "product"),
+        ("TILT=NONE\n", "", 11, 1, "TILT="),
+        ("TILT=NONE", "TILT=lamp.tlt", 6, 6, "without a folder"),
+    ] {
+        let (found_line, found_column, problem) = refusal(&plain.replacen(from, to, 1));
+        let message = problem.to_string();
+        assert!(message.contains(word), "{to:?}: {message}");
+        assert_eq!((found_line, found_column), (line, column), "{to:?}: {message}");
+    }
+}
+
+#[test]
+fn tilt_factors_are_kept() {
+    let plain = file("IESNA:LM-63-2002", "1 1000 1 3 1 1 2 0 0 0", "1 1 0", AXIAL);
+    let records = "2\n3\n0 45 90\n1 .95 .9\n";
+    let expected = Tilt { geometry: 2, angles_deg: vec![0.0, 45.0, 90.0], factors: vec![1.0, 0.95, 0.9] };
+    let tilt = |photometry: Photometry| match photometry.details {
+        Details::Lm63(details) => details.tilt,
+        other @ Details::None => panic!("{other:?}"),
+    };
+    let included = plain.replacen("TILT=NONE\n", &format!("TILT=INCLUDE\n{records}"), 1);
+    assert_eq!(tilt(parse(included.as_bytes()).unwrap()), Some(expected.clone()));
+    let named = plain.replacen("TILT=NONE", "TILT=lamp.tlt", 1);
+    let read = parse_with(named.as_bytes(), |name| {
+        assert_eq!(name, "lamp.tlt");
+        Ok(records.into())
+    });
+    assert_eq!(tilt(read.unwrap()), Some(expected));
+    assert_eq!(
+        tilt_file_beside(Path::new("a/b.ies"))("../x").unwrap_err(),
+        "only a file in the same folder is looked for"
+    );
+}
+
+#[test]
+fn planes_of_every_range_land_where_they_belong() {
+    // The value of a plane at gamma 90 is its own C angle, plus 1000.
+    let read = |c: &[f64], of: &dyn Fn(f64) -> f64| {
+        let angles: Vec<String> = c.iter().map(f64::to_string).collect();
+        let rows: Vec<String> = c.iter().map(|&c| format!("5 {} 5", of(c))).collect();
+        let table = format!("0 90 180\n{}\n{}", angles.join(" "), rows.join("\n"));
+        let ten = format!("1 -1 1 3 {} 1 2 0 0 0", c.len());
+        parse(file("IESNA:LM-63-2002", &ten, "1 1 0", &table).as_bytes()).unwrap()
+    };
+    let at = |photometry: &Photometry, c: f64| photometry.distribution.intensity(c, 90.0).value();
+    let quadrant = read(&[0.0, 30.0, 90.0], &|c| c);
+    assert_eq!((quadrant.distribution.symmetry(), at(&quadrant, 150.0)), (Symmetry::Quadrant, 30.0));
+    let c0 = read(&[0.0, 100.0, 180.0], &|c| c);
+    assert_eq!((c0.distribution.symmetry(), at(&c0, 260.0)), (Symmetry::BilateralC0, 100.0));
+    let c90 = read(&[90.0, 100.0, 270.0], &|c| c);
+    assert_eq!((c90.distribution.symmetry(), at(&c90, 80.0)), (Symmetry::BilateralC90, 100.0));
+    let about_zero = read(&[-90.0, -10.0, 90.0], &|c| 100.0 + c);
+    assert_eq!((about_zero.distribution.symmetry(), at(&about_zero, 350.0)), (Symmetry::BilateralC90, 90.0));
+    assert_eq!(at(&about_zero, 190.0), 90.0);
+    let second_half = read(&[180.0, 300.0, 360.0], &|c| c);
+    assert_eq!((second_half.distribution.symmetry(), at(&second_half, 60.0)), (Symmetry::BilateralC0, 300.0));
+    let around = read(&[-180.0, -20.0, 0.0, 70.0, 180.0], &|c| 180.0 + (c + 180.0).rem_euclid(360.0));
+    assert_eq!(around.distribution.symmetry(), Symmetry::None);
+    assert_eq!((at(&around, 340.0), at(&around, 70.0), at(&around, 180.0)), (340.0, 430.0, 180.0));
+    let open = read(&[0.0, 90.0, 180.0, 270.0], &|c| c);
+    assert_eq!(codes(&open), ["lm63/open-circle"]);
+    assert_eq!((at(&open, 270.0), at(&open, 315.0)), (270.0, 135.0));
+}
