@@ -1,8 +1,17 @@
 //! `luxproof`: specs, procedures, engines, comparison and reports around the physics of [`luminaire`].
 //!
 //! Data flows one way; each arrow is one function and each artefact a file:
-//! spec file -> [`spec::Spec`] -> scene -> plan -> readings -> comparison -> report.
+//! spec file -> [`spec::Case`] -> [`plan::Plan`] -> [`reading::Recording`] -> [`diff::Comparison`] -> [`report::Report`].
+//! Imports point down only: spec < reading < procedures < engines < plan < run < diff < report < cli.
 
+pub mod cli;
+pub mod diff;
+pub mod doctor;
 pub mod engines;
+pub mod plan;
+pub mod procedures;
 pub mod process;
 pub mod reading;
+pub mod report;
+pub mod run;
+pub mod spec;

@@ -1,3 +1,24 @@
-//! The `luxproof` program.
+//! The `luxproof` program: parses the command line, keeps Ctrl-C orderly, prints errors with their place, sets the exit code.
 
-fn main() {}
+use std::process::ExitCode;
+
+use clap::Parser;
+use luxproof::cli::Cli;
+use luxproof::report::Exit;
+use tracing_subscriber::EnvFilter;
+
+fn main() -> ExitCode {
+    // clap itself exits with 2 on a usage error, as the exit codes want it.
+    let cli = Cli::parse();
+    let level = ["warn", "info", "debug", "trace"][usize::from(cli.verbosity()).min(3)];
+    let filter = EnvFilter::new(format!("luxproof={level}"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    if let Err(error) = ctrlc::set_handler(luxproof::process::interrupt) {
+        tracing::warn!(%error, "Ctrl-C will not stop renderers in order");
+    }
+    let exit = cli.run().unwrap_or_else(|error| {
+        eprintln!("{error:?}");
+        Exit::Usage
+    });
+    ExitCode::from(exit.code())
+}

@@ -1,5 +1,6 @@
 //! Readings: what one engine says at one meter, with its uncertainty.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use schemars::JsonSchema;
@@ -58,4 +59,35 @@ pub struct Reading {
     pub std_error: Option<f64>,
     /// Distance within which the true value lies, for deterministic methods.
     pub error_bound: Option<f64>,
+}
+
+/// Everything one engine said of one procedure of one case, with what is needed to say it again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Recording {
+    /// The case.
+    pub case: String,
+    /// The procedure.
+    pub procedure: String,
+    /// The engine.
+    pub engine: String,
+    /// The engine's version, as it names itself.
+    pub version: String,
+    /// The luminaire model: point, area, impostor, or mixed.
+    pub model: String,
+    /// SHA-256 of the spec and of every file that it names.
+    pub input_sha256: String,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// What the engine set: arguments, samples, seeds, variant.
+    pub settings: BTreeMap<String, String>,
+    /// Where the engine only approximates what was asked.
+    pub approximation: Option<String>,
+    /// What the reader of a report should know.
+    pub notes: Vec<String>,
+    /// Wall-clock seconds.
+    pub wall_s: f64,
+    /// Why there are no readings, if there are none.
+    pub failure: Option<String>,
+    /// The readings, one a meter.
+    pub readings: Vec<Reading>,
 }

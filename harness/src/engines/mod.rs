@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use luminaire::scene::{Meter, Scene, Transport};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::process::{Invocation, ProcessError};
 use crate::reading::MeterId;
 
+pub use crate::spec::Budget;
 pub use site::{Site, SiteError};
 
 /// Every engine that luxproof knows, in the order of reports.
@@ -47,6 +47,11 @@ pub trait Engine: Send + Sync {
 
     /// The job as native files, runnable by hand; pure. Our own solvers have none.
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError>;
+
+    /// The command that runs an exported scene, as a person would type it in the scene's folder.
+    fn command_by_hand(&self, _job: &Job) -> Option<String> {
+        None
+    }
 
     /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError>;
@@ -82,34 +87,6 @@ pub struct Station {
     pub meter: Meter,
     /// What it is expected to read at most, in lux, if known: lets engines choose a read-out scale. Never copied to a result.
     pub expected_lx: Option<f64>,
-}
-
-/// When an engine may stop: at whichever comes first.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Budget {
-    /// Standard error relative to the reading.
-    #[serde(default = "Budget::default_relative_error")]
-    pub relative_error: f64,
-    /// Wall-clock seconds an engine and procedure.
-    #[serde(default = "Budget::default_seconds")]
-    pub seconds: f64,
-}
-
-impl Budget {
-    fn default_relative_error() -> f64 {
-        0.002
-    }
-
-    fn default_seconds() -> f64 {
-        60.0
-    }
-}
-
-impl Default for Budget {
-    fn default() -> Self {
-        Self { relative_error: Self::default_relative_error(), seconds: Self::default_seconds() }
-    }
 }
 
 /// An engine's version, as it names itself.

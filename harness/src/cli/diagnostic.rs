@@ -1,0 +1,38 @@
+//! Errors for people: the message with the line it is about, underlined.
+
+use miette::{LabeledSpan, NamedSource, Report, Severity, SourceSpan};
+
+use crate::spec::SpecError;
+
+/// A spec error with its source line, where it has one.
+pub(super) fn diagnose(error: SpecError) -> Report {
+    let name = error.file.display().to_string();
+    let text = std::fs::read(&error.file).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).ok();
+    let span = text.as_ref().and_then(|t| span(t, error.line?, error.column.unwrap_or(1)));
+    let place = match (error.line, error.column) {
+        (Some(line), Some(column)) => format!("{name}:{line}:{column}"),
+        (Some(line), None) => format!("{name}:{line}"),
+        _ => name.clone(),
+    };
+    let mut diagnostic =
+        miette::MietteDiagnostic::new(format!("{place}: {}", error.message)).with_severity(Severity::Error);
+    if let Some(help) = error.help {
+        diagnostic = diagnostic.with_help(help);
+    }
+    match (text, span) {
+        (Some(text), Some(span)) => {
+            let diagnostic = diagnostic.with_label(LabeledSpan::new_with_span(Some("here".to_owned()), span));
+            Report::new(diagnostic).with_source_code(NamedSource::new(name, text))
+        }
+        _ => Report::new(diagnostic),
+    }
+}
+
+/// The word at a line and column (from 1), as a byte range.
+fn span(text: &str, line: usize, column: usize) -> Option<SourceSpan> {
+    let start_of_line = text.split_inclusive('\n').take(line.checked_sub(1)?).map(str::len).sum::<usize>();
+    let rest = text.get(start_of_line..)?.lines().next()?;
+    let (offset, _) = rest.char_indices().nth(column.checked_sub(1)?).unwrap_or((rest.len(), ' '));
+    let word = rest[offset..].find([' ', ',', ']', '}', ':']).unwrap_or(rest.len() - offset).max(1);
+    Some((start_of_line + offset, word.min((rest.len() - offset).max(1))).into())
+}

@@ -1,0 +1,498 @@
+//! The command line: arguments, what each command does with them, and its exit code.
+
+mod diagnostic;
+
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
+
+use crate::diff::{Comparison, Judge, KnownDeviations, Published, Tolerances};
+use crate::doctor;
+use crate::engines::{self, Site};
+use crate::plan::{Asked, Plan, Selection, plan};
+use crate::reading::Recording;
+use crate::report::{self, Exit, Ingredients, Report, SpecRecord, Style};
+use crate::run;
+use crate::spec::{Case, Spec};
+
+use diagnostic::diagnose;
+
+/// Cross-validates renderers on luminaires: does a renderer put the right number of lux where a luminaire should?
+#[derive(Debug, Parser)]
+#[command(name = "luxproof", version, about)]
+pub struct Cli {
+    /// Where engines are installed [default: the user's data folder]
+    #[arg(long, global = true, env = "LUXPROOF_ENGINES", value_name = "DIR")]
+    engines_dir: Option<PathBuf>,
+    /// Print more of what happens to stderr
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    verbose: u8,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run every procedure of a spec on every engine, compare and report
+    Run(RunArgs),
+    /// Validate specs and print the plan: what would run, what is skipped and why
+    Check(CheckArgs),
+    /// Write an engine's scenes, runnable by hand
+    Export(ExportArgs),
+    /// List, install or examine engines
+    Engines(EnginesArgs),
+    /// View a finished run again
+    Report(ReportArgs),
+    /// Print the JSON Schema of the spec or of the report
+    Schema(SchemaArgs),
+}
+
+#[derive(Debug, Args)]
+struct Selected {
+    /// Engines to run, by name [default: those of the spec, else all that are there]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    engines: Vec<String>,
+    /// Procedures to run, by name [default: all of the spec]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    procedures: Vec<String>,
+    /// Seed of every random choice
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+impl Selected {
+    fn selection(&self) -> Selection {
+        Selection { engines: self.engines.clone(), procedures: self.procedures.clone(), seed: self.seed }
+    }
+}
+
+#[derive(Debug, Args)]
+struct RunArgs {
+    /// Spec files
+    #[arg(required = true, value_name = "SPEC")]
+    specs: Vec<PathBuf>,
+    #[command(flatten)]
+    selected: Selected,
+    /// Install missing engines first
+    #[arg(long)]
+    install: bool,
+    /// Folder of the run's files [default: luxproof-out/<spec name>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Views of the report to print
+    #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [Format::Terminal])]
+    format: Vec<Format>,
+    /// Threads or processes at a time [default: one a core]
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+}
+
+#[derive(Debug, Args)]
+struct CheckArgs {
+    /// Spec files
+    #[arg(required = true, value_name = "SPEC")]
+    specs: Vec<PathBuf>,
+    #[command(flatten)]
+    selected: Selected,
+}
+
+#[derive(Debug, Args)]
+struct ExportArgs {
+    /// Spec file
+    spec: PathBuf,
+    /// The engine whose scenes to write
+    #[arg(long)]
+    engine: String,
+    /// Folder to write to; one folder a procedure is made in it
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Procedures to export, by name [default: all of the spec]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    procedures: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+struct EnginesArgs {
+    #[command(subcommand)]
+    action: Option<EnginesAction>,
+}
+
+#[derive(Clone, Debug, Subcommand)]
+enum EnginesAction {
+    /// Which engines there are, and their versions
+    List,
+    /// Fetch missing engines into a folder of our own
+    Install {
+        /// Engines by name [default: all]
+        names: Vec<String>,
+    },
+    /// Let every engine read a scene of known answer
+    Doctor {
+        /// Engines by name [default: all]
+        names: Vec<String>,
+    },
+}
+
+#[derive(Debug, Args)]
+struct ReportArgs {
+    /// report.json of a run
+    result: PathBuf,
+    /// Views of the report to print
+    #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [Format::Terminal])]
+    format: Vec<Format>,
+}
+
+#[derive(Debug, Args)]
+struct SchemaArgs {
+    /// Which schema
+    #[arg(value_enum, default_value_t = SchemaOf::Spec)]
+    of: SchemaOf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SchemaOf {
+    Spec,
+    Report,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Terminal,
+    Json,
+    Markdown,
+    Junit,
+}
+
+impl Cli {
+    /// Does what the command line asks; the error, if any, is a usage or input error.
+    pub fn run(self) -> Result<Exit, Diagnostic> {
+        let site = match &self.engines_dir {
+            Some(folder) => Site::at(std::path::absolute(folder).into_diagnostic()?),
+            None => Site::of_user().into_diagnostic()?,
+        };
+        match self.command {
+            Command::Run(args) => run_specs(&args, &site),
+            Command::Check(args) => check(&args, &site),
+            Command::Export(args) => export(&args, &site),
+            Command::Engines(args) => manage_engines(&args, &site),
+            Command::Report(args) => view(&args),
+            Command::Schema(args) => schema(&args),
+        }
+    }
+
+    /// How much to log.
+    pub fn verbosity(&self) -> u8 {
+        self.verbose
+    }
+}
+
+fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic> {
+    // Every spec is read and checked before any engine starts.
+    let cases = load(&args.specs)?;
+    for case in &cases {
+        plan(case, &args.selected.selection(), site).map_err(diagnose)?;
+    }
+    if args.install {
+        // INSTALL
+    }
+    let tables = Tables::read(&cases)?;
+    let mut exit = Exit::Passed;
+    let mut reports = vec![];
+    for (case, published) in cases.iter().zip(&tables.published) {
+        let folder = out_folder(args, case);
+        let planned = plan(case, &args.selected.selection(), site).map_err(diagnose)?;
+        let report = run_case(case, &planned, published.as_ref(), &tables, args, site, &folder)?;
+        let named = |id: &str| planned.engines.iter().any(|p| p.engine.id().0 == id && p.asked == Asked::ByName);
+        exit = exit.worse(report.exit(named));
+        reports.push((report, folder));
+    }
+    print_reports(&reports, &args.format)?;
+    Ok(exit)
+}
+
+/// Tables that judging needs, read before any engine starts.
+struct Tables {
+    tolerances: Tolerances,
+    known: KnownDeviations,
+    published: Vec<Option<Published>>,
+}
+
+impl Tables {
+    fn read(cases: &[Case]) -> Result<Self, Diagnostic> {
+        let read = |case: &Case| case.published.as_deref().map(Published::read).transpose();
+        Ok(Self {
+            tolerances: Tolerances::built_in().into_diagnostic()?,
+            known: KnownDeviations::built_in().into_diagnostic()?,
+            published: cases.iter().map(read).collect::<Result<_, _>>().into_diagnostic()?,
+        })
+    }
+}
+
+fn load(specs: &[PathBuf]) -> Result<Vec<Case>, Diagnostic> {
+    specs.iter().map(|path| Case::load(path).map_err(diagnose)).collect()
+}
+
+fn out_folder(args: &RunArgs, case: &Case) -> PathBuf {
+    match &args.out {
+        Some(folder) if args.specs.len() == 1 => folder.clone(),
+        Some(folder) => folder.join(&case.name),
+        None => Path::new("luxproof-out").join(&case.name),
+    }
+}
+
+fn run_case(
+    case: &Case,
+    plan: &Plan,
+    published: Option<&Published>,
+    tables: &Tables,
+    args: &RunArgs,
+    site: &Site,
+    folder: &Path,
+) -> Result<Report, Diagnostic> {
+    let (started, clock) = (SystemTime::now(), Instant::now());
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let options = run::Options { site: site.clone(), out: folder.to_owned(), jobs: args.jobs.unwrap_or(cores).max(1) };
+    let outcome = run::run(case, plan, &options, &Bar::new()).into_diagnostic()?;
+    let comparisons = compare(case, plan, &outcome.recordings, published, tables);
+    let spec =
+        SpecRecord { path: case.path.display().to_string(), sha256: case.sha256.clone(), title: case.title.clone() };
+    let ingredients = Ingredients {
+        spec,
+        started,
+        wall_s: clock.elapsed().as_secs_f64(),
+        engines: outcome.engines,
+        recordings: &outcome.recordings,
+        skips: plan.skips.clone(),
+    };
+    let report = Report::new(ingredients, comparisons);
+    run::keep(&folder.join("report.json"), &report).into_diagnostic()?;
+    Ok(report)
+}
+
+/// Holds the recordings of a case against their references.
+fn compare(
+    case: &Case,
+    plan: &Plan,
+    recordings: &[Recording],
+    published: Option<&Published>,
+    tables: &Tables,
+) -> Vec<Comparison> {
+    let judge = Judge { tolerances: &tables.tolerances, known: &tables.known, overrides: &case.tolerances, published };
+    let of_task = |task: &crate::procedures::Task| {
+        let mine: Vec<&Recording> = recordings.iter().filter(|r| r.procedure == task.procedure).collect();
+        judge.compare(task, &mine)
+    };
+    plan.tasks.iter().flat_map(of_task).collect()
+}
+
+fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format]) -> Result<(), Diagnostic> {
+    let mut out = std::io::stdout().lock();
+    let style = if std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) {
+        Style::Colour
+    } else {
+        Style::Plain
+    };
+    for format in formats {
+        let text = match format {
+            Format::Json => {
+                let all: Vec<&Report> = reports.iter().map(|(r, _)| r).collect();
+                // One spec gives its report; several give a list of reports.
+                match all[..] {
+                    [one] => serde_json::to_string_pretty(one),
+                    _ => serde_json::to_string_pretty(&all),
+                }
+                .into_diagnostic()?
+            }
+            view => {
+                let one = |(report, folder): &(Report, PathBuf)| match view {
+                    Format::Markdown => report::markdown(report),
+                    Format::Junit => report::junit(report),
+                    _ => report::terminal(report, style, Some(&folder.display().to_string())),
+                };
+                reports.iter().map(one).collect::<Vec<_>>().join("\n")
+            }
+        };
+        writeln!(out, "{}", text.trim_end()).into_diagnostic()?;
+    }
+    Ok(())
+}
+
+fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
+    let cases = load(&args.specs)?;
+    Tables::read(&cases)?;
+    let mut out = std::io::stdout().lock();
+    let mut exit = Exit::Passed;
+    for case in &cases {
+        let plan = plan(case, &args.selected.selection(), site).map_err(diagnose)?;
+        writeln!(out, "{}: {}", case.path.display(), case.title).into_diagnostic()?;
+        for task in &plan.tasks {
+            writeln!(out, "  {} at {} meters", task.procedure, task.targets.len()).into_diagnostic()?;
+            for run in plan.runs.iter().filter(|r| plan.tasks[r.task].procedure == task.procedure) {
+                let engine = &plan.engines[run.engine];
+                let note = run.approximation.as_ref().map(|a| format!(", approximate: {a}")).unwrap_or_default();
+                writeln!(
+                    out,
+                    "    run  {:<10} at most about {:.0} s{note}",
+                    engine.engine.id(),
+                    cost(&case.budget, engine)
+                )
+                .into_diagnostic()?;
+            }
+            for skip in plan.skips.iter().filter(|s| s.procedure == task.procedure) {
+                writeln!(out, "    skip {:<10} {}", skip.engine, skip.reason).into_diagnostic()?;
+            }
+        }
+        let absent = plan.engines.iter().any(|p| p.asked == Asked::ByName && p.found.is_err());
+        exit = exit.worse(if absent { Exit::Engine } else { Exit::Passed });
+    }
+    Ok(exit)
+}
+
+/// What a run may cost at most, in seconds: the budget for renderers, next to nothing for our own solvers.
+fn cost(budget: &crate::spec::Budget, planned: &crate::plan::Planned) -> f64 {
+    if crate::plan::REFERENCES.contains(&planned.engine.id().0) { 1.0_f64.min(budget.seconds) } else { budget.seconds }
+}
+
+fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic> {
+    let case = Case::load(&args.spec).map_err(diagnose)?;
+    let selection =
+        Selection { engines: vec![args.engine.clone()], procedures: args.procedures.clone(), ..Selection::default() };
+    let plan = plan(&case, &selection, site).map_err(diagnose)?;
+    let chosen = |e: usize| plan.engines[e].engine.id().0 == args.engine;
+    let mut exported = 0;
+    // An export needs no installed engine: what is skipped for absence is exported all the same.
+    for (e, planned) in plan.engines.iter().enumerate().filter(|(e, _)| chosen(*e)) {
+        for task in &plan.tasks {
+            let job = plan.job(&case, e, task, selection.seed);
+            if let engines::Support::No(reason) = planned.engine.supports(&job) {
+                eprintln!("{}: {reason}", task.procedure);
+                continue;
+            }
+            let files = planned.engine.export(&job).into_diagnostic()?;
+            let folder = args.out.join(task.procedure);
+            std::fs::create_dir_all(&folder).into_diagnostic()?;
+            for file in &files {
+                let path = folder.join(&file.name);
+                std::fs::write(&path, &file.bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+                println!("{}", path.display());
+            }
+            if let Some(command) = planned.engine.command_by_hand(&job) {
+                println!("  cd {} && {command}", folder.display());
+            }
+            exported += files.len();
+        }
+    }
+    if exported == 0 {
+        eprintln!("{} writes no scenes", args.engine);
+    }
+    Ok(Exit::Passed)
+}
+
+fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Diagnostic> {
+    match args.action.clone().unwrap_or(EnginesAction::List) {
+        EnginesAction::List => {
+            for engine in engines::all() {
+                match engine.probe(site) {
+                    Ok(version) => println!("{:<10} {}", engine.id(), version.0),
+                    Err(absent) => println!("{:<10} absent: {absent}", engine.id()),
+                }
+            }
+            println!("engines are kept in {}", site.root().display());
+            Ok(Exit::Passed)
+        }
+        EnginesAction::Install { names } => {
+            known_engines(&names)?;
+            // INSTALL
+            Ok(Exit::Passed)
+        }
+        EnginesAction::Doctor { names } => {
+            known_engines(&names)?;
+            examine(site, &names)
+        }
+    }
+}
+
+fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
+    let tolerances = Tolerances::built_in().into_diagnostic()?;
+    let mut exit = Exit::Passed;
+    for engine in engines::all() {
+        if names.is_empty() || names.iter().any(|n| n == engine.id().0) {
+            let finding = doctor::examine(engine.as_ref(), site, &tolerances);
+            println!("{} {:<10} {}", if finding.healthy { "ok  " } else { "FAIL" }, finding.engine, finding.text);
+            exit = exit.worse(if finding.healthy { Exit::Passed } else { Exit::Engine });
+        }
+    }
+    Ok(exit)
+}
+
+fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
+    let all = engines::all();
+    for name in names {
+        if !all.iter().any(|e| e.id().0 == name) {
+            let known: Vec<&str> = all.iter().map(|e| e.id().0).collect();
+            let help = crate::spec::nearest(name, known.iter().copied())
+                .map_or(format!("known: {}", known.join(", ")), |k| format!("did you mean `{k}`?"));
+            return Err(miette::miette!(help = help, "there is no engine `{name}`"));
+        }
+    }
+    Ok(())
+}
+
+fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
+    let place = || args.result.display().to_string();
+    let text = std::fs::read_to_string(&args.result).into_diagnostic().wrap_err_with(place)?;
+    let report: Report = serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)?;
+    let folder = args.result.parent().map_or_else(PathBuf::new, Path::to_owned);
+    let exit = report.exit(|_| false);
+    print_reports(&[(report, folder)], &args.format)?;
+    Ok(exit)
+}
+
+fn schema(args: &SchemaArgs) -> Result<Exit, Diagnostic> {
+    let schema = match args.of {
+        SchemaOf::Spec => schemars::schema_for!(Spec),
+        SchemaOf::Report => schemars::schema_for!(Report),
+    };
+    println!("{}", serde_json::to_string_pretty(&schema).into_diagnostic()?);
+    Ok(Exit::Passed)
+}
+
+/// A spinner on stderr while a job runs, a line when it failed.
+struct Bar {
+    bar: ProgressBar,
+}
+
+impl Bar {
+    fn new() -> Self {
+        let bar = ProgressBar::new_spinner();
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} [{elapsed}]") {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(100));
+        Self { bar }
+    }
+}
+
+impl run::Progress for Bar {
+    fn started(&self, engine: &str, procedure: &str) {
+        self.bar.reset_elapsed();
+        self.bar.set_message(format!("{engine}: {procedure}"));
+    }
+
+    fn ended(&self, engine: &str, procedure: &str, wall: Duration, failure: Option<&str>) {
+        match failure {
+            Some(failure) => self.bar.println(format!("{engine}: {procedure} failed: {failure}")),
+            None => tracing::info!(engine, procedure, wall_s = wall.as_secs_f64(), "done"),
+        }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

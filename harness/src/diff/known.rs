@@ -1,0 +1,127 @@
+//! Known deviations: where an engine is known to differ, by how much and why, read from `reference/known_deviations.yaml`.
+
+use serde::Deserialize;
+
+use super::verdict::Verdict;
+
+const ON_RECORD: &str = include_str!("../../../reference/known_deviations.yaml");
+
+/// The record of known deviations.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KnownDeviations {
+    known_deviations: Vec<KnownDeviation>,
+}
+
+/// One known deviation: a range of relative deviations, its cause and its source.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct KnownDeviation {
+    engine: String,
+    procedure: String,
+    basis: super::Basis,
+    /// Only in this case, where one is named.
+    #[serde(default)]
+    case: Option<String>,
+    /// Lowest and highest relative deviation.
+    relative: [f64; 2],
+    /// Whether every reading is expected to deviate, so that a pass is news.
+    always: bool,
+    cause: String,
+    source: String,
+}
+
+/// Why the record cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[error("reference/known_deviations.yaml: {0}")]
+pub struct KnownDeviationError(String);
+
+impl KnownDeviations {
+    /// The record that the program was built with.
+    pub fn built_in() -> Result<Self, KnownDeviationError> {
+        let record: Self = crate::spec::from_yaml(ON_RECORD).map_err(KnownDeviationError)?;
+        for known in &record.known_deviations {
+            if known.cause.trim().is_empty() || known.source.trim().is_empty() {
+                return Err(KnownDeviationError(format!("a deviation of {} lacks cause or source", known.engine)));
+            }
+        }
+        Ok(record)
+    }
+
+    /// The verdict in the light of the record, with the cause where it applies.
+    pub fn revise(&self, verdict: Verdict, of: &Subject<'_>) -> (Verdict, Option<String>) {
+        let applies = |k: &&KnownDeviation| {
+            k.engine == of.engine
+                && k.procedure == of.procedure
+                && k.basis == of.basis
+                && k.case.as_deref().is_none_or(|c| c == of.case)
+        };
+        let Some(known) = self.known_deviations.iter().find(applies) else { return (verdict, None) };
+        let within = of.relative_deviation.is_some_and(|d| (known.relative[0]..=known.relative[1]).contains(&d));
+        match verdict {
+            Verdict::Fail | Verdict::Inconclusive if within => (Verdict::KnownDeviation, Some(known.cause.clone())),
+            Verdict::Pass if known.always => {
+                (Verdict::UnexpectedPass, Some(format!("a deviation is on record: {}", known.cause)))
+            }
+            other => (other, None),
+        }
+    }
+}
+
+/// What a verdict is about.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// The case.
+    pub case: &'a str,
+    /// The procedure.
+    pub procedure: &'a str,
+    /// The engine.
+    pub engine: &'a str,
+    /// The reference's basis.
+    pub basis: super::Basis,
+    /// Deviation over reference, where that is defined.
+    pub relative_deviation: Option<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diff::Basis;
+
+    fn record(always: bool) -> KnownDeviations {
+        let text = format!(
+            "known_deviations:\n  - {{engine: iesna, procedure: indirect_illuminance, basis: exact, relative: [-0.2, 0.1], \
+             always: {always}, cause: three surfaces, source: us}}\n"
+        );
+        crate::spec::from_yaml(&text).unwrap()
+    }
+
+    fn subject(relative_deviation: f64) -> Subject<'static> {
+        Subject {
+            case: "c",
+            procedure: "indirect_illuminance",
+            engine: "iesna",
+            basis: Basis::Exact,
+            relative_deviation: Some(relative_deviation),
+        }
+    }
+
+    #[test]
+    fn a_failure_within_the_recorded_range_is_known_and_one_outside_is_not() {
+        let record = record(false);
+        assert_eq!(record.revise(Verdict::Fail, &subject(-0.15)).0, Verdict::KnownDeviation);
+        assert_eq!(record.revise(Verdict::Fail, &subject(-0.25)).0, Verdict::Fail);
+        assert_eq!(record.revise(Verdict::Pass, &subject(-0.01)).0, Verdict::Pass);
+        assert_eq!(record.revise(Verdict::Missing, &subject(-0.15)).0, Verdict::Missing);
+    }
+
+    #[test]
+    fn a_deviation_that_is_gone_is_reported() {
+        assert_eq!(record(true).revise(Verdict::Pass, &subject(0.0)).0, Verdict::UnexpectedPass);
+    }
+
+    #[test]
+    fn the_record_of_the_program_is_sound() {
+        KnownDeviations::built_in().unwrap();
+    }
+}

@@ -1,0 +1,84 @@
+//! The verdict: an equivalence test of a deviation, with its uncertainty, against a tolerance.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a comparison ends in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The whole interval of the deviation lies within the tolerance.
+    Pass,
+    /// It lies outside, as is known and explained.
+    KnownDeviation,
+    /// It straddles the tolerance: more samples would decide.
+    Inconclusive,
+    /// The whole interval lies outside the tolerance.
+    Fail,
+    /// It passes although a deviation is on record: the record is out of date.
+    UnexpectedPass,
+    /// There is no usable reading or no usable reference.
+    Missing,
+}
+
+impl Verdict {
+    /// Whether it asks for attention.
+    pub const fn is_bad(self) -> bool {
+        matches!(self, Self::Fail | Self::UnexpectedPass | Self::Missing)
+    }
+
+    /// The name used in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::KnownDeviation => "known deviation",
+            Self::Inconclusive => "inconclusive",
+            Self::Fail => "fail",
+            Self::UnexpectedPass => "unexpected pass",
+            Self::Missing => "missing",
+        }
+    }
+}
+
+/// Judges a deviation of a reading from its reference; `expanded` is k times the combined standard uncertainty.
+///
+/// Anything that is not a finite number is missing: nothing compares as equal by accident.
+pub fn judge(deviation: f64, expanded: f64, allowed: f64) -> Verdict {
+    if !(deviation.is_finite() && expanded.is_finite() && allowed.is_finite() && expanded >= 0.0) {
+        return Verdict::Missing;
+    }
+    let distance = deviation.abs();
+    if distance + expanded <= allowed {
+        Verdict::Pass
+    } else if distance - expanded > allowed {
+        Verdict::Fail
+    } else {
+        Verdict::Inconclusive
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_interval_decides() {
+        assert_eq!(judge(0.5, 0.4, 1.0), Verdict::Pass);
+        assert_eq!(judge(-0.5, 0.6, 1.0), Verdict::Inconclusive);
+        assert_eq!(judge(1.5, 0.6, 1.0), Verdict::Inconclusive);
+        assert_eq!(judge(-1.5, 0.4, 1.0), Verdict::Fail);
+    }
+
+    #[test]
+    fn zero_tolerance_passes_only_equality() {
+        assert_eq!(judge(0.0, 0.0, 0.0), Verdict::Pass);
+        assert_eq!(judge(1e-300, 0.0, 0.0), Verdict::Fail);
+    }
+
+    #[test]
+    fn nothing_compares_as_equal_by_accident() {
+        for (d, u, a) in [(f64::NAN, 0.0, 1.0), (0.0, f64::NAN, 1.0), (0.0, 0.0, f64::NAN), (f64::INFINITY, 0.0, 1.0)] {
+            assert_eq!(judge(d, u, a), Verdict::Missing);
+        }
+    }
+}

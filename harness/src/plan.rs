@@ -1,0 +1,219 @@
+//! The plan: which engine runs which procedure of a case, what is skipped, and why.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::engines::{Absent, Engine, EngineId, Job, Site, Station, Support, Version};
+use crate::procedures::{self, Task};
+use crate::reading::MeterId;
+use crate::spec::{Case, SpecError, nearest};
+
+/// What is to be done for one case. Runs + skips = procedures x engines, always.
+pub struct Plan {
+    /// The procedures' tasks, in order.
+    pub tasks: Vec<Task>,
+    /// The engines that take part, in order.
+    pub engines: Vec<Planned>,
+    /// What will run.
+    pub runs: Vec<Run>,
+    /// What will not, and why.
+    pub skips: Vec<Skip>,
+}
+
+/// An engine of the plan.
+pub struct Planned {
+    /// The engine.
+    pub engine: Box<dyn Engine>,
+    /// Whether it is there.
+    pub found: Result<Version, Absent>,
+    /// Why it takes part.
+    pub asked: Asked,
+}
+
+/// Why an engine takes part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// It was named, on the command line or in the spec: its absence is an error.
+    ByName,
+    /// No engine was named: all that are there take part.
+    ByDefault,
+    /// Others are judged by it.
+    AsReference,
+}
+
+/// One engine on one procedure.
+pub struct Run {
+    /// Index into [`Plan::engines`].
+    pub engine: usize,
+    /// Index into [`Plan::tasks`].
+    pub task: usize,
+    /// What the engine is asked.
+    pub job: Job,
+    /// Where the engine only approximates what is asked.
+    pub approximation: Option<String>,
+}
+
+/// Something that is not run, with its reason.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Skip {
+    /// The case.
+    pub case: String,
+    /// The procedure.
+    pub procedure: String,
+    /// The engine.
+    pub engine: String,
+    /// How much is skipped.
+    pub scope: Scope,
+    /// Why.
+    pub reason: String,
+    /// What that saves, where it saves something.
+    pub saved: Option<String>,
+}
+
+/// How much is skipped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scope {
+    /// All of an engine.
+    Engine,
+    /// One procedure of an engine.
+    Procedure,
+    /// One meter.
+    Meter,
+    /// One kind of light path.
+    LightPath,
+}
+
+/// What the user chose on the command line.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// Engines by name; empty for what the spec says.
+    pub engines: Vec<String>,
+    /// Procedures by name; empty for all of the spec.
+    pub procedures: Vec<String>,
+    /// Seed of every random choice.
+    pub seed: u64,
+}
+
+/// The engines that the others are judged by: they always run, they cost next to nothing.
+pub const REFERENCES: [&str; 2] = ["simulator", "iesna"];
+
+impl Plan {
+    /// What an engine of the plan is asked for a task, whether it is there or not.
+    pub fn job(&self, case: &Case, engine: usize, task: &Task, seed: u64) -> Job {
+        job(case, self.engines[engine].engine.id(), task, seed)
+    }
+}
+
+/// Plans a case.
+pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, SpecError> {
+    let tasks = tasks(case, selection)?;
+    let engines = engines(case, selection, site)?;
+    let (mut runs, mut skips) = (vec![], vec![]);
+    for (e, planned) in engines.iter().enumerate() {
+        for (t, task) in tasks.iter().enumerate() {
+            let job = job(case, planned.engine.id(), task, selection.seed);
+            let skip = |scope, reason: String, saved: Option<&str>| Skip {
+                case: case.name.clone(),
+                procedure: task.procedure.to_owned(),
+                engine: planned.engine.id().0.to_owned(),
+                scope,
+                reason,
+                saved: saved.map(str::to_owned),
+            };
+            if let Err(absent) = &planned.found {
+                skips.push(skip(Scope::Engine, absent.to_string(), None));
+                continue;
+            }
+            match planned.engine.supports(&job) {
+                Support::Yes => runs.push(Run { engine: e, task: t, job, approximation: None }),
+                Support::Approximate { why, size } => {
+                    let size = size.map(|s| format!(" (about {:.1} %)", 100.0 * s)).unwrap_or_default();
+                    runs.push(Run { engine: e, task: t, job, approximation: Some(format!("{why}{size}")) });
+                }
+                Support::No(reason) => skips.push(skip(Scope::Procedure, reason, Some("the whole run"))),
+            }
+        }
+    }
+    Ok(Plan { tasks, engines, runs, skips })
+}
+
+fn tasks(case: &Case, selection: &Selection) -> Result<Vec<Task>, SpecError> {
+    let known = || procedures::ALL.iter().map(|p| p.name());
+    for name in &selection.procedures {
+        if !known().any(|k| k == name) {
+            return Err(unknown("procedure", name, known(), "--procedures"));
+        }
+    }
+    let wanted = |name: &str| selection.procedures.is_empty() || selection.procedures.iter().any(|p| p == name);
+    let tasks: Vec<Task> = procedures::ALL.iter().filter(|p| wanted(p.name())).filter_map(|p| p.task(case)).collect();
+    if tasks.is_empty() {
+        let message = "none of the procedures chosen with --procedures is in this spec";
+        return Err(case.source.error_at("procedures", message, "choose one that is, or leave the option out"));
+    }
+    Ok(tasks)
+}
+
+fn engines(case: &Case, selection: &Selection, site: &Site) -> Result<Vec<Planned>, SpecError> {
+    let all = crate::engines::all();
+    let ids: Vec<&'static str> = all.iter().map(|e| e.id().0).collect();
+    for name in &selection.engines {
+        if !ids.contains(&name.as_str()) {
+            return Err(unknown("engine", name, ids.iter().copied(), "--engines"));
+        }
+    }
+    let in_spec: Vec<&String> = case.engines.iter().flat_map(BTreeMap::keys).collect();
+    for name in &in_spec {
+        if !ids.contains(&name.as_str()) {
+            let mut error = unknown("engine", name, ids.iter().copied(), "");
+            let place = case.source.error_at(&format!("engines.{name}"), "", "");
+            error = SpecError { file: place.file, line: place.line, column: place.column, ..error };
+            return Err(error);
+        }
+    }
+    let asked = |id: &str| {
+        if selection.engines.iter().any(|n| n == id) {
+            Some(Asked::ByName)
+        } else if REFERENCES.contains(&id) {
+            Some(Asked::AsReference)
+        } else if !selection.engines.is_empty() {
+            None
+        } else if case.engines.is_none() {
+            Some(Asked::ByDefault)
+        } else {
+            in_spec.iter().any(|n| *n == id).then_some(Asked::ByName)
+        }
+    };
+    let chosen = all.into_iter().filter_map(|engine| asked(engine.id().0).map(|asked| (engine, asked)));
+    Ok(chosen.map(|(engine, asked)| Planned { found: engine.probe(site), engine, asked }).collect())
+}
+
+fn job(case: &Case, engine: EngineId, task: &Task, seed: u64) -> Job {
+    let settings = case.engines.as_ref().and_then(|e| e.get(engine.0)).map(|s| s.0.clone()).unwrap_or_default();
+    let station = |target: &procedures::Target| Station {
+        id: MeterId(target.id.0.clone()),
+        meter: target.meter,
+        expected_lx: None,
+    };
+    Job {
+        case: case.name.clone(),
+        procedure: task.procedure.to_owned(),
+        scene: task.scene.clone(),
+        stations: task.targets.iter().map(station).collect(),
+        transport: task.transport,
+        budget: case.budget,
+        seed,
+        settings,
+    }
+}
+
+fn unknown<'a>(kind: &str, name: &str, known: impl Iterator<Item = &'a str> + Clone, option: &str) -> SpecError {
+    let help = match nearest(name, known.clone()) {
+        Some(k) => format!("did you mean `{k}`?"),
+        None => format!("known: {}", known.collect::<Vec<_>>().join(", ")),
+    };
+    let message = format!("there is no {kind} `{name}`");
+    SpecError { file: option.into(), line: None, column: None, message, help: Some(help) }
+}

@@ -1,0 +1,52 @@
+//! Markdown for a pull request or a step summary: verdict matrix, worst deviations, skips.
+
+use std::fmt::Write;
+
+use super::Report;
+use super::terminal::{Cell, matrix, worst};
+
+/// The report as Markdown.
+pub fn markdown(report: &Report) -> String {
+    let mut text = String::new();
+    let s = &report.summary;
+    let mut line = |l: String| {
+        text.push_str(&l);
+        text.push('\n');
+    };
+    line(format!("## luxproof: {}", report.spec.title));
+    line(format!(
+        "\n{} passed, {} failed, {} undecided, {} known, {} unexpectedly passed, {} missing, {} skipped in {:.1} s\n",
+        s.pass, s.fail, s.inconclusive, s.known_deviation, s.unexpected_pass, s.missing, s.skipped, report.wall_s
+    ));
+    let engines: Vec<&str> = report.engines.iter().map(|e| e.id.as_str()).collect();
+    line(format!("| procedure | reference | {} |", engines.join(" | ")));
+    line(format!("|---|---|{}", "---|".repeat(engines.len())));
+    for row in matrix(report) {
+        let cells: Vec<String> = row.cells.iter().map(Cell::text).collect();
+        line(format!("| {} | {} | {} |", row.procedure, row.basis, cells.join(" | ")));
+    }
+    let worst = worst(report, 10);
+    if !worst.is_empty() {
+        line(
+            "\n| worst deviations | meter | value | reference | deviation | verdict |\n|---|---|---|---|---|---|"
+                .into(),
+        );
+        for c in worst {
+            let number = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.5}"));
+            line(format!(
+                "| {} {} | {} | {} | {} | {} | {} |",
+                c.engine,
+                c.procedure,
+                c.meter,
+                number(c.value),
+                number(c.reference.as_ref().map(|r| r.value)),
+                c.relative_deviation.map_or("-".to_owned(), |d| format!("{:+.3} %", 100.0 * d)),
+                c.verdict.name()
+            ));
+        }
+    }
+    for skip in &report.skips {
+        writeln!(text, "\n- skipped: {} {}: {}", skip.engine, skip.procedure, skip.reason).ok();
+    }
+    text
+}

@@ -1,0 +1,300 @@
+//! The report: one record of a run, and views of it; the JSON form is the truth.
+
+mod junit;
+mod markdown;
+mod terminal;
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::diff::{Comparison, Verdict};
+use crate::plan::Skip;
+use crate::reading::{MeterId, Quantity, Recording};
+use crate::run::{EngineStatus, Status};
+
+pub use junit::junit;
+pub use markdown::markdown;
+pub use terminal::{Style, terminal};
+
+/// Everything that is known of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Report {
+    /// Version of the format: 1.
+    pub luxproof: u32,
+    /// Version of the program.
+    pub tool_version: String,
+    /// When the run started (RFC 3339, UTC).
+    pub started: String,
+    /// Wall-clock seconds of the run.
+    pub wall_s: f64,
+    /// What was run.
+    pub spec: SpecRecord,
+    /// How each engine fared.
+    pub engines: Vec<EngineStatus>,
+    /// Every reading against every reference.
+    pub comparisons: Vec<Comparison>,
+    /// Every reading of every engine, once.
+    pub readings: Vec<ReadingRecord>,
+    /// How each engine was run on each procedure.
+    pub recordings: Vec<RecordingSummary>,
+    /// What was not run, and why.
+    pub skips: Vec<Skip>,
+    /// Comparisons by verdict.
+    pub summary: Summary,
+}
+
+/// What was run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct SpecRecord {
+    /// The spec's path as given.
+    pub path: String,
+    /// SHA-256 of the spec and of every file that it names.
+    pub sha256: String,
+    /// Its title.
+    pub title: String,
+}
+
+/// One reading of one engine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ReadingRecord {
+    /// The case.
+    pub case: String,
+    /// The procedure.
+    pub procedure: String,
+    /// The engine.
+    pub engine: String,
+    /// The luminaire model.
+    pub model: String,
+    /// The meter.
+    pub meter: MeterId,
+    /// What was read.
+    pub quantity: Quantity,
+    /// The value, in the quantity's unit.
+    pub value: f64,
+    /// Standard error of a Monte Carlo mean.
+    pub std_error: Option<f64>,
+    /// Distance within which the true value lies, for deterministic methods.
+    pub error_bound: Option<f64>,
+}
+
+/// How one engine was run on one procedure: what it takes to repeat it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RecordingSummary {
+    /// The case.
+    pub case: String,
+    /// The procedure.
+    pub procedure: String,
+    /// The engine.
+    pub engine: String,
+    /// Its version.
+    pub version: String,
+    /// SHA-256 of the spec and of every file that it names.
+    pub input_sha256: String,
+    /// Seed.
+    pub seed: u64,
+    /// What the engine set.
+    pub settings: BTreeMap<String, String>,
+    /// Where the engine only approximates.
+    pub approximation: Option<String>,
+    /// What the engine noted.
+    pub notes: Vec<String>,
+    /// Why there are no readings, if there are none.
+    pub failure: Option<String>,
+    /// Wall-clock seconds.
+    pub wall_s: f64,
+}
+
+/// Comparisons by verdict, and skips.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Summary {
+    /// Passed.
+    pub pass: usize,
+    /// Failed.
+    pub fail: usize,
+    /// Undecided within the budget.
+    pub inconclusive: usize,
+    /// Deviations on record.
+    pub known_deviation: usize,
+    /// Deviations on record that are gone.
+    pub unexpected_pass: usize,
+    /// Without reading or reference.
+    pub missing: usize,
+    /// Not run.
+    pub skipped: usize,
+}
+
+/// The exit code of a run, by the worst that happened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// 0: everything passed, known deviations included.
+    Passed,
+    /// 4: undecided within the budget.
+    Undecided,
+    /// 1: a tolerance failed.
+    Failed,
+    /// 3: an engine that was asked for failed or is absent.
+    Engine,
+    /// 2: usage or input error.
+    Usage,
+}
+
+impl Exit {
+    /// The process exit code.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Passed => 0,
+            Self::Failed => 1,
+            Self::Usage => 2,
+            Self::Engine => 3,
+            Self::Undecided => 4,
+        }
+    }
+
+    /// How bad it is: the worst of several wins (2 before 3 before 1 before 4).
+    const fn badness(self) -> u8 {
+        match self {
+            Self::Passed => 0,
+            Self::Undecided => 1,
+            Self::Failed => 2,
+            Self::Engine => 3,
+            Self::Usage => 4,
+        }
+    }
+
+    /// The worse of two.
+    #[must_use]
+    pub const fn worse(self, other: Self) -> Self {
+        if self.badness() >= other.badness() { self } else { other }
+    }
+}
+
+impl Summary {
+    fn of(comparisons: &[Comparison], skips: &[Skip]) -> Self {
+        let count = |verdict| comparisons.iter().filter(|c| c.verdict == verdict).count();
+        Self {
+            pass: count(Verdict::Pass),
+            fail: count(Verdict::Fail),
+            inconclusive: count(Verdict::Inconclusive),
+            known_deviation: count(Verdict::KnownDeviation),
+            unexpected_pass: count(Verdict::UnexpectedPass),
+            missing: count(Verdict::Missing),
+            skipped: skips.len(),
+        }
+    }
+}
+
+/// What a report is made of, besides the comparisons.
+pub struct Ingredients<'a> {
+    /// What was run.
+    pub spec: SpecRecord,
+    /// When the run started.
+    pub started: std::time::SystemTime,
+    /// How long it took.
+    pub wall_s: f64,
+    /// How each engine fared.
+    pub engines: Vec<EngineStatus>,
+    /// What they said.
+    pub recordings: &'a [Recording],
+    /// What was not run.
+    pub skips: Vec<Skip>,
+}
+
+impl Report {
+    /// Puts a report together.
+    pub fn new(ingredients: Ingredients<'_>, comparisons: Vec<Comparison>) -> Self {
+        let Ingredients { spec, started, wall_s, engines, recordings, skips } = ingredients;
+        Self {
+            luxproof: 1,
+            tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+            started: humantime::format_rfc3339_seconds(started).to_string(),
+            wall_s,
+            spec,
+            engines,
+            readings: recordings.iter().flat_map(readings).collect(),
+            recordings: recordings.iter().map(RecordingSummary::of).collect(),
+            summary: Summary::of(&comparisons, &skips),
+            comparisons,
+            skips,
+        }
+    }
+
+    /// The exit code that the run deserves. `asked` tells whether an engine was named by the user.
+    pub fn exit(&self, asked: impl Fn(&str) -> bool) -> Exit {
+        let engine = |e: &EngineStatus| match e.status {
+            Status::Failed => Exit::Engine,
+            Status::Absent if asked(&e.id) => Exit::Engine,
+            _ => Exit::Passed,
+        };
+        let verdict = |c: &Comparison| match c.verdict {
+            Verdict::Pass | Verdict::KnownDeviation => Exit::Passed,
+            Verdict::Inconclusive => Exit::Undecided,
+            Verdict::Fail | Verdict::UnexpectedPass | Verdict::Missing => Exit::Failed,
+        };
+        let all = self.engines.iter().map(engine).chain(self.comparisons.iter().map(verdict));
+        all.fold(Exit::Passed, Exit::worse)
+    }
+
+    /// The procedures of the comparisons and readings, in their order.
+    fn procedures(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = vec![];
+        for name in
+            self.recordings.iter().map(|r| r.procedure.as_str()).chain(self.skips.iter().map(|s| s.procedure.as_str()))
+        {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names.sort_by_key(|n| crate::spec::Procedures::NAMES.iter().position(|k| k == n));
+        names
+    }
+}
+
+fn readings(recording: &Recording) -> impl Iterator<Item = ReadingRecord> {
+    recording.readings.iter().map(|reading| ReadingRecord {
+        case: recording.case.clone(),
+        procedure: recording.procedure.clone(),
+        engine: recording.engine.clone(),
+        model: recording.model.clone(),
+        meter: reading.meter.clone(),
+        quantity: reading.quantity,
+        value: reading.value,
+        std_error: reading.std_error,
+        error_bound: reading.error_bound,
+    })
+}
+
+impl RecordingSummary {
+    fn of(recording: &Recording) -> Self {
+        Self {
+            case: recording.case.clone(),
+            procedure: recording.procedure.clone(),
+            engine: recording.engine.clone(),
+            version: recording.version.clone(),
+            input_sha256: recording.input_sha256.clone(),
+            seed: recording.seed,
+            settings: recording.settings.clone(),
+            approximation: recording.approximation.clone(),
+            notes: recording.notes.clone(),
+            failure: recording.failure.clone(),
+            wall_s: recording.wall_s,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_exit_wins() {
+        assert_eq!(Exit::Failed.worse(Exit::Undecided), Exit::Failed);
+        assert_eq!(Exit::Failed.worse(Exit::Engine), Exit::Engine);
+        assert_eq!(Exit::Usage.worse(Exit::Engine).code(), 2);
+        assert_eq!(
+            [Exit::Passed, Exit::Failed, Exit::Usage, Exit::Engine, Exit::Undecided].map(Exit::code),
+            [0, 1, 2, 3, 4]
+        );
+    }
+}

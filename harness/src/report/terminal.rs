@@ -1,0 +1,376 @@
+//! The terminal report: a verdict matrix, the readings side by side, the worst deviations, what was skipped, where the files are.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArrangement, Table, presets};
+
+use super::{ReadingRecord, Report};
+use crate::diff::{Basis, Comparison, Verdict};
+use crate::run::Status;
+
+/// More meters than this are summarised instead of listed.
+const LISTED_METERS: usize = 8;
+
+/// How the report is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Plain text.
+    Plain,
+    /// With ANSI colours.
+    Colour,
+}
+
+/// One row of the verdict matrix.
+pub(super) struct Row {
+    /// The procedure.
+    pub(super) procedure: String,
+    /// What its references rest on.
+    pub(super) basis: String,
+    /// One an engine, in the report's order.
+    pub(super) cells: Vec<Cell>,
+}
+
+/// One cell of the verdict matrix: the worst verdict of its comparisons.
+pub(super) enum Cell {
+    /// The engine is what others are judged by here.
+    IsReference,
+    /// Not run.
+    Skipped,
+    /// Nothing to compare.
+    Empty,
+    /// Compared.
+    Judged {
+        /// The worst verdict.
+        verdict: Verdict,
+        /// How many comparisons have it.
+        having: usize,
+        /// How many there are.
+        of: usize,
+        /// The largest relative deviation, signed.
+        deviation: Option<f64>,
+    },
+}
+
+impl Cell {
+    pub(super) fn text(&self) -> String {
+        match self {
+            Self::IsReference => "reference".to_owned(),
+            Self::Skipped => "skipped".to_owned(),
+            Self::Empty => "-".to_owned(),
+            Self::Judged { verdict, having, of, deviation } => {
+                let percent = deviation.map(|d| format!(" {}", percent(d))).unwrap_or_default();
+                let count = if having == of { format!("{of}") } else { format!("{having}/{of}") };
+                format!("{} {count}{percent}", mark(*verdict))
+            }
+        }
+    }
+
+    fn colour(&self) -> Option<Color> {
+        match self {
+            Self::Judged { verdict, .. } => Some(match verdict {
+                Verdict::Pass => Color::Green,
+                Verdict::KnownDeviation => Color::Cyan,
+                Verdict::Inconclusive => Color::Yellow,
+                Verdict::Fail | Verdict::UnexpectedPass | Verdict::Missing => Color::Red,
+            }),
+            _ => None,
+        }
+    }
+}
+
+const fn mark(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Pass => "ok",
+        Verdict::KnownDeviation => "known",
+        Verdict::Inconclusive => "undecided",
+        Verdict::Fail => "FAIL",
+        Verdict::UnexpectedPass => "UNEXPECTED PASS",
+        Verdict::Missing => "MISSING",
+    }
+}
+
+/// The verdict matrix: procedure and basis by engine.
+pub(super) fn matrix(report: &Report) -> Vec<Row> {
+    let mut rows = vec![];
+    for procedure in report.procedures() {
+        let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.procedure == procedure).collect();
+        let mut bases: Vec<Option<Basis>> = comparisons.iter().map(|c| c.reference.as_ref().map(|r| r.basis)).collect();
+        bases.sort_unstable();
+        bases.dedup();
+        for basis in bases {
+            let of_row: Vec<&Comparison> =
+                comparisons.iter().copied().filter(|c| c.reference.as_ref().map(|r| r.basis) == basis).collect();
+            rows.push(Row {
+                procedure: procedure.to_owned(),
+                basis: basis.map_or("none", Basis::name).to_owned(),
+                cells: report.engines.iter().map(|e| cell(report, procedure, &e.id, &of_row)).collect(),
+            });
+        }
+    }
+    rows
+}
+
+fn cell(report: &Report, procedure: &str, engine: &str, of_row: &[&Comparison]) -> Cell {
+    let mine: Vec<&&Comparison> = of_row.iter().filter(|c| c.engine == engine).collect();
+    let Some(verdict) = mine.iter().map(|c| c.verdict).max() else {
+        let is = |p: &str, e: &str| p == procedure && e == engine;
+        return if report.skips.iter().any(|s| is(&s.procedure, &s.engine)) {
+            Cell::Skipped
+        } else if report.recordings.iter().any(|r| is(&r.procedure, &r.engine)) && judges_others(engine) {
+            Cell::IsReference
+        } else {
+            Cell::Empty
+        };
+    };
+    let deviations = mine.iter().filter_map(|c| c.relative_deviation);
+    Cell::Judged {
+        verdict,
+        having: mine.iter().filter(|c| c.verdict == verdict).count(),
+        of: mine.len(),
+        deviation: deviations.max_by(|a, b| a.abs().total_cmp(&b.abs())),
+    }
+}
+
+fn judges_others(engine: &str) -> bool {
+    crate::plan::REFERENCES.contains(&engine)
+}
+
+/// The comparisons that deserve a look, worst first: by verdict, then by deviation over tolerance.
+pub(super) fn worst(report: &Report, count: usize) -> Vec<&Comparison> {
+    let strain = |c: &Comparison| {
+        let allowed = c.reference.as_ref().map_or(0.0, |r| c.tolerance.around(r.value));
+        c.deviation.map_or(f64::INFINITY, |d| d.abs() / allowed.max(f64::MIN_POSITIVE))
+    };
+    let mut all: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.deviation != Some(0.0)).collect();
+    all.sort_by(|a, b| b.verdict.cmp(&a.verdict).then(strain(b).total_cmp(&strain(a))));
+    all.truncate(count);
+    all
+}
+
+/// The report as text for a terminal.
+pub fn terminal(report: &Report, style: Style, folder: Option<&str>) -> String {
+    let mut text = String::new();
+    let s = &report.summary;
+    writeln!(text, "\nluxproof {}: {}", report.tool_version, report.spec.title).ok();
+    writeln!(text, "{}\n", engines_line(report)).ok();
+    writeln!(text, "{}\n", verdicts(report, style)).ok();
+    for procedure in report.procedures() {
+        if let Some(table) = readings(report, procedure, style) {
+            writeln!(text, "{table}\n").ok();
+        }
+    }
+    let worst = worst(report, 5);
+    if !worst.is_empty() {
+        writeln!(text, "Worst deviations (by verdict, then deviation over tolerance)").ok();
+        for c in worst {
+            writeln!(text, "  {}", deviation_line(c)).ok();
+        }
+        writeln!(text).ok();
+    }
+    notes(report, &mut text);
+    writeln!(
+        text,
+        "{} passed, {} failed, {} undecided, {} known deviations, {} unexpected passes, {} missing, {} skipped in {:.1} s",
+        s.pass, s.fail, s.inconclusive, s.known_deviation, s.unexpected_pass, s.missing, s.skipped, report.wall_s
+    )
+    .ok();
+    if let Some(folder) = folder {
+        writeln!(text, "files: {folder}/report.json, readings/, scenes/<engine>/, logs/").ok();
+    }
+    text
+}
+
+fn engines_line(report: &Report) -> String {
+    let of = |e: &crate::run::EngineStatus| match (e.status, &e.version) {
+        (Status::Ran, Some(version)) => format!("{} {version} ({:.1} s)", e.id, e.wall_s),
+        (Status::Failed, Some(version)) => format!("{} {version} FAILED", e.id),
+        (Status::Absent, _) => format!("{} absent", e.id),
+        _ => format!("{} skipped", e.id),
+    };
+    report.engines.iter().map(of).collect::<Vec<_>>().join(" · ")
+}
+
+fn table() -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
+    table
+}
+
+/// Colours are decided by the caller, not guessed from the stream.
+fn finish(mut table: Table, style: Style) -> String {
+    match style {
+        Style::Plain => table.force_no_tty(),
+        Style::Colour => table.enforce_styling(),
+    };
+    let text = table.to_string();
+    text.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
+}
+
+fn header(words: impl IntoIterator<Item = String>) -> Vec<TableCell> {
+    words.into_iter().map(|w| TableCell::new(w).add_attribute(Attribute::Bold)).collect()
+}
+
+fn verdicts(report: &Report, style: Style) -> String {
+    let mut table = table();
+    let engines = report.engines.iter().map(|e| e.id.clone());
+    table.set_header(header(["Verdicts".to_owned(), "against".to_owned()].into_iter().chain(engines)));
+    for row in matrix(report) {
+        let cells = row.cells.iter().map(|cell| {
+            let text = TableCell::new(cell.text());
+            cell.colour().map_or(text.clone(), |colour| text.fg(colour))
+        });
+        table.add_row([TableCell::new(row.procedure), TableCell::new(row.basis)].into_iter().chain(cells));
+    }
+    finish(table, style)
+}
+
+/// The readings of one procedure, engines side by side, with references from papers beside them.
+fn readings(report: &Report, procedure: &str, style: Style) -> Option<String> {
+    let records: Vec<&ReadingRecord> = report.readings.iter().filter(|r| r.procedure == procedure).collect();
+    let unit = records.first()?.quantity.unit();
+    let mut meters: Vec<_> = vec![];
+    for record in &records {
+        if !meters.contains(&&record.meter) {
+            meters.push(&record.meter);
+        }
+    }
+    if meters.len() > LISTED_METERS {
+        return None;
+    }
+    let engines: Vec<&str> =
+        report.engines.iter().map(|e| e.id.as_str()).filter(|e| records.iter().any(|r| r.engine == *e)).collect();
+    let mut published: BTreeMap<&str, BTreeMap<&str, f64>> = BTreeMap::new();
+    for c in report.comparisons.iter().filter(|c| c.procedure == procedure) {
+        if let Some(reference) = c.reference.as_ref().filter(|r| r.basis == Basis::Published) {
+            let column = reference.source.split(": ").next().and_then(|s| s.rsplit(", ").next()).unwrap_or("published");
+            let column = if reference.source.contains(": ") { published_column(&reference.source) } else { column };
+            published.entry(column).or_default().insert(&c.meter.0, reference.value);
+        }
+    }
+    let mut table = table();
+    let heads = [format!("{procedure} [{unit}]")].into_iter().chain(engines.iter().map(|e| (*e).to_owned()));
+    table.set_header(header(heads.chain(published.keys().map(|c| format!("paper {c}")))));
+    for meter in meters {
+        let of = |engine: &&str| records.iter().find(|r| r.meter == *meter && r.engine == **engine);
+        let values = engines.iter().map(|e| of(e).map_or("-".to_owned(), |r| value(r)));
+        let cells = published.values().map(|c| c.get(meter.0.as_str()).map_or("-".to_owned(), f64::to_string));
+        table.add_row([place(report, procedure, &meter.0)].into_iter().chain(values).chain(cells));
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    Some(finish(table, style))
+}
+
+/// The column's name within a published source, "TITLE, TABLE, COLUMN: MEANING"; titles may hold colons.
+fn published_column(source: &str) -> &str {
+    let (head, _) = source.rsplit_once(": ").unwrap_or((source, ""));
+    head.rsplit(", ").next().unwrap_or(head)
+}
+
+fn place(report: &Report, procedure: &str, meter: &str) -> String {
+    let c = report.comparisons.iter().find(|c| c.procedure == procedure && c.meter.0 == meter);
+    match c.and_then(|c| c.gamma_deg.zip(c.c_deg)) {
+        Some((gamma, plane)) => format!("  C {plane} gamma {gamma}"),
+        None => c.map_or(format!("  {meter}"), |c| format!("  {meter} ({}, {}, {})", c.at_m[0], c.at_m[1], c.at_m[2])),
+    }
+}
+
+/// Six significant digits, and the standard error in the last two digits that it reaches: `0.9431(12)`.
+fn value(record: &ReadingRecord) -> String {
+    match record.std_error {
+        Some(e) if e > 0.0 && record.value > 0.0 => {
+            let decimals = (1.0 - e.log10().floor()).clamp(0.0, 9.0) as usize;
+            let in_units = (e * 10f64.powi(decimals as i32)).round();
+            format!("{:.decimals$}({in_units})", record.value)
+        }
+        _ => significant(record.value),
+    }
+}
+
+/// Six significant digits.
+fn significant(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let decimals = (5.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// A relative deviation with a sign and two significant digits; rounding noise is shown as zero.
+fn percent(deviation: f64) -> String {
+    let percent = 100.0 * deviation;
+    match percent.abs() {
+        p if p < 5e-8 => "0 %".to_owned(),
+        p if p < 0.001 => format!("{percent:+.0e} %"),
+        p if p < 1.0 => format!("{percent:+.3} %"),
+        _ => format!("{percent:+.1} %"),
+    }
+}
+
+fn deviation_line(c: &Comparison) -> String {
+    let number = |v: Option<f64>| v.map_or("nothing".to_owned(), significant);
+    let against = c.reference.as_ref().map_or("no reference".to_owned(), |r| {
+        format!("{} {} ({})", significant(r.value), c.quantity.unit(), r.basis.name())
+    });
+    let deviation = c.relative_deviation.map(|d| format!(" {}", percent(d))).unwrap_or_default();
+    let why = c.diagnosis.as_ref().map(|d| format!(": {d}")).unwrap_or_default();
+    format!("{:<9} {} {} {} against {against}{deviation}{why}", mark(c.verdict), c.engine, c.meter, number(c.value))
+}
+
+fn notes(report: &Report, text: &mut String) {
+    let mut lines: Vec<String> = vec![];
+    for recording in &report.recordings {
+        let of = format!("{} {}", recording.engine, recording.procedure);
+        lines.extend(recording.approximation.iter().map(|a| format!("{of}: approximate, {a}")));
+        lines.extend(recording.notes.iter().map(|n| format!("{}: {n}", recording.engine)));
+        lines
+            .extend(recording.failure.iter().map(|f| format!("{of} failed: {}", f.lines().next().unwrap_or_default())));
+    }
+    for skip in &report.skips {
+        let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
+        lines.push(format!("skipped {} {}: {}{saved}", skip.engine, skip.procedure, skip.reason));
+    }
+    lines.sort();
+    lines.dedup();
+    for line in &lines {
+        writeln!(text, "  {line}").ok();
+    }
+    if !lines.is_empty() {
+        writeln!(text).ok();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reading::{MeterId, Quantity};
+
+    fn reading(value: f64, std_error: Option<f64>) -> ReadingRecord {
+        ReadingRecord {
+            case: "c".into(),
+            procedure: "p".into(),
+            engine: "e".into(),
+            model: "point".into(),
+            meter: MeterId::new("m", 0),
+            quantity: Quantity::Illuminance,
+            value,
+            std_error,
+            error_bound: None,
+        }
+    }
+
+    #[test]
+    fn values_show_the_digits_they_deserve() {
+        assert_eq!(value(&reading(0.943_147, Some(0.001_2))), "0.9431(12)");
+        assert_eq!(value(&reading(1234.5678, Some(0.0))), "1234.57");
+        assert_eq!(value(&reading(0.0, None)), "0");
+    }
+
+    #[test]
+    fn the_published_column_is_found_behind_a_title_with_a_colon() {
+        let source = "Simulation of Luminaires in Radiance: Verification Method, Table 2, lum1: Flat polygon, of light";
+        assert_eq!(published_column(source), "lum1");
+    }
+}

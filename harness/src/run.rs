@@ -1,0 +1,218 @@
+//! Runs a plan: one workbench a job, readings kept on disk as each job finishes, one engine's failure stops no other.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use luminaire::scene::Scene;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::engines::{EngineError, Job, Measurement, Site, Workbench, checked};
+use crate::plan::{Plan, Planned, Run};
+use crate::procedures::Task;
+use crate::process;
+use crate::reading::{Reading, Recording};
+use crate::spec::{Budget, Case};
+
+/// How to run.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Where engines are installed.
+    pub site: Site,
+    /// The folder of the run's files.
+    pub out: PathBuf,
+    /// Threads or processes at a time.
+    pub jobs: usize,
+}
+
+/// What a run gave.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// One a run of the plan, failures included, in the plan's order.
+    pub recordings: Vec<Recording>,
+    /// One an engine of the plan, in its order.
+    pub engines: Vec<EngineStatus>,
+}
+
+/// How an engine fared.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EngineStatus {
+    /// The engine.
+    pub id: String,
+    /// Its version, where it is there.
+    pub version: Option<String>,
+    /// How it fared.
+    pub status: Status,
+    /// Why it did not run.
+    pub reason: Option<String>,
+    /// Wall-clock seconds over all procedures.
+    pub wall_s: f64,
+}
+
+/// How an engine fared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Every job gave readings.
+    Ran,
+    /// It is not there.
+    Absent,
+    /// At least one job failed.
+    Failed,
+    /// It can do nothing that was asked.
+    Skipped,
+}
+
+/// Why a run could not even keep its files.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: {source}")]
+pub struct RunError {
+    /// The file or folder.
+    pub path: String,
+    /// The system's reason.
+    pub source: std::io::Error,
+}
+
+/// Told of every job as it starts and ends.
+pub trait Progress {
+    /// A job starts.
+    fn started(&self, engine: &str, procedure: &str);
+    /// A job ended, with its failure if it failed.
+    fn ended(&self, engine: &str, procedure: &str, wall: Duration, failure: Option<&str>);
+}
+
+/// Runs every job of a plan.
+pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress) -> Result<Outcome, RunError> {
+    let mut recordings = vec![];
+    for (e, planned) in plan.engines.iter().enumerate() {
+        let mut of_engine = vec![];
+        for run in plan.runs.iter().filter(|r| r.engine == e) {
+            let task = &plan.tasks[run.task];
+            progress.started(planned.engine.id().0, task.procedure);
+            let recording = record(case, planned, run, task, options);
+            let wall = Duration::from_secs_f64(recording.wall_s);
+            progress.ended(&recording.engine, task.procedure, wall, recording.failure.as_deref());
+            of_engine.push(recording);
+            // Written as each job finishes, so that an interruption loses only what was under way.
+            keep(&options.out.join("readings").join(format!("{}.json", planned.engine.id())), &of_engine)?;
+        }
+        recordings.extend(of_engine);
+    }
+    let engines = plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
+    Ok(Outcome { recordings, engines })
+}
+
+fn record(case: &Case, planned: &Planned, run: &Run, task: &Task, options: &Options) -> Recording {
+    let engine = planned.engine.id();
+    let start = Instant::now();
+    let measured = measure(planned, &run.job, task.procedure, options);
+    let (measurement, failure) = match measured {
+        Ok(measurement) => (measurement, None),
+        Err(error) => {
+            tracing::error!(%engine, procedure = task.procedure, "{error}");
+            (Measurement::default(), Some(error.to_string()))
+        }
+    };
+    let readings = measurement.estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
+        meter: target.id.clone(),
+        quantity: task.quantity,
+        value: estimate.value_lx * target.per_lux,
+        std_error: estimate.std_error_lx.map(|e| e * target.per_lux),
+        error_bound: estimate.error_bound_lx.map(|e| e * target.per_lux),
+    });
+    Recording {
+        case: case.name.clone(),
+        procedure: task.procedure.to_owned(),
+        engine: engine.0.to_owned(),
+        version: planned.found.as_ref().map(|v| v.0.clone()).unwrap_or_default(),
+        model: model_name(&task.scene),
+        input_sha256: case.sha256.clone(),
+        seed: run.job.seed,
+        settings: measurement.settings.clone(),
+        approximation: run.approximation.clone(),
+        notes: measurement.notes.clone(),
+        wall_s: start.elapsed().as_secs_f64(),
+        failure,
+        readings: readings.collect(),
+    }
+}
+
+fn measure(planned: &Planned, job: &Job, procedure: &str, options: &Options) -> Result<Measurement, EngineError> {
+    if process::is_interrupted() {
+        return Err(process::ProcessError::Interrupted { program: planned.engine.id().0.to_owned() }.into());
+    }
+    let engine = planned.engine.id();
+    let scene_dir = options.out.join("scenes").join(engine.0).join(procedure);
+    let workbench = Workbench {
+        site: options.site.clone(),
+        scene_dir: fresh(&scene_dir)?,
+        log: absolute(&options.out.join("logs").join(format!("{engine}.{procedure}.log")))?,
+        jobs: options.jobs,
+        limit: limit(job.budget),
+    };
+    fs::remove_file(&workbench.log).or_else(ignore_absence).map_err(|e| EngineError::io(&workbench.log, e))?;
+    let measurement = planned.engine.read(job, &workbench)?;
+    // Our own solvers write no scene: an empty folder would only puzzle.
+    fs::remove_dir(&workbench.scene_dir).ok();
+    checked(engine, job, measurement)
+}
+
+/// Far beyond the budget, which engines keep by themselves: this is for those that hang.
+fn limit(budget: Budget) -> Duration {
+    Duration::from_secs_f64((2.0 * budget.seconds + 120.0).min(1e9))
+}
+
+/// An empty folder, absolute, so that programs can run inside it.
+fn fresh(folder: &Path) -> Result<PathBuf, EngineError> {
+    let fail = |e| EngineError::io(folder, e);
+    fs::remove_dir_all(folder).or_else(ignore_absence).map_err(fail)?;
+    fs::create_dir_all(folder).map_err(fail)?;
+    absolute(folder)
+}
+
+fn absolute(path: &Path) -> Result<PathBuf, EngineError> {
+    std::path::absolute(path).map_err(|e| EngineError::io(path, e))
+}
+
+fn ignore_absence(error: std::io::Error) -> std::io::Result<()> {
+    if error.kind() == std::io::ErrorKind::NotFound { Ok(()) } else { Err(error) }
+}
+
+/// Writes JSON so that a reader sees either the old file or the new one, never half of one.
+pub fn keep<T: Serialize>(path: &Path, value: &T) -> Result<(), RunError> {
+    let fail = |source| RunError { path: path.display().to_string(), source };
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(fail)?;
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(fail)?;
+    serde_json::to_writer_pretty(&mut file, value).map_err(|e| fail(e.into()))?;
+    std::io::Write::write_all(&mut file, b"\n").map_err(fail)?;
+    file.persist(path).map_err(|e| fail(e.error))?;
+    Ok(())
+}
+
+fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
+    let id = planned.engine.id().0;
+    let mine: Vec<&Recording> = recordings.iter().filter(|r| r.engine == id).collect();
+    let failures: Vec<&str> = mine.iter().filter_map(|r| r.failure.as_deref()).collect();
+    let (status, reason) = match &planned.found {
+        Err(absent) => (Status::Absent, Some(absent.to_string())),
+        Ok(_) if !failures.is_empty() => (Status::Failed, Some(failures.join("; "))),
+        Ok(_) if mine.is_empty() => (Status::Skipped, Some("it supports nothing that was asked".to_owned())),
+        Ok(_) => (Status::Ran, None),
+    };
+    EngineStatus {
+        id: id.to_owned(),
+        version: planned.found.as_ref().ok().map(|v| v.0.clone()),
+        status,
+        reason,
+        wall_s: mine.iter().map(|r| r.wall_s).sum(),
+    }
+}
+
+fn model_name(scene: &Scene) -> String {
+    let mut models: Vec<&str> = scene.luminaires.iter().map(|l| l.model.name()).collect();
+    models.sort_unstable();
+    models.dedup();
+    if let [one] = models[..] { one.to_owned() } else { "mixed".to_owned() }
+}

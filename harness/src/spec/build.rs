@@ -1,0 +1,398 @@
+//! Spec -> Case: reads the files that a spec names, checks what the shape alone cannot, and builds the scene.
+
+use std::collections::{BTreeMap, HashSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::DVec3;
+use luminaire::geometry::Room;
+use luminaire::photometry::{self, Photometry};
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, orientation};
+use sha2::{Digest, Sha256};
+
+use super::model::{
+    Angles, Budget, EngineSettings, GridSpec, LuminaireSpec, MeterSet, ModelSpec, ObstacleSpec, Procedures, Spec,
+    ToleranceOverride,
+};
+use super::{Source, SpecError, nearest};
+
+/// Nearest a meter or a luminaire may come to a surface, relative to the room's largest extent.
+///
+/// On the surface itself a renderer's answer depends on rounding, and so would ours.
+const SURFACE_MARGIN: f64 = 1e-9;
+
+/// More meters than this are a slip of the pen.
+const MAX_METERS: usize = 1_000_000;
+
+/// A spec, read, checked and built: all that the rest of the program needs.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// The spec's file stem.
+    pub name: String,
+    /// The spec's title, or its name.
+    pub title: String,
+    /// The spec's path as given.
+    pub path: PathBuf,
+    /// SHA-256 over the spec and every file that it names, in hexadecimal.
+    pub sha256: String,
+    /// Room, obstacles and luminaires.
+    pub scene: Scene,
+    /// Meters by set.
+    pub meters: BTreeMap<String, Vec<Meter>>,
+    /// What is measured.
+    pub procedures: Procedures,
+    /// The engines that the spec names, with settings; `None` where it names none.
+    pub engines: Option<BTreeMap<String, EngineSettings>>,
+    /// When an engine may stop.
+    pub budget: Budget,
+    /// The published tables, absolute or relative to the working directory.
+    pub published: Option<PathBuf>,
+    /// Overrides of the default tolerances, by procedure.
+    pub tolerances: BTreeMap<String, ToleranceOverride>,
+    /// The text, for the places of later errors.
+    pub source: Source,
+}
+
+impl Case {
+    /// Reads, checks and builds the case of a spec file.
+    pub fn load(path: &Path) -> Result<Self, SpecError> {
+        let source = Source::read(path)?;
+        let spec = source.parse()?;
+        Builder { source: &source, folder: path.parent().unwrap_or(Path::new("")), hash: Sha256::new() }.build(spec)
+    }
+}
+
+struct Builder<'a> {
+    source: &'a Source,
+    folder: &'a Path,
+    hash: Sha256,
+}
+
+impl Builder<'_> {
+    fn build(mut self, spec: Spec) -> Result<Case, SpecError> {
+        self.hash.update(&self.source.text);
+        if spec.luxproof != 1 {
+            let message = format!("format version {} is not known", spec.luxproof);
+            return Err(self.source.error_at("luxproof", message, "this program reads version 1"));
+        }
+        let room = self.room(&spec)?;
+        let obstacles = self.obstacles(&spec.obstacles, &room)?;
+        let luminaires = self.luminaires(&spec.luminaires, &room)?;
+        let scene = Scene { room: Some(room), obstacles, luminaires };
+        let mut meters = BTreeMap::new();
+        for (name, set) in &spec.meters {
+            meters.insert(name.clone(), self.meter_set(name, set, &scene)?);
+        }
+        self.procedures(&spec.procedures, &spec.luminaires, &meters)?;
+        self.budget(spec.budget)?;
+        self.tolerances(&spec.tolerances)?;
+        let published = spec.published.map(|file| self.beside(&file));
+        if let Some(file) = &published {
+            let bytes = self.read("published", file)?;
+            self.hash.update(bytes);
+        }
+        let name = self.source.path.file_stem().map_or_else(|| "spec".into(), |s| s.to_string_lossy().into_owned());
+        Ok(Case {
+            title: spec.title.unwrap_or_else(|| name.clone()),
+            name,
+            path: self.source.path.clone(),
+            sha256: self.hash.finalize().iter().map(|b| format!("{b:02x}")).collect(),
+            scene,
+            meters,
+            procedures: spec.procedures,
+            engines: spec.engines,
+            budget: spec.budget,
+            published,
+            tolerances: spec.tolerances,
+            source: self.source.clone(),
+        })
+    }
+
+    fn room(&self, spec: &Spec) -> Result<Room, SpecError> {
+        for (k, size) in spec.room.size_m.iter().enumerate() {
+            if !(size.is_finite() && *size > 0.0) {
+                let message = format!("{size} m is no extent");
+                return Err(self.source.error_at(
+                    &format!("room.size_m[{k}]"),
+                    message,
+                    "give a positive number of metres",
+                ));
+            }
+        }
+        Ok(Room { size_m: DVec3::from(spec.room.size_m), reflectance: spec.room.reflectance.build() })
+    }
+
+    fn obstacles(&mut self, specs: &[ObstacleSpec], room: &Room) -> Result<Vec<Obstacle>, SpecError> {
+        let mut obstacles = vec![];
+        for (k, spec) in specs.iter().enumerate() {
+            let at = format!("obstacles[{k}]");
+            let obstacle = match (&spec.cuboid, &spec.mesh) {
+                (Some(cuboid), None) => {
+                    let (min_m, max_m) = (DVec3::from(cuboid.min_m), DVec3::from(cuboid.max_m));
+                    if !(min_m.is_finite() && max_m.is_finite() && min_m.cmplt(max_m).all()) {
+                        let message = format!("the box from {min_m} to {max_m} has no volume");
+                        return Err(self.source.error_at(&at, message, "give min_m below max_m on every axis"));
+                    }
+                    Obstacle { shape: Shape::Box { min_m, max_m }, reflectance: cuboid.reflectance.0 }
+                }
+                (None, Some(mesh)) => {
+                    let path = self.beside(&mesh.file);
+                    let bytes = self.read(&format!("{at}.mesh.file"), &path)?;
+                    self.hash.update(bytes);
+                    let message = "meshes are not read yet".to_owned();
+                    return Err(self.source.error_at(&at, message, "use boxes"));
+                }
+                _ => {
+                    let message = "an obstacle is either a box or a mesh";
+                    return Err(self.source.error_at(&at, message, "give exactly one of `box` and `mesh`"));
+                }
+            };
+            let (low, high) = extent(&obstacle.shape);
+            if low.min_element() < 0.0 || high.cmpgt(room.size_m).any() {
+                let message = format!("it reaches from {low} to {high}, outside the room");
+                return Err(self.source.error_at(&at, message, within(room)));
+            }
+            obstacles.push(obstacle);
+        }
+        Ok(obstacles)
+    }
+
+    fn luminaires(&mut self, specs: &[LuminaireSpec], room: &Room) -> Result<Vec<Luminaire>, SpecError> {
+        if specs.is_empty() {
+            return Err(self.source.error_at("luminaires", "there are none", "give at least one luminaire"));
+        }
+        let mut ids = HashSet::new();
+        let mut files: BTreeMap<PathBuf, Arc<Photometry>> = BTreeMap::new();
+        let mut luminaires = vec![];
+        for (k, spec) in specs.iter().enumerate() {
+            let at = |field: &str| format!("luminaires[{k}].{field}");
+            if spec.id.is_empty() || !ids.insert(&spec.id) {
+                let message = format!("`{}` is no unique name", spec.id);
+                return Err(self.source.error_at(&at("id"), message, "give every luminaire an id of its own"));
+            }
+            let position_m = DVec3::from(spec.at_m);
+            // A luminous opening may be flush with a surface; light from a single point on one would be half lost.
+            let margin = if spec.model == ModelSpec::Point { SURFACE_MARGIN * room.size_m.max_element() } else { 0.0 };
+            if !(position_m.is_finite() && room.contains(position_m, margin)) {
+                let message = format!("{position_m} lies outside the room or on its surface");
+                return Err(self.source.error_at(&at("at_m"), message, within(room)));
+            }
+            if !(spec.flux_scale.is_finite() && spec.flux_scale >= 0.0) {
+                let message = format!("{} is no factor", spec.flux_scale);
+                return Err(self.source.error_at(&at("flux_scale"), message, "give a number from 0"));
+            }
+            let turn = spec.rotate_deg;
+            if ![turn.azimuth, turn.tilt, turn.roll].iter().all(|a| a.is_finite()) {
+                return Err(self.source.error_at(&at("rotate_deg"), "angles must be finite", "give degrees"));
+            }
+            let path = self.beside(&spec.photometry);
+            let photometry = match files.get(&path) {
+                Some(read) => Arc::clone(read),
+                None => Arc::clone(files.entry(path.clone()).or_insert(self.photometry(&at("photometry"), &path)?)),
+            };
+            luminaires.push(Luminaire {
+                id: spec.id.clone(),
+                photometry,
+                position_m,
+                orientation: orientation(turn.azimuth, turn.tilt, turn.roll),
+                flux_scale: spec.flux_scale,
+                model: match spec.model {
+                    ModelSpec::Point => LuminaireModel::Point,
+                    ModelSpec::Area => LuminaireModel::Area,
+                    ModelSpec::Impostor => LuminaireModel::Impostor,
+                },
+            });
+        }
+        Ok(luminaires)
+    }
+
+    fn photometry(&mut self, at: &str, path: &Path) -> Result<Arc<Photometry>, SpecError> {
+        let bytes = self.read(at, path)?;
+        self.hash.update(bytes);
+        photometry::read_file(path).map(Arc::new).map_err(|error| SpecError {
+            file: path.to_owned(),
+            // The reader counts from 1; 0 is no place.
+            line: Some(error.line).filter(|l| *l > 0),
+            column: Some(error.column).filter(|c| *c > 0),
+            message: error.message(),
+            help: Some(error.help().to_owned()),
+        })
+    }
+
+    fn meter_set(&self, name: &str, set: &MeterSet, scene: &Scene) -> Result<Vec<Meter>, SpecError> {
+        let at = format!("meters.{name}");
+        let normal = DVec3::from(set.normal);
+        let Some(normal) = normal.try_normalize().filter(|_| normal.is_finite()) else {
+            let message = "the normal has no direction";
+            return Err(self.source.error_at(&format!("{at}.normal"), message, "give a vector other than zero"));
+        };
+        let (points, place): (Vec<DVec3>, &str) = match (&set.points_m, &set.grid) {
+            (Some(points), None) => (points.iter().map(|p| DVec3::from(*p)).collect(), "points_m"),
+            (None, Some(grid)) => (self.grid(&at, grid)?, "grid"),
+            _ => {
+                let message = "a meter set is either points or a grid";
+                return Err(self.source.error_at(&at, message, "give exactly one of `points_m` and `grid`"));
+            }
+        };
+        if points.is_empty() {
+            return Err(self.source.error_at(&at, "the set holds no points", "give at least one"));
+        }
+        for (k, &point) in points.iter().enumerate() {
+            if let Some((message, help)) = misplaced(point, scene) {
+                let path = if place == "grid" { format!("{at}.grid") } else { format!("{at}.points_m[{k}]") };
+                return Err(self.source.error_at(&path, format!("{name}[{k}] at {point} {message}"), help));
+            }
+        }
+        Ok(points.into_iter().map(|position_m| Meter { position_m, normal }).collect())
+    }
+
+    fn grid(&self, at: &str, grid: &GridSpec) -> Result<Vec<DVec3>, SpecError> {
+        let [nu, nv] = grid.counts;
+        if nu.checked_mul(nv).is_none_or(|n| n == 0 || n > MAX_METERS) {
+            let message = format!("{nu} x {nv} points");
+            let help = format!("give counts whose product lies between 1 and {MAX_METERS}");
+            return Err(self.source.error_at(&format!("{at}.grid.counts"), message, help));
+        }
+        let (origin, u, v) = (DVec3::from(grid.origin_m), DVec3::from(grid.u_m), DVec3::from(grid.v_m));
+        Ok((0..nv).flat_map(|j| (0..nu).map(move |i| origin + u * i as f64 + v * j as f64)).collect())
+    }
+
+    fn procedures(
+        &self,
+        procedures: &Procedures,
+        luminaires: &[LuminaireSpec],
+        meters: &BTreeMap<String, Vec<Meter>>,
+    ) -> Result<(), SpecError> {
+        let sets = [
+            ("direct_illuminance", procedures.direct_illuminance.as_ref().map(|p| &p.meters)),
+            ("indirect_illuminance", procedures.indirect_illuminance.as_ref().map(|p| &p.meters)),
+            ("total_illuminance", procedures.total_illuminance.as_ref().map(|p| &p.meters)),
+        ];
+        if procedures.luminous_intensity.is_none() && sets.iter().all(|(_, names)| names.is_none()) {
+            return Err(self.source.error_at("procedures", "there are none", "give at least one procedure"));
+        }
+        for (procedure, names) in sets {
+            for name in names.into_iter().flat_map(|n| n.iter()) {
+                if !meters.contains_key(name) {
+                    let message = format!("there is no meter set `{name}`");
+                    let help = suggestion(name, meters.keys().map(String::as_str));
+                    return Err(self.source.error_at(&format!("procedures.{procedure}.meters"), message, help));
+                }
+            }
+        }
+        let Some(intensity) = &procedures.luminous_intensity else { return Ok(()) };
+        let at = |field: &str| format!("procedures.luminous_intensity.{field}");
+        if !luminaires.iter().any(|l| l.id == intensity.luminaire) {
+            let message = format!("there is no luminaire `{}`", intensity.luminaire);
+            let help = suggestion(&intensity.luminaire, luminaires.iter().map(|l| l.id.as_str()));
+            return Err(self.source.error_at(&at("luminaire"), message, help));
+        }
+        if !(intensity.distance_m.is_finite() && intensity.distance_m > 0.0) {
+            let message = format!("{} m is no distance", intensity.distance_m);
+            return Err(self.source.error_at(&at("distance_m"), message, "give a positive number of metres"));
+        }
+        if let Angles::Listed(lists) = &intensity.angles {
+            let sound = |g: &f64| (0.0..=180.0).contains(g);
+            if lists.gamma_deg.is_empty() || !lists.gamma_deg.iter().all(sound) {
+                let help = "list gamma angles from 0 (nadir) to 180 (zenith)";
+                return Err(self.source.error_at(&at("angles.gamma_deg"), "not a list of gamma angles", help));
+            }
+            if lists.c_deg.is_empty() || !lists.c_deg.iter().all(|c| c.is_finite()) {
+                return Err(self.source.error_at(
+                    &at("angles.c_deg"),
+                    "not a list of C angles",
+                    "list C planes in degrees",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn budget(&self, budget: Budget) -> Result<(), SpecError> {
+        for (field, value) in [("relative_error", budget.relative_error), ("seconds", budget.seconds)] {
+            if !(value.is_finite() && value > 0.0) {
+                let at = format!("budget.{field}");
+                return Err(self.source.error_at(&at, format!("{value} is no budget"), "give a positive number"));
+            }
+        }
+        Ok(())
+    }
+
+    fn tolerances(&self, tolerances: &BTreeMap<String, ToleranceOverride>) -> Result<(), SpecError> {
+        for (procedure, tolerance) in tolerances {
+            if !Procedures::NAMES.contains(&procedure.as_str()) {
+                let help = suggestion(procedure, Procedures::NAMES.into_iter());
+                let message = format!("`{procedure}` is no procedure");
+                return Err(self.source.error_at("tolerances", message, help));
+            }
+            let values = [tolerance.relative, tolerance.absolute_lx, tolerance.absolute_cd];
+            if !values.iter().all(|v| v.is_finite() && *v >= 0.0) {
+                let at = format!("tolerances.{procedure}");
+                return Err(self.source.error_at(&at, "a tolerance is a number from 0", "give positive numbers"));
+            }
+        }
+        Ok(())
+    }
+
+    fn beside(&self, file: &Path) -> PathBuf {
+        self.folder.join(file)
+    }
+
+    fn read(&self, at: &str, path: &Path) -> Result<Vec<u8>, SpecError> {
+        std::fs::read(path).map_err(|error| {
+            let message = format!("{} cannot be read: {error}", path.display());
+            self.source.error_at(at, message, "paths are relative to the spec's folder")
+        })
+    }
+}
+
+impl Procedures {
+    /// The procedures' names in specs and reports, in their order.
+    pub const NAMES: [&str; 4] =
+        ["luminous_intensity", "direct_illuminance", "indirect_illuminance", "total_illuminance"];
+}
+
+/// What is wrong with a meter at this point, and what to do.
+fn misplaced(point: DVec3, scene: &Scene) -> Option<(&'static str, String)> {
+    let room = scene.room.as_ref()?;
+    let margin = SURFACE_MARGIN * room.size_m.max_element();
+    if !point.is_finite() || !room.contains(point, -margin) {
+        return Some(("lies outside the room", within(room)));
+    }
+    if !room.contains(point, margin) {
+        let help = "a meter on a surface sees half of nothing: move it inwards, by 1e-6 m say".to_owned();
+        return Some(("lies on a surface of the room", help));
+    }
+    let inside = |shape: &Shape| match shape {
+        Shape::Box { min_m, max_m } => point.cmpge(*min_m).all() && point.cmple(*max_m).all(),
+        Shape::Mesh { .. } => false,
+    };
+    if scene.obstacles.iter().any(|o| inside(&o.shape)) {
+        return Some(("lies inside an obstacle or on its surface", "move it out, by 1e-6 m at least".to_owned()));
+    }
+    if scene.luminaires.iter().any(|l| l.position_m.distance(point) <= margin) {
+        return Some(("lies in a luminaire's photometric centre", "move it away".to_owned()));
+    }
+    None
+}
+
+fn extent(shape: &Shape) -> (DVec3, DVec3) {
+    match shape {
+        Shape::Box { min_m, max_m } => (*min_m, *max_m),
+        Shape::Mesh { vertices_m, .. } => {
+            vertices_m.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
+        }
+    }
+}
+
+fn within(room: &Room) -> String {
+    let [x, y, z] = room.size_m.to_array();
+    format!("the room reaches from [0, 0, 0] to [{x}, {y}, {z}] m")
+}
+
+fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
+    match nearest(word, known.clone()) {
+        Some(name) => format!("did you mean `{name}`?"),
+        None => format!("known: {}", known.collect::<Vec<_>>().join(", ")),
+    }
+}

@@ -1,0 +1,99 @@
+//! Finds line and column of a place in a YAML text by walking to it and failing there: the parser knows where it is.
+
+use std::fmt;
+
+use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
+
+/// Line and column (from 1) of a path such as `meters.ceiling.points_m[2]`, or of its longest part that exists.
+pub(super) fn locate(text: &str, path: &str) -> Option<(usize, usize)> {
+    let steps = steps(path);
+    (0..=steps.len()).rev().find_map(|n| {
+        let deserializer = serde_yaml::Deserializer::from_str(text);
+        let error = Walk { steps: &steps[..n] }.deserialize(deserializer).err()?;
+        let location = error.location().filter(|_| error.to_string().contains(MARK))?;
+        Some((location.line(), location.column()))
+    })
+}
+
+const MARK: &str = "luxproof-was-here";
+
+#[derive(Debug, PartialEq)]
+enum Step {
+    Key(String),
+    Index(usize),
+}
+
+fn steps(path: &str) -> Vec<Step> {
+    let mut steps = vec![];
+    for part in path.split('.').filter(|p| !p.is_empty()) {
+        let mut pieces = part.split('[');
+        if let Some(key) = pieces.next().filter(|k| !k.is_empty()) {
+            steps.push(Step::Key(key.to_owned()));
+        }
+        steps.extend(pieces.filter_map(|i| i.trim_end_matches(']').parse().ok().map(Step::Index)));
+    }
+    steps
+}
+
+struct Walk<'a> {
+    steps: &'a [Step],
+}
+
+impl<'de> DeserializeSeed<'de> for Walk<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Walk<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(MARK)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        let Some((Step::Key(wanted), rest)) = self.steps.split_first() else {
+            return Err(A::Error::custom(MARK));
+        };
+        while let Some(key) = map.next_key::<String>()? {
+            if key == *wanted {
+                return map.next_value_seed(Walk { steps: rest });
+            }
+            map.next_value::<IgnoredAny>()?;
+        }
+        Ok(())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<(), A::Error> {
+        let Some((Step::Index(wanted), rest)) = self.steps.split_first() else {
+            return Err(A::Error::custom(MARK));
+        };
+        for _ in 0..*wanted {
+            seq.next_element::<IgnoredAny>()?;
+        }
+        seq.next_element_seed(Walk { steps: rest }).map(|_| ())
+    }
+    // Scalars fall through to the default methods, which fail with "expected luxproof-was-here".
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_found_in_block_and_flow_style() {
+        let text = "room:\n  size_m: [1, 2]\nmeters:\n  a:\n    points_m: [[1, 2, 3], [4, 5, 6]]\n";
+        assert_eq!(locate(text, "room.size_m"), Some((2, 11)));
+        assert_eq!(locate(text, "meters.a.points_m[1]"), Some((5, 27)));
+        assert_eq!(locate(text, "meters.a.points_m[1][2]"), Some((5, 34)));
+        assert_eq!(locate(text, "room.size_m[1]"), Some((2, 15)));
+    }
+
+    #[test]
+    fn a_path_that_does_not_exist_is_placed_at_its_nearest_parent() {
+        assert_eq!(locate("room:\n  size_m: [1, 2]\n", "room.reflectance.floor"), Some((2, 3)));
+    }
+}

@@ -1,0 +1,171 @@
+//! The spec: one YAML file of room, luminaires, meters and procedures, read, checked and built into a scene.
+//!
+//! The only module that knows `serde_yaml`. Every error names file, line and column.
+
+mod build;
+mod locate;
+mod model;
+
+use std::path::{Path, PathBuf};
+
+pub use build::Case;
+pub use model::{
+    Angles, BouncesSpec, Budget, DirectIlluminance, EngineSettings, IndirectIlluminance, LuminousIntensity, Names,
+    Procedures, Spec, ToleranceOverride, TotalIlluminance,
+};
+
+/// What is wrong with a spec, where, and what to do.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}{message}{}", place(.file, *.line, *.column), help.as_ref().map(|h| format!("; {h}")).unwrap_or_default())]
+pub struct SpecError {
+    /// The file that holds the error: the spec or a file that it names.
+    pub file: PathBuf,
+    /// Line, counted from 1, where the error has one.
+    pub line: Option<usize>,
+    /// Column, counted from 1.
+    pub column: Option<usize>,
+    /// What is wrong.
+    pub message: String,
+    /// What to do.
+    pub help: Option<String>,
+}
+
+fn place(file: &Path, line: Option<usize>, column: Option<usize>) -> String {
+    let number = |n: Option<usize>| n.map(|n| format!("{n}:")).unwrap_or_default();
+    format!("{}:{}{} ", file.display(), number(line), number(column))
+}
+
+/// A spec file as it was read: its text, kept for the places of errors.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// The path as given.
+    pub path: PathBuf,
+    /// The text.
+    pub text: String,
+}
+
+impl Source {
+    /// Reads a spec file.
+    pub fn read(path: &Path) -> Result<Self, SpecError> {
+        let fail = |message: String, help: &str| SpecError {
+            file: path.to_owned(),
+            line: None,
+            column: None,
+            message,
+            help: Some(help.to_owned()),
+        };
+        let bytes = std::fs::read(path).map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
+        let text = String::from_utf8(bytes).map_err(|e| fail(format!("is not UTF-8: {e}"), "save it as UTF-8"))?;
+        Ok(Self { path: path.to_owned(), text })
+    }
+
+    /// Parses the text; unknown keys are errors with the nearest known key.
+    pub fn parse(&self) -> Result<Spec, SpecError> {
+        serde_yaml::from_str(&self.text).map_err(|error| {
+            let message = error.to_string();
+            // serde_yaml ends its message with the place, which the error carries already.
+            let message = message.split(" at line ").next().unwrap_or(&message).to_owned();
+            let help = nearest_key(&message);
+            let location = error.location();
+            SpecError {
+                file: self.path.clone(),
+                line: location.as_ref().map(serde_yaml::Location::line),
+                column: location.as_ref().map(serde_yaml::Location::column),
+                message,
+                help,
+            }
+        })
+    }
+
+    /// An error at a place in the file, given as a path such as `meters.ceiling.points_m[2]`.
+    pub fn error_at(&self, path: &str, message: impl Into<String>, help: impl Into<String>) -> SpecError {
+        let place = locate::locate(&self.text, path);
+        SpecError {
+            file: self.path.clone(),
+            line: place.map(|p| p.0),
+            column: place.map(|p| p.1),
+            message: format!("{path}: {}", message.into()),
+            help: Some(help.into()),
+        }
+    }
+}
+
+/// Parses one of the project's own YAML tables; the error text carries line and column.
+pub fn from_yaml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
+    serde_yaml::from_str(text).map_err(|e| e.to_string())
+}
+
+/// A help text that names the known key closest to an unknown one, read off serde's message.
+fn nearest_key(message: &str) -> Option<String> {
+    let (_, rest) = message.split_once("unknown field `")?;
+    let mut names = rest.split('`').step_by(2);
+    let unknown = names.next()?;
+    let known: Vec<&str> = names.collect();
+    nearest(unknown, known.iter().copied()).map(|k| format!("did you mean `{k}`?"))
+}
+
+/// The candidate most like `word`, if any is like it at all.
+pub fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    candidates
+        .map(|c| (strsim::jaro_winkler(word, c), c))
+        .filter(|(likeness, _)| *likeness > 0.7)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, c)| c)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Spec, SpecError> {
+        Source { path: "spec.yaml".into(), text: text.into() }.parse()
+    }
+
+    const MINIMAL: &str = "luxproof: 1
+room:
+  size_m: [20, 20, 20]
+  reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.8}
+luminaires:
+  - {id: a, photometry: a.ies, at_m: [10, 10, 10]}
+meters:
+  plane: {points_m: [[1, 1, 1]], normal: [0, 0, 1]}
+procedures:
+  direct_illuminance: {meters: plane}
+";
+
+    #[test]
+    fn a_minimal_spec_is_read() {
+        let spec = parse(MINIMAL).unwrap();
+        assert_eq!(spec.room.size_m, [20.0, 20.0, 20.0]);
+        assert!(spec.procedures.direct_illuminance.is_some());
+    }
+
+    #[test]
+    fn unknown_keys_are_placed_and_answered_with_the_nearest_key() {
+        let error = parse(&MINIMAL.replace("size_m", "sise_m")).unwrap_err();
+        assert_eq!((error.line, error.column), (Some(3), Some(3)), "{error}");
+        assert_eq!(error.help.as_deref(), Some("did you mean `size_m`?"));
+    }
+
+    #[test]
+    fn a_reflectance_outside_zero_to_one_is_refused_at_its_place() {
+        let error = parse(&MINIMAL.replace("0.5", "1.5")).unwrap_err();
+        assert_eq!((error.line, error.column), (Some(4), Some(36)), "{error}");
+        assert!(error.message.contains("1.5"), "{error}");
+    }
+
+    #[test]
+    fn walls_may_differ_and_meter_sets_may_be_listed() {
+        let text = MINIMAL
+            .replace("walls: 0.5", "walls: {x-: 0.1, x+: 0.2, y-: 0.3, y+: 0.4}")
+            .replace("meters: plane}", "meters: [plane]}");
+        let reflectances = parse(&text).unwrap().room.reflectance.build();
+        assert_eq!((reflectances.wall_x_max, reflectances.wall_y_min), (0.2, 0.3));
+    }
+
+    #[test]
+    fn text_is_no_number() {
+        let error = parse(&MINIMAL.replace("[1, 1, 1]", "[1, much, 1]")).unwrap_err();
+        assert_eq!(error.line, Some(8), "{error}");
+    }
+}

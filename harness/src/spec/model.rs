@@ -1,0 +1,569 @@
+//! The spec's shape: one type a part of the file, unknown keys refused.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::PathBuf;
+
+use luminaire::geometry::Reflectances;
+use luminaire::scene::Bounces;
+use schemars::JsonSchema;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Serialize};
+
+/// A luxproof spec: a room, luminaires, measuring points and the procedures to run on them.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Spec {
+    /// Version of the format: 1.
+    pub luxproof: u32,
+    /// What the case is, in a line.
+    #[serde(default)]
+    pub title: Option<String>,
+    /// The room.
+    pub room: RoomSpec,
+    /// Opaque diffuse bodies.
+    #[serde(default)]
+    pub obstacles: Vec<ObstacleSpec>,
+    /// The luminaires, at least one.
+    pub luminaires: Vec<LuminaireSpec>,
+    /// Named sets of measuring points.
+    #[serde(default)]
+    pub meters: BTreeMap<String, MeterSet>,
+    /// What is measured.
+    pub procedures: Procedures,
+    /// Engines to run, with settings; all that are there by default.
+    #[serde(default)]
+    pub engines: Option<BTreeMap<String, EngineSettings>>,
+    /// When an engine may stop.
+    #[serde(default)]
+    pub budget: Budget,
+    /// Tables of a paper as further references, relative to the spec.
+    #[serde(default)]
+    pub published: Option<PathBuf>,
+    /// Overrides of the default tolerances, by procedure.
+    #[serde(default)]
+    pub tolerances: BTreeMap<String, ToleranceOverride>,
+}
+
+/// A closed box room with one corner at the origin, z up.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RoomSpec {
+    /// Extents along x, y, z in metres.
+    pub size_m: [f64; 3],
+    /// Diffuse reflectances.
+    pub reflectance: ReflectanceSpec,
+}
+
+/// Diffuse reflectances of the surfaces, each 0 to 1.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ReflectanceSpec {
+    /// Of the floor.
+    pub floor: Fraction,
+    /// Of the walls: one number, or one a wall.
+    pub walls: Walls,
+    /// Of the ceiling.
+    pub ceiling: Fraction,
+}
+
+impl ReflectanceSpec {
+    /// The six reflectances.
+    pub fn build(&self) -> Reflectances {
+        let (floor, ceiling) = (self.floor.0, self.ceiling.0);
+        match &self.walls {
+            Walls::All(rho) => Reflectances::with_equal_walls(floor, rho.0, ceiling),
+            Walls::Each(walls) => Reflectances {
+                floor,
+                ceiling,
+                wall_x_min: walls.x_min.0,
+                wall_x_max: walls.x_max.0,
+                wall_y_min: walls.y_min.0,
+                wall_y_max: walls.y_max.0,
+            },
+        }
+    }
+}
+
+/// A number from 0 to 1.
+#[derive(Clone, Copy, Debug, JsonSchema)]
+pub struct Fraction(#[schemars(range(min = 0, max = 1))] pub f64);
+
+impl<'de> Deserialize<'de> for Fraction {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(Number).and_then(Self::checked)
+    }
+}
+
+impl Fraction {
+    fn checked<E: Error>(value: f64) -> Result<Self, E> {
+        if (0.0..=1.0).contains(&value) {
+            Ok(Self(value))
+        } else {
+            Err(E::custom(format!("a reflectance lies between 0 and 1, not at {value}")))
+        }
+    }
+}
+
+/// The range check belongs inside the visitor: only there does the parser still know the place.
+struct Number;
+
+impl Visitor<'_> for Number {
+    type Value = f64;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a number between 0 and 1")
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<f64, E> {
+        Fraction::checked(value).map(|f| f.0)
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<f64, E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<f64, E> {
+        self.visit_f64(value as f64)
+    }
+}
+
+/// Reflectance of the walls.
+#[derive(Clone, Debug, JsonSchema)]
+#[schemars(untagged)]
+pub enum Walls {
+    /// All four alike.
+    All(Fraction),
+    /// One a wall.
+    Each(FourWalls),
+}
+
+/// Reflectance of each wall.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FourWalls {
+    /// The wall at x = 0.
+    #[serde(rename = "x-")]
+    pub x_min: Fraction,
+    /// The wall at x = length.
+    #[serde(rename = "x+")]
+    pub x_max: Fraction,
+    /// The wall at y = 0.
+    #[serde(rename = "y-")]
+    pub y_min: Fraction,
+    /// The wall at y = width.
+    #[serde(rename = "y+")]
+    pub y_max: Fraction,
+}
+
+impl<'de> Deserialize<'de> for Walls {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = Walls;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("one number for all walls, or {x-: , x+: , y-: , y+: }")
+            }
+
+            fn visit_f64<E: Error>(self, value: f64) -> Result<Walls, E> {
+                Fraction::checked(value).map(Walls::All)
+            }
+
+            fn visit_u64<E: Error>(self, value: u64) -> Result<Walls, E> {
+                self.visit_f64(value as f64)
+            }
+
+            fn visit_i64<E: Error>(self, value: i64) -> Result<Walls, E> {
+                self.visit_f64(value as f64)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Walls, A::Error> {
+                FourWalls::deserialize(MapAccessDeserializer::new(map)).map(Walls::Each)
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+/// An opaque diffuse body: exactly one of `box` and `mesh`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ObstacleSpec {
+    /// An axis-aligned box.
+    #[serde(default, rename = "box")]
+    pub cuboid: Option<BoxSpec>,
+    /// A triangle mesh.
+    #[serde(default)]
+    pub mesh: Option<MeshSpec>,
+}
+
+/// An axis-aligned box.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoxSpec {
+    /// Lower corner in metres.
+    pub min_m: [f64; 3],
+    /// Upper corner in metres.
+    pub max_m: [f64; 3],
+    /// Diffuse reflectance.
+    pub reflectance: Fraction,
+}
+
+/// A triangle mesh from a Wavefront OBJ file.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshSpec {
+    /// The file, relative to the spec; its unit is the metre.
+    pub file: PathBuf,
+    /// Where the file's origin comes to lie, in metres.
+    #[serde(default)]
+    pub at_m: [f64; 3],
+    /// Diffuse reflectance.
+    pub reflectance: Fraction,
+}
+
+/// A luminaire in its place.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LuminaireSpec {
+    /// Its name.
+    pub id: String,
+    /// Photometric file, relative to the spec: .ies, .ldt or .xml (TM-33).
+    pub photometry: PathBuf,
+    /// Photometric centre in metres.
+    pub at_m: [f64; 3],
+    /// Azimuth about z, then tilt about the turned y axis, then roll about the luminaire's own axis.
+    #[serde(default)]
+    pub rotate_deg: RotationSpec,
+    /// Dimming or maintenance factor.
+    #[serde(default = "one")]
+    pub flux_scale: f64,
+    /// How its extent is modelled.
+    #[serde(default)]
+    pub model: ModelSpec,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// Rotation of a luminaire in degrees.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RotationSpec {
+    /// About z.
+    pub azimuth: f64,
+    /// About the turned y axis.
+    pub tilt: f64,
+    /// About the luminaire's own axis.
+    pub roll: f64,
+}
+
+/// How much of a luminaire's body is modelled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ModelSpec {
+    /// All light from the photometric centre.
+    #[default]
+    Point,
+    /// Light from the file's luminous opening.
+    Area,
+    /// An impostor surface (Radiance's illum).
+    Impostor,
+}
+
+/// A named set of measuring points: exactly one of `points_m` and `grid`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeterSet {
+    /// Points in metres.
+    #[serde(default)]
+    pub points_m: Option<Vec<[f64; 3]>>,
+    /// A regular grid of points.
+    #[serde(default)]
+    pub grid: Option<GridSpec>,
+    /// The normal of all of them, any length.
+    pub normal: [f64; 3],
+}
+
+/// A regular grid: origin + i u + j v, i fastest.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GridSpec {
+    /// First point.
+    pub origin_m: [f64; 3],
+    /// Step along the first index.
+    pub u_m: [f64; 3],
+    /// Step along the second index.
+    pub v_m: [f64; 3],
+    /// Points along u and v.
+    pub counts: [usize; 2],
+}
+
+/// What is measured; at least one.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Procedures {
+    /// Procedure 1: the luminous intensity distribution read back.
+    pub luminous_intensity: Option<LuminousIntensity>,
+    /// Procedure 2: direct illuminance.
+    pub direct_illuminance: Option<DirectIlluminance>,
+    /// Procedure 3: reflected light alone.
+    pub indirect_illuminance: Option<IndirectIlluminance>,
+    /// Direct and indirect together.
+    pub total_illuminance: Option<TotalIlluminance>,
+}
+
+/// Procedure 1: intensity from illuminance at a distance, the luminaire alone in free field.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LuminousIntensity {
+    /// Which luminaire.
+    pub luminaire: String,
+    /// Measuring distance in metres.
+    pub distance_m: f64,
+    /// Where: the photometric file's own angles, or lists.
+    #[serde(default)]
+    pub angles: Angles,
+}
+
+/// Directions of procedure 1, in the luminaire's own frame.
+#[derive(Clone, Debug, Default, JsonSchema)]
+#[schemars(untagged)]
+pub enum Angles {
+    /// Every node of the file's table.
+    #[default]
+    #[schemars(with = "PhotometryWord")]
+    Photometry,
+    /// Every combination of the listed angles.
+    Listed(AngleLists),
+}
+
+#[derive(JsonSchema)]
+#[schemars(rename_all = "lowercase")]
+#[allow(dead_code, reason = "the shape of a word in the schema")]
+enum PhotometryWord {
+    Photometry,
+}
+
+/// Lists of angles in degrees.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AngleLists {
+    /// From the nadir.
+    pub gamma_deg: Vec<f64>,
+    /// C planes.
+    pub c_deg: Vec<f64>,
+}
+
+impl<'de> Deserialize<'de> for Angles {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = Angles;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the word `photometry`, or {gamma_deg: [...], c_deg: [...]}")
+            }
+
+            fn visit_str<E: Error>(self, word: &str) -> Result<Angles, E> {
+                match word {
+                    "photometry" => Ok(Angles::Photometry),
+                    other => Err(E::custom(format!("`{other}` is no choice of angles; expected {EXPECTED_ANGLES}"))),
+                }
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Angles, A::Error> {
+                AngleLists::deserialize(MapAccessDeserializer::new(map)).map(Angles::Listed)
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+const EXPECTED_ANGLES: &str = "`photometry` or {gamma_deg: [...], c_deg: [...]}";
+
+/// Procedure 2: direct illuminance at meters.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DirectIlluminance {
+    /// A meter set or a list of sets.
+    pub meters: Names,
+}
+
+/// Procedure 3: indirect illuminance at meters.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IndirectIlluminance {
+    /// A meter set or a list of sets.
+    pub meters: Names,
+    /// How many diffuse reflections count.
+    #[serde(default)]
+    pub bounces: BouncesSpec,
+}
+
+/// Total illuminance at meters.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TotalIlluminance {
+    /// A meter set or a list of sets.
+    pub meters: Names,
+    /// How many diffuse reflections count.
+    #[serde(default)]
+    pub bounces: BouncesSpec,
+}
+
+/// One name or a list of names.
+#[derive(Clone, Debug, JsonSchema)]
+#[schemars(untagged)]
+pub enum Names {
+    /// One.
+    One(String),
+    /// Several.
+    Many(Vec<String>),
+}
+
+impl Names {
+    /// The names in order.
+    pub fn iter(&self) -> impl Iterator<Item = &str> {
+        match self {
+            Self::One(name) => std::slice::from_ref(name).iter().map(String::as_str),
+            Self::Many(names) => names.iter().map(String::as_str),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Names {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = Names;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a meter set or a list of names")
+            }
+
+            fn visit_str<E: Error>(self, name: &str) -> Result<Names, E> {
+                Ok(Names::One(name.to_owned()))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Names, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(Names::Many)
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+/// How many diffuse reflections count: `converged` or a number.
+#[derive(Clone, Copy, Debug, Default, JsonSchema)]
+#[schemars(untagged)]
+pub enum BouncesSpec {
+    /// All of them.
+    #[default]
+    #[schemars(with = "ConvergedWord")]
+    Converged,
+    /// At most so many.
+    AtMost(u32),
+}
+
+#[derive(JsonSchema)]
+#[schemars(rename_all = "lowercase")]
+#[allow(dead_code, reason = "the shape of a word in the schema")]
+enum ConvergedWord {
+    Converged,
+}
+
+impl From<BouncesSpec> for Bounces {
+    fn from(spec: BouncesSpec) -> Self {
+        match spec {
+            BouncesSpec::Converged => Self::Converged,
+            BouncesSpec::AtMost(n) => Self::AtMost(n),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for BouncesSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl Visitor<'_> for Either {
+            type Value = BouncesSpec;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the word `converged` or a number of diffuse reflections from 1")
+            }
+
+            fn visit_str<E: Error>(self, word: &str) -> Result<BouncesSpec, E> {
+                match word {
+                    "converged" => Ok(BouncesSpec::Converged),
+                    other => {
+                        Err(E::custom(format!("`{other}` is no number of bounces; expected `converged` or 1, 2, ...")))
+                    }
+                }
+            }
+
+            fn visit_u64<E: Error>(self, n: u64) -> Result<BouncesSpec, E> {
+                match u32::try_from(n) {
+                    Ok(n) if n >= 1 => Ok(BouncesSpec::AtMost(n)),
+                    _ => Err(E::custom(format!("bounces: {n} is out of range; give 1 or more, or `converged`"))),
+                }
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+/// When an engine may stop: at whichever comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Budget {
+    /// Standard error relative to the reading.
+    #[serde(default = "Budget::default_relative_error")]
+    pub relative_error: f64,
+    /// Wall-clock seconds an engine and procedure.
+    #[serde(default = "Budget::default_seconds")]
+    pub seconds: f64,
+}
+
+impl Budget {
+    fn default_relative_error() -> f64 {
+        0.002
+    }
+
+    fn default_seconds() -> f64 {
+        60.0
+    }
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self { relative_error: Self::default_relative_error(), seconds: Self::default_seconds() }
+    }
+}
+
+/// Settings of one engine; `null` or `{}` for none.
+#[derive(Clone, Debug, Default, PartialEq, JsonSchema)]
+pub struct EngineSettings(pub BTreeMap<String, serde_json::Value>);
+
+impl<'de> Deserialize<'de> for EngineSettings {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Option::<BTreeMap<String, serde_json::Value>>::deserialize(deserializer).map(|s| Self(s.unwrap_or_default()))
+    }
+}
+
+/// An override of a default tolerance.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ToleranceOverride {
+    /// Relative to the reference.
+    #[serde(default)]
+    pub relative: f64,
+    /// Absolute, in lux.
+    #[serde(default)]
+    pub absolute_lx: f64,
+    /// Absolute, in candela.
+    #[serde(default)]
+    pub absolute_cd: f64,
+}
