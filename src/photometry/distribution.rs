@@ -121,14 +121,14 @@ impl LuminousIntensityDistribution {
         let (g, t) = bracket(&self.gamma_deg, gamma_deg);
         let along = |plane: usize| {
             let row = &self.candela[plane * (last + 1)..][..=last];
-            row[g] + t * (row[g + 1] - row[g])
+            lerp(row[g], row[g + 1], t)
         };
         if self.c_deg.len() == 1 {
             return Candela(along(0));
         }
         let (c, s) = bracket(&self.c_deg, self.symmetry.fold(c_deg));
         let (low, high) = (along(c), along(c + 1));
-        Candela(low + s * (high - low))
+        Candela(lerp(low, high, s))
     }
 
     /// Intensity towards `direction`, in the luminaire's own frame, of any length but zero.
@@ -328,6 +328,11 @@ fn bracket(nodes: &[f64], x: f64) -> (usize, f64) {
     let k = nodes.partition_point(|n| *n <= x).clamp(1, nodes.len() - 1) - 1;
     let t = (x - nodes[k]) / (nodes[k + 1] - nodes[k]);
     (k, t.clamp(0.0, 1.0))
+}
+
+/// Linear interpolation that meets both ends exactly, whatever cancels between them.
+fn lerp(a: f64, b: f64, t: f64) -> f64 {
+    if t < 0.5 { a + t * (b - a) } else { b - (1.0 - t) * (b - a) }
 }
 
 fn rising(axis: &'static str, angles: &[f64]) -> Result<(), DistributionError> {

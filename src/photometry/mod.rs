@@ -2,15 +2,23 @@
 
 mod distribution;
 mod error;
+pub mod eulumdat;
 mod lint;
 pub mod lm63;
+mod planes;
 mod text;
+mod write;
+
+#[cfg(test)]
+mod round_trip_tests;
 
 use std::path::Path;
 
 pub use distribution::{DistributionError, LuminousIntensityDistribution, Symmetry, angles_deg, direction};
 pub use error::{Problem, ReadError};
 pub use lint::{Lint, Severity};
+pub use planes::Goniometer;
+pub use write::Written;
 
 use lint::Lints;
 use text::Text;
@@ -46,6 +54,8 @@ pub enum Details {
     None,
     /// An LM-63 file.
     Lm63(lm63::Lm63Details),
+    /// A EULUMDAT file.
+    Eulumdat(Box<eulumdat::EulumdatDetails>),
 }
 
 /// Reads a photometric file of any kind: by its content, then by its extension (.ies, .ldt, .xml).
@@ -56,6 +66,7 @@ pub fn read_file(path: &Path) -> Result<Photometry, ReadError> {
     })?;
     let read = match Kind::of(path, &bytes) {
         Some(Kind::Lm63) => lm63::parse_with(&bytes, lm63::tilt_file_beside(path)),
+        Some(Kind::Eulumdat) => eulumdat::parse(&bytes),
         None => Err(Text::new(&bytes).error(0, Problem::Unrecognised)),
     };
     read.map_err(located)
@@ -65,6 +76,7 @@ pub fn read_file(path: &Path) -> Result<Photometry, ReadError> {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Lm63,
+    Eulumdat,
 }
 
 impl Kind {
@@ -74,9 +86,13 @@ impl Kind {
         if named || text.lines().any(|line| lm63::is_tilt_line(line.bytes)) {
             return Some(Self::Lm63);
         }
+        if eulumdat::looks_like(&text) {
+            return Some(Self::Eulumdat);
+        }
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         match extension.as_deref() {
             Some("ies") => Some(Self::Lm63),
+            Some("ldt") => Some(Self::Eulumdat),
             _ => None,
         }
     }
@@ -174,4 +190,17 @@ pub enum HorizontalAxis {
     X,
     /// The C90-C270 axis.
     Y,
+}
+
+impl LuminousOpening {
+    /// Width (along C90), length (along C0) and height of the box around it, in metres.
+    pub fn bounding_box_m(&self) -> [f64; 3] {
+        match *self {
+            Self::Point => [0.0; 3],
+            Self::Box { x_m, y_m, height_m } | Self::Ellipse { x_m, y_m, height_m } => [y_m, x_m, height_m],
+            Self::Ellipsoid { x_m, y_m, z_m } => [y_m, x_m, z_m],
+            Self::LyingCylinder { axis: HorizontalAxis::X, length_m, diameter_m } => [diameter_m, length_m, diameter_m],
+            Self::LyingCylinder { axis: HorizontalAxis::Y, length_m, diameter_m } => [length_m, diameter_m, diameter_m],
+        }
+    }
 }

@@ -7,7 +7,7 @@
 mod header;
 mod numbers;
 mod opening;
-mod planes;
+mod write;
 
 use std::path::Path;
 
@@ -15,13 +15,15 @@ use self::header::TiltLine;
 use self::numbers::{Number, Numbers};
 use super::error::{Problem, ReadError};
 use super::lint::Lints;
+use super::planes::{self, Goniometer, Table};
 use super::text::Text;
-use super::{Details, LuminousIntensityDistribution, Photometry};
+use super::{Details, Photometry};
 
 #[cfg(test)]
 mod tests;
 
 pub(crate) use self::header::{is_edition_line, is_tilt_line};
+pub use self::write::{write_2002, write_2019};
 
 /// Metres in a foot, exactly.
 const METRES_PER_FOOT: f64 = 0.3048;
@@ -56,17 +58,6 @@ pub struct Lm63Details {
     pub file_generation_type: f64,
     /// How the lamp's flux depends on the luminaire's tilt; kept, never applied.
     pub tilt: Option<Tilt>,
-}
-
-/// The goniometer type of a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Goniometer {
-    /// Vertical axis, angles from the horizon: automotive.
-    A,
-    /// Horizontal axis: floodlights.
-    B,
-    /// Vertical axis, angles from the nadir: everything else.
-    C,
 }
 
 /// Relative lamp flux against the tilt of the luminaire.
@@ -231,17 +222,6 @@ fn ballast_lamp_factor(numbers: &mut Numbers, edition: Edition, third: Number) -
             Ok(1.0)
         }
     }
-}
-
-/// Angles and candela values as they stand in the file, the values multiplied by the factor.
-struct Table {
-    vertical_deg: Vec<f64>,
-    vertical_at: usize,
-    horizontal_deg: Vec<f64>,
-    horizontal_at: usize,
-    /// `candela[horizontal][vertical]`.
-    candela: Vec<f64>,
-    candela_at: usize,
 }
 
 fn read_table(mut numbers: Numbers, lamps: &Lamps) -> Result<Table, ReadError> {

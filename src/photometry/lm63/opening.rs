@@ -80,7 +80,6 @@ fn from_2002(w: f64, l: f64, h: f64) -> Option<LuminousOpening> {
 /// The dimensions (width, length, height in metres) that mean an opening in LM-63-2002 and 2019.
 ///
 /// `None` where that edition has no such shape.
-#[cfg(test)]
 pub(super) fn to_dimensions(opening: &LuminousOpening) -> Option<[f64; 3]> {
     let dimensions = match *opening {
         LuminousOpening::Point => [0.0; 3],

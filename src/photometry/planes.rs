@@ -1,12 +1,34 @@
-//! From the angles of an LM-63 file to the C planes of a distribution.
+//! From the angles of a measured table to the C planes of a distribution.
 
-use super::{Goniometer, LuminousIntensityDistribution, Table};
-use crate::photometry::error::{Problem, ReadError};
-use crate::photometry::lint::Lints;
-use crate::photometry::text::Text;
+use super::LuminousIntensityDistribution;
+use super::error::{Problem, ReadError};
+use super::lint::Lints;
+use super::text::Text;
+
+/// How a luminaire was measured: the coordinates of its table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goniometer {
+    /// Vertical axis, angles from the horizon: automotive.
+    A,
+    /// Horizontal axis: floodlights.
+    B,
+    /// Vertical axis, angles from the nadir: everything else.
+    C,
+}
+
+/// Angles in degrees and intensities in candela as a file has them, and where they stand in it.
+pub(crate) struct Table {
+    pub(crate) vertical_deg: Vec<f64>,
+    pub(crate) vertical_at: usize,
+    pub(crate) horizontal_deg: Vec<f64>,
+    pub(crate) horizontal_at: usize,
+    /// `candela[horizontal][vertical]`.
+    pub(crate) candela: Vec<f64>,
+    pub(crate) candela_at: usize,
+}
 
 /// The distribution that a table means.
-pub(super) fn distribution(
+pub(crate) fn distribution(
     text: &Text,
     goniometer: Goniometer,
     table: Table,
@@ -29,7 +51,7 @@ fn type_c(text: &Text, mut table: Table, lints: &mut Lints) -> Result<LuminousIn
     if ![(0.0, 90.0), (90.0, 180.0), (0.0, 180.0)].contains(&(first, last)) {
         let message =
             format!("the vertical angles run from {first} to {last}; beyond them the intensity counts as zero");
-        lints.note("lm63/vertical-range", text.line_of(table.vertical_at), message);
+        lints.note("planes/vertical-range", text.line_of(table.vertical_at), message);
     }
     normalise_planes(text, &mut table, lints)?;
     poles_agree(text, &table, lints);
@@ -46,7 +68,7 @@ fn normalise_planes(text: &Text, table: &mut Table, lints: &mut Lints) -> Result
     let line = || text.line_of(table.horizontal_at);
     if planes == 1 {
         if first != 0.0 {
-            lints.note("lm63/single-plane", line(), format!("the only plane, {first}, was taken for every C"));
+            lints.note("planes/single", line(), format!("the only plane, {first}, was taken for every C"));
             c[0] = 0.0;
         }
         return Ok(());
@@ -56,22 +78,22 @@ fn normalise_planes(text: &Text, table: &mut Table, lints: &mut Lints) -> Result
         (0.0, 360.0) => {
             let differs = (0..gammas).any(|g| table.candela[g] != table.candela[(planes - 1) * gammas + g]);
             if differs {
-                lints.warn("lm63/open-circle", line(), "the planes 0 and 360 differ");
+                lints.warn("planes/open-circle", line(), "the planes 0 and 360 differ");
             }
         }
         (-90.0, 90.0) => {
             // Mirrored in C90-C270: C and 180 - C are one, so that the planes become 270 down to 90.
-            lints.note("lm63/negative-planes", line(), "the planes from -90 to 90 were mirrored to 90 to 270");
+            lints.note("planes/negative", line(), "the planes from -90 to 90 were mirrored to 90 to 270");
             *c = c.iter().map(|c| 180.0 - c).collect();
             reverse(table, gammas);
         }
         (180.0, 360.0) => {
-            lints.note("lm63/second-half", line(), "the planes from 180 to 360 were mirrored to 0 to 180");
+            lints.note("planes/second-half", line(), "the planes from 180 to 360 were mirrored to 0 to 180");
             *c = c.iter().map(|c| 360.0 - c).collect();
             reverse(table, gammas);
         }
         (-180.0, 180.0) if c.contains(&0.0) => {
-            lints.note("lm63/negative-planes", line(), "the planes from -180 to 180 were turned to 0 to 360");
+            lints.note("planes/negative", line(), "the planes from -180 to 180 were turned to 0 to 360");
             let zero = c.iter().position(|c| *c == 0.0).unwrap_or(0);
             let positive: Vec<f64> = c[zero..].to_vec();
             let negative = c[1..=zero].iter().map(|c| c + 360.0);
@@ -81,7 +103,7 @@ fn normalise_planes(text: &Text, table: &mut Table, lints: &mut Lints) -> Result
             table.candela = front.into_iter().chain(back.iter().copied()).collect();
         }
         (0.0, _) if planes > 2 && last < 360.0 && closes(c) => {
-            lints.warn("lm63/open-circle", line(), "the plane 360 is missing; it was taken equal to plane 0");
+            lints.warn("planes/open-circle", line(), "the plane 360 is missing; it was taken equal to plane 0");
             c.push(360.0);
             table.candela.extend_from_within(..gammas);
         }
@@ -118,7 +140,7 @@ fn poles_agree(text: &Text, table: &Table, lints: &mut Lints) {
         // A hundredth: what rounding to whole candelas and the repeatability of goniometers explain.
         if most - least > 0.01 * most {
             let message = format!("the planes disagree about the {name}: {least} to {most} cd");
-            lints.warn("lm63/pole", text.line_of(table.candela_at), message);
+            lints.warn("planes/pole", text.line_of(table.candela_at), message);
         }
     }
 }

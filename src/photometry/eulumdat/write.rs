@@ -1,0 +1,162 @@
+//! Writer of EULUMDAT files.
+
+use super::{COMPANY, DATE, EulumdatDetails, FILE, LampSet, NAME, NUMBER, REPORT, intensity_scale, parse, planes};
+use crate::photometry::write::{inverse, number, one_line};
+use crate::photometry::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, Written};
+
+/// Writes EULUMDAT.
+///
+/// Intensities become cd/klm of the lamp flux, or of the luminaire's flux for absolute photometry; wherever a number
+/// exists that the reader takes back to the same candela, that one is written.
+pub fn write(photometry: &Photometry) -> Written {
+    let details = details(photometry);
+    let scale = intensity_scale(&details);
+    let table = Table::of(&photometry.distribution);
+    let gamma_deg = table.stored.gamma_deg();
+    let mut lines: Vec<String> = vec![];
+    let keyword = |name: &str| one_line(photometry.keyword(name).unwrap_or_default());
+    lines.push(keyword(COMPANY));
+    lines.extend([details.kind.to_string(), table.symmetry.to_string()]);
+    lines.extend([table.listed_deg.len().to_string(), number(spacing(&table.listed_deg, 360.0))]);
+    lines.extend([gamma_deg.len().to_string(), number(spacing(gamma_deg, f64::NAN))]);
+    lines.extend([REPORT, NAME, NUMBER, FILE, DATE].map(keyword));
+    lines.extend(details.luminaire_mm.map(number));
+    lines.extend(opening_mm(&photometry.opening).map(number));
+    lines.extend(details.luminous_heights_mm.map(number));
+    lines.extend([details.downward_flux_percent, details.output_ratio_percent].map(number));
+    lines.extend([details.conversion_factor, details.measured_tilt_deg].map(number));
+    lines.push(details.lamp_sets.len().to_string());
+    for set in &details.lamp_sets {
+        lines.extend([set.lamps.to_string(), one_line(&set.kind), number(set.lumens)]);
+        lines.extend([one_line(&set.colour), one_line(&set.rendering), number(set.watts)]);
+    }
+    lines.extend(details.direct_ratios.map(number));
+    lines.extend(table.listed_deg.iter().copied().map(number));
+    lines.extend(gamma_deg.iter().copied().map(number));
+    for &plane in &table.order {
+        lines.extend(table.stored.plane(plane).iter().map(|i| number(inverse(*i, i / scale, |x| x * scale))));
+    }
+    let mut text = lines.join("\r\n");
+    text.push_str("\r\n");
+    Written::checked(photometry, text, parse)
+}
+
+/// The planes as EULUMDAT stores them.
+struct Table {
+    symmetry: u8,
+    /// All planes of the circle.
+    listed_deg: Vec<f64>,
+    stored: LuminousIntensityDistribution,
+    /// The stored planes in the order of the file.
+    order: Vec<usize>,
+}
+
+impl Table {
+    fn of(distribution: &LuminousIntensityDistribution) -> Self {
+        let full = distribution.full_circle();
+        let listed = |full: &LuminousIntensityDistribution| {
+            full.c_deg().iter().copied().filter(|c| *c < 360.0).collect::<Vec<f64>>()
+        };
+        let planes = distribution.c_deg().len();
+        let held = |symmetry: u8, order: Vec<usize>| {
+            let listed_deg = listed(&full);
+            let stored = planes::stored(symmetry, &listed_deg).ok()?;
+            (stored.len() == planes).then(|| Self { symmetry, listed_deg, stored: distribution.clone(), order })
+        };
+        let written = match distribution.symmetry() {
+            Symmetry::Quadrant => held(4, (0..planes).collect()),
+            Symmetry::BilateralC0 => held(2, (0..planes).collect()),
+            Symmetry::BilateralC90 => held(3, (0..planes).rev().collect()),
+            Symmetry::None if planes > 2 => None,
+            Symmetry::Axial | Symmetry::None => {
+                Some(Self { symmetry: 1, listed_deg: vec![0.0], stored: distribution.clone(), order: vec![0] })
+            }
+        };
+        // Without symmetry, or with one whose planes the format cannot place, all planes of the circle are written.
+        written.unwrap_or_else(|| {
+            let listed_deg = listed(&full);
+            let order = (0..listed_deg.len()).collect();
+            Self { symmetry: 0, listed_deg, stored: full.clone(), order }
+        })
+    }
+}
+
+/// The distance between evenly spaced angles, 0 where they are not; `end` is where the next one would lie.
+fn spacing(angles: &[f64], end: f64) -> f64 {
+    let [first, second, ..] = angles else { return 0.0 };
+    let step = second - first;
+    let even = angles.windows(2).all(|w| w[1] - w[0] == step);
+    let closes = end.is_nan() || angles[angles.len() - 1] + step == end;
+    if even && closes { step } else { 0.0 }
+}
+
+/// Length and width of the luminous area; round ones have no width.
+fn opening_mm(opening: &LuminousOpening) -> [f64; 2] {
+    let millimetres = |m: f64| inverse(m, m * 1000.0, |mm| mm / 1000.0);
+    match *opening {
+        LuminousOpening::Point => [0.0, 0.0],
+        LuminousOpening::Ellipse { x_m, y_m, .. } | LuminousOpening::Ellipsoid { x_m, y_m, .. } if x_m == y_m => {
+            [millimetres(x_m), 0.0]
+        }
+        ref other => {
+            let [width_m, length_m, _] = other.bounding_box_m();
+            // LM-63's width lies along C90, EULUMDAT's along C0.
+            [millimetres(width_m), millimetres(length_m)]
+        }
+    }
+}
+
+/// The file's own details where they still agree with the rest, else what can be said without a file.
+fn details(photometry: &Photometry) -> EulumdatDetails {
+    let [.., height_m] = photometry.opening.bounding_box_m();
+    let height_mm = inverse(height_m, height_m * 1000.0, |mm| mm / 1000.0);
+    let own = match &photometry.details {
+        Details::Eulumdat(details) => Some(details.as_ref().clone()),
+        Details::None | Details::Lm63(_) => None,
+    };
+    let mut details = own.unwrap_or_else(|| plain_details(photometry));
+    if details.luminous_heights_mm.into_iter().fold(0.0, f64::max) / 1000.0 != height_m {
+        details.luminous_heights_mm = [height_mm; 4];
+    }
+    let watts = photometry.input_watts.unwrap_or(0.0);
+    let flux = photometry.distribution.flux().value();
+    let agrees = details.lamp_sets.first().is_some_and(|set| {
+        set.watts == watts && photometry.lamp_lumens.map_or(set.lamps < 0, |l| set.lamps > 0 && set.lumens == l)
+    });
+    if !agrees {
+        let lamps = match (&photometry.details, photometry.lamp_lumens) {
+            (_, None) => -1,
+            (Details::Lm63(details), Some(_)) => i32::try_from(details.lamps).unwrap_or(1),
+            (_, Some(_)) => 1,
+        };
+        // A dark luminaire still needs a flux to divide by.
+        let lumens = photometry.lamp_lumens.unwrap_or(if flux > 0.0 { flux } else { 1000.0 });
+        let kind = photometry.keyword("LAMP").unwrap_or_default().to_string();
+        let set = LampSet { lamps, kind, lumens, colour: String::new(), rendering: String::new(), watts };
+        details.lamp_sets = vec![set];
+    }
+    details
+}
+
+fn plain_details(photometry: &Photometry) -> EulumdatDetails {
+    let distribution = &photometry.distribution;
+    let flux = distribution.flux().value();
+    let percent = |part: f64, whole: f64| if whole > 0.0 { (1e4 * part / whole).round() / 100.0 } else { 0.0 };
+    let [width_m, length_m, height_m] = photometry.opening.bounding_box_m();
+    let linear = width_m.max(length_m) > 4.0 * width_m.min(length_m);
+    EulumdatDetails {
+        kind: match distribution.symmetry() {
+            Symmetry::Axial => 1,
+            _ if linear => 2,
+            _ => 3,
+        },
+        luminaire_mm: [width_m, length_m, height_m].map(|m| (m * 1000.0).round()),
+        luminous_heights_mm: [0.0; 4],
+        downward_flux_percent: percent(distribution.flux_between(0.0, 90.0).value(), flux),
+        output_ratio_percent: percent(flux, photometry.lamp_lumens.unwrap_or(flux)),
+        conversion_factor: 1.0,
+        measured_tilt_deg: 0.0,
+        lamp_sets: vec![],
+        direct_ratios: [0.0; 10],
+    }
+}

@@ -1,0 +1,141 @@
+//! Whatever is written is read back the same, or the loss is stated; and no bytes make a reader panic.
+
+use proptest::prelude::*;
+
+use super::*;
+
+/// Rising angles in tenths of a degree between two ends, both included.
+fn angles(first: u32, last: u32) -> impl Strategy<Value = Vec<f64>> {
+    prop::collection::btree_set(10 * first..=10 * last, 0..6).prop_map(move |mut tenths| {
+        tenths.extend([10 * first, 10 * last]);
+        tenths.into_iter().map(|t| f64::from(t) / 10.0).collect()
+    })
+}
+
+fn planes() -> impl Strategy<Value = Vec<f64>> {
+    prop_oneof![Just(vec![0.0]), angles(0, 90), angles(0, 180), angles(90, 270), angles(0, 360)]
+}
+
+fn intensity() -> impl Strategy<Value = f64> {
+    prop_oneof![4 => 0.0..1e5, 1 => Just(0.0), 1 => 0.0..1e-300, 1 => 0.0..1e250]
+}
+
+fn distribution() -> impl Strategy<Value = LuminousIntensityDistribution> {
+    let gamma = prop_oneof![angles(0, 90), angles(0, 180), angles(90, 180), angles(20, 130)];
+    (planes(), gamma).prop_flat_map(|(c, gamma)| {
+        let (planes, gammas) = (c.len(), gamma.len());
+        prop::collection::vec(intensity(), planes * gammas).prop_map(move |mut candela| {
+            if c[planes - 1] == 360.0 {
+                candela.truncate((planes - 1) * gammas);
+                candela.extend_from_within(..gammas);
+            }
+            LuminousIntensityDistribution::new(c.clone(), gamma.clone(), candela).unwrap()
+        })
+    })
+}
+
+fn opening() -> impl Strategy<Value = LuminousOpening> {
+    let size = || 0.001..3.0;
+    prop_oneof![
+        Just(LuminousOpening::Point),
+        (size(), size(), 0.0..1.0).prop_map(|(x_m, y_m, height_m)| LuminousOpening::Box { x_m, y_m, height_m }),
+        (size(), size(), 0.0..1.0).prop_map(|(x_m, y_m, height_m)| LuminousOpening::Ellipse { x_m, y_m, height_m }),
+        (size(), size(), size()).prop_map(|(x_m, y_m, z_m)| LuminousOpening::Ellipsoid { x_m, y_m, z_m }),
+        (size(), size(), any::<bool>()).prop_map(|(length_m, diameter_m, x)| {
+            let axis = if x { HorizontalAxis::X } else { HorizontalAxis::Y };
+            LuminousOpening::LyingCylinder { axis, length_m, diameter_m }
+        }),
+    ]
+}
+
+fn photometry() -> impl Strategy<Value = Photometry> {
+    let keyword = ("[A-Z_]{4,8}", "[a-zäé0-9 .,-]{0,20}(\n[a-z]{1,8}){0,2}");
+    let keyword =
+        keyword.prop_map(|(k, v): (String, String)| (k, v.split('\n').map(str::trim).collect::<Vec<_>>().join("\n")));
+    let keywords = prop::collection::vec(keyword.prop_filter("MORE joins", |(k, _)| k != "MORE"), 0..4);
+    (distribution(), prop::option::of(0.1..1e5), opening(), prop::option::of(0.1..500.0), keywords).prop_map(
+        |(distribution, lamp_lumens, opening, input_watts, keywords)| Photometry {
+            lamp_lumens,
+            opening,
+            input_watts,
+            keywords,
+            ..Photometry::of(distribution)
+        },
+    )
+}
+
+/// Everything but the format's name and the lints, which belong to a file and not to what it says.
+fn same(a: &Photometry, b: &Photometry) -> bool {
+    a.details == b.details && same_light(a, b)
+}
+
+/// The same and without what only one format has.
+fn same_light(a: &Photometry, b: &Photometry) -> bool {
+    let plain =
+        |p: &Photometry| Photometry { format: String::new(), lints: vec![], details: Details::None, ..p.clone() };
+    plain(a) == plain(b)
+}
+
+proptest! {
+    #[test]
+    fn lm63_holds_every_photometry(x in photometry()) {
+        for written in [lm63::write_2002(&x), lm63::write_2019(&x)] {
+            prop_assert_eq!(&written.losses, &Vec::<String>::new());
+            let again = lm63::parse(written.text.as_bytes()).unwrap();
+            prop_assert!(same_light(&again, &x));
+            prop_assert!(written.text.lines().all(|line| line.len() <= 254 || line.starts_with('[') || !line.contains(' ')));
+            let twice = lm63::parse(lm63::write_2019(&again).text.as_bytes()).unwrap();
+            let details = |p: &Photometry| match &p.details {
+                Details::Lm63(d) => lm63::Lm63Details { edition: lm63::Edition::Lm63_2019, ..d.clone() },
+                other => panic!("{other:?}"),
+            };
+            prop_assert_eq!(details(&twice), details(&again));
+        }
+    }
+
+    #[test]
+    fn eulumdat_gives_back_what_it_holds_and_the_rest_is_stated(x in photometry()) {
+        let written = eulumdat::write(&x);
+        let held = eulumdat::parse(written.text.as_bytes()).map_err(|e| TestCaseError::fail(e.to_string()))?;
+        if written.losses.is_empty() {
+            prop_assert!(same_light(&held, &x));
+        }
+        prop_assert!(x.opening == held.opening || written.losses.iter().any(|l| l.contains("opening")));
+        prop_assert!(x.distribution == held.distribution || written.losses.iter().any(|l| l.contains("intensities") || l.contains("planes")));
+        let (flux, now) = (x.distribution.flux().value(), held.distribution.flux().value());
+        prop_assert!((flux - now).abs() <= 1e-12 * flux, "{flux} {now}");
+        let again = eulumdat::write(&held);
+        prop_assert_eq!(&again.losses, &Vec::<String>::new());
+        prop_assert!(same(&eulumdat::parse(again.text.as_bytes()).unwrap(), &held));
+    }
+
+    #[test]
+    fn no_bytes_make_a_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        let refused = [lm63::parse(&bytes).is_err(), eulumdat::parse(&bytes).is_err()];
+        prop_assert_eq!(refused, [true; 2]);
+    }
+
+    #[test]
+    fn no_damage_to_a_file_makes_a_reader_panic(
+        x in photometry(),
+        damage in prop::collection::vec((any::<prop::sample::Index>(), "[-0-9.,e \n\"a-z]{0,3}"), 1..4),
+        cut in any::<prop::sample::Index>(),
+    ) {
+        type Reader = fn(&[u8]) -> Result<Photometry, ReadError>;
+        let files: [(String, Reader); 2] =
+            [(lm63::write_2002(&x).text, lm63::parse), (eulumdat::write(&x).text, eulumdat::parse)];
+        for (text, read) in files {
+            let mut bytes = text.into_bytes();
+            for (at, patch) in &damage {
+                let at = at.index(bytes.len());
+                bytes.splice(at..(at + patch.len()).min(bytes.len()), patch.bytes());
+            }
+            for bytes in [&bytes[..], &bytes[..cut.index(bytes.len())]] {
+                match read(bytes) {
+                    Ok(read) => prop_assert!(read.distribution.flux().value() >= 0.0),
+                    Err(error) => prop_assert!(error.line >= 1 && error.column >= 1 && !error.help().is_empty()),
+                }
+            }
+        }
+    }
+}
