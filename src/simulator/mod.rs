@@ -1,5 +1,8 @@
 //! Exact solutions of a scene, each value with an error bound or a standard error.
 
+mod path_tracing;
+mod sampler;
+
 use crate::scene::{Meter, Scene, Transport};
 use crate::units::Lux;
 
@@ -10,9 +13,7 @@ pub fn illuminance(
     transport: Transport,
     accuracy: &Accuracy,
 ) -> Result<Solution, SimulatorError> {
-    // Replaced by the dispatcher.
-    let _ = (scene, meters, transport, accuracy);
-    Err(SimulatorError::Unsupported { what: "everything".into(), instead: "wait".into() })
+    path_tracing::illuminance(scene, meters, transport, accuracy)
 }
 
 /// How well and how reproducibly to solve.

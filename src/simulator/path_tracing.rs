@@ -1,0 +1,233 @@
+//! Unbiased path tracing with next-event estimation: the certifier of the deterministic solvers, and the solver for meshes.
+//!
+//! Eight independently scrambled Sobol sequences give eight independent means; their number of points doubles until the
+//! t-interval of their mean is narrow enough (A. Owen, "On the Warnock-Halton quasi-standard error", 2006, says why
+//! few replicates of many points serve best). Each sample depends on its index alone and sums run over fixed blocks in
+//! fixed order, so that every bit of the result is the same on any number of threads.
+
+mod emitter;
+mod path;
+mod world;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use self::emitter::Emitter;
+use self::path::{Integrand, Wanted};
+use self::world::World;
+use super::sampler::{Sampler, mix};
+use super::{Accuracy, Estimate, SimulatorError, Solution, Uncertainty};
+use crate::scene::{Bounces, Meter, Scene, Transport};
+use crate::units::Lux;
+
+/// Independent scrambles.
+const REPLICATES: u32 = 8;
+/// The 97.5 % quantile of Student's t with `REPLICATES - 1` degrees of freedom.
+const STUDENT_T: f64 = 2.364_624;
+/// Points of each scramble at first, as a power of two; enough that a rare light path is met before a zero is believed.
+const FIRST_LOG2: u32 = 9;
+/// Points of each scramble at most, as a power of two: about 4 million paths a meter.
+const LAST_LOG2: u32 = 19;
+/// Points summed one after the other, as a power of two.
+const BLOCK_LOG2: u32 = 8;
+/// Paths longer than this on average are refused: 1 / (1 - reflectance).
+const MAX_MEAN_REFLECTIONS: f64 = 1e5;
+/// Reflections beyond which a path counts as endless; one in e^100 of the longest paths allowed gets there.
+const MAX_REFLECTIONS: u32 = 10_000_000;
+/// A luminaire whose light peaks this much on what it lights is sampled from its own side too, which costs 4 times as much.
+const PEAKED: f64 = 20.0;
+/// Rays that find that out.
+const PEAK_RAYS: u32 = 512;
+
+/// Illuminance at every meter by path tracing, until `accuracy` is met with 95 % confidence or the samples run out.
+///
+/// Light straight from luminaires without extent is exact, by the inverse square law, and counts as such.
+pub(crate) fn illuminance(
+    scene: &Scene,
+    meters: &[Meter],
+    transport: Transport,
+    accuracy: &Accuracy,
+) -> Result<Solution, SimulatorError> {
+    PathTracer::new(scene)?.solve(meters, transport, accuracy, FIRST_LOG2..=LAST_LOG2)
+}
+
+/// A scene made ready for path tracing.
+struct PathTracer<'a> {
+    world: World,
+    emitters: Vec<Emitter<'a>>,
+    close: Vec<bool>,
+    largest_reflectance: f64,
+}
+
+/// Sums of one meter over the points so far, one a scramble.
+#[derive(Clone)]
+struct Sums {
+    lux: [f64; REPLICATES as usize],
+    points_log2: u32,
+}
+
+impl<'a> PathTracer<'a> {
+    fn new(scene: &'a Scene) -> Result<Self, SimulatorError> {
+        let reach_m = scene.luminaires.iter().map(|l| l.position_m.abs().max_element()).fold(0.0, f64::max);
+        if !reach_m.is_finite() {
+            return Err(unsupported("a luminaire whose position is not finite", "correct it"));
+        }
+        let world = World::new(scene.room, &scene.obstacles, reach_m)
+            .map_err(|e| unsupported("a mesh of the scene", &e.to_string()))?;
+        let mut largest_reflectance = 0.0_f64;
+        for reflectance in world.reflectances() {
+            if !(0.0..=1.0).contains(&reflectance) {
+                return Err(unsupported(&format!("a reflectance of {reflectance}"), "it must lie within 0..=1"));
+            }
+            largest_reflectance = largest_reflectance.max(reflectance);
+        }
+        let emitters: Vec<_> = scene.luminaires.iter().filter_map(Emitter::new).collect();
+        let close = emitters.iter().map(|e| peak(e, &world) > PEAKED).collect();
+        Ok(Self { world, emitters, close, largest_reflectance })
+    }
+
+    fn solve(
+        &self,
+        meters: &[Meter],
+        transport: Transport,
+        accuracy: &Accuracy,
+        points_log2: std::ops::RangeInclusive<u32>,
+    ) -> Result<Solution, SimulatorError> {
+        let wanted = self.wanted(transport)?;
+        let meters = (0..).zip(meters).map(|(k, m)| self.placed(k, m)).collect::<Result<Vec<_>, _>>()?;
+        let integrand = Integrand::new(&self.world, &self.emitters, self.close.clone(), wanted);
+        let mut sums = vec![Sums { lux: [0.0; REPLICATES as usize], points_log2: 0 }; meters.len()];
+        for log2 in points_log2.clone() {
+            let open: Vec<usize> = (0..meters.len())
+                .filter(|&m| log2 == *points_log2.start() || !sums[m].narrow_enough(accuracy.relative_error))
+                .collect();
+            let from = if log2 == *points_log2.start() { 0 } else { 1 << (log2 - 1) };
+            let blocks = block_sums(&integrand, &meters, &open, accuracy.seed, from..1 << log2);
+            for (&m, blocks) in open.iter().zip(&blocks) {
+                sums[m].points_log2 = log2;
+                for (sum, blocks) in sums[m].lux.iter_mut().zip(blocks) {
+                    *sum += blocks.iter().sum::<f64>();
+                }
+            }
+        }
+        let most = sums.iter().map(|s| s.points_log2).max().unwrap_or(0);
+        Ok(Solution {
+            estimates: sums.iter().map(Sums::estimate).collect(),
+            solver: format!(
+                "path tracing, {REPLICATES} Owen-scrambled Sobol sequences of up to 2^{most} paths a meter"
+            ),
+        })
+    }
+
+    fn wanted(&self, transport: Transport) -> Result<Wanted, SimulatorError> {
+        let (direct, bounces) = match transport {
+            Transport::Direct => (true, Bounces::AtMost(0)),
+            Transport::Indirect(bounces) => (false, bounces),
+            Transport::Total(bounces) => (true, bounces),
+        };
+        let reflections = match bounces {
+            Bounces::AtMost(n) => n,
+            Bounces::Converged if 1.0 - self.largest_reflectance < 1.0 / MAX_MEAN_REFLECTIONS => {
+                let what = format!("a reflectance of {} with all reflections", self.largest_reflectance);
+                return Err(unsupported(&what, "cut the reflections, or use the radiosity solver"));
+            }
+            Bounces::Converged => MAX_REFLECTIONS,
+        };
+        Ok(Wanted { direct, reflections })
+    }
+
+    /// The meter, lifted off what it may lie upon.
+    fn placed(&self, index: usize, meter: &Meter) -> Result<(DVec3, DVec3), SimulatorError> {
+        let Meter { position_m, normal } = *meter;
+        let lift_m = self.world.lift_m();
+        let point_m = position_m + normal * lift_m;
+        let trouble = if !position_m.is_finite() || !normal.is_normalized() {
+            Some("has no finite position or no unit normal")
+        } else if !self.world.contains(position_m) {
+            Some("lies outside the room")
+        } else if self.world.clearance_m(point_m) < 0.5 * lift_m {
+            Some("lies on a surface that its normal does not leave at a right angle")
+        } else if self.emitters.iter().any(|e| e.position_m() == position_m) {
+            Some("lies in the centre of a luminaire")
+        } else {
+            None
+        };
+        match trouble {
+            None => Ok((point_m, normal)),
+            Some(trouble) => {
+                Err(unsupported(&format!("meter {index} at {position_m} m, which {trouble}"), "move or turn it"))
+            }
+        }
+    }
+}
+
+/// Mean over a luminaire's light of the illuminance where it falls, in units of what its flux gives when spread evenly.
+///
+/// It is the variance, relative to the squared mean, of next-event estimation at a random place.
+fn peak(emitter: &Emitter, world: &World) -> f64 {
+    let ray = |index| {
+        let mut sampler = Sampler::new(0, index);
+        let ray = emitter.emit(sampler.next_pair(), sampler.next_pair());
+        let hit = world.closest(ray.from_m + world.lift_m() * ray.direction, ray.direction)?;
+        let lux = -ray.candela * hit.normal.dot(ray.direction) / (hit.distance_m * hit.distance_m);
+        Some(lux * ray.candela / ray.density_per_sr)
+    };
+    let square: f64 = (0..PEAK_RAYS).filter_map(ray).sum::<f64>() / f64::from(PEAK_RAYS);
+    square * world.area_m2() / emitter.flux_lm().powi(2)
+}
+
+/// Sums over blocks of points, by open meter and scramble.
+fn block_sums(
+    integrand: &Integrand,
+    meters: &[(DVec3, DVec3)],
+    open: &[usize],
+    seed: u64,
+    points: std::ops::Range<u32>,
+) -> Vec<Vec<Vec<f64>>> {
+    let block = 1 << BLOCK_LOG2;
+    let starts: Vec<u32> = points.clone().step_by(block as usize).collect();
+    let jobs: Vec<(usize, u32)> = open.iter().flat_map(|&m| (0..REPLICATES).map(move |r| (m, r))).collect();
+    let sums: Vec<Vec<f64>> = jobs
+        .par_iter()
+        .map(|&(meter, replicate)| {
+            let (point_m, normal) = meters[meter];
+            let scramble = mix(mix(seed).wrapping_add(((meter as u64) << 8) | u64::from(replicate)));
+            let sum = |start: &u32| {
+                let end = (start + block).min(points.end);
+                (*start..end).map(|index| integrand.path(point_m, normal, &mut Sampler::new(scramble, index))).sum()
+            };
+            starts.par_iter().map(sum).collect()
+        })
+        .collect();
+    sums.chunks(REPLICATES as usize).map(<[_]>::to_vec).collect()
+}
+
+impl Sums {
+    /// Mean and standard error of the scrambles' means, in lux.
+    fn mean_and_error(&self) -> (f64, f64) {
+        let n = f64::from(REPLICATES);
+        let points = f64::from(1_u32 << self.points_log2);
+        let mean = self.lux.iter().sum::<f64>() / n / points;
+        let square = self.lux.iter().map(|s| (s / points - mean).powi(2)).sum::<f64>();
+        (mean, (square / (n * (n - 1.0))).sqrt())
+    }
+
+    fn narrow_enough(&self, relative_error: f64) -> bool {
+        let (mean, error) = self.mean_and_error();
+        STUDENT_T * error <= relative_error * mean
+    }
+
+    fn estimate(&self) -> Estimate {
+        let (mean, value) = self.mean_and_error();
+        let uncertainty = Uncertainty::StandardError { value, degrees_of_freedom: REPLICATES - 1 };
+        Estimate { illuminance: Lux(mean), uncertainty }
+    }
+}
+
+fn unsupported(what: &str, instead: &str) -> SimulatorError {
+    SimulatorError::Unsupported { what: what.into(), instead: instead.into() }
+}
+
+#[cfg(test)]
+#[path = "path_tracing/tests.rs"]
+mod tests;
