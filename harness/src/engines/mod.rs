@@ -2,6 +2,7 @@
 //!
 //! Adding one: write `engines/<name>.rs` with a type that implements [`Engine`], and add its line to [`all`].
 
+mod mitsuba;
 mod site;
 
 use std::collections::BTreeMap;
@@ -20,7 +21,7 @@ pub use site::{Site, SiteError};
 
 /// Every engine that luxproof knows, in the order of reports.
 pub fn all() -> Vec<Box<dyn Engine>> {
-    vec![]
+    vec![Box::new(mitsuba::Mitsuba::default())]
 }
 
 /// The name of an engine in specs, on the command line and in reports.

@@ -1,0 +1,138 @@
+//! Which Mitsuba there is and which libLLVM its fast variants can use, found by trying in a child process.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::Deserialize;
+
+use super::settings::Settings;
+use crate::engines::{Absent, Site, Version, Workbench};
+use crate::process::Invocation;
+
+const PROBE: &str = include_str!("../../../drivers/mitsuba_probe.py");
+const REMEDY: &str = "run `luxproof engines install mitsuba`";
+/// A probe takes about a second; a machine under load may need many.
+const PROBE_LIMIT: Duration = Duration::from_secs(60);
+
+/// An interpreter with Mitsuba and what works there.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Backend {
+    root: PathBuf,
+    python: PathBuf,
+    /// The libLLVM that works; `None` leaves the scalar variants.
+    llvm: Option<PathBuf>,
+    versions: Versions,
+}
+
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+struct Versions {
+    mitsuba: String,
+    drjit: String,
+    llvm: Option<String>,
+}
+
+impl Backend {
+    /// Tries the libraries in order of preference until one traces paths.
+    pub(super) fn find(site: &Site) -> Result<Self, Absent> {
+        let absent = |reason: String| Absent { reason, remedy: REMEDY.into() };
+        let python = site.python().ok_or_else(|| absent("there is no Python environment".into()))?;
+        if site.python_package("mitsuba").is_none() {
+            return Err(absent("the Python package `mitsuba` is missing".into()));
+        }
+        let backend = |llvm, versions| Self { root: site.root().to_owned(), python: python.clone(), llvm, versions };
+        for library in candidates(site.libraries("libLLVM")) {
+            match probe(&python, "llvm_ad_mono", Some(&library)) {
+                Ok(versions) => return Ok(backend(Some(library), versions)),
+                Err(reason) => tracing::debug!(library = %library.display(), reason, "unusable libLLVM"),
+            }
+        }
+        probe(&python, "scalar_rgb", None).map(|versions| backend(None, versions)).map_err(absent)
+    }
+
+    /// Whether it was found at this site.
+    pub(super) fn is_of(&self, site: &Site) -> bool {
+        self.root == site.root()
+    }
+
+    /// Versions of the renderer and of what compiles its kernels.
+    pub(super) fn version(&self) -> Version {
+        let Versions { mitsuba, drjit, llvm } = &self.versions;
+        let llvm = llvm.as_ref().map_or("no usable LLVM".to_owned(), |v| format!("LLVM {v}"));
+        Version(format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"))
+    }
+
+    /// The command that reads an exported job, and a remark if it cannot use the variant asked for.
+    pub(super) fn invocation(&self, workbench: &Workbench, settings: &Settings) -> (Invocation, Option<String>) {
+        let threads = workbench.jobs.max(1).to_string();
+        let mut run = workbench.invoke(&self.python).args(["mitsuba_read.py", "job.json", "--threads", &threads]);
+        // Scene folders stay as exported.
+        run = run.env("PYTHONDONTWRITEBYTECODE", "1");
+        match &self.llvm {
+            Some(library) => (run.env("DRJIT_LIBLLVM_PATH", library), None),
+            None if settings.variant.starts_with("llvm") => {
+                let remark = format!(
+                    "no libLLVM of version 17 or later works here, so scalar_rgb ran instead of {}, about 500 times slower",
+                    settings.variant
+                );
+                (run.args(["--variant", "scalar_rgb"]), Some(remark))
+            }
+            None => (run, None),
+        }
+    }
+}
+
+fn probe(python: &Path, variant: &str, llvm: Option<&Path>) -> Result<Versions, String> {
+    let folder = tempfile::tempdir().map_err(|e| format!("no temporary folder: {e}"))?;
+    let mut run = Invocation::new(python, folder.path(), PROBE_LIMIT, folder.path().join("log"))
+        .args(["-", variant])
+        .stdin(PROBE.into());
+    if let Some(library) = llvm {
+        run = run.env("DRJIT_LIBLLVM_PATH", library);
+    }
+    let finished = run.run().map_err(|e| e.to_string())?;
+    // Mitsuba may log to standard output first: the answer is the last line.
+    let text = String::from_utf8_lossy(&finished.stdout);
+    let answer = text.lines().last().unwrap_or_default();
+    serde_json::from_str(answer).map_err(|e| format!("the probe of Mitsuba answered `{answer}`: {e}"))
+}
+
+/// Libraries that may work, best first: 19 is proven, newer ones come next, before 17 Dr.Jit refuses or aborts.
+fn candidates(libraries: Vec<PathBuf>) -> Vec<PathBuf> {
+    let mut known: Vec<(u32, PathBuf)> = libraries
+        .into_iter()
+        .map(|path| path.canonicalize().unwrap_or(path))
+        .filter_map(|path| Some((llvm_major(path.file_name()?.to_str()?)?, path)))
+        .filter(|(major, _)| *major >= 17)
+        .collect();
+    known.sort_by_key(|(major, path)| (*major != 19, std::cmp::Reverse(*major), path.clone()));
+    known.dedup();
+    known.into_iter().map(|(_, path)| path).collect()
+}
+
+/// The major version in `libLLVM.so.19.1`, `libLLVM-19.so` or `libLLVM-14.0.6.so.1`.
+fn llvm_major(file_name: &str) -> Option<u32> {
+    let rest = file_name.strip_prefix("libLLVM")?;
+    let rest = rest.strip_prefix(".so.").or_else(|| rest.strip_prefix('-'))?;
+    rest.split(['.', '-']).next()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn proven_llvm_comes_first_and_versions_that_abort_are_left_out() {
+        let files =
+            ["libLLVM-14.0.6.so.1", "libLLVM-15.so", "libLLVM.so.22.1", "libLLVM-19.so", "libLLVM.so.17", "libLLVM.so"];
+        let found = candidates(files.iter().map(|f| PathBuf::from("/none").join(f)).collect());
+        let names: Vec<_> = found.iter().map(|p| p.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(names, ["libLLVM-19.so", "libLLVM.so.22.1", "libLLVM.so.17"]);
+    }
+
+    #[test]
+    fn a_site_without_python_says_what_to_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let absent = Backend::find(&Site::at(folder.path())).unwrap_err();
+        assert!(absent.to_string().contains("luxproof engines install"), "{absent}");
+    }
+}

@@ -1,0 +1,194 @@
+//! A job as a folder of Mitsuba 3 files that anyone can run by hand; pure.
+//!
+//! `scene.xml` holds the integrator and the luminaires (emitters that the Python file beside it adds to Mitsuba) and
+//! includes `room.xml`, the surfaces; `job.json` holds the meters, which are no part of the scene.
+
+mod frame;
+mod surfaces;
+mod tables;
+
+use luminaire::scene::{Bounces, Luminaire, Transport};
+use serde::Serialize;
+
+pub(super) use self::frame::Frame;
+use self::tables::Tables;
+use super::settings::{Preset, Settings};
+use crate::engines::{EngineError, Job, SceneFile};
+
+const READ: &str = include_str!("../../../drivers/mitsuba_read.py");
+const GONIOMETRIC: &str = include_str!("../../../drivers/mitsuba_goniometric.py");
+
+/// Russian roulette stops a path with 5 % at least, so that above this reflectance rare long paths carry the light.
+const HIGH_REFLECTANCE: f64 = 0.95;
+
+/// All files of a job.
+pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, EngineError> {
+    let frame = Frame::of(job, settings.frame);
+    let tables = Tables::of(job);
+    let mut files = vec![
+        SceneFile::text("scene.xml", scene_xml(job, &frame, &tables)),
+        SceneFile::text("job.json", job_json(job, settings, &frame)?),
+        SceneFile::text("mitsuba_read.py", READ),
+        SceneFile::text("mitsuba_goniometric.py", GONIOMETRIC),
+    ];
+    if has_surfaces(job) {
+        files.push(SceneFile::text("room.xml", surfaces::room_xml(job, &frame)));
+        files.extend(surfaces::meshes(job, &frame));
+    }
+    files.extend(tables.files()?);
+    Ok(files)
+}
+
+fn has_surfaces(job: &Job) -> bool {
+    job.scene.room.is_some() || !job.scene.obstacles.is_empty()
+}
+
+/// What the driver is asked for.
+#[derive(Serialize)]
+struct DriverJob<'a> {
+    case: &'a str,
+    procedure: &'a str,
+    scene: &'static str,
+    variant: &'a str,
+    transport: &'static str,
+    emitters: usize,
+    relative_error: f64,
+    seconds: f64,
+    fixed_blocks: u32,
+    fixed_samples: u32,
+    seed: u64,
+    stations: Vec<DriverStation<'a>>,
+}
+
+#[derive(Serialize)]
+struct DriverStation<'a> {
+    id: &'a str,
+    position: [f64; 3],
+    normal: [f64; 3],
+}
+
+fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, EngineError> {
+    let (fixed_blocks, fixed_samples) = match settings.preset {
+        Preset::Fast => (8, 1024),
+        Preset::Audit | Preset::Default => (0, 0),
+    };
+    let stations = job.stations.iter().map(|s| DriverStation {
+        id: &s.id.0,
+        position: frame.to_scene(s.meter.position_m).to_array(),
+        normal: s.meter.normal.to_array(),
+    });
+    let driver_job = DriverJob {
+        case: &job.case,
+        procedure: &job.procedure,
+        scene: "scene.xml",
+        variant: &settings.variant,
+        transport: match job.transport {
+            Transport::Direct => "direct",
+            Transport::Indirect(_) => "indirect",
+            Transport::Total(_) => "total",
+        },
+        emitters: job.scene.luminaires.len(),
+        relative_error: job.budget.relative_error,
+        seconds: job.budget.seconds,
+        fixed_blocks,
+        fixed_samples,
+        seed: job.seed,
+        stations: stations.collect(),
+    };
+    serde_json::to_string_pretty(&driver_job).map_err(|e| super::output(format!("the job cannot be written: {e}")))
+}
+
+fn scene_xml(job: &Job, frame: &Frame, tables: &Tables) -> String {
+    let mut xml =
+        header(job, "The luminaires; read the meters of job.json with\n         python mitsuba_read.py job.json");
+    xml += &frame.comment();
+    xml += &integrator(job, "path");
+    if has_surfaces(job) {
+        xml += "    <include filename=\"room.xml\"/>\n";
+    }
+    let luminaires = job.scene.luminaires.iter().zip(tables.of_luminaires());
+    xml.extend(luminaires.map(|(luminaire, table)| emitter(luminaire, &table, frame)));
+    xml + "</scene>\n"
+}
+
+fn emitter(luminaire: &Luminaire, table: &str, frame: &Frame) -> String {
+    format!(
+        r#"
+    <!-- {id} -->
+    <emitter type="goniometric">
+        <string name="table" value="{table}"/>
+        <float name="scale" value="{scale}"/>
+        <transform name="to_world">
+            <matrix value="{matrix}"/>
+        </transform>
+    </emitter>
+"#,
+        id = comment_text(&luminaire.id),
+        scale = luminaire.flux_scale * frame.scale * frame.scale,
+        matrix = frame.matrix(luminaire.position_m, luminaire.orientation),
+    )
+}
+
+/// The first lines of a scene file.
+fn header(job: &Job, what: &str) -> String {
+    let (case, procedure) = (comment_text(&job.case), comment_text(&job.procedure));
+    format!(
+        r#"<?xml version="1.0" encoding="utf-8"?>
+<!-- {case}: {procedure}.
+     {what}
+     Metres, candela and lux: a diffuse surface's irradiance is its illuminance. z is up. -->
+<scene version="3.0.0">
+"#
+    )
+}
+
+/// The integrator with the path length that the transport asks for.
+///
+/// Mitsuba's depth counts the segments of a path from the meter to the luminaire: N reflections are depth N + 1.
+fn integrator(job: &Job, kind: &str) -> String {
+    let highest = highest_reflectance(job);
+    let (max_depth, rr_depth, why) = match job.transport {
+        Transport::Direct => (1, 5, "direct light only".to_owned()),
+        Transport::Indirect(Bounces::AtMost(n)) | Transport::Total(Bounces::AtMost(n)) => {
+            (i64::from(n) + 1, 5, format!("{n} diffuse reflections"))
+        }
+        Transport::Indirect(Bounces::Converged) | Transport::Total(Bounces::Converged)
+            if highest < HIGH_REFLECTANCE =>
+        {
+            (-1, 5, "all reflections".to_owned())
+        }
+        Transport::Indirect(Bounces::Converged) | Transport::Total(Bounces::Converged) => {
+            let n = reflections_until(highest, 0.1 * job.budget.relative_error);
+            let why = format!(
+                "{n} reflections leave less than a tenth of the relative error asked for; no Russian roulette, which \
+                 would let rare long paths carry the light at reflectance {highest}"
+            );
+            (n + 1, 1_000_000, why)
+        }
+    };
+    format!(
+        r#"    <!-- {why} -->
+    <integrator type="{kind}">
+        <integer name="max_depth" value="{max_depth}"/>
+        <integer name="rr_depth" value="{rr_depth}"/>
+    </integrator>
+"#
+    )
+}
+
+/// Reflections after which at most `share` of the light is left where every surface reflects `reflectance`.
+fn reflections_until(reflectance: f64, share: f64) -> i64 {
+    const MOST: f64 = 1e5;
+    (share.max(1e-9).ln() / reflectance.ln()).clamp(1.0, MOST).ceil() as i64
+}
+
+fn highest_reflectance(job: &Job) -> f64 {
+    use luminaire::geometry::Surface;
+    let room = job.scene.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
+    room.chain(job.scene.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
+}
+
+/// Text that may stand in an XML comment.
+fn comment_text(text: &str) -> String {
+    text.replace("--", "- -")
+}

@@ -1,0 +1,84 @@
+//! The coordinates that Mitsuba gets: the spec's own, or moved and scaled where its 32-bit floats need that.
+
+use glam::{DMat3, DVec3};
+use luminaire::scene::Shape;
+
+use crate::engines::Job;
+use crate::engines::mitsuba::settings::FrameChoice;
+
+/// Farther from the origin than this, in scene sizes, a scene is moved there.
+const FAR: f64 = 2.0;
+/// Smaller than this, a scene is scaled up: Mitsuba starts secondary rays 9e-5 x (1 + coordinate) off a surface.
+const SMALL_M: f64 = 2.0;
+/// To at least this size.
+const ENOUGH: f64 = 8.0;
+
+/// scene = (world - origin) x scale. Intensities then grow by the square of the scale, so that lux stay lux.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::engines::mitsuba) struct Frame {
+    /// The world point, in metres, that becomes the scene's origin.
+    pub(in crate::engines::mitsuba) origin_m: DVec3,
+    /// Scene units a metre; a power of two, which loses no digit.
+    pub(in crate::engines::mitsuba) scale: f64,
+}
+
+impl Frame {
+    /// The frame of a job.
+    pub(in crate::engines::mitsuba) fn of(job: &Job, choice: FrameChoice) -> Self {
+        let raw = Self { origin_m: DVec3::ZERO, scale: 1.0 };
+        let (Some((min_m, max_m)), FrameChoice::Recentred) = (bounds_m(job), choice) else { return raw };
+        let (centre_m, size_m) = (0.5 * (min_m + max_m), (max_m - min_m).max_element());
+        let far = centre_m.abs().max_element() > FAR * size_m;
+        let origin_m = if far { centre_m } else { DVec3::ZERO };
+        let small = size_m > 0.0 && size_m < SMALL_M;
+        let scale = if small { (ENOUGH / size_m).log2().ceil().exp2() } else { 1.0 };
+        Self { origin_m, scale }
+    }
+
+    /// A world point in scene units.
+    pub(in crate::engines::mitsuba) fn to_scene(self, point_m: DVec3) -> DVec3 {
+        (point_m - self.origin_m) * self.scale
+    }
+
+    /// The rows of a rotation followed by a translation to `position_m`, as Mitsuba's `matrix` wants them.
+    pub(super) fn matrix(&self, position_m: DVec3, orientation: DMat3) -> String {
+        let p = self.to_scene(position_m);
+        let row = |k: usize| {
+            let r = orientation.row(k);
+            format!("{} {} {} {}", plain(r.x), plain(r.y), plain(r.z), plain(p[k]))
+        };
+        format!("{}  {}  {}  0 0 0 1", row(0), row(1), row(2))
+    }
+
+    /// A remark for scene files whose coordinates are not the spec's.
+    pub(super) fn comment(&self) -> String {
+        if *self == (Self { origin_m: DVec3::ZERO, scale: 1.0 }) {
+            return String::new();
+        }
+        let [x, y, z] = self.origin_m.to_array();
+        let scale = self.scale;
+        format!(
+            "    <!-- Here ({x}, {y}, {z}) m is the origin and a metre is {scale} units long, so that 32-bit floats \
+             resolve the scene;\n         intensities carry the factor {}. -->\n",
+            scale * scale
+        )
+    }
+}
+
+/// A number whose rounding remainder of zero, and zero's sign, are left out.
+pub(super) fn plain(x: f64) -> f64 {
+    if x.abs() < 1e-15 { 0.0 } else { x }
+}
+
+/// Corners of the box that holds everything, in metres.
+fn bounds_m(job: &Job) -> Option<(DVec3, DVec3)> {
+    let scene = &job.scene;
+    let room = scene.room.iter().flat_map(|r| [DVec3::ZERO, r.size_m]);
+    let obstacles = scene.obstacles.iter().flat_map(|o| match &o.shape {
+        Shape::Box { min_m, max_m } => vec![*min_m, *max_m],
+        Shape::Mesh { vertices_m, .. } => vertices_m.clone(),
+    });
+    let points = room.chain(obstacles).chain(scene.luminaires.iter().map(|l| l.position_m));
+    let points = points.chain(job.stations.iter().map(|s| s.meter.position_m));
+    points.map(|p| (p, p)).reduce(|(low, high), (p, _)| (low.min(p), high.max(p)))
+}

@@ -1,0 +1,127 @@
+//! `room.xml`: the room's six surfaces and the obstacles; meshes go into OBJ files of their own.
+
+use glam::DVec3;
+use luminaire::geometry::{Room, Surface};
+use luminaire::scene::Shape;
+
+use super::frame::{Frame, plain};
+use super::header;
+use crate::engines::{Job, SceneFile};
+
+/// The surfaces as a scene file that others include.
+pub(super) fn room_xml(job: &Job, frame: &Frame) -> String {
+    let mut xml = header(job, "The surfaces, included by the other files.");
+    xml += &frame.comment();
+    if let Some(room) = &job.scene.room {
+        for surface in Surface::ALL {
+            xml += &rectangle(room, surface, frame);
+        }
+    }
+    for (k, obstacle) in job.scene.obstacles.iter().enumerate() {
+        let bsdf = diffuse(obstacle.reflectance);
+        xml += &match &obstacle.shape {
+            Shape::Box { min_m, max_m } => cube(k, *min_m, *max_m, &bsdf, frame),
+            Shape::Mesh { .. } => mesh(k, &bsdf),
+        };
+    }
+    xml + "</scene>\n"
+}
+
+/// The meshes of the obstacles, one file each.
+pub(super) fn meshes(job: &Job, frame: &Frame) -> Vec<SceneFile> {
+    let obstacles = job.scene.obstacles.iter().enumerate();
+    let mesh = |(k, obstacle): (usize, &luminaire::scene::Obstacle)| match &obstacle.shape {
+        Shape::Box { .. } => None,
+        Shape::Mesh { vertices_m, triangles } => {
+            Some(SceneFile::text(&mesh_name(k), obj(vertices_m, triangles, frame)))
+        }
+    };
+    obstacles.filter_map(mesh).collect()
+}
+
+/// Mitsuba's rectangle is the square from -1 to 1 in x and y, facing +z.
+fn rectangle(room: &Room, surface: Surface, frame: &Frame) -> String {
+    let normal = surface.inward_normal();
+    let corners = room.corners(surface);
+    let centre = frame.to_scene(0.5 * (corners[0] + corners[2]));
+    let up = if surface.axis() == 2 { DVec3::Y } else { DVec3::Z };
+    let half = 0.5 * frame.scale * room.size_m;
+    let (half_x, half_y) = (half.dot(up.cross(normal).abs()), half.dot(up));
+    format!(
+        r#"
+    <!-- {name} -->
+    <shape type="rectangle">
+        <transform name="to_world">
+            <scale x="{half_x}" y="{half_y}"/>
+            <lookat origin="{origin}" target="{target}" up="{up}"/>
+        </transform>
+        {bsdf}
+    </shape>
+"#,
+        name = surface.name(),
+        origin = list(centre),
+        target = list(centre + normal),
+        up = list(up),
+        bsdf = diffuse(room.reflectance.of(surface)),
+    )
+}
+
+/// Mitsuba's cube reaches from -1 to 1 and faces outwards.
+fn cube(k: usize, min_m: DVec3, max_m: DVec3, bsdf: &str, frame: &Frame) -> String {
+    let half = 0.5 * frame.scale * (max_m - min_m);
+    let centre = frame.to_scene(0.5 * (min_m + max_m));
+    format!(
+        r#"
+    <!-- obstacle {k} -->
+    <shape type="cube">
+        <transform name="to_world">
+            <scale value="{half}"/>
+            <translate value="{centre}"/>
+        </transform>
+        {bsdf}
+    </shape>
+"#,
+        half = list(half),
+        centre = list(centre),
+    )
+}
+
+/// Both sides of a mesh reflect; shading normals would bend its facets.
+fn mesh(k: usize, bsdf: &str) -> String {
+    format!(
+        r#"
+    <!-- obstacle {k} -->
+    <shape type="obj">
+        <string name="filename" value="{name}"/>
+        <boolean name="face_normals" value="true"/>
+        <bsdf type="twosided">
+            {bsdf}
+        </bsdf>
+    </shape>
+"#,
+        name = mesh_name(k),
+    )
+}
+
+fn mesh_name(k: usize) -> String {
+    format!("obstacle-{k}.obj")
+}
+
+fn obj(vertices_m: &[DVec3], triangles: &[[u32; 3]], frame: &Frame) -> String {
+    let vertex = |v: &DVec3| {
+        let [x, y, z] = frame.to_scene(*v).to_array();
+        format!("v {x} {y} {z}\n")
+    };
+    let face = |[a, b, c]: &[u32; 3]| format!("f {} {} {}\n", a + 1, b + 1, c + 1);
+    let lines = vertices_m.iter().map(vertex).chain(triangles.iter().map(face));
+    std::iter::once("# an obstacle, in the coordinates of room.xml\n".to_owned()).chain(lines).collect()
+}
+
+/// A grey diffuse reflector; `rgb`, since a `spectrum` would be tinted.
+fn diffuse(reflectance: f64) -> String {
+    format!(r#"<bsdf type="diffuse"> <rgb name="reflectance" value="{reflectance}"/> </bsdf>"#)
+}
+
+fn list(v: DVec3) -> String {
+    format!("{}, {}, {}", plain(v.x), plain(v.y), plain(v.z))
+}
