@@ -1,0 +1,166 @@
+//! Tests of IP-ED: the published room, refusals and objections, the tilted luminaire, negative controls.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::geometry::Reflectances;
+use crate::photometry::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry};
+use crate::scene::{LuminaireModel, Obstacle, Shape, orientation};
+use approx::assert_relative_eq;
+
+/// The published room: a cube of 20 m.
+pub(crate) fn room() -> Room {
+    Room { size_m: DVec3::splat(20.0), reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8) }
+}
+
+/// An upward cosine luminaire of 4920 lm in the middle of the published room.
+pub(crate) fn uplight_scene() -> Scene {
+    let gamma: Vec<f64> = [0.0].into_iter().chain((90..=180).map(f64::from)).collect();
+    let candela = gamma.iter().map(|g| (-g.to_radians().cos()).max(0.0)).collect();
+    let shape = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
+    let distribution = shape.scaled(4920.0 / shape.flux().value());
+    Scene { room: Some(room()), obstacles: vec![], luminaires: vec![hung(distribution)] }
+}
+
+fn hung(distribution: LuminousIntensityDistribution) -> Luminaire {
+    let photometry = Photometry {
+        format: "test".into(),
+        distribution,
+        lamp_lumens: None,
+        opening: LuminousOpening::Point,
+        input_watts: None,
+        keywords: vec![],
+        details: Details::None,
+        lints: vec![],
+    };
+    Luminaire {
+        id: "pendant".into(),
+        photometry: Arc::new(photometry),
+        position_m: DVec3::splat(10.0),
+        orientation: orientation(0.0, 0.0, 0.0),
+        flux_scale: 1.0,
+        model: LuminaireModel::Point,
+    }
+}
+
+fn on_work_plane(x: f64, y: f64) -> Meter {
+    Meter { position_m: DVec3::new(x, y, 2.0), normal: DVec3::Z }
+}
+
+const PUBLISHED_ROOM: [(f64, f64, f64); 3] = [(2.0, 2.0, 2.2347), (2.0, 10.0, 2.6917), (10.0, 10.0, 3.3285)];
+
+#[test]
+fn the_published_room_gives_the_published_values_for_4920_lumens() {
+    let scene = uplight_scene();
+    let solved = Exitances::of(&scene, 2.0).unwrap();
+    for (ratio, expected) in solved.cavity_ratios.iter().zip([4.0, 5.0, 1.0]) {
+        assert_relative_eq!(*ratio, expected, max_relative = 1e-14);
+    }
+    assert_relative_eq!(solved.reflectances.ceiling_cavity, 0.348, epsilon = 5e-4);
+    assert_relative_eq!(solved.reflectances.floor_cavity, 0.192, epsilon = 5e-4);
+    assert_relative_eq!(solved.coefficients.ceiling_cavity_exitance, 0.369, epsilon = 5e-4);
+    assert_relative_eq!(solved.coefficients.wall_exitance, 0.0802, epsilon = 5e-5);
+    for (x, y, expected) in PUBLISHED_ROOM {
+        let read = indirect_illuminance(&scene, &on_work_plane(x, y)).unwrap();
+        assert_relative_eq!(read.illuminance.value(), expected, epsilon = 1e-4);
+    }
+    let other_way = indirect_illuminance(&scene, &on_work_plane(10.0, 2.0)).unwrap();
+    assert_relative_eq!(other_way.illuminance.value(), 2.6917, epsilon = 1e-4);
+}
+
+#[test]
+fn swapped_reflectances_miss_the_published_room() {
+    let mut scene = uplight_scene();
+    let swaps = [
+        Reflectances::with_equal_walls(0.8, 0.5, 0.2),
+        Reflectances::with_equal_walls(0.5, 0.2, 0.8),
+        Reflectances::with_equal_walls(0.2, 0.8, 0.5),
+    ];
+    for reflectance in swaps {
+        scene.room = Some(Room { reflectance, ..room() });
+        for (x, y, expected) in PUBLISHED_ROOM {
+            let read = indirect_illuminance(&scene, &on_work_plane(x, y)).unwrap().illuminance.value();
+            assert!((read / expected - 1.0).abs() > 0.05, "{reflectance:?}: {read}");
+        }
+    }
+}
+
+#[test]
+fn one_luminaire_in_a_wide_room_is_approximate_and_an_array_is_supported() {
+    let mut scene = uplight_scene();
+    let one = indirect_illuminance(&scene, &on_work_plane(5.0, 5.0)).unwrap();
+    let Validity::Approximate(why) = &one.validity else { panic!("{:?}", one.validity) };
+    assert!(why.contains("20.0 m of spacing") && why.contains("12.0 m"), "{why}");
+    let single = scene.luminaires.remove(0);
+    for (x, y) in [(5.0, 5.0), (15.0, 5.0), (5.0, 15.0), (15.0, 15.0)] {
+        let mut luminaire = single.clone();
+        luminaire.position_m = DVec3::new(x, y, 10.0);
+        luminaire.flux_scale = 0.25;
+        scene.luminaires.push(luminaire);
+    }
+    let four = indirect_illuminance(&scene, &on_work_plane(5.0, 5.0)).unwrap();
+    assert_eq!(four.validity, Validity::Supported);
+    assert_relative_eq!(four.illuminance.value(), one.illuminance.value(), max_relative = 1e-12);
+}
+
+#[test]
+fn what_the_method_leaves_out_is_said() {
+    let mut scene = uplight_scene();
+    scene.obstacles = vec![Obstacle { shape: Shape::Box { min_m: DVec3::ZERO, max_m: DVec3::ONE }, reflectance: 0.5 }];
+    let mut second = scene.luminaires[0].clone();
+    second.position_m.z = 12.0;
+    scene.luminaires.push(second);
+    scene.room = Some(Room { reflectance: Reflectances { wall_x_min: 0.1, ..room().reflectance }, ..room() });
+    let read = indirect_illuminance(&scene, &on_work_plane(5.0, 5.0)).unwrap();
+    let Validity::Approximate(why) = read.validity else { panic!("{:?}", read.validity) };
+    for part in ["obstacle", "mean height", "walls differ"] {
+        assert!(why.contains(part), "{why}");
+    }
+}
+
+#[test]
+fn scenes_and_meters_outside_the_method_are_refused_with_the_reason() {
+    let scene = uplight_scene();
+    let no = |scene: &Scene, meter: &Meter, part: &str| {
+        let Validity::No(why) = Validity::of(&indirect_illuminance(scene, meter)) else {
+            panic!("not refused: {part}")
+        };
+        assert!(why.contains(part), "{why}");
+    };
+    no(&scene, &Meter { normal: DVec3::NEG_Z, ..on_work_plane(5.0, 5.0) }, "face straight up");
+    no(&scene, &Meter { normal: DVec3::X, ..on_work_plane(5.0, 5.0) }, "face straight up");
+    no(&scene, &Meter { position_m: DVec3::new(5.0, 5.0, 12.0), normal: DVec3::Z }, "not above the meter");
+    no(&scene, &Meter { position_m: DVec3::new(5.0, 25.0, 2.0), normal: DVec3::Z }, "outside the room");
+    let meter = on_work_plane(5.0, 5.0);
+    no(&Scene { room: None, ..scene.clone() }, &meter, "no room");
+    no(&Scene { luminaires: vec![], ..scene.clone() }, &meter, "no luminaire");
+    let mirror = Room { reflectance: Reflectances::with_equal_walls(0.2, 1.0, 0.8), ..room() };
+    no(&Scene { room: Some(mirror), ..scene }, &meter, "rho < 1");
+}
+
+#[test]
+fn a_tilted_luminaire_keeps_its_flux_and_turns_its_zones() {
+    let mut luminaire = uplight_scene().luminaires.remove(0);
+    let upright = zonal_flux(&luminaire);
+    luminaire.orientation = orientation(30.0, 1e-5, 0.0);
+    let barely = zonal_flux(&luminaire);
+    for (a, b) in upright.0.iter().zip(&barely.0) {
+        assert_relative_eq!(a, b, epsilon = 2e-2);
+    }
+    luminaire.orientation = orientation(0.0, 180.0, 0.0);
+    let turned = zonal_flux(&luminaire);
+    assert_relative_eq!(turned.down_lm(), upright.up_lm(), max_relative = 1e-4);
+    assert_relative_eq!(turned.0[0], upright.0[17], max_relative = 1e-3);
+}
+
+#[test]
+fn total_is_direct_plus_indirect() {
+    let gamma = vec![0.0, 180.0];
+    let isotropic = LuminousIntensityDistribution::axial(gamma, vec![100.0, 100.0]).unwrap();
+    let scene = Scene { luminaires: vec![hung(isotropic)], ..uplight_scene() };
+    let meter = on_work_plane(7.0, 4.0);
+    let total = total_illuminance(&scene, &meter).unwrap();
+    let indirect = indirect_illuminance(&scene, &meter).unwrap().illuminance;
+    let direct = 100.0 * 8.0 / (9.0 + 36.0 + 64.0_f64).powf(1.5);
+    assert_relative_eq!((total.illuminance - indirect).value(), direct, max_relative = 1e-12);
+}

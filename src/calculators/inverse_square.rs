@@ -1,0 +1,201 @@
+//! Inverse-square method: direct illuminance of a point from point luminaires, E = I cos(xi) / d^2.
+//!
+//! Lambert, *Photometria* (1760); IES Lighting Handbook, point calculations. Exact for a point source; for an extended
+//! one the five-times rule (distance at least five times the largest luminous dimension) keeps it within about 1-2.5 %.
+//! How far off it is for a Lambertian opening of the luminaire's size is worked out with Lambert's polygon formula.
+
+use glam::DVec3;
+
+use super::{Calculated, NotApplicable, Validity};
+use crate::geometry::configuration_factor::element_to_polygon;
+use crate::photometry::LuminousOpening;
+use crate::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape};
+use crate::units::Lux;
+
+/// Direct illuminance of a meter: the sum over luminaires that no obstacle hides, 0 behind the meter's plane.
+pub fn direct_illuminance(scene: &Scene, meter: &Meter) -> Result<Calculated, NotApplicable> {
+    let mut sum = Lux(0.0);
+    let mut objections = vec![];
+    for luminaire in &scene.luminaires {
+        if luminaire.position_m == meter.position_m {
+            let reason = format!("the meter lies at the photometric centre of `{}`; move either", luminaire.id);
+            return Err(NotApplicable { method: METHOD, reason });
+        }
+        let hidden = scene.obstacles.iter().any(|obstacle| blocks(obstacle, meter.position_m, luminaire.position_m));
+        let contribution = if hidden { Lux(0.0) } else { from_luminaire(luminaire, meter) };
+        sum = sum + contribution;
+        if luminaire.model != LuminaireModel::Point {
+            objections.extend(FiveTimesRule::check(luminaire, meter).objection(luminaire));
+        }
+    }
+    Ok(Calculated { illuminance: sum, validity: Validity::from_objections(&objections) })
+}
+
+/// What one luminaire gives a meter when nothing stands between.
+pub fn from_luminaire(luminaire: &Luminaire, meter: &Meter) -> Lux {
+    let towards_meter = meter.position_m - luminaire.position_m;
+    let cos_xi = -towards_meter.normalize().dot(meter.normal);
+    if cos_xi > 0.0 {
+        Lux(luminaire.intensity_towards(towards_meter).value() * cos_xi / towards_meter.length_squared())
+    } else {
+        Lux(0.0)
+    }
+}
+
+const METHOD: &str = "inverse-square method";
+
+/// The five-times rule for one luminaire and one meter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FiveTimesRule {
+    /// Distance over the largest luminous dimension; infinite for an opening without extent.
+    pub distance_over_size: f64,
+    /// Point formula over exact value, less 1, for a Lambertian opening of the luminaire's size and plan; `None` where
+    /// the meter sees the opening edge-on or is cut by its plane, or where the opening is not flat.
+    pub lambertian_error: Option<f64>,
+}
+
+impl FiveTimesRule {
+    /// Measures the rule; the luminaire's model does not matter here, only its opening.
+    pub fn check(luminaire: &Luminaire, meter: &Meter) -> Self {
+        let distance = meter.position_m.distance(luminaire.position_m);
+        let distance_over_size = distance / largest_dimension_m(&luminaire.photometry.opening);
+        Self { distance_over_size, lambertian_error: lambertian_twin(luminaire, meter) }
+    }
+
+    /// Whether the distance is at least five times the size.
+    pub fn holds(&self) -> bool {
+        self.distance_over_size >= 5.0
+    }
+
+    fn objection(&self, luminaire: &Luminaire) -> Option<String> {
+        if self.distance_over_size.is_infinite() {
+            return None;
+        }
+        let error = match self.lambertian_error {
+            Some(error) => format!("a Lambertian opening of its size would read {:+.2} % too much", 100.0 * error),
+            None => format!("its extent matters by up to about {:.2} %", 100.0 * FAR_ERROR / self.k2()),
+        };
+        let rule = if self.holds() { "" } else { ", closer than the five-times rule allows" };
+        Some(format!(
+            "`{}` is {:.2} times its largest luminous dimension away{rule}; {error}",
+            luminaire.id, self.distance_over_size
+        ))
+    }
+
+    fn k2(&self) -> f64 {
+        self.distance_over_size * self.distance_over_size
+    }
+}
+
+/// |1/3 - sin^2 theta| at most: error of a Lambertian square times (distance / side)^2.
+const FAR_ERROR: f64 = 2.0 / 3.0;
+
+/// Relative error of the point formula for a flat Lambertian opening in the luminaire's place: the exact twin.
+///
+/// `None` for openings with height or none at all, and where part of the opening lies behind the meter's plane.
+pub fn lambertian_twin(luminaire: &Luminaire, meter: &Meter) -> Option<f64> {
+    let corners: Vec<DVec3> = flat_outline_m(&luminaire.photometry.opening)?
+        .into_iter()
+        .map(|corner| luminaire.position_m + luminaire.orientation * corner)
+        .collect();
+    let axis = luminaire.orientation * DVec3::NEG_Z;
+    let towards_meter = meter.position_m - luminaire.position_m;
+    let cos_source = towards_meter.normalize().dot(axis).abs();
+    let cos_xi = -towards_meter.normalize().dot(meter.normal);
+    let visible = corners.iter().all(|corner| (corner - meter.position_m).dot(meter.normal) > 0.0);
+    if !visible || cos_source < 1e-9 {
+        return None;
+    }
+    // Exitance 1: exact E = c; intensity A cos / pi.
+    let exact = element_to_polygon(meter.position_m, meter.normal, &corners);
+    let point = area(&corners) * cos_source * cos_xi / (std::f64::consts::PI * towards_meter.length_squared());
+    Some(point / exact - 1.0)
+}
+
+fn area(corners: &[DVec3]) -> f64 {
+    let fan = corners.windows(2).skip(1).map(|edge| (edge[0] - corners[0]).cross(edge[1] - corners[0]));
+    0.5 * fan.sum::<DVec3>().length()
+}
+
+/// The largest extent of a luminous opening in metres, as the five-times rule takes it; a rectangle's longer side.
+pub fn largest_dimension_m(opening: &LuminousOpening) -> f64 {
+    match *opening {
+        LuminousOpening::Point => 0.0,
+        LuminousOpening::Box { x_m, y_m, height_m } | LuminousOpening::Ellipse { x_m, y_m, height_m } => {
+            x_m.max(y_m).max(height_m)
+        }
+        LuminousOpening::Ellipsoid { x_m, y_m, z_m } => x_m.max(y_m).max(z_m),
+        LuminousOpening::LyingCylinder { length_m, diameter_m, .. } => length_m.max(diameter_m),
+    }
+}
+
+/// The outline of a flat opening in the luminaire's own frame; an ellipse as 720 corners of equal area.
+fn flat_outline_m(opening: &LuminousOpening) -> Option<Vec<DVec3>> {
+    match *opening {
+        LuminousOpening::Box { x_m, y_m, height_m: 0.0 } if x_m > 0.0 && y_m > 0.0 => {
+            let corner = |u: f64, v: f64| DVec3::new(u * x_m, v * y_m, 0.0);
+            Some(vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)])
+        }
+        LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 } if x_m > 0.0 && y_m > 0.0 => {
+            let count = 720;
+            let step = std::f64::consts::TAU / f64::from(count);
+            let swell = 0.5 * (step / step.sin()).sqrt();
+            let corner = |k: u32| {
+                let (sin, cos) = (f64::from(k) * step).sin_cos();
+                DVec3::new(swell * x_m * cos, swell * y_m * sin, 0.0)
+            };
+            Some((0..count).map(corner).collect())
+        }
+        _ => None,
+    }
+}
+
+/// Whether an obstacle cuts the open segment between two points; an end that lies on its surface does not count.
+fn blocks(obstacle: &Obstacle, from_m: DVec3, to_m: DVec3) -> bool {
+    let along = to_m - from_m;
+    match &obstacle.shape {
+        Shape::Box { min_m, max_m } => {
+            let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
+            for axis in 0..3 {
+                let (low, high) = (min_m[axis] - from_m[axis], max_m[axis] - from_m[axis]);
+                if along[axis] == 0.0 {
+                    if low >= 0.0 || high <= 0.0 {
+                        return false;
+                    }
+                    continue;
+                }
+                let (a, b) = (low / along[axis], high / along[axis]);
+                enter = enter.max(a.min(b));
+                leave = leave.min(a.max(b));
+            }
+            leave - enter > TOUCH
+        }
+        Shape::Mesh { vertices_m, triangles } => triangles.iter().any(|triangle| {
+            let [a, b, c] = triangle.map(|vertex| vertices_m[vertex as usize]);
+            crosses(from_m, along, [a, b, c])
+        }),
+    }
+}
+
+/// Part of the segment that may lie within an obstacle by rounding when an end touches it.
+const TOUCH: f64 = 1e-12;
+
+/// Möller and Trumbore (1997): whether the segment crosses the triangle between its ends.
+fn crosses(from_m: DVec3, along: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
+    let (ab, ac) = (b - a, c - a);
+    let p = along.cross(ac);
+    let determinant = ab.dot(p);
+    if determinant == 0.0 {
+        return false;
+    }
+    let s = from_m - a;
+    let u = s.dot(p) / determinant;
+    let q = s.cross(ab);
+    let v = along.dot(q) / determinant;
+    let t = ac.dot(q) / determinant;
+    u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > TOUCH && t < 1.0 - TOUCH
+}
+
+#[cfg(test)]
+#[path = "inverse_square_tests.rs"]
+mod tests;

@@ -1,0 +1,152 @@
+//! Tests of the inverse-square method: Lambert's law, the five-times rule's own errors, shadows, refusals.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::photometry::{Details, LuminousIntensityDistribution, Photometry};
+use crate::scene::orientation;
+use approx::assert_relative_eq;
+
+fn luminaire(
+    distribution: LuminousIntensityDistribution,
+    opening: LuminousOpening,
+    model: LuminaireModel,
+) -> Luminaire {
+    let photometry = Photometry {
+        format: "test".into(),
+        distribution,
+        lamp_lumens: None,
+        opening,
+        input_watts: None,
+        keywords: vec![],
+        details: Details::None,
+        lints: vec![],
+    };
+    Luminaire {
+        id: "l".into(),
+        photometry: Arc::new(photometry),
+        position_m: DVec3::ZERO,
+        orientation: orientation(0.0, 0.0, 0.0),
+        flux_scale: 1.0,
+        model,
+    }
+}
+
+fn isotropic() -> LuminousIntensityDistribution {
+    LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0, 100.0]).unwrap()
+}
+
+fn facing_up(x: f64, y: f64, z: f64) -> Meter {
+    Meter { position_m: DVec3::new(x, y, z), normal: DVec3::Z }
+}
+
+/// The point formula's error for a flat Lambertian opening, at `k` sizes and `theta_deg` from its axis along x.
+fn error(opening: LuminousOpening, k: f64, theta_deg: f64) -> f64 {
+    let luminaire = luminaire(isotropic(), opening, LuminaireModel::Area);
+    let distance = k * largest_dimension_m(&opening);
+    let (sin, cos) = theta_deg.to_radians().sin_cos();
+    lambertian_twin(&luminaire, &facing_up(distance * sin, 0.0, -distance * cos)).unwrap()
+}
+
+#[test]
+fn five_times_rule_states_the_error_of_discs_squares_and_lines() {
+    let disc = LuminousOpening::Ellipse { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
+    let square = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
+    let line = LuminousOpening::Box { x_m: 1e-3, y_m: 1.0, height_m: 0.0 };
+    // On axis a disc of diameter 1 gives pi L / (1 + 4 k^2) exactly, so the point formula is 1/(4 k^2) too high.
+    for k in [1.0, 2.0, 5.0, 20.0] {
+        assert_relative_eq!(error(disc, k, 0.0), 0.25 / (k * k), max_relative = 1e-4, epsilon = 1e-8);
+    }
+    // Second order in 1/k; the next order stays below 1/k^4.
+    for k in [5.0_f64, 10.0, 40.0] {
+        for theta in [0.0_f64, 30.0, 45.0, 60.0, 80.0] {
+            let s2 = theta.to_radians().sin().powi(2);
+            let fourth = 1.5 / k.powi(4);
+            assert_relative_eq!(error(disc, k, theta), (0.25 - 0.75 * s2) / (k * k), epsilon = fourth);
+            assert_relative_eq!(error(square, k, theta), (1.0 / 3.0 - s2) / (k * k), epsilon = fourth);
+        }
+        assert_relative_eq!(error(line, k, 0.0), 1.0 / (6.0 * k * k), epsilon = 0.5 / k.powi(4));
+    }
+    // The figures usually quoted at five sizes.
+    for (theta, percent) in [(0.0, 1.33), (45.0, -0.65), (60.0, -1.64), (80.0, -2.5)] {
+        assert_relative_eq!(100.0 * error(square, 5.0, theta), percent, epsilon = 0.05);
+    }
+}
+
+#[test]
+fn five_times_rule_is_said_only_of_extended_models() {
+    let square = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+    let scene = |model| Scene { luminaires: vec![luminaire(isotropic(), square, model)], ..Scene::default() };
+    let read = |model, z| direct_illuminance(&scene(model), &facing_up(0.0, 0.0, z)).unwrap();
+    assert_eq!(read(LuminaireModel::Point, -1.0).validity, Validity::Supported);
+    let Validity::Approximate(far) = read(LuminaireModel::Area, -6.0).validity else { panic!("not approximate") };
+    assert!(far.contains("10.00 times") && far.contains("+0.33 %") && !far.contains("five-times"), "{far}");
+    let Validity::Approximate(near) = read(LuminaireModel::Area, -1.0).validity else { panic!("not approximate") };
+    assert!(near.contains("five-times"), "{near}");
+}
+
+#[test]
+fn illuminance_falls_with_the_square_of_distance_and_the_cosine_of_incidence() {
+    // Lambertian, 1000 cd on axis: E = I0 h^2 / d^4 at 3 m.
+    let gamma: Vec<f64> = (0..=1800).map(|k| 0.05 * f64::from(k)).collect();
+    let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
+    let lambertian = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
+    let source = luminaire(lambertian, LuminousOpening::Point, LuminaireModel::Point);
+    let scene = Scene { luminaires: vec![source], ..Scene::default() };
+    for (x, y, expected) in [(0.0, 0.0, 111.111), (1.5, 0.0, 71.111), (1.0, 1.0, 74.380), (1.5, 1.5, 49.383)] {
+        let read = direct_illuminance(&scene, &facing_up(x, y, -3.0)).unwrap();
+        assert_relative_eq!(read.illuminance.value(), expected, epsilon = 5e-4);
+        assert_eq!(read.validity, Validity::Supported);
+    }
+}
+
+#[test]
+fn a_meter_that_faces_away_reads_nothing_and_flux_scale_scales() {
+    let mut source = luminaire(isotropic(), LuminousOpening::Point, LuminaireModel::Point);
+    let meter = facing_up(0.0, 0.0, 2.0);
+    assert_eq!(from_luminaire(&source, &meter), Lux(0.0));
+    source.flux_scale = 0.3;
+    let meter = facing_up(0.0, 0.0, -2.0);
+    assert_relative_eq!(from_luminaire(&source, &meter).value(), 7.5, max_relative = 1e-14);
+}
+
+#[test]
+fn a_turned_luminaire_turns_its_distribution() {
+    let spot = LuminousIntensityDistribution::axial(vec![0.0, 30.0, 180.0], vec![100.0, 0.0, 0.0]).unwrap();
+    let mut source = luminaire(spot, LuminousOpening::Point, LuminaireModel::Point);
+    source.orientation = orientation(0.0, 90.0, 0.0);
+    let wall = Meter { position_m: DVec3::new(-2.0, 0.0, 0.0), normal: DVec3::X };
+    assert_relative_eq!(from_luminaire(&source, &wall).value(), 25.0, max_relative = 1e-12);
+    assert_eq!(from_luminaire(&source, &facing_up(0.0, 0.0, -2.0)), Lux(0.0));
+}
+
+#[test]
+fn obstacles_hide_luminaires_only_when_they_stand_between() {
+    let between = Shape::Box { min_m: DVec3::new(-0.5, -0.5, -1.2), max_m: DVec3::new(0.5, 0.5, -1.0) };
+    let beside = Shape::Box { min_m: DVec3::new(0.1, 0.1, -1.2), max_m: DVec3::new(0.5, 0.5, -1.0) };
+    let beneath = Shape::Box { min_m: DVec3::new(-0.5, -0.5, -3.0), max_m: DVec3::new(0.5, 0.5, -2.0) };
+    let triangle = Shape::Mesh {
+        vertices_m: vec![DVec3::new(-1.0, -1.0, -1.0), DVec3::new(1.0, -1.0, -1.0), DVec3::new(0.0, 2.0, -1.0)],
+        triangles: vec![[0, 1, 2]],
+    };
+    let read = |shape: &Shape, x: f64| {
+        let source = luminaire(isotropic(), LuminousOpening::Point, LuminaireModel::Point);
+        let obstacle = Obstacle { shape: shape.clone(), reflectance: 0.5 };
+        let scene = Scene { obstacles: vec![obstacle], luminaires: vec![source], ..Scene::default() };
+        direct_illuminance(&scene, &facing_up(x, 0.0, -2.0)).unwrap().illuminance.value()
+    };
+    assert_eq!(read(&between, 0.0), 0.0);
+    assert_eq!(read(&triangle, 0.0), 0.0);
+    for open in [read(&beside, 0.0), read(&beneath, 0.0)] {
+        assert_relative_eq!(open, 25.0, max_relative = 1e-14);
+    }
+    assert!(read(&triangle, 3.0) > 0.0 && read(&between, 1.5) > 0.0);
+}
+
+#[test]
+fn a_meter_at_the_photometric_centre_is_refused() {
+    let source = luminaire(isotropic(), LuminousOpening::Point, LuminaireModel::Point);
+    let scene = Scene { luminaires: vec![source], ..Scene::default() };
+    let refused = direct_illuminance(&scene, &facing_up(0.0, 0.0, 0.0));
+    assert!(matches!(Validity::of(&refused), Validity::No(_)));
+}
