@@ -2,7 +2,9 @@
 //!
 //! Adding one: write `engines/<name>.rs` with a type that implements [`Engine`], and add its line to [`all`].
 
+mod install;
 mod mitsuba;
+mod simulator;
 mod site;
 
 use std::collections::BTreeMap;
@@ -17,11 +19,15 @@ use crate::process::{Invocation, ProcessError};
 use crate::reading::MeterId;
 
 pub use crate::spec::Budget;
+pub use install::{InstallOutcome, InstallState, install};
 pub use site::{Site, SiteError};
 
 /// Every engine that luxproof knows, in the order of reports.
 pub fn all() -> Vec<Box<dyn Engine>> {
-    vec![Box::new(mitsuba::Mitsuba::default())]
+    vec![
+        Box::new(simulator::Simulator), // our own witnesses first
+        Box::new(mitsuba::Mitsuba::default()),
+    ]
 }
 
 /// The name of an engine in specs, on the command line and in reports.

@@ -1,6 +1,7 @@
 //! The site: the folder where luxproof keeps the engines it installed, and where else it looks for them.
 
 use std::env;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use etcetera::BaseStrategy;
@@ -71,8 +72,65 @@ impl Site {
         let files = folders.filter_map(|f| std::fs::read_dir(f).ok()).flat_map(Iterator::flatten);
         files.map(|f| f.path()).filter(|p| file_name_starts_with(p, prefix)).collect()
     }
+
+    /// What `LD_LIBRARY_PATH` must hold for programs of our unpacked packages; `None` if there are none.
+    pub fn library_path(&self) -> Option<OsString> {
+        let triple = format!("{}-linux-gnu", env::consts::ARCH);
+        let folders = ["usr/lib", "lib"].map(|l| self.debian().join(l));
+        let folders = folders.into_iter().flat_map(|r| [r.join(&triple), r]);
+        let present: Vec<PathBuf> = folders.filter(|f| f.is_dir()).collect();
+        env::join_paths(present).ok().filter(|p| !p.is_empty())
+    }
+
+    /// The libLLVM that suits Mitsuba best: 19 if there is one, else the newest from 17 on.
+    ///
+    /// Older ones are refused by Mitsuba (14) or end its process (15, 16).
+    pub fn llvm(&self) -> Option<PathBuf> {
+        let versioned = self.libraries("libLLVM").into_iter().filter_map(|p| llvm_major(&p).map(|v| (v, p)));
+        let usable = versioned.filter(|(major, _)| *major >= 17);
+        usable.max_by_key(|(major, _)| (*major == 19, *major)).map(|(_, path)| path)
+    }
+}
+
+/// The major version in `libLLVM.so.19.1`, `libLLVM-17.so.1` or `libLLVM-17.so`.
+fn llvm_major(path: &Path) -> Option<u32> {
+    let name = path.file_name()?.to_str()?.strip_prefix("libLLVM")?;
+    let digits = name.strip_prefix(".so.").or_else(|| name.strip_prefix('-'))?;
+    digits.split('.').next()?.parse().ok()
 }
 
 fn file_name_starts_with(path: &Path, prefix: &str) -> bool {
     path.file_name().is_some_and(|n| n.to_string_lossy().starts_with(prefix))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_llvm_version_is_read_from_every_form_of_its_file_name() {
+        for (name, major) in [
+            ("libLLVM.so.19.1", Some(19)),
+            ("libLLVM.so.18.1", Some(18)),
+            ("libLLVM-17.so.1", Some(17)),
+            ("libLLVM-14.0.6.so.1", Some(14)),
+            ("libLLVM-19.so", Some(19)),
+            ("libLLVMSPIRVLib.so.14", None),
+        ] {
+            assert_eq!(llvm_major(Path::new(name)), major, "{name}");
+        }
+    }
+
+    #[test]
+    fn llvm_19_is_taken_first_and_too_old_ones_never() {
+        let root = tempfile::tempdir().unwrap();
+        let site = Site::at(root.path());
+        let folder = site.debian().join("usr/lib");
+        std::fs::create_dir_all(&folder).unwrap();
+        for name in ["libLLVM-14.so.1", "libLLVM.so.19.1", "libLLVM.so.22.1"] {
+            std::fs::write(folder.join(name), "").unwrap();
+        }
+        assert_eq!(site.llvm().and_then(|p| llvm_major(&p)), Some(19));
+        assert_eq!(site.library_path(), Some(folder.into_os_string()));
+    }
 }

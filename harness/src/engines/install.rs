@@ -1,0 +1,174 @@
+//! Installs the engines into the site: pinned Python packages, POV-Ray and a libLLVM; does nothing where all is there.
+//!
+//! As root, Debian packages are installed system-wide; otherwise they are downloaded and unpacked into the site.
+
+mod debian;
+mod venv;
+
+use std::fs::File;
+use std::time::Duration;
+
+use crate::process::ProcessError;
+
+use super::{EngineId, Site};
+
+/// What became of one component.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InstallOutcome {
+    /// The component, e.g. `Python packages`.
+    pub component: &'static str,
+    /// How it ended.
+    pub state: InstallState,
+    /// One line for the user: where it is, or what is wrong and what to do.
+    pub detail: String,
+}
+
+/// How the installation of a component ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InstallState {
+    /// It was there already; nothing was done.
+    Present,
+    /// It is there now.
+    Installed,
+    /// It is not there, but the engines work without it, more slowly.
+    Optional,
+    /// It is not there, and an engine needs it.
+    Failed,
+}
+
+/// A part of the installation that engines share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Component {
+    PythonPackages,
+    PovRay,
+    LibLlvm,
+}
+
+/// Why a component could not be installed.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum InstallError {
+    /// A program of the installation failed.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
+    /// The site's folder could not be changed.
+    #[error("{path}: {source}")]
+    Io { path: String, source: std::io::Error },
+    /// Something that the installation needs is missing.
+    #[error("{what}; {remedy}")]
+    Missing { what: String, remedy: String },
+}
+
+/// Longest time for one step: a download of some 150 MB over a slow line.
+const LIMIT: Duration = Duration::from_secs(3600);
+
+/// Installs what the named engines need (all engines if `engines` is empty), and says per component what was done.
+///
+/// `progress` is told of each step before it starts. Another installation into the same site is waited for.
+pub fn install(site: &Site, engines: &[EngineId], mut progress: impl FnMut(&str)) -> Vec<InstallOutcome> {
+    let components = components(engines);
+    // Held to the end, so that two installations never write the same folder.
+    let lock = match lock(site) {
+        Ok(lock) => lock,
+        Err(error) => return components.iter().map(|c| c.failed(&error)).collect(),
+    };
+    let outcomes = components.iter().map(|c| c.install(site, &mut progress)).collect();
+    drop(lock);
+    outcomes
+}
+
+/// What the named engines need; all of it if none is named.
+fn components(engines: &[EngineId]) -> Vec<Component> {
+    let of = |engine: &EngineId| match engine.0 {
+        "mitsuba" => &[Component::PythonPackages, Component::LibLlvm][..],
+        "povray" => &[Component::PythonPackages, Component::PovRay],
+        "radiance" => &[Component::PythonPackages],
+        _ => &[],
+    };
+    let all = [Component::PythonPackages, Component::PovRay, Component::LibLlvm];
+    let wanted = |c: &Component| engines.is_empty() || engines.iter().any(|e| of(e).contains(c));
+    all.into_iter().filter(wanted).collect()
+}
+
+fn lock(site: &Site) -> Result<File, InstallError> {
+    std::fs::create_dir_all(site.root()).map_err(|e| InstallError::io(site.root(), e))?;
+    let path = site.root().join("install.lock");
+    let file = File::create(&path).map_err(|e| InstallError::io(&path, e))?;
+    file.lock().map_err(|e| InstallError::io(&path, e))?;
+    Ok(file)
+}
+
+impl Component {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::PythonPackages => "Python packages",
+            Self::PovRay => "POV-Ray",
+            Self::LibLlvm => "libLLVM",
+        }
+    }
+
+    fn install(self, site: &Site, progress: &mut dyn FnMut(&str)) -> InstallOutcome {
+        let present = |detail: String| self.outcome(InstallState::Present, detail);
+        let done = |result: Result<String, InstallError>| match result {
+            Ok(detail) => self.outcome(InstallState::Installed, detail),
+            Err(error) => self.failed(&error),
+        };
+        match self {
+            Self::PythonPackages if venv::is_current(site) => present(site.venv().display().to_string()),
+            Self::PythonPackages => done(venv::install(site, progress)),
+            Self::PovRay => match site.program("povray") {
+                Some(path) => present(path.display().to_string()),
+                None => done(debian::install_povray(site, progress)),
+            },
+            Self::LibLlvm => match site.llvm() {
+                Some(path) => present(path.display().to_string()),
+                None => match debian::install_llvm(site, progress) {
+                    Ok(detail) => self.outcome(InstallState::Installed, detail),
+                    Err(error) => {
+                        let detail = format!("Mitsuba will run its scalar_rgb variant, about 10x slower: {error}");
+                        self.outcome(InstallState::Optional, detail)
+                    }
+                },
+            },
+        }
+    }
+
+    fn failed(self, error: &InstallError) -> InstallOutcome {
+        self.outcome(InstallState::Failed, error.to_string())
+    }
+
+    fn outcome(self, state: InstallState, detail: String) -> InstallOutcome {
+        InstallOutcome { component: self.name(), state, detail }
+    }
+}
+
+impl InstallError {
+    fn io(path: &std::path::Path, source: std::io::Error) -> Self {
+        Self::Io { path: path.display().to_string(), source }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_engine_gets_what_it_needs_and_no_more() {
+        use Component::{LibLlvm, PovRay, PythonPackages};
+        assert_eq!(components(&[]), [PythonPackages, PovRay, LibLlvm]);
+        assert_eq!(components(&[EngineId("radiance")]), [PythonPackages]);
+        assert_eq!(components(&[EngineId("povray"), EngineId("radiance")]), [PythonPackages, PovRay]);
+        assert_eq!(components(&[EngineId("mitsuba")]), [PythonPackages, LibLlvm]);
+        assert_eq!(components(&[EngineId("simulator"), EngineId("iesna")]), []);
+    }
+
+    #[test]
+    fn a_site_that_cannot_be_written_fails_each_component_with_its_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        let outcomes = install(&Site::at(file.join("site")), &[EngineId("radiance")], |_| {});
+        assert_eq!(outcomes.len(), 1);
+        assert_eq!(outcomes[0].state, InstallState::Failed);
+        assert!(outcomes[0].detail.contains("site"), "{}", outcomes[0].detail);
+    }
+}

@@ -1,0 +1,140 @@
+//! POV-Ray and libLLVM from Debian or Ubuntu: installed as root, otherwise downloaded by apt and unpacked into the site.
+//!
+//! Without root, apt works on lists and caches of our own below the site; what the system already has is not fetched.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::{InstallError, LIMIT};
+use crate::engines::Site;
+use crate::process::Invocation;
+
+/// The libLLVM packages that Mitsuba works with, the best known first.
+const LLVM_PACKAGES: [&str; 5] = ["libllvm19", "libllvm20", "libllvm18", "libllvm17t64", "libllvm17"];
+
+/// Installs POV-Ray; returns where it is.
+pub(super) fn install_povray(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
+    let remedy = "install POV-Ray 3.7 so that `povray` is on PATH (macOS: `brew install povray`)";
+    let apt = Apt::find(site, "POV-Ray", remedy)?;
+    apt.install(&["povray"], progress)?;
+    let found = site.program("povray").ok_or_else(|| not_there("povray", remedy))?;
+    // Seen to start, with the libraries that were unpacked beside it.
+    let mut check = apt.step(&found).args(["--version"]);
+    if let Some(path) = site.library_path() {
+        check = check.env("LD_LIBRARY_PATH", path);
+    }
+    check.run()?;
+    Ok(found.display().to_string())
+}
+
+/// Installs a libLLVM that Mitsuba works with; returns where it is.
+pub(super) fn install_llvm(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
+    let remedy = "install LLVM 17 or later (macOS: `brew install llvm`)";
+    Apt::find(site, "libLLVM", remedy)?.install(&LLVM_PACKAGES, progress)?;
+    let found = site.llvm().ok_or_else(|| not_there("libLLVM", remedy))?;
+    Ok(found.display().to_string())
+}
+
+fn not_there(what: &str, remedy: &str) -> InstallError {
+    let what = format!("apt-get ended well, but {what} is still not found");
+    InstallError::Missing { what, remedy: remedy.to_owned() }
+}
+
+/// The package manager, and whether we may use it on the system.
+struct Apt<'a> {
+    site: &'a Site,
+    program: PathBuf,
+    system_wide: bool,
+}
+
+impl<'a> Apt<'a> {
+    fn find(site: &'a Site, what: &str, remedy: &str) -> Result<Self, InstallError> {
+        let missing = |what: String| InstallError::Missing { what, remedy: remedy.to_owned() };
+        let program = site.program("apt-get").ok_or_else(|| missing(format!("no apt-get to get {what} with")))?;
+        let system_wide = rustix::process::geteuid().is_root();
+        if !system_wide && site.program("dpkg").is_none() {
+            return Err(missing(format!("no dpkg to unpack {what} with")));
+        }
+        Ok(Self { site, program, system_wide })
+    }
+
+    /// Installs the first of `packages` that the archive has; refreshes the lists once if it seems to have none.
+    fn install(&self, packages: &[&str], progress: &mut dyn FnMut(&str)) -> Result<(), InstallError> {
+        if self.first_of(packages, progress).is_ok() {
+            return Ok(());
+        }
+        progress("refreshing the lists of Debian packages");
+        // Old lists may serve even where they cannot be refreshed: the last word is the installation's.
+        let refreshed = self.apt(&["update"]);
+        self.first_of(packages, progress).map_err(|error| refreshed.err().unwrap_or(error))
+    }
+
+    fn first_of(&self, packages: &[&str], progress: &mut dyn FnMut(&str)) -> Result<(), InstallError> {
+        let mut first_error = None;
+        for package in packages {
+            progress(&format!("installing {package}"));
+            match self.install_one(package) {
+                Ok(()) => return Ok(()),
+                Err(error) => first_error = first_error.or(Some(error)),
+            }
+        }
+        Err(first_error.unwrap_or_else(|| not_there("nothing", "name a package")))
+    }
+
+    fn install_one(&self, package: &str) -> Result<(), InstallError> {
+        let install = ["install", "-y", "-q", "--no-install-recommends"];
+        if self.system_wide {
+            return self.apt(&[&install[..], &[package]].concat());
+        }
+        // --reinstall: it may be installed where PATH does not lead; its dependencies then are there as well.
+        self.apt(&[&install[..], &["--download-only", "--reinstall", package]].concat())?;
+        self.unpack()
+    }
+
+    /// Unpacks every downloaded package into the site's `debian` folder.
+    fn unpack(&self) -> Result<(), InstallError> {
+        let archives = self.state().join("cache/archives");
+        let entries = fs::read_dir(&archives).map_err(|e| InstallError::io(&archives, e))?;
+        let mut packages: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| is_package(p)).collect();
+        packages.sort();
+        let root = self.site.debian();
+        fs::create_dir_all(&root).map_err(|e| InstallError::io(&root, e))?;
+        for package in &packages {
+            self.step("dpkg").args(["-x".as_ref(), package.as_os_str(), root.as_os_str()]).run()?;
+            fs::remove_file(package).map_err(|e| InstallError::io(package, e))?;
+        }
+        Ok(())
+    }
+
+    /// Runs apt-get, on our own lists and cache where the system's are not ours to change.
+    fn apt(&self, args: &[&str]) -> Result<(), InstallError> {
+        let run = self.step(&self.program).env("DEBIAN_FRONTEND", "noninteractive").env("LC_ALL", "C");
+        if self.system_wide {
+            run.args(["-o", "DPkg::Lock::Timeout=600"]).args(args).run()?;
+            return Ok(());
+        }
+        let state = self.state();
+        for folder in ["state/lists/partial", "cache/archives/partial"].map(|f| state.join(f)) {
+            fs::create_dir_all(&folder).map_err(|e| InstallError::io(&folder, e))?;
+        }
+        let options = [
+            "Debug::NoLocking=true".to_owned(),
+            format!("Dir::State={}", state.join("state").display()),
+            format!("Dir::Cache={}", state.join("cache").display()),
+        ];
+        run.args(options.into_iter().flat_map(|o| ["-o".to_owned(), o])).args(args).run()?;
+        Ok(())
+    }
+
+    fn state(&self) -> PathBuf {
+        self.site.root().join("apt")
+    }
+
+    fn step(&self, program: impl Into<PathBuf>) -> Invocation {
+        Invocation::new(program, self.site.root(), LIMIT, self.site.root().join("install.log"))
+    }
+}
+
+fn is_package(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e == "deb")
+}

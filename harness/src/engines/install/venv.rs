@@ -1,0 +1,152 @@
+//! The virtual environment of the pinned Python packages: made beside the old one, then put in its place by one rename.
+//!
+//! `venv` is a link to `venv-<hash of the lock>`; the link is made last, so a half-made environment is never used.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use super::{InstallError, LIMIT};
+use crate::engines::Site;
+use crate::process::Invocation;
+
+/// The exact packages, in pip's requirements format.
+const LOCK: &str = include_str!("../../../engines.lock");
+
+/// Whether the environment of this very lock is in place.
+pub(super) fn is_current(site: &Site) -> bool {
+    let linked = fs::read_link(site.venv()).is_ok_and(|target| target == Path::new(&folder_name()));
+    linked && site.python().is_some()
+}
+
+/// Makes the environment and puts it in place; returns where it is.
+pub(super) fn install(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
+    let folder = site.root().join(folder_name());
+    remove(&folder)?;
+    progress("making a Python environment");
+    make_environment(site, &folder)?;
+    progress("downloading and installing Mitsuba, Radiance and OpenImageIO, about 150 MB");
+    let lock = folder.join("engines.lock");
+    fs::write(&lock, LOCK).map_err(|e| InstallError::io(&lock, e))?;
+    let pip = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--no-cache-dir"];
+    let pinned = ["--require-hashes", "--only-binary", ":all:", "--requirement"];
+    step(site, folder.join("bin/python")).args(pip).args(pinned).args([lock]).run()?;
+    put_in_place(site, &folder)?;
+    Ok(site.venv().display().to_string())
+}
+
+fn make_environment(site: &Site, folder: &Path) -> Result<(), InstallError> {
+    let Some(python) = site.program("python3") else {
+        let (what, remedy) = ("there is no python3".to_owned(), "install Python 3.10 or later".to_owned());
+        return Err(InstallError::Missing { what, remedy });
+    };
+    let version = step(site, &python).args(["-c", "import sys; print('%d %d' % sys.version_info[:2])"]).run()?;
+    let version = String::from_utf8_lossy(&version.stdout).trim().to_owned();
+    let numbers: Vec<u32> = version.split(' ').filter_map(|n| n.parse().ok()).collect();
+    if numbers.as_slice() < [3, 10].as_slice() {
+        let what = format!("{} is Python {}", python.display(), version.replace(' ', "."));
+        return Err(InstallError::Missing { what, remedy: "put Python 3.10 or later first on PATH".into() });
+    }
+    // Without ensurepip `python3 -m venv` fails, which Debian's python3 does until python3-venv is there.
+    let made = step(site, &python).args(["-m", "venv"]).args([folder]).run();
+    made.map(|_| ()).map_err(|error| InstallError::Missing {
+        what: format!("`python3 -m venv` does not work: {error}"),
+        remedy: "on Debian and Ubuntu `apt-get install python3-venv` provides what it needs".into(),
+    })
+}
+
+/// Points the link `venv` at the folder in one rename, then removes environments of earlier locks.
+fn put_in_place(site: &Site, folder: &Path) -> Result<(), InstallError> {
+    let link = site.root().join("venv.new");
+    remove(&link)?;
+    std::os::unix::fs::symlink(folder_name(), &link).map_err(|e| InstallError::io(&link, e))?;
+    let venv = site.venv();
+    if venv.symlink_metadata().is_ok_and(|m| m.is_dir()) {
+        remove(&venv)?;
+    }
+    fs::rename(&link, &venv).map_err(|e| InstallError::io(&venv, e))?;
+    for old in earlier(site, folder) {
+        remove(&old)?;
+    }
+    Ok(())
+}
+
+fn earlier(site: &Site, current: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(site.root()).into_iter().flatten().flatten().map(|e| e.path());
+    let is_ours = |p: &PathBuf| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with("venv-"));
+    entries.filter(|p| is_ours(p) && p != current).collect()
+}
+
+/// Removes a file, a link (never what it points to) or a folder; fine if there is none.
+fn remove(path: &Path) -> Result<(), InstallError> {
+    let removed = match path.symlink_metadata() {
+        Err(_) => return Ok(()),
+        Ok(m) if m.is_dir() => fs::remove_dir_all(path),
+        Ok(_) => fs::remove_file(path),
+    };
+    removed.map_err(|e| InstallError::io(path, e))
+}
+
+fn step(site: &Site, program: impl Into<PathBuf>) -> Invocation {
+    Invocation::new(program, site.root(), LIMIT, site.root().join("install.log"))
+}
+
+fn folder_name() -> String {
+    let digest = Sha256::digest(LOCK.as_bytes());
+    digest.iter().take(8).fold("venv-".to_owned(), |name, byte| name + &format!("{byte:02x}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A site whose environment was made by an installation of this lock.
+    fn made(root: &Path) -> Site {
+        let folder = root.join(folder_name());
+        fs::create_dir_all(folder.join("bin")).unwrap();
+        fs::write(folder.join("bin/python"), "").unwrap();
+        let site = Site::at(root);
+        put_in_place(&site, &folder).unwrap();
+        site
+    }
+
+    #[test]
+    fn the_lock_pins_every_package_with_hashes() {
+        for package in ["mitsuba==3.9.1", "drjit==1.5.0", "pyradiance==1.3.1", "openimageio==3.2.2.0", "numpy==2.4.6"] {
+            let at = LOCK.find(&format!("\n{package}")).unwrap_or_else(|| panic!("{package}"));
+            assert!(LOCK[at + 1..].lines().nth(1).is_some_and(|l| l.contains("--hash=sha256:")), "{package}");
+        }
+    }
+
+    #[test]
+    fn an_environment_is_current_only_for_the_lock_it_was_made_from() {
+        let root = tempfile::tempdir().unwrap();
+        assert!(!is_current(&Site::at(root.path())));
+        assert!(is_current(&made(root.path())));
+        fs::remove_file(root.path().join("venv")).unwrap();
+        std::os::unix::fs::symlink("venv-0123", root.path().join("venv")).unwrap();
+        assert!(!is_current(&Site::at(root.path())));
+    }
+
+    #[test]
+    fn a_half_made_environment_is_not_current_and_a_link_elsewhere_loses_only_the_link() {
+        let root = tempfile::tempdir().unwrap();
+        fs::create_dir_all(root.path().join(folder_name())).unwrap();
+        assert!(!is_current(&Site::at(root.path())));
+        let elsewhere = tempfile::tempdir().unwrap();
+        fs::write(elsewhere.path().join("kept"), "").unwrap();
+        std::os::unix::fs::symlink(elsewhere.path(), root.path().join("venv")).unwrap();
+        assert!(is_current(&made(root.path())));
+        assert!(elsewhere.path().join("kept").exists());
+    }
+
+    #[test]
+    fn environments_of_earlier_locks_and_real_folders_in_the_way_are_removed() {
+        let root = tempfile::tempdir().unwrap();
+        fs::create_dir_all(root.path().join("venv-old/bin")).unwrap();
+        fs::create_dir_all(root.path().join("venv/bin")).unwrap();
+        assert!(is_current(&made(root.path())));
+        assert!(!root.path().join("venv-old").exists());
+    }
+}

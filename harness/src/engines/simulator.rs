@@ -1,0 +1,64 @@
+//! The engine `simulator`: our own exact solutions, read like any renderer.
+
+use luminaire::simulator::{self, Accuracy, Uncertainty};
+
+use super::{
+    Absent, Engine, EngineError, EngineId, Estimate, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
+    checked,
+};
+
+/// The exact simulation of [`luminaire::simulator`].
+pub(super) struct Simulator;
+
+const ID: EngineId = EngineId("simulator");
+
+/// How much finer than the budget's error the simulator works: a witness whose own error counts for nothing.
+const MARGIN: f64 = 0.1;
+
+impl Engine for Simulator {
+    fn id(&self) -> EngineId {
+        ID
+    }
+
+    fn probe(&self, _site: &Site) -> Result<Version, Absent> {
+        Ok(Version(env!("CARGO_PKG_VERSION").to_owned()))
+    }
+
+    fn supports(&self, _job: &Job) -> Support {
+        Support::Yes
+    }
+
+    fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
+        Ok(vec![])
+    }
+
+    fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
+        let relative_error = match job.settings.get("relative_error") {
+            None => MARGIN * job.budget.relative_error,
+            Some(value) => value.as_f64().filter(|e| *e > 0.0).ok_or_else(|| EngineError::Setting {
+                engine: ID,
+                key: "relative_error".into(),
+                what: format!("{value} is not a positive number"),
+            })?,
+        };
+        let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();
+        let accuracy = Accuracy { relative_error, seed: job.seed };
+        let solution = simulator::illuminance(&job.scene, &meters, job.transport, &accuracy)
+            .map_err(|e| EngineError::Solver { engine: ID, what: e.to_string() })?;
+        let settings = [
+            ("solver".to_owned(), solution.solver),
+            ("relative_error".to_owned(), relative_error.to_string()),
+            ("seed".to_owned(), job.seed.to_string()),
+        ];
+        let estimates = solution.estimates.iter().map(estimate).collect();
+        checked(ID, job, Measurement { estimates, settings: settings.into(), notes: vec![] })
+    }
+}
+
+fn estimate(found: &simulator::Estimate) -> Estimate {
+    let (std_error_lx, error_bound_lx) = match found.uncertainty {
+        Uncertainty::Bound(bound) => (None, Some(bound)),
+        Uncertainty::StandardError { value, .. } => (Some(value), None),
+    };
+    Estimate { value_lx: found.illuminance.value(), std_error_lx, error_bound_lx }
+}
