@@ -65,8 +65,10 @@ impl<'a> Apt<'a> {
         }
         progress("refreshing the lists of Debian packages");
         // Old lists may serve even where they cannot be refreshed: the last word is the installation's.
-        let refreshed = self.apt(&["update"]);
-        self.first_of(packages, progress).map_err(|error| refreshed.err().unwrap_or(error))
+        if let Err(error) = self.apt(&["update"]) {
+            progress(&format!("the lists could not be refreshed: {error}"));
+        }
+        self.first_of(packages, progress)
     }
 
     fn first_of(&self, packages: &[&str], progress: &mut dyn FnMut(&str)) -> Result<(), InstallError> {
@@ -97,6 +99,10 @@ impl<'a> Apt<'a> {
         let entries = fs::read_dir(&archives).map_err(|e| InstallError::io(&archives, e))?;
         let mut packages: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| is_package(p)).collect();
         packages.sort();
+        if packages.is_empty() {
+            // Without lists apt-get ends well, having fetched nothing of a package that is installed elsewhere.
+            return Err(not_there("any package to unpack", "see install.log in the folder of the engines"));
+        }
         let root = self.site.debian();
         fs::create_dir_all(&root).map_err(|e| InstallError::io(&root, e))?;
         for package in &packages {
