@@ -2,6 +2,7 @@
 //!
 //! Adding one: write `engines/<name>.rs` with a type that implements [`Engine`], and add its line to [`all`].
 
+mod iesna;
 mod install;
 mod mitsuba;
 mod simulator;
@@ -26,6 +27,7 @@ pub use site::{Site, SiteError};
 pub fn all() -> Vec<Box<dyn Engine>> {
     vec![
         Box::new(simulator::Simulator), // our own witnesses first
+        Box::new(iesna::Iesna),
         Box::new(mitsuba::Mitsuba::default()),
     ]
 }

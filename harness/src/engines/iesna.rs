@@ -1,0 +1,96 @@
+//! The engine `iesna`: inverse-square method and infinite plane - exitance difference, read like any renderer.
+
+use luminaire::calculators::{Calculated, NotApplicable, Validity, exitance_difference, inverse_square};
+use luminaire::scene::{Bounces, Meter, Scene, Transport};
+
+use super::{
+    Absent, Engine, EngineError, EngineId, Estimate, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
+    checked,
+};
+
+/// The methods of [`luminaire::calculators`].
+pub(super) struct Iesna;
+
+const ID: EngineId = EngineId("iesna");
+
+/// Rounding of the inverse-square method in `f64`, relative: a few operations and two arctangents.
+const ROUNDING: f64 = 1e-13;
+
+impl Engine for Iesna {
+    fn id(&self) -> EngineId {
+        ID
+    }
+
+    fn probe(&self, _site: &Site) -> Result<Version, Absent> {
+        Ok(Version(env!("CARGO_PKG_VERSION").to_owned()))
+    }
+
+    fn supports(&self, job: &Job) -> Support {
+        let mut objections = vec![];
+        for station in &job.stations {
+            match Validity::of(&calculate(job, &station.meter)) {
+                Validity::Supported => {}
+                Validity::Approximate(why) => objections.push(why),
+                Validity::No(why) => return Support::No(format!("{}: {why}", station.id)),
+            }
+        }
+        objections.extend(cut(job.transport).map(str::to_owned));
+        objections.dedup();
+        match objections.is_empty() {
+            true => Support::Yes,
+            false => Support::Approximate { why: objections.join("; "), size: None },
+        }
+    }
+
+    fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
+        Ok(vec![])
+    }
+
+    fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
+        let mut measurement = Measurement::default();
+        measurement.settings.insert("method".into(), method(job.transport).into());
+        measurement.notes.extend(cut(job.transport).map(str::to_owned));
+        for station in &job.stations {
+            let what = |error: NotApplicable| format!("{}: {error}", station.id);
+            let calculated = calculate(job, &station.meter)
+                .map_err(|error| EngineError::Solver { engine: ID, what: what(error) })?;
+            let value_lx = calculated.illuminance.value();
+            // The inverse-square method is exact for what it is meant for; the others know no bound.
+            let exact = job.transport == Transport::Direct && calculated.validity == Validity::Supported;
+            let error_bound_lx = exact.then_some(ROUNDING * value_lx);
+            measurement.estimates.push(Estimate { value_lx, std_error_lx: None, error_bound_lx });
+            if let Validity::Approximate(why) = calculated.validity {
+                measurement.notes.push(why);
+            }
+        }
+        measurement.notes.dedup();
+        checked(ID, job, measurement)
+    }
+}
+
+fn calculate(job: &Job, meter: &Meter) -> Result<Calculated, NotApplicable> {
+    let scene: &Scene = &job.scene;
+    match job.transport {
+        Transport::Direct => inverse_square::direct_illuminance(scene, meter),
+        Transport::Indirect(_) => exitance_difference::indirect_illuminance(scene, meter),
+        Transport::Total(_) => exitance_difference::total_illuminance(scene, meter),
+    }
+}
+
+const fn method(transport: Transport) -> &'static str {
+    match transport {
+        Transport::Direct => "inverse square",
+        Transport::Indirect(_) => "IP-ED",
+        Transport::Total(_) => "inverse square + IP-ED",
+    }
+}
+
+/// What the methods do with a limit on bounces.
+const fn cut(transport: Transport) -> Option<&'static str> {
+    match transport {
+        Transport::Indirect(Bounces::AtMost(_)) | Transport::Total(Bounces::AtMost(_)) => {
+            Some("the zonal cavity method counts all bounces; the limit is not applied")
+        }
+        _ => None,
+    }
+}
