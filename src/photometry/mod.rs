@@ -3,6 +3,7 @@
 mod distribution;
 mod error;
 pub mod eulumdat;
+mod goniometer;
 mod lint;
 pub mod lm63;
 mod planes;

@@ -1,6 +1,6 @@
 //! From the angles of a measured table to the C planes of a distribution.
 
-use super::LuminousIntensityDistribution;
+use super::{LuminousIntensityDistribution, goniometer};
 use super::error::{Problem, ReadError};
 use super::lint::Lints;
 use super::text::Text;
@@ -36,9 +36,42 @@ pub(crate) fn distribution(
 ) -> Result<LuminousIntensityDistribution, ReadError> {
     match goniometer {
         Goniometer::C => type_c(text, table, lints),
-        Goniometer::A => Err(text.error(table.vertical_at, Problem::Unsupported { what: "type A photometry".into() })),
-        Goniometer::B => Err(text.error(table.vertical_at, Problem::Unsupported { what: "type B photometry".into() })),
+        Goniometer::A | Goniometer::B => type_a_or_b(text, goniometer, &table, lints),
     }
+}
+
+/// Angles from the horizon (A) or about a horizontal axis (B), resampled.
+fn type_a_or_b(
+    text: &Text,
+    goniometer: Goniometer,
+    table: &Table,
+    lints: &mut Lints,
+) -> Result<LuminousIntensityDistribution, ReadError> {
+    let (h_most, v_most) = if goniometer == Goniometer::A { (180.0, 90.0) } else { (90.0, 180.0) };
+    let expected = "those of type A lie within -180 and 180 (horizontal), -90 and 90 (vertical), of type B the other way";
+    for (axis, angles, most, at) in [
+        ("horizontal", &table.horizontal_deg, h_most, table.horizontal_at),
+        ("vertical", &table.vertical_deg, v_most, table.vertical_at),
+    ] {
+        let (first, last) = (angles[0], angles[angles.len() - 1]);
+        if first < -most || last > most {
+            return Err(text.error(at, Problem::AngleRange { axis, first, last, expected }));
+        }
+    }
+    let resampled = goniometer::to_type_c(goniometer, table)
+        .map_err(|error| text.error(table.candela_at, Problem::Distribution(error)))?;
+    let (found, distribution) = (&resampled, &resampled.distribution);
+    let message = format!(
+        "type {goniometer:?} photometry became {} C planes of {} angles, which differ from it by up to {:.2e} cd at the \
+         nodes of the file and {:.2e} cd in the middle of its cells; the largest intensity is {:.1} cd",
+        distribution.c_deg().len(),
+        distribution.gamma_deg().len(),
+        found.node_error_cd,
+        found.cell_error_cd,
+        distribution.max_intensity().value(),
+    );
+    lints.note("planes/resampled", text.line_of(table.horizontal_at), message);
+    Ok(resampled.distribution)
 }
 
 fn type_c(text: &Text, mut table: Table, lints: &mut Lints) -> Result<LuminousIntensityDistribution, ReadError> {
