@@ -8,6 +8,7 @@ mod lint;
 pub mod lm63;
 mod planes;
 mod text;
+pub mod tm33;
 mod write;
 
 #[cfg(test)]
@@ -68,6 +69,7 @@ pub fn read_file(path: &Path) -> Result<Photometry, ReadError> {
     let read = match Kind::of(path, &bytes) {
         Some(Kind::Lm63) => lm63::parse_with(&bytes, lm63::tilt_file_beside(path)),
         Some(Kind::Eulumdat) => eulumdat::parse(&bytes),
+        Some(Kind::Tm33) => tm33::parse(&bytes),
         None => Err(Text::new(&bytes).error(0, Problem::Unrecognised)),
     };
     read.map_err(located)
@@ -78,6 +80,7 @@ pub fn read_file(path: &Path) -> Result<Photometry, ReadError> {
 enum Kind {
     Lm63,
     Eulumdat,
+    Tm33,
 }
 
 impl Kind {
@@ -87,6 +90,9 @@ impl Kind {
         if named || text.lines().any(|line| lm63::is_tilt_line(line.bytes)) {
             return Some(Self::Lm63);
         }
+        if tm33::looks_like(&text) {
+            return Some(Self::Tm33);
+        }
         if eulumdat::looks_like(&text) {
             return Some(Self::Eulumdat);
         }
@@ -94,6 +100,7 @@ impl Kind {
         match extension.as_deref() {
             Some("ies") => Some(Self::Lm63),
             Some("ldt") => Some(Self::Eulumdat),
+            Some("xml") => Some(Self::Tm33),
             _ => None,
         }
     }

@@ -1,9 +1,9 @@
 //! From the angles of a measured table to the C planes of a distribution.
 
-use super::{LuminousIntensityDistribution, goniometer};
 use super::error::{Problem, ReadError};
 use super::lint::Lints;
 use super::text::Text;
+use super::{LuminousIntensityDistribution, goniometer};
 
 /// How a luminaire was measured: the coordinates of its table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +48,8 @@ fn type_a_or_b(
     lints: &mut Lints,
 ) -> Result<LuminousIntensityDistribution, ReadError> {
     let (h_most, v_most) = if goniometer == Goniometer::A { (180.0, 90.0) } else { (90.0, 180.0) };
-    let expected = "those of type A lie within -180 and 180 (horizontal), -90 and 90 (vertical), of type B the other way";
+    let expected =
+        "those of type A lie within -180 and 180 (horizontal), -90 and 90 (vertical), of type B the other way";
     for (axis, angles, most, at) in [
         ("horizontal", &table.horizontal_deg, h_most, table.horizontal_at),
         ("vertical", &table.vertical_deg, v_most, table.vertical_at),
