@@ -1,0 +1,244 @@
+//! The collocation grid: tensor-product elements on the six surfaces of a room, graded towards the edges.
+//!
+//! Irradiance in a box behaves like powers of the distance to the edges, so the outermost elements of each axis map
+//! their parameter s by x = s² and the unknowns are polynomials in s: in x, convergence stalls at 3e-5.
+
+use glam::DVec3;
+
+use super::Effort;
+use super::symmetry::{Exchange, Operation};
+use crate::simulator::quadrature::Gauss;
+
+/// Dyadic intervals whose interpolation matrices are kept.
+const KEPT_INTERVALS: usize = 128;
+
+/// A surface of the room, numbered by axis and end: `2 * axis + 1` lies at the far end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Face(pub(super) usize);
+
+impl Face {
+    pub(super) const ALL: [Self; 6] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5)];
+
+    /// The axes normal to the face, along u and along v.
+    pub(super) const fn axes(self) -> (usize, usize, usize) {
+        let normal = self.0 / 2;
+        (normal, (normal + 1) % 3, (normal + 2) % 3)
+    }
+
+    /// The coordinate of the face along its normal.
+    pub(super) fn plane(self, size_m: DVec3) -> f64 {
+        if self.0 % 2 == 1 { size_m[self.0 / 2] } else { 0.0 }
+    }
+
+    /// +1 where the inward normal points along its axis, -1 where against it.
+    pub(super) const fn sign(self) -> f64 {
+        if self.0 % 2 == 1 { -1.0 } else { 1.0 }
+    }
+
+    /// The unit normal that points into the room.
+    pub(super) fn inward_normal(self) -> DVec3 {
+        DVec3::AXES[self.0 / 2] * self.sign()
+    }
+}
+
+/// The elements along one axis.
+#[derive(Clone, Debug)]
+pub(super) struct Axis {
+    pub(super) elements: Vec<Element>,
+    /// Node coordinates in metres, element by element, rising.
+    pub(super) nodes_m: Vec<f64>,
+    /// Quadrature weights of the nodes in metres.
+    pub(super) weights_m: Vec<f64>,
+}
+
+/// An interval along an axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Element {
+    pub(super) start_m: f64,
+    pub(super) end_m: f64,
+    grading: Grading,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Grading {
+    TowardsStart,
+    TowardsEnd,
+    Even,
+}
+
+impl Element {
+    /// Coordinate at parameter `s` in 0..=1, and its derivative.
+    pub(super) fn at(&self, s: f64) -> (f64, f64) {
+        let h = self.end_m - self.start_m;
+        match self.grading {
+            Grading::TowardsStart => (self.start_m + h * s * s, 2.0 * h * s),
+            Grading::TowardsEnd => {
+                let t = 1.0 - s;
+                (self.end_m - h * t * t, 2.0 * h * t)
+            }
+            Grading::Even => (self.start_m + h * s, h),
+        }
+    }
+
+    /// The parameter at a coordinate.
+    pub(super) fn parameter(&self, x_m: f64) -> f64 {
+        let h = self.end_m - self.start_m;
+        let s = match self.grading {
+            Grading::TowardsStart => ((x_m - self.start_m) / h).max(0.0).sqrt(),
+            Grading::TowardsEnd => 1.0 - ((self.end_m - x_m) / h).max(0.0).sqrt(),
+            Grading::Even => (x_m - self.start_m) / h,
+        };
+        s.clamp(0.0, 1.0)
+    }
+}
+
+/// All nodes of the room, numbered face by face, u major.
+#[derive(Clone, Debug)]
+pub(super) struct Grid {
+    pub(super) size_m: DVec3,
+    /// Nodes in an element along one axis.
+    pub(super) order: usize,
+    pub(super) axes: [Axis; 3],
+    /// First node of each face, and the count of all.
+    pub(super) offsets: [usize; 7],
+    /// The rule of near elements.
+    pub(super) near: Gauss,
+    nodal: Gauss,
+    /// `[interval][node][point]` for intervals numbered as a heap.
+    kept: Vec<Vec<f64>>,
+}
+
+impl Grid {
+    pub(super) fn new(size_m: DVec3, effort: &Effort) -> Self {
+        let nodal = Gauss::new(effort.order);
+        let shortest = size_m.min_element();
+        let axes = [0, 1, 2].map(|k| {
+            // Elements stay about as long as half the shortest side, and their count even: the grid has mirrors.
+            let halves = (size_m[k] / (2.0 * shortest)).round().clamp(1.0, 6.0) as usize;
+            Axis::new(size_m[k], 2 * halves * effort.elements_per_half, &nodal)
+        });
+        let mut offsets = [0; 7];
+        for face in Face::ALL {
+            let (_, u, v) = face.axes();
+            offsets[face.0 + 1] = offsets[face.0] + axes[u].nodes_m.len() * axes[v].nodes_m.len();
+        }
+        let near = Gauss::new(effort.near_points);
+        let mut grid = Self { size_m, order: effort.order, axes, offsets, near, nodal, kept: vec![] };
+        grid.kept = (0..KEPT_INTERVALS)
+            .map(|i| {
+                let (start, length) = dyadic(i.max(1));
+                let mut matrix = vec![];
+                grid.interpolation(start, length, &mut matrix);
+                matrix
+            })
+            .collect();
+        grid
+    }
+
+    /// How many nodes there are.
+    pub(super) fn len(&self) -> usize {
+        self.offsets[6]
+    }
+
+    /// Nodes along u and v of a face.
+    pub(super) fn counts(&self, face: Face) -> (usize, usize) {
+        let (_, u, v) = face.axes();
+        (self.axes[u].nodes_m.len(), self.axes[v].nodes_m.len())
+    }
+
+    /// The face of a node and its place along u and v.
+    pub(super) fn place(&self, node: usize) -> (Face, usize, usize) {
+        let face = Face((1..6).rev().find(|f| self.offsets[*f] <= node).unwrap_or(0));
+        let (_, count_v) = self.counts(face);
+        let k = node - self.offsets[face.0];
+        (face, k / count_v, k % count_v)
+    }
+
+    /// The position of a node and the area that it stands for.
+    pub(super) fn node(&self, node: usize) -> (DVec3, f64) {
+        let (face, i, j) = self.place(node);
+        let (n, u, v) = face.axes();
+        let mut x = DVec3::ZERO;
+        x[n] = face.plane(self.size_m);
+        x[u] = self.axes[u].nodes_m[i];
+        x[v] = self.axes[v].nodes_m[j];
+        (x, self.axes[u].weights_m[i] * self.axes[v].weights_m[j])
+    }
+
+    /// The node that a node falls on under a symmetry of the box.
+    pub(super) fn image(&self, node: usize, operation: Operation) -> usize {
+        let (face, i, j) = self.place(node);
+        let (n, u, v) = face.axes();
+        // The place along every axis; along the normal it is 0 or 1.
+        let mut place = [0; 3];
+        (place[n], place[u], place[v]) = (face.0 % 2, i, j);
+        for axis in 0..3 {
+            if operation.turns(axis) {
+                let count = if axis == n { 2 } else { self.axes[axis].nodes_m.len() };
+                place[axis] = count - 1 - place[axis];
+            }
+        }
+        let mut normal = n;
+        if operation.exchange == Exchange::XAndY {
+            place.swap(0, 1);
+            normal = [1, 0, 2][n];
+        }
+        let face = Face(2 * normal + place[normal]);
+        let (_, u, v) = face.axes();
+        self.offsets[face.0] + place[u] * self.counts(face).1 + place[v]
+    }
+
+    /// The interpolation matrix `[node][point]` of a dyadic interval, if it is kept.
+    pub(super) fn kept(&self, interval: usize) -> Option<&[f64]> {
+        self.kept.get(interval).map(Vec::as_slice)
+    }
+
+    /// Values `[node][point]` of the nodal polynomials at the near rule's points within an interval of s.
+    pub(super) fn interpolation(&self, start: f64, length: f64, matrix: &mut Vec<f64>) {
+        let points = self.near.nodes.len();
+        matrix.clear();
+        matrix.resize(self.order * points, 0.0);
+        let mut values = vec![0.0; self.order];
+        for (q, x) in self.near.nodes.iter().enumerate() {
+            self.nodal.lagrange(start + length * x, &mut values);
+            for (p, value) in values.iter().enumerate() {
+                matrix[p * points + q] = *value;
+            }
+        }
+    }
+
+    /// The nodal polynomials at one parameter.
+    pub(super) fn basis(&self, s: f64, out: &mut [f64]) {
+        self.nodal.lagrange(s, out);
+    }
+}
+
+impl Axis {
+    fn new(length_m: f64, count: usize, nodal: &Gauss) -> Self {
+        let boundary = |k: usize| length_m * k as f64 / count as f64;
+        let elements: Vec<_> = (0..count)
+            .map(|k| {
+                let grading = match k {
+                    0 => Grading::TowardsStart,
+                    _ if k + 1 == count => Grading::TowardsEnd,
+                    _ => Grading::Even,
+                };
+                Element { start_m: boundary(k), end_m: boundary(k + 1), grading }
+            })
+            .collect();
+        let points = |e: &Element| nodal.nodes.iter().map(|s| e.at(*s)).collect::<Vec<_>>();
+        let nodes_m = elements.iter().flat_map(|e| points(e).into_iter().map(|(x, _)| x)).collect();
+        let weights_m = elements
+            .iter()
+            .flat_map(|e| points(e).into_iter().zip(&nodal.weights).map(|((_, dx), w)| dx * w).collect::<Vec<_>>())
+            .collect();
+        Self { elements, nodes_m, weights_m }
+    }
+}
+
+/// Start and length of a dyadic interval of 0..1 by its number in a heap that begins with 1.
+pub(super) fn dyadic(interval: usize) -> (f64, f64) {
+    let depth = interval.ilog2();
+    let length = 0.5_f64.powi(depth as i32);
+    ((interval - (1 << depth)) as f64 * length, length)
+}

@@ -1,0 +1,354 @@
+//! Rows of the transport operator: the irradiance at a point from each nodal polynomial of exitance 1 on the surfaces.
+//!
+//! Far elements use their own nodes as a quadrature rule. Near ones are halved until each part is small against its
+//! distance, and integrated in the graded parameter, where the integrand is smooth. Elements that the receiver's
+//! horizon crosses are cut along it, because a kink would cost every digit past the third.
+
+use glam::DVec3;
+
+use super::grid::{Axis, Element, Face, Grid, dyadic};
+
+/// Elements at least this many half-widths away are far.
+const FAR: f64 = 4.0;
+/// Parts of near elements are halved until they lie at least this many half-widths away.
+const NEAR: f64 = 2.0;
+/// Parts smaller than this fraction of the room are not halved further.
+const SMALLEST: f64 = 1e-13;
+/// More nodes or points along an element than any effort asks for.
+const MOST: usize = 24;
+
+/// A receiving element: where it is, where it faces, and on which surface it lies, if any.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Receiver {
+    pub(super) position_m: DVec3,
+    pub(super) normal: DVec3,
+    pub(super) face: Option<Face>,
+}
+
+/// One element of one face as a receiver sees it.
+struct Panel<'a> {
+    grid: &'a Grid,
+    along_u: &'a Element,
+    along_v: &'a Element,
+    view: View,
+}
+
+/// The kernel on the plane of one face: cos cos / (π r²) at offsets (u, v) from the foot of the receiver.
+#[derive(Clone, Copy)]
+struct View {
+    foot_u: f64,
+    foot_v: f64,
+    /// Squared distance to the plane.
+    depth2: f64,
+    /// Distance to the plane over π.
+    scale: f64,
+    /// The receiver's cosine numerator is `level + tilt_u u + tilt_v v`.
+    level: f64,
+    tilt_u: f64,
+    tilt_v: f64,
+}
+
+enum Horizon {
+    Above,
+    Crosses,
+    Below,
+}
+
+/// A part of a cut element: from s0 to s1 along u, from t0 to t1 of the lit range along v.
+#[derive(Clone, Copy)]
+struct Part {
+    s: (f64, f64),
+    t: (f64, f64),
+    lit: Lit,
+}
+
+/// Which v of a strip lie above the horizon; judged once, mid-strip, because at its ends rounding would decide.
+#[derive(Clone, Copy)]
+enum Lit {
+    All,
+    BelowCrossing,
+    AboveCrossing,
+}
+
+impl Grid {
+    /// Adds to `row` the irradiance at the receiver from every nodal polynomial, exitance 1.
+    pub(super) fn add_row(&self, receiver: &Receiver, row: &mut [f64]) {
+        for face in Face::ALL {
+            if receiver.face == Some(face) {
+                continue;
+            }
+            let view = View::new(self, receiver, face);
+            let (_, u, v) = face.axes();
+            let (_, stride) = self.counts(face);
+            for (eu, along_u) in self.axes[u].elements.iter().enumerate() {
+                for (ev, along_v) in self.axes[v].elements.iter().enumerate() {
+                    let block = &mut row[self.offsets[face.0] + eu * self.order * stride + ev * self.order..];
+                    let panel = Panel { grid: self, along_u, along_v, view };
+                    match panel.horizon() {
+                        Horizon::Below => {}
+                        Horizon::Crosses => panel.add_cut(block, stride),
+                        Horizon::Above if panel.is_far() => {
+                            view.add_far(self.order, (&self.axes[u], eu), (&self.axes[v], ev), block, stride);
+                        }
+                        Horizon::Above => panel.add_near(block, stride),
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl View {
+    fn new(grid: &Grid, receiver: &Receiver, face: Face) -> Self {
+        let (n, u, v) = face.axes();
+        let depth = face.plane(grid.size_m) - receiver.position_m[n];
+        Self {
+            foot_u: receiver.position_m[u],
+            foot_v: receiver.position_m[v],
+            depth2: depth * depth,
+            scale: -depth * face.sign() / std::f64::consts::PI,
+            level: receiver.normal[n] * depth,
+            tilt_u: receiver.normal[u],
+            tilt_v: receiver.normal[v],
+        }
+    }
+
+    fn add_far(&self, order: usize, u: (&Axis, usize), v: (&Axis, usize), block: &mut [f64], stride: usize) {
+        let span = |e: usize| e * order..(e + 1) * order;
+        let (us, wu) = (&u.0.nodes_m[span(u.1)], &u.0.weights_m[span(u.1)]);
+        let (vs, wv) = (&v.0.nodes_m[span(v.1)], &v.0.weights_m[span(v.1)]);
+        let (mut cosine, mut squared) = ([0.0; MOST], [0.0; MOST]);
+        for b in 0..order {
+            let dv = vs[b] - self.foot_v;
+            cosine[b] = self.level + self.tilt_v * dv;
+            squared[b] = self.depth2 + dv * dv;
+        }
+        for a in 0..order {
+            let du = us[a] - self.foot_u;
+            let (w, u2, cu) = (wu[a] * self.scale, du * du, self.tilt_u * du);
+            let out = &mut block[a * stride..][..order];
+            for b in 0..order {
+                let r2 = u2 + squared[b];
+                out[b] += w * wv[b] * (cosine[b] + cu) / (r2 * r2);
+            }
+        }
+    }
+}
+
+impl Panel<'_> {
+    fn horizon(&self) -> Horizon {
+        // Corners on the horizon, but for rounding, belong to either side.
+        let rounding = 1e-14 * self.grid.size_m.max_element();
+        let (mut above, mut below) = (false, false);
+        for u in [self.along_u.start_m, self.along_u.end_m] {
+            for v in [self.along_v.start_m, self.along_v.end_m] {
+                let height = self.height(u, v);
+                above |= height > rounding;
+                below |= height < -rounding;
+            }
+        }
+        match (above, below) {
+            (true, true) => Horizon::Crosses,
+            (true, false) => Horizon::Above,
+            (false, _) => Horizon::Below,
+        }
+    }
+
+    fn height(&self, u: f64, v: f64) -> f64 {
+        let view = &self.view;
+        view.level + view.tilt_u * (u - view.foot_u) + view.tilt_v * (v - view.foot_v)
+    }
+
+    fn distance2(&self, u: (f64, f64), v: (f64, f64)) -> f64 {
+        let du = (self.view.foot_u - u.1).max(u.0 - self.view.foot_u).max(0.0);
+        let dv = (self.view.foot_v - v.1).max(v.0 - self.view.foot_v).max(0.0);
+        du * du + dv * dv + self.view.depth2
+    }
+
+    fn is_far(&self) -> bool {
+        let (u, v) = ((self.along_u.start_m, self.along_u.end_m), (self.along_v.start_m, self.along_v.end_m));
+        let reach = FAR * 0.5 * (u.1 - u.0).max(v.1 - v.0);
+        reach * reach <= self.distance2(u, v)
+    }
+
+    /// Whether a patch must be halved before a product rule sees it as smooth.
+    fn is_too_near(&self, u: (f64, f64), v: (f64, f64)) -> bool {
+        let widest = 0.5 * (u.1 - u.0).max(v.1 - v.0);
+        let reach = NEAR * widest;
+        reach * reach > self.distance2(u, v) && widest > SMALLEST * self.grid.size_m.max_element()
+    }
+
+    fn add_near(&self, block: &mut [f64], stride: usize) {
+        let mut parts = vec![(1_usize, 1_usize)];
+        while let Some((iu, iv)) = parts.pop() {
+            let ((s0, ds), (t0, dt)) = (dyadic(iu), dyadic(iv));
+            let u = (self.along_u.at(s0).0, self.along_u.at(s0 + ds).0);
+            let v = (self.along_v.at(t0).0, self.along_v.at(t0 + dt).0);
+            if self.is_too_near(u, v) {
+                if u.1 - u.0 >= v.1 - v.0 {
+                    parts.extend([(2 * iu, iv), (2 * iu + 1, iv)]);
+                } else {
+                    parts.extend([(iu, 2 * iv), (iu, 2 * iv + 1)]);
+                }
+                continue;
+            }
+            let (mut own_u, mut own_v) = (vec![], vec![]);
+            let matrix_u = self.matrix(iu, &mut own_u);
+            let matrix_v = self.matrix(iv, &mut own_v);
+            self.add_part((s0, ds, matrix_u), (t0, dt, matrix_v), block, stride);
+        }
+    }
+
+    fn matrix<'b>(&'b self, interval: usize, own: &'b mut Vec<f64>) -> &'b [f64] {
+        if let Some(kept) = self.grid.kept(interval) {
+            return kept;
+        }
+        let (start, length) = dyadic(interval);
+        self.grid.interpolation(start, length, own);
+        own
+    }
+
+    fn add_part(&self, u: (f64, f64, &[f64]), v: (f64, f64, &[f64]), block: &mut [f64], stride: usize) {
+        let (view, rule) = (&self.view, &self.grid.near);
+        let (order, points) = (self.grid.order, rule.nodes.len());
+        let (mut squared, mut cosine, mut weight) = ([0.0; MOST], [0.0; MOST], [0.0; MOST]);
+        for q in 0..points {
+            let (y, dy) = self.along_v.at(v.0 + v.1 * rule.nodes[q]);
+            let dv = y - view.foot_v;
+            squared[q] = view.depth2 + dv * dv;
+            cosine[q] = view.level + view.tilt_v * dv;
+            weight[q] = rule.weights[q] * dy * v.1 * u.1 * view.scale;
+        }
+        let mut inner = [[0.0; MOST]; MOST];
+        for i in 0..points {
+            let (x, dx) = self.along_u.at(u.0 + u.1 * rule.nodes[i]);
+            let du = x - view.foot_u;
+            let (w, u2, cu) = (rule.weights[i] * dx, du * du, view.tilt_u * du);
+            let mut kernel = [0.0; MOST];
+            for q in 0..points {
+                let r2 = u2 + squared[q];
+                kernel[q] = w * weight[q] * (cosine[q] + cu) / (r2 * r2);
+            }
+            for (b, basis) in v.2.chunks_exact(points).enumerate() {
+                inner[i][b] = basis.iter().zip(&kernel).map(|(l, k)| l * k).sum();
+            }
+        }
+        for (a, basis) in u.2.chunks_exact(points).enumerate() {
+            let mut sums = [0.0; MOST];
+            for (l, inner) in basis.iter().zip(&inner) {
+                for b in 0..order {
+                    sums[b] += l * inner[b];
+                }
+            }
+            for (out, sum) in block[a * stride..][..order].iter_mut().zip(&sums) {
+                *out += sum;
+            }
+        }
+    }
+
+    /// Integrates the part of the element above the receiver's horizon, in strips along u between the horizon's kinks.
+    fn add_cut(&self, block: &mut [f64], stride: usize) {
+        let mut breaks = vec![self.along_u.start_m, self.along_u.end_m];
+        for v in [self.along_v.start_m, self.along_v.end_m] {
+            breaks.push(self.view.foot_u - self.height(self.view.foot_u, v) / self.view.tilt_u);
+        }
+        breaks.retain(|u| *u >= self.along_u.start_m && *u <= self.along_u.end_m);
+        breaks.sort_by(f64::total_cmp);
+        for strip in breaks.windows(2) {
+            if strip[1] - strip[0] <= SMALLEST * self.grid.size_m.max_element() {
+                continue;
+            }
+            let s = (self.along_u.parameter(strip[0]), self.along_u.parameter(strip[1]));
+            let Some(lit) = self.lit(0.5 * (strip[0] + strip[1])) else { continue };
+            let mut parts = vec![Part { s, t: (0.0, 1.0), lit }];
+            while let Some(part) = parts.pop() {
+                let (u, v) = self.extent(&part);
+                if self.is_too_near(u, v) && part.s.1 - part.s.0 > SMALLEST {
+                    parts.extend(part.halves(u.1 - u.0 >= v.1 - v.0));
+                } else {
+                    self.add_cut_part(&part, block, stride);
+                }
+            }
+        }
+    }
+
+    /// Which v at a given u lie above the horizon, if any.
+    fn lit(&self, u: f64) -> Option<Lit> {
+        match (self.height(u, self.along_v.start_m) > 0.0, self.height(u, self.along_v.end_m) > 0.0) {
+            (true, true) => Some(Lit::All),
+            (true, false) => Some(Lit::BelowCrossing),
+            (false, true) => Some(Lit::AboveCrossing),
+            (false, false) => None,
+        }
+    }
+
+    /// Start and length, as parameters, of the v range above the horizon at a given u.
+    fn lit_range(&self, u: f64, lit: Lit) -> (f64, f64) {
+        let (v0, v1) = (self.along_v.start_m, self.along_v.end_m);
+        let crossing = || self.along_v.parameter((v0 - self.height(u, v0) / self.view.tilt_v).clamp(v0, v1));
+        match lit {
+            Lit::All => (0.0, 1.0),
+            Lit::BelowCrossing => (0.0, crossing()),
+            Lit::AboveCrossing => {
+                let start = crossing();
+                (start, 1.0 - start)
+            }
+        }
+    }
+
+    /// The ranges of u and v in metres that a part covers.
+    fn extent(&self, part: &Part) -> ((f64, f64), (f64, f64)) {
+        let mut v = (f64::INFINITY, f64::NEG_INFINITY);
+        for s in [part.s.0, 0.5 * (part.s.0 + part.s.1), part.s.1] {
+            let (start, length) = self.lit_range(self.along_u.at(s).0, part.lit);
+            for t in [part.t.0, part.t.1] {
+                let y = self.along_v.at(start + t * length).0;
+                v = (v.0.min(y), v.1.max(y));
+            }
+        }
+        ((self.along_u.at(part.s.0).0, self.along_u.at(part.s.1).0), v)
+    }
+
+    fn add_cut_part(&self, part: &Part, block: &mut [f64], stride: usize) {
+        let (rule, order) = (&self.grid.near, self.grid.order);
+        let (mut basis_u, mut basis_v) = ([0.0; MOST], [0.0; MOST]);
+        let (ds, dt) = (part.s.1 - part.s.0, part.t.1 - part.t.0);
+        for (x, wx) in rule.nodes.iter().zip(&rule.weights) {
+            let s = part.s.0 + ds * x;
+            let (u, du) = self.along_u.at(s);
+            let (start, length) = self.lit_range(u, part.lit);
+            self.grid.basis(s, &mut basis_u[..order]);
+            let mut sums = [0.0; MOST];
+            for (y, wy) in rule.nodes.iter().zip(&rule.weights) {
+                let t = start + length * (part.t.0 + dt * y);
+                let (v, dv) = self.along_v.at(t);
+                self.grid.basis(t, &mut basis_v[..order]);
+                let (x, y) = (u - self.view.foot_u, v - self.view.foot_v);
+                let r2 = x * x + y * y + self.view.depth2;
+                let weight = wx * wy * du * dv * ds * dt * length;
+                let kernel = weight * self.view.scale * self.height(u, v).max(0.0) / (r2 * r2);
+                for b in 0..order {
+                    sums[b] += kernel * basis_v[b];
+                }
+            }
+            for a in 0..order {
+                for b in 0..order {
+                    block[a * stride + b] += basis_u[a] * sums[b];
+                }
+            }
+        }
+    }
+}
+
+impl Part {
+    fn halves(self, across_u: bool) -> [Self; 2] {
+        let middle = |(a, b): (f64, f64)| 0.5 * (a + b);
+        if across_u {
+            let m = middle(self.s);
+            [Self { s: (self.s.0, m), ..self }, Self { s: (m, self.s.1), ..self }]
+        } else {
+            let m = middle(self.t);
+            [Self { t: (self.t.0, m), ..self }, Self { t: (m, self.t.1), ..self }]
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! Empty box rooms with point luminaires: hp collocation on the indirect irradiance, whose error falls exponentially.
+//!
+//! u(x) = g(x) + ∫ ρ u K dA: g is the first bounce, integrated in the luminaires' own directions; u is smooth where
+//! the exitance is not. A final gather carries the solution to a meter with the exact kernel. After Atkinson, *The
+//! Numerical Solution of Integral Equations of the Second Kind* (1997), chapters 3 (iterated collocation) and 9.
+
+mod cells;
+mod first_bounce;
+mod grid;
+mod kernel;
+mod symmetry;
+#[cfg(test)]
+mod tests;
+
+use rayon::prelude::*;
+
+use crate::geometry::Room;
+use crate::scene::{Bounces, Luminaire, Meter};
+use crate::simulator::{Bounded, gmres};
+use first_bounce::FirstBounce;
+use grid::Grid;
+use kernel::Receiver;
+use symmetry::Orbits;
+
+/// How fine a solution is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Effort {
+    /// Nodes along an element.
+    pub(super) order: usize,
+    /// Elements along half the shortest side.
+    pub(super) elements_per_half: usize,
+    /// Points of the rule on near elements.
+    pub(super) near_points: usize,
+    /// Points of the rule on a patch of the first bounce.
+    pub(super) source_points: usize,
+    /// Half-lengths at which such a patch need not be halved.
+    pub(super) source_reach: f64,
+}
+
+/// The largest relative error that each effort is the first choice for.
+const FIRST_EFFORT: [f64; 6] = [1.0, 2e-3, 1e-4, 5e-6, 1e-6, 5e-7];
+/// Rounding of sums over thousands of terms, relative.
+const ROUNDING: f64 = 1e-12;
+
+/// The ladder of efforts; each answers for the error of the one before it.
+pub(super) const EFFORTS: [Effort; 7] = [
+    Effort { order: 2, elements_per_half: 1, near_points: 4, source_points: 3, source_reach: 0.7 },
+    Effort { order: 4, elements_per_half: 1, near_points: 5, source_points: 4, source_reach: 1.0 },
+    Effort { order: 6, elements_per_half: 1, near_points: 8, source_points: 6, source_reach: 1.0 },
+    Effort { order: 8, elements_per_half: 1, near_points: 8, source_points: 8, source_reach: 1.5 },
+    Effort { order: 10, elements_per_half: 1, near_points: 10, source_points: 8, source_reach: 2.0 },
+    Effort { order: 12, elements_per_half: 1, near_points: 12, source_points: 10, source_reach: 2.0 },
+    Effort { order: 12, elements_per_half: 2, near_points: 12, source_points: 12, source_reach: 2.0 },
+];
+
+/// A difference of two efforts, times this, bounds the error of the finer one.
+const SAFETY: f64 = 3.0;
+
+/// Indirect illuminance at the meters, climbing the efforts until the bound meets `relative_error`.
+///
+/// The bound is the difference of the two finest efforts, or half the worst relative difference over all meters where
+/// a meter's own is smaller by chance, times a safety factor.
+pub(super) fn refine(
+    fields: &mut Vec<(usize, BoxField)>,
+    room: &Room,
+    luminaires: &[Luminaire],
+    bounces: Bounces,
+    meters: &[Meter],
+    relative_error: f64,
+) -> (Vec<Bounded>, String) {
+    let mut solve = |level: usize| {
+        if fields.iter().all(|(at, _)| *at != level) {
+            fields.push((level, BoxField::solve(room, luminaires, bounces, &EFFORTS[level])));
+        }
+        let field = fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field);
+        let read = |field: &BoxField| meters.par_iter().map(|meter| field.illuminance(meter)).collect::<Vec<_>>();
+        field.map(read).unwrap_or_default()
+    };
+    let mut level = FIRST_EFFORT.iter().rposition(|error| relative_error <= *error).unwrap_or(0);
+    let mut coarse = solve(level);
+    loop {
+        level += 1;
+        let fine = solve(level);
+        let values = bounded(&coarse, &fine);
+        let met = values.iter().all(|v| v.bound <= relative_error * v.value.abs());
+        if met || level + 1 == EFFORTS.len() {
+            let Effort { order, elements_per_half, .. } = EFFORTS[level];
+            let text = format!(
+                "hp collocation, order {order} with {elements_per_half} element(s) a half side: empty box, point luminaires"
+            );
+            return (values, text);
+        }
+        coarse = fine;
+    }
+}
+
+fn bounded(coarse: &[f64], fine: &[f64]) -> Vec<Bounded> {
+    let pairs = || coarse.iter().zip(fine);
+    let relative = |(c, f): (&f64, &f64)| if *f == 0.0 { 0.0 } else { ((f - c) / f).abs() };
+    let worst = pairs().map(relative).fold(0.0, f64::max);
+    pairs()
+        .map(|(c, f)| Bounded { value: *f, bound: SAFETY * (f - c).abs().max(0.5 * worst * f.abs()) + ROUNDING * f })
+        .collect()
+}
+
+/// The solved light field of a room at one effort, ready for any meter.
+#[derive(Debug)]
+pub(super) struct BoxField {
+    grid: Grid,
+    first: FirstBounce,
+    /// Indirect exitance at the nodes in lm/m²: what is gathered on top of the first bounce.
+    exitance: Vec<f64>,
+    gathers: Gathers,
+}
+
+/// What a meter sums up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Gathers {
+    Nothing,
+    FirstBounce,
+    All,
+}
+
+impl BoxField {
+    pub(super) fn solve(room: &Room, luminaires: &[Luminaire], bounces: Bounces, effort: &Effort) -> Self {
+        let grid = Grid::new(room.size_m, effort);
+        let first = FirstBounce::new(room, luminaires, effort);
+        let gathers = match bounces {
+            Bounces::AtMost(0) => Gathers::Nothing,
+            Bounces::AtMost(1) => Gathers::FirstBounce,
+            Bounces::AtMost(_) | Bounces::Converged => Gathers::All,
+        };
+        if gathers != Gathers::All {
+            return Self { exitance: vec![0.0; grid.len()], grid, first, gathers };
+        }
+        let group = symmetry::of_geometry(room.size_m);
+        let operator = Operator::new(&grid, Orbits::new(&grid, &group));
+        let rho: Vec<f64> = (0..grid.len()).map(|node| symmetry::reflectance(room, grid.place(node).0)).collect();
+        let known = known(&grid, &first, &Orbits::new(&grid, &symmetry::of_light(&group, room, luminaires)));
+        let step = |u: &[f64]| operator.apply(&exitance(u, &rho));
+        let irradiance = match bounces {
+            Bounces::Converged => gmres::solve(step, &known, 1e-14),
+            Bounces::AtMost(count) => (2..count).fold(known.clone(), |u, _| {
+                let again = step(&u);
+                known.iter().zip(&again).map(|(g, k)| g + k).collect()
+            }),
+        };
+        Self { exitance: exitance(&irradiance, &rho), grid, first, gathers }
+    }
+
+    /// Indirect illuminance at a meter inside the room, in lux.
+    pub(super) fn illuminance(&self, meter: &Meter) -> f64 {
+        if self.gathers == Gathers::Nothing {
+            return 0.0;
+        }
+        let receiver = Receiver { position_m: meter.position_m, normal: meter.normal, face: None };
+        let first = self.first.irradiance(&receiver);
+        if self.gathers == Gathers::FirstBounce {
+            return first;
+        }
+        first + gmres::dot(&balanced_row(&self.grid, &receiver), &self.exitance)
+    }
+}
+
+/// The first bounce at every node, computed once an orbit.
+fn known(grid: &Grid, first: &FirstBounce, orbits: &Orbits) -> Vec<f64> {
+    let values: Vec<f64> =
+        orbits.representatives.par_iter().map(|&node| first.irradiance(&receiver_at(grid, node))).collect();
+    let mut known = vec![0.0; grid.len()];
+    for (&node, value) in orbits.representatives.iter().zip(values) {
+        for image in &orbits.images {
+            known[image[node] as usize] = value;
+        }
+    }
+    known
+}
+
+fn exitance(irradiance: &[f64], rho: &[f64]) -> Vec<f64> {
+    irradiance.iter().zip(rho).map(|(u, rho)| u * rho).collect()
+}
+
+fn receiver_at(grid: &Grid, node: usize) -> Receiver {
+    let face = grid.place(node).0;
+    Receiver { position_m: grid.node(node).0, normal: face.inward_normal(), face: Some(face) }
+}
+
+/// A row of the operator, scaled to sum to 1: a receiver in a closed room sees nothing but the room.
+///
+/// Without it, quadrature errors of 1e-7 would outweigh the absorption of a room with reflectance .9999999.
+fn balanced_row(grid: &Grid, receiver: &Receiver) -> Vec<f64> {
+    let mut row = vec![0.0; grid.len()];
+    grid.add_row(receiver, &mut row);
+    let sum: f64 = row.iter().sum();
+    for value in &mut row {
+        *value /= sum;
+    }
+    row
+}
+
+/// Irradiance from exitance at the nodes; rows are stored once an orbit of the box's symmetries.
+struct Operator {
+    orbits: Orbits,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Operator {
+    fn new(grid: &Grid, orbits: Orbits) -> Self {
+        let row = |&node: &usize| balanced_row(grid, &receiver_at(grid, node));
+        let rows = orbits.representatives.par_iter().map(row).collect();
+        Self { orbits, rows }
+    }
+
+    fn apply(&self, exitance: &[f64]) -> Vec<f64> {
+        let images = &self.orbits.images;
+        let seen: Vec<Vec<f64>> =
+            images.iter().map(|image| image.iter().map(|j| exitance[*j as usize]).collect()).collect();
+        let sums: Vec<Vec<f64>> =
+            self.rows.par_iter().map(|row| seen.iter().map(|v| gmres::dot(row, v)).collect()).collect();
+        let mut out = vec![0.0; exitance.len()];
+        for (&node, sums) in self.orbits.representatives.iter().zip(&sums) {
+            for (image, sum) in images.iter().zip(sums) {
+                out[image[node] as usize] = *sum;
+            }
+        }
+        out
+    }
+}
