@@ -237,6 +237,11 @@ impl LuminousIntensityDistribution {
         Self { symmetry: self.symmetry, c_deg: self.c_deg.clone(), gamma_deg, candela }
     }
 
+    /// A table over the full circle whose angles are known to be in order.
+    pub(super) fn full_table(c_deg: Vec<f64>, gamma_deg: Vec<f64>, candela: Vec<f64>) -> Self {
+        Self { symmetry: Symmetry::None, c_deg, gamma_deg, candela }
+    }
+
     /// The same distribution with every intensity multiplied by `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {

@@ -1,5 +1,6 @@
 //! Luminous intensity distributions and the files that carry them.
 
+mod analysis;
 mod distribution;
 mod error;
 pub mod eulumdat;
@@ -7,6 +8,8 @@ mod goniometer;
 mod lint;
 pub mod lm63;
 mod planes;
+mod resample;
+mod sampler;
 mod text;
 pub mod tm33;
 mod write;
@@ -20,6 +23,8 @@ pub use distribution::{DistributionError, LuminousIntensityDistribution, Symmetr
 pub use error::{Problem, ReadError};
 pub use lint::{Lint, Severity};
 pub use planes::Goniometer;
+pub use resample::Resampled;
+pub use sampler::{DirectionSampler, SampledDirection};
 pub use write::Written;
 
 use lint::Lints;
