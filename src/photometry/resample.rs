@@ -99,7 +99,7 @@ mod tests {
 
     /// A table without symmetry, smooth at the poles.
     fn lopsided(step_deg: f64) -> LuminousIntensityDistribution {
-        let angles = |last: f64| (0..).map(|k| f64::from(k) * step_deg).take_while(|a| *a <= last).collect::<Vec<_>>();
+        let angles = |last: f64| (0..=(last / step_deg) as u32).map(|k| f64::from(k) * step_deg).collect::<Vec<f64>>();
         let (c, gamma) = (angles(360.0), angles(180.0));
         let of = |c: f64, g: f64| 100.0 + 30.0 * direction(c, g).dot(DVec3::new(1.0, 0.5, -2.0));
         let candela = c.iter().flat_map(|&c| gamma.iter().map(move |&g| of(c % 360.0, g))).collect();

@@ -72,9 +72,9 @@ impl DirectionSampler {
         for _ in 0..60 {
             let excess = flux(gamma) - wanted;
             if excess > 0.0 {
-                right = gamma
+                right = gamma;
             } else {
-                left = gamma
+                left = gamma;
             }
             let newton = gamma - excess / (intensity(gamma) * gamma.sin());
             let next = if newton > left && newton < right { newton } else { f64::midpoint(left, right) };
