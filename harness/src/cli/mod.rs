@@ -12,7 +12,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use crate::diff::{Comparison, Judge, KnownDeviations, Published, Tolerances};
 use crate::doctor;
-use crate::engines::{self, Site};
+use crate::engines::{self, EngineId, InstallState, Site};
 use crate::plan::{Asked, Plan, Selection, plan};
 use crate::reading::Recording;
 use crate::report::{self, Exit, Ingredients, Report, SpecRecord, Style};
@@ -197,7 +197,11 @@ fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic> {
         plan(case, &args.selected.selection(), site).map_err(diagnose)?;
     }
     if args.install {
-        // INSTALL
+        let names: Vec<EngineId> = engines::all().iter().map(|e| e.id()).collect();
+        let wanted = names
+            .into_iter()
+            .filter(|n| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| w == n.0));
+        report_installation(site, &wanted.collect::<Vec<_>>());
     }
     let tables = Tables::read(&cases)?;
     let mut exit = Exit::Passed;
@@ -406,8 +410,9 @@ fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Diagnostic> {
         }
         EnginesAction::Install { names } => {
             known_engines(&names)?;
-            // INSTALL
-            Ok(Exit::Passed)
+            let wanted = engines::all().into_iter().map(|e| e.id());
+            let wanted = wanted.filter(|e| names.is_empty() || names.iter().any(|n| n == e.0));
+            Ok(report_installation(site, &wanted.collect::<Vec<_>>()))
         }
         EnginesAction::Doctor { names } => {
             known_engines(&names)?;
@@ -440,6 +445,15 @@ fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
         }
     }
     Ok(())
+}
+
+fn report_installation(site: &Site, wanted: &[EngineId]) -> Exit {
+    let outcomes = engines::install(site, wanted, |step| eprintln!("{step}"));
+    for outcome in &outcomes {
+        eprintln!("{}: {}", outcome.component, outcome.detail);
+    }
+    let failed = outcomes.iter().any(|o| o.state == InstallState::Failed);
+    if failed { Exit::Engine } else { Exit::Passed }
 }
 
 fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
@@ -484,9 +498,9 @@ impl run::Progress for Bar {
     }
 
     fn ended(&self, engine: &str, procedure: &str, wall: Duration, failure: Option<&str>) {
-        match failure {
-            Some(failure) => self.bar.println(format!("{engine}: {procedure} failed: {failure}")),
-            None => tracing::info!(engine, procedure, wall_s = wall.as_secs_f64(), "done"),
+        tracing::info!(engine, procedure, wall_s = wall.as_secs_f64(), "done");
+        if let Some(failure) = failure {
+            self.bar.println(format!("{engine}: {procedure} failed: {failure}"));
         }
     }
 }

@@ -16,7 +16,8 @@ use crate::procedures::{Target, Task};
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
-    luxproof_published: u32,
+    #[serde(rename = "luxproof_published")]
+    version: u32,
     citation: Citation,
     rounding: Rounding,
     tables: BTreeMap<String, Table>,
@@ -96,11 +97,8 @@ impl Published {
         let fail = |message: String| PublishedError { file: path.display().to_string(), message };
         let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
         let published: Self = crate::spec::from_yaml(&text).map_err(fail)?;
-        if published.luxproof_published != 1 {
-            return Err(fail(format!(
-                "format version {} is not known; this program reads 1",
-                published.luxproof_published
-            )));
+        if published.version != 1 {
+            return Err(fail(format!("format version {} is not known; this program reads 1", published.version)));
         }
         let cells = published.tables.values().flat_map(|t| t.rows.iter().flat_map(|r| r.cells.values()));
         if let Some(bad) = cells.into_iter().find(|c| published.cell(c).is_none()) {

@@ -76,7 +76,8 @@ impl Tolerances {
                 return Err(ToleranceError(format!("a tolerance of {} has no source", rule.procedure)));
             }
         }
-        if !(self.coverage_factor.value > 0.0) || self.coverage_factor.source.trim().is_empty() {
+        let sound = self.coverage_factor.value.is_finite() && self.coverage_factor.value > 0.0;
+        if !sound || self.coverage_factor.source.trim().is_empty() {
             return Err(ToleranceError("the coverage factor needs a positive value and a source".into()));
         }
         Ok(self)

@@ -282,7 +282,7 @@ fn value(record: &ReadingRecord) -> String {
     match record.std_error {
         Some(e) if e > 0.0 && record.value > 0.0 => {
             let decimals = (1.0 - e.log10().floor()).clamp(0.0, 9.0) as usize;
-            let in_units = (e * 10f64.powi(decimals as i32)).round();
+            let in_units = (e * 10f64.powf(decimals as f64)).round();
             format!("{:.decimals$}({in_units})", record.value)
         }
         _ => significant(record.value),

@@ -1,6 +1,7 @@
 //! Spec -> Case: reads the files that a spec names, checks what the shape alone cannot, and builds the scene.
 
 use std::collections::{BTreeMap, HashSet};
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -96,7 +97,7 @@ impl Builder<'_> {
             title: spec.title.unwrap_or_else(|| name.clone()),
             name,
             path: self.source.path.clone(),
-            sha256: self.hash.finalize().iter().map(|b| format!("{b:02x}")).collect(),
+            sha256: hexadecimal(&self.hash.finalize()),
             scene,
             meters,
             procedures: spec.procedures,
@@ -272,7 +273,7 @@ impl Builder<'_> {
             return Err(self.source.error_at("procedures", "there are none", "give at least one procedure"));
         }
         for (procedure, names) in sets {
-            for name in names.into_iter().flat_map(|n| n.iter()) {
+            for name in names.into_iter().flat_map(super::model::Names::iter) {
                 if !meters.contains_key(name) {
                     let message = format!("there is no meter set `{name}`");
                     let help = suggestion(name, meters.keys().map(String::as_str));
@@ -383,6 +384,13 @@ fn extent(shape: &Shape) -> (DVec3, DVec3) {
             vertices_m.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
         }
     }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").ok();
+        text
+    })
 }
 
 fn within(room: &Room) -> String {
