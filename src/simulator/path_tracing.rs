@@ -13,10 +13,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use self::emitter::Emitter;
-use self::path::{Integrand, Wanted};
+use self::path::{ENDLESS, Integrand, Wanted};
 use self::world::World;
 use super::sampler::{Sampler, mix};
 use super::{Accuracy, Estimate, SimulatorError, Solution, Uncertainty};
+use crate::geometry::{Room, Surface};
 use crate::scene::{Bounces, Meter, Scene, Transport};
 use crate::units::Lux;
 
@@ -30,10 +31,10 @@ const FIRST_LOG2: u32 = 9;
 const LAST_LOG2: u32 = 19;
 /// Points summed one after the other, as a power of two.
 const BLOCK_LOG2: u32 = 8;
-/// Paths longer than this on average are refused: 1 / (1 - reflectance).
-const MAX_MEAN_REFLECTIONS: f64 = 1e5;
-/// Reflections beyond which a path counts as endless; one in e^100 of the longest paths allowed gets there.
-const MAX_REFLECTIONS: u32 = 10_000_000;
+/// Points of each scramble, as a power of two, before zero is believed of a meter that no light has reached.
+const DARK_LOG2: u32 = 13;
+/// Rooms in which paths are longer than this on average, 1 / (1 - reflectance), are refused.
+const MAX_MEAN_REFLECTIONS: f64 = 1e4;
 /// A luminaire whose light peaks this much on what it lights is sampled from its own side too, which costs 4 times as much.
 const PEAKED: f64 = 20.0;
 /// Rays that find that out.
@@ -56,7 +57,8 @@ struct PathTracer<'a> {
     world: World,
     emitters: Vec<Emitter<'a>>,
     close: Vec<bool>,
-    largest_reflectance: f64,
+    /// Mean over the room by area; 0 in free field.
+    mean_reflectance: f64,
 }
 
 /// Sums of one meter over the points so far, one a scramble.
@@ -64,6 +66,8 @@ struct PathTracer<'a> {
 struct Sums {
     lux: [f64; REPLICATES as usize],
     points_log2: u32,
+    /// Standard error at half as many points, where there was such a stage.
+    half_way: Option<f64>,
 }
 
 impl<'a> PathTracer<'a> {
@@ -74,16 +78,13 @@ impl<'a> PathTracer<'a> {
         }
         let world = World::new(scene.room, &scene.obstacles, reach_m)
             .map_err(|e| unsupported("a mesh of the scene", &e.to_string()))?;
-        let mut largest_reflectance = 0.0_f64;
-        for reflectance in world.reflectances() {
-            if !(0.0..=1.0).contains(&reflectance) {
-                return Err(unsupported(&format!("a reflectance of {reflectance}"), "it must lie within 0..=1"));
-            }
-            largest_reflectance = largest_reflectance.max(reflectance);
+        if let Some(reflectance) = world.reflectances().find(|r| !(0.0..=1.0).contains(r)) {
+            return Err(unsupported(&format!("a reflectance of {reflectance}"), "it must lie within 0..=1"));
         }
         let emitters: Vec<_> = scene.luminaires.iter().filter_map(Emitter::new).collect();
         let close = emitters.iter().map(|e| peak(e, &world) > PEAKED).collect();
-        Ok(Self { world, emitters, close, largest_reflectance })
+        let mean_reflectance = scene.room.map_or(0.0, |room| room_mean(&room));
+        Ok(Self { world, emitters, close, mean_reflectance })
     }
 
     fn solve(
@@ -96,7 +97,7 @@ impl<'a> PathTracer<'a> {
         let wanted = self.wanted(transport)?;
         let meters = (0..).zip(meters).map(|(k, m)| self.placed(k, m)).collect::<Result<Vec<_>, _>>()?;
         let integrand = Integrand::new(&self.world, &self.emitters, self.close.clone(), wanted);
-        let mut sums = vec![Sums { lux: [0.0; REPLICATES as usize], points_log2: 0 }; meters.len()];
+        let mut sums = vec![Sums { lux: [0.0; REPLICATES as usize], points_log2: 0, half_way: None }; meters.len()];
         for log2 in points_log2.clone() {
             let open: Vec<usize> = (0..meters.len())
                 .filter(|&m| log2 == *points_log2.start() || !sums[m].narrow_enough(accuracy.relative_error))
@@ -104,9 +105,14 @@ impl<'a> PathTracer<'a> {
             let from = if log2 == *points_log2.start() { 0 } else { 1 << (log2 - 1) };
             let blocks = block_sums(&integrand, &meters, &open, accuracy.seed, from..1 << log2);
             for (&m, blocks) in open.iter().zip(&blocks) {
+                sums[m].half_way = (from > 0).then(|| sums[m].mean_and_error().1);
                 sums[m].points_log2 = log2;
                 for (sum, blocks) in sums[m].lux.iter_mut().zip(blocks) {
                     *sum += blocks.iter().sum::<f64>();
+                }
+                if sums[m].lux.iter().any(|lux| !lux.is_finite()) {
+                    let what = format!("the light at meter {m}, where a path is endless or an illuminance infinite");
+                    return Err(unsupported(&what, "lower the reflectances, or move the meter off the luminaire"));
                 }
             }
         }
@@ -127,11 +133,11 @@ impl<'a> PathTracer<'a> {
         };
         let reflections = match bounces {
             Bounces::AtMost(n) => n,
-            Bounces::Converged if 1.0 - self.largest_reflectance < 1.0 / MAX_MEAN_REFLECTIONS => {
-                let what = format!("a reflectance of {} with all reflections", self.largest_reflectance);
+            Bounces::Converged if 1.0 - self.mean_reflectance < 1.0 / MAX_MEAN_REFLECTIONS => {
+                let what = format!("a mean reflectance of {} with all reflections", self.mean_reflectance);
                 return Err(unsupported(&what, "cut the reflections, or use the radiosity solver"));
             }
-            Bounces::Converged => MAX_REFLECTIONS,
+            Bounces::Converged => ENDLESS,
         };
         Ok(Wanted { direct, reflections })
     }
@@ -212,16 +218,31 @@ impl Sums {
         (mean, (square / (n * (n - 1.0))).sqrt())
     }
 
-    fn narrow_enough(&self, relative_error: f64) -> bool {
+    /// Mean and the standard error that one may stop by: the quadratic mean of the last and of what the one before it
+    /// promised. Stopping as soon as a noisy error is small prefers errors that are too small by chance.
+    fn mean_and_prudent_error(&self) -> (f64, f64) {
         let (mean, error) = self.mean_and_error();
-        STUDENT_T * error <= relative_error * mean
+        let promised = self.half_way.map(|half| half * std::f64::consts::FRAC_1_SQRT_2);
+        (mean, promised.map_or(error, |p| (0.5 * (error * error + p * p)).sqrt()))
+    }
+
+    fn narrow_enough(&self, relative_error: f64) -> bool {
+        let (mean, error) = self.mean_and_prudent_error();
+        STUDENT_T * error <= relative_error * mean && (mean > 0.0 || self.points_log2 >= DARK_LOG2)
     }
 
     fn estimate(&self) -> Estimate {
-        let (mean, value) = self.mean_and_error();
+        let (mean, value) = self.mean_and_prudent_error();
         let uncertainty = Uncertainty::StandardError { value, degrees_of_freedom: REPLICATES - 1 };
         Estimate { illuminance: Lux(mean), uncertainty }
     }
+}
+
+fn room_mean(room: &Room) -> f64 {
+    let [area, reflecting] = Surface::ALL.iter().fold([0.0, 0.0], |[area, reflecting], s| {
+        [area + room.area_m2(*s), reflecting + room.area_m2(*s) * room.reflectance.of(*s)]
+    });
+    reflecting / area
 }
 
 fn unsupported(what: &str, instead: &str) -> SimulatorError {

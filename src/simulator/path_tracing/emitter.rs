@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec3};
 
-use crate::photometry::{HorizontalAxis, LuminousIntensityDistribution, LuminousOpening};
+use crate::photometry::{HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Symmetry};
 use crate::scene::{Luminaire, LuminaireModel};
 
 /// A luminaire in its place.
@@ -21,6 +21,7 @@ pub(super) struct Emitter<'a> {
     to_own: DMat3,
     opening: Opening,
     bands: Bands,
+    axial: bool,
 }
 
 /// What a luminaire sends towards a point, were nothing between.
@@ -30,8 +31,9 @@ pub(super) struct Arrival {
     pub(super) from_m: DVec3,
     /// Illuminance in lux, an unbiased estimate of the whole luminaire's where it has an extent.
     pub(super) lux: f64,
-    /// Density of [`Emitter::emit`] to light the point from there, per square metre of the lit surface.
-    pub(super) density_per_m2: f64,
+    /// Illuminance for each candela: cosine over squared distance.
+    lux_per_cd: f64,
+    gamma_deg: f64,
 }
 
 /// Light that leaves a luminaire along a ray.
@@ -63,6 +65,7 @@ impl<'a> Emitter<'a> {
                 LuminaireModel::Area | LuminaireModel::Impostor => Opening::of(luminaire.photometry.opening),
             },
             bands,
+            axial: distribution.symmetry() == Symmetry::Axial,
         })
     }
 
@@ -93,19 +96,23 @@ impl<'a> Emitter<'a> {
             return None;
         }
         let own = self.to_own * path;
-        let candela = self.intensity(own) * self.opening.share(&part, own);
-        if candela == 0.0 {
-            return None;
-        }
-        let density_per_m2 = self.bands.density_per_sr(gamma_deg(own)) * cosine / square;
-        Some(Arrival { from_m, lux: candela * cosine / square, density_per_m2 })
+        let gamma_deg = self.bands.lit_gamma_deg(own)?;
+        let candela = self.intensity(own, gamma_deg) * self.opening.share(&part, own);
+        let lux_per_cd = cosine / square;
+        (candela > 0.0).then_some(Arrival { from_m, lux: candela * lux_per_cd, lux_per_cd, gamma_deg })
+    }
+
+    /// Density with which [`Emitter::emit`] would have lit the point in the same way, per square metre of its surface.
+    pub(super) fn density_per_m2(&self, arrival: &Arrival) -> f64 {
+        self.bands.density_per_sr(arrival.gamma_deg) * arrival.lux_per_cd
     }
 
     /// A ray of light: `at` picks the part of the opening, `along` the direction.
     pub(super) fn emit(&self, at: [f64; 2], along: [f64; 2]) -> Emission {
         let part = self.opening.part(at);
         let (own, density_per_sr) = self.bands.direction(along);
-        let candela = self.intensity(own) * self.opening.share(&part, own);
+        let gamma_deg = self.bands.lit_gamma_deg(own);
+        let candela = gamma_deg.map_or(0.0, |g| self.intensity(own, g) * self.opening.share(&part, own));
         Emission {
             from_m: self.position_m + self.to_world * part.at_m,
             direction: self.to_world * own,
@@ -114,8 +121,9 @@ impl<'a> Emitter<'a> {
         }
     }
 
-    fn intensity(&self, own: DVec3) -> f64 {
-        self.distribution.intensity_towards(own).value() * self.flux_scale
+    fn intensity(&self, own: DVec3, gamma_deg: f64) -> f64 {
+        let c_deg = if self.axial { 0.0 } else { own.y.atan2(own.x).to_degrees() };
+        self.distribution.intensity(c_deg, gamma_deg).value() * self.flux_scale
     }
 }
 
@@ -265,6 +273,8 @@ struct Bands {
     gamma_deg: Vec<f64>,
     /// Probability that the band is below the k-th angle.
     below: Vec<f64>,
+    /// Cosines of gamma between which there is light, a rounding wider.
+    lit_cos: [f64; 2],
 }
 
 impl Bands {
@@ -279,8 +289,19 @@ impl Bands {
         for b in &mut below {
             *b /= total;
         }
-        let cos_gamma = gamma_deg.iter().map(|g| g.to_radians().cos()).collect();
-        (total > 0.0).then_some(Self { cos_gamma, gamma_deg, below })
+        let cos_gamma: Vec<f64> = gamma_deg.iter().map(|g| g.to_radians().cos()).collect();
+        let first = below.partition_point(|b| *b == 0.0).max(1) - 1;
+        let last = below.partition_point(|b| *b < 1.0);
+        let lit_cos = [cos_gamma[last.min(cos_gamma.len() - 1)] - 1e-12, cos_gamma[first] + 1e-12];
+        (total > 0.0).then_some(Self { cos_gamma, gamma_deg, below, lit_cos })
+    }
+
+    /// Gamma of a direction of any length, `None` where the table is surely dark, which saves most of the work.
+    fn lit_gamma_deg(&self, own: DVec3) -> Option<f64> {
+        let across = own.x * own.x + own.y * own.y;
+        let cos = -own.z / (across + own.z * own.z).sqrt();
+        let [low, high] = self.lit_cos;
+        (low..=high).contains(&cos).then(|| across.sqrt().atan2(-own.z).to_degrees())
     }
 
     fn density_per_sr(&self, gamma_deg: f64) -> f64 {
@@ -297,8 +318,4 @@ impl Bands {
         let own = DVec3::new(sin * cos_c, sin * sin_c, -cos);
         (own, (self.below[k] - self.below[k - 1]) / (TAU * (self.cos_gamma[k - 1] - self.cos_gamma[k])))
     }
-}
-
-fn gamma_deg(own: DVec3) -> f64 {
-    own.x.hypot(own.y).atan2(-own.z).to_degrees()
 }

@@ -4,7 +4,7 @@
 //! it meets the light straight from the luminaires (next-event estimation) times the reflectances so far, and on.
 //! Roulette ends a path with the probability of its absorption, so that the mean stays exact. Where a luminaire stands
 //! close to a surface, the peak of light upon it is sampled from the luminaire as well, and the two estimates share the
-//! work by the balance heuristic (E. Veach, L. Guibas, SIGGRAPH 1995), which keeps the variance finite.
+//! work by the power heuristic (E. Veach, L. Guibas, SIGGRAPH 1995), which keeps the variance finite.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,9 +15,14 @@ use super::world::{Hit, World};
 use crate::simulator::sampler::Sampler;
 
 /// Reflections after which roulette sets in; before, weighting by the reflectance keeps the integrand smooth.
-const ROULETTE_FROM: u32 = 4;
-/// Reflections at which every luminaire is asked; beyond, one is picked by its flux.
+const ROULETTE_FROM: u32 = 3;
+/// So many luminaires are all asked at every surface, which case S2 shows to be worth twice its cost.
+const ALL_EMITTERS: usize = 8;
+/// Of more than that, all are asked up to this reflection; beyond, one is picked by its flux.
 const ALL_EMITTERS_UNTIL: u32 = 1;
+
+/// Reflections that no path survives in a scene that absorbs anything to speak of.
+pub(super) const ENDLESS: u32 = 2_000_000;
 
 /// What a path is asked for.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +42,8 @@ pub(super) struct Integrand<'a> {
     /// Flux of all emitters up to and including each, as a part of the whole.
     cumulative: Vec<f64>,
     any_extent: bool,
+    /// Reflections up to which all emitters are asked.
+    all_until: u32,
     wanted: Wanted,
 }
 
@@ -54,11 +61,20 @@ impl<'a> Integrand<'a> {
             *sum += e.flux_lm() / total;
             Some(*sum)
         });
-        let cumulative = cumulative.collect();
-        Self { world, emitters, close, cumulative, any_extent: emitters.iter().any(Emitter::has_extent), wanted }
+        Self {
+            world,
+            emitters,
+            close,
+            cumulative: cumulative.collect(),
+            any_extent: emitters.iter().any(Emitter::has_extent),
+            all_until: if emitters.len() <= ALL_EMITTERS { u32::MAX } else { ALL_EMITTERS_UNTIL },
+            wanted,
+        }
     }
 
     /// Illuminance in lux that one path from a meter finds; its mean over all paths is the meter's.
+    ///
+    /// Not a number where the path comes to no end, since cutting it would be a silent loss.
     pub(super) fn path(&self, meter_m: DVec3, meter_normal: DVec3, sampler: &mut Sampler) -> f64 {
         let mut lux = 0.0;
         let mut at = Vertex { point_m: meter_m, normal: meter_normal };
@@ -70,7 +86,7 @@ impl<'a> Integrand<'a> {
         let mut weight = 1.0;
         for reflection in 1..=self.wanted.reflections {
             let toward = sampler.next_pair();
-            let pick = if reflection > ALL_EMITTERS_UNTIL { self.pick(sampler) } else { Pick::All };
+            let pick = if reflection > self.all_until { self.pick(sampler) } else { Pick::All };
             let parts = self.opening_pair(sampler);
             lux += weight * self.emitted(&at, &pick, sampler);
             let Some(hit) = self.world.closest(at.point_m, cosine_direction(at.normal, toward)) else { break };
@@ -86,6 +102,9 @@ impl<'a> Integrand<'a> {
                     break;
                 }
                 weight /= hit.reflectance;
+            }
+            if reflection == ENDLESS {
+                return f64::NAN;
             }
         }
         lux
@@ -107,7 +126,7 @@ impl<'a> Integrand<'a> {
     /// Light of one luminaire on a surface; where paths sample it at a `density` and its own rays do too, their share.
     fn arriving(&self, emitter: &Emitter, at: &Vertex, parts: [f64; 2], density: Option<f64>) -> f64 {
         let Some(arrival) = emitter.arrival(at.point_m, at.normal, parts) else { return 0.0 };
-        let share = density.map_or(1.0, |paths| paths / (paths + arrival.density_per_m2));
+        let share = density.map_or(1.0, |paths| power_share(paths, emitter.density_per_m2(&arrival)));
         if share == 0.0 || !self.world.contains(arrival.from_m) || !self.world.visible(at.point_m, arrival.from_m) {
             return 0.0;
         }
@@ -143,8 +162,8 @@ impl<'a> Integrand<'a> {
         let paths = cosines / (PI * square * square);
         let cosine = -hit.normal.dot(ray.direction);
         let own = ray.density_per_sr * cosine / (hit.distance_m * hit.distance_m);
-        // Illuminance per steradian of the ray, which the ray's own density divides and its share multiplies.
-        Some(hit.reflectance * ray.candela * paths * cosine / (hit.distance_m * hit.distance_m) / (paths + own))
+        // Per steradian, over the density of the ray.
+        Some(power_share(own, paths) * hit.reflectance * ray.candela * paths / ray.density_per_sr)
     }
 
     fn opening_pair(&self, sampler: &mut Sampler) -> [f64; 2] {
@@ -152,14 +171,17 @@ impl<'a> Integrand<'a> {
     }
 
     fn pick(&self, sampler: &mut Sampler) -> Pick {
-        if self.emitters.len() < 2 {
-            return Pick::All;
-        }
         let u = sampler.next();
         let k = self.cumulative.partition_point(|c| *c <= u).min(self.emitters.len() - 1);
         let below = if k == 0 { 0.0 } else { self.cumulative[k - 1] };
         Pick::One(k, 1.0 / (self.cumulative[k] - below))
     }
+}
+
+/// The part of a sample's weight where another way would have found it at density `other`: the power heuristic.
+fn power_share(density: f64, other: f64) -> f64 {
+    let ratio = other / density;
+    1.0 / (1.0 + ratio * ratio)
 }
 
 /// Which luminaires are asked, and the inverse probability of that.

@@ -139,7 +139,7 @@ impl World {
         LIFT * self.extent_m
     }
 
-    /// The largest reflectance of any surface, the least first.
+    /// The reflectance of every surface.
     pub(super) fn reflectances(&self) -> impl Iterator<Item = f64> {
         let room = self.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
         room.chain(self.boxes.iter().map(|b| b.reflectance)).chain(self.triangle_reflectance.iter().copied())
