@@ -1,0 +1,133 @@
+"""Writes values/*.yaml: what the analytic cases must read, by area quadrature of Lambert's law.
+
+It is one of two derivations: tests/analytic_values.rs derives every value again, from closed forms and contour
+integrals of luminaire::calculators and luminaire::geometry, and compares. Case 5.7 of CIE 171:2006 is not taken
+from its Table 19, which holds errors. Cases 5.4 and 5.8 have laws (flux conservation, the mean of a closed room)
+and no values here.
+
+Only Python's standard library is needed:  python3 derive_values.py   (in this folder)
+"""
+import math
+
+FORMAT = "# Format: see reference/published/cachet.yaml; `basis` says that these are no readings but derived values.\n"
+
+
+def main():
+    up, down = (0, 0, 1), (0, 0, -1)
+    offsets = [(0, 0), (.5, 0), (1, 0), (1.5, 0), (.5, .5), (1, .5), (1.5, .5), (1, 1), (1.5, 1), (1.5, 1.5)]
+    rows = []
+    for x, y in offsets:
+        d2 = x * x + y * y + 9
+        candela, cosine = 1000 * 3 / math.sqrt(d2), 3 / math.sqrt(d2)
+        rows.append(((4 + x, 4 + y, .5), up, candela * cosine / d2))
+    write("cie-5.2", "CIE 171:2006-type case 5.2", "closed_form", 3, {"direct_illuminance": ("point", rows)})
+
+    source = rectangle((3.5, 4.5), (3.5, 4.5), 3.5)
+    rows = [((4, 2, z + .5), (0, 1, 0)) for z in (2.75, 2.25, 1.75, 1.25, .75, .25)]
+    rows += [((4, 2 + y, .5), up) for y in (.25, .75, 1.25, 1.75)]
+    rows = [(p, n, 1000 * math.pi * factor(p, n, source)) for p, n in rows]
+    write("cie-5.3", "CIE 171:2006-type case 5.3", "closed_form", 3, {"direct_illuminance": ("area", rows)})
+
+    disc = segment((2, 2), 1.5, -math.inf)
+    rows = [((2 + x, 2, 2.9), down) for x in (.25, .75, 1.25, 1.75)]
+    rows += [((3.9, 2, z), (-1, 0, 0)) for z in (.25, .75, 1.25, 1.75, 2.25, 2.75)]
+    rows = [(p, n, 800 * factor(p, n, disc)) for p, n in rows]
+    write("cie-5.6", "CIE 171:2006-type case 5.6", "closed_form", 3, {"indirect_illuminance": ("point", rows)})
+
+    places = [((3.9, y, z), (-1, 0, 0)) for y in (2, 3) for z in (.5, 1.5, 2, 2.5, 2.9)]
+    places += [((x, 2, 2.9), down) for x in (2.6, 3.0, 3.4, 3.8)]
+    rows = [(p, n, 800 * factor(p, n, segment((1.2, 2), 1, shadow_edge(p)))) for p, n in places]
+    write("cie-5.7", "CIE 171:2006-type case 5.7", "closed_form", 3, {"indirect_illuminance": ("point", rows)})
+
+    places = [(p, n) for n in (up, down, (1, 0, 0), (.36, -.48, .8))
+              for p in ((2, 2, 2), (1.3, 2.6, 2.9), (1.1, 1.1, 1.1), (2.8, 1.5, 2.2))]
+    rows = [(p, n, 250 * math.pi) for p, n in places]
+    write("furnace", "Furnace of luminous panels", "closed_form", 3, {"direct_illuminance": ("area", rows)})
+
+    ceiling = zip(((2, 2, 17), (2, 10, 17), (10, 2, 17), (10, 10, 17)),
+                  (.852757463, 2.230931615, 2.230931615, 13.559183673))
+    plane = zip(((2, 2, 2), (2, 10, 2), (10, 2, 2), (10, 10, 2)), (.94314714, 1.15551735, 1.15551735, 1.42062868))
+    write("s1", "Case S1, two independent exact methods (the same to 5e-8 lx)", "exact", 8, {
+        "direct_illuminance": ("point", [(p, down, e) for p, e in ceiling]),
+        "indirect_illuminance": ("point", [(p, up, e) for p, e in plane])}, units=5)
+
+    desk = [(.25, .25), (1.75, 1.25), (3.75, 2.75), (4.25, .75), (5.25, 3.75), (7.25, .25)]
+    direct = (66.24407, 226.03927, 161.02976, 123.15923, 210.12365, 0)
+    indirect = (51.0232, 53.0644, 48.966, 53.512, 50.245, 18.788)
+    title = "Case S2; direct by clipped polygons, indirect by path tracing (standard errors .005 to .024 lx)"
+    write("s2", title, "exact", 2, {
+        "direct_illuminance": ("area", [((x, y, .8), up, e) for (x, y), e in zip(desk, direct)]),
+        "indirect_illuminance": ("area", [((x, y, .8), up, e) for (x, y), e in zip(desk, indirect)])}, units=5)
+
+
+def gauss(n):
+    """Nodes and weights of Gauss-Legendre quadrature on 0..1, by Newton's method."""
+    out = []
+    for k in range(n):
+        x = math.cos(math.pi * (k + .75) / (n + .5))
+        for _ in range(50):
+            p0, p1 = 1.0, x
+            for j in range(2, n + 1):
+                p0, p1 = p1, ((2 * j - 1) * x * p1 - (j - 1) * p0) / j
+            slope = n * (x * p1 - p0) / (x * x - 1)
+            x -= p1 / slope
+        out.append(((1 + x) / 2, 1 / ((1 - x * x) * slope * slope)))
+    return out
+
+
+NODES = gauss(60)
+
+
+def rectangle(xs, ys, z):
+    return [((xs[0] + u * (xs[1] - xs[0]), ys[0] + v * (ys[1] - ys[0]), z), a * b * (xs[1] - xs[0]) * (ys[1] - ys[0]))
+            for u, a in NODES for v, b in NODES]
+
+
+def segment(centre, radius, beyond):
+    """Points and areas of the part x > beyond of a disc on the floor; x = r cos t takes the square root away."""
+    edge = max(-radius, beyond - centre[0])
+    if edge >= radius:
+        return []
+    widest = math.acos(edge / radius)
+    out = []
+    for u, a in NODES:
+        t = u * widest
+        half, step = radius * math.sin(t), a * widest * radius * math.sin(t)
+        for v, b in NODES:
+            out.append(((centre[0] + radius * math.cos(t), centre[1] + half * (2 * v - 1), 0.0), step * b * 2 * half))
+    return out
+
+
+def shadow_edge(point):
+    """Where the line from a point through the screen's nearer lower edge (x 2.41, z 1) meets the floor."""
+    x, _, z = point
+    return x - (x - 2.41) * z / (z - 1) if z > 1 else -math.inf
+
+
+def factor(point, normal, patches):
+    """Configuration factor by summing cos cos / (pi d^2) over horizontal patches."""
+    total = 0.0
+    for at, area in patches:
+        ray = [a - b for a, b in zip(at, point)]
+        d2 = sum(r * r for r in ray)
+        total += max(0.0, sum(r * n for r, n in zip(ray, normal))) * abs(ray[2]) / (math.pi * d2 * d2) * area
+    return total
+
+
+def write(name, title, basis, digits, tables, units=1):
+    lines = [FORMAT + "luxproof_published: 1", "citation:", f'  title: "{title}"', f"  basis: {basis}",
+             f"rounding: {{units_in_last_digit: {units}}}", "tables:"]
+    meaning = "Derived, no program's output" if basis == "closed_form" else "Exact methods, see the title"
+    for procedure, (model, rows) in tables.items():
+        column = f'{{reference: true, engine: {basis}, model: {model}, meaning: "{meaning}"}}'
+        lines += [f"  {procedure}:", f"    name: {name}", "    quantity: illuminance_lx", "    columns:",
+                  f"      value: {column}", "    rows:"]
+        for point, normal, value in rows:
+            at, facing = (f"[{', '.join(f'{v:g}' for v in vector)}]" for vector in (point, normal))
+            lines.append(f'      - {{at_m: {at}, normal: {facing}, cells: {{value: "{value:.{digits}f}"}}}}')
+    with open(f"values/{name}.yaml", "w", encoding="ascii") as file:
+        file.write("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()
