@@ -9,7 +9,6 @@ mod emitter;
 mod path;
 mod world;
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use self::emitter::Emitter;
@@ -95,8 +94,11 @@ impl<'a> PathTracer<'a> {
         points_log2: std::ops::RangeInclusive<u32>,
     ) -> Result<Solution, SimulatorError> {
         let wanted = self.wanted(transport)?;
-        let meters = (0..).zip(meters).map(|(k, m)| self.placed(k, m)).collect::<Result<Vec<_>, _>>()?;
+        let meters = (0..).zip(meters).map(|(k, m)| self.check(k, m)).collect::<Result<Vec<_>, _>>()?;
         let integrand = Integrand::new(&self.world, &self.emitters, self.close.clone(), wanted);
+        if integrand.is_exact() {
+            return Ok(self.exact(&integrand, &meters));
+        }
         let mut sums = vec![Sums { lux: [0.0; REPLICATES as usize], points_log2: 0, half_way: None }; meters.len()];
         for log2 in points_log2.clone() {
             let open: Vec<usize> = (0..meters.len())
@@ -125,6 +127,17 @@ impl<'a> PathTracer<'a> {
         })
     }
 
+    /// Shadow rays to luminaires without extent: one a luminaire tells all.
+    fn exact(&self, integrand: &Integrand, meters: &[Meter]) -> Solution {
+        let estimate = |meter: &Meter| {
+            let illuminance = Lux(integrand.direct(meter, [0.5; 2]));
+            let rounding = self.emitters.iter().map(|e| e.rounding_lux(meter.position_m)).sum();
+            Estimate { illuminance, uncertainty: Uncertainty::Bound(rounding) }
+        };
+        let solver = "inverse square with shadow rays: point luminaires, nothing reflected".into();
+        Solution { estimates: meters.par_iter().map(estimate).collect(), solver }
+    }
+
     fn wanted(&self, transport: Transport) -> Result<Wanted, SimulatorError> {
         let (direct, bounces) = match transport {
             Transport::Direct => (true, Bounces::AtMost(0)),
@@ -142,8 +155,8 @@ impl<'a> PathTracer<'a> {
         Ok(Wanted { direct, reflections })
     }
 
-    /// The meter, lifted off what it may lie upon.
-    fn placed(&self, index: usize, meter: &Meter) -> Result<(DVec3, DVec3), SimulatorError> {
+    /// The meter, where light can fall upon it.
+    fn check(&self, index: usize, meter: &Meter) -> Result<Meter, SimulatorError> {
         let Meter { position_m, normal } = *meter;
         let lift_m = self.world.lift_m();
         let point_m = position_m + normal * lift_m;
@@ -159,7 +172,7 @@ impl<'a> PathTracer<'a> {
             None
         };
         match trouble {
-            None => Ok((point_m, normal)),
+            None => Ok(*meter),
             Some(trouble) => {
                 Err(unsupported(&format!("meter {index} at {position_m} m, which {trouble}"), "move or turn it"))
             }
@@ -185,7 +198,7 @@ fn peak(emitter: &Emitter, world: &World) -> f64 {
 /// Sums over blocks of points, by open meter and scramble.
 fn block_sums(
     integrand: &Integrand,
-    meters: &[(DVec3, DVec3)],
+    meters: &[Meter],
     open: &[usize],
     seed: u64,
     points: std::ops::Range<u32>,
@@ -196,11 +209,11 @@ fn block_sums(
     let sums: Vec<Vec<f64>> = jobs
         .par_iter()
         .map(|&(meter, replicate)| {
-            let (point_m, normal) = meters[meter];
             let scramble = mix(mix(seed).wrapping_add(((meter as u64) << 8) | u64::from(replicate)));
+            let meter = &meters[meter];
             let sum = |start: &u32| {
                 let end = (start + block).min(points.end);
-                (*start..end).map(|index| integrand.path(point_m, normal, &mut Sampler::new(scramble, index))).sum()
+                (*start..end).map(|index| integrand.path(meter, &mut Sampler::new(scramble, index))).sum()
             };
             starts.par_iter().map(sum).collect()
         })
@@ -250,5 +263,6 @@ fn unsupported(what: &str, instead: &str) -> SimulatorError {
 }
 
 #[cfg(test)]
-#[path = "path_tracing/tests.rs"]
+mod test_scenes;
+#[cfg(test)]
 mod tests;

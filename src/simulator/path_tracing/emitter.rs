@@ -84,6 +84,13 @@ impl<'a> Emitter<'a> {
         self.distribution.flux().value() * self.flux_scale
     }
 
+    /// How far rounding may move the illuminance of a point at `point_m`, in lux: the angles carry a few units in the last
+    /// place, which over the steepest cell of a table of tenths of a degree are 1e-13 of its peak.
+    pub(super) fn rounding_lux(&self, point_m: DVec3) -> f64 {
+        let peak = self.distribution.max_intensity().value() * self.flux_scale;
+        1e-13 * peak / (point_m - self.position_m).length_squared()
+    }
+
     /// Light from the part of the opening that `u` picks on a surface at `point_m`; `None` from behind or without light.
     pub(super) fn arrival(&self, point_m: DVec3, normal: DVec3, u: [f64; 2]) -> Option<Arrival> {
         let part = self.opening.part(u);
@@ -319,3 +326,7 @@ impl Bands {
         (own, (self.below[k] - self.below[k - 1]) / (TAU * (self.cos_gamma[k - 1] - self.cos_gamma[k])))
     }
 }
+
+#[cfg(test)]
+#[path = "emitter_tests.rs"]
+mod tests;

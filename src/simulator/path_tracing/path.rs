@@ -12,6 +12,7 @@ use glam::DVec3;
 
 use super::emitter::Emitter;
 use super::world::{Hit, World};
+use crate::scene::Meter;
 use crate::simulator::sampler::Sampler;
 
 /// Reflections after which roulette sets in; before, weighting by the reflectance keeps the integrand smooth.
@@ -75,13 +76,14 @@ impl<'a> Integrand<'a> {
     /// Illuminance in lux that one path from a meter finds; its mean over all paths is the meter's.
     ///
     /// Not a number where the path comes to no end, since cutting it would be a silent loss.
-    pub(super) fn path(&self, meter_m: DVec3, meter_normal: DVec3, sampler: &mut Sampler) -> f64 {
+    pub(super) fn path(&self, meter: &Meter, sampler: &mut Sampler) -> f64 {
         let mut lux = 0.0;
-        let mut at = Vertex { point_m: meter_m, normal: meter_normal };
         if self.wanted.direct {
-            let u = self.opening_pair(sampler);
-            lux += self.emitters.iter().map(|e| self.arriving(e, &at, u, None)).sum::<f64>();
+            let parts = self.opening_pair(sampler);
+            lux += self.direct(meter, parts);
         }
+        let lifted_m = meter.position_m + meter.normal * self.world.lift_m();
+        let mut at = Vertex { point_m: lifted_m, normal: meter.normal };
         // Product of reflectances over survival probabilities: the weight of what the next surface receives.
         let mut weight = 1.0;
         for reflection in 1..=self.wanted.reflections {
@@ -108,6 +110,22 @@ impl<'a> Integrand<'a> {
             }
         }
         lux
+    }
+
+    /// Light straight from the parts of the luminaires that `parts` picks; exact where they have no extent.
+    pub(super) fn direct(&self, meter: &Meter, parts: [f64; 2]) -> f64 {
+        let start_m = meter.position_m + meter.normal * self.world.lift_m();
+        let light = |e: &Emitter| {
+            let arrival = e.arrival(meter.position_m, meter.normal, parts)?;
+            let open = self.world.contains(arrival.from_m) && self.world.visible(start_m, arrival.from_m);
+            open.then_some(arrival.lux)
+        };
+        self.emitters.iter().filter_map(light).sum()
+    }
+
+    /// Whether [`Self::path`] adds nothing to an exact [`Self::direct`].
+    pub(super) fn is_exact(&self) -> bool {
+        self.wanted.reflections == 0 && !self.any_extent
     }
 
     /// Light straight from the picked luminaires on a surface that a path from `before` has met.

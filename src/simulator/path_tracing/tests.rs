@@ -3,99 +3,13 @@
 use std::sync::Arc;
 
 use approx::assert_relative_eq;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
+use super::test_scenes::*;
 use super::*;
 use crate::geometry::{Mesh, Reflectances, Room};
-use crate::photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry};
-use crate::scene::{Luminaire, LuminaireModel, Obstacle, Shape, orientation};
-
-fn luminaire(distribution: LuminousIntensityDistribution, opening: LuminousOpening, at_m: DVec3) -> Luminaire {
-    Luminaire {
-        id: "lamp".into(),
-        photometry: Arc::new(Photometry { opening, ..Photometry::of(distribution) }),
-        position_m: at_m,
-        orientation: DMat3::IDENTITY,
-        flux_scale: 1.0,
-        model: if opening == LuminousOpening::Point { LuminaireModel::Point } else { LuminaireModel::Area },
-    }
-}
-
-/// Case S1: a 20 m cube with an axial uplight in its centre.
-fn s1() -> Scene {
-    let gamma = vec![0.0, 89.0, 90.0, 95.0, 115.0, 135.0, 155.0, 175.0, 180.0];
-    let candela = vec![0.0, 0.0, 4.5, 35.7, 218.3, 421.6, 576.4, 662.3, 664.4];
-    let uplight = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
-    Scene {
-        room: Some(Room { size_m: DVec3::splat(20.0), reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8) }),
-        obstacles: vec![],
-        luminaires: vec![luminaire(uplight, LuminousOpening::Point, DVec3::splat(10.0))],
-    }
-}
-
-const S1_METERS: [[f64; 2]; 4] = [[2.0, 2.0], [2.0, 10.0], [10.0, 2.0], [10.0, 10.0]];
-const S1_INDIRECT: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
-
-fn up(x: f64, y: f64, z: f64) -> Meter {
-    Meter { position_m: DVec3::new(x, y, z), normal: DVec3::Z }
-}
-
-fn s1_meters() -> Vec<Meter> {
-    S1_METERS.iter().map(|[x, y]| up(*x, *y, 2.0)).collect()
-}
-
-/// A flat Lambertian downlight of 0.6 x 0.6 m and 1000 cd along its normal, tabulated every half degree.
-fn panel(at_m: DVec3) -> Luminaire {
-    let gamma: Vec<f64> = (0..=180).map(|k| 0.5 * f64::from(k)).collect();
-    let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
-    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
-    luminaire(LuminousIntensityDistribution::axial(gamma, candela).unwrap(), opening, at_m)
-}
-
-/// The black back of a ceiling panel, which keeps the ceiling behind it dark.
-fn back(at_m: DVec3) -> Obstacle {
-    let corner = |x: f64, y: f64| at_m + DVec3::new(0.3 * x, 0.3 * y, 0.0);
-    let vertices_m = vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
-    Obstacle { shape: Shape::Mesh { vertices_m, triangles: vec![[0, 1, 2], [0, 2, 3]] }, reflectance: 0.0 }
-}
-
-/// Case S2: a furnished room with four black-backed ceiling panels.
-fn s2() -> Scene {
-    let panels = [[2.0, 1.5], [6.0, 1.5], [2.0, 4.5], [6.0, 4.5]].map(|[x, y]| DVec3::new(x, y, 3.0));
-    let cabinet = |min: [f64; 3], max: [f64; 3]| Obstacle {
-        shape: Shape::Box { min_m: DVec3::from(min), max_m: DVec3::from(max) },
-        reflectance: 0.5,
-    };
-    Scene {
-        room: Some(Room {
-            size_m: DVec3::new(8.0, 6.0, 3.0),
-            reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8),
-        }),
-        obstacles: [
-            cabinet([1.0, 1.0, 0.0], [2.6, 1.8, 0.75]),
-            cabinet([4.5, 3.5, 0.0], [6.1, 4.3, 0.75]),
-            cabinet([5.5, 0.5, 0.0], [7.5, 1.5, 2.2]),
-        ]
-        .into_iter()
-        .chain(panels.map(back))
-        .collect(),
-        luminaires: panels.map(panel).to_vec(),
-    }
-}
-
-/// x, y, direct, indirect and its standard error.
-const S2_VALUES: [[f64; 5]; 6] = [
-    [0.25, 0.25, 66.24407, 51.0232, 0.0046],
-    [1.75, 1.25, 226.03927, 53.0644, 0.0127],
-    [3.75, 2.75, 161.02976, 48.966, 0.020],
-    [4.25, 0.75, 123.15923, 53.512, 0.014],
-    [5.25, 3.75, 210.12365, 50.245, 0.024],
-    [7.25, 0.25, 0.0, 18.788, 0.007],
-];
-
-fn s2_meters() -> Vec<Meter> {
-    S2_VALUES.iter().map(|v| up(v[0], v[1], 0.8)).collect()
-}
+use crate::photometry::{LuminousIntensityDistribution, LuminousOpening};
+use crate::scene::{Luminaire, Obstacle, Shape, orientation};
 
 /// Value and standard error in lux, at a fixed effort.
 fn solve(scene: &Scene, meters: &[Meter], transport: Transport, seed: u64, log2: u32) -> Vec<(f64, f64)> {
@@ -190,7 +104,24 @@ fn light_cut_after_n_reflections_is_what_a_renderer_that_stops_there_finds() {
             assert!((value - exact).abs() < 4.0 * error && *error < 3e-3 * exact, "{n}: {value} +- {error}, {exact}");
         }
     }
-    assert_eq!(solve(&s1(), &s1_meters(), Transport::Indirect(Bounces::AtMost(0)), 3, 4)[0], (0.0, 0.0));
+    let accuracy = Accuracy { relative_error: 0.1, seed: 1 };
+    let none = illuminance(&s1(), &s1_meters(), Transport::Indirect(Bounces::AtMost(0)), &accuracy).unwrap();
+    assert!(none.estimates.iter().all(|e| e.illuminance.value() == 0.0));
+}
+
+#[test]
+fn light_straight_from_points_is_exact_and_triangles_hide_it() {
+    let mut scene = s1();
+    let Mesh { vertices_m, triangles } = Mesh::cuboid(DVec3::new(4.0, 4.0, 12.0), DVec3::new(8.0, 8.0, 12.5));
+    scene.obstacles.push(Obstacle { shape: Shape::Mesh { vertices_m, triangles }, reflectance: 0.5 });
+    let down = |x: f64, y: f64| Meter { position_m: DVec3::new(x, y, 17.0), normal: DVec3::NEG_Z };
+    let meters = [down(2.0, 2.0), down(2.0, 10.0), down(10.0, 10.0)];
+    let accuracy = Accuracy { relative_error: 0.1, seed: 1 };
+    let found = illuminance(&scene, &meters, Transport::Direct, &accuracy).unwrap();
+    for (estimate, exact) in found.estimates.iter().zip([0.0, 2.230931614869, 13.559183673469]) {
+        assert!((estimate.illuminance.value() - exact).abs() <= 1e-12 * (1.0 + exact), "{estimate:?}");
+        assert!(matches!(estimate.uncertainty, Uncertainty::Bound(bound) if bound < 1e-11), "{estimate:?}");
+    }
 }
 
 #[test]
@@ -382,6 +313,41 @@ fn relative_results_do_not_depend_on_the_scale() {
         for (a, b) in reference.iter().zip(solve(&scene, &meters, Transport::Total(Bounces::Converged), 1, 6)) {
             assert_relative_eq!(a.0, b.0, max_relative = 1e-9);
         }
+    }
+}
+
+#[test]
+fn turned_asymmetric_luminaires_agree_with_the_deterministic_solver() {
+    let planes = vec![0.0, 45.0, 90.0, 135.0, 180.0];
+    let gamma = vec![0.0, 30.0, 60.0, 90.0, 150.0];
+    let candela = (0..25).map(|k| [400.0, 300.0, 150.0, 20.0, 0.0][k % 5] * (1.0 + 0.3 * (k / 5) as f64)).collect();
+    let lamp = LuminousIntensityDistribution::new(planes, gamma, candela).unwrap();
+    let mut scene = s1();
+    scene.room = Some(Room {
+        size_m: DVec3::new(7.0, 4.0, 3.0),
+        reflectance: Reflectances {
+            floor: 0.3,
+            ceiling: 0.85,
+            wall_x_min: 0.1,
+            wall_x_max: 0.6,
+            wall_y_min: 0.5,
+            wall_y_max: 0.0,
+        },
+    });
+    scene.luminaires = [([2.0, 1.0, 2.2], 30.0, 15.0), ([5.5, 2.5, 1.6], 200.0, 130.0)]
+        .map(|(at, azimuth, tilt)| {
+            let upright = luminaire(lamp.clone(), LuminousOpening::Point, DVec3::from(at));
+            Luminaire { orientation: orientation(azimuth, tilt, 70.0), ..upright }
+        })
+        .to_vec();
+    let meters = [up(1.0, 3.0, 0.8), Meter { position_m: DVec3::new(6.9, 2.0, 1.2), normal: DVec3::NEG_X }];
+    let accuracy = Accuracy { relative_error: 1e-4, seed: 1 };
+    for transport in [CONVERGED, Transport::Total(Bounces::AtMost(2))] {
+        let exact = crate::simulator::illuminance(&scene, &meters, transport, &accuracy).unwrap();
+        assert!(exact.estimates.iter().all(|e| matches!(e.uncertainty, Uncertainty::Bound(_))));
+        let exact: Vec<f64> = exact.estimates.iter().map(|e| e.illuminance.value()).collect();
+        let trials: Vec<_> = (0..200).map(|seed| solve(&scene, &meters, transport, seed, 6)).collect();
+        assert_calibrated(&trials, &exact);
     }
 }
 
