@@ -60,17 +60,16 @@ def measure(scene, job):
     emitters = list(scene.emitters())
     if len(emitters) != job["emitters"]:
         raise RuntimeError(f"the scene has {len(emitters)} emitters, the job says {job['emitters']}")
-    points_only = all(mi.has_flag(e.flags(), mi.EmitterFlags.DeltaPosition) for e in emitters)
     dark = np.zeros(meters.count), np.zeros(meters.count)
     parts = []
     if job["transport"] in ("direct", "total") and emitters:
         block = lambda m, seed: direct(scene, meters, len(emitters), m, seed)
-        if points_only:
+        if not job["extended"]:
             parts.append((block(1, None), dark[1]))
         else:
             parts.append(report.blocks("direct", block, meters.count * len(emitters)))
     if job["transport"] in ("indirect", "total") and emitters and scene.shapes():
-        block = lambda m, seed: indirect(scene, meters, points_only, m, seed)
+        block = lambda m, seed: indirect(scene, meters, m, seed)
         parts.append(report.blocks("indirect", block, meters.count))
     values = sum((value for value, _ in parts), dark[0])
     errors = np.sqrt(sum((error**2 for _, error in parts), dark[1]))
@@ -135,7 +134,7 @@ def sample_emitters(scene, p, n, u, v):
     return directions, weights
 
 
-def indirect(scene, meters, points_only, m, seed):
+def indirect(scene, meters, m, seed):
     """Light reflected at least once: m x m paths a meter."""
     total = np.zeros(meters.count)
     each = m * m
@@ -146,27 +145,25 @@ def indirect(scene, meters, points_only, m, seed):
         n = meters.normals[rows]
         d = radius * np.cos(phi) * meters.tangents[rows] + radius * np.sin(phi) * meters.bitangents[rows]
         d += np.sqrt(1 - radius**2) * n
-        radiance = trace(scene, meters.positions[rows] + meters.offset * n, d, points_only, int(random.integers(2**32)))
+        radiance = trace(scene, meters.positions[rows] + meters.offset * n, d, int(random.integers(2**32)))
         total[rows[::each]] = np.pi * radiance.reshape(-1, each).mean(1)
     return total
 
 
-def trace(scene, p, d, points_only, seed):
-    """Radiance that the scene's integrator finds along rays, emitters seen at first hand left out."""
+def trace(scene, p, d, seed):
+    """Radiance that the scene's integrator finds along rays; the emitters have no body to be seen at first hand."""
     sampler = mi.load_dict({"type": "independent"})
     integrator = scene.integrator()
     if is_jit():
         sampler.seed(mi.UInt32(seed), len(p))
         ray = mi.RayDifferential3f(mi.Point3f(*columns(p)), mi.Vector3f(*columns(d)))
-        active = mi.Bool(True) if points_only else scene.ray_intersect(ray).emitter(scene) == mi.EmitterPtr(None)
-        radiance, _, _ = integrator.sample(scene, sampler, ray, None, active)
+        radiance, _, _ = integrator.sample(scene, sampler, ray)
         return np.array(radiance[0], np.float64)
     sampler.seed(seed, 1)
     found = np.zeros(len(p))
     for k in range(len(p)):
         ray = mi.RayDifferential3f(mi.Point3f(*p[k]), mi.Vector3f(*d[k]))
-        if points_only or scene.ray_intersect(ray).emitter(scene) is None:
-            found[k] = integrator.sample(scene, sampler, ray)[0][0]
+        found[k] = integrator.sample(scene, sampler, ray)[0][0]
     return found
 
 

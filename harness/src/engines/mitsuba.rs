@@ -41,9 +41,6 @@ impl Engine for Mitsuba {
         if has(LuminaireModel::Impostor) {
             return Support::No("Mitsuba has no impostor sources; use the model `point` or `area`".into());
         }
-        if has(LuminaireModel::Area) {
-            return Support::No("area luminaires are not exported yet".into());
-        }
         if let (Some(id), Transport::Indirect(_) | Transport::Total(_)) =
             (luminaire_close_to_a_surface(job), job.transport)
         {

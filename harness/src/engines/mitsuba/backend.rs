@@ -54,6 +54,12 @@ impl Backend {
         self.root == site.root()
     }
 
+    /// As on a machine without libLLVM.
+    #[cfg(test)]
+    pub(super) fn without_llvm(self) -> Self {
+        Self { llvm: None, ..self }
+    }
+
     /// Versions of the renderer and of what compiles its kernels.
     pub(super) fn version(&self) -> Version {
         let Versions { mitsuba, drjit, llvm } = &self.versions;

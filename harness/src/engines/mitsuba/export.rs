@@ -4,6 +4,7 @@
 //! includes `room.xml`, the surfaces; `job.json` holds the meters, which are no part of the scene.
 
 mod frame;
+mod opening;
 mod surfaces;
 mod tables;
 
@@ -52,6 +53,7 @@ struct DriverJob<'a> {
     variant: &'a str,
     transport: &'static str,
     emitters: usize,
+    extended: bool,
     relative_error: f64,
     seconds: f64,
     fixed_blocks: u32,
@@ -88,6 +90,7 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
             Transport::Total(_) => "total",
         },
         emitters: job.scene.luminaires.len(),
+        extended: job.scene.luminaires.iter().any(opening::is_extended),
         relative_error: job.budget.relative_error,
         seconds: job.budget.seconds,
         fixed_blocks,
@@ -117,13 +120,14 @@ fn emitter(luminaire: &Luminaire, table: &str, frame: &Frame) -> String {
     <!-- {id} -->
     <emitter type="goniometric">
         <string name="table" value="{table}"/>
-        <float name="scale" value="{scale}"/>
+        <float name="scale" value="{scale}"/>{opening}
         <transform name="to_world">
             <matrix value="{matrix}"/>
         </transform>
     </emitter>
 "#,
         id = comment_text(&luminaire.id),
+        opening = opening::xml(luminaire, frame),
         scale = luminaire.flux_scale * frame.scale * frame.scale,
         matrix = frame.matrix(luminaire.position_m, luminaire.orientation),
     )

@@ -14,6 +14,9 @@ use super::*;
 use crate::engines::{Budget, Station};
 use crate::reading::MeterId;
 
+mod failures;
+mod scenes;
+
 const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
 const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
 const S1_INDIRECT_LX: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];

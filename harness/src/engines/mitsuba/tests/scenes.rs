@@ -1,0 +1,133 @@
+//! Scenes beyond the empty cube: extended luminaires, obstacles, bright rooms, far and tiny coordinates.
+
+use luminaire::photometry::{HorizontalAxis, LuminousOpening};
+use luminaire::simulator::{Accuracy, illuminance};
+
+use super::*;
+
+/// An opening that sends out `distribution`.
+fn area(at_m: DVec3, distribution: LuminousIntensityDistribution, opening: LuminousOpening) -> Luminaire {
+    let photometry = Arc::new(Photometry { opening, ..Photometry::of(distribution.clone()) });
+    Luminaire { model: LuminaireModel::Area, photometry, ..luminaire("area", at_m, distribution) }
+}
+
+#[test]
+fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
+    let (x_m, y_m, diameter_m, length_m) = (0.6, 0.3, 0.1, 1.2);
+    for opening in [
+        LuminousOpening::Box { x_m, y_m, height_m: 0.0 },
+        LuminousOpening::Box { x_m, y_m, height_m: 0.1 },
+        LuminousOpening::Box { x_m, y_m: 0.0, height_m: 0.0 },
+        LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 },
+        LuminousOpening::Ellipse { x_m, y_m, height_m: 0.2 },
+        LuminousOpening::Ellipsoid { x_m, y_m: 0.6, z_m: 0.2 },
+        LuminousOpening::LyingCylinder { axis: HorizontalAxis::X, length_m, diameter_m },
+        LuminousOpening::LyingCylinder { axis: HorizontalAxis::Y, length_m, diameter_m },
+    ] {
+        let mut lamp = area(DVec3::new(1.0, 2.0, 3.0), lopsided(), opening);
+        lamp.orientation = orientation(30.0, 20.0, 10.0);
+        let angles = (&[10.0, 190.0], &[5.0, 85.0, 165.0]);
+        let far = goniometer(&lamp, 300.0, angles.0, angles.1);
+        let mut both = goniometer(&lamp, 0.8, angles.0, angles.1);
+        // Close by, the simulator's own sampling of the same opening is the witness.
+        let meters: Vec<_> = both.stations.iter().map(|s| s.meter).collect();
+        let accuracy = Accuracy { relative_error: 2e-3, seed: 1 };
+        let solution = illuminance(&both.scene, &meters, Transport::Direct, &accuracy).unwrap();
+        let near: Vec<_> = solution.estimates.iter().map(|e| e.illuminance.value()).collect();
+        let as_points = exact_direct_lx(&both);
+        let off = |(point, near): (&f64, &f64)| (point / near - 1.0).abs();
+        assert!(as_points.iter().zip(&near).map(off).fold(0.0, f64::max) > 0.02, "{opening:?}");
+
+        both.stations.extend(far.stations.clone());
+        let expected = [near, exact_direct_lx(&far)].concat();
+        let deviations = relative_deviations(&read(&both), &expected);
+        assert!(worst(&deviations) < 6e-3, "{opening:?} {deviations:?}");
+    }
+}
+
+/// Case S2: four Lambertian panels flush with the ceiling over three boxes. An opening has no body, so that plates of
+/// half a millimetre stand for the panels' black backs.
+fn s2(transport: Transport) -> Job {
+    let lambertian: Vec<f64> = (0..=90).map(|g| 1000.0 * f64::from(g).to_radians().cos().max(0.0)).collect();
+    let downlight = LuminousIntensityDistribution::axial((0..=90).map(f64::from).collect(), lambertian).unwrap();
+    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+    let panel = |[x, y]: [f64; 2]| area(DVec3::new(x, y, 2.9994), downlight.clone(), opening);
+    let cuboid = |min: [f64; 3], max: [f64; 3], reflectance| {
+        let (min_m, max_m) = (DVec3::from_array(min), DVec3::from_array(max));
+        Obstacle { shape: Shape::Box { min_m, max_m }, reflectance }
+    };
+    let centres = [[2.0, 1.5], [6.0, 1.5], [2.0, 4.5], [6.0, 4.5]];
+    let back = |[x, y]: [f64; 2]| cuboid([x - 0.3, y - 0.3, 2.9995], [x + 0.3, y + 0.3, 3.0], 0.0);
+    let boxes =
+        [([1.0, 1.0, 0.0], [2.6, 1.8, 0.75]), ([4.5, 3.5, 0.0], [6.1, 4.3, 0.75]), ([5.5, 0.5, 0.0], [7.5, 1.5, 2.2])];
+    let scene = Scene {
+        room: Some(room(DVec3::new(8.0, 6.0, 3.0), 0.2, 0.5, 0.8)),
+        obstacles: boxes.map(|(min, max)| cuboid(min, max, 0.5)).into_iter().chain(centres.map(back)).collect(),
+        luminaires: centres.map(panel).to_vec(),
+    };
+    let points = [[0.25, 0.25], [1.75, 1.25], [3.75, 2.75], [4.25, 0.75], [5.25, 3.75], [7.25, 0.25]];
+    let mut job = job(scene, stations(&points.map(|[x, y]| [x, y, 0.8]), DVec3::Z), transport);
+    job.budget.relative_error = 4e-3;
+    job
+}
+
+#[test]
+fn panels_over_furniture_give_the_exact_light() {
+    const DIRECT_LX: [f64; 5] = [66.24407, 226.03927, 161.02976, 123.15923, 210.12365];
+    const INDIRECT_LX: [f64; 6] = [51.0232, 53.0644, 48.966, 53.512, 50.245, 18.788];
+    let direct = read(&s2(Transport::Direct));
+    let deviations = relative_deviations(&direct, &DIRECT_LX);
+    assert!(worst(&deviations) < 1e-2, "{deviations:?}");
+    assert_eq!(direct.estimates[5].value_lx, 0.0);
+    let indirect = read(&s2(CONVERGED));
+    let deviations = relative_deviations(&indirect, &INDIRECT_LX);
+    assert!(worst(&deviations) < 2e-2 && worst_z(&indirect, &INDIRECT_LX) < 4.5, "{indirect:?} {deviations:?}");
+}
+
+#[test]
+fn far_and_tiny_scenes_are_read_in_coordinates_of_their_own() {
+    let mut far = goniometer(&luminaire("far", DVec3::new(3e6, 0.0, 10.0), lopsided()), 10.0, &[40.0], &[20.0, 120.0]);
+    assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) < 1e-5);
+    far.settings.insert("recentre".into(), false.into());
+    assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) > 1e-3, "raw 32-bit coordinates would do");
+
+    // S1 a thousand times smaller: a million times the lux, direct and reflected.
+    let mut tiny = s1(CONVERGED);
+    tiny.scene.room = Some(room(DVec3::splat(0.02), 0.2, 0.5, 0.8));
+    tiny.scene.luminaires[0].position_m *= 1e-3;
+    for station in &mut tiny.stations {
+        station.meter.position_m *= 1e-3;
+    }
+    let expected = S1_INDIRECT_LX.map(|lx| 1e6 * lx);
+    assert!(worst_z(&read(&tiny), &expected) < 4.5);
+}
+
+#[test]
+fn bright_rooms_keep_all_their_light() {
+    // In a closed room of one reflectance the area-mean indirect illuminance is Phi rho / (A (1 - rho)).
+    let rho = 0.97;
+    let isotropic = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0, 100.0]).unwrap();
+    let scene = Scene {
+        room: Some(room(DVec3::splat(4.0), rho, rho, rho)),
+        obstacles: vec![],
+        luminaires: vec![luminaire("centre", DVec3::splat(2.0), isotropic)],
+    };
+    // The mean over a wall, and by symmetry over the room, from 5 x 5 Gauss points.
+    let nodes = [-0.906_179_845_938_664, -0.538_469_310_105_683, 0.0, 0.538_469_310_105_683, 0.906_179_845_938_664];
+    let weights = [
+        0.236_926_885_056_189,
+        0.478_628_670_499_366,
+        0.568_888_888_888_889,
+        0.478_628_670_499_366,
+        0.236_926_885_056_189,
+    ];
+    let points: Vec<_> = nodes.iter().flat_map(|y| nodes.map(|z| [1e-3, 2.0 + 2.0 * y, 2.0 + 2.0 * z])).collect();
+    let mut bright = job(scene, stations(&points, DVec3::X), CONVERGED);
+    bright.budget = Budget { relative_error: 5e-3, seconds: 30.0 };
+    let found = read(&bright);
+    let weight = weights.iter().flat_map(|a| weights.map(|b| 0.25 * a * b));
+    let mean_lx: f64 = found.estimates.iter().zip(weight).map(|(e, w)| w * e.value_lx).sum();
+    let flux_lm = 400.0 * std::f64::consts::PI;
+    let exact_lx = flux_lm * rho / (96.0 * (1.0 - rho));
+    assert!((mean_lx / exact_lx - 1.0).abs() < 5e-3, "{mean_lx} for {exact_lx}: {found:?}");
+}
