@@ -76,7 +76,7 @@ mod tests {
     fn a_rule_of_n_nodes_integrates_degree_2n_minus_1_exactly() {
         for n in [1, 2, 5, 8, 16, 24] {
             let rule = Gauss::new(n);
-            let degree = 2 * n as i32 - 1;
+            let degree = 2 * i32::try_from(n).unwrap() - 1;
             let sum: f64 = rule.nodes.iter().zip(&rule.weights).map(|(x, w)| w * x.powi(degree)).sum();
             assert_relative_eq!(sum, 1.0 / f64::from(degree + 1), max_relative = 1e-13);
         }

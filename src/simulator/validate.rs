@@ -75,15 +75,13 @@ pub(super) fn meters(scene: &Scene, meters: &[Meter]) -> Result<(), SimulatorErr
     for (k, meter) in meters.iter().enumerate() {
         let what = format!("meter {k}");
         let p = meter.position_m;
-        if !p.is_finite() || !((meter.normal.length() - 1.0).abs() < 1e-9) {
+        if !p.is_finite() || !meter.normal.is_finite() || (meter.normal.length() - 1.0).abs() > 1e-9 {
             let problem = format!("at {p} faces {}", meter.normal);
             return invalid(&what, problem, "give finite coordinates and a normal of length 1");
         }
-        if let Some(room) = &scene.room {
-            if !room.contains(p, ON_SURFACE * room.size_m.max_element()) {
-                let problem = format!("at {p} lies on a surface of the room or outside it");
-                return invalid(&what, problem, "move it inside, a stated distance off the surface");
-            }
+        if scene.room.is_some_and(|room| !room.contains(p, ON_SURFACE * room.size_m.max_element())) {
+            let problem = format!("at {p} lies on a surface of the room or outside it");
+            return invalid(&what, problem, "move it inside, a stated distance off the surface");
         }
         if let Some(luminaire) = scene.luminaires.iter().find(|l| l.position_m == p) {
             let problem = format!("lies in the photometric centre of luminaire {}", luminaire.id);

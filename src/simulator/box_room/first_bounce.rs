@@ -2,7 +2,7 @@
 //!
 //! Cells of (C, gamma) are split at the table's angles, at the room's edges and, for a meter, at its horizon, all of
 //! them exact in the luminaire's own frame, so that the kinks of a piecewise bilinear table cost nothing whatever the
-//! luminaire's rotation. An edge or a horizon is a great circle there: tan gamma = m_z / (m_x cos C + m_y sin C) for
+//! luminaire's rotation. An edge or a horizon is a great circle there: `tan gamma = m_z / (m_x cos C + m_y sin C)` for
 //! the normal m of its plane.
 
 use std::f64::consts::PI;
@@ -118,6 +118,25 @@ impl FirstBounce {
         sum
     }
 
+    /// The flux in lumens that the surfaces reflect at the first bounce; a closed room loses none of it.
+    pub(super) fn reflected_flux(&self) -> f64 {
+        let mut sum = 0.0;
+        for face in Face::ALL {
+            let rho = reflectance(&self.room, face);
+            for source in &self.sources {
+                let mut stack: Vec<&Patch> = source.faces[face.0].iter().collect();
+                while let Some(patch) = stack.pop() {
+                    if patch.is_uneven() {
+                        stack.extend(patch.halves(source, &self.room, face));
+                    } else {
+                        sum += rho * patch.points(source, &self.room, face, &self.rule).flux.iter().sum::<f64>();
+                    }
+                }
+            }
+        }
+        sum
+    }
+
     fn walk(&self, source: &Source, patches: &[Patch], face: Face, receiver: &Receiver) -> f64 {
         let mut stack: Vec<&Patch> = patches.iter().collect();
         let smallest = SMALLEST * self.room.size_m.max_element();
@@ -125,13 +144,10 @@ impl FirstBounce {
         while let Some(patch) = stack.pop() {
             let gap = ((receiver.position_m - patch.centre_m).abs() - patch.half_m).max(DVec3::ZERO);
             let reach = self.reach * patch.half_length_m;
-            let uneven = matches!(patch.split, Split::UnevenS | Split::UnevenT);
-            if (uneven || reach * reach > gap.length_squared()) && patch.half_length_m > smallest {
-                let halves = patch.halves.get_or_init(|| patch.halve(&source.frame, &self.room, face));
-                stack.extend(halves.iter());
+            if (patch.is_uneven() || reach * reach > gap.length_squared()) && patch.half_length_m > smallest {
+                stack.extend(patch.halves(source, &self.room, face));
             } else {
-                let points = patch.points.get_or_init(|| patch.sample(&source.frame, &self.room, face, &self.rule));
-                sum += points.irradiance(receiver, face);
+                sum += patch.points(source, &self.room, face, &self.rule).irradiance(receiver, face);
             }
         }
         sum
@@ -165,6 +181,18 @@ impl Patch {
         let (centre_m, half_m) = (0.5 * (low + high), 0.52 * (high - low));
         let half_length_m = 0.5 * longest;
         Self { cell, s, t, centre_m, half_m, half_length_m, split, halves: OnceLock::new(), points: OnceLock::new() }
+    }
+
+    fn is_uneven(&self) -> bool {
+        matches!(self.split, Split::UnevenS | Split::UnevenT)
+    }
+
+    fn halves(&self, source: &Source, room: &Room, face: Face) -> &[Self; 2] {
+        self.halves.get_or_init(|| self.halve(&source.frame, room, face))
+    }
+
+    fn points(&self, source: &Source, room: &Room, face: Face, rule: &Gauss) -> &Points {
+        self.points.get_or_init(|| self.sample(&source.frame, room, face, rule))
     }
 
     fn halve(&self, frame: &LuminaireFrame, room: &Room, face: Face) -> Box<[Self; 2]> {

@@ -172,10 +172,10 @@ impl Grid {
         // The place along every axis; along the normal it is 0 or 1.
         let mut place = [0; 3];
         (place[n], place[u], place[v]) = (face.0 % 2, i, j);
-        for axis in 0..3 {
+        for (axis, place) in place.iter_mut().enumerate() {
             if operation.turns(axis) {
                 let count = if axis == n { 2 } else { self.axes[axis].nodes_m.len() };
-                place[axis] = count - 1 - place[axis];
+                *place = count - 1 - *place;
             }
         }
         let mut normal = n;
@@ -239,6 +239,6 @@ impl Axis {
 /// Start and length of a dyadic interval of 0..1 by its number in a heap that begins with 1.
 pub(super) fn dyadic(interval: usize) -> (f64, f64) {
     let depth = interval.ilog2();
-    let length = 0.5_f64.powi(depth as i32);
+    let length = 1.0 / (1_usize << depth) as f64;
     ((interval - (1 << depth)) as f64 * length, length)
 }

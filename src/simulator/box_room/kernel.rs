@@ -62,6 +62,14 @@ struct Part {
     lit: Lit,
 }
 
+/// How much of the face a part covers, in metres.
+struct Extent {
+    u: (f64, f64),
+    v: (f64, f64),
+    length_s: f64,
+    length_t: f64,
+}
+
 /// Which v of a strip lie above the horizon; judged once, mid-strip, because at its ends rounding would decide.
 #[derive(Clone, Copy)]
 enum Lit {
@@ -220,17 +228,17 @@ impl Panel<'_> {
             weight[q] = rule.weights[q] * dy * v.1 * u.1 * view.scale;
         }
         let mut inner = [[0.0; MOST]; MOST];
-        for i in 0..points {
-            let (x, dx) = self.along_u.at(u.0 + u.1 * rule.nodes[i]);
+        for ((node, node_weight), inner) in rule.nodes.iter().zip(&rule.weights).zip(&mut inner) {
+            let (x, dx) = self.along_u.at(u.0 + u.1 * node);
             let du = x - view.foot_u;
-            let (w, u2, cu) = (rule.weights[i] * dx, du * du, view.tilt_u * du);
+            let (w, u2, cu) = (node_weight * dx, du * du, view.tilt_u * du);
             let mut kernel = [0.0; MOST];
             for q in 0..points {
                 let r2 = u2 + squared[q];
                 kernel[q] = w * weight[q] * (cosine[q] + cu) / (r2 * r2);
             }
             for (b, basis) in v.2.chunks_exact(points).enumerate() {
-                inner[i][b] = basis.iter().zip(&kernel).map(|(l, k)| l * k).sum();
+                inner[b] = basis.iter().zip(&kernel).map(|(l, k)| l * k).sum();
             }
         }
         for (a, basis) in u.2.chunks_exact(points).enumerate() {
@@ -262,9 +270,9 @@ impl Panel<'_> {
             let Some(lit) = self.lit(0.5 * (strip[0] + strip[1])) else { continue };
             let mut parts = vec![Part { s, t: (0.0, 1.0), lit }];
             while let Some(part) = parts.pop() {
-                let (u, v) = self.extent(&part);
-                if self.is_too_near(u, v) && part.s.1 - part.s.0 > SMALLEST {
-                    parts.extend(part.halves(u.1 - u.0 >= v.1 - v.0));
+                let extent = self.extent(&part);
+                if self.is_too_near(extent.u, extent.v) {
+                    parts.extend(part.halves(&extent));
                 } else {
                     self.add_cut_part(&part, block, stride);
                 }
@@ -296,17 +304,19 @@ impl Panel<'_> {
         }
     }
 
-    /// The ranges of u and v in metres that a part covers.
-    fn extent(&self, part: &Part) -> ((f64, f64), (f64, f64)) {
-        let mut v = (f64::INFINITY, f64::NEG_INFINITY);
-        for s in [part.s.0, 0.5 * (part.s.0 + part.s.1), part.s.1] {
+    /// The ranges of u and v in metres that a part covers, and its lengths along s and along t.
+    fn extent(&self, part: &Part) -> Extent {
+        let u = (self.along_u.at(part.s.0).0, self.along_u.at(part.s.1).0);
+        let rows = [part.s.0, 0.5 * (part.s.0 + part.s.1), part.s.1].map(|s| {
             let (start, length) = self.lit_range(self.along_u.at(s).0, part.lit);
-            for t in [part.t.0, part.t.1] {
-                let y = self.along_v.at(start + t * length).0;
-                v = (v.0.min(y), v.1.max(y));
-            }
-        }
-        ((self.along_u.at(part.s.0).0, self.along_u.at(part.s.1).0), v)
+            [part.t.0, part.t.1].map(|t| self.along_v.at(start + t * length).0)
+        });
+        let all = || rows.iter().flatten().copied();
+        let v = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+        let drift = |t: usize| (rows[0][t] - rows[2][t]).abs();
+        let length_s = (u.1 - u.0).max(drift(0)).max(drift(1));
+        let length_t = rows.iter().map(|[low, high]| high - low).fold(0.0, f64::max);
+        Extent { u, v, length_s, length_t }
     }
 
     fn add_cut_part(&self, part: &Part, block: &mut [f64], stride: usize) {
@@ -341,9 +351,9 @@ impl Panel<'_> {
 }
 
 impl Part {
-    fn halves(self, across_u: bool) -> [Self; 2] {
+    fn halves(self, extent: &Extent) -> [Self; 2] {
         let middle = |(a, b): (f64, f64)| 0.5 * (a + b);
-        if across_u {
+        if extent.length_s >= extent.length_t {
             let m = middle(self.s);
             [Self { s: (self.s.0, m), ..self }, Self { s: (m, self.s.1), ..self }]
         } else {

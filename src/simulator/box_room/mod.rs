@@ -74,14 +74,14 @@ pub(super) fn refine(
         }
         let field = fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field);
         let read = |field: &BoxField| meters.par_iter().map(|meter| field.illuminance(meter)).collect::<Vec<_>>();
-        field.map(read).unwrap_or_default()
+        (field.map(read).unwrap_or_default(), field.map_or(0.0, |field| field.imbalance))
     };
     let mut level = FIRST_EFFORT.iter().rposition(|error| relative_error <= *error).unwrap_or(0);
-    let mut coarse = solve(level);
+    let (mut coarse, _) = solve(level);
     loop {
         level += 1;
-        let fine = solve(level);
-        let values = bounded(&coarse, &fine);
+        let (fine, imbalance) = solve(level);
+        let values = bounded(&coarse, &fine, imbalance);
         let met = values.iter().all(|v| v.bound <= relative_error * v.value.abs());
         if met || level + 1 == EFFORTS.len() {
             let Effort { order, elements_per_half, .. } = EFFORTS[level];
@@ -94,12 +94,15 @@ pub(super) fn refine(
     }
 }
 
-fn bounded(coarse: &[f64], fine: &[f64]) -> Vec<Bounded> {
+fn bounded(coarse: &[f64], fine: &[f64], imbalance: f64) -> Vec<Bounded> {
     let pairs = || coarse.iter().zip(fine);
     let relative = |(c, f): (&f64, &f64)| if *f == 0.0 { 0.0 } else { ((f - c) / f).abs() };
     let worst = pairs().map(relative).fold(0.0, f64::max);
     pairs()
-        .map(|(c, f)| Bounded { value: *f, bound: SAFETY * (f - c).abs().max(0.5 * worst * f.abs()) + ROUNDING * f })
+        .map(|(c, f)| {
+            let difference = (f - c).abs().max(0.5 * worst * f);
+            Bounded { value: *f, bound: SAFETY * difference + (imbalance + ROUNDING) * f }
+        })
         .collect()
 }
 
@@ -111,6 +114,8 @@ pub(super) struct BoxField {
     /// Indirect exitance at the nodes in lm/m²: what is gathered on top of the first bounce.
     exitance: Vec<f64>,
     gathers: Gathers,
+    /// Relative flux that interpolating the first bounce between the nodes would lose or gain.
+    imbalance: f64,
 }
 
 /// What a meter sums up.
@@ -131,12 +136,13 @@ impl BoxField {
             Bounces::AtMost(_) | Bounces::Converged => Gathers::All,
         };
         if gathers != Gathers::All {
-            return Self { exitance: vec![0.0; grid.len()], grid, first, gathers };
+            return Self { exitance: vec![0.0; grid.len()], grid, first, gathers, imbalance: 0.0 };
         }
         let group = symmetry::of_geometry(room.size_m);
         let operator = Operator::new(&grid, Orbits::new(&grid, &group));
         let rho: Vec<f64> = (0..grid.len()).map(|node| symmetry::reflectance(room, grid.place(node).0)).collect();
-        let known = known(&grid, &first, &Orbits::new(&grid, &symmetry::of_light(&group, room, luminaires)));
+        let (known, imbalance) =
+            known(&grid, &first, &Orbits::new(&grid, &symmetry::of_light(&group, room, luminaires)));
         let step = |u: &[f64]| operator.apply(&exitance(u, &rho));
         let irradiance = match bounces {
             Bounces::Converged => gmres::solve(step, &known, 1e-14),
@@ -145,7 +151,7 @@ impl BoxField {
                 known.iter().zip(&again).map(|(g, k)| g + k).collect()
             }),
         };
-        Self { exitance: exitance(&irradiance, &rho), grid, first, gathers }
+        Self { exitance: exitance(&irradiance, &rho), grid, first, gathers, imbalance }
     }
 
     /// Indirect illuminance at a meter inside the room, in lux.
@@ -162,8 +168,11 @@ impl BoxField {
     }
 }
 
-/// The first bounce at every node, computed once an orbit.
-fn known(grid: &Grid, first: &FirstBounce, orbits: &Orbits) -> Vec<f64> {
+/// The first bounce at every node, computed once an orbit, and the relative flux it would gain or lose.
+///
+/// Where a jump or a kink of a table crosses an edge of the room, interpolation between nodes misses some flux. A
+/// closed room loses none, so the nodes are scaled to carry all of it, and the correction counts as an error.
+fn known(grid: &Grid, first: &FirstBounce, orbits: &Orbits) -> (Vec<f64>, f64) {
     let values: Vec<f64> =
         orbits.representatives.par_iter().map(|&node| first.irradiance(&receiver_at(grid, node))).collect();
     let mut known = vec![0.0; grid.len()];
@@ -172,7 +181,15 @@ fn known(grid: &Grid, first: &FirstBounce, orbits: &Orbits) -> Vec<f64> {
             known[image[node] as usize] = value;
         }
     }
-    known
+    let (flux, landed) =
+        (first.reflected_flux(), known.iter().enumerate().map(|(k, g)| g * grid.node(k).1).sum::<f64>());
+    if landed == 0.0 {
+        return (known, 0.0);
+    }
+    for value in &mut known {
+        *value *= flux / landed;
+    }
+    (known, (flux / landed - 1.0).abs())
 }
 
 fn exitance(irradiance: &[f64], rho: &[f64]) -> Vec<f64> {

@@ -43,7 +43,7 @@ impl Operation {
 
     fn of_face(self, face: Face) -> Face {
         let normal = self.of_direction(face.inward_normal());
-        let axis = if normal.x != 0.0 { 0 } else { usize::from(normal.y != 0.0) + 2 * usize::from(normal.z != 0.0) };
+        let axis = if normal.z == 0.0 { usize::from(normal.y != 0.0) } else { 2 };
         Face(2 * axis + usize::from(normal[axis] < 0.0))
     }
 }
