@@ -320,7 +320,11 @@ fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format]) -> Result<()
                 reports.iter().map(one).collect::<Vec<_>>().join("\n")
             }
         };
-        writeln!(out, "{}", text.trim_end()).into_diagnostic()?;
+        match writeln!(out, "{}", text.trim_end()) {
+            // Whoever reads has seen enough (`| head`): that is no error of ours.
+            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => return Ok(()),
+            written => written.into_diagnostic()?,
+        }
     }
     Ok(())
 }

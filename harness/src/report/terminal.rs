@@ -136,7 +136,7 @@ fn judges_others(engine: &str) -> bool {
     crate::plan::REFERENCES.contains(&engine)
 }
 
-/// The comparisons that deserve a look, worst first: by verdict, then by deviation over tolerance.
+/// The worst comparison of each engine, procedure and basis, worst first: by verdict, then by deviation over tolerance.
 pub(super) fn worst(report: &Report, count: usize) -> Vec<&Comparison> {
     let strain = |c: &Comparison| {
         let allowed = c.reference.as_ref().map_or(0.0, |r| c.tolerance.around(r.value));
@@ -144,6 +144,11 @@ pub(super) fn worst(report: &Report, count: usize) -> Vec<&Comparison> {
     };
     let mut all: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.deviation != Some(0.0)).collect();
     all.sort_by(|a, b| b.verdict.cmp(&a.verdict).then(strain(b).total_cmp(&strain(a))));
+    // One of each kind: twenty meters that fail alike are one finding.
+    let kind =
+        |c: &Comparison| (c.procedure.clone(), c.engine.clone(), c.reference.as_ref().map(|r| r.basis), c.verdict);
+    let mut seen = std::collections::BTreeSet::new();
+    all.retain(|c| seen.insert(kind(c)));
     all.truncate(count);
     all
 }
@@ -243,9 +248,7 @@ fn readings(report: &Report, procedure: &str, style: Style) -> Option<String> {
     let mut published: BTreeMap<&str, BTreeMap<&str, f64>> = BTreeMap::new();
     for c in report.comparisons.iter().filter(|c| c.procedure == procedure) {
         if let Some(reference) = c.reference.as_ref().filter(|r| r.basis == Basis::Published) {
-            let column = reference.source.split(": ").next().and_then(|s| s.rsplit(", ").next()).unwrap_or("published");
-            let column = if reference.source.contains(": ") { published_column(&reference.source) } else { column };
-            published.entry(column).or_default().insert(&c.meter.0, reference.value);
+            published.entry(published_column(&reference.source)).or_default().insert(&c.meter.0, reference.value);
         }
     }
     let mut table = table();
@@ -316,7 +319,14 @@ fn deviation_line(c: &Comparison) -> String {
     });
     let deviation = c.relative_deviation.map(|d| format!(" {}", percent(d))).unwrap_or_default();
     let why = c.diagnosis.as_ref().map(|d| format!(": {d}")).unwrap_or_default();
-    format!("{:<9} {} {} {} against {against}{deviation}{why}", mark(c.verdict), c.engine, c.meter, number(c.value))
+    format!(
+        "{:<9} {} {} {} {} against {against}{deviation}{why}",
+        mark(c.verdict),
+        c.engine,
+        c.procedure,
+        c.meter,
+        number(c.value)
+    )
 }
 
 fn notes(report: &Report, text: &mut String) {

@@ -1,0 +1,90 @@
+//! The main job on real renderers: the published pendant and case S1 on all five engines, against values known independently.
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+const ENGINES: [&str; 5] = ["simulator", "iesna", "mitsuba", "povray", "radiance"];
+
+/// Case S1, converged by two independent methods: direct at `ceiling`, indirect at `workplane`, in lux.
+const S1_DIRECT: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
+const S1_INDIRECT: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
+
+fn run(spec: &str) -> (Value, Option<i32>) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let out = tempfile::tempdir().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_luxproof"))
+        .args(["run", spec, "--engines", &ENGINES.join(","), "--format", "json", "--out"])
+        .arg(out.path())
+        .current_dir(root)
+        .output()
+        .unwrap();
+    let messages = String::from_utf8_lossy(&output.stderr);
+    let report = serde_json::from_slice(&output.stdout);
+    (
+        report.unwrap_or_else(|e| panic!("no report ({e}); run `luxproof engines install`? {messages}")),
+        output.status.code(),
+    )
+}
+
+fn readings<'a>(report: &'a Value, procedure: &str, engine: &str) -> Vec<&'a Value> {
+    let all = report["readings"].as_array().unwrap();
+    let found: Vec<&Value> = all.iter().filter(|r| r["procedure"] == procedure && r["engine"] == engine).collect();
+    assert!(!found.is_empty(), "{engine} gave no reading of {procedure}: {}", report["engines"]);
+    found
+}
+
+/// Every reading lies within `tolerance` of the known value, relative.
+fn agree(report: &Value, procedure: &str, engine: &str, known: &[f64], tolerance: f64) {
+    let readings = readings(report, procedure, engine);
+    assert_eq!(readings.len(), known.len());
+    for (reading, known) in readings.iter().zip(known) {
+        let value = reading["value"].as_f64().unwrap();
+        let deviation = (value / known - 1.0).abs();
+        assert!(deviation <= tolerance, "{engine} {}: {value} for {known}, off by {deviation:.1e}", reading["meter"]);
+    }
+}
+
+#[test]
+fn case_s1_is_read_right_by_every_engine() {
+    let (report, _) = run("reference/specs/axial.yaml");
+    for (engine, tolerance) in
+        [("simulator", 1e-9), ("iesna", 1e-9), ("radiance", 1e-6), ("povray", 1e-5), ("mitsuba", 1e-5)]
+    {
+        agree(&report, "direct_illuminance", engine, &S1_DIRECT, tolerance);
+    }
+    for (engine, tolerance) in [("simulator", 1e-4), ("radiance", 2e-3), ("mitsuba", 2e-3), ("povray", 6e-3)] {
+        agree(&report, "indirect_illuminance", engine, &S1_INDIRECT, tolerance);
+    }
+    for engine in ["radiance", "mitsuba", "povray"] {
+        for reading in readings(&report, "indirect_illuminance", engine) {
+            let error = reading["std_error"].as_f64().unwrap_or_else(|| panic!("{engine} states no standard error"));
+            assert!(error > 0.0, "{engine} claims to be exact");
+        }
+    }
+}
+
+#[test]
+fn the_published_pendant_is_read_alike_by_every_engine_and_held_against_the_paper() {
+    let (report, code) = run("reference/specs/cachet.yaml");
+    assert_eq!(code, Some(0), "{}", report["summary"]);
+    let engines = report["engines"].as_array().unwrap();
+    assert!(engines.iter().all(|e| e["status"] == "ran"), "{engines:?}");
+    for procedure in ["luminous_intensity", "direct_illuminance"] {
+        let first: Vec<f64> =
+            readings(&report, procedure, "iesna").iter().map(|r| r["value"].as_f64().unwrap()).collect();
+        for engine in ENGINES {
+            agree(&report, procedure, engine, &first, 0.01);
+        }
+    }
+    let published: Vec<&Value> =
+        report["comparisons"].as_array().unwrap().iter().filter(|c| c["reference"]["basis"] == "published").collect();
+    for procedure in ["luminous_intensity", "direct_illuminance", "indirect_illuminance"] {
+        assert!(published.iter().any(|c| c["procedure"] == procedure), "no published reference for {procedure}");
+    }
+    // "2.70" is 2.69 to 2.71: a rectangular distribution of half-width .01 lx.
+    let cell = published.iter().find(|c| c["meter"] == "ceiling[0]" && c["procedure"] == "direct_illuminance").unwrap();
+    assert_eq!(cell["reference"]["value"], 2.70);
+    assert!((cell["reference"]["uncertainty"].as_f64().unwrap() - 0.01 / 3f64.sqrt()).abs() < 1e-12);
+}

@@ -1,0 +1,108 @@
+//! Negative controls: a deliberately wrong export, run on the real renderer, must fail its procedure.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
+use luxproof::diff::{Comparison, Judge, KnownDeviations, Tolerances, Verdict};
+use luxproof::engines::Site;
+use luxproof::plan::{Selection, plan};
+use luxproof::reading::Recording;
+use luxproof::run::{Options, Progress, run};
+use luxproof::spec::Case;
+
+struct Silent;
+
+impl Progress for Silent {
+    fn started(&self, _engine: &str, _procedure: &str) {}
+    fn ended(&self, _engine: &str, _procedure: &str, _wall: Duration, _failure: Option<&str>) {}
+}
+
+fn cachet() -> Case {
+    Case::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/specs/cachet.yaml")).unwrap()
+}
+
+fn selection(engine: &str) -> Selection {
+    let procedures = vec!["luminous_intensity".to_owned(), "direct_illuminance".to_owned()];
+    Selection { engines: vec![engine.to_owned()], procedures, seed: 1 }
+}
+
+fn recordings(case: &Case, engine: &str) -> Vec<Recording> {
+    let site = Site::of_user().unwrap();
+    let out = tempfile::tempdir().unwrap();
+    let plan = plan(case, &selection(engine), &site).unwrap();
+    let options = Options { site, out: out.path().to_owned(), jobs: 2 };
+    let outcome = run(case, &plan, &options, &Silent).unwrap();
+    let mine: Vec<Recording> = outcome.recordings.into_iter().filter(|r| r.engine == engine).collect();
+    assert!(!mine.is_empty(), "{engine} did not run; run `luxproof engines install`");
+    mine
+}
+
+/// What the exported scene is given instead of the true distribution.
+fn tampered(case: &Case, wrong: impl Fn(&LuminousIntensityDistribution) -> LuminousIntensityDistribution) -> Case {
+    let mut case = case.clone();
+    for luminaire in &mut case.scene.luminaires {
+        let distribution = wrong(&luminaire.photometry.distribution);
+        luminaire.photometry = Arc::new(Photometry { distribution, ..(*luminaire.photometry).clone() });
+    }
+    case
+}
+
+/// The engine's readings of `exported`, judged by the references of `truth`.
+fn judged(truth: &Case, exported: &Case, engine: &str) -> Vec<Comparison> {
+    let tolerances = Tolerances::built_in().unwrap();
+    let known = KnownDeviations::built_in().unwrap();
+    let judge = Judge { tolerances: &tolerances, known: &known, overrides: &truth.tolerances, published: None };
+    let witness = recordings(truth, "iesna");
+    let subject = recordings(exported, engine);
+    let plan = plan(truth, &selection(engine), &Site::of_user().unwrap()).unwrap();
+    let of_task = |task: &luxproof::procedures::Task| {
+        let both: Vec<&Recording> = witness.iter().chain(&subject).filter(|r| r.procedure == task.procedure).collect();
+        judge.compare(task, &both)
+    };
+    plan.tasks.iter().flat_map(of_task).filter(|c| c.engine == engine).collect()
+}
+
+fn failed(comparisons: &[Comparison], procedure: &str) -> usize {
+    comparisons.iter().filter(|c| c.procedure == procedure && c.verdict == Verdict::Fail).count()
+}
+
+fn wrong_exports_fail(engine: &str) {
+    let truth = cachet();
+    let right = judged(&truth, &truth, engine);
+    assert!(right.iter().all(|c| c.verdict == Verdict::Pass), "{engine} must pass untampered: {right:#?}");
+
+    let by_pi = judged(&truth, &tampered(&truth, |d| d.scaled(std::f64::consts::PI)), engine);
+    assert_eq!((failed(&by_pi, "luminous_intensity"), failed(&by_pi, "direct_illuminance")), (7, 4));
+
+    let multiplier_dropped = judged(&truth, &tampered(&truth, |d| d.scaled(0.5)), engine);
+    assert_eq!(failed(&multiplier_dropped, "luminous_intensity"), 7);
+
+    let turned = judged(&truth, &tampered(&truth, turned_by_90), engine);
+    // C 0 and C 90 agree at the horizon and at the zenith alone.
+    assert_eq!(failed(&turned, "luminous_intensity"), 5);
+    assert!(failed(&turned, "direct_illuminance") >= 2);
+}
+
+fn turned_by_90(distribution: &LuminousIntensityDistribution) -> LuminousIntensityDistribution {
+    let (c, gamma) = (distribution.c_deg().to_vec(), distribution.gamma_deg().to_vec());
+    let at = |c: f64| gamma.iter().map(move |&g| distribution.intensity(c + 90.0, g).value());
+    let candela = c.iter().flat_map(|&c| at(c)).collect();
+    LuminousIntensityDistribution::new(c, gamma.clone(), candela).unwrap()
+}
+
+#[test]
+fn wrong_exports_to_radiance_fail_their_procedure() {
+    wrong_exports_fail("radiance");
+}
+
+#[test]
+fn wrong_exports_to_povray_fail_their_procedure() {
+    wrong_exports_fail("povray");
+}
+
+#[test]
+fn wrong_exports_to_mitsuba_fail_their_procedure() {
+    wrong_exports_fail("mitsuba");
+}
