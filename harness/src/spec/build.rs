@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
-use luminaire::geometry::Room;
+use luminaire::geometry::{Mesh, Room};
 use luminaire::photometry::{self, Photometry};
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, orientation};
 use sha2::{Digest, Sha256};
@@ -140,8 +140,12 @@ impl Builder<'_> {
                     let path = self.beside(&mesh.file);
                     let bytes = self.read(&format!("{at}.mesh.file"), &path)?;
                     self.hash.update(bytes);
-                    let message = "meshes are not read yet".to_owned();
-                    return Err(self.source.error_at(&at, message, "use boxes"));
+                    let read = Mesh::read_obj(&path).map_err(|error| {
+                        let help = "give a Wavefront OBJ file of triangles or polygons, in metres, z up";
+                        self.source.error_at(&format!("{at}.mesh.file"), error.to_string(), help)
+                    })?;
+                    let Mesh { vertices_m, triangles } = read.moved(DVec3::from(mesh.at_m));
+                    Obstacle { shape: Shape::Mesh { vertices_m, triangles }, reflectance: mesh.reflectance.0 }
                 }
                 _ => {
                     let message = "an obstacle is either a box or a mesh";
