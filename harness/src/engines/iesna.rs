@@ -36,10 +36,10 @@ impl Engine for Iesna {
         }
         objections.extend(cut(job.transport).map(str::to_owned));
         objections.dedup();
-        match objections.is_empty() {
-            true => Support::Yes,
-            false => Support::Approximate { why: objections.join("; "), size: None },
+        if objections.is_empty() {
+            return Support::Yes;
         }
+        Support::Approximate { why: objections.join("; "), size: None }
     }
 
     fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {

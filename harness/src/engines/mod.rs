@@ -2,9 +2,12 @@
 //!
 //! Adding one: write `engines/<name>.rs` with a type that implements [`Engine`], and add its line to [`all`].
 
+#[cfg(test)]
+mod fixtures;
 mod iesna;
 mod install;
 mod mitsuba;
+mod radiance;
 mod simulator;
 mod site;
 
@@ -29,6 +32,7 @@ pub fn all() -> Vec<Box<dyn Engine>> {
         Box::new(simulator::Simulator), // our own witnesses first
         Box::new(iesna::Iesna),
         Box::new(mitsuba::Mitsuba::default()),
+        Box::new(radiance::Radiance),
     ]
 }
 

@@ -1,0 +1,85 @@
+//! The arguments of rtrace for each preset.
+
+use luminaire::scene::{Bounces, Transport};
+
+use super::settings::{Preset, Settings};
+use crate::engines::Job;
+
+/// Arguments without and with reflected light.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Options {
+    /// Direct light alone.
+    pub(super) direct: Vec<String>,
+    /// Direct and reflected light.
+    pub(super) total: Vec<String>,
+}
+
+/// Ambient divisions of a block where nothing else is known.
+pub(super) const AUDIT_DIVISIONS: u32 = 16384;
+pub(super) const FAST_DIVISIONS: u32 = 1024;
+
+/// What is left of the light after the last bounce of a converged run, relative, where the limit on bounces allows.
+const REMAINDER: f64 = 1e-7;
+/// Bounces beyond which rtrace's recursion comes near the end of an 8 MiB stack.
+const MOST_BOUNCES: u32 = 10_000;
+/// Bounces of `preset: default` where all are asked for; rtrace's own default is none.
+const DEFAULT_BOUNCES: u32 = 5;
+
+/// One source sample, no jitter, every shadow tested: exact for points.
+const POINT_SOURCES: [&str; 8] = ["-ds", "0", "-dj", "0", "-dt", "0", "-dc", "1"];
+
+impl Options {
+    /// The arguments for a job with a number of ambient divisions.
+    pub(super) fn of(job: &Job, settings: &Settings, divisions: u32) -> Self {
+        // -I: irradiance at points; -u-: a fixed sequence of random numbers.
+        let common = ["-I", "-u-"].map(str::to_owned);
+        if settings.preset == Preset::Default {
+            let bounces = bounces(job).min(match reflections(job) {
+                Some(Bounces::AtMost(n)) => n,
+                _ => DEFAULT_BOUNCES,
+            });
+            let with = |n: u32| [&common[..], &["-ab".to_owned(), n.to_string()]].concat();
+            return Self { direct: with(0), total: with(bounces) };
+        }
+        let sources = POINT_SOURCES.map(str::to_owned);
+        // -aa 0: no cache; -as 0: no supersampling, which is biased; -lr 0: Russian roulette below weight -lw.
+        let ambient = format!("-aa 0 -ad {divisions} -as 0 -lr 0 -lw 1e-5");
+        let ambient: Vec<String> = ambient.split(' ').map(str::to_owned).collect();
+        let with = |n: u32| [&common[..], &["-ab".to_owned(), n.to_string()], &sources].concat();
+        Self { direct: with(0), total: [with(bounces(job)), ambient].concat() }
+    }
+}
+
+/// The limit on reflections, if reflected light is asked for.
+fn reflections(job: &Job) -> Option<Bounces> {
+    match job.transport {
+        Transport::Direct => None,
+        Transport::Indirect(bounces) | Transport::Total(bounces) => Some(bounces),
+    }
+}
+
+/// `-ab`: how many bounces are followed.
+pub(super) fn bounces(job: &Job) -> u32 {
+    match reflections(job) {
+        None => 0,
+        Some(Bounces::AtMost(n)) => n,
+        Some(Bounces::Converged) => {
+            let rho = largest_reflectance(job);
+            let enough = if rho < 1.0 { (REMAINDER.ln() / rho.ln()).ceil() } else { f64::INFINITY };
+            (enough.min(f64::from(MOST_BOUNCES)) as u32).max(1)
+        }
+    }
+}
+
+/// The largest part of the light that a converged run can miss for the limit on bounces.
+pub(super) fn remainder(job: &Job) -> f64 {
+    match reflections(job) {
+        Some(Bounces::Converged) => largest_reflectance(job).powi(bounces(job) as i32),
+        _ => 0.0,
+    }
+}
+
+fn largest_reflectance(job: &Job) -> f64 {
+    let room = job.scene.room.iter().flat_map(|r| luminaire::geometry::Surface::ALL.map(|s| r.reflectance.of(s)));
+    room.chain(job.scene.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
+}

@@ -1,0 +1,180 @@
+//! Reflected light by independent blocks, more of them until the standard error or the time of the budget is met.
+//!
+//! A block is one estimate at every station with a fixed number of ambient divisions. rtrace draws anew for each row,
+//! so that the repetitions of a row in one process are independent; processes side by side start from different
+//! places of its random sequence, reached by rows outside the scene before the first that counts.
+
+use std::thread;
+use std::time::Instant;
+
+use glam::DVec3;
+
+use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options};
+use super::settings::{Preset, Settings};
+use super::tools::Tools;
+use super::{export, output};
+use crate::engines::{EngineError, Job, Workbench, mean_and_std_error};
+
+/// Blocks that every reading rests on, at least.
+const FEWEST_BLOCKS: usize = 8;
+/// Ambient divisions of the trial from which effort is planned.
+const TRIAL_DIVISIONS: u32 = 64;
+/// Planned beyond what the trial's own, uncertain, error suggests.
+const PLAN_MARGIN: f64 = 1.5;
+/// Starting places of the random sequence that differ by the job's seed.
+const SEEDS: u64 = 16;
+/// Starting places reserved for the processes of one job.
+const PROCESSES_A_SEED: usize = 16;
+
+/// What the blocks gave.
+pub(super) struct Blocks {
+    /// `values[block][station]`: illuminance by direct and reflected light in lux.
+    values: Vec<Vec<f64>>,
+    /// Ambient divisions of every block.
+    pub(super) divisions: u32,
+    /// The arguments of rtrace.
+    pub(super) options: Options,
+}
+
+/// One job on its bench.
+pub(super) struct Sampler<'a> {
+    pub(super) job: &'a Job,
+    pub(super) settings: &'a Settings,
+    pub(super) tools: &'a Tools,
+    pub(super) workbench: &'a Workbench,
+    pub(super) rows: Vec<[f64; 6]>,
+    /// Direct illuminance at each station in lux, not part of the error where reflected light alone is asked for.
+    pub(super) subtract_lx: Vec<f64>,
+    pub(super) started: Instant,
+}
+
+impl Blocks {
+    /// Mean and standard error at each station.
+    pub(super) fn estimates(&self) -> Vec<(f64, Option<f64>)> {
+        let stations = self.values.first().map_or(0, Vec::len);
+        let of = |s: usize| self.values.iter().map(|block| block[s]).collect::<Vec<_>>();
+        (0..stations).map(|s| mean_and_std_error(&of(s))).collect()
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.values.len()
+    }
+}
+
+impl Sampler<'_> {
+    /// Blocks as the preset asks for.
+    pub(super) fn blocks(&self) -> Result<Blocks, EngineError> {
+        match self.settings.preset {
+            // The cache of a process makes its blocks alike: one process a block.
+            Preset::Default => self.fixed(FAST_DIVISIONS, 1),
+            Preset::Fast => self.fixed(self.settings.ambient_divisions.unwrap_or(FAST_DIVISIONS), FEWEST_BLOCKS),
+            Preset::Audit => self.within_budget(),
+        }
+    }
+
+    fn fixed(&self, divisions: u32, repeats: usize) -> Result<Blocks, EngineError> {
+        let mut blocks = self.empty(divisions);
+        let processes = FEWEST_BLOCKS / repeats;
+        for first in (0..processes).step_by(self.parallel()) {
+            let starts: Vec<usize> = (first..processes.min(first + self.parallel())).collect();
+            blocks.values.extend(self.round(&blocks.options, &starts, repeats)?);
+        }
+        Ok(blocks)
+    }
+
+    fn within_budget(&self) -> Result<Blocks, EngineError> {
+        let trial_started = Instant::now();
+        let mut trial = self.empty(TRIAL_DIVISIONS);
+        trial.values = self.round(&trial.options, &[0], FEWEST_BLOCKS)?;
+        let division_s = trial_started.elapsed().as_secs_f64() / (FEWEST_BLOCKS as f64 * f64::from(TRIAL_DIVISIONS));
+        let divisions = self.settings.ambient_divisions.unwrap_or_else(|| self.plan(&trial, division_s));
+        let mut block_s = division_s * f64::from(divisions);
+
+        let mut blocks = self.empty(divisions);
+        let parallel = self.parallel();
+        let mut wanted = 2 * FEWEST_BLOCKS;
+        let mut process = 1;
+        loop {
+            let affordable = (self.seconds_left() * parallel as f64 / block_s) as usize;
+            // Fewer than the fewest blocks make no honest error, so those are made whatever the budget says.
+            let count = wanted.min(affordable).max(FEWEST_BLOCKS.saturating_sub(blocks.count()));
+            let repeats = count.div_ceil(parallel);
+            if count == 0 {
+                return Ok(blocks);
+            }
+            let round_started = Instant::now();
+            let starts: Vec<usize> = (process..process + parallel).collect();
+            blocks.values.extend(self.round(&blocks.options, &starts, repeats)?);
+            process += parallel;
+            block_s = round_started.elapsed().as_secs_f64() / repeats as f64;
+            let excess = self.worst_error(&blocks) / self.job.budget.relative_error;
+            if excess <= 1.0 || process + parallel > PROCESSES_A_SEED {
+                return Ok(blocks);
+            }
+            let missing = (blocks.count() as f64 * (PLAN_MARGIN * (excess * excess - 1.0))).ceil();
+            // With the last starting places, all that is missing at once; before that, twice as many at most.
+            let last = process + 2 * parallel > PROCESSES_A_SEED;
+            wanted = if last { missing as usize } else { (missing as usize).min(3 * blocks.count()) };
+        }
+    }
+
+    /// Divisions a block so that the fewest blocks about meet the budget.
+    fn plan(&self, trial: &Blocks, division_s: f64) -> u32 {
+        let excess = self.worst_error(trial) / self.job.budget.relative_error;
+        let needed = f64::from(TRIAL_DIVISIONS) * PLAN_MARGIN * excess * excess / 2.0;
+        let affordable = 0.5 * self.seconds_left() * self.parallel() as f64 / (2.0 * FEWEST_BLOCKS as f64 * division_s);
+        let divisions = needed.min(affordable).clamp(f64::from(TRIAL_DIVISIONS), f64::from(AUDIT_DIVISIONS));
+        // rtrace takes a square number of them.
+        (divisions.sqrt().ceil() as u32).pow(2)
+    }
+
+    /// The largest standard error relative to the reading it belongs to.
+    fn worst_error(&self, blocks: &Blocks) -> f64 {
+        let relative = |((mean, error), subtract): ((f64, Option<f64>), &f64)| {
+            let error = error.unwrap_or(f64::INFINITY);
+            if error == 0.0 { 0.0 } else { error / (mean - subtract).max(f64::MIN_POSITIVE) }
+        };
+        blocks.estimates().into_iter().zip(&self.subtract_lx).map(relative).fold(0.0, f64::max)
+    }
+
+    /// One process a starting place side by side, each with `repeats` blocks.
+    fn round(&self, options: &Options, starts: &[usize], repeats: usize) -> Result<Vec<Vec<f64>>, EngineError> {
+        let results: Vec<_> = thread::scope(|scope| {
+            let start = |&start: &usize| scope.spawn(move || self.process(options, start, repeats));
+            let running: Vec<_> = starts.iter().map(start).collect();
+            running.into_iter().map(thread::ScopedJoinHandle::join).collect()
+        });
+        let mut blocks = vec![];
+        for result in results {
+            blocks.extend(result.map_err(|_| output("a thread that talked to rtrace panicked".into()))??);
+        }
+        Ok(blocks)
+    }
+
+    fn process(&self, options: &Options, start: usize, repeats: usize) -> Result<Vec<Vec<f64>>, EngineError> {
+        let skip = start + PROCESSES_A_SEED * (self.job.seed % SEEDS) as usize;
+        let mut rows = vec![self.row_outside(); skip];
+        rows.extend(std::iter::repeat_n(&self.rows, repeats).flatten());
+        let read = self.tools.rtrace(self.workbench, &options.total, &rows)?;
+        Ok(read[skip..].chunks(self.rows.len()).map(<[f64]>::to_vec).collect())
+    }
+
+    /// A meter beyond everything that looks away: costs next to nothing and moves the random sequence on.
+    fn row_outside(&self) -> [f64; 6] {
+        let size = self.job.scene.room.map_or(1.0, |r| r.size_m.max_element());
+        let p = DVec3::splat(-10.0 * size * export::scale(self.job, self.settings.scaling));
+        [p.x, p.y, p.z, 0.0, 0.0, -1.0]
+    }
+
+    fn empty(&self, divisions: u32) -> Blocks {
+        Blocks { values: vec![], divisions, options: Options::of(self.job, self.settings, divisions) }
+    }
+
+    fn parallel(&self) -> usize {
+        self.workbench.jobs.clamp(1, PROCESSES_A_SEED / 2)
+    }
+
+    fn seconds_left(&self) -> f64 {
+        (self.job.budget.seconds - self.started.elapsed().as_secs_f64()).max(0.0)
+    }
+}

@@ -1,0 +1,92 @@
+//! Radiance's programs in the Python package `pyradiance`, called without Python: oconv and rtrace.
+
+use std::path::PathBuf;
+
+use super::{ID, export, output};
+use crate::engines::{Absent, EngineError, Site, Version, Workbench};
+use crate::process::{Invocation, ProcessError};
+
+/// Where the programs and their library are.
+#[derive(Clone, Debug)]
+pub(super) struct Tools {
+    package: PathBuf,
+}
+
+/// The octree that oconv makes of `scene.rad`.
+const OCTREE: &str = "scene.oct";
+
+impl Tools {
+    pub(super) fn find(site: &Site) -> Result<Self, Absent> {
+        let absent = |reason: String| Absent { reason, remedy: "run `luxproof engines install`".into() };
+        let package = site.python_package("pyradiance");
+        let package = package.ok_or_else(|| absent("the package pyradiance is not installed".into()))?;
+        for file in ["bin/rtrace", "bin/oconv", "bin/ies2rad", "lib/source.cal"] {
+            if !package.join(file).is_file() {
+                return Err(absent(format!("{} has no {file}", package.display())));
+            }
+        }
+        Ok(Self { package })
+    }
+
+    /// The version that rtrace names: `RADIANCE 6.0a ...`, its first two words.
+    pub(super) fn version(&self, site: &Site) -> Result<Version, Absent> {
+        let log = std::env::temp_dir().join("luxproof-probe.log");
+        let limit = std::time::Duration::from_secs(20);
+        let run = self.prepared(Invocation::new(self.program("rtrace"), site.root(), limit, log)).args(["-version"]);
+        let absent = |reason: String| Absent { reason, remedy: "run `luxproof engines install` again".into() };
+        let done = run.run().map_err(|error: ProcessError| absent(error.to_string()))?;
+        let text = String::from_utf8_lossy(&done.stdout).into_owned();
+        let version = text.split_whitespace().nth(1).ok_or_else(|| absent(format!("rtrace -version says `{text}`")))?;
+        Ok(Version(version.to_owned()))
+    }
+
+    /// Compiles `scene.rad` of the scene's folder.
+    pub(super) fn compile(&self, workbench: &Workbench) -> Result<(), EngineError> {
+        let run = self.prepared(workbench.invoke(self.program("oconv"))).args(["-f", "scene.rad"]);
+        let octree = run.run()?.stdout;
+        let path = workbench.scene_dir.join(OCTREE);
+        std::fs::write(&path, octree).map_err(|source| EngineError::io(&path, source))
+    }
+
+    /// Illuminance in lux of each row.
+    pub(super) fn rtrace(
+        &self,
+        workbench: &Workbench,
+        options: &[String],
+        rows: &[[f64; 6]],
+    ) -> Result<Vec<f64>, EngineError> {
+        let stdin = rows.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+        let run = self.prepared(workbench.invoke(self.program("rtrace")));
+        let run = run.args(["-h", "-fdd"]).args(options).args([OCTREE]).stdin(stdin);
+        let finished = run.run()?;
+        parse(&finished.stdout, rows.len())
+    }
+
+    fn program(&self, name: &str) -> PathBuf {
+        self.package.join("bin").join(name)
+    }
+
+    /// With the search paths that the programs need: for their library and for one another.
+    fn prepared(&self, run: Invocation) -> Invocation {
+        let raypath = format!(".:{}", self.package.join("lib").display());
+        let path = format!("{}:/usr/bin:/bin", self.package.join("bin").display());
+        run.env("RAYPATH", raypath).env("PATH", path)
+    }
+}
+
+/// Red, green and blue as 64-bit floats, one triple a row, to lux. rtrace ends well after fewer rows than it was given
+/// where it could not read one.
+pub(super) fn parse(stdout: &[u8], rows: usize) -> Result<Vec<f64>, EngineError> {
+    let (values, rest) = stdout.as_chunks::<8>();
+    let values: Vec<f64> = values.iter().map(|b| f64::from_le_bytes(*b)).collect();
+    if !rest.is_empty() || values.len() != 3 * rows {
+        return Err(output(format!("rtrace gave {} bytes for {rows} rows of 24", stdout.len())));
+    }
+    let (triples, _) = values.as_chunks::<3>();
+    let lux = |rgb: &[f64; 3]| export::EFFICACY * rgb.iter().zip(export::WEIGHTS).map(|(c, w)| c * w).sum::<f64>();
+    let lux: Vec<f64> = triples.iter().map(lux).collect();
+    match lux.iter().position(|e| !e.is_finite() || *e < 0.0) {
+        Some(row) => Err(EngineError::Output { engine: ID, what: format!("rtrace read {} lx in row {row}", lux[row]) }),
+        None => Ok(lux),
+    }
+}
