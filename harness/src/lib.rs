@@ -8,6 +8,7 @@ pub mod cli;
 pub mod diff;
 pub mod doctor;
 pub mod engines;
+pub mod photometry_command;
 pub mod plan;
 pub mod procedures;
 pub mod process;

@@ -5,7 +5,7 @@ use miette::{LabeledSpan, NamedSource, Report, Severity, SourceSpan};
 use crate::spec::SpecError;
 
 /// A spec error with its source line, where it has one.
-pub(super) fn diagnose(error: SpecError) -> Report {
+pub(crate) fn diagnose(error: SpecError) -> Report {
     let name = error.file.display().to_string();
     let text = std::fs::read(&error.file).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).ok();
     let span = text.as_ref().and_then(|t| span(t, error.line?, error.column.unwrap_or(1)));

@@ -1,6 +1,6 @@
 //! The command line: arguments, what each command does with them, and its exit code.
 
-mod diagnostic;
+pub(crate) mod diagnostic;
 
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -13,6 +13,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 use crate::diff::{Comparison, Judge, KnownDeviations, Published, Tolerances};
 use crate::doctor;
 use crate::engines::{self, EngineId, InstallState, Site};
+use crate::photometry_command::{self, PhotometryArgs};
 use crate::plan::{Asked, Plan, Selection, plan};
 use crate::reading::Recording;
 use crate::report::{self, Exit, Ingredients, Report, SpecRecord, Style};
@@ -45,6 +46,8 @@ enum Command {
     Export(ExportArgs),
     /// List, install or examine engines
     Engines(EnginesArgs),
+    /// What photometric files say: flux, symmetry, lint, polar diagram, conversion
+    Photometry(PhotometryArgs),
     /// View a finished run again
     Report(ReportArgs),
     /// Print the JSON Schema of the spec or of the report
@@ -179,6 +182,7 @@ impl Cli {
             Command::Check(args) => check(&args, &site),
             Command::Export(args) => export(&args, &site),
             Command::Engines(args) => manage_engines(&args, &site),
+            Command::Photometry(args) => photometry_command::run(&args),
             Command::Report(args) => view(&args),
             Command::Schema(args) => schema(&args),
         }

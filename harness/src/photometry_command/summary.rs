@@ -1,0 +1,196 @@
+//! The numbers that a photometric file is known by, for people and for programs.
+
+use std::fmt;
+use std::path::Path;
+
+use luminaire::photometry::{Lint, LuminousOpening, Photometry, Symmetry};
+use luminaire::units::{Candela, Lumen};
+use serde::Serialize;
+
+/// One file's record in `--json`.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    file: String,
+    format: String,
+    luminaire: Option<String>,
+    flux_lm: f64,
+    flux_up_lm: f64,
+    flux_down_lm: f64,
+    max_cd: f64,
+    symmetry: &'static str,
+    /// The symmetry that the values themselves have.
+    detected_symmetry: &'static str,
+    c_planes: Angles,
+    gamma: Angles,
+    lamp_lumens: Option<f64>,
+    /// Luminaire flux over lamp flux.
+    output_ratio: Option<f64>,
+    input_watts: Option<f64>,
+    /// Luminaire flux over input power.
+    efficacy_lm_per_w: Option<f64>,
+    opening: String,
+    /// Width (along C90), length (along C0), height.
+    opening_m: [f64; 3],
+    /// Full angles to half of the largest intensity, planes C0-C180 and C90-C270.
+    beam_angle_deg: [Option<f64>; 2],
+    /// Full angles to a tenth of the largest intensity.
+    field_angle_deg: [Option<f64>; 2],
+    /// Spacing criterion along C0 and C90.
+    spacing_criterion: [Option<f64>; 2],
+    cie_flux_code: Option<[f64; 5]>,
+    lint: Vec<LintRecord>,
+}
+
+/// How angles are spaced.
+#[derive(Debug, Serialize)]
+struct Angles {
+    count: usize,
+    first_deg: f64,
+    last_deg: f64,
+    /// `null` where they are not evenly spaced.
+    step_deg: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct LintRecord {
+    code: &'static str,
+    line: usize,
+    message: String,
+}
+
+impl Summary {
+    pub(super) fn of(file: &Path, photometry: &Photometry) -> Self {
+        let distribution = &photometry.distribution;
+        let (flux, max) = (distribution.flux(), distribution.max_intensity());
+        let within = |fraction: f64| [0.0, 90.0].map(|c| distribution.angle_within(c, fraction, max));
+        let lit = max > Candela(0.0);
+        Self {
+            file: file.display().to_string(),
+            format: photometry.format.clone(),
+            luminaire: photometry.keyword("LUMINAIRE").or(photometry.keyword("LUMCAT")).map(str::to_owned),
+            flux_lm: flux.value(),
+            flux_up_lm: distribution.flux_between(90.0, 180.0).value(),
+            flux_down_lm: distribution.flux_between(0.0, 90.0).value(),
+            max_cd: max.value(),
+            symmetry: name(distribution.symmetry()),
+            detected_symmetry: name(distribution.detected_symmetry(1e-9)),
+            c_planes: Angles::of(distribution.c_deg()),
+            gamma: Angles::of(distribution.gamma_deg()),
+            lamp_lumens: photometry.lamp_lumens,
+            output_ratio: photometry.lamp_lumens.map(|lumens| flux.value() / lumens),
+            input_watts: photometry.input_watts,
+            efficacy_lm_per_w: photometry.input_watts.map(|watts| flux.value() / watts),
+            opening: opening(&photometry.opening),
+            opening_m: photometry.opening.bounding_box_m(),
+            beam_angle_deg: if lit { within(0.5) } else { [None; 2] },
+            field_angle_deg: if lit { within(0.1) } else { [None; 2] },
+            spacing_criterion: [0.0, 90.0].map(|c| distribution.spacing_criterion(c)),
+            cie_flux_code: distribution.cie_flux_code(Lumen(photometry.lamp_lumens.unwrap_or(flux.value()))),
+            lint: photometry.lints.iter().map(LintRecord::of).collect(),
+        }
+    }
+}
+
+impl LintRecord {
+    fn of(lint: &Lint) -> Self {
+        Self { code: lint.code, line: lint.line, message: lint.message.clone() }
+    }
+}
+
+impl Angles {
+    fn of(angles: &[f64]) -> Self {
+        let steps = || angles.windows(2).map(|w| w[1] - w[0]);
+        // A millionth of a degree is beyond what any file means.
+        let even = |step: &f64| steps().all(|s| (s - step).abs() < 1e-6);
+        let (first_deg, last_deg) = (angles[0], angles[angles.len() - 1]);
+        Self { count: angles.len(), first_deg, last_deg, step_deg: steps().next().filter(even) }
+    }
+}
+
+impl fmt::Display for Angles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.count == 1 {
+            return f.write_str("1");
+        }
+        write!(f, "{} from {} to {}°", self.count, self.first_deg, self.last_deg)?;
+        match self.step_deg {
+            Some(step) => write!(f, " every {step}°"),
+            None => f.write_str(", unevenly spaced"),
+        }
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.file)?;
+        let mut row = |name: &str, value: String| writeln!(f, "  {name:<20} {value}");
+        row("format", self.format.clone())?;
+        if let Some(luminaire) = &self.luminaire {
+            row("luminaire", luminaire.lines().next().unwrap_or_default().to_owned())?;
+        }
+        let up = if self.flux_lm > 0.0 { 100.0 * self.flux_up_lm / self.flux_lm } else { 0.0 };
+        row(
+            "flux",
+            format!("{:.1} lm: {:.1} up ({up:.1} %), {:.1} down", self.flux_lm, self.flux_up_lm, self.flux_down_lm),
+        )?;
+        row("largest intensity", format!("{:.1} cd", self.max_cd))?;
+        let hidden = if self.symmetry == self.detected_symmetry {
+            String::new()
+        } else {
+            format!(" (the values are {})", self.detected_symmetry)
+        };
+        row("symmetry", format!("{}{hidden}", self.symmetry))?;
+        row("C planes", self.c_planes.to_string())?;
+        row("gamma angles", self.gamma.to_string())?;
+        row("luminous opening", self.opening.clone())?;
+        match (self.lamp_lumens, self.output_ratio) {
+            (Some(lumens), Some(ratio)) => {
+                row("lamps", format!("{lumens} lm, light output ratio {:.1} %", 100.0 * ratio))?;
+            }
+            _ => row("lamps", "absolute photometry".to_owned())?,
+        }
+        if let (Some(watts), Some(efficacy)) = (self.input_watts, self.efficacy_lm_per_w) {
+            row("power", format!("{watts} W, {efficacy:.1} lm/W"))?;
+        }
+        let pair = |[c0, c90]: [Option<f64>; 2], digits: usize, unit: &str| {
+            let one = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.digits$}{unit}"));
+            format!("C0 {}, C90 {}", one(c0), one(c90))
+        };
+        row("beam angle (50 %)", pair(self.beam_angle_deg, 1, "°"))?;
+        row("field angle (10 %)", pair(self.field_angle_deg, 1, "°"))?;
+        row("spacing criterion", pair(self.spacing_criterion, 2, ""))?;
+        if let Some(code) = self.cie_flux_code {
+            row("CIE flux code", code.map(|n| format!("{n:.0}")).join(" "))?;
+        }
+        if !self.lint.is_empty() {
+            row("lints", format!("{} (--lint prints them)", self.lint.len()))?;
+        }
+        Ok(())
+    }
+}
+
+fn name(symmetry: Symmetry) -> &'static str {
+    match symmetry {
+        Symmetry::Axial => "axial",
+        Symmetry::Quadrant => "quadrant",
+        Symmetry::BilateralC0 => "bilateral_c0",
+        Symmetry::BilateralC90 => "bilateral_c90",
+        Symmetry::None => "none",
+    }
+}
+
+fn opening(opening: &LuminousOpening) -> String {
+    let [width, length, height] = opening.bounding_box_m();
+    let shape = match opening {
+        LuminousOpening::Point => return "point".to_owned(),
+        LuminousOpening::Box { height_m: 0.0, .. } => "rectangle",
+        LuminousOpening::Box { .. } => "box",
+        LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 } if x_m == y_m => "circle",
+        LuminousOpening::Ellipse { height_m: 0.0, .. } => "ellipse",
+        LuminousOpening::Ellipse { .. } => "upright cylinder",
+        LuminousOpening::Ellipsoid { x_m, y_m, z_m } if x_m == y_m && y_m == z_m => "sphere",
+        LuminousOpening::Ellipsoid { .. } => "ellipsoid",
+        LuminousOpening::LyingCylinder { .. } => "lying cylinder",
+    };
+    format!("{shape}, {length:.3} m along C0, {width:.3} m along C90, {height:.3} m high")
+}

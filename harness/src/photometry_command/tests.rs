@@ -1,0 +1,137 @@
+//! What the command prints, writes and answers.
+
+use std::path::Path;
+
+use clap::Parser;
+use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening};
+
+use super::*;
+
+#[derive(Debug, Parser)]
+struct Line {
+    #[command(flatten)]
+    args: PhotometryArgs,
+}
+
+fn arguments(line: &[&str]) -> PhotometryArgs {
+    Line::try_parse_from(std::iter::once(&"photometry").chain(line)).unwrap().args
+}
+
+/// A pendant of 1000 lm lamps: cos downward, a little light up, wider across C90.
+fn pendant() -> Photometry {
+    let gamma: Vec<f64> = (0..=36).map(|k| 5.0 * f64::from(k)).collect();
+    let plane = |wide: f64| {
+        let shape =
+            move |g: f64| if g < 90.0 { 200.0 * (g / wide).to_radians().cos().max(0.0) } else { (g - 90.0) / 3.0 };
+        gamma.iter().map(move |&g| shape(g)).collect::<Vec<f64>>()
+    };
+    let candela = [plane(1.0), plane(1.2)].concat();
+    let distribution = LuminousIntensityDistribution::new(vec![0.0, 90.0], gamma.clone(), candela).unwrap();
+    Photometry {
+        lamp_lumens: Some(1000.0),
+        opening: LuminousOpening::Box { x_m: 1.2, y_m: 0.1, height_m: 0.0 },
+        input_watts: Some(10.0),
+        keywords: vec![("LUMINAIRE".into(), "Pendant <1 & 2>".into())],
+        ..Photometry::of(distribution)
+    }
+}
+
+#[test]
+fn the_summary_has_the_fields_of_the_contract() {
+    let record = Reading { file: "a.ies".into(), read: Ok(pendant()) }.record().unwrap();
+    for field in ["file", "format", "flux_lm", "flux_up_lm", "flux_down_lm", "max_cd", "symmetry", "lint"] {
+        assert!(record.get(field).is_some(), "{field}");
+    }
+    let number = |field: &str| record[field].as_f64().unwrap();
+    assert_eq!(record["symmetry"], "quadrant");
+    assert!((number("flux_up_lm") + number("flux_down_lm") - number("flux_lm")).abs() < 1e-9);
+    assert!((number("efficacy_lm_per_w") - number("flux_lm") / 10.0).abs() < 1e-12);
+    assert_eq!(number("max_cd"), 200.0);
+}
+
+#[test]
+fn the_summary_reads_well() {
+    let summary = Summary::of(Path::new("pendant.ies"), &pendant()).to_string();
+    insta::assert_snapshot!(summary);
+}
+
+#[test]
+fn the_diagram_puts_each_intensity_at_its_angle_and_radius() {
+    let svg = polar::diagram("pendant.ies", &pendant());
+    // 200 cd/klm at the nadir: four rings of 50, the outermost at 200 units.
+    assert_eq!(svg.matches("<circle").count(), 4, "{svg}");
+    assert!(svg.contains(">cd/klm<") && svg.contains(">150<") && svg.contains("Pendant &lt;1 &amp; 2&gt;"));
+    let path = |colour: &str| {
+        let line =
+            svg.lines().find(|l| l.starts_with("<path d=\"M0") && l.contains(colour) && l.contains('Z')).unwrap();
+        let points = line.split('"').nth(1).unwrap().trim_start_matches('M').trim_end_matches('Z').to_owned();
+        let point = |p: &str| p.split(' ').map(|n| n.parse::<f64>().unwrap()).collect::<Vec<f64>>();
+        points.split('L').map(point).collect::<Vec<_>>()
+    };
+    for (colour, wide) in [("#c0272d", 1.0), ("#1f5fa8", 1.2)] {
+        let points = path(colour);
+        assert_eq!(points.len(), 2 * 181);
+        let expected = 200.0 * (60.0f64 / wide).to_radians().cos();
+        let (right, left) = (&points[120], &points[181 + 60]);
+        for (point, side) in [(right, 1.0), (left, -1.0)] {
+            assert!((point[0] - side * expected * 60f64.to_radians().sin()).abs() < 0.01, "{point:?}");
+            assert!((point[1] - expected * 60f64.to_radians().cos()).abs() < 0.01, "{point:?}");
+        }
+    }
+}
+
+#[test]
+fn a_downlight_has_half_rings() {
+    let table = LuminousIntensityDistribution::axial(vec![0.0, 90.0], vec![730.0, 0.0]).unwrap();
+    let svg = polar::diagram("spot.ies", &Photometry::of(table));
+    assert_eq!(svg.matches("<circle").count(), 0);
+    assert!(svg.contains(">cd<") && svg.contains(">800<") && svg.contains("spot.ies, "));
+}
+
+#[test]
+fn conversion_follows_the_extension_and_refusal_is_exit_2() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("a.ies"), lm63::write_2002(&pendant()).text).unwrap();
+    std::fs::write(at("bad.ies"), "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 0\n0 90\n0\n5\n").unwrap();
+    let text = |name: &str| at(name).display().to_string();
+    let exit = run(&arguments(&[&text("a.ies"), "--convert", &text("b.ldt"), "--polar", &text("a.svg")])).unwrap();
+    assert_eq!(exit, Exit::Passed);
+    let converted = photometry::read_file(&at("b.ldt")).unwrap();
+    assert_eq!(converted.format, "EULUMDAT");
+    assert_eq!(converted.distribution, pendant().distribution);
+    assert!(std::fs::read_to_string(at("a.svg")).unwrap().starts_with("<svg "));
+    assert_eq!(run(&arguments(&[&text("a.ies"), &text("bad.ies"), "--json"])).unwrap(), Exit::Usage);
+    assert!(run(&arguments(&[&text("a.ies"), "--convert", &text("b.doc")])).is_err());
+    assert!(run(&arguments(&[&text("a.ies"), &text("a.ies"), "--polar", "x.svg"])).is_err());
+    assert!(run(&arguments(&[&text("a.ies"), "--format", "sarif"])).is_err());
+}
+
+#[test]
+fn sarif_names_rule_level_and_line_of_lints_and_refusals() {
+    let odd = " IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 0.9 0\n0 90\n0\n5 5\n";
+    let readings = [odd, "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 0\n0 90\n0\n5 x\n"]
+        .map(|text| Reading { file: "a b.ies".into(), read: lm63::parse(text.as_bytes()) });
+    let log: serde_json::Value = serde_json::from_str(&sarif::log(&readings).unwrap()).unwrap();
+    let results = log["runs"][0]["results"].as_array().unwrap();
+    let found: Vec<_> = results
+        .iter()
+        .map(|r| (r["ruleId"].as_str().unwrap(), r["level"].as_str().unwrap(), region(r)["startLine"].as_u64()))
+        .collect();
+    assert_eq!(
+        found,
+        [
+            ("lm63/leading-blanks", "note", Some(1)),
+            ("lm63/ballast-lamp-factor", "warning", Some(4)),
+            ("lm63/keywords", "note", None),
+            ("refused", "error", Some(7)),
+        ]
+    );
+    assert_eq!(region(&results[3])["startColumn"], 3);
+    assert_eq!(results[0]["locations"][0]["physicalLocation"]["artifactLocation"]["uri"], "a%20b.ies");
+    assert!(lints(&readings).starts_with("a b.ies:1: note: blanks"));
+}
+
+fn region(result: &serde_json::Value) -> &serde_json::Value {
+    &result["locations"][0]["physicalLocation"]["region"]
+}
