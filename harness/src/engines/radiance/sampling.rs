@@ -1,8 +1,8 @@
 //! Reflected light by independent blocks, more of them until the standard error or the time of the budget is met.
 //!
 //! A block is one estimate at every station with a fixed number of ambient divisions. rtrace draws anew for each row,
-//! so that the repetitions of a row in one process are independent; processes side by side start from different
-//! places of its random sequence, reached by rows outside the scene before the first that counts.
+//! so that the repetitions of a row in one process are independent. It seeds itself from the clock, in seconds: processes
+//! that start together start from different places of one random sequence, reached by rows outside the scene.
 
 use std::thread;
 use std::time::Instant;
@@ -21,7 +21,7 @@ const FEWEST_BLOCKS: usize = 8;
 const TRIAL_DIVISIONS: u32 = 64;
 /// Planned beyond what the trial's own, uncertain, error suggests.
 const PLAN_MARGIN: f64 = 1.5;
-/// Starting places of the random sequence that differ by the job's seed.
+/// Starting places of the random sequence that differ by the job's seed, for jobs that start within one second.
 const SEEDS: u64 = 16;
 /// Starting places reserved for the processes of one job.
 const PROCESSES_A_SEED: usize = 16;

@@ -9,6 +9,7 @@ use luminaire::geometry::Reflectances;
 use luminaire::scene::{Bounces, Obstacle, Shape, orientation};
 
 use super::*;
+use crate::engines::Budget;
 use crate::engines::fixtures::*;
 
 fn workbench(folder: &Path) -> Workbench {
@@ -18,6 +19,10 @@ fn workbench(folder: &Path) -> Workbench {
 
 fn read(job: &Job) -> Measurement {
     read_tampered(job, |_, text| text)
+}
+
+fn within(relative_error: f64, job: Job) -> Job {
+    Job { budget: Budget { relative_error, seconds: 60.0 }, ..job }
 }
 
 /// Reads after every file went through `tamper(name, text)`.
@@ -46,20 +51,20 @@ fn direct_light_follows_the_inverse_square_law_in_single_precision() {
 
 #[test]
 fn indirect_light_is_the_converged_value_within_its_standard_error() {
-    let found = read(&s1(CONVERGED));
+    let found = read(&within(2e-3, s1(CONVERGED)));
     let deviations = relative_deviations(&found, &S1_INDIRECT_LX);
-    assert!(worst(&deviations) < 4e-3 && worst_z(&found, &S1_INDIRECT_LX) < 4.0, "{found:?}");
-    assert!(found.estimates.iter().all(|e| e.std_error_lx.unwrap() < 1.05e-3 * e.value_lx), "{found:?}");
+    assert!(worst(&deviations) < 8e-3 && worst_z(&found, &S1_INDIRECT_LX) < 4.0, "{found:?}");
+    assert!(found.estimates.iter().all(|e| e.std_error_lx.unwrap() < 2.01e-3 * e.value_lx), "{found:?}");
 }
 
 #[test]
 fn n_bounces_are_n_diffuse_reflections() {
     let mut seven = s1(Transport::Indirect(Bounces::AtMost(7)));
     // The difference to the converged value is .6 %.
-    seven.budget.relative_error = 5e-4;
+    seven.budget.relative_error = 8e-4;
     let found = read(&seven);
     assert!(worst_z(&found, &S1_SEVEN_LX) < 4.0, "{found:?}");
-    assert!(worst_z(&found, &S1_INDIRECT_LX) > 8.0, "{found:?}");
+    assert!(worst_z(&found, &S1_INDIRECT_LX) > 5.0, "{found:?}");
     let none = read(&s1(Transport::Indirect(Bounces::AtMost(0))));
     assert!(none.estimates.iter().all(|e| e.value_lx == 0.0), "{none:?}");
 }
@@ -74,7 +79,7 @@ fn total_is_direct_plus_indirect() {
     let direct = exact_direct_lx(&total);
     let mut indirect = total.clone();
     indirect.transport = CONVERGED;
-    let (total, indirect) = (read(&total), read(&indirect));
+    let (total, indirect) = (read(&within(2e-3, total)), read(&within(2e-3, indirect)));
     for ((total, indirect), direct) in total.estimates.iter().zip(&indirect.estimates).zip(direct) {
         let sum = direct + indirect.value_lx;
         let error = total.std_error_lx.unwrap().hypot(indirect.std_error_lx.unwrap());
