@@ -60,6 +60,9 @@ def measure(scene, job):
     emitters = list(scene.emitters())
     if len(emitters) != job["emitters"]:
         raise RuntimeError(f"the scene has {len(emitters)} emitters, the job says {job['emitters']}")
+    if job["film"]:
+        block = lambda m, seed: film(scene, job["film"], meters.count, seed)
+        return report.with_readings(*report.blocks(job["transport"], block, meters.count))
     dark = np.zeros(meters.count), np.zeros(meters.count)
     parts = []
     if job["transport"] in ("direct", "total") and emitters:
@@ -73,10 +76,16 @@ def measure(scene, job):
         parts.append(report.blocks("indirect", block, meters.count))
     values = sum((value for value, _ in parts), dark[0])
     errors = np.sqrt(sum((error**2 for _, error in parts), dark[1]))
-    bad = [s["id"] for s, ok in zip(job["stations"], np.isfinite(values) & np.isfinite(errors)) if not ok]
-    if bad:
-        raise RuntimeError(f"illuminance is not finite at {', '.join(bad)}")
-    return report.with_readings(values.tolist(), errors.tolist())
+    return report.with_readings(values, errors)
+
+
+def film(scene, reading, meters, seed):
+    """Illuminance from a rendered film: a tile of pixels a meter, side by side."""
+    image = np.array(mi.render(scene, seed=int(generator(seed, 0).integers(2**32))), np.float64)
+    tile = reading["tile"]
+    if image.shape[:2] != (tile, tile * meters):
+        raise RuntimeError(f"the film measures {image.shape}, not {tile} x {tile} pixels for each of {meters} meters")
+    return reading["factor"] * image[:, :, 0].reshape(tile, meters, tile).mean((0, 2))
 
 
 class Meters:
@@ -216,8 +225,11 @@ class Report:
         return max(2, min(full, math.isqrt(int(affordable))))
 
     def with_readings(self, values, errors):
-        stations = (s["id"] for s in self.job["stations"])
-        readings = [{"id": i, "value": v, "std_error": e} for i, v, e in zip(stations, values, errors)]
+        rows = list(zip((s["id"] for s in self.job["stations"]), values.tolist(), errors.tolist()))
+        bad = [name for name, value, error in rows if not math.isfinite(value + error)]
+        if bad:
+            raise RuntimeError(f"illuminance is not finite at {', '.join(bad)}")
+        readings = [{"id": name, "value": value, "std_error": error} for name, value, error in rows]
         versions = {"mitsuba": mi.__version__, "drjit": dr.__version__}
         settings = {"variant": mi.variant(), **self.settings}
         return {"versions": versions, "readings": readings, "settings": settings, "notes": self.notes}

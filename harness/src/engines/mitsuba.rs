@@ -10,10 +10,12 @@ mod tests;
 
 use std::sync::Mutex;
 
-use luminaire::scene::{LuminaireModel, Shape, Transport};
+use glam::DVec3;
+use luminaire::geometry::Surface;
+use luminaire::scene::{Luminaire, LuminaireModel, Shape, Transport};
 
 use self::backend::Backend;
-use self::settings::Settings;
+use self::settings::{Preset, Settings};
 use super::{Absent, Engine, EngineError, EngineId, Job, Measurement, SceneFile, Site, Support, Version, Workbench};
 
 const ID: EngineId = EngineId("mitsuba");
@@ -40,6 +42,10 @@ impl Engine for Mitsuba {
         let has = |model| job.scene.luminaires.iter().any(|l| l.model == model);
         if has(LuminaireModel::Impostor) {
             return Support::No("Mitsuba has no impostor sources; use the model `point` or `area`".into());
+        }
+        let stock = Settings::of(job).is_ok_and(|s| s.preset == Preset::Default);
+        if let Some(why) = export::obstacle_to_stock(job).filter(|_| stock) {
+            return Support::No(why);
         }
         if let (Some(id), Transport::Indirect(_) | Transport::Total(_)) =
             (luminaire_close_to_a_surface(job), job.transport)
@@ -91,16 +97,23 @@ fn output(what: String) -> EngineError {
     EngineError::Output { engine: ID, what }
 }
 
-/// A luminaire whose light a surface receives at a distance that is tiny against the scene.
+/// A luminaire that lights a surface at a distance that is tiny against the scene.
 fn luminaire_close_to_a_surface(job: &Job) -> Option<&str> {
     let room = job.scene.room?;
     let close_m = CLOSE * room.size_m.max_element();
-    let near = |l: &&luminaire::scene::Luminaire| {
-        let in_box = |shape: &Shape| match shape {
-            Shape::Box { min_m, max_m } => l.position_m.clamp(*min_m, *max_m).distance(l.position_m) < close_m,
-            Shape::Mesh { .. } => false,
-        };
-        !room.contains(l.position_m, close_m) || job.scene.obstacles.iter().any(|o| in_box(&o.shape))
+    let lights = |l: &Luminaire, path: DVec3| path.length() < close_m && l.intensity_towards(path).value() > 0.0;
+    let lights_the_room = |l: &Luminaire, s: Surface| {
+        let distance_m = (l.position_m - room.corners(s)[0]).dot(s.inward_normal());
+        // A flush luminaire, too, has a direction towards its surface.
+        lights(l, -s.inward_normal() * distance_m.max(1e-9 * close_m))
     };
-    job.scene.luminaires.iter().find(near).map(|l| l.id.as_str())
+    let lights_an_obstacle = |l: &Luminaire, shape: &Shape| match shape {
+        Shape::Box { min_m, max_m } => lights(l, l.position_m.clamp(*min_m, *max_m) - l.position_m),
+        Shape::Mesh { .. } => false,
+    };
+    let is_close = |l: &&Luminaire| {
+        Surface::ALL.into_iter().any(|s| lights_the_room(l, s))
+            || job.scene.obstacles.iter().any(|o| lights_an_obstacle(l, &o.shape))
+    };
+    job.scene.luminaires.iter().find(is_close).map(|l| l.id.as_str())
 }

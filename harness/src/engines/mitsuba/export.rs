@@ -5,6 +5,7 @@
 
 mod frame;
 mod opening;
+mod stock;
 mod surfaces;
 mod tables;
 
@@ -12,6 +13,7 @@ use luminaire::scene::{Bounces, Luminaire, Transport};
 use serde::Serialize;
 
 pub(super) use self::frame::Frame;
+pub(super) use self::stock::obstacle_to_stock;
 use self::tables::Tables;
 use super::settings::{Preset, Settings};
 use crate::engines::{EngineError, Job, SceneFile};
@@ -37,6 +39,7 @@ pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, En
         files.extend(surfaces::meshes(job, &frame));
     }
     files.extend(tables.files()?);
+    files.extend(stock::files(job, settings, &frame, &tables));
     Ok(files)
 }
 
@@ -57,9 +60,17 @@ struct DriverJob<'a> {
     relative_error: f64,
     seconds: f64,
     fixed_blocks: u32,
-    fixed_samples: u32,
+    fixed_samples: usize,
+    film: Option<Film>,
     seed: u64,
     stations: Vec<DriverStation<'a>>,
+}
+
+/// How a rendered film is read instead.
+#[derive(Serialize)]
+struct Film {
+    tile: usize,
+    factor: f64,
 }
 
 #[derive(Serialize)]
@@ -70,9 +81,12 @@ struct DriverStation<'a> {
 }
 
 fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, EngineError> {
-    let (fixed_blocks, fixed_samples) = match settings.preset {
-        Preset::Fast => (8, 1024),
-        Preset::Audit | Preset::Default => (0, 0),
+    let film = Film { tile: stock::TILE, factor: stock::pixel_factor(job) };
+    let (fixed_blocks, fixed_samples, scene, film) = match settings.preset {
+        Preset::Audit => (0, 0, "scene.xml", None),
+        Preset::Fast => (8, 1024, "scene.xml", None),
+        // Four samples a pixel are Mitsuba's own choice.
+        Preset::Default => (8, 4 * stock::TILE * stock::TILE, "stock.xml", Some(film)),
     };
     let stations = job.stations.iter().map(|s| DriverStation {
         id: &s.id.0,
@@ -82,7 +96,7 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
     let driver_job = DriverJob {
         case: &job.case,
         procedure: &job.procedure,
-        scene: "scene.xml",
+        scene,
         variant: &settings.variant,
         transport: match job.transport {
             Transport::Direct => "direct",
@@ -95,6 +109,7 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
         seconds: job.budget.seconds,
         fixed_blocks,
         fixed_samples,
+        film,
         seed: job.seed,
         stations: stations.collect(),
     };

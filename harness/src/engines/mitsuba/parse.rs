@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::output;
 use super::precision::float_error_lx;
-use super::settings::Settings;
+use super::settings::{Preset, Settings};
 use crate::engines::{EngineError, Estimate, Job, Measurement};
 
 #[derive(Deserialize)]
@@ -43,7 +43,8 @@ pub(super) fn measurement(stdout: &[u8], job: &Job, settings: &Settings) -> Resu
             return Err(output(format!("gave `{}` where `{}` was asked for", row.id, station.id)));
         }
         // Direct light of points is deterministic: what is left is the rounding of 32-bit floats.
-        let sampled = row.std_error > 0.0 || job.transport != Transport::Direct;
+        let exact = settings.preset != Preset::Default && job.transport == Transport::Direct;
+        let sampled = row.std_error > 0.0 || !exact;
         estimates.push(Estimate {
             value_lx: row.value,
             std_error_lx: sampled.then_some(row.std_error),

@@ -122,6 +122,7 @@ fn diffuse(reflectance: f64) -> String {
     format!(r#"<bsdf type="diffuse"> <rgb name="reflectance" value="{reflectance}"/> </bsdf>"#)
 }
 
-fn list(v: DVec3) -> String {
+/// A vector as Mitsuba reads it.
+pub(super) fn list(v: DVec3) -> String {
     format!("{}, {}, {}", plain(v.x), plain(v.y), plain(v.z))
 }

@@ -34,6 +34,16 @@ impl<'a> Tables<'a> {
         tables
     }
 
+    /// The distributions, each once.
+    pub(super) fn distinct(&self) -> impl Iterator<Item = &'a LuminousIntensityDistribution> {
+        self.distinct.iter().copied()
+    }
+
+    /// Which of them each luminaire has, in the luminaires' order.
+    pub(super) fn indices(&self) -> impl Iterator<Item = usize> {
+        self.of_luminaire.iter().copied()
+    }
+
     /// The file of each luminaire's table, in the luminaires' order.
     pub(super) fn of_luminaires(&self) -> impl Iterator<Item = String> {
         self.of_luminaire.iter().map(|k| name(*k))

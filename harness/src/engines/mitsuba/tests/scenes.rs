@@ -31,7 +31,7 @@ fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
         let mut both = goniometer(&lamp, 0.8, angles.0, angles.1);
         // Close by, the simulator's own sampling of the same opening is the witness.
         let meters: Vec<_> = both.stations.iter().map(|s| s.meter).collect();
-        let accuracy = Accuracy { relative_error: 2e-3, seed: 1 };
+        let accuracy = Accuracy { relative_error: 3e-3, seed: 1 };
         let solution = illuminance(&both.scene, &meters, Transport::Direct, &accuracy).unwrap();
         let near: Vec<_> = solution.estimates.iter().map(|e| e.illuminance.value()).collect();
         let as_points = exact_direct_lx(&both);
@@ -130,4 +130,54 @@ fn bright_rooms_keep_all_their_light() {
     let flux_lm = 400.0 * std::f64::consts::PI;
     let exact_lx = flux_lm * rho / (96.0 * (1.0 - rho));
     assert!((mean_lx / exact_lx - 1.0).abs() < 5e-3, "{mean_lx} for {exact_lx}: {found:?}");
+}
+
+fn with_preset(mut job: Job, preset: &str) -> Job {
+    job.settings.insert("preset".into(), preset.into());
+    job
+}
+
+#[test]
+fn the_stock_scene_reads_the_same_light_within_its_own_errors() {
+    let direct = read(&with_preset(s1(Transport::Direct), "default"));
+    // 16-bit pixels and shadow rays that end short of the light.
+    assert!(worst(&relative_deviations(&direct, &S1_DIRECT_LX)) < 2e-3, "{direct:?}");
+    let indirect = read(&with_preset(s1(CONVERGED), "default"));
+    assert!(worst_z(&indirect, &S1_INDIRECT_LX) < 6.0, "{indirect:?}");
+    assert!(worst(&relative_deviations(&indirect, &S1_INDIRECT_LX)) < 0.08, "{indirect:?}");
+
+    // Turned, lopsided and dimmed, so that an image upside down or mirrored shows.
+    let mut lamp = luminaire("turned", DVec3::new(1.0, 2.0, 3.0), lopsided());
+    lamp.orientation = orientation(30.0, 20.0, 10.0);
+    lamp.flux_scale = 0.7;
+    let angles = [20.0, 90.0, 200.0, 310.0];
+    let goniometer = goniometer(&lamp, 5.0, &angles, &[0.0, 30.0, 85.0, 120.0, 160.0]);
+    let exact = exact_direct_lx(&goniometer);
+    let found = read(&with_preset(goniometer, "default"));
+    assert!(worst(&relative_deviations(&found, &exact)) < 3e-3, "{found:?} for {exact:?}");
+}
+
+#[test]
+fn the_fast_preset_takes_a_fixed_number_of_samples() {
+    let found = read(&with_preset(s1(CONVERGED), "fast"));
+    assert_eq!(found.settings["indirect_blocks"], "8");
+    assert_eq!(found.settings["indirect_samples_a_meter_and_block"], "1024");
+    assert!(worst_z(&found, &S1_INDIRECT_LX) < 6.0, "{found:?}");
+}
+
+#[test]
+fn what_cannot_be_read_well_is_said_beforehand() {
+    let support = |job: &Job| Mitsuba::default().supports(job);
+    assert_eq!(support(&s1(CONVERGED)), Support::Yes);
+    // Panels flush with the ceiling light nothing close by.
+    assert_eq!(support(&s2(CONVERGED)), Support::Yes);
+    assert!(matches!(support(&with_preset(s2(CONVERGED), "default")), Support::No(_)));
+    let mut uplight = s1(CONVERGED);
+    uplight.scene.luminaires[0].position_m.z = 19.99;
+    assert!(matches!(support(&uplight), Support::Approximate { .. }));
+    uplight.transport = Transport::Direct;
+    assert_eq!(support(&uplight), Support::Yes);
+    let mut impostor = s1(Transport::Direct);
+    impostor.scene.luminaires[0].model = LuminaireModel::Impostor;
+    assert!(matches!(support(&impostor), Support::No(_)));
 }

@@ -1,0 +1,269 @@
+//! `stock.xml`: the same scene for Mitsuba as it is installed, without Python.
+//!
+//! Mitsuba has no goniometric emitter. A `point` inside a sphere that lets through I / Imax in every direction is one:
+//! the sphere is a `mask` whose opacity is a latitude-longitude image, around a dielectric without refraction, so that
+//! paths go straight through it and only connections to the light are dimmed.
+
+use glam::DVec3;
+use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
+use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Shape, Transport};
+
+use super::frame::Frame;
+use super::surfaces::list;
+use super::tables::Tables;
+use super::{comment_text, has_surfaces, header, integrator};
+use crate::engines::mitsuba::settings::{Preset, Settings};
+use crate::engines::{Job, SceneFile, Station};
+
+/// Pixels along a side of a meter's tile: more samples in one pixel would drown in its 32-bit sum.
+pub(super) const TILE: usize = 16;
+/// Meters that fit side by side on a film.
+const MOST_METERS: usize = 256;
+/// Radius of the filter sphere in parts of the scene's size ...
+const RADIUS: f64 = 7e-3;
+/// ... and where it is lost: Mitsuba ends shadow rays 8.9e-4 of their length before the light.
+const LEAST_RADIUS: f64 = 1.8e-3;
+/// Radius of a meter's patch in parts of the scene's size.
+const PATCH: f64 = 3e-4;
+/// Rows of an opacity image: a quarter of a degree.
+const ROWS: usize = 721;
+/// Its columns, if the luminaire is not axially symmetric: a degree.
+const COLUMNS: usize = 360;
+
+/// A sensor of a batch shows its tile of the batch's film but insists on a film of its own.
+const ONE_PIXEL: &str = r#"<film type="hdrfilm"> <integer name="width" value="1"/> <integer name="height" value="1"/> <rfilter type="box"/> </film>"#;
+
+/// Why the stock scene cannot be had, if so.
+pub(in crate::engines::mitsuba) fn obstacle_to_stock(job: &Job) -> Option<String> {
+    if job.scene.luminaires.iter().any(|l| l.model != LuminaireModel::Point) {
+        return Some("a stock Mitsuba scene has goniometric light from points only".into());
+    }
+    if job.stations.len() > MOST_METERS {
+        return Some(format!("a stock Mitsuba scene reads {MOST_METERS} meters at most"));
+    }
+    let size_m = size_m(job);
+    job.scene.luminaires.iter().find(|l| radius_m(job, l) < LEAST_RADIUS * size_m).map(|l| {
+        format!("`{}` is so close to something else that the sphere which shapes its light would be lost", l.id)
+    })
+}
+
+/// The scene and its images; nothing where it cannot be had.
+pub(super) fn files(job: &Job, settings: &Settings, frame: &Frame, tables: &Tables) -> Vec<SceneFile> {
+    if obstacle_to_stock(job).is_some() {
+        return vec![];
+    }
+    let images = tables.distinct().enumerate().map(|(k, d)| SceneFile { name: image_name(k), bytes: opacity_pfm(d) });
+    let mut files = vec![SceneFile::text("stock.xml", xml(job, settings, frame, tables))];
+    files.extend(images);
+    files
+}
+
+/// What a pixel is multiplied with to be an illuminance: a white patch's radiance or an irradiance.
+pub(super) fn pixel_factor(job: &Job) -> f64 {
+    if reads_patches(job) { std::f64::consts::PI } else { 1.0 }
+}
+
+/// An irradiancemeter never meets a point light: it reads indirect light, and a white patch the rest.
+fn reads_patches(job: &Job) -> bool {
+    !matches!(job.transport, Transport::Indirect(_))
+}
+
+fn xml(job: &Job, settings: &Settings, frame: &Frame, tables: &Tables) -> String {
+    let what = format!(
+        "For Mitsuba without Python; render with\n         mitsuba -m {} stock.xml\n     Every meter is a tile of {TILE} x {TILE} \
+         pixels, in the order of job.json: illuminance is the mean of its pixels{}.",
+        settings.variant,
+        if reads_patches(job) { " times pi" } else { "" }
+    );
+    let mut xml = header(job, &what) + &frame.comment() + &integrator(&patched(job), "volpath");
+    if has_surfaces(job) {
+        xml += "    <include filename=\"room.xml\"/>\n";
+    }
+    let luminaires = job.scene.luminaires.iter().zip(tables.indices());
+    xml.extend(luminaires.map(|(luminaire, table)| filtered_point(job, luminaire, table, frame)));
+    xml + &meters(job, settings, frame) + "</scene>\n"
+}
+
+/// The job with a path that also reflects from a white patch.
+fn patched(job: &Job) -> Job {
+    let transport = match job.transport {
+        Transport::Direct => Transport::Total(Bounces::AtMost(1)),
+        Transport::Total(Bounces::AtMost(n)) => Transport::Total(Bounces::AtMost(n + 1)),
+        other => other,
+    };
+    Job { transport, ..job.clone() }
+}
+
+fn filtered_point(job: &Job, luminaire: &Luminaire, table: usize, frame: &Frame) -> String {
+    let peak_cd = luminaire.photometry.distribution.max_intensity().value();
+    let rows = ROWS as f64;
+    let columns = columns(&luminaire.photometry.distribution) as f64;
+    format!(
+        r#"
+    <!-- {id} -->
+    <emitter type="point">
+        <point name="position" value="{at}"/>
+        <rgb name="intensity" value="{intensity}"/>
+    </emitter>
+    <shape type="sphere">
+        <float name="radius" value="{radius}"/>
+        <transform name="to_world">
+            <matrix value="{matrix}"/>
+        </transform>
+        <bsdf type="mask">
+            <texture type="bitmap" name="opacity">
+                <string name="filename" value="{image}"/>
+                <boolean name="raw" value="true"/>
+                <string name="format" value="variant"/>
+                <!-- first and last row at the poles, column k at C = k x {step} degrees -->
+                <transform name="to_uv">
+                    <scale x="1" y="{scale_y}"/>
+                    <translate x="{shift_x}" y="{shift_y}"/>
+                </transform>
+            </texture>
+            <bsdf type="dielectric"> <float name="int_ior" value="1"/> <float name="ext_ior" value="1"/> </bsdf>
+        </bsdf>
+    </shape>
+"#,
+        id = comment_text(&luminaire.id),
+        at = list(frame.to_scene(luminaire.position_m)),
+        intensity = peak_cd * luminaire.flux_scale * frame.scale * frame.scale,
+        radius = radius_m(job, luminaire) * frame.scale,
+        matrix = frame.matrix(luminaire.position_m, luminaire.orientation),
+        image = image_name(table),
+        step = 360.0 / columns,
+        scale_y = (rows - 1.0) / rows,
+        shift_x = 0.5 / columns,
+        shift_y = 0.5 / rows,
+    )
+}
+
+fn meters(job: &Job, settings: &Settings, frame: &Frame) -> String {
+    // Mitsuba's own film keeps 16 bits.
+    let component = match settings.preset {
+        Preset::Default => "",
+        Preset::Audit | Preset::Fast => "\n            <string name=\"component_format\" value=\"float32\"/>",
+    };
+    let samples = match settings.preset {
+        Preset::Default => "",
+        Preset::Audit | Preset::Fast => " <integer name=\"sample_count\" value=\"256\"/> ",
+    };
+    let size = size_m(job) * frame.scale;
+    let meter = |s: &Station| {
+        if reads_patches(job) { patch_and_eye(s, frame, size) } else { irradiance_meter(s, frame, size) }
+    };
+    let (sensors, patches): (Vec<_>, Vec<_>) = job.stations.iter().map(meter).unzip();
+    format!(
+        r#"
+    <!-- the meters, side by side; a box filter keeps them apart -->
+    <sensor type="batch">
+        <film type="hdrfilm">
+            <integer name="width" value="{width}"/>
+            <integer name="height" value="{TILE}"/>
+            <rfilter type="box"/>
+            <string name="pixel_format" value="luminance"/>{component}
+        </film>
+        <sampler type="independent">{samples}</sampler>
+{sensors}    </sensor>
+{patches}"#,
+        width = TILE * job.stations.len(),
+        sensors = sensors.concat(),
+        patches = patches.concat(),
+    )
+}
+
+/// A white patch and an eye in front of it.
+fn patch_and_eye(station: &Station, frame: &Frame, size: f64) -> (String, String) {
+    let (at, normal) = (frame.to_scene(station.meter.position_m), station.meter.normal);
+    let radius = PATCH * size;
+    let id = comment_text(&station.id.0);
+    let eye = format!(
+        r#"        <sensor type="radiancemeter"> <!-- {id} -->
+            <point name="origin" value="{}"/>
+            <vector name="direction" value="{}"/>
+            {ONE_PIXEL}
+        </sensor>
+"#,
+        list(at + 2.0 * radius * normal),
+        list(-normal)
+    );
+    let patch = format!(
+        r#"    <shape type="disk"> <!-- {id} -->
+        {}
+        <bsdf type="diffuse"> <rgb name="reflectance" value="1"/> </bsdf>
+    </shape>
+"#,
+        disk_transform(at, normal, radius)
+    );
+    (eye, patch)
+}
+
+fn irradiance_meter(station: &Station, frame: &Frame, size: f64) -> (String, String) {
+    let (at, normal) = (frame.to_scene(station.meter.position_m), station.meter.normal);
+    let meter = format!(
+        r#"        <shape type="disk"> <!-- {} -->
+            {}
+            <sensor type="irradiancemeter"> {ONE_PIXEL} </sensor>
+        </shape>
+"#,
+        comment_text(&station.id.0),
+        disk_transform(at, normal, PATCH * size)
+    );
+    (meter, String::new())
+}
+
+fn disk_transform(at: DVec3, normal: DVec3, radius: f64) -> String {
+    let up = if normal.z.abs() > 0.5 { DVec3::Y } else { DVec3::Z };
+    format!(
+        r#"<transform name="to_world"> <scale value="{radius}"/> <lookat origin="{}" target="{}" up="{}"/> </transform>"#,
+        list(at),
+        list(at + normal),
+        list(up)
+    )
+}
+
+/// The filter sphere's radius: no meter, luminaire, box or surface may lie within it.
+fn radius_m(job: &Job, luminaire: &Luminaire) -> f64 {
+    let at = luminaire.position_m;
+    let meters = job.stations.iter().map(|s| s.meter.position_m.distance(at));
+    let others = job.scene.luminaires.iter().map(|l| l.position_m.distance(at)).filter(|d| *d > 0.0);
+    let walls = job.scene.room.iter().map(|r| at.min(r.size_m - at).min_element());
+    let boxes = job.scene.obstacles.iter().filter_map(|o| match &o.shape {
+        Shape::Box { min_m, max_m } => Some(at.clamp(*min_m, *max_m).distance(at)),
+        Shape::Mesh { .. } => None,
+    });
+    let nearest = meters.chain(others).chain(walls).chain(boxes).fold(f64::INFINITY, f64::min);
+    (RADIUS * size_m(job)).min(0.5 * nearest)
+}
+
+/// The longest distance that light travels in one piece, in metres.
+fn size_m(job: &Job) -> f64 {
+    let lamps = job.scene.luminaires.iter().map(|l| l.position_m);
+    let meters = || job.stations.iter().map(|s| s.meter.position_m);
+    let reach = lamps.flat_map(|l| meters().map(move |m| m.distance(l))).fold(0.0, f64::max);
+    job.scene.room.map_or(reach, |r| r.size_m.length())
+}
+
+fn image_name(table: usize) -> String {
+    format!("opacity-{table}.pfm")
+}
+
+fn columns(distribution: &LuminousIntensityDistribution) -> usize {
+    if distribution.symmetry() == Symmetry::Axial { 2 } else { COLUMNS }
+}
+
+/// 1 - I / Imax over gamma (zenith first) and C, as a portable float map, whose rows go from the bottom up.
+fn opacity_pfm(distribution: &LuminousIntensityDistribution) -> Vec<u8> {
+    let columns = columns(distribution);
+    let peak = distribution.max_intensity().value();
+    let mut bytes = format!("Pf\n{columns} {ROWS}\n-1.0\n").into_bytes();
+    for row in 0..ROWS {
+        let gamma_deg = 180.0 * row as f64 / (ROWS - 1) as f64;
+        for column in 0..columns {
+            let intensity = distribution.intensity(360.0 * column as f64 / columns as f64, gamma_deg).value();
+            let transmitted = if peak > 0.0 { intensity / peak } else { 0.0 };
+            bytes.extend(((1.0 - transmitted) as f32).to_le_bytes());
+        }
+    }
+    bytes
+}
