@@ -13,9 +13,12 @@ use crate::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape};
 use crate::units::Lux;
 
 /// Direct illuminance of a meter: the sum over luminaires that no obstacle hides, 0 behind the meter's plane.
+///
+/// Exact for point models. For extended ones the validity states the five-times rule of the luminaire that is nearest in
+/// terms of its size.
 pub fn direct_illuminance(scene: &Scene, meter: &Meter) -> Result<Calculated, NotApplicable> {
     let mut sum = Lux(0.0);
-    let mut objections = vec![];
+    let mut nearest: Option<(FiveTimesRule, &Luminaire)> = None;
     for luminaire in &scene.luminaires {
         if luminaire.position_m == meter.position_m {
             let reason = format!("the meter lies at the photometric centre of `{}`; move either", luminaire.id);
@@ -24,11 +27,15 @@ pub fn direct_illuminance(scene: &Scene, meter: &Meter) -> Result<Calculated, No
         let hidden = scene.obstacles.iter().any(|obstacle| blocks(obstacle, meter.position_m, luminaire.position_m));
         let contribution = if hidden { Lux(0.0) } else { from_luminaire(luminaire, meter) };
         sum = sum + contribution;
-        if luminaire.model != LuminaireModel::Point {
-            objections.extend(FiveTimesRule::check(luminaire, meter).objection(luminaire));
+        if luminaire.model != LuminaireModel::Point && contribution.value() > 0.0 {
+            let rule = FiveTimesRule::check(luminaire, meter);
+            if nearest.is_none_or(|(other, _)| rule.distance_over_size < other.distance_over_size) {
+                nearest = Some((rule, luminaire));
+            }
         }
     }
-    Ok(Calculated { illuminance: sum, validity: Validity::from_objections(&objections) })
+    let objection = nearest.and_then(|(rule, luminaire)| rule.objection(luminaire));
+    Ok(Calculated { illuminance: sum, validity: Validity::from_objections(objection.as_slice()) })
 }
 
 /// What one luminaire gives a meter when nothing stands between.
@@ -72,7 +79,7 @@ impl FiveTimesRule {
             return None;
         }
         let error = match self.lambertian_error {
-            Some(error) => format!("a Lambertian opening of its size would read {:+.2} % too much", 100.0 * error),
+            Some(error) => format!("for a Lambertian opening of its size the method errs by {:+.2} %", 100.0 * error),
             None => format!("its extent matters by up to about {:.2} %", 100.0 * FAR_ERROR / self.k2()),
         };
         let rule = if self.holds() { "" } else { ", closer than the five-times rule allows" };

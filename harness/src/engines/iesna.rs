@@ -34,8 +34,8 @@ impl Engine for Iesna {
                 Validity::No(why) => return Support::No(format!("{}: {why}", station.id)),
             }
         }
+        let mut objections = in_short(objections);
         objections.extend(cut(job.transport).map(str::to_owned));
-        objections.dedup();
         if objections.is_empty() {
             return Support::Yes;
         }
@@ -49,7 +49,7 @@ impl Engine for Iesna {
     fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
         let mut measurement = Measurement::default();
         measurement.settings.insert("method".into(), method(job.transport).into());
-        measurement.notes.extend(cut(job.transport).map(str::to_owned));
+        let mut notes = vec![];
         for station in &job.stations {
             let what = |error: NotApplicable| format!("{}: {error}", station.id);
             let calculated = calculate(job, &station.meter)
@@ -60,12 +60,24 @@ impl Engine for Iesna {
             let error_bound_lx = exact.then_some(ROUNDING * value_lx);
             measurement.estimates.push(Estimate { value_lx, std_error_lx: None, error_bound_lx });
             if let Validity::Approximate(why) = calculated.validity {
-                measurement.notes.push(why);
+                notes.push(why);
             }
         }
-        measurement.notes.dedup();
+        measurement.notes = in_short(notes);
+        measurement.notes.extend(cut(job.transport).map(str::to_owned));
         checked(ID, job, measurement)
     }
+}
+
+/// The first of many objections that differ only in their figures, and how many more there are.
+fn in_short(mut objections: Vec<String>) -> Vec<String> {
+    objections.dedup();
+    if objections.len() > 2 {
+        let more = objections.len() - 1;
+        objections.truncate(1);
+        objections[0].push_str(&format!(" (and the like at {more} more meters)"));
+    }
+    objections
 }
 
 fn calculate(job: &Job, meter: &Meter) -> Result<Calculated, NotApplicable> {
