@@ -26,6 +26,13 @@ pub struct Published {
 #[derive(Clone, Debug, Deserialize)]
 struct Citation {
     title: String,
+    /// What the values are, where they are not a paper's.
+    #[serde(default = "published")]
+    basis: Basis,
+}
+
+const fn published() -> Basis {
+    Basis::Published
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -116,7 +123,8 @@ impl Published {
             return vec![];
         };
         let Some(row) = table.rows.iter().find(|r| r.is_at(target)) else { return vec![] };
-        let closed_form = matches!(task.transport, Transport::Direct);
+        // Derived values judge every engine, whatever they are of.
+        let closed_form = matches!(task.transport, Transport::Direct) || self.citation.basis != Basis::Published;
         let compared = |column: &Column| {
             let same_bounces = match (column.bounces.filter(|_| table.bounces.is_some()), task.transport) {
                 (Some(n), Transport::Indirect(b) | Transport::Total(b)) => b == Bounces::AtMost(n),
@@ -131,7 +139,7 @@ impl Published {
                 value: cell.value,
                 // A rectangular distribution over the rounding interval (GUM 4.3.7).
                 uncertainty: cell.half_width / 3f64.sqrt(),
-                basis: Basis::Published,
+                basis: self.citation.basis,
                 source: format!("{}, {}, {name}: {}", self.citation.title, table.name, column.meaning),
             })
         };
@@ -166,6 +174,15 @@ impl Row {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn derived_values_say_what_they_rest_on() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/analytic/values");
+        for (name, basis) in [("cie-5.6", Basis::ClosedForm), ("s2", Basis::Exact)] {
+            let published = Published::read(&folder.join(format!("{name}.yaml"))).unwrap();
+            assert_eq!(published.citation.basis, basis, "{name}");
+        }
+    }
 
     #[test]
     fn a_cell_stands_for_the_interval_of_its_printed_digits() {
