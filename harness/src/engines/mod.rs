@@ -7,6 +7,7 @@ mod fixtures;
 mod iesna;
 mod install;
 mod mitsuba;
+mod povray;
 mod radiance;
 mod simulator;
 mod site;
@@ -33,6 +34,7 @@ pub fn all() -> Vec<Box<dyn Engine>> {
         Box::new(iesna::Iesna),
         Box::new(mitsuba::Mitsuba::default()),
         Box::new(radiance::Radiance),
+        Box::new(povray::PovRay),
     ]
 }
 

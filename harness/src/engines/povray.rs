@@ -1,0 +1,206 @@
+//! POV-Ray 3.7: meters as discs seen by a mesh camera, radiosity in independent blocks of a turned scene.
+//!
+//! Direct light is exact to its float colours. Radiosity interpolates a cache of irradiance (Ward, Rubinstein & Clear,
+//! SIGGRAPH 1988), deterministically: each block turns the whole scene by another rotation, which gives it other sample
+//! directions and other cache points, so that the blocks' spread is an honest standard error of their mean. What all blocks
+//! share, the bias of the interpolation, is named beside it.
+
+mod blocks;
+mod export;
+mod frame;
+mod opening;
+mod pigment;
+mod pixels;
+mod settings;
+
+#[cfg(test)]
+mod cases;
+#[cfg(test)]
+mod tests;
+
+use luminaire::geometry::{Room, Surface};
+use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
+
+use super::{
+    Absent, Engine, EngineError, EngineId, Estimate, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
+    checked,
+};
+use export::Light;
+use settings::{Preset, Settings};
+
+/// The engine's name.
+const ID: EngineId = EngineId("povray");
+
+/// POV-Ray.
+pub(super) struct PovRay;
+
+impl Engine for PovRay {
+    fn id(&self) -> EngineId {
+        ID
+    }
+
+    fn probe(&self, site: &Site) -> Result<Version, Absent> {
+        let remedy = || "run `luxproof engines install`, or install the Debian package povray".to_owned();
+        let absent = |reason| Absent { reason, remedy: remedy() };
+        let program = blocks::program(site).map_err(|e| absent(e.to_string()))?;
+        let folder = tempfile::tempdir().map_err(|e| absent(e.to_string()))?;
+        let limit = std::time::Duration::from_secs(20);
+        let invocation = crate::process::Invocation::new(program, folder.path(), limit, folder.path().join("log"));
+        let done = blocks::hermetic(invocation, site).args(["--version"]).run().map_err(|e| absent(e.to_string()))?;
+        let said = format!("{}\n{}", String::from_utf8_lossy(&done.stdout), done.stderr);
+        let version = said.lines().find_map(|l| l.trim().strip_prefix("POV-Ray "));
+        let version = version.and_then(|v| v.split_whitespace().next());
+        version.map(|v| Version(v.to_owned())).ok_or_else(|| absent("povray does not tell its version".to_owned()))
+    }
+
+    fn supports(&self, job: &Job) -> Support {
+        support(job)
+    }
+
+    fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
+        let settings = Settings::of(job)?;
+        let ini =
+            "; POV-Ray takes this file for the user's and the system's povray.ini, which could change settings.\n";
+        Ok(vec![export::scene(job, &settings), SceneFile::text("povray.ini", ini)])
+    }
+
+    fn command_by_hand(&self, job: &Job) -> Option<String> {
+        let command =
+            |light, image: &str| format!("povray {}", export::arguments(job.stations.len(), light, 0, image).join(" "));
+        Some(match job.transport {
+            Transport::Direct => command(Light::Direct, "direct.ppm"),
+            Transport::Indirect(_) => command(Light::Indirect, "indirect.ppm"),
+            Transport::Total(_) => {
+                [command(Light::Direct, "direct.ppm"), command(Light::Indirect, "indirect.ppm")].join("; ")
+            }
+        })
+    }
+
+    fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
+        let settings = Settings::of(job)?;
+        workbench.write(&self.export(job)?)?;
+        let bench = blocks::Bench::new(job, workbench, &settings)?;
+        let measurement = match job.transport {
+            Transport::Direct | Transport::Total(Bounces::AtMost(0)) => bench.direct()?,
+            Transport::Indirect(Bounces::AtMost(0)) => darkness(job),
+            Transport::Indirect(_) => bench.indirect()?,
+            Transport::Total(_) => sum(&bench.direct()?, bench.indirect()?),
+        };
+        checked(ID, job, measurement)
+    }
+}
+
+fn darkness(job: &Job) -> Measurement {
+    let dark = Estimate { value_lx: 0.0, std_error_lx: None, error_bound_lx: Some(0.0) };
+    let notes = vec!["nothing that was never reflected is indirect: not rendered".to_owned()];
+    Measurement { estimates: vec![dark; job.stations.len()], notes, ..Measurement::default() }
+}
+
+/// Direct and indirect light together; the direct part's bound is far below the indirect part's standard error.
+fn sum(direct: &Measurement, mut indirect: Measurement) -> Measurement {
+    for (total, part) in indirect.estimates.iter_mut().zip(&direct.estimates) {
+        total.value_lx += part.value_lx;
+        let squares = total.std_error_lx.map(|e| e.hypot(part.error_bound_lx.unwrap_or(0.0)));
+        total.std_error_lx = squares;
+    }
+    for (key, value) in &direct.settings {
+        indirect.settings.entry(key.clone()).or_insert_with(|| value.clone());
+    }
+    indirect
+}
+
+fn support(job: &Job) -> Support {
+    for luminaire in &job.scene.luminaires {
+        if let Some(why) = unsupported_luminaire(luminaire) {
+            return Support::No(why);
+        }
+    }
+    if let Some(why) = filters_in_the_way(job) {
+        return Support::No(why);
+    }
+    let bounces = match job.transport {
+        Transport::Direct => return Support::Yes,
+        Transport::Indirect(bounces) | Transport::Total(bounces) => bounces,
+    };
+    let Some(room) = job.scene.room else {
+        return Support::No("in free field nothing reflects: there is no room to gather light from".to_owned());
+    };
+    let preset = Settings::of(job).map_or(Preset::Audit, |s| s.preset);
+    cache_error(mean_reflectance(&room), bounces, preset)
+}
+
+/// The bias of radiosity's cache, as measured against exact values, and what twenty reflections leave out.
+fn cache_error(mean_reflectance: f64, bounces: Bounces, preset: Preset) -> Support {
+    let interpolation = match preset {
+        Preset::Audit if mean_reflectance >= 0.9 => 0.09,
+        Preset::Audit => AUDIT_BIAS,
+        Preset::Default => 0.26,
+        Preset::Fast => 0.05,
+    };
+    let cut = match bounces {
+        Bounces::AtMost(n) if n <= settings::DEEPEST => 0.0,
+        _ => mean_reflectance.powi(settings::DEEPEST as i32),
+    };
+    let mut why =
+        "radiosity interpolates a cache of irradiance (Ward et al. 1988), whose bias all blocks share".to_owned();
+    if cut > 1e-3 {
+        why.push_str("; POV-Ray follows 20 reflections at most");
+    }
+    Support::Approximate { why, size: Some(interpolation + cut) }
+}
+
+/// Largest mean deviation of the audit preset from exact values, relative: see `tests::audit_bias_is_within_what_is_named`.
+const AUDIT_BIAS: f64 = 0.005;
+
+fn unsupported_luminaire(luminaire: &Luminaire) -> Option<String> {
+    let id = &luminaire.id;
+    let planes = luminaire.photometry.distribution.full_circle().c_deg().len();
+    if planes > pigment::MOST_ENTRIES {
+        return Some(format!("{id} has {planes} C planes; a map of POV-Ray holds {}", pigment::MOST_ENTRIES));
+    }
+    match luminaire.model {
+        LuminaireModel::Impostor => Some(format!("{id}: POV-Ray has no impostor surfaces")),
+        LuminaireModel::Area if opening::parts(luminaire.photometry.opening, 1).is_none() => {
+            Some(format!("{id}: only flat luminous openings are modelled in POV-Ray"))
+        }
+        _ => None,
+    }
+}
+
+/// A luminaire's filter dims whatever passes through it: another luminaire's light towards a meter must not.
+fn filters_in_the_way(job: &Job) -> Option<String> {
+    let recentring = Settings::of(job).map_or(settings::Recentring::On, |s| s.recentre);
+    let radius_m = 1.5 * export::FILTER_RADIUS / frame::Frame::of(job, recentring).scale;
+    let lit: Vec<&Luminaire> = job.scene.luminaires.iter().filter(|l| export::candela(l) > 0.0).collect();
+    for (k, a) in lit.iter().enumerate() {
+        for (_, b) in lit.iter().enumerate().filter(|(j, _)| *j != k) {
+            if a.position_m.distance(b.position_m) < 2.0 * radius_m {
+                return Some(format!(
+                    "{} and {} are at the same point, where POV-Ray would filter both by either",
+                    a.id, b.id
+                ));
+            }
+            let passes = |p: glam::DVec3| distance_to_segment(b.position_m, a.position_m, p) < radius_m;
+            if let Some(station) = job.stations.iter().find(|s| passes(s.meter.position_m)) {
+                return Some(format!("{} lies between {} and {}, and would filter its light", b.id, a.id, station.id));
+            }
+        }
+        let near = job.stations.iter().find(|s| a.position_m.distance(s.meter.position_m) < 2.0 * radius_m);
+        if let Some(station) = near {
+            return Some(format!("{} is inside the filter of {}", station.id, a.id));
+        }
+    }
+    None
+}
+
+fn distance_to_segment(point: glam::DVec3, from: glam::DVec3, to: glam::DVec3) -> f64 {
+    let along = to - from;
+    let t = ((point - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    point.distance(from + t * along)
+}
+
+/// Reflectance of the room, averaged over area.
+fn mean_reflectance(room: &Room) -> f64 {
+    let over = |f: &dyn Fn(Surface) -> f64| Surface::ALL.iter().map(|&s| f(s)).sum::<f64>();
+    over(&|s| room.area_m2(s) * room.reflectance.of(s)) / over(&|s| room.area_m2(s))
+}

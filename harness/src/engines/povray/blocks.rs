@@ -1,0 +1,315 @@
+//! Runs POV-Ray: direct light in a few looks of rising magnification, reflected light in blocks until the budget is met.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::thread;
+use std::time::Instant;
+
+use crate::engines::{EngineError, Estimate, Job, Measurement, SceneFile, Site, Workbench, mean_and_std_error};
+use crate::process::Invocation;
+
+use super::ID;
+use super::export::{self, Light};
+use super::pixels::{self, Readout, Seen};
+use super::settings::{Preset, Settings};
+
+/// Independent blocks of radiosity at least.
+const FEWEST_BLOCKS: usize = 8;
+/// Rays a sample at least, where the budget is short.
+const FEWEST_RAYS: f64 = 25.0;
+/// Looks at direct light at most: each narrows a reading by 1e3 at least.
+const MOST_LOOKS: usize = 10;
+/// Below this share of its upper bound a reading is darkness.
+const DARK: f64 = 1e-12;
+
+/// Where a job's runs happen.
+pub(super) struct Bench<'a> {
+    job: &'a Job,
+    workbench: &'a Workbench,
+    settings: &'a Settings,
+    program: PathBuf,
+}
+
+/// The program at a site.
+pub(super) fn program(site: &Site) -> Result<PathBuf, EngineError> {
+    let what = "povray is not installed; run `luxproof engines install`".to_owned();
+    site.program("povray").ok_or(EngineError::Solver { engine: ID, what })
+}
+
+/// An invocation that finds the libraries of an unpacked Debian package.
+pub(super) fn hermetic(invocation: Invocation, site: &Site) -> Invocation {
+    if !invocation.program.starts_with(site.debian()) {
+        return invocation;
+    }
+    let triple = format!("usr/lib/{}-linux-gnu", std::env::consts::ARCH);
+    invocation.env("LD_LIBRARY_PATH", site.debian().join(triple).into_os_string())
+}
+
+/// One run's choices.
+#[derive(Clone, Copy)]
+struct Run {
+    light: Light,
+    seed: u32,
+    count: u32,
+}
+
+impl<'a> Bench<'a> {
+    /// A bench for a job.
+    pub(super) fn new(job: &'a Job, workbench: &'a Workbench, settings: &'a Settings) -> Result<Self, EngineError> {
+        Ok(Self { job, workbench, settings, program: program(&workbench.site)? })
+    }
+
+    /// Direct light: deterministic, read at rising magnification until the read-out no longer matters.
+    pub(super) fn direct(&self) -> Result<Measurement, EngineError> {
+        let run = Run { light: Light::Direct, seed: 0, count: self.settings.count };
+        let first = export::first_readouts(self.job, Light::Direct);
+        let mut looks: Vec<Look> = first.iter().map(|r| Look::Again(*r)).collect();
+        let mut taken = 0;
+        while looks.iter().any(|l| matches!(l, Look::Again(_))) {
+            if taken == MOST_LOOKS {
+                return Err(output(format!("direct light was not read after {MOST_LOOKS} looks")));
+            }
+            taken += 1;
+            let readouts: Vec<Readout> = looks.iter().map(Look::readout).collect();
+            let seen = self.look(run, &readouts)?;
+            for (k, look) in looks.iter_mut().enumerate() {
+                if let Look::Again(readout) = *look {
+                    *look = next_look(readout, seen[k], scale_of(first[k]));
+                }
+            }
+        }
+        let mut estimates = vec![];
+        for (look, scale) in looks.iter().zip(&first) {
+            let Look::Done { lx, resolution_lx } = *look else { continue };
+            // Bilinear maps in single precision are off by a share of the largest intensity, not of this one.
+            let bound = resolution_lx + DIRECT_RELATIVE * lx + self.table_error() * scale_of(*scale);
+            estimates.push(Estimate { value_lx: lx, std_error_lx: None, error_bound_lx: Some(bound) });
+        }
+        let mut settings = self.common_settings(run);
+        settings.insert("looks".into(), taken.to_string());
+        Ok(Measurement { estimates, settings, notes: vec![] })
+    }
+
+    /// Reflected light: blocks of turned scenes.
+    pub(super) fn indirect(&self) -> Result<Measurement, EngineError> {
+        let start = Instant::now();
+        let budget = self.job.budget;
+        let mut run = Run { light: Light::Indirect, seed: self.seed(0), count: self.settings.count };
+        let pilot = self.pilot(run)?;
+        let jobs = self.workbench.jobs.max(1);
+        let mut notes = vec![];
+        let left_s = budget.seconds - start.elapsed().as_secs_f64();
+        let waves = FEWEST_BLOCKS.div_ceil(jobs) as f64;
+        // Time grows a little faster than rays.
+        let share = (0.9 * left_s / (waves * pilot.wall_s)).max(1e-3).powf(0.8);
+        if share < 1.0 && self.settings.preset == Preset::Audit {
+            run.count = (f64::from(run.count) * share).max(FEWEST_RAYS) as u32;
+            notes.push(format!("{} rays a sample instead of {}: the budget is short", run.count, self.settings.count));
+        }
+        self.keep_readouts(&pilot.readouts)?;
+        let mut blocks: Vec<Vec<f64>> = vec![];
+        let mut wave_s = pilot.wall_s;
+        loop {
+            let wave = Instant::now();
+            let first = blocks.len() + 1;
+            blocks.extend(self.wave(run, first, jobs, &pilot)?);
+            wave_s = wave_s.max(wave.elapsed().as_secs_f64());
+            let over = start.elapsed().as_secs_f64() + wave_s > budget.seconds;
+            if blocks.len() >= FEWEST_BLOCKS && (over || worst_error(&blocks) <= budget.relative_error) {
+                break;
+            }
+        }
+        let estimates = (0..self.job.stations.len()).map(|k| {
+            let (value_lx, std_error_lx) = mean_and_std_error(&of_station(&blocks, k));
+            Estimate { value_lx, std_error_lx, error_bound_lx: None }
+        });
+        let mut settings = self.common_settings(run);
+        settings.insert("blocks".into(), blocks.len().to_string());
+        settings.insert("seeds".into(), format!("{}..={}", self.seed(1), self.seed(blocks.len())));
+        settings.insert("count".into(), run.count.to_string());
+        settings.insert("error_bound".into(), self.settings.error_bound.to_string());
+        settings.insert("recursion_limit".into(), self.settings.recursion_limit.to_string());
+        Ok(Measurement { estimates: estimates.collect(), settings, notes })
+    }
+
+    /// A first block, which finds each meter's scale and how long a block takes.
+    fn pilot(&self, run: Run) -> Result<Pilot, EngineError> {
+        let mut readouts = export::first_readouts(self.job, Light::Indirect);
+        let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();
+        let mut dark = vec![false; readouts.len()];
+        for _ in 0..MOST_LOOKS {
+            let start = Instant::now();
+            let seen = self.look(run, &readouts)?;
+            let wall_s = start.elapsed().as_secs_f64();
+            let mut settled = true;
+            for (k, seen) in seen.into_iter().enumerate() {
+                let scale = match seen {
+                    // The blue channel holds a 1.5 times larger reading yet.
+                    Seen::Value { lx, .. } => 400.0 * lx,
+                    Seen::Below(limit) if limit < 1e-6 * upper[k] => {
+                        dark[k] = true;
+                        scale_of(readouts[k])
+                    }
+                    Seen::Below(limit) => {
+                        settled = false;
+                        4.0 * limit
+                    }
+                    Seen::Above => {
+                        settled = false;
+                        1e3 * scale_of(readouts[k])
+                    }
+                    Seen::Missed => return Err(self.missed(k)),
+                };
+                readouts[k] = Readout::Coarse(scale);
+            }
+            if settled {
+                return Ok(Pilot { readouts, dark, wall_s });
+            }
+        }
+        Err(output(format!("reflected light was not read after {MOST_LOOKS} looks")))
+    }
+
+    /// Several blocks side by side, each a process of one thread.
+    fn wave(&self, run: Run, first: usize, jobs: usize, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
+        thread::scope(|scope| {
+            let block = |k: usize| {
+                let run = Run { seed: self.seed(k), ..run };
+                scope.spawn(move || self.block(run, pilot))
+            };
+            let running: Vec<_> = (first..first + jobs).map(block).collect();
+            let join = |h: thread::ScopedJoinHandle<'_, Result<Vec<f64>, EngineError>>| {
+                h.join().unwrap_or_else(|_| Err(output("a block's thread panicked".to_owned())))
+            };
+            running.into_iter().map(join).collect::<Vec<_>>().into_iter().collect()
+        })
+    }
+
+    fn block(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
+        let seen = self.render(run, &pilot.readouts)?;
+        let value = |(k, seen): (usize, Seen)| match seen {
+            Seen::Value { lx, .. } => Ok(lx),
+            Seen::Below(_) if pilot.dark[k] => Ok(0.0),
+            Seen::Missed => Err(self.missed(k)),
+            _ => {
+                let id = &self.job.stations[k].id;
+                Err(output(format!("block {} reads {id} hundreds of times off the first block", run.seed)))
+            }
+        };
+        seen.into_iter().enumerate().map(value).collect()
+    }
+
+    fn look(&self, run: Run, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
+        self.keep_readouts(readouts)?;
+        self.render(run, readouts)
+    }
+
+    fn keep_readouts(&self, readouts: &[Readout]) -> Result<(), EngineError> {
+        self.workbench.write(&[SceneFile::text("readouts.inc", export::readouts(readouts))])
+    }
+
+    /// One run of POV-Ray, one pixel a meter.
+    fn render(&self, run: Run, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
+        let image = format!("seed{}.ppm", run.seed);
+        let path = self.workbench.scene_dir.join(&image);
+        let invocation = self.workbench.invoke(&self.program).args(self.arguments(run, &image));
+        hermetic(invocation, &self.workbench.site).run()?;
+        let bytes = std::fs::read(&path).map_err(|e| EngineError::io(&path, e))?;
+        std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
+        let pixels = pixels::parse(&bytes).map_err(output)?;
+        if pixels.len() != readouts.len() {
+            return Err(output(format!("gave {} pixels for {} meters", pixels.len(), readouts.len())));
+        }
+        Ok(readouts.iter().zip(pixels).map(|(r, p)| pixels::decode(*r, p)).collect())
+    }
+
+    fn arguments(&self, run: Run, image: &str) -> Vec<String> {
+        let mut arguments = export::arguments(self.job.stations.len(), run.light, run.seed, image);
+        arguments.extend([format!("Declare=Count={}", run.count), "Declare=Readouts=1".to_owned()]);
+        arguments
+    }
+
+    /// The seed of a block; 0 would leave the scene unturned.
+    fn seed(&self, block: usize) -> u32 {
+        let mixed = self.job.seed.wrapping_mul(1_000_003).wrapping_add(block as u64);
+        (mixed % 0x7fff_fffe) as u32 + 1
+    }
+
+    fn table_error(&self) -> f64 {
+        let axial = |l: &luminaire::scene::Luminaire| l.photometry.distribution.c_deg().len() == 1;
+        if self.job.scene.luminaires.iter().all(axial) { AXIAL_TABLE } else { BILINEAR_TABLE }
+    }
+
+    fn common_settings(&self, run: Run) -> BTreeMap<String, String> {
+        let arguments = self.arguments(run, "image.ppm").join(" ");
+        [("arguments", arguments), ("preset", self.settings.preset.name().to_owned())]
+            .map(|(k, v)| (k.to_owned(), v))
+            .into()
+    }
+
+    fn missed(&self, k: usize) -> EngineError {
+        output(format!("the disc of {} was not seen: something hides it from 2 mm away", self.job.stations[k].id))
+    }
+}
+
+/// Direct light's error relative to a reading: single-precision colours and the fade-distance law, as measured.
+const DIRECT_RELATIVE: f64 = 5e-7;
+/// A map's error relative to the largest intensity, as measured: one plane, and several.
+const AXIAL_TABLE: f64 = 2e-7;
+const BILINEAR_TABLE: f64 = 1e-6;
+
+struct Pilot {
+    readouts: Vec<Readout>,
+    dark: Vec<bool>,
+    wall_s: f64,
+}
+
+/// Where reading one meter's direct light stands.
+#[derive(Clone, Copy)]
+enum Look {
+    Again(Readout),
+    Done { lx: f64, resolution_lx: f64 },
+}
+
+impl Look {
+    fn readout(&self) -> Readout {
+        match *self {
+            Self::Again(readout) => readout,
+            Self::Done { lx, .. } => Readout::Coarse(if lx > 0.0 { lx } else { 1.0 }),
+        }
+    }
+}
+
+fn next_look(readout: Readout, seen: Seen, upper: f64) -> Look {
+    match (readout, seen) {
+        (_, Seen::Value { lx, resolution_lx }) if resolution_lx <= 1e-7 * lx => Look::Done { lx, resolution_lx },
+        (_, Seen::Value { lx, .. }) if lx > 0.0 => Look::Again(Readout::Fine(lx)),
+        (_, Seen::Below(limit)) if limit < DARK * upper => Look::Done { lx: 0.0, resolution_lx: limit },
+        (_, Seen::Below(limit)) => Look::Again(Readout::Coarse(4.0 * limit)),
+        (r, Seen::Above) => Look::Again(Readout::Coarse(1e3 * scale_of(r))),
+        // A disc that is not seen will not be seen again: the looks run out and say so.
+        (r, _) => Look::Again(Readout::Coarse(scale_of(r))),
+    }
+}
+
+fn scale_of(readout: Readout) -> f64 {
+    match readout {
+        Readout::Coarse(scale) | Readout::Fine(scale) => scale,
+    }
+}
+
+fn of_station(blocks: &[Vec<f64>], k: usize) -> Vec<f64> {
+    blocks.iter().map(|b| b[k]).collect()
+}
+
+/// The largest relative standard error of any meter that sees light.
+fn worst_error(blocks: &[Vec<f64>]) -> f64 {
+    let relative = |k| match mean_and_std_error(&of_station(blocks, k)) {
+        (mean, Some(error)) if mean > 0.0 => error / mean,
+        _ => 0.0,
+    };
+    (0..blocks.first().map_or(0, Vec::len)).map(relative).fold(0.0, f64::max)
+}
+
+fn output(what: String) -> EngineError {
+    EngineError::Output { engine: ID, what }
+}

@@ -1,0 +1,348 @@
+//! A job as a POV-Ray scene: pure, commented, and runnable by hand with the command at its top.
+//!
+//! Light is in photometric units: a white diffuse surface (`pigment {rgb 1} finish {diffuse 1}`) that receives E lux shows
+//! E, since POV-Ray drops pi from both sides; a light of `rgb I/(2 F^2)` with `fade_distance F` and `fade_power 2` gives
+//! I / (F^2 + d^2) lux at d metres (POV-Ray 3.7 reference, 2.5.10.8).
+
+use std::fmt::Write;
+
+use glam::DVec3;
+use luminaire::geometry::Surface;
+use luminaire::photometry::LuminousIntensityDistribution;
+use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Shape, Transport};
+
+use crate::engines::{Job, SceneFile};
+
+use super::frame::Frame;
+use super::opening::{self, Part};
+use super::pigment;
+use super::pixels::Readout;
+use super::settings::{DEEPEST, Settings};
+
+/// The scene's file name.
+pub(super) const SCENE: &str = "scene.pov";
+
+/// Radius of the filter round a light, in scene units; POV-Ray silently ignores one of 1e-3.
+pub(super) const FILTER_RADIUS: f64 = 0.002;
+
+/// Points along each side of a luminous opening: for direct light, and for direct light past obstacles.
+const POINTS: usize = 6;
+const POINTS_PAST_OBSTACLES: usize = 12;
+/// For indirect light, which does not see the difference.
+const POINTS_INDIRECT: usize = 2;
+
+/// Which light a scene lets its meters see.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Light {
+    /// Straight from the luminaires.
+    Direct,
+    /// Reflected at least once.
+    Indirect,
+}
+
+/// Writes the scene.
+pub(super) fn scene(job: &Job, settings: &Settings) -> SceneFile {
+    let frame = Frame::of(job, settings.recentre);
+    let mut text = head(job, settings, frame);
+    text.push_str(&meters(job, frame));
+    text.push_str(&luminaires(job, frame));
+    text.push_str(&surroundings(job, frame));
+    SceneFile::text(SCENE, text)
+}
+
+/// The arguments of one run, without the program: `part` and `seed` choose what the scene shows.
+pub(super) fn arguments(stations: usize, part: Light, seed: u32, image: &str) -> Vec<String> {
+    let mut arguments =
+        vec![format!("+I{SCENE}"), format!("+O{image}"), "+FP16".to_owned(), "File_Gamma=1.0".to_owned()];
+    arguments.extend([format!("+W{stations}"), "+H1".to_owned()]);
+    arguments.extend(["-A", "-D", "+WT1", "-GD", "-GR", "-GS"].map(str::to_owned));
+    arguments.push(format!("Declare=Indirect={}", u8::from(part == Light::Indirect)));
+    arguments.push(format!("Declare=Seed={seed}"));
+    arguments
+}
+
+/// What a scene's discs show where no other read-out is given to them.
+pub(super) fn first_readouts(job: &Job, part: Light) -> Vec<Readout> {
+    job.stations.iter().map(|s| Readout::Coarse(upper_bound_lx(job, s.meter.position_m, part))).collect()
+}
+
+/// The file that gives every disc its read-out, included where it is asked for with `Declare=Readouts=1`.
+pub(super) fn readouts(readouts: &[Readout]) -> String {
+    let entry = |r: &Readout| match r {
+        Readout::Coarse(scale) => format!("<{scale:e}, 0>"),
+        Readout::Fine(expected) => format!("<{expected:e}, 1>"),
+    };
+    let entries: Vec<String> = readouts.iter().map(entry).collect();
+    format!("#declare Readout = array[{}] {{\n  {}\n}};\n", entries.len(), entries.join(",\n  "))
+}
+
+/// No more than a few times the illuminance to be expected: where it is wrong, a second run finds out.
+fn upper_bound_lx(job: &Job, at_m: DVec3, part: Light) -> f64 {
+    let bound = match (part, job.scene.room) {
+        (Light::Indirect, Some(room)) => {
+            let area: f64 = Surface::ALL.iter().map(|&s| room.area_m2(s)).sum();
+            let mean = super::mean_reflectance(&room);
+            let flux = |l: &Luminaire| l.photometry.distribution.flux().value() * l.flux_scale;
+            8.0 * job.scene.luminaires.iter().map(flux).sum::<f64>() / area * mean / (1.0 - mean).max(0.01)
+        }
+        _ => {
+            let most = |l: &Luminaire| {
+                let distance_squared = l.position_m.distance_squared(at_m).max(1e-6);
+                l.photometry.distribution.max_intensity().value() * l.flux_scale / distance_squared
+            };
+            job.scene.luminaires.iter().map(most).sum()
+        }
+    };
+    if bound > 0.0 { bound } else { 1.0 }
+}
+
+fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
+    let count = job.stations.len();
+    let (part, what) = match job.transport {
+        Transport::Direct => (Light::Direct, "direct light"),
+        Transport::Indirect(_) => (Light::Indirect, "reflected light"),
+        Transport::Total(_) => {
+            (Light::Direct, "direct light (Indirect=0) and reflected light (Indirect=1), to be added")
+        }
+    };
+    let arguments = arguments(count, part, 0, "scene.ppm").join(" ");
+    let mut text = format!(
+        "// {}, {}: illuminance at {count} meters, {what}.\n// Run: povray {arguments}\n\
+         // One pixel a meter. With x = E / scale of the meter (below): red .25 + x/2, green 16 x, blue 256 x, linear.\n\
+         // Seed > 0 turns the whole scene, which gives radiosity other sample directions and changes nothing else.\n",
+        one_line(&job.case),
+        one_line(&job.procedure)
+    );
+    writeln!(
+        text,
+        "// Scene units are {} m; the origin is at {} m of the spec.",
+        1.0 / frame.scale,
+        vector(frame.centre_m)
+    )
+    .ok();
+    text.push_str("#version 3.7;\n");
+    let indirect = u8::from(part == Light::Indirect);
+    writeln!(text, "#ifndef (Indirect) #declare Indirect = {indirect}; #end").ok();
+    text.push_str("#ifndef (Seed) #declare Seed = 0; #end\n");
+    text.push_str(
+        "\n// Reflectances divided and lights multiplied by Brightness carry the same light, and keep the weight of rays above\n\
+         // .25, below which POV-Ray would loosen error_bound by up to .25.\n",
+    );
+    writeln!(text, "#ifndef (Count) #declare Count = {}; #end", settings.count).ok();
+    writeln!(text, "#declare Brightness = #if (Indirect) {}; #else 1; #end", settings.brightness).ok();
+    text.push_str("global_settings {\n  assumed_gamma 1.0 max_trace_level 10 adc_bailout 1e-9\n");
+    if let Some(reflections) = reflections(job.transport) {
+        writeln!(text, "  #if (Indirect) {} #end", settings.radiosity(reflections)).ok();
+    }
+    text.push_str("}\n\n");
+    text.push_str(TURN);
+    text
+}
+
+const TURN: &str = "#declare S = seed(Seed);
+#declare Turn = transform {
+  #if (Seed > 0) rotate 360*rand(S)*z rotate degrees(acos(1 - 2*rand(S)))*y rotate 360*rand(S)*z #end
+}
+#declare TurnFunction = function { transform { Turn } }
+#macro Turned(P) (TurnFunction(P.x, P.y, P.z)) #end
+";
+
+/// Diffuse reflections of a transport: `None` without any, `Some(None)` for all of them.
+fn reflections(transport: Transport) -> Option<Option<u32>> {
+    match transport {
+        Transport::Direct => None,
+        Transport::Indirect(b) | Transport::Total(b) => Some(match b {
+            Bounces::Converged => None,
+            Bounces::AtMost(n) => Some(n.min(DEEPEST)),
+        }),
+    }
+}
+
+fn meters(job: &Job, frame: Frame) -> String {
+    let count = job.stations.len();
+    let mut text = format!("\n// Meters: position, normal.\n#declare Meters = array[{count}][2] {{\n");
+    let seats = super::frame::seats(job, frame);
+    let rows: Vec<String> = job
+        .stations
+        .iter()
+        .zip(&seats)
+        .map(|(s, seat)| format!("  {{{}, {}}}", vector(*seat), vector(s.meter.normal)))
+        .collect();
+    text.push_str(&rows.join(",\n"));
+    text.push_str("\n};\n// Illuminance that the pixel's scale stands for, in lux.\n#ifdef (Readouts) #include \"readouts.inc\" #else\n");
+    let first = |part| readouts(&first_readouts(job, part));
+    if job.scene.room.is_some() && job.transport != Transport::Direct {
+        write!(text, "#if (Indirect)\n{}#else\n{}#end\n", first(Light::Indirect), first(Light::Direct)).ok();
+    } else {
+        text.push_str(&first(Light::Direct));
+    }
+    text.push_str("#end\n");
+    text.push_str(&METERS.replace("COUNT", &count.to_string()));
+    text
+}
+
+/// A mesh camera takes one pixel from each triangle's centre (POV-Ray 3.7 reference, 2.4.1.3.10): a disc 2 mm below.
+const METERS: &str = "
+#declare Aim = mesh {
+  #for (K, 0, COUNT - 1)
+    #local P = Turned(Meters[K][0]);
+    #local N = Turned(Meters[K][1]);
+    #local U = vnormalize(vcross(N, #if (abs(N.x) < .7) x #else y #end));
+    #local V = vcross(N, U);
+    #local C = P - (U + V)*1e-4;
+    triangle { C, C + V*3e-4, C + U*3e-4 }  // its normal, (P3 - P1) x (P2 - P1), is the meter's
+  #end
+}
+camera { mesh_camera { 1 0 mesh { Aim } } location <0, 0, .002> direction <0, 0, -1> }
+
+#macro Disc(K)
+  #local E = Readout[K].x*Brightness;
+  #if (Readout[K].y = 0)
+    #local Gain = <.5, 16, 256>/E;
+    #local Offset = <.25, 0, 0>;
+  #else
+    #local Gain = <.5, 500, 1e-6>/E;
+    #local Offset = <.25, .5 - 500, .25>;
+  #end
+  disc { Turned(Meters[K][0]), Turned(Meters[K][1]), .001
+    pigment { rgb Gain }
+    finish { ambient 0 diffuse 1 emission rgb Offset/Gain }  // POV-Ray multiplies emission by the pigment
+    no_shadow no_reflection no_radiosity }
+#end
+";
+
+fn luminaires(job: &Job, frame: Frame) -> String {
+    let mut text = String::from(
+        "\n// Luminaires: a point light behind a small sphere whose pigment filters it to the luminous intensity distribution.\n\
+         #declare AngleGamma = function(x, y, z) { degrees(atan2(sqrt(x*x + y*y), -z)) }\n\
+         #declare AngleC = function(x, y, z) { degrees(atan2(y, x) + select(atan2(y, x), 2*pi, 0)) }\n\
+         #declare F = 1e-6;\n",
+    );
+    let mut declared: Vec<&LuminousIntensityDistribution> = vec![];
+    for luminaire in job.scene.luminaires.iter().filter(|l| candela(l) > 0.0) {
+        let distribution = &luminaire.photometry.distribution;
+        let known = declared.iter().position(|d| *d == distribution);
+        let number = known.unwrap_or(declared.len());
+        if known.is_none() {
+            declared.push(distribution);
+            text.push_str(&pigment::declare(&format!("Distribution{number}"), distribution));
+        }
+        text.push_str(&one_luminaire(job, luminaire, number, frame));
+    }
+    text
+}
+
+fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame) -> String {
+    let mut text =
+        format!("// {}: {} cd at most, {}\n", one_line(&luminaire.id), candela(luminaire), luminaire.model.name());
+    let axes = luminaire.orientation;
+    let matrix: Vec<String> = [axes.x_axis, axes.y_axis, axes.z_axis].iter().map(|a| numbers(*a)).collect();
+    writeln!(text, "#macro Luminaire(P, Candela)").ok();
+    writeln!(
+        text,
+        "  light_source {{ P rgb Brightness*Candela/(2*F*F) fade_distance F fade_power 2 transform {{ Turn }} }}\n  \
+         sphere {{ 0, {FILTER_RADIUS} pigment {{ Distribution{number} }} finish {{ ambient 0 diffuse 0 }}\n    \
+         hollow no_image no_reflection no_radiosity\n    matrix <{}, 0, 0, 0> translate P transform {{ Turn }} }}\n#end",
+        matrix.join(", ")
+    )
+    .ok();
+    let candela = candela(luminaire) * frame.scale * frame.scale;
+    let place = |part: &Part| vector(frame.point(luminaire.position_m + axes * part.offset_m));
+    let instances = |points: usize| -> String {
+        let line = |part: &Part| format!("Luminaire({}, {})\n", place(part), candela * part.share);
+        parts(luminaire, points).iter().map(line).collect()
+    };
+    let points = if job.scene.obstacles.is_empty() { POINTS } else { POINTS_PAST_OBSTACLES };
+    if luminaire.model == LuminaireModel::Point || job.transport == Transport::Direct {
+        text.push_str(&instances(points));
+    } else {
+        write!(text, "#if (Indirect)\n{}#else\n{}#end\n", instances(POINTS_INDIRECT), instances(points)).ok();
+    }
+    text
+}
+
+/// The point lights that stand for a luminaire.
+pub(super) fn parts(luminaire: &Luminaire, points: usize) -> Vec<Part> {
+    let whole = vec![Part { offset_m: DVec3::ZERO, share: 1.0 }];
+    match luminaire.model {
+        LuminaireModel::Point => whole,
+        _ => opening::parts(luminaire.photometry.opening, points).unwrap_or(whole),
+    }
+}
+
+/// The largest intensity, flux scale included.
+pub(super) fn candela(luminaire: &Luminaire) -> f64 {
+    luminaire.photometry.distribution.max_intensity().value() * luminaire.flux_scale
+}
+
+fn surroundings(job: &Job, frame: Frame) -> String {
+    let mut text = String::from(
+        "\n// The discs; those for reflected light stand in a group of their own that no light shines on.\n",
+    );
+    let discs = format!("#for (K, 0, {} - 1) Disc(K) #end", job.stations.len());
+    writeln!(text, "#if (Indirect) light_group {{ {discs} global_lights off }} #else {discs} #end").ok();
+    text.push_str(
+        "\n#macro Diffuse(Rho) pigment { rgb Rho/Brightness } finish { ambient 0 diffuse 1 } transform { Turn } #end\n",
+    );
+    if let Some(room) = job.scene.room {
+        text.push_str("\n// The room: six slabs around it.\n");
+        for surface in Surface::ALL {
+            let (min, max) = slab(room.size_m, surface, 1.0 / frame.scale);
+            let corners = format!("{}, {}", vector(frame.point(min)), vector(frame.point(max)));
+            let rho = room.reflectance.of(surface);
+            writeln!(text, "box {{ {corners} Diffuse({rho}) }}  // {}", surface.name()).ok();
+        }
+    }
+    if !job.scene.obstacles.is_empty() {
+        text.push_str("\n// Obstacles.\n");
+        job.scene.obstacles.iter().for_each(|o| text.push_str(&obstacle(o, frame)));
+    }
+    text
+}
+
+/// A slab outside the room, one scene unit thick, wide enough to close the edges.
+fn slab(size_m: DVec3, surface: Surface, thickness_m: f64) -> (DVec3, DVec3) {
+    let (mut min, mut max) = (DVec3::splat(-thickness_m), size_m + thickness_m);
+    let axis = surface.axis();
+    if surface.is_far() {
+        min[axis] = size_m[axis];
+    } else {
+        max[axis] = 0.0;
+    }
+    (min, max)
+}
+
+fn obstacle(obstacle: &Obstacle, frame: Frame) -> String {
+    let rho = obstacle.reflectance;
+    match &obstacle.shape {
+        Shape::Box { min_m, max_m } => {
+            format!("box {{ {}, {} Diffuse({rho}) }}\n", vector(frame.point(*min_m)), vector(frame.point(*max_m)))
+        }
+        Shape::Mesh { vertices_m, triangles } => {
+            let vertices: Vec<String> = vertices_m.iter().map(|v| vector(frame.point(*v))).collect();
+            let faces: Vec<String> = triangles.iter().map(|[a, b, c]| format!("<{a},{b},{c}>")).collect();
+            format!(
+                "mesh2 {{\n  vertex_vectors {{ {}, {} }}\n  face_indices {{ {}, {} }}\n  Diffuse({rho}) }}\n",
+                vertices.len(),
+                vertices.join(", "),
+                faces.len(),
+                faces.join(", ")
+            )
+        }
+    }
+}
+
+fn vector(v: DVec3) -> String {
+    format!("<{}>", numbers(v))
+}
+
+/// Shortest digits that read back to the same number; no negative zero.
+fn numbers(v: DVec3) -> String {
+    let clean = |x: f64| if x == 0.0 { 0.0 } else { x };
+    format!("{}, {}, {}", clean(v.x), clean(v.y), clean(v.z))
+}
+
+/// Names come from specs: a line break would end the comment they stand in.
+fn one_line(text: &str) -> String {
+    text.replace(|c: char| c.is_control(), " ")
+}

@@ -1,0 +1,91 @@
+//! Where scene coordinates lie: near the origin and of a handy size, so that POV-Ray's absolute tolerances do no harm.
+//!
+//! POV-Ray ignores what is nearer than 1e-4 to a ray's start and takes 1e-3 for nothing near a shadow ray's
+//! (MIN_ISECT_DEPTH, SHADOW_TOLERANCE); its radiosity measures distances from the camera.
+
+use glam::DVec3;
+use luminaire::geometry::Surface;
+use luminaire::scene::Shape;
+
+use crate::engines::Job;
+
+use super::settings::Recentring;
+
+/// From metres of the spec to units of the scene: (p - centre) scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Frame {
+    /// The spec's point that becomes the origin.
+    pub(super) centre_m: DVec3,
+    /// Scene units a metre; intensities grow with its square, so that lux stay lux.
+    pub(super) scale: f64,
+}
+
+impl Frame {
+    /// The frame of a job.
+    pub(super) fn of(job: &Job, recentring: Recentring) -> Self {
+        if recentring == Recentring::Off {
+            return Self { centre_m: DVec3::ZERO, scale: 1.0 };
+        }
+        let (low, high) = match job.scene.room {
+            Some(room) => (DVec3::ZERO, room.size_m),
+            None => extent_m(job),
+        };
+        let size_m = (high - low).max_element();
+        let handy = (1.0..=200.0).contains(&size_m) || size_m <= 0.0;
+        Self { centre_m: low.midpoint(high), scale: if handy { 1.0 } else { 10.0 / size_m } }
+    }
+
+    /// A point of the spec in scene units.
+    pub(super) fn point(self, p_m: DVec3) -> DVec3 {
+        (p_m - self.centre_m) * self.scale
+    }
+}
+
+fn extent_m(job: &Job) -> (DVec3, DVec3) {
+    let meters = job.stations.iter().map(|s| s.meter.position_m);
+    let luminaires = job.scene.luminaires.iter().map(|l| l.position_m);
+    let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = meters.chain(luminaires).fold(start, |(low, high), p| (low.min(p), high.max(p)));
+    if low.is_finite() { (low, high) } else { (DVec3::ZERO, DVec3::ZERO) }
+}
+
+/// Where each disc sits, in scene units: at its meter, but clear of a surface that the meter lies on and of discs that
+/// cross it.
+pub(super) fn seats(job: &Job, frame: Frame) -> Vec<DVec3> {
+    let points: Vec<DVec3> = job.stations.iter().map(|s| frame.point(s.meter.position_m)).collect();
+    let normal = |k: usize| job.stations[k].meter.normal;
+    let seat = |k: usize| {
+        if on_a_surface(job, frame, points[k]) {
+            return points[k] + CLEAR * normal(k);
+        }
+        // Each of two crossing discs lies a little behind its own meter, so that each meter sees its own first.
+        let crosses =
+            |j: usize| j != k && points[j].distance(points[k]) < REACH && normal(j).dot(normal(k)).abs() < 1.0 - 1e-9;
+        if (0..points.len()).any(crosses) { points[k] - BEHIND * normal(k) } else { points[k] }
+    };
+    (0..points.len()).map(seat).collect()
+}
+
+/// How far a disc is lifted off a surface.
+const CLEAR: f64 = 2e-5;
+/// How far a disc lies behind its meter where discs cross.
+const BEHIND: f64 = 1e-6;
+/// Discs nearer than this to each other, twice their radius, may cross.
+const REACH: f64 = 2e-3;
+
+fn on_a_surface(job: &Job, frame: Frame, point: DVec3) -> bool {
+    let near = |distance: f64| distance.abs() < CLEAR / 2.0;
+    let on_room = job.scene.room.is_some_and(|room| {
+        let (low, high) = (frame.point(DVec3::ZERO), frame.point(room.size_m));
+        Surface::ALL.iter().any(|s| near(point[s.axis()] - if s.is_far() { high } else { low }[s.axis()]))
+    });
+    let on_box = |shape: &Shape| match shape {
+        Shape::Box { min_m, max_m } => {
+            let (low, high) = (frame.point(*min_m), frame.point(*max_m));
+            let inside = point.cmpge(low - CLEAR).all() && point.cmple(high + CLEAR).all();
+            inside && (0..3).any(|axis| near(point[axis] - low[axis]) || near(point[axis] - high[axis]))
+        }
+        Shape::Mesh { .. } => false,
+    };
+    on_room || job.scene.obstacles.iter().any(|o| on_box(&o.shape))
+}

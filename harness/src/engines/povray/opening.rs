@@ -1,0 +1,98 @@
+//! Flat luminous openings as sets of weighted point lights: Gauss-Legendre points over a rectangle or an ellipse.
+//!
+//! A flat opening of uniform luminance at every direction emits I(C, gamma) dA / A from each of its elements, so that the
+//! illuminance is the mean of point luminaires over the opening; the quadrature is exact for polynomials of order 2n - 1
+//! (Abramowitz & Stegun, Handbook of Mathematical Functions, 25.4.30).
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use luminaire::photometry::LuminousOpening;
+
+/// A part of a luminaire: where it is in the luminaire's frame and its share of the intensity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Part {
+    /// Offset from the photometric centre in metres.
+    pub(super) offset_m: DVec3,
+    /// Share of the intensity; all shares together make 1.
+    pub(super) share: f64,
+}
+
+/// The parts of an opening, `n` by `n`; `None` where the opening is not flat.
+pub(super) fn parts(opening: LuminousOpening, n: usize) -> Option<Vec<Part>> {
+    let nodes = gauss_legendre(n);
+    match opening {
+        LuminousOpening::Point => Some(vec![Part { offset_m: DVec3::ZERO, share: 1.0 }]),
+        LuminousOpening::Box { x_m, y_m, height_m: 0.0 } => {
+            let part = |(u, wu): (f64, f64), (v, wv): (f64, f64)| Part {
+                offset_m: DVec3::new(u * x_m, v * y_m, 0.0) / 2.0,
+                share: wu * wv / 4.0,
+            };
+            Some(nodes.iter().flat_map(|&a| nodes.iter().map(move |&b| part(a, b))).collect())
+        }
+        LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 } => {
+            let turns = 2 * n;
+            let part = |(u, w): (f64, f64), k: usize| {
+                // Uniform in the square of the radius, evenly spaced in angle.
+                let radius = f64::midpoint(1.0, u).sqrt() / 2.0;
+                let (sin, cos) = (2.0 * PI * (k as f64 + 0.5) / turns as f64).sin_cos();
+                Part { offset_m: DVec3::new(x_m * cos, y_m * sin, 0.0) * radius, share: w / 2.0 / turns as f64 }
+            };
+            Some(nodes.iter().flat_map(|&a| (0..turns).map(move |k| part(a, k))).collect())
+        }
+        _ => None,
+    }
+}
+
+/// Nodes and weights on -1..1 by Newton's method on the Legendre polynomial.
+fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
+    let node = |k: usize| {
+        let mut x = (PI * (k as f64 + 0.75) / (n as f64 + 0.5)).cos();
+        let mut slope = 1.0;
+        for _ in 0..30 {
+            let (value, derivative) = legendre(n, x);
+            slope = derivative;
+            x -= value / derivative;
+        }
+        (x, 2.0 / ((1.0 - x * x) * slope * slope))
+    };
+    (0..n).map(node).collect()
+}
+
+/// The Legendre polynomial of degree `n` and its derivative.
+fn legendre(n: usize, x: f64) -> (f64, f64) {
+    let (mut before, mut here) = (1.0, x);
+    for k in 2..=n {
+        let k = k as f64;
+        (before, here) = (here, ((2.0 * k - 1.0) * x * here - (k - 1.0) * before) / k);
+    }
+    (here, n as f64 * (x * here - before) / (x * x - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn shares_make_one_and_second_moments_are_those_of_the_shape() {
+        let (x_m, y_m) = (0.6, 1.2);
+        let rectangle = LuminousOpening::Box { x_m, y_m, height_m: 0.0 };
+        let ellipse = LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 };
+        for (opening, moment) in [(rectangle, 12.0), (ellipse, 16.0)] {
+            for n in [2, 4, 16] {
+                let parts = parts(opening, n).unwrap();
+                let sum = |f: fn(DVec3) -> f64| parts.iter().map(|p| p.share * f(p.offset_m)).sum::<f64>();
+                assert_relative_eq!(sum(|_| 1.0), 1.0, max_relative = 1e-13);
+                assert_relative_eq!(sum(|p| p.x * p.x), x_m * x_m / moment, max_relative = 1e-13);
+                assert_relative_eq!(sum(|p| p.y * p.y), y_m * y_m / moment, max_relative = 1e-13);
+                assert_relative_eq!(sum(|p| p.x * p.y), 0.0, epsilon = 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn openings_with_a_height_are_not_flat() {
+        assert_eq!(parts(LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.1 }, 4), None);
+    }
+}

@@ -1,0 +1,178 @@
+//! POV-Ray's 16-bit portable pixmap read back as illuminance: pure decoding, with a check that every disc was seen.
+//!
+//! A meter's disc shows x = E / scale three times in one pixel: red .25 + x/2, green 16 x, blue 256 x. Once E is known
+//! to a thousandth, it shows the deviation y = E / expected - 1 instead: red .75 + y/2, green .5 + 500 y, blue .25. The
+//! offsets are light that only a disc emits: a pixel without them has missed its disc and seen a wall.
+
+/// What a disc was told to show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Readout {
+    /// Illuminance over this scale, in lux.
+    Coarse(f64),
+    /// Deviation from this illuminance, in lux.
+    Fine(f64),
+}
+
+/// What a pixel says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Seen {
+    /// An illuminance in lux and half the step of the channel it came from.
+    Value {
+        /// Illuminance in lux.
+        lx: f64,
+        /// Half a step of the read-out, in lux.
+        resolution_lx: f64,
+    },
+    /// More than the scale can show.
+    Above,
+    /// Less than the finest channel resolves; at most this, in lux.
+    Below(f64),
+    /// No disc in this pixel.
+    Missed,
+}
+
+/// A row of RGB pixels, 0..=1.
+pub(super) fn parse(bytes: &[u8]) -> Result<Vec<[f64; 3]>, String> {
+    let mut header = Header { bytes, at: 0 };
+    if header.word() != Some("P6") {
+        return Err("wrote a file that is no portable pixmap".to_owned());
+    }
+    let mut number = || header.word().and_then(|w| w.parse::<usize>().ok());
+    let (Some(width), Some(height), Some(65535)) = (number(), number(), number()) else {
+        return Err("wrote a portable pixmap that is not of 16 bits".to_owned());
+    };
+    // One white space ends the header.
+    let data = bytes.get(header.at + 1..).unwrap_or_default();
+    let (found, wanted) = (data.len() / 6, width * height);
+    if found != wanted {
+        return Err(format!("wrote {found} pixels where its header says {wanted}"));
+    }
+    let channel = |b: &[u8], k: usize| f64::from(u16::from_be_bytes([b[2 * k], b[2 * k + 1]])) / FULL;
+    Ok(data.chunks_exact(6).map(|b| [channel(b, 0), channel(b, 1), channel(b, 2)]).collect())
+}
+
+/// Decodes one pixel.
+pub(super) fn decode(readout: Readout, [red, green, blue]: [f64; 3]) -> Seen {
+    match readout {
+        Readout::Coarse(scale) => coarse(scale, red, green, blue),
+        Readout::Fine(expected) => fine(expected, red, green, blue),
+    }
+}
+
+fn coarse(scale: f64, red: f64, green: f64, blue: f64) -> Seen {
+    if red >= CLIPPED {
+        // White: nothing distinguishes a disc from a bright wall, and a second look decides.
+        return if green >= CLIPPED && blue >= CLIPPED { Seen::Above } else { Seen::Missed };
+    }
+    let (x, gain) = [(blue, 256.0), (green, 16.0)]
+        .into_iter()
+        .find(|(level, _)| *level < CLIPPED)
+        .map_or((2.0 * (red - 0.25), 0.5), |(level, gain)| (level / gain, gain));
+    // Red tells the same value by its own offset.
+    if (red - 0.25 - 0.5 * x).abs() > 2.0 / FULL + 1e-3 * x {
+        return Seen::Missed;
+    }
+    if blue < FAINT {
+        return Seen::Below(scale * (blue + 1.0 / FULL) / 256.0);
+    }
+    Seen::Value { lx: scale * x, resolution_lx: scale * 0.5 / FULL / gain }
+}
+
+fn fine(expected: f64, red: f64, green: f64, blue: f64) -> Seen {
+    if (blue - 0.25).abs() > 2.0 / FULL {
+        return Seen::Missed;
+    }
+    if red >= CLIPPED {
+        return Seen::Above;
+    }
+    let within = green > 1.0 - CLIPPED && green < CLIPPED;
+    let (y, gain) = if within { ((green - 0.5) / 500.0, 500.0) } else { (2.0 * (red - 0.75), 0.5) };
+    if (red - 0.75 - 0.5 * y).abs() > 2.0 / FULL {
+        return Seen::Missed;
+    }
+    Seen::Value { lx: expected * (1.0 + y), resolution_lx: expected * 0.5 / FULL / gain }
+}
+
+const FULL: f64 = 65535.0;
+/// A channel at or above this may have been cut off.
+const CLIPPED: f64 = 65500.0 / FULL;
+/// A blue channel below this has too few steps to be a measure.
+const FAINT: f64 = 64.0 / FULL;
+
+/// Words of a header, comments left out.
+struct Header<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Header<'a> {
+    fn word(&mut self) -> Option<&'a str> {
+        loop {
+            let rest = self.bytes.get(self.at..)?;
+            match rest.first()? {
+                b'#' => self.at += rest.iter().position(|b| *b == b'\n')?,
+                b if b.is_ascii_whitespace() => self.at += 1,
+                _ => {
+                    let length = rest.iter().position(u8::is_ascii_whitespace)?;
+                    self.at += length;
+                    return std::str::from_utf8(&rest[..length]).ok();
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn quantised(rgb: [f64; 3]) -> [f64; 3] {
+        rgb.map(|v| (v.clamp(0.0, 1.0) * FULL).round() / FULL)
+    }
+
+    #[test]
+    fn what_a_disc_shows_is_read_back_within_the_stated_resolution() {
+        for x in [1.2, 0.3, 0.05, 1e-3, 1e-5] {
+            let Seen::Value { lx, resolution_lx } =
+                decode(Readout::Coarse(40.0), quantised([0.25 + x / 2.0, 16.0 * x, 256.0 * x]))
+            else {
+                panic!("{x} was not read")
+            };
+            assert!((lx - 40.0 * x).abs() <= resolution_lx * 1.001, "{x}: {lx}");
+        }
+        for y in [0.2, 3e-4, -3e-4, 0.0, -0.9] {
+            let seen = decode(Readout::Fine(7.0), quantised([0.75 + y / 2.0, 0.5 + 500.0 * y, 0.25]));
+            let Seen::Value { lx, resolution_lx } = seen else { panic!("{y} was not read") };
+            assert!((lx - 7.0 * (1.0 + y)).abs() <= resolution_lx * 1.001, "{y}: {lx}");
+        }
+    }
+
+    #[test]
+    fn darkness_and_too_much_light_are_not_values() {
+        assert!(matches!(decode(Readout::Coarse(1.0), [0.25, 0.0, 0.0]), Seen::Below(_)));
+        assert_eq!(decode(Readout::Coarse(1.0), [1.0, 1.0, 1.0]), Seen::Above);
+        assert_eq!(decode(Readout::Fine(1.0), quantised([1.5, 1.0, 0.25])), Seen::Above);
+    }
+
+    #[test]
+    fn a_pixel_that_missed_its_disc_is_told_from_every_grey_wall() {
+        for grey in [0.0, 0.1, 0.25, 0.5, 0.9] {
+            assert_eq!(decode(Readout::Coarse(1.0), [grey; 3]), Seen::Missed, "{grey}");
+            assert_eq!(decode(Readout::Fine(1.0), [grey; 3]), Seen::Missed, "{grey}");
+        }
+    }
+
+    #[test]
+    fn pixmaps_with_comments_are_read_and_short_ones_refused() {
+        let mut bytes = b"P6\n# Software: POV-Ray\n# Date: 1\n2 1\n65535\n".to_vec();
+        bytes.extend([0x80, 0, 0, 0, 0xff, 0xff, 0, 1, 0, 0, 0, 0]);
+        let pixels = parse(&bytes).unwrap();
+        assert_eq!(pixels.len(), 2);
+        assert_relative_eq!(pixels[0][0], 32768.0 / 65535.0);
+        assert_eq!((pixels[0][2], pixels[1][0]), (1.0, 1.0 / 65535.0));
+        bytes.pop();
+        assert!(parse(&bytes).is_err());
+        assert!(parse(b"P5\n1 1\n255\n0").is_err());
+    }
+}
