@@ -4,7 +4,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use luminaire::scene::Scene;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -126,7 +125,7 @@ fn record(case: &Case, planned: &Planned, run: &Run, task: &Task, options: &Opti
         procedure: task.procedure.to_owned(),
         engine: engine.0.to_owned(),
         version: planned.found.as_ref().map(|v| v.0.clone()).unwrap_or_default(),
-        model: model_name(&task.scene),
+        model: task.model(),
         input_sha256: case.sha256.clone(),
         seed: run.job.seed,
         settings: measurement.settings.clone(),
@@ -208,11 +207,4 @@ fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
         reason,
         wall_s: mine.iter().map(|r| r.wall_s).sum(),
     }
-}
-
-fn model_name(scene: &Scene) -> String {
-    let mut models: Vec<&str> = scene.luminaires.iter().map(|l| l.model.name()).collect();
-    models.sort_unstable();
-    models.dedup();
-    if let [one] = models[..] { one.to_owned() } else { "mixed".to_owned() }
 }

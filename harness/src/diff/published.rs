@@ -56,8 +56,10 @@ struct Table {
 struct Column {
     reference: bool,
     engine: String,
-    #[serde(rename = "model")]
-    _model: String,
+    model: String,
+    /// Further luminaire models that the column may be held against.
+    #[serde(default)]
+    also: Vec<String>,
     #[serde(default, rename = "distance_m")]
     _distance_m: Option<f64>,
     #[serde(default)]
@@ -117,12 +119,13 @@ impl Published {
     /// The references that the paper holds for a reading of `engine` at one target.
     ///
     /// The paper's own reference columns of a closed form judge every engine; every other column stands beside the
-    /// readings of the engine that it names. A column at a fixed number of bounces is compared with readings at that number.
+    /// readings of the engine that it names, of the same luminaire model. A column at a fixed number of bounces is compared with readings at that number.
     pub fn references(&self, task: &Task, target: &Target, engine: &str) -> Vec<Reference> {
         let Some(table) = self.tables.get(task.procedure).filter(|t| t.quantity == task.quantity) else {
             return vec![];
         };
         let Some(row) = table.rows.iter().find(|r| r.is_at(target)) else { return vec![] };
+        let model = task.model();
         // Derived values judge every engine, whatever they are of.
         let closed_form = matches!(task.transport, Transport::Direct) || self.citation.basis != Basis::Published;
         let compared = |column: &Column| {
@@ -130,7 +133,8 @@ impl Published {
                 (Some(n), Transport::Indirect(b) | Transport::Total(b)) => b == Bounces::AtMost(n),
                 _ => true,
             };
-            same_bounces && ((column.reference && closed_form) || column.engine == engine)
+            let same_model = column.model == model || column.also.contains(&model);
+            same_bounces && ((column.reference && closed_form) || (column.engine == engine && same_model))
         };
         let columns = table.columns.iter().filter(|(_, column)| compared(column));
         let reference = |(name, column): (&String, &Column)| {

@@ -42,6 +42,16 @@ pub struct Task {
     pub targets: Vec<Target>,
 }
 
+impl Task {
+    /// The luminaire model of the scene: point, area, impostor, or mixed.
+    pub fn model(&self) -> String {
+        let mut models: Vec<&str> = self.scene.luminaires.iter().map(|l| l.model.name()).collect();
+        models.sort_unstable();
+        models.dedup();
+        if let [one] = models[..] { one.to_owned() } else { "mixed".to_owned() }
+    }
+}
+
 /// One place of measurement and how its illuminance becomes a reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
