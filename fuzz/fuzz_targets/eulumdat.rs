@@ -11,7 +11,9 @@ fuzz_target!(|bytes: &[u8]| {
             assert!(read.distribution.flux().value() >= 0.0);
             let written = eulumdat::write(&read);
             let again = eulumdat::parse(written.text.as_bytes()).expect("a written file is legal");
-            assert_eq!(again.distribution.c_deg(), read.distribution.c_deg());
+            // Planes that are no mirror images of each other cannot be listed again; that must be said.
+            let same = again.distribution == read.distribution;
+            assert!(same || !written.losses.is_empty());
             assert_eq!(again.distribution.gamma_deg(), read.distribution.gamma_deg());
         }
         Err(error) => assert!(error.line >= 1 && error.column >= 1),

@@ -51,15 +51,14 @@ pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
     let table = reader.table(intensity, data)?;
     let distribution = planes::distribution(&text, goniometer, table, &mut lints)?;
     reader.remarks(root, emitter, &mut lints)?;
-    let quantity = reader.number(emitter, "Quantity")?.unwrap_or(1.0);
-    let rated = reader.number(emitter, "RatedLumens")?.filter(|lumens| *lumens > 0.0);
+    let rated = reader.rated_lumens(emitter)?;
     let absolute = [intensity, data].into_iter().find_map(|node| content(node, "AbsolutePhotometry"));
     let relative = absolute.is_some_and(|value| matches!(value.as_str(), "false" | "0"));
     let watts = reader.number(emitter, "InputWattage")?.or(reader.number(emitter, "InputWatts")?);
     let photometry = Photometry {
         format: format.into(),
         distribution,
-        lamp_lumens: rated.filter(|_| relative).map(|lumens| lumens * quantity),
+        lamp_lumens: rated.filter(|_| relative),
         opening: LuminousOpening::Point,
         input_watts: watts.filter(|watts| *watts > 0.0),
         keywords: keywords(root),
@@ -138,6 +137,20 @@ impl Reader<'_> {
         }
         let problem = Problem::OutOfRange { what: name.into(), found: number, expected: "zero or more" };
         Err(self.error(node, problem))
+    }
+
+    /// Rated lumens of all emitters of this kind together; zero counts as unknown.
+    fn rated_lumens(&self, emitter: Node) -> Result<Option<f64>, ReadError> {
+        let quantity = self.number(emitter, "Quantity")?.unwrap_or(1.0);
+        let lumens = quantity * self.number(emitter, "RatedLumens")?.unwrap_or(0.0);
+        if quantity >= 1.0 && lumens.is_finite() {
+            return Ok((lumens > 0.0).then_some(lumens));
+        }
+        let (what, found) = ("Quantity".into(), quantity);
+        Err(self.error(
+            emitter,
+            Problem::OutOfRange { what, found, expected: "at least one, and no more than makes sense" },
+        ))
     }
 
     fn finite(&self, node: Node, what: &str, value: &str) -> Result<f64, ReadError> {

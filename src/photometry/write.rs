@@ -61,6 +61,9 @@ fn distribution_loss(original: &Photometry, again: &Photometry) -> String {
 }
 
 fn keyword_losses(original: &Photometry, again: &Photometry, losses: &mut Vec<String>) {
+    if original.keywords == again.keywords {
+        return;
+    }
     let lamp_kind = match &again.details {
         Details::Eulumdat(details) => details.lamp_sets.first().map(|set| set.kind.as_str()),
         Details::None | Details::Lm63(_) => None,
@@ -76,7 +79,7 @@ fn keyword_losses(original: &Photometry, again: &Photometry, losses: &mut Vec<St
     }
     if !lost.is_empty() {
         losses.push(format!("keywords lost or changed: {}", lost.join(", ")));
-    } else if original.keywords != again.keywords {
+    } else {
         losses.push("keywords were added or their order changed".into());
     }
 }

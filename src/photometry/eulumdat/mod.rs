@@ -206,6 +206,10 @@ fn read_table(fields: &mut Fields, head: &Head, scale: f64) -> Result<LuminousIn
     let c_deg = fields.angles("C", head.planes)?;
     let gamma_deg = fields.angles("gamma", head.gammas)?;
     let stored = planes::stored(head.symmetry, &c_deg).map_err(|problem| fields.error_here(problem))?;
+    if !planes::mirrored(head.symmetry, &c_deg) {
+        let message = format!("the C planes are no mirror images of each other although Isym is {}", head.symmetry);
+        fields.warn("ldt/mirror", message);
+    }
     let gammas = gamma_deg.len();
     fields.room_for("the number of intensities", stored.len() * gammas)?;
     let table_line = fields.line();

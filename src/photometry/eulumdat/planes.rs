@@ -43,3 +43,22 @@ pub(super) fn arrange(symmetry: u8, mut c_deg: Vec<f64>, mut candela: Vec<f64>, 
     }
     (c_deg, candela)
 }
+
+/// Whether the listed planes are mirror images of each other, as the symmetry indicator says.
+pub(super) fn mirrored(symmetry: u8, c_deg: &[f64]) -> bool {
+    let open = if c_deg.last() == Some(&360.0) { &c_deg[..c_deg.len() - 1] } else { c_deg };
+    let planes = open.len();
+    // The plane `at` lies in the mirror; those on its two sides belong together. Files round their angles.
+    let about = |mirror_deg: f64, at: usize| {
+        (1..planes).all(|k| {
+            let off = (open[(at + k) % planes] + open[(at + planes - k) % planes] - 2.0 * mirror_deg).rem_euclid(360.0);
+            off.min(360.0 - off) < 0.01
+        })
+    };
+    match symmetry {
+        2 => about(0.0, 0),
+        3 => about(90.0, planes / 4),
+        4 => about(0.0, 0) && about(90.0, planes / 4),
+        _ => true,
+    }
+}

@@ -49,6 +49,7 @@ fn every_symmetry_puts_its_planes_where_they_belong() {
     ] {
         let found = read(&lines(symmetry, &around, stored)).unwrap();
         assert_eq!(found.distribution.symmetry(), expected);
+        assert!(!codes(&found).contains(&"ldt/mirror"));
         for (c, value) in at {
             assert_eq!(found.distribution.intensity(c, 90.0).value(), 2.0 * (value + 1.0), "Isym {symmetry}, C {c}");
         }
@@ -93,6 +94,15 @@ fn negative_lamps_mean_absolute_photometry_and_the_first_set_counts() {
     assert_eq!((found.lamp_lumens, codes(&found)), (Some(2000.0), vec!["ldt/lamp-sets"]));
     let Details::Eulumdat(details) = found.details else { panic!("{:?}", found.details) };
     assert_eq!(details.lamp_sets[1].kind, "other");
+}
+
+#[test]
+fn planes_that_are_no_mirror_images_are_remarked() {
+    let around = [4.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0];
+    let found = read(&lines(3, &around, &[270.0, 315.0, 4.0, 45.0, 90.0])).unwrap();
+    assert_eq!(codes(&found)[0], "ldt/mirror");
+    assert_eq!(found.distribution.intensity(176.0, 90.0).value(), 10.0);
+    assert!(!write(&found).losses.is_empty());
 }
 
 #[test]

@@ -149,6 +149,10 @@ fn read_lamps(numbers: &mut Numbers, edition: Edition) -> Result<Lamps, ReadErro
         numbers.checked(format_args!("the lumens per lamp"), "positive, or -1 for absolute photometry", |n| {
             n > 0.0 || n == -1.0
         })?;
+    if !(first.value * lumens.value).is_finite() {
+        let (what, found) = ("the lumens of all lamps together".into(), f64::INFINITY);
+        return Err(text.error(lumens.at, Problem::OutOfRange { what, found, expected: "finite" }));
+    }
     let multiplier = numbers.checked(format_args!("the candela multiplier"), "positive", |n| n > 0.0)?;
     let vertical = numbers.count(format_args!("the number of vertical angles"), 2.0)?;
     let horizontal = numbers.count(format_args!("the number of horizontal angles"), 1.0)?;
@@ -237,7 +241,8 @@ fn read_table(mut numbers: Numbers, lamps: &Lamps) -> Result<Table, ReadError> {
         for v in 0..vertical {
             let what = format_args!("candela value {} of {vertical} at horizontal angle {angle}", v + 1);
             let number = numbers.checked(what, "zero or more", |n| n >= 0.0)?;
-            if v == 0 && h > 0 && !numbers.text.bytes[before..number.at].iter().any(|b| matches!(b, b'\n' | b'\r')) {
+            let begins_line = || numbers.text.bytes[before..number.at].iter().any(|b| matches!(b, b'\n' | b'\r'));
+            if v == 0 && h > 0 && !begins_line() && !numbers.lints.again("lm63/broken-record") {
                 let line = numbers.text.line_of(number.at);
                 numbers.lints.note("lm63/broken-record", line, "the values of a horizontal angle do not begin a line");
             }

@@ -131,6 +131,7 @@ fn refusals_name_the_place() {
         ("3 1 1 2 0", "3 1e300 1 2 0", 7, 10, "bytes follow"),
         ("1 -1 1", "1 -2 1", 7, 3, "-1 for absolute"),
         ("1 -1 1", "0 -1 1", 7, 1, "whole number"),
+        ("1 -1 1", "2 1e308 1", 7, 3, "finite"),
         ("1 -1 1", "1 -1 0", 7, 6, "positive"),
         ("1 -1 1", "1 -1 1e-300 3 1 1 2 0 0 0 1e-300 1 0 ", 7, 6, "product"),
         ("TILT=NONE\n", "", 11, 1, "TILT="),

@@ -73,6 +73,7 @@ fn refusals_name_the_place() {
         (">20<", ">twenty<", 21, 77, "should be a number"),
         (">20<", ">NaN<", 21, 77, "not finite"),
         ("h=\"90\" v=\"0\"", "h=\"80\" v=\"0\"", 15, 7, "3 different"),
+        ("<Quantity>1", "<Quantity>0", 9, 3, "at least one"),
         ("<Multiplier>2", "<Multiplier>-2", 17, 9, "zero or more"),
     ] {
         let text = PLAIN.replace(from, to);
