@@ -65,15 +65,19 @@ impl<'a> Bench<'a> {
         let first = export::first_readouts(self.job, Light::Direct);
         let mut looks: Vec<Look> = first.iter().map(|r| Look::Again(*r)).collect();
         let mut taken = 0;
-        while looks.iter().any(|l| matches!(l, Look::Again(_))) {
+        while let Some(k) = looks.iter().position(|l| matches!(l, Look::Again(_))) {
             if taken == MOST_LOOKS {
-                return Err(output(format!("direct light was not read after {MOST_LOOKS} looks")));
+                let id = &self.job.stations[k].id;
+                return Err(output(format!("direct light at {id} was not read after {MOST_LOOKS} looks")));
             }
             taken += 1;
             let readouts: Vec<Readout> = looks.iter().map(Look::readout).collect();
             let seen = self.look(run, &readouts)?;
             for (k, look) in looks.iter_mut().enumerate() {
                 if let Look::Again(readout) = *look {
+                    if seen[k] == Seen::Missed {
+                        return Err(self.missed(k));
+                    }
                     *look = next_look(readout, seen[k], scale_of(first[k]));
                 }
             }
@@ -104,7 +108,10 @@ impl<'a> Bench<'a> {
         let share = (0.9 * left_s / (waves * pilot.wall_s)).max(1e-3).powf(0.8);
         if share < 1.0 && self.settings.preset == Preset::Audit {
             run.count = (f64::from(run.count) * share).max(FEWEST_RAYS) as u32;
-            notes.push(format!("{} rays a sample instead of {}: the budget is short", run.count, self.settings.count));
+            notes.push(format!(
+                "{} rays a sample instead of {}, which biases the reading more: the budget is short",
+                run.count, self.settings.count
+            ));
         }
         self.keep_readouts(&pilot.readouts)?;
         let mut blocks: Vec<Vec<f64>> = vec![];
@@ -286,7 +293,6 @@ fn next_look(readout: Readout, seen: Seen, upper: f64) -> Look {
         (_, Seen::Below(limit)) if limit < DARK * upper => Look::Done { lx: 0.0, resolution_lx: limit },
         (_, Seen::Below(limit)) => Look::Again(Readout::Coarse(4.0 * limit)),
         (r, Seen::Above) => Look::Again(Readout::Coarse(1e3 * scale_of(r))),
-        // A disc that is not seen will not be seen again: the looks run out and say so.
         (r, _) => Look::Again(Readout::Coarse(scale_of(r))),
     }
 }

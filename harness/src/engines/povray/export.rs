@@ -9,7 +9,7 @@ use std::fmt::Write;
 use glam::DVec3;
 use luminaire::geometry::Surface;
 use luminaire::photometry::LuminousIntensityDistribution;
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Shape, Transport};
+use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport};
 
 use crate::engines::{Job, SceneFile};
 
@@ -17,7 +17,7 @@ use super::frame::Frame;
 use super::opening::{self, Part};
 use super::pigment;
 use super::pixels::Readout;
-use super::settings::{DEEPEST, Settings};
+use super::settings::Settings;
 
 /// The scene's file name.
 pub(super) const SCENE: &str = "scene.pov";
@@ -78,20 +78,17 @@ pub(super) fn readouts(readouts: &[Readout]) -> String {
 
 /// No more than a few times the illuminance to be expected: where it is wrong, a second run finds out.
 fn upper_bound_lx(job: &Job, at_m: DVec3, part: Light) -> f64 {
-    let bound = match (part, job.scene.room) {
-        (Light::Indirect, Some(room)) => {
-            let area: f64 = Surface::ALL.iter().map(|&s| room.area_m2(s)).sum();
-            let mean = super::mean_reflectance(&room);
-            let flux = |l: &Luminaire| l.photometry.distribution.flux().value() * l.flux_scale;
-            8.0 * job.scene.luminaires.iter().map(flux).sum::<f64>() / area * mean / (1.0 - mean).max(0.01)
-        }
-        _ => {
-            let most = |l: &Luminaire| {
-                let distance_squared = l.position_m.distance_squared(at_m).max(1e-6);
-                l.photometry.distribution.max_intensity().value() * l.flux_scale / distance_squared
-            };
-            job.scene.luminaires.iter().map(most).sum()
-        }
+    let bound: f64 = if let (Light::Indirect, Some(room)) = (part, job.scene.room) {
+        let area: f64 = Surface::ALL.iter().map(|&s| room.area_m2(s)).sum();
+        let mean = super::mean_reflectance(&room);
+        let flux = |l: &Luminaire| l.photometry.distribution.flux().value() * l.flux_scale;
+        8.0 * job.scene.luminaires.iter().map(flux).sum::<f64>() / area * mean / (1.0 - mean).max(0.01)
+    } else {
+        let most = |l: &Luminaire| {
+            let distance_squared = l.position_m.distance_squared(at_m).max(1e-6);
+            l.photometry.distribution.max_intensity().value() * l.flux_scale / distance_squared
+        };
+        job.scene.luminaires.iter().map(most).sum()
     };
     if bound > 0.0 { bound } else { 1.0 }
 }
@@ -131,8 +128,8 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
     writeln!(text, "#ifndef (Count) #declare Count = {}; #end", settings.count).ok();
     writeln!(text, "#declare Brightness = #if (Indirect) {}; #else 1; #end", settings.brightness).ok();
     text.push_str("global_settings {\n  assumed_gamma 1.0 max_trace_level 10 adc_bailout 1e-9\n");
-    if let Some(reflections) = reflections(job.transport) {
-        writeln!(text, "  #if (Indirect) {} #end", settings.radiosity(reflections)).ok();
+    if let Transport::Indirect(bounces) | Transport::Total(bounces) = job.transport {
+        writeln!(text, "  #if (Indirect) {} #end", settings.radiosity(bounces)).ok();
     }
     text.push_str("}\n\n");
     text.push_str(TURN);
@@ -146,17 +143,6 @@ const TURN: &str = "#declare S = seed(Seed);
 #declare TurnFunction = function { transform { Turn } }
 #macro Turned(P) (TurnFunction(P.x, P.y, P.z)) #end
 ";
-
-/// Diffuse reflections of a transport: `None` without any, `Some(None)` for all of them.
-fn reflections(transport: Transport) -> Option<Option<u32>> {
-    match transport {
-        Transport::Direct => None,
-        Transport::Indirect(b) | Transport::Total(b) => Some(match b {
-            Bounces::Converged => None,
-            Bounces::AtMost(n) => Some(n.min(DEEPEST)),
-        }),
-    }
-}
 
 fn meters(job: &Job, frame: Frame) -> String {
     let count = job.stations.len();
@@ -205,8 +191,9 @@ camera { mesh_camera { 1 0 mesh { Aim } } location <0, 0, .002> direction <0, 0,
     #local Offset = <.25, .5 - 500, .25>;
   #end
   disc { Turned(Meters[K][0]), Turned(Meters[K][1]), .001
-    pigment { rgb Gain }
-    finish { ambient 0 diffuse 1 emission rgb Offset/Gain }  // POV-Ray multiplies emission by the pigment
+    // POV-Ray multiplies emission by the pigment.
+    texture { pigment { rgb Gain } finish { ambient 0 diffuse 1 emission rgb Offset/Gain } }
+    interior_texture { pigment { rgbt 1 } finish { ambient 0 diffuse 0 } }  // the back is not there
     no_shadow no_reflection no_radiosity }
 #end
 ";

@@ -1,7 +1,7 @@
 //! Where scene coordinates lie: near the origin and of a handy size, so that POV-Ray's absolute tolerances do no harm.
 //!
 //! POV-Ray ignores what is nearer than 1e-4 to a ray's start and takes 1e-3 for nothing near a shadow ray's
-//! (MIN_ISECT_DEPTH, SHADOW_TOLERANCE); its radiosity measures distances from the camera.
+//! (`MIN_ISECT_DEPTH`, `SHADOW_TOLERANCE`); its radiosity measures distances from the camera.
 
 use glam::DVec3;
 use luminaire::geometry::Surface;
@@ -31,8 +31,13 @@ impl Frame {
             None => extent_m(job),
         };
         let size_m = (high - low).max_element();
+        let centre_m = low.midpoint(high);
+        let metres = Self { centre_m, scale: 1.0 };
         let handy = (1.0..=200.0).contains(&size_m) || size_m <= 0.0;
-        Self { centre_m: low.midpoint(high), scale: if handy { 1.0 } else { 10.0 / size_m } }
+        // Meters that need room for their discs get it by the scale of everything else.
+        let free =
+            seats(job, metres).iter().zip(&job.stations).all(|(seat, s)| *seat == metres.point(s.meter.position_m));
+        if handy && free { metres } else { Self { centre_m, scale: LARGE / size_m.max(f64::MIN_POSITIVE) } }
     }
 
     /// A point of the spec in scene units.
@@ -40,6 +45,9 @@ impl Frame {
         (p_m - self.centre_m) * self.scale
     }
 }
+
+/// Extent in units of a scene that is scaled, so large that POV-Ray's absolute tolerances and ours vanish in it.
+const LARGE: f64 = 1000.0;
 
 fn extent_m(job: &Job) -> (DVec3, DVec3) {
     let meters = job.stations.iter().map(|s| s.meter.position_m);
@@ -58,7 +66,8 @@ pub(super) fn seats(job: &Job, frame: Frame) -> Vec<DVec3> {
         if on_a_surface(job, frame, points[k]) {
             return points[k] + CLEAR * normal(k);
         }
-        // Each of two crossing discs lies a little behind its own meter, so that each meter sees its own first.
+        // Each of two crossing discs lies a little behind its own meter: another's front comes after it, and another's
+        // back, which is transparent, before it, by more than POV-Ray's least distance between hits.
         let crosses =
             |j: usize| j != k && points[j].distance(points[k]) < REACH && normal(j).dot(normal(k)).abs() < 1.0 - 1e-9;
         if (0..points.len()).any(crosses) { points[k] - BEHIND * normal(k) } else { points[k] }
@@ -69,7 +78,7 @@ pub(super) fn seats(job: &Job, frame: Frame) -> Vec<DVec3> {
 /// How far a disc is lifted off a surface.
 const CLEAR: f64 = 2e-5;
 /// How far a disc lies behind its meter where discs cross.
-const BEHIND: f64 = 1e-6;
+const BEHIND: f64 = 1e-4;
 /// Discs nearer than this to each other, twice their radius, may cross.
 const REACH: f64 = 2e-3;
 

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use luminaire::scene::Bounces;
+
 use crate::engines::{EngineError, Job};
 
 use super::ID;
@@ -104,7 +106,11 @@ impl Settings {
     }
 
     /// The `radiosity` block for a number of diffuse reflections.
-    pub(super) fn radiosity(&self, reflections: Option<u32>) -> String {
+    pub(super) fn radiosity(&self, bounces: Bounces) -> String {
+        let reflections = match bounces {
+            Bounces::Converged => None,
+            Bounces::AtMost(n) => Some(n.min(DEEPEST)),
+        };
         if self.preset == Preset::Default {
             let limit = reflections.map(|n| format!(" recursion_limit {n}")).unwrap_or_default();
             return format!("radiosity {{{limit} }}");
@@ -119,8 +125,8 @@ impl Settings {
     }
 }
 
-/// Length of the pool of sample directions, a prime.
-const POOL: u32 = 200_003;
+/// Length of the pool of sample directions, a prime; every level of recursion copies the pool, which takes its time.
+const POOL: u32 = 20_011;
 
 impl Preset {
     /// Its name in specs.

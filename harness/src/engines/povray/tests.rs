@@ -10,6 +10,7 @@ use luminaire::scene::{LuminaireModel, Obstacle, Scene, Shape, orientation};
 
 use super::cases::{INDIRECT, S1_DIRECT_LX, S1_INDIRECT_LX, job, lopsided, luminaire, s1, uplight};
 use super::*;
+use crate::engines::Budget;
 
 fn site() -> Site {
     let site = std::env::var_os("LUXPROOF_ENGINES").map_or_else(|| Site::of_user().unwrap(), Site::at);
@@ -44,6 +45,39 @@ fn direct_exact(job: &Job) -> Vec<f64> {
 fn worst_relative(measured: &Measurement, exact: &[f64]) -> f64 {
     let pairs = measured.estimates.iter().zip(exact);
     pairs.map(|(e, x)| (e.value_lx / x - 1.0).abs()).fold(0.0, f64::max)
+}
+
+fn exported(job: &Job) -> String {
+    String::from_utf8(PovRay.export(job).unwrap().remove(0).bytes).unwrap()
+}
+
+#[test]
+fn the_scene_of_s1_is_as_reviewed() {
+    insta::assert_snapshot!(exported(&s1(INDIRECT)));
+}
+
+#[test]
+fn a_scene_with_turned_area_luminaires_and_obstacles_is_as_reviewed() {
+    let mut lamp = luminaire("panel", lopsided(), DVec3::new(2.0, 1.5, 2.9));
+    lamp.orientation = orientation(30.0, 20.0, 0.0);
+    lamp.model = LuminaireModel::Area;
+    std::sync::Arc::make_mut(&mut lamp.photometry).opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+    let room = Room { size_m: DVec3::new(8.0, 6.0, 3.0), reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8) };
+    let vertices_m = vec![DVec3::new(1.0, 1.0, 1.0), DVec3::new(2.0, 1.0, 1.0), DVec3::new(1.0, 2.0, 1.0)];
+    let obstacles = vec![
+        Obstacle {
+            shape: Shape::Box { min_m: DVec3::new(4.0, 3.0, 0.0), max_m: DVec3::new(5.0, 4.0, 0.75) },
+            reflectance: 0.5,
+        },
+        Obstacle { shape: Shape::Mesh { vertices_m, triangles: vec![[0, 1, 2]] }, reflectance: 0.3 },
+    ];
+    let mut job = job(
+        Scene { room: Some(room), obstacles, luminaires: vec![lamp] },
+        &[(DVec3::new(0.25, 0.25, 0.8), DVec3::Z)],
+        Transport::Total(Bounces::AtMost(7)),
+    );
+    job.settings.insert("preset".into(), "fast".into());
+    insta::assert_snapshot!(exported(&job));
 }
 
 #[test]
@@ -98,9 +132,8 @@ fn several_luminaires_add_up_in_scenes_of_any_size() {
         let exact = direct_exact(&job);
         let measured = read(&job);
         for (estimate, exact) in measured.estimates.iter().zip(&exact) {
-            // A meter on a surface is read 2e-5 scene units above it.
             assert!(
-                (estimate.value_lx - exact).abs() <= 2e-5 * exact,
+                (estimate.value_lx - exact).abs() <= 2e-6 * exact,
                 "{size}: {} lx, exact {exact}",
                 estimate.value_lx
             );
@@ -157,11 +190,14 @@ fn a_flat_opening_is_the_mean_of_its_points() {
 
 #[test]
 fn indirect_light_of_s1_is_exact_within_its_errors_and_the_named_bias() {
-    let measured = read(&s1(INDIRECT));
+    let mut job = s1(INDIRECT);
+    // No dependence on how busy the machine is: as few blocks as there may be, each in full.
+    job.budget = Budget { relative_error: 0.02, seconds: 1e6 };
+    let measured = read(&job);
     for (estimate, exact) in measured.estimates.iter().zip(S1_INDIRECT_LX) {
         let allowed = 3.0 * estimate.std_error_lx.unwrap() + AUDIT_BIAS * exact;
         assert!((estimate.value_lx - exact).abs() < allowed, "{estimate:?} {exact}");
-        assert!(estimate.std_error_lx.unwrap() < 0.01 * exact, "{estimate:?}");
+        assert!(estimate.std_error_lx.unwrap() < 0.02 * exact, "{estimate:?}");
     }
     assert!(measured.settings["blocks"].parse::<usize>().unwrap() >= 8);
 }
