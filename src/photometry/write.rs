@@ -77,11 +77,11 @@ fn keyword_losses(original: &Photometry, again: &Photometry, losses: &mut Vec<St
             lost.push(if keyword.0.is_empty() { "a label line".into() } else { format!("[{}]", keyword.0) });
         }
     }
-    if !lost.is_empty() {
-        losses.push(format!("keywords lost or changed: {}", lost.join(", ")));
+    losses.push(if lost.is_empty() {
+        "keywords were added or their order changed".into()
     } else {
-        losses.push("keywords were added or their order changed".into());
-    }
+        format!("keywords lost or changed: {}", lost.join(", "))
+    });
 }
 
 fn detail_losses(original: &Photometry, again: &Photometry, losses: &mut Vec<String>) {

@@ -263,3 +263,10 @@ fn a_type_b_table_too_fine_for_a_grid_through_its_nodes_states_its_error() {
     assert!(read.lints.iter().any(|l| l.code == "planes/resampled" && l.message.contains("at the nodes")));
     assert!((distribution.intensity(0.0, 30.0).value() - 500.0).abs() < 1.0);
 }
+
+#[test]
+fn the_reference_file_of_case_s1_gives_its_converged_flux() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("reference/luminaires/axial.ies");
+    let read = crate::photometry::read_file(&path).unwrap();
+    approx::assert_relative_eq!(read.distribution.flux().value(), 1817.2814559, max_relative = 1e-9);
+}
