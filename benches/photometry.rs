@@ -30,9 +30,10 @@ fn as_tm33(photometry: &Photometry) -> String {
         let values = table.gamma_deg().iter().zip(table.plane(c));
         values
             .map(|(v, i)| format!("<IntData h=\"{}\" v=\"{v}\">{i}</IntData>\n", table.c_deg()[c]))
-            .collect::<String>()
+            .collect::<Vec<String>>()
+            .concat()
     };
-    let data: String = (0..table.c_deg().len()).map(plane).collect();
+    let data = (0..table.c_deg().len()).map(plane).collect::<Vec<String>>().concat();
     format!(
         "<IESTM33-22><Emitter><LuminousData><LuminousIntensity>{data}</LuminousIntensity></LuminousData></Emitter></IESTM33-22>"
     )
