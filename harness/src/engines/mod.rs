@@ -5,6 +5,7 @@
 #[cfg(test)]
 mod fixtures;
 mod iesna;
+mod image;
 mod install;
 mod mitsuba;
 mod povray;

@@ -42,6 +42,9 @@ impl Engine for PovRay {
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         let remedy = || "run `luxproof engines install`, or install the Debian package povray".to_owned();
         let absent = |reason| Absent { reason, remedy: remedy() };
+        if site.python_package("OpenImageIO").is_none() {
+            return Err(absent("OpenImageIO, which reads its images, is not there".to_owned()));
+        }
         let program = blocks::program(site).map_err(|e| absent(e.to_string()))?;
         let folder = tempfile::tempdir().map_err(|e| absent(e.to_string()))?;
         let limit = std::time::Duration::from_secs(20);

@@ -334,7 +334,10 @@ fn notes(report: &Report, text: &mut String) {
     for recording in &report.recordings {
         let of = format!("{} {}", recording.engine, recording.procedure);
         lines.extend(recording.approximation.iter().map(|a| format!("{of}: approximate, {a}")));
-        lines.extend(recording.notes.iter().map(|n| format!("{}: {n}", recording.engine)));
+        // What the approximation says already need not be said again.
+        let said = |note: &&String| recording.approximation.as_ref().is_some_and(|a| a.contains(note.as_str()));
+        let news = recording.notes.iter().filter(|n| !said(n));
+        lines.extend(news.map(|n| format!("{}: {n}", recording.engine)));
         lines
             .extend(recording.failure.iter().map(|f| format!("{of} failed: {}", f.lines().next().unwrap_or_default())));
     }

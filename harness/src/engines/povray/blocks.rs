@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::Instant;
 
+use crate::engines::image::read_rgb;
 use crate::engines::{EngineError, Estimate, Job, Measurement, SceneFile, Site, Workbench, mean_and_std_error};
 use crate::process::Invocation;
 
@@ -220,9 +221,8 @@ impl<'a> Bench<'a> {
         let path = self.workbench.scene_dir.join(&image);
         let invocation = self.workbench.invoke(&self.program).args(self.arguments(run, &image));
         hermetic(invocation, &self.workbench.site).run()?;
-        let bytes = std::fs::read(&path).map_err(|e| EngineError::io(&path, e))?;
+        let pixels = read_rgb(ID, self.workbench, &path)?;
         std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
-        let pixels = pixels::parse(&bytes).map_err(output)?;
         if pixels.len() != readouts.len() {
             return Err(output(format!("gave {} pixels for {} meters", pixels.len(), readouts.len())));
         }

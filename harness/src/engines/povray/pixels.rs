@@ -1,4 +1,4 @@
-//! POV-Ray's 16-bit portable pixmap read back as illuminance: pure decoding, with a check that every disc was seen.
+//! POV-Ray's pixels read back as illuminance: pure decoding, with a check that every disc was seen.
 //!
 //! A meter's disc shows x = E / scale three times in one pixel: red .25 + x/2, green 16 x, blue 256 x. Once E is known
 //! to a thousandth, it shows the deviation y = E / expected - 1 instead: red .75 + y/2, green .5 + 500 y, blue .25. The
@@ -29,26 +29,6 @@ pub(super) enum Seen {
     Below(f64),
     /// No disc in this pixel.
     Missed,
-}
-
-/// A row of RGB pixels, 0..=1.
-pub(super) fn parse(bytes: &[u8]) -> Result<Vec<[f64; 3]>, String> {
-    let mut header = Header { bytes, at: 0 };
-    if header.word() != Some("P6") {
-        return Err("wrote a file that is no portable pixmap".to_owned());
-    }
-    let mut number = || header.word().and_then(|w| w.parse::<usize>().ok());
-    let (Some(width), Some(height), Some(65535)) = (number(), number(), number()) else {
-        return Err("wrote a portable pixmap that is not of 16 bits".to_owned());
-    };
-    // One white space ends the header.
-    let data = bytes.get(header.at + 1..).unwrap_or_default();
-    let (found, wanted) = (data.len() / 6, width * height);
-    if found != wanted {
-        return Err(format!("wrote {found} pixels where its header says {wanted}"));
-    }
-    let channel = |b: &[u8], k: usize| f64::from(u16::from_be_bytes([b[2 * k], b[2 * k + 1]])) / FULL;
-    Ok(data.chunks_exact(6).map(|b| [channel(b, 0), channel(b, 1), channel(b, 2)]).collect())
 }
 
 /// Decodes one pixel.
@@ -99,33 +79,9 @@ const CLIPPED: f64 = 65500.0 / FULL;
 /// A blue channel below this has too few steps to be a measure.
 const FAINT: f64 = 64.0 / FULL;
 
-/// Words of a header, comments left out.
-struct Header<'a> {
-    bytes: &'a [u8],
-    at: usize,
-}
-
-impl<'a> Header<'a> {
-    fn word(&mut self) -> Option<&'a str> {
-        loop {
-            let rest = self.bytes.get(self.at..)?;
-            match rest.first()? {
-                b'#' => self.at += rest.iter().position(|b| *b == b'\n')?,
-                b if b.is_ascii_whitespace() => self.at += 1,
-                _ => {
-                    let length = rest.iter().position(u8::is_ascii_whitespace)?;
-                    self.at += length;
-                    return std::str::from_utf8(&rest[..length]).ok();
-                }
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use approx::assert_relative_eq;
 
     fn quantised(rgb: [f64; 3]) -> [f64; 3] {
         rgb.map(|v| (v.clamp(0.0, 1.0) * FULL).round() / FULL)
@@ -161,18 +117,5 @@ mod tests {
             assert_eq!(decode(Readout::Coarse(1.0), [grey; 3]), Seen::Missed, "{grey}");
             assert_eq!(decode(Readout::Fine(1.0), [grey; 3]), Seen::Missed, "{grey}");
         }
-    }
-
-    #[test]
-    fn pixmaps_with_comments_are_read_and_short_ones_refused() {
-        let mut bytes = b"P6\n# Software: POV-Ray\n# Date: 1\n2 1\n65535\n".to_vec();
-        bytes.extend([0x80, 0, 0, 0, 0xff, 0xff, 0, 1, 0, 0, 0, 0]);
-        let pixels = parse(&bytes).unwrap();
-        assert_eq!(pixels.len(), 2);
-        assert_relative_eq!(pixels[0][0], 32768.0 / 65535.0);
-        assert_eq!((pixels[0][2], pixels[1][0]), (1.0, 1.0 / 65535.0));
-        bytes.pop();
-        assert!(parse(&bytes).is_err());
-        assert!(parse(b"P5\n1 1\n255\n0").is_err());
     }
 }
