@@ -1,5 +1,7 @@
 //! The command line as a user meets it: errors with their place before any engine starts, exit codes, views, schemas.
 
+#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,5 +1,7 @@
 //! Negative controls: a deliberately wrong export, run on the real renderer, must fail its procedure.
 
+#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
+
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
