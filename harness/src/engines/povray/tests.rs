@@ -12,6 +12,9 @@ use super::cases::{INDIRECT, S1_DIRECT_LX, S1_INDIRECT_LX, job, lopsided, lumina
 use super::*;
 use crate::engines::Budget;
 
+/// A fault and how to put it into a job.
+type Tamper = (&'static str, fn(&mut Job));
+
 fn site() -> Site {
     let site = std::env::var_os("LUXPROOF_ENGINES").map_or_else(|| Site::of_user().unwrap(), Site::at);
     assert!(PovRay.probe(&site).is_ok(), "povray is not there: run `luxproof engines install`");
@@ -207,7 +210,7 @@ fn wrong_exports_are_seen_in_the_readings() {
     let mut right = s1(Transport::Direct);
     right.scene.luminaires[0] = luminaire("lopsided", lopsided(), DVec3::splat(10.0));
     let exact = direct_exact(&right);
-    let tampers: [(&str, fn(&mut Job)); 3] = [
+    let tampers: [Tamper; 3] = [
         ("pi", |j| j.scene.luminaires[0].flux_scale = std::f64::consts::PI),
         ("multiplier dropped", |j| j.scene.luminaires[0].flux_scale = 0.1),
         ("C turned by 90 degrees", |j| j.scene.luminaires[0].orientation = orientation(90.0, 0.0, 0.0)),
