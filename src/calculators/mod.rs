@@ -10,6 +10,7 @@
 //! Nothing here imports the simulator: each bears witness against the other.
 
 pub mod closed_form;
+mod deviation;
 pub mod exitance_difference;
 pub mod inverse_square;
 pub mod uniform_surfaces;
@@ -17,6 +18,7 @@ mod validity;
 pub mod zonal_cavity;
 pub mod zonal_multiplier;
 
+pub use deviation::{DeviationSplit, Uncertain};
 pub use validity::{Calculated, NotApplicable, Validity};
 
 #[cfg(test)]

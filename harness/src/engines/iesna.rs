@@ -74,8 +74,7 @@ fn in_short(mut objections: Vec<String>) -> Vec<String> {
     objections.dedup();
     if objections.len() > 2 {
         let more = objections.len() - 1;
-        objections.truncate(1);
-        objections[0].push_str(&format!(" (and the like at {more} more meters)"));
+        objections = vec![format!("{} (and the like at {more} more meters)", objections[0])];
     }
     objections
 }
