@@ -24,7 +24,7 @@ fn main() -> Result<(), Failure> {
 }
 
 /// All computed tables, in the document's order.
-pub fn report() -> Result<String, Failure> {
+pub(crate) fn report() -> Result<String, Failure> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("reference");
     let rows = published(&std::fs::read_to_string(folder.join("published/cachet.yaml"))?)?;
     let photometry = read_file(&folder.join("luminaires/cachet-reconstructed.ies"))?;
