@@ -5,7 +5,7 @@
 //! ray/triangle intersection", JCGT 2(1), 2013. This is the only file that knows `obvhs` and `f32`.
 //!
 //! The tree may propose too much but never too little: it lives in a frame where the scene spans
-//! [`FRAME_EXTENT`] units (its node test holds an absolute 1e-4), every box is padded by [`PADDING`] units, which
+//! `FRAME_EXTENT` units (its node test holds an absolute 1e-4), every box is padded by `PADDING` units, which
 //! exceeds the sum of all `f32` roundings of origin, direction, box and slab test (about 4e-3 units), rays enter the
 //! tree at its bounds instead of far outside, and no `f32` distance ever rejects a hit.
 
@@ -153,7 +153,7 @@ impl TriangleBvh {
     }
 }
 
-/// The frame of the tree: centred on the scene and scaled so that it spans [`FRAME_EXTENT`].
+/// The frame of the tree: centred on the scene and scaled so that it spans `FRAME_EXTENT`.
 struct Frame {
     centre_m: DVec3,
     /// Units of the frame to the metre.
