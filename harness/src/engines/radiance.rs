@@ -1,7 +1,11 @@
 //! Radiance (Ward 1994): its own rtrace, ambient cache off, driven through stdin and read in 64-bit floats.
 
 mod export;
+#[cfg(test)]
+mod failure_tests;
 mod float_error;
+#[cfg(test)]
+mod opening_tests;
 mod options;
 mod sampling;
 mod settings;
@@ -11,9 +15,9 @@ mod tools;
 
 use std::time::Instant;
 
-use luminaire::scene::{LuminaireModel, Transport};
+use luminaire::scene::Transport;
 
-use self::options::Options;
+use self::options::{Options, Sources};
 use self::sampling::Sampler;
 use self::settings::{Preset, Settings};
 use self::tools::Tools;
@@ -43,15 +47,24 @@ impl Engine for Radiance {
     }
 
     fn supports(&self, job: &Job) -> Support {
-        if job.scene.luminaires.iter().any(|l| l.model != LuminaireModel::Point) {
-            return Support::No("only point luminaires are exported to Radiance".into());
+        // Settings that make no sense are told by `export` and `read`, as errors.
+        let Ok(settings) = Settings::of(job) else { return Support::Yes };
+        if let Some(why) = job.scene.luminaires.iter().find_map(|l| export::unsupported(l, &settings)) {
+            return Support::No(why);
         }
-        let remainder = options::remainder(job);
-        if remainder > 1e-6 {
-            let why = format!("light after {} bounces is left out", options::bounces(job));
-            return Support::Approximate { why, size: Some(remainder) };
+        let left_out = Some(options::remainder(job)).filter(|r| *r > 1e-6);
+        let known = [
+            (left_out, format!("light after {} bounces is left out", options::bounces(job))),
+            (export::disc_error(job, &settings), "a round opening is sampled as a square of the same area".into()),
+            (export::swallowed(job, &settings), "extended sources swallow the reflected light that meets them".into()),
+        ];
+        let known: Vec<_> = known.into_iter().filter_map(|(size, why)| Some((size?, why))).collect();
+        if known.is_empty() {
+            return Support::Yes;
         }
-        Support::Yes
+        let size = known.iter().map(|(size, _)| size).sum();
+        let why: Vec<_> = known.into_iter().map(|(_, why)| why).collect();
+        Support::Approximate { why: why.join("; "), size: Some(size) }
     }
 
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
@@ -78,45 +91,75 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
     let settings = Settings::of(job)?;
     let tools = Tools::find(&workbench.site).map_err(|absent| output(absent.to_string()))?;
     workbench.write(files)?;
+    for (k, luminaire) in job.scene.luminaires.iter().enumerate() {
+        tools.ies2rad(workbench, k, luminaire, export::route(luminaire, &settings))?;
+    }
     tools.compile(workbench)?;
     let rows = export::rows(job, export::scale(job, settings.scaling));
+    let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows, started };
     let options = printed_options(job, &settings);
-    let direct_lx = tools.rtrace(workbench, &options.direct, &rows)?;
     let mut measurement = Measurement::default();
     measurement.settings.insert("seed".into(), job.seed.to_string());
+
+    let direct = direct(&sampler, &options)?;
     if job.transport == Transport::Direct {
         measurement.settings.insert("rtrace".into(), options.direct.join(" "));
-        let pairs = direct_lx.into_iter().zip(&job.stations);
-        measurement.estimates = pairs.map(|(value_lx, station)| deterministic(job, value_lx, station)).collect();
+        measurement.estimates = direct;
         return checked(ID, job, measurement);
     }
-    let subtract_lx = match job.transport {
-        Transport::Indirect(_) => direct_lx,
-        _ => vec![0.0; rows.len()],
-    };
-    let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows, subtract_lx, started };
-    let blocks = sampler.blocks()?;
-    measurement.settings.insert("rtrace".into(), blocks.options.total.join(" "));
+    let part_lx = tools.rtrace(workbench, &options.part_of_total, &sampler.rows)?;
+    let nothing = vec![0.0; part_lx.len()];
+    let asked = if matches!(job.transport, Transport::Total(_)) { &nothing } else { &part_lx };
+    let blocks = sampler.total(asked)?;
+    measurement.settings.insert("rtrace".into(), blocks.options.join(" "));
     measurement.settings.insert("blocks".into(), blocks.count().to_string());
     measurement.settings.insert("ambient_divisions".into(), blocks.divisions.to_string());
     measurement.notes.push(NOT_REPEATABLE.into());
-    let pairs = blocks.estimates().into_iter().zip(&sampler.subtract_lx);
-    measurement.estimates = pairs.map(|((mean, error), subtract)| sampled(mean, error, *subtract)).collect();
+    let parts = blocks.estimates().into_iter().zip(part_lx).zip(&direct);
+    let estimate = |((total, part_lx), direct)| match job.transport {
+        Transport::Total(_) => sum(reflected(total, part_lx), direct),
+        _ => reflected(total, part_lx),
+    };
+    measurement.estimates = parts.map(estimate).collect();
     checked(ID, job, measurement)
 }
 
-fn deterministic(job: &Job, value_lx: f64, station: &Station) -> Estimate {
+/// Direct light at every station: read once where rtrace's answer is determined, in blocks where it is sampled.
+fn direct(sampler: &Sampler<'_>, options: &Options) -> Result<Vec<Estimate>, EngineError> {
+    let Sampler { job, settings, .. } = *sampler;
+    if Sources::of(job, settings) == Sources::Openings && settings.preset != Preset::Default {
+        let blocks = sampler.direct(options)?;
+        return Ok(blocks.estimates().into_iter().map(sampled).collect());
+    }
+    let direct_lx = sampler.tools.rtrace(sampler.workbench, &options.direct, &sampler.rows)?;
+    let pairs = direct_lx.into_iter().zip(&job.stations);
+    Ok(pairs.map(|(value_lx, station)| determined(job, value_lx, station)).collect())
+}
+
+fn determined(job: &Job, value_lx: f64, station: &Station) -> Estimate {
     let bound = FLOAT_READ_OUT * value_lx + float_error::of_tables_lx(&job.scene, &station.meter);
     Estimate { value_lx, std_error_lx: None, error_bound_lx: Some(bound) }
 }
 
-/// The mean less the direct light; the read-out of both adds to the standard error.
-fn sampled(mean_lx: f64, error_lx: Option<f64>, subtract_lx: f64) -> Estimate {
-    let read_out = FLOAT_READ_OUT * mean_lx;
-    let value_lx = mean_lx - subtract_lx;
-    // Below the read-out a difference has no sign.
-    let value_lx = if value_lx < 0.0 && value_lx > -read_out { 0.0 } else { value_lx };
-    Estimate { value_lx, std_error_lx: error_lx.map(|e| e.hypot(read_out)), error_bound_lx: None }
+/// A mean of blocks with its standard error; the read-out adds to it.
+fn sampled((mean_lx, error_lx): (f64, Option<f64>)) -> Estimate {
+    let std_error_lx = error_lx.map(|e| e.hypot(FLOAT_READ_OUT * mean_lx));
+    Estimate { value_lx: mean_lx, std_error_lx, error_bound_lx: None }
+}
+
+/// All light less the direct part of it, which rtrace finds anew each time to the last digit.
+fn reflected(total: (f64, Option<f64>), part_lx: f64) -> Estimate {
+    let all = sampled(total);
+    let value_lx = all.value_lx - part_lx;
+    // Below its error a difference has no sign.
+    let lost = value_lx < 0.0 && all.std_error_lx.is_some_and(|e| value_lx > -4.0 * e);
+    Estimate { value_lx: if lost { 0.0 } else { value_lx }, ..all }
+}
+
+fn sum(reflected: Estimate, direct: &Estimate) -> Estimate {
+    let error = |e: f64| e.hypot(direct.std_error_lx.or(direct.error_bound_lx).unwrap_or(0.0));
+    let value_lx = reflected.value_lx + direct.value_lx;
+    Estimate { value_lx, std_error_lx: reflected.std_error_lx.map(error), error_bound_lx: None }
 }
 
 fn output(what: String) -> EngineError {

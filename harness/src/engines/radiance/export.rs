@@ -3,13 +3,13 @@
 //! `scene.rad` holds surfaces and luminaires, `luminaire-<n>.dat` the candela tables, `meters.txt` the meters and
 //! `run.sh` the commands. Formats: Ward and Shakespeare, *Rendering with Radiance* (1998); refman of Radiance 6.
 
-use std::fmt::Write;
+mod luminaires;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use luminaire::geometry::Surface;
-use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
-use luminaire::scene::{Luminaire, Obstacle, Shape, Transport};
+use luminaire::scene::{Obstacle, Shape, Transport};
 
+pub(super) use self::luminaires::{EDGE_DEG, Route, disc_error, ies2rad_options, route, swallowed, unsupported};
 use super::options::Options;
 use super::settings::{Scaling, Settings};
 use crate::engines::{Job, SceneFile};
@@ -21,22 +21,15 @@ pub(super) const WEIGHTS: [f64; 3] = [0.265, 0.670, 0.065];
 
 /// `rtrace -I` reads this far in front of the point it is given, in Radiance's units, whatever the scene's size.
 const READ_AHEAD: f64 = 1e-4;
-/// A table that stops with light at its edge falls to zero within this angle; Radiance would extrapolate it.
-pub(super) const EDGE_DEG: f64 = 1e-4;
-/// Radius of the sphere that stands for a point luminaire, in Radiance's units; 1e-6 and less are refused by Radiance.
-const POINT_RADIUS: f64 = 1e-3;
-const SMALLEST_RADIUS: f64 = 2e-6;
-
 /// All files of a job.
 pub(super) fn files(job: &Job, settings: &Settings, options: &Options) -> Vec<SceneFile> {
     let scale = scale(job, settings.scaling);
     let mut files = vec![
-        SceneFile::text("scene.rad", scene_rad(job, scale)),
+        SceneFile::text("scene.rad", scene_rad(job, settings, scale)),
         SceneFile::text("meters.txt", meters_txt(job, scale)),
-        SceneFile::text("run.sh", run_sh(job, options)),
+        SceneFile::text("run.sh", run_sh(job, settings, options)),
     ];
-    let tables = job.scene.luminaires.iter().enumerate();
-    files.extend(tables.map(|(k, l)| SceneFile::text(&dat_name(k), dat(&l.photometry.distribution))));
+    files.extend(luminaires::files(job, settings));
     files
 }
 
@@ -63,15 +56,17 @@ fn meters_txt(job: &Job, scale: f64) -> String {
     rows(job, scale).iter().map(row).collect()
 }
 
-fn run_sh(job: &Job, options: &Options) -> String {
+fn run_sh(job: &Job, settings: &Settings, options: &Options) -> String {
     let [r, g, b] = WEIGHTS.map(|w| EFFICACY * w);
     let lux = format!("rcalc -e '$1={r}*$1+{g}*$2+{b}*$3'");
     let mut text = format!(
         "#!/bin/sh\n# {}\n# Prints the illuminance in lux at each line of meters.txt.\n\
          # RAYPATH must name Radiance's library (for source.cal).\nset -e\n\
-         export RAYPATH=.:${{RAYPATH:-/usr/local/lib/ray}}\noconv -f scene.rad > scene.oct\n",
+         export RAYPATH=.:${{RAYPATH:-/usr/local/lib/ray}}\n",
         title(job)
     );
+    text += &luminaires::commands(job, settings);
+    text += "oconv -f scene.rad > scene.oct\n";
     let rtrace = |args: &[String]| format!("rtrace -h {} scene.oct < meters.txt | {lux}", args.join(" "));
     let direct = rtrace(&options.direct);
     let total = rtrace(&options.total);
@@ -80,6 +75,7 @@ fn run_sh(job: &Job, options: &Options) -> String {
         Transport::Total(_) => text += &format!("{total}\n"),
         Transport::Indirect(_) => {
             text += "# Indirect light is all light less the direct.\n";
+            let direct = rtrace(&options.part_of_total);
             text += &format!("{direct} > direct.txt\n{total} > total.txt\n");
             text += "rlam total.txt direct.txt | rcalc -e '$1=$1-$2'\n";
         }
@@ -92,7 +88,7 @@ fn title(job: &Job) -> String {
     format!("luxproof: case {}, procedure {}", line(&job.case), line(&job.procedure))
 }
 
-fn scene_rad(job: &Job, scale: f64) -> String {
+fn scene_rad(job: &Job, settings: &Settings, scale: f64) -> String {
     let mut text = format!("# {}\n# Run by hand: sh run.sh. Units: ", title(job));
     text += &if scale == 1.0 { "metres.\n".to_owned() } else { format!("{scale} to the metre.\n") };
     if let Some(room) = &job.scene.room {
@@ -107,9 +103,7 @@ fn scene_rad(job: &Job, scale: f64) -> String {
         text += &format!("\n# Obstacle {k}.\n");
         text += &obstacle_rad(k, obstacle, scale);
     }
-    for (k, luminaire) in job.scene.luminaires.iter().enumerate() {
-        text += &point(k, luminaire, point_radius(job, luminaire, scale), scale);
-    }
+    text += &luminaires::rad(job, settings, scale);
     text
 }
 
@@ -159,87 +153,4 @@ fn box_faces(min: DVec3, max: DVec3) -> Vec<Vec<DVec3>> {
         corners
     };
     (0..3).flat_map(|axis| [face(axis, false), face(axis, true)]).collect()
-}
-
-/// A sphere so small that only its centre matters: radiance I / (179 pi r^2) towards each direction.
-fn point(k: usize, luminaire: &Luminaire, radius: f64, scale: f64) -> String {
-    let factor = luminaire.flux_scale * scale * scale / (EFFICACY * std::f64::consts::PI * radius * radius);
-    let p = luminaire.position_m * scale;
-    let mut text =
-        format!("\n# Luminaire {}: a point, as a sphere of radius {radius}; its table is in candela.\n", luminaire.id);
-    text += &format!("{}light luminaire-{k}\n0\n0\n3 1 1 1\n", brightdata(k, luminaire, "corr", &[factor]));
-    text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
-    text
-}
-
-/// The table as a pattern, turned as the luminaire is; ends with the modifier's name, ready for a material.
-fn brightdata(k: usize, luminaire: &Luminaire, correction: &str, factors: &[f64]) -> String {
-    let coordinates = match luminaire.photometry.distribution.symmetry() {
-        Symmetry::Axial => "src_theta",
-        _ => "src_phi src_theta",
-    };
-    let mut words = format!("{correction} {} source.cal {coordinates}", dat_name(k));
-    for (axis, angle_deg) in euler_deg(luminaire.orientation) {
-        // Writing to a string cannot fail.
-        write!(words, " -r{axis} {angle_deg}").ok();
-    }
-    let factors: Vec<String> = factors.iter().map(|f| format!("{f:e}")).collect();
-    format!(
-        "void brightdata luminaire-{k}-candela\n{} {words}\n0\n{} {}\nluminaire-{k}-candela ",
-        words.split(' ').count(),
-        factors.len(),
-        factors.join(" ")
-    )
-}
-
-/// Rotations about the fixed axes, in the order xform applies them, that make up the orientation; none for the identity.
-fn euler_deg(orientation: DMat3) -> Vec<(char, f64)> {
-    // R = Rz(azimuth) Ry(tilt) Rz(roll): the last column is the turned z axis, the last row holds the roll.
-    let (x, y, z) = (orientation.x_axis, orientation.y_axis, orientation.z_axis);
-    let sin_tilt = z.x.hypot(z.y);
-    let (roll, tilt, azimuth) = if sin_tilt > 1e-12 {
-        (y.z.atan2(-x.z), sin_tilt.atan2(z.z), z.y.atan2(z.x))
-    } else {
-        (0.0, if z.z > 0.0 { 0.0 } else { std::f64::consts::PI }, (-y.x).atan2(y.y))
-    };
-    // 1e-10 degrees are far below what a float table resolves, and spare the reader the rounding of arcs.
-    let rounded = |a: f64| (a.to_degrees() * 1e10).round() / 1e10;
-    let turned = [('z', roll), ('y', tilt), ('z', azimuth)];
-    turned.into_iter().map(|(axis, a)| (axis, rounded(a))).filter(|(_, a)| *a != 0.0).collect()
-}
-
-fn dat_name(k: usize) -> String {
-    format!("luminaire-{k}.dat")
-}
-
-/// The candela table in Radiance's data format: gamma alone, or C (0 to 360) by gamma; zero outside its gamma range.
-fn dat(distribution: &LuminousIntensityDistribution) -> String {
-    let padded = distribution.padded(EDGE_DEG);
-    let axis = |angles: &[f64]| format!("0 0 {}\n{}\n", angles.len(), joined(angles));
-    if padded.symmetry() == Symmetry::Axial {
-        return format!("1\n{}{}\n", axis(padded.gamma_deg()), joined(padded.plane(0)));
-    }
-    let full = padded.full_circle();
-    let planes: String = (0..full.c_deg().len()).map(|c| joined(full.plane(c)) + "\n").collect();
-    format!("2\n{}{}{planes}", axis(full.c_deg()), axis(full.gamma_deg()))
-}
-
-fn joined(values: &[f64]) -> String {
-    values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
-}
-
-/// Small against the nearest surface, luminaire and meter, so that the sphere touches none of them.
-fn point_radius(job: &Job, luminaire: &Luminaire, scale: f64) -> f64 {
-    let at = luminaire.position_m;
-    let to_stations = job.stations.iter().map(|s| s.meter.position_m.distance(at));
-    let to_room = job.scene.room.iter().flat_map(|r| {
-        let far = r.size_m - at;
-        at.to_array().into_iter().chain(far.to_array())
-    });
-    let to_boxes = job.scene.obstacles.iter().filter_map(|o| match &o.shape {
-        Shape::Box { min_m, max_m } => Some(at.clamp(*min_m, *max_m).distance(at)),
-        Shape::Mesh { .. } => None,
-    });
-    let nearest = to_stations.chain(to_room).chain(to_boxes).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
-    POINT_RADIUS.min(0.01 * nearest * scale).max(SMALLEST_RADIUS)
 }

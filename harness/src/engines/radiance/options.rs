@@ -2,6 +2,7 @@
 
 use luminaire::scene::{Bounces, Transport};
 
+use super::export::{Route, route};
 use super::settings::{Preset, Settings};
 use crate::engines::Job;
 
@@ -12,6 +13,8 @@ pub(super) struct Options {
     pub(super) direct: Vec<String>,
     /// Direct and reflected light.
     pub(super) total: Vec<String>,
+    /// Direct light just as it is part of `total`: the difference is reflected light, free of the noise of the direct.
+    pub(super) part_of_total: Vec<String>,
 }
 
 /// Ambient divisions of a block where nothing else is known.
@@ -22,38 +25,75 @@ pub(super) const FAST_DIVISIONS: u32 = 1024;
 const REMAINDER: f64 = 1e-7;
 /// Bounces beyond which rtrace's recursion comes near the end of an 8 MiB stack.
 const MOST_BOUNCES: u32 = 10_000;
-/// Bounces of `preset: default` where all are asked for; rtrace's own default is none.
-const DEFAULT_BOUNCES: u32 = 5;
+/// Bounces of `preset: default` where all are asked for: rtrace's own default is none, and its default cache takes a few
+/// seconds a meter with two (case S1), 20 with three.
+const DEFAULT_BOUNCES: u32 = 2;
 
 /// Weight below which rays are at risk, in units of the weight of one division's ray. The error at a given time is
 /// least near .1 to .2 (case S1: 8e-6 s against 11e-6 at .5 and 2e-5 at .01); at .8 rtrace would cut the divisions.
 const ROULETTE: f64 = 0.15;
 
-/// One source sample, no jitter, every shadow tested: exact for points.
-const POINT_SOURCES: [&str; 8] = ["-ds", "0", "-dj", "0", "-dt", "0", "-dc", "1"];
+/// How the luminaires' light is sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sources {
+    /// One sample to the centre: exact for points.
+    Points,
+    /// Samples over the parts of an opening: jittered, unbiased and read in blocks for direct light; in the middle of each
+    /// part for reflected light, where surfaces average what is left of the steps in penumbras.
+    Openings,
+    /// ies2rad's surfaces with rtrace's default subdivision, as they are used and were published.
+    Ies2rad,
+}
+
+impl Sources {
+    /// What the luminaires of a job need.
+    pub(super) fn of(job: &Job, settings: &Settings) -> Self {
+        let has = |wanted: &[Route]| job.scene.luminaires.iter().any(|l| wanted.contains(&route(l, settings)));
+        if has(&[Route::Opening]) {
+            Self::Openings
+        } else if has(&[Route::Ies2radLight, Route::Ies2radIllum]) {
+            Self::Ies2rad
+        } else {
+            Self::Points
+        }
+    }
+
+    /// Options of rtrace; a finer subdivision where direct light alone is asked for. Every shadow is tested.
+    const fn options(self, alone: bool) -> &'static str {
+        match (self, alone) {
+            (Self::Points, _) => "-ds 0 -dj 0 -dt 0 -dc 1",
+            (Self::Openings, true) => "-u+ -ds 0.02 -dj 1 -dt 0 -dc 1",
+            (Self::Openings, false) => "-ds 0.1 -dj 0 -dt 0 -dc 1",
+            (Self::Ies2rad, _) => "-ds 0.2 -dj 0 -dt 0 -dc 1",
+        }
+    }
+}
 
 impl Options {
     /// The arguments for a job with a number of ambient divisions.
     pub(super) fn of(job: &Job, settings: &Settings, divisions: u32) -> Self {
+        let words = |text: String| -> Vec<String> { text.split(' ').map(str::to_owned).collect() };
         // -I: irradiance at points.
-        let common = ["-I"].map(str::to_owned);
         if settings.preset == Preset::Default {
-            let bounces = bounces(job).min(match reflections(job) {
+            let bounces = match reflections(job) {
                 Some(Bounces::AtMost(n)) => n,
-                _ => DEFAULT_BOUNCES,
-            });
-            let with = |n: u32| [&common[..], &["-ab".to_owned(), n.to_string()]].concat();
-            return Self { direct: with(0), total: with(bounces) };
+                Some(Bounces::Converged) => DEFAULT_BOUNCES,
+                None => 0,
+            };
+            let direct = words("-I -ab 0".into());
+            return Self { part_of_total: direct.clone(), direct, total: words(format!("-I -ab {bounces}")) };
         }
-        let sources = POINT_SOURCES.map(str::to_owned);
+        let sources = Sources::of(job, settings);
         // -u+: random numbers proper, since the fixed sequence of -u- repeats a bias of .3 % in every block (case S1,
         // up to 7 standard errors of 120 blocks). -aa 0: no cache; -as 0: no supersampling, which is biased;
         // -lr 0: Russian roulette below weight -lw.
-        let weight = ROULETTE / f64::from(divisions);
-        let ambient = format!("-u+ -aa 0 -ad {divisions} -as 0 -lr 0 -lw {weight:e}");
-        let ambient: Vec<String> = ambient.split(' ').map(str::to_owned).collect();
-        let with = |n: u32| [&common[..], &["-ab".to_owned(), n.to_string()], &sources].concat();
-        Self { direct: with(0), total: [with(bounces(job)), ambient].concat() }
+        let ambient = format!("-u+ -aa 0 -ad {divisions} -as 0 -lr 0 -lw {:e}", ROULETTE / f64::from(divisions));
+        let bounces = bounces(job);
+        Self {
+            direct: words(format!("-I -ab 0 {}", sources.options(true))),
+            total: words(format!("-I -ab {bounces} {} {ambient}", sources.options(false))),
+            part_of_total: words(format!("-I -ab 0 {}", sources.options(false))),
+        }
     }
 }
 

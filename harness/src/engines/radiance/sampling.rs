@@ -33,7 +33,7 @@ pub(super) struct Blocks {
     /// Ambient divisions of every block.
     pub(super) divisions: u32,
     /// The arguments of rtrace.
-    pub(super) options: Options,
+    pub(super) options: Vec<String>,
 }
 
 /// One job on its bench.
@@ -43,8 +43,6 @@ pub(super) struct Sampler<'a> {
     pub(super) tools: &'a Tools,
     pub(super) workbench: &'a Workbench,
     pub(super) rows: Vec<[f64; 6]>,
-    /// Direct illuminance at each station in lux, not part of the error where reflected light alone is asked for.
-    pub(super) subtract_lx: Vec<f64>,
     pub(super) started: Instant,
 }
 
@@ -61,33 +59,61 @@ impl Blocks {
     }
 }
 
-impl Sampler<'_> {
-    /// Blocks as the preset asks for.
-    pub(super) fn blocks(&self) -> Result<Blocks, EngineError> {
-        match self.settings.preset {
-            // The cache of a process makes its blocks alike: one process a block.
-            Preset::Default => self.fixed(FAST_DIVISIONS, 1),
-            Preset::Fast => self.fixed(self.settings.ambient_divisions.unwrap_or(FAST_DIVISIONS), FEWEST_BLOCKS),
-            Preset::Audit => self.within_budget(),
-        }
-    }
+/// Where sampling may stop, whether or not the error is small enough.
+const DIRECT_SHARE: f64 = 0.3;
+/// Direct light that is subtracted or is all that is asked for should add little to the error.
+const DIRECT_ERROR: f64 = 0.3;
 
-    fn fixed(&self, divisions: u32, repeats: usize) -> Result<Blocks, EngineError> {
-        let mut blocks = self.empty(divisions);
-        let processes = FEWEST_BLOCKS / repeats;
-        for first in (0..processes).step_by(self.parallel()) {
-            let starts: Vec<usize> = (first..processes.min(first + self.parallel())).collect();
-            blocks.values.extend(self.round(&blocks.options, &starts, repeats)?);
+impl Sampler<'_> {
+    /// Direct light of openings, whose samples are jittered: blocks in one process, doubled until they are good enough.
+    pub(super) fn direct(&self, options: &Options) -> Result<Blocks, EngineError> {
+        let mut blocks = Blocks { values: vec![], divisions: 0, options: options.direct.clone() };
+        let until_s = DIRECT_SHARE * self.job.budget.seconds;
+        let nothing = vec![0.0; self.rows.len()];
+        for start in 0..PROCESSES_A_SEED {
+            let round_started = Instant::now();
+            let more = self.process(&blocks.options, start, blocks.count().max(FEWEST_BLOCKS))?;
+            blocks.values.extend(more);
+            let enough = self.worst_error(&blocks, &nothing) <= DIRECT_ERROR * self.job.budget.relative_error;
+            let spent_s = self.started.elapsed().as_secs_f64();
+            if enough || spent_s + 2.0 * round_started.elapsed().as_secs_f64() > until_s {
+                break;
+            }
         }
         Ok(blocks)
     }
 
-    fn within_budget(&self) -> Result<Blocks, EngineError> {
+    /// Blocks of all light as the preset asks for; `subtract_lx` is direct light that does not count for the error asked.
+    pub(super) fn total(&self, subtract_lx: &[f64]) -> Result<Blocks, EngineError> {
+        match self.settings.preset {
+            // The cache of a process makes its blocks alike: one process a block.
+            Preset::Default => self.fixed(FAST_DIVISIONS, 1),
+            Preset::Fast => self.fixed(self.settings.ambient_divisions.unwrap_or(FAST_DIVISIONS), FEWEST_BLOCKS),
+            Preset::Audit => self.within_budget(subtract_lx),
+        }
+    }
+
+    /// The fewest blocks in processes of `repeats` each; where time runs out before, as many as there are, but two.
+    fn fixed(&self, divisions: u32, repeats: usize) -> Result<Blocks, EngineError> {
+        let mut blocks = self.empty(divisions);
+        let processes = FEWEST_BLOCKS / repeats;
+        for first in (0..processes).step_by(self.parallel()) {
+            let round_started = Instant::now();
+            let starts: Vec<usize> = (first..processes.min(first + self.parallel())).collect();
+            blocks.values.extend(self.round(&blocks.options, &starts, repeats)?);
+            if blocks.count() >= 2 && round_started.elapsed().as_secs_f64() > self.seconds_left() {
+                break;
+            }
+        }
+        Ok(blocks)
+    }
+
+    fn within_budget(&self, subtract_lx: &[f64]) -> Result<Blocks, EngineError> {
         let trial_started = Instant::now();
         let mut trial = self.empty(TRIAL_DIVISIONS);
         trial.values = self.round(&trial.options, &[0], FEWEST_BLOCKS)?;
         let division_s = trial_started.elapsed().as_secs_f64() / (FEWEST_BLOCKS as f64 * f64::from(TRIAL_DIVISIONS));
-        let divisions = self.settings.ambient_divisions.unwrap_or_else(|| self.plan(&trial, division_s));
+        let divisions = self.settings.ambient_divisions.unwrap_or_else(|| self.plan(&trial, division_s, subtract_lx));
         let mut block_s = division_s * f64::from(divisions);
 
         let mut blocks = self.empty(divisions);
@@ -107,7 +133,7 @@ impl Sampler<'_> {
             blocks.values.extend(self.round(&blocks.options, &starts, repeats)?);
             process += parallel;
             block_s = round_started.elapsed().as_secs_f64() / repeats as f64;
-            let excess = self.worst_error(&blocks) / self.job.budget.relative_error;
+            let excess = self.worst_error(&blocks, subtract_lx) / self.job.budget.relative_error;
             if excess <= 1.0 || process + parallel > PROCESSES_A_SEED {
                 return Ok(blocks);
             }
@@ -119,8 +145,8 @@ impl Sampler<'_> {
     }
 
     /// Divisions a block so that the fewest blocks about meet the budget.
-    fn plan(&self, trial: &Blocks, division_s: f64) -> u32 {
-        let excess = self.worst_error(trial) / self.job.budget.relative_error;
+    fn plan(&self, trial: &Blocks, division_s: f64, subtract_lx: &[f64]) -> u32 {
+        let excess = self.worst_error(trial, subtract_lx) / self.job.budget.relative_error;
         let needed = f64::from(TRIAL_DIVISIONS) * PLAN_MARGIN * excess * excess / 2.0;
         let affordable = 0.5 * self.seconds_left() * self.parallel() as f64 / (2.0 * FEWEST_BLOCKS as f64 * division_s);
         let divisions = needed.min(affordable).clamp(f64::from(TRIAL_DIVISIONS), f64::from(AUDIT_DIVISIONS));
@@ -129,16 +155,16 @@ impl Sampler<'_> {
     }
 
     /// The largest standard error relative to the reading it belongs to.
-    fn worst_error(&self, blocks: &Blocks) -> f64 {
+    fn worst_error(&self, blocks: &Blocks, subtract_lx: &[f64]) -> f64 {
         let relative = |((mean, error), subtract): ((f64, Option<f64>), &f64)| {
             let error = error.unwrap_or(f64::INFINITY);
             if error == 0.0 { 0.0 } else { error / (mean - subtract).max(f64::MIN_POSITIVE) }
         };
-        blocks.estimates().into_iter().zip(&self.subtract_lx).map(relative).fold(0.0, f64::max)
+        blocks.estimates().into_iter().zip(subtract_lx).map(relative).fold(0.0, f64::max)
     }
 
     /// One process a starting place side by side, each with `repeats` blocks.
-    fn round(&self, options: &Options, starts: &[usize], repeats: usize) -> Result<Vec<Vec<f64>>, EngineError> {
+    fn round(&self, options: &[String], starts: &[usize], repeats: usize) -> Result<Vec<Vec<f64>>, EngineError> {
         let results: Vec<_> = thread::scope(|scope| {
             let start = |&start: &usize| scope.spawn(move || self.process(options, start, repeats));
             let running: Vec<_> = starts.iter().map(start).collect();
@@ -151,11 +177,11 @@ impl Sampler<'_> {
         Ok(blocks)
     }
 
-    fn process(&self, options: &Options, start: usize, repeats: usize) -> Result<Vec<Vec<f64>>, EngineError> {
+    fn process(&self, options: &[String], start: usize, repeats: usize) -> Result<Vec<Vec<f64>>, EngineError> {
         let skip = start + PROCESSES_A_SEED * (self.job.seed % SEEDS) as usize;
         let mut rows = vec![self.row_outside(); skip];
         rows.extend(std::iter::repeat_n(&self.rows, repeats).flatten());
-        let read = self.tools.rtrace(self.workbench, &options.total, &rows)?;
+        let read = self.tools.rtrace(self.workbench, options, &rows)?;
         Ok(read[skip..].chunks(self.rows.len()).map(<[f64]>::to_vec).collect())
     }
 
@@ -167,7 +193,7 @@ impl Sampler<'_> {
     }
 
     fn empty(&self, divisions: u32) -> Blocks {
-        Blocks { values: vec![], divisions, options: Options::of(self.job, self.settings, divisions) }
+        Blocks { values: vec![], divisions, options: Options::of(self.job, self.settings, divisions).total }
     }
 
     fn parallel(&self) -> usize {

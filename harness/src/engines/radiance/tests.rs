@@ -17,11 +17,11 @@ fn workbench(folder: &Path) -> Workbench {
     Workbench { site: Site::of_user().unwrap(), scene_dir: folder.to_owned(), log: folder.join("log"), jobs: 2, limit }
 }
 
-fn read(job: &Job) -> Measurement {
+pub(super) fn read(job: &Job) -> Measurement {
     read_tampered(job, |_, text| text)
 }
 
-fn within(relative_error: f64, job: Job) -> Job {
+pub(super) fn within(relative_error: f64, job: Job) -> Job {
     Job { budget: Budget { relative_error, seconds: 60.0 }, ..job }
 }
 
@@ -180,4 +180,42 @@ fn exported_files_are_these() {
     let files = Radiance.export(&job).unwrap();
     let texts = files.iter().map(|f| format!("==== {}\n{}\n", f.name, String::from_utf8_lossy(&f.bytes)));
     insta::assert_snapshot!(texts.collect::<Vec<_>>().concat());
+}
+
+#[test]
+fn tiny_and_huge_rooms_read_as_their_scale_has_it() {
+    for size in [1e-3, 1e5] {
+        let mut job = s1(Transport::Direct);
+        job.scene.room.as_mut().unwrap().size_m *= size;
+        job.scene.luminaires[0].position_m *= size;
+        job.scene.luminaires[0].flux_scale *= size * size;
+        for station in &mut job.stations {
+            station.meter.position_m *= size;
+        }
+        let found = read(&job);
+        assert!(worst(&relative_deviations(&found, &S1_DIRECT_LX)) < 1e-6, "{size}: {found:?}");
+    }
+}
+
+#[test]
+fn the_fast_preset_is_right_and_the_defaults_are_off_by_far_more_than_their_standard_error() {
+    let preset = |name: &str| {
+        let mut job = s1(CONVERGED);
+        job.settings.insert("preset".into(), name.into());
+        job.budget.seconds = 1.0;
+        job.stations.truncate(1);
+        read(&job)
+    };
+    let fast = preset("fast");
+    assert!(fast.settings["blocks"] == "8" && worst_z(&fast, &S1_INDIRECT_LX) < 5.0, "{fast:?}");
+    let defaults = preset("default");
+    let off = worst(&relative_deviations(&defaults, &S1_INDIRECT_LX));
+    assert!((0.2..0.35).contains(&off) && worst_z(&defaults, &S1_INDIRECT_LX) > 5.0, "{defaults:?}");
+}
+
+#[test]
+fn free_field_has_no_indirect_light() {
+    let mut job = s1(CONVERGED);
+    job.scene.room = None;
+    assert!(read(&job).estimates.iter().all(|e| e.value_lx == 0.0 && e.std_error_lx == Some(0.0)));
 }

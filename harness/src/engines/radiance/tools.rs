@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+use luminaire::scene::Luminaire;
+
+use super::export::Route;
 use super::{ID, export, output};
 use crate::engines::{Absent, EngineError, Site, Version, Workbench};
 use crate::process::{Invocation, ProcessError};
@@ -46,6 +49,31 @@ impl Tools {
         let octree = run.run()?.stdout;
         let path = workbench.scene_dir.join(OCTREE);
         std::fs::write(&path, octree).map_err(|source| EngineError::io(&path, source))
+    }
+
+    /// Lets ies2rad make `luminaire-<k>.rad`, where the luminaire goes that way.
+    pub(super) fn ies2rad(
+        &self,
+        workbench: &Workbench,
+        k: usize,
+        luminaire: &Luminaire,
+        route: Route,
+    ) -> Result<(), EngineError> {
+        let kind = match route {
+            Route::Point | Route::Opening => return Ok(()),
+            Route::Ies2radLight => "' light '",
+            Route::Ies2radIllum => "' illum '",
+        };
+        let options = export::ies2rad_options(k, luminaire);
+        self.prepared(workbench.invoke(self.program("ies2rad"))).args(options).run()?;
+        let made = workbench.scene_dir.join(format!("ies2rad-{k}.rad"));
+        let text = std::fs::read_to_string(&made).map_err(|source| EngineError::io(&made, source))?;
+        // ies2rad knows no box of illum; its light becomes one.
+        if !text.contains("' light '") {
+            return Err(output(format!("{} holds no light", made.display())));
+        }
+        let path = workbench.scene_dir.join(format!("luminaire-{k}.rad"));
+        std::fs::write(&path, text.replace("' light '", kind)).map_err(|source| EngineError::io(&path, source))
     }
 
     /// Illuminance in lux of each row.

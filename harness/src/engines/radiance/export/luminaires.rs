@@ -1,0 +1,375 @@
+//! Luminaires as Radiance's light sources: points, luminous openings, and what ies2rad makes of a file.
+//!
+//! A part of an opening sends out its share of the intensity in every direction, L = I(C, gamma) / projected area, as
+//! `flatcorr`, `boxcorr` and `cylcorr` of Radiance's source.cal have it.
+
+use std::f64::consts::PI;
+use std::fmt::Write;
+
+use glam::{DMat3, DVec3};
+use luminaire::geometry::Surface;
+use luminaire::photometry::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, lm63};
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Shape, Transport};
+
+use super::{EFFICACY, box_faces, polygon};
+use crate::engines::radiance::settings::{Photometrist, Settings};
+use crate::engines::{Job, SceneFile};
+
+/// A table that stops with light at its edge falls to zero within this angle; Radiance would extrapolate it.
+pub(in crate::engines::radiance) const EDGE_DEG: f64 = 1e-4;
+/// The same where ies2rad writes the angles, with six digits.
+const IES2RAD_EDGE_DEG: f64 = 0.01;
+/// Distance of a flat opening's faces from its plane, in Radiance's units: a luminaire may be flush with a surface.
+const FACE_OFFSET: f64 = 1e-5;
+/// Radius of the sphere that stands for a point luminaire, in Radiance's units; 1e-6 and less are refused by Radiance.
+const POINT_RADIUS: f64 = 1e-3;
+const SMALLEST_RADIUS: f64 = 2e-6;
+/// Diameter over length above which Radiance warns that its sampling of a cylinder is poor.
+const SLENDER: f64 = 0.4;
+
+/// Deviation of a square from the disc of its area, Lambertian, on axis, one diameter away.
+const DISC_AT_ONE_DIAMETER: f64 = 0.024;
+
+/// By which way a luminaire becomes a light source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::engines::radiance) enum Route {
+    /// A tiny sphere.
+    Point,
+    /// The luminous opening, with the table at full precision.
+    Opening,
+    /// ies2rad's surfaces, as light.
+    Ies2radLight,
+    /// ies2rad's surfaces, as an impostor (illum).
+    Ies2radIllum,
+}
+
+/// The way of a luminaire.
+pub(in crate::engines::radiance) fn route(luminaire: &Luminaire, settings: &Settings) -> Route {
+    match (luminaire.model, settings.photometrist) {
+        (LuminaireModel::Impostor, _) => Route::Ies2radIllum,
+        (_, Photometrist::Ies2rad) => Route::Ies2radLight,
+        (LuminaireModel::Area, Photometrist::Exporter) if luminaire.photometry.opening != LuminousOpening::Point => {
+            Route::Opening
+        }
+        (LuminaireModel::Area | LuminaireModel::Point, Photometrist::Exporter) => Route::Point,
+    }
+}
+
+/// Why a luminaire's opening cannot be said to Radiance, if it cannot.
+pub(in crate::engines::radiance) fn unsupported(luminaire: &Luminaire, settings: &Settings) -> Option<String> {
+    let exported = route(luminaire, settings) == Route::Opening;
+    let what = match luminaire.photometry.opening {
+        LuminousOpening::Ellipse { x_m, y_m, .. } if x_m != y_m => "an elliptic opening",
+        LuminousOpening::Ellipse { x_m, height_m, .. } if height_m > 0.0 && x_m > SLENDER * height_m => {
+            "an upright cylinder as thick as this, which Radiance samples badly"
+        }
+        LuminousOpening::Ellipsoid { x_m, y_m, z_m } if x_m != y_m || y_m != z_m => "an ellipsoid",
+        LuminousOpening::LyingCylinder { .. } => "a lying cylinder",
+        _ => return None,
+    };
+    exported.then(|| format!("`{}` has {what}, which Radiance's source.cal does not know", luminaire.id))
+}
+
+/// How far off a disc is at most that Radiance samples as a square of its area, relative; `None` without one.
+///
+/// On axis at k diameters: square over disc - 1 = -.024 at k = 1 (measured), falling as 1 / k^2.
+pub(in crate::engines::radiance) fn disc_error(job: &Job, settings: &Settings) -> Option<f64> {
+    let of = |l: &Luminaire| match l.photometry.opening {
+        LuminousOpening::Ellipse { x_m, .. } if route(l, settings) == Route::Opening => {
+            let distances = job.stations.iter().map(|s| s.meter.position_m.distance(l.position_m));
+            let nearest = distances.fold(f64::INFINITY, f64::min) / x_m;
+            Some(DISC_AT_ONE_DIAMETER / (nearest * nearest))
+        }
+        _ => None,
+    };
+    job.scene.luminaires.iter().filter_map(of).reduce(f64::max)
+}
+
+/// Part of the reflected light that is lost at most because a ray that meets an extended source ends there, light and
+/// illum alike, while luminaires otherwise are no obstacles; `None` where nothing is reflected or all are points.
+///
+/// The configuration factor of the sources for the meter that sees most of them, and their part of the room's surface.
+/// Measured: 1.5 % at a meter of case S2 where this says 3 %.
+pub(in crate::engines::radiance) fn swallowed(job: &Job, settings: &Settings) -> Option<f64> {
+    let room = job.scene.room.filter(|_| job.transport != Transport::Direct)?;
+    let has_extent = |l: &&Luminaire| route(l, settings) != Route::Point;
+    let extended: Vec<&Luminaire> = job.scene.luminaires.iter().filter(has_extent).collect();
+    if extended.is_empty() {
+        return None;
+    }
+    let seen = |meter: &Meter| extended.iter().map(|l| factor(l, meter)).sum::<f64>();
+    let most = job.stations.iter().map(|s| seen(&s.meter)).fold(0.0, f64::max);
+    let surface: f64 = Surface::ALL.iter().map(|s| room.area_m2(*s)).sum();
+    let sections: f64 = extended.iter().map(|l| largest_section_m2(l)).sum();
+    Some((most + sections / surface).min(1.0))
+}
+
+/// Configuration factor of an opening in one piece, far off; one with height is taken face on.
+fn factor(luminaire: &Luminaire, meter: &Meter) -> f64 {
+    let ray = luminaire.position_m - meter.position_m;
+    let direction = ray.normalize_or_zero();
+    let is_flat = luminaire.photometry.opening.bounding_box_m()[2] == 0.0;
+    let own = if is_flat { direction.dot(luminaire.orientation * DVec3::Z).abs() } else { 1.0 };
+    largest_section_m2(luminaire) * own * direction.dot(meter.normal).max(0.0) / (PI * ray.length_squared())
+}
+
+fn largest_section_m2(luminaire: &Luminaire) -> f64 {
+    let size = luminaire.photometry.opening.bounding_box_m();
+    (size[0] * size[1]).max(size[1] * size[2]).max(size[2] * size[0])
+}
+
+/// The sources in `scene.rad`.
+pub(super) fn rad(job: &Job, settings: &Settings, scale: f64) -> String {
+    let mut text = String::new();
+    for (k, l) in job.scene.luminaires.iter().enumerate() {
+        text += &match route(l, settings) {
+            Route::Point => point(k, l, point_radius(job, l, scale), scale),
+            Route::Opening => opening(k, l, scale),
+            Route::Ies2radLight | Route::Ies2radIllum => by_ies2rad(k, l, scale),
+        };
+    }
+    text
+}
+
+/// The tables beside `scene.rad`: Radiance data, or the photometric file for ies2rad.
+pub(super) fn files(job: &Job, settings: &Settings) -> Vec<SceneFile> {
+    let file = |(k, l): (usize, &Luminaire)| match route(l, settings) {
+        Route::Point | Route::Opening => SceneFile::text(&dat_name(k), dat(&l.photometry.distribution)),
+        Route::Ies2radLight => SceneFile::text(&ies_name(k), ies(&l.photometry, l.photometry.opening)),
+        Route::Ies2radIllum => {
+            SceneFile::text(&ies_name(k), ies(&l.photometry, with_height(l.photometry.opening, settings)))
+        }
+    };
+    job.scene.luminaires.iter().enumerate().map(file).collect()
+}
+
+/// What run.sh does before oconv.
+pub(super) fn commands(job: &Job, settings: &Settings) -> String {
+    let mut text = String::new();
+    for (k, l) in job.scene.luminaires.iter().enumerate() {
+        let kind = match route(l, settings) {
+            Route::Point | Route::Opening => continue,
+            Route::Ies2radLight => "light",
+            Route::Ies2radIllum => "illum",
+        };
+        text += &format!("ies2rad {}\n", ies2rad_options(k, l).join(" "));
+        text += &format!("sed \"s/' light '/' {kind} '/\" ies2rad-{k}.rad > luminaire-{k}.rad\n");
+    }
+    text
+}
+
+/// Arguments of ies2rad that make `ies2rad-<k>.rad`. -t default: without it the keyword \[LAMP\] may scale everything.
+pub(in crate::engines::radiance) fn ies2rad_options(k: usize, luminaire: &Luminaire) -> Vec<String> {
+    let options = ["-t", "default", "-m", &luminaire.flux_scale.to_string(), "-o", &format!("ies2rad-{k}")];
+    options.into_iter().map(str::to_owned).chain([ies_name(k)]).collect()
+}
+
+fn by_ies2rad(k: usize, luminaire: &Luminaire, scale: f64) -> String {
+    let p = luminaire.position_m * scale;
+    let turns: Vec<String> =
+        euler_deg(luminaire.orientation).iter().map(|(axis, a)| format!(" -r{axis} {a}")).collect();
+    let turns = turns.concat();
+    let size = if scale == 1.0 { String::new() } else { format!(" -s {scale}") };
+    let comment = format!("\n# Luminaire {}: by ies2rad, see run.sh.\n", luminaire.id);
+    format!("{comment}!xform{size}{turns} -t {} {} {} luminaire-{k}.rad\n", p.x, p.y, p.z)
+}
+
+/// A sphere so small that only its centre matters: radiance I / (179 pi r^2) towards each direction.
+fn point(k: usize, luminaire: &Luminaire, radius: f64, scale: f64) -> String {
+    let factor = luminaire.flux_scale * scale * scale / (EFFICACY * PI * radius * radius);
+    let p = luminaire.position_m * scale;
+    let mut text =
+        format!("\n# Luminaire {}: a point, as a sphere of radius {radius}; its table is in candela.\n", luminaire.id);
+    text += &light(k, luminaire, "corr", &[factor]);
+    text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
+    text
+}
+
+/// The luminous opening in its place, every part with its share of the intensity.
+fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
+    let mut text = format!("\n# Luminaire {}: its luminous opening; its table is in candela.\n", luminaire.id);
+    let body = Body { k, luminaire, scale };
+    let factor = luminaire.flux_scale / EFFICACY;
+    match luminaire.photometry.opening {
+        LuminousOpening::Box { x_m, y_m, height_m: 0.0 } => {
+            text += &light(k, luminaire, "flatcorr", &[factor / (x_m * y_m)]);
+            let corner = |u: f64, v: f64, z: f64| DVec3::new(0.5 * u * x_m, 0.5 * v * y_m, z);
+            for (z, turn) in body.lit_faces() {
+                let corners = [(-1.0, -turn), (1.0, -turn), (1.0, turn), (-1.0, turn)].map(|(u, v)| corner(u, v, z));
+                text += &body.polygon(if turn > 0.0 { "up" } else { "down" }, &corners);
+            }
+        }
+        LuminousOpening::Box { x_m, y_m, height_m } => {
+            text += &light(k, luminaire, "boxcorr", &[factor, x_m, y_m, height_m]);
+            let half = 0.5 * DVec3::new(x_m, y_m, height_m);
+            for (f, face) in box_faces(-half, half).iter().enumerate() {
+                text += &body.polygon(&f.to_string(), face);
+            }
+        }
+        LuminousOpening::Ellipse { x_m, height_m: 0.0, .. } => {
+            text += &light(k, luminaire, "flatcorr", &[factor / (0.25 * PI * x_m * x_m)]);
+            for (z, turn) in body.lit_faces() {
+                text += &body.disc(if turn > 0.0 { "up" } else { "down" }, z, turn, 0.5 * x_m);
+            }
+        }
+        LuminousOpening::Ellipse { x_m, height_m, .. } => {
+            text += &light(k, luminaire, "cylcorr", &[factor, x_m, height_m]);
+            text += &body.disc("up", 0.5 * height_m, 1.0, 0.5 * x_m);
+            text += &body.disc("down", -0.5 * height_m, -1.0, 0.5 * x_m);
+            text += &body.side(height_m, 0.5 * x_m);
+        }
+        LuminousOpening::Ellipsoid { x_m, .. } => {
+            text += &light(k, luminaire, "corr", &[factor / (0.25 * PI * x_m * x_m)]);
+            let p = luminaire.position_m * scale;
+            let radius = 0.5 * x_m * scale;
+            text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
+        }
+        // Refused before by `unsupported`, or a point, which has its own way.
+        LuminousOpening::LyingCylinder { .. } | LuminousOpening::Point => {}
+    }
+    text
+}
+
+/// Places parts of a luminaire in the scene.
+struct Body<'a> {
+    k: usize,
+    luminaire: &'a Luminaire,
+    scale: f64,
+}
+
+impl Body<'_> {
+    /// Height and direction (1 up, -1 down) of the faces of a flat opening that send out light.
+    fn lit_faces(&self) -> Vec<(f64, f64)> {
+        let table = &self.luminaire.photometry.distribution;
+        let (down, up) = (table.flux_between(0.0, 90.0).value(), table.flux_between(90.0, 180.0).value());
+        let offset = FACE_OFFSET / self.scale;
+        [(down, -1.0), (up, 1.0)].into_iter().filter(|(lm, _)| *lm > 0.0).map(|(_, s)| (s * offset, s)).collect()
+    }
+
+    fn placed(&self, own_m: DVec3) -> DVec3 {
+        (self.luminaire.position_m + self.luminaire.orientation * own_m) * self.scale
+    }
+
+    fn polygon(&self, part: &str, corners_m: &[DVec3]) -> String {
+        let corners: Vec<DVec3> = corners_m.iter().map(|p| self.placed(*p)).collect();
+        let name = format!("luminaire-{}", self.k);
+        polygon(&name, &format!("{name}-{part}"), &corners)
+    }
+
+    fn disc(&self, part: &str, z_m: f64, turn: f64, radius_m: f64) -> String {
+        let p = self.placed(DVec3::new(0.0, 0.0, z_m));
+        let n = self.luminaire.orientation * DVec3::new(0.0, 0.0, turn);
+        let (k, r) = (self.k, radius_m * self.scale);
+        format!(
+            "luminaire-{k} ring luminaire-{k}-{part}\n0\n0\n8\n    {} {} {}\n    {} {} {}\n    0 {r}\n",
+            p.x, p.y, p.z, n.x, n.y, n.z
+        )
+    }
+
+    fn side(&self, height_m: f64, radius_m: f64) -> String {
+        let [a, b] = [-0.5, 0.5].map(|z| self.placed(DVec3::new(0.0, 0.0, z * height_m)));
+        let (k, r) = (self.k, radius_m * self.scale);
+        format!(
+            "luminaire-{k} cylinder luminaire-{k}-side\n0\n0\n7\n    {} {} {}\n    {} {} {}\n    {r}\n",
+            a.x, a.y, a.z, b.x, b.y, b.z
+        )
+    }
+}
+
+/// The material: the table as a pattern, turned as the luminaire is.
+fn light(k: usize, luminaire: &Luminaire, correction: &str, factors: &[f64]) -> String {
+    let coordinates = match luminaire.photometry.distribution.symmetry() {
+        Symmetry::Axial => "src_theta",
+        _ => "src_phi src_theta",
+    };
+    let mut words = format!("{correction} {} source.cal {coordinates}", dat_name(k));
+    for (axis, angle_deg) in euler_deg(luminaire.orientation) {
+        // Writing to a string cannot fail.
+        write!(words, " -r{axis} {angle_deg}").ok();
+    }
+    let factors: Vec<String> = factors.iter().map(|f| format!("{f:e}")).collect();
+    format!(
+        "void brightdata luminaire-{k}-candela\n{} {words}\n0\n{} {}\n\
+         luminaire-{k}-candela light luminaire-{k}\n0\n0\n3 1 1 1\n",
+        words.split(' ').count(),
+        factors.len(),
+        factors.join(" ")
+    )
+}
+
+/// Rotations about the fixed axes, in the order xform applies them, that make up the orientation; none for the identity.
+fn euler_deg(orientation: DMat3) -> Vec<(char, f64)> {
+    // R = Rz(azimuth) Ry(tilt) Rz(roll): the last column is the turned z axis, the last row holds the roll.
+    let (x, y, z) = (orientation.x_axis, orientation.y_axis, orientation.z_axis);
+    let sin_tilt = z.x.hypot(z.y);
+    let (roll, tilt, azimuth) = if sin_tilt > 1e-12 {
+        (y.z.atan2(-x.z), sin_tilt.atan2(z.z), z.y.atan2(z.x))
+    } else {
+        (0.0, if z.z > 0.0 { 0.0 } else { std::f64::consts::PI }, (-y.x).atan2(y.y))
+    };
+    // 1e-10 degrees are far below what a float table resolves, and spare the reader the rounding of arcs.
+    let rounded = |a: f64| (a.to_degrees() * 1e10).round() / 1e10;
+    let turned = [('z', roll), ('y', tilt), ('z', azimuth)];
+    turned.into_iter().map(|(axis, a)| (axis, rounded(a))).filter(|(_, a)| *a != 0.0).collect()
+}
+
+/// LM-63 for ies2rad: the whole sphere of gamma, the whole circle of C, and the opening.
+fn ies(photometry: &Photometry, opening: LuminousOpening) -> String {
+    let padded = photometry.distribution.padded(IES2RAD_EDGE_DEG);
+    // ies2rad swaps the sides of files over C 90 to 270.
+    let distribution = if padded.symmetry() == Symmetry::BilateralC90 { padded.full_circle() } else { padded };
+    let keywords = vec![];
+    let plain =
+        Photometry { distribution, opening, keywords, lamp_lumens: None, details: Details::None, ..photometry.clone() };
+    lm63::write_2002(&plain).text
+}
+
+/// A flat opening as the box that a published impostor was.
+fn with_height(opening: LuminousOpening, settings: &Settings) -> LuminousOpening {
+    match opening {
+        LuminousOpening::Box { x_m, y_m, height_m: 0.0 } => {
+            LuminousOpening::Box { x_m, y_m, height_m: settings.impostor_height_m }
+        }
+        other => other,
+    }
+}
+
+fn ies_name(k: usize) -> String {
+    format!("luminaire-{k}.ies")
+}
+
+fn dat_name(k: usize) -> String {
+    format!("luminaire-{k}.dat")
+}
+
+/// The candela table in Radiance's data format: gamma alone, or C (0 to 360) by gamma; zero outside its gamma range.
+fn dat(distribution: &LuminousIntensityDistribution) -> String {
+    let padded = distribution.padded(EDGE_DEG);
+    let axis = |angles: &[f64]| format!("0 0 {}\n{}\n", angles.len(), joined(angles));
+    if padded.symmetry() == Symmetry::Axial {
+        return format!("1\n{}{}\n", axis(padded.gamma_deg()), joined(padded.plane(0)));
+    }
+    let full = padded.full_circle();
+    let planes: String = (0..full.c_deg().len()).map(|c| joined(full.plane(c)) + "\n").collect();
+    format!("2\n{}{}{planes}", axis(full.c_deg()), axis(full.gamma_deg()))
+}
+
+fn joined(values: &[f64]) -> String {
+    values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// Small against the nearest surface, luminaire and meter, so that the sphere touches none of them.
+fn point_radius(job: &Job, luminaire: &Luminaire, scale: f64) -> f64 {
+    let at = luminaire.position_m;
+    let to_stations = job.stations.iter().map(|s| s.meter.position_m.distance(at));
+    let to_room = job.scene.room.iter().flat_map(|r| {
+        let far = r.size_m - at;
+        at.to_array().into_iter().chain(far.to_array())
+    });
+    let to_boxes = job.scene.obstacles.iter().filter_map(|o| match &o.shape {
+        Shape::Box { min_m, max_m } => Some(at.clamp(*min_m, *max_m).distance(at)),
+        Shape::Mesh { .. } => None,
+    });
+    let nearest = to_stations.chain(to_room).chain(to_boxes).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
+    POINT_RADIUS.min(0.01 * nearest * scale).max(SMALLEST_RADIUS)
+}

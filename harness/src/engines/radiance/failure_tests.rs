@@ -1,0 +1,128 @@
+//! What happens when rtrace crashes, hangs or gives nonsense: an error each time, never a number.
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::time::Duration;
+
+use luminaire::scene::{Bounces, Transport};
+
+use super::*;
+use crate::engines::fixtures::s1;
+use crate::process::ProcessError;
+
+/// A site whose rtrace is a shell script; the other programs do nothing.
+fn fake_site(root: &Path, rtrace: &str) -> Site {
+    let package = root.join("venv/lib/python3/site-packages/pyradiance");
+    for folder in ["bin", "lib"] {
+        fs::create_dir_all(package.join(folder)).unwrap();
+    }
+    fs::write(package.join("lib/source.cal"), "").unwrap();
+    for (name, script) in [("rtrace", rtrace), ("oconv", "true"), ("ies2rad", "true")] {
+        let path = package.join("bin").join(name);
+        fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    Site::at(root)
+}
+
+fn failure(rtrace: &str, transport: Transport, limit_s: f64) -> EngineError {
+    let folder = tempfile::tempdir().unwrap();
+    let site = fake_site(folder.path(), rtrace);
+    let scene_dir = folder.path().join("scene");
+    fs::create_dir(&scene_dir).unwrap();
+    let limit = Duration::from_secs_f64(limit_s);
+    let bench = Workbench { site, scene_dir, log: folder.path().join("log"), jobs: 2, limit };
+    Radiance.read(&s1(transport), &bench).unwrap_err()
+}
+
+/// Prints `rows` triples of the 64-bit float whose bytes are given as octal escapes.
+fn triples(rows: u32, float: &str) -> String {
+    format!("cat > /dev/null; for i in $(seq {}); do printf '{float}'; done", 3 * rows)
+}
+
+const ONE: &str = r"\000\000\000\000\000\000\360\077";
+const NAN: &str = r"\000\000\000\000\000\000\370\177";
+const MINUS_ONE: &str = r"\000\000\000\000\000\000\360\277";
+
+#[test]
+fn a_crash_is_an_error_with_its_signal() {
+    let error = failure("kill -SEGV $$", Transport::Direct, 20.0);
+    assert!(
+        matches!(&error, EngineError::Process(ProcessError::Failed { status, .. }) if status.contains("11")),
+        "{error}"
+    );
+}
+
+#[test]
+fn an_out_of_memory_kill_is_named() {
+    let error = failure("kill -KILL $$", Transport::Direct, 20.0).to_string();
+    assert!(error.contains("out of memory"), "{error}");
+}
+
+#[test]
+fn a_hang_is_killed_at_the_limit() {
+    let error = failure("sleep 60", Transport::Direct, 0.3);
+    assert!(matches!(error, EngineError::Process(ProcessError::TimedOut { .. })), "{error}");
+}
+
+#[test]
+fn an_error_of_the_user_keeps_what_rtrace_said() {
+    let error = failure("echo 'rtrace: fatal - cannot find function' >&2; exit 1", Transport::Direct, 20.0).to_string();
+    assert!(error.contains("cannot find function"), "{error}");
+}
+
+#[test]
+fn fewer_rows_than_meters_are_no_reading_though_rtrace_exits_well() {
+    let error = failure(&triples(3, ONE), Transport::Direct, 20.0);
+    assert!(matches!(error, EngineError::Output { .. }), "{error}");
+    let error = failure(&triples(4, ONE), Transport::Indirect(Bounces::Converged), 20.0);
+    assert!(matches!(error, EngineError::Output { .. }), "{error}");
+}
+
+#[test]
+fn nan_and_negative_light_are_no_readings() {
+    for nonsense in [NAN, MINUS_ONE] {
+        let error = failure(&triples(4, nonsense), Transport::Direct, 20.0);
+        assert!(matches!(error, EngineError::Output { .. }), "{error}");
+    }
+}
+
+#[test]
+fn a_wheel_without_its_programs_is_absent_with_the_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let absent = Radiance.probe(&Site::at(folder.path())).unwrap_err().to_string();
+    assert!(absent.contains("luxproof engines install"), "{absent}");
+    let site = fake_site(folder.path(), "true");
+    fs::remove_file(site.python_package("pyradiance").unwrap().join("bin/oconv")).unwrap();
+    assert!(Radiance.probe(&site).unwrap_err().reason.contains("bin/oconv"));
+    assert!(Radiance.probe(&fake_site(folder.path(), "echo")).is_err());
+}
+
+#[test]
+fn settings_that_make_no_sense_are_errors_that_name_them() {
+    for (key, value) in [("preset", "best"), ("ambient_divisions", "0"), ("impostor_height_m", "0"), ("speed", "1")] {
+        let mut job = s1(Transport::Direct);
+        job.settings.insert(key.into(), serde_json::from_str(value).unwrap_or_else(|_| value.into()));
+        let error = Radiance.export(&job).unwrap_err().to_string();
+        assert!(error.contains(&format!("engines.radiance.{key}")), "{error}");
+    }
+}
+
+#[test]
+fn ies2rad_that_makes_no_light_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let site = fake_site(folder.path(), &triples(4, ONE));
+    let bench = Workbench {
+        site,
+        scene_dir: folder.path().into(),
+        log: folder.path().join("log"),
+        jobs: 1,
+        limit: Duration::from_secs(20),
+    };
+    let mut job = s1(Transport::Direct);
+    job.settings.insert("photometry".into(), "ies2rad".into());
+    fs::write(folder.path().join("ies2rad-0.rad"), "# nothing\n").unwrap();
+    let error = Radiance.read(&job, &bench).unwrap_err();
+    assert!(matches!(error, EngineError::Output { .. }), "{error}");
+}
