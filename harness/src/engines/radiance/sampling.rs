@@ -54,6 +54,15 @@ impl Blocks {
         (0..stations).map(|s| mean_and_std_error(&of(s))).collect()
     }
 
+    /// The largest standard error relative to the reading it belongs to.
+    fn worst_error(&self, subtract_lx: &[f64]) -> f64 {
+        let relative = |((mean, error), subtract): ((f64, Option<f64>), &f64)| {
+            let error = error.unwrap_or(f64::INFINITY);
+            if error == 0.0 { 0.0 } else { error / (mean - subtract).max(f64::MIN_POSITIVE) }
+        };
+        self.estimates().into_iter().zip(subtract_lx).map(relative).fold(0.0, f64::max)
+    }
+
     pub(super) fn count(&self) -> usize {
         self.values.len()
     }
@@ -74,7 +83,7 @@ impl Sampler<'_> {
             let round_started = Instant::now();
             let more = self.process(&blocks.options, start, blocks.count().max(FEWEST_BLOCKS))?;
             blocks.values.extend(more);
-            let enough = self.worst_error(&blocks, &nothing) <= DIRECT_ERROR * self.job.budget.relative_error;
+            let enough = blocks.worst_error(&nothing) <= DIRECT_ERROR * self.job.budget.relative_error;
             let spent_s = self.started.elapsed().as_secs_f64();
             if enough || spent_s + 2.0 * round_started.elapsed().as_secs_f64() > until_s {
                 break;
@@ -133,7 +142,7 @@ impl Sampler<'_> {
             blocks.values.extend(self.round(&blocks.options, &starts, repeats)?);
             process += parallel;
             block_s = round_started.elapsed().as_secs_f64() / repeats as f64;
-            let excess = self.worst_error(&blocks, subtract_lx) / self.job.budget.relative_error;
+            let excess = blocks.worst_error(subtract_lx) / self.job.budget.relative_error;
             if excess <= 1.0 || process + parallel > PROCESSES_A_SEED {
                 return Ok(blocks);
             }
@@ -146,21 +155,12 @@ impl Sampler<'_> {
 
     /// Divisions a block so that the fewest blocks about meet the budget.
     fn plan(&self, trial: &Blocks, division_s: f64, subtract_lx: &[f64]) -> u32 {
-        let excess = self.worst_error(trial, subtract_lx) / self.job.budget.relative_error;
+        let excess = trial.worst_error(subtract_lx) / self.job.budget.relative_error;
         let needed = f64::from(TRIAL_DIVISIONS) * PLAN_MARGIN * excess * excess / 2.0;
         let affordable = 0.5 * self.seconds_left() * self.parallel() as f64 / (2.0 * FEWEST_BLOCKS as f64 * division_s);
         let divisions = needed.min(affordable).clamp(f64::from(TRIAL_DIVISIONS), f64::from(AUDIT_DIVISIONS));
         // rtrace takes a square number of them.
         (divisions.sqrt().ceil() as u32).pow(2)
-    }
-
-    /// The largest standard error relative to the reading it belongs to.
-    fn worst_error(&self, blocks: &Blocks, subtract_lx: &[f64]) -> f64 {
-        let relative = |((mean, error), subtract): ((f64, Option<f64>), &f64)| {
-            let error = error.unwrap_or(f64::INFINITY);
-            if error == 0.0 { 0.0 } else { error / (mean - subtract).max(f64::MIN_POSITIVE) }
-        };
-        blocks.estimates().into_iter().zip(subtract_lx).map(relative).fold(0.0, f64::max)
     }
 
     /// One process a starting place side by side, each with `repeats` blocks.
