@@ -1,9 +1,9 @@
 //! POV-Ray 3.7: meters as discs seen by a mesh camera, radiosity in independent blocks of a turned scene.
 //!
 //! Direct light is exact to its float colours. Radiosity interpolates a cache of irradiance (Ward, Rubinstein & Clear,
-//! SIGGRAPH 1988), deterministically: each block turns the whole scene by another rotation, which gives it other sample
-//! directions and other cache points, so that the blocks' spread is an honest standard error of their mean. What all blocks
-//! share, the bias of the interpolation, is named beside it.
+//! SIGGRAPH 1988), deterministically: each block turns the whole scene by another rotation and starts elsewhere in the
+//! sequence of sample directions, which gives it other directions and other cache points, so that the blocks' spread is
+//! an honest standard error of their mean. What all blocks share, the bias of the interpolation, is named beside it.
 
 mod blocks;
 mod export;
@@ -13,8 +13,6 @@ mod pigment;
 mod pixels;
 mod settings;
 
-#[cfg(test)]
-mod cases;
 #[cfg(test)]
 mod tests;
 
@@ -68,8 +66,9 @@ impl Engine for PovRay {
     }
 
     fn command_by_hand(&self, job: &Job) -> Option<String> {
+        let settings = Settings::of(job).ok()?;
         let command =
-            |light, image: &str| format!("povray {}", export::arguments(job.stations.len(), light, 0, image).join(" "));
+            |light, image: &str| format!("povray {}", export::arguments(job, &settings, light, 0, image).join(" "));
         Some(match job.transport {
             Transport::Direct => command(Light::Direct, "direct.ppm"),
             Transport::Indirect(_) => command(Light::Indirect, "indirect.ppm"),
@@ -152,8 +151,9 @@ fn cache_error(mean_reflectance: f64, bounces: Bounces, preset: Preset) -> Suppo
     Support::Approximate { why, size: Some(interpolation + cut) }
 }
 
-/// Largest mean deviation of the audit preset from exact values, relative: see `tests::indirect_light_of_s1_is_exact_within_its_errors_and_the_named_bias`.
-const AUDIT_BIAS: f64 = 0.01;
+/// Bias of the audit preset, relative: in S1, 32 blocks of 200 rays a sample read -.05 to +.30 % of the exact values, each
+/// within .15 to .28 %, and 48 blocks of 100 rays -.07 to +.14 % within .2 to .4 %.
+const AUDIT_BIAS: f64 = 0.005;
 
 fn unsupported_luminaire(luminaire: &Luminaire) -> Option<String> {
     let id = &luminaire.id;

@@ -109,10 +109,7 @@ impl<'a> Bench<'a> {
         let share = (0.9 * left_s / (waves * pilot.wall_s)).max(1e-3).powf(0.8);
         if share < 1.0 && self.settings.preset == Preset::Audit {
             run.count = (f64::from(run.count) * share).max(FEWEST_RAYS) as u32;
-            notes.push(format!(
-                "{} rays a sample instead of {}, which biases the reading more: the budget is short",
-                run.count, self.settings.count
-            ));
+            notes.push(format!("{} rays a sample instead of {}: the budget is short", run.count, self.settings.count));
         }
         self.keep_readouts(&pilot.readouts)?;
         let mut blocks: Vec<Vec<f64>> = vec![];
@@ -223,14 +220,19 @@ impl<'a> Bench<'a> {
         hermetic(invocation, &self.workbench.site).run()?;
         let pixels = read_rgb(ID, self.workbench, &path)?;
         std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
-        if pixels.len() != readouts.len() {
-            return Err(output(format!("gave {} pixels for {} meters", pixels.len(), readouts.len())));
+        let blanks = export::blanks(self.settings, run.light, run.seed);
+        if pixels.len() != blanks + readouts.len() {
+            return Err(output(format!(
+                "gave {} pixels for {} meters and {blanks} blanks",
+                pixels.len(),
+                readouts.len()
+            )));
         }
-        Ok(readouts.iter().zip(pixels).map(|(r, p)| pixels::decode(*r, p)).collect())
+        Ok(readouts.iter().zip(pixels.into_iter().skip(blanks)).map(|(r, p)| pixels::decode(*r, p)).collect())
     }
 
     fn arguments(&self, run: Run, image: &str) -> Vec<String> {
-        let mut arguments = export::arguments(self.job.stations.len(), run.light, run.seed, image);
+        let mut arguments = export::arguments(self.job, self.settings, run.light, run.seed, image);
         arguments.extend([format!("Declare=Count={}", run.count), "Declare=Readouts=1".to_owned()]);
         arguments
     }

@@ -78,7 +78,7 @@ impl Settings {
         match settings.get("preset").map_or(Some("audit"), serde_json::Value::as_str) {
             Some("audit") => Ok(Self {
                 preset: Preset::Audit,
-                count: 200,
+                count: 400,
                 error_bound: 0.1,
                 brightness: 8.0,
                 recursion_limit: DEEPEST,
@@ -126,7 +126,7 @@ impl Settings {
 }
 
 /// Length of the pool of sample directions, a prime; every level of recursion copies the pool, which takes its time.
-const POOL: u32 = 20_011;
+pub(super) const POOL: u32 = 20_011;
 
 impl Preset {
     /// Its name in specs.
@@ -157,8 +157,8 @@ fn wrong(key: &str, what: &str) -> EngineError {
 
 #[cfg(test)]
 mod tests {
-    use super::super::cases;
     use super::*;
+    use crate::engines::fixtures;
 
     #[test]
     fn unknown_settings_and_senseless_values_are_errors_that_name_the_key() {
@@ -170,7 +170,7 @@ mod tests {
             ("preset", serde_json::json!("best")),
             ("recentre", serde_json::json!(1)),
         ] {
-            let mut job = cases::s1(cases::INDIRECT);
+            let mut job = fixtures::s1(fixtures::CONVERGED);
             job.settings.insert(key.to_owned(), value);
             let text = Settings::of(&job).unwrap_err().to_string();
             assert!(text.starts_with(&format!("engines.povray.{key}: ")), "{text}");
