@@ -124,7 +124,8 @@ def write(name, title, basis, digits, tables, units=1):
                   f"      value: {column}", "    rows:"]
         for point, normal, value in rows:
             at, facing = (f"[{', '.join(f'{v:g}' for v in vector)}]" for vector in (point, normal))
-            lines.append(f'      - {{at_m: {at}, normal: {facing}, cells: {{value: "{value:.{digits}f}"}}}}')
+            places = digits if value else 6     # nothing at all is known better than by its last digit
+            lines.append(f'      - {{at_m: {at}, normal: {facing}, cells: {{value: "{value:.{places}f}"}}}}')
     with open(f"values/{name}.yaml", "w", encoding="ascii") as file:
         file.write("\n".join(lines) + "\n")
 

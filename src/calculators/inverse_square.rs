@@ -14,8 +14,8 @@ use crate::units::Lux;
 
 /// Direct illuminance of a meter: the sum over luminaires that no obstacle hides, 0 behind the meter's plane.
 ///
-/// Exact for point models. For extended ones the validity states the five-times rule of the luminaire that is nearest in
-/// terms of its size.
+/// Exact for point models. For extended ones the luminaire that is nearest in terms of its size decides: within the
+/// five-times rule the validity states how far off a Lambertian opening would be, closer the method does not apply.
 pub fn direct_illuminance(scene: &Scene, meter: &Meter) -> Result<Calculated, NotApplicable> {
     let mut sum = Lux(0.0);
     let mut nearest: Option<(FiveTimesRule, &Luminaire)> = None;
@@ -35,6 +35,11 @@ pub fn direct_illuminance(scene: &Scene, meter: &Meter) -> Result<Calculated, No
         }
     }
     let objection = nearest.and_then(|(rule, luminaire)| rule.objection(luminaire));
+    if let (Some(reason), Some((rule, _))) = (&objection, nearest)
+        && !rule.holds()
+    {
+        return Err(NotApplicable { method: METHOD, reason: reason.clone() });
+    }
     Ok(Calculated { illuminance: sum, validity: Validity::from_objections(objection.as_slice()) })
 }
 
@@ -82,7 +87,7 @@ impl FiveTimesRule {
             Some(error) => format!("for a Lambertian opening of its size the method errs by {:+.2} %", 100.0 * error),
             None => format!("its extent matters by up to about {:.2} %", 100.0 * FAR_ERROR / self.k2()),
         };
-        let rule = if self.holds() { "" } else { ", closer than the five-times rule allows" };
+        let rule = if self.holds() { "" } else { ", closer than the five-times rule allows; take an area method" };
         Some(format!(
             "`{}` is {:.2} times its largest luminous dimension away{rule}; {error}",
             luminaire.id, self.distance_over_size

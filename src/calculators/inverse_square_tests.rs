@@ -77,12 +77,15 @@ fn five_times_rule_states_the_error_of_discs_squares_and_lines() {
 fn five_times_rule_is_said_only_of_extended_models() {
     let square = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
     let scene = |model| Scene { luminaires: vec![luminaire(isotropic(), square, model)], ..Scene::default() };
-    let read = |model, z| direct_illuminance(&scene(model), &facing_up(0.0, 0.0, z)).unwrap();
-    assert_eq!(read(LuminaireModel::Point, -1.0).validity, Validity::Supported);
-    let Validity::Approximate(far) = read(LuminaireModel::Area, -6.0).validity else { panic!("not approximate") };
+    let read = |model, z| Validity::of(&direct_illuminance(&scene(model), &facing_up(0.0, 0.0, z)));
+    assert_eq!(read(LuminaireModel::Point, -1.0), Validity::Supported);
+    let Validity::Approximate(far) = read(LuminaireModel::Area, -6.0) else { panic!("not approximate") };
     assert!(far.contains("10.00 times") && far.contains("+0.33 %") && !far.contains("five-times"), "{far}");
-    let Validity::Approximate(near) = read(LuminaireModel::Area, -1.0).validity else { panic!("not approximate") };
-    assert!(near.contains("five-times"), "{near}");
+    let Validity::No(near) = read(LuminaireModel::Area, -2.9) else { panic!("applies") };
+    assert!(near.contains("4.83 times") && near.contains("five-times"), "{near}");
+    assert!(matches!(read(LuminaireModel::Area, -3.1), Validity::Approximate(_)));
+    // A meter that faces away is dark, however near.
+    assert_eq!(read(LuminaireModel::Area, 1.0), Validity::Supported);
 }
 
 #[test]
