@@ -5,10 +5,12 @@ use crate::scene::{Luminaire, Meter, Scene};
 
 /// Direct illuminance in lux at a meter that nothing hides from any luminaire.
 pub(super) fn illuminance(scene: &Scene, meter: &Meter) -> Bounded {
-    scene.luminaires.iter().fold(Bounded::default(), |sum, luminaire| Bounded {
-        value: sum.value + inverse_square(luminaire, meter),
-        bound: sum.bound + rounding(luminaire, meter),
-    })
+    scene.luminaires.iter().fold(Bounded::default(), |sum, luminaire| sum + point(luminaire, meter))
+}
+
+/// Direct illuminance in lux from one luminaire as a point.
+pub(super) fn point(luminaire: &Luminaire, meter: &Meter) -> Bounded {
+    Bounded { value: inverse_square(luminaire, meter), bound: rounding(luminaire, meter) }
 }
 
 /// Illuminance in lux at an unobstructed meter: E = I(C, gamma) cos ξ / d², zero behind the meter.

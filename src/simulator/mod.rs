@@ -5,15 +5,19 @@
 
 mod box_room;
 mod direct;
+mod emission;
 mod gmres;
 mod path_tracing;
+mod prepared;
 mod quadrature;
+mod radiosity;
 mod sampler;
 mod validate;
+mod visibility;
 
-use crate::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
+use crate::scene::{Meter, Scene, Transport};
 use crate::units::Lux;
-use box_room::BoxField;
+pub use prepared::Prepared;
 
 /// Illuminance at every meter, by the cheapest solver that meets `accuracy`.
 ///
@@ -28,83 +32,18 @@ pub fn illuminance(
     Prepared::new(scene, transport, accuracy)?.illuminance(meters)
 }
 
-/// A scene whose light field is solved once and then answers for any number of meters.
-#[derive(Debug)]
-pub struct Prepared {
-    scene: Scene,
-    transport: Transport,
-    accuracy: Accuracy,
-    factor: f64,
-    fields: Vec<(usize, BoxField)>,
-}
-
-impl Prepared {
-    /// Checks a scene; solving waits for the first meters.
-    pub fn new(scene: &Scene, transport: Transport, accuracy: &Accuracy) -> Result<Self, SimulatorError> {
-        validate::scene(scene)?;
-        validate::accuracy(accuracy)?;
-        let (scene, accuracy) = (scene.clone(), *accuracy);
-        Ok(Self { scene, transport, accuracy, factor: 1.0, fields: vec![] })
-    }
-
-    /// The same light field with every luminaire dimmed by one more common factor, not negative: light adds up, nothing is solved.
-    #[must_use]
-    pub fn dimmed(mut self, factor: f64) -> Self {
-        self.factor *= factor;
-        self
-    }
-
-    /// Illuminance at every meter; what is solved on the way stays for the next call.
-    pub fn illuminance(&mut self, meters: &[Meter]) -> Result<Solution, SimulatorError> {
-        validate::meters(&self.scene, meters)?;
-        let points_only = self.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
-        if !points_only || !self.scene.obstacles.is_empty() {
-            let mut solution = path_tracing::illuminance(&self.scene, meters, self.transport, &self.accuracy)?;
-            for estimate in &mut solution.estimates {
-                *estimate = estimate.dimmed(self.factor);
-            }
-            return Ok(solution);
-        }
-        let (direct, indirect) = match self.transport {
-            Transport::Direct => (true, None),
-            Transport::Indirect(bounces) => (false, Some(bounces)),
-            Transport::Total(bounces) => (true, Some(bounces)),
-        };
-        let mut values = vec![Bounded::default(); meters.len()];
-        let mut solver = vec![];
-        if direct {
-            for (value, meter) in values.iter_mut().zip(meters) {
-                *value = direct::illuminance(&self.scene, meter);
-            }
-            solver.push("inverse square: point luminaires, nothing in between".to_owned());
-        }
-        if let Some(bounces) = indirect {
-            let (indirect, text) = self.indirect(meters, bounces);
-            for (value, more) in values.iter_mut().zip(indirect) {
-                *value = Bounded { value: value.value + more.value, bound: value.bound + more.bound };
-            }
-            solver.push(text);
-        }
-        let estimates = values.iter().map(|v| {
-            let uncertainty = Uncertainty::Bound(v.bound);
-            Estimate { illuminance: Lux(v.value), uncertainty }.dimmed(self.factor)
-        });
-        Ok(Solution { estimates: estimates.collect(), solver: solver.join("; ") })
-    }
-
-    fn indirect(&mut self, meters: &[Meter], bounces: Bounces) -> (Vec<Bounded>, String) {
-        let Some(room) = self.scene.room else {
-            return (vec![Bounded::default(); meters.len()], "free field: nothing reflects".into());
-        };
-        box_room::refine(&mut self.fields, &room, &self.scene.luminaires, bounces, meters, self.accuracy.relative_error)
-    }
-}
-
 /// A value and how far off it may be.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Bounded {
     value: f64,
     bound: f64,
+}
+
+impl std::ops::Add for Bounded {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self { value: self.value + other.value, bound: self.bound + other.bound }
+    }
 }
 
 /// How well and how reproducibly to solve.

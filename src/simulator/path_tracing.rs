@@ -263,6 +263,6 @@ fn unsupported(what: &str, instead: &str) -> SimulatorError {
 }
 
 #[cfg(test)]
-mod test_scenes;
+pub(super) mod test_scenes;
 #[cfg(test)]
 mod tests;

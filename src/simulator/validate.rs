@@ -83,12 +83,20 @@ pub(super) fn meters(scene: &Scene, meters: &[Meter]) -> Result<(), SimulatorErr
             let problem = format!("at {p} lies on a surface of the room or outside it");
             return invalid(&what, problem, "move it inside, a stated distance off the surface");
         }
+        if let Some(body) = scene.obstacles.iter().position(|o| holds(&o.shape, p)) {
+            let problem = format!("at {p} lies in or on obstacle {body}");
+            return invalid(&what, problem, "move it off, a stated distance from the surface");
+        }
         if let Some(luminaire) = scene.luminaires.iter().find(|l| l.position_m == p) {
             let problem = format!("lies in the photometric centre of luminaire {}", luminaire.id);
             return invalid(&what, problem, "move it away");
         }
     }
     Ok(())
+}
+
+fn holds(shape: &Shape, p: DVec3) -> bool {
+    matches!(shape, Shape::Box { min_m, max_m } if p.cmpge(*min_m).all() && p.cmple(*max_m).all())
 }
 
 fn reflectance(what: &str, rho: f64) -> Result<(), SimulatorError> {

@@ -111,12 +111,7 @@ pub(super) struct Grid {
 impl Grid {
     pub(super) fn new(size_m: DVec3, effort: &Effort) -> Self {
         let nodal = Gauss::new(effort.order);
-        let shortest = size_m.min_element();
-        let axes = [0, 1, 2].map(|k| {
-            // Elements stay about as long as half the shortest side, and their count even: the grid has mirrors.
-            let halves = (size_m[k] / (2.0 * shortest)).round().clamp(1.0, 6.0) as usize;
-            Axis::new(size_m[k], 2 * halves * effort.elements_per_half, &nodal)
-        });
+        let axes = [0, 1, 2].map(|k| Axis::new(size_m[k], elements(size_m, k, effort), &nodal));
         let mut offsets = [0; 7];
         for face in Face::ALL {
             let (_, u, v) = face.axes();
@@ -133,6 +128,13 @@ impl Grid {
             })
             .collect();
         grid
+    }
+
+    /// How many numbers the operator stores, rows once an orbit of the box's symmetries.
+    pub(super) fn matrix_entries(size_m: DVec3, effort: &Effort) -> usize {
+        let nodes = |k| effort.order * elements(size_m, k, effort);
+        let count = 2 * (nodes(0) * nodes(1) + nodes(1) * nodes(2) + nodes(2) * nodes(0));
+        count * count / if size_m.x == size_m.y { 16 } else { 8 }
     }
 
     /// How many nodes there are.
@@ -234,6 +236,12 @@ impl Axis {
             .collect();
         Self { elements, nodes_m, weights_m }
     }
+}
+
+/// Elements along an axis: about as long as half the shortest side, and evenly many, so that the grid has mirrors.
+fn elements(size_m: DVec3, axis: usize, effort: &Effort) -> usize {
+    let halves = (size_m[axis] / (2.0 * size_m.min_element())).round().clamp(1.0, 6.0) as usize;
+    2 * halves * effort.elements_per_half
 }
 
 /// Start and length of a dyadic interval of 0..1 by its number in a heap that begins with 1.

@@ -37,6 +37,8 @@ pub(super) struct Effort {
     pub(super) source_reach: f64,
 }
 
+/// Entries of the operator at most: 128 MiB.
+const MOST_ENTRIES: usize = 1 << 24;
 /// The largest relative error that each effort is the first choice for.
 const FIRST_EFFORT: [f64; 6] = [1.0, 2e-3, 1e-4, 5e-6, 1e-6, 5e-7];
 /// Rounding of sums over thousands of terms, relative.
@@ -83,7 +85,9 @@ pub(super) fn refine(
         let (fine, imbalance) = solve(level);
         let values = bounded(&coarse, &fine, imbalance);
         let met = values.iter().all(|v| v.bound <= relative_error * v.value.abs());
-        if met || level + 1 == EFFORTS.len() {
+        let fits =
+            EFFORTS.get(level + 1).is_some_and(|effort| Grid::matrix_entries(room.size_m, effort) <= MOST_ENTRIES);
+        if met || !fits {
             let Effort { order, elements_per_half, .. } = EFFORTS[level];
             let text = format!(
                 "hp collocation, order {order} with {elements_per_half} element(s) a half side: empty box, point luminaires"

@@ -8,7 +8,7 @@ use crate::geometry::{Reflectances, Room};
 use crate::photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry};
 use crate::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape};
 
-pub(super) fn luminaire(
+pub(crate) fn luminaire(
     distribution: LuminousIntensityDistribution,
     opening: LuminousOpening,
     at_m: DVec3,
@@ -24,7 +24,7 @@ pub(super) fn luminaire(
 }
 
 /// Case S1: a 20 m cube with an axial uplight in its centre.
-pub(super) fn s1() -> Scene {
+pub(crate) fn s1() -> Scene {
     let gamma = vec![0.0, 89.0, 90.0, 95.0, 115.0, 135.0, 155.0, 175.0, 180.0];
     let candela = vec![0.0, 0.0, 4.5, 35.7, 218.3, 421.6, 576.4, 662.3, 664.4];
     let uplight = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
@@ -35,19 +35,19 @@ pub(super) fn s1() -> Scene {
     }
 }
 
-pub(super) const S1_METERS: [[f64; 2]; 4] = [[2.0, 2.0], [2.0, 10.0], [10.0, 2.0], [10.0, 10.0]];
-pub(super) const S1_INDIRECT: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
+pub(crate) const S1_METERS: [[f64; 2]; 4] = [[2.0, 2.0], [2.0, 10.0], [10.0, 2.0], [10.0, 10.0]];
+pub(crate) const S1_INDIRECT: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
 
-pub(super) fn up(x: f64, y: f64, z: f64) -> Meter {
+pub(crate) fn up(x: f64, y: f64, z: f64) -> Meter {
     Meter { position_m: DVec3::new(x, y, z), normal: DVec3::Z }
 }
 
-pub(super) fn s1_meters() -> Vec<Meter> {
+pub(crate) fn s1_meters() -> Vec<Meter> {
     S1_METERS.iter().map(|[x, y]| up(*x, *y, 2.0)).collect()
 }
 
 /// A flat Lambertian downlight of 0.6 x 0.6 m and 1000 cd along its normal, tabulated every half degree.
-pub(super) fn panel(at_m: DVec3) -> Luminaire {
+pub(crate) fn panel(at_m: DVec3) -> Luminaire {
     let gamma: Vec<f64> = (0..=180).map(|k| 0.5 * f64::from(k)).collect();
     let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
     let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
@@ -55,14 +55,14 @@ pub(super) fn panel(at_m: DVec3) -> Luminaire {
 }
 
 /// The black back of a ceiling panel, which keeps the ceiling behind it dark.
-pub(super) fn back(at_m: DVec3) -> Obstacle {
+pub(crate) fn back(at_m: DVec3) -> Obstacle {
     let corner = |x: f64, y: f64| at_m + DVec3::new(0.3 * x, 0.3 * y, 0.0);
     let vertices_m = vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
     Obstacle { shape: Shape::Mesh { vertices_m, triangles: vec![[0, 1, 2], [0, 2, 3]] }, reflectance: 0.0 }
 }
 
 /// Case S2: a furnished room with four black-backed ceiling panels.
-pub(super) fn s2() -> Scene {
+pub(crate) fn s2() -> Scene {
     let panels = [[2.0, 1.5], [6.0, 1.5], [2.0, 4.5], [6.0, 4.5]].map(|[x, y]| DVec3::new(x, y, 3.0));
     let cabinet = |min: [f64; 3], max: [f64; 3]| Obstacle {
         shape: Shape::Box { min_m: DVec3::from(min), max_m: DVec3::from(max) },
@@ -86,7 +86,7 @@ pub(super) fn s2() -> Scene {
 }
 
 /// x, y, direct, indirect and its standard error.
-pub(super) const S2_VALUES: [[f64; 5]; 6] = [
+pub(crate) const S2_VALUES: [[f64; 5]; 6] = [
     [0.25, 0.25, 66.24407, 51.0232, 0.0046],
     [1.75, 1.25, 226.03927, 53.0644, 0.0127],
     [3.75, 2.75, 161.02976, 48.966, 0.020],
@@ -95,6 +95,6 @@ pub(super) const S2_VALUES: [[f64; 5]; 6] = [
     [7.25, 0.25, 0.0, 18.788, 0.007],
 ];
 
-pub(super) fn s2_meters() -> Vec<Meter> {
+pub(crate) fn s2_meters() -> Vec<Meter> {
     S2_VALUES.iter().map(|v| up(v[0], v[1], 0.8)).collect()
 }

@@ -1,0 +1,182 @@
+//! What an element sees of a patch: its configuration factor, the factor's moments, and the light of a varying exitance.
+//!
+//! Parts of the patch that nothing hides are quartered until they are far and integrated by a rule; parts that
+//! something hides, or the horizon crosses, are quartered twice and then clipped exactly.
+
+use glam::DVec3;
+
+use super::exitance::{Exitance, QUARTERS, RULE};
+use super::patches::Patch;
+use crate::geometry::configuration_factor::element_to_polygon;
+use crate::simulator::visibility::{Occluder, candidates, visible_pieces};
+
+/// A part this many radii away is integrated by the nine-point rule: 2e-5 of its factor.
+const FAR: f64 = 5.0;
+/// Quarterings of a patch before what is still near is taken as uniform.
+const DEEPEST: u32 = 5;
+/// Quarterings before what is clipped is taken as uniform, piece by piece.
+const DEEPEST_CLIPPED: u32 = 2;
+/// A configuration factor and what goes with it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Factor {
+    pub(super) whole: f64,
+    /// Weighted with the distance from the patch's centre along each side.
+    pub(super) moments_m: [f64; 2],
+    /// Weighted with the patch's own exitance.
+    pub(super) weighted: f64,
+}
+
+/// A part of a patch, in coordinates of -1..=1 along both sides.
+#[derive(Clone, Copy)]
+struct Part<'a> {
+    a: f64,
+    b: f64,
+    half: f64,
+    depth: u32,
+    /// The smallest part with an exitance of its own that holds it.
+    exitance: &'a Exitance,
+    /// Centre and half side of that part.
+    within: (f64, f64, f64),
+}
+
+impl<'a> Part<'a> {
+    fn whole(exitance: &'a Exitance) -> Self {
+        Self { a: 0.0, b: 0.0, half: 1.0, depth: 0, exitance, within: (0.0, 0.0, 1.0) }
+    }
+
+    fn quarters(self) -> [Self; 4] {
+        std::array::from_fn(|k| {
+            let (a, b) = (self.a + QUARTERS[k].0 * self.half, self.b + QUARTERS[k].1 * self.half);
+            let part = Self { a, b, half: 0.5 * self.half, depth: self.depth + 1, ..self };
+            match self.exitance.quarters() {
+                Some(quarters) => Self { exitance: &quarters[k], within: (a, b, part.half), ..part },
+                None => part,
+            }
+        })
+    }
+
+    fn exitance_at(&self, a: f64, b: f64) -> f64 {
+        let (centre_a, centre_b, half) = self.within;
+        self.exitance.at((a - centre_a) / half, (b - centre_b) / half)
+    }
+}
+
+/// An element that looks at a patch.
+struct View<'a> {
+    position_m: DVec3,
+    normal: DVec3,
+    patch: &'a Patch,
+    /// Half the patch's sides.
+    u: DVec3,
+    v: DVec3,
+}
+
+/// What an element sees of a patch with a given exitance.
+pub(super) fn factor(
+    position_m: DVec3,
+    normal: DVec3,
+    patch: &Patch,
+    exitance: &Exitance,
+    occluders: &[Occluder],
+) -> Factor {
+    let mut factor = Factor::default();
+    let away = patch.centre_m - position_m;
+    if away.dot(patch.normal) >= 0.0 || away.dot(normal) <= -patch.radius_m {
+        return factor;
+    }
+    let (u, v) = (0.5 * patch.side_m(0), 0.5 * patch.side_m(1));
+    let view = View { position_m, normal, patch, u, v };
+    let hiding = candidates(position_m, &patch.corners_m, occluders);
+    view.add(Part::whole(exitance), &hiding, &mut factor);
+    let (length_u, length_v) = (u.length(), v.length());
+    factor.moments_m = [factor.moments_m[0] * length_u, factor.moments_m[1] * length_v];
+    factor
+}
+
+impl View<'_> {
+    fn add(&self, part: Part, hiding: &[&Occluder], factor: &mut Factor) {
+        let centre = self.patch.centre_m + self.u * part.a + self.v * part.b;
+        let radius = self.patch.radius_m * part.half;
+        let away = centre - self.position_m;
+        let height = away.dot(self.normal);
+        if height <= -radius {
+            return;
+        }
+        let far = away.length_squared() > (FAR * radius).powi(2);
+        if hiding.is_empty() && far && height >= radius {
+            return self.add_far(part, away, factor);
+        }
+        let deepest = if hiding.is_empty() && height >= radius { DEEPEST } else { DEEPEST_CLIPPED };
+        let rough = part.exitance.quarters().is_some() && part.depth < DEEPEST;
+        if !rough && (part.depth >= deepest || (far && part.depth > 0)) {
+            return self.add_clipped(part, hiding, factor);
+        }
+        for quarter in part.quarters() {
+            if hiding.is_empty() {
+                self.add(quarter, hiding, factor);
+                continue;
+            }
+            let outline = self.corners(quarter);
+            let centre = 0.5 * (outline[0] + outline[2]);
+            let still: Vec<_> =
+                hiding.iter().copied().filter(|o| o.may_hide(self.position_m, &outline, centre)).collect();
+            self.add(quarter, &still, factor);
+        }
+    }
+
+    fn corners(&self, part: Part) -> [DVec3; 4] {
+        let h = part.half;
+        [(-h, -h), (h, -h), (h, h), (-h, h)]
+            .map(|(a, b)| self.patch.centre_m + self.u * (part.a + a) + self.v * (part.b + b))
+    }
+
+    fn add_far(&self, part: Part, away: DVec3, factor: &mut Factor) {
+        let scale = -away.dot(self.patch.normal) * self.patch.area_m2 * part.half * part.half / std::f64::consts::PI;
+        let (u, v) = (self.u * part.half, self.v * part.half);
+        for (i, (x, wx)) in RULE.into_iter().enumerate() {
+            for (j, (y, wy)) in RULE.into_iter().enumerate() {
+                let d = away + x * u + y * v;
+                let r2 = d.length_squared();
+                let seen = scale * wx * wy * d.dot(self.normal) / (r2 * r2);
+                let (a, b) = (part.a + part.half * x, part.b + part.half * y);
+                let own = part.half == part.within.2;
+                let exitance = if own { part.exitance.at_node(3 * i + j) } else { part.exitance_at(a, b) };
+                factor.whole += seen;
+                factor.moments_m[0] += seen * a;
+                factor.moments_m[1] += seen * b;
+                factor.weighted += seen * exitance;
+            }
+        }
+    }
+
+    fn add_clipped(&self, part: Part, hiding: &[&Occluder], factor: &mut Factor) {
+        let outline = self.corners(part);
+        if hiding.is_empty() {
+            return self.add_piece(part, &outline, factor);
+        }
+        for piece in visible_pieces(self.position_m, &outline, hiding) {
+            self.add_piece(part, &piece, factor);
+        }
+    }
+
+    /// A piece taken as uniform, at the exitance of its centre of area.
+    fn add_piece(&self, part: Part, piece: &[DVec3], factor: &mut Factor) {
+        let seen = element_to_polygon(self.position_m, self.normal, piece);
+        let (mut weight, mut sum) = (0.0, DVec3::ZERO);
+        for k in 2..piece.len() {
+            let area = (piece[k - 1] - piece[0]).cross(piece[k] - piece[0]).length();
+            weight += area;
+            sum += area * (piece[0] + piece[k - 1] + piece[k]) / 3.0;
+        }
+        if weight == 0.0 {
+            return;
+        }
+        let from_centre = sum / weight - self.patch.centre_m;
+        let a = from_centre.dot(self.u) / self.u.length_squared();
+        let b = from_centre.dot(self.v) / self.v.length_squared();
+        factor.whole += seen;
+        factor.moments_m[0] += seen * a;
+        factor.moments_m[1] += seen * b;
+        factor.weighted += seen * part.exitance_at(a, b);
+    }
+}
