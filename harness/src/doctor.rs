@@ -29,7 +29,7 @@ pub struct Finding {
 
 /// Lets one engine read the known scene, in a folder that is thrown away.
 pub fn examine(engine: &dyn Engine, site: &Site, tolerances: &Tolerances) -> Finding {
-    let finding = |healthy, text| Finding { engine: engine.id().0.to_owned(), healthy, text };
+    let finding = |healthy, text| Finding { engine: engine.id().name().to_owned(), healthy, text };
     let version = match engine.probe(site) {
         Ok(version) => version,
         Err(absent) => return finding(false, format!("absent: {absent}")),
@@ -73,10 +73,10 @@ fn check(
         jobs: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         limit: std::time::Duration::from_secs(120),
     };
-    let measurement = checked(id, &job, engine.read(&job, &workbench)?)?;
-    let expected = expected(&job).map_err(|what| EngineError::Solver { engine: id, what })?;
+    let measurement = checked(&id, &job, engine.read(&job, &workbench)?)?;
+    let expected = expected(&job).map_err(|what| EngineError::Solver { engine: id.clone(), what })?;
     let estimate = measurement.estimates[0];
-    let tolerance = tolerances.of(procedure, Basis::Exact, id.0, Quantity::Illuminance, &BTreeMap::new());
+    let tolerance = tolerances.of(procedure, Basis::Exact, id.name(), Quantity::Illuminance, &BTreeMap::new());
     let spread = tolerances.coverage_factor() * estimate.std_error_lx.unwrap_or(0.0);
     let deviation = estimate.value_lx - expected;
     // Undecided is healthy here: the budget is small, and only gross faults are looked for.

@@ -4,6 +4,11 @@
 //! spec file -> [`spec::Case`] -> [`plan::Plan`] -> [`reading::Recording`] -> [`diff::Comparison`] -> [`report::Report`].
 //! Imports point down only: spec < reading < procedures < engines < plan < run < diff < report < cli.
 
+/// The worked example of the documentation, compiled and run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/adding-an-engine.md")]
+pub struct AddingAnEngine;
+
 pub mod cli;
 pub mod diff;
 pub mod doctor;

@@ -1,6 +1,7 @@
 //! The plan: which engine runs which procedure of a case, what is skipped, and why.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -103,7 +104,7 @@ pub const REFERENCES: [&str; 2] = ["simulator", "iesna"];
 impl Plan {
     /// What an engine of the plan is asked for a task, whether it is there or not.
     pub fn job(&self, case: &Case, engine: usize, task: &Task, seed: u64) -> Job {
-        job(case, self.engines[engine].engine.id(), task, seed)
+        job(case, &self.engines[engine].engine.id(), task, seed)
     }
 }
 
@@ -114,11 +115,11 @@ pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, Spe
     let (mut runs, mut skips) = (vec![], vec![]);
     for (e, planned) in engines.iter().enumerate() {
         for (t, task) in tasks.iter().enumerate() {
-            let job = job(case, planned.engine.id(), task, selection.seed);
+            let job = job(case, &planned.engine.id(), task, selection.seed);
             let skip = |scope, reason: String, saved: Option<&str>| Skip {
                 case: case.name.clone(),
                 procedure: task.procedure.to_owned(),
-                engine: planned.engine.id().0.to_owned(),
+                engine: planned.engine.id().name().to_owned(),
                 scope,
                 reason,
                 saved: saved.map(str::to_owned),
@@ -157,20 +158,28 @@ fn tasks(case: &Case, selection: &Selection) -> Result<Vec<Task>, SpecError> {
 }
 
 fn engines(case: &Case, selection: &Selection, site: &Site) -> Result<Vec<Planned>, SpecError> {
-    let all = crate::engines::all();
-    let ids: Vec<&'static str> = all.iter().map(|e| e.id().0).collect();
-    for name in &selection.engines {
-        if !ids.contains(&name.as_str()) {
-            return Err(unknown("engine", name, ids.iter().copied(), "--engines"));
-        }
-    }
+    let mut all = crate::engines::all();
+    let built_in = names(&all);
     let in_spec: Vec<&String> = case.engines.iter().flat_map(BTreeMap::keys).collect();
-    for name in &in_spec {
-        if !ids.contains(&name.as_str()) {
-            let mut error = unknown("engine", name, ids.iter().copied(), "");
+    for (name, settings) in case.engines.iter().flatten().filter(|(name, _)| !built_in.contains(*name)) {
+        if !settings.0.contains_key("command") {
+            let mut error = unknown("engine", name, built_in.iter().map(String::as_str), "");
             let place = case.source.error_at(&format!("engines.{name}"), "", "");
             error = SpecError { file: place.file, line: place.line, column: place.column, ..error };
+            error.help = error.help.map(|h| format!("{h} A program of your own needs `command: [...]`"));
             return Err(error);
+        }
+        let folder = case.path.parent().unwrap_or(Path::new(""));
+        let engine = crate::engines::external(name, &settings.0, folder).map_err(|error| {
+            let help = "give `command: [program, arguments...]`, paths relative to the spec";
+            case.source.error_at(&format!("engines.{name}"), error.to_string(), help)
+        })?;
+        all.push(engine);
+    }
+    let ids = names(&all);
+    for name in &selection.engines {
+        if !ids.contains(name) {
+            return Err(unknown("engine", name, ids.iter().map(String::as_str), "--engines"));
         }
     }
     let asked = |id: &str| {
@@ -186,12 +195,16 @@ fn engines(case: &Case, selection: &Selection, site: &Site) -> Result<Vec<Planne
             in_spec.iter().any(|n| *n == id).then_some(Asked::ByName)
         }
     };
-    let chosen = all.into_iter().filter_map(|engine| asked(engine.id().0).map(|asked| (engine, asked)));
+    let chosen = all.into_iter().filter_map(|engine| asked(engine.id().name()).map(|asked| (engine, asked)));
     Ok(chosen.map(|(engine, asked)| Planned { found: engine.probe(site), engine, asked }).collect())
 }
 
-fn job(case: &Case, engine: EngineId, task: &Task, seed: u64) -> Job {
-    let settings = case.engines.as_ref().and_then(|e| e.get(engine.0)).map(|s| s.0.clone()).unwrap_or_default();
+fn names(engines: &[Box<dyn Engine>]) -> Vec<String> {
+    engines.iter().map(|e| e.id().name().to_owned()).collect()
+}
+
+fn job(case: &Case, engine: &EngineId, task: &Task, seed: u64) -> Job {
+    let settings = case.engines.as_ref().and_then(|e| e.get(engine.name())).map(|s| s.0.clone()).unwrap_or_default();
     let station = |target: &procedures::Target| Station {
         id: MeterId(target.id.0.clone()),
         meter: target.meter,

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::engines::{EngineError, Job, Measurement, Site, Workbench, checked};
-use crate::plan::{Plan, Planned, Run};
+use crate::plan::{Plan, Planned, Run, Scope, Skip};
 use crate::procedures::Task;
 use crate::process;
 use crate::reading::{Reading, Recording};
@@ -32,6 +32,8 @@ pub struct Outcome {
     pub recordings: Vec<Recording>,
     /// One an engine of the plan, in its order.
     pub engines: Vec<EngineStatus>,
+    /// What an engine declined once it had seen the job.
+    pub skips: Vec<Skip>,
 }
 
 /// How an engine fared.
@@ -83,13 +85,20 @@ pub trait Progress {
 
 /// Runs every job of a plan.
 pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress) -> Result<Outcome, RunError> {
-    let mut recordings = vec![];
+    let (mut recordings, mut skips) = (vec![], vec![]);
     for (e, planned) in plan.engines.iter().enumerate() {
         let mut of_engine = vec![];
         for run in plan.runs.iter().filter(|r| r.engine == e) {
             let task = &plan.tasks[run.task];
-            progress.started(planned.engine.id().0, task.procedure);
-            let recording = record(case, planned, run, task, options);
+            progress.started(planned.engine.id().name(), task.procedure);
+            let start = Instant::now();
+            let measured = measure(planned, &run.job, task.procedure, options);
+            if let Err(EngineError::Declined { why, .. }) = &measured {
+                progress.ended(planned.engine.id().name(), task.procedure, start.elapsed(), None);
+                skips.push(declined(case, planned, task, why));
+                continue;
+            }
+            let recording = record(case, planned, run, task, measured, start.elapsed());
             let wall = Duration::from_secs_f64(recording.wall_s);
             progress.ended(&recording.engine, task.procedure, wall, recording.failure.as_deref());
             of_engine.push(recording);
@@ -99,13 +108,29 @@ pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress)
         recordings.extend(of_engine);
     }
     let engines = plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
-    Ok(Outcome { recordings, engines })
+    Ok(Outcome { recordings, engines, skips })
 }
 
-fn record(case: &Case, planned: &Planned, run: &Run, task: &Task, options: &Options) -> Recording {
+fn declined(case: &Case, planned: &Planned, task: &Task, why: &str) -> Skip {
+    Skip {
+        case: case.name.clone(),
+        procedure: task.procedure.to_owned(),
+        engine: planned.engine.id().name().to_owned(),
+        scope: Scope::Procedure,
+        reason: format!("it declines: {why}"),
+        saved: None,
+    }
+}
+
+fn record(
+    case: &Case,
+    planned: &Planned,
+    run: &Run,
+    task: &Task,
+    measured: Result<Measurement, EngineError>,
+    wall: Duration,
+) -> Recording {
     let engine = planned.engine.id();
-    let start = Instant::now();
-    let measured = measure(planned, &run.job, task.procedure, options);
     let (measurement, failure) = match measured {
         Ok(measurement) => (measurement, None),
         Err(error) => {
@@ -123,7 +148,7 @@ fn record(case: &Case, planned: &Planned, run: &Run, task: &Task, options: &Opti
     Recording {
         case: case.name.clone(),
         procedure: task.procedure.to_owned(),
-        engine: engine.0.to_owned(),
+        engine: engine.name().to_owned(),
         version: planned.found.as_ref().map(|v| v.0.clone()).unwrap_or_default(),
         model: task.model(),
         input_sha256: case.sha256.clone(),
@@ -131,7 +156,7 @@ fn record(case: &Case, planned: &Planned, run: &Run, task: &Task, options: &Opti
         settings: measurement.settings.clone(),
         approximation: run.approximation.clone(),
         notes: measurement.notes.clone(),
-        wall_s: start.elapsed().as_secs_f64(),
+        wall_s: wall.as_secs_f64(),
         failure,
         readings: readings.collect(),
     }
@@ -139,10 +164,10 @@ fn record(case: &Case, planned: &Planned, run: &Run, task: &Task, options: &Opti
 
 fn measure(planned: &Planned, job: &Job, procedure: &str, options: &Options) -> Result<Measurement, EngineError> {
     if process::is_interrupted() {
-        return Err(process::ProcessError::Interrupted { program: planned.engine.id().0.to_owned() }.into());
+        return Err(process::ProcessError::Interrupted { program: planned.engine.id().name().to_owned() }.into());
     }
     let engine = planned.engine.id();
-    let scene_dir = options.out.join("scenes").join(engine.0).join(procedure);
+    let scene_dir = options.out.join("scenes").join(engine.name()).join(procedure);
     let workbench = Workbench {
         site: options.site.clone(),
         scene_dir: fresh(&scene_dir)?,
@@ -154,7 +179,7 @@ fn measure(planned: &Planned, job: &Job, procedure: &str, options: &Options) -> 
     let measurement = planned.engine.read(job, &workbench)?;
     // Our own solvers write no scene: an empty folder would only puzzle.
     fs::remove_dir(&workbench.scene_dir).ok();
-    checked(engine, job, measurement)
+    checked(&engine, job, measurement)
 }
 
 /// Far beyond the budget, which engines keep by themselves: this is for those that hang.
@@ -191,8 +216,8 @@ pub fn keep<T: Serialize>(path: &Path, value: &T) -> Result<(), RunError> {
 }
 
 fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
-    let id = planned.engine.id().0;
-    let mine: Vec<&Recording> = recordings.iter().filter(|r| r.engine == id).collect();
+    let id = planned.engine.id();
+    let mine: Vec<&Recording> = recordings.iter().filter(|r| r.engine == id.name()).collect();
     let failures: Vec<&str> = mine.iter().filter_map(|r| r.failure.as_deref()).collect();
     let (status, reason) = match &planned.found {
         Err(absent) => (Status::Absent, Some(absent.to_string())),
@@ -201,7 +226,7 @@ fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
         Ok(_) => (Status::Ran, None),
     };
     EngineStatus {
-        id: id.to_owned(),
+        id: id.name().to_owned(),
         version: planned.found.as_ref().ok().map(|v| v.0.clone()),
         status,
         reason,

@@ -50,7 +50,7 @@ enum Command {
     Photometry(PhotometryArgs),
     /// View a finished run again
     Report(ReportArgs),
-    /// Print the JSON Schema of the spec or of the report
+    /// Print the JSON Schema of the spec, the report, or what external adapters read and print
     Schema(SchemaArgs),
 }
 
@@ -160,6 +160,10 @@ struct SchemaArgs {
 enum SchemaOf {
     Spec,
     Report,
+    /// What an external adapter reads on its standard input
+    Job,
+    /// What an external adapter prints on its standard output
+    Readings,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -204,7 +208,7 @@ fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic> {
         let names: Vec<EngineId> = engines::all().iter().map(|e| e.id()).collect();
         let wanted = names
             .into_iter()
-            .filter(|n| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| w == n.0));
+            .filter(|n| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| w == n.name()));
         report_installation(site, &wanted.collect::<Vec<_>>());
     }
     let tables = Tables::read(&cases)?;
@@ -214,7 +218,7 @@ fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic> {
         let folder = out_folder(args, case);
         let planned = plan(case, &args.selected.selection(), site).map_err(diagnose)?;
         let report = run_case(case, &planned, published.as_ref(), &tables, args, site, &folder)?;
-        let named = |id: &str| planned.engines.iter().any(|p| p.engine.id().0 == id && p.asked == Asked::ByName);
+        let named = |id: &str| planned.engines.iter().any(|p| p.engine.id().name() == id && p.asked == Asked::ByName);
         exit = exit.worse(report.exit(named));
         reports.push((report, folder));
     }
@@ -274,7 +278,7 @@ fn run_case(
         wall_s: clock.elapsed().as_secs_f64(),
         engines: outcome.engines,
         recordings: &outcome.recordings,
-        skips: plan.skips.clone(),
+        skips: plan.skips.iter().cloned().chain(outcome.skips).collect(),
     };
     let report = Report::new(ingredients, comparisons);
     run::keep(&folder.join("report.json"), &report).into_diagnostic()?;
@@ -366,7 +370,11 @@ fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
 
 /// What a run may cost at most, in seconds: the budget for renderers, next to nothing for our own solvers.
 fn cost(budget: &crate::spec::Budget, planned: &crate::plan::Planned) -> f64 {
-    if crate::plan::REFERENCES.contains(&planned.engine.id().0) { 1.0_f64.min(budget.seconds) } else { budget.seconds }
+    if crate::plan::REFERENCES.contains(&planned.engine.id().name()) {
+        1.0_f64.min(budget.seconds)
+    } else {
+        budget.seconds
+    }
 }
 
 fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic> {
@@ -374,7 +382,7 @@ fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic> {
     let selection =
         Selection { engines: vec![args.engine.clone()], procedures: args.procedures.clone(), ..Selection::default() };
     let plan = plan(&case, &selection, site).map_err(diagnose)?;
-    let chosen = |e: usize| plan.engines[e].engine.id().0 == args.engine;
+    let chosen = |e: usize| plan.engines[e].engine.id().name() == args.engine;
     let mut exported = 0;
     // An export needs no installed engine: what is skipped for absence is exported all the same.
     for (e, planned) in plan.engines.iter().enumerate().filter(|(e, _)| chosen(*e)) {
@@ -419,7 +427,7 @@ fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Diagnostic> {
         EnginesAction::Install { names } => {
             known_engines(&names)?;
             let wanted = engines::all().into_iter().map(|e| e.id());
-            let wanted = wanted.filter(|e| names.is_empty() || names.iter().any(|n| n == e.0));
+            let wanted = wanted.filter(|e| names.is_empty() || names.iter().any(|n| n == e.name()));
             Ok(report_installation(site, &wanted.collect::<Vec<_>>()))
         }
         EnginesAction::Doctor { names } => {
@@ -433,7 +441,7 @@ fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
     let tolerances = Tolerances::built_in().into_diagnostic()?;
     let mut exit = Exit::Passed;
     for engine in engines::all() {
-        if names.is_empty() || names.iter().any(|n| n == engine.id().0) {
+        if names.is_empty() || names.iter().any(|n| n == engine.id().name()) {
             let finding = doctor::examine(engine.as_ref(), site, &tolerances);
             println!("{} {:<10} {}", if finding.healthy { "ok  " } else { "FAIL" }, finding.engine, finding.text);
             exit = exit.worse(if finding.healthy { Exit::Passed } else { Exit::Engine });
@@ -443,10 +451,10 @@ fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
 }
 
 fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
-    let all = engines::all();
+    let known: Vec<EngineId> = engines::all().iter().map(|e| e.id()).collect();
+    let known: Vec<&str> = known.iter().map(EngineId::name).collect();
     for name in names {
-        if !all.iter().any(|e| e.id().0 == name) {
-            let known: Vec<&str> = all.iter().map(|e| e.id().0).collect();
+        if !known.contains(&name.as_str()) {
             let help = crate::spec::nearest(name, known.iter().copied())
                 .map_or(format!("known: {}", known.join(", ")), |k| format!("did you mean `{k}`?"));
             return Err(miette::miette!(help = help, "there is no engine `{name}`"));
@@ -478,6 +486,8 @@ fn schema(args: &SchemaArgs) -> Result<Exit, Diagnostic> {
     let schema = match args.of {
         SchemaOf::Spec => schemars::schema_for!(Spec),
         SchemaOf::Report => schemars::schema_for!(Report),
+        SchemaOf::Job => schemars::schema_for!(engines::ExternalJob),
+        SchemaOf::Readings => schemars::schema_for!(engines::ExternalReadings),
     };
     println!("{}", serde_json::to_string_pretty(&schema).into_diagnostic()?);
     Ok(Exit::Passed)

@@ -11,7 +11,7 @@ use super::{
 /// The methods of [`luminaire::calculators`].
 pub(super) struct Iesna;
 
-const ID: EngineId = EngineId("iesna");
+const ID: EngineId = EngineId::new("iesna");
 
 /// Rounding of the inverse-square method in `f64`, relative: a few operations and two arctangents.
 const ROUNDING: f64 = 1e-13;
@@ -65,7 +65,7 @@ impl Engine for Iesna {
         }
         measurement.notes = in_short(notes);
         measurement.notes.extend(cut(job.transport).map(str::to_owned));
-        checked(ID, job, measurement)
+        checked(&ID, job, measurement)
     }
 }
 

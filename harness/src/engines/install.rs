@@ -78,7 +78,7 @@ pub fn install(site: &Site, engines: &[EngineId], mut progress: impl FnMut(&str)
 
 /// What the named engines need; all of it if none is named.
 fn components(engines: &[EngineId]) -> Vec<Component> {
-    let of = |engine: &EngineId| match engine.0 {
+    let of = |engine: &EngineId| match engine.name() {
         "mitsuba" => &[Component::PythonPackages, Component::LibLlvm][..],
         "povray" => &[Component::PythonPackages, Component::PovRay],
         "radiance" => &[Component::PythonPackages],
@@ -155,10 +155,10 @@ mod tests {
     fn every_engine_gets_what_it_needs_and_no_more() {
         use Component::{LibLlvm, PovRay, PythonPackages};
         assert_eq!(components(&[]), [PythonPackages, PovRay, LibLlvm]);
-        assert_eq!(components(&[EngineId("radiance")]), [PythonPackages]);
-        assert_eq!(components(&[EngineId("povray"), EngineId("radiance")]), [PythonPackages, PovRay]);
-        assert_eq!(components(&[EngineId("mitsuba")]), [PythonPackages, LibLlvm]);
-        assert_eq!(components(&[EngineId("simulator"), EngineId("iesna")]), []);
+        assert_eq!(components(&[EngineId::new("radiance")]), [PythonPackages]);
+        assert_eq!(components(&[EngineId::new("povray"), EngineId::new("radiance")]), [PythonPackages, PovRay]);
+        assert_eq!(components(&[EngineId::new("mitsuba")]), [PythonPackages, LibLlvm]);
+        assert_eq!(components(&[EngineId::new("simulator"), EngineId::new("iesna")]), []);
     }
 
     #[test]
@@ -166,7 +166,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         std::fs::write(&file, "").unwrap();
-        let outcomes = install(&Site::at(file.join("site")), &[EngineId("radiance")], |_| {});
+        let outcomes = install(&Site::at(file.join("site")), &[EngineId::new("radiance")], |_| {});
         assert_eq!(outcomes.len(), 1);
         assert_eq!(outcomes[0].state, InstallState::Failed);
         assert!(outcomes[0].detail.contains("site"), "{}", outcomes[0].detail);

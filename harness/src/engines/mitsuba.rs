@@ -18,7 +18,7 @@ use self::backend::Backend;
 use self::settings::{Preset, Settings};
 use super::{Absent, Engine, EngineError, EngineId, Job, Measurement, SceneFile, Site, Support, Version, Workbench};
 
-const ID: EngineId = EngineId("mitsuba");
+const ID: EngineId = EngineId::new("mitsuba");
 
 /// Nearer than this to a surface, a point luminaire's spot is too small for paths to find, in parts of the scene's size.
 const CLOSE: f64 = 2.5e-3;
@@ -81,7 +81,7 @@ impl Mitsuba {
         let mut measurement = parse::measurement(&finished.stdout, job, settings)?;
         measurement.notes.extend(fallback);
         measurement.settings.insert("command".into(), run.command_line());
-        super::checked(ID, job, measurement)
+        super::checked(&ID, job, measurement)
     }
 
     fn backend(&self, site: &Site) -> Result<Backend, Absent> {

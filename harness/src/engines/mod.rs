@@ -1,7 +1,9 @@
 //! Engines: everything that yields readings, renderers and our own solvers alike, behind one seam.
 //!
-//! Adding one: write `engines/<name>.rs` with a type that implements [`Engine`], and add its line to [`all`].
+//! Adding one: write `engines/<name>.rs` with a type that implements [`Engine`], and add its line to [`all`]; or leave this
+//! program as it is and name a program of your own in a spec, see [`external`]. `docs/adding-an-engine.md` walks through both.
 
+mod external;
 #[cfg(test)]
 mod fixtures;
 mod iesna;
@@ -13,6 +15,7 @@ mod radiance;
 mod simulator;
 mod site;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -25,6 +28,7 @@ use crate::process::{Invocation, ProcessError};
 use crate::reading::MeterId;
 
 pub use crate::spec::Budget;
+pub use external::{ExternalJob, ExternalReadings};
 pub use install::{InstallOutcome, InstallState, install};
 pub use site::{Site, SiteError};
 
@@ -39,14 +43,42 @@ pub fn all() -> Vec<Box<dyn Engine>> {
     ]
 }
 
+/// A program that a spec names as an engine of its own, `engines: {<name>: {command: [...]}}`; paths are relative to `folder`.
+///
+/// The error tells which setting is wrong, and how.
+pub fn external(
+    name: &str,
+    settings: &BTreeMap<String, serde_json::Value>,
+    folder: &Path,
+) -> Result<Box<dyn Engine>, EngineError> {
+    Ok(Box::new(external::External::new(name, settings, folder)?))
+}
+
 /// The name of an engine in specs, on the command line and in reports.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(transparent)]
-pub struct EngineId(pub &'static str);
+pub struct EngineId(Cow<'static, str>);
+
+impl EngineId {
+    /// The name of an engine of our own list.
+    pub const fn new(name: &'static str) -> Self {
+        Self(Cow::Borrowed(name))
+    }
+
+    /// The name that a spec gives to a program of its own.
+    pub const fn of_spec(name: String) -> Self {
+        Self(Cow::Owned(name))
+    }
+
+    /// The name itself.
+    pub fn name(&self) -> &str {
+        &self.0
+    }
+}
 
 impl fmt::Display for EngineId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.0)
+        f.pad(&self.0)
     }
 }
 
@@ -237,6 +269,14 @@ pub enum EngineError {
         /// What is wrong with it.
         what: String,
     },
+    /// It cannot do what was asked, as it says itself once it has seen the job: a skip, no failure.
+    #[error("{engine} declines: {why}")]
+    Declined {
+        /// The engine.
+        engine: EngineId,
+        /// Why.
+        why: String,
+    },
     /// Our own solver gave up.
     #[error("{engine}: {what}")]
     Solver {
@@ -255,17 +295,20 @@ impl EngineError {
 }
 
 /// Checks what every engine must hold: one finite, non-negative value a station.
-pub fn checked(engine: EngineId, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
+pub fn checked(engine: &EngineId, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
     let (found, wanted) = (measurement.estimates.len(), job.stations.len());
     if found != wanted {
-        return Err(EngineError::Output { engine, what: format!("gave {found} readings for {wanted} meters") });
+        return Err(EngineError::Output {
+            engine: engine.clone(),
+            what: format!("gave {found} readings for {wanted} meters"),
+        });
     }
     for (estimate, station) in measurement.estimates.iter().zip(&job.stations) {
         let errors = [estimate.std_error_lx, estimate.error_bound_lx];
         let sound = |v: f64| v.is_finite() && v >= 0.0;
         if !sound(estimate.value_lx) || !errors.into_iter().flatten().all(sound) {
             let what = format!("read {} lx (error {errors:?}) at {}", estimate.value_lx, station.id);
-            return Err(EngineError::Output { engine, what });
+            return Err(EngineError::Output { engine: engine.clone(), what });
         }
     }
     Ok(measurement)
@@ -288,7 +331,7 @@ mod tests {
     use glam::DVec3;
     use luminaire::scene::Scene;
 
-    const ENGINE: EngineId = EngineId("test");
+    const ENGINE: EngineId = EngineId::new("test");
 
     fn job(stations: usize) -> Job {
         let meter = Meter { position_m: DVec3::ONE, normal: DVec3::Z };
@@ -312,13 +355,13 @@ mod tests {
 
     #[test]
     fn missing_rows_nan_infinity_and_negative_readings_are_errors() {
-        assert!(checked(ENGINE, &job(2), measurement(&[1.0, 0.0])).is_ok());
+        assert!(checked(&ENGINE, &job(2), measurement(&[1.0, 0.0])).is_ok());
         for bad in [&[1.0][..], &[1.0, f64::NAN], &[1.0, f64::INFINITY], &[-1e-9, 1.0], &[1.0, 1.0, 1.0]] {
-            assert!(checked(ENGINE, &job(2), measurement(bad)).is_err(), "{bad:?}");
+            assert!(checked(&ENGINE, &job(2), measurement(bad)).is_err(), "{bad:?}");
         }
         let mut odd = measurement(&[1.0]);
         odd.estimates[0].std_error_lx = Some(f64::NAN);
-        assert!(checked(ENGINE, &job(1), odd).is_err());
+        assert!(checked(&ENGINE, &job(1), odd).is_err());
     }
 
     #[test]

@@ -27,7 +27,7 @@ use export::Light;
 use settings::{Preset, Settings};
 
 /// The engine's name.
-const ID: EngineId = EngineId("povray");
+const ID: EngineId = EngineId::new("povray");
 
 /// POV-Ray.
 pub(super) struct PovRay;
@@ -88,7 +88,7 @@ impl Engine for PovRay {
             Transport::Indirect(_) => bench.indirect()?,
             Transport::Total(_) => sum(&bench.direct()?, bench.indirect()?),
         };
-        checked(ID, job, measurement)
+        checked(&ID, job, measurement)
     }
 }
 

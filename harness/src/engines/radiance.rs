@@ -26,7 +26,7 @@ use super::{
     Workbench, checked,
 };
 
-const ID: EngineId = EngineId("radiance");
+const ID: EngineId = EngineId::new("radiance");
 
 /// Radiance keeps colours and candela tables in 32-bit floats; measured against the inverse-square law.
 const FLOAT_READ_OUT: f64 = 5e-7;
@@ -105,7 +105,7 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
     if job.transport == Transport::Direct {
         measurement.settings.insert("rtrace".into(), options.direct.join(" "));
         measurement.estimates = direct;
-        return checked(ID, job, measurement);
+        return checked(&ID, job, measurement);
     }
     let part_lx = tools.rtrace(workbench, &options.part_of_total, &sampler.rows)?;
     let nothing = vec![0.0; part_lx.len()];
@@ -121,7 +121,7 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
         _ => reflected(total, part_lx),
     };
     measurement.estimates = parts.map(estimate).collect();
-    checked(ID, job, measurement)
+    checked(&ID, job, measurement)
 }
 
 /// Direct light at every station: read once where rtrace's answer is determined, in blocks where it is sampled.

@@ -10,7 +10,7 @@ use super::{
 /// The exact simulation of [`luminaire::simulator`].
 pub(super) struct Simulator;
 
-const ID: EngineId = EngineId("simulator");
+const ID: EngineId = EngineId::new("simulator");
 
 /// How much finer than the budget's error the simulator works: a witness whose own error counts for nothing.
 const MARGIN: f64 = 0.1;
@@ -51,7 +51,7 @@ impl Engine for Simulator {
             ("seed".to_owned(), job.seed.to_string()),
         ];
         let estimates = solution.estimates.iter().map(estimate).collect();
-        checked(ID, job, Measurement { estimates, settings: settings.into(), notes: vec![] })
+        checked(&ID, job, Measurement { estimates, settings: settings.into(), notes: vec![] })
     }
 }
 

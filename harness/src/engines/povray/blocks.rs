@@ -218,7 +218,7 @@ impl<'a> Bench<'a> {
         let path = self.workbench.scene_dir.join(&image);
         let invocation = self.workbench.invoke(&self.program).args(self.arguments(run, &image));
         hermetic(invocation, &self.workbench.site).run()?;
-        let pixels = read_rgb(ID, self.workbench, &path)?;
+        let pixels = read_rgb(&ID, self.workbench, &path)?;
         std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
         let blanks = export::blanks(self.settings, run.light, run.seed);
         if pixels.len() != blanks + readouts.len() {

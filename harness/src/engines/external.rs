@@ -1,0 +1,155 @@
+//! External adapters: any program that reads a job as JSON on its standard input and prints readings as JSON is an engine.
+//!
+//! A spec names it: `engines: {mine: {command: [python3, mine.py]}}`. It runs in the spec's folder, with the time limit, log
+//! and checks of every other engine.
+
+mod form;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+pub use self::form::{ExternalJob, ExternalReadings};
+use super::{
+    Absent, Engine, EngineError, EngineId, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
+};
+use crate::process::Invocation;
+
+/// The environment variable that names an empty folder for the adapter's own files, kept with the run.
+const FOLDER_VARIABLE: &str = "LUXPROOF_SCENE_DIR";
+
+/// The file that holds the job.
+const JOB_FILE: &str = "job.json";
+
+/// An engine that is a program of the user's.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct External {
+    id: EngineId,
+    /// The program and its arguments, as in the spec.
+    command: Vec<String>,
+    /// The procedures that it takes part in; `None` for all.
+    procedures: Option<Vec<String>>,
+    /// The spec's folder, in which it runs.
+    folder: PathBuf,
+}
+
+impl External {
+    /// The engine that a spec describes.
+    pub(super) fn new(
+        name: &str,
+        settings: &BTreeMap<String, serde_json::Value>,
+        folder: &Path,
+    ) -> Result<Self, EngineError> {
+        let id = EngineId::of_spec(name.to_owned());
+        let error = |key: &str, what: &str| EngineError::Setting {
+            engine: id.clone(),
+            key: key.to_owned(),
+            what: what.to_owned(),
+        };
+        let words = |key: &str| settings.get(key).map(|v| serde_json::from_value::<Vec<String>>(v.clone()));
+        let command = match words("command") {
+            Some(Ok(words)) if words.first().is_some_and(|w| !w.is_empty()) => words,
+            _ => return Err(error("command", "must be a list of a program and its arguments")),
+        };
+        let procedures = words("procedures")
+            .transpose()
+            .map_err(|_| error("procedures", "must be a list of procedures that it can do"))?;
+        let known = crate::spec::Procedures::NAMES;
+        if let Some(odd) = procedures.iter().flatten().find(|p| !known.contains(&p.as_str())) {
+            return Err(error("procedures", &format!("there is no `{odd}`; there are {}", known.join(", "))));
+        }
+        // The name becomes a folder of the run.
+        if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
+            return Err(error("command", "an engine's name holds letters, digits, - and _ only"));
+        }
+        let folder = std::path::absolute(folder).map_err(|e| EngineError::io(folder, e))?;
+        Ok(Self { id, command, procedures, folder })
+    }
+
+    /// The program: a path is relative to the spec's folder, a bare name is looked up there and then on PATH.
+    fn program(&self, site: &Site) -> Option<PathBuf> {
+        let beside = self.folder.join(&self.command[0]);
+        let is_path = self.command[0].contains('/');
+        if is_path { Some(beside).filter(|p| p.is_file()) } else { site.program(&self.command[0]) }
+    }
+
+    fn invocation(&self, job: &Job, workbench: &Workbench) -> Result<Invocation, EngineError> {
+        let program = self.program(&workbench.site).ok_or_else(|| self.output(self.absence()))?;
+        let input = ExternalJob::of(job).to_json().map_err(|e| self.output(format!("the job is no JSON: {e}")))?;
+        let run = Invocation::new(program, &self.folder, workbench.limit, &workbench.log);
+        Ok(run.args(&self.command[1..]).env(FOLDER_VARIABLE, &workbench.scene_dir).stdin(input))
+    }
+
+    fn absence(&self) -> String {
+        format!("`{}` is neither beside the spec nor on PATH", self.command[0])
+    }
+
+    fn output(&self, what: String) -> EngineError {
+        EngineError::Output { engine: self.id.clone(), what }
+    }
+}
+
+impl Engine for External {
+    fn id(&self) -> EngineId {
+        self.id.clone()
+    }
+
+    /// The version of an adapter is the SHA-256 of its command and of the files that the command names.
+    fn probe(&self, site: &Site) -> Result<Version, Absent> {
+        let program = self
+            .program(site)
+            .ok_or_else(|| Absent { reason: self.absence(), remedy: format!("correct engines.{}.command", self.id) })?;
+        let mut hash = Sha256::new();
+        for word in &self.command {
+            hash.update(word);
+            hash.update([0]);
+        }
+        let named = self.command[1..].iter().map(|w| self.folder.join(w)).filter(|p| p.is_file());
+        for path in std::iter::once(program).chain(named) {
+            let absent = |e: std::io::Error| Absent {
+                reason: format!("{} cannot be read: {e}", path.display()),
+                remedy: "check its permissions".to_owned(),
+            };
+            hash.update(std::fs::read(&path).map_err(absent)?);
+        }
+        let digits = hash.finalize().iter().take(6).fold(String::new(), |mut text, byte| {
+            write!(text, "{byte:02x}").ok();
+            text
+        });
+        Ok(Version(format!("sha256:{digits}")))
+    }
+
+    fn supports(&self, job: &Job) -> Support {
+        match &self.procedures {
+            Some(mine) if !mine.contains(&job.procedure) => {
+                Support::No(format!("engines.{}.procedures does not name it", self.id))
+            }
+            _ => Support::Yes,
+        }
+    }
+
+    fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
+        let bytes = ExternalJob::of(job).to_json().map_err(|e| self.output(format!("the job is no JSON: {e}")))?;
+        Ok(vec![SceneFile { name: JOB_FILE.to_owned(), bytes }])
+    }
+
+    fn command_by_hand(&self, _job: &Job) -> Option<String> {
+        let nothing = std::time::Duration::ZERO;
+        let command = Invocation::new(&self.command[0], &self.folder, nothing, "").args(&self.command[1..]);
+        let there = Invocation::new("cd", &self.folder, nothing, "").args([&self.folder]);
+        Some(format!("({} && {}) < {JOB_FILE}", there.command_line(), command.command_line()))
+    }
+
+    fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
+        workbench.write(&self.export(job)?)?;
+        let run = self.invocation(job, workbench)?;
+        let finished = run.run()?;
+        let mut measurement = form::measurement(&finished.stdout, job, &self.id)?;
+        measurement.settings.insert("command".into(), run.command_line());
+        checked(&self.id, job, measurement)
+    }
+}

@@ -1,0 +1,278 @@
+//! The two forms that an external adapter reads and writes: a job and its readings, both JSON; pure.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use luminaire::geometry::Surface;
+use luminaire::photometry::{HorizontalAxis, LuminousOpening};
+use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::super::{EngineError, EngineId, Estimate, Job, Measurement, Station};
+use crate::spec::Budget;
+
+/// The version of both forms.
+const VERSION: u32 = 1;
+
+/// What an adapter reads on its standard input: everything in metres, candela, lux and world coordinates with z up.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ExternalJob {
+    /// Version of the form: 1.
+    luxproof_job: u32,
+    /// The case.
+    case: String,
+    /// The procedure.
+    procedure: String,
+    /// Which light counts: straight from the luminaires, reflected at least once, or both.
+    light: Light,
+    /// Light reflected more often than this does not count; null: all of it counts.
+    bounces: Option<u32>,
+    /// The closed room, one corner at the origin; null: free field.
+    room: Option<RoomForm>,
+    /// Opaque diffuse bodies.
+    obstacles: Vec<ObstacleForm>,
+    /// The luminaires.
+    luminaires: Vec<LuminaireForm>,
+    /// Where illuminance is asked for.
+    meters: Vec<MeterForm>,
+    /// When to stop: at whichever comes first.
+    budget: Budget,
+    /// Seed of every random choice.
+    seed: u64,
+    /// The engine's settings from the spec, `command` and `procedures` left out.
+    settings: BTreeMap<String, serde_json::Value>,
+}
+
+/// Which light counts.
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum Light {
+    /// Straight from the luminaires.
+    Direct,
+    /// Reflected at least once.
+    Indirect,
+    /// Both.
+    Total,
+}
+
+/// A box room.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+struct RoomForm {
+    /// Extents along x, y, z.
+    size_m: [f64; 3],
+    /// Diffuse reflectances: `floor`, `ceiling` and the walls `x-`, `x+`, `y-`, `y+`.
+    reflectance: BTreeMap<&'static str, f64>,
+}
+
+/// A body: `min_m` and `max_m` of a box, or `vertices_m` and `triangles` of a mesh whose both sides reflect.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[serde(untagged)]
+enum ObstacleForm {
+    /// An axis-aligned box.
+    Box { min_m: [f64; 3], max_m: [f64; 3], reflectance: f64 },
+    /// Triangles.
+    Mesh { vertices_m: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>, reflectance: f64 },
+}
+
+/// A luminaire.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+struct LuminaireForm {
+    /// Its name.
+    id: String,
+    /// `point`, `area` or `impostor`.
+    model: &'static str,
+    /// Photometric centre.
+    position_m: [f64; 3],
+    /// Where the luminaire's own x (C 0), y (C 90) and z axis (away from the nadir) point.
+    axes: [[f64; 3]; 3],
+    /// Its luminous opening; null for the model `point`.
+    opening: Option<OpeningForm>,
+    /// C planes in degrees, rising from 0 to 360.
+    c_deg: Vec<f64>,
+    /// Angles from the nadir in degrees, rising; beyond the first and the last there is no light.
+    gamma_deg: Vec<f64>,
+    /// Intensity, one row a C plane, flux scale applied; bilinear in (C, gamma) between.
+    candela: Vec<Vec<f64>>,
+}
+
+/// A luminous opening, centred on the photometric centre, extents along the luminaire's own axes.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+struct OpeningForm {
+    /// `point`, `box`, `upright_cylinder` (`box` and `upright_cylinder` are flat where z is 0), `ellipsoid`, `cylinder_along_x` or
+    /// `cylinder_along_y`.
+    shape: &'static str,
+    /// Extents along x, y and z.
+    size_m: [f64; 3],
+}
+
+/// A meter.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+struct MeterForm {
+    /// Its name.
+    id: String,
+    /// Its position.
+    position_m: [f64; 3],
+    /// Its unit normal: it reads light that arrives on this side.
+    normal: [f64; 3],
+}
+
+/// What an adapter prints on its standard output: one reading a meter in the job's order, or why it declines.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ExternalReadings {
+    /// One a meter.
+    readings: Vec<ReadingForm>,
+    /// Instead of readings: why it cannot do this job, which is then skipped for this reason.
+    declined: Option<String>,
+    /// What was set, for whoever repeats it: versions, samples, arguments.
+    settings: BTreeMap<String, String>,
+    /// What the reader of the report should know.
+    notes: Vec<String>,
+}
+
+/// One reading.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct ReadingForm {
+    /// The meter's name.
+    meter: String,
+    /// Illuminance, finite and not negative.
+    illuminance_lx: f64,
+    /// Standard error of a Monte Carlo mean.
+    #[serde(default)]
+    std_error_lx: Option<f64>,
+    /// Distance within which the true value lies, for deterministic methods.
+    #[serde(default)]
+    error_bound_lx: Option<f64>,
+}
+
+impl ExternalJob {
+    /// The form of a job.
+    pub fn of(job: &Job) -> Self {
+        let (light, bounces) = match job.transport {
+            Transport::Direct => (Light::Direct, None),
+            Transport::Indirect(bounces) => (Light::Indirect, limit(bounces)),
+            Transport::Total(bounces) => (Light::Total, limit(bounces)),
+        };
+        let ours = ["command", "procedures"];
+        let settings = job.settings.iter().filter(|(k, _)| !ours.contains(&k.as_str()));
+        Self {
+            luxproof_job: VERSION,
+            case: job.case.clone(),
+            procedure: job.procedure.clone(),
+            light,
+            bounces,
+            room: room(&job.scene),
+            obstacles: job.scene.obstacles.iter().map(obstacle).collect(),
+            luminaires: job.scene.luminaires.iter().map(luminaire).collect(),
+            meters: job.stations.iter().map(meter).collect(),
+            budget: job.budget,
+            seed: job.seed,
+            settings: settings.map(|(k, v)| (k.clone(), v.clone())).collect(),
+        }
+    }
+
+    /// The text that an adapter reads.
+    pub fn to_json(&self) -> Result<Vec<u8>, serde_json::Error> {
+        serde_json::to_vec_pretty(self)
+    }
+}
+
+const fn limit(bounces: Bounces) -> Option<u32> {
+    match bounces {
+        Bounces::Converged => None,
+        Bounces::AtMost(n) => Some(n),
+    }
+}
+
+fn room(scene: &Scene) -> Option<RoomForm> {
+    let room = scene.room?;
+    let name = |s: Surface| match s {
+        Surface::Floor => "floor",
+        Surface::Ceiling => "ceiling",
+        Surface::WallXMin => "x-",
+        Surface::WallXMax => "x+",
+        Surface::WallYMin => "y-",
+        Surface::WallYMax => "y+",
+    };
+    let reflectance = Surface::ALL.into_iter().map(|s| (name(s), room.reflectance.of(s))).collect();
+    Some(RoomForm { size_m: room.size_m.to_array(), reflectance })
+}
+
+fn obstacle(obstacle: &Obstacle) -> ObstacleForm {
+    let reflectance = obstacle.reflectance;
+    match &obstacle.shape {
+        Shape::Box { min_m, max_m } => {
+            ObstacleForm::Box { min_m: min_m.to_array(), max_m: max_m.to_array(), reflectance }
+        }
+        Shape::Mesh { vertices_m, triangles } => ObstacleForm::Mesh {
+            vertices_m: vertices_m.iter().map(DVec3::to_array).collect(),
+            triangles: triangles.clone(),
+            reflectance,
+        },
+    }
+}
+
+fn luminaire(luminaire: &Luminaire) -> LuminaireForm {
+    let table = luminaire.photometry.distribution.full_circle().scaled(luminaire.flux_scale);
+    LuminaireForm {
+        id: luminaire.id.clone(),
+        model: luminaire.model.name(),
+        position_m: luminaire.position_m.to_array(),
+        axes: luminaire.orientation.to_cols_array_2d(),
+        opening: (luminaire.model != LuminaireModel::Point).then(|| opening(luminaire.photometry.opening)),
+        c_deg: table.c_deg().to_vec(),
+        gamma_deg: table.gamma_deg().to_vec(),
+        candela: (0..table.c_deg().len()).map(|c| table.plane(c).to_vec()).collect(),
+    }
+}
+
+fn opening(opening: LuminousOpening) -> OpeningForm {
+    let shape = match opening {
+        LuminousOpening::Point => "point",
+        LuminousOpening::Box { .. } => "box",
+        LuminousOpening::Ellipse { .. } => "upright_cylinder",
+        LuminousOpening::Ellipsoid { .. } => "ellipsoid",
+        LuminousOpening::LyingCylinder { axis: HorizontalAxis::X, .. } => "cylinder_along_x",
+        LuminousOpening::LyingCylinder { axis: HorizontalAxis::Y, .. } => "cylinder_along_y",
+    };
+    let [y, x, z] = opening.bounding_box_m();
+    OpeningForm { shape, size_m: [x, y, z] }
+}
+
+fn meter(station: &Station) -> MeterForm {
+    MeterForm {
+        id: station.id.0.clone(),
+        position_m: station.meter.position_m.to_array(),
+        normal: station.meter.normal.to_array(),
+    }
+}
+
+/// Reads what an adapter printed; every meter must be there once, in order.
+pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineId) -> Result<Measurement, EngineError> {
+    let output = |what: String| EngineError::Output { engine: engine.clone(), what };
+    let answer: ExternalReadings = serde_json::from_slice(stdout).map_err(|e| {
+        let start: String = String::from_utf8_lossy(stdout).chars().take(200).collect();
+        output(format!("its answer is no JSON of readings ({e}): `{start}`"))
+    })?;
+    if let Some(why) = answer.declined {
+        return Err(EngineError::Declined { engine: engine.clone(), why });
+    }
+    let (found, wanted) = (answer.readings.len(), job.stations.len());
+    if found != wanted {
+        return Err(output(format!("gave {found} readings for {wanted} meters")));
+    }
+    let mut estimates = Vec::with_capacity(wanted);
+    for (reading, station) in answer.readings.iter().zip(&job.stations) {
+        if reading.meter != station.id.0 {
+            return Err(output(format!("gave `{}` where `{}` was asked for", reading.meter, station.id)));
+        }
+        estimates.push(Estimate {
+            value_lx: reading.illuminance_lx,
+            std_error_lx: reading.std_error_lx,
+            error_bound_lx: reading.error_bound_lx,
+        });
+    }
+    Ok(Measurement { estimates, settings: answer.settings, notes: answer.notes })
+}

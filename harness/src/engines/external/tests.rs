@@ -1,0 +1,148 @@
+//! The forms as text, and every way in which an adapter can fail: with small shell scripts in its place.
+
+use std::time::Duration;
+
+use glam::DVec3;
+use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport, orientation};
+use serde_json::json;
+
+use super::*;
+use crate::engines::fixtures::{CONVERGED, lopsided, luminaire, s1};
+use crate::process::ProcessError;
+
+fn adapter(script: &str, folder: &Path) -> External {
+    let settings = BTreeMap::from([("command".to_owned(), json!(["sh", "-c", script]))]);
+    External::new("mine", &settings, folder).unwrap()
+}
+
+fn read_within(script: &str, limit: Duration) -> Result<Measurement, EngineError> {
+    let folder = tempfile::tempdir().unwrap();
+    let site = Site::at(folder.path());
+    let bench = Workbench { site, scene_dir: folder.path().into(), log: folder.path().join("log"), jobs: 1, limit };
+    adapter(script, folder.path()).read(&s1(Transport::Direct), &bench)
+}
+
+fn read(script: &str) -> Result<Measurement, EngineError> {
+    read_within(script, Duration::from_secs(20))
+}
+
+/// A script that reads its job and prints these readings.
+fn prints(rows: &[(&str, &str)]) -> String {
+    let row = |(meter, lux): &(&str, &str)| format!(r#"{{"meter": "{meter}", "illuminance_lx": {lux}}}"#);
+    let rows = rows.iter().map(row).collect::<Vec<_>>().join(", ");
+    format!(r#"cat > /dev/null; echo '{{"readings": [{rows}]}}'"#)
+}
+
+#[test]
+fn what_an_adapter_prints_is_what_is_read() {
+    let found = read(&prints(&[("m[0]", "1"), ("m[1]", "2.5"), ("m[2]", "0"), ("m[3]", "4")])).unwrap();
+    assert_eq!(found.estimates.iter().map(|e| e.value_lx).collect::<Vec<_>>(), [1.0, 2.5, 0.0, 4.0]);
+    assert!(found.settings["command"].starts_with("/"), "{:?}", found.settings);
+}
+
+#[test]
+fn rows_that_are_missing_swapped_negative_or_not_a_number_are_no_readings() {
+    let three = [("m[0]", "1"), ("m[1]", "1"), ("m[2]", "1")];
+    for (fourth, says) in [
+        (None, "3 readings for 4 meters"),
+        (Some(("m[2]", "1")), "gave `m[2]` where `m[3]`"),
+        (Some(("m[3]", "-1")), "read -1 lx"),
+        (Some(("m[3]", "NaN")), "no JSON of readings"),
+        (Some(("m[3]", "1e999")), "no JSON of readings"),
+        (Some(("m[3]", "null")), "no JSON of readings"),
+    ] {
+        let rows: Vec<_> = three.into_iter().chain(fourth).collect();
+        let error = read(&prints(&rows)).unwrap_err();
+        assert!(matches!(error, EngineError::Output { .. }) && error.to_string().contains(says), "{says}: {error}");
+    }
+    let error = read("cat > /dev/null; echo Segmentation fault").unwrap_err().to_string();
+    assert!(error.contains("Segmentation fault"), "{error}");
+}
+
+#[test]
+fn a_crash_a_hang_and_an_out_of_memory_kill_are_told_apart() {
+    let crash = read("echo 'no lamp' >&2; exit 3").unwrap_err().to_string();
+    assert!(crash.contains("exit code 3") && crash.contains("no lamp"), "{crash}");
+    let killed = read("kill -KILL $$").unwrap_err().to_string();
+    assert!(killed.contains("out of memory"), "{killed}");
+    let hung = read_within("sleep 60", Duration::from_millis(300)).unwrap_err();
+    assert!(matches!(hung, EngineError::Process(ProcessError::TimedOut { .. })), "{hung}");
+}
+
+#[test]
+fn declining_is_no_failure() {
+    let error = read(r#"cat > /dev/null; echo '{"declined": "no such light"}'"#).unwrap_err();
+    assert!(matches!(&error, EngineError::Declined { why, .. } if why == "no such light"), "{error}");
+}
+
+#[test]
+fn the_version_changes_with_the_command_and_with_the_files_that_it_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let site = Site::at(folder.path());
+    std::fs::write(folder.path().join("mine.sh"), "one").unwrap();
+    let version = |words: serde_json::Value| {
+        let settings = BTreeMap::from([("command".to_owned(), words)]);
+        External::new("mine", &settings, folder.path()).unwrap().probe(&site).unwrap().0
+    };
+    let before = version(json!(["sh", "mine.sh"]));
+    assert_eq!(before, version(json!(["sh", "mine.sh"])));
+    assert_ne!(before, version(json!(["sh", "mine.sh", "-v"])));
+    std::fs::write(folder.path().join("mine.sh"), "two").unwrap();
+    assert_ne!(before, version(json!(["sh", "mine.sh"])));
+    let absent = BTreeMap::from([("command".to_owned(), json!(["./gone"]))]);
+    let absent = External::new("mine", &absent, folder.path()).unwrap().probe(&site).unwrap_err();
+    assert!(absent.to_string().contains("./gone"), "{absent}");
+}
+
+#[test]
+fn settings_that_make_no_sense_are_named() {
+    for (settings, key) in [
+        (json!({"command": "mine.py"}), "engines.mine.command"),
+        (json!({"command": []}), "engines.mine.command"),
+        (json!({"command": ["x"], "procedures": ["glare"]}), "engines.mine.procedures"),
+    ] {
+        let settings: BTreeMap<_, _> = serde_json::from_value(settings).unwrap();
+        let error = External::new("mine", &settings, Path::new(".")).unwrap_err().to_string();
+        assert!(error.contains(key), "{error}");
+    }
+    let command = BTreeMap::from([("command".to_owned(), json!(["x"]))]);
+    assert!(External::new("../mine", &command, Path::new(".")).is_err());
+}
+
+#[test]
+fn procedures_left_out_are_not_run() {
+    let settings: BTreeMap<_, _> =
+        serde_json::from_value(json!({"command": ["x"], "procedures": ["direct_illuminance"]})).unwrap();
+    let engine = External::new("mine", &settings, Path::new(".")).unwrap();
+    let mut job = s1(Transport::Direct);
+    job.procedure = "direct_illuminance".into();
+    assert_eq!(engine.supports(&job), Support::Yes);
+    job.procedure = "indirect_illuminance".into();
+    assert!(matches!(engine.supports(&job), Support::No(_)));
+}
+
+#[test]
+fn the_job_of_a_furnished_room_is_as_reviewed() {
+    let mut job = s1(CONVERGED);
+    job.settings.insert("command".into(), json!(["x"]));
+    job.settings.insert("quality".into(), json!("high"));
+    let mut panel: Luminaire = luminaire("panel", DVec3::new(2.0, 1.5, 2.5), lopsided());
+    panel.orientation = orientation(90.0, 0.0, 0.0);
+    panel.model = LuminaireModel::Area;
+    panel.flux_scale = 0.5;
+    job.scene.luminaires.push(panel);
+    job.scene.obstacles = vec![
+        Obstacle { shape: Shape::Box { min_m: DVec3::ONE, max_m: DVec3::splat(2.0) }, reflectance: 0.5 },
+        Obstacle {
+            shape: Shape::Mesh { vertices_m: vec![DVec3::X, DVec3::Y, DVec3::Z], triangles: vec![[0, 1, 2]] },
+            reflectance: 0.3,
+        },
+    ];
+    job.stations.truncate(1);
+    let folder = Path::new("/");
+    let text = String::from_utf8(adapter("x", folder).export(&job).unwrap().remove(0).bytes).unwrap();
+    // Numbers one a line make 200 lines of it: compact for the reviewer.
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let lines: Vec<String> = value.as_object().unwrap().iter().map(|(k, v)| format!("{k}: {v}")).collect();
+    insta::assert_snapshot!(lines.join("\n"));
+}
