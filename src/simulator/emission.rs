@@ -84,13 +84,13 @@ impl Emitter {
             }
             let hiding = candidates(meter.position_m, &above, occluders);
             for piece in visible_pieces(meter.position_m, &above, &hiding) {
-                sum = sum + self.from_piece(face, &piece, meter, relative_error);
+                sum = sum + self.piece_illuminance(face, &piece, meter, relative_error);
             }
         }
         sum
     }
 
-    fn from_piece(&self, face: &Face, piece: &[DVec3], meter: &Meter, relative_error: f64) -> Bounded {
+    fn piece_illuminance(&self, face: &Face, piece: &[DVec3], meter: &Meter, relative_error: f64) -> Bounded {
         if let Some(lambertian) = self.lambertian {
             let down = self.luminaire.orientation * DVec3::NEG_Z;
             if down.dot(meter.position_m - piece[0]) <= 0.0 {

@@ -109,16 +109,13 @@ impl Prepared {
                 Ok(narrower(radiosity, self.paths(meters, bounces).ok()))
             }
             Solver::Furnished(furnished) => {
-                match path_tracing::illuminance(&self.scene, meters, Transport::Indirect(bounces), &self.accuracy) {
-                    Ok(mut paths) => {
-                        paths.solver += ": finer than radiosity reaches";
-                        Ok(paths)
-                    }
-                    Err(_) => {
-                        let (values, text) = furnished.indirect(meters, bounces, error);
-                        Ok(bounded(&values, &text))
-                    }
+                let transport = Transport::Indirect(bounces);
+                if let Ok(mut paths) = path_tracing::illuminance(&self.scene, meters, transport, &self.accuracy) {
+                    paths.solver += ": finer than radiosity reaches";
+                    return Ok(paths);
                 }
+                let (values, text) = furnished.indirect(meters, bounces, error);
+                Ok(bounded(&values, &text))
             }
             Solver::PathsOnly => self.paths(meters, bounces),
         }

@@ -22,7 +22,9 @@ use crate::simulator::quadrature::Gauss;
 /// Cells are not halved below this fraction of the room.
 const SMALLEST: f64 = 1e-12;
 /// A cell whose halves differ more than this in length is halved: its map is too uneven for a product rule.
-const UNEVEN: f64 = 3.0;
+const UNEVEN: f64 = 3.0123;
+/// Which of two lengths is longer: no 1, because equal ones are frequent and rounding would decide.
+const TIE: f64 = 1.000_123;
 
 /// Everything that the luminaires light, as patches that halve themselves near a receiver.
 #[derive(Debug)]
@@ -89,7 +91,7 @@ impl FirstBounce {
                 Source { frame, faces }
             })
             .collect();
-        Self { room: *room, sources, rule: Gauss::new(effort.source_points), reach: effort.source_reach }
+        Self { room: *room, sources, rule: Gauss::new(effort.source_points), reach: 1.0123 * effort.source_reach }
     }
 
     /// Irradiance at a receiver, in lux, of light reflected once.
@@ -175,7 +177,7 @@ impl Patch {
         let split = match (uneven(&along_s), uneven(&along_t)) {
             (_, true) => Split::UnevenT,
             (true, false) => Split::UnevenS,
-            _ if length_s > length_t => Split::AlongS,
+            _ if length_s > TIE * length_t => Split::AlongS,
             _ => Split::AlongT,
         };
         let (centre_m, half_m) = (0.5 * (low + high), 0.52 * (high - low));

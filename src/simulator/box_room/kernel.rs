@@ -9,9 +9,13 @@ use glam::DVec3;
 use super::grid::{Axis, Element, Face, Grid, dyadic};
 
 /// Elements at least this many half-widths away are far.
-const FAR: f64 = 4.0;
+///
+/// No whole number, here and below: grids make distances that are whole multiples, and rounding would decide.
+const FAR: f64 = 4.0123;
 /// Parts of near elements are halved until they lie at least this many half-widths away.
-const NEAR: f64 = 2.0;
+const NEAR: f64 = 2.0123;
+/// How much longer one side must be than the other to be halved first.
+const TIE: f64 = 1.000_123;
 /// Parts smaller than this fraction of the room are not halved further.
 const SMALLEST: f64 = 1e-13;
 /// More nodes or points along an element than any effort asks for.
@@ -193,7 +197,7 @@ impl Panel<'_> {
             let u = (self.along_u.at(s0).0, self.along_u.at(s0 + ds).0);
             let v = (self.along_v.at(t0).0, self.along_v.at(t0 + dt).0);
             if self.is_too_near(u, v) {
-                if u.1 - u.0 >= v.1 - v.0 {
+                if u.1 - u.0 >= TIE * (v.1 - v.0) {
                     parts.extend([(2 * iu, iv), (2 * iu + 1, iv)]);
                 } else {
                     parts.extend([(iu, 2 * iv), (iu, 2 * iv + 1)]);
@@ -353,7 +357,7 @@ impl Panel<'_> {
 impl Part {
     fn halves(self, extent: &Extent) -> [Self; 2] {
         let middle = |(a, b): (f64, f64)| 0.5 * (a + b);
-        if extent.length_s >= extent.length_t {
+        if extent.length_s >= TIE * extent.length_t {
             let m = middle(self.s);
             [Self { s: (self.s.0, m), ..self }, Self { s: (m, self.s.1), ..self }]
         } else {

@@ -1,13 +1,16 @@
 //! Laws that an empty box must obey.
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
+use approx::assert_relative_eq;
 use glam::{DMat3, DVec3};
 
 use crate::geometry::{Reflectances, Room};
 use crate::photometry::{LuminousIntensityDistribution, Photometry};
-use crate::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport};
-use crate::simulator::{Accuracy, Uncertainty, illuminance};
+use crate::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
+use crate::simulator::box_room::{BoxField, EFFORTS, Effort};
+use crate::simulator::{Accuracy, Estimate, Prepared, Uncertainty, illuminance};
 
 pub(super) fn point(position_m: DVec3, distribution: LuminousIntensityDistribution) -> Luminaire {
     let photometry = Photometry::of(distribution);
@@ -57,5 +60,232 @@ fn s1_lies_within_its_bound_at_every_accuracy_and_bounce_count() {
                 assert!(bound <= relative_error * truth, "{bounces:?} {relative_error}: {bound}");
             }
         }
+    }
+}
+
+fn accuracy(relative_error: f64) -> Accuracy {
+    Accuracy { relative_error, seed: 1 }
+}
+
+/// Values and bounds of converged indirect light.
+fn indirect(scene: &Scene, meters: &[Meter], relative_error: f64) -> Vec<(f64, f64)> {
+    let converged = Transport::Indirect(Bounces::Converged);
+    let solution = illuminance(scene, meters, converged, &accuracy(relative_error)).unwrap();
+    solution.estimates.iter().map(pair).collect()
+}
+
+fn pair(estimate: &Estimate) -> (f64, f64) {
+    let Uncertainty::Bound(bound) = estimate.uncertainty else { panic!("{estimate:?} has no bound") };
+    (estimate.illuminance.value(), bound)
+}
+
+/// Random numbers within 0..1, the same on every machine.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 33) as f64 / (1_u64 << 31) as f64
+    }
+
+    fn within(&mut self, low: f64, high: f64) -> DVec3 {
+        let mut at = || low + (high - low) * self.next();
+        DVec3::new(at(), at(), at())
+    }
+}
+
+/// A room with six reflectances and a turned luminaire whose table starts and ends with a step.
+fn random_scene(random: &mut Random) -> (Scene, Vec<Meter>) {
+    let size_m = random.within(2.0, 6.0);
+    let mut rho = || 0.9 * random.next();
+    let reflectance = Reflectances {
+        floor: rho(),
+        ceiling: rho(),
+        wall_x_min: rho(),
+        wall_x_max: rho(),
+        wall_y_min: rho(),
+        wall_y_max: rho(),
+    };
+    let c_deg = vec![0.0, 90.0, 180.0, 270.0, 360.0];
+    let gamma_deg = vec![10.0, 40.0, 75.0, 110.0];
+    let mut candela: Vec<f64> = (0..16).map(|_| 100.0 * random.next()).collect();
+    candela.extend_from_within(..4);
+    let distribution = LuminousIntensityDistribution::new(c_deg, gamma_deg, candela).unwrap();
+    let mut luminaire = point(size_m * random.within(0.1, 0.9), distribution);
+    let [azimuth, tilt, roll] = random.within(0.0, 360.0).to_array();
+    luminaire.orientation = orientation(azimuth, tilt, roll);
+    let mut meter = || Meter {
+        position_m: size_m * random.within(0.01, 0.99),
+        normal: (random.within(-1.0, 1.0) + DVec3::splat(1e-3)).normalize(),
+    };
+    let meters = (0..6).map(|_| meter()).collect();
+    (Scene { room: Some(Room { size_m, reflectance }), obstacles: vec![], luminaires: vec![luminaire] }, meters)
+}
+
+#[test]
+fn bounds_hold_in_random_rooms_against_higher_orders() {
+    let mut random = Random(7);
+    for case in 0..8 {
+        let (scene, meters) = random_scene(&mut random);
+        let field = BoxField::solve(&scene.room.unwrap(), &scene.luminaires, Bounces::Converged, &EFFORTS[3]);
+        for relative_error in [0.5, 0.03] {
+            let found = indirect(&scene, &meters, relative_error);
+            for (meter, (value, bound)) in meters.iter().zip(found) {
+                // The higher order errs by less than 5e-4 itself.
+                let truth = field.illuminance(meter);
+                let error = (value - truth).abs();
+                assert!(error <= bound + 5e-4 * truth, "case {case}: {error} of {truth} beyond {bound}");
+            }
+        }
+    }
+}
+
+#[test]
+fn scale_changes_lux_by_its_square_alone() {
+    let (mut scene, _) = s1();
+    let size_m = DVec3::new(4.0, 5.0, 3.0);
+    scene.room = scene.room.map(|room| Room { size_m, ..room });
+    scene.luminaires[0].position_m = DVec3::new(1.3, 2.1, 1.2);
+    scene.luminaires[0].orientation = orientation(30.0, 20.0, 0.0);
+    let at = |x, y, z| Meter { position_m: DVec3::new(x, y, z), normal: DVec3::new(0.1, 0.2, 1.0).normalize() };
+    let meters = [at(1.0, 1.0, 0.8), at(0.03, 2.0, 1.7), at(3.9, 4.9, 0.1)];
+    let reference = indirect(&scene, &meters, 1e-3);
+    for scale in [1e-6, 1e-3, 1e6] {
+        let mut scaled = scene.clone();
+        scaled.room = scene.room.map(|room| Room { size_m: room.size_m * scale, ..room });
+        scaled.luminaires[0].position_m *= scale;
+        let meters: Vec<_> = meters.iter().map(|m| Meter { position_m: m.position_m * scale, ..*m }).collect();
+        for ((value, _), (expected, _)) in indirect(&scaled, &meters, 1e-3).iter().zip(&reference) {
+            assert_relative_eq!(value * scale * scale, *expected, max_relative = 1e-9);
+        }
+    }
+}
+
+/// x to y, y to z, z to x: a room laid on its side.
+fn turn(p: DVec3) -> DVec3 {
+    DVec3::new(p.z, p.x, p.y)
+}
+
+#[test]
+fn a_room_turned_as_a_whole_reads_the_same() {
+    let (scene, meters) = random_scene(&mut Random(5));
+    let mut turned = scene.clone();
+    let Room { size_m, reflectance: r } = scene.room.unwrap();
+    let reflectance = Reflectances {
+        floor: r.wall_y_min,
+        ceiling: r.wall_y_max,
+        wall_x_min: r.floor,
+        wall_x_max: r.ceiling,
+        wall_y_min: r.wall_x_min,
+        wall_y_max: r.wall_x_max,
+    };
+    turned.room = Some(Room { size_m: turn(size_m), reflectance });
+    let luminaire = &mut turned.luminaires[0];
+    luminaire.position_m = turn(luminaire.position_m);
+    luminaire.orientation = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X) * luminaire.orientation;
+    let turned_meters: Vec<_> =
+        meters.iter().map(|m| Meter { position_m: turn(m.position_m), normal: turn(m.normal) }).collect();
+    let pairs = indirect(&scene, &meters, 0.03);
+    for ((value, _), (expected, _)) in indirect(&turned, &turned_meters, 0.03).iter().zip(&pairs) {
+        assert_relative_eq!(value, expected, max_relative = 1e-9);
+    }
+}
+
+#[test]
+fn a_luminaire_turned_against_its_table_turned_back_reads_the_same() {
+    let c_deg: Vec<f64> = (0..=8).map(|k| 45.0 * f64::from(k)).collect();
+    let row = |c: usize| [200.0, 100.0 + 10.0 * c as f64, 20.0, 0.0];
+    let table = |shift: usize| {
+        let candela = (0..9).flat_map(|c| row((c + shift) % 8)).collect();
+        LuminousIntensityDistribution::new(c_deg.clone(), vec![0.0, 30.0, 60.0, 90.0], candela).unwrap()
+    };
+    let room = Room { size_m: DVec3::new(4.0, 5.0, 3.0), reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8) };
+    let at = DVec3::new(1.5, 2.0, 2.4);
+    let plain = Scene { room: Some(room), obstacles: vec![], luminaires: vec![point(at, table(0))] };
+    let mut turned = Scene { luminaires: vec![point(at, table(2))], ..plain.clone() };
+    turned.luminaires[0].orientation = orientation(90.0, 0.0, 0.0);
+    let meters = [Meter { position_m: DVec3::new(1.0, 1.0, 0.8), normal: DVec3::Z }];
+    let (plain, turned) = (indirect(&plain, &meters, 0.01), indirect(&turned, &meters, 0.01));
+    assert_relative_eq!(plain[0].0, turned[0].0, max_relative = 1e-9);
+}
+
+/// Area-mean indirect illuminance of a 4 m cube of one reflectance with 10 000 lm at its centre, from the nodes.
+fn furnace_mean(rho: f64, effort: &Effort) -> f64 {
+    let isotropic = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![10_000.0 / (4.0 * PI); 2]).unwrap();
+    let room = Room { size_m: DVec3::splat(4.0), reflectance: Reflectances::with_equal_walls(rho, rho, rho) };
+    let luminaires = [point(DVec3::splat(2.0), isotropic)];
+    BoxField::solve(&room, &luminaires, Bounces::Converged, effort).mean_exitance() / rho
+}
+
+#[test]
+fn interreflection_in_a_cube_is_phi_rho_over_area_times_absorption() {
+    for (rho, published) in [(0.05, 5.482), (0.5, 104.167), (0.95, 1979.17)] {
+        assert_relative_eq!(furnace_mean(rho, &EFFORTS[3]), published, max_relative = 1e-4);
+    }
+    let exact = |rho: f64| 10_000.0 / 96.0 * rho / (1.0 - rho);
+    for (rho, tolerance) in [(0.05, 1e-9), (0.5, 1e-9), (0.95, 1e-9), (0.999, 1e-9), (1.0 - 1e-9, 1e-6)] {
+        let exact = 10_000.0 / 96.0 * rho / (1.0 - rho);
+        assert_relative_eq!(furnace_mean(rho, &EFFORTS[1]), exact, max_relative = 1e-6_f64.min(100.0 * tolerance));
+        for effort in &EFFORTS[3..5] {
+            assert_relative_eq!(furnace_mean(rho, effort), exact, max_relative = tolerance);
+        }
+    }
+}
+
+#[test]
+fn direct_light_of_a_lambertian_point_is_i0_h2_over_d4() {
+    let gamma: Vec<f64> = (0..=9000).map(|k| 0.01 * f64::from(k)).collect();
+    let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
+    let source = point(DVec3::new(0.0, 0.0, 3.0), LuminousIntensityDistribution::axial(gamma, candela).unwrap());
+    let scene = Scene { room: None, obstacles: vec![], luminaires: vec![source] };
+    let offsets = [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.5, 0.0), (0.5, 0.5), (1.0, 0.5), (1.5, 1.5)];
+    let meters = offsets.map(|(x, y)| Meter { position_m: DVec3::new(x, y, 0.0), normal: DVec3::Z });
+    let solution = illuminance(&scene, &meters, Transport::Total(Bounces::Converged), &accuracy(1e-6)).unwrap();
+    for ((x, y), estimate) in offsets.into_iter().zip(&solution.estimates) {
+        let d2 = x * x + y * y + 9.0;
+        // A chord of the cosine over a hundredth of a degree errs by 4e-9.
+        assert_relative_eq!(estimate.illuminance.value(), 9000.0 / (d2 * d2), max_relative = 4e-9);
+    }
+}
+
+#[test]
+fn light_near_a_surface_or_flush_with_it_is_solved_or_refused() {
+    let (mut scene, _) = s1();
+    let near = |z| [Meter { position_m: DVec3::new(3.0, 4.0, z), normal: DVec3::Z }];
+    let height = |scene: &mut Scene, z| scene.luminaires[0].position_m.z = z;
+    // An uplight closer and closer to the ceiling lights a spot of the same flux.
+    height(&mut scene, 20.0 - 1e-3);
+    let spot = indirect(&scene, &near(1.0), 0.01)[0];
+    height(&mut scene, 20.0 - 1e-6);
+    let tighter = indirect(&scene, &near(1.0), 0.01)[0];
+    assert!((spot.0 - tighter.0).abs() <= 1e-3 * spot.0 + spot.1 + tighter.1, "{spot:?} {tighter:?}");
+    assert!(spot.0 > 0.5, "{spot:?}");
+    // A meter closer and closer to the floor converges.
+    let (close, closer) = (indirect(&scene, &near(1e-3), 0.01)[0], indirect(&scene, &near(1e-9), 0.01)[0]);
+    assert!((close.0 - closer.0).abs() <= 1e-3 * close.0, "{close:?} {closer:?}");
+    for meters in [near(0.0), near(f64::NAN), near(21.0)] {
+        let refused = illuminance(&scene, &meters, Transport::Direct, &accuracy(0.01));
+        assert!(refused.is_err(), "{refused:?}");
+    }
+}
+
+#[test]
+fn every_bit_is_the_same_on_any_number_of_threads() {
+    let (scene, meters) = random_scene(&mut Random(11));
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| indirect(&scene, &meters, 0.05))
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn dimming_and_further_meters_solve_nothing_again() {
+    let (scene, meters) = s1();
+    let mut prepared = Prepared::new(&scene, Transport::Total(Bounces::Converged), &accuracy(1e-3)).unwrap();
+    let whole = prepared.illuminance(&meters).unwrap();
+    let mut dimmed = prepared.dimmed(0.25);
+    for (estimate, whole) in dimmed.illuminance(&meters[..2]).unwrap().estimates.iter().zip(&whole.estimates) {
+        assert_relative_eq!(pair(estimate).0, 0.25 * pair(whole).0, max_relative = 1e-6);
     }
 }
