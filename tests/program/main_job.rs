@@ -64,8 +64,7 @@ fn case_s1_is_read_right_by_every_engine() {
     {
         agree(&report, "direct_illuminance", engine, &S1_DIRECT, tolerance);
     }
-    // POV-Ray: blocks of its cache scatter by up to 1.2e-2 within this budget, as measured; the others are far inside.
-    for (engine, tolerance) in [("simulator", 1e-4), ("radiance", 2e-3), ("mitsuba", 2e-3), ("povray", 2e-2)] {
+    for (engine, tolerance) in [("simulator", 1e-4), ("radiance", 2e-3), ("mitsuba", 2e-3), ("povray", 6e-3)] {
         agree(&report, "indirect_illuminance", engine, &S1_INDIRECT, tolerance);
     }
     for engine in ["radiance", "mitsuba", "povray"] {

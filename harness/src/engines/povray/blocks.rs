@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::Instant;
 
+use luminaire::scene::{Bounces, Transport};
+
 use crate::engines::image::read_rgb;
 use crate::engines::{EngineError, Estimate, Job, Measurement, SceneFile, Site, Workbench, mean_and_std_error};
 use crate::process::Invocation;
@@ -12,7 +14,7 @@ use crate::process::Invocation;
 use super::ID;
 use super::export::{self, Light};
 use super::pixels::{self, Readout, Seen};
-use super::settings::{Preset, Settings};
+use super::settings::{FIRST_REFLECTION_RAYS, LONG_POOL, POOL, Preset, Settings};
 
 /// Independent blocks of radiosity at least.
 const FEWEST_BLOCKS: usize = 8;
@@ -52,6 +54,31 @@ struct Run {
     light: Light,
     seed: u32,
     count: u32,
+    reflections: Reflections,
+}
+
+/// Which reflections a run follows.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reflections {
+    /// As many as asked for, out of the cache.
+    All,
+    /// The first alone, which needs no cache.
+    First,
+}
+
+impl Run {
+    /// Length of the pool of directions.
+    fn pool(self) -> u32 {
+        if self.reflections == Reflections::First && self.count > POOL / 10 { LONG_POOL } else { POOL }
+    }
+
+    fn blanks(self) -> usize {
+        if self.light == Light::Direct || self.seed == 0 {
+            0
+        } else {
+            export::blanks(self.seed, self.pool() / self.count)
+        }
+    }
 }
 
 impl<'a> Bench<'a> {
@@ -62,7 +89,7 @@ impl<'a> Bench<'a> {
 
     /// Direct light: deterministic, read at rising magnification until the read-out no longer matters.
     pub(super) fn direct(&self) -> Result<Measurement, EngineError> {
-        let run = Run { light: Light::Direct, seed: 0, count: self.settings.count };
+        let run = Run { light: Light::Direct, seed: 0, count: self.settings.count, reflections: Reflections::All };
         let first = export::first_readouts(self.job, Light::Direct);
         let mut looks: Vec<Look> = first.iter().map(|r| Look::Again(*r)).collect();
         let mut taken = 0;
@@ -99,14 +126,15 @@ impl<'a> Bench<'a> {
     pub(super) fn indirect(&self) -> Result<Measurement, EngineError> {
         let start = Instant::now();
         let budget = self.job.budget;
-        let mut run = Run { light: Light::Indirect, seed: self.seed(0), count: self.settings.count };
+        let count = self.settings.count;
+        let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, reflections: Reflections::All };
         let pilot = self.pilot(run)?;
         let jobs = self.workbench.jobs.max(1);
         let mut notes = vec![];
         let left_s = budget.seconds - start.elapsed().as_secs_f64();
         let waves = FEWEST_BLOCKS.div_ceil(jobs) as f64;
-        // Time grows a little faster than rays.
-        let share = (0.9 * left_s / (waves * pilot.wall_s)).max(1e-3).powf(0.8);
+        // Time grows a little faster than rays; the runs of the first reflection add about a third.
+        let share = (0.65 * left_s / (waves * pilot.wall_s)).max(1e-3).powf(0.8);
         if share < 1.0 && self.settings.preset == Preset::Audit {
             run.count = (f64::from(run.count) * share).max(FEWEST_RAYS) as u32;
             notes.push(format!("{} rays a sample instead of {}: the budget is short", run.count, self.settings.count));
@@ -132,6 +160,9 @@ impl<'a> Bench<'a> {
         settings.insert("blocks".into(), blocks.len().to_string());
         settings.insert("seeds".into(), format!("{}..={}", self.seed(1), self.seed(blocks.len())));
         settings.insert("count".into(), run.count.to_string());
+        if self.settings.preset != Preset::Default {
+            settings.insert("count_first_reflection".into(), (FIRST_REFLECTION_RAYS * run.count).to_string());
+        }
         settings.insert("error_bound".into(), self.settings.error_bound.to_string());
         settings.insert("recursion_limit".into(), self.settings.recursion_limit.to_string());
         Ok(Measurement { estimates: estimates.collect(), settings, notes })
@@ -189,11 +220,33 @@ impl<'a> Bench<'a> {
         })
     }
 
+    /// One block's reading of every meter.
+    ///
+    /// The first reflection, most of the noise, is read once more with many rays and no cache, and exchanged for the
+    /// one of the same few rays: E = E(all, few rays) - E(first, the same rays) + E(first, many rays).
     fn block(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
+        if self.settings.preset == Preset::Default {
+            return self.values(run, pilot);
+        }
+        let few = Run { reflections: Reflections::First, ..run };
+        let many = self.values(Run { count: FIRST_REFLECTION_RAYS * run.count, ..few }, pilot)?;
+        if self.first_reflection_only() {
+            return Ok(many);
+        }
+        let (all, few) = (self.values(run, pilot)?, self.values(few, pilot)?);
+        Ok(all.iter().zip(&few).zip(&many).map(|((all, few), many)| all - few + many).collect())
+    }
+
+    fn first_reflection_only(&self) -> bool {
+        matches!(self.job.transport, Transport::Indirect(Bounces::AtMost(1)) | Transport::Total(Bounces::AtMost(1)))
+    }
+
+    fn values(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
         let seen = self.render(run, &pilot.readouts)?;
         let value = |(k, seen): (usize, Seen)| match seen {
             Seen::Value { lx, .. } => Ok(lx),
-            Seen::Below(_) if pilot.dark[k] => Ok(0.0),
+            // What the first reflection leaves out there, later ones bring.
+            Seen::Below(_) if pilot.dark[k] || run.reflections == Reflections::First => Ok(0.0),
             Seen::Missed => Err(self.missed(k)),
             _ => {
                 let id = &self.job.stations[k].id;
@@ -220,7 +273,7 @@ impl<'a> Bench<'a> {
         hermetic(invocation, &self.workbench.site).run()?;
         let pixels = read_rgb(&ID, self.workbench, &path)?;
         std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
-        let blanks = export::blanks(self.settings, run.light, run.seed);
+        let blanks = run.blanks();
         if pixels.len() != blanks + readouts.len() {
             return Err(output(format!(
                 "gave {} pixels for {} meters and {blanks} blanks",
@@ -232,8 +285,11 @@ impl<'a> Bench<'a> {
     }
 
     fn arguments(&self, run: Run, image: &str) -> Vec<String> {
-        let mut arguments = export::arguments(self.job, self.settings, run.light, run.seed, image);
+        let mut arguments = export::arguments(self.job, run.light, run.seed, run.blanks(), image);
         arguments.extend([format!("Declare=Count={}", run.count), "Declare=Readouts=1".to_owned()]);
+        if run.reflections == Reflections::First {
+            arguments.extend([format!("Declare=Pool={}", run.pool()), "Declare=Limit=1".to_owned()]);
+        }
         arguments
     }
 

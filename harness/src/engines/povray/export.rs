@@ -50,9 +50,8 @@ pub(super) fn scene(job: &Job, settings: &Settings) -> SceneFile {
     SceneFile::text(SCENE, text)
 }
 
-/// The arguments of one run, without the program: `light` and `seed` choose what the scene shows.
-pub(super) fn arguments(job: &Job, settings: &Settings, light: Light, seed: u32, image: &str) -> Vec<String> {
-    let blanks = blanks(settings, light, seed);
+/// The arguments of one run, without the program: `light`, `seed` and `blanks` choose what the scene shows.
+pub(super) fn arguments(job: &Job, light: Light, seed: u32, blanks: usize, image: &str) -> Vec<String> {
     let mut arguments =
         vec![format!("+I{SCENE}"), format!("+O{image}"), "+FP16".to_owned(), "File_Gamma=1.0".to_owned()];
     arguments.extend([format!("+W{}", blanks + job.stations.len()), "+H1".to_owned()]);
@@ -63,19 +62,15 @@ pub(super) fn arguments(job: &Job, settings: &Settings, light: Light, seed: u32,
     arguments
 }
 
-/// Blank pixels before the meters': they move the start of radiosity's sequence of directions.
+/// Blank pixels before the meters': they move the start of radiosity's sequence of directions, which has so many parts.
 ///
 /// POV-Ray takes one part of the sequence after the other, always from its beginning. Without blanks the first meter had
 /// the same few hundred inclinations in every block, however the scene was turned, and their error did not average out:
 /// up to 2 % at a count of 100.
-pub(super) fn blanks(settings: &Settings, light: Light, seed: u32) -> usize {
-    if light == Light::Direct || seed == 0 {
-        return 0;
-    }
+pub(super) fn blanks(seed: u32, parts: u32) -> usize {
     // Fibonacci hashing (Knuth, The Art of Computer Programming, vol. 3, 6.4) spreads successive seeds evenly.
     let spread = f64::from(seed.wrapping_mul(2_654_435_769)) / 2_f64.powi(32);
-    let parts = (POOL / settings.count).clamp(1, MOST_BLANKS);
-    1 + (spread * f64::from(parts)) as usize
+    1 + (spread * f64::from(parts.clamp(1, MOST_BLANKS))) as usize
 }
 
 /// The tube of blanks is this long at most, so that POV-Ray's least cell stays shorter than their spacing.
@@ -122,7 +117,7 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
             (Light::Direct, "direct light (Indirect=0) and reflected light (Indirect=1), to be added")
         }
     };
-    let arguments = arguments(job, settings, part, 0, "scene.ppm").join(" ");
+    let arguments = arguments(job, part, 0, 0, "scene.ppm").join(" ");
     let mut text = format!(
         "// {}, {}: illuminance at {count} meters, {what}.\n// Run: povray {arguments}\n\
          // One pixel a meter. With x = E / scale of the meter (below): red .25 + x/2, green 16 x, blue 256 x, linear.\n\
@@ -146,7 +141,12 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
         "\n// Reflectances divided and lights multiplied by Brightness carry the same light, and keep the weight of rays above\n\
          // .25, below which POV-Ray would loosen error_bound by up to .25.\n",
     );
+    text.push_str("// Rays a sample, the length of the pool that they come from, and reflections; Limit=1 reads the first reflection alone.\n");
     writeln!(text, "#ifndef (Count) #declare Count = {}; #end", settings.count).ok();
+    writeln!(text, "#ifndef (Pool) #declare Pool = {POOL}; #end").ok();
+    if let Transport::Indirect(bounces) | Transport::Total(bounces) = job.transport {
+        writeln!(text, "#ifndef (Limit) #declare Limit = {}; #end", settings.recursion_limit(bounces)).ok();
+    }
     writeln!(text, "#declare Brightness = #if (Indirect) {}; #else 1; #end", settings.brightness).ok();
     text.push_str("global_settings {\n  assumed_gamma 1.0 max_trace_level 10 adc_bailout 1e-9\n");
     if let Transport::Indirect(bounces) | Transport::Total(bounces) = job.transport {
