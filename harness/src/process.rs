@@ -66,6 +66,16 @@ pub enum ProcessError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// Its messages could not be kept.
+    #[error("cannot keep the messages of {program} in {log}: {source}")]
+    Log {
+        /// The program.
+        program: String,
+        /// The log file.
+        log: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
     /// It did not finish in time.
     #[error("{program} was killed after its limit of {limit_s:.1} s; its messages are in {log}")]
     TimedOut {
@@ -141,7 +151,11 @@ impl Invocation {
         kill_group(&child);
         let (stdout, stderr) = pipes.join();
         let stderr = String::from_utf8_lossy(&stderr).into_owned();
-        self.keep_log(&stderr).map_err(|source| self.start_error(source))?;
+        self.keep_log(&stderr).map_err(|source| ProcessError::Log {
+            program: self.name(),
+            log: self.log_name(),
+            source,
+        })?;
         let status = ended?;
         if status.success() {
             return Ok(Finished { stdout, stderr, wall: start.elapsed() });

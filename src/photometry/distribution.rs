@@ -242,6 +242,11 @@ impl LuminousIntensityDistribution {
         Self { symmetry: Symmetry::None, c_deg, gamma_deg, candela }
     }
 
+    /// An axial table whose angles and values come from another table, and so are known to be in order.
+    pub(super) fn of_average(gamma_deg: Vec<f64>, candela: Vec<f64>) -> Self {
+        Self { symmetry: Symmetry::Axial, c_deg: vec![0.0], gamma_deg, candela }
+    }
+
     /// The same distribution with every intensity multiplied by `factor`.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {

@@ -38,7 +38,16 @@ pub(super) struct Summary {
     /// Spacing criterion along C0 and C90.
     spacing_criterion: [Option<f64>; 2],
     cie_flux_code: Option<[f64; 5]>,
+    bug_zones_lm: BugZones,
     lint: Vec<LintRecord>,
+}
+
+/// Flux in the zones of the Luminaire Classification System (TM-15), from low to very high.
+#[derive(Debug, Serialize)]
+struct BugZones {
+    back: [f64; 4],
+    up: [f64; 2],
+    forward: [f64; 4],
 }
 
 /// How angles are spaced.
@@ -86,6 +95,7 @@ impl Summary {
             field_angle_deg: if lit { within(0.1) } else { [None; 2] },
             spacing_criterion: [0.0, 90.0].map(|c| distribution.spacing_criterion(c)),
             cie_flux_code: distribution.cie_flux_code(Lumen(photometry.lamp_lumens.unwrap_or(flux.value()))),
+            bug_zones_lm: BugZones::of(photometry),
             lint: photometry.lints.iter().map(LintRecord::of).collect(),
         }
     }
@@ -94,6 +104,26 @@ impl Summary {
 impl LintRecord {
     fn of(lint: &Lint) -> Self {
         Self { code: lint.code, line: lint.line, message: lint.message.clone() }
+    }
+}
+
+impl BugZones {
+    /// C = 0 runs across the street in LM-63 and along it in EULUMDAT.
+    fn of(photometry: &Photometry) -> Self {
+        let forward_c_deg = if photometry.format.starts_with("EULUMDAT") { 90.0 } else { 0.0 };
+        let zones = photometry.distribution.classification_zones(forward_c_deg);
+        Self {
+            back: zones.back.map(Lumen::value),
+            up: zones.up.map(Lumen::value),
+            forward: zones.forward.map(Lumen::value),
+        }
+    }
+}
+
+impl fmt::Display for BugZones {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list = |zones: &[f64]| zones.iter().map(|lm| format!("{lm:.0}")).collect::<Vec<_>>().join(" ");
+        write!(f, "back {}, up {}, forward {} lm", list(&self.back), list(&self.up), list(&self.forward))
     }
 }
 
@@ -162,6 +192,7 @@ impl fmt::Display for Summary {
         if let Some(code) = self.cie_flux_code {
             row("CIE flux code", code.map(|n| format!("{n:.0}")).join(" "))?;
         }
+        row("BUG zones", self.bug_zones_lm.to_string())?;
         if !self.lint.is_empty() {
             row("lints", format!("{} (--lint prints them)", self.lint.len()))?;
         }

@@ -33,10 +33,12 @@ impl Tools {
 
     /// The version that rtrace names: `RADIANCE 6.0a ...`, its first two words.
     pub(super) fn version(&self, site: &Site) -> Result<Version, Absent> {
-        let log = std::env::temp_dir().join("luxproof-probe.log");
-        let limit = std::time::Duration::from_secs(20);
-        let run = self.prepared(Invocation::new(self.program("rtrace"), site.root(), limit, log)).args(["-version"]);
         let absent = |reason: String| Absent { reason, remedy: "run `luxproof engines install` again".into() };
+        // A folder of this run's own: in a shared one another user's log could not be written.
+        let folder = tempfile::tempdir().map_err(|e| absent(format!("no temporary folder: {e}")))?;
+        let limit = std::time::Duration::from_secs(20);
+        let log = folder.path().join("log");
+        let run = self.prepared(Invocation::new(self.program("rtrace"), site.root(), limit, log)).args(["-version"]);
         let done = run.run().map_err(|error: ProcessError| absent(error.to_string()))?;
         let text = String::from_utf8_lossy(&done.stdout).into_owned();
         let version = text.split_whitespace().nth(1).ok_or_else(|| absent(format!("rtrace -version says `{text}`")))?;
