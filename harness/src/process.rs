@@ -140,6 +140,14 @@ impl Invocation {
         words.map(|w| quoted(&w.to_string_lossy())).collect::<Vec<_>>().join(" ")
     }
 
+    /// The command line with the environment that the program needs before it.
+    pub fn command_line_with_env(&self) -> String {
+        let set = |(key, value): &(OsString, OsString)| {
+            format!("{}={} ", key.to_string_lossy(), quoted(&value.to_string_lossy()))
+        };
+        self.env.iter().map(set).collect::<String>() + &self.command_line()
+    }
+
     /// Runs the program to its end, its limit or an interruption.
     pub fn run(&self) -> Result<Finished, ProcessError> {
         let start = Instant::now();
@@ -329,5 +337,7 @@ mod tests {
     fn command_lines_can_be_pasted_into_a_shell() {
         let run = Invocation::new("rtrace", Path::new("."), Duration::ZERO, "log").args(["-ab", "99", "it's.oct"]);
         assert_eq!(run.command_line(), r"rtrace -ab 99 'it'\''s.oct'");
+        let run = run.env("RAYPATH", ".:/my lib");
+        assert_eq!(run.command_line_with_env(), r"RAYPATH='.:/my lib' rtrace -ab 99 'it'\''s.oct'");
     }
 }

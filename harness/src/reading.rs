@@ -86,6 +86,9 @@ pub struct Recording {
     pub notes: Vec<String>,
     /// Wall-clock seconds.
     pub wall_s: f64,
+    /// Relative standard uncertainty of the engine as an instrument, from its calibration; 0 for our own solvers.
+    #[serde(default)]
+    pub instrument_uncertainty: f64,
     /// Why there are no readings, if there are none.
     pub failure: Option<String>,
     /// The readings, one a meter.

@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::engines::calibration::{Calibrated, Origin, calibrate};
 use crate::engines::{EngineError, Job, Measurement, Site, Workbench, checked};
-use crate::plan::{Plan, Planned, Run, Scope, Skip};
+use crate::plan::{Plan, Planned, REFERENCES, Run, Scope, Skip};
 use crate::procedures::Task;
 use crate::process;
 use crate::reading::{Reading, Recording};
@@ -79,6 +80,8 @@ pub struct RunError {
 pub trait Progress {
     /// A job starts.
     fn started(&self, engine: &str, procedure: &str);
+    /// An engine was calibrated just now: what that found and where it is kept.
+    fn calibrated(&self, _engine: &str, _found: &Calibrated) {}
     /// A job ended, with its failure if it failed.
     fn ended(&self, engine: &str, procedure: &str, wall: Duration, failure: Option<&str>);
 }
@@ -88,17 +91,28 @@ pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress)
     let (mut recordings, mut skips) = (vec![], vec![]);
     for (e, planned) in plan.engines.iter().enumerate() {
         let mut of_engine = vec![];
+        let instrument = instrument(plan, e, options, progress);
         for run in plan.runs.iter().filter(|r| r.engine == e) {
             let task = &plan.tasks[run.task];
             progress.started(planned.engine.id().name(), task.procedure);
             let start = Instant::now();
-            let measured = measure(planned, &run.job, task.procedure, options);
+            let measured = match &instrument {
+                Ok(_) => measure(planned, &run.job, task.procedure, options),
+                // An instrument that reads known scenes wrong reads nothing.
+                Err(reason) => Err(EngineError::Solver { engine: planned.engine.id(), what: reason.clone() }),
+            };
             if let Err(EngineError::Declined { why, .. }) = &measured {
                 progress.ended(planned.engine.id().name(), task.procedure, start.elapsed(), None);
                 skips.push(declined(case, planned, task, why));
                 continue;
             }
-            let recording = record(case, planned, run, task, measured, start.elapsed());
+            let mut recording = record(case, planned, run, task, measured, start.elapsed());
+            if let Ok(Some(calibrated)) = &instrument {
+                recording.instrument_uncertainty = calibrated.calibration.uncertainty(run.job.transport);
+                if let Ok(file) = &calibrated.kept {
+                    recording.settings.insert("calibration".to_owned(), file.clone());
+                }
+            }
             let wall = Duration::from_secs_f64(recording.wall_s);
             progress.ended(&recording.engine, task.procedure, wall, recording.failure.as_deref());
             of_engine.push(recording);
@@ -109,6 +123,28 @@ pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress)
     }
     let engines = plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
     Ok(Outcome { recordings, engines, skips })
+}
+
+/// The calibration of an engine of the plan; `None` where it has nothing to do or is one of our own solvers, which are what
+/// the others are calibrated by.
+fn instrument(plan: &Plan, e: usize, options: &Options, progress: &dyn Progress) -> Result<Option<Calibrated>, String> {
+    let planned = &plan.engines[e];
+    let id = planned.engine.id();
+    let (Ok(version), Some(run)) = (&planned.found, plan.runs.iter().find(|r| r.engine == e)) else { return Ok(None) };
+    if REFERENCES.contains(&id.name()) {
+        return Ok(None);
+    }
+    progress.started(id.name(), "calibration");
+    let found = calibrate(planned.engine.as_ref(), version, &run.job.settings, &options.site, options.jobs);
+    match found {
+        Ok(calibrated) => {
+            if calibrated.origin == Origin::Measured {
+                progress.calibrated(id.name(), &calibrated);
+            }
+            Ok(Some(calibrated))
+        }
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 fn declined(case: &Case, planned: &Planned, task: &Task, why: &str) -> Skip {
@@ -157,6 +193,7 @@ fn record(
         approximation: run.approximation.clone(),
         notes: measurement.notes.clone(),
         wall_s: wall.as_secs_f64(),
+        instrument_uncertainty: 0.0,
         failure,
         readings: readings.collect(),
     }

@@ -92,13 +92,16 @@ fn the_example_adapter_is_at_most_sixty_lines_and_agrees_with_the_inverse_square
 }
 
 #[test]
-fn a_wrong_adapter_fails_its_procedures() {
+fn an_adapter_that_reads_a_known_scene_wrong_is_a_failed_engine() {
     let wrong = example().replace("math.atan2(y, x)", "math.atan2(x, y)");
     assert_ne!(wrong, example());
     let folder = folder(&wrong);
     let (report, code) = run(folder.path());
-    assert_ne!(code, Some(0));
-    assert!(of_adapter(&report, "comparisons", "engine").iter().any(|c| c["verdict"] != "pass"));
+    assert_eq!(code, Some(3));
+    let engine = of_adapter(&report, "engines", "id")[0];
+    assert_eq!(engine["status"], "failed");
+    assert!(engine["reason"].as_str().unwrap().contains("scene `asymmetric`"), "{engine}");
+    assert!(of_adapter(&report, "readings", "engine").is_empty());
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 pub(crate) mod diagnostic;
 
+use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -12,6 +13,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use crate::diff::{Comparison, Judge, KnownDeviations, Published, Tolerances};
 use crate::doctor;
+use crate::engines::calibration::{self, Calibrated};
 use crate::engines::{self, EngineId, InstallState, Site};
 use crate::photometry_command::{self, PhotometryArgs};
 use crate::plan::{Asked, Plan, Selection, plan};
@@ -400,7 +402,7 @@ fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic> {
                 std::fs::write(&path, &file.bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
                 println!("{}", path.display());
             }
-            if let Some(command) = planned.engine.command_by_hand(&job) {
+            if let Some(command) = planned.engine.command_by_hand(&job, site) {
                 println!("  cd {} && {command}", folder.display());
             }
             exported += files.len();
@@ -445,9 +447,29 @@ fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
             let finding = doctor::examine(engine.as_ref(), site, &tolerances);
             println!("{} {:<10} {}", if finding.healthy { "ok  " } else { "FAIL" }, finding.engine, finding.text);
             exit = exit.worse(if finding.healthy { Exit::Passed } else { Exit::Engine });
+            exit = exit.worse(calibrate_anew(engine.as_ref(), site));
         }
     }
     Ok(exit)
+}
+
+/// Measures an engine's calibration again, keeps it and prints it.
+fn calibrate_anew(engine: &dyn engines::Engine, site: &Site) -> Exit {
+    let Ok(version) = engine.probe(site) else { return Exit::Passed };
+    if crate::plan::REFERENCES.contains(&engine.id().name()) {
+        return Exit::Passed;
+    }
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    match calibration::measure(engine, &version, &BTreeMap::new(), site, cores) {
+        Ok(found) => {
+            println!("     {:<10} {}", engine.id(), calibration_line(&found));
+            Exit::Passed
+        }
+        Err(error) => {
+            println!("FAIL {:<10} {error}", engine.id());
+            Exit::Engine
+        }
+    }
 }
 
 fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
@@ -493,6 +515,14 @@ fn schema(args: &SchemaArgs) -> Result<Exit, Diagnostic> {
     Ok(Exit::Passed)
 }
 
+fn calibration_line(found: &Calibrated) -> String {
+    let kept = match &found.kept {
+        Ok(file) => format!("kept in {file}"),
+        Err(why) => format!("not kept, so that it is measured again next time: {why}"),
+    };
+    format!("{}; {kept}", found.calibration.summary())
+}
+
 /// A spinner on stderr while a job runs, a line when it failed.
 struct Bar {
     bar: ProgressBar,
@@ -513,6 +543,10 @@ impl run::Progress for Bar {
     fn started(&self, engine: &str, procedure: &str) {
         self.bar.reset_elapsed();
         self.bar.set_message(format!("{engine}: {procedure}"));
+    }
+
+    fn calibrated(&self, engine: &str, found: &Calibrated) {
+        self.bar.suspend(|| eprintln!("{engine}: calibrated before its first use: {}", calibration_line(found)));
     }
 
     fn ended(&self, engine: &str, procedure: &str, wall: Duration, failure: Option<&str>) {

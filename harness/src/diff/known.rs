@@ -23,6 +23,9 @@ struct KnownDeviation {
     /// Only in this case, where one is named.
     #[serde(default)]
     case: Option<String>,
+    /// Only with this luminaire model, where one is named.
+    #[serde(default)]
+    model: Option<String>,
     /// Lowest and highest relative deviation.
     relative: [f64; 2],
     /// Whether every reading is expected to deviate, so that a pass is news.
@@ -55,6 +58,7 @@ impl KnownDeviations {
                 && k.procedure == of.procedure
                 && k.basis == of.basis
                 && k.case.as_deref().is_none_or(|c| c == of.case)
+                && k.model.as_deref().is_none_or(|m| m == of.model)
         };
         let Some(known) = self.known_deviations.iter().find(applies) else { return (verdict, None) };
         let within = of.relative_deviation.is_some_and(|d| (known.relative[0]..=known.relative[1]).contains(&d));
@@ -77,6 +81,8 @@ pub struct Subject<'a> {
     pub procedure: &'a str,
     /// The engine.
     pub engine: &'a str,
+    /// The luminaire model.
+    pub model: &'a str,
     /// The reference's basis.
     pub basis: super::Basis,
     /// Deviation over reference, where that is defined.
@@ -101,6 +107,7 @@ mod tests {
             case: "c",
             procedure: "indirect_illuminance",
             engine: "iesna",
+            model: "point",
             basis: Basis::Exact,
             relative_deviation: Some(relative_deviation),
         }
@@ -113,6 +120,16 @@ mod tests {
         assert_eq!(record.revise(Verdict::Fail, &subject(-0.25)).0, Verdict::Fail);
         assert_eq!(record.revise(Verdict::Pass, &subject(-0.01)).0, Verdict::Pass);
         assert_eq!(record.revise(Verdict::Missing, &subject(-0.15)).0, Verdict::Missing);
+    }
+
+    #[test]
+    fn a_record_for_one_model_excuses_no_other() {
+        let text = "known_deviations:\n  - {engine: iesna, procedure: indirect_illuminance, basis: exact, model: impostor, \
+                    relative: [-0.2, 0.1], always: false, cause: a box, source: us}\n";
+        let record: KnownDeviations = crate::spec::from_yaml(text).unwrap();
+        assert_eq!(record.revise(Verdict::Fail, &subject(-0.15)).0, Verdict::Fail);
+        let impostor = Subject { model: "impostor", ..subject(-0.15) };
+        assert_eq!(record.revise(Verdict::Fail, &impostor).0, Verdict::KnownDeviation);
     }
 
     #[test]

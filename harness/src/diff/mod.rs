@@ -154,7 +154,8 @@ impl Judge<'_> {
         let deviation = pair.map(|(a, b)| a.value - b.value).filter(|d| d.is_finite());
         let relative_deviation = pair.map(|(a, b)| (a.value - b.value) / b.value).filter(|d| d.is_finite());
         let verdict = pair.map_or(Verdict::Missing, |(reading, reference)| {
-            let combined = standard_uncertainty(reading).hypot(reference.uncertainty);
+            let instrument = recording.instrument_uncertainty * reading.value;
+            let combined = standard_uncertainty(reading).hypot(reference.uncertainty).hypot(instrument);
             let sound = reading.value >= 0.0 && reference.value >= 0.0;
             let deviation = if sound { reading.value - reference.value } else { f64::NAN };
             judge(deviation, self.tolerances.coverage_factor() * combined, tolerance.around(reference.value))
@@ -163,6 +164,7 @@ impl Judge<'_> {
             case: &recording.case,
             procedure: task.procedure,
             engine: &recording.engine,
+            model: &recording.model,
             basis,
             relative_deviation,
         });

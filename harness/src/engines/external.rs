@@ -137,7 +137,7 @@ impl Engine for External {
         Ok(vec![SceneFile { name: JOB_FILE.to_owned(), bytes }])
     }
 
-    fn command_by_hand(&self, _job: &Job) -> Option<String> {
+    fn command_by_hand(&self, _job: &Job, _site: &Site) -> Option<String> {
         let nothing = std::time::Duration::ZERO;
         let command = Invocation::new(&self.command[0], &self.folder, nothing, "").args(&self.command[1..]);
         let there = Invocation::new("cd", &self.folder, nothing, "").args([&self.folder]);

@@ -60,6 +60,11 @@ impl Engine for Mitsuba {
         export::files(job, &Settings::of(job)?)
     }
 
+    fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
+        let plain = "python3 mitsuba_read.py job.json".to_owned();
+        Some(self.backend(site).map_or(plain, |backend| backend.command_by_hand()))
+    }
+
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
         let settings = Settings::of(job)?;
         self.read_files(&export::files(job, &settings)?, job, &settings, workbench)

@@ -3,6 +3,7 @@
 //! Adding one: write `engines/<name>.rs` with a type that implements [`Engine`], and add its line to [`all`]; or leave this
 //! program as it is and name a program of your own in a spec, see [`external`]. `docs/adding-an-engine.md` walks through both.
 
+pub mod calibration;
 mod external;
 #[cfg(test)]
 mod fixtures;
@@ -12,6 +13,8 @@ mod install;
 mod mitsuba;
 mod povray;
 mod radiance;
+#[cfg(test)]
+mod repetition_tests;
 mod simulator;
 mod site;
 
@@ -96,8 +99,9 @@ pub trait Engine: Send + Sync {
     /// The job as native files, runnable by hand; pure. Our own solvers have none.
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError>;
 
-    /// The command that runs an exported scene, as a person would type it in the scene's folder.
-    fn command_by_hand(&self, _job: &Job) -> Option<String> {
+    /// The command that runs an exported scene, as a person would type it in the scene's folder; it names the engine that is
+    /// installed at the site, or else relies on one on PATH.
+    fn command_by_hand(&self, _job: &Job, _site: &Site) -> Option<String> {
         None
     }
 

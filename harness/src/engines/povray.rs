@@ -66,9 +66,15 @@ impl Engine for PovRay {
         Ok(vec![export::scene(job, &settings), SceneFile::text("povray.ini", ini)])
     }
 
-    fn command_by_hand(&self, job: &Job) -> Option<String> {
+    fn command_by_hand(&self, job: &Job, site: &Site) -> Option<String> {
         Settings::of(job).ok()?;
-        let command = |light, image: &str| format!("povray {}", export::arguments(job, light, 0, 0, image).join(" "));
+        let program = blocks::program(site).unwrap_or_else(|_| "povray".into());
+        let command = |light, image: &str| {
+            let (here, nothing) = (std::path::Path::new("."), std::time::Duration::ZERO);
+            let invocation = crate::process::Invocation::new(&program, here, nothing, "");
+            let arguments = export::arguments(job, light, 0, 0, image);
+            blocks::hermetic(invocation, site).args(arguments).command_line_with_env()
+        };
         Some(match job.transport {
             Transport::Direct => command(Light::Direct, "direct.ppm"),
             Transport::Indirect(_) => command(Light::Indirect, "indirect.ppm"),

@@ -100,6 +100,9 @@ pub struct RecordingSummary {
     pub approximation: Option<String>,
     /// What the engine noted.
     pub notes: Vec<String>,
+    /// Relative standard uncertainty of the engine as an instrument, from its calibration; verdicts carry it.
+    #[serde(default)]
+    pub instrument_uncertainty: f64,
     /// Why there are no readings, if there are none.
     pub failure: Option<String>,
     /// Wall-clock seconds.
@@ -277,6 +280,7 @@ impl RecordingSummary {
             settings: recording.settings.clone(),
             approximation: recording.approximation.clone(),
             notes: recording.notes.clone(),
+            instrument_uncertainty: recording.instrument_uncertainty,
             failure: recording.failure.clone(),
             wall_s: recording.wall_s,
         }

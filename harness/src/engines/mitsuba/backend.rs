@@ -67,6 +67,17 @@ impl Backend {
         Version(format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"))
     }
 
+    /// The command that reads an exported job with what is installed here.
+    pub(super) fn command_by_hand(&self) -> String {
+        let run =
+            Invocation::new(&self.python, Path::new("."), Duration::ZERO, "").args(["mitsuba_read.py", "job.json"]);
+        match &self.llvm {
+            Some(library) => run.env("DRJIT_LIBLLVM_PATH", library),
+            None => run.args(["--variant", "scalar_rgb"]),
+        }
+        .command_line_with_env()
+    }
+
     /// The command that reads an exported job, and a remark if it cannot use the variant asked for.
     pub(super) fn invocation(&self, workbench: &Workbench, settings: &Settings) -> (Invocation, Option<String>) {
         let threads = workbench.jobs.max(1).to_string();

@@ -92,6 +92,12 @@ impl Tools {
         parse(&finished.stdout, rows.len())
     }
 
+    /// The command that runs an exported scene with the programs of this package.
+    pub(super) fn command_by_hand(&self) -> String {
+        let (here, nothing) = (std::path::Path::new("."), std::time::Duration::ZERO);
+        self.prepared(Invocation::new("sh", here, nothing, "")).args(["run.sh"]).command_line_with_env()
+    }
+
     fn program(&self, name: &str) -> PathBuf {
         self.package.join("bin").join(name)
     }

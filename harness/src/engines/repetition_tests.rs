@@ -1,0 +1,66 @@
+//! Seeded repetitions of case S1 on the real renderers: unbiased, and with standard errors that are what they say.
+//!
+//! Few and small, so that every test run affords them; `examples/repetitions.rs` does twenty at audit size, and
+//! `benchmarks/repetitions.md` has its figures.
+
+use std::time::Duration;
+
+use super::fixtures::{CONVERGED, S1_INDIRECT_LX, s1};
+use super::mitsuba::Mitsuba;
+use super::povray::PovRay;
+use super::radiance::Radiance;
+use super::*;
+
+const REPETITIONS: u64 = 5;
+
+fn repetitions(engine: &dyn Engine, settings: &[(&str, serde_json::Value)], budget: Budget) -> Vec<Measurement> {
+    let site = Site::of_user().unwrap();
+    let read = |seed| {
+        let folder = tempfile::tempdir().unwrap();
+        let (scene_dir, log) = (folder.path().to_owned(), folder.path().join("log"));
+        let bench = Workbench { site: site.clone(), scene_dir, log, jobs: 2, limit: Duration::from_secs(120) };
+        let settings = settings.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
+        let job = Job { seed, budget, settings, ..s1(CONVERGED) };
+        engine.read(&job, &bench).unwrap()
+    };
+    (1..=REPETITIONS).map(read).collect()
+}
+
+/// Each repetition rests on eight blocks, so that its deviation over its standard error is Student's t of 7 degrees of
+/// freedom, whose variance is 7/5.
+fn unbiased_with_honest_errors(found: &[Measurement], bias: f64) {
+    let mut squares = 0.0;
+    for (k, exact) in S1_INDIRECT_LX.into_iter().enumerate() {
+        let off = |m: &Measurement| m.estimates[k].value_lx - exact;
+        let error = |m: &Measurement| m.estimates[k].std_error_lx.unwrap();
+        let mean = found.iter().map(off).sum::<f64>() / found.len() as f64;
+        let pooled = found.iter().map(|m| error(m).powi(2)).sum::<f64>().sqrt() / found.len() as f64;
+        // 35 degrees of freedom: beyond 4.5 once in ten thousand.
+        assert!(mean.abs() < 4.5 * pooled + bias * exact, "point {k}: {mean} lx off, {pooled} lx pooled: {found:?}");
+        let beyond = |m: &Measurement| (off(m).abs() - bias * exact).max(0.0) / error(m);
+        squares += found.iter().map(|m| beyond(m).powi(2)).sum::<f64>();
+    }
+    let count = (S1_INDIRECT_LX.len() * found.len()) as f64;
+    // Standard errors stated at half their size would give four times 7/5.
+    assert!(squares < 3.0 * 1.4 * count, "sum of squared z {squares} for {count}: {found:?}");
+}
+
+#[test]
+fn mitsuba_repeats_unbiased_within_its_standard_errors() {
+    let found = repetitions(&Mitsuba::default(), &[("preset", "fast".into())], Budget::default());
+    unbiased_with_honest_errors(&found, 0.0);
+}
+
+#[test]
+fn radiance_repeats_unbiased_within_its_standard_errors() {
+    let found = repetitions(&Radiance, &[("preset", "fast".into())], Budget::default());
+    unbiased_with_honest_errors(&found, 0.0);
+}
+
+#[test]
+fn povray_repeats_within_its_standard_errors_and_its_named_bias() {
+    // Eight blocks of so few rays, however busy the machine is.
+    let budget = Budget { relative_error: 0.5, seconds: 1e6 };
+    let found = repetitions(&PovRay, &[("count", 50.into())], budget);
+    unbiased_with_honest_errors(&found, 0.005);
+}

@@ -1,0 +1,77 @@
+//! Case S2, a furnished office under luminous panels, on all three renderers against exact values.
+
+#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
+
+use std::path::Path;
+use std::time::Duration;
+
+use luxproof::engines::{Estimate, Site, Support, Workbench};
+use luxproof::plan::{Selection, plan};
+use luxproof::spec::{Budget, Case};
+
+/// By clipped polygons.
+const DIRECT_LX: [f64; 6] = [66.24407, 226.03927, 161.02976, 123.15923, 210.12365, 0.0];
+/// By path tracing, within .005 to .024 lx.
+const INDIRECT_LX: [f64; 6] = [51.0232, 53.0644, 48.966, 53.512, 50.245, 18.788];
+
+/// What an engine reads of a procedure of case S2, and what it says beforehand of its own error, relative.
+fn read(engine: &str, procedure: &str, budget: Budget, settings: &[(&str, u32)]) -> (Vec<Estimate>, f64) {
+    let site = Site::of_user().unwrap();
+    let spec = Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/analytic/s2.yaml");
+    let case = Case { budget, ..Case::load(&spec).unwrap() };
+    let selection = Selection { engines: vec![engine.into()], procedures: vec![procedure.into()], seed: 1 };
+    let plan = plan(&case, &selection, &site).unwrap();
+    let mine = plan.runs.iter().find(|r| plan.engines[r.engine].engine.id().name() == engine);
+    let run = mine.unwrap_or_else(|| panic!("{engine} does not run; run `luxproof engines install`"));
+    let mut job = run.job.clone();
+    job.settings.extend(settings.iter().map(|(k, v)| ((*k).to_owned(), (*v).into())));
+    let engine = &plan.engines[run.engine].engine;
+    let declared = match engine.supports(&job) {
+        Support::Approximate { size, .. } => size.unwrap_or(0.0),
+        Support::Yes => 0.0,
+        Support::No(why) => panic!("{why}"),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (scene_dir, log) = (folder.path().to_owned(), folder.path().join("log"));
+    let bench = Workbench { site, scene_dir, log, jobs: 2, limit: Duration::from_secs(300) };
+    (engine.read(&job, &bench).unwrap().estimates, declared)
+}
+
+fn direct_light_within_1_percent(engine: &str) {
+    let (found, _) = read(engine, "direct_illuminance", Budget { relative_error: 0.004, seconds: 30.0 }, &[]);
+    for (k, (estimate, exact)) in found.iter().zip(DIRECT_LX).enumerate() {
+        assert!((estimate.value_lx - exact).abs() <= 0.01 * exact, "{engine} at {k}: {estimate:?} for {exact}");
+    }
+}
+
+/// Within 2 %, noise and what the engine itself declares apart.
+fn reflected_light_within_2_percent(engine: &str, budget: Budget, settings: &[(&str, u32)]) {
+    let (found, declared) = read(engine, "indirect_illuminance", budget, settings);
+    assert!(declared < 0.04, "{declared}");
+    for (k, (estimate, exact)) in found.iter().zip(INDIRECT_LX).enumerate() {
+        let error = estimate.std_error_lx.unwrap();
+        assert!(error < 0.02 * exact, "{engine} at {k}: {estimate:?}");
+        let allowed = declared.max(0.02) * exact + 3.0 * error;
+        assert!((estimate.value_lx - exact).abs() <= allowed, "{engine} at {k}: {estimate:?} for {exact}");
+    }
+}
+
+const BUDGET: Budget = Budget { relative_error: 0.008, seconds: 20.0 };
+
+#[test]
+fn mitsuba_reads_the_furnished_office() {
+    direct_light_within_1_percent("mitsuba");
+    reflected_light_within_2_percent("mitsuba", BUDGET, &[]);
+}
+
+#[test]
+fn radiance_reads_the_furnished_office_but_for_the_light_that_panels_swallow() {
+    direct_light_within_1_percent("radiance");
+    reflected_light_within_2_percent("radiance", BUDGET, &[]);
+}
+
+#[test]
+fn povray_reads_the_furnished_office() {
+    direct_light_within_1_percent("povray");
+    reflected_light_within_2_percent("povray", Budget { relative_error: 0.5, seconds: 60.0 }, &[]);
+}
