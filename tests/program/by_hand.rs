@@ -80,9 +80,9 @@ fn mitsuba_prints_readings_with_their_standard_errors() {
     }
 }
 
-/// The scales that a scene's header tells of, in lux: those of direct light are the last.
+/// The scales that a scene tells of, in lux: those of direct light are the last.
 fn scales(scene: &str) -> Vec<f64> {
-    let block = scene.split("#declare Readout = array").nth(2).unwrap();
+    let block = scene.split("#declare Readout = array").last().unwrap();
     let block = block.split("};").next().unwrap();
     block.split('<').skip(1).map(|c| c.split(',').next().unwrap().parse().unwrap()).collect()
 }

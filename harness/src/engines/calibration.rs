@@ -5,7 +5,7 @@
 //! - **Asymmetric**: a table without symmetry, turned, over nodes, mid-nodes and both poles; shows mirrored or wrapped tables.
 //! - **Shadow**: a box between luminaire and meters in a black room; shows light that leaks or meters that are missed.
 //! - **Furnace**: a cube that its luminaire lights evenly, so that reflected light is the same everywhere in every direction,
-//!   E = rho / (1 - rho) x flux / area; shows what a method of reflected light loses or gains.
+//!   E = rho / (1 - rho) x flux / area, to 5e-4; shows what a method of reflected light loses or gains.
 //!
 //! What an engine declares of its method ([`Support::Approximate`]) is not the instrument's and stays in its readings.
 

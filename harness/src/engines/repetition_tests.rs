@@ -1,7 +1,7 @@
 //! Seeded repetitions of case S1 on the real renderers: unbiased, and with standard errors that are what they say.
 //!
-//! Few and small, so that every test run affords them; `examples/repetitions.rs` does twenty at audit size, and
-//! `benchmarks/repetitions.md` has its figures.
+//! Few and small, so that every test run affords them; `benchmarks/repetitions.py` does twenty at audit
+//! size, and `benchmarks/repetitions.md` has its figures.
 
 use std::time::Duration;
 

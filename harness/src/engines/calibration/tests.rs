@@ -11,7 +11,7 @@ use super::*;
 const VERSION: &str = "1";
 const INDIRECT: Transport = Transport::Indirect(Bounces::Converged);
 
-/// The simulator behind a fault: every reading passes through it.
+/// The right answers behind a fault: every reading passes through it.
 struct Faulty<F> {
     fault: F,
     reads: AtomicUsize,
@@ -41,13 +41,14 @@ impl<F: Fn(&Job, usize, Estimate) -> Estimate + Send + Sync> Engine for Faulty<F
         Ok(vec![])
     }
 
-    fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
+    fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
         self.reads.fetch_add(1, Ordering::SeqCst);
-        let mut measurement = Simulator.read(job, workbench)?;
-        for (k, estimate) in measurement.estimates.iter_mut().enumerate() {
-            *estimate = (self.fault)(job, k, *estimate);
-        }
-        Ok(measurement)
+        let scenes = scenes::all(&BTreeMap::new());
+        let scene = scenes.iter().find(|s| s.job.stations == job.stations).unwrap();
+        let right =
+            |known: &scenes::Known| Estimate { value_lx: known.exact_lx, std_error_lx: None, error_bound_lx: None };
+        let estimates = scene.known.iter().map(right).enumerate().map(|(k, e)| (self.fault)(job, k, e));
+        Ok(Measurement { estimates: estimates.collect(), ..Measurement::default() })
     }
 }
 
@@ -67,8 +68,9 @@ fn the_closed_forms_are_what_the_simulator_has() {
     assert_eq!(names, ["point", "asymmetric", "shadow", "furnace"]);
     for part in &calibration.parts {
         assert_eq!(part.left_out, None);
-        // The furnace's table is linear between nodes 3 degrees apart, so that its light is even to a few parts in 1e4 only.
-        let limit = if part.reflected { 2e-4 } else { 1e-12 };
+        // The furnace's table is linear between nodes 3 degrees apart, so that its light is even to a few parts in 1e4 only,
+        // and the simulator itself works to 2e-4.
+        let limit = if part.reflected { 6e-4 } else { 1e-12 };
         assert!(part.deviation < limit, "{part:?}");
     }
 }
@@ -148,6 +150,7 @@ fn where_nothing_can_be_kept_the_calibration_still_counts() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     std::fs::write(&file, "").unwrap();
-    let found = calibrate(&Simulator, &Version(VERSION.into()), &BTreeMap::new(), &Site::at(file), 1).unwrap();
+    let engine = Faulty::new(scaled(1.0));
+    let found = calibrate(&engine, &Version(VERSION.into()), &BTreeMap::new(), &Site::at(file), 1).unwrap();
     assert!(found.kept.is_err());
 }
