@@ -20,7 +20,7 @@ fn repetitions(engine: &dyn Engine, settings: &[(&str, serde_json::Value)], budg
         let (scene_dir, log) = (folder.path().to_owned(), folder.path().join("log"));
         let bench = Workbench { site: site.clone(), scene_dir, log, jobs: 2, limit: Duration::from_secs(120) };
         let settings = settings.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
-        let job = Job { seed, budget, settings, ..s1(CONVERGED) };
+        let job = Job { budget, seed, settings, ..s1(CONVERGED) };
         engine.read(&job, &bench).unwrap()
     };
     (1..=REPETITIONS).map(read).collect()
