@@ -128,6 +128,12 @@ pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, Spe
                 skips.push(skip(Scope::Engine, absent.to_string(), None));
                 continue;
             }
+            if case.only_engines.as_ref().is_some_and(|own| !own.iter().any(|o| o == planned.engine.id().name()))
+                && !REFERENCES.contains(&planned.engine.id().name())
+            {
+                skips.push(skip(Scope::Engine, "the case is not for this engine".into(), Some("the whole run")));
+                continue;
+            }
             match planned.engine.supports(&job) {
                 Support::Yes => runs.push(Run { engine: e, task: t, job, approximation: None }),
                 Support::Approximate { why, size } => {
@@ -141,6 +147,17 @@ pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, Spe
     Ok(Plan { tasks, engines, runs, skips })
 }
 
+impl Selection {
+    /// Whether a case holds any of the chosen procedures.
+    pub fn concerns(&self, case: &Case) -> bool {
+        procedures::ALL.iter().any(|p| self.wants(p.name()) && p.task(case).is_some())
+    }
+
+    fn wants(&self, procedure: &str) -> bool {
+        self.procedures.is_empty() || self.procedures.iter().any(|p| p == procedure)
+    }
+}
+
 fn tasks(case: &Case, selection: &Selection) -> Result<Vec<Task>, SpecError> {
     let known = || procedures::ALL.iter().map(|p| p.name());
     for name in &selection.procedures {
@@ -148,8 +165,8 @@ fn tasks(case: &Case, selection: &Selection) -> Result<Vec<Task>, SpecError> {
             return Err(unknown("procedure", name, known(), "--procedures"));
         }
     }
-    let wanted = |name: &str| selection.procedures.is_empty() || selection.procedures.iter().any(|p| p == name);
-    let tasks: Vec<Task> = procedures::ALL.iter().filter(|p| wanted(p.name())).filter_map(|p| p.task(case)).collect();
+    let tasks: Vec<Task> =
+        procedures::ALL.iter().filter(|p| selection.wants(p.name())).filter_map(|p| p.task(case)).collect();
     if tasks.is_empty() {
         let message = "none of the procedures chosen with --procedures is in this spec";
         return Err(case.source.error_at("procedures", message, "choose one that is, or leave the option out"));

@@ -74,6 +74,9 @@ pub struct Recording {
     pub version: String,
     /// The luminaire model: point, area, impostor, or mixed.
     pub model: String,
+    /// Which light counted, e.g. `indirect, 7 bounces`.
+    #[serde(default)]
+    pub light: String,
     /// SHA-256 of the spec and of every file that it names.
     pub input_sha256: String,
     /// Seed of every random choice.

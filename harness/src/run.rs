@@ -52,6 +52,25 @@ pub struct EngineStatus {
     pub wall_s: f64,
 }
 
+impl EngineStatus {
+    /// Takes in how the same engine fared in another case: a failure outlasts everything, and one run counts as ran.
+    pub fn join(&mut self, other: Self) {
+        let weight = |s: Status| match s {
+            Status::Skipped => 0,
+            Status::Absent => 1,
+            Status::Ran => 2,
+            Status::Failed => 3,
+        };
+        self.wall_s += other.wall_s;
+        if weight(other.status) > weight(self.status) {
+            *self = Self { wall_s: self.wall_s, ..other };
+        } else if other.status == Status::Failed {
+            let reasons: Vec<String> = [self.reason.take(), other.reason].into_iter().flatten().collect();
+            self.reason = Some(reasons.join("; "));
+        }
+    }
+}
+
 /// How an engine fared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -187,6 +206,7 @@ fn record(
         engine: engine.name().to_owned(),
         version: planned.found.as_ref().map(|v| v.0.clone()).unwrap_or_default(),
         model: task.model(),
+        light: task.light(),
         input_sha256: case.sha256.clone(),
         seed: run.job.seed,
         settings: measurement.settings.clone(),

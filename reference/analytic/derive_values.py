@@ -2,8 +2,7 @@
 
 It is one of two derivations: tests/analytic_values.rs derives every value again, from closed forms and contour
 integrals of luminaire::calculators and luminaire::geometry, and compares. Case 5.7 of CIE 171:2006 is not taken
-from its Table 19, which holds errors. Cases 5.4 and 5.8 have laws (flux conservation, the mean of a closed room)
-and no values here.
+from its Table 19, which holds errors. Case 5.8 has a law (the mean of a closed room) and no values here.
 
 Only Python's standard library is needed:  python3 derive_values.py   (in this folder)
 """
@@ -28,6 +27,14 @@ def main():
     rows = [(p, n, 1000 * math.pi * factor(p, n, source)) for p, n in rows]
     write("cie-5.3", "CIE 171:2006-type case 5.3", "closed_form", 3, {"direct_illuminance": ("area", rows)})
 
+    # The meters of the spec: products of four Gauss-Legendre nodes on a quarter of each side.
+    x, z = ([round(.5 + half * u, 9) for u, _ in sorted(gauss(4))] for half in (2, 1.5))
+    rows = [((a, b, .5), up) for a in x for b in x] + [((a, b, 3.5), down) for a in x for b in x]
+    rows += [((w, a, b), (n, 0, 0)) for w, n in ((.5, 1), (4.5, -1)) for a in x for b in z]
+    rows += [((a, w, b), (0, n, 0)) for w, n in ((.5, 1), (4.5, -1)) for a in x for b in z]
+    rows = [(p, n, isotropic(10_000, (2.5, 2.5, 2.0), p, n)) for p, n in rows]
+    write("cie-5.4", "CIE 171:2006-type case 5.4", "closed_form", 3, {"direct_illuminance": ("point", rows)})
+
     disc = segment((2, 2), 1.5, -math.inf)
     rows = [((2 + x, 2, 2.9), down) for x in (.25, .75, 1.25, 1.75)]
     rows += [((3.9, 2, z), (-1, 0, 0)) for z in (.25, .75, 1.25, 1.75, 2.25, 2.75)]
@@ -40,7 +47,7 @@ def main():
     write("cie-5.7", "CIE 171:2006-type case 5.7", "closed_form", 3, {"indirect_illuminance": ("point", rows)})
 
     places = [(p, n) for n in (up, down, (1, 0, 0), (.36, -.48, .8))
-              for p in ((2, 2, 2), (1.3, 2.6, 2.9), (1.1, 1.1, 1.1), (2.8, 1.5, 2.2))]
+              for p in ((2, 2, 2), (1.6, 2.3, 2.45), (1.55, 1.6, 1.55), (2.4, 1.7, 2.1))]
     rows = [(p, n, 250 * math.pi) for p, n in places]
     write("furnace", "Furnace of luminous panels", "closed_form", 3, {"direct_illuminance": ("area", rows)})
 
@@ -114,6 +121,13 @@ def factor(point, normal, patches):
     return total
 
 
+def isotropic(flux_lm, lamp, place, normal):
+    """Inverse-square law of a point that sends the same intensity everywhere."""
+    ray = [a - b for a, b in zip(lamp, place)]
+    distance = math.hypot(*ray)
+    return flux_lm / (4 * math.pi) * sum(a * b for a, b in zip(ray, normal)) / distance ** 3
+
+
 def write(name, title, basis, digits, tables, units=1):
     lines = [FORMAT + "luxproof_published: 1", "citation:", f'  title: "{title}"', f"  basis: {basis}",
              f"rounding: {{units_in_last_digit: {units}}}", "tables:"]
@@ -123,7 +137,7 @@ def write(name, title, basis, digits, tables, units=1):
         lines += [f"  {procedure}:", f"    name: {name}", "    quantity: illuminance_lx", "    columns:",
                   f"      value: {column}", "    rows:"]
         for point, normal, value in rows:
-            at, facing = (f"[{', '.join(f'{v:g}' for v in vector)}]" for vector in (point, normal))
+            at, facing = (f"[{', '.join(f'{v:.9g}' for v in vector)}]" for vector in (point, normal))
             places = digits if value else 6     # nothing at all is known better than by its last digit
             lines.append(f'      - {{at_m: {at}, normal: {facing}, cells: {{value: "{value:.{places}f}"}}}}')
     with open(f"values/{name}.yaml", "w", encoding="ascii") as file:

@@ -48,7 +48,8 @@ impl DeviationSplit {
 /// The words after "IP-ED differs from Radiance by ".
 impl fmt::Display for DeviationSplit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = |share: f64| 100.0 * share;
+        // What rounds to nothing has no sign.
+        let percent = |share: f64| (1000.0 * share).round() / 10.0 + 0.0;
         write!(
             f,
             "{:+.1} %: {:+.1} % is the method's, {:+.1} % the renderer's, +-{:.1} %",
@@ -74,6 +75,12 @@ mod tests {
         let split = DeviationSplit::new(Lux(1.089), within(1.002, 0.0006), within(1.0, 0.0008)).unwrap();
         assert_relative_eq!(split.whole, split.method + split.renderer, epsilon = 1e-15);
         assert_eq!(split.to_string(), "+8.9 %: +8.7 % is the method's, +0.2 % the renderer's, +-0.1 %");
+    }
+
+    #[test]
+    fn what_rounds_to_nothing_has_no_sign() {
+        let split = DeviationSplit::new(Lux(1.03), within(0.9999, 0.0), within(1.0, 0.0)).unwrap();
+        assert_eq!(split.to_string(), "+3.0 %: +3.0 % is the method's, +0.0 % the renderer's, +-0.0 %");
     }
 
     #[test]

@@ -1,28 +1,29 @@
 //! The command line: arguments, what each command does with them, and its exit code.
 
 pub(crate) mod diagnostic;
+mod run_specs;
 
 use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
-use crate::diff::{Comparison, Judge, KnownDeviations, Published, Tolerances};
+use crate::diff::Tolerances;
 use crate::doctor;
 use crate::engines::calibration::{self, Calibrated};
 use crate::engines::{self, EngineId, InstallState, Site};
 use crate::photometry_command::{self, PhotometryArgs};
-use crate::plan::{Asked, Plan, Selection, plan};
-use crate::reading::Recording;
-use crate::report::{self, Exit, Ingredients, Report, SpecRecord, Style};
+use crate::plan::{Asked, Selection, plan};
+use crate::report::{self, Exit, Report, Style};
 use crate::run;
-use crate::spec::{Case, Spec};
+use crate::spec::{Case, Spec, suite};
 
 use diagnostic::diagnose;
+use run_specs::{Tables, run_specs};
 
 /// Cross-validates renderers on luminaires: does a renderer put the right number of lux where a luminaire should?
 #[derive(Debug, Parser)]
@@ -77,7 +78,7 @@ impl Selected {
 
 #[derive(Debug, Args)]
 struct RunArgs {
-    /// Spec files
+    /// Spec files, folders of them or patterns
     #[arg(required = true, value_name = "SPEC")]
     specs: Vec<PathBuf>,
     #[command(flatten)]
@@ -98,7 +99,7 @@ struct RunArgs {
 
 #[derive(Debug, Args)]
 struct CheckArgs {
-    /// Spec files
+    /// Spec files, folders of them or patterns
     #[arg(required = true, value_name = "SPEC")]
     specs: Vec<PathBuf>,
     #[command(flatten)]
@@ -200,109 +201,6 @@ impl Cli {
     }
 }
 
-fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic> {
-    // Every spec is read and checked before any engine starts.
-    let cases = load(&args.specs)?;
-    for case in &cases {
-        plan(case, &args.selected.selection(), site).map_err(diagnose)?;
-    }
-    if args.install {
-        let names: Vec<EngineId> = engines::all().iter().map(|e| e.id()).collect();
-        let wanted = names
-            .into_iter()
-            .filter(|n| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| w == n.name()));
-        report_installation(site, &wanted.collect::<Vec<_>>());
-    }
-    let tables = Tables::read(&cases)?;
-    let mut exit = Exit::Passed;
-    let mut reports = vec![];
-    for (case, published) in cases.iter().zip(&tables.published) {
-        let folder = out_folder(args, case);
-        let planned = plan(case, &args.selected.selection(), site).map_err(diagnose)?;
-        let report = run_case(case, &planned, published.as_ref(), &tables, args, site, &folder)?;
-        let named = |id: &str| planned.engines.iter().any(|p| p.engine.id().name() == id && p.asked == Asked::ByName);
-        exit = exit.worse(report.exit(named));
-        reports.push((report, folder));
-    }
-    print_reports(&reports, &args.format)?;
-    Ok(exit)
-}
-
-/// Tables that judging needs, read before any engine starts.
-struct Tables {
-    tolerances: Tolerances,
-    known: KnownDeviations,
-    published: Vec<Option<Published>>,
-}
-
-impl Tables {
-    fn read(cases: &[Case]) -> Result<Self, Diagnostic> {
-        let read = |case: &Case| case.published.as_deref().map(Published::read).transpose();
-        Ok(Self {
-            tolerances: Tolerances::built_in().into_diagnostic()?,
-            known: KnownDeviations::built_in().into_diagnostic()?,
-            published: cases.iter().map(read).collect::<Result<_, _>>().into_diagnostic()?,
-        })
-    }
-}
-
-fn load(specs: &[PathBuf]) -> Result<Vec<Case>, Diagnostic> {
-    specs.iter().map(|path| Case::load(path).map_err(diagnose)).collect()
-}
-
-fn out_folder(args: &RunArgs, case: &Case) -> PathBuf {
-    match &args.out {
-        Some(folder) if args.specs.len() == 1 => folder.clone(),
-        Some(folder) => folder.join(&case.name),
-        None => Path::new("luxproof-out").join(&case.name),
-    }
-}
-
-fn run_case(
-    case: &Case,
-    plan: &Plan,
-    published: Option<&Published>,
-    tables: &Tables,
-    args: &RunArgs,
-    site: &Site,
-    folder: &Path,
-) -> Result<Report, Diagnostic> {
-    let (started, clock) = (SystemTime::now(), Instant::now());
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let options = run::Options { site: site.clone(), out: folder.to_owned(), jobs: args.jobs.unwrap_or(cores).max(1) };
-    let outcome = run::run(case, plan, &options, &Bar::new()).into_diagnostic()?;
-    let comparisons = compare(case, plan, &outcome.recordings, published, tables);
-    let spec =
-        SpecRecord { path: case.path.display().to_string(), sha256: case.sha256.clone(), title: case.title.clone() };
-    let ingredients = Ingredients {
-        spec,
-        started,
-        wall_s: clock.elapsed().as_secs_f64(),
-        engines: outcome.engines,
-        recordings: &outcome.recordings,
-        skips: plan.skips.iter().cloned().chain(outcome.skips).collect(),
-    };
-    let report = Report::new(ingredients, comparisons);
-    run::keep(&folder.join("report.json"), &report).into_diagnostic()?;
-    Ok(report)
-}
-
-/// Holds the recordings of a case against their references.
-fn compare(
-    case: &Case,
-    plan: &Plan,
-    recordings: &[Recording],
-    published: Option<&Published>,
-    tables: &Tables,
-) -> Vec<Comparison> {
-    let judge = Judge { tolerances: &tables.tolerances, known: &tables.known, overrides: &case.tolerances, published };
-    let of_task = |task: &crate::procedures::Task| {
-        let mine: Vec<&Recording> = recordings.iter().filter(|r| r.procedure == task.procedure).collect();
-        judge.compare(task, &mine)
-    };
-    plan.tasks.iter().flat_map(of_task).collect()
-}
-
 fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format]) -> Result<(), Diagnostic> {
     let mut out = std::io::stdout().lock();
     let style = if std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) {
@@ -340,13 +238,13 @@ fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format]) -> Result<()
 }
 
 fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
-    let cases = load(&args.specs)?;
+    let cases = suite(&args.specs).map_err(diagnose)?;
     Tables::read(&cases)?;
     let mut out = std::io::stdout().lock();
     let mut exit = Exit::Passed;
     for case in &cases {
         let plan = plan(case, &args.selected.selection(), site).map_err(diagnose)?;
-        writeln!(out, "{}: {}", case.path.display(), case.title).into_diagnostic()?;
+        writeln!(out, "{} ({}): {}", case.name, case.path.display(), case.title).into_diagnostic()?;
         for task in &plan.tasks {
             writeln!(out, "  {} at {} meters", task.procedure, task.targets.len()).into_diagnostic()?;
             for run in plan.runs.iter().filter(|r| plan.tasks[r.task].procedure == task.procedure) {
@@ -380,22 +278,36 @@ fn cost(budget: &crate::spec::Budget, planned: &crate::plan::Planned) -> f64 {
 }
 
 fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic> {
-    let case = Case::load(&args.spec).map_err(diagnose)?;
+    let cases = suite(std::slice::from_ref(&args.spec)).map_err(diagnose)?;
+    let mut exported = 0;
+    for case in &cases {
+        // One folder a case, where there are several.
+        let folder = if cases.len() == 1 { args.out.clone() } else { args.out.join(&case.name) };
+        exported += export_case(case, args, site, &folder)?;
+    }
+    if exported == 0 {
+        eprintln!("{} writes no scenes", args.engine);
+    }
+    Ok(Exit::Passed)
+}
+
+/// Exports one case; how many files that made.
+fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Result<usize, Diagnostic> {
     let selection =
         Selection { engines: vec![args.engine.clone()], procedures: args.procedures.clone(), ..Selection::default() };
-    let plan = plan(&case, &selection, site).map_err(diagnose)?;
+    let plan = plan(case, &selection, site).map_err(diagnose)?;
     let chosen = |e: usize| plan.engines[e].engine.id().name() == args.engine;
     let mut exported = 0;
     // An export needs no installed engine: what is skipped for absence is exported all the same.
     for (e, planned) in plan.engines.iter().enumerate().filter(|(e, _)| chosen(*e)) {
         for task in &plan.tasks {
-            let job = plan.job(&case, e, task, selection.seed);
+            let job = plan.job(case, e, task, selection.seed);
             if let engines::Support::No(reason) = planned.engine.supports(&job) {
                 eprintln!("{}: {reason}", task.procedure);
                 continue;
             }
             let files = planned.engine.export(&job).into_diagnostic()?;
-            let folder = args.out.join(task.procedure);
+            let folder = out.join(task.procedure);
             std::fs::create_dir_all(&folder).into_diagnostic()?;
             for file in &files {
                 let path = folder.join(&file.name);
@@ -408,10 +320,7 @@ fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic> {
             exported += files.len();
         }
     }
-    if exported == 0 {
-        eprintln!("{} writes no scenes", args.engine);
-    }
-    Ok(Exit::Passed)
+    Ok(exported)
 }
 
 fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Diagnostic> {
@@ -526,23 +435,24 @@ fn calibration_line(found: &Calibrated) -> String {
 /// A spinner on stderr while a job runs, a line when it failed.
 struct Bar {
     bar: ProgressBar,
+    case: String,
 }
 
 impl Bar {
-    fn new() -> Self {
+    fn new(case: &str) -> Self {
         let bar = ProgressBar::new_spinner();
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} [{elapsed}]") {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(100));
-        Self { bar }
+        Self { bar, case: case.to_owned() }
     }
 }
 
 impl run::Progress for Bar {
     fn started(&self, engine: &str, procedure: &str) {
         self.bar.reset_elapsed();
-        self.bar.set_message(format!("{engine}: {procedure}"));
+        self.bar.set_message(format!("{}: {engine}: {procedure}", self.case));
     }
 
     fn calibrated(&self, engine: &str, found: &Calibrated) {
@@ -552,7 +462,7 @@ impl run::Progress for Bar {
     fn ended(&self, engine: &str, procedure: &str, wall: Duration, failure: Option<&str>) {
         tracing::info!(engine, procedure, wall_s = wall.as_secs_f64(), "done");
         if let Some(failure) = failure {
-            self.bar.println(format!("{engine}: {procedure} failed: {failure}"));
+            self.bar.println(format!("{}: {engine}: {procedure} failed: {failure}", self.case));
         }
     }
 }

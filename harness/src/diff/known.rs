@@ -20,7 +20,7 @@ struct KnownDeviation {
     engine: String,
     procedure: String,
     basis: super::Basis,
-    /// Only in this case, where one is named.
+    /// Only in this case, where one is named; the name of a spec stands for all its cases.
     #[serde(default)]
     case: Option<String>,
     /// Only with this luminaire model, where one is named.
@@ -57,7 +57,7 @@ impl KnownDeviations {
             k.engine == of.engine
                 && k.procedure == of.procedure
                 && k.basis == of.basis
-                && k.case.as_deref().is_none_or(|c| c == of.case)
+                && k.case.as_deref().is_none_or(|c| of.is_of(c))
                 && k.model.as_deref().is_none_or(|m| m == of.model)
         };
         let Some(known) = self.known_deviations.iter().find(applies) else { return (verdict, None) };
@@ -87,6 +87,12 @@ pub struct Subject<'a> {
     pub basis: super::Basis,
     /// Deviation over reference, where that is defined.
     pub relative_deviation: Option<f64>,
+}
+
+impl Subject<'_> {
+    fn is_of(&self, name: &str) -> bool {
+        self.case.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 mod known;
 mod published;
+mod split;
 mod tolerance;
 mod verdict;
 
@@ -16,7 +17,8 @@ use crate::reading::{MeterId, Quantity, Reading, Recording};
 use crate::spec::ToleranceOverride;
 
 pub use known::{KnownDeviationError, KnownDeviations, Subject};
-pub use published::{Cell, Published, PublishedError};
+pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedRow, PublishedTable};
+pub use split::Split;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 pub use verdict::{Verdict, judge};
 
@@ -116,6 +118,11 @@ pub struct Judge<'a> {
 }
 
 impl Judge<'_> {
+    /// What of each deviation of an approximate method from a renderer is whose; `recordings` as for [`Self::compare`].
+    pub fn split(&self, task: &Task, recordings: &[&Recording]) -> Vec<Split> {
+        split::splits(task, recordings, self.tolerances.coverage_factor())
+    }
+
     /// Holds every reading of one task against every reference there is for it.
     ///
     /// `recordings` are those of this task, one an engine. An engine that failed is `missing` at every meter.

@@ -7,10 +7,12 @@ use std::path::Path;
 
 use glam::DVec3;
 use luminaire::scene::{Bounces, Transport};
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::{Basis, Reference};
 use crate::procedures::{Target, Task};
+use crate::reading::MeterId;
 
 /// The tables of one paper.
 #[derive(Clone, Debug, Deserialize)]
@@ -81,6 +83,54 @@ struct Row {
     cells: BTreeMap<String, String>,
 }
 
+/// A published table as it is printed, with the meters that its rows belong to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PublishedTable {
+    /// The paper.
+    pub title: String,
+    /// The table's name in it.
+    pub name: String,
+    /// The procedure that reads its values.
+    pub procedure: String,
+    /// What they are.
+    pub quantity: crate::reading::Quantity,
+    /// The cases that are held against it.
+    pub cases: Vec<String>,
+    /// Its columns.
+    pub columns: Vec<PublishedColumn>,
+    /// Its rows, in the order of the meters.
+    pub rows: Vec<PublishedRow>,
+}
+
+impl PublishedTable {
+    /// Whether both are the same table of the same paper.
+    pub fn is_the_same(&self, other: &Self) -> bool {
+        (&self.title, &self.name, &self.procedure) == (&other.title, &other.name, &other.procedure)
+    }
+}
+
+/// A column of a published table.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct PublishedColumn {
+    /// Its name.
+    pub name: String,
+    /// Whether it is what the paper judges its other columns by.
+    pub reference: bool,
+    /// What it holds, in a sentence.
+    pub meaning: String,
+}
+
+/// A row of a published table.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct PublishedRow {
+    /// The meter at its place.
+    pub meter: MeterId,
+    /// The place: gamma in degrees, or the position in metres.
+    pub place: String,
+    /// The printed digits by column.
+    pub cells: BTreeMap<String, String>,
+}
+
 /// A printed value with the interval it stands for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
@@ -110,7 +160,7 @@ impl Published {
             return Err(fail(format!("format version {} is not known; this program reads 1", published.version)));
         }
         let cells = published.tables.values().flat_map(|t| t.rows.iter().flat_map(|r| r.cells.values()));
-        if let Some(bad) = cells.into_iter().find(|c| published.cell(c).is_none()) {
+        if let Some(bad) = cells.into_iter().find(|c| published.cell(c, 0).is_none()) {
             return Err(fail(format!("the cell \"{bad}\" is no number")));
         }
         Ok(published)
@@ -119,26 +169,27 @@ impl Published {
     /// The references that the paper holds for a reading of `engine` at one target.
     ///
     /// The paper's own reference columns of a closed form judge every engine; every other column stands beside the
-    /// readings of the engine that it names, of the same luminaire model. A column at a fixed number of bounces is compared with readings at that number.
+    /// readings of the engine that it names; both of the same luminaire model. A column at a fixed number of bounces is compared with readings at that number.
     pub fn references(&self, task: &Task, target: &Target, engine: &str) -> Vec<Reference> {
         let Some(table) = self.tables.get(task.procedure).filter(|t| t.quantity == task.quantity) else {
             return vec![];
         };
         let Some(row) = table.rows.iter().find(|r| r.is_at(target)) else { return vec![] };
         let model = task.model();
-        // Derived values judge every engine, whatever they are of.
-        let closed_form = matches!(task.transport, Transport::Direct) || self.citation.basis != Basis::Published;
+        // Derived values judge every engine, whatever they are of; a paper's those of the same luminaire model.
+        let derived = self.citation.basis != Basis::Published;
+        let closed_form = matches!(task.transport, Transport::Direct);
         let compared = |column: &Column| {
             let same_bounces = match (column.bounces.filter(|_| table.bounces.is_some()), task.transport) {
                 (Some(n), Transport::Indirect(b) | Transport::Total(b)) => b == Bounces::AtMost(n),
                 _ => true,
             };
             let same_model = column.model == model || column.also.contains(&model);
-            same_bounces && ((column.reference && closed_form) || (column.engine == engine && same_model))
+            same_bounces && (derived || (same_model && (column.engine == engine || (column.reference && closed_form))))
         };
         let columns = table.columns.iter().filter(|(_, column)| compared(column));
         let reference = |(name, column): (&String, &Column)| {
-            let cell = self.cell(row.cells.get(name)?)?;
+            let cell = self.cell(row.cells.get(name)?, table.decimals(name))?;
             Some(Reference {
                 value: cell.value,
                 // A rectangular distribution over the rounding interval (GUM 4.3.7).
@@ -150,11 +201,55 @@ impl Published {
         columns.filter_map(reference).collect()
     }
 
-    fn cell(&self, printed: &str) -> Option<Cell> {
+    /// The table of a task as printed, rows at its targets alone; `None` where the paper has none, or these are derived
+    /// values and no paper's.
+    pub fn table(&self, task: &Task, case: &str) -> Option<PublishedTable> {
+        if self.citation.basis != Basis::Published {
+            return None;
+        }
+        let table = self.tables.get(task.procedure).filter(|t| t.quantity == task.quantity)?;
+        let row = |target: &Target| {
+            let row = table.rows.iter().find(|r| r.is_at(target))?;
+            let place = match target.direction {
+                Some(d) => format!("{}", d.gamma_deg),
+                None => format!("({})", target.meter.position_m.to_array().map(|x| x.to_string()).join(", ")),
+            };
+            let cells = row.cells.iter().map(|(column, printed)| (column.clone(), printed.clone())).collect();
+            Some(PublishedRow { meter: target.id.clone(), place, cells })
+        };
+        let rows: Vec<PublishedRow> = task.targets.iter().filter_map(row).collect();
+        let column = |(name, column): (&String, &Column)| PublishedColumn {
+            name: name.clone(),
+            reference: column.reference,
+            meaning: column.meaning.clone(),
+        };
+        (!rows.is_empty()).then(|| PublishedTable {
+            title: self.citation.title.clone(),
+            name: table.name.clone(),
+            procedure: task.procedure.to_owned(),
+            quantity: table.quantity,
+            cases: vec![case.to_owned()],
+            columns: table.columns.iter().map(column).collect(),
+            rows,
+        })
+    }
+
+    /// A printed cell; one without decimals stands for the interval of a column that prints `decimals`.
+    fn cell(&self, printed: &str, decimals: usize) -> Option<Cell> {
         let value: f64 = printed.trim().parse().ok().filter(|v: &f64| v.is_finite())?;
-        let decimals = printed.split_once('.').map_or(0, |(_, fraction)| fraction.trim().len());
-        let unit = 10f64.powi(-i32::try_from(decimals).ok()?);
+        let unit = 10f64.powi(-i32::try_from(decimals_of(printed).max(decimals)).ok()?);
         Some(Cell { value, half_width: unit * self.rounding.units_in_last_digit })
+    }
+}
+
+fn decimals_of(printed: &str) -> usize {
+    printed.split_once('.').map_or(0, |(_, fraction)| fraction.trim().len())
+}
+
+impl Table {
+    /// The decimals of a column: those of its longest cell, since a bare 0 among them is as exact as they are.
+    fn decimals(&self, column: &str) -> usize {
+        self.rows.iter().filter_map(|r| r.cells.get(column)).map(|c| decimals_of(c)).max().unwrap_or(0)
     }
 }
 
@@ -192,9 +287,13 @@ mod tests {
     fn a_cell_stands_for_the_interval_of_its_printed_digits() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/published/cachet.yaml");
         let published = Published::read(&path).unwrap();
-        assert_eq!(published.cell("2.70"), Some(Cell { value: 2.70, half_width: 0.01 }));
-        assert_eq!(published.cell("35.7"), Some(Cell { value: 35.7, half_width: 0.1 }));
-        assert_eq!(published.cell("0"), Some(Cell { value: 0.0, half_width: 1.0 }));
-        assert_eq!(published.cell("n/a"), None);
+        assert_eq!(published.cell("2.70", 0), Some(Cell { value: 2.70, half_width: 0.01 }));
+        assert_eq!(published.cell("35.7", 1), Some(Cell { value: 35.7, half_width: 0.1 }));
+        assert_eq!(published.cell("0", 0), Some(Cell { value: 0.0, half_width: 1.0 }));
+        assert_eq!(published.cell("n/a", 0), None);
+        // The zero of lum1 stands in a column of two decimals.
+        let table = &published.tables["luminous_intensity"];
+        assert_eq!((table.decimals("lum1"), table.decimals("ies_file")), (2, 1));
+        assert_eq!(published.cell("0", 2), Some(Cell { value: 0.0, half_width: 0.01 }));
     }
 }

@@ -123,7 +123,7 @@ fn support(job: &Job) -> Support {
             return Support::No(why);
         }
     }
-    if let Some(why) = filters_in_the_way(job) {
+    if let Some(why) = filters_in_the_way(job).or_else(|| too_near(job)) {
         return Support::No(why);
     }
     let bounces = match job.transport {
@@ -200,6 +200,17 @@ fn filters_in_the_way(job: &Job) -> Option<String> {
         }
     }
     None
+}
+
+/// A meter so near an opening that it tells the opening's point lights apart.
+fn too_near(job: &Job) -> Option<String> {
+    if matches!(job.transport, Transport::Indirect(_)) {
+        return None;
+    }
+    let opening::TooNear { station, luminaire, distance_m, spacing_m } = opening::too_near(job, export::points(job))?;
+    Some(format!(
+        "{station} is {distance_m:.2} m from the opening of {luminaire}, whose point lights are up to {spacing_m:.2} m apart"
+    ))
 }
 
 fn distance_to_segment(point: glam::DVec3, from: glam::DVec3, to: glam::DVec3) -> f64 {

@@ -5,7 +5,7 @@ mod indirect_illuminance;
 mod luminous_intensity;
 mod total_illuminance;
 
-use luminaire::scene::{Meter, Scene, Transport};
+use luminaire::scene::{Bounces, Meter, Scene, Transport};
 
 use crate::reading::{MeterId, Quantity};
 use crate::spec::{Case, Names};
@@ -49,6 +49,22 @@ impl Task {
         models.sort_unstable();
         models.dedup();
         if let [one] = models[..] { one.to_owned() } else { "mixed".to_owned() }
+    }
+
+    /// Which light counts, in words.
+    pub fn light(&self) -> String {
+        match self.transport {
+            Transport::Direct => "direct".to_owned(),
+            Transport::Indirect(n) => format!("indirect, {}", bounces(n)),
+            Transport::Total(n) => format!("total, {}", bounces(n)),
+        }
+    }
+}
+
+fn bounces(bounces: Bounces) -> String {
+    match bounces {
+        Bounces::Converged => "all bounces".to_owned(),
+        Bounces::AtMost(n) => format!("{n} bounces"),
     }
 }
 

@@ -10,7 +10,9 @@ pub fn junit(report: &Report) -> String {
     let mut junit = JUnit::new("luxproof");
     let mut suite = TestSuite::new(report.spec.title.clone());
     for recording in &report.recordings {
-        let of_run = |c: &&Comparison| c.procedure == recording.procedure && c.engine == recording.engine;
+        let of_run = |c: &&Comparison| {
+            c.case == recording.case && c.procedure == recording.procedure && c.engine == recording.engine
+        };
         let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(of_run).collect();
         let mut case = TestCase::new(format!("{} {}", recording.procedure, recording.engine), status(&comparisons));
         case.set_classname(recording.case.clone());

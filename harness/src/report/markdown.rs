@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::Report;
 use super::terminal::{Cell, matrix, worst};
+use super::{paper, split};
 
 /// The report as Markdown.
 pub fn markdown(report: &Report) -> String {
@@ -19,11 +20,29 @@ pub fn markdown(report: &Report) -> String {
         s.pass, s.fail, s.inconclusive, s.known_deviation, s.unexpected_pass, s.missing, s.skipped, report.wall_s
     ));
     let engines: Vec<&str> = report.engines.iter().map(|e| e.id.as_str()).collect();
-    line(format!("| procedure | reference | {} |", engines.join(" | ")));
-    line(format!("|---|---|{}", "---|".repeat(engines.len())));
+    line(format!(
+        "| {}procedure | reference | {} |",
+        if report.is_suite() { "case | " } else { "" },
+        engines.join(" | ")
+    ));
+    line(format!("|---|---|{}", "---|".repeat(engines.len() + usize::from(report.is_suite()))));
     for row in matrix(report) {
         let cells: Vec<String> = row.cells.iter().map(Cell::text).collect();
-        line(format!("| {} | {} | {} |", row.procedure, row.basis, cells.join(" | ")));
+        let case = if report.is_suite() { format!("{} | ", row.case) } else { String::new() };
+        line(format!("| {case}{} | {} | {} |", row.procedure, row.basis, cells.join(" | ")));
+    }
+    for grid in paper::grids(report) {
+        line(format!("\n{}\n\n| {} |\n|{}", grid.title, grid.head.join(" | "), "---|".repeat(grid.head.len())));
+        for row in grid.rows {
+            line(format!("| {} |", row.join(" | ")));
+        }
+    }
+    let splits = split::widest(report);
+    if !splits.is_empty() {
+        line(String::new());
+        for split in splits {
+            line(format!("- {}: {}", split::place(report, split), split.text));
+        }
     }
     let worst = worst(report, 10);
     if !worst.is_empty() {
@@ -33,8 +52,9 @@ pub fn markdown(report: &Report) -> String {
         );
         for c in worst {
             let number = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.5}"));
+            let case = if report.is_suite() { format!("{} ", c.case) } else { String::new() };
             line(format!(
-                "| {} {} | {} | {} | {} | {} | {} |",
+                "| {case}{} {} | {} | {} | {} | {} | {} |",
                 c.engine,
                 c.procedure,
                 c.meter,
@@ -46,7 +66,8 @@ pub fn markdown(report: &Report) -> String {
         }
     }
     for skip in &report.skips {
-        writeln!(text, "\n- skipped: {} {}: {}", skip.engine, skip.procedure, skip.reason).ok();
+        let case = if report.is_suite() { format!("{} ", skip.case) } else { String::new() };
+        writeln!(text, "\n- skipped: {case}{} {}: {}", skip.engine, skip.procedure, skip.reason).ok();
     }
     text
 }

@@ -2,6 +2,8 @@
 
 mod junit;
 mod markdown;
+mod paper;
+mod split;
 mod terminal;
 
 use std::collections::BTreeMap;
@@ -9,7 +11,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::diff::{Comparison, Verdict};
+use crate::diff::{Comparison, PublishedTable, Split, Verdict};
 use crate::plan::Skip;
 use crate::reading::{MeterId, Quantity, Recording};
 use crate::run::{EngineStatus, Status};
@@ -41,8 +43,26 @@ pub struct Report {
     pub recordings: Vec<RecordingSummary>,
     /// What was not run, and why.
     pub skips: Vec<Skip>,
+    /// Where an approximate method differs from a renderer: what of it is the method's and what the renderer's.
+    #[serde(default)]
+    pub splits: Vec<Split>,
+    /// The published tables that the cases are held against, as they are printed.
+    #[serde(default)]
+    pub published: Vec<PublishedTable>,
+    /// The cases, in their order.
+    #[serde(default)]
+    pub cases: Vec<CaseRecord>,
     /// Comparisons by verdict.
     pub summary: Summary,
+}
+
+/// One case of a run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct CaseRecord {
+    /// Its name.
+    pub name: String,
+    /// What was run.
+    pub spec: SpecRecord,
 }
 
 /// What was run.
@@ -88,6 +108,12 @@ pub struct RecordingSummary {
     pub procedure: String,
     /// The engine.
     pub engine: String,
+    /// The luminaire model.
+    #[serde(default)]
+    pub model: String,
+    /// Which light counted.
+    #[serde(default)]
+    pub light: String,
     /// Its version.
     pub version: String,
     /// SHA-256 of the spec and of every file that it names.
@@ -190,6 +216,8 @@ impl Summary {
 
 /// What a report is made of, besides the comparisons.
 pub struct Ingredients<'a> {
+    /// The case.
+    pub case: String,
     /// What was run.
     pub spec: SpecRecord,
     /// When the run started.
@@ -202,17 +230,22 @@ pub struct Ingredients<'a> {
     pub recordings: &'a [Recording],
     /// What was not run.
     pub skips: Vec<Skip>,
+    /// What of a deviation is whose.
+    pub splits: Vec<Split>,
+    /// Published tables.
+    pub published: Vec<PublishedTable>,
 }
 
 impl Report {
     /// Puts a report together.
     pub fn new(ingredients: Ingredients<'_>, comparisons: Vec<Comparison>) -> Self {
-        let Ingredients { spec, started, wall_s, engines, recordings, skips } = ingredients;
+        let Ingredients { case, spec, started, wall_s, engines, recordings, skips, splits, published } = ingredients;
         Self {
             luxproof: 1,
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
             started: humantime::format_rfc3339_seconds(started).to_string(),
             wall_s,
+            cases: vec![CaseRecord { name: case, spec: spec.clone() }],
             spec,
             engines,
             readings: recordings.iter().flat_map(readings).collect(),
@@ -220,7 +253,45 @@ impl Report {
             summary: Summary::of(&comparisons, &skips),
             comparisons,
             skips,
+            splits,
+            published,
         }
+    }
+
+    /// One report of several cases; `None` of none.
+    pub fn joined(spec: SpecRecord, reports: Vec<Self>) -> Option<Self> {
+        let joined = reports.into_iter().reduce(|mut all, one| {
+            all.wall_s += one.wall_s;
+            all.comparisons.extend(one.comparisons);
+            all.readings.extend(one.readings);
+            all.recordings.extend(one.recordings);
+            all.skips.extend(one.skips);
+            all.splits.extend(one.splits);
+            all.cases.extend(one.cases);
+            for table in one.published {
+                match all.published.iter_mut().find(|t| t.is_the_same(&table)) {
+                    Some(same) => same.cases.extend(table.cases),
+                    None => all.published.push(table),
+                }
+            }
+            for engine in one.engines {
+                match all.engines.iter_mut().find(|e| e.id == engine.id) {
+                    Some(same) => same.join(engine),
+                    None => all.engines.push(engine),
+                }
+            }
+            all
+        })?;
+        let summary = Summary::of(&joined.comparisons, &joined.skips);
+        let order = |e: &EngineStatus| crate::engines::all().iter().position(|known| known.id().name() == e.id);
+        let mut engines = joined.engines;
+        engines.sort_by_key(order);
+        Some(Self { spec, engines, summary, ..joined })
+    }
+
+    /// Whether more than one case was run.
+    fn is_suite(&self) -> bool {
+        self.cases.len() > 1
     }
 
     /// The exit code that the run deserves. `asked` tells whether an engine was named by the user.
@@ -274,6 +345,8 @@ impl RecordingSummary {
             case: recording.case.clone(),
             procedure: recording.procedure.clone(),
             engine: recording.engine.clone(),
+            model: recording.model.clone(),
+            light: recording.light.clone(),
             version: recording.version.clone(),
             input_sha256: recording.input_sha256.clone(),
             seed: recording.seed,

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArrangement, Table, presets};
 
-use super::{ReadingRecord, Report};
+use super::{ReadingRecord, Report, paper, split};
 use crate::diff::{Basis, Comparison, Verdict};
 use crate::run::Status;
 
@@ -23,6 +23,8 @@ pub enum Style {
 
 /// One row of the verdict matrix.
 pub(super) struct Row {
+    /// The case.
+    pub(super) case: String,
     /// The procedure.
     pub(super) procedure: String,
     /// What its references rest on.
@@ -92,9 +94,12 @@ const fn mark(verdict: Verdict) -> &'static str {
 
 /// The verdict matrix: procedure and basis by engine.
 pub(super) fn matrix(report: &Report) -> Vec<Row> {
+    let cases = || report.cases.iter().map(|c| c.name.as_str());
+    let of_case = |case| report.procedures().into_iter().map(move |procedure| (case, procedure));
     let mut rows = vec![];
-    for procedure in report.procedures() {
-        let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.procedure == procedure).collect();
+    for (case, procedure) in cases().flat_map(of_case) {
+        let is_mine = |c: &&Comparison| c.case == case && c.procedure == procedure;
+        let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(is_mine).collect();
         let mut bases: Vec<Option<Basis>> = comparisons.iter().map(|c| c.reference.as_ref().map(|r| r.basis)).collect();
         bases.sort_unstable();
         bases.dedup();
@@ -102,22 +107,23 @@ pub(super) fn matrix(report: &Report) -> Vec<Row> {
             let of_row: Vec<&Comparison> =
                 comparisons.iter().copied().filter(|c| c.reference.as_ref().map(|r| r.basis) == basis).collect();
             rows.push(Row {
+                case: case.to_owned(),
                 procedure: procedure.to_owned(),
                 basis: basis.map_or("none", Basis::name).to_owned(),
-                cells: report.engines.iter().map(|e| cell(report, procedure, &e.id, &of_row)).collect(),
+                cells: report.engines.iter().map(|e| cell(report, case, procedure, &e.id, &of_row)).collect(),
             });
         }
     }
     rows
 }
 
-fn cell(report: &Report, procedure: &str, engine: &str, of_row: &[&Comparison]) -> Cell {
+fn cell(report: &Report, case: &str, procedure: &str, engine: &str, of_row: &[&Comparison]) -> Cell {
     let mine: Vec<&&Comparison> = of_row.iter().filter(|c| c.engine == engine).collect();
     let Some(verdict) = mine.iter().map(|c| c.verdict).max() else {
-        let is = |p: &str, e: &str| p == procedure && e == engine;
-        return if report.skips.iter().any(|s| is(&s.procedure, &s.engine)) {
+        let is = |c: &str, p: &str, e: &str| c == case && p == procedure && e == engine;
+        return if report.skips.iter().any(|s| is(&s.case, &s.procedure, &s.engine)) {
             Cell::Skipped
-        } else if report.recordings.iter().any(|r| is(&r.procedure, &r.engine)) && judges_others(engine) {
+        } else if report.recordings.iter().any(|r| is(&r.case, &r.procedure, &r.engine)) && judges_others(engine) {
             Cell::IsReference
         } else {
             Cell::Empty
@@ -160,16 +166,30 @@ pub fn terminal(report: &Report, style: Style, folder: Option<&str>) -> String {
     writeln!(text, "\nluxproof {}: {}", report.tool_version, report.spec.title).ok();
     writeln!(text, "{}\n", engines_line(report)).ok();
     writeln!(text, "{}\n", verdicts(report, style)).ok();
-    for procedure in report.procedures() {
+    for grid in paper::grids(report) {
+        writeln!(text, "{}\n", drawn(&grid, style)).ok();
+    }
+    // In a suite the readings of a procedure are those of many rooms: they stay in the files.
+    let in_paper = |p: &&str| report.published.iter().any(|t| t.procedure == **p);
+    for procedure in report.procedures().into_iter().filter(|p| !report.is_suite() && !in_paper(p)) {
         if let Some(table) = readings(report, procedure, style) {
             writeln!(text, "{table}\n").ok();
         }
+    }
+    let splits = split::widest(report);
+    if !splits.is_empty() {
+        writeln!(text, "Methods apart from renderers (where they differ most)").ok();
+        for split in splits {
+            writeln!(text, "  {}: {}", split::place(report, split), split.text).ok();
+        }
+        writeln!(text).ok();
     }
     let worst = worst(report, 5);
     if !worst.is_empty() {
         writeln!(text, "Worst deviations (by verdict, then deviation over tolerance)").ok();
         for c in worst {
-            writeln!(text, "  {}", deviation_line(c)).ok();
+            let case = if report.is_suite() { format!("{}: ", c.case) } else { String::new() };
+            writeln!(text, "  {case}{}", deviation_line(c)).ok();
         }
         writeln!(text).ok();
     }
@@ -220,17 +240,25 @@ fn verdicts(report: &Report, style: Style) -> String {
     let mut table = table();
     let engines = report.engines.iter().map(|e| e.id.clone());
     table.set_header(header(["Verdicts".to_owned(), "against".to_owned()].into_iter().chain(engines)));
+    let mut case = String::new();
     for row in matrix(report) {
+        if report.is_suite() && row.case != case {
+            table.add_row([TableCell::new(row.case.as_str()).add_attribute(Attribute::Bold)]);
+            case.clone_from(&row.case);
+        }
         let cells = row.cells.iter().map(|cell| {
             let text = TableCell::new(cell.text());
             cell.colour().map_or(text.clone(), |colour| text.fg(colour))
         });
-        table.add_row([TableCell::new(row.procedure), TableCell::new(row.basis)].into_iter().chain(cells));
+        let indent = if report.is_suite() { "  " } else { "" };
+        table.add_row(
+            [TableCell::new(format!("{indent}{}", row.procedure)), TableCell::new(row.basis)].into_iter().chain(cells),
+        );
     }
     finish(table, style)
 }
 
-/// The readings of one procedure, engines side by side, with references from papers beside them.
+/// The readings of one procedure, engines side by side.
 fn readings(report: &Report, procedure: &str, style: Style) -> Option<String> {
     let records: Vec<&ReadingRecord> = report.readings.iter().filter(|r| r.procedure == procedure).collect();
     let unit = records.first()?.quantity.unit();
@@ -245,20 +273,13 @@ fn readings(report: &Report, procedure: &str, style: Style) -> Option<String> {
     }
     let engines: Vec<&str> =
         report.engines.iter().map(|e| e.id.as_str()).filter(|e| records.iter().any(|r| r.engine == *e)).collect();
-    let mut published: BTreeMap<&str, BTreeMap<&str, f64>> = BTreeMap::new();
-    for c in report.comparisons.iter().filter(|c| c.procedure == procedure) {
-        if let Some(reference) = c.reference.as_ref().filter(|r| r.basis == Basis::Published) {
-            published.entry(published_column(&reference.source)).or_default().insert(&c.meter.0, reference.value);
-        }
-    }
     let mut table = table();
     let heads = [format!("{procedure} [{unit}]")].into_iter().chain(engines.iter().map(|e| (*e).to_owned()));
-    table.set_header(header(heads.chain(published.keys().map(|c| format!("paper {c}")))));
+    table.set_header(header(heads));
     for meter in meters {
         let of = |engine: &&str| records.iter().find(|r| r.meter == *meter && r.engine == **engine);
         let values = engines.iter().map(|e| of(e).map_or("-".to_owned(), |r| value(r)));
-        let cells = published.values().map(|c| c.get(meter.0.as_str()).map_or("-".to_owned(), f64::to_string));
-        table.add_row([place(report, procedure, &meter.0)].into_iter().chain(values).chain(cells));
+        table.add_row([place(report, procedure, &meter.0)].into_iter().chain(values));
     }
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
@@ -266,8 +287,22 @@ fn readings(report: &Report, procedure: &str, style: Style) -> Option<String> {
     Some(finish(table, style))
 }
 
+/// A table of a paper with ours beside it.
+fn drawn(grid: &paper::Grid, style: Style) -> String {
+    let mut table = table();
+    table.set_header(header(grid.head.iter().cloned()));
+    for row in &grid.rows {
+        table.add_row(row.iter().map(TableCell::new));
+    }
+    let places = 1..grid.head.len() - 1;
+    for (_, column) in table.column_iter_mut().enumerate().filter(|(k, _)| places.contains(k)) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    format!("{}\n{}", grid.title, finish(table, style))
+}
+
 /// The column's name within a published source, "TITLE, TABLE, COLUMN: MEANING"; titles may hold colons.
-fn published_column(source: &str) -> &str {
+pub(super) fn published_column(source: &str) -> &str {
     let (head, _) = source.rsplit_once(": ").unwrap_or((source, ""));
     head.rsplit(", ").next().unwrap_or(head)
 }
@@ -281,7 +316,7 @@ fn place(report: &Report, procedure: &str, meter: &str) -> String {
 }
 
 /// Six significant digits, and the standard error in the last two digits that it reaches: `0.9431(12)`.
-fn value(record: &ReadingRecord) -> String {
+pub(super) fn value(record: &ReadingRecord) -> String {
     match record.std_error {
         Some(e) if e > 0.0 && record.value > 0.0 => {
             let decimals = (1.0 - e.log10().floor()).clamp(0.0, 9.0) as usize;
@@ -302,7 +337,7 @@ fn significant(value: f64) -> String {
 }
 
 /// A relative deviation with a sign and two significant digits; rounding noise is shown as zero.
-fn percent(deviation: f64) -> String {
+pub(super) fn percent(deviation: f64) -> String {
     let percent = 100.0 * deviation;
     match percent.abs() {
         p if p < 5e-8 => "0 %".to_owned(),
@@ -330,25 +365,34 @@ fn deviation_line(c: &Comparison) -> String {
 }
 
 fn notes(report: &Report, text: &mut String) {
-    let mut lines: Vec<String> = vec![];
+    // The cases that each line is about: what holds for one alone is told with its name.
+    let mut lines: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for recording in &report.recordings {
         let of = format!("{} {}", recording.engine, recording.procedure);
-        lines.extend(recording.approximation.iter().map(|a| format!("{of}: approximate, {a}")));
+        let mut note = |line: String| lines.entry(line).or_default().push(&recording.case);
+        if let Some(approximation) = &recording.approximation {
+            note(format!("{of}: approximate, {approximation}"));
+        }
         // What the approximation says already need not be said again.
         let said = |note: &&String| recording.approximation.as_ref().is_some_and(|a| a.contains(note.as_str()));
-        let news = recording.notes.iter().filter(|n| !said(n));
-        lines.extend(news.map(|n| format!("{}: {n}", recording.engine)));
-        lines
-            .extend(recording.failure.iter().map(|f| format!("{of} failed: {}", f.lines().next().unwrap_or_default())));
+        recording.notes.iter().filter(|n| !said(n)).for_each(|n| note(format!("{}: {n}", recording.engine)));
+        if let Some(failure) = &recording.failure {
+            note(format!("{of} failed: {}", failure.lines().next().unwrap_or_default()));
+        }
     }
     for skip in &report.skips {
         let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
-        lines.push(format!("skipped {} {}: {}{saved}", skip.engine, skip.procedure, skip.reason));
+        let line = format!("skipped {} {}: {}{saved}", skip.engine, skip.procedure, skip.reason);
+        lines.entry(line).or_default().push(&skip.case);
     }
-    lines.sort();
-    lines.dedup();
-    for line in &lines {
-        writeln!(text, "  {line}").ok();
+    for (line, cases) in &mut lines {
+        cases.dedup();
+        let place = match cases[..] {
+            [one] if report.is_suite() => format!("{one}: "),
+            [_] => String::new(),
+            _ => format!("{} cases: ", cases.len()),
+        };
+        writeln!(text, "  {place}{line}").ok();
     }
     if !lines.is_empty() {
         writeln!(text).ok();

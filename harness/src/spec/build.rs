@@ -11,6 +11,7 @@ use luminaire::photometry::{self, Photometry};
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, orientation};
 use sha2::{Digest, Sha256};
 
+use super::cases::Variant;
 use super::model::{
     Angles, Budget, EngineSettings, GridSpec, LuminaireSpec, MeterSet, ModelSpec, ObstacleSpec, Procedures, Spec,
     ToleranceOverride,
@@ -28,7 +29,7 @@ const MAX_METERS: usize = 1_000_000;
 /// A spec, read, checked and built: all that the rest of the program needs.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// The spec's file stem.
+    /// The spec's file stem, and behind a slash the name of one of its cases.
     pub name: String,
     /// The spec's title, or its name.
     pub title: String,
@@ -44,6 +45,8 @@ pub struct Case {
     pub procedures: Procedures,
     /// The engines that the spec names, with settings; `None` where it names none.
     pub engines: Option<BTreeMap<String, EngineSettings>>,
+    /// The engines that a case of a suite is for, where its overrides name some; others are skipped.
+    pub only_engines: Option<Vec<String>>,
     /// When an engine may stop.
     pub budget: Budget,
     /// The published tables, absolute or relative to the working directory.
@@ -55,11 +58,28 @@ pub struct Case {
 }
 
 impl Case {
-    /// Reads, checks and builds the case of a spec file.
+    /// Reads, checks and builds the case of a spec file, without the overrides of its `cases`.
     pub fn load(path: &Path) -> Result<Self, SpecError> {
         let source = Source::read(path)?;
         let spec = source.parse()?;
-        Builder { source: &source, folder: path.parent().unwrap_or(Path::new("")), hash: Sha256::new() }.build(spec)
+        Builder::new(&source).build(spec)
+    }
+
+    /// All cases of a spec file: those of its `cases`, or the one that it is.
+    pub fn load_all(path: &Path) -> Result<Vec<Self>, SpecError> {
+        let source = Source::read(path)?;
+        let spec = source.parse()?;
+        let variants = super::cases::variants(&source)?;
+        if variants.is_empty() {
+            return Ok(vec![Builder::new(&source).build(spec)?]);
+        }
+        let build = |v: Variant| {
+            let mut builder = Builder::new(&v.source);
+            builder.hash.update(&v.name);
+            let case = builder.build(v.spec)?;
+            Ok(Self { name: format!("{}/{}", case.name, v.name), only_engines: v.engines, ..case })
+        };
+        variants.into_iter().map(build).collect()
     }
 }
 
@@ -69,7 +89,11 @@ struct Builder<'a> {
     hash: Sha256,
 }
 
-impl Builder<'_> {
+impl<'a> Builder<'a> {
+    fn new(source: &'a Source) -> Self {
+        Self { source, folder: source.path.parent().unwrap_or(Path::new("")), hash: Sha256::new() }
+    }
+
     fn build(mut self, spec: Spec) -> Result<Case, SpecError> {
         self.hash.update(&self.source.text);
         if spec.luxproof != 1 {
@@ -102,6 +126,7 @@ impl Builder<'_> {
             meters,
             procedures: spec.procedures,
             engines: spec.engines,
+            only_engines: None,
             budget: spec.budget,
             published,
             tolerances: spec.tolerances,
@@ -390,7 +415,8 @@ fn extent(shape: &Shape) -> (DVec3, DVec3) {
     }
 }
 
-fn hexadecimal(bytes: &[u8]) -> String {
+/// Bytes as hexadecimal digits.
+pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
         write!(text, "{byte:02x}").ok();
         text

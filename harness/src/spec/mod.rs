@@ -3,16 +3,20 @@
 //! The only module that knows `serde_yaml`. Every error names file, line and column.
 
 mod build;
+mod cases;
 mod locate;
 mod model;
+mod suite;
 
 use std::path::{Path, PathBuf};
 
 pub use build::Case;
+pub(crate) use build::hexadecimal;
 pub use model::{
     Angles, BouncesSpec, Budget, DirectIlluminance, EngineSettings, IndirectIlluminance, LuminousIntensity, Names,
     Procedures, Spec, ToleranceOverride, TotalIlluminance,
 };
+pub use suite::suite;
 
 /// What is wrong with a spec, where, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -42,6 +46,8 @@ pub struct Source {
     pub path: PathBuf,
     /// The text.
     pub text: String,
+    /// The places of the overrides that lie over it, such as `cases[1]`; none but in a case of a suite.
+    overrides: Vec<String>,
 }
 
 impl Source {
@@ -56,7 +62,12 @@ impl Source {
         };
         let bytes = std::fs::read(path).map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
         let text = String::from_utf8(bytes).map_err(|e| fail(format!("is not UTF-8: {e}"), "save it as UTF-8"))?;
-        Ok(Self { path: path.to_owned(), text })
+        Ok(Self::new(path.to_owned(), text))
+    }
+
+    /// The text of a spec file.
+    pub fn new(path: PathBuf, text: String) -> Self {
+        Self { path, text, overrides: vec![] }
     }
 
     /// Parses the text; unknown keys are errors with the nearest known key.
@@ -79,7 +90,7 @@ impl Source {
 
     /// An error at a place in the file, given as a path such as `meters.ceiling.points_m[2]`.
     pub fn error_at(&self, path: &str, message: impl Into<String>, help: impl Into<String>) -> SpecError {
-        let place = locate::locate(&self.text, path);
+        let place = self.overridden(path).or_else(|| locate::locate(&self.text, path));
         SpecError {
             file: self.path.clone(),
             line: place.map(|p| p.0),
@@ -87,6 +98,16 @@ impl Source {
             message: format!("{path}: {}", message.into()),
             help: Some(help.into()),
         }
+    }
+
+    /// The place of a path in the override that sets it or something near it, if one does.
+    fn overridden(&self, path: &str) -> Option<(usize, usize)> {
+        let first = path.split(['.', '[']).next().filter(|f| !f.is_empty())?;
+        self.overrides.iter().rev().find_map(|place| {
+            let nearest = locate::locate(&self.text, &format!("{place}.{first}"));
+            let found = nearest != locate::locate(&self.text, place);
+            if found { locate::locate(&self.text, &format!("{place}.{path}")) } else { None }
+        })
     }
 }
 
@@ -118,7 +139,7 @@ mod tests {
     use super::*;
 
     fn parse(text: &str) -> Result<Spec, SpecError> {
-        Source { path: "spec.yaml".into(), text: text.into() }.parse()
+        Source::new("spec.yaml".into(), text.into()).parse()
     }
 
     const MINIMAL: &str = "luxproof: 1

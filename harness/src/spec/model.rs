@@ -44,6 +44,21 @@ pub struct Spec {
     /// Overrides of the default tolerances, by procedure.
     #[serde(default)]
     pub tolerances: BTreeMap<String, ToleranceOverride>,
+    /// Overrides that make a suite of the spec, each a case of its own: a list, each with a `name`, or a matrix.
+    #[serde(default)]
+    #[schemars(with = "Option<CasesSchema>")]
+    pub cases: Option<serde::de::IgnoredAny>,
+}
+
+/// The shape of `cases`; they are read and checked where they are laid over the spec.
+#[derive(JsonSchema)]
+#[schemars(rename = "Cases", untagged)]
+#[allow(dead_code, reason = "the shape of overrides in the schema")]
+enum CasesSchema {
+    /// Overrides with a `name` each.
+    List(Vec<BTreeMap<String, serde_json::Value>>),
+    /// Axes of named overrides; every combination is a case.
+    Matrix(BTreeMap<String, BTreeMap<String, Option<BTreeMap<String, serde_json::Value>>>>),
 }
 
 /// A closed box room with one corner at the origin, z up.

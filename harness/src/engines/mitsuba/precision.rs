@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use luminaire::photometry::LuminousIntensityDistribution;
+use luminaire::photometry::angles_deg;
 use luminaire::scene::Luminaire;
 
 use super::export::Frame;
@@ -28,21 +29,30 @@ fn luminaire_error_lx(luminaire: &Luminaire, frame: &Frame, meter: DVec3, meter_
     // Both points are rounded before they are subtracted.
     let angle_rad = ROUNDINGS * EPSILON + 2.0 * EPSILON * (meter.abs() + lamp.abs()).max_element() / distance;
     let intensity_cd = luminaire.intensity_towards(meter_m - luminaire.position_m).value();
-    let slope = steepest_cd_per_rad(&luminaire.photometry.distribution) * luminaire.flux_scale;
+    let own = luminaire.orientation.transpose() * (meter_m - luminaire.position_m);
+    let gamma_deg = angles_deg(own).1;
+    let slope = steepest_cd_per_rad(&luminaire.photometry.distribution, gamma_deg) * luminaire.flux_scale;
     (2.0 * angle_rad * intensity_cd + angle_rad * slope) / (distance_m * distance_m)
 }
 
-/// The largest change of intensity with direction, poles left out where every plane meets.
-fn steepest_cd_per_rad(distribution: &LuminousIntensityDistribution) -> f64 {
-    let (c, gamma) = (distribution.c_deg(), distribution.gamma_deg());
+/// Far more than floats turn a direction by.
+const NEIGHBOURHOOD_DEG: f64 = 0.01;
+
+/// The largest change of intensity with direction near `gamma_deg`, poles left out where every plane meets.
+fn steepest_cd_per_rad(distribution: &LuminousIntensityDistribution, gamma_deg: f64) -> f64 {
+    let (c, all) = (distribution.c_deg(), distribution.gamma_deg());
+    // The rows of the cells that the direction may fall into.
+    let first = all.partition_point(|g| *g < gamma_deg - NEIGHBOURHOOD_DEG).saturating_sub(1);
+    let last = all.partition_point(|g| *g <= gamma_deg + NEIGHBOURHOOD_DEG).min(all.len() - 1);
+    let gamma = &all[first..=last];
     let mut steepest = 0.0_f64;
     for plane in 0..c.len() {
-        let row = distribution.plane(plane);
+        let row = &distribution.plane(plane)[first..=last];
         for g in 0..gamma.len() - 1 {
             steepest = steepest.max(((row[g + 1] - row[g]) / (gamma[g + 1] - gamma[g]).to_radians()).abs());
         }
         if plane > 0 {
-            let before = distribution.plane(plane - 1);
+            let before = &distribution.plane(plane - 1)[first..=last];
             for (g, gamma_deg) in gamma.iter().enumerate() {
                 let turn_rad = (c[plane] - c[plane - 1]).to_radians() * gamma_deg.to_radians().sin().max(0.01);
                 steepest = steepest.max(((row[g] - before[g]) / turn_rad).abs());

@@ -172,20 +172,19 @@ impl<'a> Bench<'a> {
     fn pilot(&self, run: Run) -> Result<Pilot, EngineError> {
         let mut readouts = export::first_readouts(self.job, Light::Indirect);
         let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();
-        let mut dark = vec![false; readouts.len()];
         for _ in 0..MOST_LOOKS {
             let start = Instant::now();
             let seen = self.look(run, &readouts)?;
             let wall_s = start.elapsed().as_secs_f64();
-            let mut settled = true;
+            let (mut settled, mut brightest_lx) = (true, 0.0_f64);
             for (k, seen) in seen.into_iter().enumerate() {
                 let scale = match seen {
                     // The blue channel holds a 1.5 times larger reading yet.
-                    Seen::Value { lx, .. } => 400.0 * lx,
-                    Seen::Below(limit) if limit < 1e-6 * upper[k] => {
-                        dark[k] = true;
-                        scale_of(readouts[k])
+                    Seen::Value { lx, .. } => {
+                        brightest_lx = brightest_lx.max(lx);
+                        400.0 * lx
                     }
+                    Seen::Below(limit) if limit < 1e-6 * upper[k] => scale_of(readouts[k]),
                     Seen::Below(limit) => {
                         settled = false;
                         4.0 * limit
@@ -199,7 +198,10 @@ impl<'a> Bench<'a> {
                 readouts[k] = Readout::Coarse(scale);
             }
             if settled {
-                return Ok(Pilot { readouts, dark, wall_s });
+                // A meter that one block sees in near darkness may be brighter by far in the next.
+                let least = 0.4 * brightest_lx;
+                let readouts = readouts.iter().map(|r| Readout::Coarse(scale_of(*r).max(least))).collect();
+                return Ok(Pilot { readouts, wall_s });
             }
         }
         Err(output(format!("reflected light was not read after {MOST_LOOKS} looks")))
@@ -245,10 +247,10 @@ impl<'a> Bench<'a> {
         let seen = self.render(run, &pilot.readouts)?;
         let value = |(k, seen): (usize, Seen)| match seen {
             Seen::Value { lx, .. } => Ok(lx),
-            // What the first reflection leaves out there, later ones bring.
-            Seen::Below(_) if pilot.dark[k] || run.reflections == Reflections::First => Ok(0.0),
+            // None of a block's few rays met what little light there is; the spread of the blocks tells.
+            Seen::Below(_) => Ok(0.0),
             Seen::Missed => Err(self.missed(k)),
-            _ => {
+            Seen::Above => {
                 let id = &self.job.stations[k].id;
                 Err(output(format!("block {} reads {id} hundreds of times off the first block", run.seed)))
             }
@@ -324,7 +326,6 @@ const BILINEAR_TABLE: f64 = 1e-6;
 
 struct Pilot {
     readouts: Vec<Readout>,
-    dark: Vec<bool>,
     wall_s: f64,
 }
 

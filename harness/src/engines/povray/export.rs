@@ -283,13 +283,19 @@ fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame) 
         let line = |part: &Part| format!("Luminaire({}, {})\n", place(part), candela * part.share);
         parts(luminaire, points).iter().map(line).collect()
     };
-    let points = if job.scene.obstacles.is_empty() { POINTS } else { POINTS_PAST_OBSTACLES };
+    let points = points(job);
     if luminaire.model == LuminaireModel::Point || job.transport == Transport::Direct {
         text.push_str(&instances(points));
     } else {
         write!(text, "#if (Indirect)\n{}#else\n{}#end\n", instances(POINTS_INDIRECT), instances(points)).ok();
     }
     text
+}
+
+/// Point lights along an opening for direct light: more where obstacles or nearness would show them.
+pub(super) fn points(job: &Job) -> usize {
+    let few_do = job.scene.obstacles.is_empty() && opening::too_near(job, POINTS).is_none();
+    if few_do { POINTS } else { POINTS_PAST_OBSTACLES }
 }
 
 /// The point lights that stand for a luminaire.

@@ -8,6 +8,9 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use luminaire::photometry::LuminousOpening;
+use luminaire::scene::{Luminaire, LuminaireModel};
+
+use crate::engines::Job;
 
 /// A part of a luminaire: where it is in the luminaire's frame and its share of the intensity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +45,39 @@ pub(super) fn parts(opening: LuminousOpening, n: usize) -> Option<Vec<Part>> {
         }
         _ => None,
     }
+}
+
+/// A meter nearer to an opening than twice the widest gap between its point lights.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct TooNear {
+    /// The meter.
+    pub(super) station: String,
+    /// The luminaire.
+    pub(super) luminaire: String,
+    /// Its distance from the opening in metres.
+    pub(super) distance_m: f64,
+    /// The widest gap in metres.
+    pub(super) spacing_m: f64,
+}
+
+/// The first meter that would tell the `n` by `n` point lights of an opening apart.
+///
+/// Measured in a cube of luminous panels of 2 m: 3 % at one gap's distance, below .5 % at two. Gauss-Legendre points are
+/// furthest apart in the middle, pi / 2 times the mean.
+pub(super) fn too_near(job: &Job, n: usize) -> Option<TooNear> {
+    let of = |l: &Luminaire| {
+        let [along_y, along_x, along_z] = l.photometry.opening.bounding_box_m();
+        let half_m = 0.5 * DVec3::new(along_x, along_y, along_z);
+        let spacing_m = PI * half_m.max_element() / n as f64;
+        let distance_m = |p: DVec3| {
+            let own = l.orientation.transpose() * (p - l.position_m);
+            own.distance(own.clamp(-half_m, half_m))
+        };
+        let near = job.stations.iter().find(|s| distance_m(s.meter.position_m) < 2.0 * spacing_m)?;
+        let distance_m = distance_m(near.meter.position_m);
+        Some(TooNear { station: near.id.to_string(), luminaire: l.id.clone(), distance_m, spacing_m })
+    };
+    job.scene.luminaires.iter().filter(|l| l.model == LuminaireModel::Area).find_map(of)
 }
 
 /// Nodes and weights on -1..1 by Newton's method on the Legendre polynomial.

@@ -1,0 +1,169 @@
+//! `luxproof run`: every case of the specs, folders and patterns given, one report over all.
+
+use std::path::{Path, PathBuf};
+use std::time::{Instant, SystemTime};
+
+use miette::{IntoDiagnostic, Report as Diagnostic};
+use sha2::{Digest, Sha256};
+
+use super::diagnostic::diagnose;
+use super::{Bar, RunArgs, print_reports, report_installation};
+use crate::diff::{Comparison, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
+use crate::engines::{self, EngineId, Site};
+use crate::plan::{Asked, Plan, plan};
+use crate::procedures::Task;
+use crate::reading::Recording;
+use crate::report::{Exit, Ingredients, Report, SpecRecord};
+use crate::run;
+use crate::spec::{Case, suite};
+
+/// Runs all cases, judges and prints.
+pub(super) fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic> {
+    // Every spec is read and checked before any engine starts.
+    let mut cases = suite(&args.specs).map_err(diagnose)?;
+    let selection = args.selected.selection();
+    // Of a suite, the cases that the chosen procedures concern; a choice that concerns none is refused below.
+    if cases.iter().any(|case| selection.concerns(case)) {
+        cases.retain(|case| selection.concerns(case));
+    }
+    for case in &cases {
+        plan(case, &selection, site).map_err(diagnose)?;
+    }
+    if args.install {
+        let names: Vec<EngineId> = engines::all().iter().map(|e| e.id()).collect();
+        let wanted = names
+            .into_iter()
+            .filter(|n| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| w == n.name()));
+        report_installation(site, &wanted.collect::<Vec<_>>());
+    }
+    let tables = Tables::read(&cases)?;
+    let root = out_folder(args);
+    let mut exit = Exit::Passed;
+    let mut reports = vec![];
+    for (case, published) in cases.iter().zip(&tables.published) {
+        let folder = if cases.len() == 1 { root.clone() } else { root.join(within(&root, case)) };
+        let planned = plan(case, &selection, site).map_err(diagnose)?;
+        let report = run_case(case, &planned, published.as_ref(), &tables, args, site, &folder)?;
+        let named = |id: &str| planned.engines.iter().any(|p| p.engine.id().name() == id && p.asked == Asked::ByName);
+        exit = exit.worse(report.exit(named));
+        reports.push(report);
+    }
+    let Some(report) = Report::joined(record(args, &cases), reports) else { return Ok(exit) };
+    if cases.len() > 1 {
+        run::keep(&root.join("report.json"), &report).into_diagnostic()?;
+    }
+    print_reports(&[(report, root)], &args.format)?;
+    Ok(exit)
+}
+
+/// The folder of the run: by default that of the one spec or folder, or one for all where there are several.
+fn out_folder(args: &RunArgs) -> PathBuf {
+    let of_one = |path: &PathBuf| path.file_stem().map(|stem| Path::new("luxproof-out").join(stem));
+    match (&args.out, &args.specs[..]) {
+        (Some(folder), _) => folder.clone(),
+        (None, [one]) if !one.display().to_string().contains('*') => {
+            of_one(one).unwrap_or_else(|| "luxproof-out/suite".into())
+        }
+        _ => "luxproof-out/suite".into(),
+    }
+}
+
+/// The folder of one case of several, a spec's own name not twice.
+fn within(root: &Path, case: &Case) -> PathBuf {
+    let spec = root.file_name().and_then(|n| n.to_str()).map(|n| format!("{n}/"));
+    let own = spec.and_then(|prefix| case.name.strip_prefix(&prefix));
+    PathBuf::from(own.unwrap_or(&case.name))
+}
+
+/// What was run, all cases together.
+fn record(args: &RunArgs, cases: &[Case]) -> SpecRecord {
+    if let [case] = cases {
+        return record_of(case);
+    }
+    let paths: Vec<String> = args.specs.iter().map(|p| p.display().to_string()).collect();
+    let mut hash = Sha256::new();
+    for case in cases {
+        hash.update(&case.sha256);
+    }
+    let sha256 = crate::spec::hexadecimal(&hash.finalize());
+    let of_one_spec = cases.iter().all(|c| c.path == cases[0].path);
+    let title = match cases {
+        [first, ..] if of_one_spec => first.title.clone(),
+        _ => format!("{} cases of {}", cases.len(), paths.join(", ")),
+    };
+    SpecRecord { path: paths.join(" "), sha256, title }
+}
+
+fn record_of(case: &Case) -> SpecRecord {
+    SpecRecord { path: case.path.display().to_string(), sha256: case.sha256.clone(), title: case.title.clone() }
+}
+
+/// Tables that judging needs, read before any engine starts.
+pub(super) struct Tables {
+    tolerances: Tolerances,
+    known: KnownDeviations,
+    published: Vec<Option<Published>>,
+}
+
+impl Tables {
+    pub(super) fn read(cases: &[Case]) -> Result<Self, Diagnostic> {
+        let read = |case: &Case| case.published.as_deref().map(Published::read).transpose();
+        Ok(Self {
+            tolerances: Tolerances::built_in().into_diagnostic()?,
+            known: KnownDeviations::built_in().into_diagnostic()?,
+            published: cases.iter().map(read).collect::<Result<_, _>>().into_diagnostic()?,
+        })
+    }
+}
+
+fn run_case(
+    case: &Case,
+    plan: &Plan,
+    published: Option<&Published>,
+    tables: &Tables,
+    args: &RunArgs,
+    site: &Site,
+    folder: &Path,
+) -> Result<Report, Diagnostic> {
+    let (started, clock) = (SystemTime::now(), Instant::now());
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let options = run::Options { site: site.clone(), out: folder.to_owned(), jobs: args.jobs.unwrap_or(cores).max(1) };
+    let outcome = run::run(case, plan, &options, &Bar::new(&case.name)).into_diagnostic()?;
+    let Judged { comparisons, splits, tables } = judge(case, plan, &outcome.recordings, published, tables);
+    let ingredients = Ingredients {
+        case: case.name.clone(),
+        spec: record_of(case),
+        started,
+        wall_s: clock.elapsed().as_secs_f64(),
+        engines: outcome.engines,
+        recordings: &outcome.recordings,
+        skips: plan.skips.iter().cloned().chain(outcome.skips).collect(),
+        splits,
+        published: tables,
+    };
+    let report = Report::new(ingredients, comparisons);
+    run::keep(&folder.join("report.json"), &report).into_diagnostic()?;
+    Ok(report)
+}
+
+/// What follows from the recordings of a case.
+#[derive(Default)]
+struct Judged {
+    comparisons: Vec<Comparison>,
+    splits: Vec<Split>,
+    tables: Vec<PublishedTable>,
+}
+
+/// Holds the recordings of a case against their references.
+fn judge(case: &Case, plan: &Plan, recordings: &[Recording], published: Option<&Published>, tables: &Tables) -> Judged {
+    let judge = Judge { tolerances: &tables.tolerances, known: &tables.known, overrides: &case.tolerances, published };
+    let mut judged = Judged::default();
+    for task in &plan.tasks {
+        let task: &Task = task;
+        let mine: Vec<&Recording> = recordings.iter().filter(|r| r.procedure == task.procedure).collect();
+        judged.comparisons.extend(judge.compare(task, &mine));
+        judged.splits.extend(judge.split(task, &mine));
+        judged.tables.extend(published.and_then(|p| p.table(task, &case.name)));
+    }
+    judged
+}

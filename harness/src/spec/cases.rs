@@ -1,0 +1,227 @@
+//! The cases of a spec: overrides of its own text, as a list or as a matrix, each a case of its own.
+//!
+//! A mapping is laid over a mapping key by key, and over a list whose items have an `id` item by item; everything else
+//! replaces what was there.
+
+use serde_yaml::{Mapping, Value};
+
+use super::model::{EngineSettings, Spec};
+use super::{Source, SpecError};
+
+/// One case of a spec: its text with overrides laid over it.
+#[derive(Clone, Debug)]
+pub(super) struct Variant {
+    /// Its name; the parts of a matrix are joined by hyphens.
+    pub(super) name: String,
+    /// The spec that results.
+    pub(super) spec: Spec,
+    /// The engines that its overrides name: the case is for these alone.
+    pub(super) engines: Option<Vec<String>>,
+    /// The spec's text, knowing which overrides lie over it.
+    pub(super) source: Source,
+}
+
+/// An override: its name, its place in the spec, and what it says.
+#[derive(Clone, Debug)]
+struct Override {
+    name: String,
+    place: String,
+    says: Mapping,
+}
+
+/// The cases of a spec, in its order; empty for a spec without `cases`.
+pub(super) fn variants(source: &Source) -> Result<Vec<Variant>, SpecError> {
+    let text: Value = serde_yaml::from_str(&source.text).map_err(|e| source.error_at("", e.to_string(), ""))?;
+    let Value::Mapping(mut base) = text else { return Ok(vec![]) };
+    let Some(cases) = base.remove("cases") else { return Ok(vec![]) };
+    let combinations = match cases {
+        Value::Sequence(list) => listed(source, list)?.into_iter().map(|o| vec![o]).collect(),
+        Value::Mapping(axes) => matrix(source, axes)?,
+        _ => return Err(source.error_at("cases", "neither a list nor a matrix", FORM)),
+    };
+    if combinations.is_empty() {
+        return Err(source.error_at("cases", "there are none", "give at least one, or leave `cases` out"));
+    }
+    let mut variants: Vec<Variant> = vec![];
+    for overrides in combinations {
+        let variant = combined(source, &base, &overrides)?;
+        if variants.iter().any(|v| v.name == variant.name) {
+            let message = format!("two cases are named `{}`", variant.name);
+            return Err(source.error_at(&overrides[0].place, message, "give every case a name of its own"));
+        }
+        variants.push(variant);
+    }
+    Ok(variants)
+}
+
+const FORM: &str = "give a list of overrides, each with a `name`, or a matrix {axis: {name: override, ...}, ...}";
+
+fn listed(source: &Source, list: Vec<Value>) -> Result<Vec<Override>, SpecError> {
+    let item = |(k, value): (usize, Value)| {
+        let place = format!("cases[{k}]");
+        let Value::Mapping(mut says) = value else {
+            return Err(source.error_at(&place, "this is no override", FORM));
+        };
+        let Some(Value::String(name)) = says.remove("name") else {
+            return Err(source.error_at(&place, "the case has no name", "give it one: `name: ...`"));
+        };
+        check_name(source, &place, &name)?;
+        Ok(Override { name, place, says })
+    };
+    list.into_iter().enumerate().map(item).collect()
+}
+
+/// Every combination of one override an axis, the last axis fastest.
+fn matrix(source: &Source, axes: Mapping) -> Result<Vec<Vec<Override>>, SpecError> {
+    let mut combinations: Vec<Vec<Override>> = vec![vec![]];
+    for (axis, choices) in axes {
+        let axis = axis.as_str().unwrap_or_default().to_owned();
+        let Value::Mapping(choices) = choices else {
+            return Err(source.error_at(&format!("cases.{axis}"), "this is no axis of a matrix", FORM));
+        };
+        let mut overrides = vec![];
+        for (name, says) in choices {
+            let name = name.as_str().unwrap_or_default().to_owned();
+            let place = format!("cases.{axis}.{name}");
+            check_name(source, &place, &name)?;
+            let says = match says {
+                Value::Mapping(says) => says,
+                Value::Null => Mapping::new(),
+                _ => return Err(source.error_at(&place, "this is no override", FORM)),
+            };
+            overrides.push(Override { name, place, says });
+        }
+        let with = |head: &Vec<Override>| {
+            overrides.iter().map(|o| [head.as_slice(), std::slice::from_ref(o)].concat()).collect::<Vec<_>>()
+        };
+        combinations = combinations.iter().flat_map(with).collect();
+    }
+    Ok(combinations.into_iter().filter(|c| !c.is_empty()).collect())
+}
+
+/// Names become folders.
+fn check_name(source: &Source, place: &str, name: &str) -> Result<(), SpecError> {
+    let sound = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    if !name.is_empty() && !name.starts_with('.') && name.chars().all(sound) {
+        return Ok(());
+    }
+    let help = "use letters, digits, hyphens, underscores and points; put a name of digits alone in quotes";
+    Err(source.error_at(place, format!("`{name}` is no name of a case"), help))
+}
+
+fn combined(source: &Source, base: &Mapping, overrides: &[Override]) -> Result<Variant, SpecError> {
+    let names: Vec<&str> = overrides.iter().map(|o| o.name.as_str()).collect();
+    let name = names.join("-");
+    let mut text = Value::Mapping(base.clone());
+    let mut engines: Option<Vec<String>> = None;
+    for o in overrides {
+        if o.says.contains_key("cases") || o.says.contains_key("luxproof") {
+            return Err(source.error_at(&o.place, "a case has neither cases nor a format version of its own", FORM));
+        }
+        lay(&mut text, &Value::Mapping(o.says.clone())).map_err(|missing| {
+            let message = format!("there is no `{missing}` to override");
+            source.error_at(&o.place, message, "name an item by its `id`")
+        })?;
+        if let Some(Value::Mapping(own)) = o.says.get("engines") {
+            engines = Some(own.keys().filter_map(Value::as_str).map(str::to_owned).collect());
+        }
+    }
+    let mut spec: Spec = serde_yaml::from_value(text).map_err(|error| {
+        let message = format!("with the overrides of case `{name}`: {error}");
+        let help = super::nearest_key(&message).unwrap_or_else(|| FORM.to_owned());
+        source.error_at(&overrides[0].place, message, help)
+    })?;
+    if let (Some(own), Some(all)) = (&engines, &mut spec.engines) {
+        all.retain(|id, _: &mut EngineSettings| own.contains(id));
+    }
+    let overrides = overrides.iter().map(|o| o.place.clone()).collect();
+    Ok(Variant { name, spec, engines, source: Source { overrides, ..source.clone() } })
+}
+
+/// Lays an override over a value; the error is the id of an item that is not there.
+fn lay(base: &mut Value, over: &Value) -> Result<(), String> {
+    match (base, over) {
+        (Value::Mapping(base), Value::Mapping(over)) => {
+            for (key, value) in over {
+                match base.get_mut(key) {
+                    Some(below) => lay(below, value)?,
+                    None => drop(base.insert(key.clone(), value.clone())),
+                }
+            }
+        }
+        (Value::Sequence(items), Value::Mapping(over)) if items.iter().all(|i| i.get("id").is_some()) => {
+            for (id, value) in over {
+                let item = items.iter_mut().find(|i| i.get("id") == Some(id));
+                let missing = || id.as_str().unwrap_or("?").to_owned();
+                lay(item.ok_or_else(missing)?, value)?;
+            }
+        }
+        (base, over) => *base = over.clone(),
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::model::ModelSpec;
+
+    const BASE: &str = "luxproof: 1
+room:
+  size_m: [4, 4, 3]
+  reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.8}
+luminaires:
+  - {id: a, photometry: a.ies, at_m: [2, 2, 2]}
+  - {id: b, photometry: a.ies, at_m: [2, 2, 2]}
+meters:
+  plane: {points_m: [[1, 1, 1]], normal: [0, 0, 1]}
+procedures:
+  indirect_illuminance: {meters: plane}
+  direct_illuminance: {meters: plane}
+";
+
+    fn of(cases: &str) -> Result<Vec<Variant>, SpecError> {
+        variants(&Source::new("spec.yaml".into(), format!("{BASE}{cases}")))
+    }
+
+    #[test]
+    fn a_list_overrides_key_by_key_and_items_by_their_id() {
+        let cases = of("cases:\n  - name: one\n  - name: two\n    room: {reflectance: {walls: 0.1}}\n    \
+                        luminaires: {b: {model: area}}\n    engines: {radiance: {preset: fast}}\n")
+        .unwrap();
+        assert_eq!(cases.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["one", "two"]);
+        assert_eq!(cases[0].spec.luminaires[1].model, ModelSpec::Point);
+        assert_eq!(
+            cases[1].spec.luminaires.iter().map(|l| l.model).collect::<Vec<_>>(),
+            [ModelSpec::Point, ModelSpec::Area]
+        );
+        let reflectance = cases[1].spec.room.reflectance.build();
+        assert_eq!((reflectance.floor, reflectance.wall_x_min), (0.2, 0.1));
+        assert_eq!((cases[0].engines.clone(), cases[1].engines.clone()), (None, Some(vec!["radiance".to_owned()])));
+    }
+
+    #[test]
+    fn a_matrix_is_every_combination_and_null_removes_a_procedure() {
+        let cases = of("cases:\n  model: {point: {}, area: {luminaires: {a: {model: area}}}}\n  \
+                        light: {seven: {procedures: {indirect_illuminance: {bounces: 7}}}, \
+                        all: {procedures: {direct_illuminance: null}}}\n")
+        .unwrap();
+        let names: Vec<&str> = cases.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["point-seven", "point-all", "area-seven", "area-all"]);
+        assert!(cases[2].spec.procedures.direct_illuminance.is_some());
+        assert!(cases[3].spec.procedures.direct_illuminance.is_none());
+        assert_eq!(cases[3].spec.luminaires[0].model, ModelSpec::Area);
+    }
+
+    #[test]
+    fn errors_of_an_override_are_placed_at_it() {
+        let line = |cases: &str| of(cases).unwrap_err().line;
+        assert_eq!(line("cases:\n  - name: one\n  - {name: two, rooom: {}}\n"), Some(15));
+        assert_eq!(line("cases:\n  - {name: one, luminaires: {c: {model: area}}}\n"), Some(14));
+        assert_eq!(line("cases:\n  - {name: one}\n  - {name: one}\n"), Some(15));
+        assert_eq!(line("cases:\n  - {name: ../one}\n"), Some(14));
+        assert_eq!(line("cases: []\n"), Some(13));
+        let error = of("cases:\n  - {name: two, room: {sise_m: 3}}\n").unwrap_err();
+        assert_eq!(error.help.as_deref(), Some("did you mean `size_m`?"), "{error}");
+    }
+}

@@ -1,0 +1,96 @@
+//! Suites: the cases of spec files, of folders of specs and of patterns, in a fixed order.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::{Case, SpecError};
+
+/// The cases of several specs, folders or patterns, in the order given; the files of a folder are sorted by name.
+pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
+    let mut cases: Vec<Case> = vec![];
+    for path in asked {
+        for file in files(path)? {
+            cases.extend(Case::load_all(&file)?);
+        }
+    }
+    let mut names: BTreeMap<&str, &Path> = BTreeMap::new();
+    for case in &cases {
+        if let Some(other) = names.insert(&case.name, &case.path) {
+            let message = format!("holds a case `{}`, and so does {}", case.name, other.display());
+            return Err(plain(&case.path, message, "run them apart, or rename one: a report tells cases by name"));
+        }
+    }
+    Ok(cases)
+}
+
+/// The spec files that a path stands for: itself, the specs of a folder, or what a pattern matches.
+fn files(path: &Path) -> Result<Vec<PathBuf>, SpecError> {
+    if path.is_dir() {
+        return specs_of(path);
+    }
+    let Some(pattern) = path.to_str().filter(|p| !path.exists() && p.contains(['*', '?', '['])) else {
+        return Ok(vec![path.to_owned()]);
+    };
+    let matches = glob::glob(pattern).map_err(|e| plain(path, format!("is no pattern: {e}"), "give a file"))?;
+    let mut found: Vec<PathBuf> = matches.filter_map(Result::ok).collect();
+    found.sort();
+    if found.is_empty() {
+        return Err(plain(path, "matches no file".to_owned(), "check the pattern"));
+    }
+    Ok(found)
+}
+
+/// The YAML files of a folder that are specs, by name; tables and the like beside them are left alone.
+fn specs_of(folder: &Path) -> Result<Vec<PathBuf>, SpecError> {
+    let unreadable = |e: std::io::Error| plain(folder, format!("cannot be read: {e}"), "check the path");
+    let mut specs = vec![];
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        if path.extension().is_some_and(|e| e == "yaml" || e == "yml") && path.is_file() {
+            let text = std::fs::read(&path).map_err(unreadable)?;
+            if String::from_utf8_lossy(&text).lines().any(|l| l.starts_with("luxproof:")) {
+                specs.push(path);
+            }
+        }
+    }
+    specs.sort();
+    if specs.is_empty() {
+        let help = "a folder is run for its *.yaml files that begin a line with `luxproof:`";
+        return Err(plain(folder, "holds no spec".to_owned(), help));
+    }
+    Ok(specs)
+}
+
+fn plain(file: &Path, message: String, help: &str) -> SpecError {
+    SpecError { file: file.to_owned(), line: None, column: None, message, help: Some(help.to_owned()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reference(folder: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference").join(folder)
+    }
+
+    fn names(paths: &[PathBuf]) -> Result<Vec<String>, SpecError> {
+        suite(paths).map(|cases| cases.into_iter().map(|c| c.name).collect())
+    }
+
+    #[test]
+    fn a_folder_is_the_suite_of_its_specs_by_name() {
+        let found = names(&[reference("analytic")]).unwrap();
+        assert!(found.is_sorted() && found.len() >= 10, "{found:?}");
+        assert_eq!(names(&[reference("analytic/*.yaml")]).unwrap(), found);
+        let spec = |name: &str| reference("analytic").join(name);
+        assert_eq!(names(&[spec("s2.yaml"), spec("s1.yaml")]).unwrap(), ["s2", "s1"]);
+    }
+
+    #[test]
+    fn what_yields_no_spec_or_one_name_twice_is_refused() {
+        assert!(names(&[reference("luminaires")]).unwrap_err().message.contains("no spec"));
+        assert!(names(&[reference("analytic/*.yml")]).unwrap_err().message.contains("matches no file"));
+        let s1 = reference("analytic/s1.yaml");
+        assert!(names(&[s1.clone(), s1]).unwrap_err().message.contains("so does"));
+    }
+}
