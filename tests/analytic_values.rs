@@ -181,6 +181,13 @@ const GAUSS: [(f64, f64); 4] = [
 ];
 
 #[test]
+fn an_isotropic_point_follows_the_inverse_square_law() {
+    // Independently of the table's square and cosine: from the luminaire's own file, by the calculator.
+    let scene = scene(DVec3::new(5.0, 5.0, 4.0), 0.0, "isotropic.ies", DVec3::new(2.5, 2.5, 2.0));
+    check("cie-5.4.yaml", 96, |meter| inverse_square::direct_illuminance(&scene, meter).unwrap().illuminance.value());
+}
+
+#[test]
 fn a_box_collects_the_flux_that_is_emitted_in_it() {
     // The meters of cie-5.4.yaml, read from the file: 16 a set, six sets in the file's order.
     let text = std::fs::read_to_string(reference("analytic/cie-5.4.yaml")).unwrap();
@@ -226,6 +233,32 @@ fn the_simulator_keeps_the_mean_of_a_closed_room() {
         assert!((mean - law).abs() < allowed, "rho {rho}: {mean} against {law}, allowed {allowed}");
         assert!(allowed < 0.01 * law, "rho {rho}: the check is blunt, {allowed} of {law}");
     }
+}
+
+#[test]
+fn the_simulator_keeps_the_mean_of_an_integrating_box_whatever_its_shape_and_the_place_of_the_light() {
+    // The meters of integrating-box.yaml, read from the file: 9 a set, six sets in the file's order.
+    let text = std::fs::read_to_string(reference("analytic/integrating-box.yaml")).unwrap();
+    let scene = scene(DVec3::new(6.0, 4.0, 3.0), 0.7, "isotropic.ies", DVec3::new(2.0, 1.5, 1.2));
+    let mut normal = DVec3::ZERO;
+    let (mut meters, mut areas) = (vec![], vec![]);
+    for line in text.lines() {
+        if let Some(rest) = line.trim().strip_prefix("normal: [") {
+            normal = vector(rest.trim_end_matches(']'));
+        } else if let Some(rest) = line.trim().strip_prefix("- [") {
+            let (weights, k) = ([5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0], meters.len() % 9);
+            areas.push(normal.abs().dot(DVec3::new(12.0, 18.0, 24.0)) * weights[k / 3] * weights[k % 3]);
+            meters.push(Meter { position_m: vector(rest.trim_end_matches(']')), normal });
+        }
+    }
+    assert_eq!(meters.len(), 54);
+    assert!((areas.iter().sum::<f64>() - 108.0).abs() < 1e-9);
+    let accuracy = Accuracy { relative_error: 1e-3, seed: 1 };
+    let solution = simulator::illuminance(&scene, &meters, Transport::Indirect(Bounces::Converged), &accuracy).unwrap();
+    let flux: f64 = solution.estimates.iter().zip(&areas).map(|(e, area)| e.illuminance.value() * area).sum();
+    let law = closed_form::closed_room_mean_indirect(Lumen(10_000.0), 108.0, 0.7).value();
+    assert!((law - 216.049).abs() < 5e-4, "{law}");
+    assert!((flux / 108.0 / law - 1.0).abs() < 5e-3, "{} for {law}", flux / 108.0);
 }
 
 fn doubt(uncertainty: Uncertainty) -> f64 {

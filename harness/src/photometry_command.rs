@@ -11,6 +11,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use luminaire::calculators::zonal_cavity::{UtilizationTable, ZonalFlux};
 use luminaire::photometry::{self, Photometry, ReadError, Severity, Written, eulumdat, lm63};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr, miette};
 
@@ -32,6 +33,9 @@ pub struct PhotometryArgs {
     /// Print what was tolerated or is doubtful instead of the summary
     #[arg(long)]
     lint: bool,
+    /// Print coefficients of utilization over room cavity ratios and reflectances instead of the summary
+    #[arg(long, conflicts_with_all = ["lint", "json", "format"])]
+    utilization: bool,
     /// How to print
     #[arg(long, value_enum, value_name = "FORMAT", default_value_t = Format::Terminal)]
     format: Format,
@@ -72,6 +76,7 @@ pub fn run(args: &PhotometryArgs) -> Result<Exit, Diagnostic> {
         Format::Json => json(&readings)?,
         Format::Sarif => sarif::log(&readings)?,
         Format::Terminal if args.lint => lints(&readings),
+        Format::Terminal if args.utilization => utilization(&readings)?,
         Format::Terminal => summaries(&readings),
     };
     print!("{text}");
@@ -125,6 +130,24 @@ fn lints(readings: &[Reading]) -> String {
 fn summaries(readings: &[Reading]) -> String {
     let read = |reading: &Reading| reading.read.as_ref().ok().map(|p| Summary::of(&reading.file, p).to_string());
     readings.iter().filter_map(read).collect::<Vec<String>>().join("\n")
+}
+
+/// The customary table of each file, by its lamps' flux or, in absolute photometry, its own.
+fn utilization(readings: &[Reading]) -> Result<String, Diagnostic> {
+    let mut tables = vec![];
+    for reading in readings {
+        let Ok(photometry) = &reading.read else { continue };
+        let distribution = &photometry.distribution;
+        let (lumens, whose) = match photometry.lamp_lumens {
+            Some(lumens) => (lumens, "of lamp flux"),
+            None => (distribution.flux().value(), "of luminaire flux (absolute photometry)"),
+        };
+        let table = UtilizationTable::customary(&ZonalFlux::of(distribution), lumens)
+            .into_diagnostic()
+            .wrap_err_with(|| reading.file.display().to_string())?;
+        tables.push(format!("{}: {whose}, {lumens:.1} lm\n{table}", reading.file.display()));
+    }
+    Ok(tables.join("\n"))
 }
 
 fn write_files(args: &PhotometryArgs, file: &Path, photometry: &Photometry) -> Result<(), Diagnostic> {

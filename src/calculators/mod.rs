@@ -14,6 +14,7 @@ mod deviation;
 pub mod exitance_difference;
 pub mod inverse_square;
 pub mod uniform_surfaces;
+mod utilization_print;
 mod validity;
 pub mod zonal_cavity;
 pub mod zonal_multiplier;

@@ -135,3 +135,22 @@ fn sarif_names_rule_level_and_line_of_lints_and_refusals() {
 fn region(result: &serde_json::Value) -> &serde_json::Value {
     &result["locations"][0]["physicalLocation"]["region"]
 }
+
+#[test]
+fn utilization_is_of_the_lamps_flux_and_falls_with_the_cavity_ratio() {
+    let text = utilization(&[Reading { file: "a.ies".into(), read: Ok(pendant()) }]).unwrap();
+    assert!(text.starts_with("a.ies: of lamp flux, 1000.0 lm\n"), "{text}");
+    let first_column: Vec<u32> = (0..=10)
+        .map(|ratio| {
+            let row = text.lines().rev().nth(10 - ratio).unwrap();
+            let cells: Vec<u32> = row.split_whitespace().map(|c| c.parse().unwrap()).collect();
+            assert_eq!(cells[0] as usize, ratio);
+            cells[1]
+        })
+        .collect();
+    assert!(first_column.windows(2).all(|w| w[1] < w[0]), "{first_column:?}");
+    // Without walls every lumen reaches the work plane or the ceiling once: (down + .8 up) / (1 - .8 x .2), per lamp lumen.
+    let distribution = pendant().distribution;
+    let (down, up) = (distribution.flux_between(0.0, 90.0).value(), distribution.flux_between(90.0, 180.0).value());
+    assert_eq!(f64::from(first_column[0]), (100.0 * (down + 0.8 * up) / 1000.0 / (1.0 - 0.16)).round());
+}
