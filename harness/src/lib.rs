@@ -2,7 +2,7 @@
 //!
 //! Data flows one way; each arrow is one function and each artefact a file:
 //! spec file -> [`spec::Case`] -> [`plan::Plan`] -> [`reading::Recording`] -> [`diff::Comparison`] -> [`report::Report`].
-//! Imports point down only: spec < reading < procedures < engines < plan < run < diff < report < cli.
+//! Imports point down only: spec < reading < procedures < engines < plan < run < diff < diagnosis < report < cli.
 
 /// The worked example of the documentation, compiled and run as a test.
 #[cfg(doctest)]
@@ -10,6 +10,7 @@
 pub struct AddingAnEngine;
 
 pub mod cli;
+pub mod diagnosis;
 pub mod diff;
 pub mod doctor;
 pub mod engines;
@@ -20,4 +21,5 @@ pub mod process;
 pub mod reading;
 pub mod report;
 pub mod run;
+pub mod selftest;
 pub mod spec;

@@ -20,6 +20,7 @@ use crate::photometry_command::{self, PhotometryArgs};
 use crate::plan::{Asked, Selection, plan};
 use crate::report::{self, Exit, Report, Style};
 use crate::run;
+use crate::selftest::selftest;
 use crate::spec::{Case, Spec, suite};
 
 use diagnostic::diagnose;
@@ -53,6 +54,8 @@ enum Command {
     Photometry(PhotometryArgs),
     /// View a finished run again
     Report(ReportArgs),
+    /// Put known faults into right readings and see whether the harness catches and names them
+    Selftest(SelftestArgs),
     /// Print the JSON Schema of the spec, the report, or what external adapters read and print
     Schema(SchemaArgs),
 }
@@ -153,6 +156,28 @@ struct ReportArgs {
 }
 
 #[derive(Debug, Args)]
+struct SelftestArgs {
+    /// Noisy runs a fault
+    #[arg(long, default_value_t = 20, value_name = "N")]
+    runs: usize,
+    /// Noisy runs without a fault, in each case
+    #[arg(long, default_value_t = 100, value_name = "N")]
+    clean_runs: usize,
+    /// Seed of the noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// View of the scorecard to print
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = CardFormat::Terminal)]
+    format: CardFormat,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum CardFormat {
+    Terminal,
+    Json,
+}
+
+#[derive(Debug, Args)]
 struct SchemaArgs {
     /// Which schema
     #[arg(value_enum, default_value_t = SchemaOf::Spec)]
@@ -191,6 +216,7 @@ impl Cli {
             Command::Engines(args) => manage_engines(&args, &site),
             Command::Photometry(args) => photometry_command::run(&args),
             Command::Report(args) => view(&args),
+            Command::Selftest(args) => test_oneself(&args),
             Command::Schema(args) => schema(&args),
         }
     }
@@ -199,6 +225,16 @@ impl Cli {
     pub fn verbosity(&self) -> u8 {
         self.verbose
     }
+}
+
+fn test_oneself(args: &SelftestArgs) -> Result<Exit, Diagnostic> {
+    let card = selftest(args.runs.max(1), args.clean_runs, args.seed).into_diagnostic()?;
+    let text = match args.format {
+        CardFormat::Terminal => card.to_string(),
+        CardFormat::Json => serde_json::to_string_pretty(&card).into_diagnostic()? + "\n",
+    };
+    std::io::stdout().lock().write_all(text.as_bytes()).into_diagnostic()?;
+    Ok(if card.is_good() { Exit::Passed } else { Exit::Failed })
 }
 
 fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format]) -> Result<(), Diagnostic> {

@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 
 use super::diagnostic::diagnose;
 use super::{Bar, RunArgs, print_reports, report_installation};
+use crate::diagnosis;
 use crate::diff::{Comparison, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
 use crate::engines::{self, EngineId, Site};
 use crate::plan::{Asked, Plan, plan};
@@ -161,7 +162,9 @@ fn judge(case: &Case, plan: &Plan, recordings: &[Recording], published: Option<&
     for task in &plan.tasks {
         let task: &Task = task;
         let mine: Vec<&Recording> = recordings.iter().filter(|r| r.procedure == task.procedure).collect();
-        judged.comparisons.extend(judge.compare(task, &mine));
+        let mut comparisons = judge.compare(task, &mine);
+        diagnosis::diagnose(task, &mut comparisons);
+        judged.comparisons.extend(comparisons);
         judged.splits.extend(judge.split(task, &mine));
         judged.tables.extend(published.and_then(|p| p.table(task, &case.name)));
     }

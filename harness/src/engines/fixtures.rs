@@ -17,11 +17,11 @@ pub(super) const S1_INDIRECT_LX: [f64; 4] = [0.94314714, 1.15551735, 1.15551735,
 /// Indirect light cut at seven reflections.
 pub(super) const S1_SEVEN_LX: [f64; 4] = [0.93537, 1.14730, 1.14730, 1.41182];
 
-pub(super) fn photometry(distribution: LuminousIntensityDistribution) -> Arc<Photometry> {
+pub(crate) fn photometry(distribution: LuminousIntensityDistribution) -> Arc<Photometry> {
     Arc::new(Photometry::of(distribution))
 }
 
-pub(super) fn luminaire(id: &str, at_m: DVec3, distribution: LuminousIntensityDistribution) -> Luminaire {
+pub(crate) fn luminaire(id: &str, at_m: DVec3, distribution: LuminousIntensityDistribution) -> Luminaire {
     Luminaire {
         id: id.into(),
         photometry: photometry(distribution),
@@ -32,14 +32,14 @@ pub(super) fn luminaire(id: &str, at_m: DVec3, distribution: LuminousIntensityDi
     }
 }
 
-pub(super) fn axial_uplight() -> LuminousIntensityDistribution {
+pub(crate) fn axial_uplight() -> LuminousIntensityDistribution {
     let gamma = vec![0.0, 89.0, 90.0, 95.0, 115.0, 135.0, 155.0, 175.0, 180.0];
     let candela = vec![0.0, 0.0, 4.5, 35.7, 218.3, 421.6, 576.4, 662.3, 664.4];
     LuminousIntensityDistribution::axial(gamma, candela).unwrap()
 }
 
 /// No symmetry at all, uneven planes; every plane meets at the poles.
-pub(super) fn lopsided() -> LuminousIntensityDistribution {
+pub(crate) fn lopsided() -> LuminousIntensityDistribution {
     let c = vec![0.0, 20.0, 90.0, 135.0, 250.0, 360.0];
     let gamma = vec![0.0, 15.0, 40.0, 70.0, 90.0, 130.0, 180.0];
     let value = |c: f64, g: f64| {
@@ -50,17 +50,17 @@ pub(super) fn lopsided() -> LuminousIntensityDistribution {
     LuminousIntensityDistribution::new(c, gamma, candela).unwrap()
 }
 
-pub(super) fn quadrant() -> LuminousIntensityDistribution {
+pub(crate) fn quadrant() -> LuminousIntensityDistribution {
     let c = vec![0.0, 30.0, 90.0];
     let candela = [[900.0, 700.0, 80.0, 0.0], [900.0, 820.0, 150.0, 0.0], [900.0, 1000.0, 400.0, 0.0]].concat();
     LuminousIntensityDistribution::new(c, vec![0.0, 30.0, 60.0, 90.0], candela).unwrap()
 }
 
-pub(super) fn room(size_m: DVec3, floor: f64, walls: f64, ceiling: f64) -> Room {
+pub(crate) fn room(size_m: DVec3, floor: f64, walls: f64, ceiling: f64) -> Room {
     Room { size_m, reflectance: Reflectances::with_equal_walls(floor, walls, ceiling) }
 }
 
-pub(super) fn stations(points_m: &[[f64; 3]], normal: DVec3) -> Vec<Station> {
+pub(crate) fn stations(points_m: &[[f64; 3]], normal: DVec3) -> Vec<Station> {
     let station = |(k, p): (usize, &[f64; 3])| {
         let meter = Meter { position_m: DVec3::from_array(*p), normal };
         Station { id: MeterId::new("m", k), meter, expected_lx: None }
@@ -68,7 +68,7 @@ pub(super) fn stations(points_m: &[[f64; 3]], normal: DVec3) -> Vec<Station> {
     points_m.iter().enumerate().map(station).collect()
 }
 
-pub(super) fn job(scene: Scene, stations: Vec<Station>, transport: Transport) -> Job {
+pub(crate) fn job(scene: Scene, stations: Vec<Station>, transport: Transport) -> Job {
     Job {
         case: "test case".into(),
         procedure: "test procedure".into(),
@@ -81,7 +81,7 @@ pub(super) fn job(scene: Scene, stations: Vec<Station>, transport: Transport) ->
     }
 }
 
-pub(super) fn s1(transport: Transport) -> Job {
+pub(crate) fn s1(transport: Transport) -> Job {
     let scene = Scene {
         room: Some(room(DVec3::splat(20.0), 0.2, 0.5, 0.8)),
         obstacles: vec![],
@@ -92,7 +92,7 @@ pub(super) fn s1(transport: Transport) -> Job {
 }
 
 /// Every (C, gamma) of a grid, read at `distance_m` in free field.
-pub(super) fn goniometer(luminaire: &Luminaire, distance_m: f64, c_deg: &[f64], gamma_deg: &[f64]) -> Job {
+pub(crate) fn goniometer(luminaire: &Luminaire, distance_m: f64, c_deg: &[f64], gamma_deg: &[f64]) -> Job {
     let towards = |c: f64, g: f64| luminaire.orientation * direction(c, g);
     let station = |(k, d): (usize, DVec3)| {
         let meter = Meter { position_m: luminaire.position_m + distance_m * d, normal: -d };
@@ -104,7 +104,7 @@ pub(super) fn goniometer(luminaire: &Luminaire, distance_m: f64, c_deg: &[f64], 
 }
 
 /// Inverse-square law in an empty convex room or free field.
-pub(super) fn exact_direct_lx(job: &Job) -> Vec<f64> {
+pub(crate) fn exact_direct_lx(job: &Job) -> Vec<f64> {
     let at = |station: &Station| {
         let from = |l: &Luminaire| {
             let ray = station.meter.position_m - l.position_m;
@@ -116,16 +116,16 @@ pub(super) fn exact_direct_lx(job: &Job) -> Vec<f64> {
     job.stations.iter().map(at).collect()
 }
 
-pub(super) fn relative_deviations(measurement: &Measurement, exact: &[f64]) -> Vec<f64> {
+pub(crate) fn relative_deviations(measurement: &Measurement, exact: &[f64]) -> Vec<f64> {
     measurement.estimates.iter().zip(exact).map(|(e, x)| e.value_lx / x - 1.0).collect()
 }
 
-pub(super) fn worst(deviations: &[f64]) -> f64 {
+pub(crate) fn worst(deviations: &[f64]) -> f64 {
     deviations.iter().fold(0.0, |w: f64, d| if d.is_nan() { f64::INFINITY } else { w.max(d.abs()) })
 }
 
 /// The largest deviation in standard errors.
-pub(super) fn worst_z(measurement: &Measurement, exact: &[f64]) -> f64 {
+pub(crate) fn worst_z(measurement: &Measurement, exact: &[f64]) -> f64 {
     let z = |(e, x): (&Estimate, &f64)| (e.value_lx - x) / e.std_error_lx.unwrap();
     worst(&measurement.estimates.iter().zip(exact).map(z).collect::<Vec<_>>())
 }

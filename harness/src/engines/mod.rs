@@ -6,7 +6,7 @@
 pub mod calibration;
 mod external;
 #[cfg(test)]
-mod fixtures;
+pub(crate) mod fixtures;
 mod iesna;
 mod image;
 mod install;

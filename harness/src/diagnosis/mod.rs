@@ -1,0 +1,209 @@
+//! Why readings fail: every known fault is tried on them, and named where it alone explains all of them.
+//!
+//! A fault explains readings where chi-squared of what is left is as small as chance makes it; a free parameter costs
+//! what Schwarz's criterion (Ann. Statist. 6, 1978) asks for it. Where several explain them equally well all are named,
+//! and where none does, nothing is said.
+
+mod faults;
+
+use std::collections::BTreeSet;
+
+use crate::diff::{Basis, Comparison, Verdict};
+use crate::procedures::Task;
+
+pub use faults::{Effect, Fault, faults, truth};
+
+/// Error of a prediction that no uncertainty of a reading covers, relative: engines' own small biases.
+const SLACK: f64 = 5e-4;
+/// Likewise, as a share of the largest reading.
+const FLOOR: f64 = 1e-6;
+/// Explanations that are this much worse than the best, in chi-squared, are no rivals of it.
+const RIVAL: f64 = 4.0;
+/// Rivals that are named at most.
+const MOST_RIVALS: usize = 3;
+
+/// A fault that explains readings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cause {
+    /// The fault's short name.
+    pub id: &'static str,
+    /// What went wrong, with the evidence.
+    pub text: String,
+    /// What went wrong, without the evidence.
+    pub what: String,
+    /// Chi-squared of what it leaves, and what its free parameter costs.
+    score: f64,
+}
+
+/// Names the cause of failures among one task's comparisons, where one is found.
+pub fn diagnose(task: &Task, comparisons: &mut [Comparison]) {
+    let key = |c: &Comparison| Some((c.engine.clone(), c.reference.as_ref()?.basis));
+    let failed = comparisons.iter().filter(|c| c.verdict == Verdict::Fail);
+    let groups: BTreeSet<(String, Basis)> = failed.filter_map(key).collect();
+    for group in groups {
+        // Printed values and calculators are off by more than a renderer's fault.
+        if !matches!(group.1, Basis::ClosedForm | Basis::Exact) || group.0 == "iesna" {
+            continue;
+        }
+        let mine = |c: &&mut Comparison| key(c).as_ref() == Some(&group);
+        let members: Vec<&mut Comparison> = comparisons.iter_mut().filter(mine).collect();
+        let Some(readings) = Readings::of(&members) else { continue };
+        let faults = faults(task, &readings.right);
+        let text = named(&causes(&faults, &readings));
+        for comparison in members.into_iter().filter(|c| c.verdict == Verdict::Fail && c.diagnosis.is_none()) {
+            comparison.diagnosis.clone_from(&text);
+        }
+    }
+}
+
+fn named(causes: &[Cause]) -> Option<String> {
+    (!causes.is_empty()).then(|| causes.iter().map(|c| c.text.clone()).collect::<Vec<_>>().join("; or "))
+}
+
+/// Readings beside what they should be.
+#[derive(Clone, Debug)]
+pub struct Readings {
+    /// As read.
+    pub read: Vec<f64>,
+    /// As they should be.
+    pub right: Vec<f64>,
+    /// Combined standard uncertainty of each pair.
+    pub uncertainty: Vec<f64>,
+}
+
+impl Readings {
+    /// `None` where one of them is missing: what is not there cannot be explained.
+    fn of(members: &[&mut Comparison]) -> Option<Self> {
+        let mut readings = Self { read: vec![], right: vec![], uncertainty: vec![] };
+        for comparison in members {
+            let reference = comparison.reference.as_ref()?;
+            readings.read.push(comparison.value.filter(|v| v.is_finite())?);
+            readings.right.push(reference.value);
+            readings.uncertainty.push(comparison.std_error.unwrap_or(0.0).hypot(reference.uncertainty));
+        }
+        Some(readings)
+    }
+
+    fn len(&self) -> usize {
+        self.read.len()
+    }
+
+    /// Standard deviation of a reading from a prediction that is right.
+    fn sigma(&self, k: usize, predicted: f64) -> f64 {
+        let largest = self.right.iter().chain(&self.read).copied().fold(0.0, f64::max);
+        self.uncertainty[k].hypot(SLACK * predicted).hypot(FLOOR * largest).max(f64::MIN_POSITIVE)
+    }
+
+    fn chi_squared(&self, predicted: &[f64]) -> f64 {
+        let term = |k: usize| ((self.read[k] - predicted[k]) / self.sigma(k, predicted[k])).powi(2);
+        (0..self.len()).map(term).sum()
+    }
+
+    /// The factor that makes `shape` fit best, and its standard error.
+    fn factor(&self, shape: &[f64]) -> Option<(f64, f64)> {
+        let weight = |k: usize| self.sigma(k, self.read[k]).powi(-2);
+        let square: f64 = (0..self.len()).map(|k| weight(k) * shape[k] * shape[k]).sum();
+        let product: f64 = (0..self.len()).map(|k| weight(k) * shape[k] * self.read[k]).sum();
+        let factor = product / square;
+        (factor.is_finite() && factor > 0.0).then(|| (factor, square.sqrt().recip()))
+    }
+
+    /// The largest relative distance from a prediction, in percent.
+    fn worst_percent(&self, predicted: &[f64]) -> f64 {
+        let largest = predicted.iter().copied().fold(0.0, f64::max);
+        let off = self.read.iter().zip(predicted).map(|(y, p)| (y - p).abs() / p.max(FLOOR * largest));
+        100.0 * off.filter(|x| x.is_finite()).fold(0.0, f64::max)
+    }
+}
+
+/// The faults that explain readings, the best first; empty where none does or none is needed.
+pub fn causes(faults: &[Fault], readings: &Readings) -> Vec<Cause> {
+    if readings.len() < 2 || is_chance(readings.chi_squared(&readings.right), readings.len()) {
+        return vec![];
+    }
+    let mut found: Vec<Cause> = faults.iter().filter_map(|fault| explanation(fault, readings)).collect();
+    found.sort_by(|a, b| a.score.total_cmp(&b.score));
+    let best = found.first().map_or(0.0, |c| c.score);
+    found.retain(|c| c.score <= best + RIVAL);
+    found.truncate(MOST_RIVALS);
+    if found.is_empty() {
+        found.extend(unnamed_factor(readings));
+    }
+    found
+}
+
+/// Whether chi-squared is no larger than chance makes it, but for one time in a thousand or so.
+fn is_chance(chi_squared: f64, freedom: usize) -> bool {
+    let freedom = freedom as f64;
+    chi_squared <= freedom + 3.1 * (2.0 * freedom).sqrt() + 6.0
+}
+
+fn explanation(fault: &Fault, readings: &Readings) -> Option<Cause> {
+    let n = readings.len();
+    let (predicted, parameters, found) = match &fault.effect {
+        Effect::Factor(_) => {
+            let (factor, error) = readings.factor(&readings.right)?;
+            let found = format!("all {n} readings are {factor:.4} ± {error:.4} times the reference");
+            (fault.readings(&readings.right)?, 0, Some(found))
+        }
+        Effect::Values(values) => (values.clone(), 0, None),
+        Effect::Shape(_) => {
+            let shape = fault.readings(&readings.right)?;
+            let (factor, _) = readings.factor(&shape)?;
+            (shape.iter().map(|s| factor * s).collect(), 1, None)
+        }
+        Effect::Clamp => {
+            let level = readings.read.iter().copied().fold(0.0, f64::max);
+            let cut = readings.right.iter().filter(|r| **r > level * (1.0 + 10.0 * SLACK)).count();
+            if cut < 2 || cut == n {
+                return None;
+            }
+            let found = format!("{cut} of {n} readings stop at {level:.6}");
+            (readings.right.iter().map(|r| r.min(level)).collect(), 1, Some(found))
+        }
+        Effect::Offset => {
+            let weight = |k: usize| readings.sigma(k, readings.right[k]).powi(-2);
+            let total: f64 = (0..n).map(weight).sum();
+            let offset = (0..n).map(|k| weight(k) * (readings.read[k] - readings.right[k])).sum::<f64>() / total;
+            let found = format!("all {n} readings are {offset:.6} more than the reference");
+            (readings.right.iter().map(|r| r + offset).collect(), 1, Some(found))
+        }
+    };
+    if n < 2 + parameters || predicted.iter().any(|p| !p.is_finite()) {
+        return None;
+    }
+    let chi_squared = readings.chi_squared(&predicted);
+    is_chance(chi_squared, n - parameters).then(|| Cause {
+        id: fault.id,
+        what: fault.what.clone(),
+        text: match found {
+            Some(found) => format!("{found}: {}", fault.what),
+            None => format!(
+                "{}: that explains all {n} readings to {:.2} %, which are up to {:.1} % off otherwise",
+                fault.what,
+                readings.worst_percent(&predicted),
+                readings.worst_percent(&readings.right)
+            ),
+        },
+        score: chi_squared + parameters as f64 * (n as f64).ln().max(1.0),
+    })
+}
+
+/// A factor that is the same everywhere and none of those known.
+fn unnamed_factor(readings: &Readings) -> Option<Cause> {
+    let n = readings.len();
+    let (factor, error) = readings.factor(&readings.right)?;
+    let predicted: Vec<f64> = readings.right.iter().map(|r| factor * r).collect();
+    let chi_squared = readings.chi_squared(&predicted);
+    (n >= 3 && is_chance(chi_squared, n - 1)).then(|| Cause {
+        id: "factor",
+        what: "a factor that is none of those known".to_owned(),
+        text: format!(
+            "all {n} readings are {factor:.4} ± {error:.4} times the reference: a factor that is none of those known"
+        ),
+        score: chi_squared,
+    })
+}
+
+#[cfg(test)]
+mod tests;

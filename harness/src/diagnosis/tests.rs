@@ -1,0 +1,69 @@
+//! What is named, and what is better left unsaid.
+
+use luminaire::scene::{Bounces, Transport};
+
+use super::*;
+use crate::engines::fixtures;
+use crate::procedures::Target;
+use crate::reading::{MeterId, Quantity};
+
+fn task(transport: Transport) -> Task {
+    let job = fixtures::s1(transport);
+    let target = |(k, s): (usize, &crate::engines::Station)| Target {
+        id: MeterId::new("m", k),
+        meter: s.meter,
+        direction: None,
+        per_lux: 1.0,
+    };
+    let targets = job.stations.iter().enumerate().map(target).collect();
+    Task { procedure: "test", scene: job.scene, transport, quantity: Quantity::Illuminance, targets }
+}
+
+fn found(task: &Task, right: &[f64], read: Vec<f64>) -> Vec<Cause> {
+    let uncertainty = read.iter().map(|r| 1e-4 * r).collect();
+    causes(&faults(task, right), &Readings { read, right: right.to_vec(), uncertainty })
+}
+
+#[test]
+fn a_factor_of_pi_is_named_with_its_evidence() {
+    let task = task(Transport::Direct);
+    let right = truth(&task).unwrap();
+    let read = right.iter().map(|r| r * std::f64::consts::PI).collect();
+    let causes = found(&task, &right, read);
+    assert_eq!(causes[0].id, "factor-pi");
+    assert!(causes[0].text.starts_with("all 4 readings are 3.1416 ± "), "{}", causes[0].text);
+}
+
+#[test]
+fn light_that_stops_early_is_told_by_the_number_of_its_reflections() {
+    let task = task(Transport::Indirect(Bounces::Converged));
+    let right = truth(&task).unwrap();
+    // Case S1 cut at five reflections, as solved by two other methods.
+    let read = vec![0.91170, 1.12222, 1.12222, 1.38492];
+    let causes = found(&task, &right, read);
+    assert_eq!(causes[0].what, "light stops after 5 reflections");
+}
+
+#[test]
+fn what_nothing_explains_is_left_unsaid() {
+    let task = task(Transport::Direct);
+    let right = truth(&task).unwrap();
+    let read: Vec<f64> = right.iter().zip([1.1, 0.8, 1.3, 0.95]).map(|(r, f)| r * f).collect();
+    assert_eq!(found(&task, &right, read), []);
+}
+
+#[test]
+fn right_readings_need_no_cause() {
+    let task = task(Transport::Direct);
+    let right = truth(&task).unwrap();
+    assert_eq!(found(&task, &right, right.clone()), []);
+}
+
+#[test]
+fn an_unknown_factor_is_called_one() {
+    let task = task(Transport::Direct);
+    let right = truth(&task).unwrap();
+    let read = right.iter().map(|r| 1.37 * r).collect();
+    let causes = found(&task, &right, read);
+    assert_eq!((causes.len(), causes[0].id), (1, "factor"));
+}
