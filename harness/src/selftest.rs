@@ -177,6 +177,7 @@ impl Subject {
             approximation: None,
             notes: vec![],
             wall_s: 0.0,
+            instrument_uncertainty: 0.0,
             failure: None,
             readings: self.task.targets.iter().zip(values).zip(errors).map(reading).collect(),
         }
