@@ -171,6 +171,7 @@ impl Subject {
             engine: engine.to_owned(),
             version: String::new(),
             model: self.task.model(),
+            light: self.task.light(),
             input_sha256: String::new(),
             seed: 0,
             settings: std::collections::BTreeMap::new(),
