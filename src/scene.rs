@@ -13,7 +13,7 @@ use crate::units::Candela;
 pub struct Scene {
     /// The closed room; `None` is free field: nothing reflects, nothing blocks.
     pub room: Option<Room>,
-    /// Opaque diffuse bodies inside the room.
+    /// Opaque diffuse bodies inside the room; without a room they block and reflect alone, in free field.
     pub obstacles: Vec<Obstacle>,
     /// The luminaires, each with its own photometry.
     pub luminaires: Vec<Luminaire>,
@@ -69,7 +69,8 @@ pub struct Luminaire {
 pub enum LuminaireModel {
     /// All light from the photometric centre.
     Point,
-    /// Light from the file's luminous opening.
+    /// Light from the file's luminous opening. The opening itself neither blocks nor reflects: a body that does, such as
+    /// the black back of a ceiling panel, is an obstacle of its own.
     Area,
     /// An impostor surface that a renderer samples for the light behind it (Radiance's illum).
     Impostor,

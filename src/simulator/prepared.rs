@@ -7,7 +7,7 @@ use crate::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
 use crate::units::Lux;
 
 /// Below this relative error radiosity is not tried: its finest mesh does not get there.
-const RADIOSITY_REACHES: f64 = 1e-3;
+const RADIOSITY_REACHES: f64 = 2e-3;
 /// Half width of a 95 % t-interval with seven degrees of freedom, in standard errors.
 const STUDENT_T: f64 = 2.365;
 
@@ -27,7 +27,7 @@ enum Solver {
     Empty(Vec<(usize, BoxField)>),
     /// Boxes, plates and rectangular openings.
     Furnished(Box<Furnished>),
-    /// Meshes, round openings, bodies outside a room.
+    /// Meshes, round openings, bodies outside a room, more bodies than radiosity can mesh.
     PathsOnly,
 }
 
@@ -66,7 +66,7 @@ impl Prepared {
     fn solve(&mut self, meters: &[Meter]) -> Result<Solution, SimulatorError> {
         if matches!(self.solver, Solver::PathsOnly) {
             let mut solution = path_tracing::illuminance(&self.scene, meters, self.transport, &self.accuracy)?;
-            solution.solver += ": meshes, round openings or bodies without a room";
+            solution.solver += ": meshes, round openings, bodies without a room or too many of them";
             return Ok(solution);
         }
         match self.transport {

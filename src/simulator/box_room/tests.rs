@@ -222,7 +222,6 @@ fn interreflection_in_a_cube_is_phi_rho_over_area_times_absorption() {
     for (rho, published) in [(0.05, 5.482), (0.5, 104.167), (0.95, 1979.17)] {
         assert_relative_eq!(furnace_mean(rho, &EFFORTS[3]), published, max_relative = 1e-4);
     }
-    let exact = |rho: f64| 10_000.0 / 96.0 * rho / (1.0 - rho);
     for (rho, tolerance) in [(0.05, 1e-9), (0.5, 1e-9), (0.95, 1e-9), (0.999, 1e-9), (1.0 - 1e-9, 1e-6)] {
         let exact = 10_000.0 / 96.0 * rho / (1.0 - rho);
         assert_relative_eq!(furnace_mean(rho, &EFFORTS[1]), exact, max_relative = 1e-6_f64.min(100.0 * tolerance));

@@ -85,7 +85,7 @@ fn gather(quarters: [&Nine; 4]) -> Nine {
 }
 
 /// The parabolas through the three nodes.
-fn basis(x: f64) -> [f64; 3] {
+pub(super) fn basis(x: f64) -> [f64; 3] {
     let s = x / RULE[2].0;
     [0.5 * s * (s - 1.0), 1.0 - s * s, 0.5 * s * (s + 1.0)]
 }

@@ -5,10 +5,10 @@
 
 use glam::DVec3;
 
-use super::exitance::{Exitance, QUARTERS, RULE};
+use super::exitance::{Exitance, Nine, QUARTERS, RULE, basis};
 use super::patches::Patch;
 use crate::geometry::configuration_factor::element_to_polygon;
-use crate::simulator::visibility::{Occluder, candidates, visible_pieces};
+use crate::simulator::visibility::{Occluder, candidates, clip, visible_pieces};
 
 /// A part this many radii away is integrated by the nine-point rule: 2e-5 of its factor.
 const FAR: f64 = 5.0;
@@ -19,11 +19,20 @@ const DEEPEST_CLIPPED: u32 = 2;
 /// A configuration factor and what goes with it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Factor {
-    pub(super) whole: f64,
-    /// Weighted with the distance from the patch's centre along each side.
-    pub(super) moments_m: [f64; 2],
+    /// For biquadratic exitance of 1 at one of the patch's nodes and 0 at the others, in their order.
+    pub(super) by_node: Nine,
     /// Weighted with the patch's own exitance.
     pub(super) weighted: f64,
+}
+
+impl Factor {
+    fn add(&mut self, seen: f64, a: f64, b: f64, exitance: f64) {
+        let (u, v) = (basis(a), basis(b));
+        for (k, sum) in self.by_node.iter_mut().enumerate() {
+            *sum += seen * u[k / 3] * v[k % 3];
+        }
+        self.weighted += seen * exitance;
+    }
 }
 
 /// A part of a patch, in coordinates of -1..=1 along both sides.
@@ -87,9 +96,10 @@ pub(super) fn factor(
     let (u, v) = (0.5 * patch.side_m(0), 0.5 * patch.side_m(1));
     let view = View { position_m, normal, patch, u, v };
     let hiding = candidates(position_m, &patch.corners_m, occluders);
+    if view.is_hidden(&patch.corners_m, &hiding) {
+        return factor;
+    }
     view.add(Part::whole(exitance), &hiding, &mut factor);
-    let (length_u, length_v) = (u.length(), v.length());
-    factor.moments_m = [factor.moments_m[0] * length_u, factor.moments_m[1] * length_v];
     factor
 }
 
@@ -106,9 +116,8 @@ impl View<'_> {
         if hiding.is_empty() && far && height >= radius {
             return self.add_far(part, away, factor);
         }
-        let deepest = if hiding.is_empty() && height >= radius { DEEPEST } else { DEEPEST_CLIPPED };
-        let rough = part.exitance.quarters().is_some() && part.depth < DEEPEST;
-        if !rough && (part.depth >= deepest || (far && part.depth > 0)) {
+        let deepest = if hiding.is_empty() { DEEPEST } else { DEEPEST_CLIPPED };
+        if part.depth >= deepest || (far && part.depth > 0) {
             return self.add_clipped(part, hiding, factor);
         }
         for quarter in part.quarters() {
@@ -117,11 +126,19 @@ impl View<'_> {
                 continue;
             }
             let outline = self.corners(quarter);
+            if self.is_hidden(&outline, hiding) {
+                continue;
+            }
             let centre = 0.5 * (outline[0] + outline[2]);
             let still: Vec<_> =
                 hiding.iter().copied().filter(|o| o.may_hide(self.position_m, &outline, centre)).collect();
             self.add(quarter, &still, factor);
         }
+    }
+
+    /// Whether one body, being convex, hides all of an outline.
+    fn is_hidden(&self, outline: &[DVec3; 4], hiding: &[&Occluder]) -> bool {
+        hiding.iter().any(|o| outline.iter().all(|corner| o.blocks(self.position_m, *corner)))
     }
 
     fn corners(&self, part: Part) -> [DVec3; 4] {
@@ -141,20 +158,20 @@ impl View<'_> {
                 let (a, b) = (part.a + part.half * x, part.b + part.half * y);
                 let own = part.half == part.within.2;
                 let exitance = if own { part.exitance.at_node(3 * i + j) } else { part.exitance_at(a, b) };
-                factor.whole += seen;
-                factor.moments_m[0] += seen * a;
-                factor.moments_m[1] += seen * b;
-                factor.weighted += seen * exitance;
+                factor.add(seen, a, b, exitance);
             }
         }
     }
 
     fn add_clipped(&self, part: Part, hiding: &[&Occluder], factor: &mut Factor) {
-        let outline = self.corners(part);
-        if hiding.is_empty() {
-            return self.add_piece(part, &outline, factor);
+        let above = clip(&self.corners(part), self.normal, self.position_m);
+        if above.len() < 3 {
+            return;
         }
-        for piece in visible_pieces(self.position_m, &outline, hiding) {
+        if hiding.is_empty() {
+            return self.add_piece(part, &above, factor);
+        }
+        for piece in visible_pieces(self.position_m, &above, hiding) {
             self.add_piece(part, &piece, factor);
         }
     }
@@ -174,9 +191,6 @@ impl View<'_> {
         let from_centre = sum / weight - self.patch.centre_m;
         let a = from_centre.dot(self.u) / self.u.length_squared();
         let b = from_centre.dot(self.v) / self.v.length_squared();
-        factor.whole += seen;
-        factor.moments_m[0] += seen * a;
-        factor.moments_m[1] += seen * b;
-        factor.weighted += seen * part.exitance_at(a, b);
+        factor.add(seen, a, b, part.exitance_at(a, b));
     }
 }

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
+use super::exitance::RULE;
 use crate::geometry::{Room, Surface};
 use crate::scene::{Obstacle, Shape};
 use crate::simulator::visibility::Occluder;
@@ -13,6 +14,10 @@ const CONTACT: f64 = 1e-9;
 /// A body nearer to a surface than this fraction of the room leaves its outline in the surface's patches.
 const NEARBY: f64 = 0.1;
 
+/// Patches before a narrow gap are at most so many times as long as it is wide.
+const GAPS_LONG: f64 = 1.0;
+/// Parts of an edge at most, however narrow the gap before it: what a gap of no width would need ends nowhere.
+const MOST_PARTS: f64 = 24.0;
 /// A rectangle of uniform reflectance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Patch {
@@ -23,8 +28,6 @@ pub(super) struct Patch {
     pub(super) radius_m: f64,
     pub(super) area_m2: f64,
     pub(super) reflectance: f64,
-    /// How the exitance changes along the patch's two sides, from its own panel's patches.
-    pub(super) slopes: [Slope; 2],
 }
 
 impl Patch {
@@ -34,18 +37,16 @@ impl Patch {
         [at(a - half, b - half), at(a + half, b - half), at(a + half, b + half), at(a - half, b + half)]
     }
 
+    /// The nine nodes of biquadratic exitance, second side fastest.
+    pub(super) fn nodes_m(&self) -> [DVec3; 9] {
+        std::array::from_fn(|k| self.centre_m + 0.5 * (RULE[k / 3].0 * self.side_m(0) + RULE[k % 3].0 * self.side_m(1)))
+    }
+
     /// The first or the second side as a vector.
     pub(super) fn side_m(&self, side: usize) -> DVec3 {
         let [a, b, _, d] = self.corners_m;
         if side == 0 { b - a } else { d - a }
     }
-}
-
-/// A difference quotient: up to three patches of a row and their weights, summing to zero, per metre.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Slope {
-    pub(super) patches: [u32; 3],
-    pub(super) weights: [f64; 3],
 }
 
 /// A body with its reflectance.
@@ -81,6 +82,16 @@ pub(super) fn bodies(room: &Room, obstacles: &[Obstacle]) -> Option<Vec<Body>> {
     (bodies.iter().all(inside) && all_apart).then_some(bodies)
 }
 
+/// Whether a body is a plate upon a surface of the room.
+pub(super) fn lies_flat(room: &Room, shape: &Occluder) -> bool {
+    let slack = CONTACT * room.size_m.max_element();
+    let flat = |axis: usize| {
+        let (low, high) = (shape.min_m[axis], shape.max_m[axis]);
+        low == high && (low <= slack || high >= room.size_m[axis] - slack)
+    };
+    (0..3).any(flat)
+}
+
 /// A box, or a mesh of two triangles that is an axis-aligned plate.
 fn aligned(shape: &Shape) -> Option<Occluder> {
     match shape {
@@ -106,31 +117,25 @@ fn aligned(shape: &Shape) -> Option<Occluder> {
     }
 }
 
-/// Every patch that can be seen; `size_m` is the longest side before it is divided by `multiple`.
-pub(super) fn patches(room: &Room, bodies: &[Body], size_m: f64, multiple: usize) -> Vec<Patch> {
+/// How long patches are: as a rule, and how often shorter than that and than what the gap before them allows.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fineness {
+    pub(super) side_m: f64,
+    pub(super) divisor: f64,
+}
+
+/// Every patch that can be seen.
+pub(super) fn patches(room: &Room, bodies: &[Body], fineness: Fineness) -> Vec<Patch> {
     let scale = room.size_m.max_element();
     let mut patches = vec![];
     for panel in panels(room, bodies) {
         let (u, v) = ((panel.axis + 1) % 3, (panel.axis + 2) % 3);
-        let (us, vs) = [u, v].map(|along| cuts(&panel, along, bodies, scale, size_m, multiple)).into();
-        let mut places = vec![];
+        let [us, vs] = [u, v].map(|along| cuts(&panel, along, room, bodies, fineness));
         for su in us.windows(2) {
             for sv in vs.windows(2) {
                 let patch = panel.patch((su[0], su[1]), (sv[0], sv[1]));
-                let seen = !is_covered(&panel, &patch, bodies, scale);
-                places.push(seen.then_some(patches.len()));
-                patches.extend(seen.then_some(patch));
+                patches.extend((!is_covered(&panel, &patch, bodies, scale)).then_some(patch));
             }
-        }
-        let count = vs.len() - 1;
-        for (k, place) in places.iter().enumerate() {
-            let Some(own) = *place else { continue };
-            let rows = [(u, us.len() - 1, k / count, count), (v, count, k % count, 1)];
-            let slopes = rows.map(|(along, length, at, stride)| {
-                let other = |i: usize| places[k + i * stride - at * stride].map(|p| (p, patches[p].centre_m[along]));
-                slope(at, length, other)
-            });
-            patches[own].slopes = slopes;
         }
     }
     patches
@@ -165,47 +170,29 @@ fn panels(room: &Room, bodies: &[Body]) -> Vec<Panel> {
     panels
 }
 
-/// The derivative at place `at` of the parabola through the nearest three patches of a row without gaps.
-fn slope(at: usize, length: usize, patch: impl Fn(usize) -> Option<(usize, f64)>) -> Slope {
-    let unbroken =
-        |run: &std::ops::RangeInclusive<usize>| *run.end() < length && run.clone().all(|i| patch(i).is_some());
-    let around = [(at >= 1).then(|| at - 1..=at + 1), Some(at..=at + 2), (at >= 2).then(|| at - 2..=at)];
-    let pairs = [Some(at..=at + 1), (at >= 1).then(|| at - 1..=at)];
-    let Some(run) = around.into_iter().chain(pairs).flatten().find(unbroken) else { return Slope::default() };
-    let points: Vec<_> = run.filter_map(&patch).collect();
-    let here = patch(at).map_or(0.0, |p| p.1);
-    let mut slope = Slope::default();
-    for (k, (index, x)) in points.iter().enumerate() {
-        // The derivative of a Lagrange polynomial: the sum over its factors, each left out once.
-        let others: Vec<f64> = points.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, p)| p.1).collect();
-        let scale: f64 = others.iter().map(|o| x - o).product();
-        let sum = match others.as_slice() {
-            [a, b] => (here - a) + (here - b),
-            _ => 1.0,
-        };
-        slope.patches[k] = *index as u32;
-        slope.weights[k] = sum / scale;
-    }
-    slope
-}
-
 /// Coordinates along an axis at which a panel is cut.
-fn cuts(panel: &Panel, along: usize, bodies: &[Body], scale: f64, size_m: f64, multiple: usize) -> Vec<f64> {
+fn cuts(panel: &Panel, along: usize, room: &Room, bodies: &[Body], fineness: Fineness) -> Vec<f64> {
+    let scale = room.size_m.max_element();
     let (low, high) = (panel.low_m[along], panel.high_m[along]);
+    let near: Vec<(f64, f64, f64)> = bodies
+        .iter()
+        .enumerate()
+        .filter(|(k, _)| panel.owner != Some(*k))
+        .map(|(_, body)| (panel.gap_m(&body.shape), body.shape.min_m[along], body.shape.max_m[along]))
+        .filter(|(gap, ..)| *gap <= NEARBY * scale)
+        .collect();
     let mut marks = vec![low, high];
-    for (k, body) in bodies.iter().enumerate() {
-        let shape = &body.shape;
-        let gap = (shape.min_m[panel.axis] - panel.coordinate_m).max(panel.coordinate_m - shape.max_m[panel.axis]);
-        if panel.owner != Some(k) && gap <= NEARBY * scale {
-            marks.extend([shape.min_m[along], shape.max_m[along]]);
-        }
-    }
+    marks.extend(near.iter().flat_map(|(_, start, end)| [*start, *end]));
     marks.retain(|x| *x >= low && *x <= high);
     marks.sort_by(f64::total_cmp);
     marks.dedup_by(|a, b| *a - *b <= CONTACT * scale);
     let mut cuts = vec![marks[0]];
     for w in marks.windows(2) {
-        let parts = ((w[1] - w[0]) / size_m).round().max(1.0) as usize * multiple;
+        let middle = 0.5 * (w[0] + w[1]);
+        let faced = near.iter().filter(|(gap, start, end)| *gap > CONTACT * scale && (*start..=*end).contains(&middle));
+        let gap = faced.map(|(gap, ..)| *gap).fold(panel.gap_to_room_m(room), f64::min);
+        let side_m = fineness.side_m.min(GAPS_LONG * gap) / fineness.divisor;
+        let parts = ((w[1] - w[0]) / side_m).round().clamp(1.0, MOST_PARTS) as usize;
         // Irradiance runs like powers of the distance to where surfaces meet: patches shrink towards it.
         let graded = |k: usize| (0.5 * PI * k as f64 / parts as f64).sin().powi(2);
         cuts.extend((1..=parts).map(|k| {
@@ -228,6 +215,20 @@ fn is_covered(panel: &Panel, patch: &Patch, bodies: &[Body], scale: f64) -> bool
 }
 
 impl Panel {
+    /// The distance to a body before or behind it.
+    fn gap_m(&self, shape: &Occluder) -> f64 {
+        (shape.min_m[self.axis] - self.coordinate_m).max(self.coordinate_m - shape.max_m[self.axis])
+    }
+
+    /// The distance to the surface of the room that a side of a body looks at; none for the room's own surfaces.
+    fn gap_to_room_m(&self, room: &Room) -> f64 {
+        match (self.owner, self.far) {
+            (None, _) => f64::INFINITY,
+            (_, true) => room.size_m[self.axis] - self.coordinate_m,
+            (_, false) => self.coordinate_m,
+        }
+    }
+
     fn patch(&self, su: (f64, f64), sv: (f64, f64)) -> Patch {
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
         let at = |a: f64, b: f64| {
@@ -245,7 +246,6 @@ impl Panel {
             radius_m: 0.5 * corners_m[0].distance(corners_m[2]),
             area_m2: (su.1 - su.0) * (sv.1 - sv.0),
             reflectance: self.reflectance,
-            slopes: [Slope::default(); 2],
         }
     }
 }
