@@ -247,7 +247,11 @@ fn of_transport(task: &Task) -> Vec<Fault> {
         let of = |bounces| if total { Transport::Total(bounces) } else { Transport::Indirect(bounces) };
         let most = if let Bounces::AtMost(n) = bounces { n.min(MOST_BOUNCES) } else { MOST_BOUNCES };
         for n in 0..most {
-            light("bounces-cut", &format!("light stops after {n} reflections"), of(Bounces::AtMost(n)));
+            light(
+                "bounces-cut",
+                &format!("light stops after {n} reflection{}", if n == 1 { "" } else { "s" }),
+                of(Bounces::AtMost(n)),
+            );
         }
         if total {
             light("direct-lost", "direct light is missing", Transport::Indirect(bounces));
