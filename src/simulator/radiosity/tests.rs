@@ -1,9 +1,15 @@
 //! Laws that a furnished room must obey.
 
+use std::f64::consts::PI;
+
+use approx::assert_relative_eq;
 use glam::DVec3;
 
-use crate::scene::{Bounces, Meter, Transport};
-use crate::simulator::path_tracing::test_scenes::{S2_VALUES, s1, s1_meters, s2, s2_meters, up};
+use crate::geometry::configuration_factor::element_to_polygon;
+use crate::geometry::{Reflectances, Room};
+use crate::photometry::{LuminousIntensityDistribution, LuminousOpening};
+use crate::scene::{Bounces, Meter, Obstacle, Scene, Shape, Transport};
+use crate::simulator::path_tracing::test_scenes::{S2_VALUES, luminaire, s1, s1_meters, s2, s2_meters, up};
 use crate::simulator::{Accuracy, Uncertainty, illuminance};
 
 fn bound(uncertainty: Uncertainty) -> f64 {
@@ -59,8 +65,8 @@ fn an_empty_room_comes_out_as_hp_collocation_says() {
         scene.obstacles.clear();
         let exact = illuminance(&scene, &meters, Transport::Indirect(bounces), &accuracy(1e-4)).unwrap();
         let (min_m, max_m) = (DVec3::new(10.0, 10.0, 0.0), DVec3::new(10.01, 10.01, 0.01));
-        let shape = crate::scene::Shape::Box { min_m, max_m };
-        scene.obstacles.push(crate::scene::Obstacle { shape, reflectance: 0.2 });
+        let shape = Shape::Box { min_m, max_m };
+        scene.obstacles.push(Obstacle { shape, reflectance: 0.2 });
         let solution = illuminance(&scene, &meters, Transport::Indirect(bounces), &accuracy(1.0)).unwrap();
         assert!(solution.solver.contains("radiosity"), "{}", solution.solver);
         for (estimate, exact) in solution.estimates.iter().zip(&exact.estimates) {
@@ -70,4 +76,80 @@ fn an_empty_room_comes_out_as_hp_collocation_says() {
             assert!(error <= 5e-3 * exact.illuminance.value(), "{bounces:?}: {error}");
         }
     }
+}
+
+fn cuboid(min: [f64; 3], max: [f64; 3], reflectance: f64) -> Obstacle {
+    Obstacle { shape: Shape::Box { min_m: DVec3::from(min), max_m: DVec3::from(max) }, reflectance }
+}
+
+/// CIE 171 case 5.3: a 1 m square of exitance 1000 π centred on the ceiling of a black room, 4 m by 4 m by 3 m.
+#[test]
+fn an_area_source_lights_walls_and_floor_as_configuration_factors_say() {
+    let gamma: Vec<f64> = (0..=9000).map(|k| 0.01 * f64::from(k)).collect();
+    let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
+    let distribution = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
+    let opening = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
+    let source = luminaire(distribution, opening, DVec3::new(2.0, 2.0, 3.0));
+    let room = Room { size_m: DVec3::new(4.0, 4.0, 3.0), reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+    let scene = Scene { room: Some(room), obstacles: vec![], luminaires: vec![source] };
+    let wall = [(2.75, 32.677), (2.25, 75.194), (1.75, 81.323), (1.25, 69.061), (0.75, 53.404), (0.25, 40.002)];
+    let floor = [(0.25, 61.424), (0.75, 79.255), (1.25, 95.667), (1.75, 105.778)];
+    // A nanometre off the surfaces.
+    let on_wall = wall.map(|(z, lux)| (Meter { position_m: DVec3::new(2.0, 1e-9, z), normal: DVec3::Y }, lux));
+    let on_floor = floor.map(|(y, lux)| (up(2.0, y, 1e-9), lux));
+    let (meters, published): (Vec<_>, Vec<_>) = on_wall.into_iter().chain(on_floor).unzip();
+    let found = illuminance(&scene, &meters, Transport::Total(Bounces::Converged), &accuracy(1e-2)).unwrap();
+    for ((estimate, meter), published) in found.estimates.iter().zip(&meters).zip(published) {
+        let square = [(1.5, 1.5), (2.5, 1.5), (2.5, 2.5), (1.5, 2.5)].map(|(x, y)| DVec3::new(x, y, 3.0));
+        let exact = 1000.0 * PI * element_to_polygon(meter.position_m, meter.normal, &square);
+        assert_relative_eq!(estimate.illuminance.value(), exact, max_relative = 1e-6);
+        assert_relative_eq!(exact, published, epsilon = 1e-3);
+    }
+}
+
+/// CIE 171 case 5.7: an opaque screen between a lit surface and the meter.
+#[test]
+fn a_screen_hides_the_reflected_light_that_it_should() {
+    let spot = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0, 100.0]).unwrap();
+    let reflectance = Reflectances { floor: 0.5, ..Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+    let room = Room { size_m: DVec3::new(4.0, 4.0, 3.0), reflectance };
+    let lamp = luminaire(spot, LuminousOpening::Point, DVec3::new(1.0, 2.0, 1.0));
+    let screen = cuboid([1.99, 0.0, 0.0], [2.01, 4.0, 1.2], 0.0);
+    let scene = Scene { room: Some(room), obstacles: vec![screen], luminaires: vec![lamp] };
+    let meter = |x, z| Meter { position_m: DVec3::new(x, 2.0, z), normal: DVec3::NEG_Z };
+    let meters = [meter(3.5, 0.5), meter(3.0, 2.5)];
+    let once = Transport::Indirect(Bounces::AtMost(1));
+    let found = illuminance(&scene, &meters, once, &accuracy(1e-2)).unwrap();
+    // Behind the screen the meter sees only floor in the screen's shadow: the lamp hangs below its top.
+    assert_eq!(found.estimates[0].illuminance.value(), 0.0);
+    // From above, midpoints of 2 cm squares of lit floor; light and view both pass the screen or do not.
+    let (mut exact, step) = (0.0, 0.02);
+    for i in 0..200 {
+        for j in 0..200 {
+            let p = DVec3::new((f64::from(i) + 0.5) * step, (f64::from(j) + 0.5) * step, 0.0);
+            let down = p - DVec3::new(1.0, 2.0, 1.0);
+            let view = meters[1].position_m - p;
+            let height_at = |x: f64| view.z * (x - p.x) / view.x;
+            if p.x > 1.99 || height_at(1.99) < 1.2 || height_at(2.01) < 1.2 {
+                continue;
+            }
+            let lit = 100.0 / down.length_squared().powf(1.5);
+            exact += 0.5 * lit / PI * (view.z / view.length_squared()).powi(2) * step * step;
+        }
+    }
+    let seen = found.estimates[1];
+    let error = (seen.illuminance.value() - exact).abs();
+    assert!(exact > 0.0 && error <= bound(seen.uncertainty) + 0.02 * exact, "{seen:?}, {exact}");
+}
+
+#[test]
+fn more_bodies_than_can_be_meshed_go_to_another_solver() {
+    let mut scene = s2();
+    for k in 0..60 {
+        let (x, y) = (0.1 + 0.12 * f64::from(k % 30), 5.0 + 0.3 * f64::from(k / 30));
+        scene.obstacles.push(cuboid([x, y, 0.1], [x + 0.05, y + 0.05, 0.2], 0.5));
+    }
+    let found =
+        illuminance(&scene, &s2_meters()[..1], Transport::Indirect(Bounces::Converged), &accuracy(0.1)).unwrap();
+    assert!(found.solver.contains("path tracing"), "{}", found.solver);
 }
