@@ -153,3 +153,23 @@ fn more_bodies_than_can_be_meshed_go_to_another_solver() {
         illuminance(&scene, &s2_meters()[..1], Transport::Indirect(Bounces::Converged), &accuracy(0.1)).unwrap();
     assert!(found.solver.contains("path tracing"), "{}", found.solver);
 }
+
+/// Against path tracing at 184 meters, kept with the benchmark: x, y, lux, standard error.
+#[test]
+fn bounds_hold_at_every_meter_of_s2() {
+    let lines = include_str!("../../../benches/s2_indirect.txt").lines().filter(|line| !line.starts_with('#'));
+    let truth: Vec<Vec<f64>> = lines.map(|line| line.split(' ').map(|n| n.parse().unwrap()).collect()).collect();
+    assert_eq!(truth.len(), 184);
+    let meters: Vec<Meter> = truth.iter().map(|v| up(v[0], v[1], 0.8)).collect();
+    let converged = Transport::Indirect(Bounces::Converged);
+    let solution = illuminance(&s2(), &meters, converged, &accuracy(0.1)).unwrap();
+    let mut errors = vec![];
+    for (estimate, v) in solution.estimates.iter().zip(&truth) {
+        let error = (estimate.illuminance.value() - v[2]).abs();
+        let bound = bound(estimate.uncertainty);
+        assert!(error <= bound + 3.0 * v[3], "{error} beyond {bound} at {} {}", v[0], v[1]);
+        errors.push(error / v[2]);
+    }
+    errors.sort_by(f64::total_cmp);
+    assert!(errors[92] <= 5e-4 && errors[183] <= 4e-3, "median {}, worst {}", errors[92], errors[183]);
+}
