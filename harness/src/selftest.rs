@@ -114,7 +114,8 @@ fn cases(folder: &Path) -> Result<Vec<Case>, SelftestError> {
         made.and_then(|()| std::fs::write(&path, text))
             .map_err(|e| SelftestError(format!("{}: {e}", path.display())))?;
     }
-    let specs = FILES.iter().filter(|(name, _)| name.ends_with(".yaml"));
+    let is_spec = |name: &str| Path::new(name).extension().is_some_and(|e| e == "yaml");
+    let specs = FILES.iter().filter(|(name, _)| is_spec(name));
     specs.map(|(name, _)| Case::load(&folder.join(name)).map_err(|e| SelftestError(e.to_string()))).collect()
 }
 

@@ -186,7 +186,7 @@ fn of_luminaires(task: &Task) -> Vec<Fault> {
         of_each(id, &what, &|l| remap(l, |c, g| (c - turn, g)));
     }
     of_each("c-mirrored", "C runs the other way round: 90 and 270 degrees are exchanged", &|l| {
-        remap(l, |c, g| (-c, g))
+        remap(l, |c, g| (-c, g));
     });
     of_each("c-mirrored-90", "C 0 and C 180 are exchanged", &|l| remap(l, |c, g| (180.0 - c, g)));
     of_each("gamma-flipped", "gamma is counted from the zenith: up and down are exchanged", &|l| {
@@ -227,10 +227,14 @@ fn of_room(task: &Task) -> Vec<Fault> {
     }));
     // The exponent of display gamma, as an RGB colour would be decoded.
     faults.extend(with("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", &|r| {
-        Surface::ALL.iter().for_each(|s| *reflectance(r, *s) = room.reflectance.of(*s).powf(2.2));
+        for surface in Surface::ALL {
+            *reflectance(r, surface) = room.reflectance.of(surface).powf(2.2);
+        }
     }));
     faults.extend(with("gamma-encoded", "reflectances are encoded as colours, to the power of 1/2.2", &|r| {
-        Surface::ALL.iter().for_each(|s| *reflectance(r, *s) = room.reflectance.of(*s).powf(1.0 / 2.2));
+        for surface in Surface::ALL {
+            *reflectance(r, surface) = room.reflectance.of(surface).powf(1.0 / 2.2);
+        }
     }));
     faults
 }
