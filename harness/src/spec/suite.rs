@@ -83,7 +83,7 @@ mod tests {
         assert!(found.is_sorted() && found.len() >= 10, "{found:?}");
         assert_eq!(names(&[reference("analytic/*.yaml")]).unwrap(), found);
         let spec = |name: &str| reference("analytic").join(name);
-        assert_eq!(names(&[spec("s2.yaml"), spec("s1.yaml")]).unwrap(), ["s2", "s1"]);
+        assert_eq!(names(&[spec("s2.yaml"), spec("s1.yaml")]).unwrap(), ["s2/direct", "s2/indirect", "s1"]);
     }
 
     #[test]
