@@ -7,6 +7,7 @@
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
 
@@ -26,12 +27,19 @@ const UNEVEN: f64 = 3.0123;
 /// Which of two lengths is longer: no 1, because equal ones are frequent and rounding would decide.
 const TIE: f64 = 1.000_123;
 
+/// Points that are kept for the next receiver, 32 bytes each; beyond that they are made anew every time.
+///
+/// A dozen luminaires with fine tables would keep gigabytes otherwise.
+const MOST_KEPT: usize = 4_000_000;
+
 /// Everything that the luminaires light, as patches that halve themselves near a receiver.
 #[derive(Debug)]
 pub(super) struct FirstBounce {
     room: Room,
     sources: Vec<Source>,
     rule: Gauss,
+    /// Points kept so far.
+    kept: AtomicUsize,
     /// Patches are halved until they lie at least this many half-lengths away.
     reach: f64,
 }
@@ -91,7 +99,8 @@ impl FirstBounce {
                 Source { frame, faces }
             })
             .collect();
-        Self { room: *room, sources, rule: Gauss::new(effort.source_points), reach: 1.0123 * effort.source_reach }
+        let (rule, kept) = (Gauss::new(effort.source_points), AtomicUsize::new(0));
+        Self { room: *room, sources, rule, kept, reach: 1.0123 * effort.source_reach }
     }
 
     /// Irradiance at a receiver, in lux, of light reflected once.
@@ -131,7 +140,7 @@ impl FirstBounce {
                     if patch.is_uneven() {
                         stack.extend(patch.halves(source, &self.room, face));
                     } else {
-                        sum += rho * patch.points(source, &self.room, face, &self.rule).flux.iter().sum::<f64>();
+                        sum += rho * self.at_points(patch, source, face, |points| points.flux.iter().sum());
                     }
                 }
             }
@@ -149,10 +158,23 @@ impl FirstBounce {
             if (patch.is_uneven() || reach * reach > gap.length_squared()) && patch.half_length_m > smallest {
                 stack.extend(patch.halves(source, &self.room, face));
             } else {
-                sum += patch.points(source, &self.room, face, &self.rule).irradiance(receiver, face);
+                sum += self.at_points(patch, source, face, |points| points.irradiance(receiver, face));
             }
         }
         sum
+    }
+
+    /// Evaluates something at a patch's points, which are kept as long as there is room: the result is the same.
+    fn at_points(&self, patch: &Patch, source: &Source, face: Face, f: impl Fn(&Points) -> f64) -> f64 {
+        if let Some(points) = patch.points.get() {
+            return f(points);
+        }
+        let points = patch.sample(&source.frame, &self.room, face, &self.rule);
+        let value = f(&points);
+        if self.kept.fetch_add(points.flux.len(), Ordering::Relaxed) < MOST_KEPT {
+            patch.points.set(points).ok();
+        }
+        value
     }
 }
 
@@ -191,10 +213,6 @@ impl Patch {
 
     fn halves(&self, source: &Source, room: &Room, face: Face) -> &[Self; 2] {
         self.halves.get_or_init(|| self.halve(&source.frame, room, face))
-    }
-
-    fn points(&self, source: &Source, room: &Room, face: Face, rule: &Gauss) -> &Points {
-        self.points.get_or_init(|| self.sample(&source.frame, room, face, rule))
     }
 
     fn halve(&self, frame: &LuminaireFrame, room: &Room, face: Face) -> Box<[Self; 2]> {
