@@ -140,8 +140,7 @@ fn support(job: &Job) -> Support {
 /// The bias of radiosity's cache, as measured against exact values, and what twenty reflections leave out.
 fn cache_error(mean_reflectance: f64, bounces: Bounces, preset: Preset) -> Support {
     let interpolation = match preset {
-        Preset::Audit if mean_reflectance >= 0.9 => 0.09,
-        Preset::Audit => AUDIT_BIAS,
+        Preset::Audit => audit_bias(mean_reflectance),
         Preset::Default => 0.26,
         Preset::Fast => 0.05,
     };
@@ -155,6 +154,20 @@ fn cache_error(mean_reflectance: f64, bounces: Bounces, preset: Preset) -> Suppo
         why.push_str("; POV-Ray follows 20 reflections at most");
     }
     Support::Approximate { why, size: Some(interpolation + cut) }
+}
+
+/// Bias of the audit preset by mean reflectance, linear between what was measured: case S1 at .5; a closed 6 m room of .7
+/// everywhere, +1.0 to +3.0 % within .2 %, most where it is darkest (8 blocks of 102 rays); rooms of .9, up to +9 %.
+fn audit_bias(mean_reflectance: f64) -> f64 {
+    let between = |(x, y): (f64, f64), (a, b): (f64, f64)| y + (b - y) * (mean_reflectance - x) / (a - x);
+    let (usual, bright, white) = ((0.5, AUDIT_BIAS), (0.7, 0.03), (0.9, 0.09));
+    if mean_reflectance <= usual.0 {
+        usual.1
+    } else if mean_reflectance <= bright.0 {
+        between(usual, bright)
+    } else {
+        between(bright, white).min(white.1)
+    }
 }
 
 /// Bias of the audit preset, relative: in S1, 12 blocks of 200 rays a sample read -.04 to +.07 % off the exact values, each

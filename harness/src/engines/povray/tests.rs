@@ -221,6 +221,17 @@ fn indirect_light_of_s1_is_exact_within_its_errors_and_the_named_bias() {
 }
 
 #[test]
+fn brighter_rooms_have_a_larger_named_bias() {
+    let named = |rho: f64| match super::cache_error(rho, Bounces::AtMost(7), Preset::Audit) {
+        Support::Approximate { size: Some(size), .. } => size,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!([0.3, 0.5].map(named), [0.005; 2]);
+    assert!((named(0.7) - 0.03).abs() < 1e-12 && (named(0.95) - 0.09).abs() < 1e-12);
+    assert!(named(0.6) > named(0.5) && named(0.8) > named(0.7));
+}
+
+#[test]
 fn reflections_are_cut_at_the_number_asked_for() {
     let seven = in_eight_blocks(s1(Transport::Indirect(Bounces::AtMost(7))), 100);
     within_errors_and_named_bias(&read(&seven), &S1_SEVEN_LX);
