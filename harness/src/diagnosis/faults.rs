@@ -183,7 +183,7 @@ fn of_luminaires(task: &Task) -> Vec<Fault> {
     for turn in [90.0, 180.0, 270.0] {
         let id = ["c-turned-90", "c-turned-180", "c-turned-270"][(turn / 90.0) as usize - 1];
         let what = format!("the distribution is turned by {turn} degrees in C");
-        of_each(id, &what, &|l| remap(l, |c, g| (c - turn, g)));
+        of_each(id, &what, &|l| replace(l, l.photometry.distribution.turned(turn)));
     }
     of_each("c-mirrored", "C runs the other way round: 90 and 270 degrees are exchanged", &|l| {
         remap(l, |c, g| (-c, g));
@@ -285,10 +285,9 @@ fn replace(luminaire: &mut Luminaire, distribution: LuminousIntensityDistributio
 /// Reads the table at other angles: at its own nodes and their images, so that nothing is lost between them.
 fn remap(luminaire: &mut Luminaire, source: impl Fn(f64, f64) -> (f64, f64)) {
     let table = luminaire.photometry.distribution.full_circle();
-    // Every map is its own inverse, or a turn whose images are nodes less a multiple of 90 degrees.
-    let images =
-        |c: &f64| [0.0, 90.0, 180.0, 270.0].map(|turn| [(c + turn).rem_euclid(360.0), (turn - c).rem_euclid(360.0)]);
-    let mut c_deg: Vec<f64> = table.c_deg().iter().flat_map(images).flatten().chain([0.0, 360.0]).collect();
+    // Every map is its own inverse: nodes of C go to their mirror images about C 0 or C 90.
+    let images = |c: &f64| [*c, (-c).rem_euclid(360.0), (180.0 - c).rem_euclid(360.0)];
+    let mut c_deg: Vec<f64> = table.c_deg().iter().flat_map(images).chain([0.0, 360.0]).collect();
     let mut gamma_deg: Vec<f64> = table.gamma_deg().iter().flat_map(|g| [*g, source(0.0, *g).1]).collect();
     for angles in [&mut c_deg, &mut gamma_deg] {
         angles.sort_by(f64::total_cmp);
