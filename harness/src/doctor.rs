@@ -70,7 +70,7 @@ fn check(
         site: site.clone(),
         scene_dir: folder.path().to_owned(),
         log: folder.path().join("log"),
-        jobs: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        jobs: crate::process::cores(),
         limit: std::time::Duration::from_secs(120),
     };
     let measurement = checked(&id, &job, engine.read(&job, &workbench)?)?;

@@ -25,6 +25,27 @@ pub fn is_interrupted() -> bool {
     INTERRUPTED.load(Ordering::SeqCst)
 }
 
+/// How many threads or processes run side by side where nobody says: one a core.
+pub fn cores() -> usize {
+    thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+/// Asks a program about itself, its version say, in a folder of its own: in a shared one another user's log could not
+/// be written.
+pub fn ask(
+    program: PathBuf,
+    question: &str,
+    prepare: impl FnOnce(Invocation) -> Invocation,
+) -> Result<Finished, ProcessError> {
+    let name = program.display().to_string();
+    let folder = tempfile::tempdir().map_err(|source| ProcessError::Start { program: name, source })?;
+    let log = folder.path().join("log");
+    prepare(Invocation::new(program, folder.path(), ANSWER_LIMIT, log)).args([question]).run()
+}
+
+/// A program that does not know its version by now hangs.
+const ANSWER_LIMIT: Duration = Duration::from_secs(20);
+
 /// One run of an external program.
 #[derive(Clone, Debug)]
 pub struct Invocation {

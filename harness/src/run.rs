@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::engines::calibration::{Calibrated, Origin, calibrate};
+use crate::engines::calibration::{Calibrated, Earlier, Origin, calibrate};
 use crate::engines::{EngineError, Job, Measurement, Site, Workbench, checked};
 use crate::plan::{Plan, Planned, REFERENCES, Run, Scope, Skip};
 use crate::procedures::Task;
@@ -154,7 +154,8 @@ fn instrument(plan: &Plan, e: usize, options: &Options, progress: &dyn Progress)
         return Ok(None);
     }
     progress.started(id.name(), "calibration");
-    let found = calibrate(planned.engine.as_ref(), version, &run.job.settings, &options.site, options.jobs);
+    let found =
+        calibrate(planned.engine.as_ref(), version, &run.job.settings, &options.site, options.jobs, Earlier::Counts);
     match found {
         Ok(calibrated) => {
             if calibrated.origin == Origin::Measured {

@@ -14,10 +14,11 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use crate::diff::Tolerances;
 use crate::doctor;
-use crate::engines::calibration::{self, Calibrated};
+use crate::engines::calibration::{self, Calibrated, Earlier};
 use crate::engines::{self, EngineId, InstallState, Site};
 use crate::photometry_command::{self, PhotometryArgs};
 use crate::plan::{Asked, Selection, plan};
+use crate::process;
 use crate::report::{self, Exit, Report, Style};
 use crate::run;
 use crate::selftest::selftest;
@@ -404,8 +405,7 @@ fn calibrate_anew(engine: &dyn engines::Engine, site: &Site) -> Exit {
     if crate::plan::REFERENCES.contains(&engine.id().name()) {
         return Exit::Passed;
     }
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    match calibration::measure(engine, &version, &BTreeMap::new(), site, cores) {
+    match calibration::calibrate(engine, &version, &BTreeMap::new(), site, process::cores(), Earlier::Ignored) {
         Ok(found) => {
             println!("     {:<10} {}", engine.id(), calibration_line(&found));
             Exit::Passed

@@ -13,6 +13,7 @@ use crate::diff::{Comparison, Judge, KnownDeviations, Published, PublishedTable,
 use crate::engines::{self, EngineId, Site};
 use crate::plan::{Asked, Plan, plan};
 use crate::procedures::Task;
+use crate::process;
 use crate::reading::Recording;
 use crate::report::{Exit, Ingredients, Report, SpecRecord};
 use crate::run;
@@ -27,25 +28,25 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic>
     if cases.iter().any(|case| selection.concerns(case)) {
         cases.retain(|case| selection.concerns(case));
     }
-    for case in &cases {
-        plan(case, &selection, site).map_err(diagnose)?;
-    }
+    let planned = || cases.iter().map(|case| plan(case, &selection, site)).collect::<Result<Vec<Plan>, _>>();
+    let mut plans = planned().map_err(diagnose)?;
     if args.install {
         let names: Vec<EngineId> = engines::all().iter().map(|e| e.id()).collect();
         let wanted = names
             .into_iter()
             .filter(|n| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| w == n.name()));
         report_installation(site, &wanted.collect::<Vec<_>>());
+        // With what is there now.
+        plans = planned().map_err(diagnose)?;
     }
     let tables = Tables::read(&cases)?;
     let root = out_folder(args);
     let mut exit = Exit::Passed;
     let mut reports = vec![];
-    for (case, published) in cases.iter().zip(&tables.published) {
+    for ((case, plan), published) in cases.iter().zip(&plans).zip(&tables.published) {
         let folder = if cases.len() == 1 { root.clone() } else { root.join(within(&root, case)) };
-        let planned = plan(case, &selection, site).map_err(diagnose)?;
-        let report = run_case(case, &planned, published.as_ref(), &tables, args, site, &folder)?;
-        let named = |id: &str| planned.engines.iter().any(|p| p.engine.id().name() == id && p.asked == Asked::ByName);
+        let report = run_case(case, plan, published.as_ref(), &tables, args, site, &folder)?;
+        let named = |id: &str| plan.engines.iter().any(|p| p.engine.id().name() == id && p.asked == Asked::ByName);
         exit = exit.worse(report.exit(named));
         reports.push(report);
     }
@@ -127,8 +128,11 @@ fn run_case(
     folder: &Path,
 ) -> Result<Report, Diagnostic> {
     let (started, clock) = (SystemTime::now(), Instant::now());
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let options = run::Options { site: site.clone(), out: folder.to_owned(), jobs: args.jobs.unwrap_or(cores).max(1) };
+    let options = run::Options {
+        site: site.clone(),
+        out: folder.to_owned(),
+        jobs: args.jobs.unwrap_or_else(process::cores).max(1),
+    };
     let outcome = run::run(case, plan, &options, &Bar::new(&case.name)).into_diagnostic()?;
     let Judged { comparisons, splits, tables } = judge(case, plan, &outcome.recordings, published, tables);
     let ingredients = Ingredients {

@@ -112,6 +112,15 @@ pub enum CalibrationError {
     Engine(#[from] EngineError),
 }
 
+/// Whether a calibration of earlier counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Earlier {
+    /// It does, where one is kept.
+    Counts,
+    /// It does not: everything is measured afresh.
+    Ignored,
+}
+
 /// The calibration of an engine with some settings: kept from an earlier one, else measured and kept.
 pub fn calibrate(
     engine: &dyn Engine,
@@ -119,24 +128,14 @@ pub fn calibrate(
     settings: &BTreeMap<String, serde_json::Value>,
     site: &Site,
     jobs: usize,
+    earlier: Earlier,
 ) -> Result<Calibrated, CalibrationError> {
     let scenes = scenes::all(settings);
     let path = store::path(engine, version, settings, site, &scenes)?;
-    if let Some(calibration) = store::read(&path) {
+    let kept = if earlier == Earlier::Counts { store::read(&path) } else { None };
+    if let Some(calibration) = kept {
         return Ok(Calibrated { calibration, origin: Origin::Kept, kept: Ok(path.display().to_string()) });
     }
-    measure(engine, version, settings, site, jobs)
-}
-
-/// Measures afresh, whatever is kept, and keeps the result.
-pub fn measure(
-    engine: &dyn Engine,
-    version: &Version,
-    settings: &BTreeMap<String, serde_json::Value>,
-    site: &Site,
-    jobs: usize,
-) -> Result<Calibrated, CalibrationError> {
-    let scenes = scenes::all(settings);
     let parts = scenes.iter().map(|scene| part(engine, scene, site, jobs));
     let calibration = Calibration {
         engine: engine.id().name().to_owned(),
@@ -145,7 +144,6 @@ pub fn measure(
         settings: settings.clone(),
         parts: parts.collect::<Result<_, _>>()?,
     };
-    let path = store::path(engine, version, settings, site, &scenes)?;
     let noise = calibration.parts.iter().map(|p| p.std_error).fold(0.0, f64::max);
     let kept = if noise > scenes::BUDGET.relative_error {
         Err(format!("noise of {noise:.1e}, as on a machine with other work"))

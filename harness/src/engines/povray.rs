@@ -24,6 +24,7 @@ use super::{
     Absent, Engine, EngineError, EngineId, Estimate, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
     checked,
 };
+use crate::process;
 use export::Light;
 use settings::{Preset, Settings};
 
@@ -45,10 +46,8 @@ impl Engine for PovRay {
             return Err(absent("OpenImageIO, which reads its images, is not there".to_owned()));
         }
         let program = blocks::program(site).map_err(|e| absent(e.to_string()))?;
-        let folder = tempfile::tempdir().map_err(|e| absent(e.to_string()))?;
-        let limit = std::time::Duration::from_secs(20);
-        let invocation = crate::process::Invocation::new(program, folder.path(), limit, folder.path().join("log"));
-        let done = blocks::hermetic(invocation, site).args(["--version"]).run().map_err(|e| absent(e.to_string()))?;
+        let done = process::ask(program, "--version", |asked| blocks::hermetic(asked, site));
+        let done = done.map_err(|e| absent(e.to_string()))?;
         let said = format!("{}\n{}", String::from_utf8_lossy(&done.stdout), done.stderr);
         let version = said.lines().find_map(|l| l.trim().strip_prefix("POV-Ray "));
         let version = version.and_then(|v| v.split_whitespace().next());

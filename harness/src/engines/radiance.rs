@@ -43,7 +43,7 @@ impl Engine for Radiance {
     }
 
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
-        Tools::find(site)?.version(site)
+        Tools::find(site)?.version()
     }
 
     fn supports(&self, job: &Job) -> Support {

@@ -7,7 +7,7 @@ use luminaire::scene::Luminaire;
 use super::export::Route;
 use super::{ID, export, output};
 use crate::engines::{Absent, EngineError, Site, Version, Workbench};
-use crate::process::{Invocation, ProcessError};
+use crate::process::{self, Invocation};
 
 /// Where the programs and their library are.
 #[derive(Clone, Debug)]
@@ -32,14 +32,10 @@ impl Tools {
     }
 
     /// The version that rtrace names: `RADIANCE 6.0a ...`, its first two words.
-    pub(super) fn version(&self, site: &Site) -> Result<Version, Absent> {
+    pub(super) fn version(&self) -> Result<Version, Absent> {
         let absent = |reason: String| Absent { reason, remedy: "run `luxproof engines install` again".into() };
-        // A folder of this run's own: in a shared one another user's log could not be written.
-        let folder = tempfile::tempdir().map_err(|e| absent(format!("no temporary folder: {e}")))?;
-        let limit = std::time::Duration::from_secs(20);
-        let log = folder.path().join("log");
-        let run = self.prepared(Invocation::new(self.program("rtrace"), site.root(), limit, log)).args(["-version"]);
-        let done = run.run().map_err(|error: ProcessError| absent(error.to_string()))?;
+        let done = process::ask(self.program("rtrace"), "-version", |asked| self.prepared(asked));
+        let done = done.map_err(|error| absent(error.to_string()))?;
         let text = String::from_utf8_lossy(&done.stdout).into_owned();
         let version = text.split_whitespace().nth(1).ok_or_else(|| absent(format!("rtrace -version says `{text}`")))?;
         Ok(Version(version.to_owned()))
