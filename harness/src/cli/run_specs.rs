@@ -1,5 +1,6 @@
 //! `luxproof run`: every case of the specs, folders and patterns given, one report over all.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Instant, SystemTime};
 
@@ -15,7 +16,7 @@ use crate::plan::{Asked, Plan, plan};
 use crate::procedures::Task;
 use crate::process;
 use crate::reading::Recording;
-use crate::report::{Exit, Ingredients, Report, SpecRecord};
+use crate::report::{self, Exit, Ingredients, Report, SpecRecord};
 use crate::run;
 use crate::spec::{Case, suite};
 
@@ -145,10 +146,22 @@ fn run_case(
         skips: plan.skips.iter().cloned().chain(outcome.skips).collect(),
         splits,
         published: tables,
+        curves: plan.tasks.iter().flat_map(|task| report::curves(&case.name, task)).collect(),
+        commands: commands(plan, site),
     };
     let report = Report::new(ingredients, comparisons);
     run::keep(&folder.join("report.json"), &report).into_diagnostic()?;
     Ok(report)
+}
+
+/// What repeats each run of a plan by hand.
+fn commands(plan: &Plan, site: &Site) -> BTreeMap<(String, String), String> {
+    let of = |run: &crate::plan::Run| {
+        let engine = &plan.engines[run.engine].engine;
+        let command = engine.command_by_hand(&run.job, site)?;
+        Some(((plan.tasks[run.task].procedure.to_owned(), engine.id().name().to_owned()), command))
+    };
+    plan.runs.iter().filter_map(of).collect()
 }
 
 /// What follows from the recordings of a case.

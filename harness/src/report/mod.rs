@@ -1,5 +1,6 @@
 //! The report: one record of a run, and views of it; the JSON form is the truth.
 
+mod curve;
 mod junit;
 mod markdown;
 mod paper;
@@ -16,6 +17,7 @@ use crate::plan::Skip;
 use crate::reading::{MeterId, Quantity, Recording};
 use crate::run::{EngineStatus, Status};
 
+pub use curve::{Curve, curves};
 pub use junit::junit;
 pub use markdown::markdown;
 pub use terminal::{Style, terminal};
@@ -49,6 +51,9 @@ pub struct Report {
     /// The published tables that the cases are held against, as they are printed.
     #[serde(default)]
     pub published: Vec<PublishedTable>,
+    /// What the photometric files say where their luminous intensity is read back.
+    #[serde(default)]
+    pub curves: Vec<Curve>,
     /// The cases, in their order.
     #[serde(default)]
     pub cases: Vec<CaseRecord>,
@@ -129,6 +134,9 @@ pub struct RecordingSummary {
     /// Relative standard uncertainty of the engine as an instrument, from its calibration; verdicts carry it.
     #[serde(default)]
     pub instrument_uncertainty: f64,
+    /// The command that repeats it by hand in the folder that `luxproof export` makes, where there is one.
+    #[serde(default)]
+    pub command: Option<String>,
     /// Why there are no readings, if there are none.
     pub failure: Option<String>,
     /// Wall-clock seconds.
@@ -234,12 +242,29 @@ pub struct Ingredients<'a> {
     pub splits: Vec<Split>,
     /// Published tables.
     pub published: Vec<PublishedTable>,
+    /// Curves of the photometric files.
+    pub curves: Vec<Curve>,
+    /// What repeats an engine's part by hand, by procedure and engine.
+    pub commands: BTreeMap<(String, String), String>,
 }
 
 impl Report {
     /// Puts a report together.
     pub fn new(ingredients: Ingredients<'_>, comparisons: Vec<Comparison>) -> Self {
-        let Ingredients { case, spec, started, wall_s, engines, recordings, skips, splits, published } = ingredients;
+        let Ingredients {
+            case,
+            spec,
+            started,
+            wall_s,
+            engines,
+            recordings,
+            skips,
+            splits,
+            published,
+            curves,
+            commands,
+        } = ingredients;
+        let command = |r: &Recording| commands.get(&(r.procedure.clone(), r.engine.clone())).cloned();
         Self {
             luxproof: 1,
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -249,12 +274,13 @@ impl Report {
             spec,
             engines,
             readings: recordings.iter().flat_map(readings).collect(),
-            recordings: recordings.iter().map(RecordingSummary::of).collect(),
+            recordings: recordings.iter().map(|r| RecordingSummary::of(r, command(r))).collect(),
             summary: Summary::of(&comparisons, &skips),
             comparisons,
             skips,
             splits,
             published,
+            curves,
         }
     }
 
@@ -267,6 +293,7 @@ impl Report {
             all.recordings.extend(one.recordings);
             all.skips.extend(one.skips);
             all.splits.extend(one.splits);
+            all.curves.extend(one.curves);
             all.cases.extend(one.cases);
             for table in one.published {
                 match all.published.iter_mut().find(|t| t.is_the_same(&table)) {
@@ -340,7 +367,7 @@ fn readings(recording: &Recording) -> impl Iterator<Item = ReadingRecord> {
 }
 
 impl RecordingSummary {
-    fn of(recording: &Recording) -> Self {
+    fn of(recording: &Recording, command: Option<String>) -> Self {
         Self {
             case: recording.case.clone(),
             procedure: recording.procedure.clone(),
@@ -354,6 +381,7 @@ impl RecordingSummary {
             approximation: recording.approximation.clone(),
             notes: recording.notes.clone(),
             instrument_uncertainty: recording.instrument_uncertainty,
+            command,
             failure: recording.failure.clone(),
             wall_s: recording.wall_s,
         }
