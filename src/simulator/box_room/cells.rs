@@ -50,7 +50,46 @@ impl Curve {
     }
 }
 
+/// A line of constant C through a cell.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    low: f64,
+    high: f64,
+    /// World direction at gamma 90.
+    across: DVec3,
+    /// World direction of the zenith.
+    axis: DVec3,
+    /// Intensity at the gamma that it starts from, and what it gains a radian.
+    candela: f64,
+    from: f64,
+    slope: f64,
+    measure: f64,
+}
+
+impl Row {
+    /// The world direction at a parameter from 0 to 1, and the flux in lumens that a unit of both parameters carries there.
+    pub(super) fn direction(&self, t: f64) -> (DVec3, f64) {
+        let gamma = self.low + t * (self.high - self.low);
+        let (sin_g, cos_g) = gamma.sin_cos();
+        let candela = self.candela + (gamma - self.from) * self.slope;
+        (sin_g * self.across - cos_g * self.axis, candela * sin_g * self.measure)
+    }
+}
+
 impl Cell {
+    /// The piece of the table that it belongs to.
+    pub(super) fn piece(&self) -> (usize, usize) {
+        self.piece
+    }
+
+    /// The larger of the angles that a part of it spans along C and along gamma, where bounds are curved at least that along C.
+    pub(super) fn widest_rad(&self, part_s: f64, part_t: f64) -> f64 {
+        let along_c = part_s * (self.c.1 - self.c.0);
+        let gamma = |c: f64| self.upper.at(c) - self.lower.at(c);
+        let along_gamma = part_t * gamma(self.c.0).max(gamma(self.c.1)).max(gamma(0.5 * (self.c.0 + self.c.1)));
+        along_c.max(along_gamma)
+    }
+
     /// Whether it goes on where another one ends, under the same bounds.
     fn continues(&self, before: &Self) -> bool {
         self.piece == before.piece && self.lower == before.lower && self.upper == before.upper && self.c.0 == before.c.1
@@ -75,37 +114,40 @@ impl LuminaireFrame {
         Self { position_m, orientation, c_rad, gamma_rad, candela }
     }
 
-    /// The world direction at (s, t) of a cell, and the flux in lumens that a unit of s and t carries there.
-    pub(super) fn direction(&self, cell: &Cell, s: f64, t: f64) -> (DVec3, f64) {
+    /// A line of constant C through a cell, at a parameter from 0 to 1.
+    pub(super) fn row(&self, cell: &Cell, s: f64) -> Row {
         let c = cell.c.0 + s * (cell.c.1 - cell.c.0);
         let (low, high) = (cell.lower.at(c), cell.upper.at(c));
-        let gamma = low + t * (high - low);
-        let ((sin_c, cos_c), (sin_g, cos_g)) = (c.sin_cos(), gamma.sin_cos());
-        let local = DVec3::new(sin_g * cos_c, sin_g * sin_c, -cos_g);
-        let flux = self.intensity(cell.piece, c, gamma) * sin_g * (cell.c.1 - cell.c.0) * (high - low);
-        (self.orientation * local, flux)
-    }
-
-    fn intensity(&self, (i, j): (usize, usize), c: f64, gamma: f64) -> f64 {
+        let (sin_c, cos_c) = c.sin_cos();
+        let (i, j) = cell.piece;
         let (c0, c1) = (self.c_rad[i], self.c_rad[i + 1]);
         let (g0, g1) = (self.gamma_rad[j], self.gamma_rad[j + 1]);
-        let (s, t) = ((c - c0) / (c1 - c0), (gamma - g0) / (g1 - g0));
-        let at = |di: usize, dj: usize| self.candela[(i + di) * self.gamma_rad.len() + j + dj];
-        let along = |di: usize| at(di, 0) + t * (at(di, 1) - at(di, 0));
-        along(0) + s * (along(1) - along(0))
+        let along_c = (c - c0) / (c1 - c0);
+        let candela = [0, 1].map(|dj| {
+            let at = |di: usize| self.candela[(i + di) * self.gamma_rad.len() + j + dj];
+            at(0) + along_c * (at(1) - at(0))
+        });
+        let slope = (candela[1] - candela[0]) / (g1 - g0);
+        let measure = (cell.c.1 - cell.c.0) * (high - low);
+        let across = self.orientation * DVec3::new(cos_c, sin_c, 0.0);
+        Row { low, high, across, axis: self.orientation.z_axis, candela: candela[0], from: g0, slope, measure }
     }
 
-    /// The cells that together make up a convex polygon as the luminaire sees it, without those that carry no light.
-    pub(super) fn cells(&self, polygon_m: &[DVec3]) -> Vec<Cell> {
+    /// The pieces of the table that carry light.
+    pub(super) fn lit_pieces(&self) -> Vec<(usize, usize)> {
+        let all = (0..self.gamma_rad.len() - 1).flat_map(|j| (0..self.c_rad.len() - 1).map(move |i| (i, j)));
+        all.filter(|piece| !self.is_dark(*piece)).collect()
+    }
+
+    /// The cells, out of some pieces of the table by rising gamma, that make up a convex polygon as the luminaire sees it.
+    pub(super) fn cells(&self, polygon_m: &[DVec3], pieces: &[(usize, usize)]) -> Vec<Cell> {
         let outline = Outline::new(self, polygon_m);
         let mut cells: Vec<Cell> = vec![];
-        for j in 0..self.gamma_rad.len() - 1 {
+        for of_band in pieces.chunk_by(|a, b| a.1 == b.1) {
+            let j = of_band[0].1;
             let band = (self.gamma_rad[j], self.gamma_rad[j + 1]);
             let breaks = outline.breaks(band);
-            for i in 0..self.c_rad.len() - 1 {
-                if self.is_dark((i, j)) {
-                    continue;
-                }
+            for &(i, _) in of_band {
                 let turn = (self.c_rad[i], self.c_rad[i + 1]);
                 let mut cuts = vec![turn.0];
                 cuts.extend(breaks.iter().copied().filter(|c| *c > turn.0 + SAME_ANGLE && *c < turn.1 - SAME_ANGLE));

@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::Effort;
-use super::symmetry::{Exchange, Operation};
+use super::symmetry::{self, Operation};
 use crate::simulator::quadrature::Gauss;
 
 /// Dyadic intervals whose interpolation matrices are kept.
@@ -134,7 +134,7 @@ impl Grid {
     pub(super) fn matrix_entries(size_m: DVec3, effort: &Effort) -> usize {
         let nodes = |k| effort.order * elements(size_m, k, effort);
         let count = 2 * (nodes(0) * nodes(1) + nodes(1) * nodes(2) + nodes(2) * nodes(0));
-        count * count / if size_m.x == size_m.y { 16 } else { 8 }
+        count * count / symmetry::of_geometry(size_m).len()
     }
 
     /// How many nodes there are.
@@ -167,27 +167,24 @@ impl Grid {
         (x, self.axes[u].weights_m[i] * self.axes[v].weights_m[j])
     }
 
-    /// The node that a node falls on under a symmetry of the box.
-    pub(super) fn image(&self, node: usize, operation: Operation) -> usize {
-        let (face, i, j) = self.place(node);
-        let (n, u, v) = face.axes();
-        // The place along every axis; along the normal it is 0 or 1.
-        let mut place = [0; 3];
-        (place[n], place[u], place[v]) = (face.0 % 2, i, j);
-        for (axis, place) in place.iter_mut().enumerate() {
-            if operation.turns(axis) {
-                let count = if axis == n { 2 } else { self.axes[axis].nodes_m.len() };
-                *place = count - 1 - *place;
+    /// The node that each node falls on under a symmetry of the box.
+    pub(super) fn images(&self, operation: Operation) -> Vec<u32> {
+        let to = |axis: usize| operation.axes.iter().position(|from| *from == axis).unwrap_or(axis);
+        let mut images = Vec::with_capacity(self.len());
+        for face in Face::ALL {
+            let (n, u, v) = face.axes();
+            let end = face.0 % 2;
+            let image = Face(2 * to(n) + if operation.turns(n) { 1 - end } else { end });
+            let (count_u, count_v) = self.counts(face);
+            let stride = |axis: usize| if image.axes().1 == to(axis) { self.counts(image).1 } else { 1 };
+            let (stride_u, stride_v) = (stride(u), stride(v));
+            let along = |axis: usize, count: usize, k: usize| if operation.turns(axis) { count - 1 - k } else { k };
+            for i in 0..count_u {
+                let start = self.offsets[image.0] + along(u, count_u, i) * stride_u;
+                images.extend((0..count_v).map(|j| (start + along(v, count_v, j) * stride_v) as u32));
             }
         }
-        let mut normal = n;
-        if operation.exchange == Exchange::XAndY {
-            place.swap(0, 1);
-            normal = [1, 0, 2][n];
-        }
-        let face = Face(2 * normal + place[normal]);
-        let (_, u, v) = face.axes();
-        self.offsets[face.0] + place[u] * self.counts(face).1 + place[v]
+        images
     }
 
     /// The interpolation matrix `[node][point]` of a dyadic interval, if it is kept.

@@ -8,6 +8,7 @@ mod cells;
 mod first_bounce;
 mod grid;
 mod kernel;
+mod patch;
 mod symmetry;
 #[cfg(test)]
 mod tests;
@@ -35,6 +36,8 @@ pub(super) struct Effort {
     pub(super) source_points: usize,
     /// Half-lengths at which such a patch need not be halved.
     pub(super) source_reach: f64,
+    /// What a rule on a far patch may miss of it, relative.
+    pub(super) source_tolerance: f64,
 }
 
 /// Entries of the operator at most: 128 MiB.
@@ -46,13 +49,62 @@ const ROUNDING: f64 = 1e-12;
 
 /// The ladder of efforts; each answers for the error of the one before it.
 pub(super) const EFFORTS: [Effort; 7] = [
-    Effort { order: 2, elements_per_half: 1, near_points: 4, source_points: 3, source_reach: 0.7 },
-    Effort { order: 4, elements_per_half: 1, near_points: 5, source_points: 4, source_reach: 1.0 },
-    Effort { order: 6, elements_per_half: 1, near_points: 8, source_points: 6, source_reach: 1.0 },
-    Effort { order: 8, elements_per_half: 1, near_points: 8, source_points: 8, source_reach: 1.5 },
-    Effort { order: 10, elements_per_half: 1, near_points: 10, source_points: 8, source_reach: 2.0 },
-    Effort { order: 12, elements_per_half: 1, near_points: 12, source_points: 10, source_reach: 2.0 },
-    Effort { order: 12, elements_per_half: 2, near_points: 12, source_points: 12, source_reach: 2.0 },
+    Effort {
+        order: 2,
+        elements_per_half: 1,
+        near_points: 4,
+        source_points: 3,
+        source_reach: 0.7,
+        source_tolerance: 1e-3,
+    },
+    Effort {
+        order: 4,
+        elements_per_half: 1,
+        near_points: 5,
+        source_points: 4,
+        source_reach: 1.0,
+        source_tolerance: 1e-5,
+    },
+    Effort {
+        order: 6,
+        elements_per_half: 1,
+        near_points: 8,
+        source_points: 6,
+        source_reach: 1.0,
+        source_tolerance: 1e-7,
+    },
+    Effort {
+        order: 8,
+        elements_per_half: 1,
+        near_points: 8,
+        source_points: 8,
+        source_reach: 1.5,
+        source_tolerance: 1e-9,
+    },
+    Effort {
+        order: 10,
+        elements_per_half: 1,
+        near_points: 10,
+        source_points: 8,
+        source_reach: 2.0,
+        source_tolerance: 1e-10,
+    },
+    Effort {
+        order: 12,
+        elements_per_half: 1,
+        near_points: 12,
+        source_points: 10,
+        source_reach: 2.0,
+        source_tolerance: 1e-11,
+    },
+    Effort {
+        order: 12,
+        elements_per_half: 2,
+        near_points: 12,
+        source_points: 12,
+        source_reach: 2.0,
+        source_tolerance: 1e-11,
+    },
 ];
 
 /// A difference of two efforts, times this, bounds the error of the finer one.
@@ -75,8 +127,7 @@ pub(super) fn refine(
             fields.push((level, BoxField::solve(room, luminaires, bounces, &EFFORTS[level])));
         }
         let field = fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field);
-        let read = |field: &BoxField| meters.par_iter().map(|meter| field.illuminance(meter)).collect::<Vec<_>>();
-        (field.map(read).unwrap_or_default(), field.map_or(0.0, |field| field.imbalance))
+        (field.map(|field| field.illuminance(meters)).unwrap_or_default(), field.map_or(0.0, |field| field.imbalance))
     };
     let mut level = FIRST_EFFORT.iter().rposition(|error| relative_error <= *error).unwrap_or(0);
     let (mut coarse, _) = solve(level);
@@ -143,17 +194,22 @@ impl BoxField {
             return Self { exitance: vec![0.0; grid.len()], grid, first, gathers, imbalance: 0.0 };
         }
         let group = symmetry::of_geometry(room.size_m);
-        let operator = Operator::new(&grid, Orbits::new(&grid, &group));
+        let orbits = Orbits::new(&grid, &group);
+        let light = orbits.under(symmetry::of_light(&group, room, luminaires));
+        let operator = Operator::new(&grid, orbits);
         let rho: Vec<f64> = (0..grid.len()).map(|node| symmetry::reflectance(room, grid.place(node).0)).collect();
-        let (known, imbalance) =
-            known(&grid, &first, &Orbits::new(&grid, &symmetry::of_light(&group, room, luminaires)));
-        let step = |u: &[f64]| operator.apply(&exitance(u, &rho));
-        let irradiance = match bounces {
-            Bounces::Converged => gmres::solve(step, &known, 1e-14),
-            Bounces::AtMost(count) => (2..count).fold(known.clone(), |u, _| {
-                let again = step(&u);
-                known.iter().zip(&again).map(|(g, k)| g + k).collect()
-            }),
+        let (known, imbalance) = known(&grid, &first, &light);
+        // Where the light is symmetrical enough, its orbits are the unknowns, and their matrix is no larger.
+        let irradiance = if light.images.len().pow(2) >= group.len() {
+            let rows = operator.folded(&light);
+            let rho: Vec<f64> = light.representatives.iter().map(|node| rho[*node]).collect();
+            let step = |u: &[f64]| {
+                let exitance = exitance(u, &rho);
+                rows.par_iter().map(|row| gmres::dot(row, &exitance)).collect()
+            };
+            light.unfold(&interreflect(step, known, bounces))
+        } else {
+            interreflect(|u| operator.apply(&exitance(u, &rho)), light.unfold(&known), bounces)
         };
         Self { exitance: exitance(&irradiance, &rho), grid, first, gathers, imbalance }
     }
@@ -165,35 +221,43 @@ impl BoxField {
         areas().zip(&self.exitance).map(|(a, m)| a * m).sum::<f64>() / areas().sum::<f64>()
     }
 
-    /// Indirect illuminance at a meter inside the room, in lux.
-    pub(super) fn illuminance(&self, meter: &Meter) -> f64 {
+    /// Indirect illuminance at meters inside the room, in lux.
+    pub(super) fn illuminance(&self, meters: &[Meter]) -> Vec<f64> {
         if self.gathers == Gathers::Nothing {
-            return 0.0;
+            return vec![0.0; meters.len()];
         }
-        let receiver = Receiver { position_m: meter.position_m, normal: meter.normal, face: None };
-        let first = self.first.irradiance(&receiver);
-        if self.gathers == Gathers::FirstBounce {
-            return first;
+        let receiver = |m: &Meter| Receiver { position_m: m.position_m, normal: m.normal, face: None };
+        let receivers: Vec<_> = meters.iter().map(receiver).collect();
+        let mut lux = self.first.irradiance(&receivers);
+        if self.gathers == Gathers::All {
+            lux.par_iter_mut().zip(&receivers).for_each(|(lux, receiver)| {
+                *lux += gmres::dot(&balanced_row(&self.grid, receiver), &self.exitance);
+            });
         }
-        first + gmres::dot(&balanced_row(&self.grid, &receiver), &self.exitance)
+        lux
     }
 }
 
-/// The first bounce at every node, computed once an orbit, and the relative flux it would gain or lose.
+/// Irradiance after all the reflections that count, from that after one and what a further one makes of it.
+fn interreflect(step: impl Fn(&[f64]) -> Vec<f64>, known: Vec<f64>, bounces: Bounces) -> Vec<f64> {
+    match bounces {
+        Bounces::Converged => gmres::solve(step, &known, 1e-14),
+        Bounces::AtMost(count) => (2..count).fold(known.clone(), |u, _| {
+            let again = step(&u);
+            known.iter().zip(&again).map(|(g, k)| g + k).collect()
+        }),
+    }
+}
+
+/// The first bounce by orbit, and the relative flux that its values at the nodes would gain or lose.
 ///
 /// Where a jump or a kink of a table crosses an edge of the room, interpolation between nodes misses some flux. A
 /// closed room loses none, so the nodes are scaled to carry all of it, and the correction counts as an error.
 fn known(grid: &Grid, first: &FirstBounce, orbits: &Orbits) -> (Vec<f64>, f64) {
-    let values: Vec<f64> =
-        orbits.representatives.par_iter().map(|&node| first.irradiance(&receiver_at(grid, node))).collect();
-    let mut known = vec![0.0; grid.len()];
-    for (&node, value) in orbits.representatives.iter().zip(values) {
-        for image in &orbits.images {
-            known[image[node] as usize] = value;
-        }
-    }
-    let (flux, landed) =
-        (first.reflected_flux(), known.iter().enumerate().map(|(k, g)| g * grid.node(k).1).sum::<f64>());
+    let receivers: Vec<_> = orbits.representatives.iter().map(|node| receiver_at(grid, *node)).collect();
+    let mut known = first.irradiance(&receivers);
+    let at_nodes = orbits.orbit.iter().enumerate().map(|(node, orbit)| known[*orbit as usize] * grid.node(node).1);
+    let (flux, landed) = (first.reflected_flux(), at_nodes.sum::<f64>());
     if landed == 0.0 {
         return (known, 0.0);
     }
@@ -248,27 +312,38 @@ impl Operator {
 
     /// Scales columns so that every node's light falls somewhere in full: no flux is lost or made.
     ///
-    /// Without it, the corners' singularities cost the whole room a few parts in 1e8 at any order.
+    /// Without it, the corners' singularities cost the whole room a few parts in 1e8 at any order. All nodes of an orbit
+    /// get the same scale.
     fn balance_columns(&mut self, grid: &Grid) {
-        let areas: Vec<f64> = (0..grid.len()).map(|node| grid.node(node).1).collect();
+        let Orbits { representatives, orbit, sizes, .. } = &self.orbits;
+        let areas: Vec<f64> = representatives.iter().zip(sizes).map(|(node, n)| grid.node(*node).1 * n).collect();
         let mut landed = vec![0.0; areas.len()];
-        let images = &self.orbits.images;
-        for (&node, row) in self.orbits.representatives.iter().zip(&self.rows) {
-            // Every image of the node is met as often as operations leave it where it is.
-            let times = images.iter().filter(|image| image[node] as usize == node).count();
-            let share = areas[node] / times as f64;
-            for image in images {
-                for (value, j) in row.iter().zip(image) {
-                    landed[*j as usize] += share * value;
-                }
+        for (area, row) in areas.iter().zip(&self.rows) {
+            for (value, j) in row.iter().zip(orbit) {
+                landed[*j as usize] += area * value;
             }
         }
         let scales: Vec<f64> = areas.iter().zip(&landed).map(|(area, landed)| area / landed).collect();
         self.rows.par_iter_mut().for_each(|row| {
-            for (value, scale) in row.iter_mut().zip(&scales) {
-                *value *= scale;
+            for (value, j) in row.iter_mut().zip(orbit) {
+                *value *= scales[*j as usize];
             }
         });
+    }
+
+    /// Irradiance at one node an orbit from exitance by orbit.
+    fn folded(&self, light: &Orbits) -> Vec<Vec<f64>> {
+        let Orbits { images, orbit, .. } = &self.orbits;
+        let row = |&node: &usize| {
+            let mut folded = vec![0.0; light.representatives.len()];
+            let kept = orbit[node] as usize;
+            let image = images.iter().find(|image| image[self.orbits.representatives[kept]] as usize == node);
+            for (value, j) in self.rows[kept].iter().zip(image.into_iter().flatten()) {
+                folded[light.orbit[*j as usize] as usize] += value;
+            }
+            folded
+        };
+        light.representatives.par_iter().map(row).collect()
     }
 
     fn apply(&self, exitance: &[f64]) -> Vec<f64> {

@@ -1,7 +1,8 @@
 //! Symmetries of a box and of the light in it: rows of the operator and first bounces are computed once an orbit.
 //!
-//! A box always has three mirrors and, with a square plan, the exchange of x and y. The geometry keeps all of them,
-//! whatever the light does; the first bounce keeps those that also leave luminaires and reflectances as they are.
+//! A box always has three mirrors and, with equal sides, the exchange of their axes: 48 operations in a cube. The geometry
+//! keeps all of them, whatever the light does; the first bounce and the whole light field keep those that also leave
+//! luminaires and reflectances as they are.
 
 use glam::{DMat3, DVec3};
 
@@ -10,22 +11,21 @@ use crate::geometry::{Room, Surface};
 use crate::photometry::direction;
 use crate::scene::Luminaire;
 
-/// A symmetry of a box: mirrors, then perhaps x and y exchanged.
+/// A symmetry of a box: mirrors, then perhaps axes exchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Operation {
     /// Bit k turns axis k round.
     pub(super) mirrors: u8,
-    pub(super) exchange: Exchange,
+    /// Component k of an image is component `axes[k]` of what it is the image of.
+    pub(super) axes: [usize; 3],
 }
 
-/// Whether x and y change places.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Exchange {
-    Nothing,
-    XAndY,
-}
+/// All orders of three axes.
+const PERMUTATIONS: [[usize; 3]; 6] = [[0, 1, 2], [1, 0, 2], [0, 2, 1], [2, 1, 0], [1, 2, 0], [2, 0, 1]];
 
 impl Operation {
+    const IDENTITY: Self = Self { mirrors: 0, axes: PERMUTATIONS[0] };
+
     pub(super) const fn turns(self, axis: usize) -> bool {
         self.mirrors >> axis & 1 == 1
     }
@@ -34,7 +34,7 @@ impl Operation {
     fn of_direction(self, d: DVec3) -> DVec3 {
         let sign = |axis| if self.turns(axis) { -1.0 } else { 1.0 };
         let d = d * DVec3::new(sign(0), sign(1), sign(2));
-        if self.exchange == Exchange::XAndY { DVec3::new(d.y, d.x, d.z) } else { d }
+        DVec3::from_array(self.axes.map(|axis| d[axis]))
     }
 
     fn of_point(self, p: DVec3, size_m: DVec3) -> DVec3 {
@@ -43,25 +43,21 @@ impl Operation {
 
     fn of_face(self, face: Face) -> Face {
         let normal = self.of_direction(face.inward_normal());
-        let axis = if normal.z == 0.0 { usize::from(normal.y != 0.0) } else { 2 };
+        let axis = usize::from(normal.x == 0.0) + usize::from(normal.x == 0.0 && normal.y == 0.0);
         Face(2 * axis + usize::from(normal[axis] < 0.0))
     }
 }
 
 /// The symmetries of the room's shape.
 pub(super) fn of_geometry(size_m: DVec3) -> Vec<Operation> {
-    let exchanges: &[_] =
-        if size_m.x == size_m.y { &[Exchange::Nothing, Exchange::XAndY] } else { &[Exchange::Nothing] };
-    exchanges.iter().flat_map(|&exchange| (0..8).map(move |mirrors| Operation { mirrors, exchange })).collect()
+    let keeps_size = |axes: &[usize; 3]| (0..3).all(|k| size_m[axes[k]] == size_m[k]);
+    let exchanges = PERMUTATIONS.into_iter().filter(keeps_size);
+    exchanges.flat_map(|axes| (0..8).map(move |mirrors| Operation { mirrors, axes })).collect()
 }
 
-/// Which of the room's symmetries its reflectances and its luminaires share.
-pub(super) fn of_light(geometry: &[Operation], room: &Room, luminaires: &[Luminaire]) -> Vec<Operation> {
-    geometry
-        .iter()
-        .copied()
-        .filter(|op| keeps_reflectances(*op, room) && keeps_luminaires(*op, room, luminaires))
-        .collect()
+/// Whether a symmetry of the room, by its place in `geometry`, is one of its reflectances and its luminaires too.
+pub(super) fn of_light(geometry: &[Operation], room: &Room, luminaires: &[Luminaire]) -> impl Fn(usize) -> bool {
+    move |k| keeps_reflectances(geometry[k], room) && keeps_luminaires(geometry[k], room, luminaires)
 }
 
 /// The reflectance of a face.
@@ -75,7 +71,7 @@ fn keeps_reflectances(op: Operation, room: &Room) -> bool {
 }
 
 fn keeps_luminaires(op: Operation, room: &Room, luminaires: &[Luminaire]) -> bool {
-    if op == (Operation { mirrors: 0, exchange: Exchange::Nothing }) {
+    if op == Operation::IDENTITY {
         return true;
     }
     let mut free: Vec<_> = luminaires.iter().collect();
@@ -121,15 +117,47 @@ pub(super) struct Orbits {
     pub(super) images: Vec<Vec<u32>>,
     /// One node an orbit, rising.
     pub(super) representatives: Vec<usize>,
+    /// The place in `representatives` of each node's orbit.
+    pub(super) orbit: Vec<u32>,
+    /// How many nodes each orbit has.
+    pub(super) sizes: Vec<f64>,
 }
 
 impl Orbits {
     pub(super) fn new(grid: &Grid, group: &[Operation]) -> Self {
-        let count = grid.len();
-        let images: Vec<Vec<u32>> =
-            group.iter().map(|op| (0..count).map(|node| grid.image(node, *op) as u32).collect()).collect();
-        let is_first = |node: &usize| images.iter().all(|image| image[*node] as usize >= *node);
-        let representatives = (0..count).filter(is_first).collect();
-        Self { images, representatives }
+        Self::of_images(grid.len(), group.iter().map(|op| grid.images(*op)).collect())
+    }
+
+    fn of_images(count: usize, images: Vec<Vec<u32>>) -> Self {
+        let (mut representatives, mut orbit, mut sizes) = (vec![], vec![0; count], vec![]);
+        // The least node of an orbit stands for it; it comes first.
+        let mut least: Vec<u32> = (0..count as u32).collect();
+        for image in &images {
+            for (least, image) in least.iter_mut().zip(image) {
+                *least = (*least).min(*image);
+            }
+        }
+        for (node, least) in least.into_iter().enumerate() {
+            if least as usize == node {
+                orbit[node] = representatives.len() as u32;
+                representatives.push(node);
+                sizes.push(0.0);
+            } else {
+                orbit[node] = orbit[least as usize];
+            }
+            sizes[orbit[node] as usize] += 1.0;
+        }
+        Self { images, representatives, orbit, sizes }
+    }
+
+    /// The orbits under a part of the group, which `keeps` picks by its place.
+    pub(super) fn under(&self, mut keeps: impl FnMut(usize) -> bool) -> Self {
+        let images = self.images.iter().enumerate().filter(|(k, _)| keeps(*k)).map(|(_, image)| image.clone());
+        Self::of_images(self.orbit.len(), images.collect())
+    }
+
+    /// Values at all nodes from values by orbit.
+    pub(super) fn unfold(&self, values: &[f64]) -> Vec<f64> {
+        self.orbit.iter().map(|orbit| values[*orbit as usize]).collect()
     }
 }

@@ -1,0 +1,240 @@
+//! Parts of what a luminaire lights on one face of the room, each with the points that stand for its reflected flux.
+//!
+//! A product Gauss rule sees a kernel whose pole lies `z` half-lengths away from its centre with an error that falls like
+//! `(z + sqrt(z² - 1))^(-2n)` in its points n a direction (Trefethen, *Approximation Theory and Approximation Practice*
+//! (2013), theorem 19.3), so that patches far away need few points, and near ones are halved.
+
+use std::sync::OnceLock;
+
+use glam::DVec3;
+
+use super::cells::{Cell, LuminaireFrame};
+use super::grid::Face;
+use super::kernel::Receiver;
+use crate::geometry::Room;
+use crate::simulator::quadrature::Gauss;
+
+/// A cell whose halves differ more than this in length is halved: its map is too uneven for a product rule.
+const UNEVEN: f64 = 3.0123;
+/// Which of two lengths is longer: no 1, because equal ones are frequent and rounding would decide.
+const TIE: f64 = 1.000_123;
+/// How many rules of different size a patch may use.
+const RULES: usize = 3;
+
+/// The rules of every size up to the one for near patches, and from where on each serves.
+#[derive(Debug)]
+pub(super) struct Rules {
+    gauss: Vec<Gauss>,
+    /// Squared distances in half-lengths beyond which the rule of each size serves.
+    beyond2: Vec<f64>,
+    /// The largest angle in radians whose sines and cosines the rule of each size integrates.
+    widest_rad: Vec<f64>,
+}
+
+/// A part of a cell, on its face.
+#[derive(Debug)]
+pub(super) struct Patch {
+    cell: Cell,
+    /// Parameter ranges within the cell.
+    s: (f64, f64),
+    t: (f64, f64),
+    pub(super) centre_m: DVec3,
+    pub(super) half_m: DVec3,
+    pub(super) half_length_m: f64,
+    split: Split,
+    /// Points a direction of the rules for near, for middling and for far receivers.
+    sizes: [u8; RULES],
+    halves: OnceLock<Box<[Patch; 2]>>,
+    points: [OnceLock<Points>; RULES],
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Split {
+    AlongS,
+    AlongT,
+    /// Needed for the map's own sake, at any distance.
+    UnevenS,
+    UnevenT,
+}
+
+/// What patches are made on: a luminaire and the face that it lights.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ground<'a> {
+    pub(super) frame: &'a LuminaireFrame,
+    pub(super) room: &'a Room,
+    pub(super) face: Face,
+    pub(super) rules: &'a Rules,
+}
+
+/// Points on a face and the flux that each reflects, over π: all x, all y, all z, all fluxes.
+#[derive(Clone, Debug)]
+pub(super) struct Points(Box<[f64]>);
+
+impl Rules {
+    /// Rules of up to `count` points a direction, of which the largest serves from `reach` half-lengths on.
+    pub(super) fn new(count: usize, reach: f64, tolerance: f64) -> Self {
+        // The rate at which the error falls in the nearest patches, kept by smaller rules farther away.
+        let nearest = 1.0 + reach;
+        let rate = count as f64 * (nearest + (nearest * nearest - 1.0).sqrt()).ln();
+        let from = |n: usize| {
+            let radius = (rate / n as f64).exp();
+            (0.5 * (radius + 1.0 / radius) - 1.0).powi(2)
+        };
+        // The Gauss rule of n points errs by about x^(2n) / (2n)! for the cosine of x on either side.
+        let widest = |n: usize| {
+            let factorial: f64 = (1..=2 * n).map(|k| k as f64).product();
+            (tolerance * factorial).powf(0.5 / n as f64)
+        };
+        Self {
+            gauss: (1..=count).map(Gauss::new).collect(),
+            beyond2: (1..=count).map(from).collect(),
+            widest_rad: (1..=count).map(widest).collect(),
+        }
+    }
+}
+
+impl Patch {
+    pub(super) fn new(cell: Cell, s: (f64, f64), t: (f64, f64), ground: Ground) -> Self {
+        let parts = [0.0, 0.5, 1.0];
+        let p = parts.map(|i| {
+            let row = ground.frame.row(&cell, s.0 + i * (s.1 - s.0));
+            parts.map(|j| ground.hit(row.direction(t.0 + j * (t.1 - t.0)).0))
+        });
+        let all = || p.iter().flatten();
+        let low = all().fold(DVec3::INFINITY, |m, q| m.min(*q));
+        let high = all().fold(DVec3::NEG_INFINITY, |m, q| m.max(*q));
+        let along_s = [0, 1, 2].map(|j| (p[0][j].distance(p[1][j]), p[1][j].distance(p[2][j])));
+        let along_t = [0, 1, 2].map(|i| (p[i][0].distance(p[i][1]), p[i][1].distance(p[i][2])));
+        let length = |rows: &[(f64, f64)]| rows.iter().map(|(a, b)| a + b).fold(0.0, f64::max);
+        let (length_s, length_t) = (length(&along_s), length(&along_t));
+        let longest = length_s.max(length_t);
+        let uneven =
+            |rows: &[(f64, f64)]| rows.iter().any(|(a, b)| a.max(*b) > UNEVEN * a.min(*b) && a + b > 0.05 * longest);
+        let split = match (uneven(&along_s), uneven(&along_t)) {
+            (_, true) => Split::UnevenT,
+            (true, false) => Split::UnevenS,
+            _ if length_s > TIE * length_t => Split::AlongS,
+            _ => Split::AlongT,
+        };
+        let (centre_m, half_m) = (0.5 * (low + high), 0.52 * (high - low));
+        let near = ground.rules.gauss.len();
+        let angle = cell.widest_rad((s.1 - s.0).abs(), (t.1 - t.0).abs());
+        let far = 1 + ground.rules.widest_rad.iter().position(|widest| angle <= *widest).unwrap_or(near - 1);
+        let sizes = [near, usize::midpoint(near, far), far].map(|n| n as u8);
+        let (halves, points) = (OnceLock::new(), [const { OnceLock::new() }; RULES]);
+        Self { cell, s, t, centre_m, half_m, half_length_m: 0.5 * longest, split, sizes, halves, points }
+    }
+
+    /// The piece of the luminaire's table that the patch is lit by.
+    pub(super) fn piece(&self) -> (usize, usize) {
+        self.cell.piece()
+    }
+
+    /// Whether the map is too uneven for any rule.
+    pub(super) fn is_uneven(&self) -> bool {
+        matches!(self.split, Split::UnevenS | Split::UnevenT)
+    }
+
+    /// The smallest rule that serves at a squared distance; `None` where the patch must be halved.
+    pub(super) fn rule_at(&self, distance2: f64, rules: &Rules) -> Option<usize> {
+        let h2 = self.half_length_m * self.half_length_m;
+        (0..RULES).rev().find(|k| rules.beyond2[usize::from(self.sizes[*k]) - 1] * h2 <= distance2)
+    }
+
+    /// The rule for receivers far away.
+    pub(super) const FAR: usize = RULES - 1;
+    /// The rule for the nearest receivers.
+    pub(super) const NEAR: usize = 0;
+
+    /// How many points a rule of the patch has.
+    pub(super) fn count(&self, rule: usize) -> usize {
+        usize::from(self.sizes[rule]).pow(2)
+    }
+
+    pub(super) fn kept_halves(&self) -> &OnceLock<Box<[Self; 2]>> {
+        &self.halves
+    }
+
+    pub(super) fn kept_points(&self, rule: usize) -> &OnceLock<Points> {
+        &self.points[rule]
+    }
+
+    pub(super) fn halve(&self, ground: Ground) -> Box<[Self; 2]> {
+        let middle = |(a, b): (f64, f64)| 0.5 * (a + b);
+        let part = |s, t| Self::new(self.cell, s, t, ground);
+        Box::new(match self.split {
+            Split::AlongS | Split::UnevenS => {
+                let m = middle(self.s);
+                [part((self.s.0, m), self.t), part((m, self.s.1), self.t)]
+            }
+            Split::AlongT | Split::UnevenT => {
+                let m = middle(self.t);
+                [part(self.s, (self.t.0, m)), part(self.s, (m, self.t.1))]
+            }
+        })
+    }
+
+    pub(super) fn sample(&self, rule: usize, ground: Ground) -> Points {
+        let gauss = &ground.rules.gauss[usize::from(self.sizes[rule]) - 1];
+        let count = self.count(rule);
+        let mut numbers = vec![0.0; 4 * count].into_boxed_slice();
+        let (ds, dt) = (self.s.1 - self.s.0, self.t.1 - self.t.0);
+        let mut k = 0;
+        for (a, wa) in gauss.nodes.iter().zip(&gauss.weights) {
+            let row = ground.frame.row(&self.cell, self.s.0 + ds * a);
+            for (b, wb) in gauss.nodes.iter().zip(&gauss.weights) {
+                let (direction, flux) = row.direction(self.t.0 + dt * b);
+                let p = ground.hit(direction);
+                let four = [p.x, p.y, p.z, flux * wa * wb * ds * dt];
+                for (part, value) in four.into_iter().enumerate() {
+                    numbers[part * count + k] = value;
+                }
+                k += 1;
+            }
+        }
+        Points(numbers)
+    }
+}
+
+impl Ground<'_> {
+    /// Where a direction from the luminaire meets the face, kept within the face against rounding.
+    fn hit(&self, direction: DVec3) -> DVec3 {
+        let n = self.face.axes().0;
+        let plane = self.face.plane(self.room.size_m);
+        let from_m = self.frame.position_m;
+        let mut p = from_m + direction * ((plane - from_m[n]) / direction[n]).abs();
+        p[n] = plane;
+        p.clamp(DVec3::ZERO, self.room.size_m)
+    }
+}
+
+impl Points {
+    /// Flux at all points.
+    pub(super) fn flux(&self) -> f64 {
+        self.0[self.0.len() / 4 * 3..].iter().sum()
+    }
+
+    pub(super) fn irradiance(&self, receiver: &Receiver, face: Face) -> f64 {
+        let (p, n, m) = (receiver.position_m, receiver.normal, face.inward_normal());
+        let count = self.0.len() / 4;
+        let ((x, y), (z, flux)) = {
+            let (xy, zf) = self.0.split_at(2 * count);
+            (xy.split_at(count), zf.split_at(count))
+        };
+        let mut lanes = [0.0; 4];
+        let term = |x: f64, y: f64, z: f64, flux: f64| {
+            let d = DVec3::new(x - p.x, y - p.y, z - p.z);
+            let r2 = d.length_squared();
+            flux * d.dot(n).max(0.0) * -d.dot(m) / (r2 * r2)
+        };
+        let quads = x.chunks_exact(4).zip(y.chunks_exact(4));
+        let quads = quads.zip(z.chunks_exact(4)).zip(flux.chunks_exact(4));
+        for (((x, y), z), flux) in quads {
+            for k in 0..4 {
+                lanes[k] += term(x[k], y[k], z[k], flux[k]);
+            }
+        }
+        let tail: f64 = (count / 4 * 4..count).map(|k| term(x[k], y[k], z[k], flux[k])).sum();
+        lanes[0] + lanes[1] + (lanes[2] + lanes[3]) + tail
+    }
+}
