@@ -62,7 +62,7 @@ pub struct Reading {
 }
 
 /// Everything one engine said of one procedure of one case, with what is needed to say it again.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Recording {
     /// The case.
     pub case: String,
@@ -92,8 +92,37 @@ pub struct Recording {
     /// Relative standard uncertainty of the engine as an instrument, from its calibration; 0 for our own solvers.
     #[serde(default)]
     pub instrument_uncertainty: f64,
+    /// What it shares with other engines: witnesses that share a component count once.
+    #[serde(default)]
+    pub components: Vec<String>,
     /// Why there are no readings, if there are none.
     pub failure: Option<String>,
     /// The readings, one a meter.
     pub readings: Vec<Reading>,
+}
+
+impl Recording {
+    /// Degrees of freedom of the standard errors: one less than the independent blocks that they were estimated from, where
+    /// the engine's settings tell them as `blocks` or `<part>_blocks`; the fewest, where several parts do.
+    pub fn degrees_of_freedom(&self) -> Option<f64> {
+        let counts = self.settings.iter().filter(|(key, _)| *key == "blocks" || key.ends_with("_blocks"));
+        let blocks = counts.filter_map(|(_, count)| count.parse::<u32>().ok()).filter(|count| *count >= 2).min()?;
+        Some(f64::from(blocks - 1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fewest_blocks_tell_the_degrees_of_freedom() {
+        let of = |settings: &[(&str, &str)]| {
+            let settings = settings.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+            Recording { settings, ..Recording::default() }.degrees_of_freedom()
+        };
+        assert_eq!(of(&[("blocks", "8"), ("seed", "1")]), Some(7.0));
+        assert_eq!(of(&[("direct_blocks", "64"), ("indirect_blocks", "16")]), Some(15.0));
+        assert_eq!(of(&[("samples", "8")]), None);
+    }
 }

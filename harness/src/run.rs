@@ -214,9 +214,10 @@ fn record(
         approximation: run.approximation.clone(),
         notes: measurement.notes.clone(),
         wall_s: wall.as_secs_f64(),
-        instrument_uncertainty: 0.0,
+        components: planned.engine.components(&run.job).into_iter().map(str::to_owned).collect(),
         failure,
         readings: readings.collect(),
+        ..Recording::default()
     }
 }
 

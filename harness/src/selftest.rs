@@ -170,18 +170,10 @@ impl Subject {
             case: self.case.clone(),
             procedure: self.task.procedure.to_owned(),
             engine: engine.to_owned(),
-            version: String::new(),
             model: self.task.model(),
             light: self.task.light(),
-            input_sha256: String::new(),
-            seed: 0,
-            settings: std::collections::BTreeMap::new(),
-            approximation: None,
-            notes: vec![],
-            wall_s: 0.0,
-            instrument_uncertainty: 0.0,
-            failure: None,
             readings: self.task.targets.iter().zip(values).zip(errors).map(reading).collect(),
+            ..Recording::default()
         }
     }
 

@@ -151,6 +151,9 @@ enum EnginesAction {
 struct ReportArgs {
     /// report.json of a run
     result: PathBuf,
+    /// Print the error budget of every deviation, and nothing else
+    #[arg(long)]
+    budget: bool,
     /// Views of the report to print
     #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [Format::Terminal])]
     format: Vec<Format>,
@@ -234,8 +237,16 @@ fn test_oneself(args: &SelftestArgs) -> Result<Exit, Diagnostic> {
         CardFormat::Terminal => card.to_string(),
         CardFormat::Json => serde_json::to_string_pretty(&card).into_diagnostic()? + "\n",
     };
-    std::io::stdout().lock().write_all(text.as_bytes()).into_diagnostic()?;
+    print(&text)?;
     Ok(if card.is_good() { Exit::Passed } else { Exit::Failed })
+}
+
+fn print(text: &str) -> Result<(), Diagnostic> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        // Whoever reads has seen enough (`| head`): that is no error of ours.
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        written => written.into_diagnostic(),
+    }
 }
 
 fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format]) -> Result<(), Diagnostic> {
@@ -445,7 +456,11 @@ fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
     let report: Report = serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)?;
     let folder = args.result.parent().map_or_else(PathBuf::new, Path::to_owned);
     let exit = report.exit(|_| false);
-    print_reports(&[(report, folder)], &args.format)?;
+    if args.budget {
+        print(&report::budgets(&report))?;
+    } else {
+        print_reports(&[(report, folder)], &args.format)?;
+    }
     Ok(exit)
 }
 

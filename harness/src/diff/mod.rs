@@ -1,9 +1,14 @@
 //! The diffing layer: readings against references that carry their own uncertainty; it sees nothing but readings.
 
+mod family;
+mod input;
 mod known;
 mod published;
 mod split;
+#[cfg(test)]
+mod tests;
 mod tolerance;
+mod uncertainty;
 mod verdict;
 
 use std::collections::BTreeMap;
@@ -16,10 +21,13 @@ use crate::procedures::{Target, Task};
 use crate::reading::{MeterId, Quantity, Reading, Recording};
 use crate::spec::ToleranceOverride;
 
+use input::Input;
+
 pub use known::{KnownDeviationError, KnownDeviations, Subject};
 pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedRow, PublishedTable};
 pub use split::Split;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
+pub use uncertainty::{Component, ErrorBudget, Shape, Source};
 pub use verdict::{Verdict, judge};
 
 /// What a reference rests on.
@@ -103,6 +111,12 @@ pub struct Comparison {
     pub verdict: Verdict,
     /// Why, where that is known.
     pub diagnosis: Option<String>,
+    /// What the deviation may owe to chance and ignorance; null where there is no deviation.
+    #[serde(default)]
+    pub budget: Option<ErrorBudget>,
+    /// How probable a deviation this large would be, were the engine just within the tolerance.
+    #[serde(default)]
+    pub p_value: Option<f64>,
 }
 
 /// What judging needs besides the readings.
@@ -125,24 +139,58 @@ impl Judge<'_> {
 
     /// Holds every reading of one task against every reference there is for it.
     ///
-    /// `recordings` are those of this task, one an engine. An engine that failed is `missing` at every meter.
+    /// `recordings` are those of this task, one an engine. An engine that failed is `missing` at every meter. What fails, fails
+    /// at the family-wise level of all comparisons of its engine here.
     pub fn compare(&self, task: &Task, recordings: &[&Recording]) -> Vec<Comparison> {
+        let input = self.published.map(|_| Input::of(task));
         let mut comparisons = vec![];
         for recording in recordings {
+            let mut family = vec![];
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.readings.get(k);
                 let mut references = reference_from_witness(task, recordings, k, &recording.engine);
-                references.extend(self.published.iter().flat_map(|p| p.references(task, target, &recording.engine)));
+                for reference in self.published.iter().flat_map(|p| p.references(task, target, &recording.engine)) {
+                    references.push(Held::published(reference, input.as_ref(), target, reading));
+                }
                 if references.is_empty() && (reading.is_none() || !is_witness(&recording.engine)) {
                     // Nothing to hold it against, or nothing to hold: that is said, never passed over.
-                    comparisons.push(self.comparison(task, recording, target, reading, None));
+                    family.push(self.comparison(task, recording, target, reading, None));
                 }
-                for reference in references {
-                    comparisons.push(self.comparison(task, recording, target, reading, Some(reference)));
+                for held in references {
+                    family.push(self.comparison(task, recording, target, reading, Some(held)));
                 }
             }
+            self.decide(&mut family);
+            comparisons.extend(family);
         }
         comparisons
+    }
+
+    /// Verdicts of all comparisons of one engine in one procedure of one case.
+    fn decide(&self, family: &mut [Comparison]) {
+        let tested: Vec<usize> = (0..family.len()).filter(|k| family[*k].p_value.is_some()).collect();
+        let p_values: Vec<f64> = tested.iter().filter_map(|k| family[*k].p_value).collect();
+        let rejected = family::rejected(&p_values, self.tolerances.family_wise_error());
+        for (k, rejected) in tested.into_iter().zip(rejected) {
+            let of_one = &mut family[k].verdict;
+            if *of_one == Verdict::Fail && !rejected {
+                *of_one = Verdict::Inconclusive;
+            }
+        }
+        for comparison in family {
+            let Some(basis) = comparison.reference.as_ref().map(|r| r.basis) else { continue };
+            let subject = Subject {
+                case: &comparison.case,
+                procedure: &comparison.procedure,
+                engine: &comparison.engine,
+                model: &comparison.model,
+                basis,
+                relative_deviation: comparison.relative_deviation,
+            };
+            let (verdict, cause) = self.known.revise(comparison.verdict, &subject);
+            comparison.verdict = verdict;
+            comparison.diagnosis = cause.or(comparison.diagnosis.take());
+        }
     }
 
     fn comparison(
@@ -151,37 +199,24 @@ impl Judge<'_> {
         recording: &Recording,
         target: &Target,
         reading: Option<&Reading>,
-        reference: Option<Reference>,
+        held: Option<Held>,
     ) -> Comparison {
-        let basis = reference.as_ref().map(|r| r.basis);
+        let basis = held.as_ref().map(|h| h.reference.basis);
         let tolerance = basis.map_or_else(Tolerance::default, |basis| {
             self.tolerances.of(task.procedure, basis, &recording.engine, task.quantity, self.overrides)
         });
-        let pair = reading.zip(reference.as_ref());
-        let deviation = pair.map(|(a, b)| a.value - b.value).filter(|d| d.is_finite());
-        let relative_deviation = pair.map(|(a, b)| (a.value - b.value) / b.value).filter(|d| d.is_finite());
-        let verdict = pair.map_or(Verdict::Missing, |(reading, reference)| {
-            let instrument = recording.instrument_uncertainty * reading.value;
-            let combined = standard_uncertainty(reading).hypot(reference.uncertainty).hypot(instrument);
-            let sound = reading.value >= 0.0 && reference.value >= 0.0;
-            let deviation = if sound { reading.value - reference.value } else { f64::NAN };
-            judge(deviation, self.tolerances.coverage_factor() * combined, tolerance.around(reference.value))
+        let pair = reading.zip(held.as_ref());
+        let difference = pair.map(|(a, b)| a.value - b.reference.value);
+        let budget = pair.map(|(reading, held)| {
+            let components = of_reading(recording, reading).into_iter().chain(held.components.iter().copied());
+            ErrorBudget::new(components.collect(), self.tolerances.coverage_factor())
         });
-        let subject = basis.map(|basis| Subject {
-            case: &recording.case,
-            procedure: task.procedure,
-            engine: &recording.engine,
-            model: &recording.model,
-            basis,
-            relative_deviation,
-        });
-        let (verdict, cause) = subject.map_or((verdict, None), |s| self.known.revise(verdict, &s));
-        let missing = match (reading, &reference) {
+        let missing = match (reading, &held) {
             (None, _) => recording.failure.clone().or_else(|| Some("no reading".to_owned())),
             (_, None) => Some("no reference".to_owned()),
             _ => None,
         };
-        Comparison {
+        let mut comparison = Comparison {
             case: recording.case.clone(),
             procedure: task.procedure.to_owned(),
             engine: recording.engine.clone(),
@@ -194,14 +229,63 @@ impl Judge<'_> {
             quantity: task.quantity,
             value: reading.map(|r| r.value),
             std_error: reading.and_then(|r| r.std_error),
-            reference,
-            deviation,
-            relative_deviation,
+            reference: held.map(|h| h.reference),
+            deviation: difference.filter(|d| d.is_finite()),
+            relative_deviation: None,
             tolerance,
-            verdict,
-            diagnosis: cause.or(missing),
+            verdict: Verdict::Missing,
+            diagnosis: missing,
+            budget,
+            p_value: None,
+        };
+        let Some(((value, reference), budget)) =
+            comparison.value.zip(comparison.reference.as_ref()).zip(comparison.budget.as_ref())
+        else {
+            return comparison;
+        };
+        comparison.relative_deviation = Some((value - reference.value) / reference.value).filter(|d| d.is_finite());
+        let sound = value >= 0.0 && reference.value >= 0.0;
+        let deviation = if sound { value - reference.value } else { f64::NAN };
+        let allowed = tolerance.around(reference.value);
+        comparison.verdict = judge(deviation, budget.expanded, allowed);
+        if comparison.verdict != Verdict::Missing {
+            comparison.p_value = Some(budget.p_value(deviation, allowed));
         }
+        comparison
     }
+}
+
+/// A reference with what is uncertain of it.
+struct Held {
+    reference: Reference,
+    components: Vec<Component>,
+}
+
+impl Held {
+    /// A printed or derived value, which does not rest on the photometric file.
+    fn published(reference: Reference, input: Option<&Input<'_>>, target: &Target, reading: Option<&Reading>) -> Self {
+        let rounding = Component {
+            source: Source::Rounding,
+            uncertainty: reference.uncertainty,
+            ..Component::within(Source::Rounding, 0.0)
+        };
+        let input = input.zip(reading).map(|(i, r)| Component::within(Source::Input, i.bound(target, r.value)));
+        Self { reference, components: std::iter::once(rounding).chain(input).collect() }
+    }
+}
+
+/// What is uncertain of a reading.
+fn of_reading(recording: &Recording, reading: &Reading) -> Vec<Component> {
+    let mut components = vec![];
+    if let Some(error) = reading.std_error {
+        components.push(Component::normal(Source::MonteCarlo, error, recording.degrees_of_freedom()));
+    }
+    if let Some(bound) = reading.error_bound {
+        components.push(Component::within(Source::Discretisation, bound));
+    }
+    let instrument = recording.instrument_uncertainty * reading.value.abs();
+    components.push(Component::normal(Source::Instrument, instrument, None));
+    components
 }
 
 /// Which of our own engines others are judged by in a procedure, and on what basis.
@@ -218,23 +302,29 @@ fn is_witness(engine: &str) -> bool {
     crate::plan::REFERENCES.contains(&engine)
 }
 
-fn reference_from_witness(task: &Task, recordings: &[&Recording], k: usize, engine: &str) -> Vec<Reference> {
+fn reference_from_witness(task: &Task, recordings: &[&Recording], k: usize, engine: &str) -> Vec<Held> {
     let (witness, basis, source) = witness_of(task);
     if engine == witness {
         return vec![];
     }
     let recording = recordings.iter().find(|r| r.engine == witness);
-    let reference = recording.and_then(|r| r.readings.get(k).map(|reading| (r, reading)));
-    let reference = reference.map(|(recording, reading)| Reference {
-        value: reading.value,
-        uncertainty: standard_uncertainty(reading),
-        basis,
-        source: match recording.settings.get("solver") {
-            Some(solver) if basis == Basis::Exact => format!("{source}: {solver}"),
-            _ => source.to_owned(),
+    let reading = recording.and_then(|r| r.readings.get(k).map(|reading| (r, reading)));
+    let held = reading.map(|(recording, reading)| Held {
+        reference: Reference {
+            value: reading.value,
+            uncertainty: standard_uncertainty(reading),
+            basis,
+            source: match recording.settings.get("solver") {
+                Some(solver) if basis == Basis::Exact => format!("{source}: {solver}"),
+                _ => source.to_owned(),
+            },
         },
+        components: of_reading(recording, reading)
+            .into_iter()
+            .map(|component| Component { source: Source::Reference, ..component })
+            .collect(),
     });
-    reference.into_iter().collect()
+    held.into_iter().collect()
 }
 
 /// Standard uncertainty of a reading: its standard error, or a bound taken as a rectangular distribution (GUM 4.3.7).

@@ -102,8 +102,6 @@ fn display_name(engine: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::*;
     use crate::reading::Quantity;
     use luminaire::scene::{Bounces, Scene};
@@ -120,18 +118,9 @@ mod tests {
             case: "c".into(),
             procedure: "indirect_illuminance".into(),
             engine: engine.into(),
-            version: String::new(),
             model: "point".into(),
-            light: String::new(),
-            input_sha256: String::new(),
-            seed: 1,
-            settings: BTreeMap::new(),
-            approximation: None,
-            notes: vec![],
-            wall_s: 0.0,
-            instrument_uncertainty: 0.0,
-            failure: None,
             readings: vec![reading],
+            ..Recording::default()
         }
     }
 

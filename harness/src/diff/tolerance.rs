@@ -32,6 +32,7 @@ impl Tolerance {
 #[serde(deny_unknown_fields)]
 pub struct Tolerances {
     coverage_factor: Sourced,
+    family_wise_error: Sourced,
     tolerances: Vec<Rule>,
 }
 
@@ -80,12 +81,21 @@ impl Tolerances {
         if !sound || self.coverage_factor.source.trim().is_empty() {
             return Err(ToleranceError("the coverage factor needs a positive value and a source".into()));
         }
+        let level = &self.family_wise_error;
+        if !(level.value > 0.0 && level.value < 0.5) || level.source.trim().is_empty() {
+            return Err(ToleranceError("the family-wise error needs a value between 0 and .5 and a source".into()));
+        }
         Ok(self)
     }
 
-    /// How many combined standard uncertainties a verdict allows for.
+    /// How many standard deviations of a normal distribution the interval of a verdict covers.
     pub fn coverage_factor(&self) -> f64 {
         self.coverage_factor.value
+    }
+
+    /// How probable any false failure may be among all comparisons of an engine in a procedure.
+    pub fn family_wise_error(&self) -> f64 {
+        self.family_wise_error.value
     }
 
     /// The tolerance of a comparison: the spec's override, else the rule that names most, else zero.

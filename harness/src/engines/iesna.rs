@@ -42,6 +42,10 @@ impl Engine for Iesna {
         Support::Approximate { why: objections.join("; "), size: None }
     }
 
+    fn components(&self, _job: &Job) -> Vec<&'static str> {
+        vec![super::FILE_READER, super::OWN_LOOKUP]
+    }
+
     fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
         Ok(vec![])
     }

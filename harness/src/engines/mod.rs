@@ -85,6 +85,12 @@ impl fmt::Display for EngineId {
     }
 }
 
+/// The component of every engine that gets its candela table from our own reader of photometric files.
+pub const FILE_READER: &str = "luxproof's reader of photometric files";
+
+/// The component of our own solvers, which look intensities up alike.
+const OWN_LOOKUP: &str = "luminaire's interpolation of candela tables";
+
 /// Something that reads illuminance at meters of a scene.
 pub trait Engine: Send + Sync {
     /// Its name.
@@ -95,6 +101,12 @@ pub trait Engine: Send + Sync {
 
     /// Whether it can do this job, exactly or nearly; decided from the job alone, before anything starts.
     fn supports(&self, job: &Job) -> Support;
+
+    /// What it shares with other engines, by name: what one error would put off for all who have it. Witnesses that share a
+    /// component count once; their own code need not be named.
+    fn components(&self, _job: &Job) -> Vec<&'static str> {
+        vec![FILE_READER]
+    }
 
     /// The job as native files, runnable by hand; pure. Our own solvers have none.
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError>;

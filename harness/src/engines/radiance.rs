@@ -19,7 +19,7 @@ use luminaire::scene::Transport;
 
 use self::options::{Options, Sources};
 use self::sampling::Sampler;
-use self::settings::{Preset, Settings};
+use self::settings::{Photometrist, Preset, Settings};
 use self::tools::Tools;
 use super::{
     Absent, Engine, EngineError, EngineId, Estimate, Job, Measurement, SceneFile, Site, Station, Support, Version,
@@ -66,6 +66,14 @@ impl Engine for Radiance {
         let size = known.iter().map(|(size, _)| size).sum();
         let why: Vec<_> = known.into_iter().map(|(_, why)| why).collect();
         Support::Approximate { why: why.join("; "), size: Some(size) }
+    }
+
+    fn components(&self, job: &Job) -> Vec<&'static str> {
+        match Settings::of(job).map(|s| s.photometrist) {
+            // It reads the file as our reader and writer pass it on, expanded to the whole sphere.
+            Ok(Photometrist::Ies2rad) => vec![super::FILE_READER, "ies2rad"],
+            _ => vec![super::FILE_READER],
+        }
     }
 
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {

@@ -28,6 +28,10 @@ impl Engine for Simulator {
         Support::Yes
     }
 
+    fn components(&self, _job: &Job) -> Vec<&'static str> {
+        vec![super::FILE_READER, super::OWN_LOOKUP]
+    }
+
     fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
         Ok(vec![])
     }

@@ -1,5 +1,6 @@
 //! The report: one record of a run, and views of it; the JSON form is the truth.
 
+mod budget;
 mod curve;
 mod junit;
 mod markdown;
@@ -17,6 +18,7 @@ use crate::plan::Skip;
 use crate::reading::{MeterId, Quantity, Recording};
 use crate::run::{EngineStatus, Status};
 
+pub use budget::budgets;
 pub use curve::{Curve, curves};
 pub use junit::junit;
 pub use markdown::markdown;
