@@ -15,11 +15,10 @@ pub(super) fn rejected(p_values: &[f64], level: f64) -> Vec<bool> {
     order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));
     let mut rejected = vec![false; p_values.len()];
     for (rank, &k) in order.iter().enumerate() {
-        // Written so that NaN rejects nothing.
-        if !(p_values[k] <= level / (p_values.len() - rank) as f64) {
+        rejected[k] = p_values[k] <= level / (p_values.len() - rank) as f64;
+        if !rejected[k] {
             break;
         }
-        rejected[k] = true;
     }
     rejected
 }

@@ -33,7 +33,8 @@ impl Tolerance {
 pub struct Tolerances {
     coverage_factor: Sourced,
     family_wise_error: Sourced,
-    tolerances: Vec<Rule>,
+    #[serde(rename = "tolerances")]
+    rules: Vec<Rule>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -72,7 +73,7 @@ impl Tolerances {
     }
 
     fn checked(self) -> Result<Self, ToleranceError> {
-        for rule in &self.tolerances {
+        for rule in &self.rules {
             if rule.source.trim().is_empty() {
                 return Err(ToleranceError(format!("a tolerance of {} has no source", rule.procedure)));
             }
@@ -120,7 +121,7 @@ impl Tolerances {
                 && rule.engine.as_deref().is_none_or(|e| e == engine)
         };
         let names = |rule: &&Rule| usize::from(rule.basis.is_some()) + 2 * usize::from(rule.engine.is_some());
-        let rule = self.tolerances.iter().filter(applies).max_by_key(names);
+        let rule = self.rules.iter().filter(applies).max_by_key(names);
         rule.map(|r| Tolerance { relative: r.relative, absolute: absolute(r.absolute_lx, r.absolute_cd) })
             .unwrap_or_default()
     }
