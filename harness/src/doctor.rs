@@ -72,6 +72,7 @@ fn check(
         log: folder.path().join("log"),
         jobs: crate::process::cores(),
         limit: std::time::Duration::from_secs(120),
+        peak: crate::process::PeakMemory::default(),
     };
     let measurement = checked(&id, &job, engine.read(&job, &workbench)?)?;
     let expected = expected(&job).map_err(|what| EngineError::Solver { engine: id.clone(), what })?;

@@ -8,7 +8,8 @@ use std::io::{Read, Write};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command as StdCommand, ExitStatus, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -28,6 +29,41 @@ pub fn is_interrupted() -> bool {
 /// How many threads or processes run side by side where nobody says: one a core.
 pub fn cores() -> usize {
     thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+/// The largest resident memory of any process of a job so far; clones share it.
+#[derive(Clone, Debug, Default)]
+pub struct PeakMemory(Arc<AtomicU64>);
+
+impl PeakMemory {
+    /// In MiB; `None` where no process was seen, or the system does not tell.
+    pub fn mib(&self) -> Option<f64> {
+        let kib = self.0.load(Ordering::Relaxed);
+        (kib > 0).then_some(kib as f64 / 1024.0)
+    }
+
+    /// Looks at a process that runs: a number, or `self`.
+    pub fn look_at(&self, process: &str) {
+        // rusage would do after the end, but counts what a fork shares with its parent as the child's own.
+        let Ok(status) = fs::read_to_string(format!("/proc/{process}/status")) else { return };
+        let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+        let kib = line.and_then(|l| l.split_whitespace().next()).and_then(|w| w.parse().ok());
+        self.0.fetch_max(kib.unwrap_or(0), Ordering::Relaxed);
+    }
+}
+
+/// Processor time of this process and of all its children that have ended.
+pub fn cpu_time() -> Duration {
+    use nix::sys::resource::{UsageWho, getrusage};
+    let of = |who| {
+        getrusage(who).map_or(Duration::ZERO, |usage| {
+            let micros = |t: nix::sys::time::TimeVal| {
+                u64::try_from(t.tv_sec()).unwrap_or(0) * 1_000_000 + u64::try_from(t.tv_usec()).unwrap_or(0)
+            };
+            Duration::from_micros(micros(usage.user_time()) + micros(usage.system_time()))
+        })
+    };
+    of(UsageWho::RUSAGE_SELF) + of(UsageWho::RUSAGE_CHILDREN)
 }
 
 /// Asks a program about itself, its version say, in a folder of its own: in a shared one another user's log could not
@@ -63,6 +99,8 @@ pub struct Invocation {
     pub limit: Duration,
     /// Where its standard error is kept.
     pub log: PathBuf,
+    /// Told of the memory that it takes.
+    pub peak: PeakMemory,
 }
 
 /// What a program that exited with 0 gave.
@@ -131,7 +169,8 @@ impl Invocation {
     /// An invocation without input, in `cwd`, with a limit and a log file.
     pub fn new(program: impl Into<PathBuf>, cwd: &Path, limit: Duration, log: impl Into<PathBuf>) -> Self {
         let (args, env, stdin) = (vec![], vec![], vec![]);
-        Self { program: program.into(), args, env, cwd: cwd.to_owned(), stdin, limit, log: log.into() }
+        let peak = PeakMemory::default();
+        Self { program: program.into(), args, env, cwd: cwd.to_owned(), stdin, limit, log: log.into(), peak }
     }
 
     /// Adds arguments.
@@ -212,7 +251,9 @@ impl Invocation {
 
     fn wait(&self, child: &mut Child, start: Instant) -> Result<ExitStatus, ProcessError> {
         let mut pause = Duration::from_micros(200);
+        let process = child.id().to_string();
         loop {
+            self.peak.look_at(&process);
             if let Some(status) = child.try_wait().map_err(|source| self.start_error(source))? {
                 return Ok(status);
             }
@@ -345,6 +386,21 @@ mod tests {
         assert!(matches!(error, ProcessError::TimedOut { .. }), "{error}");
         thread::sleep(Duration::from_millis(1300));
         assert!(!folder.path().join("survivor").exists());
+    }
+
+    #[test]
+    fn memory_and_processor_time_of_a_program_are_seen() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = |script: &str| {
+            let invocation = Invocation::new("sh", folder.path(), Duration::from_secs(20), folder.path().join("log"));
+            let invocation = invocation.args(["-c", script]);
+            invocation.run().unwrap();
+            invocation.peak.mib().unwrap()
+        };
+        let before = cpu_time();
+        let (small, large) = (run("sleep 0.1"), run("x=$(head -c 50000000 /dev/zero | tr '\\0' a); sleep 0.1"));
+        assert!(small > 0.1 && large > small + 40.0, "{small} {large}");
+        assert!(cpu_time() - before > Duration::from_millis(5));
     }
 
     #[test]

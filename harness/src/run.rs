@@ -233,6 +233,7 @@ fn measure(planned: &Planned, job: &Job, procedure: &str, options: &Options) -> 
         log: absolute(&options.out.join("logs").join(format!("{engine}.{procedure}.log")))?,
         jobs: options.jobs,
         limit: limit(job.budget),
+        peak: process::PeakMemory::default(),
     };
     fs::remove_file(&workbench.log).or_else(ignore_absence).map_err(|e| EngineError::io(&workbench.log, e))?;
     let measurement = planned.engine.read(job, &workbench)?;

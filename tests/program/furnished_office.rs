@@ -33,7 +33,14 @@ fn read(engine: &str, procedure: &str, budget: Budget, settings: &[(&str, u32)])
     };
     let folder = tempfile::tempdir().unwrap();
     let (scene_dir, log) = (folder.path().to_owned(), folder.path().join("log"));
-    let bench = Workbench { site, scene_dir, log, jobs: 2, limit: Duration::from_secs(300) };
+    let bench = Workbench {
+        site,
+        scene_dir,
+        log,
+        jobs: 2,
+        limit: Duration::from_secs(300),
+        peak: luxproof::process::PeakMemory::default(),
+    };
     (engine.read(&job, &bench).unwrap().estimates, declared)
 }
 

@@ -201,7 +201,14 @@ fn read(engine: &dyn Engine, job: &Job, site: &Site, jobs: usize) -> Result<Vec<
     let log = folder.path().join("log");
     let scene_dir = folder.path().join("scene");
     std::fs::create_dir(&scene_dir).map_err(|e| EngineError::io(&scene_dir, e))?;
-    let workbench = Workbench { site: site.clone(), scene_dir, log, jobs, limit: LIMIT };
+    let workbench = Workbench {
+        site: site.clone(),
+        scene_dir,
+        log,
+        jobs,
+        limit: LIMIT,
+        peak: crate::process::PeakMemory::default(),
+    };
     Ok(checked(&engine.id(), job, engine.read(job, &workbench)?)?.estimates)
 }
 

@@ -49,6 +49,7 @@ mod tests {
             log: folder.path().join("log"),
             jobs: 1,
             limit: Duration::from_secs(60),
+            peak: crate::process::PeakMemory::default(),
         };
         let path = folder.path().join("two.ppm");
         let mut bytes = b"P6\n2 1\n65535\n".to_vec();

@@ -16,7 +16,9 @@ use luminaire::scene::{Luminaire, LuminaireModel, Shape, Transport};
 
 use self::backend::Backend;
 use self::settings::{Preset, Settings};
-use super::{Absent, Engine, EngineError, EngineId, Job, Measurement, SceneFile, Site, Support, Version, Workbench};
+use super::{
+    Absent, Engine, EngineError, EngineId, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench,
+};
 
 const ID: EngineId = EngineId::new("mitsuba");
 
@@ -63,6 +65,10 @@ impl Engine for Mitsuba {
     fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
         let plain = "python3 mitsuba_read.py job.json".to_owned();
         Some(self.backend(site).map_or(plain, |backend| backend.command_by_hand()))
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        settings::KNOBS
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {

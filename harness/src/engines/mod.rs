@@ -27,7 +27,7 @@ use std::time::Duration;
 use luminaire::scene::{Meter, Scene, Transport};
 use serde::Serialize;
 
-use crate::process::{Invocation, ProcessError};
+use crate::process::{Invocation, PeakMemory, ProcessError};
 use crate::reading::MeterId;
 
 pub use crate::spec::Budget;
@@ -117,8 +117,22 @@ pub trait Engine: Send + Sync {
         None
     }
 
+    /// The settings whose effect on time and result is worth knowing, with values to try; `preset` first where there is one.
+    fn knobs(&self) -> &'static [Knob] {
+        &[]
+    }
+
     /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError>;
+}
+
+/// A setting of an engine with values worth trying.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Knob {
+    /// Its key in a spec.
+    pub key: &'static str,
+    /// Values as YAML flow scalars, the default first.
+    pub values: &'static [&'static str],
 }
 
 /// One procedure of one case, as an engine is asked for it.
@@ -213,12 +227,14 @@ pub struct Workbench {
     pub jobs: usize,
     /// Past this the job is killed.
     pub limit: Duration,
+    /// Told of the memory that the job's processes took.
+    pub peak: PeakMemory,
 }
 
 impl Workbench {
     /// An invocation in the scene's folder with this job's log and limit.
     pub fn invoke(&self, program: impl Into<PathBuf>) -> Invocation {
-        Invocation::new(program, &self.scene_dir, self.limit, &self.log)
+        Invocation { peak: self.peak.clone(), ..Invocation::new(program, &self.scene_dir, self.limit, &self.log) }
     }
 
     /// Writes exported files into the scene's folder.

@@ -21,8 +21,8 @@ use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 
 use super::{
-    Absent, Engine, EngineError, EngineId, Estimate, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
-    checked,
+    Absent, Engine, EngineError, EngineId, Estimate, Job, Knob, Measurement, SceneFile, Site, Support, Version,
+    Workbench, checked,
 };
 use crate::process;
 use export::Light;
@@ -81,6 +81,10 @@ impl Engine for PovRay {
                 [command(Light::Direct, "direct.ppm"), command(Light::Indirect, "indirect.ppm")].join("; ")
             }
         })
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        settings::KNOBS
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {

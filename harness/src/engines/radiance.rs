@@ -22,8 +22,8 @@ use self::sampling::Sampler;
 use self::settings::{Photometrist, Preset, Settings};
 use self::tools::Tools;
 use super::{
-    Absent, Engine, EngineError, EngineId, Estimate, Job, Measurement, SceneFile, Site, Station, Support, Version,
-    Workbench, checked,
+    Absent, Engine, EngineError, EngineId, Estimate, Job, Knob, Measurement, SceneFile, Site, Station, Support,
+    Version, Workbench, checked,
 };
 
 const ID: EngineId = EngineId::new("radiance");
@@ -83,6 +83,10 @@ impl Engine for Radiance {
 
     fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
         Some(Tools::find(site).map_or_else(|_| "sh run.sh".to_owned(), |tools| tools.command_by_hand()))
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        settings::KNOBS
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {

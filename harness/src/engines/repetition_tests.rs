@@ -18,7 +18,14 @@ fn repetitions(engine: &dyn Engine, settings: &[(&str, serde_json::Value)], budg
     let read = |seed| {
         let folder = tempfile::tempdir().unwrap();
         let (scene_dir, log) = (folder.path().to_owned(), folder.path().join("log"));
-        let bench = Workbench { site: site.clone(), scene_dir, log, jobs: 2, limit: Duration::from_secs(120) };
+        let bench = Workbench {
+            site: site.clone(),
+            scene_dir,
+            log,
+            jobs: 2,
+            limit: Duration::from_secs(120),
+            peak: crate::process::PeakMemory::default(),
+        };
         let settings = settings.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
         let job = Job { budget, seed, settings, ..s1(CONVERGED) };
         engine.read(&job, &bench).unwrap()

@@ -3,8 +3,8 @@
 use luminaire::simulator::{self, Accuracy, Uncertainty};
 
 use super::{
-    Absent, Engine, EngineError, EngineId, Estimate, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
-    checked,
+    Absent, Engine, EngineError, EngineId, Estimate, Job, Knob, Measurement, SceneFile, Site, Support, Version,
+    Workbench, checked,
 };
 
 /// The exact simulation of [`luminaire::simulator`].
@@ -34,6 +34,10 @@ impl Engine for Simulator {
 
     fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
         Ok(vec![])
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        &[Knob { key: "relative_error", values: &["0.001", "0.1", "0.00001"] }]
     }
 
     fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {

@@ -18,7 +18,14 @@ fn adapter(script: &str, folder: &Path) -> External {
 fn read_within(script: &str, limit: Duration) -> Result<Measurement, EngineError> {
     let folder = tempfile::tempdir().unwrap();
     let site = Site::at(folder.path());
-    let bench = Workbench { site, scene_dir: folder.path().into(), log: folder.path().join("log"), jobs: 1, limit };
+    let bench = Workbench {
+        site,
+        scene_dir: folder.path().into(),
+        log: folder.path().join("log"),
+        jobs: 1,
+        limit,
+        peak: crate::process::PeakMemory::default(),
+    };
     adapter(script, folder.path()).read(&s1(Transport::Direct), &bench)
 }
 

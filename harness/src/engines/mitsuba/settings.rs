@@ -3,10 +3,17 @@
 use serde::Deserialize;
 
 use super::ID;
-use crate::engines::{EngineError, Job};
+use crate::engines::{EngineError, Job, Knob};
 
 /// Variants whose single sample is a luminance; the spectral and polarised ones are not.
 const VARIANTS: [&str; 5] = ["llvm_ad_mono", "llvm_ad_rgb", "scalar_rgb", "cuda_ad_mono", "cuda_ad_rgb"];
+
+/// What a spec may set, with values worth trying.
+pub(super) const KNOBS: &[Knob] = &[
+    Knob { key: "preset", values: &["audit", "fast", "default"] },
+    Knob { key: "variant", values: &["llvm_ad_mono", "llvm_ad_rgb", "scalar_rgb"] },
+    Knob { key: "recentre", values: &["true", "false"] },
+];
 
 /// Settings with their defaults.
 #[derive(Clone, Debug, PartialEq)]

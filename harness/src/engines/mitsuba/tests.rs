@@ -125,7 +125,14 @@ fn exact_direct_lx(job: &Job) -> Vec<f64> {
 fn workbench(folder: &Path) -> Workbench {
     let site = Site::of_user().unwrap();
     let limit = Duration::from_secs(120);
-    Workbench { site, scene_dir: folder.to_owned(), log: folder.join("log"), jobs: 2, limit }
+    Workbench {
+        site,
+        scene_dir: folder.to_owned(),
+        log: folder.join("log"),
+        jobs: 2,
+        limit,
+        peak: crate::process::PeakMemory::default(),
+    }
 }
 
 fn read(job: &Job) -> Measurement {

@@ -4,12 +4,21 @@ use std::collections::BTreeMap;
 
 use luminaire::scene::Bounces;
 
-use crate::engines::{EngineError, Job};
+use crate::engines::{EngineError, Job, Knob};
 
 use super::ID;
 
 /// The deepest recursion that POV-Ray 3.7 accepts (`RadiosityFunction::DEPTH_MAX`).
 pub(super) const DEEPEST: u32 = 20;
+
+/// What a spec may set, with values worth trying.
+pub(super) const KNOBS: &[Knob] = &[
+    Knob { key: "preset", values: &["audit", "fast", "default"] },
+    Knob { key: "count", values: &["200", "50"] },
+    Knob { key: "error_bound", values: &["0.1", "0.5"] },
+    Knob { key: "recursion_limit", values: &["20", "4"] },
+    Knob { key: "recentre", values: &["true", "false"] },
+];
 
 /// How POV-Ray is set up for a job.
 #[derive(Clone, Debug, PartialEq)]

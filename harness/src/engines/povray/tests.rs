@@ -28,7 +28,14 @@ fn site() -> Site {
 
 fn workbench(folder: &Path) -> Workbench {
     let limit = Duration::from_secs(120);
-    Workbench { site: site(), scene_dir: folder.to_owned(), log: folder.join("log"), jobs: 2, limit }
+    Workbench {
+        site: site(),
+        scene_dir: folder.to_owned(),
+        log: folder.join("log"),
+        jobs: 2,
+        limit,
+        peak: crate::process::PeakMemory::default(),
+    }
 }
 
 fn read(job: &Job) -> Measurement {

@@ -32,7 +32,14 @@ fn failure(rtrace: &str, transport: Transport, limit_s: f64) -> EngineError {
     let scene_dir = folder.path().join("scene");
     fs::create_dir(&scene_dir).unwrap();
     let limit = Duration::from_secs_f64(limit_s);
-    let bench = Workbench { site, scene_dir, log: folder.path().join("log"), jobs: 2, limit };
+    let bench = Workbench {
+        site,
+        scene_dir,
+        log: folder.path().join("log"),
+        jobs: 2,
+        limit,
+        peak: crate::process::PeakMemory::default(),
+    };
     Radiance.read(&s1(transport), &bench).unwrap_err()
 }
 
@@ -119,6 +126,7 @@ fn ies2rad_that_makes_no_light_is_an_error() {
         log: folder.path().join("log"),
         jobs: 1,
         limit: Duration::from_secs(20),
+        peak: crate::process::PeakMemory::default(),
     };
     let mut job = s1(Transport::Direct);
     job.settings.insert("photometry".into(), "ies2rad".into());

@@ -3,7 +3,16 @@
 use serde::Deserialize;
 
 use super::ID;
-use crate::engines::{EngineError, Job};
+use crate::engines::{EngineError, Job, Knob};
+
+/// What a spec may set, with values worth trying.
+pub(super) const KNOBS: &[Knob] = &[
+    Knob { key: "preset", values: &["audit", "fast", "default"] },
+    Knob { key: "ambient_divisions", values: &["16384", "1024"] },
+    Knob { key: "photometry", values: &["exporter", "ies2rad"] },
+    Knob { key: "impostor_height_m", values: &["0.057", "0.2"] },
+    Knob { key: "rescale", values: &["true", "false"] },
+];
 
 /// Settings with their defaults.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,7 +14,14 @@ use crate::engines::fixtures::*;
 
 fn workbench(folder: &Path) -> Workbench {
     let limit = Duration::from_secs(120);
-    Workbench { site: Site::of_user().unwrap(), scene_dir: folder.to_owned(), log: folder.join("log"), jobs: 2, limit }
+    Workbench {
+        site: Site::of_user().unwrap(),
+        scene_dir: folder.to_owned(),
+        log: folder.join("log"),
+        jobs: 2,
+        limit,
+        peak: crate::process::PeakMemory::default(),
+    }
 }
 
 pub(super) fn read(job: &Job) -> Measurement {
