@@ -186,7 +186,8 @@ fn engines(case: &Case, selection: &Selection, site: &Site) -> Result<Vec<Planne
             error.help = error.help.map(|h| format!("{h} A program of your own needs `command: [...]`"));
             return Err(error);
         }
-        let folder = case.path.parent().unwrap_or(Path::new(""));
+        // The parent of a bare file name is empty, which is no folder.
+        let folder = case.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let engine = crate::engines::external(name, &settings.0, folder).map_err(|error| {
             let help = "give `command: [program, arguments...]`, paths relative to the spec";
             case.source.error_at(&format!("engines.{name}"), error.to_string(), help)

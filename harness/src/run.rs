@@ -144,6 +144,28 @@ pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress)
     Ok(Outcome { recordings, engines, skips })
 }
 
+/// What a case gives that is not run at all: a skip for every run of its plan, and engines of the given status.
+pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcome {
+    let skip = |run: &Run| Skip {
+        case: case.name.clone(),
+        procedure: plan.tasks[run.task].procedure.to_owned(),
+        engine: plan.engines[run.engine].engine.id().name().to_owned(),
+        scope: Scope::Procedure,
+        reason: reason.to_owned(),
+        saved: Some("the whole run".to_owned()),
+    };
+    let engine = |(e, planned): (usize, &Planned)| {
+        let engine = self::status(planned, &[]);
+        if plan.runs.iter().any(|run| run.engine == e) {
+            EngineStatus { status, reason: Some(reason.to_owned()), ..engine }
+        } else {
+            engine
+        }
+    };
+    let engines = plan.engines.iter().enumerate().map(engine).collect();
+    Outcome { recordings: vec![], engines, skips: plan.runs.iter().map(skip).collect() }
+}
+
 /// The calibration of an engine of the plan; `None` where it has nothing to do or is one of our own solvers, which are what
 /// the others are calibrated by.
 fn instrument(plan: &Plan, e: usize, options: &Options, progress: &dyn Progress) -> Result<Option<Calibrated>, String> {

@@ -1,15 +1,14 @@
 //! The command line: arguments, what each command does with them, and its exit code.
 
 pub(crate) mod diagnostic;
+mod progress;
 mod run_specs;
 
 use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use crate::diff::Tolerances;
@@ -20,9 +19,8 @@ use crate::photometry_command::{self, PhotometryArgs};
 use crate::plan::{Asked, Selection, plan};
 use crate::process;
 use crate::report::{self, Exit, Report, Style};
-use crate::run;
 use crate::selftest::selftest;
-use crate::spec::{Case, Spec, suite};
+use crate::spec::{Case, Spec, filtered, suite};
 
 use diagnostic::diagnose;
 use run_specs::{Tables, run_specs};
@@ -69,6 +67,9 @@ struct Selected {
     /// Procedures to run, by name [default: all of the spec]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     procedures: Vec<String>,
+    /// Only cases whose name matches: a glob, or a part of the name; may be given several times [default: all]
+    #[arg(long, value_name = "PATTERN")]
+    filter: Vec<String>,
     /// Seed of every random choice
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -96,6 +97,9 @@ struct RunArgs {
     /// Views of the report to print
     #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [Format::Terminal])]
     format: Vec<Format>,
+    /// Stop after the first case that fails; the cases left are reported as skipped
+    #[arg(long)]
+    fail_fast: bool,
     /// Threads or processes at a time [default: one a core]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
@@ -286,7 +290,7 @@ fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format]) -> Result<()
 }
 
 fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
-    let cases = suite(&args.specs).map_err(diagnose)?;
+    let cases = suite(&args.specs).and_then(|all| filtered(all, &args.selected.filter)).map_err(diagnose)?;
     Tables::read(&cases)?;
     let mut out = std::io::stdout().lock();
     let mut exit = Exit::Passed;
@@ -481,45 +485,4 @@ fn calibration_line(found: &Calibrated) -> String {
         Err(why) => format!("not kept, so that it is measured again next time: {why}"),
     };
     format!("{}; {kept}", found.calibration.summary())
-}
-
-/// A spinner on stderr while a job runs, a line when it failed.
-struct Bar {
-    bar: ProgressBar,
-    case: String,
-}
-
-impl Bar {
-    fn new(case: &str) -> Self {
-        let bar = ProgressBar::new_spinner();
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} [{elapsed}]") {
-            bar.set_style(style);
-        }
-        bar.enable_steady_tick(Duration::from_millis(100));
-        Self { bar, case: case.to_owned() }
-    }
-}
-
-impl run::Progress for Bar {
-    fn started(&self, engine: &str, procedure: &str) {
-        self.bar.reset_elapsed();
-        self.bar.set_message(format!("{}: {engine}: {procedure}", self.case));
-    }
-
-    fn calibrated(&self, engine: &str, found: &Calibrated) {
-        self.bar.suspend(|| eprintln!("{engine}: calibrated before its first use: {}", calibration_line(found)));
-    }
-
-    fn ended(&self, engine: &str, procedure: &str, wall: Duration, failure: Option<&str>) {
-        tracing::info!(engine, procedure, wall_s = wall.as_secs_f64(), "done");
-        if let Some(failure) = failure {
-            self.bar.println(format!("{}: {engine}: {procedure} failed: {failure}", self.case));
-        }
-    }
-}
-
-impl Drop for Bar {
-    fn drop(&mut self) {
-        self.bar.finish_and_clear();
-    }
 }

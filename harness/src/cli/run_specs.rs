@@ -8,7 +8,8 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 use sha2::{Digest, Sha256};
 
 use super::diagnostic::diagnose;
-use super::{Bar, RunArgs, print_reports, report_installation};
+use super::progress::Progress;
+use super::{RunArgs, print_reports, report_installation};
 use crate::diagnosis;
 use crate::diff::{Comparison, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
 use crate::engines::{self, EngineId, Site};
@@ -17,13 +18,13 @@ use crate::procedures::Task;
 use crate::process;
 use crate::reading::Recording;
 use crate::report::{self, Exit, Ingredients, Report, SpecRecord};
-use crate::run;
-use crate::spec::{Case, suite};
+use crate::run::{self, Status};
+use crate::spec::{Case, filtered, suite};
 
 /// Runs all cases, judges and prints.
 pub(super) fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic> {
     // Every spec is read and checked before any engine starts.
-    let mut cases = suite(&args.specs).map_err(diagnose)?;
+    let mut cases = suite(&args.specs).and_then(|all| filtered(all, &args.selected.filter)).map_err(diagnose)?;
     let selection = args.selected.selection();
     // Of a suite, the cases that the chosen procedures concern; a choice that concerns none is refused below.
     if cases.iter().any(|case| selection.concerns(case)) {
@@ -44,13 +45,24 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic>
     let root = out_folder(args);
     let mut exit = Exit::Passed;
     let mut reports = vec![];
+    let progress = Progress::of(plans.iter().zip(&cases).map(|(plan, case)| (plan, case.budget.seconds)));
+    let suite =
+        Suite { tables: &tables, site, progress: &progress, jobs: args.jobs.unwrap_or_else(process::cores).max(1) };
+    let mut stop: Option<Stop> = None;
     for ((case, plan), published) in cases.iter().zip(&plans).zip(&tables.published) {
         let folder = if cases.len() == 1 { root.clone() } else { root.join(within(&root, case)) };
-        let report = run_case(case, plan, published.as_ref(), &tables, args, site, &folder)?;
+        let report = run_case(case, plan, published.as_ref(), &suite, stop.as_ref(), &folder)?;
         let named = |id: &str| plan.engines.iter().any(|p| p.engine.id().name() == id && p.asked == Asked::ByName);
-        exit = exit.worse(report.exit(named));
+        let exit_of_case = report.exit(named);
+        if process::is_interrupted() {
+            stop = Some(Stop::Interrupted);
+        } else if args.fail_fast && stop.is_none() && matches!(exit_of_case, Exit::Failed | Exit::Engine) {
+            stop = Some(Stop::Failed { case: case.name.clone() });
+        }
+        exit = exit.worse(exit_of_case);
         reports.push(report);
     }
+    drop(progress);
     let Some(report) = Report::joined(record(args, &cases), reports) else { return Ok(exit) };
     if cases.len() > 1 {
         run::keep(&root.join("report.json"), &report).into_diagnostic()?;
@@ -119,23 +131,50 @@ impl Tables {
     }
 }
 
+/// Why the cases that are left are not run.
+#[derive(Clone, Debug, thiserror::Error)]
+enum Stop {
+    #[error("not run: the run was interrupted")]
+    Interrupted,
+    #[error("not run: {case} failed, and --fail-fast was asked for")]
+    Failed { case: String },
+}
+
+impl Stop {
+    /// How the engines of a case that is left have fared: an interruption must not look like success.
+    fn status(&self) -> Status {
+        match self {
+            Self::Interrupted => Status::Failed,
+            Self::Failed { .. } => Status::Skipped,
+        }
+    }
+}
+
+/// What all cases of a run share.
+struct Suite<'a> {
+    tables: &'a Tables,
+    site: &'a Site,
+    progress: &'a Progress,
+    jobs: usize,
+}
+
 fn run_case(
     case: &Case,
     plan: &Plan,
     published: Option<&Published>,
-    tables: &Tables,
-    args: &RunArgs,
-    site: &Site,
+    suite: &Suite<'_>,
+    stop: Option<&Stop>,
     folder: &Path,
 ) -> Result<Report, Diagnostic> {
     let (started, clock) = (SystemTime::now(), Instant::now());
-    let options = run::Options {
-        site: site.clone(),
-        out: folder.to_owned(),
-        jobs: args.jobs.unwrap_or_else(process::cores).max(1),
+    let options = run::Options { site: suite.site.clone(), out: folder.to_owned(), jobs: suite.jobs };
+    let outcome = match stop {
+        Some(stop) => run::not_run(case, plan, stop.status(), &stop.to_string()),
+        None => {
+            run::run(case, plan, &options, &suite.progress.case(&case.name, case.budget.seconds)).into_diagnostic()?
+        }
     };
-    let outcome = run::run(case, plan, &options, &Bar::new(&case.name)).into_diagnostic()?;
-    let Judged { comparisons, splits, tables } = judge(case, plan, &outcome.recordings, published, tables);
+    let Judged { comparisons, splits, tables } = judge(case, plan, &outcome.recordings, published, suite.tables);
     let ingredients = Ingredients {
         case: case.name.clone(),
         spec: record_of(case),
@@ -147,7 +186,7 @@ fn run_case(
         splits,
         published: tables,
         curves: plan.tasks.iter().flat_map(|task| report::curves(&case.name, task)).collect(),
-        commands: commands(plan, site),
+        commands: commands(plan, suite.site),
     };
     let report = Report::new(ingredients, comparisons);
     run::keep(&folder.join("report.json"), &report).into_diagnostic()?;

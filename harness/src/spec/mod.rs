@@ -16,7 +16,7 @@ pub use model::{
     Angles, BouncesSpec, Budget, DirectIlluminance, EngineSettings, IndirectIlluminance, LuminousIntensity, Names,
     Procedures, Spec, ToleranceOverride, TotalIlluminance,
 };
-pub use suite::suite;
+pub use suite::{filtered, suite};
 
 /// What is wrong with a spec, where, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

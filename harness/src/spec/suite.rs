@@ -23,6 +23,27 @@ pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
     Ok(cases)
 }
 
+/// The cases whose names match any of the patterns: a glob where it holds `*`, `?` or `[`, a part of the name otherwise.
+///
+/// Without a pattern all cases stay. A choice that leaves none is refused: an empty run would pass.
+pub fn filtered(cases: Vec<Case>, patterns: &[String]) -> Result<Vec<Case>, SpecError> {
+    let option = Path::new("--filter");
+    let mut globs = vec![];
+    for pattern in patterns.iter().filter(|p| p.contains(['*', '?', '['])) {
+        let refused =
+            |e| plain(option, format!("`{pattern}` is no pattern: {e}"), "use *, ? or [...], or a part of the name");
+        globs.push(glob::Pattern::new(pattern).map_err(refused)?);
+    }
+    let is_part = |name: &str| patterns.iter().any(|p| !p.contains(['*', '?', '[']) && name.contains(p.as_str()));
+    let chosen = |name: &str| patterns.is_empty() || is_part(name) || globs.iter().any(|g| g.matches(name));
+    if !cases.iter().any(|case| chosen(&case.name)) {
+        let names: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
+        let message = format!("no case matches `{}`", patterns.join("`, `"));
+        return Err(plain(option, message, &format!("the cases are {}", names.join(", "))));
+    }
+    Ok(cases.into_iter().filter(|case| chosen(&case.name)).collect())
+}
+
 /// The spec files that a path stands for: itself, the specs of a folder, or what a pattern matches.
 fn files(path: &Path) -> Result<Vec<PathBuf>, SpecError> {
     if path.is_dir() {
@@ -84,6 +105,22 @@ mod tests {
         assert_eq!(names(&[reference("analytic/*.yaml")]).unwrap(), found);
         let spec = |name: &str| reference("analytic").join(name);
         assert_eq!(names(&[spec("s2.yaml"), spec("s1.yaml")]).unwrap(), ["s2/direct", "s2/indirect", "s1"]);
+    }
+
+    #[test]
+    fn a_filter_is_a_glob_or_a_part_of_the_name_and_never_leaves_nothing() {
+        let chosen = |patterns: &[&str]| {
+            let patterns: Vec<String> = patterns.iter().map(|p| (*p).to_owned()).collect();
+            let cases = filtered(suite(&[reference("analytic")]).unwrap(), &patterns)?;
+            Ok::<_, SpecError>(cases.into_iter().map(|c| c.name).collect::<Vec<_>>())
+        };
+        assert_eq!(chosen(&["rho-"]).unwrap(), ["cie-5.8/rho-10", "cie-5.8/rho-50", "cie-5.8/rho-90"]);
+        assert_eq!(chosen(&["s?", "*direct"]).unwrap(), ["s1", "s2/direct", "s2/indirect"]);
+        assert_eq!(chosen(&["*/direct"]).unwrap(), ["s2/direct"]);
+        assert_eq!(chosen(&[]).unwrap(), names(&[reference("analytic")]).unwrap());
+        let none = chosen(&["cachet"]).unwrap_err();
+        assert!(none.message.contains("no case matches `cachet`") && none.help.unwrap().contains("cie-5.2, "));
+        assert!(chosen(&["s[", "s1"]).unwrap_err().message.contains("is no pattern"));
     }
 
     #[test]
