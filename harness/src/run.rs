@@ -1,5 +1,7 @@
 //! Runs a plan: one workbench a job, readings kept on disk as each job finishes, one engine's failure stops no other.
 
+mod reader;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -7,13 +9,15 @@ use std::time::{Duration, Instant};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::cache::Cache;
 use crate::engines::calibration::{Calibrated, Earlier, Origin, calibrate};
-use crate::engines::{EngineError, Job, Measurement, Site, Workbench, checked};
+use crate::engines::{EngineError, Measurement, Site};
 use crate::plan::{Plan, Planned, REFERENCES, Run, Scope, Skip};
 use crate::procedures::Task;
-use crate::process;
 use crate::reading::{Reading, Recording};
-use crate::spec::{Budget, Case};
+use crate::spec::Case;
+
+pub use reader::{Reader, Source, Taken};
 
 /// How to run.
 #[derive(Clone, Debug)]
@@ -24,6 +28,8 @@ pub struct Options {
     pub out: PathBuf,
     /// Threads or processes at a time.
     pub jobs: usize,
+    /// Where readings are kept between runs; `None`: nowhere, and every reading is taken anew.
+    pub cache: Option<Cache>,
 }
 
 /// What a run gave.
@@ -35,6 +41,8 @@ pub struct Outcome {
     pub engines: Vec<EngineStatus>,
     /// What an engine declined once it had seen the job.
     pub skips: Vec<Skip>,
+    /// How many answers of engines came out of the cache.
+    pub from_cache: usize,
 }
 
 /// How an engine fared.
@@ -107,7 +115,13 @@ pub trait Progress {
 
 /// Runs every job of a plan.
 pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress) -> Result<Outcome, RunError> {
-    let (mut recordings, mut skips) = (vec![], vec![]);
+    let (mut recordings, mut skips, mut from_cache) = (vec![], vec![], 0);
+    let reader = Reader {
+        site: options.site.clone(),
+        out: options.out.clone(),
+        cache: options.cache.clone(),
+        threads: options.jobs,
+    };
     for (e, planned) in plan.engines.iter().enumerate() {
         let mut of_engine = vec![];
         let instrument = instrument(plan, e, options, progress);
@@ -116,7 +130,7 @@ pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress)
             progress.started(planned.engine.id().name(), task.procedure);
             let start = Instant::now();
             let measured = match &instrument {
-                Ok(_) => measure(planned, &run.job, task.procedure, options),
+                Ok(_) => reader.read(planned, &run.job, task.procedure),
                 // An instrument that reads known scenes wrong reads nothing.
                 Err(reason) => Err(EngineError::Solver { engine: planned.engine.id(), what: reason.clone() }),
             };
@@ -125,6 +139,7 @@ pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress)
                 skips.push(declined(case, planned, task, why));
                 continue;
             }
+            from_cache += usize::from(measured.as_ref().is_ok_and(|taken| taken.source == Source::Cache));
             let mut recording = record(case, planned, run, task, measured, start.elapsed());
             if let Ok(Some(calibrated)) = &instrument {
                 recording.instrument_uncertainty = calibrated.calibration.uncertainty(run.job.transport);
@@ -141,7 +156,7 @@ pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress)
         recordings.extend(of_engine);
     }
     let engines = plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
-    Ok(Outcome { recordings, engines, skips })
+    Ok(Outcome { recordings, engines, skips, from_cache })
 }
 
 /// What a case gives that is not run at all: a skip for every run of its plan, and engines of the given status.
@@ -163,7 +178,7 @@ pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcom
         }
     };
     let engines = plan.engines.iter().enumerate().map(engine).collect();
-    Outcome { recordings: vec![], engines, skips: plan.runs.iter().map(skip).collect() }
+    Outcome { recordings: vec![], engines, skips: plan.runs.iter().map(skip).collect(), from_cache: 0 }
 }
 
 /// The calibration of an engine of the plan; `None` where it has nothing to do or is one of our own solvers, which are what
@@ -205,15 +220,15 @@ fn record(
     planned: &Planned,
     run: &Run,
     task: &Task,
-    measured: Result<Measurement, EngineError>,
+    taken: Result<Taken, EngineError>,
     wall: Duration,
 ) -> Recording {
     let engine = planned.engine.id();
-    let (measurement, failure) = match measured {
-        Ok(measurement) => (measurement, None),
+    let (measurement, wall_s, failure) = match taken {
+        Ok(taken) => (taken.measurement, taken.wall_s, None),
         Err(error) => {
             tracing::error!(%engine, procedure = task.procedure, "{error}");
-            (Measurement::default(), Some(error.to_string()))
+            (Measurement::default(), wall.as_secs_f64(), Some(error.to_string()))
         }
     };
     let readings = measurement.estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
@@ -235,54 +250,12 @@ fn record(
         settings: measurement.settings.clone(),
         approximation: run.approximation.clone(),
         notes: measurement.notes.clone(),
-        wall_s: wall.as_secs_f64(),
+        wall_s,
         components: planned.engine.components(&run.job).into_iter().map(str::to_owned).collect(),
         failure,
         readings: readings.collect(),
         ..Recording::default()
     }
-}
-
-fn measure(planned: &Planned, job: &Job, procedure: &str, options: &Options) -> Result<Measurement, EngineError> {
-    if process::is_interrupted() {
-        return Err(process::ProcessError::Interrupted { program: planned.engine.id().name().to_owned() }.into());
-    }
-    let engine = planned.engine.id();
-    let scene_dir = options.out.join("scenes").join(engine.name()).join(procedure);
-    let workbench = Workbench {
-        site: options.site.clone(),
-        scene_dir: fresh(&scene_dir)?,
-        log: absolute(&options.out.join("logs").join(format!("{engine}.{procedure}.log")))?,
-        jobs: options.jobs,
-        limit: limit(job.budget),
-        peak: process::PeakMemory::default(),
-    };
-    fs::remove_file(&workbench.log).or_else(ignore_absence).map_err(|e| EngineError::io(&workbench.log, e))?;
-    let measurement = planned.engine.read(job, &workbench)?;
-    // Our own solvers write no scene: an empty folder would only puzzle.
-    fs::remove_dir(&workbench.scene_dir).ok();
-    checked(&engine, job, measurement)
-}
-
-/// Far beyond the budget, which engines keep by themselves: this is for those that hang.
-fn limit(budget: Budget) -> Duration {
-    Duration::from_secs_f64((2.0 * budget.seconds + 120.0).min(1e9))
-}
-
-/// An empty folder, absolute, so that programs can run inside it.
-fn fresh(folder: &Path) -> Result<PathBuf, EngineError> {
-    let fail = |e| EngineError::io(folder, e);
-    fs::remove_dir_all(folder).or_else(ignore_absence).map_err(fail)?;
-    fs::create_dir_all(folder).map_err(fail)?;
-    absolute(folder)
-}
-
-fn absolute(path: &Path) -> Result<PathBuf, EngineError> {
-    std::path::absolute(path).map_err(|e| EngineError::io(path, e))
-}
-
-fn ignore_absence(error: std::io::Error) -> std::io::Result<()> {
-    if error.kind() == std::io::ErrorKind::NotFound { Ok(()) } else { Err(error) }
 }
 
 /// Writes JSON so that a reader sees either the old file or the new one, never half of one.

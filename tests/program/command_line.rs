@@ -52,6 +52,7 @@ impl Room {
             .args(args)
             .current_dir(self.path())
             .env("NO_COLOR", "1")
+            .env("LUXPROOF_CACHE", self.path().join("cache"))
             .env_remove("RUST_BACKTRACE")
             .output()
             .unwrap()

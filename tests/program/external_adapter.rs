@@ -50,6 +50,7 @@ fn luxproof(folder: &Path, args: &[&str]) -> Output {
     let mut program = Command::new(env!("CARGO_BIN_EXE_luxproof"));
     // Elsewhere than the spec's folder: paths of the command count from the spec.
     program.args(args).current_dir("/").env("NO_COLOR", "1").env("LUXPROOF_ENGINES", folder.join("engines"));
+    program.env("LUXPROOF_CACHE", folder.join("cache"));
     program.output().unwrap()
 }
 

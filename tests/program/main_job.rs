@@ -25,7 +25,7 @@ fn run(spec: &str, procedures: &str) -> (Value, Option<i32>) {
     let out = tempfile::tempdir().unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_luxproof"))
         .args(["run", spec, "--engines", &ENGINES.join(","), "--procedures", procedures])
-        .args(["--format", "json", "--out"])
+        .args(["--no-cache", "--format", "json", "--out"])
         .arg(out.path())
         .current_dir(root)
         .output()

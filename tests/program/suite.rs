@@ -14,7 +14,7 @@ fn run(args: &[&str]) -> (Value, Option<i32>) {
     let output = Command::new(env!("CARGO_BIN_EXE_luxproof"))
         .arg("run")
         .args(args)
-        .args(["--format", "json", "--out"])
+        .args(["--no-cache", "--format", "json", "--out"])
         .arg(out.path())
         .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))
         .output()

@@ -1,5 +1,6 @@
 //! The command line: arguments, what each command does with them, and its exit code.
 
+mod cache;
 pub(crate) mod diagnostic;
 mod progress;
 mod run_specs;
@@ -32,6 +33,9 @@ pub struct Cli {
     /// Where engines are installed [default: the user's data folder]
     #[arg(long, global = true, env = "LUXPROOF_ENGINES", value_name = "DIR")]
     engines_dir: Option<PathBuf>,
+    /// Where readings are kept between runs [default: the user's cache folder]
+    #[arg(long, global = true, env = "LUXPROOF_CACHE", value_name = "DIR")]
+    cache_dir: Option<PathBuf>,
     /// Print more of what happens to stderr
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
@@ -55,6 +59,8 @@ enum Command {
     Report(ReportArgs),
     /// Put known faults into right readings and see whether the harness catches and names them
     Selftest(SelftestArgs),
+    /// What the cache of readings holds; take out what is damaged or long unused
+    Cache(cache::CacheArgs),
     /// Print the JSON Schema of the spec, the report, or what external adapters read and print
     Schema(SchemaArgs),
 }
@@ -103,6 +109,9 @@ struct RunArgs {
     /// Threads or processes at a time [default: one a core]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
+    /// Take every reading anew, and keep none
+    #[arg(long)]
+    no_cache: bool,
 }
 
 #[derive(Debug, Args)]
@@ -218,7 +227,8 @@ impl Cli {
             None => Site::of_user().into_diagnostic()?,
         };
         match self.command {
-            Command::Run(args) => run_specs(&args, &site),
+            Command::Run(args) => run_specs(&args, &site, &cache::folder(self.cache_dir)?),
+            Command::Cache(args) => cache::manage(&args, &cache::folder(self.cache_dir)?),
             Command::Check(args) => check(&args, &site),
             Command::Export(args) => export(&args, &site),
             Command::Engines(args) => manage_engines(&args, &site),

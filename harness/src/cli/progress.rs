@@ -95,7 +95,7 @@ impl Progress {
     }
 
     /// Prints a line above the bar.
-    fn line(&self, text: &str) {
+    pub(super) fn line(&self, text: &str) {
         self.bar.suspend(|| eprintln!("{text}"));
     }
 

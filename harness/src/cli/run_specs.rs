@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use super::diagnostic::diagnose;
 use super::progress::Progress;
 use super::{RunArgs, print_reports, report_installation};
+use crate::cache::Cache;
 use crate::diagnosis;
 use crate::diff::{Comparison, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
 use crate::engines::{self, EngineId, Site};
@@ -22,7 +23,7 @@ use crate::run::{self, Status};
 use crate::spec::{Case, filtered, suite};
 
 /// Runs all cases, judges and prints.
-pub(super) fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic> {
+pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Diagnostic> {
     // Every spec is read and checked before any engine starts.
     let mut cases = suite(&args.specs).and_then(|all| filtered(all, &args.selected.filter)).map_err(diagnose)?;
     let selection = args.selected.selection();
@@ -43,11 +44,17 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site) -> Result<Exit, Diagnostic>
     }
     let tables = Tables::read(&cases)?;
     let root = out_folder(args);
+    let cache = Some(cache).filter(|_| !args.no_cache);
     let mut exit = Exit::Passed;
     let mut reports = vec![];
     let progress = Progress::of(plans.iter().zip(&cases).map(|(plan, case)| (plan, case.budget.seconds)));
-    let suite =
-        Suite { tables: &tables, site, progress: &progress, jobs: args.jobs.unwrap_or_else(process::cores).max(1) };
+    let suite = Suite {
+        tables: &tables,
+        site,
+        cache,
+        progress: &progress,
+        jobs: args.jobs.unwrap_or_else(process::cores).max(1),
+    };
     let mut stop: Option<Stop> = None;
     for ((case, plan), published) in cases.iter().zip(&plans).zip(&tables.published) {
         let folder = if cases.len() == 1 { root.clone() } else { root.join(within(&root, case)) };
@@ -154,6 +161,8 @@ impl Stop {
 struct Suite<'a> {
     tables: &'a Tables,
     site: &'a Site,
+    /// Where readings are kept between runs, unless they are not to be.
+    cache: Option<&'a Cache>,
     progress: &'a Progress,
     jobs: usize,
 }
@@ -167,13 +176,24 @@ fn run_case(
     folder: &Path,
 ) -> Result<Report, Diagnostic> {
     let (started, clock) = (SystemTime::now(), Instant::now());
-    let options = run::Options { site: suite.site.clone(), out: folder.to_owned(), jobs: suite.jobs };
+    let options = run::Options {
+        site: suite.site.clone(),
+        out: folder.to_owned(),
+        jobs: suite.jobs,
+        cache: suite.cache.cloned(),
+    };
     let outcome = match stop {
         Some(stop) => run::not_run(case, plan, stop.status(), &stop.to_string()),
         None => {
             run::run(case, plan, &options, &suite.progress.case(&case.name, case.budget.seconds)).into_diagnostic()?
         }
     };
+    if outcome.from_cache > 0 {
+        let count = outcome.from_cache;
+        suite
+            .progress
+            .line(&format!("{}: {count} answers of engines from the cache (--no-cache asks anew)", case.name));
+    }
     let Judged { comparisons, splits, tables } = judge(case, plan, &outcome.recordings, published, suite.tables);
     let ingredients = Ingredients {
         case: case.name.clone(),

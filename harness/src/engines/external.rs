@@ -66,6 +66,8 @@ impl External {
         if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
             return Err(error("command", "an engine's name holds letters, digits, - and _ only"));
         }
+        // The folder of a spec that is named without one is the working directory.
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let folder = std::path::absolute(folder).map_err(|e| EngineError::io(folder, e))?;
         Ok(Self { id, command, procedures, folder })
     }
@@ -143,6 +145,11 @@ impl Engine for External {
         let command = Invocation::new(&self.command[0], &self.folder, nothing, "").args(&self.command[1..]);
         let there = Invocation::new("cd", &self.folder, nothing, "").args([&self.folder]);
         Some(format!("({} && {}) < {JOB_FILE}", there.command_line(), command.command_line()))
+    }
+
+    /// A program of the user's is told the names of case and procedure, and may heed them.
+    fn essence(&self, job: &Job) -> Job {
+        job.clone()
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {

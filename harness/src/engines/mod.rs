@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use luminaire::scene::{Meter, Scene, Transport};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::process::{Invocation, PeakMemory, ProcessError};
 use crate::reading::MeterId;
@@ -120,6 +120,12 @@ pub trait Engine: Send + Sync {
     /// The settings whose effect on time and result is worth knowing, with values to try; `preset` first where there is one.
     fn knobs(&self) -> &'static [Knob] {
         &[]
+    }
+
+    /// The job without what makes no difference to this engine's readings: two jobs that are equal then are one to it. For
+    /// most, the names of case and procedure are comments.
+    fn essence(&self, job: &Job) -> Job {
+        Job { case: String::new(), procedure: String::new(), ..job.clone() }
     }
 
     /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
@@ -248,7 +254,8 @@ impl Workbench {
 }
 
 /// What an engine gives for a job.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Measurement {
     /// One a station, in the stations' order.
     pub estimates: Vec<Estimate>,
@@ -259,7 +266,8 @@ pub struct Measurement {
 }
 
 /// An illuminance with what is known of its error.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Estimate {
     /// Illuminance in lux.
     pub value_lx: f64,

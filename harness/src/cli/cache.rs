@@ -1,0 +1,84 @@
+//! `luxproof cache`: what the cache of readings holds, and taking out what is damaged or long unused.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Subcommand};
+use etcetera::BaseStrategy;
+use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
+
+use crate::cache::Cache;
+use crate::report::Exit;
+
+#[derive(Debug, Args)]
+pub(super) struct CacheArgs {
+    #[command(subcommand)]
+    action: Option<Action>,
+}
+
+#[derive(Clone, Copy, Debug, Subcommand)]
+enum Action {
+    /// Where it is, how many readings of each engine it holds, what is damaged
+    Info,
+    /// Take out what is damaged, what killed runs left half written, and readings that no run used for long
+    Prune {
+        /// Days without use after which a reading goes; 0 takes out all
+        #[arg(long, default_value_t = 90, value_name = "DAYS")]
+        unused: u32,
+    },
+}
+
+/// The cache in the folder that was chosen, or in the user's cache folder.
+pub(super) fn folder(chosen: Option<PathBuf>) -> Result<Cache, Diagnostic> {
+    let folder = if let Some(folder) = chosen {
+        folder
+    } else {
+        let help = "name a folder with --cache-dir";
+        let user = etcetera::choose_base_strategy().into_diagnostic().wrap_err(help)?;
+        user.cache_dir().join("luxproof").join("readings")
+    };
+    Ok(Cache::at(std::path::absolute(folder).into_diagnostic()?))
+}
+
+/// Does what `luxproof cache` asks.
+pub(super) fn manage(args: &CacheArgs, cache: &Cache) -> Result<Exit, Diagnostic> {
+    let text = match args.action.unwrap_or(Action::Info) {
+        Action::Info => info(cache)?,
+        Action::Prune { unused } => prune(cache, unused)?,
+    };
+    std::io::stdout().lock().write_all(text.as_bytes()).into_diagnostic()?;
+    Ok(Exit::Passed)
+}
+
+fn info(cache: &Cache) -> Result<String, Diagnostic> {
+    let contents = cache.contents().into_diagnostic()?;
+    let mut lines = vec![format!("readings are kept in {}", cache.root().display())];
+    for (engine, (entries, bytes)) in &contents.engines {
+        lines.push(format!("{engine:<10} {entries} entries, {:.1} KiB", kibibytes(*bytes)));
+    }
+    if contents.engines.is_empty() {
+        lines.push("it is empty".to_owned());
+    }
+    lines.extend(contents.damaged.iter().map(|d| format!("damaged, read anew when it is asked for: {d}")));
+    if contents.unfinished > 0 {
+        let count = contents.unfinished;
+        lines.push(format!("{count} files that a run is writing, or was when it was killed"));
+    }
+    Ok(lines.join("\n") + "\n")
+}
+
+fn prune(cache: &Cache, unused_days: u32) -> Result<String, Diagnostic> {
+    let pruned = cache.prune(Duration::from_secs(86_400 * u64::from(unused_days))).into_diagnostic()?;
+    Ok(format!(
+        "took out {} unused for {unused_days} days, {} damaged, {} half written: {:.1} KiB\n",
+        pruned.unused,
+        pruned.damaged,
+        pruned.unfinished,
+        kibibytes(pruned.bytes)
+    ))
+}
+
+fn kibibytes(bytes: u64) -> f64 {
+    bytes as f64 / 1024.0
+}
