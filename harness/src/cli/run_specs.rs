@@ -12,7 +12,7 @@ use super::progress::Progress;
 use super::{RunArgs, print_reports, report_installation};
 use crate::cache::Cache;
 use crate::diagnosis;
-use crate::diff::{Comparison, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
+use crate::diff::{Comparison, Consensus, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
 use crate::engines::{self, EngineId, Site};
 use crate::plan::{Asked, Plan, plan};
 use crate::procedures::Task;
@@ -194,7 +194,8 @@ fn run_case(
             .progress
             .line(&format!("{}: {count} answers of engines from the cache (--no-cache asks anew)", case.name));
     }
-    let Judged { comparisons, splits, tables } = judge(case, plan, &outcome.recordings, published, suite.tables);
+    let Judged { comparisons, splits, consensus, tables } =
+        judge(case, plan, &outcome.recordings, published, suite.tables);
     let ingredients = Ingredients {
         case: case.name.clone(),
         spec: record_of(case),
@@ -204,6 +205,7 @@ fn run_case(
         recordings: &outcome.recordings,
         skips: plan.skips.iter().cloned().chain(outcome.skips).collect(),
         splits,
+        consensus,
         published: tables,
         curves: plan.tasks.iter().flat_map(|task| report::curves(&case.name, task)).collect(),
         commands: commands(plan, suite.site),
@@ -228,6 +230,7 @@ fn commands(plan: &Plan, site: &Site) -> BTreeMap<(String, String), String> {
 struct Judged {
     comparisons: Vec<Comparison>,
     splits: Vec<Split>,
+    consensus: Vec<Consensus>,
     tables: Vec<PublishedTable>,
 }
 
@@ -242,6 +245,7 @@ fn judge(case: &Case, plan: &Plan, recordings: &[Recording], published: Option<&
         diagnosis::diagnose(task, &mut comparisons);
         judged.comparisons.extend(comparisons);
         judged.splits.extend(judge.split(task, &mine));
+        judged.consensus.extend(judge.consensus(task, &mine));
         judged.tables.extend(published.and_then(|p| p.table(task, &case.name)));
     }
     judged

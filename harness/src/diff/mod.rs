@@ -1,5 +1,6 @@
 //! The diffing layer: readings against references that carry their own uncertainty; it sees nothing but readings.
 
+mod consensus;
 mod family;
 mod input;
 mod known;
@@ -23,6 +24,7 @@ use crate::spec::ToleranceOverride;
 
 use input::Input;
 
+pub use consensus::{Consensus, Witness};
 pub use known::{KnownDeviationError, KnownDeviations, Subject};
 pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedRow, PublishedTable};
 pub use split::Split;
@@ -135,6 +137,11 @@ impl Judge<'_> {
     /// What of each deviation of an approximate method from a renderer is whose; `recordings` as for [`Self::compare`].
     pub fn split(&self, task: &Task, recordings: &[&Recording]) -> Vec<Split> {
         split::splits(task, recordings, self.tolerances.coverage_factor())
+    }
+
+    /// Who of the engines departs from the others, the reference included; `recordings` as for [`Self::compare`].
+    pub fn consensus(&self, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
+        consensus::consensus(self, task, recordings)
     }
 
     /// Holds every reading of one task against every reference there is for it.

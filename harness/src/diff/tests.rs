@@ -44,7 +44,7 @@ fn recording(engine: &str, readings: &[(f64, Option<f64>)], blocks: Option<usize
 }
 
 /// A normal number (Box & Muller, Ann. Math. Statist. 29, 1958).
-fn normal(random: &mut fastrand::Rng) -> f64 {
+pub(super) fn normal(random: &mut fastrand::Rng) -> f64 {
     (-2.0 * (1.0 - random.f64()).ln()).sqrt() * (std::f64::consts::TAU * random.f64()).cos()
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::Report;
 use super::terminal::{Cell, matrix, worst};
-use super::{paper, split};
+use super::{consensus, paper, split};
 
 /// The report as Markdown.
 pub fn markdown(report: &Report) -> String {
@@ -43,6 +43,11 @@ pub fn markdown(report: &Report) -> String {
         for split in splits {
             line(format!("- {}: {}", split::place(report, split), split.text));
         }
+    }
+    let departures = consensus::lines(report);
+    if !departures.is_empty() {
+        line("\nWho departs from the other witnesses, the reference included:\n".into());
+        departures.iter().for_each(|departure| line(format!("- {departure}")));
     }
     let worst = worst(report, 10);
     if !worst.is_empty() {

@@ -1,6 +1,7 @@
 //! The report: one record of a run, and views of it; the JSON form is the truth.
 
 mod budget;
+mod consensus;
 mod curve;
 mod junit;
 mod markdown;
@@ -13,7 +14,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::diff::{Comparison, PublishedTable, Split, Verdict};
+use crate::diff::{Comparison, Consensus, PublishedTable, Split, Verdict};
 use crate::plan::Skip;
 use crate::reading::{MeterId, Quantity, Recording};
 use crate::run::{EngineStatus, Status};
@@ -50,6 +51,9 @@ pub struct Report {
     /// Where an approximate method differs from a renderer: what of it is the method's and what the renderer's.
     #[serde(default)]
     pub splits: Vec<Split>,
+    /// What the witnesses of each case and procedure say of each other: who departs.
+    #[serde(default)]
+    pub consensus: Vec<Consensus>,
     /// The published tables that the cases are held against, as they are printed.
     #[serde(default)]
     pub published: Vec<PublishedTable>,
@@ -242,6 +246,8 @@ pub struct Ingredients<'a> {
     pub skips: Vec<Skip>,
     /// What of a deviation is whose.
     pub splits: Vec<Split>,
+    /// What the witnesses say of each other.
+    pub consensus: Vec<Consensus>,
     /// Published tables.
     pub published: Vec<PublishedTable>,
     /// Curves of the photometric files.
@@ -262,6 +268,7 @@ impl Report {
             recordings,
             skips,
             splits,
+            consensus,
             published,
             curves,
             commands,
@@ -281,6 +288,7 @@ impl Report {
             comparisons,
             skips,
             splits,
+            consensus,
             published,
             curves,
         }
@@ -295,6 +303,7 @@ impl Report {
             all.recordings.extend(one.recordings);
             all.skips.extend(one.skips);
             all.splits.extend(one.splits);
+            all.consensus.extend(one.consensus);
             all.curves.extend(one.curves);
             all.cases.extend(one.cases);
             for table in one.published {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArrangement, Table, presets};
 
-use super::{ReadingRecord, Report, paper, split};
+use super::{ReadingRecord, Report, consensus, paper, split};
 use crate::diff::{Basis, Comparison, Verdict};
 use crate::run::Status;
 
@@ -182,6 +182,12 @@ pub fn terminal(report: &Report, style: Style, folder: Option<&str>) -> String {
         for split in splits {
             writeln!(text, "  {}: {}", split::place(report, split), split.text).ok();
         }
+        writeln!(text).ok();
+    }
+    let departures = consensus::lines(report);
+    if !departures.is_empty() {
+        writeln!(text, "Who departs from the other witnesses, the reference included").ok();
+        departures.iter().for_each(|line| writeln!(text, "  {line}").unwrap_or_default());
         writeln!(text).ok();
     }
     let worst = worst(report, 5);
