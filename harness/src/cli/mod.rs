@@ -19,7 +19,7 @@ use crate::engines::{self, EngineId, InstallState, Site};
 use crate::photometry_command::{self, PhotometryArgs};
 use crate::plan::{Asked, Selection, plan};
 use crate::process;
-use crate::report::{self, Exit, Report, Style};
+use crate::report::{self, Beside, Exit, Report, Style};
 use crate::selftest::selftest;
 use crate::spec::{Case, Spec, filtered, suite};
 
@@ -167,6 +167,9 @@ struct ReportArgs {
     /// Print the error budget of every deviation, and nothing else
     #[arg(long)]
     budget: bool,
+    /// JSON of `luxproof bench` or `luxproof stress` to show with it in HTML
+    #[arg(long, value_name = "FILE")]
+    beside: Vec<PathBuf>,
     /// Views of the report to print
     #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [Format::Terminal])]
     format: Vec<Format>,
@@ -217,6 +220,8 @@ enum Format {
     Json,
     Markdown,
     Junit,
+    /// One self-contained file; best sent to one with `>`
+    Html,
 }
 
 impl Cli {
@@ -263,7 +268,7 @@ fn print(text: &str) -> Result<(), Diagnostic> {
     }
 }
 
-fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format]) -> Result<(), Diagnostic> {
+fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format], beside: &[Beside]) -> Result<(), Diagnostic> {
     let mut out = std::io::stdout().lock();
     let style = if std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) {
         Style::Colour
@@ -281,6 +286,7 @@ fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format]) -> Result<()
                 }
                 .into_diagnostic()?
             }
+            Format::Html => print_page(reports, beside),
             view => {
                 let one = |(report, folder): &(Report, PathBuf)| match view {
                     Format::Markdown => report::markdown(report),
@@ -297,6 +303,20 @@ fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format]) -> Result<()
         }
     }
     Ok(())
+}
+
+/// The page, also kept in the run's folder; on a terminal only its place is printed.
+fn print_page(reports: &[(Report, PathBuf)], beside: &[Beside]) -> String {
+    let mut pages = vec![];
+    for (report, folder) in reports {
+        let (page, file) = (report::page(report, beside), folder.join("report.html"));
+        let kept = std::fs::write(&file, &page);
+        if let Err(error) = &kept {
+            tracing::warn!(file = %file.display(), %error, "the page is printed, not kept");
+        }
+        pages.push(if kept.is_ok() && std::io::stdout().is_terminal() { file.display().to_string() } else { page });
+    }
+    pages.join("\n")
 }
 
 fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
@@ -470,12 +490,19 @@ fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
     let report: Report = serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)?;
     let folder = args.result.parent().map_or_else(PathBuf::new, Path::to_owned);
     let exit = report.exit(|_| false);
+    let beside = args.beside.iter().map(|path| read_beside(path)).collect::<Result<Vec<_>, _>>()?;
     if args.budget {
         print(&report::budgets(&report))?;
     } else {
-        print_reports(&[(report, folder)], &args.format)?;
+        print_reports(&[(report, folder)], &args.format, &beside)?;
     }
     Ok(exit)
+}
+
+fn read_beside(path: &Path) -> Result<Beside, Diagnostic> {
+    let place = || path.display().to_string();
+    let text = std::fs::read_to_string(path).into_diagnostic().wrap_err_with(place)?;
+    Beside::from_json(&text).into_diagnostic().wrap_err_with(place)
 }
 
 fn schema(args: &SchemaArgs) -> Result<Exit, Diagnostic> {

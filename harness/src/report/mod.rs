@@ -3,6 +3,7 @@
 mod budget;
 mod consensus;
 mod curve;
+mod html;
 mod junit;
 mod markdown;
 mod paper;
@@ -21,6 +22,7 @@ use crate::run::{EngineStatus, Status};
 
 pub use budget::budgets;
 pub use curve::{Curve, curves};
+pub use html::{Beside, BesideError, page};
 pub use junit::junit;
 pub use markdown::markdown;
 pub use terminal::{Style, terminal};

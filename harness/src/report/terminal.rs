@@ -334,7 +334,7 @@ pub(super) fn value(record: &ReadingRecord) -> String {
 }
 
 /// Six significant digits.
-fn significant(value: f64) -> String {
+pub(super) fn significant(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

@@ -1,0 +1,152 @@
+//! Further measurements shown with a report: JSON of `luxproof bench` and `luxproof stress`.
+
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+use serde::Deserialize;
+
+use super::palette::Palette;
+
+/// A file of further measurements.
+#[derive(Clone, Debug)]
+pub enum Beside {
+    /// Error against run time.
+    Bench(Vec<BenchCurve>),
+    /// Where invariances break.
+    Stress(Vec<StressLaw>),
+}
+
+/// Why a file cannot be shown beside a report.
+#[derive(Debug, thiserror::Error)]
+pub enum BesideError {
+    /// It is no JSON.
+    #[error("it is no JSON: {0}")]
+    Json(#[from] serde_json::Error),
+    /// It is something else.
+    #[error(
+        "it holds neither `curves` (of `luxproof bench --format json`) nor `laws` (of `luxproof stress --format json`)"
+    )]
+    Unknown,
+}
+
+/// One engine's error against run time.
+#[derive(Clone, Debug, Deserialize)]
+pub struct BenchCurve {
+    /// The engine.
+    pub engine: String,
+    /// The procedure.
+    pub procedure: String,
+    /// The solver.
+    #[serde(default)]
+    pub solver: Option<String>,
+    /// The preset.
+    #[serde(default)]
+    pub preset: Option<String>,
+    /// Its rungs.
+    pub points: Vec<BenchPoint>,
+}
+
+/// One rung of a curve.
+#[derive(Clone, Copy, Debug, Deserialize)]
+pub struct BenchPoint {
+    /// Wall-clock seconds.
+    pub wall_s: f64,
+    /// Relative error.
+    pub relative_error: Option<f64>,
+    /// Lower end of its interval.
+    #[serde(default)]
+    pub relative_error_low: Option<f64>,
+    /// Upper end of its interval.
+    #[serde(default)]
+    pub relative_error_high: Option<f64>,
+}
+
+/// How one engine keeps one law.
+#[derive(Clone, Debug, Deserialize)]
+pub struct StressLaw {
+    /// The engine.
+    pub engine: String,
+    /// The law.
+    pub law: String,
+    /// Largest relative deviation.
+    #[serde(default)]
+    pub worst_deviation: Option<f64>,
+    /// Magnitude at which the deviation first passes the fraction.
+    #[serde(default)]
+    pub breaks_at: BTreeMap<String, Option<f64>>,
+    /// In which way it breaks.
+    #[serde(default)]
+    pub how: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct File {
+    curves: Option<Vec<BenchCurve>>,
+    laws: Option<Vec<StressLaw>>,
+}
+
+impl Beside {
+    /// Reads what a file holds, whichever of the two it is.
+    pub fn from_json(text: &str) -> Result<Self, BesideError> {
+        match serde_json::from_str::<File>(text)? {
+            File { curves: Some(curves), .. } => Ok(Self::Bench(curves)),
+            File { laws: Some(laws), .. } => Ok(Self::Stress(laws)),
+            File { .. } => Err(BesideError::Unknown),
+        }
+    }
+}
+
+/// The stress matrix, if any file holds one.
+pub(super) fn stress_section(beside: &[Beside], palette: &Palette) -> Option<Markup> {
+    let laws: Vec<&StressLaw> =
+        beside.iter().filter_map(|b| if let Beside::Stress(laws) = b { Some(laws) } else { None }).flatten().collect();
+    if laws.is_empty() {
+        return None;
+    }
+    let (mut engines, mut names): (Vec<&str>, Vec<&str>) = (vec![], vec![]);
+    for law in &laws {
+        if !engines.contains(&law.engine.as_str()) {
+            engines.push(&law.engine);
+        }
+        if !names.contains(&law.law.as_str()) {
+            names.push(&law.law);
+        }
+    }
+    engines.sort_by_key(|e| palette.order(e));
+    Some(html! {
+        h2 id="stress-title" { "Numerical stability" }
+        p.lead { "The largest deviation from each law, and the magnitude at which it first passes 0.1 %, 1 % and 10 %." }
+        div.scroll tabindex="0" role="region" aria-label="Stress matrix" {
+            table.matrix.stress {
+                thead { tr { th scope="col" { "law" } @for e in &engines { th scope="col" { (palette.label(e)) } } } }
+                tbody { @for name in names { tr {
+                    th scope="row" { (name.replace('_', " ")) }
+                    @for e in &engines { (stress_cell(laws.iter().find(|l| l.law == name && l.engine == *e))) }
+                } } }
+            }
+        }
+    })
+}
+
+fn stress_cell(law: Option<&&StressLaw>) -> Markup {
+    let Some(law) = law else { return html! { td.quiet { "–" } } };
+    let breaks: Vec<(&str, f64)> =
+        ["0.001", "0.01", "0.1"].iter().filter_map(|k| Some((*k, law.breaks_at.get(*k).copied().flatten()?))).collect();
+    let class = match (law.worst_deviation, law.how.as_deref()) {
+        (_, Some("nan" | "crash" | "hang" | "silent_loss")) | (None, _) => "v-fail",
+        (Some(d), _) if d.abs() >= 0.1 => "v-fail",
+        (Some(d), _) if d.abs() >= 0.001 => "v-undecided",
+        _ => "v-pass",
+    };
+    let name = |key: &str| match key {
+        "0.001" => "0.1 %",
+        "0.01" => "1 %",
+        _ => "10 %",
+    };
+    html! {
+        td class=(class) {
+            div { (law.worst_deviation.map_or("no reading".to_owned(), super::percent)) @if let Some(how) = &law.how { " " (how.replace('_', " ")) } }
+            @if let Some((key, at)) = breaks.first() { div.most { (name(key)) " at " (format!("{at:.0e}")) } }
+        }
+    }
+}

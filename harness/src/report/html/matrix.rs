@@ -1,0 +1,69 @@
+//! The verdict matrix: case, procedure and basis by engine; each cell opens the readings that it stands for.
+
+use maud::{Markup, html};
+
+use super::super::Report;
+use super::super::terminal::{Cell, matrix};
+use super::palette::Palette;
+use super::{class, glyph, percent, title, verdict_name};
+use crate::diff::Verdict;
+
+pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
+    let rows = matrix(report);
+    let mut cases: Vec<&str> = rows.iter().map(|r| r.case.as_str()).collect();
+    cases.dedup();
+    html! {
+        h2 id="matrix-title" { "Verdicts" }
+        p.lead {
+            "Each cell is the worst verdict of its readings, how many of them it holds for, and the largest deviation. "
+            "A cell opens its readings."
+        }
+        div.scroll tabindex="0" role="region" aria-label="Verdict matrix" {
+            table.matrix {
+                thead { tr {
+                    th scope="col" { "procedure" } th scope="col" { "held against" }
+                    @for engine in &report.engines { th scope="col" { (palette.label(&engine.id)) } }
+                } }
+                @for case in cases {
+                    tbody {
+                        @if report.is_suite() {
+                            tr.case { th scope="rowgroup" colspan=(report.engines.len() + 2) { (case) } }
+                        }
+                        @for row in rows.iter().filter(|r| r.case == case) {
+                            tr {
+                                th scope="row" { (title(&row.procedure)) }
+                                td.basis { (row.basis) }
+                                @for (engine, cell) in report.engines.iter().zip(&row.cells) {
+                                    (drawn(cell, [case, &row.procedure, &row.basis, &engine.id]))
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        ul.legend {
+            @for verdict in [Verdict::Pass, Verdict::KnownDeviation, Verdict::Inconclusive, Verdict::Fail, Verdict::UnexpectedPass, Verdict::Missing] {
+                li class={ "v-" (class(verdict)) } { span.glyph aria-hidden="true" { (glyph(verdict)) } " " (verdict_name(verdict)) }
+            }
+        }
+    }
+}
+
+fn drawn(cell: &Cell, [case, procedure, basis, engine]: [&str; 4]) -> Markup {
+    match cell {
+        Cell::IsReference => html! { td.quiet { "reference" } },
+        Cell::Skipped => html! { td.quiet { a href="#skips" { "not run" } } },
+        Cell::Empty => html! { td.quiet { "–" } },
+        Cell::Judged { verdict, having, of, deviation } => html! {
+            td class={ "v-" (class(*verdict)) } {
+                button.open type="button" data-case=(case) data-procedure=(procedure) data-basis=(basis) data-engine=(engine)
+                    aria-label={ (engine) ", " (title(procedure)) " against " (basis) ": " (having) " of " (of) " " (verdict_name(*verdict)) } {
+                    span.glyph aria-hidden="true" { (glyph(*verdict)) } " "
+                    span.count { @if having == of { (of) } @else { (having) "/" (of) } }
+                    @if let Some(deviation) = deviation { span.most { (percent(*deviation)) } }
+                }
+            }
+        },
+    }
+}

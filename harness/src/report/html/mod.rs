@@ -1,0 +1,224 @@
+//! The HTML report: one self-contained file that loads nothing, for screens light and dark, for paper and for keyboards.
+//!
+//! Plots are drawn here as SVG, so that the same report gives the same bytes; the script only filters, sorts and opens.
+
+mod beside;
+mod matrix;
+mod palette;
+mod plot;
+mod procedure;
+mod provenance;
+mod rows;
+mod skips;
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::Report;
+use crate::diff::Verdict;
+use palette::Palette;
+use rows::Rows;
+
+pub use beside::{Beside, BesideError};
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+/// Nothing is loaded from anywhere: the browser itself is told to refuse it.
+const POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
+
+/// The report as one HTML file; `beside` are further measurements to show with it.
+pub fn page(report: &Report, beside: &[Beside]) -> String {
+    let palette = Palette::of(report);
+    let mut rows = Rows::default();
+    let sections: Vec<(String, String, Markup)> = sections(report, beside, &palette, &mut rows);
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta name="generator" content=(format!("luxproof {}", report.tool_version));
+                title { (report.spec.title) " · luxproof" }
+                style { (PreEscaped(STYLE)) (PreEscaped(palette.style())) }
+                noscript { style { "tr[hidden]{display:table-row}.filters,.theme,.all,.more{display:none}" } }
+            }
+            body {
+                (palette.marks())
+                a.skip href="#main" { "Skip to the report" }
+                nav aria-label="Sections" {
+                    div.bar {
+                        a.brand href="#top" { "luxproof" }
+                        ul { @for (id, name, _) in &sections { li { a href={ "#" (id) } { (name) } } } }
+                        button.theme type="button" { "Dark" }
+                    }
+                }
+                main id="main" {
+                    (head(report))
+                    @for (id, _, section) in &sections { section id=(id) aria-labelledby={ (id) "-title" } { (section) } }
+                }
+                footer {
+                    "Written by luxproof " (report.tool_version) ". Everything here is a view of report.json, which holds all digits."
+                }
+                dialog id="budget" aria-labelledby="budget-title" {
+                    form method="dialog" { button.close aria-label="Close" { "×" } }
+                    h2 id="budget-title" {}
+                    div.content {}
+                }
+                script type="application/json" id="data" { (PreEscaped(rows.json())) }
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// Every section with its id and its name in the navigation.
+fn sections(report: &Report, beside: &[Beside], palette: &Palette, rows: &mut Rows) -> Vec<(String, String, Markup)> {
+    let mut sections = vec![("matrix".to_owned(), "Verdicts".to_owned(), matrix::section(report, palette))];
+    for name in report.procedures() {
+        let section = procedure::section(report, name, palette, rows);
+        sections.push((name.to_owned(), short(name).to_owned(), section));
+    }
+    sections.push(("time".to_owned(), "Run time".to_owned(), plot::times::section(report, beside, palette)));
+    if let Some(stress) = beside::stress_section(beside, palette) {
+        sections.push(("stress".to_owned(), "Stress".to_owned(), stress));
+    }
+    sections.push(("skips".to_owned(), "Not run".to_owned(), skips::section(report)));
+    sections.push(("provenance".to_owned(), "Provenance".to_owned(), provenance::section(report, palette)));
+    sections
+}
+
+fn head(report: &Report) -> Markup {
+    let s = &report.summary;
+    let counts = [
+        (Verdict::Pass, s.pass),
+        (Verdict::KnownDeviation, s.known_deviation),
+        (Verdict::Inconclusive, s.inconclusive),
+        (Verdict::Fail, s.fail),
+        (Verdict::UnexpectedPass, s.unexpected_pass),
+        (Verdict::Missing, s.missing),
+    ];
+    let of = report.comparisons.len();
+    let cases = report.cases.len();
+    html! {
+        header id="top" {
+            p.overline {
+                "luxproof " (report.tool_version) " · " (report.started.replace('T', " ").replace('Z', " UTC")) " · "
+                (plural(cases, "case")) " · " (plural(report.engines.len(), "engine")) " · " (duration(report.wall_s))
+            }
+            h1 { (report.spec.title) }
+            p.spec { code { (report.spec.path) } }
+            @if of > 0 {
+                div.share aria-hidden="true" {
+                    @for (verdict, count) in counts { @if count > 0 {
+                        span class={ "v-" (class(verdict)) } style={ "flex-grow:" (count) } {}
+                    } }
+                }
+            }
+            dl.counts {
+                @for (verdict, count) in counts { @if count > 0 || verdict == Verdict::Pass || verdict == Verdict::Fail {
+                    div class={ "v-" (class(verdict)) } { dt { span.glyph aria-hidden="true" { (glyph(verdict)) } " " (verdict_name(verdict)) } dd { (count) } }
+                } }
+                div { dt { "not run" } dd { (s.skipped) } }
+            }
+        }
+    }
+}
+
+/// The verdict's class in the style sheet.
+fn class(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Pass => "pass",
+        Verdict::KnownDeviation => "known",
+        Verdict::Inconclusive => "undecided",
+        Verdict::Fail | Verdict::UnexpectedPass | Verdict::Missing => "fail",
+    }
+}
+
+/// The verdict's sign, so that colour is never needed.
+fn glyph(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Pass => "✓",
+        Verdict::KnownDeviation => "≈",
+        Verdict::Inconclusive => "?",
+        Verdict::Fail => "✕",
+        Verdict::UnexpectedPass => "!",
+        Verdict::Missing => "∅",
+    }
+}
+
+fn verdict_name(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Pass => "passed",
+        Verdict::KnownDeviation => "known deviation",
+        Verdict::Inconclusive => "undecided",
+        Verdict::Fail => "failed",
+        Verdict::UnexpectedPass => "unexpected pass",
+        Verdict::Missing => "missing",
+    }
+}
+
+/// A procedure's name in the navigation.
+fn short(procedure: &str) -> &str {
+    match procedure {
+        "luminous_intensity" => "Intensity",
+        "direct_illuminance" => "Direct",
+        "indirect_illuminance" => "Indirect",
+        "total_illuminance" => "Total",
+        other => other,
+    }
+}
+
+/// A procedure's name as a heading.
+fn title(procedure: &str) -> String {
+    let words = procedure.replace('_', " ");
+    let mut letters = words.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn plural(count: usize, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}
+
+/// Seconds as people say them.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.01 => "< 0.01 s".to_owned(),
+        s if s < 1.0 => format!("{s:.2} s"),
+        s if s < 120.0 => format!("{s:.1} s"),
+        s => format!("{:.0} min {:02.0} s", (s / 60.0).floor(), s % 60.0),
+    }
+}
+
+/// A signed relative deviation with a real minus sign and powers of ten as people write them.
+fn percent(deviation: f64) -> String {
+    let text = super::terminal::percent(deviation);
+    match text.trim_end_matches(" %").split_once('e').map(|(m, e)| (m, e.parse())) {
+        Some((mantissa, Ok(exponent))) => minus(&format!("{mantissa}·{} %", power(exponent))),
+        _ => minus(&text),
+    }
+}
+
+/// Real minus signs before numbers, and a real plus-minus; hyphens within words stay.
+fn minus(text: &str) -> String {
+    let mut result = String::with_capacity(text.len());
+    let text = text.replace("+-", "± ");
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        let before_digit = letters.peek().is_some_and(char::is_ascii_digit);
+        let within_word = result.chars().next_back().is_some_and(char::is_alphanumeric);
+        result.push(if letter == '-' && before_digit && !within_word { '−' } else { letter });
+    }
+    result
+}
+
+/// A power of ten: 10⁻⁶.
+fn power(exponent: i32) -> String {
+    let digits = ["⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"];
+    let raised: String = exponent.abs().to_string().bytes().map(|b| digits[usize::from(b - b'0')]).collect();
+    format!("10{}{raised}", if exponent < 0 { "⁻" } else { "" })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,109 @@
+//! One colour and one mark an engine, the same in every plot and table; told apart without colour vision and in print.
+//!
+//! Colours after Okabe and Ito, "Color Universal Design" (2008), darkened on paper and lightened on black until text in them
+//! keeps a contrast of 4.5 to 1.
+
+use maud::{Markup, html};
+
+use super::super::Report;
+
+/// Colour on paper and on black.
+const COLOURS: [(&str, &str); 8] = [
+    ("#3d4148", "#d5d8dd"),
+    ("#8c6100", "#e6b84d"),
+    ("#0067a8", "#62b5ea"),
+    ("#b84a00", "#f08a4b"),
+    ("#007a5a", "#3fc79d"),
+    ("#a8457f", "#e294c3"),
+    ("#5b4bb5", "#a89cf0"),
+    ("#7a6a58", "#c9b8a4"),
+];
+/// Engines that have their colour for good, so that two reports read alike.
+const KNOWN: [&str; 7] = ["simulator", "iesna", "mitsuba", "radiance", "povray", "cycles", "luxcore"];
+
+/// The engines of a report with their colours and marks.
+pub(super) struct Palette {
+    engines: Vec<(String, usize)>,
+}
+
+impl Palette {
+    pub(super) fn of(report: &Report) -> Self {
+        let fixed = |id: &str| KNOWN.iter().position(|k| *k == id);
+        let mut next = KNOWN.len();
+        let engines = report.engines.iter().map(|e| {
+            let index = fixed(&e.id).unwrap_or_else(|| {
+                next += 1;
+                next - 1
+            });
+            (e.id.clone(), index % COLOURS.len())
+        });
+        Self { engines: engines.collect() }
+    }
+
+    /// Custom properties `--e0` ... for the style sheet.
+    pub(super) fn style(&self) -> String {
+        let colour = |(k, (paper, black)): (usize, &(&str, &str))| format!("--e{k}:light-dark({paper},{black});");
+        let colours: String = COLOURS.iter().enumerate().map(colour).collect();
+        let uses = |k| format!(".e{k}{{fill:var(--e{k})}}.ring .e{k},.line.e{k}{{stroke:var(--e{k})}}");
+        format!(":root{{{colours}}}{}", (0..COLOURS.len()).map(uses).collect::<String>())
+    }
+
+    /// Index of an engine's colour and mark; engines that only another file knows take what is left.
+    pub(super) fn index(&self, engine: &str) -> usize {
+        let found = self.engines.iter().find(|(id, _)| id == engine).map(|(_, k)| *k);
+        found.or_else(|| KNOWN.iter().position(|k| *k == engine)).unwrap_or(COLOURS.len() - 1)
+    }
+
+    /// The engine's order in the report.
+    pub(super) fn order(&self, engine: &str) -> usize {
+        self.engines.iter().position(|(id, _)| id == engine).unwrap_or(self.engines.len())
+    }
+
+    /// The engine's mark at a place of a plot.
+    pub(super) fn mark(&self, engine: &str, [x, y]: [f64; 2], radius: f64) -> Markup {
+        let index = self.index(engine);
+        html! { path.mark class={ "e" (index) } d=(shape(index, x, y, radius)) {} }
+    }
+
+    /// Every mark once, for [`Self::label`] to refer to.
+    pub(super) fn marks(&self) -> Markup {
+        let mut known: Vec<usize> = self.engines.iter().map(|(_, k)| *k).chain([COLOURS.len() - 1]).collect();
+        known.extend(0..KNOWN.len());
+        known.sort_unstable();
+        known.dedup();
+        html! {
+            svg.marks aria-hidden="true" { @for k in known {
+                symbol id={ "k" (k) } viewBox="0 0 12 12" { path class={ "mark e" (k) } d=(shape(k, 6.0, 6.0, 4.4)) {} }
+            } }
+        }
+    }
+
+    /// The engine's name behind its mark.
+    pub(super) fn label(&self, engine: &str) -> Markup {
+        let index = self.index(engine);
+        html! {
+            span.engine { svg.key aria-hidden="true" { use href={ "#k" (index) } {} } (engine) }
+        }
+    }
+}
+
+/// Outline of a mark: circle, square, triangle, diamond, triangle upside down, pentagon, hexagon, bar.
+fn shape(index: usize, x: f64, y: f64, r: f64) -> String {
+    let polygon = |corners: u32, turn_deg: f64, size: f64| {
+        let corner = |k: u32| {
+            let (sin, cos) = (turn_deg + 360.0 * f64::from(k) / f64::from(corners)).to_radians().sin_cos();
+            format!("{:.1} {:.1}", x + size * sin, y - size * cos)
+        };
+        format!("M{}Z", (0..corners).map(corner).collect::<Vec<_>>().join("L"))
+    };
+    match index {
+        0 => format!("M{:.1} {y:.1}a{r} {r} 0 1 0 {:.1} 0a{r} {r} 0 1 0 {:.1} 0Z", x - r, 2.0 * r, -2.0 * r),
+        1 => polygon(4, 45.0, 1.25 * r),
+        2 => polygon(3, 0.0, 1.3 * r),
+        3 => polygon(4, 0.0, 1.3 * r),
+        4 => polygon(3, 180.0, 1.3 * r),
+        5 => polygon(5, 0.0, 1.15 * r),
+        6 => polygon(6, 0.0, 1.1 * r),
+        _ => format!("M{:.1} {:.1}h{:.1}v{:.1}h{:.1}Z", x - r, y - 0.5 * r, 2.0 * r, r, -2.0 * r),
+    }
+}

@@ -1,0 +1,88 @@
+//! Axes: round ticks, and a scale for deviations that is straight near zero and logarithmic beyond.
+
+/// Round values from `low` to `high`, about `count` of them.
+pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
+    let step = round_step((high - low) / count.max(1) as f64);
+    if !(step.is_finite() && step > 0.0) {
+        return vec![low];
+    }
+    let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+    (first..=last).map(|k| k as f64 * step).collect()
+}
+
+/// The next of 1, 2, 2.5, 5, 10 times a power of ten.
+pub(super) fn round_step(raw: f64) -> f64 {
+    let decade = 10f64.powf(raw.log10().floor());
+    [1.0, 2.0, 2.5, 5.0, 10.0].map(|d| d * decade).into_iter().find(|s| *s >= raw * 0.999).unwrap_or(10.0 * decade)
+}
+
+/// A tick's label without the noise of binary fractions.
+pub(super) fn label(value: f64) -> String {
+    let decimals = (3.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.replace('-', "−") }
+}
+
+/// Relative deviations, in per cent, on a line: straight up to 0.01 %, logarithmic beyond.
+pub(super) struct Deviations {
+    most: f64,
+    left: f64,
+    width: f64,
+}
+
+/// Below this, in per cent, the scale is straight: differences of rounding and single precision.
+const STRAIGHT: f64 = 0.01;
+
+impl Deviations {
+    /// A scale that holds `most` per cent to either side, between `left` and `left + width`.
+    pub(super) fn new(most: f64, left: f64, width: f64) -> Self {
+        // The next 1 or 3 of a decade, so that marks keep off the edge.
+        let decade = 10f64.powf(most.max(0.1).log10().floor());
+        let most = [1.0, 3.0, 10.0].map(|d| d * decade).into_iter().find(|m| *m >= most).unwrap_or(10.0 * decade);
+        Self { most: most.min(300.0), left, width }
+    }
+
+    /// Where a deviation lies; what is beyond the scale lies at its end.
+    pub(super) fn x(&self, percent: f64) -> f64 {
+        let bent = |p: f64| (p.abs() / STRAIGHT).ln_1p().copysign(p);
+        let part = (bent(percent) / bent(self.most)).clamp(-1.0, 1.0);
+        self.left + 0.5 * self.width * (1.0 + part)
+    }
+
+    /// Zero and the decades to either side.
+    pub(super) fn ticks(&self) -> Vec<f64> {
+        let decades = [0.1, 1.0, 10.0, 100.0].into_iter().filter(|d| *d <= self.most);
+        let mut ticks: Vec<f64> = decades.flat_map(|d| [-d, d]).chain([0.0]).collect();
+        ticks.sort_by(f64::total_cmp);
+        ticks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_within_the_axis() {
+        assert_eq!(ticks(0.0, 10.0, 5), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
+        assert_eq!(ticks(0.5, 3.2, 3), [1.0, 2.0, 3.0]);
+        assert_eq!(ticks(1.0, 1.0, 3), [1.0]);
+    }
+
+    #[test]
+    fn the_scale_of_deviations_is_odd_and_rising() {
+        let scale = Deviations::new(5.0, 10.0, 200.0);
+        assert!((scale.x(0.0) - 110.0).abs() < 1e-12);
+        for (a, b) in [(-300.0, -10.0), (-0.5, -0.05), (0.0, 1e-4), (0.02, 0.1), (1.0, 5.0)] {
+            assert!(scale.x(a) <= scale.x(b), "{a} {b}");
+            assert!((scale.x(a) + scale.x(-a) - 220.0).abs() < 1e-9);
+        }
+        assert!((scale.x(1e6) - 210.0).abs() < 1e-9, "what is beyond lies at the end");
+    }
+
+    #[test]
+    fn labels_have_a_real_minus_and_no_trailing_zeros() {
+        assert_eq!([label(-0.1), label(0.0), label(2.50), label(1200.0)], ["−0.1", "0", "2.5", "1200"]);
+    }
+}

@@ -1,0 +1,110 @@
+//! Plots as SVG panels of one width, so that they read alike on a telephone and on paper.
+
+mod axis;
+mod colours;
+mod contour;
+mod grid;
+mod polar;
+mod strip;
+pub(super) mod times;
+
+use maud::{Markup, html};
+
+use super::super::Report;
+use super::palette::Palette;
+use crate::diff::{Basis, Comparison};
+
+/// Width of every panel in user units; a telephone shows one at about its natural size.
+pub(super) const WIDTH: f64 = 350.0;
+/// More cases than this a procedure are left to the table.
+const MOST_CASES: usize = 9;
+
+/// The comparisons of one case in one procedure.
+pub(super) struct Group<'a> {
+    pub(super) case: &'a str,
+    pub(super) procedure: &'a str,
+    pub(super) comparisons: Vec<&'a Comparison>,
+}
+
+/// One group a case, in the cases' order, those without comparisons left out.
+pub(super) fn groups<'a>(report: &'a Report, procedure: &str) -> Vec<Group<'a>> {
+    let of_case = |case: &'a str| {
+        let mine = |c: &&Comparison| c.case == case && c.procedure == procedure;
+        let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(mine).collect();
+        let procedure = comparisons.first()?.procedure.as_str();
+        Some(Group { case, procedure, comparisons })
+    };
+    report.cases.iter().filter_map(|c| of_case(&c.name)).collect()
+}
+
+/// The panels of a procedure.
+pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -> Vec<Markup> {
+    let mut shown: Vec<&Group<'_>> = groups.iter().collect();
+    if shown.len() > MOST_CASES {
+        // Of many cases those are drawn that ask for attention most.
+        shown.sort_by_key(|g| std::cmp::Reverse(g.comparisons.iter().map(|c| c.verdict).max()));
+        shown.truncate(MOST_CASES);
+    }
+    let mut panels: Vec<Markup> = vec![];
+    // Panels of a kind side by side, so that cases compare along a row.
+    panels.extend(shown.iter().filter_map(|group| polar::panel(report, group, palette)));
+    panels.extend(shown.iter().flat_map(|group| grid::panels(report, group, palette)));
+    panels.extend(shown.iter().map(|group| strip::panel(report, group, palette)));
+    if shown.len() < groups.len() {
+        panels.push(html! { p.quiet { "Drawn: " (shown.len()) " of " (groups.len()) " cases, those that ask for attention most." } });
+    }
+    panels
+}
+
+impl Group<'_> {
+    /// The engines of the group in the report's order.
+    fn engines(&self, palette: &Palette) -> Vec<&str> {
+        let mut engines: Vec<&str> = self.comparisons.iter().map(|c| c.engine.as_str()).collect();
+        engines.sort_unstable();
+        engines.dedup();
+        engines.sort_by_key(|e| palette.order(e));
+        engines
+    }
+
+    /// The firmest basis: what the group is drawn against.
+    fn basis(&self) -> Option<Basis> {
+        self.comparisons.iter().filter_map(|c| c.reference.as_ref().map(|r| r.basis)).min()
+    }
+
+    /// The panel's title: the case where there are several.
+    fn title(&self, report: &Report, what: &str) -> String {
+        if report.is_suite() { format!("{}: {what}", self.case) } else { what.to_owned() }
+    }
+}
+
+/// A panel: a title, the drawing with its description, what to read from it.
+fn figure(title: &str, height: f64, drawing: &Markup, caption: &Markup) -> Markup {
+    html! {
+        figure {
+            figcaption { strong { (title) } }
+            svg viewBox={ "0 0 " (WIDTH) " " (number(height)) } role="img" aria-label=(title) { (drawing) }
+            div.caption { (caption) }
+        }
+    }
+}
+
+/// Text in a drawing.
+fn text(class: &str, anchor: &str, [x, y]: [f64; 2], words: &str) -> Markup {
+    html! { text class=(class) text-anchor=(anchor) x=(number(x)) y=(number(y)) { (words) } }
+}
+
+/// A straight line in a drawing.
+fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Markup {
+    html! { path class=(class) d={ "M" (number(x1)) " " (number(y1)) "L" (number(x2)) " " (number(y2)) } {} }
+}
+
+/// A coordinate without needless digits.
+fn number(value: f64) -> String {
+    let text = format!("{value:.1}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
+/// The engines of a plot, each behind its mark.
+fn legend(engines: &[&str], palette: &Palette) -> Markup {
+    html! { span.keys { @for engine in engines { (palette.label(engine)) " " } } }
+}

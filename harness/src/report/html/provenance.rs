@@ -1,0 +1,89 @@
+//! Where every number comes from: engine versions, settings, seeds, hashes, and the commands that repeat it by hand.
+
+use maud::{Markup, html};
+
+use super::super::{RecordingSummary, Report};
+use super::palette::Palette;
+use super::{duration, title};
+use crate::run::Status;
+
+pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
+    html! {
+        h2 id="provenance-title" { "Provenance" }
+        p.lead { "To repeat the run, then one engine's part by hand:" }
+        pre.commands tabindex="0" { code { (commands(report)) } }
+        div.scroll tabindex="0" role="region" aria-label="Engines" {
+            table {
+                thead { tr { th scope="col" { "engine" } th scope="col" { "version" } th scope="col" { "status" } th.number scope="col" { "run time" } } }
+                tbody {
+                    @for e in &report.engines {
+                        tr { th scope="row" { (palette.label(&e.id)) } td { (e.version.as_deref().unwrap_or("–")) }
+                            td.wide { (status(e.status)) @if let Some(reason) = &e.reason { ": " (reason) } } td.number { (duration(e.wall_s)) } }
+                    }
+                }
+            }
+        }
+        h3 { "Inputs" }
+        div.scroll tabindex="0" role="region" aria-label="Inputs" {
+            table {
+                thead { tr { th scope="col" { "case" } th scope="col" { "spec" } th scope="col" { "SHA-256 of the spec and all it names" } } }
+                tbody { @for c in &report.cases { tr { th scope="row" { (c.name) } td { code { (c.spec.path) } } td { code.hash { (c.spec.sha256) } } } } }
+            }
+        }
+        h3 { "Settings" }
+        @for engine in &report.engines {
+            @let mine: Vec<&RecordingSummary> = report.recordings.iter().filter(|r| r.engine == engine.id).collect();
+            @if !mine.is_empty() {
+                details { summary { (palette.label(&engine.id)) " " span.quiet { (super::plural(mine.len(), "run")) } }
+                    div.scroll tabindex="0" role="region" aria-label={ "Settings of " (engine.id) } { (settings(&mine)) }
+                }
+            }
+        }
+    }
+}
+
+fn settings(recordings: &[&RecordingSummary]) -> Markup {
+    html! {
+        table.settings {
+            thead { tr { th scope="col" { "case" } th scope="col" { "procedure" } th scope="col" { "luminaire, light" } th.number scope="col" { "seed" }
+                th.number scope="col" { "run time" } th.number scope="col" { "instrument" } th scope="col" { "settings and command" } } }
+            tbody {
+                @for r in recordings {
+                    tr { th scope="row" { (r.case) } td { (title(&r.procedure)) } td { (r.model) ", " (r.light) } td.number { (r.seed) }
+                        td.number { (duration(r.wall_s)) } td.number { (format!("{:.1e}", r.instrument_uncertainty)) }
+                        td.wide { dl {
+                            @for (key, value) in &r.settings { div { dt { (key.replace('_', " ")) } dd { code { (value) } } } }
+                            @if let Some(command) = &r.command { div { dt { "by hand" } dd { code { (command) } } } }
+                        } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn commands(report: &Report) -> String {
+    let seed = report.recordings.first().map_or(1, |r| r.seed);
+    let engines: Vec<&str> = report.engines.iter().filter(|e| e.status == Status::Ran).map(|e| e.id.as_str()).collect();
+    let mut lines = vec![format!("luxproof run {} --engines {} --seed {seed}", report.spec.path, engines.join(","))];
+    for engine in engines {
+        let with_command = report.recordings.iter().find(|r| r.engine == engine && r.command.is_some());
+        let Some((r, command)) = with_command.and_then(|r| r.command.as_ref().map(|c| (r, c))) else { continue };
+        let path = report.cases.iter().find(|c| c.name == r.case).map_or(&report.spec.path, |c| &c.spec.path);
+        let case = if report.is_suite() { format!("{}/", r.case) } else { String::new() };
+        lines.push(format!(
+            "luxproof export {path} --engine {engine} --out by-hand && cd by-hand/{case}{} && {command}",
+            r.procedure
+        ));
+    }
+    lines.join("\n")
+}
+
+const fn status(status: Status) -> &'static str {
+    match status {
+        Status::Ran => "ran",
+        Status::Absent => "absent",
+        Status::Failed => "failed",
+        Status::Skipped => "had nothing to do",
+    }
+}

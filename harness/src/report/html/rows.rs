@@ -1,0 +1,77 @@
+//! The readings as rows: compact data for the script, which opens the error budget of a reading on request.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use super::palette::Palette;
+use crate::diff::Comparison;
+
+/// Rows that have been given out, with the words they share.
+#[derive(Default)]
+pub(super) struct Rows {
+    words: BTreeMap<String, usize>,
+    rows: Vec<Value>,
+}
+
+impl Rows {
+    /// Takes a comparison in; its number for the script.
+    pub(super) fn add(&mut self, c: &Comparison, palette: &Palette) -> usize {
+        let components = c.budget.iter().flat_map(|b| &b.components);
+        let components: Vec<Value> =
+            components.map(|part| json!([self.word(part.source.name()), short(Some(part.uncertainty))])).collect();
+        let source = c.reference.as_ref().map_or("", |r| r.source.as_str());
+        let basis = c.reference.as_ref().map_or("none", |r| r.basis.name());
+        let words = [&c.case, &c.engine, basis, source, c.diagnosis.as_deref().unwrap_or_default(), c.verdict.name()]
+            .map(|w| self.word(w));
+        let budget = c.budget.as_ref();
+        let row = json!([
+            words,
+            c.meter.0,
+            super::procedure::place(c),
+            short(c.value),
+            short(c.reference.as_ref().map(|r| r.value)),
+            short(c.deviation),
+            short(c.relative_deviation),
+            short(Some(c.tolerance.around(c.reference.as_ref().map_or(0.0, |r| r.value)))),
+            components,
+            c.quantity.unit(),
+            short(strain(c)),
+            palette.index(&c.engine),
+            short(budget.map(|b| b.combined)),
+            short(budget.map(|b| b.expanded)),
+            short(budget.map(|b| b.coverage_factor)),
+            short(c.p_value),
+        ]);
+        self.rows.push(row);
+        self.rows.len() - 1
+    }
+
+    fn word(&mut self, word: &str) -> usize {
+        let next = self.words.len();
+        *self.words.entry(word.to_owned()).or_insert(next)
+    }
+
+    /// What the script reads; `<` is escaped so that no text can end the element.
+    pub(super) fn json(&self) -> String {
+        let mut words = vec![""; self.words.len()];
+        for (word, &k) in &self.words {
+            words[k] = word;
+        }
+        json!({"words": words, "rows": self.rows}).to_string().replace('<', "\\u003c")
+    }
+}
+
+/// Seven significant digits: what a page shows; all of them are in report.json.
+fn short(value: Option<f64>) -> Value {
+    value
+        .filter(|v| v.is_finite())
+        .and_then(|v| format!("{v:.6e}").parse::<f64>().ok())
+        .map_or(Value::Null, |v| json!(v))
+}
+
+/// The deviation over what is allowed; `None` where either is missing or nothing is allowed.
+pub(super) fn strain(c: &Comparison) -> Option<f64> {
+    let allowed = c.tolerance.around(c.reference.as_ref()?.value);
+    c.deviation.map(|d| d / allowed).filter(|s| s.is_finite())
+}
