@@ -62,7 +62,7 @@ impl Palette {
     /// The engine's mark at a place of a plot.
     pub(super) fn mark(&self, engine: &str, [x, y]: [f64; 2], radius: f64) -> Markup {
         let index = self.index(engine);
-        html! { path.mark class={ "e" (index) } d=(shape(index, x, y, radius)) {} }
+        html! { path class={ "mark e" (index) } d=(shape(index, x, y, radius)) {} }
     }
 
     /// Every mark once, for [`Self::label`] to refer to.

@@ -160,7 +160,7 @@ fn printed(grid: &paper::Grid) -> Markup {
 fn meaning(procedure: &str) -> String {
     let text = match procedure {
         "luminous_intensity" => {
-            "The luminous intensity distribution read back from illuminance at a distance in free field, I = E d², over the curve of the photometric file."
+            "The luminous intensity distribution read back from illuminance at a distance in free field, I = E d², over the curve of the photometric file."
         }
         "direct_illuminance" => "Illuminance straight from the luminaires, without any reflected light.",
         "indirect_illuminance" => "Illuminance by light that was reflected at least once.",
