@@ -15,6 +15,7 @@ pub mod diagnosis;
 pub mod diff;
 pub mod doctor;
 pub mod engines;
+pub mod history;
 pub mod photometry_command;
 pub mod plan;
 pub mod procedures;

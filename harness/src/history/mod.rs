@@ -5,13 +5,10 @@
 
 mod change;
 mod entry;
-mod plot;
 mod series;
-mod site;
 #[cfg(test)]
 mod synthetic;
 
-pub use change::{Change, Level, NIGHTS_PER_FALSE_ALARM, changes};
+pub use change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part, changes};
 pub use entry::{Entry, HistoryError, add, entries};
 pub use series::{History, Key, Series, VersionChange};
-pub use site::{Latest, site};

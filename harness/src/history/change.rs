@@ -1,0 +1,445 @@
+//! Change points: cumulative sums of what each night brings that the nights before did not foretell.
+//!
+//! Page, Continuous inspection schemes, Biometrika 41 (1954), with the self-starting form of Hawkins, Self-starting Cusum
+//! charts for location and scale, The Statistician 36 (1987): every night is foretold by the mean of the nights before it, so
+//! that neither the true deviation nor its spread need be known, and no night counts twice.
+//!
+//! A series' residual is its deviation less the mean of the nights before, in standard errors, times sqrt(n / (n + 1)). The
+//! residuals of a group of series are added over the square root of their number and divided by their own spread over the
+//! nights before, which gives Student's t, and that the normal deviate U (Wallace, Bounds on normal approximations to
+//! Student's and the chi-square distributions, Ann. Math. Statist. 30 (1959)). Both sums S = max(0, S +- U - 1) are those for a
+//! shift of two standard errors. A change is reported where one exceeds its limit, and it is dated, among the nights since the
+//! sum last was zero, to the one that makes what followed most likely. Limits come from the mean time between false alarms by Siegmund, Sequential Analysis (1985), section 2.6.
+
+use std::collections::BTreeMap;
+
+use super::series::{History, Series};
+
+/// Over all groups of a history together there is at most one false alarm in so many nights, in the mean.
+pub const NIGHTS_PER_FALSE_ALARM: f64 = 30.0;
+
+/// Half the shift that the sums are made for, in standard errors.
+const REFERENCE_VALUE: f64 = 1.0;
+
+/// So many residuals estimate the spread before any is judged by it.
+const LEARNING: usize = 5;
+
+/// A residual moves the estimates by no more than so many times the spread.
+const MOST: f64 = 4.0;
+
+/// One night alone is no change: it takes a sum no further than this share of its limit.
+const ONE_NIGHT: f64 = 0.9;
+
+/// Changes of one engine and procedure dated so close together are one change seen several times.
+const SAME_CHANGE: usize = 3;
+
+/// The smallest standard error, relative to the reference: for engines that state none. A change far below any tolerance is one still.
+const SMALLEST_ERROR: f64 = 1e-6;
+
+/// The smallest spread of a group's residuals, in standard errors: for what repeats exactly.
+const SMALLEST_SPREAD: f64 = 0.1;
+
+/// How many series are judged together, with the share of the false alarms that each kind may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// All cases of an engine in a procedure.
+    EngineAndProcedure,
+    /// One case of these.
+    Case,
+    /// One comparison.
+    Comparison,
+}
+
+impl Level {
+    const ALL: [Self; 3] = [Self::EngineAndProcedure, Self::Case, Self::Comparison];
+
+    const fn share(self) -> f64 {
+        match self {
+            Self::EngineAndProcedure => 0.8,
+            Self::Case | Self::Comparison => 0.1,
+        }
+    }
+}
+
+/// A deviation that has changed and stayed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// How many series changed together.
+    pub level: Level,
+    /// The engine.
+    pub engine: String,
+    /// The procedure.
+    pub procedure: String,
+    /// Where, below engine and procedure.
+    pub part: Part,
+    /// The first night after the change, by estimate.
+    pub night: usize,
+    /// The night on which it was noticed.
+    pub noticed: usize,
+    /// How far the deviation moved, in standard errors of a reading, in the mean over the group.
+    pub standard_errors: f64,
+    /// Likewise relative to the reference.
+    pub relative: f64,
+    /// The cases and comparisons that show the same change by themselves.
+    pub seen_in: Vec<Part>,
+}
+
+/// A case of an engine and procedure, or one comparison of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Part {
+    /// The case; none for all.
+    pub case: Option<String>,
+    /// The meter; none for all of the case.
+    pub meter: Option<String>,
+}
+
+/// The changes of a history, by night and level. What several levels see of one engine and procedure at once is one change.
+pub fn changes(history: &History) -> Vec<Change> {
+    let mut found: Vec<Change> = vec![];
+    for change in Level::ALL.into_iter().flat_map(|level| at_level(history, level)) {
+        let same = |c: &&mut Change| {
+            (&c.engine, &c.procedure) == (&change.engine, &change.procedure)
+                && c.night.abs_diff(change.night) <= SAME_CHANGE
+        };
+        match found.iter_mut().find(same) {
+            Some(wider) => wider.seen_in.push(change.part),
+            None => found.push(change),
+        }
+    }
+    found.sort_by(|a, b| (a.night, a.level).cmp(&(b.night, b.level)));
+    found
+}
+
+fn at_level(history: &History, level: Level) -> Vec<Change> {
+    let mut groups: BTreeMap<(&str, &str, &str, usize), Vec<&Series>> = BTreeMap::new();
+    for (k, series) in history.series.iter().enumerate() {
+        let key = &series.key;
+        let case = if level == Level::EngineAndProcedure { "" } else { key.case.as_str() };
+        let number = if level == Level::Comparison { k } else { 0 };
+        groups.entry((&key.engine, &key.procedure, case, number)).or_default().push(series);
+    }
+    let limit = limit(groups.len() as f64 * NIGHTS_PER_FALSE_ALARM / level.share());
+    let mut found = vec![];
+    for ((engine, procedure, case, _), members) in groups {
+        let part = Part {
+            case: (level != Level::EngineAndProcedure).then(|| case.to_owned()),
+            meter: (level == Level::Comparison).then(|| members[0].key.meter.clone()),
+        };
+        let named = |alarm: Alarm| Change {
+            level,
+            engine: engine.to_owned(),
+            procedure: procedure.to_owned(),
+            part: part.clone(),
+            night: alarm.night,
+            noticed: alarm.noticed,
+            standard_errors: alarm.shift.0,
+            relative: alarm.shift.1,
+            seen_in: vec![],
+        };
+        found.extend(alarms(&members, history.nights.len(), limit).into_iter().map(named));
+    }
+    found
+}
+
+/// The limit of the two sums of one group that gives it a false alarm every so many nights, by bisection.
+fn limit(nights: f64) -> f64 {
+    // Of one sum; the two together alarm twice as often. 1.166 is the overshoot of normal steps.
+    let between_alarms = |limit: f64| {
+        let b = 2.0 * REFERENCE_VALUE * (limit + 1.166);
+        (b.exp() - 1.0 - b) / (2.0 * REFERENCE_VALUE * REFERENCE_VALUE) / 2.0
+    };
+    let (mut low, mut high) = (0.0, 40.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if between_alarms(middle) < nights { low = middle } else { high = middle }
+    }
+    high
+}
+
+struct Alarm {
+    night: usize,
+    noticed: usize,
+    shift: (f64, f64),
+}
+
+/// The changes of one group. After each the estimates start anew from the night of the change.
+fn alarms(members: &[&Series], nights: usize, limit: f64) -> Vec<Alarm> {
+    let mut found: Vec<Alarm> = vec![];
+    let (mut start, mut heeded) = (0, 0);
+    while let Some(night) = first_alarm(members, start..nights, heeded, limit) {
+        let Noticed { change, noticed } = night;
+        found.push(Alarm { night: change, noticed, shift: shift(members, start, change, noticed) });
+        (start, heeded) = (change, noticed + 1);
+    }
+    found
+}
+
+struct Noticed {
+    change: usize,
+    noticed: usize,
+}
+
+/// The first alarm from night `heeded` on, of a segment without earlier changes.
+fn first_alarm(members: &[&Series], segment: std::ops::Range<usize>, heeded: usize, limit: f64) -> Option<Noticed> {
+    let most = REFERENCE_VALUE + ONE_NIGHT * limit;
+    let mut told = vec![Told::default(); members.len()];
+    let mut spread = Spread::default();
+    let mut deviates = vec![];
+    let (mut sums, mut zero) = ([0.0_f64; 2], [0; 2]);
+    for night in segment {
+        let heard = members.iter().zip(&mut told).filter_map(|(series, told)| told.hear(series, night));
+        let (sum, count) = heard.fold((0.0, 0.0_f64), |(sum, count), residual| (sum + residual, count + 1.0));
+        if count == 0.0 {
+            continue;
+        }
+        let residual = sum / count.sqrt();
+        let deviate = normal_deviate(residual / spread.value(), spread.count).clamp(-most, most);
+        spread.hear(residual);
+        if spread.count <= LEARNING {
+            continue;
+        }
+        deviates.push((night, deviate));
+        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+            sums[side] += sign * deviate - REFERENCE_VALUE;
+            if sums[side] <= 0.0 {
+                (sums[side], zero[side]) = (0.0, deviates.len());
+            } else if sums[side] > limit && night >= heeded {
+                return Some(Noticed { change: most_likely(&deviates[zero[side]..]), noticed: night });
+            }
+        }
+    }
+    None
+}
+
+/// Of nights with their deviates: the night from which on the deviates are most unlike zero.
+fn most_likely(deviates: &[(usize, f64)]) -> usize {
+    let (mut best, mut sum) = ((0.0, 0), 0.0);
+    for (count, (night, deviate)) in (1..).zip(deviates.iter().rev()) {
+        sum += deviate;
+        let evidence = sum * sum / f64::from(count);
+        if evidence > best.0 {
+            best = (evidence, *night);
+        }
+    }
+    best.1
+}
+
+/// The spread of residuals, which single wild nights do not widen.
+#[derive(Clone, Copy, Default)]
+struct Spread {
+    squares: f64,
+    count: usize,
+}
+
+impl Spread {
+    fn value(&self) -> f64 {
+        (self.squares / self.count.max(1) as f64).sqrt().max(SMALLEST_SPREAD)
+    }
+
+    /// The most that a residual may move an estimate by; there is no telling at first.
+    fn most(&self) -> f64 {
+        if self.count < LEARNING { f64::INFINITY } else { MOST * self.value() }
+    }
+
+    fn hear(&mut self, residual: f64) {
+        self.squares += residual.clamp(-self.most(), self.most()).powi(2);
+        self.count += 1;
+    }
+}
+
+/// What the nights of a segment have told of one series so far.
+#[derive(Clone, Copy, Default)]
+struct Told {
+    nights: f64,
+    mean: f64,
+    square_of_errors: f64,
+    spread: Spread,
+}
+
+impl Told {
+    /// Takes in a night; its residual in standard errors, where there is a night before to foretell it.
+    fn hear(&mut self, series: &Series, night: usize) -> Option<f64> {
+        let deviation = series.deviation[night];
+        if !deviation.is_finite() {
+            return None;
+        }
+        let n = self.nights;
+        self.nights += 1.0;
+        // A night's standard error is itself uncertain: the root mean square of all nights counts, unless tonight's is larger.
+        self.square_of_errors += series.std_error[night].powi(2);
+        let error = (self.square_of_errors / self.nights).sqrt().max(series.std_error[night]);
+        let error = error.max(SMALLEST_ERROR * series.reference[night].abs()).max(f64::MIN_POSITIVE);
+        if n == 0.0 {
+            self.mean = deviation;
+            return None;
+        }
+        let residual = (deviation - self.mean) * (n / (n + 1.0)).sqrt() / error;
+        let most = self.spread.most() * error;
+        self.mean += (deviation - self.mean).clamp(-most, most) / self.nights;
+        self.spread.hear(residual);
+        Some(residual)
+    }
+}
+
+/// The standard normal deviate as likely as Student's t.
+fn normal_deviate(t: f64, degrees_of_freedom: usize) -> f64 {
+    let n = degrees_of_freedom as f64;
+    (8.0 * n + 1.0) / (8.0 * n + 3.0) * (n * (t * t / n.max(1.0)).ln_1p()).sqrt() * t.signum()
+}
+
+/// How far a group's deviations moved at a change: in standard errors and relative to the reference.
+fn shift(members: &[&Series], start: usize, change: usize, noticed: usize) -> (f64, f64) {
+    let (mut errors, mut relative, mut count) = (0.0, 0.0, 0.0);
+    for series in members {
+        let mean = |values: &[f64], nights: std::ops::Range<usize>| {
+            let there = nights.filter(|n| series.deviation[*n].is_finite()).map(|n| values[n]);
+            let (sum, count) = there.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+            sum / count
+        };
+        let moved = mean(&series.deviation, change..noticed + 1) - mean(&series.deviation, start..change);
+        let reference = mean(&series.reference, start..noticed + 1).abs();
+        let squares: Vec<f64> = series.std_error.iter().map(|e| e * e).collect();
+        let error = mean(&squares, start..noticed + 1).sqrt().max(SMALLEST_ERROR * reference).max(f64::MIN_POSITIVE);
+        if moved.is_finite() {
+            errors += moved / error;
+            relative += if reference > 0.0 { moved / reference } else { 0.0 };
+            count += 1.0;
+        }
+    }
+    (errors / count, relative / count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::synthetic::{Shift, Synthetic};
+
+    /// Seeds of the simulations; each is a year of 2000 comparisons a night.
+    const SEEDS: std::ops::Range<u64> = 0..12;
+
+    /// Of planted shifts of Mitsuba's indirect light, one a seed, seen at a level: how many are noticed within so many nights,
+    /// and how many of these are dated to within two nights.
+    fn found(base: &Synthetic, shift: Shift, level: Level, within: usize) -> (usize, usize) {
+        let part = Part {
+            case: (level != Level::EngineAndProcedure).then(|| "suite/case-0".to_owned()),
+            meter: (level == Level::Comparison).then(|| "workplane[0]".to_owned()),
+        };
+        let (mut noticed, mut dated) = (0, 0);
+        for seed in SEEDS {
+            let shift = Shift { night: 60 + 23 * seed as usize, ..shift };
+            let history =
+                Synthetic { seed, shift: Some(shift), nights: shift.night + within, ..base.clone() }.history();
+            let mine = |c: &&Change| {
+                (c.engine.as_str(), c.procedure.as_str()) == ("mitsuba", "indirect_illuminance")
+                    && c.noticed >= shift.night
+                    && (c.part == part || c.seen_in.contains(&part))
+            };
+            if let Some(change) = changes(&history).iter().find(mine) {
+                noticed += 1;
+                dated += usize::from(change.night.abs_diff(shift.night) <= 2);
+            }
+        }
+        (noticed, dated)
+    }
+
+    const SEEN: Shift = Shift { night: 0, standard_errors: 2.0, cases: 5, meters: 20 };
+
+    fn all() -> usize {
+        SEEDS.count()
+    }
+
+    #[test]
+    fn a_year_without_change_has_at_most_one_false_alarm_a_month_over_all_series() {
+        for common in [0.0, 1.0] {
+            let mut alarms = 0;
+            for seed in SEEDS {
+                alarms += changes(&Synthetic { seed, common, ..Synthetic::default() }.history()).len();
+            }
+            let months = 12.0 * all() as f64;
+            println!("{alarms} false alarms in {months} months");
+            assert!(alarms as f64 <= months, "{alarms} in {months} months");
+        }
+    }
+
+    #[test]
+    fn a_shift_of_all_readings_of_an_engine_is_noticed_within_five_nights() {
+        let seen = found(&Synthetic::default(), SEEN, Level::EngineAndProcedure, 5);
+        assert_eq!(seen, (all(), all()));
+    }
+
+    #[test]
+    fn a_shift_of_one_case_is_noticed_within_five_nights() {
+        let seen = found(&Synthetic::default(), Shift { cases: 1, ..SEEN }, Level::Case, 5);
+        assert_eq!(seen, (all(), all()));
+    }
+
+    #[test]
+    fn a_shift_is_mostly_noticed_within_five_nights_where_all_meters_share_their_noise() {
+        // Nothing can be averaged away: the group is as uncertain as each of its readings.
+        let seen = found(&Synthetic { common: 1.0, ..Synthetic::default() }, SEEN, Level::EngineAndProcedure, 5);
+        println!("{seen:?} of {}", all());
+        assert!(3 * seen.0 >= 2 * all(), "{seen:?}");
+    }
+
+    #[test]
+    fn a_shift_of_one_reading_among_two_thousand_is_noticed_within_three_weeks() {
+        let one = Shift { cases: 1, meters: 1, ..SEEN };
+        let seen = found(&Synthetic::default(), one, Level::Comparison, 21);
+        println!("{:?} within five nights", found(&Synthetic::default(), one, Level::Comparison, 5));
+        assert!(10 * seen.0 >= 9 * all(), "{seen:?}");
+    }
+
+    /// An engine that repeats exactly, with what the nights add.
+    fn exact(nights: &[f64]) -> Vec<Change> {
+        let mut history = Synthetic { nights: nights.len(), cases: 1, meters: 1, ..Synthetic::default() }.history();
+        history.series.truncate(1);
+        let series = &mut history.series[0];
+        series.std_error.fill(0.0);
+        series.reference.fill(100.0);
+        series.deviation = nights.iter().map(|d| -0.5 + d).collect();
+        changes(&history)
+    }
+
+    #[test]
+    fn an_engine_that_repeats_exactly_changes_where_it_changes_at_all_and_one_bad_night_is_no_change() {
+        let mut nights = vec![0.0; 30];
+        assert_eq!(exact(&nights), []);
+        nights[12] = 3.0;
+        assert_eq!(exact(&nights), []);
+        nights[20..].fill(1e-3);
+        let found = exact(&nights);
+        let of_all = |c: &&Change| c.level == Level::EngineAndProcedure;
+        let dates: Vec<(usize, usize)> = found.iter().filter(of_all).map(|c| (c.night, c.noticed)).collect();
+        assert_eq!(dates, [(20, 21)]);
+        nights[12] = 0.0;
+        let found = exact(&nights);
+        assert!(
+            (found[0].relative - 1e-5).abs() < 1e-12 && (found[0].standard_errors - 10.0).abs() < 1e-6,
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn nights_without_readings_change_nothing() {
+        let mut nights = vec![0.0; 40];
+        nights[10..20].fill(f64::NAN);
+        assert_eq!(exact(&nights), []);
+        nights[25..].fill(-1e-3);
+        assert_eq!(exact(&nights)[0].night, 25);
+    }
+
+    #[test]
+    fn limits_are_those_of_the_tables_of_cumulative_sums() {
+        // Two sums with reference value 1 and limit 2.52: 370 steps between false alarms (Hawkins and Olwell 1998, table 3.1).
+        assert!((limit(370.4) - 2.52).abs() < 0.05, "{}", limit(370.4));
+    }
+
+    #[test]
+    fn the_deviate_is_as_likely_as_students_t() {
+        // Two-sided 5 %, 1 % and 0.1 % points of t.
+        for (t, n, u) in [(2.571, 5, 1.960), (3.169, 10, 2.576), (3.659, 29, 3.291)] {
+            assert!((normal_deviate(t, n) - u).abs() < 0.02, "{t} {n}: {}", normal_deviate(t, n));
+            assert_eq!(normal_deviate(-t, n), -normal_deviate(t, n));
+        }
+    }
+}
