@@ -4,6 +4,7 @@ mod consensus;
 mod family;
 mod input;
 mod known;
+mod paper_split;
 mod published;
 mod split;
 #[cfg(test)]
@@ -26,7 +27,8 @@ use input::Input;
 
 pub use consensus::{Consensus, Witness};
 pub use known::{KnownDeviationError, KnownDeviations, Subject};
-pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedRow, PublishedTable};
+pub use paper_split::{PaperSplit, Share, Stage, Stages, shares};
+pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use split::Split;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 pub use uncertainty::{Component, ErrorBudget, Shape, Source};

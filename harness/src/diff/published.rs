@@ -22,7 +22,22 @@ pub struct Published {
     version: u32,
     citation: Citation,
     rounding: Rounding,
+    /// What is known of the luminaire's flux beyond our file.
+    #[serde(default)]
+    flux: Option<PublishedFlux>,
     tables: BTreeMap<String, Table>,
+}
+
+/// The flux of a paper's luminaire, as far as its tables tell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PublishedFlux {
+    /// In lumens.
+    pub value_lm: f64,
+    /// Half the width of the interval that holds it.
+    pub half_width_lm: f64,
+    /// How that is known.
+    pub source: String,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -96,6 +111,15 @@ pub struct PublishedTable {
     pub quantity: crate::reading::Quantity,
     /// The cases that are held against it.
     pub cases: Vec<String>,
+    /// Diffuse reflections that its renderings include, where that matters.
+    #[serde(default)]
+    pub bounces: Option<u32>,
+    /// Units of the last printed digit that a cell is uncertain by.
+    #[serde(default)]
+    pub units_in_last_digit: f64,
+    /// The luminaire's flux, as far as the tables tell.
+    #[serde(default)]
+    pub flux: Option<PublishedFlux>,
     /// Its columns.
     pub columns: Vec<PublishedColumn>,
     /// Its rows, in the order of the meters.
@@ -118,6 +142,12 @@ pub struct PublishedColumn {
     pub reference: bool,
     /// What it holds, in a sentence.
     pub meaning: String,
+    /// The engine whose readings stand beside it.
+    #[serde(default)]
+    pub engine: String,
+    /// The luminaire model, likewise.
+    #[serde(default)]
+    pub model: String,
 }
 
 /// A row of a published table.
@@ -222,6 +252,8 @@ impl Published {
             name: name.clone(),
             reference: column.reference,
             meaning: column.meaning.clone(),
+            engine: column.engine.clone(),
+            model: column.model.clone(),
         };
         (!rows.is_empty()).then(|| PublishedTable {
             title: self.citation.title.clone(),
@@ -229,6 +261,9 @@ impl Published {
             procedure: task.procedure.to_owned(),
             quantity: table.quantity,
             cases: vec![case.to_owned()],
+            bounces: table.bounces,
+            units_in_last_digit: self.rounding.units_in_last_digit,
+            flux: self.flux.clone(),
             columns: table.columns.iter().map(column).collect(),
             rows,
         })

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::Report;
 use super::terminal::{Cell, matrix, worst};
-use super::{consensus, paper, split};
+use super::{consensus, paper, paper_split, split};
 
 /// The report as Markdown.
 pub fn markdown(report: &Report) -> String {
@@ -31,7 +31,7 @@ pub fn markdown(report: &Report) -> String {
         let case = if report.is_suite() { format!("{} | ", row.case) } else { String::new() };
         line(format!("| {case}{} | {} | {} |", row.procedure, row.basis, cells.join(" | ")));
     }
-    for grid in paper::grids(report) {
+    for grid in paper::grids(report).into_iter().chain(paper_split::grid(report)) {
         line(format!("\n{}\n\n| {} |\n|{}", grid.title, grid.head.join(" | "), "---|".repeat(grid.head.len())));
         for row in grid.rows {
             line(format!("| {} |", row.join(" | ")));

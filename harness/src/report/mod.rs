@@ -7,6 +7,7 @@ mod html;
 mod junit;
 mod markdown;
 mod paper;
+mod paper_split;
 mod split;
 mod terminal;
 
@@ -15,7 +16,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::diff::{Comparison, Consensus, PublishedTable, Split, Verdict};
+use crate::diff::{Comparison, Consensus, PaperSplit, PublishedTable, Split, Verdict};
 use crate::plan::Skip;
 use crate::reading::{MeterId, Quantity, Recording};
 use crate::run::{EngineStatus, Status};
@@ -53,6 +54,9 @@ pub struct Report {
     /// Where an approximate method differs from a renderer: what of it is the method's and what the renderer's.
     #[serde(default)]
     pub splits: Vec<Split>,
+    /// What of the distance between a paper's calculation and its renderings is whose.
+    #[serde(default)]
+    pub paper_splits: Vec<PaperSplit>,
     /// What the witnesses of each case and procedure say of each other: who departs.
     #[serde(default)]
     pub consensus: Vec<Consensus>,
@@ -290,6 +294,7 @@ impl Report {
             comparisons,
             skips,
             splits,
+            paper_splits: vec![],
             consensus,
             published,
             curves,
@@ -326,7 +331,8 @@ impl Report {
         let order = |e: &EngineStatus| crate::engines::all().iter().position(|known| known.id().name() == e.id);
         let mut engines = joined.engines;
         engines.sort_by_key(order);
-        Some(Self { spec, engines, summary, ..joined })
+        let joined = Self { spec, engines, summary, ..joined };
+        Some(Self { paper_splits: paper_split::splits(&joined), ..joined })
     }
 
     /// Whether more than one case was run.

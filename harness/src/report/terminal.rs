@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArrangement, Table, presets};
 
-use super::{ReadingRecord, Report, consensus, paper, split};
+use super::{ReadingRecord, Report, consensus, paper, paper_split, split};
 use crate::diff::{Basis, Comparison, Verdict};
 use crate::run::Status;
 
@@ -166,7 +166,7 @@ pub fn terminal(report: &Report, style: Style, folder: Option<&str>) -> String {
     writeln!(text, "\nluxproof {}: {}", report.tool_version, report.spec.title).ok();
     writeln!(text, "{}\n", engines_line(report)).ok();
     writeln!(text, "{}\n", verdicts(report, style)).ok();
-    for grid in paper::grids(report) {
+    for grid in paper::grids(report).into_iter().chain(paper_split::grid(report)) {
         writeln!(text, "{}\n", drawn(&grid, style)).ok();
     }
     // In a suite the readings of a procedure are those of many rooms: they stay in the files.
