@@ -2,7 +2,7 @@
 //!
 //! Data flows one way; each arrow is one function and each artefact a file:
 //! spec file -> [`spec::Case`] -> [`plan::Plan`] -> [`reading::Recording`] -> [`diff::Comparison`] -> [`report::Report`].
-//! Imports point down only: spec < reading < procedures < engines < cache < plan < run < diff < diagnosis < report < cli.
+//! Imports point down only: spec < reading < procedures < engines < cache < plan < run < diff < {diagnosis | sequential} < report < cli.
 
 /// The worked example of the documentation, compiled and run as a test.
 #[cfg(doctest)]
@@ -24,4 +24,5 @@ pub mod reading;
 pub mod report;
 pub mod run;
 pub mod selftest;
+pub mod sequential;
 pub mod spec;

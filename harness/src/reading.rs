@@ -95,6 +95,9 @@ pub struct Recording {
     /// What it shares with other engines: witnesses that share a component count once.
     #[serde(default)]
     pub components: Vec<String>,
+    /// At which of several planned looks each reading was last sampled, counted from 1; empty where one look was planned.
+    #[serde(default)]
+    pub looks: Vec<u32>,
     /// Why there are no readings, if there are none.
     pub failure: Option<String>,
     /// The readings, one a meter.

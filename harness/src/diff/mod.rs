@@ -6,6 +6,7 @@ mod input;
 mod known;
 mod paper_split;
 mod published;
+mod spending;
 mod split;
 #[cfg(test)]
 mod tests;
@@ -29,6 +30,7 @@ pub use consensus::{Consensus, Witness};
 pub use known::{KnownDeviationError, KnownDeviations, Subject};
 pub use paper_split::{PaperSplit, Share, Stage, Stages, shares};
 pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
+pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 pub use uncertainty::{Component, ErrorBudget, Shape, Source};
@@ -141,6 +143,11 @@ impl Judge<'_> {
         split::splits(task, recordings, self.tolerances.coverage_factor())
     }
 
+    /// What an engine is held to in a task, by what others are judged by there.
+    pub fn tolerance(&self, task: &Task, engine: &str) -> Tolerance {
+        self.tolerances.of(task.procedure, witness_of(task).1, engine, task.quantity, self.overrides)
+    }
+
     /// Who of the engines departs from the others, the reference included; `recordings` as for [`Self::compare`].
     pub fn consensus(&self, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
         consensus::consensus(self, task, recordings)
@@ -154,7 +161,7 @@ impl Judge<'_> {
         let input = self.published.map(|_| Input::of(task));
         let mut comparisons = vec![];
         for recording in recordings {
-            let mut family = vec![];
+            let (mut family, mut shares) = (vec![], vec![]);
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.readings.get(k);
                 let mut references = reference_from_witness(task, recordings, k, &recording.engine);
@@ -163,22 +170,23 @@ impl Judge<'_> {
                 }
                 if references.is_empty() && (reading.is_none() || !is_witness(&recording.engine)) {
                     // Nothing to hold it against, or nothing to hold: that is said, never passed over.
-                    family.push(self.comparison(task, recording, target, reading, None));
+                    family.push(self.comparison(task, recording, k, None));
                 }
                 for held in references {
-                    family.push(self.comparison(task, recording, target, reading, Some(held)));
+                    family.push(self.comparison(task, recording, k, Some(held)));
                 }
+                shares.resize(family.len(), share_of_reading(recording, k));
             }
-            self.decide(&mut family);
+            self.decide(&mut family, &shares);
             comparisons.extend(family);
         }
         comparisons
     }
 
-    /// Verdicts of all comparisons of one engine in one procedure of one case.
-    fn decide(&self, family: &mut [Comparison]) {
+    /// Verdicts of all comparisons of one engine in one procedure of one case; of its error each may spend its share.
+    fn decide(&self, family: &mut [Comparison], shares: &[f64]) {
         let tested: Vec<usize> = (0..family.len()).filter(|k| family[*k].p_value.is_some()).collect();
-        let p_values: Vec<f64> = tested.iter().filter_map(|k| family[*k].p_value).collect();
+        let p_values: Vec<f64> = tested.iter().filter_map(|k| Some(family[*k].p_value? / shares[*k])).collect();
         let rejected = family::rejected(&p_values, self.tolerances.family_wise_error());
         for (k, rejected) in tested.into_iter().zip(rejected) {
             let of_one = &mut family[k].verdict;
@@ -202,14 +210,8 @@ impl Judge<'_> {
         }
     }
 
-    fn comparison(
-        &self,
-        task: &Task,
-        recording: &Recording,
-        target: &Target,
-        reading: Option<&Reading>,
-        held: Option<Held>,
-    ) -> Comparison {
+    fn comparison(&self, task: &Task, recording: &Recording, k: usize, held: Option<Held>) -> Comparison {
+        let (target, reading) = (&task.targets[k], recording.readings.get(k));
         let basis = held.as_ref().map(|h| h.reference.basis);
         let tolerance = basis.map_or_else(Tolerance::default, |basis| {
             self.tolerances.of(task.procedure, basis, &recording.engine, task.quantity, self.overrides)
@@ -218,7 +220,8 @@ impl Judge<'_> {
         let difference = pair.map(|(a, b)| a.value - b.reference.value);
         let budget = pair.map(|(reading, held)| {
             let components = of_reading(recording, reading).into_iter().chain(held.components.iter().copied());
-            ErrorBudget::new(components.collect(), self.tolerances.coverage_factor())
+            let tail = uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor());
+            ErrorBudget::new(components.collect(), tail * share_of_reading(recording, k))
         });
         let missing = match (reading, &held) {
             (None, _) => recording.failure.clone().or_else(|| Some("no reading".to_owned())),
@@ -281,6 +284,12 @@ impl Held {
         let input = input.zip(reading).map(|(i, r)| Component::within(Source::Input, i.bound(target, r.value)));
         Self { reference, components: std::iter::once(rounding).chain(input).collect() }
     }
+}
+
+/// The share of its error that a decision about a reading may spend: all of it where only one look was planned.
+fn share_of_reading(recording: &Recording, k: usize) -> f64 {
+    let is_sampled = recording.readings.get(k).is_some_and(|r| r.std_error.is_some_and(|e| e > 0.0));
+    recording.looks.get(k).filter(|_| is_sampled).map_or(1.0, |look| share_of_error(*look))
 }
 
 /// What is uncertain of a reading.

@@ -101,16 +101,16 @@ pub struct ErrorBudget {
 }
 
 impl ErrorBudget {
-    /// Adds components up; the interval covers as much as `coverage_factor` standard deviations of a normal distribution.
-    pub fn new(mut components: Vec<Component>, coverage_factor: f64) -> Self {
+    /// Adds components up; an error beyond the interval has the probability `tail` on either side.
+    pub fn new(mut components: Vec<Component>, tail: f64) -> Self {
         components.retain(|c| c.uncertainty != 0.0);
         let combined = components.iter().map(|c| c.uncertainty.powi(2)).sum::<f64>().sqrt();
         let spread = Spread::of(&components);
-        let expanded = spread.quantile(upper_tail_of_normal(coverage_factor));
+        let expanded = spread.quantile(tail);
         Self {
             combined,
             degrees_of_freedom: spread.degrees_of_freedom,
-            coverage_factor: if combined > 0.0 { expanded / combined } else { coverage_factor },
+            coverage_factor: if combined > 0.0 { expanded / combined } else { 0.0 },
             expanded,
             components,
         }
@@ -236,7 +236,7 @@ mod tests {
     use super::*;
 
     fn budget(components: &[Component]) -> ErrorBudget {
-        ErrorBudget::new(components.to_vec(), 2.0)
+        ErrorBudget::new(components.to_vec(), upper_tail_of_normal(2.0))
     }
 
     #[test]
