@@ -25,4 +25,5 @@ pub mod report;
 pub mod run;
 pub mod selftest;
 pub mod sequential;
+pub mod slots;
 pub mod spec;

@@ -1,22 +1,27 @@
 //! Runs a plan: one workbench a job, readings kept on disk as each job finishes, one engine's failure stops no other.
 
+mod machine;
 mod reader;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::cache::Cache;
-use crate::engines::calibration::{Calibrated, Earlier, Origin, calibrate};
+use crate::engines::calibration::{Calibrated, Origin};
 use crate::engines::{EngineError, Measurement, Site};
 use crate::plan::{Plan, Planned, REFERENCES, Run, Scope, Skip};
 use crate::procedures::Task;
 use crate::reading::{Reading, Recording};
+use crate::slots::side_by_side;
 use crate::spec::Case;
 
+pub use machine::Machine;
 pub use reader::{Reader, Source, Taken};
 
 /// How to run.
@@ -26,8 +31,8 @@ pub struct Options {
     pub site: Site,
     /// The folder of the run's files.
     pub out: PathBuf,
-    /// Threads or processes at a time.
-    pub jobs: usize,
+    /// How much runs at a time; cases that run side by side share one.
+    pub machine: Arc<Machine>,
     /// Where readings are kept between runs; `None`: nowhere, and every reading is taken anew.
     pub cache: Option<Cache>,
 }
@@ -104,7 +109,7 @@ pub struct RunError {
 }
 
 /// Told of every job as it starts and ends.
-pub trait Progress {
+pub trait Progress: Sync {
     /// A job starts.
     fn started(&self, engine: &str, procedure: &str);
     /// An engine was calibrated just now: what that found and where it is kept.
@@ -113,50 +118,95 @@ pub trait Progress {
     fn ended(&self, engine: &str, procedure: &str, wall: Duration, failure: Option<&str>);
 }
 
-/// Runs every job of a plan.
+/// Runs every job of a plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
 pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress) -> Result<Outcome, RunError> {
-    let (mut recordings, mut skips, mut from_cache) = (vec![], vec![], 0);
+    let threads = options.machine.slots.threads();
     let reader = Reader {
         site: options.site.clone(),
         out: options.out.clone(),
         cache: options.cache.clone(),
-        threads: options.jobs,
+        machine: Arc::clone(&options.machine),
     };
-    for (e, planned) in plan.engines.iter().enumerate() {
-        let mut of_engine = vec![];
-        let instrument = instrument(plan, e, options, progress);
-        for run in plan.runs.iter().filter(|r| r.engine == e) {
-            let task = &plan.tasks[run.task];
-            progress.started(planned.engine.id().name(), task.procedure);
-            let start = Instant::now();
-            let measured = match &instrument {
-                Ok(_) => reader.read(planned, &run.job, task.procedure),
-                // An instrument that reads known scenes wrong reads nothing.
-                Err(reason) => Err(EngineError::Solver { engine: planned.engine.id(), what: reason.clone() }),
-            };
-            if let Err(EngineError::Declined { why, .. }) = &measured {
-                progress.ended(planned.engine.id().name(), task.procedure, start.elapsed(), None);
-                skips.push(declined(case, planned, task, why));
-                continue;
-            }
-            from_cache += usize::from(measured.as_ref().is_ok_and(|taken| taken.source == Source::Cache));
-            let mut recording = record(case, planned, run, task, measured, start.elapsed());
-            if let Ok(Some(calibrated)) = &instrument {
-                recording.instrument_uncertainty = calibrated.calibration.uncertainty(run.job.transport);
-                if let Ok(file) = &calibrated.kept {
-                    recording.settings.insert("calibration".to_owned(), file.clone());
-                }
-            }
-            let wall = Duration::from_secs_f64(recording.wall_s);
-            progress.ended(&recording.engine, task.procedure, wall, recording.failure.as_deref());
-            of_engine.push(recording);
-            // Written as each job finishes, so that an interruption loses only what was under way.
-            keep(&options.out.join("readings").join(format!("{}.json", planned.engine.id())), &of_engine)?;
+    let engines: Vec<usize> = (0..plan.engines.len()).collect();
+    let instruments = side_by_side(threads, &engines, |&e| instrument(plan, e, options, progress));
+    let shelf = Shelf { folder: options.out.join("readings"), recordings: Mutex::default() };
+    let runs: Vec<(usize, &Run)> = plan.runs.iter().enumerate().collect();
+    let one = |&(k, run): &(usize, &Run)| -> Result<Done, RunError> {
+        let done = measure(case, plan, run, &reader, &instruments[run.engine], progress);
+        if let Done::Recorded(recording, _) = &done {
+            shelf.keep(k, recording)?;
         }
-        recordings.extend(of_engine);
+        Ok(done)
+    };
+    let (mut recordings, mut skips, mut from_cache) = (vec![], vec![], 0);
+    for done in side_by_side(threads, &runs, one) {
+        match done? {
+            Done::Recorded(recording, source) => {
+                from_cache += usize::from(source == Some(Source::Cache));
+                recordings.push(*recording);
+            }
+            Done::Declined(skip) => skips.push(skip),
+        }
     }
     let engines = plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
     Ok(Outcome { recordings, engines, skips, from_cache })
+}
+
+/// What became of one run of the plan.
+enum Done {
+    Recorded(Box<Recording>, Option<Source>),
+    Declined(Skip),
+}
+
+/// One run of the plan: the one place where a recording is made of what engines answer.
+fn measure(
+    case: &Case,
+    plan: &Plan,
+    run: &Run,
+    reader: &Reader,
+    instrument: &Result<Option<Calibrated>, String>,
+    progress: &dyn Progress,
+) -> Done {
+    let (planned, task) = (&plan.engines[run.engine], &plan.tasks[run.task]);
+    let engine = planned.engine.id();
+    progress.started(engine.name(), task.procedure);
+    let start = Instant::now();
+    let taken = match instrument {
+        Ok(_) => reader.read(planned, &run.job, task.procedure),
+        // An instrument that reads known scenes wrong reads nothing.
+        Err(reason) => Err(EngineError::Solver { engine: engine.clone(), what: reason.clone() }),
+    };
+    if let Err(EngineError::Declined { why, .. }) = &taken {
+        progress.ended(engine.name(), task.procedure, start.elapsed(), None);
+        return Done::Declined(declined(case, planned, task, why));
+    }
+    let source = taken.as_ref().ok().map(|taken| taken.source);
+    let mut recording = record(case, planned, run, task, taken, start.elapsed());
+    if let Ok(Some(calibrated)) = instrument {
+        recording.instrument_uncertainty = calibrated.calibration.uncertainty(run.job.transport);
+        if let Ok(file) = &calibrated.kept {
+            recording.settings.insert("calibration".to_owned(), file.clone());
+        }
+    }
+    let wall = Duration::from_secs_f64(recording.wall_s);
+    progress.ended(&recording.engine, task.procedure, wall, recording.failure.as_deref());
+    Done::Recorded(Box::new(recording), source)
+}
+
+/// The readings' files, written as each job finishes, so that an interruption loses only what was under way.
+struct Shelf {
+    folder: PathBuf,
+    /// By place in the plan.
+    recordings: Mutex<BTreeMap<usize, Recording>>,
+}
+
+impl Shelf {
+    fn keep(&self, place: usize, recording: &Recording) -> Result<(), RunError> {
+        let mut all = self.recordings.lock().unwrap_or_else(PoisonError::into_inner);
+        all.insert(place, recording.clone());
+        let of_engine: Vec<&Recording> = all.values().filter(|r| r.engine == recording.engine).collect();
+        keep(&self.folder.join(format!("{}.json", recording.engine)), &of_engine)
+    }
 }
 
 /// What a case gives that is not run at all: a skip for every run of its plan, and engines of the given status.
@@ -191,17 +241,12 @@ fn instrument(plan: &Plan, e: usize, options: &Options, progress: &dyn Progress)
         return Ok(None);
     }
     progress.started(id.name(), "calibration");
-    let found =
-        calibrate(planned.engine.as_ref(), version, &run.job.settings, &options.site, options.jobs, Earlier::Counts);
-    match found {
-        Ok(calibrated) => {
-            if calibrated.origin == Origin::Measured {
-                progress.calibrated(id.name(), &calibrated);
-            }
-            Ok(Some(calibrated))
+    let made = |calibrated: &Calibrated| {
+        if calibrated.origin == Origin::Measured {
+            progress.calibrated(id.name(), calibrated);
         }
-        Err(error) => Err(error.to_string()),
-    }
+    };
+    options.machine.calibration(planned.engine.as_ref(), version, &run.job, &options.site, made).map(Some)
 }
 
 fn declined(case: &Case, planned: &Planned, task: &Task, why: &str) -> Skip {

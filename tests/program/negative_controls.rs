@@ -11,7 +11,7 @@ use luxproof::diff::{Comparison, Judge, KnownDeviations, Tolerances, Verdict};
 use luxproof::engines::Site;
 use luxproof::plan::{Selection, plan};
 use luxproof::reading::Recording;
-use luxproof::run::{Options, Progress, run};
+use luxproof::run::{Machine, Options, Progress, run};
 use luxproof::spec::Case;
 
 struct Silent;
@@ -34,7 +34,7 @@ fn recordings(case: &Case, engine: &str) -> Vec<Recording> {
     let site = Site::of_user().unwrap();
     let out = tempfile::tempdir().unwrap();
     let plan = plan(case, &selection(engine), &site).unwrap();
-    let options = Options { site, out: out.path().to_owned(), jobs: 2, cache: None };
+    let options = Options { site, out: out.path().to_owned(), machine: Machine::new(2), cache: None };
     let outcome = run(case, &plan, &options, &Silent).unwrap();
     let mine: Vec<Recording> = outcome.recordings.into_iter().filter(|r| r.engine == engine).collect();
     assert!(!mine.is_empty(), "{engine} did not run; run `luxproof engines install`");

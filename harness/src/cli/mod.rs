@@ -21,6 +21,7 @@ use crate::plan::{Asked, Selection, plan};
 use crate::process;
 use crate::report::{self, Beside, Exit, Report, Style};
 use crate::selftest::selftest;
+use crate::slots::Slots;
 use crate::spec::{Case, Spec, filtered, suite};
 
 use diagnostic::diagnose;
@@ -450,7 +451,14 @@ fn calibrate_anew(engine: &dyn engines::Engine, site: &Site) -> Exit {
     if crate::plan::REFERENCES.contains(&engine.id().name()) {
         return Exit::Passed;
     }
-    match calibration::calibrate(engine, &version, &BTreeMap::new(), site, process::cores(), Earlier::Ignored) {
+    match calibration::calibrate(
+        engine,
+        &version,
+        &BTreeMap::new(),
+        site,
+        &Slots::new(process::cores()),
+        Earlier::Ignored,
+    ) {
         Ok(found) => {
             println!("     {:<10} {}", engine.id(), calibration_line(&found));
             Exit::Passed

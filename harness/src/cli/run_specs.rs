@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Instant, SystemTime};
 
 use miette::{IntoDiagnostic, Report as Diagnostic};
@@ -19,11 +20,13 @@ use crate::procedures::Task;
 use crate::process;
 use crate::reading::Recording;
 use crate::report::{self, Exit, Ingredients, Report, SpecRecord};
-use crate::run::{self, Status};
+use crate::run::{self, Machine, Status};
+use crate::slots::side_by_side;
 use crate::spec::{Case, filtered, suite};
 
 /// Runs all cases, judges and prints.
 pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Diagnostic> {
+    let clock = Instant::now();
     // Every spec is read and checked before any engine starts.
     let mut cases = suite(&args.specs).and_then(|all| filtered(all, &args.selected.filter)).map_err(diagnose)?;
     let selection = args.selected.selection();
@@ -45,32 +48,35 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
     let tables = Tables::read(&cases)?;
     let root = out_folder(args);
     let cache = Some(cache).filter(|_| !args.no_cache);
-    let mut exit = Exit::Passed;
-    let mut reports = vec![];
     let progress = Progress::of(plans.iter().zip(&cases).map(|(plan, case)| (plan, case.budget.seconds)));
-    let suite = Suite {
-        tables: &tables,
-        site,
-        cache,
-        progress: &progress,
-        jobs: args.jobs.unwrap_or_else(process::cores).max(1),
-    };
-    let mut stop: Option<Stop> = None;
-    for ((case, plan), published) in cases.iter().zip(&plans).zip(&tables.published) {
+    let threads = args.jobs.unwrap_or_else(process::cores).max(1);
+    let suite = Suite { tables: &tables, site, cache, progress: &progress, machine: Machine::new(threads) };
+    let stop: Mutex<Option<Stop>> = Mutex::new(None);
+    let one = |&k: &usize| -> Result<(Report, Exit), Diagnostic> {
+        let (case, plan) = (&cases[k], &plans[k]);
         let folder = if cases.len() == 1 { root.clone() } else { root.join(within(&root, case)) };
-        let report = run_case(case, plan, published.as_ref(), &suite, stop.as_ref(), &folder)?;
+        let stopped = stop.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let report = run_case(case, plan, tables.published[k].as_ref(), &suite, stopped.as_ref(), &folder)?;
         let named = |id: &str| plan.engines.iter().any(|p| p.engine.id().name() == id && p.asked == Asked::ByName);
-        let exit_of_case = report.exit(named);
+        let exit = report.exit(named);
+        let mut stop = stop.lock().unwrap_or_else(PoisonError::into_inner);
         if process::is_interrupted() {
-            stop = Some(Stop::Interrupted);
-        } else if args.fail_fast && stop.is_none() && matches!(exit_of_case, Exit::Failed | Exit::Engine) {
-            stop = Some(Stop::Failed { case: case.name.clone() });
+            *stop = Some(Stop::Interrupted);
+        } else if args.fail_fast && stop.is_none() && matches!(exit, Exit::Failed | Exit::Engine) {
+            *stop = Some(Stop::Failed { case: case.name.clone() });
         }
-        exit = exit.worse(exit_of_case);
-        reports.push(report);
-    }
+        Ok((report, exit))
+    };
+    // What comes after a failure must not have begun before it.
+    let side = if args.fail_fast { 1 } else { threads.min(CASES_AT_A_TIME) };
+    let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
+    let (reports, exits): (Vec<Report>, Vec<Exit>) =
+        done.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+    let exit = exits.into_iter().fold(Exit::Passed, Exit::worse);
     drop(progress);
     let Some(report) = Report::joined(record(args, &cases), reports) else { return Ok(exit) };
+    // Cases ran side by side: their seconds do not add up.
+    let report = Report { wall_s: clock.elapsed().as_secs_f64(), ..report };
     if cases.len() > 1 {
         run::keep(&root.join("report.json"), &report).into_diagnostic()?;
     }
@@ -164,8 +170,11 @@ struct Suite<'a> {
     /// Where readings are kept between runs, unless they are not to be.
     cache: Option<&'a Cache>,
     progress: &'a Progress,
-    jobs: usize,
+    machine: Arc<Machine>,
 }
+
+/// More cases at a time would only wait for the machine's slots, each on threads of its own.
+const CASES_AT_A_TIME: usize = 8;
 
 fn run_case(
     case: &Case,
@@ -179,7 +188,7 @@ fn run_case(
     let options = run::Options {
         site: suite.site.clone(),
         out: folder.to_owned(),
-        jobs: suite.jobs,
+        machine: Arc::clone(&suite.machine),
         cache: suite.cache.cloned(),
     };
     let outcome = match stop {

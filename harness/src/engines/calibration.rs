@@ -21,6 +21,8 @@ use luminaire::scene::Transport;
 use serde::{Deserialize, Serialize};
 
 use self::scenes::KnownScene;
+use crate::slots::{Slots, side_by_side};
+
 use super::{Engine, EngineError, EngineId, Job, Site, Support, Version, Workbench, checked};
 
 /// A deviation beyond this, noise and declared approximations apart, is no uncertainty but a broken instrument.
@@ -127,7 +129,7 @@ pub fn calibrate(
     version: &Version,
     settings: &BTreeMap<String, serde_json::Value>,
     site: &Site,
-    jobs: usize,
+    slots: &Slots,
     earlier: Earlier,
 ) -> Result<Calibrated, CalibrationError> {
     let scenes = scenes::all(settings);
@@ -136,13 +138,13 @@ pub fn calibrate(
     if let Some(calibration) = kept {
         return Ok(Calibrated { calibration, origin: Origin::Kept, kept: Ok(path.display().to_string()) });
     }
-    let parts = scenes.iter().map(|scene| part(engine, scene, site, jobs));
+    let parts = side_by_side(scenes.len(), &scenes, |scene| part(engine, scene, site, slots));
     let calibration = Calibration {
         engine: engine.id().name().to_owned(),
         version: version.0.clone(),
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
         settings: settings.clone(),
-        parts: parts.collect::<Result<_, _>>()?,
+        parts: parts.into_iter().collect::<Result<_, _>>()?,
     };
     let noise = calibration.parts.iter().map(|p| p.std_error).fold(0.0, f64::max);
     let kept = if noise > scenes::BUDGET.relative_error {
@@ -174,7 +176,7 @@ impl Calibration {
     }
 }
 
-fn part(engine: &dyn Engine, scene: &KnownScene, site: &Site, jobs: usize) -> Result<Part, CalibrationError> {
+fn part(engine: &dyn Engine, scene: &KnownScene, site: &Site, slots: &Slots) -> Result<Part, CalibrationError> {
     let left_out = |why: String| Part {
         scene: scene.name.to_owned(),
         reflected: scene.is_reflected(),
@@ -189,14 +191,16 @@ fn part(engine: &dyn Engine, scene: &KnownScene, site: &Site, jobs: usize) -> Re
         Support::Approximate { size, .. } => size.unwrap_or(0.0),
         Support::No(why) => return Ok(left_out(why)),
     };
-    match read(engine, &scene.job, site, jobs) {
+    match read(engine, &scene.job, site, slots) {
         Ok(estimates) => judge(engine.id(), scene, declared, &estimates),
         Err(EngineError::Declined { why, .. }) => Ok(left_out(why)),
         Err(error) => Err(error.into()),
     }
 }
 
-fn read(engine: &dyn Engine, job: &Job, site: &Site, jobs: usize) -> Result<Vec<super::Estimate>, EngineError> {
+fn read(engine: &dyn Engine, job: &Job, site: &Site, slots: &Slots) -> Result<Vec<super::Estimate>, EngineError> {
+    let held = slots.take(super::share(engine, job, slots));
+    let jobs = held.threads();
     let folder = tempfile::tempdir().map_err(|e| EngineError::io(&std::env::temp_dir(), e))?;
     let log = folder.path().join("log");
     let scene_dir = folder.path().join("scene");

@@ -71,6 +71,11 @@ impl Engine for Mitsuba {
         settings::KNOBS
     }
 
+    /// One process, whatever its threads: Python, LLVM, and a wavefront of paths.
+    fn memory_mib(&self, job: &Job, _threads: usize) -> u64 {
+        1024 + super::geometry_mib(job)
+    }
+
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
         let settings = Settings::of(job)?;
         self.read_files(&export::files(job, &settings)?, job, &settings, workbench)

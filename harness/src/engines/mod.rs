@@ -24,11 +24,12 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use luminaire::scene::{Meter, Scene, Transport};
+use luminaire::scene::{Meter, Obstacle, Scene, Shape, Transport};
 use serde::{Deserialize, Serialize};
 
 use crate::process::{Invocation, PeakMemory, ProcessError};
 use crate::reading::MeterId;
+use crate::slots::{Share, Slots};
 
 pub use crate::spec::Budget;
 pub use external::{ExternalJob, ExternalReadings};
@@ -122,6 +123,12 @@ pub trait Engine: Send + Sync {
         &[]
     }
 
+    /// Memory that a job takes on so many threads or processes, in MiB; an estimate on the safe side, of which as much runs side
+    /// by side as there is room for. Twice what case S2 took and more, a process each.
+    fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
+        threads as u64 * (256 + geometry_mib(job))
+    }
+
     /// The job without what makes no difference to this engine's readings: two jobs that are equal then are one to it. For
     /// most, the names of case and procedure are comments.
     fn essence(&self, job: &Job) -> Job {
@@ -139,6 +146,23 @@ pub struct Knob {
     pub key: &'static str,
     /// Values as YAML flow scalars, the default first.
     pub values: &'static [&'static str],
+}
+
+/// What of the machine an engine is given for a job: one thread for what is determined or quick, many for reflected light, whose
+/// readings are as good as the seconds of the budget allow.
+pub fn share(engine: &dyn Engine, job: &Job, slots: &Slots) -> Share {
+    let threads = if job.transport == Transport::Direct { 1 } else { slots.threads_a_reading() };
+    Share { threads, memory_mib: engine.memory_mib(job, threads) }
+}
+
+/// What meshes take in a renderer, about 1 KiB a triangle with its hierarchy, and meters in their read-out.
+pub fn geometry_mib(job: &Job) -> u64 {
+    let triangles = |o: &Obstacle| match &o.shape {
+        Shape::Box { .. } => 12,
+        Shape::Mesh { triangles, .. } => triangles.len(),
+    };
+    let triangles: usize = job.scene.obstacles.iter().map(triangles).sum();
+    ((triangles + job.stations.len()) / 1024) as u64
 }
 
 /// One procedure of one case, as an engine is asked for it.

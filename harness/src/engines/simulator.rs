@@ -52,7 +52,7 @@ impl Engine for Simulator {
         job
     }
 
-    fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
+    fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
         let relative_error = match job.settings.get("relative_error") {
             None => MARGIN * job.budget.relative_error,
             Some(value) => value.as_f64().filter(|e| *e > 0.0).ok_or_else(|| EngineError::Setting {
@@ -63,8 +63,13 @@ impl Engine for Simulator {
         };
         let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();
         let accuracy = Accuracy { relative_error, seed: job.seed };
-        let solution = simulator::illuminance(&job.scene, &meters, job.transport, &accuracy)
-            .map_err(|e| EngineError::Solver { engine: ID, what: e.to_string() })?;
+        let failed = |what: String| EngineError::Solver { engine: ID, what };
+        // On its own threads and no more: what runs beside it counts on the others.
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(workbench.jobs.max(1)).build();
+        let solution = threads
+            .map_err(|e| failed(e.to_string()))?
+            .install(|| simulator::illuminance(&job.scene, &meters, job.transport, &accuracy))
+            .map_err(|e| failed(e.to_string()))?;
         let settings = [
             ("solver".to_owned(), solution.solver),
             ("relative_error".to_owned(), relative_error.to_string()),

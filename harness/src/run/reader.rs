@@ -2,13 +2,16 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::cache::{Answer, Cache, Entry, Key, Lookup, key};
-use crate::engines::{EngineError, Job, Measurement, Site, Workbench, checked};
+use crate::engines::{EngineError, Job, Measurement, Site, Workbench, checked, share};
 use crate::plan::Planned;
 use crate::process;
 use crate::spec::Budget;
+
+use super::Machine;
 
 /// Takes readings for a run: everything that measures goes through [`Reader::read`].
 ///
@@ -24,8 +27,8 @@ pub struct Reader {
     pub out: PathBuf,
     /// Where earlier readings are; `None`: every reading is taken anew, and none is kept.
     pub cache: Option<Cache>,
-    /// Threads or processes that an engine may have.
-    pub threads: usize,
+    /// How much of the machine an engine may have.
+    pub machine: Arc<Machine>,
 }
 
 /// Readings that were taken.
@@ -55,7 +58,7 @@ impl Reader {
         if process::is_interrupted() {
             return Err(process::ProcessError::Interrupted { program: engine.name().to_owned() }.into());
         }
-        let bench = self.workbench(engine.name(), job, place)?;
+        let mut bench = self.workbench(engine.name(), job, place)?;
         let kept = self.kept(planned, job)?;
         if let Some((cache, key)) = &kept
             && let Some(entry) = find(cache, key)
@@ -65,6 +68,10 @@ impl Reader {
             tidy(&bench);
             return taken(planned, job, entry);
         }
+        // Its seconds count from when it has what it needs.
+        let slots = &self.machine.slots;
+        let held = slots.take(share(planned.engine.as_ref(), job, slots));
+        bench.jobs = held.threads();
         let start = Instant::now();
         let answer = match planned.engine.read(job, &bench).and_then(|m| checked(&engine, job, m)) {
             Ok(measurement) => Answer::Read(measurement),
@@ -72,6 +79,7 @@ impl Reader {
             Err(error) => return Err(error),
         };
         let wall_s = start.elapsed().as_secs_f64();
+        drop(held);
         tidy(&bench);
         let entry = Entry {
             engine: engine.name().to_owned(),
@@ -107,7 +115,7 @@ impl Reader {
             site: self.site.clone(),
             scene_dir: fresh(&self.out.join("scenes").join(engine).join(place))?,
             log,
-            jobs: self.threads,
+            jobs: 1,
             limit: limit(job.budget),
             peak: process::PeakMemory::default(),
         })

@@ -58,7 +58,14 @@ fn scaled(factor: f64) -> impl Fn(&Job, usize, Estimate) -> Estimate + Send + Sy
 
 fn found(engine: &dyn Engine) -> Result<Calibrated, CalibrationError> {
     let folder = tempfile::tempdir().unwrap();
-    calibrate(engine, &Version(VERSION.into()), &BTreeMap::new(), &Site::at(folder.path()), 1, Earlier::Counts)
+    calibrate(
+        engine,
+        &Version(VERSION.into()),
+        &BTreeMap::new(),
+        &Site::at(folder.path()),
+        &Slots::new(1),
+        Earlier::Counts,
+    )
 }
 
 #[test]
@@ -129,7 +136,7 @@ fn a_calibration_is_measured_once_a_version_and_settings() {
     let site = Site::at(folder.path());
     let engine = Faulty::new(scaled(1.0));
     let read = |version: &str, settings: &BTreeMap<String, serde_json::Value>| {
-        calibrate(&engine, &Version(version.into()), settings, &site, 1, Earlier::Counts).unwrap()
+        calibrate(&engine, &Version(version.into()), settings, &site, &Slots::new(1), Earlier::Counts).unwrap()
     };
     let plain = BTreeMap::new();
     let first = read("1", &plain);
@@ -151,7 +158,14 @@ fn where_nothing_can_be_kept_the_calibration_still_counts() {
     let file = folder.path().join("file");
     std::fs::write(&file, "").unwrap();
     let engine = Faulty::new(scaled(1.0));
-    let found =
-        calibrate(&engine, &Version(VERSION.into()), &BTreeMap::new(), &Site::at(file), 1, Earlier::Counts).unwrap();
+    let found = calibrate(
+        &engine,
+        &Version(VERSION.into()),
+        &BTreeMap::new(),
+        &Site::at(file),
+        &Slots::new(1),
+        Earlier::Counts,
+    )
+    .unwrap();
     assert!(found.kept.is_err());
 }

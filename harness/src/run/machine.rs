@@ -1,0 +1,47 @@
+//! What all cases of a run share: the machine's slots, and each engine's calibration, which is made once.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use crate::engines::calibration::{Calibrated, Earlier, calibrate};
+use crate::engines::{Engine, Job, Site, Version};
+use crate::slots::Slots;
+
+/// Slots and instruments of a run.
+#[derive(Debug)]
+pub struct Machine {
+    /// How much runs at a time.
+    pub slots: Slots,
+    calibrations: Mutex<BTreeMap<String, Arc<Calibrating>>>,
+}
+
+type Calibrating = OnceLock<Result<Calibrated, String>>;
+
+impl Machine {
+    /// So many threads or processes at a time.
+    pub fn new(threads: usize) -> Arc<Self> {
+        Arc::new(Self { slots: Slots::new(threads), calibrations: Mutex::default() })
+    }
+
+    /// The calibration of an engine with the settings of a job, kept or made now; `made` is told of one that a first case
+    /// asks for, where other cases find it or wait for it.
+    pub(super) fn calibration(
+        &self,
+        engine: &dyn Engine,
+        version: &Version,
+        job: &Job,
+        site: &Site,
+        made: impl Fn(&Calibrated),
+    ) -> Result<Calibrated, String> {
+        let name = format!("{} {} {:?}", engine.id(), version.0, job.settings);
+        let cell = {
+            let mut all = self.calibrations.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::clone(all.entry(name).or_default())
+        };
+        let calibrate = || {
+            let found = calibrate(engine, version, &job.settings, site, &self.slots, Earlier::Counts);
+            found.inspect(|calibrated| made(calibrated)).map_err(|error| error.to_string())
+        };
+        cell.get_or_init(calibrate).clone()
+    }
+}

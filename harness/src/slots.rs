@@ -1,0 +1,190 @@
+//! Slots: how much of the machine runs at a time, so that engines side by side do not starve each other.
+//!
+//! An engine that is given k threads or processes holds k slots as long as it works, so that one that keeps its budget by the clock has the
+//! processors that it counts on. Memory is handed out likewise, by estimate. Whoever comes first is served first: a job that
+//! needs every slot is not passed by small ones for ever.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+
+/// The part of the free memory that jobs may have together.
+const SHARE_OF_MEMORY: f64 = 0.8;
+
+/// More threads than this a reading are no use: Radiance's and POV-Ray's fewest blocks are eight.
+const MOST_A_READING: usize = 8;
+
+/// What may be in use at a time.
+#[derive(Debug)]
+pub struct Slots {
+    all: Share,
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+/// A number of slots and an amount of memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// Threads or processes.
+    pub threads: usize,
+    /// Memory in MiB, an estimate.
+    pub memory_mib: u64,
+}
+
+#[derive(Debug)]
+struct State {
+    free: Share,
+    next_ticket: u64,
+    served: u64,
+}
+
+/// Slots in use; they are free again when this is dropped.
+#[derive(Debug)]
+pub struct Held<'a> {
+    slots: &'a Slots,
+    share: Share,
+}
+
+impl Slots {
+    /// So many threads or processes at a time, and most of the memory that is free now.
+    pub fn new(threads: usize) -> Self {
+        Self::with_memory(threads, free_memory_mib().unwrap_or(u64::MAX))
+    }
+
+    fn with_memory(threads: usize, memory_mib: u64) -> Self {
+        let all = Share { threads: threads.max(1), memory_mib };
+        let state = State { free: all, next_ticket: 0, served: 0 };
+        Self { all, state: Mutex::new(state), changed: Condvar::new() }
+    }
+
+    /// Threads or processes at a time.
+    pub fn threads(&self) -> usize {
+        self.all.threads
+    }
+
+    /// Threads for a reading of sampled, reflected light, which makes the most of its seconds with many.
+    pub fn threads_a_reading(&self) -> usize {
+        self.all.threads.min(MOST_A_READING)
+    }
+
+    /// Waits for a share. What asks for more than there is gets all that there is.
+    pub fn take(&self, share: Share) -> Held<'_> {
+        let Share { threads, memory_mib } = share;
+        let share =
+            Share { threads: threads.clamp(1, self.all.threads), memory_mib: memory_mib.min(self.all.memory_mib) };
+        let mut state = self.state();
+        let ticket = state.next_ticket;
+        state.next_ticket += 1;
+        let fits = |s: &State| s.free.threads >= share.threads && s.free.memory_mib >= share.memory_mib;
+        while !(state.served == ticket && fits(&state)) {
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        state.served += 1;
+        state.free.threads -= share.threads;
+        state.free.memory_mib -= share.memory_mib;
+        self.changed.notify_all();
+        Held { slots: self, share }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Held<'_> {
+    /// How many threads or processes may be used.
+    pub fn threads(&self) -> usize {
+        self.share.threads
+    }
+}
+
+impl Drop for Held<'_> {
+    fn drop(&mut self) {
+        let mut state = self.slots.state();
+        state.free.threads += self.share.threads;
+        state.free.memory_mib += self.share.memory_mib;
+        self.slots.changed.notify_all();
+    }
+}
+
+/// Does something with every item on so many threads, begun in the items' order; the results are in that order too, whoever ends first.
+pub fn side_by_side<T: Sync, R: Send>(threads: usize, items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let next = AtomicUsize::new(0);
+    let worker = || {
+        let mut done = vec![];
+        while let Some((k, item)) = Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|k| Some((k, items.get(k)?))) {
+            done.push((k, work(item)));
+        }
+        done
+    };
+    let mut results: Vec<(usize, R)> = thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads.clamp(1, items.len().max(1))).map(|_| scope.spawn(worker)).collect();
+        let join = |w: thread::ScopedJoinHandle<'_, Vec<(usize, R)>>| match w.join() {
+            Ok(done) => done,
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        workers.into_iter().flat_map(join).collect()
+    });
+    results.sort_by_key(|(k, _)| *k);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+/// `MemAvailable` of /proc/meminfo, less what is left to others.
+fn free_memory_mib() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    let kib: f64 = line.split_whitespace().next()?.parse().ok()?;
+    Some((SHARE_OF_MEMORY * kib / 1024.0) as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_more_than_all_slots_and_all_memory_are_ever_in_use() {
+        let slots = Slots::with_memory(3, 1000);
+        let (threads, memory) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let items: Vec<(usize, u64)> = (0..200).map(|k| (1 + k % 5, [10, 400, 5000, 900][k % 4])).collect();
+        let done = side_by_side(8, &items, |&(want, mib)| {
+            let held = slots.take(Share { threads: want, memory_mib: mib });
+            assert_eq!(held.threads(), want.min(3));
+            let used = threads.fetch_add(held.threads(), Ordering::SeqCst) + held.threads();
+            let mib = mib.min(1000) as usize;
+            let reserved = memory.fetch_add(mib, Ordering::SeqCst) + mib;
+            assert!(used <= 3 && reserved <= 1000, "{used} slots, {reserved} MiB");
+            thread::yield_now();
+            threads.fetch_sub(held.threads(), Ordering::SeqCst);
+            memory.fetch_sub(mib, Ordering::SeqCst);
+            want
+        });
+        assert_eq!(done, items.iter().map(|i| i.0).collect::<Vec<_>>(), "results stay in the items' order");
+    }
+
+    #[test]
+    fn a_job_that_needs_every_slot_is_not_passed_by_those_that_came_later() {
+        let slots = Slots::with_memory(2, 100);
+        let order = Mutex::new(vec![]);
+        let first = slots.take(Share { threads: 1, memory_mib: 1 });
+        thread::scope(|scope| {
+            for (k, threads) in [(0, 2), (1, 1)] {
+                let waiting = slots.state().next_ticket;
+                let (slots, order) = (&slots, &order);
+                scope.spawn(move || {
+                    let _held = slots.take(Share { threads, memory_mib: 1 });
+                    order.lock().unwrap().push(k);
+                });
+                while slots.state().next_ticket == waiting {
+                    thread::yield_now();
+                }
+            }
+            drop(first);
+        });
+        assert_eq!(order.into_inner().unwrap(), [0, 1]);
+    }
+
+    #[test]
+    fn the_memory_of_this_machine_is_known() {
+        assert!(free_memory_mib().is_some_and(|mib| mib > 10));
+    }
+}
