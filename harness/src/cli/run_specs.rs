@@ -76,7 +76,7 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
     drop(progress);
     let Some(report) = Report::joined(record(args, &cases), reports) else { return Ok(exit) };
     // Cases ran side by side: their seconds do not add up.
-    let report = Report { wall_s: clock.elapsed().as_secs_f64(), ..report };
+    let report = if cases.len() > 1 { Report { wall_s: clock.elapsed().as_secs_f64(), ..report } } else { report };
     if cases.len() > 1 {
         run::keep(&root.join("report.json"), &report).into_diagnostic()?;
     }
