@@ -2,6 +2,7 @@
 
 mod cache;
 pub(crate) mod diagnostic;
+mod history;
 mod progress;
 mod run_specs;
 
@@ -58,6 +59,8 @@ enum Command {
     Photometry(PhotometryArgs),
     /// View a finished run again
     Report(ReportArgs),
+    /// Keep a history of nightly runs and draw it
+    History(history::HistoryArgs),
     /// Put known faults into right readings and see whether the harness catches and names them
     Selftest(SelftestArgs),
     /// What the cache of readings holds; take out what is damaged or long unused
@@ -240,6 +243,7 @@ impl Cli {
             Command::Engines(args) => manage_engines(&args, &site),
             Command::Photometry(args) => photometry_command::run(&args),
             Command::Report(args) => view(&args),
+            Command::History(args) => history::history(&args),
             Command::Selftest(args) => test_oneself(&args),
             Command::Schema(args) => schema(&args),
         }

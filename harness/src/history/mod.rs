@@ -6,9 +6,12 @@
 mod change;
 mod entry;
 mod series;
+mod site;
 #[cfg(test)]
 mod synthetic;
+mod trend;
 
 pub use change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part, changes};
 pub use entry::{Entry, HistoryError, add, entries};
 pub use series::{History, Key, Series, VersionChange};
+pub use site::site;

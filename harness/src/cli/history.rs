@@ -1,0 +1,85 @@
+//! `luxproof history`: adds the reports of a night, draws the site.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
+
+use crate::history::{History, add, changes, entries, site};
+use crate::report::{Exit, Report};
+
+#[derive(Debug, Args)]
+pub(super) struct HistoryArgs {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Add the comparisons of reports, one line each; a night that is added again takes the place of its lines
+    Add {
+        /// report.json of a run
+        #[arg(required = true, value_name = "REPORT")]
+        reports: Vec<PathBuf>,
+        /// The history, made if there is none
+        #[arg(long, value_name = "FILE")]
+        history: PathBuf,
+        /// The night [default: the day on which each run started]
+        #[arg(long, value_name = "YYYY-MM-DD")]
+        night: Option<String>,
+    },
+    /// Draw the site: last night, changes, trends
+    Site {
+        /// The history
+        #[arg(long, value_name = "FILE")]
+        history: PathBuf,
+        /// Folder to write index.html to
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// A report to link to, relative to the site: NAME=PATH; may be given several times
+        #[arg(long, value_name = "NAME=PATH", value_parser = link)]
+        report: Vec<(String, String)>,
+    },
+}
+
+fn link(text: &str) -> Result<(String, String), String> {
+    let (name, path) = text.split_once('=').ok_or("give a name and a path, NAME=PATH")?;
+    Ok((name.to_owned(), path.to_owned()))
+}
+
+/// Does what the command line asks of a history.
+pub(super) fn history(args: &HistoryArgs) -> Result<Exit, Diagnostic> {
+    match &args.action {
+        Action::Add { reports, history, night } => {
+            for path in reports {
+                add_report(path, history, night.as_deref())?;
+            }
+        }
+        Action::Site { history, out, report } => draw(history, out, report)?,
+    }
+    Ok(Exit::Passed)
+}
+
+fn add_report(path: &Path, history: &Path, night: Option<&str>) -> Result<(), Diagnostic> {
+    let place = || path.display().to_string();
+    let text = std::fs::read_to_string(path).into_diagnostic().wrap_err_with(place)?;
+    let report: Report = serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)?;
+    let entries = entries(&report, night).into_diagnostic()?;
+    let replaced = add(history, &entries).into_diagnostic()?;
+    let instead = if replaced > 0 { format!(" in place of {replaced}") } else { String::new() };
+    println!("{}: {} comparisons added{instead}", history.display(), entries.len());
+    Ok(())
+}
+
+fn draw(path: &Path, out: &Path, reports: &[(String, String)]) -> Result<(), Diagnostic> {
+    let history = History::read(path).into_diagnostic()?;
+    if history.is_cut_short {
+        eprintln!("{}: the last line is cut short and left out", path.display());
+    }
+    std::fs::create_dir_all(out).into_diagnostic().wrap_err_with(|| out.display().to_string())?;
+    let page = out.join("index.html");
+    std::fs::write(&page, site(&history, reports)).into_diagnostic().wrap_err_with(|| page.display().to_string())?;
+    let (nights, series) = (history.nights.len(), history.series.len());
+    println!("{}: {nights} nights, {series} series, {} changes", page.display(), changes(&history).len());
+    Ok(())
+}
