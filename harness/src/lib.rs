@@ -2,13 +2,14 @@
 //!
 //! Data flows one way; each arrow is one function and each artefact a file:
 //! spec file -> [`spec::Case`] -> [`plan::Plan`] -> [`reading::Recording`] -> [`diff::Comparison`] -> [`report::Report`].
-//! Imports point down only: spec < reading < procedures < engines < cache < plan < run < diff < {diagnosis | sequential} < report < cli.
+//! Imports point down only: spec < reading < procedures < engines < cache < plan < run < diff < {diagnosis | sequential} < report < baseline < cli.
 
 /// The worked example of the documentation, compiled and run as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/adding-an-engine.md")]
 pub struct AddingAnEngine;
 
+pub mod baseline;
 pub mod cache;
 pub mod cli;
 pub mod diagnosis;

@@ -1,7 +1,9 @@
 //! The command line: arguments, what each command does with them, and its exit code.
 
+mod accept;
 mod cache;
 pub(crate) mod diagnostic;
+mod diff;
 mod history;
 mod progress;
 mod run_specs;
@@ -61,6 +63,10 @@ enum Command {
     Report(ReportArgs),
     /// Keep a history of nightly runs and draw it
     History(history::HistoryArgs),
+    /// What changed between two runs, a mean shift told apart from noise
+    Diff(diff::DiffArgs),
+    /// Make the readings of a run a baseline, under review and for a reason
+    Accept(accept::AcceptArgs),
     /// Put known faults into right readings and see whether the harness catches and names them
     Selftest(SelftestArgs),
     /// What the cache of readings holds; take out what is damaged or long unused
@@ -104,6 +110,9 @@ struct RunArgs {
     /// Folder of the run's files [default: luxproof-out/<spec name>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Hold the readings against a baseline of `luxproof accept`: a .json file, or a folder that holds one a spec
+    #[arg(long, value_name = "FILE|DIR")]
+    baseline: Option<PathBuf>,
     /// Views of the report to print
     #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [Format::Terminal])]
     format: Vec<Format>,
@@ -244,6 +253,8 @@ impl Cli {
             Command::Photometry(args) => photometry_command::run(&args),
             Command::Report(args) => view(&args),
             Command::History(args) => history::history(&args),
+            Command::Diff(args) => diff::diff(&args),
+            Command::Accept(args) => accept::accept(&args),
             Command::Selftest(args) => test_oneself(&args),
             Command::Schema(args) => schema(&args),
         }

@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 use super::diagnostic::diagnose;
 use super::progress::Progress;
 use super::{RunArgs, print_reports, report_installation};
+use crate::baseline::{self, Baseline, Comparability, Entry, State};
 use crate::cache::Cache;
 use crate::diagnosis;
 use crate::diff::{Comparison, Consensus, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
@@ -72,16 +73,43 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
     let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
     let (reports, exits): (Vec<Report>, Vec<Exit>) =
         done.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-    let exit = exits.into_iter().fold(Exit::Passed, Exit::worse);
+    let mut exit = exits.into_iter().fold(Exit::Passed, Exit::worse);
     drop(progress);
     let Some(report) = Report::joined(record(args, &cases), reports) else { return Ok(exit) };
     // Cases ran side by side: their seconds do not add up.
     let report = if cases.len() > 1 { Report { wall_s: clock.elapsed().as_secs_f64(), ..report } } else { report };
+    if let Some(path) = &args.baseline {
+        exit = exit.worse(hold_against_baseline(&report, path, &root)?);
+    }
     if cases.len() > 1 {
         run::keep(&root.join("report.json"), &report).into_diagnostic()?;
     }
     print_reports(&[(report, root)], &args.format, &[])?;
     Ok(exit)
+}
+
+/// Holds a run against its baseline; what does not match it fails and is left as a candidate in the run's folder.
+fn hold_against_baseline(report: &Report, path: &Path, root: &Path) -> Result<Exit, Diagnostic> {
+    let place = Baseline::place(path, report);
+    let kept = if place.exists() { Baseline::read(&place).into_diagnostic()?.entries } else { vec![] };
+    let candidate = Baseline::candidate(report);
+    // What was not asked of this run is not missed in it.
+    let skipped = report.skips.iter().map(|s| (s.case.as_str(), s.procedure.as_str(), s.engine.as_str()));
+    let asked: Vec<_> = candidate.entries.iter().map(Entry::key).chain(skipped).collect();
+    let kept: Vec<Entry> = kept.into_iter().filter(|e| asked.contains(&e.key())).collect();
+    let changes = baseline::compare(&kept, &candidate.entries, Comparability::SameInstrument);
+    // A missing baseline is no agreement.
+    let clean = changes.entries.iter().all(|e| e.state == State::Unchanged);
+    eprint!("baseline {}:\n{}", place.display(), super::diff::text(&changes));
+    run::keep(&root.join("baseline-changes.json"), &changes).into_diagnostic()?;
+    if clean {
+        return Ok(Exit::Passed);
+    }
+    let file = root.join("baseline-candidate.json");
+    candidate.write(&file).into_diagnostic()?;
+    let accept = format!("luxproof accept {} --baseline {}", root.display(), path.display());
+    eprintln!("left as a candidate: {}; to review it: {accept}", file.display());
+    Ok(Exit::Failed)
 }
 
 /// The folder of the run: by default that of the one spec or folder, or one for all where there are several.

@@ -1,0 +1,90 @@
+//! `luxproof accept`: the readings of a run become a baseline, under review and for a reason.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
+
+use crate::baseline::{Baseline, Comparability, Decision, State, compare, review};
+use crate::report::{Exit, Report};
+
+/// Where baselines are kept unless something else is said.
+const FOLDER: &str = "baselines";
+
+#[derive(Debug, Args)]
+pub(super) struct AcceptArgs {
+    /// Folder of a run, or its report.json
+    run: PathBuf,
+    /// The baseline: a .json file, or a folder that holds one a spec [default: baselines]
+    #[arg(long, value_name = "FILE|DIR")]
+    baseline: Option<PathBuf>,
+    /// Accept everything that is new or changed without asking; needs --reason
+    #[arg(long, requires = "reason")]
+    all: bool,
+    /// Why it is right, kept with what --all accepts
+    #[arg(long, value_name = "TEXT", requires = "all")]
+    reason: Option<String>,
+}
+
+/// The report of a run, named by its folder or its file.
+pub(super) fn read_report(run: &Path) -> Result<Report, Diagnostic> {
+    let file = if run.is_dir() { run.join("report.json") } else { run.to_owned() };
+    let place = || file.display().to_string();
+    let text = std::fs::read_to_string(&file).into_diagnostic().wrap_err_with(place)?;
+    serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)
+}
+
+pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
+    let report = read_report(&args.run)?;
+    let path = Baseline::place(args.baseline.as_deref().unwrap_or(Path::new(FOLDER)), &report);
+    let mut baseline = if path.exists() {
+        Baseline::read(&path).into_diagnostic()?
+    } else {
+        Baseline { luxproof_baseline: 1, entries: vec![] }
+    };
+    let candidates = sound(Baseline::candidate(&report));
+    let changes = compare(&baseline.entries, &candidates, Comparability::SameInstrument);
+    let now = humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string();
+    let decision = match &args.reason {
+        Some(reason) if reason.trim().is_empty() => {
+            return Err(miette::miette!(help = "say why these readings are right", "an empty reason"));
+        }
+        Some(reason) => {
+            let open = |e: &&crate::baseline::Entry| {
+                let change = changes.entries.iter().find(|c| e.key() == (&c.case, &c.procedure, &c.engine));
+                change.is_none_or(|c| c.state != State::Unchanged)
+            };
+            let accepted = candidates.iter().filter(open).map(|e| e.accepted_for(reason.trim(), &now)).collect();
+            Decision { accepted, declined: 0 }
+        }
+        None if std::io::stdin().is_terminal() => {
+            let (mut input, mut output) = (std::io::stdin().lock(), std::io::stderr().lock());
+            review(&changes, &candidates, &now, &mut input, &mut output).into_diagnostic()?
+        }
+        None => {
+            let help = "run it on a terminal, or accept everything with --all --reason TEXT";
+            return Err(miette::miette!(help = help, "there is no terminal to review on"));
+        }
+    };
+    let (accepted, declined) = (decision.accepted.len(), decision.declined);
+    let unchanged = changes.entries.iter().filter(|c| c.state == State::Unchanged).count();
+    if accepted > 0 {
+        baseline.accept(decision.accepted);
+        baseline.write(&path).into_diagnostic()?;
+    }
+    println!("{accepted} accepted, {declined} declined, {unchanged} unchanged: {}", path.display());
+    Ok(Exit::Passed)
+}
+
+/// What may become a baseline: runs that gave readings, all of them finite.
+fn sound(candidate: Baseline) -> Vec<crate::baseline::Entry> {
+    let is_sound = |e: &crate::baseline::Entry| {
+        let sound = !e.readings.is_empty() && e.readings.iter().all(|r| r.value.is_finite() && r.value >= 0.0);
+        if !sound {
+            eprintln!("{} {} of {}: without sound readings, never accepted", e.engine, e.procedure, e.case);
+        }
+        sound
+    };
+    candidate.entries.into_iter().filter(is_sound).collect()
+}

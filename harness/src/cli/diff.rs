@@ -1,0 +1,102 @@
+//! `luxproof diff`: what changed between two runs, a mean shift told apart from noise.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use miette::{IntoDiagnostic, Report as Diagnostic};
+
+use super::accept::read_report;
+use crate::baseline::{Baseline, Changes, Comparability, EntryChange, State, compare};
+use crate::report::Exit;
+
+#[derive(Debug, Args)]
+pub(super) struct DiffArgs {
+    /// The earlier run: its folder or report.json
+    old: PathBuf,
+    /// The later run: its folder or report.json
+    new: PathBuf,
+    /// View to print
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = DiffFormat::Terminal)]
+    format: DiffFormat,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum DiffFormat {
+    Terminal,
+    Json,
+}
+
+pub(super) fn diff(args: &DiffArgs) -> Result<Exit, Diagnostic> {
+    let [old, new] = [&args.old, &args.new].map(|run| read_report(run).map(|r| Baseline::candidate(&r)));
+    let changes = compare(&old?.entries, &new?.entries, Comparability::SameSpec);
+    let text = match args.format {
+        DiffFormat::Terminal => text(&changes),
+        DiffFormat::Json => serde_json::to_string_pretty(&changes).into_diagnostic()? + "\n",
+    };
+    std::io::stdout().lock().write_all(text.as_bytes()).into_diagnostic()?;
+    Ok(if changes.is_clean() { Exit::Passed } else { Exit::Failed })
+}
+
+/// Changes for people: a line an entry, the meters that moved below it.
+pub(super) fn text(changes: &Changes) -> String {
+    let mut text = String::new();
+    for entry in &changes.entries {
+        writeln!(text, "{:<9} {} {} {}{}", name(entry.state), entry.case, entry.procedure, entry.engine, mean(entry))
+            .ok();
+        for note in &entry.notes {
+            writeln!(text, "            {note}").ok();
+        }
+        for m in entry.meters.iter().filter(|m| m.significant).take(5) {
+            let in_u = if m.uncertainty > 0.0 {
+                format!(", {:+.1} u", (m.new - m.old) / m.uncertainty)
+            } else {
+                String::new()
+            };
+            let relative = 100.0 * (m.new - m.old) / m.old;
+            writeln!(
+                text,
+                "            {} {:.6} -> {:.6} {}: {relative:+.4} %{in_u}",
+                m.meter,
+                m.old,
+                m.new,
+                m.quantity.unit()
+            )
+            .ok();
+        }
+    }
+    let count = |state| changes.entries.iter().filter(|e| e.state == state).count();
+    writeln!(
+        text,
+        "{} unchanged, {} shifted, {} changed, {} vanished, {} new, {} refused; {} tests, each at {:.1e}",
+        count(State::Unchanged),
+        count(State::Shifted),
+        count(State::Changed),
+        count(State::Vanished),
+        count(State::New),
+        count(State::Refused),
+        changes.tests,
+        changes.level
+    )
+    .ok();
+    text
+}
+
+fn mean(entry: &EntryChange) -> String {
+    entry.mean.map_or_else(String::new, |m| {
+        let in_u = m.relative / m.uncertainty;
+        format!(": mean {:+.4} % +- {:.4} % ({in_u:+.1} u)", 100.0 * m.relative, 100.0 * m.uncertainty)
+    })
+}
+
+const fn name(state: State) -> &'static str {
+    match state {
+        State::Unchanged => "unchanged",
+        State::Shifted => "SHIFTED",
+        State::Changed => "CHANGED",
+        State::Vanished => "VANISHED",
+        State::New => "new",
+        State::Refused => "REFUSED",
+    }
+}
