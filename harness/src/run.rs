@@ -37,6 +37,18 @@ pub struct Options {
     pub cache: Option<Cache>,
 }
 
+impl Options {
+    /// Who takes the run's readings.
+    pub fn reader(&self) -> Reader {
+        Reader {
+            site: self.site.clone(),
+            out: self.out.clone(),
+            cache: self.cache.clone(),
+            machine: Arc::clone(&self.machine),
+        }
+    }
+}
+
 /// What a run gave.
 #[derive(Clone, Debug)]
 pub struct Outcome {
@@ -121,12 +133,7 @@ pub trait Progress: Sync {
 /// Runs every job of a plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
 pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress) -> Result<Outcome, RunError> {
     let threads = options.machine.slots.threads();
-    let reader = Reader {
-        site: options.site.clone(),
-        out: options.out.clone(),
-        cache: options.cache.clone(),
-        machine: Arc::clone(&options.machine),
-    };
+    let reader = options.reader();
     let engines: Vec<usize> = (0..plan.engines.len()).collect();
     let instruments = side_by_side(threads, &engines, |&e| instrument(plan, e, options, progress));
     let shelf = Shelf { folder: options.out.join("readings"), recordings: Mutex::default() };

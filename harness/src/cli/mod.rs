@@ -7,6 +7,7 @@ mod diff;
 mod history;
 mod progress;
 mod run_specs;
+mod sampling;
 
 use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
@@ -125,6 +126,9 @@ struct RunArgs {
     /// Take every reading anew, and keep none
     #[arg(long)]
     no_cache: bool,
+    /// When sampling stops
+    #[arg(long, value_enum, value_name = "WHEN", default_value_t)]
+    sampling: sampling::Sampling,
 }
 
 #[derive(Debug, Args)]

@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 
 use super::diagnostic::diagnose;
 use super::progress::Progress;
+use super::sampling::sample_on;
 use super::{RunArgs, print_reports, report_installation};
 use crate::baseline::{self, Baseline, Comparability, Entry, State};
 use crate::cache::Cache;
@@ -22,6 +23,7 @@ use crate::process;
 use crate::reading::Recording;
 use crate::report::{self, Exit, Ingredients, Report, SpecRecord};
 use crate::run::{self, Machine, Status};
+use crate::sequential;
 use crate::slots::side_by_side;
 use crate::spec::{Case, filtered, suite};
 
@@ -47,6 +49,9 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
         plans = planned().map_err(diagnose)?;
     }
     let tables = Tables::read(&cases)?;
+    for ((case, plan), published) in cases.iter().zip(&mut plans).zip(&tables.published) {
+        args.sampling.grant(&tables.judge(case, published.as_ref()), plan);
+    }
     let root = out_folder(args);
     let cache = Some(cache).filter(|_| !args.no_cache);
     let progress = Progress::of(plans.iter().zip(&cases).map(|(plan, case)| (plan, case.budget.seconds)));
@@ -172,6 +177,12 @@ impl Tables {
     }
 }
 
+impl Tables {
+    fn judge<'a>(&'a self, case: &'a Case, published: Option<&'a Published>) -> Judge<'a> {
+        Judge { tolerances: &self.tolerances, known: &self.known, overrides: &case.tolerances, published }
+    }
+}
+
 /// Why the cases that are left are not run.
 #[derive(Clone, Debug, thiserror::Error)]
 enum Stop {
@@ -219,20 +230,24 @@ fn run_case(
         machine: Arc::clone(&suite.machine),
         cache: suite.cache.cloned(),
     };
-    let outcome = match stop {
+    let mut outcome = match stop {
         Some(stop) => run::not_run(case, plan, stop.status(), &stop.to_string()),
         None => {
             run::run(case, plan, &options, &suite.progress.case(&case.name, case.budget.seconds)).into_diagnostic()?
         }
     };
+    let judge = suite.tables.judge(case, published);
+    if stop.is_none() && !process::is_interrupted() {
+        let told = |text: &str| suite.progress.line(&format!("{}: {text}", case.name));
+        sample_on(case, plan, &judge, &options.reader(), &mut outcome, &told).into_diagnostic()?;
+    }
     if outcome.from_cache > 0 {
         let count = outcome.from_cache;
         suite
             .progress
             .line(&format!("{}: {count} answers of engines from the cache (--no-cache asks anew)", case.name));
     }
-    let Judged { comparisons, splits, consensus, tables } =
-        judge(case, plan, &outcome.recordings, published, suite.tables);
+    let Judged { comparisons, splits, consensus, tables } = judged(case, plan, &outcome.recordings, &judge);
     let ingredients = Ingredients {
         case: case.name.clone(),
         spec: record_of(case),
@@ -272,18 +287,18 @@ struct Judged {
 }
 
 /// Holds the recordings of a case against their references.
-fn judge(case: &Case, plan: &Plan, recordings: &[Recording], published: Option<&Published>, tables: &Tables) -> Judged {
-    let judge = Judge { tolerances: &tables.tolerances, known: &tables.known, overrides: &case.tolerances, published };
+fn judged(case: &Case, plan: &Plan, recordings: &[Recording], judge: &Judge<'_>) -> Judged {
     let mut judged = Judged::default();
     for task in &plan.tasks {
         let task: &Task = task;
         let mine: Vec<&Recording> = recordings.iter().filter(|r| r.procedure == task.procedure).collect();
         let mut comparisons = judge.compare(task, &mine);
         diagnosis::diagnose(task, &mut comparisons);
+        sequential::tell_the_price(&mut comparisons, &mine);
         judged.comparisons.extend(comparisons);
         judged.splits.extend(judge.split(task, &mine));
         judged.consensus.extend(judge.consensus(task, &mine));
-        judged.tables.extend(published.and_then(|p| p.table(task, &case.name)));
+        judged.tables.extend(judge.published.and_then(|p| p.table(task, &case.name)));
     }
     judged
 }

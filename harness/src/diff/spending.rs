@@ -1,6 +1,6 @@
 //! How a comparison that may be looked at several times spends its error: alpha spending over planned looks.
 //!
-//! Lan & DeMets (Biometrika 70, 1983) let each look spend a part of the error that is fixed in advance; the parts add up to the
+//! Lan and Demets (Biometrika 70, 1983) let each look spend a part of the error that is fixed in advance; the parts add up to the
 //! whole, so that by Bonferroni's inequality the chance of a wrong decision at any look is no larger than that of one test. Half
 //! of it goes to the first look, which decides nearly everything, half of what is left to each further one, all of it to the last.
 
