@@ -132,7 +132,8 @@ fn a_filter_runs_the_cases_it_names_and_is_refused_if_it_names_none() {
 fn an_interrupted_run_leaves_a_valid_report_of_what_was_done_and_of_what_was_not() {
     let folder = Folder::new();
     fs::write(folder.path("hang"), "").unwrap();
-    let child = folder.command(&[]).spawn().unwrap();
+    // One case at a time, so that it is certain which have begun.
+    let child = folder.command(&["--jobs", "1"]).spawn().unwrap();
     let patience = Instant::now();
     while folder.starts()[1] == 0 {
         assert!(patience.elapsed() < Duration::from_secs(120), "the second case never started");
@@ -155,4 +156,10 @@ fn an_interrupted_run_leaves_a_valid_report_of_what_was_done_and_of_what_was_not
     // Viewed again it still is no success.
     let view = Command::new(env!("CARGO_BIN_EXE_luxproof")).arg("report").arg(folder.path("out/report.json")).output();
     assert_eq!(view.unwrap().status.code(), Some(3));
+    // Run again, it goes on where it stopped: the case that was whole is not rendered a second time.
+    fs::remove_file(folder.path("hang")).unwrap();
+    let output = folder.run(&["--jobs", "1"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(folder.starts(), [1, 2, 1]);
+    assert_eq!(folder.report()["skips"].as_array().unwrap().len(), 0);
 }

@@ -1,0 +1,129 @@
+//! The guide in docs/: every command in it runs, in the order of the pages, with the engines that it names.
+//!
+//! Blocks marked `console` hold commands behind `$ `; a block marked `yaml NAME` is a file that the commands after it use. All
+//! commands run in one folder that looks like the root of a checkout. Two things differ from what a reader does: `cargo install`
+//! builds what `cargo test` has built already, and `ci/nightly` is told of that program by LUXPROOF.
+
+#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
+
+use std::fs;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const PAGES: [&str; 6] =
+    ["first-audit", "writing-a-spec", "reading-a-report", "adding-an-engine", "nightly", "methods"];
+
+/// A step of the guide.
+#[derive(Debug, PartialEq)]
+enum Step {
+    Run(String),
+    Write(String, String),
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
+}
+
+/// The steps of a page.
+fn steps(page: &str) -> Vec<Step> {
+    let mut steps = vec![];
+    let mut lines = page.lines();
+    while let Some(line) = lines.next() {
+        let Some(info) = line.strip_prefix("```").filter(|i| !i.is_empty()) else { continue };
+        let block: Vec<&str> = lines.by_ref().take_while(|l| *l != "```").collect();
+        match info.split_once(' ') {
+            None if info == "console" => {
+                steps.extend(block.iter().filter_map(|l| l.strip_prefix("$ ")).map(|c| Step::Run(c.to_owned())));
+            }
+            Some(("yaml", name)) => steps.push(Step::Write(name.to_owned(), block.join("\n") + "\n")),
+            _ => (),
+        }
+    }
+    steps
+}
+
+#[test]
+fn steps_are_the_commands_and_files_of_a_page() {
+    let page = "text\n```console\n$ one two\noutput\n$ three\n```\n```yaml a.yaml\nb: 1\n```\n```text\n$ no\n```\n";
+    let (run, write) = (|c: &str| Step::Run(c.to_owned()), Step::Write("a.yaml".to_owned(), "b: 1\n".to_owned()));
+    assert_eq!(steps(page), [run("one two"), run("three"), write]);
+}
+
+/// A folder like the root of a checkout, with `luxproof` and `cargo` on its own path.
+fn checkout(folder: &Path) {
+    for name in ["reference", "ci", "docs", "harness", "Cargo.toml", "README.md"] {
+        symlink(root().join(name), folder.join(name)).unwrap();
+    }
+    let bin = folder.join("bin");
+    fs::create_dir(&bin).unwrap();
+    symlink(env!("CARGO_BIN_EXE_luxproof"), bin.join("luxproof")).unwrap();
+    let cargo = format!(
+        "#!/bin/sh\n[ \"$*\" = 'install --locked --path harness' ] || exit 2\nexec {} build --locked --quiet --manifest-path {}/harness/Cargo.toml\n",
+        env!("CARGO"),
+        root().display()
+    );
+    fs::write(bin.join("cargo"), cargo).unwrap();
+    fs::set_permissions(bin.join("cargo"), fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+#[test]
+fn every_command_of_the_guide_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    checkout(folder.path());
+    fs::create_dir(folder.path().join("luxproof-out")).unwrap();
+    let path = format!("{}:{}", folder.path().join("bin").display(), std::env::var("PATH").unwrap());
+    let mut count = 0;
+    for name in PAGES {
+        let page = fs::read_to_string(root().join(format!("docs/{name}.md"))).unwrap();
+        for step in steps(&page) {
+            match step {
+                Step::Write(file, text) => fs::write(folder.path().join(file), text).unwrap(),
+                Step::Run(command) => {
+                    let output = Command::new("sh")
+                        .args(["-c", &command])
+                        .current_dir(folder.path())
+                        .env("PATH", &path)
+                        .env("LUXPROOF", env!("CARGO_BIN_EXE_luxproof"))
+                        .env("LUXPROOF_CACHE", folder.path().join("cache"))
+                        .output()
+                        .unwrap();
+                    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+                    let (out, messages) = (text(&output.stdout), text(&output.stderr));
+                    assert!(
+                        output.status.success(),
+                        "docs/{name}.md: `{command}`: {}\n{out}\n{messages}",
+                        output.status
+                    );
+                    count += 1;
+                }
+            }
+        }
+    }
+    assert!(count >= 20, "only {count} commands were found");
+    // What the pages say is there, is there.
+    for file in
+        ["cie-5.2/report.html", "cie-5.3/report.csv", "cie-5.3/junit.xml", "spec.schema.json", "try/site/index.html"]
+    {
+        let length = fs::metadata(folder.path().join("luxproof-out").join(file)).map(|m| m.len());
+        assert!(length.is_ok_and(|l| l > 100), "{file}");
+    }
+    let history = fs::read_to_string(folder.path().join("luxproof-out/try/history.jsonl")).unwrap();
+    assert!(history.contains("\"night\":\"2026-01-31\"") && history.contains("\"night\":\"2026-02-01\""));
+}
+
+#[test]
+fn links_between_the_pages_lead_somewhere() {
+    let mut count = 0;
+    for name in PAGES.into_iter().chain(["README"]) {
+        let page = fs::read_to_string(root().join(format!("docs/{name}.md"))).unwrap();
+        for target in page.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let file = target.split('#').next().unwrap();
+            if !file.is_empty() && !file.contains("://") {
+                assert!(root().join("docs").join(file).exists(), "docs/{name}.md: {target}");
+                count += 1;
+            }
+        }
+    }
+    assert!(count >= 10, "only {count} links were found");
+}
