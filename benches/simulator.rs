@@ -30,7 +30,7 @@ fn main() -> Result<(), Failure> {
     more_meters(&scene, &meters)?;
     let (scene, meters, truth) = s2()?;
     row("S2", &scene, &meters, 1e-1, &truth, 2)?;
-    row("S2", &scene, &meters, 1.2e-2, &truth, 1)?;
+    row("S2", &scene, &meters, 1.5e-2, &truth, 1)?;
     let (_, ms) = best(3, || illuminance(&scene, &meters, Transport::Direct, &accuracy(1e-9)))?;
     println!("\nDirect light of S2: {:.2} µs a meter.", 1e3 * ms / meters.len() as f64);
     if let Some(peak) = peak_memory_mib() {

@@ -103,10 +103,13 @@ impl Prepared {
             Solver::Furnished(furnished) if error >= RADIOSITY_REACHES => {
                 let (values, text) = furnished.indirect(meters, bounces, error);
                 let radiosity = bounded(&values, &text);
-                if values.iter().all(|v| v.bound <= error * v.value) {
+                let open: Vec<usize> =
+                    (0..values.len()).filter(|k| values[*k].bound > error * values[*k].value).collect();
+                if open.is_empty() {
                     return Ok(radiosity);
                 }
-                Ok(narrower(radiosity, self.paths(meters, bounces).ok()))
+                let asked: Vec<Meter> = open.iter().map(|k| meters[*k]).collect();
+                Ok(narrower(radiosity, &open, self.paths(&asked, bounces).ok()))
             }
             Solver::Furnished(furnished) => {
                 let transport = Transport::Indirect(bounces);
@@ -151,14 +154,19 @@ fn total(direct: &Solution, indirect: &Solution) -> Solution {
     Solution { estimates, solver: format!("{}; {}", direct.solver, indirect.solver) }
 }
 
-/// At every meter the solver that knows it better.
-fn narrower(radiosity: Solution, paths: Option<Solution>) -> Solution {
+/// Path tracing at the open meters, where it knows them better.
+fn narrower(mut radiosity: Solution, open: &[usize], paths: Option<Solution>) -> Solution {
     let Some(paths) = paths else { return radiosity };
     let width = |e: &Estimate| match e.uncertainty {
         Uncertainty::Bound(bound) => bound,
         Uncertainty::StandardError { value, .. } => STUDENT_T * value,
     };
-    let pairs = radiosity.estimates.iter().zip(&paths.estimates);
-    let estimates = pairs.map(|(r, p)| if width(r) <= width(p) { *r } else { *p }).collect();
-    Solution { estimates, solver: format!("{}, or {} where that is narrower", radiosity.solver, paths.solver) }
+    for (k, path) in open.iter().zip(&paths.estimates) {
+        let estimate = &mut radiosity.estimates[*k];
+        if width(path) < width(estimate) {
+            *estimate = *path;
+        }
+    }
+    radiosity.solver += &format!(", or {} where that is narrower", paths.solver);
+    radiosity
 }

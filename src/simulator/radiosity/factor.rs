@@ -16,6 +16,26 @@ const FAR: f64 = 5.0;
 const DEEPEST: u32 = 5;
 /// Quarterings before what is clipped is taken as uniform, piece by piece.
 const DEEPEST_CLIPPED: u32 = 2;
+/// Heights below this fraction of a part count as on the horizon.
+const ON_HORIZON: f64 = 1e-9;
+/// Radon's rule of degree 5 on a triangle: weights and barycentric coordinates.
+const TRIANGLE_RULE: [(f64, [f64; 3]); 7] = {
+    const A: f64 = 0.470_142_064_105_115_1;
+    const B: f64 = 0.101_286_507_323_456_34;
+    const WA: f64 = 0.132_394_152_788_506_2;
+    const WB: f64 = 0.125_939_180_544_827_15;
+    const T: f64 = 1.0 / 3.0;
+    [
+        (0.225, [T, T, T]),
+        (WA, [A, A, 1.0 - 2.0 * A]),
+        (WA, [A, 1.0 - 2.0 * A, A]),
+        (WA, [1.0 - 2.0 * A, A, A]),
+        (WB, [B, B, 1.0 - 2.0 * B]),
+        (WB, [B, 1.0 - 2.0 * B, B]),
+        (WB, [1.0 - 2.0 * B, B, B]),
+    ]
+};
+
 /// A configuration factor and what goes with it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Factor {
@@ -32,6 +52,13 @@ impl Factor {
             *sum += seen * u[k / 3] * v[k % 3];
         }
         self.weighted += seen * exitance;
+    }
+
+    fn add_scaled(&mut self, other: &Self, by: f64) {
+        for (sum, more) in self.by_node.iter_mut().zip(&other.by_node) {
+            *sum += by * more;
+        }
+        self.weighted += by * other.weighted;
     }
 }
 
@@ -113,7 +140,9 @@ impl View<'_> {
             return;
         }
         let far = away.length_squared() > (FAR * radius).powi(2);
-        if hiding.is_empty() && far && height >= radius {
+        // The least height of a corner above the element's horizon.
+        let lowest = height - part.half * (self.u.dot(self.normal).abs() + self.v.dot(self.normal).abs());
+        if hiding.is_empty() && far && lowest >= -ON_HORIZON * radius {
             return self.add_far(part, away, factor);
         }
         let deepest = if hiding.is_empty() { DEEPEST } else { DEEPEST_CLIPPED };
@@ -176,21 +205,25 @@ impl View<'_> {
         }
     }
 
-    /// A piece taken as uniform, at the exitance of its centre of area.
+    /// A piece: its factor exact, shared out over the patch by a rule on its triangles.
     fn add_piece(&self, part: Part, piece: &[DVec3], factor: &mut Factor) {
-        let seen = element_to_polygon(self.position_m, self.normal, piece);
-        let (mut weight, mut sum) = (0.0, DVec3::ZERO);
+        let (mut own, mut sum) = (Factor::default(), 0.0);
         for k in 2..piece.len() {
-            let area = (piece[k - 1] - piece[0]).cross(piece[k] - piece[0]).length();
-            weight += area;
-            sum += area * (piece[0] + piece[k - 1] + piece[k]) / 3.0;
+            let t = [piece[0], piece[k - 1], piece[k]];
+            let area = (t[1] - t[0]).cross(t[2] - t[0]).length();
+            for (weight, [a, b, c]) in TRIANGLE_RULE {
+                let p = a * t[0] + b * t[1] + c * t[2];
+                let away = p - self.position_m;
+                let seen = weight * area * away.dot(self.normal).max(0.0) / away.length_squared().powi(2);
+                let from_centre = p - self.patch.centre_m;
+                let a = from_centre.dot(self.u) / self.u.length_squared();
+                let b = from_centre.dot(self.v) / self.v.length_squared();
+                own.add(seen, a, b, part.exitance_at(a, b));
+                sum += seen;
+            }
         }
-        if weight == 0.0 {
-            return;
+        if sum > 0.0 {
+            factor.add_scaled(&own, element_to_polygon(self.position_m, self.normal, piece) / sum);
         }
-        let from_centre = sum / weight - self.patch.centre_m;
-        let a = from_centre.dot(self.u) / self.u.length_squared();
-        let b = from_centre.dot(self.v) / self.v.length_squared();
-        factor.add(seen, a, b, part.exitance_at(a, b));
     }
 }

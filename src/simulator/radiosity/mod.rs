@@ -23,24 +23,30 @@ use exitance::{Exitance, Nine, RULE};
 use factor::factor;
 use patches::{Body, Fineness, Patch};
 
-/// Patches at most: the matrix of their nodes then takes 100 MiB.
-const MOST_PATCHES: usize = 400;
+/// Patches at most: the matrix of their nodes then takes 130 MB.
+const MOST_PATCHES: usize = 450;
 /// Bodies at most: every one cuts what it comes close to, and patches multiply.
 const MOST_BODIES: usize = 40;
 /// Nodes of a patch.
 const NODES: usize = 9;
-/// Patches of the first mesh, before outlines are cut into it.
+/// Patches of an empty room whose sides are as long as the rule of thumb says.
 const FIRST_PATCHES: f64 = 60.0;
-/// How much shorter the patches of each mesh are than a rule of thumb says.
-const DIVISORS: [f64; 5] = [0.4, 0.6, 0.9, 1.3, 1.8];
-/// The first mesh serves where errors as large as this are allowed.
+/// How much shorter the patches of each mesh are than that.
+const DIVISORS: [f64; 5] = [0.35, 0.5, 0.7, 1.0, 1.4];
+/// Meshes that are solved one after the other, the second with half the sides of the first: where errors as large as
+/// [`COARSE`] are allowed, and otherwise.
+const COARSE_MESHES: [usize; 4] = [0, 2, 3, 4];
+const FINE_MESHES: [usize; 3] = [1, 3, 4];
 const COARSE: f64 = 0.02;
 
 /// Exitance is projected on biquadratics to this fraction of the room's mean.
 const ROUGHNESS: f64 = 5e-4;
 
-/// What finer meshes do not show, relative: case S2 settles up to 1.4e-3 below path tracing in the middle of the room.
-const FLOOR: f64 = 1.5e-3;
+/// What finer meshes do not show, relative: energy gained in rooms where all surfaces reflect alike is below 2e-4.
+const FLOOR: f64 = 2e-4;
+
+/// Bounds are so many times what the law of convergence says.
+const SAFETY: f64 = 4.5;
 
 /// A scene that radiosity can treat, with the meshes solved so far.
 #[derive(Debug)]
@@ -76,7 +82,7 @@ impl Furnished {
         let stands = |b: &&Body| !scene.room.is_some_and(|room| patches::lies_flat(&room, &b.shape));
         let occluders: Vec<Occluder> = bodies.iter().filter(stands).map(|b| b.shape).collect();
         let furnished = Self { room: scene.room, bodies, occluders, emitters, fields: vec![] };
-        let fits = |room: &Room| furnished.mesh(room, 2).len() <= MOST_PATCHES;
+        let fits = |room: &Room| furnished.fits(room, COARSE_MESHES[1]);
         (furnished.bodies.len() <= MOST_BODIES && furnished.room.as_ref().is_none_or(fits)).then_some(furnished)
     }
 
@@ -104,25 +110,38 @@ impl Furnished {
         if bounces == Bounces::AtMost(0) {
             return (vec![Bounded::default(); meters.len()], "no reflection asked for".into());
         }
-        let first = usize::from(relative_error < COARSE && self.mesh(&room, 3).len() <= MOST_PATCHES);
-        let mut readings: Vec<Vec<f64>> = vec![];
-        for level in first..DIVISORS.len() {
+        let levels: &[usize] =
+            if relative_error < COARSE && self.fits(&room, FINE_MESHES[1]) { &FINE_MESHES } else { &COARSE_MESHES };
+        let mut readings: Vec<Reading> = vec![];
+        let mut why = "the bound meets what was asked";
+        for level in levels.iter().copied() {
             if self.fields.iter().all(|(at, _)| *at != level) {
                 let patches = self.mesh(&room, level);
                 if patches.len() > MOST_PATCHES {
+                    why = "finer meshes have too many patches";
                     break;
                 }
                 self.fields.push((level, self.solve(patches, bounces)));
             }
             let field = self.fields.iter().find(|(at, _)| *at == level);
-            readings.extend(field.map(|(_, f)| meters.par_iter().map(|m| self.gather(f, m)).collect()));
-            if readings.len() >= 3 && bounded(&readings).iter().all(|v| v.bound <= relative_error * v.value.abs()) {
+            readings.extend(field.map(|(_, f)| Reading {
+                divisor: DIVISORS[level],
+                lux: meters.par_iter().map(|m| self.gather(f, m)).collect(),
+            }));
+            if readings.len() >= 2 && bounded(&readings).iter().all(|v| v.bound <= relative_error * v.value.abs()) {
                 break;
+            }
+            if level == levels[levels.len() - 1] {
+                why = "there is no finer mesh";
             }
         }
         let count = self.fields.last().map_or(0, |(_, field)| field.patches.len());
-        let text = format!("collocation radiosity, up to {count} biquadratic patches: bodies or openings");
+        let text = format!("collocation radiosity, up to {count} biquadratic patches: bodies or openings; {why}");
         (bounded(&readings), text)
+    }
+
+    fn fits(&self, room: &Room, level: usize) -> bool {
+        self.mesh(room, level).len() <= MOST_PATCHES
     }
 
     /// The patches of a level, each finer than the one before.
@@ -206,16 +225,32 @@ fn exitance(irradiance: &[f64], patches: &[Patch]) -> Vec<f64> {
     irradiance.iter().enumerate().map(|(k, u)| u * patches[k / NODES].reflectance).collect()
 }
 
-/// The finest of three meshes at every meter, and how far off it may be.
+/// What a mesh gives at every meter.
+struct Reading {
+    divisor: f64,
+    lux: Vec<f64>,
+}
+
+/// The finest mesh at every meter, and how far off it may be.
 ///
-/// Errors fall at least like the square of the patches, to a fourth over both steps. The bound is the last step, or
-/// half of both together where that is more; what is small by chance counts as the median of all meters.
-fn bounded(readings: &[Vec<f64>]) -> Vec<Bounded> {
-    let [.., coarse, middle, fine] = readings else { return vec![] };
-    let step = |k: usize| (fine[k] - middle[k]).abs().max(0.5 * (fine[k] - coarse[k]).abs());
-    let mut relative: Vec<f64> = (0..fine.len()).filter(|k| fine[*k] != 0.0).map(|k| step(k) / fine[k].abs()).collect();
+/// Errors fall at least like the square of the patches' sides, so that a mesh with sides shorter by r is off by at most
+/// 1 / (r^2 - 1) of its distance from the one before; [`SAFETY`] times that is the bound, and not less than half of what the step before gave.
+/// What is small by chance counts as more than what nine in ten meters have.
+fn bounded(readings: &[Reading]) -> Vec<Bounded> {
+    let [.., coarse, fine] = readings else { return vec![] };
+    let step = |k: usize, fine: &Reading, coarse: &Reading| {
+        let ratio = fine.divisor / coarse.divisor;
+        SAFETY * (fine.lux[k] - coarse.lux[k]).abs() / (ratio * ratio - 1.0)
+    };
+    let before = |k: usize| match readings {
+        [.., first, coarse, _] => 0.5 * step(k, coarse, first),
+        _ => 0.0,
+    };
+    let lux = &fine.lux;
+    let widest: Vec<f64> = (0..lux.len()).map(|k| step(k, fine, coarse).max(before(k))).collect();
+    let mut relative: Vec<f64> = (0..lux.len()).filter(|k| lux[*k] != 0.0).map(|k| widest[k] / lux[k].abs()).collect();
     relative.sort_by(f64::total_cmp);
-    let median = relative.get(relative.len() / 2).copied().unwrap_or(0.0);
-    let bound = |k: usize| step(k).max(median * fine[k].abs()) + FLOOR * fine[k].abs();
-    (0..fine.len()).map(|k| Bounded { value: fine[k], bound: bound(k) }).collect()
+    let usual = relative.get(relative.len() * 9 / 10).copied().unwrap_or(0.0);
+    let bound = |k: usize| widest[k].max(usual * lux[k].abs()) + FLOOR * lux[k].abs();
+    (0..lux.len()).map(|k| Bounded { value: lux[k], bound: bound(k) }).collect()
 }

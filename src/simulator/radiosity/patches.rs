@@ -1,7 +1,5 @@
 //! Rectangular patches of a furnished box room: cut where bodies stand, lean or come close, halved alike everywhere.
 
-use std::f64::consts::PI;
-
 use glam::DVec3;
 
 use super::exitance::RULE;
@@ -18,6 +16,13 @@ const NEARBY: f64 = 0.1;
 const GAPS_LONG: f64 = 1.0;
 /// Parts of an edge at most, however narrow the gap before it: what a gap of no width would need ends nowhere.
 const MOST_PARTS: f64 = 24.0;
+/// Where surfaces meet, the last patch is cut at this part of its side.
+const GRADE: f64 = 0.25;
+/// Patches shorter than this part of the mesh's side are not.
+const GRADED_FROM: f64 = 0.2;
+/// The reflectance that the mesh's side is meant for.
+const TYPICAL_REFLECTANCE: f64 = 0.5;
+
 /// A rectangle of uniform reflectance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Patch {
@@ -129,12 +134,18 @@ pub(super) fn patches(room: &Room, bodies: &[Body], fineness: Fineness) -> Vec<P
     let scale = room.size_m.max_element();
     let mut patches = vec![];
     for panel in panels(room, bodies) {
-        let (u, v) = ((panel.axis + 1) % 3, (panel.axis + 2) % 3);
-        let [us, vs] = [u, v].map(|along| cuts(&panel, along, room, bodies, fineness));
+        let others = bodies.iter().enumerate().filter(|(k, _)| panel.owner != Some(*k));
+        let near: Vec<(f64, Occluder)> = others
+            .map(|(_, body)| (panel.gap_m(&body.shape), body.shape))
+            .filter(|(gap, _)| *gap <= NEARBY * scale)
+            .collect();
+        let [us, vs] = [1, 2].map(|k| marks(&panel, (panel.axis + k) % 3, &near, scale));
         for su in us.windows(2) {
             for sv in vs.windows(2) {
-                let patch = panel.patch((su[0], su[1]), (sv[0], sv[1]));
-                patches.extend((!is_covered(&panel, &patch, bodies, scale)).then_some(patch));
+                let cell = panel.patch((su[0], su[1]), (sv[0], sv[1]));
+                if !is_covered(&panel, cell.centre_m, bodies, scale) {
+                    patches.extend(panel.divided(&cell, room, bodies, &near, fineness));
+                }
             }
         }
     }
@@ -170,47 +181,41 @@ fn panels(room: &Room, bodies: &[Body]) -> Vec<Panel> {
     panels
 }
 
-/// Coordinates along an axis at which a panel is cut.
-fn cuts(panel: &Panel, along: usize, room: &Room, bodies: &[Body], fineness: Fineness) -> Vec<f64> {
-    let scale = room.size_m.max_element();
+/// Coordinates along an axis at which bodies that touch a panel or come close to it cut it.
+fn marks(panel: &Panel, along: usize, near: &[(f64, Occluder)], scale: f64) -> Vec<f64> {
     let (low, high) = (panel.low_m[along], panel.high_m[along]);
-    let near: Vec<(f64, f64, f64)> = bodies
-        .iter()
-        .enumerate()
-        .filter(|(k, _)| panel.owner != Some(*k))
-        .map(|(_, body)| (panel.gap_m(&body.shape), body.shape.min_m[along], body.shape.max_m[along]))
-        .filter(|(gap, ..)| *gap <= NEARBY * scale)
-        .collect();
     let mut marks = vec![low, high];
-    marks.extend(near.iter().flat_map(|(_, start, end)| [*start, *end]));
+    marks.extend(near.iter().flat_map(|(_, shape)| [shape.min_m[along], shape.max_m[along]]));
     marks.retain(|x| *x >= low && *x <= high);
     marks.sort_by(f64::total_cmp);
     marks.dedup_by(|a, b| *a - *b <= CONTACT * scale);
-    let mut cuts = vec![marks[0]];
-    for w in marks.windows(2) {
-        let middle = 0.5 * (w[0] + w[1]);
-        let faced = near.iter().filter(|(gap, start, end)| *gap > CONTACT * scale && (*start..=*end).contains(&middle));
-        let gap = faced.map(|(gap, ..)| *gap).fold(panel.gap_to_room_m(room), f64::min);
-        let side_m = fineness.side_m.min(GAPS_LONG * gap) / fineness.divisor;
-        let parts = ((w[1] - w[0]) / side_m).round().clamp(1.0, MOST_PARTS) as usize;
-        // Irradiance runs like powers of the distance to where surfaces meet: patches shrink towards it.
-        let graded = |k: usize| (0.5 * PI * k as f64 / parts as f64).sin().powi(2);
-        cuts.extend((1..=parts).map(|k| {
-            if k == parts { w[1] } else { w[0] + (w[1] - w[0]) * (0.5 * graded(k) + 0.5 * k as f64 / parts as f64) }
-        }));
-    }
+    marks
+}
+
+/// Where one side of a cell is cut: evenly, and once more next to corners.
+///
+/// Irradiance runs like x ln x where surfaces meet at a right angle.
+fn cuts(low: f64, high: f64, side_m: f64, corners: [bool; 2]) -> Vec<f64> {
+    let parts = ((high - low) / side_m).round().clamp(1.0, MOST_PARTS);
+    let part_m = (high - low) / parts;
+    let graded = part_m > GRADED_FROM * side_m;
+    let mut cuts = vec![low];
+    cuts.extend((graded && corners[0]).then_some(low + GRADE * part_m));
+    cuts.extend((1..parts as usize).map(|k| low + part_m * k as f64));
+    cuts.extend((graded && corners[1]).then_some(high - GRADE * part_m));
+    cuts.push(high);
     cuts
 }
 
-/// Whether a body stands on a patch.
-fn is_covered(panel: &Panel, patch: &Patch, bodies: &[Body], scale: f64) -> bool {
+/// Whether a body stands on a point of a panel.
+fn is_covered(panel: &Panel, point_m: DVec3, bodies: &[Body], scale: f64) -> bool {
     let slack = DVec3::splat(CONTACT * scale);
-    let before = patch.centre_m + patch.normal * (2.0 * CONTACT * scale);
+    let before = point_m + panel.normal() * (2.0 * CONTACT * scale);
     bodies.iter().enumerate().any(|(k, body)| {
         let (low, high) = (body.shape.min_m, body.shape.max_m);
         let holds = |p: DVec3| p.cmpge(low - slack).all() && p.cmple(high + slack).all();
         let plate = high[panel.axis] == low[panel.axis];
-        panel.owner != Some(k) && (holds(before) || plate && holds(patch.centre_m))
+        panel.owner != Some(k) && (holds(before) || plate && holds(point_m))
     })
 }
 
@@ -229,6 +234,49 @@ impl Panel {
         }
     }
 
+    fn normal(&self) -> DVec3 {
+        DVec3::AXES[self.axis] * if self.far { 1.0 } else { -1.0 }
+    }
+
+    /// The patches of a cell that no mark cuts.
+    fn divided(
+        &self,
+        cell: &Patch,
+        room: &Room,
+        bodies: &[Body],
+        near: &[(f64, Occluder)],
+        fineness: Fineness,
+    ) -> Vec<Patch> {
+        let scale = room.size_m.max_element();
+        let axes = [(self.axis + 1) % 3, (self.axis + 2) % 3];
+        let low = cell.corners_m[0];
+        let high = cell.corners_m[2];
+        // Before a body and around its corners light changes within the distance to it.
+        let distance_m = |s: &Occluder| (cell.centre_m - cell.centre_m.clamp(s.min_m, s.max_m)).length();
+        let gaps = near.iter().filter(|(gap, _)| *gap > CONTACT * scale).map(|(_, shape)| distance_m(shape));
+        let gap = gaps.fold(self.gap_to_room_m(room), f64::min);
+        // What reflects little may be known less well.
+        let lively = (TYPICAL_REFLECTANCE / self.reflectance).sqrt().clamp(0.5, 2.0);
+        let side_m = (lively * fineness.side_m).min(GAPS_LONG * gap) / fineness.divisor;
+        let is_corner = |axis: usize, far: bool| {
+            let end = if far { high[axis] } else { low[axis] };
+            let mut beyond = cell.centre_m;
+            beyond[axis] = end + if far { 4.0 } else { -4.0 } * CONTACT * scale;
+            let slack = CONTACT * scale;
+            beyond[axis] < -slack || beyond[axis] > room.size_m[axis] + slack || self.meets(beyond, bodies, scale)
+        };
+        let [us, vs] = axes.map(|k| cuts(low[k], high[k], side_m, [is_corner(k, false), is_corner(k, true)]));
+        let pairs = us.windows(2).flat_map(|su| vs.windows(2).map(move |sv| (su, sv)));
+        pairs.map(|(su, sv)| self.patch((su[0], su[1]), (sv[0], sv[1]))).collect()
+    }
+
+    /// Whether a body rises from a point in the panel's plane.
+    fn meets(&self, point_m: DVec3, bodies: &[Body], scale: f64) -> bool {
+        let before = point_m + self.normal() * (4.0 * CONTACT * scale);
+        let holds = |s: &Occluder| before.cmpgt(s.min_m).all() && before.cmplt(s.max_m).all();
+        bodies.iter().enumerate().any(|(k, body)| self.owner != Some(k) && holds(&body.shape))
+    }
+
     fn patch(&self, su: (f64, f64), sv: (f64, f64)) -> Patch {
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
         let at = |a: f64, b: f64| {
@@ -242,7 +290,7 @@ impl Panel {
         Patch {
             corners_m,
             centre_m: 0.5 * (corners_m[0] + corners_m[2]),
-            normal: DVec3::AXES[self.axis] * if self.far { 1.0 } else { -1.0 },
+            normal: self.normal(),
             radius_m: 0.5 * corners_m[0].distance(corners_m[2]),
             area_m2: (su.1 - su.0) * (sv.1 - sv.0),
             reflectance: self.reflectance,
