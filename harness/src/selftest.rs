@@ -1,5 +1,7 @@
 //! The self-test: every known fault is put into a witness's readings, and the harness must catch it and name it.
 
+mod calibration;
+
 use std::fmt;
 use std::path::Path;
 
@@ -10,6 +12,8 @@ use crate::diff::{Judge, KnownDeviations, Tolerances, Verdict};
 use crate::procedures::{self, Task};
 use crate::reading::{Reading, Recording};
 use crate::spec::Case;
+
+pub use calibration::{Calibrations, calibrations};
 
 /// The specs and their luminaires, laid out as in the repository.
 const FILES: [(&str, &str); 5] = [

@@ -24,7 +24,7 @@ use crate::photometry_command::{self, PhotometryArgs};
 use crate::plan::{Asked, Selection, plan};
 use crate::process;
 use crate::report::{self, Beside, Exit, Report, Style};
-use crate::selftest::selftest;
+use crate::selftest::{calibrations, selftest};
 use crate::slots::Slots;
 use crate::spec::{Case, Spec, filtered, suite};
 
@@ -203,6 +203,9 @@ struct SelftestArgs {
     /// Seed of the noise
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Show how good the verdicts' intervals and p-values are, and nothing else
+    #[arg(long)]
+    calibration: bool,
     /// View of the scorecard to print
     #[arg(long, value_enum, value_name = "FORMAT", default_value_t = CardFormat::Terminal)]
     format: CardFormat,
@@ -271,6 +274,14 @@ impl Cli {
 }
 
 fn test_oneself(args: &SelftestArgs) -> Result<Exit, Diagnostic> {
+    if args.calibration {
+        let found = calibrations(args.seed);
+        print(&match args.format {
+            CardFormat::Terminal => found.to_string(),
+            CardFormat::Json => serde_json::to_string(&found).into_diagnostic()? + "\n",
+        })?;
+        return Ok(if found.is_good() { Exit::Passed } else { Exit::Failed });
+    }
     let card = selftest(args.runs.max(1), args.clean_runs, args.seed).into_diagnostic()?;
     let text = match args.format {
         CardFormat::Terminal => card.to_string(),
