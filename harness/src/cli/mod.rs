@@ -5,9 +5,11 @@ mod cache;
 pub(crate) mod diagnostic;
 mod diff;
 mod history;
+mod measuring;
 mod progress;
 mod run_specs;
 mod sampling;
+mod stress;
 
 use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
@@ -72,6 +74,11 @@ enum Command {
     Selftest(SelftestArgs),
     /// What the cache of readings holds; take out what is damaged or long unused
     Cache(cache::CacheArgs),
+    /// Numerical stability: laws that must hold whatever the scene, driven until something breaks
+    Stress(stress::StressArgs),
+    /// Take one reading for another process of this program
+    #[command(name = crate::measure::READ_ONE, hide = true)]
+    ReadOne,
     /// Print the JSON Schema of the spec, the report, or what external adapters read and print
     Schema(SchemaArgs),
 }
@@ -263,6 +270,8 @@ impl Cli {
             Command::Diff(args) => diff::diff(&args),
             Command::Accept(args) => accept::accept(&args),
             Command::Selftest(args) => test_oneself(&args),
+            Command::Stress(args) => stress::run(&args, &site),
+            Command::ReadOne => measuring::read_one(&site),
             Command::Schema(args) => schema(&args),
         }
     }

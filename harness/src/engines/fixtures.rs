@@ -11,7 +11,7 @@ use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transpo
 use super::{Budget, Estimate, Job, Measurement, Station};
 use crate::reading::MeterId;
 
-pub(super) const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
+pub(crate) const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
 pub(super) const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
 pub(super) const S1_INDIRECT_LX: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
 /// Indirect light cut at seven reflections.

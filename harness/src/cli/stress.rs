@@ -1,0 +1,126 @@
+//! `luxproof stress`: metamorphic laws on every engine, and a matrix of what breaks where.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use miette::{IntoDiagnostic, Report as Diagnostic};
+
+use super::diagnostic::diagnose;
+use super::measuring::{self, Bar};
+use crate::engines::Site;
+use crate::measure::Shelf;
+use crate::process;
+use crate::report::Exit;
+use crate::run;
+use crate::spec::{Budget, Case, suite};
+use crate::stress::{self, Coordinates, Options, Progress, StressReport, Subject, laws};
+
+#[derive(Debug, Args)]
+pub(super) struct StressArgs {
+    /// Spec files, folders of them or patterns
+    #[arg(required = true, value_name = "SPEC")]
+    specs: Vec<PathBuf>,
+    /// Engines to stress, by name [default: all that are there]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    engines: Vec<String>,
+    /// Laws to try, by name [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    laws: Vec<String>,
+    /// Give renderers the scene's own coordinates instead of moving and scaling them to suit 32-bit floats
+    #[arg(long)]
+    raw: bool,
+    /// Minutes after which no reading starts, for each spec; run again to go on from there
+    #[arg(long, default_value_t = 15.0, value_name = "MINUTES")]
+    minutes: f64,
+    /// Seconds for one noisy reading
+    #[arg(long, default_value_t = 3.0, value_name = "SECONDS")]
+    seconds: f64,
+    /// Seconds past which a reading hangs
+    #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
+    limit: f64,
+    /// Readings at a time [default: one a core]
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Seed of every random choice
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder of finished readings and of stress.json [default: luxproof-out/stress/<spec name>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// View to print
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = StressFormat::Terminal)]
+    format: StressFormat,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum StressFormat {
+    Terminal,
+    Json,
+    Markdown,
+}
+
+impl Progress for Bar {
+    fn planned(&self, points: usize) {
+        Self::planned(self, points);
+    }
+
+    fn ended(&self, engine: &str, law: &str, magnitude: f64) {
+        Self::ended(self, format!("{engine}: {law} {magnitude:e}"));
+    }
+}
+
+/// Stresses every case; the exit code tells whether our own exact solver broke a law.
+pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
+    for law in &args.laws {
+        if laws::find(law).is_none() {
+            let known: Vec<&str> = laws::ALL.iter().map(|l| l.id).collect();
+            let help = crate::spec::nearest(law, known.iter().copied())
+                .map_or(format!("known: {}", known.join(", ")), |k| format!("did you mean `{k}`?"));
+            return Err(miette::miette!(help = help, "there is no law `{law}`"));
+        }
+    }
+    let sensible = |x: f64| x.is_finite() && x >= 0.0;
+    if ![args.minutes, args.seconds, args.limit].into_iter().all(sensible) {
+        return Err(miette::miette!("--minutes, --seconds and --limit must be numbers from 0"));
+    }
+    let cases: Vec<Case> = suite(&args.specs).map_err(diagnose)?.into_iter().filter(stress::concerns).collect();
+    if cases.is_empty() {
+        return Err(miette::miette!("there is neither direct nor indirect illuminance to stress in these specs"));
+    }
+    let present = measuring::engines_present(&args.engines, site)?;
+    let subjects: Vec<Subject> =
+        present.into_iter().map(|(engine, version)| Subject { engine, version: version.0 }).collect();
+    let mut reports = vec![];
+    for case in &cases {
+        let folder = measuring::folder(args.out.as_ref(), "stress", &case.path);
+        let options = Options {
+            laboratory: measuring::laboratory(site)?,
+            shelf: Shelf::new(folder.join("readings")),
+            jobs: args.jobs.unwrap_or_else(process::cores).max(1),
+            time: Duration::from_secs_f64((60.0 * args.minutes).min(1e9)),
+            budget: Budget { relative_error: 1e-3, seconds: args.seconds },
+            limit: Duration::from_secs_f64(args.limit.clamp(1.0, 1e9)),
+            laws: &args.laws,
+            seed: args.seed,
+            coordinates: if args.raw { Coordinates::Raw } else { Coordinates::Fitted },
+        };
+        let report = stress::stress(case, &subjects, &options, &Bar::new());
+        let name = if cases.len() == 1 { "stress.json".into() } else { format!("stress-{}.json", case.name.replace('/', "-")) };
+        run::keep(&folder.join(name), &report).into_diagnostic()?;
+        reports.push(report);
+    }
+    super::print(&view(&reports, args.format).into_diagnostic()?)?;
+    let broken = reports.iter().any(|r| r.broken_by("simulator").next().is_some());
+    Ok(if broken { Exit::Failed } else { Exit::Passed })
+}
+
+fn view(reports: &[StressReport], format: StressFormat) -> Result<String, serde_json::Error> {
+    let joined = |one: fn(&StressReport) -> String| reports.iter().map(one).collect::<Vec<_>>().join("\n");
+    Ok(match (format, reports) {
+        (StressFormat::Terminal, _) => joined(StressReport::terminal),
+        (StressFormat::Markdown, _) => joined(StressReport::markdown),
+        (StressFormat::Json, [one]) => serde_json::to_string_pretty(one)? + "\n",
+        (StressFormat::Json, all) => serde_json::to_string_pretty(all)? + "\n",
+    })
+}

@@ -1,0 +1,103 @@
+use luminaire::scene::Transport;
+use luminaire::simulator::{Accuracy, illuminance};
+
+use super::{ALL, Against, find};
+use crate::engines::fixtures::{CONVERGED, lopsided, luminaire, s1};
+use crate::engines::Job;
+
+fn exact(job: &Job) -> Vec<f64> {
+    let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();
+    let accuracy = Accuracy { relative_error: 1e-4, seed: 1 };
+    let solution = illuminance(&job.scene, &meters, job.transport, &accuracy).unwrap();
+    solution.estimates.iter().map(|e| e.illuminance.value()).collect()
+}
+
+/// A lopsided luminaire off the middle of a room of no symmetry.
+fn awkward(transport: Transport) -> Job {
+    let mut job = s1(transport);
+    let room = job.scene.room.as_mut().unwrap();
+    room.size_m = glam::DVec3::new(20.0, 18.5, 19.0);
+    room.reflectance.wall_x_max = 0.3;
+    room.reflectance.wall_y_min = 0.7;
+    let mut lamp = luminaire("lopsided", glam::DVec3::new(7.0, 11.0, 9.5), lopsided());
+    lamp.orientation = luminaire::scene::orientation(20.0, 35.0, 50.0);
+    job.scene.luminaires = vec![lamp];
+    job
+}
+
+fn holds(id: &str, magnitude: f64, base: &Job, within: f64) {
+    let variant = (find(id).unwrap().variant)(base, magnitude).unwrap();
+    let (read, before) = (exact(&variant.job), exact(base));
+    let right: Vec<f64> = match variant.against {
+        Against::Base(factor) => before.iter().map(|x| factor * x).collect(),
+        Against::Sum(parts) => {
+            let parts: Vec<Vec<f64>> = parts.iter().map(exact).collect();
+            (0..read.len()).map(|k| parts.iter().map(|p| p[k]).sum()).collect()
+        }
+        Against::Known(known) => known,
+        Against::Mean { .. } | Against::Witness => panic!("{id} has no value at each station"),
+    };
+    for (a, b) in read.iter().zip(&right) {
+        assert!((a - b).abs() <= within * b.max(1e-12), "{id} at {magnitude}: {a} for {b}");
+    }
+}
+
+#[test]
+fn similar_scenes_read_alike_whatever_the_luminaire_and_the_walls() {
+    for transport in [Transport::Direct, CONVERGED] {
+        let (job, within) = (awkward(transport), if transport == Transport::Direct { 1e-9 } else { 3e-4 });
+        for (law, magnitude) in [
+            ("scale_up", 10.0),
+            ("scale_down", 1e-3),
+            ("turned_room", 1.0),
+            ("turned_room", 3.0),
+            ("room_on_its_side", 1.0),
+            ("room_on_its_side", 2.0),
+            ("turned_luminaire", 45.0),
+            ("mirror", 1.0),
+            ("mirror", 2.0),
+            ("mirror", 3.0),
+            ("flux_up", 1e9),
+            ("superposition", 2.0),
+            ("fine_table", 1.0),
+        ] {
+            holds(law, magnitude, &job, within);
+        }
+    }
+    holds("translation", 1e3, &awkward(Transport::Direct), 1e-9);
+    holds("meter_near_luminaire", 1e-3, &awkward(Transport::Direct), 1e-9);
+    holds("needle_beam", 0.1, &awkward(Transport::Direct), 1e-9);
+    holds("one_gamma", 1e-3, &awkward(Transport::Direct), 1e-9);
+    holds("dark", 0.0, &awkward(CONVERGED), 1e-9);
+}
+
+#[test]
+fn a_furnace_gives_back_all_light_to_the_quadrature_stated() {
+    for (law, magnitude) in [
+        ("reflectance", 0.5),
+        ("reflectance", 0.9),
+        ("reflectance", 0.999),
+        ("near_ceiling", 1e-3),
+        ("needle_beam", 1.0),
+        ("one_gamma", 1.0),
+        ("many_luminaires", 1.0),
+    ] {
+        let variant = (find(law).unwrap().variant)(&s1(CONVERGED), magnitude).unwrap();
+        let Against::Mean { weights, value_lx, quadrature } = variant.against else { panic!("{law}") };
+        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+        let mean: f64 = exact(&variant.job).iter().zip(&weights).map(|(x, w)| x * w).sum();
+        println!("{law} {magnitude}: {:e}", mean / value_lx - 1.0);
+        assert!((mean / value_lx - 1.0).abs() < quadrature, "{law} {magnitude}: {mean} for {value_lx}");
+    }
+}
+
+#[test]
+fn every_law_has_a_name_of_its_own_and_says_something_of_the_plain_case() {
+    for (k, law) in ALL.iter().enumerate() {
+        assert!(ALL[..k].iter().all(|l| l.id != law.id), "{}", law.id);
+        let says = [Transport::Direct, CONVERGED].iter().any(|&transport| {
+            law.light.concerns(transport) && law.magnitudes.iter().all(|m| (law.variant)(&s1(transport), *m).is_some())
+        });
+        assert!(says, "{}", law.id);
+    }
+}
