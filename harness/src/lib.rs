@@ -11,6 +11,7 @@ pub struct AddingAnEngine;
 
 pub mod baseline;
 pub mod cache;
+pub mod bench;
 pub mod cli;
 pub mod diagnosis;
 pub mod diff;

@@ -146,9 +146,7 @@ pub fn here(engine: &dyn Engine, job: &Job, site: &Site, jobs: usize, limit: Dur
     }
     let taken = Outcome { wall_s, cpu_s, peak_mib: peak.mib(), declared, ..Outcome::default() };
     match measured {
-        Ok(measurement) => {
-            Outcome { estimates: measurement.estimates, settings: measurement.settings, ..taken }
-        }
+        Ok(measurement) => Outcome { estimates: measurement.estimates, settings: measurement.settings, ..taken },
         Err(error) => Outcome { failure: Some(Failure { kind: kind(&error), text: error.to_string() }), ..taken },
     }
 }
@@ -243,11 +241,8 @@ pub fn task(case: &Case, procedure: &str) -> Option<Task> {
 
 /// What an engine without settings is asked for a task.
 pub fn base_job(case: &Case, task: &Task) -> Job {
-    let station = |target: &procedures::Target| Station {
-        id: target.id.clone(),
-        meter: target.meter,
-        expected_lx: None,
-    };
+    let station =
+        |target: &procedures::Target| Station { id: target.id.clone(), meter: target.meter, expected_lx: None };
     Job {
         case: case.name.clone(),
         procedure: task.procedure.to_owned(),

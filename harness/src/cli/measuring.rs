@@ -76,8 +76,12 @@ impl Bar {
     }
 
     pub(super) fn ended(&self, what: String) {
+        self.ended_part(what, 1);
+    }
+
+    pub(super) fn ended_part(&self, what: String, parts: u64) {
         self.bar.set_message(what);
-        self.bar.inc(1);
+        self.bar.inc(parts);
     }
 }
 

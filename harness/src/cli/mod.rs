@@ -2,6 +2,7 @@
 
 mod accept;
 mod cache;
+mod bench;
 pub(crate) mod diagnostic;
 mod diff;
 mod history;
@@ -74,6 +75,8 @@ enum Command {
     Selftest(SelftestArgs),
     /// What the cache of readings holds; take out what is damaged or long unused
     Cache(cache::CacheArgs),
+    /// Run time against error, for every engine, solver and preset
+    Bench(bench::BenchArgs),
     /// Numerical stability: laws that must hold whatever the scene, driven until something breaks
     Stress(stress::StressArgs),
     /// Take one reading for another process of this program
@@ -270,6 +273,7 @@ impl Cli {
             Command::Diff(args) => diff::diff(&args),
             Command::Accept(args) => accept::accept(&args),
             Command::Selftest(args) => test_oneself(&args),
+            Command::Bench(args) => bench::run(&args, &site),
             Command::Stress(args) => stress::run(&args, &site),
             Command::ReadOne => measuring::read_one(&site),
             Command::Schema(args) => schema(&args),

@@ -106,7 +106,11 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
             coordinates: if args.raw { Coordinates::Raw } else { Coordinates::Fitted },
         };
         let report = stress::stress(case, &subjects, &options, &Bar::new());
-        let name = if cases.len() == 1 { "stress.json".into() } else { format!("stress-{}.json", case.name.replace('/', "-")) };
+        let name = if cases.len() == 1 {
+            "stress.json".into()
+        } else {
+            format!("stress-{}.json", case.name.replace('/', "-"))
+        };
         run::keep(&folder.join(name), &report).into_diagnostic()?;
         reports.push(report);
     }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::Subject;
 use super::judge::Compared;
 use super::laws::Law;
-use super::Subject;
 use crate::measure::{Failure, FailureKind};
 use crate::spec::Case;
 

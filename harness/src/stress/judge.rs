@@ -13,32 +13,32 @@ const LOST: f64 = 0.5;
 
 /// A value with what is stated of its error, in lux.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Reading {
-    pub(super) value: f64,
-    pub(super) std_error: f64,
-    pub(super) bound: f64,
+pub(crate) struct Reading {
+    pub(crate) value: f64,
+    pub(crate) std_error: f64,
+    pub(crate) bound: f64,
 }
 
 impl Reading {
-    pub(super) fn exact(value: f64) -> Self {
+    pub(crate) fn exact(value: f64) -> Self {
         Self { value, std_error: 0.0, bound: 0.0 }
     }
 }
 
 /// What a comparison found, relative.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Compared {
+pub(crate) struct Compared {
     /// The largest deviation beyond noise.
-    pub(super) beyond: f64,
+    pub(crate) beyond: f64,
     /// The largest noise: what could not have been seen.
-    pub(super) noise: f64,
+    pub(crate) noise: f64,
     /// Whether most of the light was gone somewhere.
-    pub(super) is_lost: bool,
+    pub(crate) is_lost: bool,
     /// Whether neither side is random.
-    pub(super) is_exact: bool,
+    pub(crate) is_exact: bool,
 }
 
-pub(super) fn readings(outcome: &Outcome) -> Vec<Reading> {
+pub(crate) fn readings(outcome: &Outcome) -> Vec<Reading> {
     let reading = |e: &crate::engines::Estimate| Reading {
         value: e.value_lx,
         std_error: e.std_error_lx.unwrap_or(0.0),
@@ -47,29 +47,26 @@ pub(super) fn readings(outcome: &Outcome) -> Vec<Reading> {
     outcome.estimates.iter().map(reading).collect()
 }
 
-pub(super) fn times(readings: &[Reading], factor: f64) -> Vec<Reading> {
-    let of = |r: &Reading| Reading {
-        value: factor * r.value,
-        std_error: factor * r.std_error,
-        bound: factor * r.bound,
-    };
+pub(crate) fn times(readings: &[Reading], factor: f64) -> Vec<Reading> {
+    let of =
+        |r: &Reading| Reading { value: factor * r.value, std_error: factor * r.std_error, bound: factor * r.bound };
     readings.iter().map(of).collect()
 }
 
-pub(super) fn add(sum: &mut [Reading], part: &[Reading]) {
+pub(crate) fn add(sum: &mut [Reading], part: &[Reading]) {
     for (s, p) in sum.iter_mut().zip(part) {
         *s = Reading { value: s.value + p.value, std_error: s.std_error.hypot(p.std_error), bound: s.bound + p.bound };
     }
 }
 
 /// The weighted mean; errors add up as if they were all one, since those of one run may be.
-pub(super) fn mean(readings: &[Reading], weights: &[f64]) -> Reading {
+pub(crate) fn mean(readings: &[Reading], weights: &[f64]) -> Reading {
     let over = |f: &dyn Fn(&Reading) -> f64| readings.iter().zip(weights).map(|(r, w)| w * f(r)).sum();
     Reading { value: over(&|r| r.value), std_error: over(&|r| r.std_error), bound: over(&|r| r.bound) }
 }
 
 /// Compares station by station; `brightest_lx` is the scale where all that is right is dark.
-pub(super) fn compare(read: &[Reading], right: &[Reading], brightest_lx: f64) -> Compared {
+pub(crate) fn compare(read: &[Reading], right: &[Reading], brightest_lx: f64) -> Compared {
     let brightest = right.iter().map(|r| r.value).fold(0.0, f64::max);
     let least = if brightest > 0.0 { FAINT * brightest } else { brightest_lx.max(f64::MIN_POSITIVE) };
     let mut found = Compared { beyond: 0.0, noise: 0.0, is_lost: false, is_exact: true };

@@ -1,8 +1,8 @@
 //! Stress: every law at every magnitude on every engine, within a time, resumable; what breaks where.
 
-pub mod laws;
 mod findings;
-mod judge;
+pub(crate) mod judge;
+pub mod laws;
 mod report;
 #[cfg(test)]
 mod tests;
@@ -164,9 +164,8 @@ impl Queue {
     /// Whether a milder magnitude of the same law hung already: the next would hang as well, and cost as much.
     fn hopeless(&self, points: &[Point], k: usize) -> bool {
         let point = &points[k];
-        let alike = |p: &Point| {
-            p.subject == point.subject && p.law.id == point.law.id && p.procedure == point.procedure
-        };
+        let alike =
+            |p: &Point| p.subject == point.subject && p.law.id == point.law.id && p.procedure == point.procedure;
         let hung = |j: usize| self.findings[j].as_ref().is_some_and(|f| f.how == Some(How::Hang));
         (0..points.len()).any(|j| hung(j) && points[j].step < point.step && alike(&points[j]))
     }

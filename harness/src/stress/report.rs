@@ -58,7 +58,9 @@ impl StressReport {
             for point in law.points.iter().filter(|p| p.how.is_some()) {
                 let key = format!("{:e}", point.magnitude);
                 let what = match (point.deviation, point.how) {
-                    (Some(d), how) => format!("{}{}", percent(d), if how == Some(How::SilentLoss) { " lost" } else { "" }),
+                    (Some(d), how) => {
+                        format!("{}{}", percent(d), if how == Some(How::SilentLoss) { " lost" } else { "" })
+                    }
                     (None, Some(how)) => how.name().to_owned(),
                     _ => String::new(),
                 };
@@ -75,7 +77,16 @@ impl StressReport {
             let list: Vec<String> = order.iter().map(|k| format!("{k}: {}", by_magnitude[k])).collect();
             let why = law.points.iter().find_map(|p| p.how.and(p.text.as_deref())).map(first_line);
             let why = why.map(|w| format!(" ({w})")).unwrap_or_default();
-            writeln!(text, "{bullet}{} {}: {}. At {} {}{why}", law.engine, law.law, law.what, law.unit, list.join("; ")).ok();
+            writeln!(
+                text,
+                "{bullet}{} {}: {}. At {} {}{why}",
+                law.engine,
+                law.law,
+                law.what,
+                law.unit,
+                list.join("; ")
+            )
+            .ok();
         }
         text
     }

@@ -100,7 +100,7 @@ fn what_breaks_is_reported_at_its_magnitude_and_in_its_way() {
     assert_eq!(law("many_luminaires").refused_at, Some(1000.0));
     assert_eq!(law("mirror").how, None);
     let text = report.terminal();
-    assert!(text.contains("0.1 % @ 1e2, 10 % @ 1e4") && text.contains("nan @ 1e6"), "{text}");
+    assert!(text.contains("0.1 % @ 1e2, 1.0 % @ 1e4, 10 % @ 1e4") && text.contains("nan @ 1e6"), "{text}");
     assert!(report.markdown().lines().any(|l| l.starts_with("| mirror") && l.contains("ok")));
 }
 

@@ -161,7 +161,8 @@ fn aside(luminaire: &Luminaire, job: &Job, k: usize) -> Option<Luminaire> {
     // Back and forth between a tenth and nine tenths of the room.
     let folded = |x: f64| 0.9 - 0.8 * (((x - 0.1) / 0.8).rem_euclid(2.0) - 1.0).abs();
     let part = luminaire.position_m / size_m + step;
-    let position_m = if k == 0 { luminaire.position_m } else { size_m * DVec3::new(folded(part.x), folded(part.y), folded(part.z)) };
+    let position_m =
+        if k == 0 { luminaire.position_m } else { size_m * DVec3::new(folded(part.x), folded(part.y), folded(part.z)) };
     Some(Luminaire { id: format!("{}_{k}", luminaire.id), position_m, ..luminaire.clone() })
 }
 

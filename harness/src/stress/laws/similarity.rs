@@ -146,7 +146,10 @@ fn obstacle(obstacle: &Obstacle, place: &impl Fn(DVec3) -> DVec3, determinant: f
         Shape::Mesh { vertices_m, triangles } => Shape::Mesh {
             vertices_m: vertices_m.iter().map(|v| place(*v)).collect(),
             // Mirrored, the other way round is counter-clockwise.
-            triangles: triangles.iter().map(|&[a, b, c]| if determinant < 0.0 { [a, c, b] } else { [a, b, c] }).collect(),
+            triangles: triangles
+                .iter()
+                .map(|&[a, b, c]| if determinant < 0.0 { [a, c, b] } else { [a, b, c] })
+                .collect(),
         },
     };
     Obstacle { shape, reflectance: obstacle.reflectance }

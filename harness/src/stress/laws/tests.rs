@@ -2,8 +2,8 @@ use luminaire::scene::Transport;
 use luminaire::simulator::{Accuracy, illuminance};
 
 use super::{ALL, Against, find};
-use crate::engines::fixtures::{CONVERGED, lopsided, luminaire, s1};
 use crate::engines::Job;
+use crate::engines::fixtures::{CONVERGED, lopsided, luminaire, s1};
 
 fn exact(job: &Job) -> Vec<f64> {
     let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();

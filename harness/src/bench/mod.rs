@@ -1,0 +1,313 @@
+//! Bench: run time against error, for every engine, solver and preset along a ladder of effort.
+//!
+//! Every reading is taken afresh or from this measurement's own shelf, never from a cache of results.
+
+mod curve;
+mod fit;
+mod knobs;
+mod ladder;
+mod plot;
+mod report;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use luminaire::scene::{LuminaireModel, Transport};
+use serde::Serialize;
+
+pub use self::curve::{BenchPoint, Curve, Pareto};
+pub use self::knobs::KnobEffect;
+use self::ladder::ladder;
+use crate::engines::{Engine, Job};
+use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, base_job, settings_of};
+use crate::plan::REFERENCES;
+use crate::procedures::{self, Task};
+use crate::process;
+use crate::spec::{Budget, Case};
+use crate::stress::laws::Place;
+
+/// How to bench.
+pub struct Options<'a> {
+    /// Where readings are taken.
+    pub laboratory: Laboratory,
+    /// Where finished readings are kept.
+    pub shelf: Shelf,
+    /// Readings a rung, each with a seed of its own.
+    pub repetitions: usize,
+    /// Threads or processes that a reading may use.
+    pub jobs: usize,
+    /// No reading starts after this.
+    pub time: Duration,
+    /// Seconds of the rungs of renderers whose light is sampled.
+    pub seconds: &'a [f64],
+    /// Procedures by name; empty for all of the spec but intensities.
+    pub procedures: &'a [String],
+    /// First seed.
+    pub seed: u64,
+    /// Whether settings are tried one by one.
+    pub knobs: Knobs,
+}
+
+/// Whether settings are tried one by one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Knobs {
+    /// Each is.
+    Tried,
+    /// None is.
+    Left,
+}
+
+/// An engine on the bench.
+pub struct Subject {
+    /// The engine.
+    pub engine: Box<dyn Engine>,
+    /// Its version.
+    pub version: String,
+}
+
+/// Told of every reading as it ends.
+pub trait Progress {
+    /// That many seconds more are expected.
+    fn planned(&self, seconds: f64);
+    /// A reading ended that was expected to take so long.
+    fn ended(&self, what: &str, seconds: f64);
+}
+
+/// What the bench found with some cases.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct BenchReport {
+    /// The machine.
+    pub machine: String,
+    /// Engines with their versions.
+    pub engines: BTreeMap<String, String>,
+    /// One an engine, solver, preset and procedure.
+    pub curves: Vec<Curve>,
+    /// One a case and procedure: what no other engine beats in both time and error.
+    pub pareto: Vec<Pareto>,
+    /// What each setting does, where they were tried.
+    pub knobs: Vec<KnobEffect>,
+    /// What could not be measured, and why.
+    pub left_out: Vec<String>,
+}
+
+/// Benches engines with one case and adds what it finds to a report.
+pub fn bench(
+    case: &Case,
+    subjects: &[Subject],
+    options: &Options<'_>,
+    progress: &dyn Progress,
+    report: &mut BenchReport,
+) {
+    let bench = Bench { case, options, progress, until: Instant::now() + options.time };
+    report.machine = machine();
+    for subject in subjects {
+        report.engines.insert(subject.engine.id().name().to_owned(), subject.version.clone());
+    }
+    let asked = |name: &str| {
+        if options.procedures.is_empty() {
+            name != "luminous_intensity"
+        } else {
+            options.procedures.iter().any(|p| p == name)
+        }
+    };
+    for task in procedures::ALL.iter().filter(|p| asked(p.name())).filter_map(|p| p.task(case)) {
+        let job = base_job(case, &task);
+        let Some(truth) = bench.truth(&task, &job) else {
+            report.left_out.push(format!("{}, {}: there is no exact reference in time", case.name, task.procedure));
+            continue;
+        };
+        for subject in subjects {
+            match bench.curves(subject, &task, &job, &truth) {
+                Ok(curves) => report.curves.extend(curves),
+                Err(why) => {
+                    report.left_out.push(format!("{}, {}, {}: {why}", case.name, task.procedure, subject.engine.id()))
+                }
+            }
+            if options.knobs == Knobs::Tried {
+                report.knobs.extend(bench.knob_effects(subject, &task, &job));
+            }
+        }
+        report.pareto.push(Pareto::of(&case.name, task.procedure, &report.curves));
+    }
+}
+
+/// The exact values and how far off they may be.
+pub(crate) struct Truth {
+    pub(crate) values_lx: Vec<f64>,
+    pub(crate) uncertainty_lx: Vec<f64>,
+}
+
+/// Accuracy of the exact reference where bodies and openings allow no closed solution, and where there are none.
+const FURNISHED: f64 = 1e-3;
+const EMPTY: f64 = 1e-6;
+/// Past this a reference, or a reading, is not waited for.
+const LIMIT: Duration = Duration::from_secs(300);
+
+struct Bench<'a> {
+    case: &'a Case,
+    options: &'a Options<'a>,
+    progress: &'a dyn Progress,
+    until: Instant,
+}
+
+impl Bench<'_> {
+    /// The exact simulation, as finely as it goes.
+    fn truth(&self, task: &Task, job: &Job) -> Option<Truth> {
+        let engine = crate::engines::all().into_iter().find(|e| e.id().name() == "simulator")?;
+        let subject = Subject { engine, version: env!("CARGO_PKG_VERSION").to_owned() };
+        let finest = if is_furnished(job) { FURNISHED } else { EMPTY };
+        // Something is better than nothing: coarser where the finest takes too long.
+        [finest, 5.0 * finest].into_iter().find_map(|accuracy| {
+            let settings = BTreeMap::from([("relative_error".to_owned(), accuracy.into())]);
+            let outcome = self.take(&subject, task.procedure, job, &settings, job.budget, self.options.seed, None)?;
+            outcome.failure.is_none().then(|| Truth::of(&outcome))
+        })
+    }
+
+    fn curves(&self, subject: &Subject, task: &Task, job: &Job, truth: &Truth) -> Result<Vec<Curve>, String> {
+        let settings = settings_of(self.case, subject.engine.id().name());
+        let rungs = ladder(subject.engine.as_ref(), job, is_furnished(job), &settings, self.options.seconds);
+        let repetitions = self.options.repetitions.max(1);
+        self.progress.planned(rungs.iter().map(|r| r.expected_s() * repetitions as f64).sum());
+        let start_up_s = self.start_up(subject, task, job, &settings);
+        let set_up_s = self.set_up(subject, task, job, &settings);
+        let mut curves: Vec<Curve> = vec![];
+        let (mut last_wall_s, mut last_preset, mut refusal) = (0.0, "", None);
+        for rung in &rungs {
+            // A rung below what the last one took anyway would only repeat it.
+            let repeats = rung.preset == last_preset && rung.budget.seconds < 0.8 * last_wall_s && rung.is_timed;
+            let mut outcomes = vec![];
+            for k in 0..repetitions {
+                if !repeats {
+                    let settings = rung.settings(&settings);
+                    let seed = self.options.seed + k as u64;
+                    outcomes.extend(self.take(subject, task.procedure, job, &settings, rung.budget, seed, None));
+                }
+                let what = format!("{}: {} {} {:e}", subject.engine.id(), task.procedure, rung.preset, rung.effort);
+                self.progress.ended(&what, rung.expected_s());
+            }
+            refusal = refusal.or(outcomes.iter().find_map(|o| o.failure.as_ref()).map(|f| f.text.clone()));
+            outcomes.retain(|o| o.failure.is_none());
+            let Some(first) = outcomes.first() else { continue };
+            (last_wall_s, last_preset) = (first.wall_s, rung.preset.as_str());
+            let solver = ladder::solver(first);
+            let point = BenchPoint::of(rung.effort, &outcomes, truth);
+            let known = curves.iter_mut().find(|c| c.solver == solver && c.preset == rung.preset);
+            match known {
+                Some(curve) => curve.points.push(point),
+                None => curves.push(Curve {
+                    case: self.case.name.clone(),
+                    engine: subject.engine.id().name().to_owned(),
+                    procedure: task.procedure.to_owned(),
+                    solver,
+                    preset: rung.preset.clone(),
+                    start_up_s,
+                    set_up_s,
+                    points: vec![point],
+                    ..Curve::default()
+                }),
+            }
+        }
+        curves.iter_mut().for_each(Curve::conclude);
+        match refusal {
+            Some(why) if curves.is_empty() => Err(why.lines().next().unwrap_or_default().to_owned()),
+            _ => Ok(curves),
+        }
+    }
+
+    /// Seconds of a job with next to no work: direct light at one meter. Our own solvers have no start-up.
+    fn start_up(&self, subject: &Subject, task: &Task, job: &Job, settings: &Settings) -> f64 {
+        let mut least = job.clone();
+        least.transport = Transport::Direct;
+        least.stations.truncate(1);
+        self.least(subject, task, &least, settings, "start_up")
+    }
+
+    /// Seconds of the job itself with as little effort as the engine can do with.
+    fn set_up(&self, subject: &Subject, task: &Task, job: &Job, settings: &Settings) -> f64 {
+        self.least(subject, task, job, settings, "set_up")
+    }
+
+    fn least(&self, subject: &Subject, task: &Task, job: &Job, settings: &Settings, name: &str) -> f64 {
+        if REFERENCES.contains(&subject.engine.id().name()) {
+            return 0.0;
+        }
+        let budget = Budget { relative_error: 1e3, seconds: 0.0 };
+        let place = |k: usize| Some(Place { law: name.to_owned(), magnitude: 0.0, part: k });
+        let times = (0..2).filter_map(|k| {
+            let taken = self.take(subject, task.procedure, job, settings, budget, self.options.seed, place(k))?;
+            taken.failure.is_none().then_some(taken.wall_s)
+        });
+        times.reduce(f64::min).unwrap_or(0.0)
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "they are what makes one reading different from the next")]
+    fn take(
+        &self,
+        subject: &Subject,
+        procedure: &str,
+        job: &Job,
+        settings: &Settings,
+        budget: Budget,
+        seed: u64,
+        place: Option<Place>,
+    ) -> Option<Outcome> {
+        let request = Request {
+            spec: self.case.path.clone(),
+            spec_sha256: self.case.sha256.clone(),
+            case: self.case.name.clone(),
+            procedure: procedure.to_owned(),
+            engine: subject.engine.id().name().to_owned(),
+            version: subject.version.clone(),
+            place,
+            settings: settings.clone(),
+            budget,
+            seed,
+            jobs: self.options.jobs,
+            limit_s: LIMIT.as_secs_f64(),
+        };
+        if let Some(kept) = self.options.shelf.find(&request) {
+            return Some(kept);
+        }
+        if Instant::now() >= self.until || process::is_interrupted() {
+            return None;
+        }
+        let job = Job { settings: settings.clone(), budget, seed, ..job.clone() };
+        let outcome = self.options.laboratory.read(subject.engine.as_ref(), &job, &request);
+        if let Err(error) = self.options.shelf.keep(&request, &outcome) {
+            tracing::warn!(%error, "a finished reading could not be kept");
+        }
+        (outcome.failure_kind() != Some(FailureKind::Interrupted)).then_some(outcome)
+    }
+}
+
+type Settings = BTreeMap<String, serde_json::Value>;
+
+fn is_furnished(job: &Job) -> bool {
+    let points = job.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
+    (!points || !job.scene.obstacles.is_empty()) && job.transport != Transport::Direct
+}
+
+impl Truth {
+    fn of(outcome: &Outcome) -> Self {
+        let error = |e: &crate::engines::Estimate| e.std_error_lx.map(|s| 2.0 * s).or(e.error_bound_lx).unwrap_or(0.0);
+        Self {
+            values_lx: outcome.estimates.iter().map(|e| e.value_lx).collect(),
+            uncertainty_lx: outcome.estimates.iter().map(error).collect(),
+        }
+    }
+}
+
+/// The processor, its cores, the system's load and how this program was built.
+fn machine() -> String {
+    let processors = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model =
+        processors.lines().find_map(|l| l.strip_prefix("model name")).map(|l| l.trim_start_matches([' ', '\t', ':']));
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let load = load.split(' ').next().unwrap_or("?").to_owned();
+    let build = if cfg!(debug_assertions) { "a development build, which is slow" } else { "a release build" };
+    let model = model.unwrap_or(std::env::consts::ARCH);
+    format!("{model}, {} cores, load average {load} at the end; {build}", process::cores())
+}

@@ -1,0 +1,117 @@
+//! `luxproof bench`: run time against error, tables and plots.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use miette::{IntoDiagnostic, Report as Diagnostic};
+
+use super::diagnostic::diagnose;
+use super::measuring::{self, Bar};
+use crate::bench::{self, BenchReport, Knobs, Options, Progress, Subject};
+use crate::engines::Site;
+use crate::measure::Shelf;
+use crate::process;
+use crate::report::Exit;
+use crate::run;
+use crate::spec::{Procedures, suite};
+
+#[derive(Debug, Args)]
+pub(super) struct BenchArgs {
+    /// Spec files, folders of them or patterns
+    #[arg(required = true, value_name = "SPEC")]
+    specs: Vec<PathBuf>,
+    /// Engines to bench, by name [default: all that are there]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    engines: Vec<String>,
+    /// Procedures to bench, by name [default: all of the spec but luminous intensity]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    procedures: Vec<String>,
+    /// Readings a rung, each with a seed of its own
+    #[arg(long, default_value_t = 3, value_name = "N")]
+    repetitions: usize,
+    /// Seconds of the rungs of renderers' sampled light
+    #[arg(long, value_delimiter = ',', value_name = "SECONDS", default_values_t = [0.25, 1.0, 4.0, 12.0])]
+    seconds: Vec<f64>,
+    /// Also try the engines' settings one by one: which changes the result, and which does nothing
+    #[arg(long)]
+    knobs: bool,
+    /// Minutes after which no reading starts, for each case; run again to go on from there
+    #[arg(long, default_value_t = 7.0, value_name = "MINUTES")]
+    minutes: f64,
+    /// Threads or processes that a reading may use [default: one a core]
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// First seed
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder of finished readings and of bench.json [default: luxproof-out/bench/<spec name>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Views to print
+    #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [BenchFormat::Terminal])]
+    format: Vec<BenchFormat>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum BenchFormat {
+    Terminal,
+    Json,
+    Markdown,
+    Csv,
+    Svg,
+}
+
+impl Progress for Bar {
+    fn planned(&self, seconds: f64) {
+        Self::planned(self, (10.0 * seconds).ceil() as usize);
+    }
+
+    fn ended(&self, what: &str, seconds: f64) {
+        self.ended_part(what.to_owned(), (10.0 * seconds).ceil() as u64);
+    }
+}
+
+/// Benches every case and prints one report over all.
+pub(super) fn run(args: &BenchArgs, site: &Site) -> Result<Exit, Diagnostic> {
+    if let Some(odd) = args.procedures.iter().find(|p| !Procedures::NAMES.contains(&p.as_str())) {
+        return Err(miette::miette!("there is no procedure `{odd}`; there are {}", Procedures::NAMES.join(", ")));
+    }
+    if !args.seconds.iter().chain([&args.minutes]).all(|s| s.is_finite() && *s >= 0.0) || args.seconds.is_empty() {
+        return Err(miette::miette!("--seconds and --minutes must be numbers from 0"));
+    }
+    let cases = suite(&args.specs).map_err(diagnose)?;
+    let present = measuring::engines_present(&args.engines, site)?;
+    let subjects: Vec<Subject> =
+        present.into_iter().map(|(engine, version)| Subject { engine, version: version.0 }).collect();
+    let first = args.specs.first().map_or(std::path::Path::new("suite"), PathBuf::as_path);
+    let folder = measuring::folder(args.out.as_ref(), "bench", first);
+    let options = Options {
+        laboratory: measuring::laboratory(site)?,
+        shelf: Shelf::new(folder.join("readings")),
+        repetitions: args.repetitions.max(1),
+        jobs: args.jobs.unwrap_or_else(process::cores).max(1),
+        time: Duration::from_secs_f64((60.0 * args.minutes).min(1e9)),
+        seconds: &args.seconds,
+        procedures: &args.procedures,
+        seed: args.seed,
+        knobs: if args.knobs { Knobs::Tried } else { Knobs::Left },
+    };
+    let (mut report, bar) = (BenchReport::default(), Bar::new());
+    for case in &cases {
+        bench::bench(case, &subjects, &options, &bar, &mut report);
+    }
+    drop(bar);
+    run::keep(&folder.join("bench.json"), &report).into_diagnostic()?;
+    for format in &args.format {
+        let text = match format {
+            BenchFormat::Terminal => report.terminal(),
+            BenchFormat::Json => serde_json::to_string_pretty(&report).into_diagnostic()? + "\n",
+            BenchFormat::Markdown => report.markdown(),
+            BenchFormat::Csv => report.csv(),
+            BenchFormat::Svg => report.svg(),
+        };
+        super::print(&text)?;
+    }
+    Ok(Exit::Passed)
+}
