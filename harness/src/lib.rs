@@ -10,8 +10,8 @@
 pub struct AddingAnEngine;
 
 pub mod baseline;
-pub mod cache;
 pub mod bench;
+pub mod cache;
 pub mod cli;
 pub mod diagnosis;
 pub mod diff;

@@ -122,7 +122,7 @@ pub fn bench(
             match bench.curves(subject, &task, &job, &truth) {
                 Ok(curves) => report.curves.extend(curves),
                 Err(why) => {
-                    report.left_out.push(format!("{}, {}, {}: {why}", case.name, task.procedure, subject.engine.id()))
+                    report.left_out.push(format!("{}, {}, {}: {why}", case.name, task.procedure, subject.engine.id()));
                 }
             }
             if options.knobs == Knobs::Tried {

@@ -154,7 +154,7 @@ fn percent(x: f64) -> String {
     match 100.0 * x {
         p if p >= 9.95 => format!("{p:.0} %"),
         p if p >= 0.0095 => format!("{p:.2} %"),
-        p if p == 0.0 => "0 %".to_owned(),
+        0.0 => "0 %".to_owned(),
         p => format!("{p:.0e} %"),
     }
 }

@@ -35,7 +35,7 @@ impl Engine for KnownLaw {
     fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
         let gain = job.settings.get("gain").and_then(serde_json::Value::as_f64).unwrap_or(1.0);
         let noise = 0.02 / job.budget.seconds.max(1e-6).sqrt();
-        let sign = if job.seed % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if job.seed.is_multiple_of(2) { 1.0 } else { -1.0 };
         let estimate = |x: &f64| Estimate {
             value_lx: x * gain * (1.0 + BIAS + sign * noise),
             std_error_lx: Some(x * noise),

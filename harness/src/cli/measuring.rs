@@ -13,8 +13,11 @@ use crate::engines::{self, Engine, Site, Version};
 use crate::measure::{self, Laboratory, OwnSolvers};
 use crate::report::Exit;
 
+/// An engine that is there, and its version.
+pub(super) type Present = (Box<dyn Engine>, Version);
+
 /// The engines that were named, or all that are there; one that was named and is absent is an error.
-pub(super) fn engines_present(names: &[String], site: &Site) -> Result<Vec<(Box<dyn Engine>, Version)>, Diagnostic> {
+pub(super) fn engines_present(names: &[String], site: &Site) -> Result<Vec<Present>, Diagnostic> {
     known_engines(names)?;
     let mut present = vec![];
     for engine in engines::all() {

@@ -1,8 +1,8 @@
 //! The command line: arguments, what each command does with them, and its exit code.
 
 mod accept;
-mod cache;
 mod bench;
+mod cache;
 pub(crate) mod diagnostic;
 mod diff;
 mod history;

@@ -13,7 +13,7 @@ use crate::reading::MeterId;
 
 pub(crate) const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
 pub(super) const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
-pub(super) const S1_INDIRECT_LX: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
+pub(crate) const S1_INDIRECT_LX: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
 /// Indirect light cut at seven reflections.
 pub(super) const S1_SEVEN_LX: [f64; 4] = [0.93537, 1.14730, 1.14730, 1.41182];
 

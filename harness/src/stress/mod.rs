@@ -256,7 +256,7 @@ impl Bench<'_> {
         let id = subject.engine.id();
         let mut settings = settings_of(self.case, id.name());
         match (id.name(), self.options.coordinates) {
-            ("simulator", _) => drop(settings.insert("relative_error".into(), self.own_accuracy(job).into())),
+            ("simulator", _) => drop(settings.insert("relative_error".into(), Self::own_accuracy(job).into())),
             (_, Coordinates::Fitted) => {}
             (name, Coordinates::Raw) => {
                 let key = if name == "radiance" { "rescale" } else { "recentre" };
@@ -272,12 +272,12 @@ impl Bench<'_> {
     fn witness(&self, point: &Point, job: &Job, place: Option<Place>) -> Option<Outcome> {
         let engine = crate::engines::all().into_iter().find(|e| e.id().name() == "simulator")?;
         let subject = Subject { engine, version: env!("CARGO_PKG_VERSION").to_owned() };
-        let settings = BTreeMap::from([("relative_error".to_owned(), (0.1 * self.own_accuracy(job)).into())]);
+        let settings = BTreeMap::from([("relative_error".to_owned(), (0.1 * Self::own_accuracy(job)).into())]);
         self.take(&subject, point, job, place, (settings, self.options.seed))
     }
 
     /// How fine the simulator works: much finer than what is looked for, where its fast solvers reach that.
-    fn own_accuracy(&self, job: &Job) -> f64 {
+    fn own_accuracy(job: &Job) -> f64 {
         let points = job.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
         if points && job.scene.obstacles.is_empty() { 1e-4 } else { 5e-3 }
     }

@@ -24,7 +24,7 @@ impl StressReport {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let mut text = format!("## {}\n\n{}", self.case, line(&head));
         text.push_str(&line(&vec!["---".to_owned(); head.len()]));
-        rows.iter().for_each(|row| text.push_str(&line(row)));
+        text.extend(rows.iter().map(|row| line(row)));
         format!("{text}\n{LEGEND}\n\n{}", self.remarks("- "))
     }
 
@@ -40,7 +40,7 @@ impl StressReport {
             }
             seen.push(&law.law);
             let of = |engine: &&String| {
-                self.laws.iter().find(|l| l.law == law.law && l.engine == **engine).map_or("".to_owned(), cell)
+                self.laws.iter().find(|l| l.law == law.law && l.engine == **engine).map_or(String::new(), cell)
             };
             let mut row = vec![law.law.clone(), law.unit.to_owned()];
             row.extend(engines.iter().map(of));

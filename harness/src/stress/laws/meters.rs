@@ -77,6 +77,7 @@ fn stations(meters: &[Meter]) -> Vec<Station> {
 }
 
 fn at(job: &Job, meters: &[(DVec3, DVec3)]) -> Option<Variant> {
+    job.scene.room?;
     let mut job = job.clone();
     let meters: Vec<Meter> = meters.iter().map(|&(position_m, normal)| Meter { position_m, normal }).collect();
     job.stations = stations(&meters);

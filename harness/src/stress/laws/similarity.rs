@@ -216,7 +216,7 @@ fn moved(job: &Job, by_m: DVec3) -> Job {
 /// An empty convex room stands in the way of no direct light: without it, everything can be moved.
 fn translated(job: &Job, distance_m: f64) -> Option<Variant> {
     let mut moved = moved(job, DVec3::splat(distance_m));
-    moved.scene.room = None;
+    moved.scene.room.take()?;
     Some(same(moved))
 }
 
