@@ -22,7 +22,7 @@ function program() {
 export async function start() {
   const browser = await chromium.launch({ executablePath: program(), args: FLAGS });
   const open = async (file, { width, colorScheme = "light", scale = 1, height = 900 }) => {
-    const context = await browser.newContext({ viewport: { width, height }, colorScheme, deviceScaleFactor: scale, bypassCSP: true });
+    const context = await browser.newContext({ viewport: { width, height }, colorScheme, deviceScaleFactor: scale });
     const page = await context.newPage();
     const troubles = [];
     page.on("console", (message) => { if (["error", "warning"].includes(message.type())) troubles.push(message.text()); });

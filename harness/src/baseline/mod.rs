@@ -129,29 +129,31 @@ pub enum BaselineError {
 
 /// Settings that tell of effort, chance and paths: they differ between runs of one instrument with one method. Whatever an
 /// engine sets besides counts, so that a setting nobody thought of is refused rather than overlooked.
-const EFFORT: [&str; 14] = [
+const EFFORT: [&str; 11] = [
     "ambient_divisions",
     "arguments",
     "blocks",
     "calibration",
     "command",
     "count_first_reflection",
-    "indirect_blocks",
-    "indirect_samples_a_meter_and_block",
     "looks",
     "rounds",
     "rtrace",
-    "samples",
     "seed",
     "seeds",
 ];
+
+/// Whether a setting tells of effort: blocks and samples are counted under several names.
+fn is_effort(key: &str) -> bool {
+    EFFORT.contains(&key) || key.ends_with("_blocks") || key.contains("samples")
+}
 
 impl Entry {
     fn of(report: &Report, recording: &RecordingSummary) -> Self {
         let mine = |r: &&crate::report::ReadingRecord| {
             r.case == recording.case && r.procedure == recording.procedure && r.engine == recording.engine
         };
-        let settings = recording.settings.iter().filter(|(key, _)| !EFFORT.contains(&key.as_str()));
+        let settings = recording.settings.iter().filter(|(key, _)| !is_effort(key));
         let whole = Recording { settings: recording.settings.clone(), ..Recording::default() };
         Self {
             case: recording.case.clone(),

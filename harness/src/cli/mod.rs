@@ -26,7 +26,7 @@ use crate::engines::{self, EngineId, InstallState, Site};
 use crate::photometry_command::{self, PhotometryArgs};
 use crate::plan::{Asked, Selection, plan};
 use crate::process;
-use crate::report::{self, Beside, Exit, Report, Style};
+use crate::report::{self, Beside, Detail, Exit, Report, Style};
 use crate::selftest::{calibrations, selftest};
 use crate::slots::Slots;
 use crate::spec::{Case, Spec, filtered, suite};
@@ -108,6 +108,23 @@ impl Selected {
     }
 }
 
+/// Which views of a report are printed, and how.
+#[derive(Debug, Args)]
+struct Views {
+    /// Views of the report to print
+    #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [Format::Terminal])]
+    format: Vec<Format>,
+    /// Tell everything on the terminal: papers' tables, methods apart from renderers, notes (as -v)
+    #[arg(long)]
+    all: bool,
+    /// Where the whole report is published, for Markdown to lead to
+    #[arg(long, value_name = "URL")]
+    link: Option<String>,
+    /// JSON of `luxproof bench` or `luxproof stress` to show with it in HTML
+    #[arg(long, value_name = "FILE")]
+    beside: Vec<PathBuf>,
+}
+
 #[derive(Debug, Args)]
 struct RunArgs {
     /// Spec files, folders of them or patterns
@@ -124,9 +141,8 @@ struct RunArgs {
     /// Hold the readings against a baseline of `luxproof accept`: a .json file, or a folder that holds one a spec
     #[arg(long, value_name = "FILE|DIR")]
     baseline: Option<PathBuf>,
-    /// Views of the report to print
-    #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [Format::Terminal])]
-    format: Vec<Format>,
+    #[command(flatten)]
+    views: Views,
     /// Stop after the first case that fails; the cases left are reported as skipped
     #[arg(long)]
     fail_fast: bool,
@@ -194,12 +210,8 @@ struct ReportArgs {
     /// Print the error budget of every deviation, and nothing else
     #[arg(long)]
     budget: bool,
-    /// JSON of `luxproof bench` or `luxproof stress` to show with it in HTML
-    #[arg(long, value_name = "FILE")]
-    beside: Vec<PathBuf>,
-    /// Views of the report to print
-    #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [Format::Terminal])]
-    format: Vec<Format>,
+    #[command(flatten)]
+    views: Views,
 }
 
 #[derive(Debug, Args)]
@@ -250,6 +262,7 @@ enum Format {
     Json,
     Markdown,
     Junit,
+    Csv,
     /// One self-contained file; best sent to one with `>`
     Html,
 }
@@ -262,13 +275,19 @@ impl Cli {
             None => Site::of_user().into_diagnostic()?,
         };
         match self.command {
-            Command::Run(args) => run_specs(&args, &site, &cache::folder(self.cache_dir)?),
+            Command::Run(mut args) => {
+                args.views.all |= self.verbose > 0;
+                run_specs(&args, &site, &cache::folder(self.cache_dir)?)
+            }
             Command::Cache(args) => cache::manage(&args, &cache::folder(self.cache_dir)?),
             Command::Check(args) => check(&args, &site),
             Command::Export(args) => export(&args, &site),
             Command::Engines(args) => manage_engines(&args, &site),
             Command::Photometry(args) => photometry_command::run(&args),
-            Command::Report(args) => view(&args),
+            Command::Report(mut args) => {
+                args.views.all |= self.verbose > 0;
+                view(&args)
+            }
             Command::History(args) => history::history(&args),
             Command::Diff(args) => diff::diff(&args),
             Command::Accept(args) => accept::accept(&args),
@@ -312,14 +331,16 @@ fn print(text: &str) -> Result<(), Diagnostic> {
     }
 }
 
-fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format], beside: &[Beside]) -> Result<(), Diagnostic> {
+fn print_reports(reports: &[(Report, PathBuf)], views: &Views) -> Result<(), Diagnostic> {
+    let beside = views.beside.iter().map(|path| read_beside(path)).collect::<Result<Vec<_>, _>>()?;
+    let detail = if views.all { Detail::All } else { Detail::Brief };
     let mut out = std::io::stdout().lock();
     let style = if std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) {
         Style::Colour
     } else {
         Style::Plain
     };
-    for format in formats {
+    for format in &views.format {
         let text = match format {
             Format::Json => {
                 let all: Vec<&Report> = reports.iter().map(|(r, _)| r).collect();
@@ -330,12 +351,13 @@ fn print_reports(reports: &[(Report, PathBuf)], formats: &[Format], beside: &[Be
                 }
                 .into_diagnostic()?
             }
-            Format::Html => print_page(reports, beside),
+            Format::Html => print_page(reports, &beside),
             view => {
                 let one = |(report, folder): &(Report, PathBuf)| match view {
-                    Format::Markdown => report::markdown(report),
+                    Format::Markdown => report::markdown(report, views.link.as_deref()),
+                    Format::Csv => report::csv(report),
                     Format::Junit => report::junit(report),
-                    _ => report::terminal(report, style, Some(&folder.display().to_string())),
+                    _ => report::terminal(report, style, detail, Some(&folder.display().to_string())),
                 };
                 reports.iter().map(one).collect::<Vec<_>>().join("\n")
             }
@@ -541,11 +563,10 @@ fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
     let report: Report = serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)?;
     let folder = args.result.parent().map_or_else(PathBuf::new, Path::to_owned);
     let exit = report.exit(|_| false);
-    let beside = args.beside.iter().map(|path| read_beside(path)).collect::<Result<Vec<_>, _>>()?;
     if args.budget {
         print(&report::budgets(&report))?;
     } else {
-        print_reports(&[(report, folder)], &args.format, &beside)?;
+        print_reports(&[(report, folder)], &args.views)?;
     }
     Ok(exit)
 }

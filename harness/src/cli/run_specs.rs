@@ -89,7 +89,7 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
     if cases.len() > 1 {
         run::keep(&root.join("report.json"), &report).into_diagnostic()?;
     }
-    print_reports(&[(report, root)], &args.format, &[])?;
+    print_reports(&[(report, root)], &args.views)?;
     Ok(exit)
 }
 

@@ -2,33 +2,57 @@
 
 use quick_junit::{NonSuccessKind, Report as JUnit, TestCase, TestCaseStatus, TestSuite};
 
-use super::Report;
+use super::{RecordingSummary, Report};
 use crate::diff::{Comparison, Verdict};
+use crate::plan::Skip;
 
-/// The report as JUnit XML.
+/// The report as JUnit XML: one suite a case.
 pub fn junit(report: &Report) -> String {
     let mut junit = JUnit::new("luxproof");
-    let mut suite = TestSuite::new(report.spec.title.clone());
-    for recording in &report.recordings {
+    for case in &report.cases {
+        junit.add_test_suite(suite(report, &case.name));
+    }
+    // Writing to a string fails on no condition that a report can meet; an empty document would be noticed at once.
+    junit.to_string().unwrap_or_default()
+}
+
+fn suite(report: &Report, name: &str) -> TestSuite {
+    let mut suite = TestSuite::new(name);
+    for recording in report.recordings.iter().filter(|r| r.case == name) {
         let of_run = |c: &&Comparison| {
             c.case == recording.case && c.procedure == recording.procedure && c.engine == recording.engine
         };
         let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(of_run).collect();
         let mut case = TestCase::new(format!("{} {}", recording.procedure, recording.engine), status(&comparisons));
         case.set_classname(recording.case.clone());
-        case.set_time(std::time::Duration::from_secs_f64(recording.wall_s));
+        case.set_time(std::time::Duration::from_secs_f64(recording.wall_s.max(0.0)));
+        // What was left out of a job that ran is told with it: a job is one test case.
+        let left_out: Vec<String> = report.skips.iter().filter(|s| is_of(s, recording)).map(reason).collect();
+        if !left_out.is_empty() {
+            case.set_system_out(left_out.join("\n"));
+        }
         suite.add_test_case(case);
     }
-    for skip in &report.skips {
+    for skip in report.skips.iter().filter(|s| s.case == name) {
+        if report.recordings.iter().any(|r| is_of(skip, r)) {
+            continue;
+        }
         let mut status = TestCaseStatus::skipped();
-        status.set_message(skip.reason.clone());
+        status.set_message(reason(skip));
         let mut case = TestCase::new(format!("{} {}", skip.procedure, skip.engine), status);
         case.set_classname(skip.case.clone());
         suite.add_test_case(case);
     }
-    junit.add_test_suite(suite);
-    // Writing to a string fails on no condition that a report can meet; an empty document would be noticed at once.
-    junit.to_string().unwrap_or_default()
+    suite
+}
+
+fn is_of(skip: &Skip, recording: &RecordingSummary) -> bool {
+    skip.case == recording.case && skip.procedure == recording.procedure && skip.engine == recording.engine
+}
+
+fn reason(skip: &Skip) -> String {
+    let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
+    format!("{}{saved}", skip.reason)
 }
 
 fn status(comparisons: &[&Comparison]) -> TestCaseStatus {

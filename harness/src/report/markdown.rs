@@ -7,7 +7,9 @@ use super::terminal::{Cell, matrix, worst};
 use super::{consensus, paper, paper_split, split};
 
 /// The report as Markdown.
-pub fn markdown(report: &Report) -> String {
+///
+/// `link` leads to the whole report, where it is published.
+pub fn markdown(report: &Report, link: Option<&str>) -> String {
     let mut text = String::new();
     let s = &report.summary;
     let mut line = |l: String| {
@@ -32,10 +34,16 @@ pub fn markdown(report: &Report) -> String {
         line(format!("| {case}{} | {} | {} |", row.procedure, row.basis, cells.join(" | ")));
     }
     for grid in paper::grids(report).into_iter().chain(paper_split::grid(report)) {
-        line(format!("\n{}\n\n| {} |\n|{}", grid.title, grid.head.join(" | "), "---|".repeat(grid.head.len())));
+        line(format!(
+            "\n<details><summary>{}</summary>\n\n| {} |\n|{}",
+            grid.title,
+            grid.head.join(" | "),
+            "---|".repeat(grid.head.len())
+        ));
         for row in grid.rows {
-            line(format!("| {} |", row.join(" | ")));
+            line(format!("| {} |", row.iter().map(|c| cell(c)).collect::<Vec<_>>().join(" | ")));
         }
+        line("\n</details>".to_owned());
     }
     let splits = split::widest(report);
     if !splits.is_empty() {
@@ -74,5 +82,13 @@ pub fn markdown(report: &Report) -> String {
         let case = if report.is_suite() { format!("{} ", skip.case) } else { String::new() };
         writeln!(text, "\n- skipped: {case}{} {}: {}", skip.engine, skip.procedure, skip.reason).ok();
     }
+    if let Some(link) = link {
+        writeln!(text, "\n[The whole report]({link})").ok();
+    }
     text
+}
+
+/// Text that cannot end a cell of a table.
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|").replace('\n', " ")
 }

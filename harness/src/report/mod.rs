@@ -2,6 +2,7 @@
 
 mod budget;
 mod consensus;
+mod csv;
 mod curve;
 mod html;
 mod junit;
@@ -22,11 +23,12 @@ use crate::reading::{MeterId, Quantity, Recording};
 use crate::run::{EngineStatus, Status};
 
 pub use budget::budgets;
+pub use csv::csv;
 pub use curve::{Curve, curves};
 pub use html::{Beside, BesideError, page};
 pub use junit::junit;
 pub use markdown::markdown;
-pub use terminal::{Style, terminal};
+pub use terminal::{Detail, Style, terminal};
 
 /// Everything that is known of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -11,6 +11,9 @@ use crate::run::Status;
 
 /// More meters than this are summarised instead of listed.
 const LISTED_METERS: usize = 8;
+/// Lines of each kind, and letters of a line, that a brief report spends.
+const BRIEF: usize = 4;
+const BRIEF_WIDTH: usize = 156;
 
 /// How the report is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +22,15 @@ pub enum Style {
     Plain,
     /// With ANSI colours.
     Colour,
+}
+
+/// How much the report tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// What fits a screen: verdicts, the worst, what was skipped, where the files are.
+    Brief,
+    /// Every table and note besides.
+    All,
 }
 
 /// One row of the verdict matrix.
@@ -160,12 +172,53 @@ pub(super) fn worst(report: &Report, count: usize) -> Vec<&Comparison> {
 }
 
 /// The report as text for a terminal.
-pub fn terminal(report: &Report, style: Style, folder: Option<&str>) -> String {
+pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&str>) -> String {
     let mut text = String::new();
     let s = &report.summary;
     writeln!(text, "\nluxproof {}: {}", report.tool_version, report.spec.title).ok();
     writeln!(text, "{}\n", engines_line(report)).ok();
     writeln!(text, "{}\n", verdicts(report, style)).ok();
+    if detail == Detail::All || !report.is_suite() {
+        tables(report, style, &mut text);
+    }
+    let departures = consensus::lines(report);
+    if !departures.is_empty() {
+        writeln!(text, "Who departs from the other witnesses, the reference included").ok();
+        let most = if detail == Detail::All { usize::MAX } else { BRIEF };
+        departures
+            .iter()
+            .take(most)
+            .map(|l| shortened(l, detail))
+            .for_each(|line| writeln!(text, "  {line}").unwrap_or_default());
+        writeln!(text).ok();
+    }
+    let worst = worst(report, 5);
+    if !worst.is_empty() {
+        writeln!(text, "Worst deviations (by verdict, then deviation over tolerance)").ok();
+        for c in worst {
+            let case = if report.is_suite() { format!("{}: ", c.case) } else { String::new() };
+            writeln!(text, "  {}", shortened(&format!("{case}{}", deviation_line(c)), detail)).ok();
+        }
+        writeln!(text).ok();
+    }
+    match detail {
+        Detail::All => notes(report, &mut text),
+        Detail::Brief => brief_notes(report, &mut text),
+    }
+    writeln!(
+        text,
+        "{} passed, {} failed, {} undecided, {} known deviations, {} unexpected passes, {} missing, {} skipped in {:.1} s",
+        s.pass, s.fail, s.inconclusive, s.known_deviation, s.unexpected_pass, s.missing, s.skipped, report.wall_s
+    )
+    .ok();
+    if let Some(folder) = folder {
+        writeln!(text, "files: {folder}/report.json, readings/, scenes/<engine>/, logs/").ok();
+    }
+    text
+}
+
+/// Papers' tables, readings side by side, methods apart from renderers.
+fn tables(report: &Report, style: Style, text: &mut String) {
     for grid in paper::grids(report).into_iter().chain(paper_split::grid(report)) {
         writeln!(text, "{}\n", drawn(&grid, style)).ok();
     }
@@ -184,32 +237,6 @@ pub fn terminal(report: &Report, style: Style, folder: Option<&str>) -> String {
         }
         writeln!(text).ok();
     }
-    let departures = consensus::lines(report);
-    if !departures.is_empty() {
-        writeln!(text, "Who departs from the other witnesses, the reference included").ok();
-        departures.iter().for_each(|line| writeln!(text, "  {line}").unwrap_or_default());
-        writeln!(text).ok();
-    }
-    let worst = worst(report, 5);
-    if !worst.is_empty() {
-        writeln!(text, "Worst deviations (by verdict, then deviation over tolerance)").ok();
-        for c in worst {
-            let case = if report.is_suite() { format!("{}: ", c.case) } else { String::new() };
-            writeln!(text, "  {case}{}", deviation_line(c)).ok();
-        }
-        writeln!(text).ok();
-    }
-    notes(report, &mut text);
-    writeln!(
-        text,
-        "{} passed, {} failed, {} undecided, {} known deviations, {} unexpected passes, {} missing, {} skipped in {:.1} s",
-        s.pass, s.fail, s.inconclusive, s.known_deviation, s.unexpected_pass, s.missing, s.skipped, report.wall_s
-    )
-    .ok();
-    if let Some(folder) = folder {
-        writeln!(text, "files: {folder}/report.json, readings/, scenes/<engine>/, logs/").ok();
-    }
-    text
 }
 
 fn engines_line(report: &Report) -> String {
@@ -245,21 +272,21 @@ fn header(words: impl IntoIterator<Item = String>) -> Vec<TableCell> {
 fn verdicts(report: &Report, style: Style) -> String {
     let mut table = table();
     let engines = report.engines.iter().map(|e| e.id.clone());
-    table.set_header(header(["Verdicts".to_owned(), "against".to_owned()].into_iter().chain(engines)));
+    let heads = if report.is_suite() { &["Verdicts", "procedure", "against"][..] } else { &["Verdicts", "against"] };
+    table.set_header(header(heads.iter().map(|h| (*h).to_owned()).chain(engines)));
     let mut case = String::new();
     for row in matrix(report) {
-        if report.is_suite() && row.case != case {
-            table.add_row([TableCell::new(row.case.as_str()).add_attribute(Attribute::Bold)]);
-            case.clone_from(&row.case);
-        }
+        let first = row.case != case;
+        case.clone_from(&row.case);
         let cells = row.cells.iter().map(|cell| {
             let text = TableCell::new(cell.text());
             cell.colour().map_or(text.clone(), |colour| text.fg(colour))
         });
-        let indent = if report.is_suite() { "  " } else { "" };
-        table.add_row(
-            [TableCell::new(format!("{indent}{}", row.procedure)), TableCell::new(row.basis)].into_iter().chain(cells),
-        );
+        // A case is named once, in front of its first row.
+        let case = TableCell::new(if first { row.case.as_str() } else { "" }).add_attribute(Attribute::Bold);
+        let case = report.is_suite().then_some(case);
+        let heads = [TableCell::new(row.procedure), TableCell::new(row.basis)];
+        table.add_row(case.into_iter().chain(heads).chain(cells));
     }
     finish(table, style)
 }
@@ -368,6 +395,47 @@ fn deviation_line(c: &Comparison) -> String {
         c.meter,
         number(c.value)
     )
+}
+
+/// A line of a brief report ends at the screen's edge.
+fn shortened(line: &str, detail: Detail) -> String {
+    if detail == Detail::All || line.chars().count() <= BRIEF_WIDTH {
+        return line.to_owned();
+    }
+    line.chars().take(BRIEF_WIDTH - 1).chain(['…']).collect()
+}
+
+/// Failures and skips, those of a kind on one line, and how much more there is.
+fn brief_notes(report: &Report, text: &mut String) {
+    let mut groups: BTreeMap<String, std::collections::BTreeSet<(&str, &str)>> = BTreeMap::new();
+    for r in &report.recordings {
+        if let Some(failure) = &r.failure {
+            let line = format!("{} failed: {}", r.engine, failure.lines().next().unwrap_or_default());
+            groups.entry(line).or_default().insert((&r.case, &r.procedure));
+        }
+    }
+    for skip in &report.skips {
+        let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
+        let line = format!("skipped {}: {}{saved}", skip.engine, skip.reason);
+        groups.entry(line).or_default().insert((&skip.case, &skip.procedure));
+    }
+    for (line, jobs) in groups.iter().take(2 * BRIEF) {
+        let place = match jobs.iter().collect::<Vec<_>>()[..] {
+            [(case, procedure)] if report.is_suite() => format!("{case} {procedure}: "),
+            [(_, procedure)] => format!("{procedure}: "),
+            _ => format!("{} jobs: ", jobs.len()),
+        };
+        writeln!(text, "  {}", shortened(&format!("{place}{line}"), Detail::Brief)).ok();
+    }
+    let more = groups.len().saturating_sub(2 * BRIEF);
+    let notes: usize = report.recordings.iter().map(|r| r.notes.len() + usize::from(r.approximation.is_some())).sum();
+    let counts =
+        [(more, "more skips"), (notes, "notes and approximations"), (report.published.len(), "published tables")];
+    let counts: Vec<String> = counts.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+    if !counts.is_empty() {
+        writeln!(text, "  {}: --all", counts.join(", ")).ok();
+    }
+    writeln!(text).ok();
 }
 
 fn notes(report: &Report, text: &mut String) {

@@ -57,8 +57,8 @@ fn drawn(cell: &Cell, [case, procedure, basis, engine]: [&str; 4]) -> Markup {
         Cell::Empty => html! { td.quiet { "–" } },
         Cell::Judged { verdict, having, of, deviation } => html! {
             td class={ "v-" (class(*verdict)) } {
-                button.open type="button" data-case=(case) data-procedure=(procedure) data-basis=(basis) data-engine=(engine)
-                    aria-label={ (engine) ", " (title(procedure)) " against " (basis) ": " (having) " of " (of) " " (verdict_name(*verdict)) } {
+                button.open type="button" data-case=(case) data-procedure=(procedure) data-basis=(basis) data-engine=(engine){
+                    span.unseen { (engine) ", " (title(procedure)) " against " (basis) ": " (verdict_name(*verdict)) " " }
                     span.glyph aria-hidden="true" { (glyph(*verdict)) } " "
                     span.count { @if having == of { (of) } @else { (having) "/" (of) } }
                     @if let Some(deviation) = deviation { span.most { (percent(*deviation)) } }

@@ -107,8 +107,8 @@ fn panel(report: &Report, procedure: &str, curves: &[&BenchCurve], palette: &Pal
         (text("axis", "middle", [LEFT + 0.5 * width, TOP + PLOT + 31.0], "run time [s]"))
         text.axis text-anchor="middle" transform={ "translate(11 " (TOP + 0.5 * PLOT) ") rotate(-90)" } { "largest deviation [%]" }
         @for curve in curves { (drawn(curve, palette, &place)) }
-        @for point in &points { g.ring { title { (point.words) } (palette.mark(&point.engine, place(point.wall_s, point.error), 4.4)) } }
         @for (engine, [x, y]) in &labels { (text("direct halo", if *x > LEFT + 0.7 * width { "end" } else { "start" }, [if *x > LEFT + 0.7 * width { x - 8.0 } else { x + 8.0 }, y + 4.0], engine)) }
+        @for point in &points { g.ring { title { (point.words) } (palette.mark(&point.engine, place(point.wall_s, point.error), 4.4)) } }
     };
     let floor = points.iter().any(|p| p.error < LEAST_ERROR);
     let caption = html! {
