@@ -59,7 +59,7 @@ fn checkout(folder: &Path) {
     fs::create_dir(&bin).unwrap();
     symlink(env!("CARGO_BIN_EXE_luxproof"), bin.join("luxproof")).unwrap();
     let cargo = format!(
-        "#!/bin/sh\n[ \"$*\" = 'install --locked --path harness' ] || exit 2\nexec {} build --locked --quiet --manifest-path {}/harness/Cargo.toml\n",
+        "#!/bin/sh\n[ \"$*\" = 'install --locked --path harness' ] || exit 2\ncd {1} && exec {0} build --locked --quiet --bin luxproof\n",
         env!("CARGO"),
         root().display()
     );
@@ -102,9 +102,7 @@ fn every_command_of_the_guide_runs() {
     }
     assert!(count >= 20, "only {count} commands were found");
     // What the pages say is there, is there.
-    for file in
-        ["cie-5.2/report.html", "cie-5.3/report.csv", "cie-5.3/junit.xml", "spec.schema.json", "try/site/index.html"]
-    {
+    for file in ["cie-5.2/report.html", "cie-5.3/junit.xml", "spec.schema.json", "try/site/index.html"] {
         let length = fs::metadata(folder.path().join("luxproof-out").join(file)).map(|m| m.len());
         assert!(length.is_ok_and(|l| l > 100), "{file}");
     }
