@@ -30,8 +30,9 @@ const MOST: f64 = 4.0;
 /// One night alone is no change: it takes a sum no further than this share of its limit.
 const ONE_NIGHT: f64 = 0.9;
 
-/// Changes of one engine and procedure dated so close together are one change seen several times.
-const SAME_CHANGE: usize = 3;
+/// What a part of a group shows so few nights before the group, or so many after it and in the same direction, is the group's
+/// change: a single series needs longer to show it.
+const SAME_CHANGE: (usize, usize) = (3, 21);
 
 /// The smallest standard error, relative to the reference: for engines that state none. A change far below any tolerance is one still.
 const SMALLEST_ERROR: f64 = 1e-6;
@@ -97,9 +98,12 @@ pub struct Part {
 pub fn changes(history: &History) -> Vec<Change> {
     let mut found: Vec<Change> = vec![];
     for change in Level::ALL.into_iter().flat_map(|level| at_level(history, level)) {
+        let (before, after) = SAME_CHANGE;
         let same = |c: &&mut Change| {
+            let after = if c.level < change.level { after } else { before };
             (&c.engine, &c.procedure) == (&change.engine, &change.procedure)
-                && c.night.abs_diff(change.night) <= SAME_CHANGE
+                && (c.night..=c.night + before + after).contains(&(change.night + before))
+                && (c.standard_errors > 0.0) == (change.standard_errors > 0.0)
         };
         match found.iter_mut().find(same) {
             Some(wider) => wider.seen_in.push(change.part),

@@ -106,7 +106,7 @@ fn changed(history: &History, changes: &[Change]) -> Markup {
                     tbody {
                         @for change in changes.iter().rev() {
                             tr {
-                                td { (history.nights[change.night]) } td { (history.nights[change.noticed]) }
+                                td.date { (history.nights[change.night]) } td.date { (history.nights[change.noticed]) }
                                 td { (change.engine) } td { (change.procedure) } td { (place(change)) }
                                 td.number { (percent(change.relative)) }
                                 td.number { (format!("{:+.1}", change.standard_errors)) }
@@ -166,7 +166,7 @@ mod tests {
         let history = nights(Some(Shift { night: 40, standard_errors: 4.0, cases: 2, meters: 4 }));
         let page = site(&history, &[("suite".to_owned(), "suite/report.html".to_owned())]);
         let date = &history.nights[40];
-        assert!(page.contains(&format!("<td>{date}</td>")), "no row for {date}");
+        assert!(page.contains(&format!("<td class=\"date\">{date}</td>")), "no row for {date}");
         assert!(page.contains("1.1 (was 1.0)"));
         assert!(page.contains("href=\"suite/report.html\""));
         let figure =

@@ -59,7 +59,7 @@ pub(super) fn figure(history: &History, engine: &str, procedure: &str, changes: 
                 }
                 figcaption id={ (id) "-caption" } {
                     "Mean deviation of " (members.len()) " comparisons, last " (percent(*last)) ". "
-                    @if mine.is_empty() { "No change." }
+                    @if mine.is_empty() { "No change. " }
                     @for change in &mine {
                         "Change on " (history.nights[change.night]) " by " (percent(change.relative)) ". "
                     }
@@ -79,7 +79,8 @@ pub(super) fn percent(relative: f64) -> String {
     let percent = 100.0 * relative;
     match percent.abs() {
         a if a == 0.0 => "0 %".to_owned(),
-        a if a < 0.001 => format!("{percent:+.0e} %"),
+        a if a < 1e-3 => format!("{percent:+.1e} %"),
+        a if a < 0.1 => format!("{percent:+.4} %"),
         a if a < 1.0 => format!("{percent:+.3} %"),
         _ => format!("{percent:+.1} %"),
     }
@@ -97,7 +98,7 @@ impl Frame {
         let finite = || values.iter().copied().filter(|v| v.is_finite());
         let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
         // Zero is in sight where it is near; what repeats exactly lies in the middle.
-        let margin = (0.15 * (high - low)).max(1e-3 * high.abs().max(low.abs())).max(1e-9);
+        let margin = (0.15 * (high - low)).max(0.05 * high.abs().max(low.abs())).max(1e-9);
         Self { nights: values.len(), low: low - margin, high: high + margin }
     }
 
