@@ -30,9 +30,11 @@ const MOST: f64 = 4.0;
 /// One night alone is no change: it takes a sum no further than this share of its limit.
 const ONE_NIGHT: f64 = 0.9;
 
-/// What a part of a group shows so few nights before the group, or so many after it and in the same direction, is the group's
-/// change: a single series needs longer to show it.
-const SAME_CHANGE: (usize, usize) = (3, 21);
+/// Changes in the same direction of one engine and procedure dated so close together are one change seen several times ...
+const SAME_CHANGE: usize = 3;
+
+/// ... and what a single comparison shows so many nights after its group: it needs longer.
+const SAME_CHANGE_OF_ONE: usize = 21;
 
 /// The smallest standard error, relative to the reference: for engines that state none. A change far below any tolerance is one still.
 const SMALLEST_ERROR: f64 = 1e-6;
@@ -98,11 +100,11 @@ pub struct Part {
 pub fn changes(history: &History) -> Vec<Change> {
     let mut found: Vec<Change> = vec![];
     for change in Level::ALL.into_iter().flat_map(|level| at_level(history, level)) {
-        let (before, after) = SAME_CHANGE;
         let same = |c: &&mut Change| {
-            let after = if c.level < change.level { after } else { before };
+            let is_one_of_it = change.level == Level::Comparison && c.level < Level::Comparison;
+            let after = if is_one_of_it { SAME_CHANGE_OF_ONE } else { SAME_CHANGE };
             (&c.engine, &c.procedure) == (&change.engine, &change.procedure)
-                && (c.night..=c.night + before + after).contains(&(change.night + before))
+                && (c.night..=c.night + SAME_CHANGE + after).contains(&(change.night + SAME_CHANGE))
                 && (c.standard_errors > 0.0) == (change.standard_errors > 0.0)
         };
         match found.iter_mut().find(same) {
