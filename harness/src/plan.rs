@@ -1,7 +1,10 @@
 //! The plan: which engine runs which procedure of a case, what is skipped, and why.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+mod roster;
+mod shortcut;
+mod spot_check;
+
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,9 +12,14 @@ use serde::{Deserialize, Serialize};
 use crate::engines::{Absent, Engine, EngineId, Job, Site, Station, Support, Version};
 use crate::procedures::{self, Task};
 use crate::reading::MeterId;
-use crate::spec::{Case, SpecError, nearest};
+use crate::spec::{Budget, Case, SpecError, nearest};
+use luminaire::scene::Transport;
 
-/// What is to be done for one case. Runs + skips = procedures x engines, always.
+use roster::Roster;
+use shortcut::Repeated;
+pub use shortcut::{Fill, Omission, Shortcut};
+
+/// What is to be done for one case. Runs + skips of whole procedures or engines = procedures x engines, always.
 pub struct Plan {
     /// The procedures' tasks, in order.
     pub tasks: Vec<Task>,
@@ -25,12 +33,24 @@ pub struct Plan {
 
 /// An engine of the plan.
 pub struct Planned {
-    /// The engine.
-    pub engine: Box<dyn Engine>,
-    /// Whether it is there.
-    pub found: Result<Version, Absent>,
+    /// The engine; one that knows itself by now is shared by all cases.
+    pub engine: Arc<dyn Engine>,
+    /// Whether it is there; `None`: it has nothing to do here and was not asked.
+    pub found: Option<Result<Version, Absent>>,
     /// Why it takes part.
     pub asked: Asked,
+}
+
+impl Planned {
+    /// The engine's version, where it is there.
+    pub fn version(&self) -> Option<String> {
+        self.found.as_ref()?.as_ref().ok().map(|v| v.0.clone())
+    }
+
+    /// Whether it was looked for in vain.
+    pub fn is_absent(&self) -> bool {
+        matches!(self.found, Some(Err(_)))
+    }
 }
 
 /// Why an engine takes part.
@@ -54,6 +74,12 @@ pub struct Run {
     pub job: Job,
     /// Where the engine only approximates what is asked.
     pub approximation: Option<String>,
+    /// How much that is, relative, where it is known.
+    pub declared: f64,
+    /// The least that has to be rendered for it.
+    pub shortcut: Shortcut,
+    /// Stations that are rendered all the same, to be held against what the shortcut says.
+    pub spot_check: Vec<usize>,
 }
 
 /// Something that is not run, with its reason.
@@ -87,6 +113,13 @@ pub enum Scope {
     LightPath,
 }
 
+impl Scope {
+    /// Whether nothing is read; where single meters or light paths are left out, their readings follow from others.
+    pub const fn leaves_no_reading(self) -> bool {
+        matches!(self, Self::Engine | Self::Procedure)
+    }
+}
+
 /// What the user chose on the command line.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
@@ -108,43 +141,167 @@ impl Plan {
     }
 }
 
-/// Plans a case.
+/// Plans one case by itself, with all shortcuts.
 pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, SpecError> {
-    let tasks = tasks(case, selection)?;
-    let engines = engines(case, selection, site)?;
-    let (mut runs, mut skips) = (vec![], vec![]);
-    for (e, planned) in engines.iter().enumerate() {
-        for (t, task) in tasks.iter().enumerate() {
-            let job = job(case, &planned.engine.id(), task, selection.seed);
-            let skip = |scope, reason: String, saved: Option<&str>| Skip {
-                case: case.name.clone(),
-                procedure: task.procedure.to_owned(),
-                engine: planned.engine.id().name().to_owned(),
-                scope,
-                reason,
-                saved: saved.map(str::to_owned),
-            };
-            if let Err(absent) = &planned.found {
-                skips.push(skip(Scope::Engine, absent.to_string(), None));
-                continue;
-            }
-            if case.only_engines.as_ref().is_some_and(|own| !own.iter().any(|o| o == planned.engine.id().name()))
-                && !REFERENCES.contains(&planned.engine.id().name())
-            {
-                skips.push(skip(Scope::Engine, "the case is not for this engine".into(), Some("the whole run")));
-                continue;
-            }
-            match planned.engine.supports(&job) {
-                Support::Yes => runs.push(Run { engine: e, task: t, job, approximation: None }),
-                Support::Approximate { why, size } => {
-                    let size = size.map(|s| format!(" (about {:.1} %)", 100.0 * s)).unwrap_or_default();
-                    runs.push(Run { engine: e, task: t, job, approximation: Some(format!("{why}{size}")) });
+    Planner::new(selection, site, Skipping::Allowed).plan(case)
+}
+
+/// Whether readings may be left out that follow from others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Skipping {
+    /// They may.
+    Allowed,
+    /// Everything is rendered.
+    Nothing,
+}
+
+/// Plans the cases of a run one after the other: it remembers which engines are there and which jobs there were.
+pub struct Planner<'a> {
+    selection: &'a Selection,
+    site: &'a Site,
+    skipping: Skipping,
+    roster: Roster,
+    repeated: Repeated,
+}
+
+impl<'a> Planner<'a> {
+    /// A planner that has seen no case yet.
+    pub fn new(selection: &'a Selection, site: &'a Site, skipping: Skipping) -> Self {
+        Self { selection, site, skipping, roster: Roster::new(), repeated: Repeated::default() }
+    }
+
+    /// Plans the next case.
+    pub fn plan(&mut self, case: &Case) -> Result<Plan, SpecError> {
+        let tasks = tasks(case, self.selection)?;
+        let chosen = self.roster.chosen(case, self.selection)?;
+        let offers: Vec<Vec<Offer>> =
+            chosen.iter().map(|(engine, _)| self.offers(case, engine.as_ref(), &tasks)).collect();
+        // Who has nothing to do is not even asked for a version.
+        let busy = |e: &usize| offers[*e].iter().any(|o| matches!(o, Offer::Run(_)));
+        let busy: Vec<usize> = (0..chosen.len()).filter(busy).collect();
+        let engines: Vec<Arc<dyn Engine>> = busy.iter().map(|e| Arc::clone(&chosen[*e].0)).collect();
+        let mut found: Vec<Option<Result<Version, Absent>>> = vec![None; chosen.len()];
+        for (e, answer) in busy.into_iter().zip(self.roster.probe(&engines, self.site)) {
+            found[e] = Some(answer);
+        }
+        let mut plan = Plan { tasks, engines: vec![], runs: vec![], skips: vec![] };
+        for (e, ((engine, asked), (found, offers))) in chosen.into_iter().zip(found.into_iter().zip(offers)).enumerate()
+        {
+            let absence = found.as_ref().and_then(|f| f.as_ref().err()).map(ToString::to_string);
+            for (task, offer) in plan.tasks.iter().zip(offers) {
+                let skip = |scope, reason, saved| skip(case, task, engine.as_ref(), (scope, reason, saved));
+                match (&absence, offer) {
+                    (Some(absent), _) => plan.skips.push(skip(Scope::Engine, absent.clone(), None)),
+                    (None, Offer::Skip(scope, reason)) => {
+                        plan.skips.push(skip(scope, reason, Some("the whole run".to_owned())));
+                    }
+                    (None, Offer::Run(run)) => plan.runs.push(Run { engine: e, ..*run }),
                 }
-                Support::No(reason) => skips.push(skip(Scope::Procedure, reason, Some("the whole run"))),
+            }
+            plan.engines.push(Planned { engine, found, asked });
+        }
+        if self.skipping == Skipping::Allowed {
+            self.shorten(case, &mut plan);
+        }
+        Ok(plan)
+    }
+
+    /// What an engine makes of each task, from the job alone.
+    fn offers(&self, case: &Case, engine: &dyn Engine, tasks: &[Task]) -> Vec<Offer> {
+        let id = engine.id();
+        let is_left_out = case.only_engines.as_ref().is_some_and(|own| !own.iter().any(|o| o == id.name()))
+            && !REFERENCES.contains(&id.name());
+        let offer = |(t, task): (usize, &Task)| {
+            if is_left_out {
+                return Offer::Skip(Scope::Engine, "the case is not for this engine".into());
+            }
+            let job = job(case, &id, task, self.selection.seed);
+            let (approximation, declared) = match engine.supports(&job) {
+                Support::Yes => (None, 0.0),
+                Support::Approximate { why, size } => {
+                    let text = size.map(|s| format!(" (about {:.1} %)", 100.0 * s)).unwrap_or_default();
+                    (Some(format!("{why}{text}")), size.unwrap_or(0.0))
+                }
+                Support::No(reason) => return Offer::Skip(Scope::Procedure, reason),
+            };
+            let shortcut = Shortcut::none(&job);
+            Offer::Run(Box::new(Run { engine: 0, task: t, job, approximation, declared, shortcut, spot_check: vec![] }))
+        };
+        tasks.iter().enumerate().map(offer).collect()
+    }
+
+    /// Finds the shortcuts of a plan, writes them among its skips and draws what is rendered all the same.
+    fn shorten(&mut self, case: &Case, plan: &mut Plan) {
+        for run in &mut plan.runs {
+            let planned = &plan.engines[run.engine];
+            if planned.asked != Asked::AsReference && !REFERENCES.contains(&planned.engine.id().name()) {
+                run.shortcut = Shortcut::of(&run.job);
+            }
+            self.repeated.shorten(&mut run.shortcut, planned.engine.as_ref());
+            let all_s = cost_s(planned.engine.as_ref(), case.budget);
+            for omission in &run.shortcut.omissions {
+                let saved = format!(
+                    "{:.0} % of the run, at most about {:.0} s",
+                    100.0 * omission.share,
+                    omission.share * all_s
+                );
+                let what = (omission.scope, omission.reason.clone(), Some(saved));
+                plan.skips.push(skip(case, &plan.tasks[run.task], planned.engine.as_ref(), what));
             }
         }
+        plan.skips.extend(facts(case, &plan.tasks));
+        let engines = &plan.engines;
+        let is_witness = |run: &Run| REFERENCES.contains(&engines[run.engine].engine.id().name());
+        spot_check::draw(&mut plan.runs, is_witness, self.selection.seed);
     }
-    Ok(Plan { tasks, engines, runs, skips })
+}
+
+/// What no engine does in a case, whatever its shortcuts.
+fn facts(case: &Case, tasks: &[Task]) -> Vec<Skip> {
+    let fact = |task: &Task, engine: &str, reason: &str| Skip {
+        case: case.name.clone(),
+        procedure: task.procedure.to_owned(),
+        engine: engine.to_owned(),
+        scope: Scope::LightPath,
+        reason: reason.to_owned(),
+        saved: None,
+    };
+    let direct = tasks.iter().filter(|t| t.transport == Transport::Direct && t.scene.room.is_some());
+    let of = |task: &Task| {
+        let mut found = vec![fact(task, EVERYONE, "direct light only: no reflection is followed")];
+        if task.scene.obstacles.is_empty() {
+            let reason = "the room is empty and convex, nothing hides a luminaire: no visibility is tested";
+            found.push(fact(task, REFERENCES[0], reason));
+        }
+        found
+    };
+    direct.flat_map(of).collect()
+}
+
+/// Stands for all engines in what is skipped by definition.
+const EVERYONE: &str = "all";
+
+/// What an engine makes of a task.
+enum Offer {
+    Run(Box<Run>),
+    Skip(Scope, String),
+}
+
+/// What a run of a whole job may cost, in seconds: the budget for renderers, next to nothing for our own solvers.
+pub fn cost_s(engine: &dyn Engine, budget: Budget) -> f64 {
+    if REFERENCES.contains(&engine.id().name()) { budget.seconds.min(1.0) } else { budget.seconds }
+}
+
+fn skip(case: &Case, task: &Task, engine: &dyn Engine, what: (Scope, String, Option<String>)) -> Skip {
+    let (scope, reason, saved) = what;
+    Skip {
+        case: case.name.clone(),
+        procedure: task.procedure.to_owned(),
+        engine: engine.id().name().to_owned(),
+        scope,
+        reason,
+        saved,
+    }
 }
 
 impl Selection {
@@ -172,53 +329,6 @@ fn tasks(case: &Case, selection: &Selection) -> Result<Vec<Task>, SpecError> {
         return Err(case.source.error_at("procedures", message, "choose one that is, or leave the option out"));
     }
     Ok(tasks)
-}
-
-fn engines(case: &Case, selection: &Selection, site: &Site) -> Result<Vec<Planned>, SpecError> {
-    let mut all = crate::engines::all();
-    let built_in = names(&all);
-    let in_spec: Vec<&String> = case.engines.iter().flat_map(BTreeMap::keys).collect();
-    for (name, settings) in case.engines.iter().flatten().filter(|(name, _)| !built_in.contains(*name)) {
-        if !settings.0.contains_key("command") {
-            let mut error = unknown("engine", name, built_in.iter().map(String::as_str), "");
-            let place = case.source.error_at(&format!("engines.{name}"), "", "");
-            error = SpecError { file: place.file, line: place.line, column: place.column, ..error };
-            error.help = error.help.map(|h| format!("{h} A program of your own needs `command: [...]`"));
-            return Err(error);
-        }
-        // The parent of a bare file name is empty, which is no folder.
-        let folder = case.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let engine = crate::engines::external(name, &settings.0, folder).map_err(|error| {
-            let help = "give `command: [program, arguments...]`, paths relative to the spec";
-            case.source.error_at(&format!("engines.{name}"), error.to_string(), help)
-        })?;
-        all.push(engine);
-    }
-    let ids = names(&all);
-    for name in &selection.engines {
-        if !ids.contains(name) {
-            return Err(unknown("engine", name, ids.iter().map(String::as_str), "--engines"));
-        }
-    }
-    let asked = |id: &str| {
-        if selection.engines.iter().any(|n| n == id) {
-            Some(Asked::ByName)
-        } else if REFERENCES.contains(&id) {
-            Some(Asked::AsReference)
-        } else if !selection.engines.is_empty() {
-            None
-        } else if case.engines.is_none() {
-            Some(Asked::ByDefault)
-        } else {
-            in_spec.iter().any(|n| *n == id).then_some(Asked::ByName)
-        }
-    };
-    let chosen = all.into_iter().filter_map(|engine| asked(engine.id().name()).map(|asked| (engine, asked)));
-    Ok(chosen.map(|(engine, asked)| Planned { found: engine.probe(site), engine, asked }).collect())
-}
-
-fn names(engines: &[Box<dyn Engine>]) -> Vec<String> {
-    engines.iter().map(|e| e.id().name().to_owned()).collect()
 }
 
 fn job(case: &Case, engine: &EngineId, task: &Task, seed: u64) -> Job {

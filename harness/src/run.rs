@@ -179,7 +179,7 @@ fn measure(
     progress.started(engine.name(), task.procedure);
     let start = Instant::now();
     let taken = match instrument {
-        Ok(_) => reader.read(planned, &run.job, task.procedure),
+        Ok(_) => answer(planned, run, reader, task.procedure),
         // An instrument that reads known scenes wrong reads nothing.
         Err(reason) => Err(EngineError::Solver { engine: engine.clone(), what: reason.clone() }),
     };
@@ -198,6 +198,33 @@ fn measure(
     let wall = Duration::from_secs_f64(recording.wall_s);
     progress.ended(&recording.engine, task.procedure, wall, recording.failure.as_deref());
     Done::Recorded(Box::new(recording), source)
+}
+
+/// What an engine answers to a run: it renders what the shortcut leaves, the rest follows, and the spot check must agree.
+fn answer(planned: &Planned, run: &Run, reader: &Reader, place: &str) -> Result<Taken, EngineError> {
+    let shortcut = &run.shortcut;
+    let rendered = if shortcut.job.stations.is_empty() {
+        Taken { measurement: Measurement::default(), wall_s: 0.0, source: Source::Nobody }
+    } else {
+        reader.read(planned, &shortcut.job, place)?
+    };
+    let mut taken = Taken { measurement: shortcut.complete(rendered.measurement, &run.job), ..rendered };
+    if let Some(job) = run.spot_check_job() {
+        let seen = reader.read(planned, &job, &format!("{place}-spot-check"))?;
+        let failed = |what| EngineError::Solver { engine: planned.engine.id(), what };
+        run.hold(&taken.measurement, &seen.measurement).map_err(failed)?;
+        taken.wall_s += seen.wall_s;
+        // What was rendered stands.
+        for (&station, estimate) in run.spot_check.iter().zip(seen.measurement.estimates) {
+            taken.measurement.estimates[station] = estimate;
+        }
+        let names: Vec<String> = job.stations.iter().map(|s| s.id.to_string()).collect();
+        taken.measurement.settings.insert("spot_checked".to_owned(), names.join(", "));
+        if taken.source == Source::Nobody {
+            taken.source = seen.source;
+        }
+    }
+    Ok(taken)
 }
 
 /// The readings' files, written as each job finishes, so that an interruption loses only what was under way.
@@ -243,7 +270,9 @@ pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcom
 fn instrument(plan: &Plan, e: usize, options: &Options, progress: &dyn Progress) -> Result<Option<Calibrated>, String> {
     let planned = &plan.engines[e];
     let id = planned.engine.id();
-    let (Ok(version), Some(run)) = (&planned.found, plan.runs.iter().find(|r| r.engine == e)) else { return Ok(None) };
+    let (Some(Ok(version)), Some(run)) = (&planned.found, plan.runs.iter().find(|r| r.engine == e)) else {
+        return Ok(None);
+    };
     if REFERENCES.contains(&id.name()) {
         return Ok(None);
     }
@@ -294,7 +323,7 @@ fn record(
         case: case.name.clone(),
         procedure: task.procedure.to_owned(),
         engine: engine.name().to_owned(),
-        version: planned.found.as_ref().map(|v| v.0.clone()).unwrap_or_default(),
+        version: planned.version().unwrap_or_default(),
         model: task.model(),
         light: task.light(),
         input_sha256: case.sha256.clone(),
@@ -327,14 +356,15 @@ fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
     let mine: Vec<&Recording> = recordings.iter().filter(|r| r.engine == id.name()).collect();
     let failures: Vec<&str> = mine.iter().filter_map(|r| r.failure.as_deref()).collect();
     let (status, reason) = match &planned.found {
-        Err(absent) => (Status::Absent, Some(absent.to_string())),
-        Ok(_) if !failures.is_empty() => (Status::Failed, Some(failures.join("; "))),
-        Ok(_) if mine.is_empty() => (Status::Skipped, Some("it supports nothing that was asked".to_owned())),
-        Ok(_) => (Status::Ran, None),
+        Some(Err(absent)) => (Status::Absent, Some(absent.to_string())),
+        Some(Ok(_)) if !failures.is_empty() => (Status::Failed, Some(failures.join("; "))),
+        None => (Status::Skipped, Some("it supports nothing that was asked: not started".to_owned())),
+        Some(Ok(_)) if mine.is_empty() => (Status::Skipped, Some("it declined all that was asked".to_owned())),
+        Some(Ok(_)) => (Status::Ran, None),
     };
     EngineStatus {
         id: id.name().to_owned(),
-        version: planned.found.as_ref().ok().map(|v| v.0.clone()),
+        version: planned.version(),
         status,
         reason,
         wall_s: mine.iter().map(|r| r.wall_s).sum(),

@@ -24,7 +24,7 @@ use crate::doctor;
 use crate::engines::calibration::{self, Calibrated, Earlier};
 use crate::engines::{self, EngineId, InstallState, Site};
 use crate::photometry_command::{self, PhotometryArgs};
-use crate::plan::{Asked, Selection, plan};
+use crate::plan::{Asked, Planner, Selection, Skipping, cost_s, plan};
 use crate::process;
 use crate::report::{self, Beside, Detail, Exit, Report, Style};
 use crate::selftest::{calibrations, selftest};
@@ -100,9 +100,16 @@ struct Selected {
     /// Seed of every random choice
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Render everything, also what follows from other readings
+    #[arg(long)]
+    no_skips: bool,
 }
 
 impl Selected {
+    fn skipping(&self) -> Skipping {
+        if self.no_skips { Skipping::Nothing } else { Skipping::Allowed }
+    }
+
     fn selection(&self) -> Selection {
         Selection { engines: self.engines.clone(), procedures: self.procedures.clone(), seed: self.seed }
     }
@@ -390,8 +397,10 @@ fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
     Tables::read(&cases)?;
     let mut out = std::io::stdout().lock();
     let mut exit = Exit::Passed;
+    let selection = args.selected.selection();
+    let mut planner = Planner::new(&selection, site, args.selected.skipping());
     for case in &cases {
-        let plan = plan(case, &args.selected.selection(), site).map_err(diagnose)?;
+        let plan = planner.plan(case).map_err(diagnose)?;
         writeln!(out, "{} ({}): {}", case.name, case.path.display(), case.title).into_diagnostic()?;
         for task in &plan.tasks {
             writeln!(out, "  {} at {} meters", task.procedure, task.targets.len()).into_diagnostic()?;
@@ -402,27 +411,24 @@ fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
                     out,
                     "    run  {:<10} at most about {:.0} s{note}",
                     engine.engine.id(),
-                    cost(&case.budget, engine)
+                    left(run) * cost_s(engine.engine.as_ref(), case.budget)
                 )
                 .into_diagnostic()?;
             }
             for skip in plan.skips.iter().filter(|s| s.procedure == task.procedure) {
-                writeln!(out, "    skip {:<10} {}", skip.engine, skip.reason).into_diagnostic()?;
+                let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
+                writeln!(out, "    skip {:<10} {}{saved}", skip.engine, skip.reason).into_diagnostic()?;
             }
         }
-        let absent = plan.engines.iter().any(|p| p.asked == Asked::ByName && p.found.is_err());
+        let absent = plan.engines.iter().any(|p| p.asked == Asked::ByName && p.is_absent());
         exit = exit.worse(if absent { Exit::Engine } else { Exit::Passed });
     }
     Ok(exit)
 }
 
-/// What a run may cost at most, in seconds: the budget for renderers, next to nothing for our own solvers.
-fn cost(budget: &crate::spec::Budget, planned: &crate::plan::Planned) -> f64 {
-    if crate::plan::REFERENCES.contains(&planned.engine.id().name()) {
-        1.0_f64.min(budget.seconds)
-    } else {
-        budget.seconds
-    }
+/// The part of a run's work that no shortcut saves.
+fn left(run: &crate::plan::Run) -> f64 {
+    run.shortcut.omissions.iter().map(|o| 1.0 - o.share).product()
 }
 
 fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic> {

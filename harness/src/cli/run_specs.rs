@@ -17,7 +17,7 @@ use crate::cache::Cache;
 use crate::diagnosis;
 use crate::diff::{Comparison, Consensus, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
 use crate::engines::{self, EngineId, Site};
-use crate::plan::{Asked, Plan, plan};
+use crate::plan::{Asked, Plan, Planner};
 use crate::procedures::Task;
 use crate::process;
 use crate::reading::Recording;
@@ -37,7 +37,10 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
     if cases.iter().any(|case| selection.concerns(case)) {
         cases.retain(|case| selection.concerns(case));
     }
-    let planned = || cases.iter().map(|case| plan(case, &selection, site)).collect::<Result<Vec<Plan>, _>>();
+    let planned = || {
+        let mut planner = Planner::new(&selection, site, args.selected.skipping());
+        cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()
+    };
     let mut plans = planned().map_err(diagnose)?;
     if args.install {
         let names: Vec<EngineId> = engines::all().iter().map(|e| e.id()).collect();
@@ -56,7 +59,8 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
     let cache = Some(cache).filter(|_| !args.no_cache);
     let progress = Progress::of(plans.iter().zip(&cases).map(|(plan, case)| (plan, case.budget.seconds)));
     let threads = args.jobs.unwrap_or_else(process::cores).max(1);
-    let suite = Suite { tables: &tables, site, cache, progress: &progress, machine: Machine::new(threads) };
+    let machine = if args.selected.no_skips { Machine::rendering_everything(threads) } else { Machine::new(threads) };
+    let suite = Suite { tables: &tables, site, cache, progress: &progress, machine };
     let stop: Mutex<Option<Stop>> = Mutex::new(None);
     let one = |&k: &usize| -> Result<(Report, Exit), Diagnostic> {
         let (case, plan) = (&cases[k], &plans[k]);

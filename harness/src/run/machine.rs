@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use crate::cache::{Entry, Key};
 use crate::engines::calibration::{Calibrated, Earlier, calibrate};
 use crate::engines::{Engine, Job, Site, Version};
 use crate::slots::Slots;
@@ -13,14 +14,30 @@ pub struct Machine {
     /// How much runs at a time.
     pub slots: Slots,
     calibrations: Mutex<BTreeMap<String, Arc<Calibrating>>>,
+    /// What engines answered in this run; `None`: equal jobs are rendered as often as they are asked.
+    answers: Option<Mutex<BTreeMap<Key, Arc<Answered>>>>,
 }
+
+/// An answer of this run, locked while it is being found.
+pub(super) type Answered = Mutex<Option<Entry>>;
 
 type Calibrating = OnceLock<Result<Calibrated, String>>;
 
 impl Machine {
     /// So many threads or processes at a time.
     pub fn new(threads: usize) -> Arc<Self> {
-        Arc::new(Self { slots: Slots::new(threads), calibrations: Mutex::default() })
+        Arc::new(Self { slots: Slots::new(threads), calibrations: Mutex::default(), answers: Some(Mutex::default()) })
+    }
+
+    /// The same, where every job is rendered as often as it is asked.
+    pub fn rendering_everything(threads: usize) -> Arc<Self> {
+        Arc::new(Self { slots: Slots::new(threads), calibrations: Mutex::default(), answers: None })
+    }
+
+    /// Where the answer to an equal job of this run is, or will be.
+    pub(super) fn answered(&self, key: &Key) -> Option<Arc<Answered>> {
+        let mut all = self.answers.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(Arc::clone(all.entry(key.clone()).or_default()))
     }
 
     /// The calibration of an engine with the settings of a job, kept or made now; `made` is told of one that a first case

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::cache::{Answer, Cache, Entry, Key, Lookup, key};
@@ -47,8 +47,10 @@ pub struct Taken {
 pub enum Source {
     /// The engine, just now.
     Engine,
-    /// The cache, from an earlier answer of the engine.
+    /// The cache or this run, from an earlier answer of the engine.
     Cache,
+    /// Nobody had to be asked.
+    Nobody,
 }
 
 impl Reader {
@@ -59,13 +61,19 @@ impl Reader {
             return Err(process::ProcessError::Interrupted { program: engine.name().to_owned() }.into());
         }
         let mut bench = self.workbench(engine.name(), job, place)?;
-        let kept = self.kept(planned, job)?;
-        if let Some((cache, key)) = &kept
-            && let Some(entry) = find(cache, key)
-        {
+        let key = self.key(planned, job)?;
+        // Whoever asks the same at the same time waits for this answer.
+        let answered = key.as_ref().and_then(|key| self.machine.answered(key));
+        let mut answered = answered.as_ref().map(|a| a.lock().unwrap_or_else(PoisonError::into_inner));
+        let known = answered.as_ref().and_then(|a| (**a).clone());
+        let kept = self.cache.as_ref().zip(key);
+        if let Some(entry) = known.or_else(|| kept.as_ref().and_then(|(cache, key)| find(cache, key))) {
             bench.write(&planned.engine.export(job)?)?;
-            self.note(&bench, &format!("read in {:.3} s, kept in {}", entry.wall_s, cache.path(key).display()))?;
+            self.note(&bench, &format!("read in {:.3} s for {} {}", entry.wall_s, entry.case, entry.procedure))?;
             tidy(&bench);
+            if let Some(answered) = &mut answered {
+                **answered = Some(entry.clone());
+            }
             return taken(planned, job, entry);
         }
         // Its seconds count from when it has what it needs.
@@ -83,7 +91,7 @@ impl Reader {
         tidy(&bench);
         let entry = Entry {
             engine: engine.name().to_owned(),
-            version: planned.found.as_ref().map(|v| v.0.clone()).unwrap_or_default(),
+            version: planned.version().unwrap_or_default(),
             case: job.case.clone(),
             procedure: job.procedure.clone(),
             wall_s,
@@ -94,16 +102,19 @@ impl Reader {
         {
             tracing::warn!("{engine}: a reading could not be kept in {}: {error}", cache.path(key).display());
         }
+        if let Some(answered) = &mut answered {
+            **answered = Some(entry.clone());
+        }
         match entry.answer {
             Answer::Read(measurement) => Ok(Taken { measurement, wall_s, source: Source::Engine }),
             Answer::Declined(why) => Err(EngineError::Declined { engine, why }),
         }
     }
 
-    /// The cache and the key of a job; `None` where nothing is to be kept.
-    fn kept(&self, planned: &Planned, job: &Job) -> Result<Option<(&Cache, Key)>, EngineError> {
-        match (&self.cache, &planned.found) {
-            (Some(cache), Ok(version)) => Ok(Some((cache, key(planned.engine.as_ref(), version, job)?))),
+    /// The key of a job; `None` where nothing asks for one.
+    fn key(&self, planned: &Planned, job: &Job) -> Result<Option<Key>, EngineError> {
+        match &planned.found {
+            Some(Ok(version)) => key(planned.engine.as_ref(), version, job).map(Some),
             _ => Ok(None),
         }
     }

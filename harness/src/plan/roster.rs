@@ -1,0 +1,83 @@
+//! Who takes part: the engines that a command line and a spec choose, each asked for its version once and only if it has work.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::{Asked, REFERENCES, Selection, unknown};
+use crate::engines::{self, Absent, Engine, Site, Version};
+use crate::slots::side_by_side;
+use crate::spec::{Case, SpecError};
+
+/// Our own engines, shared by all cases, and what they say of their version.
+pub(super) struct Roster {
+    engines: Vec<Arc<dyn Engine>>,
+    probed: BTreeMap<String, Result<Version, Absent>>,
+}
+
+impl Roster {
+    pub(super) fn new() -> Self {
+        Self { engines: engines::all().into_iter().map(Arc::from).collect(), probed: BTreeMap::new() }
+    }
+
+    /// The engines of a case, in the order of reports.
+    pub(super) fn chosen(
+        &self,
+        case: &Case,
+        selection: &Selection,
+    ) -> Result<Vec<(Arc<dyn Engine>, Asked)>, SpecError> {
+        let mut all = self.engines.clone();
+        let built_in = names(&all);
+        let in_spec: Vec<&String> = case.engines.iter().flat_map(BTreeMap::keys).collect();
+        for (name, settings) in case.engines.iter().flatten().filter(|(name, _)| !built_in.contains(*name)) {
+            if !settings.0.contains_key("command") {
+                let mut error = unknown("engine", name, built_in.iter().map(String::as_str), "");
+                let place = case.source.error_at(&format!("engines.{name}"), "", "");
+                error = SpecError { file: place.file, line: place.line, column: place.column, ..error };
+                error.help = error.help.map(|h| format!("{h} A program of your own needs `command: [...]`"));
+                return Err(error);
+            }
+            let folder = case.path.parent().unwrap_or(Path::new(""));
+            let engine = engines::external(name, &settings.0, folder).map_err(|error| {
+                let help = "give `command: [program, arguments...]`, paths relative to the spec";
+                case.source.error_at(&format!("engines.{name}"), error.to_string(), help)
+            })?;
+            all.push(Arc::from(engine));
+        }
+        let ids = names(&all);
+        for name in &selection.engines {
+            if !ids.contains(name) {
+                return Err(unknown("engine", name, ids.iter().map(String::as_str), "--engines"));
+            }
+        }
+        let asked = |id: &str| {
+            if selection.engines.iter().any(|n| n == id) {
+                Some(Asked::ByName)
+            } else if REFERENCES.contains(&id) {
+                Some(Asked::AsReference)
+            } else if !selection.engines.is_empty() {
+                None
+            } else if case.engines.is_none() {
+                Some(Asked::ByDefault)
+            } else {
+                in_spec.iter().any(|n| *n == id).then_some(Asked::ByName)
+            }
+        };
+        Ok(all.into_iter().filter_map(|engine| asked(engine.id().name()).map(|asked| (engine, asked))).collect())
+    }
+
+    /// The versions of engines, side by side; those of our own list are remembered for the next case.
+    pub(super) fn probe(&mut self, engines: &[Arc<dyn Engine>], site: &Site) -> Vec<Result<Version, Absent>> {
+        let is_ours = |e: &Arc<dyn Engine>| self.engines.iter().any(|ours| Arc::ptr_eq(ours, e));
+        let known = |e: &Arc<dyn Engine>| self.probed.get(e.id().name()).filter(|_| is_ours(e)).cloned();
+        let found = side_by_side(engines.len(), engines, |e| known(e).unwrap_or_else(|| e.probe(site)));
+        let ours = engines.iter().zip(&found).filter(|(e, _)| is_ours(e));
+        let ours: Vec<_> = ours.map(|(e, found)| (e.id().name().to_owned(), found.clone())).collect();
+        self.probed.extend(ours);
+        found
+    }
+}
+
+fn names(engines: &[Arc<dyn Engine>]) -> Vec<String> {
+    engines.iter().map(|e| e.id().name().to_owned()).collect()
+}

@@ -1,0 +1,166 @@
+//! Shortcuts: the least that has to be rendered for a run, and how the other readings follow from it; pure.
+//!
+//! Our own witnesses take none: they read every meter as it was asked, so that a claim that is wrong shows in every comparison, besides in the spot
+//! checks, which render a random twentieth of what was not rendered.
+
+mod bounces;
+mod dark;
+mod repeated;
+mod symmetry;
+#[cfg(test)]
+mod tests;
+
+use luminaire::scene::Transport;
+
+use crate::engines::{Estimate, Job, Measurement};
+
+pub(super) use repeated::Repeated;
+
+/// How the readings of a job follow from another job that is less work.
+#[derive(Clone, Debug)]
+pub struct Shortcut {
+    /// What is rendered; no stations: nothing.
+    pub job: Job,
+    /// One a station of the job that was asked.
+    pub fill: Vec<Fill>,
+    /// What is rendered is this many times too dark: the jobs differ in flux.
+    pub factor: f64,
+    /// What is left out and why, for the report.
+    pub omissions: Vec<Omission>,
+}
+
+/// Where the reading at a station comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fill {
+    /// It is that of a station of the job that is rendered.
+    Rendered(usize),
+    /// It is that of a station of the job that is rendered, which it mirrors.
+    Mirrors {
+        /// The station that is rendered.
+        station: usize,
+        /// The symmetry that takes that station to this one.
+        by: String,
+    },
+    /// No light gets there.
+    Dark,
+}
+
+/// Something that is not rendered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Omission {
+    /// Whether it is meters or light paths that are left out.
+    pub scope: super::Scope,
+    /// Why.
+    pub reason: String,
+    /// The part of the run's work that this saves, 0 to 1.
+    pub share: f64,
+}
+
+impl Shortcut {
+    /// Everything is rendered.
+    pub fn none(job: &Job) -> Self {
+        let fill = (0..job.stations.len()).map(Fill::Rendered).collect();
+        Self { job: job.clone(), fill, factor: 1.0, omissions: vec![] }
+    }
+
+    /// The least work for a job.
+    pub(super) fn of(job: &Job) -> Self {
+        let mut shortcut = Self::none(job);
+        bounces::shorten(&mut shortcut);
+        if job.procedure != "luminous_intensity" {
+            dark::shorten(&mut shortcut, job);
+            symmetry::shorten(&mut shortcut, job);
+        }
+        shortcut
+    }
+
+    /// The stations of the job that was asked whose readings are not simply rendered: what spot checks choose from.
+    pub fn unseen(&self, asked: &Job) -> Vec<usize> {
+        let altered = self.factor != 1.0 || self.job.transport != asked.transport;
+        let is = |f: &Fill| altered || !matches!(f, Fill::Rendered(_));
+        self.fill.iter().enumerate().filter(|(_, f)| is(f)).map(|(k, _)| k).collect()
+    }
+
+    /// The readings of the job that was asked, from those of the job that was rendered.
+    pub fn complete(&self, rendered: Measurement, asked: &Job) -> Measurement {
+        let dark = Estimate { value_lx: 0.0, std_error_lx: None, error_bound_lx: Some(0.0) };
+        let of = |k: usize| rendered.estimates.get(k).map_or(dark, |e| scaled(*e, self.factor));
+        let estimate = |fill: &Fill| match fill {
+            Fill::Rendered(k) | Fill::Mirrors { station: k, .. } => of(*k),
+            Fill::Dark => dark,
+        };
+        let estimates = self.fill.iter().map(estimate).collect();
+        let mut settings = rendered.settings;
+        settings.extend(self.traces(asked));
+        Measurement { estimates, settings, notes: rendered.notes }
+    }
+
+    /// Which meter's reading is which other's, for whoever repeats it.
+    fn traces(&self, asked: &Job) -> Vec<(String, String)> {
+        let mut mirrored = vec![];
+        let mut dark = vec![];
+        for (fill, station) in self.fill.iter().zip(&asked.stations) {
+            match fill {
+                Fill::Rendered(_) => {}
+                Fill::Mirrors { station: k, by } => {
+                    mirrored.push(format!("{} is {} ({by})", station.id, self.job.stations[*k].id));
+                }
+                Fill::Dark => dark.push(station.id.to_string()),
+            }
+        }
+        let mut traces = vec![];
+        if !mirrored.is_empty() {
+            traces.push(("mirrored_meters".to_owned(), mirrored.join(", ")));
+        }
+        if !dark.is_empty() {
+            traces.push(("meters_without_light".to_owned(), dark.join(", ")));
+        }
+        if self.factor != 1.0 {
+            traces.push(("rescaled_by".to_owned(), self.factor.to_string()));
+        }
+        traces
+    }
+
+    /// Keeps of the rendered stations those that `wanted` says, and tells every fill where they are now.
+    fn render_only(&mut self, wanted: &[bool], instead: impl Fn(usize) -> Fill) {
+        let place: Vec<usize> = wanted
+            .iter()
+            .scan(0, |next, &w| {
+                let here = *next;
+                *next += usize::from(w);
+                Some(here)
+            })
+            .collect();
+        for fill in &mut self.fill {
+            if let Fill::Rendered(k) = *fill {
+                *fill = if wanted[k] {
+                    Fill::Rendered(place[k])
+                } else {
+                    match instead(k) {
+                        Fill::Mirrors { station, by } => Fill::Mirrors { station: place[station], by },
+                        other => other,
+                    }
+                };
+            }
+        }
+        let mut keep = wanted.iter();
+        self.job.stations.retain(|_| keep.next().copied().unwrap_or(true));
+    }
+
+    fn omit(&mut self, scope: super::Scope, share: f64, reason: String) {
+        self.omissions.push(Omission { scope, reason, share });
+    }
+}
+
+fn scaled(estimate: Estimate, factor: f64) -> Estimate {
+    Estimate {
+        value_lx: estimate.value_lx * factor,
+        std_error_lx: estimate.std_error_lx.map(|e| e * factor),
+        error_bound_lx: estimate.error_bound_lx.map(|e| e * factor),
+    }
+}
+
+/// Whether a transport holds light straight from the luminaires.
+const fn is_direct(transport: Transport) -> bool {
+    matches!(transport, Transport::Direct)
+}

@@ -1,0 +1,121 @@
+//! Spot checks: a random part of what is not rendered is rendered all the same, and must be what the shortcut says.
+
+use super::Run;
+use crate::engines::{Estimate, Job, Measurement};
+
+/// The part of what is not rendered that is looked at, one reading at least.
+const PART: f64 = 0.05;
+/// Standard errors that two readings of one quantity may be apart.
+const COVERAGE: f64 = 5.0;
+/// What renderers' single-precision coordinates make of two meters that mirror each other, relative to the brightest reading.
+const ROUNDING: f64 = 2e-5;
+
+/// Draws the stations to be looked at, over all runs of a case but those of witnesses, which read every meter anyway.
+pub(super) fn draw(runs: &mut [Run], is_witness: impl Fn(&Run) -> bool, seed: u64) {
+    let unseen = |(r, run): (usize, &Run)| run.shortcut.unseen(&run.job).into_iter().map(move |s| (r, s));
+    let subjects = runs.iter().enumerate().filter(|(_, run)| !is_witness(run));
+    let mut unseen: Vec<(usize, usize)> = subjects.flat_map(unseen).collect();
+    fastrand::Rng::with_seed(seed).shuffle(&mut unseen);
+    let wanted = (PART * unseen.len() as f64).ceil() as usize;
+    for (r, station) in unseen.into_iter().take(wanted) {
+        runs[r].spot_check.push(station);
+    }
+    for run in runs {
+        run.spot_check.sort_unstable();
+    }
+}
+
+impl Run {
+    /// The job of the spot check: what was asked, at the stations drawn; `None` where none was.
+    pub fn spot_check_job(&self) -> Option<Job> {
+        let stations: Vec<_> = self.spot_check.iter().map(|&s| self.job.stations[s].clone()).collect();
+        (!stations.is_empty()).then(|| Job { stations, ..self.job.clone() })
+    }
+
+    /// Holds what a spot check read against what a shortcut says; the error names the first reading that is another.
+    pub fn hold(&self, said: &Measurement, seen: &Measurement) -> Result<(), String> {
+        let brightest = said.estimates.iter().chain(&seen.estimates).map(|e| e.value_lx).fold(0.0, f64::max);
+        for (&station, seen) in self.spot_check.iter().zip(&seen.estimates) {
+            let said = &said.estimates[station];
+            let noise = COVERAGE * spread(said).hypot(spread(seen)) + bound(said) + bound(seen);
+            let allowed = noise + self.declared * said.value_lx.max(seen.value_lx) + ROUNDING * brightest;
+            // Written so that NaN, too, disagrees.
+            if !((said.value_lx - seen.value_lx).abs() <= allowed) {
+                return Err(format!(
+                    "spot check: {} reads {} lx where {} lx follow from a shortcut ({}); --no-skips renders everything",
+                    self.job.stations[station].id,
+                    seen.value_lx,
+                    said.value_lx,
+                    self.shortcut.omissions.iter().map(|o| o.reason.as_str()).collect::<Vec<_>>().join("; ")
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn spread(estimate: &Estimate) -> f64 {
+    estimate.std_error_lx.unwrap_or(0.0)
+}
+
+fn bound(estimate: &Estimate) -> f64 {
+    estimate.error_bound_lx.unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::engines::fixtures;
+    use crate::plan::{Fill, Shortcut};
+
+    fn run(points: usize) -> Run {
+        let points_m: Vec<[f64; 3]> = (0..points).map(|k| [k as f64, 1.0, 1.0]).collect();
+        let mut job = fixtures::s1(luminaire::scene::Transport::Direct);
+        job.stations = fixtures::stations(&points_m, DVec3::Z);
+        let mut shortcut = Shortcut::none(&job);
+        shortcut.job.stations.truncate(1);
+        for fill in &mut shortcut.fill[1..] {
+            *fill = Fill::Mirrors { station: 0, by: "a false claim".into() };
+        }
+        Run { engine: 0, task: 0, job, approximation: None, declared: 0.0, shortcut, spot_check: vec![] }
+    }
+
+    fn measurement(values: &[f64], std_error_lx: Option<f64>) -> Measurement {
+        let estimate = |&value_lx| Estimate { value_lx, std_error_lx, error_bound_lx: None };
+        Measurement { estimates: values.iter().map(estimate).collect(), ..Measurement::default() }
+    }
+
+    #[test]
+    fn a_twentieth_is_drawn_one_at_least_by_the_seed() {
+        for (points, wanted) in [(1, 0), (2, 1), (21, 1), (22, 2), (401, 20)] {
+            let mut runs = [run(points)];
+            draw(&mut runs, |_| false, 1);
+            assert_eq!(runs[0].spot_check.len(), wanted, "{points}");
+            assert!(runs[0].spot_check.iter().all(|s| (1..points).contains(s)));
+        }
+        let drawn = |seed| {
+            let mut runs = [run(401), run(401)];
+            draw(&mut runs, |_| false, seed);
+            runs.map(|r| r.spot_check)
+        };
+        assert_eq!(drawn(1), drawn(1));
+        assert_ne!(drawn(1), drawn(2));
+    }
+
+    #[test]
+    fn a_false_claim_disagrees_and_noise_does_not() {
+        let mut run = run(3);
+        run.spot_check = vec![2];
+        let job = run.spot_check_job().unwrap();
+        assert_eq!(job.stations[0].id.to_string(), "m[2]");
+        let said = |values: &[f64], e| run.shortcut.complete(measurement(values, e), &run.job);
+        assert!(run.hold(&said(&[5.0], None), &measurement(&[5.0], None)).is_ok());
+        assert!(run.hold(&said(&[5.0], Some(0.01)), &measurement(&[5.06], Some(0.01))).is_ok());
+        for (wrong, e) in [(5.01, None), (5.08, Some(0.01)), (0.0, Some(0.01)), (f64::NAN, None)] {
+            let error = run.hold(&said(&[5.0], e), &measurement(&[wrong], e)).unwrap_err();
+            assert!(error.contains("m[2]"), "{error}");
+        }
+    }
+}

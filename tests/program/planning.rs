@@ -1,0 +1,183 @@
+//! Planning in whole runs: what follows from other readings is not rendered, is said, is checked, and any number of jobs says the same.
+
+#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// A symmetric room, its uplit twin, the same at half the light, and a copy under another name.
+const SPEC: &str = "luxproof: 1
+room:
+  size_m: [6, 4, 3]
+  reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.7}
+luminaires:
+  - {id: lamp, photometry: lamp.ies, at_m: [3, 2, 2.5]}
+meters:
+  plane: {grid: {origin_m: [0.5, 0.5, 0.8], u_m: [1, 0, 0], v_m: [0, 1, 0], counts: [6, 4]}, normal: [0, 0, 1]}
+procedures:
+  direct_illuminance: {meters: plane}
+engines:
+  mine: {command: [python3, adapter.py]}
+cases:
+  - {name: whole}
+  - {name: dimmed, luminaires: {lamp: {flux_scale: 0.5}}}
+  - {name: above, luminaires: {lamp: {at_m: [3, 2, 0.4]}}}
+";
+
+const LAMP: &str = "IESNA:LM-63-2002
+TILT=NONE
+1 -1 1 4 3 1 2 0 0 0
+1 1 0
+0 60 80 90
+0 45 90
+100 80 10 0
+100 70 20 0
+100 40 30 0
+";
+
+struct Lab {
+    folder: tempfile::TempDir,
+}
+
+impl Lab {
+    /// The example adapter with a replacement; it notes how many meters it was asked for.
+    fn new(from: &str, to: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples/inverse_square.py");
+        let example = fs::read_to_string(example).unwrap();
+        let noting = "    open('asked', 'a').write(f\"{job['case']} {len(job['meters'])}\\n\")\n    readings = []\n";
+        let adapter = example.replace("    readings = []\n", noting);
+        assert_ne!(adapter, example);
+        let changed = adapter.replace(from, to);
+        assert!(from.is_empty() || changed != adapter);
+        for (name, text) in [("spec.yaml", SPEC), ("lamp.ies", LAMP), ("adapter.py", &changed)] {
+            fs::write(folder.path().join(name), text).unwrap();
+        }
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn luxproof(&self, args: &[&str]) -> Output {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_luxproof"));
+        program.args(args).current_dir(self.folder.path()).env("NO_COLOR", "1");
+        program.env("LUXPROOF_ENGINES", self.path("engines")).env("LUXPROOF_CACHE", self.path("cache"));
+        program.output().unwrap()
+    }
+
+    fn run(&self, more: &[&str]) -> (Value, Option<i32>) {
+        let args = ["run", "spec.yaml", "--out", "out", "--format", "json", "--no-cache"];
+        let output = self.luxproof(&[&args, more].concat());
+        let report = serde_json::from_slice(&output.stdout);
+        (report.unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr))), output.status.code())
+    }
+
+    /// The meters that the adapter was asked for in the spec's cases, since the last time.
+    fn asked(&self) -> usize {
+        let text = fs::read_to_string(self.path("asked")).unwrap_or_default();
+        fs::remove_file(self.path("asked")).ok();
+        let of_spec = text.lines().filter(|l| l.starts_with("spec/"));
+        of_spec.map(|l| l.split(' ').nth(1).unwrap().parse::<usize>().unwrap()).sum()
+    }
+}
+
+fn values(report: &Value) -> Vec<(String, f64)> {
+    let name = |r: &Value| format!("{} {} {} {}", r["case"], r["procedure"], r["engine"], r["meter"]);
+    report["readings"].as_array().unwrap().iter().map(|r| (name(r), r["value"].as_f64().unwrap())).collect()
+}
+
+fn verdicts(report: &Value) -> Vec<String> {
+    let one = |c: &Value| {
+        format!("{} {} {} {} {}", c["case"], c["engine"], c["meter"], c["reference"]["basis"], c["verdict"])
+    };
+    report["comparisons"].as_array().unwrap().iter().map(one).collect()
+}
+
+#[test]
+fn what_follows_is_not_rendered_and_reads_and_is_judged_the_same() {
+    let lab = Lab::new("", "");
+    let (whole, code) = lab.run(&["--no-skips"]);
+    assert_eq!(code, Some(0), "{}", whole["engines"]);
+    assert_eq!(lab.asked(), 3 * 24);
+    let (planned, code) = lab.run(&[]);
+    assert_eq!(code, Some(0), "{}", planned["engines"]);
+    // A quarter of two cases, nothing of the third; and a twentieth of what was left out, of each case.
+    let asked = lab.asked();
+    assert_eq!(asked, (6 + 1) + (6 + 1) + 2, "{}", planned["skips"]);
+    assert_eq!(verdicts(&whole), verdicts(&planned));
+    for ((name, a), (same, b)) in values(&whole).into_iter().zip(values(&planned)) {
+        assert!(name == same && (a - b).abs() <= 1e-12 * a.abs(), "{name}: {a} and {b}");
+    }
+    let skips = planned["skips"].as_array().unwrap();
+    let says = |case: &str, engine: &str, what: &str| {
+        let is =
+            |s: &&Value| s["case"] == case && s["engine"] == engine && s["reason"].as_str().unwrap().contains(what);
+        let found = skips.iter().find(is).unwrap_or_else(|| panic!("{case}: no `{what}` in {skips:?}"));
+        assert!(found["saved"].as_str().unwrap().contains('%'), "{found}");
+    };
+    says("spec/whole", "mine", "18 of 24 meters mirror others");
+    says("spec/dimmed", "simulator", "rescaled by 0.5");
+    says("spec/above", "mine", "no luminaire sends light straight to 24 of 24 meters");
+    assert!(whole["skips"].as_array().unwrap().is_empty());
+    let recording = planned["recordings"].as_array().unwrap().iter().find(|r| r["engine"] == "mine").unwrap();
+    assert!(
+        recording["settings"]["mirrored_meters"].as_str().unwrap().contains("plane[23] is plane[0] (x -> -x, y -> -y)")
+    );
+    let check = lab.luxproof(&["check", "spec.yaml"]);
+    assert!(String::from_utf8_lossy(&check.stdout).contains("18 of 24 meters mirror others"));
+}
+
+#[test]
+fn a_wrong_claim_of_symmetry_is_caught_by_the_spot_check() {
+    // An engine that reads a third more in one half of the room: what it reads there does not follow from the other half.
+    let from = "        lux = illuminance_lx(job[\"luminaires\"], meter)\n";
+    let to = format!("{from}        lux *= 1.33 if job['room'] and meter['position_m'][0] > 3 else 1.0\n");
+    let lab = Lab::new(from, &to);
+    // Wherever in the other half the twentieth falls: of 18 meters that are left out 9 lie there, or 12 that mirror x.
+    let mut caught = 0;
+    for seed in 1..=8 {
+        let (report, code) = lab.run(&["--filter", "whole", "--seed", &seed.to_string()]);
+        let engine = report["engines"].as_array().unwrap().iter().find(|e| e["id"] == "mine").unwrap();
+        if code == Some(3) {
+            caught += 1;
+            assert!(engine["reason"].as_str().unwrap().contains("spot check: plane["), "{engine}");
+        } else {
+            // The meter that was drawn lies in the half that is read right.
+            assert_eq!(code, Some(0), "{engine}");
+        }
+    }
+    assert!(caught >= 3, "caught {caught} of 8 times");
+}
+
+#[test]
+fn any_number_of_jobs_says_the_same_to_the_byte_but_for_times() {
+    let lab = Lab::new("", "");
+    let said = |jobs: &str| {
+        let (mut report, code) = lab.run(&["--jobs", jobs]);
+        assert_eq!(code, Some(0));
+        timeless(&mut report);
+        serde_json::to_string_pretty(&report).unwrap()
+    };
+    let alone = said("1");
+    for jobs in ["2", "3", "16"] {
+        assert!(said(jobs) == alone, "--jobs {jobs} says something else");
+    }
+}
+
+/// Takes out what the clock says.
+fn timeless(value: &mut Value) {
+    match value {
+        Value::Object(map) => {
+            map.remove("wall_s");
+            map.remove("started");
+            map.values_mut().for_each(timeless);
+        }
+        Value::Array(list) => list.iter_mut().for_each(timeless),
+        _ => {}
+    }
+}
