@@ -33,6 +33,7 @@ impl Sampling {
             if !REFERENCES.contains(&engine.name()) {
                 let tolerance = judge.tolerance(&plan.tasks[run.task], engine.name());
                 run.job.budget = sequential::first_look(run.job.budget, tolerance.relative);
+                run.shortcut.job.budget = run.job.budget;
             }
         }
     }

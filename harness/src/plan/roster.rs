@@ -9,6 +9,9 @@ use crate::engines::{self, Absent, Engine, Site, Version};
 use crate::slots::side_by_side;
 use crate::spec::{Case, SpecError};
 
+/// An engine and why it takes part.
+pub(super) type Chosen = (Arc<dyn Engine>, Asked);
+
 /// Our own engines, shared by all cases, and what they say of their version.
 pub(super) struct Roster {
     engines: Vec<Arc<dyn Engine>>,
@@ -21,11 +24,7 @@ impl Roster {
     }
 
     /// The engines of a case, in the order of reports.
-    pub(super) fn chosen(
-        &self,
-        case: &Case,
-        selection: &Selection,
-    ) -> Result<Vec<(Arc<dyn Engine>, Asked)>, SpecError> {
+    pub(super) fn chosen(&self, case: &Case, selection: &Selection) -> Result<Vec<Chosen>, SpecError> {
         let mut all = self.engines.clone();
         let built_in = names(&all);
         let in_spec: Vec<&String> = case.engines.iter().flat_map(BTreeMap::keys).collect();

@@ -39,8 +39,8 @@ impl Run {
             let said = &said.estimates[station];
             let noise = COVERAGE * spread(said).hypot(spread(seen)) + bound(said) + bound(seen);
             let allowed = noise + self.declared * said.value_lx.max(seen.value_lx) + ROUNDING * brightest;
-            // Written so that NaN, too, disagrees.
-            if !((said.value_lx - seen.value_lx).abs() <= allowed) {
+            let apart = (said.value_lx - seen.value_lx).abs();
+            if apart.is_nan() || allowed.is_nan() || apart > allowed {
                 return Err(format!(
                     "spot check: {} reads {} lx where {} lx follow from a shortcut ({}); --no-skips renders everything",
                     self.job.stations[station].id,

@@ -61,7 +61,7 @@ impl Reader {
             return Err(process::ProcessError::Interrupted { program: engine.name().to_owned() }.into());
         }
         let mut bench = self.workbench(engine.name(), job, place)?;
-        let key = self.key(planned, job)?;
+        let key = key_of(planned, job)?;
         // Whoever asks the same at the same time waits for this answer.
         let answered = key.as_ref().and_then(|key| self.machine.answered(key));
         let mut answered = answered.as_ref().map(|a| a.lock().unwrap_or_else(PoisonError::into_inner));
@@ -111,14 +111,6 @@ impl Reader {
         }
     }
 
-    /// The key of a job; `None` where nothing asks for one.
-    fn key(&self, planned: &Planned, job: &Job) -> Result<Option<Key>, EngineError> {
-        match &planned.found {
-            Some(Ok(version)) => key(planned.engine.as_ref(), version, job).map(Some),
-            _ => Ok(None),
-        }
-    }
-
     fn workbench(&self, engine: &str, job: &Job, place: &str) -> Result<Workbench, EngineError> {
         let log = absolute(&self.out.join("logs").join(format!("{engine}.{}.log", place.replace('/', "."))))?;
         fs::remove_file(&log).or_else(ignore_absence).map_err(|e| EngineError::io(&log, e))?;
@@ -136,6 +128,14 @@ impl Reader {
         let fail = |e| EngineError::io(&bench.log, e);
         fs::create_dir_all(self.out.join("logs")).map_err(fail)?;
         fs::write(&bench.log, format!("not run: {text}\n")).map_err(fail)
+    }
+}
+
+/// The key of a job; `None` where nothing asks for one.
+fn key_of(planned: &Planned, job: &Job) -> Result<Option<Key>, EngineError> {
+    match &planned.found {
+        Some(Ok(version)) => key(planned.engine.as_ref(), version, job).map(Some),
+        _ => Ok(None),
     }
 }
 
