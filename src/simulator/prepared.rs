@@ -1,6 +1,6 @@
 //! The dispatcher: which solver treats a scene, kept together with what it has solved so far.
 
-use super::box_room::{self, BoxField};
+use super::box_room::EmptyRoom;
 use super::radiosity::Furnished;
 use super::{Accuracy, Bounded, Estimate, SimulatorError, Solution, Uncertainty, direct, path_tracing, validate};
 use crate::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
@@ -23,8 +23,8 @@ pub struct Prepared {
 
 #[derive(Debug)]
 enum Solver {
-    /// Point luminaires with nothing in between, in a room or in free field; fields by effort.
-    Empty(Vec<(usize, BoxField)>),
+    /// Point luminaires with nothing in between, in a room or in free field.
+    Empty(EmptyRoom),
     /// Boxes, plates and rectangular openings.
     Furnished(Box<Furnished>),
     /// Meshes, round openings, bodies outside a room, more bodies than radiosity can mesh.
@@ -38,7 +38,7 @@ impl Prepared {
         validate::accuracy(accuracy)?;
         let points_only = scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
         let solver = if points_only && scene.obstacles.is_empty() {
-            Solver::Empty(vec![])
+            Solver::Empty(EmptyRoom::default())
         } else {
             Furnished::new(scene).map_or(Solver::PathsOnly, |f| Solver::Furnished(Box::new(f)))
         };
@@ -96,8 +96,8 @@ impl Prepared {
             return Ok(bounded(&vec![Bounded::default(); meters.len()], text));
         };
         match &mut self.solver {
-            Solver::Empty(fields) => {
-                let (values, text) = box_room::refine(fields, &room, &self.scene.luminaires, bounces, meters, error);
+            Solver::Empty(empty) => {
+                let (values, text) = empty.indirect(&room, &self.scene.luminaires, bounces, meters, error);
                 Ok(bounded(&values, &text))
             }
             Solver::Furnished(furnished) if error >= RADIOSITY_REACHES => {

@@ -21,7 +21,7 @@ use crate::simulator::{Bounded, gmres};
 use first_bounce::FirstBounce;
 use grid::Grid;
 use kernel::Receiver;
-use symmetry::Orbits;
+use symmetry::{Orbits, Symmetries};
 
 /// How fine a solution is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,42 +110,69 @@ pub(super) const EFFORTS: [Effort; 7] = [
 /// A difference of two efforts, times this, bounds the error of the finer one.
 const SAFETY: f64 = 3.0;
 
-/// Indirect illuminance at the meters, climbing the efforts until the bound meets `relative_error`.
-///
-/// The bound is the difference of the two finest efforts, or half the worst relative difference over all meters where
-/// a meter's own is smaller by chance, times a safety factor.
-pub(super) fn refine(
-    fields: &mut Vec<(usize, BoxField)>,
-    room: &Room,
-    luminaires: &[Luminaire],
-    bounces: Bounces,
-    meters: &[Meter],
-    relative_error: f64,
-) -> (Vec<Bounded>, String) {
-    let mut solve = |level: usize| {
-        if fields.iter().all(|(at, _)| *at != level) {
-            fields.push((level, BoxField::solve(room, luminaires, bounces, &EFFORTS[level])));
+/// An empty room with point luminaires, solved as finely as anyone has asked so far.
+#[derive(Debug, Default)]
+pub(super) struct EmptyRoom {
+    symmetries: Option<Symmetries>,
+    /// By place in [`EFFORTS`].
+    fields: Vec<(usize, BoxField)>,
+}
+
+impl EmptyRoom {
+    /// Indirect illuminance at the meters, climbing the efforts until the bound meets `relative_error`.
+    ///
+    /// The bound is the difference of the two finest efforts, or half the worst relative difference over all meters where
+    /// a meter's own is smaller by chance, times a safety factor.
+    pub(super) fn indirect(
+        &mut self,
+        room: &Room,
+        luminaires: &[Luminaire],
+        bounces: Bounces,
+        meters: &[Meter],
+        relative_error: f64,
+    ) -> (Vec<Bounded>, String) {
+        // Entering the pool of threads once: each small job that is sent there on its own costs as much as it does.
+        rayon::scope(|_| self.climb(room, luminaires, bounces, meters, relative_error))
+    }
+
+    fn climb(
+        &mut self,
+        room: &Room,
+        luminaires: &[Luminaire],
+        bounces: Bounces,
+        meters: &[Meter],
+        relative_error: f64,
+    ) -> (Vec<Bounded>, String) {
+        let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires));
+        let fields = &mut self.fields;
+        let mut solve = |level: usize| {
+            if fields.iter().all(|(at, _)| *at != level) {
+                fields.push((level, BoxField::solve(room, luminaires, symmetries, bounces, &EFFORTS[level])));
+            }
+            let field = fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field);
+            (
+                field.map(|field| field.illuminance(meters)).unwrap_or_default(),
+                field.map_or(0.0, |field| field.imbalance),
+            )
+        };
+        let mut level = FIRST_EFFORT.iter().rposition(|error| relative_error <= *error).unwrap_or(0);
+        let (mut coarse, _) = solve(level);
+        loop {
+            level += 1;
+            let (fine, imbalance) = solve(level);
+            let values = bounded(&coarse, &fine, imbalance);
+            let met = values.iter().all(|v| v.bound <= relative_error * v.value.abs());
+            let fits =
+                EFFORTS.get(level + 1).is_some_and(|effort| Grid::matrix_entries(room.size_m, effort) <= MOST_ENTRIES);
+            if met || !fits {
+                let Effort { order, elements_per_half, .. } = EFFORTS[level];
+                let text = format!(
+                    "hp collocation, order {order} with {elements_per_half} element(s) a half side: empty box, point luminaires"
+                );
+                return (values, text);
+            }
+            coarse = fine;
         }
-        let field = fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field);
-        (field.map(|field| field.illuminance(meters)).unwrap_or_default(), field.map_or(0.0, |field| field.imbalance))
-    };
-    let mut level = FIRST_EFFORT.iter().rposition(|error| relative_error <= *error).unwrap_or(0);
-    let (mut coarse, _) = solve(level);
-    loop {
-        level += 1;
-        let (fine, imbalance) = solve(level);
-        let values = bounded(&coarse, &fine, imbalance);
-        let met = values.iter().all(|v| v.bound <= relative_error * v.value.abs());
-        let fits =
-            EFFORTS.get(level + 1).is_some_and(|effort| Grid::matrix_entries(room.size_m, effort) <= MOST_ENTRIES);
-        if met || !fits {
-            let Effort { order, elements_per_half, .. } = EFFORTS[level];
-            let text = format!(
-                "hp collocation, order {order} with {elements_per_half} element(s) a half side: empty box, point luminaires"
-            );
-            return (values, text);
-        }
-        coarse = fine;
     }
 }
 
@@ -182,7 +209,13 @@ enum Gathers {
 }
 
 impl BoxField {
-    pub(super) fn solve(room: &Room, luminaires: &[Luminaire], bounces: Bounces, effort: &Effort) -> Self {
+    fn solve(
+        room: &Room,
+        luminaires: &[Luminaire],
+        symmetries: &Symmetries,
+        bounces: Bounces,
+        effort: &Effort,
+    ) -> Self {
         let grid = Grid::new(room.size_m, effort);
         let first = FirstBounce::new(room, luminaires, effort);
         let gathers = match bounces {
@@ -193,19 +226,21 @@ impl BoxField {
         if gathers != Gathers::All {
             return Self { exitance: vec![0.0; grid.len()], grid, first, gathers, imbalance: 0.0 };
         }
-        let group = symmetry::of_geometry(room.size_m);
-        let orbits = Orbits::new(&grid, &group);
-        let light = orbits.under(symmetry::of_light(&group, room, luminaires));
+        let orbits = Orbits::new(&grid, &symmetries.of_room);
+        let light = orbits.under(&symmetries.of_light);
         let operator = Operator::new(&grid, orbits);
         let rho: Vec<f64> = (0..grid.len()).map(|node| symmetry::reflectance(room, grid.place(node).0)).collect();
         let (known, imbalance) = known(&grid, &first, &light);
         // Where the light is symmetrical enough, its orbits are the unknowns, and their matrix is no larger.
-        let irradiance = if light.images.len().pow(2) >= group.len() {
+        let irradiance = if light.images.len().pow(2) >= operator.orbits.images.len() {
             let rows = operator.folded(&light);
             let rho: Vec<f64> = light.representatives.iter().map(|node| rho[*node]).collect();
             let step = |u: &[f64]| {
                 let exitance = exitance(u, &rho);
-                rows.par_iter().map(|row| gmres::dot(row, &exitance)).collect()
+                let lux = |row: &Vec<f64>| gmres::dot(row, &exitance);
+                // Sums that take microseconds are not worth a second thread.
+                let few = rows.len() < 500;
+                if few { rows.iter().map(lux).collect() } else { rows.par_iter().map(lux).collect() }
             };
             light.unfold(&interreflect(step, known, bounces))
         } else {

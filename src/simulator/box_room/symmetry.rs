@@ -4,11 +4,13 @@
 //! keeps all of them, whatever the light does; the first bounce and the whole light field keep those that also leave
 //! luminaires and reflectances as they are.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 
 use super::grid::{Face, Grid};
 use crate::geometry::{Room, Surface};
-use crate::photometry::direction;
+use crate::photometry::{Symmetry, direction};
 use crate::scene::Luminaire;
 
 /// A symmetry of a box: mirrors, then perhaps axes exchanged.
@@ -55,9 +57,24 @@ pub(super) fn of_geometry(size_m: DVec3) -> Vec<Operation> {
     exchanges.flat_map(|axes| (0..8).map(move |mirrors| Operation { mirrors, axes })).collect()
 }
 
-/// Whether a symmetry of the room, by its place in `geometry`, is one of its reflectances and its luminaires too.
-pub(super) fn of_light(geometry: &[Operation], room: &Room, luminaires: &[Luminaire]) -> impl Fn(usize) -> bool {
-    move |k| keeps_reflectances(geometry[k], room) && keeps_luminaires(geometry[k], room, luminaires)
+/// The symmetries of a room's shape, and which of them its light shares.
+#[derive(Clone, Debug)]
+pub(super) struct Symmetries {
+    pub(super) of_room: Vec<Operation>,
+    /// Places in `of_room`.
+    pub(super) of_light: Vec<usize>,
+}
+
+impl Symmetries {
+    pub(super) fn of(room: &Room, luminaires: &[Luminaire]) -> Self {
+        let of_room = of_geometry(room.size_m);
+        let is_shared = |k: &usize| {
+            let op = of_room[*k];
+            keeps_reflectances(op, room) && keeps_luminaires(op, room, luminaires)
+        };
+        let of_light = (0..of_room.len()).filter(is_shared).collect();
+        Self { of_room, of_light }
+    }
 }
 
 /// The reflectance of a face.
@@ -85,7 +102,12 @@ fn keeps_luminaires(op: Operation, room: &Room, luminaires: &[Luminaire]) -> boo
 
 /// Whether `other` shines as the image of `luminaire` does: at every node and inside every cell of both tables.
 fn is_image(op: Operation, luminaire: &Luminaire, other: &Luminaire) -> bool {
-    let peak = luminaire.photometry.distribution.max_intensity().value() * luminaire.flux_scale;
+    let table = &luminaire.photometry.distribution;
+    if table.symmetry() == Symmetry::Axial && Arc::ptr_eq(&luminaire.photometry, &other.photometry) {
+        let axis = op.of_direction(luminaire.orientation.z_axis);
+        return luminaire.flux_scale == other.flux_scale && (axis - other.orientation.z_axis).length() <= 1e-13;
+    }
+    let peak = table.max_intensity().value() * luminaire.flux_scale;
     let same = |d: DVec3| {
         let (a, b) = (luminaire.intensity_towards(d).value(), other.intensity_towards(op.of_direction(d)).value());
         (a - b).abs() <= 1e-12 * peak
@@ -150,10 +172,9 @@ impl Orbits {
         Self { images, representatives, orbit, sizes }
     }
 
-    /// The orbits under a part of the group, which `keeps` picks by its place.
-    pub(super) fn under(&self, mut keeps: impl FnMut(usize) -> bool) -> Self {
-        let images = self.images.iter().enumerate().filter(|(k, _)| keeps(*k)).map(|(_, image)| image.clone());
-        Self::of_images(self.orbit.len(), images.collect())
+    /// The orbits under a part of the group.
+    pub(super) fn under(&self, operations: &[usize]) -> Self {
+        Self::of_images(self.orbit.len(), operations.iter().map(|k| self.images[*k].clone()).collect())
     }
 
     /// Values at all nodes from values by orbit.

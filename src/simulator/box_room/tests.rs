@@ -9,6 +9,7 @@ use glam::{DMat3, DVec3};
 use crate::geometry::{Reflectances, Room};
 use crate::photometry::{LuminousIntensityDistribution, Photometry};
 use crate::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
+use crate::simulator::box_room::symmetry::Symmetries;
 use crate::simulator::box_room::{BoxField, EFFORTS, Effort};
 use crate::simulator::{Accuracy, Estimate, Prepared, Uncertainty, illuminance};
 
@@ -80,10 +81,10 @@ fn pair(estimate: &Estimate) -> (f64, f64) {
 }
 
 /// Random numbers within 0..1, the same on every machine.
-struct Random(u64);
+pub(super) struct Random(pub(super) u64);
 
 impl Random {
-    fn next(&mut self) -> f64 {
+    pub(super) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 33) as f64 / (1_u64 << 31) as f64
     }
@@ -95,7 +96,7 @@ impl Random {
 }
 
 /// A room with six reflectances and a turned luminaire whose table starts and ends with a step.
-fn random_scene(random: &mut Random) -> (Scene, Vec<Meter>) {
+pub(super) fn random_scene(random: &mut Random) -> (Scene, Vec<Meter>) {
     let size_m = random.within(2.0, 6.0);
     let mut rho = || 0.9 * random.next();
     let reflectance = Reflectances {
@@ -127,7 +128,7 @@ fn bounds_hold_in_random_rooms_against_higher_orders() {
     let mut random = Random(7);
     for case in 0..8 {
         let (scene, meters) = random_scene(&mut random);
-        let field = BoxField::solve(&scene.room.unwrap(), &scene.luminaires, Bounces::Converged, &EFFORTS[3]);
+        let field = solve(&scene, &EFFORTS[3]);
         for relative_error in [0.5, 0.03] {
             let found = indirect(&scene, &meters, relative_error);
             for (truth, (value, bound)) in field.illuminance(&meters).into_iter().zip(found) {
@@ -208,12 +209,17 @@ fn a_luminaire_turned_against_its_table_turned_back_reads_the_same() {
     assert_relative_eq!(plain[0].0, turned[0].0, max_relative = 1e-9);
 }
 
+fn solve(scene: &Scene, effort: &Effort) -> BoxField {
+    let (room, luminaires) = (scene.room.unwrap(), &scene.luminaires);
+    BoxField::solve(&room, luminaires, &Symmetries::of(&room, luminaires), Bounces::Converged, effort)
+}
+
 /// Area-mean indirect illuminance of a 4 m cube of one reflectance with 10 000 lm at its centre, from the nodes.
 fn furnace_mean(rho: f64, effort: &Effort) -> f64 {
     let isotropic = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![10_000.0 / (4.0 * PI); 2]).unwrap();
     let room = Room { size_m: DVec3::splat(4.0), reflectance: Reflectances::with_equal_walls(rho, rho, rho) };
-    let luminaires = [point(DVec3::splat(2.0), isotropic)];
-    BoxField::solve(&room, &luminaires, Bounces::Converged, effort).mean_exitance() / rho
+    let luminaires = vec![point(DVec3::splat(2.0), isotropic)];
+    solve(&Scene { room: Some(room), obstacles: vec![], luminaires }, effort).mean_exitance() / rho
 }
 
 #[test]
