@@ -40,10 +40,15 @@ enum Curve {
 
 impl Curve {
     fn at(self, c: f64) -> f64 {
+        self.at_turn(c.sin_cos())
+    }
+
+    /// At the C of this sine and cosine.
+    fn at_turn(self, (sin_c, cos_c): (f64, f64)) -> f64 {
         match self {
             Self::Constant(gamma) => gamma,
             Self::GreatCircle(m) => {
-                let across = m.x * c.cos() + m.y * c.sin();
+                let across = m.x * cos_c + m.y * sin_c;
                 if m.z >= 0.0 { m.z.atan2(across) } else { (-m.z).atan2(-across) }
             }
         }
@@ -67,6 +72,11 @@ pub(super) struct Row {
 }
 
 impl Row {
+    /// The angle along gamma from end to end.
+    pub(super) fn gamma_rad(&self) -> f64 {
+        self.high - self.low
+    }
+
     /// The world direction at a parameter from 0 to 1, and the flux in lumens that a unit of both parameters carries there.
     pub(super) fn direction(&self, t: f64) -> (DVec3, f64) {
         let gamma = self.low + t * (self.high - self.low);
@@ -82,12 +92,9 @@ impl Cell {
         self.piece
     }
 
-    /// The larger of the angles that a part of it spans along C and along gamma, where bounds are curved at least that along C.
-    pub(super) fn widest_rad(&self, part_s: f64, part_t: f64) -> f64 {
-        let along_c = part_s * (self.c.1 - self.c.0);
-        let gamma = |c: f64| self.upper.at(c) - self.lower.at(c);
-        let along_gamma = part_t * gamma(self.c.0).max(gamma(self.c.1)).max(gamma(0.5 * (self.c.0 + self.c.1)));
-        along_c.max(along_gamma)
+    /// The angle along C from the first parameter to the second.
+    pub(super) fn turn_rad(&self, s: (f64, f64)) -> f64 {
+        (s.1 - s.0) * (self.c.1 - self.c.0)
     }
 
     /// Whether it goes on where another one ends, under the same bounds.
@@ -117,8 +124,8 @@ impl LuminaireFrame {
     /// A line of constant C through a cell, at a parameter from 0 to 1.
     pub(super) fn row(&self, cell: &Cell, s: f64) -> Row {
         let c = cell.c.0 + s * (cell.c.1 - cell.c.0);
-        let (low, high) = (cell.lower.at(c), cell.upper.at(c));
         let (sin_c, cos_c) = c.sin_cos();
+        let (low, high) = (cell.lower.at_turn((sin_c, cos_c)), cell.upper.at_turn((sin_c, cos_c)));
         let (i, j) = cell.piece;
         let (c0, c1) = (self.c_rad[i], self.c_rad[i + 1]);
         let (g0, g1) = (self.gamma_rad[j], self.gamma_rad[j + 1]);

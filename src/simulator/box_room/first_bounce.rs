@@ -77,10 +77,10 @@ impl FirstBounce {
             }
             let mut on_face = vec![0.0; receivers.len()];
             let polygon = corners(&self.room, face);
-            let mut in_view = vec![];
+            let mut in_view = Numbers { numbers: vec![], start: 0 };
             for (k, receiver) in receivers.iter().enumerate().filter(|(_, r)| r.face != Some(face)) {
                 match above_horizon(receiver, &polygon, self.room.size_m.max_element()) {
-                    Visible::All => in_view.push(k as u32),
+                    Visible::All => in_view.numbers.push(k as u32),
                     Visible::Part(lit) => on_face[k] += self.partly_seen(face, &lit, receiver),
                     Visible::Nothing => {}
                 }
@@ -88,7 +88,7 @@ impl FirstBounce {
             for source in &self.sources {
                 let ground = self.ground(source, face);
                 for patch in &source.faces[face.0] {
-                    self.walk(patch, ground, receivers, &in_view, &mut on_face);
+                    self.walk(patch, ground, receivers, &mut in_view, &mut on_face);
                 }
             }
             for (sum, on_face) in sums.iter_mut().zip(on_face) {
@@ -113,9 +113,9 @@ impl FirstBounce {
 
     fn flux(&self, patch: &Patch, ground: Ground) -> f64 {
         if patch.is_uneven() {
-            return self.with_halves(patch, ground, |halves| halves.iter().map(|half| self.flux(half, ground)).sum());
+            return self.halves(patch, ground, &mut None).iter().map(|half| self.flux(half, ground)).sum();
         }
-        self.with_points(patch, Patch::FAR, ground, Points::flux)
+        self.points(patch, Patch::FAR, ground, &mut None).flux()
     }
 
     fn ground<'a>(&'a self, source: &'a Source, face: Face) -> Ground<'a> {
@@ -125,7 +125,7 @@ impl FirstBounce {
     /// Light from a face that the horizon of a receiver crosses: pieces of a table that it crosses are cut along it.
     fn partly_seen(&self, face: Face, lit: &[DVec3], receiver: &Receiver) -> f64 {
         let mut sum = [0.0];
-        let receiver = std::slice::from_ref(receiver);
+        let (receiver, mut only) = (std::slice::from_ref(receiver), Numbers { numbers: vec![0], start: 0 });
         let rounding = 1e-14 * self.room.size_m.max_element();
         for source in &self.sources {
             let ground = self.ground(source, face);
@@ -134,69 +134,77 @@ impl FirstBounce {
                 let heights = piece.iter().map(|patch| heights(patch, &receiver[0]));
                 let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
                 if low >= -rounding {
-                    piece.iter().for_each(|patch| self.walk(patch, ground, receiver, &[0], &mut sum));
+                    piece.iter().for_each(|patch| self.walk(patch, ground, receiver, &mut only, &mut sum));
                 } else if high > rounding {
                     crossed.push(piece[0].piece());
                 }
             }
             if !crossed.is_empty() {
                 for patch in patches(ground, source.frame.cells(lit, &crossed)) {
-                    self.walk(&patch, ground, receiver, &[0], &mut sum);
+                    self.walk(&patch, ground, receiver, &mut only, &mut sum);
                 }
             }
         }
         sum[0]
     }
 
-    /// Adds what a patch gives the receivers of these numbers.
-    fn walk(&self, patch: &Patch, ground: Ground, receivers: &[Receiver], numbers: &[u32], sums: &mut [f64]) {
+    /// Adds what a patch gives the receivers whose numbers `list` holds from `start` on; leaves the list as it was.
+    fn walk(&self, patch: &Patch, ground: Ground, receivers: &[Receiver], list: &mut Numbers, sums: &mut [f64]) {
         let smallest = SMALLEST * self.room.size_m.max_element();
-        let (mut near, mut far) = (vec![], vec![]);
-        for &number in numbers {
-            let gap = (receivers[number as usize].position_m - patch.centre_m).abs() - patch.half_m;
-            let rule = patch.rule_at(gap.max(DVec3::ZERO).length_squared(), &self.rules);
-            match rule {
-                _ if patch.half_length_m <= smallest => far.push((Patch::NEAR, number)),
-                Some(rule) if !patch.is_uneven() => far.push((rule, number)),
-                _ => near.push(number),
+        let (start, end) = (list.start, list.numbers.len());
+        let mut own = [const { None }; Patch::RULES];
+        for k in start..end {
+            let number = list.numbers[k];
+            let receiver = &receivers[number as usize];
+            let gap = (receiver.position_m - patch.centre_m).abs() - patch.half_m;
+            let rule = match patch.rule_at(gap.max(DVec3::ZERO).length_squared(), &self.rules) {
+                _ if patch.half_length_m <= smallest => Patch::NEAR,
+                Some(rule) if !patch.is_uneven() => rule,
+                _ => {
+                    list.numbers.push(number);
+                    continue;
+                }
+            };
+            let points = self.points(patch, rule, ground, &mut own[rule]);
+            sums[number as usize] += points.irradiance(receiver, ground.face);
+        }
+        if list.numbers.len() > end {
+            let mut own = None;
+            list.start = end;
+            for half in self.halves(patch, ground, &mut own) {
+                self.walk(half, ground, receivers, list, sums);
             }
-        }
-        far.sort_unstable_by_key(|(rule, _)| *rule);
-        for same in far.chunk_by(|a, b| a.0 == b.0) {
-            self.with_points(patch, same[0].0, ground, |points| {
-                for (_, number) in same {
-                    sums[*number as usize] += points.irradiance(&receivers[*number as usize], ground.face);
-                }
-            });
-        }
-        if !near.is_empty() {
-            self.with_halves(patch, ground, |halves| {
-                for half in halves {
-                    self.walk(half, ground, receivers, &near, sums);
-                }
-            });
+            list.start = start;
+            list.numbers.truncate(end);
         }
     }
 
-    /// Does something with a patch's points, which are kept as long as there is room: the result is the same.
-    fn with_points<T>(&self, patch: &Patch, rule: usize, ground: Ground, f: impl FnOnce(&Points) -> T) -> T {
-        let bytes = 32 * patch.count(rule);
-        self.with(patch.kept_points(rule), bytes, || patch.sample(rule, ground), f)
+    /// A patch's points, which are kept as long as there is room, or made here: the result is the same.
+    fn points<'a>(&self, patch: &'a Patch, rule: usize, ground: Ground, own: &'a mut Option<Points>) -> &'a Points {
+        self.kept(patch.kept_points(rule), 32 * patch.count(rule), || patch.sample(rule, ground), own)
     }
 
-    fn with_halves<T>(&self, patch: &Patch, ground: Ground, f: impl FnOnce(&[Patch; 2]) -> T) -> T {
-        self.with(patch.kept_halves(), 2 * size_of::<Patch>(), || patch.halve(ground), |halves| f(halves))
+    fn halves<'a>(&self, patch: &'a Patch, ground: Ground, own: &'a mut Option<Box<[Patch; 2]>>) -> &'a [Patch; 2] {
+        let halves: &Box<[Patch; 2]> =
+            self.kept(patch.kept_halves(), 2 * size_of::<Patch>(), || patch.halve(ground), own);
+        halves
     }
 
-    fn with<V, T>(&self, place: &OnceLock<V>, bytes: usize, make: impl Fn() -> V, f: impl FnOnce(&V) -> T) -> T {
+    fn kept<'a, V>(&self, place: &'a OnceLock<V>, bytes: usize, make: impl Fn() -> V, own: &'a mut Option<V>) -> &'a V {
         if let Some(value) = place.get() {
-            return f(value);
+            return value;
         }
-        if self.kept.fetch_add(bytes, Ordering::Relaxed) < MOST_KEPT {
-            return f(place.get_or_init(make));
+        if own.is_none() && self.kept.fetch_add(bytes, Ordering::Relaxed) < MOST_KEPT {
+            return place.get_or_init(make);
         }
-        f(&make())
+        own.get_or_insert_with(make)
     }
+}
+
+/// Numbers of receivers in a stack, of which the top belongs to the patch that is being walked.
+struct Numbers {
+    numbers: Vec<u32>,
+    start: usize,
 }
 
 /// The least and the greatest height of a patch above the horizon of a receiver, in metres, or somewhat more.

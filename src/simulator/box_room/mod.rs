@@ -5,6 +5,7 @@
 //! Numerical Solution of Integral Equations of the Second Kind* (1997), chapters 3 (iterated collocation) and 9.
 
 mod cells;
+mod error;
 mod first_bounce;
 mod grid;
 mod kernel;
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 use crate::geometry::Room;
 use crate::scene::{Bounces, Luminaire, Meter};
 use crate::simulator::{Bounded, gmres};
+use error::{Probes, Reading};
 use first_bounce::FirstBounce;
 use grid::Grid;
 use kernel::Receiver;
@@ -43,12 +45,9 @@ pub(super) struct Effort {
 /// Entries of the operator at most: 128 MiB.
 const MOST_ENTRIES: usize = 1 << 24;
 /// The largest relative error that each effort is the first choice for.
-const FIRST_EFFORT: [f64; 6] = [1.0, 2e-3, 1e-4, 5e-6, 1e-6, 5e-7];
-/// Rounding of sums over thousands of terms, relative.
-const ROUNDING: f64 = 1e-12;
-
-/// The ladder of efforts; each answers for the error of the one before it.
-pub(super) const EFFORTS: [Effort; 7] = [
+const FIRST_EFFORT: [f64; 5] = [f64::INFINITY, 2e-2, 2e-5, 5e-6, 5e-7];
+/// The ladder of efforts; the rules of the first bounce grow with the order, or neighbours would share their errors.
+pub(super) const EFFORTS: [Effort; 8] = [
     Effort {
         order: 2,
         elements_per_half: 1,
@@ -59,6 +58,14 @@ pub(super) const EFFORTS: [Effort; 7] = [
     },
     Effort {
         order: 4,
+        elements_per_half: 1,
+        near_points: 4,
+        source_points: 3,
+        source_reach: 1.0,
+        source_tolerance: 1e-4,
+    },
+    Effort {
+        order: 5,
         elements_per_half: 1,
         near_points: 5,
         source_points: 4,
@@ -78,22 +85,22 @@ pub(super) const EFFORTS: [Effort; 7] = [
         elements_per_half: 1,
         near_points: 8,
         source_points: 8,
-        source_reach: 1.5,
-        source_tolerance: 1e-9,
+        source_reach: 1.2,
+        source_tolerance: 1e-8,
     },
     Effort {
         order: 10,
         elements_per_half: 1,
         near_points: 10,
-        source_points: 8,
-        source_reach: 2.0,
-        source_tolerance: 1e-10,
+        source_points: 9,
+        source_reach: 1.5,
+        source_tolerance: 1e-9,
     },
     Effort {
         order: 12,
         elements_per_half: 1,
         near_points: 12,
-        source_points: 10,
+        source_points: 12,
         source_reach: 2.0,
         source_tolerance: 1e-11,
     },
@@ -102,13 +109,10 @@ pub(super) const EFFORTS: [Effort; 7] = [
         elements_per_half: 2,
         near_points: 12,
         source_points: 12,
-        source_reach: 2.0,
-        source_tolerance: 1e-11,
+        source_reach: 2.5,
+        source_tolerance: 1e-12,
     },
 ];
-
-/// A difference of two efforts, times this, bounds the error of the finer one.
-const SAFETY: f64 = 3.0;
 
 /// An empty room with point luminaires, solved as finely as anyone has asked so far.
 #[derive(Debug, Default)]
@@ -119,10 +123,8 @@ pub(super) struct EmptyRoom {
 }
 
 impl EmptyRoom {
-    /// Indirect illuminance at the meters, climbing the efforts until the bound meets `relative_error`.
-    ///
-    /// The bound is the difference of the two finest efforts, or half the worst relative difference over all meters where
-    /// a meter's own is smaller by chance, times a safety factor.
+    /// Indirect illuminance at the meters, climbing the efforts until the bound meets `relative_error`; and in words how
+    /// far that went and why no farther.
     pub(super) fn indirect(
         &mut self,
         room: &Room,
@@ -144,48 +146,36 @@ impl EmptyRoom {
         relative_error: f64,
     ) -> (Vec<Bounded>, String) {
         let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires));
-        let fields = &mut self.fields;
-        let mut solve = |level: usize| {
-            if fields.iter().all(|(at, _)| *at != level) {
-                fields.push((level, BoxField::solve(room, luminaires, symmetries, bounces, &EFFORTS[level])));
-            }
-            let field = fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field);
-            (
-                field.map(|field| field.illuminance(meters)).unwrap_or_default(),
-                field.map_or(0.0, |field| field.imbalance),
-            )
-        };
         let mut level = FIRST_EFFORT.iter().rposition(|error| relative_error <= *error).unwrap_or(0);
-        let (mut coarse, _) = solve(level);
+        let mut readings = vec![];
         loop {
-            level += 1;
-            let (fine, imbalance) = solve(level);
-            let values = bounded(&coarse, &fine, imbalance);
-            let met = values.iter().all(|v| v.bound <= relative_error * v.value.abs());
-            let fits =
-                EFFORTS.get(level + 1).is_some_and(|effort| Grid::matrix_entries(room.size_m, effort) <= MOST_ENTRIES);
-            if met || !fits {
-                let Effort { order, elements_per_half, .. } = EFFORTS[level];
-                let text = format!(
-                    "hp collocation, order {order} with {elements_per_half} element(s) a half side: empty box, point luminaires"
-                );
-                return (values, text);
+            if self.fields.iter().all(|(at, _)| *at != level) {
+                let field = BoxField::solve(room, luminaires, symmetries, bounces, &EFFORTS[level]);
+                self.fields.push((level, field));
             }
-            coarse = fine;
+            let field = self.fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field);
+            readings.extend(field.map(|field| Reading::of(field, meters)));
+            level += 1;
+            let Some(values) = error::bounded(&readings, room, meters) else { continue };
+            let worst =
+                values.iter().map(|v| if v.bound == 0.0 { 0.0 } else { v.bound / v.value.abs() }).fold(0.0, f64::max);
+            let why = match EFFORTS.get(level) {
+                _ if worst <= relative_error => {
+                    format!("its bound of {worst:.0e} meets the {relative_error:.0e} asked for")
+                }
+                None => format!("the finest there is, its bound is {worst:.0e}"),
+                Some(next) if Grid::matrix_entries(room.size_m, next) > MOST_ENTRIES => {
+                    format!("a finer matrix would not fit, its bound is {worst:.0e}")
+                }
+                Some(_) => continue,
+            };
+            let Effort { order, elements_per_half, .. } = EFFORTS[level - 1];
+            let text = format!(
+                "hp collocation, order {order} with {elements_per_half} element(s) a half side: empty box, point luminaires; {why}"
+            );
+            return (values, text);
         }
     }
-}
-
-fn bounded(coarse: &[f64], fine: &[f64], imbalance: f64) -> Vec<Bounded> {
-    let pairs = || coarse.iter().zip(fine);
-    let relative = |(c, f): (&f64, &f64)| if *f == 0.0 { 0.0 } else { ((f - c) / f).abs() };
-    let worst = pairs().map(relative).fold(0.0, f64::max);
-    pairs()
-        .map(|(c, f)| {
-            let difference = (f - c).abs().max(0.5 * worst * f);
-            Bounded { value: *f, bound: SAFETY * difference + (imbalance + ROUNDING) * f }
-        })
-        .collect()
 }
 
 /// The solved light field of a room at one effort, ready for any meter.
@@ -196,6 +186,8 @@ pub(super) struct BoxField {
     /// Indirect exitance at the nodes in lm/m²: what is gathered on top of the first bounce.
     exitance: Vec<f64>,
     gathers: Gathers,
+    /// What the probes read, for the error's sake.
+    probes: Probes,
     /// Relative flux that interpolating the first bounce between the nodes would lose or gain.
     imbalance: f64,
 }
@@ -224,7 +216,8 @@ impl BoxField {
             Bounces::AtMost(_) | Bounces::Converged => Gathers::All,
         };
         if gathers != Gathers::All {
-            return Self { exitance: vec![0.0; grid.len()], grid, first, gathers, imbalance: 0.0 };
+            return Self { exitance: vec![0.0; grid.len()], grid, first, gathers, probes: vec![], imbalance: 0.0 }
+                .probed();
         }
         let orbits = Orbits::new(&grid, &symmetries.of_room);
         let light = orbits.under(&symmetries.of_light);
@@ -246,7 +239,13 @@ impl BoxField {
         } else {
             interreflect(|u| operator.apply(&exitance(u, &rho)), light.unfold(&known), bounces)
         };
-        Self { exitance: exitance(&irradiance, &rho), grid, first, gathers, imbalance }
+        let exitance = exitance(&irradiance, &rho);
+        Self { exitance, grid, first, gathers, probes: vec![], imbalance }.probed()
+    }
+
+    fn probed(self) -> Self {
+        let probes = self.illuminance(&error::probes(self.grid.size_m));
+        Self { probes, ..self }
     }
 
     /// Area-mean indirect exitance in lm/m².

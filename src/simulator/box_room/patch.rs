@@ -96,10 +96,8 @@ impl Rules {
 impl Patch {
     pub(super) fn new(cell: Cell, s: (f64, f64), t: (f64, f64), ground: Ground) -> Self {
         let parts = [0.0, 0.5, 1.0];
-        let p = parts.map(|i| {
-            let row = ground.frame.row(&cell, s.0 + i * (s.1 - s.0));
-            parts.map(|j| ground.hit(row.direction(t.0 + j * (t.1 - t.0)).0))
-        });
+        let rows = parts.map(|i| ground.frame.row(&cell, s.0 + i * (s.1 - s.0)));
+        let p = rows.map(|row| parts.map(|j| ground.hit(row.direction(t.0 + j * (t.1 - t.0)).0)));
         let all = || p.iter().flatten();
         let low = all().fold(DVec3::INFINITY, |m, q| m.min(*q));
         let high = all().fold(DVec3::NEG_INFINITY, |m, q| m.max(*q));
@@ -118,7 +116,8 @@ impl Patch {
         };
         let (centre_m, half_m) = (0.5 * (low + high), 0.52 * (high - low));
         let near = ground.rules.gauss.len();
-        let angle = cell.widest_rad((s.1 - s.0).abs(), (t.1 - t.0).abs());
+        let along_gamma = rows.iter().map(|row| row.gamma_rad() * (t.1 - t.0)).fold(0.0, f64::max);
+        let angle = cell.turn_rad(s).max(along_gamma);
         let far = 1 + ground.rules.widest_rad.iter().position(|widest| angle <= *widest).unwrap_or(near - 1);
         let sizes = [near, usize::midpoint(near, far), far].map(|n| n as u8);
         let (halves, points) = (OnceLock::new(), [const { OnceLock::new() }; RULES]);
@@ -141,6 +140,7 @@ impl Patch {
         (0..RULES).rev().find(|k| rules.beyond2[usize::from(self.sizes[*k]) - 1] * h2 <= distance2)
     }
 
+    pub(super) const RULES: usize = RULES;
     /// The rule for receivers far away.
     pub(super) const FAR: usize = RULES - 1;
     /// The rule for the nearest receivers.
