@@ -17,6 +17,8 @@ use crate::simulator::Bounded;
 const SAFETY: f64 = 5.0;
 /// No effort is believed to be better than the one before it by more than this.
 const BEST_RATE: f64 = 0.1;
+/// The same where one difference alone is known.
+const BEST_FIRST_RATE: f64 = 0.3;
 /// The part of the flux that interpolation lost and that scaling gave back which may still be in the wrong place.
 const MISPLACED: f64 = 0.25;
 /// Distance from a surface straight ahead, in shortest sides of the room, within which no rate is trusted.
@@ -64,8 +66,10 @@ pub(super) fn bounded(readings: &[Reading], room: &Room, meters: &[Meter]) -> Op
     let difference = fine.difference(coarse);
     let ratio = |a: f64, b: f64| if a <= 0.0 { 0.0 } else { a / b };
     let flux_rate = ratio(fine.imbalance, coarse.imbalance);
-    let rate = before.last().map_or(flux_rate, |first| flux_rate.max(ratio(difference, coarse.difference(first))));
-    let rate = rate.clamp(BEST_RATE, 1.0);
+    let rate = match before {
+        [.., first] => flux_rate.max(ratio(difference, coarse.difference(first))).clamp(BEST_RATE, 1.0),
+        [] => flux_rate.clamp(BEST_FIRST_RATE, 1.0),
+    };
     let bound = |meter: &Meter, lux: f64| {
         let rate = rate.max((CLOSE / ahead(room, meter)).powi(2).min(WORST_RATE));
         lux.abs() * (SAFETY * rate * difference + MISPLACED * fine.imbalance + ROUNDING)

@@ -134,7 +134,9 @@ impl FirstBounce {
                 let heights = piece.iter().map(|patch| heights(patch, &receiver[0]));
                 let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
                 if low >= -rounding {
-                    piece.iter().for_each(|patch| self.walk(patch, ground, receiver, &mut only, &mut sum));
+                    for patch in piece {
+                        self.walk(patch, ground, receiver, &mut only, &mut sum);
+                    }
                 } else if high > rounding {
                     crossed.push(piece[0].piece());
                 }
@@ -185,9 +187,7 @@ impl FirstBounce {
     }
 
     fn halves<'a>(&self, patch: &'a Patch, ground: Ground, own: &'a mut Option<Box<[Patch; 2]>>) -> &'a [Patch; 2] {
-        let halves: &Box<[Patch; 2]> =
-            self.kept(patch.kept_halves(), 2 * size_of::<Patch>(), || patch.halve(ground), own);
-        halves
+        self.kept(patch.kept_halves(), 2 * size_of::<Patch>(), || patch.halve(ground), own).as_ref()
     }
 
     fn kept<'a, V>(&self, place: &'a OnceLock<V>, bytes: usize, make: impl Fn() -> V, own: &'a mut Option<V>) -> &'a V {

@@ -67,10 +67,10 @@ pub(super) const EFFORTS: [Effort; 8] = [
     Effort {
         order: 5,
         elements_per_half: 1,
-        near_points: 5,
-        source_points: 4,
+        near_points: 6,
+        source_points: 5,
         source_reach: 1.0,
-        source_tolerance: 1e-5,
+        source_tolerance: 1e-6,
     },
     Effort {
         order: 6,
@@ -235,9 +235,9 @@ impl BoxField {
                 let few = rows.len() < 500;
                 if few { rows.iter().map(lux).collect() } else { rows.par_iter().map(lux).collect() }
             };
-            light.unfold(&interreflect(step, known, bounces))
+            light.unfold(&interreflect(step, &known, bounces))
         } else {
-            interreflect(|u| operator.apply(&exitance(u, &rho)), light.unfold(&known), bounces)
+            interreflect(|u| operator.apply(&exitance(u, &rho)), &light.unfold(&known), bounces)
         };
         let exitance = exitance(&irradiance, &rho);
         Self { exitance, grid, first, gathers, probes: vec![], imbalance }.probed()
@@ -273,10 +273,10 @@ impl BoxField {
 }
 
 /// Irradiance after all the reflections that count, from that after one and what a further one makes of it.
-fn interreflect(step: impl Fn(&[f64]) -> Vec<f64>, known: Vec<f64>, bounces: Bounces) -> Vec<f64> {
+fn interreflect(step: impl Fn(&[f64]) -> Vec<f64>, known: &[f64], bounces: Bounces) -> Vec<f64> {
     match bounces {
-        Bounces::Converged => gmres::solve(step, &known, 1e-14),
-        Bounces::AtMost(count) => (2..count).fold(known.clone(), |u, _| {
+        Bounces::Converged => gmres::solve(step, known, 1e-14),
+        Bounces::AtMost(count) => (2..count).fold(known.to_vec(), |u, _| {
             let again = step(&u);
             known.iter().zip(&again).map(|(g, k)| g + k).collect()
         }),
