@@ -16,6 +16,8 @@ use crate::spec::Budget;
 const WEIGHTS: [f64; LOOKS as usize] = [1.0, 2.0, 6.0, 18.0];
 /// A look that could be granted less than this share of the first one's effort is not worth an engine's start.
 const LEAST_WEIGHT: f64 = 0.5;
+/// A first look counts as this long at least, in seconds: one that was mirrored or read off another case took none.
+const SHORTEST_S: f64 = 1.0;
 /// Standard errors of the first look within a tolerance, where sampling stops as soon as it is decided: it then decides
 /// whatever deviates by up to half of the tolerance.
 const FIRST_LOOK: f64 = 5.0;
@@ -63,7 +65,7 @@ pub fn refine(
         return;
     }
     subject.looks = vec![1; subject.readings.len()];
-    let (first_s, mut total_weight) = (subject.wall_s.max(1e-3), WEIGHTS[0]);
+    let (first_s, mut total_weight) = (subject.wall_s.max(SHORTEST_S), WEIGHTS[0]);
     for look in 2..=LOOKS {
         let targets = undecided(judge, task, witnesses, subject);
         if targets.is_empty() {
