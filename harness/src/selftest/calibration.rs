@@ -168,13 +168,16 @@ fn kolmogorov(distance: f64, count: usize) -> f64 {
 
 impl fmt::Display for Calibrations {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let heads = NOMINAL.iter().map(|n| format!(" {:.2} % |", 100.0 * n)).collect::<String>();
-        writeln!(f, "| uncertainty | | p-values uniform: Kolmogorov's p |{heads}")?;
+        let cells = |shares: &mut dyn Iterator<Item = f64>| {
+            shares.map(|share| format!("{:.2} %", 100.0 * share)).collect::<Vec<_>>().join(" | ")
+        };
+        let heads = cells(&mut NOMINAL.into_iter());
+        writeln!(f, "| uncertainty | | p-values uniform: Kolmogorov's p | {heads} |")?;
         writeln!(f, "|---|---|---|{}", "---|".repeat(NOMINAL.len()))?;
         for interval in &self.intervals {
-            let found = interval.coverage.iter().map(|c| format!(" {:.2} % |", 100.0 * c.found)).collect::<String>();
+            let found = cells(&mut interval.coverage.iter().map(|c| c.found));
             let mark = if interval.is_good() { "ok" } else { "OFF" };
-            writeln!(f, "| {} | {mark} | {:.2} |{found}", interval.kind, interval.ks_p)?;
+            writeln!(f, "| {} | {mark} | {:.2} | {found} |", interval.kind, interval.ks_p)?;
         }
         Ok(())
     }
