@@ -168,14 +168,15 @@ struct Alarm {
     shift: (f64, f64),
 }
 
-/// The changes of one group. After each the estimates start anew from the night of the change.
+/// The changes of one group. After each the estimates start anew with the night after it was noticed: the nights since the change
+/// were picked for being unusual, and would foretell the next ones wrong.
 fn alarms(members: &[&Series], nights: usize, limit: f64) -> Vec<Alarm> {
     let mut found: Vec<Alarm> = vec![];
-    let (mut start, mut heeded) = (0, 0);
-    while let Some(night) = first_alarm(members, start..nights, heeded, limit) {
+    let mut start = 0;
+    while let Some(night) = first_alarm(members, start..nights, limit) {
         let Noticed { change, noticed } = night;
         found.push(Alarm { night: change, noticed, shift: shift(members, start, change, noticed) });
-        (start, heeded) = (change, noticed + 1);
+        start = noticed + 1;
     }
     found
 }
@@ -185,8 +186,8 @@ struct Noticed {
     noticed: usize,
 }
 
-/// The first alarm from night `heeded` on, of a segment without earlier changes.
-fn first_alarm(members: &[&Series], segment: std::ops::Range<usize>, heeded: usize, limit: f64) -> Option<Noticed> {
+/// The first alarm of a segment without earlier changes.
+fn first_alarm(members: &[&Series], segment: std::ops::Range<usize>, limit: f64) -> Option<Noticed> {
     let most = REFERENCE_VALUE + ONE_NIGHT * limit;
     let mut told = vec![Told::default(); members.len()];
     let mut spread = Spread::default();
@@ -209,7 +210,7 @@ fn first_alarm(members: &[&Series], segment: std::ops::Range<usize>, heeded: usi
             sums[side] += sign * deviate - REFERENCE_VALUE;
             if sums[side] <= 0.0 {
                 (sums[side], zero[side]) = (0.0, deviates.len());
-            } else if sums[side] > limit && night >= heeded {
+            } else if sums[side] > limit {
                 return Some(Noticed { change: most_likely(&deviates[zero[side]..]), noticed: night });
             }
         }
