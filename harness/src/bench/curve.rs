@@ -13,6 +13,9 @@ pub(super) const TARGETS: [f64; 4] = [0.1, 0.01, 1e-3, 1e-4];
 /// Readings darker than this part of the brightest are held against that instead of themselves.
 const FAINT: f64 = 0.01;
 
+/// What is left of a time without the start-up at least, in parts of it.
+const LEAST_NET: f64 = 0.05;
+
 /// Error against time of one engine, solver and preset at one procedure.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Curve {
@@ -115,7 +118,8 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 impl Curve {
     /// Fills in what follows from the points.
     pub(super) fn conclude(&mut self) {
-        let net = |p: &BenchPoint| (p.wall_s - self.start_up_s).max(1e-3 * p.wall_s);
+        // A difference of two times that are nearly alike is not known better than that.
+        let net = |p: &BenchPoint| (p.wall_s - self.start_up_s).max(LEAST_NET * p.wall_s);
         let points: Vec<(f64, f64)> = self.points.iter().map(|p| (net(p), p.relative_error)).collect();
         let whole: Vec<(f64, f64)> = self.points.iter().map(|p| (p.wall_s, p.relative_error)).collect();
         let times = |points: &[(f64, f64)]| TARGETS.map(|t| (t.to_string(), fit::time_to(points, t))).into();
