@@ -94,7 +94,7 @@ fn a_missing_baseline_fails_and_leaves_a_candidate_that_nobody_accepted() {
     fs::copy(candidate, room.path("baselines/spec.json")).unwrap();
     let output = room.run(&["--baseline", "baselines"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("accepted for no reason"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("was accepted for no"), "{}", stderr(&output));
 }
 
 #[test]
@@ -149,7 +149,9 @@ fn two_runs_that_agree_differ_in_nothing_and_a_planted_change_exits_1() {
     assert_eq!(output.status.code(), Some(1), "{}", stdout(&output));
     assert!(stdout(&output).contains("CHANGED") && stdout(&output).contains("+1.0000 %"), "{}", stdout(&output));
     let json = room.luxproof(&["diff", "out", "later", "--format", "json"]);
-    assert_eq!(serde_json::from_str::<serde_json::Value>(&stdout(&json)).unwrap()["entries"][0]["state"], "changed");
+    let changes: serde_json::Value = serde_json::from_str(&stdout(&json)).unwrap();
+    let changed = changes["entries"].as_array().unwrap().iter().filter(|e| e["state"] == "changed").count();
+    assert_eq!(changed, 1, "{changes}");
 }
 
 #[test]
