@@ -135,10 +135,10 @@ pub fn compare(old: &[Entry], new: &[Entry], comparability: Comparability) -> Ch
 fn decide(entry: &mut EntryChange, level: f64) {
     for meter in &mut entry.meters {
         // A probability that is no number never counts as agreement.
-        meter.significant = !(meter.p_value >= level);
+        meter.significant = meter.p_value < level || meter.p_value.is_nan();
     }
     if entry.state == State::Unchanged {
-        if entry.mean.is_some_and(|m| !(m.p_value >= level)) {
+        if entry.mean.is_some_and(|m| m.p_value < level || m.p_value.is_nan()) {
             entry.state = State::Shifted;
         } else if entry.meters.iter().any(|m| m.significant) {
             entry.state = State::Changed;
@@ -175,12 +175,11 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
     let mut change = bare(a, State::Unchanged, notes);
     let freedom = |u: [f64; 2]| welch_satterthwaite(u, [a.degrees_of_freedom, b.degrees_of_freedom]);
     for before in &a.readings {
-        match b.readings.iter().find(|now| now.meter == before.meter && now.quantity == before.quantity) {
-            Some(now) => change.meters.push(meter(before, now, &freedom)),
-            None => {
-                change.state = State::Vanished;
-                change.notes.push(format!("{} is not read any more", before.meter));
-            }
+        if let Some(now) = b.readings.iter().find(|now| now.meter == before.meter && now.quantity == before.quantity) {
+            change.meters.push(meter(before, now, &freedom));
+        } else {
+            change.state = State::Vanished;
+            change.notes.push(format!("{} is not read any more", before.meter));
         }
     }
     change.mean = mean(&change.meters, freedom([1.0, 1.0]));

@@ -26,7 +26,9 @@ pub struct Curve {
 pub fn curves(case: &str, task: &Task) -> Vec<Curve> {
     let mut planes: Vec<f64> =
         task.targets.iter().filter_map(|t| t.direction).flat_map(|d| [d.c_deg, d.c_deg + 180.0]).collect();
-    planes.iter_mut().for_each(|c| *c = c.rem_euclid(360.0));
+    for c in &mut planes {
+        *c = c.rem_euclid(360.0);
+    }
     planes.sort_by(f64::total_cmp);
     planes.dedup();
     let [luminaire] = &task.scene.luminaires[..] else { return vec![] };

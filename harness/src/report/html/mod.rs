@@ -40,7 +40,7 @@ pub fn page(report: &Report, beside: &[Beside]) -> String {
                 meta http-equiv="Content-Security-Policy" content=(POLICY);
                 meta name="generator" content=(format!("luxproof {}", report.tool_version));
                 title { (report.spec.title) " · luxproof" }
-                style { (PreEscaped(STYLE)) (PreEscaped(palette.style())) }
+                style { (PreEscaped(STYLE)) (PreEscaped(Palette::style())) }
                 noscript { style { "tr[hidden]{display:table-row}.filters,.theme,.all,.more{display:none}" } }
             }
             body {

@@ -41,7 +41,7 @@ impl Palette {
     }
 
     /// Custom properties `--e0` ... for the style sheet.
-    pub(super) fn style(&self) -> String {
+    pub(super) fn style() -> String {
         let colour = |(k, (paper, black)): (usize, &(&str, &str))| format!("--e{k}:light-dark({paper},{black});");
         let colours: String = COLOURS.iter().enumerate().map(colour).collect();
         let uses = |k| format!(".e{k}{{fill:var(--e{k})}}.ring .e{k},.line.e{k}{{stroke:var(--e{k})}}");

@@ -1,6 +1,6 @@
 //! Colour scales that keep their order without colour vision: cividis for amounts, purple to orange for deviations.
 //!
-//! Cividis: Nuñez, Anderton, Renslow, PLOS ONE 13 (2018) e0199239, nine of its colours; purple to orange: Brewer's PuOr.
+//! Cividis: Nuñez, Anderton, Renslow, PLOS ONE 13 (2018) e0199239, nine of its colours; purple to orange: Brewer's `PuOr`.
 
 type Rgb = [f64; 3];
 

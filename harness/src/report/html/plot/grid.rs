@@ -131,7 +131,7 @@ fn isolux(title: &str, mine: &[&Comparison], lattice: &Lattice) -> Markup {
         (cells(mine, lattice, &frame, |k| colours::amount(part(values[k])), |k| format!("{} {unit}", super::super::super::terminal::significant(values[k]))))
         @for level in &levels { (isoline(&values, lattice, &frame, *level)) }
         (coordinates(lattice, &frame))
-        (colour_bar(&frame, |t| colours::amount(t), &[(0.0, label(significant(low))), (1.0, label(significant(high)))], &format!("illuminance [{unit}]")))
+        (colour_bar(&frame, colours::amount, &[(0.0, label(significant(low))), (1.0, label(significant(high)))], &format!("illuminance [{unit}]")))
     };
     let caption = html! { "Cells: the reference at each meter; lines: isolux, in " (unit) "." };
     figure(title, frame.size[1] + 46.0 + BAR, &drawing, &caption)
@@ -155,7 +155,8 @@ fn isoline(values: &[f64], lattice: &Lattice, frame: &Frame, level: f64) -> Mark
             let (a, b) = (place(*a), place(*b));
             format!("M{} {}L{} {}", number(a[0]), number(a[1]), number(b[0]), number(b[1]))
         })
-        .collect();
+        .collect::<Vec<String>>()
+        .concat();
     // Its label: where the line comes nearest to the middle of the right half.
     let wanted = [LEFT + 0.72 * frame.size[0], 6.0 + 0.5 * frame.size[1]];
     let middle = |[a, b]: &[[f64; 2]; 2]| place([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]);
