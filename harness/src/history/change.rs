@@ -112,7 +112,7 @@ pub fn changes(history: &History) -> Vec<Change> {
             None => found.push(change),
         }
     }
-    found.sort_by(|a, b| (a.night, a.level).cmp(&(b.night, b.level)));
+    found.sort_by_key(|a| (a.night, a.level));
     found
 }
 
