@@ -3,8 +3,8 @@
 //! Errors fall by much from order to order where the light is smooth, and by little where a jump of a table crosses an
 //! edge of the room. The rate is seen in two ways: in how the differences shrink, and in how the flux does that
 //! interpolation loses. Close in front of a surface the error does not average out, and no rate is trusted. The constants
-//! come from 286 meters in 48 random rooms, half of them with jumps: errors were at most .82 of the bounds, 2 % in the
-//! median.
+//! come from 286 meters in 48 random rooms, two thirds of them with jumps, solved with rules of the first bounce somewhat
+//! unlike those of today's efforts: errors were at most .82 of the bounds, 2 % in the median. The tests check today's.
 
 use glam::DVec3;
 
