@@ -202,9 +202,9 @@ mod tests {
         let (a, b) = (entry("2026-01-01", "one", 2.0), entry("2026-01-01", "one-more", 2.5));
         let c = entry("2026-01-02", "one", 3.0);
         assert_eq!(add(&path, &[a, b.clone()]).unwrap(), 0);
-        assert_eq!(add(&path, &[c.clone()]).unwrap(), 0);
+        assert_eq!(add(&path, std::slice::from_ref(&c)).unwrap(), 0);
         let again = entry("2026-01-01", "one", 2.25);
-        assert_eq!(add(&path, &[again.clone()]).unwrap(), 1);
+        assert_eq!(add(&path, std::slice::from_ref(&again)).unwrap(), 1);
         let text = fs::read_to_string(&path).unwrap();
         let read: Vec<Entry<'_>> = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
         assert_eq!(read, [b, c, again]);
@@ -228,7 +228,7 @@ mod tests {
         let good = ["2026-01-31", "2024-02-29"];
         let bad = ["", "2026-1-31", "2026-13-01", "20260131", "2026-01-31T", "tonight..."];
         assert!(good.iter().all(|n| is_date(n)) && !bad.iter().any(|n| is_date(n)));
-        assert_eq!(rounded(Some(std::f64::consts::PI), 4), Some(3.142));
+        assert_eq!(rounded(Some(1.732_05), 4), Some(1.732));
         assert_eq!(rounded(Some(-1.23456789e-12), 3), Some(-1.23e-12));
         assert_eq!((rounded(Some(f64::NAN), 3), rounded(Some(0.0), 3), rounded(None, 3)), (None, Some(0.0), None));
     }

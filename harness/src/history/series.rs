@@ -96,12 +96,12 @@ impl History {
             let fail =
                 |(line, what)| HistoryError::Line { path: path.display().to_string(), line: lines_before + line, what };
             found.push(read.map_err(fail)?);
-            lines_before += found.last().map_or(0, |_| part.iter().filter(|b| **b == b'\n').count());
+            lines_before += part.split(|b| *b == b'\n').count() - 1;
         }
-        Ok(Self { is_cut_short: whole < bytes.len(), ..Self::joined(found) })
+        Ok(Self { is_cut_short: whole < bytes.len(), ..Self::joined(&found) })
     }
 
-    fn joined(parts: Vec<Part<'_>>) -> Self {
+    fn joined(parts: &[Part<'_>]) -> Self {
         let nights: BTreeSet<&str> = parts.iter().flat_map(|p| p.nights.iter().map(AsRef::as_ref)).collect();
         let nights: Vec<String> = nights.into_iter().map(str::to_owned).collect();
         let night_of = |name: &str| nights.binary_search_by(|n| n.as_str().cmp(name)).unwrap_or_default();
@@ -117,7 +117,7 @@ impl History {
         };
         let mut series: Vec<Series> = place.keys().map(empty).collect();
         let mut versions: BTreeMap<(String, usize), String> = BTreeMap::new();
-        for part in &parts {
+        for part in parts {
             let night_of: Vec<usize> = part.nights.iter().map(|n| night_of(n)).collect();
             let series_of: Vec<usize> = part.keys.iter().map(|k| place[&k.key()]).collect();
             for point in &part.points {

@@ -89,9 +89,9 @@ impl Synthetic {
         let (own, shared) = ((1.0 - self.common).sqrt(), self.common.sqrt());
         let mut deviation = vec![];
         let mut std_error = vec![];
-        for night in 0..self.nights {
+        for (night, common) in common.iter().enumerate().take(self.nights) {
             let moved = shift.filter(|s| night >= s.night).map_or(0.0, |s| s.standard_errors);
-            deviation.push(bias + error * (own * random.draw() + shared * common[night] + moved));
+            deviation.push(bias + error * (own * random.draw() + shared * common + moved));
             let squares: f64 = (0..7).map(|_| random.draw().powi(2)).sum();
             std_error.push(error * (squares / 7.0).sqrt());
         }

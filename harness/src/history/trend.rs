@@ -78,7 +78,7 @@ pub(super) fn figure(history: &History, engine: &str, procedure: &str, changes: 
 pub(super) fn percent(relative: f64) -> String {
     let percent = 100.0 * relative;
     match percent.abs() {
-        a if a == 0.0 => "0 %".to_owned(),
+        0.0 => "0 %".to_owned(),
         a if a < 1e-3 => format!("{percent:+.1e} %"),
         a if a < 0.1 => format!("{percent:+.4} %"),
         a if a < 1.0 => format!("{percent:+.3} %"),

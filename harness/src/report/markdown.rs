@@ -55,7 +55,9 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
     let departures = consensus::lines(report);
     if !departures.is_empty() {
         line("\nWho departs from the other witnesses, the reference included:\n".into());
-        departures.iter().for_each(|departure| line(format!("- {departure}")));
+        for departure in &departures {
+            line(format!("- {departure}"));
+        }
     }
     let worst = worst(report, 10);
     if !worst.is_empty() {
