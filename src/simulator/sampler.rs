@@ -52,6 +52,17 @@ impl Sampler {
     pub(crate) fn next_pair(&mut self) -> [f64; 2] {
         [self.next(), self.next()]
     }
+
+    /// Two coordinates moved on round the unit square and folded, all points of the sequence by the same random way.
+    ///
+    /// A jump of the integrand along a coordinate cuts one stratum of the points, and the mean over the sequence takes
+    /// two values, one of them so rare perhaps that every sequence has the other. Moved, each sequence is cut elsewhere;
+    /// folded, what is smooth stays continuous at the edge.
+    pub(crate) fn moved(&self, pair: [f64; 2]) -> [f64; 2] {
+        let way = mix(self.seed ^ 0x2545_f491_4f6c_dd1d);
+        let by = [unit(way), unit(mix(way))];
+        std::array::from_fn(|k| 1.0 - (2.0 * (pair[k] + by[k]).fract() - 1.0).abs())
+    }
 }
 
 /// A well mixed function of 64 bits (the finaliser of splitmix64, G. Steele et al. 2014).

@@ -80,7 +80,7 @@ impl<'a> Integrand<'a> {
         let mut lux = 0.0;
         if self.wanted.direct {
             let parts = self.opening_pair(sampler);
-            lux += self.direct(meter, parts);
+            lux += self.direct(meter, sampler.moved(parts));
         }
         let lifted_m = meter.position_m + meter.normal * self.world.lift_m();
         let mut at = Vertex { point_m: lifted_m, normal: meter.normal };
