@@ -120,7 +120,8 @@ impl<'a> Integrand<'a> {
             let open = self.world.contains(arrival.from_m) && self.world.visible(start_m, arrival.from_m);
             open.then_some(arrival.lux)
         };
-        self.emitters.iter().filter_map(light).sum()
+        // The sum of nothing would be -0.
+        self.emitters.iter().filter_map(light).fold(0.0, |sum, lux| sum + lux)
     }
 
     /// Whether [`Self::path`] adds nothing to an exact [`Self::direct`].
