@@ -5,6 +5,8 @@
 //! opening has I(w) dA / A on both sides. Where the table is a cosine at every node, the opening has one luminance and
 //! Lambert's polygon formula holds but for the interpolation, which counts as an error.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
 use super::quadrature::Gauss;
@@ -116,6 +118,43 @@ impl Emitter {
         outward.dot(direction).max(0.0) / projected
     }
 
+    /// Whether it has no extent.
+    pub(super) fn is_point(&self) -> bool {
+        self.faces.is_empty()
+    }
+
+    /// Illuminance in lux at a meter of a luminaire without extent by way of a flat polygon that faces along `normal` and
+    /// reflects everything: over what is both lit and seen of it, where the light is as smooth as the table.
+    pub(super) fn reflected(
+        &self,
+        meter: &Meter,
+        polygon_m: &[DVec3],
+        normal: DVec3,
+        occluders: &[Occluder],
+        relative_error: f64,
+    ) -> Bounded {
+        let from = self.luminaire.position_m;
+        let above = clip(polygon_m, meter.normal, meter.position_m);
+        let faces = |point: DVec3| (point - polygon_m[0]).dot(normal) > 0.0;
+        if above.len() < 3 || !faces(from) || !faces(meter.position_m) {
+            return Bounded::default();
+        }
+        let light = |p: DVec3| {
+            let away = p - meter.position_m;
+            let r2 = away.length_squared();
+            let cosines = away.dot(meter.normal).max(0.0) * -away.dot(normal) / r2;
+            direct::point(&self.luminaire, &Meter { position_m: p, normal }).value * cosines / (PI * r2)
+        };
+        let mut sum = Bounded::default();
+        for lit in visible_pieces(from, &above, &candidates(from, &above, occluders)) {
+            let hiding = candidates(meter.position_m, &lit, occluders);
+            for seen in visible_pieces(meter.position_m, &lit, &hiding) {
+                sum = sum + integrate(&seen, relative_error, &light);
+            }
+        }
+        sum
+    }
+
     /// Direct illuminance in lux at nodes of a flat polygon that faces along `normal`.
     ///
     /// Where a point luminaire's sharp shadow crosses the polygon, every node gets the exact mean.
@@ -156,7 +195,7 @@ fn lambertian(luminaire: &Luminaire, area_m2: f64) -> Option<Lambertian> {
     }
     let widest = gammas.windows(2).filter(|w| w[0] < 90.0).map(|w| (w[1] - w[0]).to_radians()).fold(0.0, f64::max);
     // A chord of the cosine lies below it by at most the square of the step over 8, relative.
-    let exitance = std::f64::consts::PI * plane[0] * luminaire.flux_scale / area_m2;
+    let exitance = PI * plane[0] * luminaire.flux_scale / area_m2;
     Some(Lambertian { exitance, interpolation: widest * widest / 8.0 })
 }
 

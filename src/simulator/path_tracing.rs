@@ -263,6 +263,8 @@ fn unsupported(what: &str, instead: &str) -> SimulatorError {
 }
 
 #[cfg(test)]
+mod agreement_tests;
+#[cfg(test)]
 pub(super) mod test_scenes;
 #[cfg(test)]
 mod tests;

@@ -100,7 +100,7 @@ impl Prepared {
                 let (values, text) = empty.indirect(&room, &self.scene.luminaires, bounces, meters, error);
                 Ok(bounded(&values, &text))
             }
-            Solver::Furnished(furnished) if error >= RADIOSITY_REACHES => {
+            Solver::Furnished(furnished) if error >= RADIOSITY_REACHES || furnished.is_integrable(bounces) => {
                 let (values, text) = furnished.indirect(meters, bounces, error);
                 let radiosity = bounded(&values, &text);
                 let open: Vec<usize> =

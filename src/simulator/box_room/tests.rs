@@ -11,6 +11,7 @@ use crate::photometry::{LuminousIntensityDistribution, Photometry};
 use crate::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
 use crate::simulator::box_room::symmetry::Symmetries;
 use crate::simulator::box_room::{BoxField, EFFORTS, Effort};
+use crate::simulator::quadrature::Gauss;
 use crate::simulator::{Accuracy, Estimate, Prepared, Uncertainty, illuminance};
 
 pub(super) fn point(position_m: DVec3, distribution: LuminousIntensityDistribution) -> Luminaire {
@@ -265,6 +266,34 @@ fn interreflection_in_a_cube_is_phi_rho_over_area_times_absorption() {
         for (effort, flux) in EFFORTS[1..6].iter().zip([1e-5, 1e-6, 1e-7, 1e-9, 1e-9]) {
             assert_relative_eq!(furnace_mean(rho, effort), exact, max_relative = tolerance.max(flux));
         }
+    }
+}
+
+/// CIE 171 case 5.4: what a black room collects is what is emitted in it.
+#[test]
+fn a_black_room_collects_the_flux_that_is_emitted_in_it() {
+    let isotropic = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![10_000.0 / (4.0 * PI); 2]).unwrap();
+    let room = Room { size_m: DVec3::new(4.0, 4.0, 3.0), reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+    let luminaires = vec![point(DVec3::new(2.0, 2.0, 1.5), isotropic)];
+    let scene = Scene { room: Some(room), obstacles: vec![], luminaires };
+    let rule = Gauss::new(24);
+    let (mut meters, mut areas) = (vec![], vec![]);
+    for (axis, far) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for (i, j) in (0..24).flat_map(|i| (0..24).map(move |j| (i, j))) {
+            let mut position_m = DVec3::ZERO;
+            position_m[u] = rule.nodes[i] * room.size_m[u];
+            position_m[v] = rule.nodes[j] * room.size_m[v];
+            // A nanometre off the surface.
+            position_m[axis] = if far { room.size_m[axis] - 1e-9 } else { 1e-9 };
+            meters.push(Meter { position_m, normal: DVec3::AXES[axis] * if far { -1.0 } else { 1.0 } });
+            areas.push(rule.weights[i] * rule.weights[j] * room.size_m[u] * room.size_m[v]);
+        }
+    }
+    for transport in [Transport::Direct, Transport::Total(Bounces::Converged)] {
+        let found = illuminance(&scene, &meters, transport, &accuracy(1e-6)).unwrap();
+        let flux: f64 = found.estimates.iter().zip(&areas).map(|(e, area)| e.illuminance.value() * area).sum();
+        assert_relative_eq!(flux, 10_000.0, max_relative = 1e-8);
     }
 }
 

@@ -110,6 +110,10 @@ impl Furnished {
         if bounces == Bounces::AtMost(0) {
             return (vec![Bounded::default(); meters.len()], "no reflection asked for".into());
         }
+        if self.is_integrable(bounces) {
+            let text = "light reflected once, integrated over what is both lit and seen".into();
+            return (self.once_reflected(&room, meters, relative_error), text);
+        }
         let levels: &[usize] =
             if relative_error < COARSE && self.fits(&room, FINE_MESHES[1]) { &FINE_MESHES } else { &COARSE_MESHES };
         let mut readings: Vec<Reading> = vec![];
@@ -138,6 +142,29 @@ impl Furnished {
         let count = self.fields.last().map_or(0, |(_, field)| field.patches.len());
         let text = format!("collocation radiosity, up to {count} biquadratic patches: bodies or openings; {why}");
         (bounded(&readings), text)
+    }
+
+    /// Whether no mesh is needed: one reflection of light from luminaires without extent.
+    pub(super) fn is_integrable(&self, bounces: Bounces) -> bool {
+        bounces == Bounces::AtMost(1) && self.emitters.iter().all(Emitter::is_point)
+    }
+
+    fn once_reflected(&self, room: &Room, meters: &[Meter], relative_error: f64) -> Vec<Bounded> {
+        let surfaces = self.mesh(room, 0);
+        let error = relative_error.clamp(1e-9, 1e-3);
+        let at = |meter: &Meter| {
+            let mut sum = Bounded::default();
+            for surface in surfaces.iter().filter(|s| s.reflectance > 0.0) {
+                for emitter in &self.emitters {
+                    let Bounded { value, bound } =
+                        emitter.reflected(meter, &surface.corners_m, surface.normal, &self.occluders, error);
+                    sum = sum + Bounded { value: surface.reflectance * value, bound: surface.reflectance * bound };
+                }
+            }
+            // Clipping and the angles round.
+            Bounded { bound: sum.bound + 1e-11 * sum.value, ..sum }
+        };
+        meters.par_iter().map(at).collect()
     }
 
     fn fits(&self, room: &Room, level: usize) -> bool {

@@ -9,9 +9,9 @@ use super::*;
 use crate::geometry::configuration_factor::element_to_polygon;
 use crate::geometry::{Reflectances, Room};
 use crate::photometry::{LuminousIntensityDistribution, LuminousOpening};
-use crate::scene::{Bounces, Meter, Obstacle, Scene, Shape, Transport};
+use crate::scene::{Bounces, Luminaire, Meter, Obstacle, Scene, Shape, Transport};
 use crate::simulator::path_tracing::test_scenes::{S2_VALUES, luminaire, s1, s1_meters, s2, s2_meters, up};
-use crate::simulator::{Accuracy, Uncertainty, illuminance};
+use crate::simulator::{Accuracy, Uncertainty, illuminance, path_tracing};
 
 fn bound(uncertainty: Uncertainty) -> f64 {
     match uncertainty {
@@ -62,14 +62,19 @@ fn an_empty_room_comes_out_as_hp_collocation_says() {
     // A body too small to matter sends the scene to radiosity.
     let mut scene = s1();
     let meters = s1_meters();
-    for bounces in [Bounces::Converged, Bounces::AtMost(1), Bounces::AtMost(3)] {
+    let integrated = (Bounces::AtMost(1), "integrated");
+    for (bounces, solver) in [Bounces::Converged, Bounces::AtMost(2), Bounces::AtMost(3)]
+        .map(|bounces| (bounces, "radiosity"))
+        .into_iter()
+        .chain([integrated])
+    {
         scene.obstacles.clear();
         let exact = illuminance(&scene, &meters, Transport::Indirect(bounces), &accuracy(1e-4)).unwrap();
         let (min_m, max_m) = (DVec3::new(10.0, 10.0, 0.0), DVec3::new(10.01, 10.01, 0.01));
         let shape = Shape::Box { min_m, max_m };
         scene.obstacles.push(Obstacle { shape, reflectance: 0.2 });
         let solution = illuminance(&scene, &meters, Transport::Indirect(bounces), &accuracy(1.0)).unwrap();
-        assert!(solution.solver.contains("radiosity"), "{}", solution.solver);
+        assert!(solution.solver.contains(solver), "{}", solution.solver);
         for (estimate, exact) in solution.estimates.iter().zip(&exact.estimates) {
             let error = (estimate.illuminance - exact.illuminance).value().abs();
             let bound = bound(estimate.uncertainty) + bound(exact.uncertainty);
@@ -108,39 +113,112 @@ fn an_area_source_lights_walls_and_floor_as_configuration_factors_say() {
     }
 }
 
+/// A lamp over a floor that alone reflects, and the light on a meter that looks down at a strip of it up to `to_x_m`, by
+/// Simpson's rule: rho / pi times the integral of the floor's illuminance times cos cos / r^2.
+fn lamp_over_a_floor(to_x_m: f64, meter_m: DVec3) -> (Scene, f64) {
+    let spot = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0, 100.0]).unwrap();
+    let reflectance = Reflectances { floor: 0.5, ..Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+    let lamp_m = DVec3::new(1.0, 2.0, 1.0);
+    let scene = Scene {
+        room: Some(Room { size_m: DVec3::new(4.0, 4.0, 3.0), reflectance }),
+        obstacles: vec![],
+        luminaires: vec![luminaire(spot, LuminousOpening::Point, lamp_m)],
+    };
+    let steps = 400;
+    let weight = |k: u32| [2.0, 4.0][k as usize % 2] - f64::from(k == 0 || k == steps);
+    let mut lux = 0.0;
+    for (i, j) in (0..=steps).flat_map(|i| (0..=steps).map(move |j| (i, j))) {
+        let at = |k: u32| f64::from(k) / f64::from(steps);
+        let p = DVec3::new(to_x_m * at(i), 4.0 * at(j), 0.0);
+        let floor = 100.0 * lamp_m.z / (p - lamp_m).length_squared().powf(1.5);
+        let seen = (meter_m.z / (p - meter_m).length_squared()).powi(2) / PI;
+        lux += weight(i) * weight(j) / 9.0 * 0.5 * floor * seen;
+    }
+    (scene, lux * to_x_m * 4.0 / f64::from(steps).powi(2))
+}
+
+/// CIE 171 case 5.6: light that a surface reflects once, by the solver for empty rooms and by the one for furnished rooms.
+#[test]
+fn a_surface_reflects_what_lights_it() {
+    let meter = Meter { position_m: DVec3::new(3.0, 2.0, 2.5), normal: DVec3::NEG_Z };
+    let (mut scene, exact) = lamp_over_a_floor(4.0, meter.position_m);
+    for body in [None, Some(cuboid([0.1, 0.1, 2.8], [0.2, 0.2, 2.9], 0.0))] {
+        scene.obstacles.extend(body);
+        let once = Transport::Indirect(Bounces::AtMost(1));
+        let estimate = illuminance(&scene, &[meter], once, &accuracy(1e-7)).unwrap().estimates[0];
+        let error = (estimate.illuminance.value() - exact).abs();
+        assert!(error <= bound(estimate.uncertainty) + 1e-9 * exact, "{error} beyond {estimate:?}");
+        assert!(error <= 1e-6 * exact, "{error} of {exact}");
+    }
+}
+
 /// CIE 171 case 5.7: an opaque screen between a lit surface and the meter.
 #[test]
 fn a_screen_hides_the_reflected_light_that_it_should() {
-    let spot = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0, 100.0]).unwrap();
-    let reflectance = Reflectances { floor: 0.5, ..Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
-    let room = Room { size_m: DVec3::new(4.0, 4.0, 3.0), reflectance };
-    let lamp = luminaire(spot, LuminousOpening::Point, DVec3::new(1.0, 2.0, 1.0));
-    let screen = cuboid([1.99, 0.0, 0.0], [2.01, 4.0, 1.2], 0.0);
-    let scene = Scene { room: Some(room), obstacles: vec![screen], luminaires: vec![lamp] };
     let meter = |x, z| Meter { position_m: DVec3::new(x, 2.0, z), normal: DVec3::NEG_Z };
     let meters = [meter(3.5, 0.5), meter(3.0, 2.5)];
+    // Over the farther edge of the screen's top the second meter sees the floor up to here; all of that is lit.
+    let seen_to = 3.0 - 2.5 * (3.0 - 1.99) / (2.5 - 1.2);
+    let (mut scene, exact) = lamp_over_a_floor(seen_to, meters[1].position_m);
+    scene.obstacles.push(cuboid([1.99, 0.0, 0.0], [2.01, 4.0, 1.2], 0.0));
     let once = Transport::Indirect(Bounces::AtMost(1));
-    let found = illuminance(&scene, &meters, once, &accuracy(1e-2)).unwrap();
-    // Behind the screen the meter sees only floor in the screen's shadow: the lamp hangs below its top.
-    assert_eq!(found.estimates[0].illuminance.value(), 0.0);
-    // From above, midpoints of 2 cm squares of lit floor; light and view both pass the screen or do not.
-    let (mut exact, step) = (0.0, 0.02);
-    for i in 0..200 {
-        for j in 0..200 {
-            let p = DVec3::new((f64::from(i) + 0.5) * step, (f64::from(j) + 0.5) * step, 0.0);
-            let down = p - DVec3::new(1.0, 2.0, 1.0);
-            let view = meters[1].position_m - p;
-            let height_at = |x: f64| view.z * (x - p.x) / view.x;
-            if p.x > 1.99 || height_at(1.99) < 1.2 || height_at(2.01) < 1.2 {
-                continue;
-            }
-            let lit = 100.0 / down.length_squared().powf(1.5);
-            exact += 0.5 * lit / PI * (view.z / view.length_squared()).powi(2) * step * step;
-        }
+    for relative_error in [1e-2, 1e-5, 1e-8] {
+        let found = illuminance(&scene, &meters, once, &accuracy(relative_error)).unwrap();
+        // The first meter sees only floor in the screen's shadow: the lamp hangs below its top.
+        assert_eq!(found.estimates[0].illuminance.value(), 0.0);
+        let error = (found.estimates[1].illuminance.value() - exact).abs();
+        let bound = bound(found.estimates[1].uncertainty);
+        assert!(error <= bound + 1e-9 * exact && bound <= relative_error * exact, "{error}, {bound} of {exact}");
+        assert!(error <= 1e-6 * exact || relative_error > 1e-5, "{error} of {exact}");
     }
-    let seen = found.estimates[1];
-    let error = (seen.illuminance.value() - exact).abs();
-    assert!(exact > 0.0 && error <= bound(seen.uncertainty) + 0.02 * exact, "{seen:?}, {exact}");
+}
+
+/// CIE 171 case 5.7 with a luminous surface: what shows of it over a screen is a rectangle.
+#[test]
+fn a_screen_leaves_the_closed_form_of_what_shows_of_a_luminous_surface() {
+    let gamma: Vec<f64> = (0..=9000).map(|k| 0.01 * f64::from(k)).collect();
+    let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
+    let distribution = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
+    let opening = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
+    let source = luminaire(distribution, opening, DVec3::new(1.0, 2.0, 3.0));
+    let room = Room { size_m: DVec3::new(4.0, 4.0, 3.5), reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+    let obstacles = vec![cuboid([1.99, 0.0, 0.0], [2.01, 4.0, 2.0], 0.0)];
+    let scene = Scene { room: Some(room), obstacles, luminaires: vec![source] };
+    for meter in [up(3.0, 2.0, 0.8), up(2.7, 3.5, 0.9), up(3.9, 0.3, 0.5)] {
+        // Over the nearer edge of the screen's top.
+        let p = meter.position_m;
+        let from_x = (p.x - (3.0 - p.z) * (p.x - 2.01) / (2.0 - p.z)).max(0.5);
+        let shown = [(from_x, 1.5), (1.5, 1.5), (1.5, 2.5), (from_x, 2.5)].map(|(x, y)| DVec3::new(x, y, 3.0));
+        let exact = if from_x < 1.5 { 1000.0 * PI * element_to_polygon(p, DVec3::Z, &shown) } else { 0.0 };
+        let found = illuminance(&scene, &[meter], Transport::Direct, &accuracy(1e-6)).unwrap().estimates[0];
+        assert_relative_eq!(found.illuminance.value(), exact, max_relative = 1e-6);
+        assert!((found.illuminance.value() - exact).abs() <= bound(found.uncertainty), "{found:?} for {exact}");
+    }
+}
+
+/// The path tracer knows neither clipping nor quadrature.
+#[test]
+fn light_reflected_once_between_bodies_is_what_paths_find() {
+    let (mut scene, _) = lamp_over_a_floor(4.0, DVec3::new(3.0, 2.0, 2.5));
+    scene.room = scene.room.map(|r| Room { reflectance: Reflectances::with_equal_walls(0.3, 0.5, 0.8), ..r });
+    scene.luminaires.push(Luminaire { position_m: DVec3::new(3.3, 0.7, 2.6), ..scene.luminaires[0].clone() });
+    scene.obstacles = vec![
+        cuboid([1.5, 1.0, 0.0], [1.6, 3.0, 1.7], 0.6),
+        cuboid([2.5, 2.2, 0.9], [3.5, 3.4, 1.1], 0.4),
+        cuboid([0.2, 3.0, 1.5], [1.1, 3.7, 3.0], 0.1),
+    ];
+    let meters = [up(0.4, 3.2, 0.3), up(2.9, 2.7, 0.1), up(1.7, 2.0, 0.8), up(3.8, 0.2, 1.5)];
+    let once = Transport::Indirect(Bounces::AtMost(1));
+    let exact = illuminance(&scene, &meters, once, &accuracy(1e-5)).unwrap();
+    assert!(exact.solver.contains("integrated") && !exact.solver.contains("paths"), "{}", exact.solver);
+    let asked = Accuracy { relative_error: 3e-3, seed: 4 };
+    let paths = path_tracing::illuminance(&scene, &meters, once, &asked).unwrap();
+    for (exact, path) in exact.estimates.iter().zip(&paths.estimates) {
+        let Uncertainty::StandardError { value: error, .. } = path.uncertainty else { panic!("{path:?}") };
+        assert!(bound(exact.uncertainty) <= 1e-5 * exact.illuminance.value(), "{exact:?}");
+        let difference = (exact.illuminance - path.illuminance).value().abs();
+        assert!(difference <= 4.0 * error && error <= 2e-3 * exact.illuminance.value(), "{exact:?}, {path:?}");
+    }
 }
 
 #[test]
