@@ -8,7 +8,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
-use super::known_engines;
+use super::engines::known_engines;
 use crate::engines::{self, Engine, Site, Version};
 use crate::measure::{self, Laboratory, OwnSolvers};
 use crate::report::Exit;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::calibration_line;
+use super::engines::calibration_line;
 use crate::engines::calibration::Calibrated;
 use crate::plan::{Plan, REFERENCES, Run};
 use crate::run;

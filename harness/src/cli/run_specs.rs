@@ -8,10 +8,12 @@ use std::time::{Instant, SystemTime};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 use sha2::{Digest, Sha256};
 
+use super::RunArgs;
 use super::diagnostic::diagnose;
+use super::engines::report_installation;
 use super::progress::Progress;
 use super::sampling::sample_on;
-use super::{RunArgs, print_reports, report_installation};
+use super::views::print_reports;
 use crate::baseline::{self, Baseline, Comparability, Entry, State};
 use crate::cache::Cache;
 use crate::diagnosis;

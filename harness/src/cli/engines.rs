@@ -1,0 +1,130 @@
+//! `luxproof engines`: which there are, installing them, examining them.
+
+use std::collections::BTreeMap;
+
+use clap::{Args, Subcommand};
+use miette::{IntoDiagnostic, Report as Diagnostic};
+
+use crate::diff::Tolerances;
+use crate::doctor;
+use crate::engines::calibration::{self, Calibrated, Earlier};
+use crate::engines::{self, EngineId, InstallState, Site};
+use crate::process;
+use crate::report::Exit;
+use crate::slots::Slots;
+
+#[derive(Debug, Args)]
+pub(super) struct EnginesArgs {
+    #[command(subcommand)]
+    action: Option<EnginesAction>,
+}
+
+#[derive(Clone, Debug, Subcommand)]
+enum EnginesAction {
+    /// Which engines there are, and their versions
+    List,
+    /// Fetch missing engines into a folder of our own
+    Install {
+        /// Engines by name [default: all]
+        names: Vec<String>,
+    },
+    /// Let every engine read a scene of known answer
+    Doctor {
+        /// Engines by name [default: all]
+        names: Vec<String>,
+    },
+}
+
+pub(super) fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Diagnostic> {
+    match args.action.clone().unwrap_or(EnginesAction::List) {
+        EnginesAction::List => {
+            for engine in engines::all() {
+                match engine.probe(site) {
+                    Ok(version) => println!("{:<10} {}", engine.id(), version.0),
+                    Err(absent) => println!("{:<10} absent: {absent}", engine.id()),
+                }
+            }
+            println!("engines are kept in {}", site.root().display());
+            Ok(Exit::Passed)
+        }
+        EnginesAction::Install { names } => {
+            known_engines(&names)?;
+            let wanted = engines::all().into_iter().map(|e| e.id());
+            let wanted = wanted.filter(|e| names.is_empty() || names.iter().any(|n| n == e.name()));
+            Ok(report_installation(site, &wanted.collect::<Vec<_>>()))
+        }
+        EnginesAction::Doctor { names } => {
+            known_engines(&names)?;
+            examine(site, &names)
+        }
+    }
+}
+
+fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
+    let tolerances = Tolerances::built_in().into_diagnostic()?;
+    let mut exit = Exit::Passed;
+    for engine in engines::all() {
+        if names.is_empty() || names.iter().any(|n| n == engine.id().name()) {
+            let finding = doctor::examine(engine.as_ref(), site, &tolerances);
+            println!("{} {:<10} {}", if finding.healthy { "ok  " } else { "FAIL" }, finding.engine, finding.text);
+            exit = exit.worse(if finding.healthy { Exit::Passed } else { Exit::Engine });
+            exit = exit.worse(calibrate_anew(engine.as_ref(), site));
+        }
+    }
+    Ok(exit)
+}
+
+/// Measures an engine's calibration again, keeps it and prints it.
+fn calibrate_anew(engine: &dyn engines::Engine, site: &Site) -> Exit {
+    let Ok(version) = engine.probe(site) else { return Exit::Passed };
+    if crate::plan::REFERENCES.contains(&engine.id().name()) {
+        return Exit::Passed;
+    }
+    match calibration::calibrate(
+        engine,
+        &version,
+        &BTreeMap::new(),
+        site,
+        &Slots::new(process::cores()),
+        Earlier::Ignored,
+    ) {
+        Ok(found) => {
+            println!("     {:<10} {}", engine.id(), calibration_line(&found));
+            Exit::Passed
+        }
+        Err(error) => {
+            println!("FAIL {:<10} {error}", engine.id());
+            Exit::Engine
+        }
+    }
+}
+
+pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
+    let known: Vec<EngineId> = engines::all().iter().map(|e| e.id()).collect();
+    let known: Vec<&str> = known.iter().map(EngineId::name).collect();
+    for name in names {
+        if !known.contains(&name.as_str()) {
+            let help = crate::spec::nearest(name, known.iter().copied())
+                .map_or(format!("known: {}", known.join(", ")), |k| format!("did you mean `{k}`?"));
+            return Err(miette::miette!(help = help, "there is no engine `{name}`"));
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn report_installation(site: &Site, wanted: &[EngineId]) -> Exit {
+    let outcomes = engines::install(site, wanted, |step| eprintln!("{step}"));
+    for outcome in &outcomes {
+        eprintln!("{}: {}", outcome.component, outcome.detail);
+    }
+    let failed = outcomes.iter().any(|o| o.state == InstallState::Failed);
+    if failed { Exit::Engine } else { Exit::Passed }
+}
+
+pub(super) fn calibration_line(found: &Calibrated) -> String {
+    let kept = match &found.kept {
+        Ok(file) => format!("kept in {file}"),
+        Err(why) => format!("not kept, so that it is measured again next time: {why}"),
+    };
+    format!("{}; {kept}", found.calibration.summary())
+}

@@ -1,0 +1,73 @@
+//! `luxproof export`: an engine's scenes, runnable by hand, with the command beside them.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
+
+use super::diagnostic::diagnose;
+use crate::engines::{self, Site};
+use crate::plan::{Selection, plan};
+use crate::report::Exit;
+use crate::spec::{Case, suite};
+
+#[derive(Debug, Args)]
+pub(super) struct ExportArgs {
+    /// Spec file
+    spec: PathBuf,
+    /// The engine whose scenes to write
+    #[arg(long)]
+    engine: String,
+    /// Folder to write to; one folder a procedure is made in it
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Procedures to export, by name [default: all of the spec]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    procedures: Vec<String>,
+}
+
+pub(super) fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic> {
+    let cases = suite(std::slice::from_ref(&args.spec)).map_err(diagnose)?;
+    let mut exported = 0;
+    for case in &cases {
+        // One folder a case, where there are several.
+        let folder = if cases.len() == 1 { args.out.clone() } else { args.out.join(&case.name) };
+        exported += export_case(case, args, site, &folder)?;
+    }
+    if exported == 0 {
+        eprintln!("{} writes no scenes", args.engine);
+    }
+    Ok(Exit::Passed)
+}
+
+/// Exports one case; how many files that made.
+fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Result<usize, Diagnostic> {
+    let selection =
+        Selection { engines: vec![args.engine.clone()], procedures: args.procedures.clone(), ..Selection::default() };
+    let plan = plan(case, &selection, site).map_err(diagnose)?;
+    let chosen = |e: usize| plan.engines[e].engine.id().name() == args.engine;
+    let mut exported = 0;
+    // An export needs no installed engine: what is skipped for absence is exported all the same.
+    for (e, planned) in plan.engines.iter().enumerate().filter(|(e, _)| chosen(*e)) {
+        for task in &plan.tasks {
+            let job = plan.job(case, e, task, selection.seed);
+            if let engines::Support::No(reason) = planned.engine.supports(&job) {
+                eprintln!("{}: {reason}", task.procedure);
+                continue;
+            }
+            let files = planned.engine.export(&job).into_diagnostic()?;
+            let folder = out.join(task.procedure);
+            std::fs::create_dir_all(&folder).into_diagnostic()?;
+            for file in &files {
+                let path = folder.join(&file.name);
+                std::fs::write(&path, &file.bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+                println!("{}", path.display());
+            }
+            if let Some(command) = planned.engine.command_by_hand(&job, site) {
+                println!("  cd {} && {command}", folder.display());
+            }
+            exported += files.len();
+        }
+    }
+    Ok(exported)
+}

@@ -1,0 +1,51 @@
+//! `luxproof selftest`: the scorecard of faults, and how good intervals and p-values are.
+
+use clap::{Args, ValueEnum};
+use miette::{IntoDiagnostic, Report as Diagnostic};
+
+use super::print;
+use crate::report::Exit;
+use crate::selftest::{calibrations, selftest};
+
+#[derive(Debug, Args)]
+pub(super) struct SelftestArgs {
+    /// Noisy runs a fault
+    #[arg(long, default_value_t = 20, value_name = "N")]
+    runs: usize,
+    /// Noisy runs without a fault, in each case
+    #[arg(long, default_value_t = 100, value_name = "N")]
+    clean_runs: usize,
+    /// Seed of the noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Show how good the verdicts' intervals and p-values are, and nothing else
+    #[arg(long)]
+    calibration: bool,
+    /// View of the scorecard to print
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = CardFormat::Terminal)]
+    format: CardFormat,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum CardFormat {
+    Terminal,
+    Json,
+}
+
+pub(super) fn test_oneself(args: &SelftestArgs) -> Result<Exit, Diagnostic> {
+    if args.calibration {
+        let found = calibrations(args.seed);
+        print(&match args.format {
+            CardFormat::Terminal => found.to_string(),
+            CardFormat::Json => serde_json::to_string(&found).into_diagnostic()? + "\n",
+        })?;
+        return Ok(if found.is_good() { Exit::Passed } else { Exit::Failed });
+    }
+    let card = selftest(args.runs.max(1), args.clean_runs, args.seed).into_diagnostic()?;
+    let text = match args.format {
+        CardFormat::Terminal => card.to_string(),
+        CardFormat::Json => serde_json::to_string_pretty(&card).into_diagnostic()? + "\n",
+    };
+    print(&text)?;
+    Ok(if card.is_good() { Exit::Passed } else { Exit::Failed })
+}
