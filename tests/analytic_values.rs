@@ -225,11 +225,11 @@ fn the_simulator_keeps_the_mean_of_a_closed_room() {
         let transport = Transport::Indirect(Bounces::Converged);
         let solution = simulator::illuminance(&scene, &meters, transport, &accuracy).unwrap();
         let mean: f64 = solution.estimates.iter().zip(&weights).map(|(e, w)| e.illuminance.value() * w).sum();
-        let variance: f64 =
-            solution.estimates.iter().zip(&weights).map(|(e, w)| (w * doubt(e.uncertainty)).powi(2)).sum();
+        // Bounds of one method err alike, so that they add up.
+        let doubts: f64 = solution.estimates.iter().zip(&weights).map(|(e, w)| w * doubt(e.uncertainty)).sum();
         let law = closed_form::closed_room_mean_indirect(Lumen(10_000.0), 96.0, rho).value();
-        // Four standard errors and the quadrature's own 3e-4.
-        let allowed = 4.0 * variance.sqrt() + 3e-4 * law;
+        // And what four Gauss points make of x ln x at the edges: 5.3e-4, at orders 6 to 10 of the simulator alike.
+        let allowed = doubts + 6e-4 * law;
         assert!((mean - law).abs() < allowed, "rho {rho}: {mean} against {law}, allowed {allowed}");
         assert!(allowed < 0.01 * law, "rho {rho}: the check is blunt, {allowed} of {law}");
     }
