@@ -19,7 +19,7 @@ use crate::cache::Cache;
 use crate::diagnosis;
 use crate::diff::{Comparison, Consensus, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
 use crate::engines::{self, EngineId, Site};
-use crate::plan::{Asked, Plan, Planner};
+use crate::plan::{Asked, Plan, Planner, Scope, Skip};
 use crate::procedures::Task;
 use crate::process;
 use crate::reading::Recording;
@@ -251,9 +251,12 @@ fn run_case(
         let count = outcome.from_cache;
         suite
             .progress
-            .line(&format!("{}: {count} answers of engines from the cache (--no-cache asks anew)", case.name));
+            .line(&format!("{}: {count} answer(s) of engines from the cache (--no-cache asks anew)", case.name));
     }
     let Judged { comparisons, splits, consensus, tables } = judged(case, plan, &outcome.recordings, &judge);
+    // What follows from other readings follows from nothing where the case was never begun.
+    let holds = |s: &&Skip| stop.is_none() || matches!(s.scope, Scope::Engine | Scope::Procedure);
+    let planned_skips = plan.skips.iter().filter(holds);
     let ingredients = Ingredients {
         case: case.name.clone(),
         spec: record_of(case),
@@ -261,7 +264,7 @@ fn run_case(
         wall_s: clock.elapsed().as_secs_f64(),
         engines: outcome.engines,
         recordings: &outcome.recordings,
-        skips: plan.skips.iter().cloned().chain(outcome.skips).collect(),
+        skips: planned_skips.cloned().chain(outcome.skips).collect(),
         splits,
         consensus,
         published: tables,

@@ -133,10 +133,10 @@ fn cell(report: &Report, case: &str, procedure: &str, engine: &str, of_row: &[&C
     let mine: Vec<&&Comparison> = of_row.iter().filter(|c| c.engine == engine).collect();
     let Some(verdict) = mine.iter().map(|c| c.verdict).max() else {
         let is = |c: &str, p: &str, e: &str| c == case && p == procedure && e == engine;
-        return if report.skips.iter().any(|s| is(&s.case, &s.procedure, &s.engine)) {
-            Cell::Skipped
-        } else if report.recordings.iter().any(|r| is(&r.case, &r.procedure, &r.engine)) && judges_others(engine) {
+        return if report.recordings.iter().any(|r| is(&r.case, &r.procedure, &r.engine)) && judges_others(engine) {
             Cell::IsReference
+        } else if report.skips.iter().any(|s| is(&s.case, &s.procedure, &s.engine)) {
+            Cell::Skipped
         } else {
             Cell::Empty
         };
