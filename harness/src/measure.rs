@@ -10,12 +10,12 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::engines::{Engine, EngineError, Estimate, Job, Site, Station, Support, Workbench, checked};
+use crate::engines::{Engine, EngineError, Estimate, Job, Site, Support, Workbench, checked};
 use crate::plan::REFERENCES;
 use crate::procedures::{self, Task};
 use crate::process::{self, Invocation, PeakMemory, ProcessError};
 use crate::run::{self, RunError};
-use crate::spec::{Budget, Case, EngineSettings, hexadecimal};
+use crate::spec::{Budget, Case, hexadecimal};
 use crate::stress::laws::{self, Place};
 
 /// A reading to take, as another process or a later run finds it again.
@@ -91,6 +91,14 @@ pub enum FailureKind {
     SilentLoss,
     /// The user asked to stop.
     Interrupted,
+}
+
+/// An engine that is measured.
+pub struct Subject {
+    /// The engine.
+    pub engine: Box<dyn Engine>,
+    /// Its version.
+    pub version: String,
 }
 
 /// Where readings are taken.
@@ -217,7 +225,7 @@ impl Outcome {
 impl Request {
     /// The job that it names, in its case.
     pub fn job(&self, case: &Case) -> Option<Job> {
-        let base = base_job(case, &task(case, &self.procedure)?);
+        let base = Job::of_task(case, &task(case, &self.procedure)?);
         let job = match &self.place {
             None => base,
             Some(place) => laws::job(&base, place)?,
@@ -237,28 +245,6 @@ impl Request {
 /// The task of one procedure of a case.
 pub fn task(case: &Case, procedure: &str) -> Option<Task> {
     procedures::ALL.iter().find(|p| p.name() == procedure)?.task(case)
-}
-
-/// What an engine without settings is asked for a task.
-pub fn base_job(case: &Case, task: &Task) -> Job {
-    let station =
-        |target: &procedures::Target| Station { id: target.id.clone(), meter: target.meter, expected_lx: None };
-    Job {
-        case: case.name.clone(),
-        procedure: task.procedure.to_owned(),
-        scene: task.scene.clone(),
-        stations: task.targets.iter().map(station).collect(),
-        transport: task.transport,
-        budget: case.budget,
-        seed: 1,
-        settings: BTreeMap::new(),
-    }
-}
-
-/// The settings that a spec gives an engine.
-pub fn settings_of(case: &Case, engine: &str) -> BTreeMap<String, serde_json::Value> {
-    let of_engine = case.engines.as_ref().and_then(|all| all.get(engine));
-    of_engine.map(|EngineSettings(settings)| settings.clone()).unwrap_or_default()
 }
 
 /// Finished readings on disk, so that an interrupted measurement goes on where it stopped.

@@ -9,10 +9,9 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::engines::{Absent, Engine, EngineId, Job, Site, Station, Support, Version};
+use crate::engines::{Absent, Engine, EngineId, Job, Site, Support, Version};
 use crate::procedures::{self, Task};
-use crate::reading::MeterId;
-use crate::spec::{Budget, Case, SpecError, nearest};
+use crate::spec::{Budget, Case, SpecError, suggestion};
 use luminaire::scene::Transport;
 
 use roster::Roster;
@@ -332,29 +331,11 @@ fn tasks(case: &Case, selection: &Selection) -> Result<Vec<Task>, SpecError> {
 }
 
 fn job(case: &Case, engine: &EngineId, task: &Task, seed: u64) -> Job {
-    let settings = case.engines.as_ref().and_then(|e| e.get(engine.name())).map(|s| s.0.clone()).unwrap_or_default();
-    let station = |target: &procedures::Target| Station {
-        id: MeterId(target.id.0.clone()),
-        meter: target.meter,
-        expected_lx: None,
-    };
-    Job {
-        case: case.name.clone(),
-        procedure: task.procedure.to_owned(),
-        scene: task.scene.clone(),
-        stations: task.targets.iter().map(station).collect(),
-        transport: task.transport,
-        budget: case.budget,
-        seed,
-        settings,
-    }
+    Job { seed, settings: case.settings_of(engine.name()), ..Job::of_task(case, task) }
 }
 
 fn unknown<'a>(kind: &str, name: &str, known: impl Iterator<Item = &'a str> + Clone, option: &str) -> SpecError {
-    let help = match nearest(name, known.clone()) {
-        Some(k) => format!("did you mean `{k}`?"),
-        None => format!("known: {}", known.collect::<Vec<_>>().join(", ")),
-    };
+    let help = suggestion(name, known);
     let message = format!("there is no {kind} `{name}`");
     SpecError { file: option.into(), line: None, column: None, message, help: Some(help) }
 }

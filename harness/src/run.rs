@@ -4,7 +4,6 @@ mod machine;
 mod reader;
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -15,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::cache::Cache;
 use crate::engines::calibration::{Calibrated, Origin};
 use crate::engines::{EngineError, Measurement, Site};
+use crate::files;
 use crate::plan::{Plan, Planned, REFERENCES, Run, Scope, Skip};
 use crate::procedures::Task;
 use crate::reading::{Reading, Recording};
@@ -341,14 +341,7 @@ fn record(
 
 /// Writes JSON so that a reader sees either the old file or the new one, never half of one.
 pub fn keep<T: Serialize>(path: &Path, value: &T) -> Result<(), RunError> {
-    let fail = |source| RunError { path: path.display().to_string(), source };
-    let folder = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(fail)?;
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(fail)?;
-    serde_json::to_writer_pretty(&mut file, value).map_err(|e| fail(e.into()))?;
-    std::io::Write::write_all(&mut file, b"\n").map_err(fail)?;
-    file.persist(path).map_err(|e| fail(e.error))?;
-    Ok(())
+    files::replace_json(path, value).map_err(|source| RunError { path: path.display().to_string(), source })
 }
 
 fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {

@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::diagnosis::{self, Effect, Fault, Readings};
 use crate::diff::{Judge, KnownDeviations, Tolerances, Verdict};
 use crate::procedures::{self, Task};
+use crate::random::normal;
 use crate::reading::{Reading, Recording};
 use crate::spec::Case;
 
@@ -263,12 +264,6 @@ fn scores(case: &Case, subjects: &[Subject], judge: &Judge<'_>, runs: usize, ran
         score
     };
     names.into_iter().map(&mut one).collect()
-}
-
-/// A normal number of mean 0 and deviation 1 (Box & Muller, Ann. Math. Statist. 29, 1958).
-fn normal(random: &mut fastrand::Rng) -> f64 {
-    let (u, v) = (1.0 - random.f64(), random.f64());
-    (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
 impl fmt::Display for Scorecard {

@@ -185,13 +185,10 @@ fn duration(seconds: f64) -> String {
 mod tests {
     use std::collections::BTreeMap;
 
-    use glam::DVec3;
-    use luminaire::scene::{Bounces, Meter, Scene, Transport};
-
     use super::*;
+    use crate::diff::tests::task;
     use crate::diff::{KnownDeviations, Tolerances};
-    use crate::procedures::Target;
-    use crate::reading::{MeterId, Quantity};
+    use crate::random::normal;
 
     /// An engine that is off by so much at each meter, with normal noise that shrinks with the seconds granted.
     struct Synthetic {
@@ -206,11 +203,7 @@ mod tests {
     impl Synthetic {
         fn estimate(&mut self, truth: f64, effort: f64) -> Estimate {
             let sigma = self.noise / effort.sqrt() * (self.blocks as f64).sqrt();
-            let mut normal = || {
-                let (u, v) = (1.0 - self.random.f64(), self.random.f64());
-                (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
-            };
-            let values: Vec<f64> = (0..self.blocks).map(|_| truth + sigma * normal()).collect();
+            let values: Vec<f64> = (0..self.blocks).map(|_| truth + sigma * normal(&mut self.random)).collect();
             let (value_lx, std_error_lx) = crate::engines::mean_and_std_error(&values);
             Estimate { value_lx, std_error_lx, error_bound_lx: None }
         }
@@ -231,40 +224,10 @@ mod tests {
         }
     }
 
-    fn task(meters: usize) -> Task {
-        let target = |k| Target {
-            id: MeterId::new("grid", k),
-            meter: Meter { position_m: DVec3::ZERO, normal: DVec3::Z },
-            direction: None,
-            per_lux: 1.0,
-        };
-        Task {
-            procedure: "indirect_illuminance",
-            scene: Scene::default(),
-            transport: Transport::Indirect(Bounces::Converged),
-            quantity: Quantity::Illuminance,
-            targets: (0..meters).map(target).collect(),
-        }
-    }
-
     fn recording(engine: &str, measurement: Measurement) -> Recording {
-        let reading = |(k, e): (usize, &Estimate)| Reading {
-            meter: MeterId::new("grid", k),
-            quantity: Quantity::Illuminance,
-            value: e.value_lx,
-            std_error: e.std_error_lx,
-            error_bound: None,
-        };
-        Recording {
-            case: "c".into(),
-            procedure: "indirect_illuminance".into(),
-            engine: engine.into(),
-            model: "point".into(),
-            wall_s: 1.0,
-            readings: measurement.estimates.iter().enumerate().map(reading).collect(),
-            settings: measurement.settings,
-            ..Recording::default()
-        }
+        let readings: Vec<_> = measurement.estimates.iter().map(|e| (e.value_lx, e.std_error_lx)).collect();
+        let settings = measurement.settings;
+        Recording { wall_s: 1.0, settings, ..crate::diff::tests::recording(engine, &readings, None) }
     }
 
     /// One run: what becomes of meters that are truly so far from a reference of 1, with a tolerance of 2 %.
@@ -321,11 +284,9 @@ mod tests {
         // The negative control: at each look the whole error, until one decides.
         let wrong = (0..2000).filter(|seed| {
             let mut random = fastrand::Rng::with_seed(*seed);
-            let mut normal =
-                || (-2.0 * (1.0 - random.f64()).ln()).sqrt() * (std::f64::consts::TAU * random.f64()).cos();
             let (mut sum, mut weight) = (0.0, 0.0);
             WEIGHTS.iter().any(|w| {
-                sum += w.sqrt() * normal();
+                sum += w.sqrt() * normal(&mut random);
                 weight += w;
                 // One-sided at 5 %: z = 1.645.
                 sum / f64::sqrt(weight) > 1.645

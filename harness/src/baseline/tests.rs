@@ -1,6 +1,7 @@
 //! The laws of baselines: refused unless they match, noise told apart from shifts, nothing accepted without a reason.
 
 use super::*;
+use crate::random::normal;
 
 fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
     let reading = |(k, value): (usize, &f64)| Accepted {
@@ -28,8 +29,6 @@ fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
 
 /// Values near 100 lx with normal noise.
 fn noisy(rng: &mut fastrand::Rng, meters: usize, std_error: f64, shift: f64) -> Vec<f64> {
-    let normal =
-        |rng: &mut fastrand::Rng| (-2.0 * (1.0 - rng.f64()).ln()).sqrt() * (std::f64::consts::TAU * rng.f64()).cos();
     (0..meters).map(|k| (100.0 + k as f64) * (1.0 + shift) + std_error * normal(rng)).collect()
 }
 

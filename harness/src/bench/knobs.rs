@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{Bench, Settings, Subject};
 use crate::engines::{Engine, Job};
-use crate::measure::{Outcome, settings_of};
+use crate::measure::Outcome;
 use crate::procedures::Task;
 use crate::spec::Budget;
 use crate::stress::judge;
@@ -66,7 +66,7 @@ const SLOWER: f64 = 1.5;
 impl Bench<'_> {
     /// Every value of every setting of an engine but its default.
     pub(super) fn knob_effects(&self, subject: &Subject, task: &Task, job: &Job) -> Vec<KnobEffect> {
-        let own = settings_of(self.case, subject.engine.id().name());
+        let own = self.case.settings_of(subject.engine.id().name());
         let read =
             |settings: &Settings| self.take(subject, task.procedure, job, settings, BUDGET, self.options.seed, None);
         let knobs: Vec<_> = subject.engine.knobs().iter().filter(|k| !own.contains_key(k.key)).collect();

@@ -20,8 +20,8 @@ use serde::Serialize;
 pub use self::curve::{BenchPoint, Curve, Pareto};
 pub use self::knobs::KnobEffect;
 use self::ladder::ladder;
-use crate::engines::{Engine, Job};
-use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, base_job, settings_of};
+use crate::engines::Job;
+use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, Subject};
 use crate::plan::REFERENCES;
 use crate::procedures::{self, Task};
 use crate::process;
@@ -57,14 +57,6 @@ pub enum Knobs {
     Tried,
     /// None is.
     Left,
-}
-
-/// An engine on the bench.
-pub struct Subject {
-    /// The engine.
-    pub engine: Box<dyn Engine>,
-    /// Its version.
-    pub version: String,
 }
 
 /// Told of every reading as it ends.
@@ -113,7 +105,7 @@ pub fn bench(
         }
     };
     for task in procedures::ALL.iter().filter(|p| asked(p.name())).filter_map(|p| p.task(case)) {
-        let job = base_job(case, &task);
+        let job = Job::of_task(case, &task);
         let Some(truth) = bench.truth(&task, &job) else {
             report.left_out.push(format!("{}, {}: there is no exact reference in time", case.name, task.procedure));
             continue;
@@ -172,7 +164,7 @@ impl Bench<'_> {
     }
 
     fn curves(&self, subject: &Subject, task: &Task, job: &Job, truth: &Truth) -> Result<Vec<Curve>, String> {
-        let settings = settings_of(self.case, subject.engine.id().name());
+        let settings = self.case.settings_of(subject.engine.id().name());
         let rungs = ladder(subject.engine.as_ref(), job, is_furnished(job), &settings, self.options.seconds);
         let repetitions = self.options.repetitions.max(1);
         self.progress.planned(rungs.iter().map(|r| r.expected_s() * repetitions as f64).sum());

@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use super::*;
 use crate::engines::{
-    Absent, EngineError, EngineId, Estimate, Knob, Measurement, SceneFile, Site, Support, Version, Workbench,
+    Absent, Engine, EngineError, EngineId, Estimate, Knob, Measurement, SceneFile, Site, Support, Version, Workbench,
 };
 use crate::measure::OwnSolvers;
 

@@ -11,8 +11,9 @@ mod upkeep;
 #[cfg(test)]
 mod tests;
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
+
+use crate::files;
 
 pub use entry::{Answer, Entry};
 pub use key::{Key, key};
@@ -71,12 +72,6 @@ impl Cache {
 
     /// Keeps an entry. A reader, and a run that goes on after this one was killed, sees all of it or nothing.
     pub fn keep(&self, key: &Key, entry: &Entry) -> std::io::Result<()> {
-        let path = self.path(key);
-        let folder = path.parent().unwrap_or(&self.root);
-        std::fs::create_dir_all(folder)?;
-        let mut file = tempfile::Builder::new().prefix(upkeep::UNFINISHED).tempfile_in(folder)?;
-        file.write_all(entry::text(entry, key.digits())?.as_bytes())?;
-        file.persist(&path).map_err(|e| e.error)?;
-        Ok(())
+        files::replace(&self.path(key), entry::text(entry, key.digits())?.as_bytes())
     }
 }

@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use super::{Cache, entry};
-
-/// How the name of a file starts that is being written.
-pub(super) const UNFINISHED: &str = ".unfinished-";
+use crate::files::UNFINISHED;
 
 /// A file that was begun longer ago than this has no writer any more.
 const WRITERS_LIVE: Duration = Duration::from_secs(3600);

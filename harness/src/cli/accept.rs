@@ -4,8 +4,9 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
+use miette::{IntoDiagnostic, Report as Diagnostic};
 
+use super::views::read_report;
 use crate::baseline::{Baseline, Comparability, Decision, State, compare, review};
 use crate::report::{Exit, Report};
 
@@ -28,15 +29,12 @@ pub(super) struct AcceptArgs {
 }
 
 /// The report of a run, named by its folder or its file.
-pub(super) fn read_report(run: &Path) -> Result<Report, Diagnostic> {
-    let file = if run.is_dir() { run.join("report.json") } else { run.to_owned() };
-    let place = || file.display().to_string();
-    let text = std::fs::read_to_string(&file).into_diagnostic().wrap_err_with(place)?;
-    serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)
+pub(super) fn read_run(run: &Path) -> Result<Report, Diagnostic> {
+    if run.is_dir() { read_report(&run.join("report.json")) } else { read_report(run) }
 }
 
 pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
-    let report = read_report(&args.run)?;
+    let report = read_run(&args.run)?;
     let path = Baseline::place(args.baseline.as_deref().unwrap_or(Path::new(FOLDER)), &report);
     let mut baseline = if path.exists() {
         Baseline::read(&path).into_diagnostic()?

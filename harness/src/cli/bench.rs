@@ -8,7 +8,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::diagnose;
 use super::measuring::{self, Bar};
-use crate::bench::{self, BenchReport, Knobs, Options, Progress, Subject};
+use crate::bench::{self, BenchReport, Knobs, Options, Progress};
 use crate::engines::Site;
 use crate::measure::Shelf;
 use crate::process;
@@ -81,9 +81,7 @@ pub(super) fn run(args: &BenchArgs, site: &Site) -> Result<Exit, Diagnostic> {
         return Err(miette::miette!("--seconds and --minutes must be numbers from 0"));
     }
     let cases = suite(&args.specs).map_err(diagnose)?;
-    let present = measuring::engines_present(&args.engines, site)?;
-    let subjects: Vec<Subject> =
-        present.into_iter().map(|(engine, version)| Subject { engine, version: version.0 }).collect();
+    let subjects = measuring::subjects(&args.engines, site)?;
     let first = args.specs.first().map_or(std::path::Path::new("suite"), PathBuf::as_path);
     let folder = measuring::folder(args.out.as_ref(), "bench", first);
     let options = Options {

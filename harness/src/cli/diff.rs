@@ -1,13 +1,13 @@
 //! `luxproof diff`: what changed between two runs, a mean shift told apart from noise.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
-use super::accept::read_report;
+use super::accept::read_run;
+use super::print;
 use crate::baseline::{Baseline, Changes, Comparability, EntryChange, State, compare};
 use crate::report::Exit;
 
@@ -29,13 +29,13 @@ enum DiffFormat {
 }
 
 pub(super) fn diff(args: &DiffArgs) -> Result<Exit, Diagnostic> {
-    let [old, new] = [&args.old, &args.new].map(|run| read_report(run).map(|r| Baseline::candidate(&r)));
+    let [old, new] = [&args.old, &args.new].map(|run| read_run(run).map(|r| Baseline::candidate(&r)));
     let changes = compare(&old?.entries, &new?.entries, Comparability::SameSpec);
     let text = match args.format {
         DiffFormat::Terminal => text(&changes),
         DiffFormat::Json => serde_json::to_string_pretty(&changes).into_diagnostic()? + "\n",
     };
-    std::io::stdout().lock().write_all(text.as_bytes()).into_diagnostic()?;
+    print(&text)?;
     Ok(if changes.is_clean() { Exit::Passed } else { Exit::Failed })
 }
 

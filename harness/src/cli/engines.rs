@@ -12,6 +12,7 @@ use crate::engines::{self, EngineId, InstallState, Site};
 use crate::process;
 use crate::report::Exit;
 use crate::slots::Slots;
+use crate::spec::suggestion;
 
 #[derive(Debug, Args)]
 pub(super) struct EnginesArgs {
@@ -104,8 +105,7 @@ pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
     let known: Vec<&str> = known.iter().map(EngineId::name).collect();
     for name in names {
         if !known.contains(&name.as_str()) {
-            let help = crate::spec::nearest(name, known.iter().copied())
-                .map_or(format!("known: {}", known.join(", ")), |k| format!("did you mean `{k}`?"));
+            let help = suggestion(name, known.iter().copied());
             return Err(miette::miette!(help = help, "there is no engine `{name}`"));
         }
     }

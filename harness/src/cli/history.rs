@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
+use super::views::read_report;
 use crate::history::{History, add, changes, entries, site};
-use crate::report::{Exit, Report};
+use crate::report::Exit;
 
 #[derive(Debug, Args)]
 pub(super) struct HistoryArgs {
@@ -61,9 +62,7 @@ pub(super) fn history(args: &HistoryArgs) -> Result<Exit, Diagnostic> {
 }
 
 fn add_report(path: &Path, history: &Path, night: Option<&str>) -> Result<(), Diagnostic> {
-    let place = || path.display().to_string();
-    let text = std::fs::read_to_string(path).into_diagnostic().wrap_err_with(place)?;
-    let report: Report = serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)?;
+    let report = read_report(path)?;
     let entries = entries(&report, night).into_diagnostic()?;
     let replaced = add(history, &entries).into_diagnostic()?;
     let instead = if replaced > 0 { format!(" in place of {replaced}") } else { String::new() };
@@ -78,8 +77,11 @@ fn draw(path: &Path, out: &Path, reports: &[(String, String)]) -> Result<(), Dia
     }
     std::fs::create_dir_all(out).into_diagnostic().wrap_err_with(|| out.display().to_string())?;
     let page = out.join("index.html");
-    std::fs::write(&page, site(&history, reports)).into_diagnostic().wrap_err_with(|| page.display().to_string())?;
+    let changes = changes(&history);
+    std::fs::write(&page, site(&history, &changes, reports))
+        .into_diagnostic()
+        .wrap_err_with(|| page.display().to_string())?;
     let (nights, series) = (history.nights.len(), history.series.len());
-    println!("{}: {nights} nights, {series} series, {} changes", page.display(), changes(&history).len());
+    println!("{}: {nights} nights, {series} series, {} changes", page.display(), changes.len());
     Ok(())
 }

@@ -9,15 +9,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::engines::known_engines;
-use crate::engines::{self, Engine, Site, Version};
-use crate::measure::{self, Laboratory, OwnSolvers};
+use crate::engines::{self, Site};
+use crate::measure::{self, Laboratory, OwnSolvers, Subject};
 use crate::report::Exit;
 
-/// An engine that is there, and its version.
-pub(super) type Present = (Box<dyn Engine>, Version);
-
 /// The engines that were named, or all that are there; one that was named and is absent is an error.
-pub(super) fn engines_present(names: &[String], site: &Site) -> Result<Vec<Present>, Diagnostic> {
+pub(super) fn subjects(names: &[String], site: &Site) -> Result<Vec<Subject>, Diagnostic> {
     known_engines(names)?;
     let mut present = vec![];
     for engine in engines::all() {
@@ -26,7 +23,7 @@ pub(super) fn engines_present(names: &[String], site: &Site) -> Result<Vec<Prese
             continue;
         }
         match engine.probe(site) {
-            Ok(version) => present.push((engine, version)),
+            Ok(version) => present.push(Subject { engine, version: version.0 }),
             Err(absent) if is_named => return Err(miette::miette!("{}: {absent}", engine.id())),
             Err(absent) => eprintln!("{}: {absent}", engine.id()),
         }

@@ -13,8 +13,8 @@ use crate::measure::Shelf;
 use crate::process;
 use crate::report::Exit;
 use crate::run;
-use crate::spec::{Budget, Case, suite};
-use crate::stress::{self, Coordinates, Options, Progress, StressReport, Subject, laws};
+use crate::spec::{Budget, Case, suggestion, suite};
+use crate::stress::{self, Coordinates, Options, Progress, StressReport, laws};
 
 #[derive(Debug, Args)]
 pub(super) struct StressArgs {
@@ -74,9 +74,7 @@ impl Progress for Bar {
 pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
     for law in &args.laws {
         if laws::find(law).is_none() {
-            let known: Vec<&str> = laws::ALL.iter().map(|l| l.id).collect();
-            let help = crate::spec::nearest(law, known.iter().copied())
-                .map_or(format!("known: {}", known.join(", ")), |k| format!("did you mean `{k}`?"));
+            let help = suggestion(law, laws::ALL.iter().map(|l| l.id));
             return Err(miette::miette!(help = help, "there is no law `{law}`"));
         }
     }
@@ -88,9 +86,7 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
     if cases.is_empty() {
         return Err(miette::miette!("there is neither direct nor indirect illuminance to stress in these specs"));
     }
-    let present = measuring::engines_present(&args.engines, site)?;
-    let subjects: Vec<Subject> =
-        present.into_iter().map(|(engine, version)| Subject { engine, version: version.0 }).collect();
+    let subjects = measuring::subjects(&args.engines, site)?;
     let mut reports = vec![];
     for case in &cases {
         let folder = measuring::folder(args.out.as_ref(), "stress", &case.path);

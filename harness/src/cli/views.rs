@@ -1,6 +1,6 @@
 //! Views of finished reports: which are printed after a run, and `luxproof report`.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -51,7 +51,6 @@ pub(super) struct ReportArgs {
 pub(super) fn print_reports(reports: &[(Report, PathBuf)], views: &Views) -> Result<(), Diagnostic> {
     let beside = views.beside.iter().map(|path| read_beside(path)).collect::<Result<Vec<_>, _>>()?;
     let detail = if views.all { Detail::All } else { Detail::Brief };
-    let mut out = std::io::stdout().lock();
     let style = if std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) {
         Style::Colour
     } else {
@@ -79,11 +78,7 @@ pub(super) fn print_reports(reports: &[(Report, PathBuf)], views: &Views) -> Res
                 reports.iter().map(one).collect::<Vec<_>>().join("\n")
             }
         };
-        match writeln!(out, "{}", text.trim_end()) {
-            // Whoever reads has seen enough (`| head`): that is no error of ours.
-            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => return Ok(()),
-            written => written.into_diagnostic()?,
-        }
+        print(&format!("{}\n", text.trim_end()))?;
     }
     Ok(())
 }
@@ -103,9 +98,7 @@ fn print_page(reports: &[(Report, PathBuf)], beside: &[Beside]) -> String {
 }
 
 pub(super) fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
-    let place = || args.result.display().to_string();
-    let text = std::fs::read_to_string(&args.result).into_diagnostic().wrap_err_with(place)?;
-    let report: Report = serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)?;
+    let report = read_report(&args.result)?;
     let folder = args.result.parent().map_or_else(PathBuf::new, Path::to_owned);
     let exit = report.exit(|_| false);
     if args.budget {
@@ -114,6 +107,13 @@ pub(super) fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
         print_reports(&[(report, folder)], &args.views)?;
     }
     Ok(exit)
+}
+
+/// A report.json.
+pub(super) fn read_report(file: &Path) -> Result<Report, Diagnostic> {
+    let place = || file.display().to_string();
+    let text = std::fs::read_to_string(file).into_diagnostic().wrap_err_with(place)?;
+    serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)
 }
 
 fn read_beside(path: &Path) -> Result<Beside, Diagnostic> {

@@ -431,7 +431,7 @@ mod tests {
             let reading = |k| Reading {
                 meter: MeterId::new("grid", k),
                 quantity: Quantity::Illuminance,
-                value: (10.0 + k as f64) * factor * (1.0 + noise * crate::diff::tests::normal(&mut random)),
+                value: (10.0 + k as f64) * factor * (1.0 + noise * crate::random::normal(&mut random)),
                 std_error: Some(noise * (10.0 + k as f64)),
                 error_bound: None,
             };

@@ -9,7 +9,7 @@ mod published;
 mod spending;
 mod split;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod tolerance;
 mod uncertainty;
 mod verdict;

@@ -6,9 +6,10 @@ use glam::DVec3;
 use luminaire::scene::{Bounces, Meter, Scene, Transport};
 
 use super::*;
+use crate::random::normal;
 
 /// A task of so many meters of indirect light in an empty scene; what is read there is made up.
-fn task(meters: usize) -> Task {
+pub(crate) fn task(meters: usize) -> Task {
     let target = |k| Target {
         id: MeterId::new("grid", k),
         meter: Meter { position_m: DVec3::ZERO, normal: DVec3::Z },
@@ -24,7 +25,8 @@ fn task(meters: usize) -> Task {
     }
 }
 
-fn recording(engine: &str, readings: &[(f64, Option<f64>)], blocks: Option<usize>) -> Recording {
+/// What an engine says of such a task: values with their standard errors.
+pub(crate) fn recording(engine: &str, readings: &[(f64, Option<f64>)], blocks: Option<usize>) -> Recording {
     let reading = |(k, (value, std_error)): (usize, &(f64, Option<f64>))| Reading {
         meter: MeterId::new("grid", k),
         quantity: Quantity::Illuminance,
@@ -41,11 +43,6 @@ fn recording(engine: &str, readings: &[(f64, Option<f64>)], blocks: Option<usize
         readings: readings.iter().enumerate().map(reading).collect(),
         ..Recording::default()
     }
-}
-
-/// A normal number (Box & Muller, Ann. Math. Statist. 29, 1958).
-pub(super) fn normal(random: &mut fastrand::Rng) -> f64 {
-    (-2.0 * (1.0 - random.f64()).ln()).sqrt() * (std::f64::consts::TAU * random.f64()).cos()
 }
 
 /// The share of runs in which any of 192 noisy meters fails that truly lie `deviation` off a reference of 1.

@@ -27,9 +27,11 @@ use std::time::Duration;
 use luminaire::scene::{Meter, Obstacle, Scene, Shape, Transport};
 use serde::{Deserialize, Serialize};
 
+use crate::procedures::{Target, Task};
 use crate::process::{Invocation, PeakMemory, ProcessError};
 use crate::reading::MeterId;
 use crate::slots::{Share, Slots};
+use crate::spec::Case;
 
 pub use crate::spec::Budget;
 pub use external::{ExternalJob, ExternalReadings};
@@ -184,6 +186,23 @@ pub struct Job {
     pub seed: u64,
     /// The engine's own settings from the spec, e.g. `variant: llvm_ad_mono`.
     pub settings: BTreeMap<String, serde_json::Value>,
+}
+
+impl Job {
+    /// What an engine without settings is asked for a task of a case.
+    pub fn of_task(case: &Case, task: &Task) -> Self {
+        let station = |target: &Target| Station { id: target.id.clone(), meter: target.meter, expected_lx: None };
+        Self {
+            case: case.name.clone(),
+            procedure: task.procedure.to_owned(),
+            scene: task.scene.clone(),
+            stations: task.targets.iter().map(station).collect(),
+            transport: task.transport,
+            budget: case.budget,
+            seed: 1,
+            settings: BTreeMap::new(),
+        }
+    }
 }
 
 /// A meter with its name.

@@ -9,6 +9,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::diff::{Basis, Verdict};
+use crate::files;
 use crate::reading::Quantity;
 use crate::report::Report;
 
@@ -157,10 +158,7 @@ pub fn add(path: &Path, entries: &[Entry<'_>]) -> Result<usize, HistoryError> {
         return Ok(0);
     }
     let kept: Vec<u8> = lines().filter(stays).flatten().copied().chain(new).collect();
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(fail)?;
-    file.write_all(&kept).map_err(fail)?;
-    file.persist(path).map_err(|e| fail(e.error))?;
+    files::replace(path, &kept).map_err(fail)?;
     Ok(replaced)
 }
 

@@ -2,14 +2,13 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part, changes};
+use super::change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part};
 use super::series::History;
 use super::trend::{figure, percent, trend};
 use crate::diff::Verdict;
 
-/// The page: one file that needs nothing else. `reports` are links to the reports of the last night, with what they are called.
-pub fn site(history: &History, reports: &[(String, String)]) -> String {
-    let changes = changes(history);
+/// The page: one file that needs nothing else. `changes` are those of the history, `reports` are links to the reports of the last night, with what they are called.
+pub fn site(history: &History, changes: &[Change], reports: &[(String, String)]) -> String {
     let last = history.nights.last().map_or("no night yet", String::as_str);
     html! {
         (DOCTYPE)
@@ -34,7 +33,7 @@ pub fn site(history: &History, reports: &[(String, String)]) -> String {
                         }
                     }
                     (tonight(history))
-                    (changed(history, &changes))
+                    (changed(history, changes))
                     h2 { "Trends" }
                     p.soft {
                         "A red line with a triangle is a change of the deviation, a dashed line a new version of the engine. "
@@ -42,7 +41,7 @@ pub fn site(history: &History, reports: &[(String, String)]) -> String {
                     }
                     div.trends {
                         @for (engine, procedure) in history.engines_and_procedures() {
-                            (figure(history, engine, procedure, &changes))
+                            (figure(history, engine, procedure, changes))
                         }
                     }
                 }
@@ -154,6 +153,7 @@ fn version(history: &History, change: &Change) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::history::changes;
     use crate::history::synthetic::{Shift, Synthetic};
 
     fn nights(shift: Option<Shift>) -> History {
@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn a_change_and_the_new_version_beside_it_stand_in_the_table_and_in_the_trend() {
         let history = nights(Some(Shift { night: 40, standard_errors: 4.0, cases: 2, meters: 4 }));
-        let page = site(&history, &[("suite".to_owned(), "suite/report.html".to_owned())]);
+        let page = site(&history, &changes(&history), &[("suite".to_owned(), "suite/report.html".to_owned())]);
         let date = &history.nights[40];
         assert!(page.contains(&format!("<td class=\"date\">{date}</td>")), "no row for {date}");
         assert!(page.contains("1.1 (was 1.0)"));
@@ -185,11 +185,11 @@ mod tests {
 
     #[test]
     fn a_page_without_nights_or_without_readings_says_so() {
-        assert!(site(&History::default(), &[]).contains("no night yet"));
+        assert!(site(&History::default(), &[], &[]).contains("no night yet"));
         let mut history = nights(None);
         history.series[0].deviation.fill(f64::NAN);
         history.series.truncate(1);
-        assert!(site(&history, &[]).contains("No readings."));
+        assert!(site(&history, &changes(&history), &[]).contains("No readings."));
     }
 
     #[test]
@@ -198,7 +198,7 @@ mod tests {
         for series in &mut history.series {
             series.key.engine = "<b>\"x".to_owned();
         }
-        let page = site(&history, &[]);
+        let page = site(&history, &changes(&history), &[]);
         assert!(page.contains("&lt;b&gt;") && !page.contains("<b>"));
     }
 }

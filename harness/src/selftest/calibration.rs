@@ -8,9 +8,9 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::normal;
 use crate::diff::{Component, ErrorBudget, Source};
 use crate::engines::mean_and_std_error;
+use crate::random::normal;
 
 /// P-values drawn for Kolmogorov's test.
 const RUNS: usize = 500;

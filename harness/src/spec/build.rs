@@ -16,7 +16,7 @@ use super::model::{
     Angles, Budget, EngineSettings, GridSpec, LuminaireSpec, MeterSet, ModelSpec, ObstacleSpec, Procedures, Spec,
     ToleranceOverride,
 };
-use super::{Source, SpecError, nearest};
+use super::{Source, SpecError, suggestion};
 
 /// Nearest a meter or a luminaire may come to a surface, relative to the room's largest extent.
 ///
@@ -58,6 +58,12 @@ pub struct Case {
 }
 
 impl Case {
+    /// The settings that the spec gives an engine; none where it names none.
+    pub fn settings_of(&self, engine: &str) -> BTreeMap<String, serde_json::Value> {
+        let of_engine = self.engines.as_ref().and_then(|all| all.get(engine));
+        of_engine.map(|EngineSettings(settings)| settings.clone()).unwrap_or_default()
+    }
+
     /// Reads, checks and builds the case of a spec file, without the overrides of its `cases`.
     pub fn load(path: &Path) -> Result<Self, SpecError> {
         let source = Source::read(path)?;
@@ -426,11 +432,4 @@ pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
 fn within(room: &Room) -> String {
     let [x, y, z] = room.size_m.to_array();
     format!("the room reaches from [0, 0, 0] to [{x}, {y}, {z}] m")
-}
-
-fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
-    match nearest(word, known.clone()) {
-        Some(name) => format!("did you mean `{name}`?"),
-        None => format!("known: {}", known.collect::<Vec<_>>().join(", ")),
-    }
 }

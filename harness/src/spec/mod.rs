@@ -125,6 +125,14 @@ fn nearest_key(message: &str) -> Option<String> {
     nearest(unknown, known.iter().copied()).map(|k| format!("did you mean `{k}`?"))
 }
 
+/// A help text for an unknown name: the known one most like it, or else all of them.
+pub fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
+    match nearest(word, known.clone()) {
+        Some(name) => format!("did you mean `{name}`?"),
+        None => format!("known: {}", known.collect::<Vec<_>>().join(", ")),
+    }
+}
+
 /// The candidate most like `word`, if any is like it at all.
 pub fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     candidates

@@ -18,8 +18,8 @@ use self::findings::{Finding, How};
 pub use self::findings::{LawReport, PointReport, StressReport};
 use self::judge::Reading;
 use self::laws::{Against, Law, Place, Variant};
-use crate::engines::{Engine, Job};
-use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, base_job, settings_of, task};
+use crate::engines::Job;
+use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, Subject, task};
 use crate::procedures;
 use crate::process;
 use crate::spec::{Budget, Case};
@@ -53,14 +53,6 @@ pub enum Coordinates {
     Fitted,
     /// Those of the scene, to see how a renderer itself bears them.
     Raw,
-}
-
-/// An engine under stress.
-pub struct Subject {
-    /// The engine.
-    pub engine: Box<dyn Engine>,
-    /// Its version.
-    pub version: String,
 }
 
 /// Told of every point as it ends.
@@ -130,7 +122,7 @@ fn points(case: &Case, subjects: &[Subject], options: &Options<'_>) -> Vec<Point
             // Intensities are direct light in free field, whose laws direct illuminance keeps as well.
             let tasks = procedures::ALL.iter().filter(|p| p.name() != "luminous_intensity");
             for task in tasks.filter_map(|p| p.task(case)).filter(|t| law.light.concerns(t.transport)) {
-                let base = base_job(case, &task);
+                let base = Job::of_task(case, &task);
                 let says = |step: &usize| (law.variant)(&base, law.magnitudes[*step]).is_some();
                 let steps = (0..law.magnitudes.len()).filter(says);
                 let point = |step| Point { subject, law, step, procedure: task.procedure, base: base.clone() };
@@ -254,7 +246,7 @@ impl Bench<'_> {
     fn read(&self, point: &Point, job: &Job, place: Option<Place>, seed: u64) -> Option<Outcome> {
         let subject = &self.subjects[point.subject];
         let id = subject.engine.id();
-        let mut settings = settings_of(self.case, id.name());
+        let mut settings = self.case.settings_of(id.name());
         match (id.name(), self.options.coordinates) {
             ("simulator", _) => drop(settings.insert("relative_error".into(), Self::own_accuracy(job).into())),
             (_, Coordinates::Fitted) => {}

@@ -3,7 +3,7 @@ use std::time::Duration;
 use super::laws::Place;
 use super::*;
 use crate::engines::{
-    Absent, EngineError, EngineId, Estimate, Measurement, SceneFile, Site, Support, Version, Workbench,
+    Absent, Engine, EngineError, EngineId, Estimate, Measurement, SceneFile, Site, Support, Version, Workbench,
 };
 use crate::measure::OwnSolvers;
 
@@ -118,7 +118,7 @@ fn a_run_cut_short_goes_on_where_it_stopped() {
 #[test]
 fn a_place_leads_another_process_to_the_same_job() {
     let case = axial();
-    let base = base_job(&case, &task(&case, "indirect_illuminance").unwrap());
+    let base = Job::of_task(&case, &task(&case, "indirect_illuminance").unwrap());
     let place = |part| Place { law: "superposition".into(), magnitude: 2.0, part };
     let luminaires = |part| laws::job(&base, &place(part)).unwrap().scene.luminaires.len();
     assert_eq!((luminaires(0), luminaires(1), luminaires(2)), (2, 1, 1));

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
+
+use crate::files;
 
 use super::super::{Engine, EngineError, Site, Version};
 use super::Calibration;
@@ -57,12 +58,5 @@ pub(super) fn read(path: &Path) -> Option<Calibration> {
 
 /// Keeps a calibration so that a reader sees all of it or nothing; the error is why it could not be kept.
 pub(super) fn keep(path: &Path, calibration: &Calibration) -> Result<(), String> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let fail = |e: std::io::Error| format!("{}: {e}", path.display());
-    std::fs::create_dir_all(folder).map_err(fail)?;
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(fail)?;
-    serde_json::to_writer_pretty(&mut file, calibration).map_err(|e| fail(e.into()))?;
-    file.write_all(b"\n").map_err(fail)?;
-    file.persist(path).map_err(|e| fail(e.error))?;
-    Ok(())
+    files::replace_json(path, calibration).map_err(|e| format!("{}: {e}", path.display()))
 }
