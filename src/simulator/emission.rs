@@ -16,6 +16,9 @@ use crate::geometry::configuration_factor::element_to_polygon;
 use crate::photometry::{LuminousIntensityDistribution, LuminousOpening, Symmetry};
 use crate::scene::{Luminaire, LuminaireModel, Meter};
 
+/// Relative deviation of a table from a cosine that passes for rounding of its figures; it counts as an error.
+const COSINE_ROUNDING: f64 = 1e-5;
+
 /// Halvings of a triangle after which an integral stops improving.
 const DEEPEST: u32 = 9;
 
@@ -36,7 +39,7 @@ struct Face {
     outward: Option<DVec3>,
 }
 
-/// One luminance on the lower side of a flat opening, and the largest relative error of saying so.
+/// One luminance on the lower side of a flat opening, and the largest relative error of saying so: of interpolation and of rounded figures.
 #[derive(Clone, Copy, Debug)]
 struct Lambertian {
     exitance: f64,
@@ -180,7 +183,7 @@ impl Emitter {
     }
 }
 
-/// Recognises I0 cos gamma, dark above, at every node of a table.
+/// Recognises I0 cos gamma, dark above, at every node of a table, as far as its figures are written out.
 fn lambertian(luminaire: &Luminaire, area_m2: f64) -> Option<Lambertian> {
     let table: &LuminousIntensityDistribution = &luminaire.photometry.distribution;
     if table.symmetry() != Symmetry::Axial || table.gamma_deg()[0] != 0.0 {
@@ -188,15 +191,17 @@ fn lambertian(luminaire: &Luminaire, area_m2: f64) -> Option<Lambertian> {
     }
     let (gammas, plane) = (table.gamma_deg(), table.plane(0));
     let cosine = |g: f64| if g < 90.0 { g.to_radians().cos() } else { 0.0 };
-    let is_cosine = |(g, i): (&f64, &f64)| (i - plane[0] * cosine(*g)).abs() <= 1e-12 * plane[0];
-    let reaches = gammas.contains(&90.0);
-    if !reaches || !gammas.iter().zip(plane).all(is_cosine) {
+    let off = |(g, i): (&f64, &f64)| ((i - plane[0] * cosine(*g)).abs() - 1e-12 * plane[0]).max(0.0);
+    // Relative at every node, and so at what is interpolated between two; infinite where the cosine is dark.
+    let relative = |node: (&f64, &f64)| if off(node) == 0.0 { 0.0 } else { off(node) / (plane[0] * cosine(*node.0)) };
+    let rounding = gammas.iter().zip(plane).map(relative).fold(0.0, f64::max);
+    if !gammas.contains(&90.0) || rounding > COSINE_ROUNDING {
         return None;
     }
     let widest = gammas.windows(2).filter(|w| w[0] < 90.0).map(|w| (w[1] - w[0]).to_radians()).fold(0.0, f64::max);
     // A chord of the cosine lies below it by at most the square of the step over 8, relative.
     let exitance = PI * plane[0] * luminaire.flux_scale / area_m2;
-    Some(Lambertian { exitance, interpolation: widest * widest / 8.0 })
+    Some(Lambertian { exitance, interpolation: widest * widest / 8.0 + rounding })
 }
 
 /// Area of a convex flat polygon.

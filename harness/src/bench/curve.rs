@@ -35,7 +35,9 @@ pub struct Curve {
     pub set_up_s: f64,
     /// By rising effort.
     pub points: Vec<BenchPoint>,
-    /// Wall-clock seconds to a relative error; null where it was not reached.
+    /// How far off the reference may be, relative; errors below are not told from none.
+    pub reference_floor: f64,
+    /// Wall-clock seconds to a relative error; null where it was not reached or lies below the reference's floor.
     pub time_to: BTreeMap<String, Option<f64>>,
     /// The same, start-up apart.
     pub time_to_net: BTreeMap<String, Option<f64>>,
@@ -74,8 +76,7 @@ pub struct BenchPoint {
 
 impl BenchPoint {
     pub(super) fn of(effort: f64, outcomes: &[Outcome], truth: &Truth) -> Self {
-        let brightest = truth.values_lx.iter().copied().fold(0.0, f64::max);
-        let scale = |v: f64| v.max(FAINT * brightest).max(f64::MIN_POSITIVE);
+        let scale = |v: f64| scale(v, &truth.values_lx);
         let stations = truth.values_lx.len();
         let relative = |o: &Outcome| -> Vec<f64> {
             o.estimates.iter().zip(&truth.values_lx).map(|(e, v)| (e.value_lx - v) / scale(*v)).collect()
@@ -89,9 +90,7 @@ impl BenchPoint {
             errors.iter().map(|e| (e[s] - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)
         };
         let variance = (0..stations).map(of_station).sum::<f64>() / stations as f64;
-        // Of the reference, as far as it goes into a root mean square.
-        let known: f64 = truth.uncertainty_lx.iter().zip(&truth.values_lx).map(|(u, v)| (u / scale(*v)).powi(2)).sum();
-        let known = (known / stations as f64).sqrt();
+        let known = truth.floor();
         let is_random = variance > 1e-6 * relative_error * relative_error;
         let (low, high) = if is_random { fit::interval_of_rms(errors.len()) } else { (1.0, 1.0) };
         Self {
@@ -109,6 +108,12 @@ impl BenchPoint {
     }
 }
 
+/// What an error at a meter of that value counts against, in lx.
+pub(super) fn scale(value_lx: f64, all_lx: &[f64]) -> f64 {
+    let brightest = all_lx.iter().copied().fold(0.0, f64::max);
+    value_lx.max(FAINT * brightest).max(f64::MIN_POSITIVE)
+}
+
 fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut all: Vec<f64> = values.collect();
     all.sort_by(f64::total_cmp);
@@ -122,7 +127,9 @@ impl Curve {
         let net = |p: &BenchPoint| (p.wall_s - self.start_up_s).max(LEAST_NET * p.wall_s);
         let points: Vec<(f64, f64)> = self.points.iter().map(|p| (net(p), p.relative_error)).collect();
         let whole: Vec<(f64, f64)> = self.points.iter().map(|p| (p.wall_s, p.relative_error)).collect();
-        let times = |points: &[(f64, f64)]| TARGETS.map(|t| (t.to_string(), fit::time_to(points, t))).into();
+        let told = |t: &f64| *t >= self.reference_floor;
+        let time = |points: &[(f64, f64)], t: f64| Some(t).filter(told).and_then(|t| fit::time_to(points, t));
+        let times = |points: &[(f64, f64)]| TARGETS.map(|t| (t.to_string(), time(points, t))).into();
         self.time_to = times(&whole);
         self.time_to_net = times(&points);
         if let Some(Fit { slope, floor }) = fit::fit(&points) {
@@ -148,15 +155,15 @@ pub struct Pareto {
     pub case: String,
     /// The procedure.
     pub procedure: String,
-    /// Curve, wall-clock seconds and relative error, by rising time.
+    /// Curve, wall-clock seconds and relative error, by rising time; an error below the reference's floor counts as it.
     pub front: Vec<(String, f64, f64)>,
 }
 
 impl Pareto {
-    pub(super) fn of(case: &str, procedure: &str, curves: &[Curve]) -> Self {
+    pub(super) fn of(case: &str, procedure: &str, curves: &[Curve], floor: f64) -> Self {
         let mine = curves.iter().filter(|c| c.case == case && c.procedure == procedure);
         let mut all: Vec<(String, f64, f64)> =
-            mine.flat_map(|c| c.points.iter().map(|p| (c.name(), p.wall_s, p.relative_error))).collect();
+            mine.flat_map(|c| c.points.iter().map(|p| (c.name(), p.wall_s, p.relative_error.max(floor)))).collect();
         all.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
         let mut front: Vec<(String, f64, f64)> = vec![];
         for point in all {

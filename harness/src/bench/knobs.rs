@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Bench, Settings, Subject};
+use super::{Bench, Effort, LIMIT, Settings, Subject};
 use crate::engines::{Engine, Job};
 use crate::measure::Outcome;
 use crate::procedures::Task;
@@ -67,8 +67,8 @@ impl Bench<'_> {
     /// Every value of every setting of an engine but its default.
     pub(super) fn knob_effects(&self, subject: &Subject, task: &Task, job: &Job) -> Vec<KnobEffect> {
         let own = self.case.settings_of(subject.engine.id().name());
-        let read =
-            |settings: &Settings| self.take(subject, task.procedure, job, settings, BUDGET, self.options.seed, None);
+        let effort = Effort { budget: BUDGET, seed: self.options.seed, limit: LIMIT };
+        let read = |settings: &Settings| self.take(subject, task.procedure, job, settings, effort, None);
         let knobs: Vec<_> = subject.engine.knobs().iter().filter(|k| !own.contains_key(k.key)).collect();
         let tries = knobs.iter().flat_map(|k| k.values.iter().skip(1).map(move |v| (k.key, *v)));
         let Some(before) = (!knobs.is_empty()).then(|| read(&own)).flatten() else { return vec![] };

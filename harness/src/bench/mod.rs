@@ -76,12 +76,29 @@ pub struct BenchReport {
     pub engines: BTreeMap<String, String>,
     /// One an engine, solver, preset and procedure.
     pub curves: Vec<Curve>,
+    /// One a case and procedure: what errors are told against, and the error below which they are not told.
+    pub references: Vec<Reference>,
     /// One a case and procedure: what no other engine beats in both time and error.
     pub pareto: Vec<Pareto>,
     /// What each setting does, where they were tried.
     pub knobs: Vec<KnobEffect>,
     /// What could not be measured, and why.
     pub left_out: Vec<String>,
+}
+
+/// The exact values of a case and procedure.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reference {
+    /// The case.
+    pub case: String,
+    /// The procedure.
+    pub procedure: String,
+    /// What solved it, in full.
+    pub solver: String,
+    /// Root mean square over meters of how far off it may be, relative: errors below are not told from none.
+    pub floor: f64,
+    /// Wall-clock seconds that it took.
+    pub wall_s: f64,
 }
 
 /// Benches engines with one case and adds what it finds to a report.
@@ -121,7 +138,14 @@ pub fn bench(
                 report.knobs.extend(bench.knob_effects(subject, &task, &job));
             }
         }
-        report.pareto.push(Pareto::of(&case.name, task.procedure, &report.curves));
+        report.pareto.push(Pareto::of(&case.name, task.procedure, &report.curves, truth.floor()));
+        report.references.push(Reference {
+            case: case.name.clone(),
+            procedure: task.procedure.to_owned(),
+            solver: truth.solver.clone(),
+            floor: truth.floor(),
+            wall_s: truth.wall_s,
+        });
     }
     if Instant::now() >= bench.until && !options.time.is_zero() {
         report
@@ -134,13 +158,29 @@ pub fn bench(
 pub(crate) struct Truth {
     pub(crate) values_lx: Vec<f64>,
     pub(crate) uncertainty_lx: Vec<f64>,
+    pub(crate) solver: String,
+    pub(crate) wall_s: f64,
 }
 
-/// Accuracy of the exact reference where bodies and openings allow no closed solution, and where there are none.
-const FURNISHED: f64 = 1e-3;
-const EMPTY: f64 = 1e-7;
-/// Past this a reference, or a reading, is not waited for.
+/// Accuracies of the exact reference, from what is tried first to what has to do: where bodies and openings allow no
+/// closed solution, and where there are none.
+///
+/// The first of furnished rooms is met by path tracing, which confers with no radiosity that is benched; the rest by
+/// radiosity with its own bound, in seconds.
+const FURNISHED: [f64; 2] = [1e-3, 1e-2];
+const EMPTY: [f64; 2] = [1e-7, 5e-7];
+/// Past this a try at a reference is not waited for.
+const REFERENCE_LIMIT: Duration = Duration::from_secs(90);
+/// Past this a reading is not waited for.
 const LIMIT: Duration = Duration::from_secs(300);
+
+/// What one reading may take.
+#[derive(Clone, Copy)]
+struct Effort {
+    budget: Budget,
+    seed: u64,
+    limit: Duration,
+}
 
 struct Bench<'a> {
     case: &'a Case,
@@ -154,11 +194,12 @@ impl Bench<'_> {
     fn truth(&self, task: &Task, job: &Job) -> Option<Truth> {
         let engine = crate::engines::all().into_iter().find(|e| e.id().name() == "simulator")?;
         let subject = Subject { engine, version: env!("CARGO_PKG_VERSION").to_owned() };
-        let finest = if is_furnished(job) { FURNISHED } else { EMPTY };
+        let accuracies = if is_furnished(job) { FURNISHED } else { EMPTY };
         // Something is better than nothing: coarser where the finest takes too long.
-        [finest, 5.0 * finest].into_iter().find_map(|accuracy| {
+        accuracies.into_iter().find_map(|accuracy| {
             let settings = BTreeMap::from([("relative_error".to_owned(), accuracy.into())]);
-            let outcome = self.take(&subject, task.procedure, job, &settings, job.budget, self.options.seed, None)?;
+            let effort = Effort { budget: job.budget, seed: self.options.seed, limit: REFERENCE_LIMIT };
+            let outcome = self.take(&subject, task.procedure, job, &settings, effort, None)?;
             outcome.failure.is_none().then(|| Truth::of(&outcome))
         })
     }
@@ -179,8 +220,8 @@ impl Bench<'_> {
             for k in 0..repetitions {
                 if !repeats {
                     let settings = rung.settings(&settings);
-                    let seed = self.options.seed + k as u64;
-                    outcomes.extend(self.take(subject, task.procedure, job, &settings, rung.budget, seed, None));
+                    let effort = Effort { budget: rung.budget, seed: self.options.seed + k as u64, limit: LIMIT };
+                    outcomes.extend(self.take(subject, task.procedure, job, &settings, effort, None));
                 }
                 let what = format!("{}: {} {} {:e}", subject.engine.id(), task.procedure, rung.preset, rung.effort);
                 self.progress.ended(&what, rung.expected_s());
@@ -202,6 +243,7 @@ impl Bench<'_> {
                     preset: rung.preset.clone(),
                     start_up_s,
                     set_up_s,
+                    reference_floor: truth.floor(),
                     points: vec![point],
                     ..Curve::default()
                 }),
@@ -234,23 +276,23 @@ impl Bench<'_> {
         let budget = Budget { relative_error: 1e3, seconds: 0.0 };
         let place = |k: usize| Some(Place { law: name.to_owned(), magnitude: 0.0, part: k });
         let times = (0..2).filter_map(|k| {
-            let taken = self.take(subject, task.procedure, job, settings, budget, self.options.seed, place(k))?;
+            let effort = Effort { budget, seed: self.options.seed, limit: LIMIT };
+            let taken = self.take(subject, task.procedure, job, settings, effort, place(k))?;
             taken.failure.is_none().then_some(taken.wall_s)
         });
         times.reduce(f64::min).unwrap_or(0.0)
     }
 
-    #[allow(clippy::too_many_arguments, reason = "they are what makes one reading different from the next")]
     fn take(
         &self,
         subject: &Subject,
         procedure: &str,
         job: &Job,
         settings: &Settings,
-        budget: Budget,
-        seed: u64,
+        effort: Effort,
         place: Option<Place>,
     ) -> Option<Outcome> {
+        let Effort { budget, seed, limit } = effort;
         let request = Request {
             spec: self.case.path.clone(),
             spec_sha256: self.case.sha256.clone(),
@@ -263,7 +305,7 @@ impl Bench<'_> {
             budget,
             seed,
             jobs: self.options.jobs,
-            limit_s: LIMIT.as_secs_f64(),
+            limit_s: limit.as_secs_f64(),
         };
         if let Some(kept) = self.options.shelf.find(&request) {
             return Some(kept);
@@ -293,7 +335,19 @@ impl Truth {
         Self {
             values_lx: outcome.estimates.iter().map(|e| e.value_lx).collect(),
             uncertainty_lx: outcome.estimates.iter().map(error).collect(),
+            solver: outcome.settings.get("solver").cloned().unwrap_or_default(),
+            wall_s: outcome.wall_s,
         }
+    }
+
+    /// Root mean square over meters of how far off it may be, relative as errors are.
+    pub(crate) fn floor(&self) -> f64 {
+        let parts = self
+            .uncertainty_lx
+            .iter()
+            .zip(&self.values_lx)
+            .map(|(u, v)| (u / curve::scale(*v, &self.values_lx)).powi(2));
+        (parts.sum::<f64>() / self.values_lx.len().max(1) as f64).sqrt()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Views of a bench report: a table for a terminal, Markdown, CSV.
 
-use super::BenchReport;
 use super::curve::{Curve, TARGETS};
+use super::{BenchReport, Reference};
 
 impl BenchReport {
     /// The tables for a terminal.
@@ -36,6 +36,15 @@ impl BenchReport {
                 "{}, {}: seconds to a relative error (start-up apart in brackets)\n\n",
                 pareto.case, pareto.procedure
             ));
+            let same = |r: &&Reference| r.case == pareto.case && r.procedure == pareto.procedure;
+            for reference in self.references.iter().filter(same) {
+                text.push_str(&format!(
+                    "Reference: simulator, {}; {} s. It may be {} off, root mean square over the meters; smaller errors are not told.\n\n",
+                    reference.solver,
+                    seconds(reference.wall_s),
+                    percent(reference.floor)
+                ));
+            }
             text.push_str(&table(head(), curves.iter().map(|c| row(c)).collect()));
             let front: Vec<String> = pareto
                 .front

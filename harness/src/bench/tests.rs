@@ -113,20 +113,24 @@ fn is_well_formed(svg: &str) {
     assert_eq!(opened, closed, "{svg}");
 }
 
-#[test]
-fn the_front_holds_what_no_other_point_beats() {
-    let point = |wall_s: f64, relative_error: f64| BenchPoint {
+fn benched_point() -> BenchPoint {
+    BenchPoint {
         effort: 1.0,
-        wall_s,
-        cpu_s: wall_s,
+        wall_s: 1.0,
+        cpu_s: 1.0,
         peak_mib: None,
-        relative_error,
+        relative_error: 0.0,
         relative_error_low: 0.0,
         relative_error_high: 1.0,
         worst_error: 1.0,
         variance: 0.0,
         repetitions: 1,
-    };
+    }
+}
+
+#[test]
+fn the_front_holds_what_no_other_point_beats() {
+    let point = |wall_s: f64, relative_error: f64| BenchPoint { wall_s, relative_error, ..benched_point() };
     let curve = |engine: &str, points: Vec<BenchPoint>| Curve {
         case: "c".into(),
         procedure: "p".into(),
@@ -136,6 +140,20 @@ fn the_front_holds_what_no_other_point_beats() {
     };
     let curves =
         [curve("a", vec![point(1.0, 0.1), point(4.0, 0.05)]), curve("b", vec![point(2.0, 0.2), point(3.0, 0.01)])];
-    let front: Vec<f64> = Pareto::of("c", "p", &curves).front.iter().map(|f| f.1).collect();
+    let front: Vec<f64> = Pareto::of("c", "p", &curves, 0.0).front.iter().map(|f| f.1).collect();
     assert_eq!(front, [1.0, 3.0]);
+    // What the reference cannot tell apart is no gain.
+    assert_eq!(Pareto::of("c", "p", &curves, 0.2).front.iter().map(|f| (f.1, f.2)).collect::<Vec<_>>(), [(1.0, 0.2)]);
+}
+
+#[test]
+fn no_time_is_told_to_an_error_below_the_references_floor() {
+    let point = |wall_s: f64, relative_error: f64| BenchPoint { wall_s, relative_error, ..benched_point() };
+    let concluded = |reference_floor: f64| {
+        let mut curve = Curve { reference_floor, points: vec![point(1.0, 0.05), point(2.0, 5e-4)], ..Curve::default() };
+        curve.conclude();
+        ["0.1", "0.01", "0.001"].map(|t| curve.time_to[t].is_some())
+    };
+    assert_eq!(concluded(0.0), [true, true, true]);
+    assert_eq!(concluded(2e-3), [true, true, false]);
 }

@@ -328,3 +328,25 @@ fn the_first_reflection_of_walls_is_that_of_a_dense_sum() {
     let found = illuminance(&scene, &[meter], once, &accuracy(0.1)).unwrap().estimates[0];
     assert_relative_eq!(found.illuminance.value(), exact, max_relative = 1e-4);
 }
+
+#[test]
+fn a_cosine_table_with_rounded_figures_lights_like_the_cosine_within_its_bound() {
+    let exact = s2();
+    let mut rounded = s2();
+    for lamp in &mut rounded.luminaires {
+        let table = &lamp.photometry.distribution;
+        let figures = |i: &f64| (i * 1e6).round() / 1e6;
+        let candela = table.plane(0).iter().map(figures).collect();
+        let table = LuminousIntensityDistribution::axial(table.gamma_deg().to_vec(), candela).unwrap();
+        *lamp = luminaire(table, lamp.photometry.opening, lamp.position_m);
+    }
+    let direct =
+        |scene: &Scene| illuminance(scene, &s2_meters(), Transport::Direct, &accuracy(1e-3)).unwrap().estimates;
+    for (a, b) in direct(&exact).iter().zip(direct(&rounded)) {
+        let off = (a.illuminance - b.illuminance).value().abs();
+        assert!(off <= 1e-6 * a.illuminance.value(), "{a:?} {b:?}");
+        // The closed formula's bound, not a quadrature's.
+        assert!(bound(b.uncertainty) > 9e-6 * b.illuminance.value(), "{b:?}");
+        assert!(bound(b.uncertainty) < 1.1e-5 * b.illuminance.value(), "{b:?}");
+    }
+}
