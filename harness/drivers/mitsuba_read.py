@@ -24,6 +24,8 @@ import numpy as np
 LEAST_BLOCKS = 8  # for a standard error
 GOOD_BLOCKS = 32  # for one that is itself good to 13 %
 LANES = 1 << 17  # rays in flight
+LEAST_SIDE = 64  # strata a side of a block, so that blocks are many strata and their errors near normal
+PLAN_MARGIN = 2.0  # the spread of two blocks is a rough guess of the error of one
 
 
 def main():
@@ -211,18 +213,23 @@ class Report:
         return mean, error
 
     def block_side(self, block, rays):
-        """m such that a block fills the rays in flight and that enough blocks fit in the time."""
+        """m such that a block fills the rays in flight at most, and enough blocks about reach the error and fit in the time."""
         if self.job["fixed_samples"]:
             return max(1, math.isqrt(self.job["fixed_samples"]))
         full = min(256, max(2, math.isqrt(LANES // rays)))
         trial = full if is_jit() else 2
+        trials = []
         for seed in (0, 1):  # the first one compiles kernels
             began = time.monotonic()
-            block(trial, (self.job["seed"], 2, seed))
+            trials.append(block(trial, (self.job["seed"], 2, seed)))
         ray_s = (time.monotonic() - began) / (trial**2 * rays)
         left_s = self.job["seconds"] - (time.monotonic() - START)
         affordable = max(left_s, 0) / GOOD_BLOCKS / ray_s / rays
-        return max(2, min(full, math.isqrt(int(affordable))))
+        mean, error = mean_and_error(trials)
+        worst = np.max(np.divide(error, mean, out=np.zeros_like(mean), where=mean > 0), initial=0)
+        # `error` is that of the mean of two; m x m samples are at least as good as m x m independent ones.
+        needed = trial * PLAN_MARGIN * worst / self.job["relative_error"] * math.sqrt(2 / GOOD_BLOCKS)
+        return max(2, min(full, math.ceil(max(needed, LEAST_SIDE)), math.isqrt(int(affordable))))
 
     def with_readings(self, values, errors):
         rows = list(zip((s["id"] for s in self.job["stations"]), values.tolist(), errors.tolist()))
