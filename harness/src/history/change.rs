@@ -1,4 +1,4 @@
-//! Change points: cumulative sums of what each night brings that the nights before did not foretell.
+//! Change points: sums over nights of what each brings that the nights before did not foretell.
 //!
 //! Page, Continuous inspection schemes, Biometrika 41 (1954), with the self-starting form of Hawkins, Self-starting Cusum
 //! charts for location and scale, The Statistician 36 (1987): every night is foretold by the mean of the nights before it, so
@@ -7,25 +7,21 @@
 //! A series' residual is its deviation less the mean of the nights before, in standard errors, times sqrt(n / (n + 1)). The
 //! residuals of a group of series are added over the square root of their number and divided by their own spread over the
 //! nights before, which gives Student's t, and that the normal deviate U (Wallace, Bounds on normal approximations to
-//! Student's and the chi-square distributions, Ann. Math. Statist. 30 (1959)). Both sums S = max(0, S +- U - 1) are those for a
-//! shift of two standard errors. A change is reported where one exceeds its limit, and it is dated, among the nights since the
-//! sum last was zero, to the one that makes what followed most likely. Limits come from the mean time between false alarms by Siegmund, Sequential Analysis (1985), section 2.6.
+//! Student's and the chi-square distributions, Ann. Math. Statist. 30 (1959)). The spread of a single comparison is moderated by that
+//! of its case (Smyth, Linear models and empirical Bayes methods, Stat. Appl. Genet. Mol. Biol. 3 (2004)).
+//!
+//! Two statistics are watched, each with its share of the false alarms: the sums S = max(0, S +- U - 1), quickest in the mean
+//! for a shift of two standard errors, and the sum of the last five nights, likeliest to see one within five. A change is
+//! dated, among the nights since the sum last was zero or among the five, to the one that makes what followed most likely.
 
 use std::collections::BTreeMap;
 
+use super::limits::{Limits, REFERENCE_VALUE, WINDOW};
 use super::series::{History, Series};
+use super::told::{LEARNING, MOST, SMALLEST_ERROR, Spread, Told, spread_of_all};
 
 /// Over all groups of a history together there is at most one false alarm in so many nights, in the mean.
 pub const NIGHTS_PER_FALSE_ALARM: f64 = 30.0;
-
-/// Half the shift that the sums are made for, in standard errors.
-const REFERENCE_VALUE: f64 = 1.0;
-
-/// So many residuals estimate the spread before any is judged by it.
-const LEARNING: usize = 5;
-
-/// A residual moves the estimates by no more than so many times the spread.
-const MOST: f64 = 4.0;
 
 /// One night alone is no change: it takes a sum no further than this share of its limit.
 const ONE_NIGHT: f64 = 0.9;
@@ -35,12 +31,6 @@ const SAME_CHANGE: usize = 3;
 
 /// ... and what a single comparison shows so many nights after its group: it needs longer.
 const SAME_CHANGE_OF_ONE: usize = 21;
-
-/// The smallest standard error, relative to the reference: for engines that state none. A change far below any tolerance is one still.
-const SMALLEST_ERROR: f64 = 1e-6;
-
-/// The smallest spread of a group's residuals, in standard errors: for what repeats exactly.
-const SMALLEST_SPREAD: f64 = 0.1;
 
 /// How many series are judged together, with the share of the false alarms that each kind may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -58,8 +48,9 @@ impl Level {
 
     const fn share(self) -> f64 {
         match self {
-            Self::EngineAndProcedure => 0.8,
-            Self::Case | Self::Comparison => 0.1,
+            Self::EngineAndProcedure => 0.25,
+            Self::Case => 0.05,
+            Self::Comparison => 0.7,
         }
     }
 }
@@ -124,7 +115,8 @@ fn at_level(history: &History, level: Level) -> Vec<Change> {
         let number = if level == Level::Comparison { k } else { 0 };
         groups.entry((&key.engine, &key.procedure, case, number)).or_default().push(series);
     }
-    let limit = limit(groups.len() as f64 * NIGHTS_PER_FALSE_ALARM / level.share());
+    let limits = Limits::of(groups.len() as f64 * NIGHTS_PER_FALSE_ALARM / level.share());
+    let cases = if level == Level::Comparison { spreads_of_cases(history) } else { BTreeMap::new() };
     let mut found = vec![];
     for ((engine, procedure, case, _), members) in groups {
         let part = Part {
@@ -142,24 +134,20 @@ fn at_level(history: &History, level: Level) -> Vec<Change> {
             relative: alarm.shift.1,
             seen_in: vec![],
         };
-        found.extend(alarms(&members, history.nights.len(), limit).into_iter().map(named));
+        let watch = Watch { limits, peers: cases.get(&(engine, procedure, case)).map_or(&[], Vec::as_slice) };
+        found.extend(watch.alarms(&members, history.nights.len()).into_iter().map(named));
     }
     found
 }
 
-/// The limit of the two sums of one group that gives it a false alarm every so many nights, by bisection.
-fn limit(nights: f64) -> f64 {
-    // Of one sum; the two together alarm twice as often. 1.166 is the overshoot of normal steps.
-    let between_alarms = |limit: f64| {
-        let b = 2.0 * REFERENCE_VALUE * (limit + 1.166);
-        (b.exp() - 1.0 - b) / (2.0 * REFERENCE_VALUE * REFERENCE_VALUE) / 2.0
-    };
-    let (mut low, mut high) = (0.0, 40.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if between_alarms(middle) < nights { low = middle } else { high = middle }
+/// The spread that all comparisons of a case show together before each night.
+fn spreads_of_cases(history: &History) -> BTreeMap<(&str, &str, &str), Vec<Spread>> {
+    let mut cases: BTreeMap<_, Vec<&Series>> = BTreeMap::new();
+    for series in &history.series {
+        let key = &series.key;
+        cases.entry((key.engine.as_str(), key.procedure.as_str(), key.case.as_str())).or_default().push(series);
     }
-    high
+    cases.into_iter().map(|(case, members)| (case, spread_of_all(&members, history.nights.len()))).collect()
 }
 
 struct Alarm {
@@ -168,54 +156,69 @@ struct Alarm {
     shift: (f64, f64),
 }
 
-/// The changes of one group. After each the estimates start anew with the night after it was noticed: the nights since the change
-/// were picked for being unusual, and would foretell the next ones wrong.
-fn alarms(members: &[&Series], nights: usize, limit: f64) -> Vec<Alarm> {
-    let mut found: Vec<Alarm> = vec![];
-    let mut start = 0;
-    while let Some(night) = first_alarm(members, start..nights, limit) {
-        let Noticed { change, noticed } = night;
-        found.push(Alarm { night: change, noticed, shift: shift(members, start, change, noticed) });
-        start = noticed + 1;
-    }
-    found
-}
-
 struct Noticed {
     change: usize,
     noticed: usize,
 }
 
-/// The first alarm of a segment without earlier changes.
-fn first_alarm(members: &[&Series], segment: std::ops::Range<usize>, limit: f64) -> Option<Noticed> {
-    let most = REFERENCE_VALUE + ONE_NIGHT * limit;
-    let mut told = vec![Told::default(); members.len()];
-    let mut spread = Spread::default();
-    let mut deviates = vec![];
-    let (mut sums, mut zero) = ([0.0_f64; 2], [0; 2]);
-    for night in segment {
-        let heard = members.iter().zip(&mut told).filter_map(|(series, told)| told.hear(series, night));
-        let (sum, count) = heard.fold((0.0, 0.0_f64), |(sum, count), residual| (sum + residual, count + 1.0));
-        if count == 0.0 {
-            continue;
+/// What a group is watched by.
+struct Watch<'a> {
+    limits: Limits,
+    /// The spread of the comparisons that are like it, before each night; none for a group that is judged by its own alone.
+    peers: &'a [Spread],
+}
+
+impl Watch<'_> {
+    /// The changes of one group. After each the estimates start anew with the night after it was noticed: the nights since the
+    /// change were picked for being unusual, and would foretell the next ones wrong.
+    fn alarms(&self, members: &[&Series], nights: usize) -> Vec<Alarm> {
+        let mut found: Vec<Alarm> = vec![];
+        let mut start = 0;
+        while let Some(night) = self.first_alarm(members, start..nights) {
+            let Noticed { change, noticed } = night;
+            found.push(Alarm { night: change, noticed, shift: shift(members, start, change, noticed) });
+            start = noticed + 1;
         }
-        let residual = sum / count.sqrt();
-        let deviate = normal_deviate(residual / spread.value(), spread.count).clamp(-most, most);
-        spread.hear(residual);
-        if spread.count <= LEARNING {
-            continue;
-        }
-        deviates.push((night, deviate));
-        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
-            sums[side] += sign * deviate - REFERENCE_VALUE;
-            if sums[side] <= 0.0 {
-                (sums[side], zero[side]) = (0.0, deviates.len());
-            } else if sums[side] > limit {
-                return Some(Noticed { change: most_likely(&deviates[zero[side]..]), noticed: night });
+        found
+    }
+
+    /// The first alarm of a segment without earlier changes.
+    fn first_alarm(&self, members: &[&Series], segment: std::ops::Range<usize>) -> Option<Noticed> {
+        let most = REFERENCE_VALUE + ONE_NIGHT * self.limits.sum;
+        let mut told = vec![Told::default(); members.len()];
+        let mut spread = Spread::default();
+        let mut deviates = vec![];
+        let (mut sums, mut zero) = ([0.0_f64; 2], [0; 2]);
+        for night in segment {
+            let heard = members.iter().zip(&mut told).filter_map(|(series, told)| told.hear(series, night));
+            let (sum, count) = heard.fold((0.0, 0.0_f64), |(sum, count), residual| (sum + residual, count + 1.0));
+            if count == 0.0 {
+                continue;
+            }
+            let residual = sum / count.sqrt();
+            let known = self.peers.get(night).map_or(spread, |peers| spread.moderated_by(*peers));
+            let deviate = known.deviate(residual).clamp(-most, most);
+            let is_learning = spread.count < LEARNING;
+            spread.hear(residual);
+            if is_learning {
+                continue;
+            }
+            deviates.push((night, deviate));
+            for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+                sums[side] += sign * deviate - REFERENCE_VALUE;
+                if sums[side] <= 0.0 {
+                    (sums[side], zero[side]) = (0.0, deviates.len());
+                } else if sums[side] > self.limits.sum {
+                    return Some(Noticed { change: most_likely(&deviates[zero[side]..]), noticed: night });
+                }
+            }
+            let last = &deviates[deviates.len().saturating_sub(WINDOW)..];
+            if self.limits.are_exceeded_by(last.iter().map(|(_, deviate)| deviate.clamp(-MOST, MOST))) {
+                return Some(Noticed { change: most_likely(last), noticed: night });
             }
         }
+        None
     }
-    None
 }
 
 /// Of nights with their deviates: the night from which on the deviates are most unlike zero.
@@ -229,69 +232,6 @@ fn most_likely(deviates: &[(usize, f64)]) -> usize {
         }
     }
     best.1
-}
-
-/// The spread of residuals, which single wild nights do not widen.
-#[derive(Clone, Copy, Default)]
-struct Spread {
-    squares: f64,
-    count: usize,
-}
-
-impl Spread {
-    fn value(&self) -> f64 {
-        (self.squares / self.count.max(1) as f64).sqrt().max(SMALLEST_SPREAD)
-    }
-
-    /// The most that a residual may move an estimate by; there is no telling at first.
-    fn most(&self) -> f64 {
-        if self.count < LEARNING { f64::INFINITY } else { MOST * self.value() }
-    }
-
-    fn hear(&mut self, residual: f64) {
-        self.squares += residual.clamp(-self.most(), self.most()).powi(2);
-        self.count += 1;
-    }
-}
-
-/// What the nights of a segment have told of one series so far.
-#[derive(Clone, Copy, Default)]
-struct Told {
-    nights: f64,
-    mean: f64,
-    square_of_errors: f64,
-    spread: Spread,
-}
-
-impl Told {
-    /// Takes in a night; its residual in standard errors, where there is a night before to foretell it.
-    fn hear(&mut self, series: &Series, night: usize) -> Option<f64> {
-        let deviation = series.deviation[night];
-        if !deviation.is_finite() {
-            return None;
-        }
-        let n = self.nights;
-        self.nights += 1.0;
-        // A night's standard error is itself uncertain: the root mean square of all nights counts, unless tonight's is larger.
-        self.square_of_errors += series.std_error[night].powi(2);
-        let error = (self.square_of_errors / self.nights).sqrt().max(series.std_error[night]);
-        let error = error.max(SMALLEST_ERROR * series.reference[night].abs()).max(f64::MIN_POSITIVE);
-        if n == 0.0 {
-            self.mean = deviation;
-            return None;
-        }
-        let residual = (deviation - self.mean) * (n / (n + 1.0)).sqrt() / error;
-        let most = self.spread.most() * error;
-        self.mean += (deviation - self.mean).clamp(-most, most) / self.nights;
-        self.spread.hear(residual);
-        Some(residual)
-    }
-}
-
-/// The standard normal deviate as likely as Student's t.
-fn normal_deviate(t: f64, degrees_of_freedom: usize) -> f64 {
-    let n = degrees_of_freedom as f64;
-    (8.0 * n + 1.0) / (8.0 * n + 3.0) * (n * (t * t / n.max(1.0)).ln_1p()).sqrt() * t.signum()
 }
 
 /// How far a group's deviations moved at a change: in standard errors and relative to the reference.
@@ -388,12 +328,44 @@ mod tests {
         assert!(3 * seen.0 >= 2 * all(), "{seen:?}");
     }
 
+    /// Shifts of single readings, one in each of five cases, so that no group shows them: how many nights each took to be
+    /// noticed, as far as it was within three weeks.
+    fn delays_of_single_readings(seeds: std::ops::Range<u64>) -> Vec<Option<usize>> {
+        let mut delays = vec![];
+        for seed in seeds {
+            let shift = Shift { night: 60 + 23 * (seed as usize % 12), meters: 1, ..SEEN };
+            let history =
+                Synthetic { seed, shift: Some(shift), nights: shift.night + 21, ..Synthetic::default() }.history();
+            let found = at_level(&history, Level::Comparison);
+            for case in 0..shift.cases {
+                let case = Some(format!("suite/case-{case}"));
+                let part = Part { case, meter: Some("workplane[0]".to_owned()) };
+                let mine = |c: &&Change| {
+                    (c.engine.as_str(), c.procedure.as_str()) == ("mitsuba", "indirect_illuminance")
+                        && c.noticed >= shift.night
+                        && c.part == part
+                };
+                delays.push(found.iter().find(mine).map(|change| change.noticed + 1 - shift.night));
+            }
+        }
+        delays
+    }
+
     #[test]
-    fn a_shift_of_one_reading_among_two_thousand_is_noticed_within_three_weeks() {
-        let one = Shift { cases: 1, meters: 1, ..SEEN };
-        let seen = found(&Synthetic::default(), one, Level::Comparison, 21);
-        println!("{:?} within five nights", found(&Synthetic::default(), one, Level::Comparison, 5));
-        assert!(10 * seen.0 >= 9 * all(), "{seen:?}");
+    fn a_shift_of_one_reading_among_two_thousand_is_noticed_half_the_time_within_five_nights_and_soon_otherwise() {
+        let delays = delays_of_single_readings(SEEDS);
+        let within = |nights: usize| delays.iter().flatten().filter(|d| **d <= nights).count();
+        println!(
+            "{} within 5, {} within 7, {} within 10, {} within 21 of {}",
+            within(5),
+            within(7),
+            within(10),
+            within(21),
+            delays.len()
+        );
+        assert!(20 * within(5) >= 7 * delays.len(), "{delays:?}");
+        assert!(10 * within(10) >= 8 * delays.len(), "{delays:?}");
+        assert!(20 * within(21) >= 19 * delays.len(), "{delays:?}");
     }
 
     /// An engine that repeats exactly, with what the nights add.
@@ -433,20 +405,5 @@ mod tests {
         assert_eq!(exact(&nights), []);
         nights[25..].fill(-1e-3);
         assert_eq!(exact(&nights)[0].night, 25);
-    }
-
-    #[test]
-    fn limits_are_those_of_the_tables_of_cumulative_sums() {
-        // Two sums with reference value 1 and limit 2.52: 370 steps between false alarms (Hawkins and Olwell 1998, table 3.1).
-        assert!((limit(370.4) - 2.52).abs() < 0.05, "{}", limit(370.4));
-    }
-
-    #[test]
-    fn the_deviate_is_as_likely_as_students_t() {
-        // Two-sided 5 %, 1 % and 0.1 % points of t.
-        for (t, n, u) in [(2.571, 5, 1.960), (3.169, 10, 2.576), (3.659, 29, 3.291)] {
-            assert!((normal_deviate(t, n) - u).abs() < 0.02, "{t} {n}: {}", normal_deviate(t, n));
-            assert_eq!(normal_deviate(-t, n), -normal_deviate(t, n));
-        }
     }
 }

@@ -5,10 +5,12 @@
 
 mod change;
 mod entry;
+mod limits;
 mod series;
 mod site;
 #[cfg(test)]
 mod synthetic;
+mod told;
 mod trend;
 
 pub use change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part, changes};

@@ -117,7 +117,7 @@ fn changed(history: &History, changes: &[Change]) -> Markup {
             }
         }
         p.soft {
-            "Found by cumulative sums over nights; at most one false alarm in "
+            "Found by sums over nights; at most one false alarm in "
             (format!("{NIGHTS_PER_FALSE_ALARM:.0}")) " nights is to be expected over all series together. "
             "One bad night is no change."
         }

@@ -137,17 +137,17 @@ fn date(night: usize) -> String {
 }
 
 /// Standard normal numbers (Box and Muller 1958).
-struct Normal {
+pub(super) struct Normal {
     random: fastrand::Rng,
     spare: Option<f64>,
 }
 
 impl Normal {
-    fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64) -> Self {
         Self { random: fastrand::Rng::with_seed(seed), spare: None }
     }
 
-    fn draw(&mut self) -> f64 {
+    pub(super) fn draw(&mut self) -> f64 {
         if let Some(spare) = self.spare.take() {
             return spare;
         }
