@@ -278,7 +278,7 @@ fn facts(case: &Case, tasks: &[Task]) -> Vec<Skip> {
 }
 
 /// Stands for all engines in what is skipped by definition.
-const EVERYONE: &str = "all";
+pub(crate) const EVERYONE: &str = "all";
 
 /// What an engine makes of a task.
 enum Offer {

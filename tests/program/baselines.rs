@@ -105,8 +105,37 @@ fn an_accepted_run_repeats_and_keeps_its_reason() {
     assert!(baseline.contains("\"reason\": \"first look\""), "{baseline}");
     let output = room.run(&["--baseline", "baselines/spec.json"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    assert!(stderr(&output).contains("4 unchanged"), "{}", stderr(&output));
+    assert!(stdout(&output).contains("4 unchanged"), "{}", stderr(&output));
     assert!(!room.path("out/baseline-candidate.json").exists());
+}
+
+#[test]
+fn every_view_tells_what_departs_from_the_baseline() {
+    let room = Room::new();
+    room.accepted();
+    let version = concat!("\"version\": \"", env!("CARGO_PKG_VERSION"), "\"");
+    edit(&room.path("baselines/spec.json"), version, "\"version\": \"0.0.1\"");
+    assert_eq!(room.run(&["--baseline", "baselines"]).status.code(), Some(1));
+    for (view, says) in [
+        ("terminal", "Baseline baselines/spec.json: 4 REFUSED"),
+        ("markdown", "Baseline `baselines/spec.json`: 4 REFUSED"),
+        ("junit", "<failure message=\"REFUSED\">version: 0.0.1 before"),
+        ("html", "4 REFUSED"),
+        ("json", "\"is_as_accepted\": false"),
+    ] {
+        let output = room.luxproof(&["report", "out/report.json", "--format", view]);
+        assert_eq!(output.status.code(), Some(1), "{view}: a finished run is judged as when it ran");
+        assert!(stdout(&output).contains(says), "{view}: {}", stdout(&output));
+    }
+}
+
+#[test]
+fn others_may_read_a_baseline_as_they_may_any_new_file() {
+    use std::os::unix::fs::PermissionsExt;
+    let room = Room::new();
+    room.accepted();
+    let mode = |name: &str| fs::metadata(room.path(name)).unwrap().permissions().mode() & 0o777;
+    assert_eq!(mode("baselines/spec.json"), mode("lamp.ies"));
 }
 
 #[test]
@@ -120,7 +149,7 @@ fn a_baseline_of_another_spec_or_version_is_refused_and_a_changed_value_found() 
     let output = room.run(&["--baseline", "baselines"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(
-        stderr(&output).contains("REFUSED") && stderr(&output).contains("version: 0.0.1 before"),
+        stdout(&output).contains("REFUSED") && stdout(&output).contains("version: 0.0.1 before"),
         "{}",
         stderr(&output)
     );
@@ -129,7 +158,7 @@ fn a_baseline_of_another_spec_or_version_is_refused_and_a_changed_value_found() 
     edit(&room.path("lamp.ies"), "100 80 0", "110 80 0");
     let output = room.run(&["--baseline", "baselines"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(stderr(&output).contains("REFUSED") && stderr(&output).contains("spec: "), "{}", stderr(&output));
+    assert!(stdout(&output).contains("REFUSED") && stdout(&output).contains("spec: "), "{}", stderr(&output));
 }
 
 #[test]

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::files;
 use crate::reading::{MeterId, Quantity, Recording};
 use crate::report::{RecordingSummary, Report};
 
@@ -221,11 +222,8 @@ impl Baseline {
     /// Writes it, one reading a line.
     pub fn write(&self, path: &Path) -> Result<(), BaselineError> {
         let fail = |source| BaselineError::Io { path: path.display().to_string(), source };
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(fail)?;
-        }
         let text = self.text().map_err(|e| fail(e.into()))?;
-        fs::write(path, text).map_err(fail)
+        files::replace_shared(path, text.as_bytes()).map_err(fail)
     }
 
     fn text(&self) -> Result<String, serde_json::Error> {

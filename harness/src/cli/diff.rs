@@ -1,15 +1,15 @@
 //! `luxproof diff`: what changed between two runs, a mean shift told apart from noise.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::accept::read_run;
 use super::print;
-use crate::baseline::{Baseline, Changes, Comparability, EntryChange, State, compare};
-use crate::report::Exit;
+use crate::baseline::{Baseline, Changes, Comparability, EntryChange, MeterChange, State, compare};
+use crate::report::{BaselineCheck, BaselineLine, Exit};
 
 #[derive(Debug, Args)]
 pub(super) struct DiffArgs {
@@ -45,25 +45,8 @@ pub(super) fn text(changes: &Changes) -> String {
     for entry in &changes.entries {
         writeln!(text, "{:<9} {} {} {}{}", name(entry.state), entry.case, entry.procedure, entry.engine, mean(entry))
             .ok();
-        for note in &entry.notes {
-            writeln!(text, "            {note}").ok();
-        }
-        for m in entry.meters.iter().filter(|m| m.significant).take(5) {
-            let in_u = if m.uncertainty > 0.0 {
-                format!(", {:+.1} u", (m.new - m.old) / m.uncertainty)
-            } else {
-                String::new()
-            };
-            let relative = 100.0 * (m.new - m.old) / m.old;
-            writeln!(
-                text,
-                "            {} {:.6} -> {:.6} {}: {relative:+.4} %{in_u}",
-                m.meter,
-                m.old,
-                m.new,
-                m.quantity.unit()
-            )
-            .ok();
+        for detail in details(entry) {
+            writeln!(text, "            {detail}").ok();
         }
     }
     let count = |state| changes.entries.iter().filter(|e| e.state == state).count();
@@ -81,6 +64,35 @@ pub(super) fn text(changes: &Changes) -> String {
     )
     .ok();
     text
+}
+
+/// Changes as a report keeps them. Nothing that nobody accepted counts as accepted, be it new.
+pub(super) fn check(changes: &Changes, file: &Path) -> BaselineCheck {
+    let line = |entry: &EntryChange| {
+        let mean = mean(entry);
+        let mean = mean.strip_prefix(": ").map(str::to_owned);
+        BaselineLine {
+            case: entry.case.clone(),
+            procedure: entry.procedure.clone(),
+            engine: entry.engine.clone(),
+            state: name(entry.state).to_owned(),
+            is_as_accepted: entry.state == State::Unchanged,
+            details: mean.into_iter().chain(details(entry)).collect(),
+        }
+    };
+    BaselineCheck { file: file.display().to_string(), entries: changes.entries.iter().map(line).collect() }
+}
+
+/// What differs besides the readings, and the meters that moved, five at most.
+fn details(entry: &EntryChange) -> Vec<String> {
+    let moved = |m: &MeterChange| {
+        let in_u =
+            if m.uncertainty > 0.0 { format!(", {:+.1} u", (m.new - m.old) / m.uncertainty) } else { String::new() };
+        let relative = 100.0 * (m.new - m.old) / m.old;
+        format!("{} {:.6} -> {:.6} {}: {relative:+.4} %{in_u}", m.meter, m.old, m.new, m.quantity.unit())
+    };
+    let meters = entry.meters.iter().filter(|m| m.significant).take(5).map(moved);
+    entry.notes.iter().cloned().chain(meters).collect()
 }
 
 fn mean(entry: &EntryChange) -> String {

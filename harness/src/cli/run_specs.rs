@@ -14,7 +14,7 @@ use super::engines::report_installation;
 use super::progress::Progress;
 use super::sampling::sample_on;
 use super::views::print_reports;
-use crate::baseline::{self, Baseline, Comparability, Entry, State};
+use crate::baseline::{self, Baseline, Comparability, Entry};
 use crate::cache::Cache;
 use crate::diagnosis;
 use crate::diff::{Comparison, Consensus, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
@@ -23,7 +23,7 @@ use crate::plan::{Asked, Plan, Planner, Scope, Skip};
 use crate::procedures::Task;
 use crate::process;
 use crate::reading::Recording;
-use crate::report::{self, Exit, Ingredients, Report, SpecRecord};
+use crate::report::{self, BaselineCheck, Exit, Ingredients, Report, SpecRecord};
 use crate::run::{self, Machine, Status};
 use crate::sequential;
 use crate::slots::side_by_side;
@@ -88,11 +88,13 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
     drop(progress);
     let Some(report) = Report::joined(record(args, &cases), reports) else { return Ok(exit) };
     // Cases ran side by side: their seconds do not add up.
-    let report = if cases.len() > 1 { Report { wall_s: clock.elapsed().as_secs_f64(), ..report } } else { report };
+    let mut report = if cases.len() > 1 { Report { wall_s: clock.elapsed().as_secs_f64(), ..report } } else { report };
     if let Some(path) = &args.baseline {
-        exit = exit.worse(hold_against_baseline(&report, path, &root)?);
+        let check = hold_against_baseline(&report, path, &root)?;
+        exit = exit.worse(if check.is_as_accepted() { Exit::Passed } else { Exit::Failed });
+        report.baseline = Some(check);
     }
-    if cases.len() > 1 {
+    if cases.len() > 1 || report.baseline.is_some() {
         run::keep(&root.join("report.json"), &report).into_diagnostic()?;
     }
     print_reports(&[(report, root)], &args.views)?;
@@ -100,7 +102,7 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
 }
 
 /// Holds a run against its baseline; what does not match it fails and is left as a candidate in the run's folder.
-fn hold_against_baseline(report: &Report, path: &Path, root: &Path) -> Result<Exit, Diagnostic> {
+fn hold_against_baseline(report: &Report, path: &Path, root: &Path) -> Result<BaselineCheck, Diagnostic> {
     let place = Baseline::place(path, report);
     let kept = if place.exists() { Baseline::read(&place).into_diagnostic()?.entries } else { vec![] };
     let candidate = Baseline::candidate(report);
@@ -109,18 +111,15 @@ fn hold_against_baseline(report: &Report, path: &Path, root: &Path) -> Result<Ex
     let asked: Vec<_> = candidate.entries.iter().map(Entry::key).chain(skipped).collect();
     let kept: Vec<Entry> = kept.into_iter().filter(|e| asked.contains(&e.key())).collect();
     let changes = baseline::compare(&kept, &candidate.entries, Comparability::SameInstrument);
-    // A missing baseline is no agreement.
-    let clean = changes.entries.iter().all(|e| e.state == State::Unchanged);
-    eprint!("baseline {}:\n{}", place.display(), super::diff::text(&changes));
     run::keep(&root.join("baseline-changes.json"), &changes).into_diagnostic()?;
-    if clean {
-        return Ok(Exit::Passed);
+    let check = super::diff::check(&changes, &place);
+    if !check.is_as_accepted() {
+        let file = root.join("baseline-candidate.json");
+        candidate.write(&file).into_diagnostic()?;
+        let accept = format!("luxproof accept {} --baseline {}", root.display(), path.display());
+        eprintln!("baseline: left as a candidate: {}; to review it: {accept}", file.display());
     }
-    let file = root.join("baseline-candidate.json");
-    candidate.write(&file).into_diagnostic()?;
-    let accept = format!("luxproof accept {} --baseline {}", root.display(), path.display());
-    eprintln!("left as a candidate: {}; to review it: {accept}", file.display());
-    Ok(Exit::Failed)
+    Ok(check)
 }
 
 /// The folder of the run: by default that of the one spec or folder, or one for all where there are several.

@@ -6,6 +6,7 @@
 mod change;
 mod entry;
 mod limits;
+mod repeat;
 mod series;
 mod site;
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The history as series over nights: one a comparison that repeats from night to night.
 //!
 //! A year of 2000 comparisons a night is some 200 MB of lines. They are read by as many threads as there are cores, each a
-//! part of the file; only what trends need is taken from a line.
+//! part of the file; only what trends need is taken from a line, and what a line only repeats is not parsed again (`repeat.rs`).
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -11,6 +11,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::entry::HistoryError;
+use super::repeat::{Head, Numbers};
 use crate::diff::{Basis, Verdict};
 use crate::process;
 
@@ -90,13 +91,16 @@ impl History {
             let lost = |_| Err((0, "the thread that read it gave up".to_owned()));
             started.into_iter().map(|thread| thread.join().unwrap_or_else(lost)).collect()
         });
-        let mut lines_before = 0;
         let mut found = vec![];
-        for (read, part) in read.into_iter().zip(&parts) {
-            let fail =
-                |(line, what)| HistoryError::Line { path: path.display().to_string(), line: lines_before + line, what };
-            found.push(read.map_err(fail)?);
-            lines_before += part.split(|b| *b == b'\n').count() - 1;
+        for (k, read) in read.into_iter().enumerate() {
+            // Lines are counted only where one is wrong.
+            let before = || parts[..k].iter().map(|part| lines(part).count()).sum::<usize>();
+            let path = || path.display().to_string();
+            found.push(read.map_err(|(line, what)| HistoryError::Line {
+                path: path(),
+                line: before() + line,
+                what,
+            })?);
         }
         Ok(Self { is_cut_short: whole < bytes.len(), ..Self::joined(&found) })
     }
@@ -122,13 +126,13 @@ impl History {
             let series_of: Vec<usize> = part.keys.iter().map(|k| place[&k.key()]).collect();
             for point in &part.points {
                 let (one, night) = (&mut series[series_of[point.key]], night_of[point.night]);
-                one.deviation[night] = point.deviation;
-                one.std_error[night] = point.std_error;
-                one.reference[night] = point.reference;
-                one.verdicts[night] = Some(point.verdict);
+                one.deviation[night] = point.numbers.deviation;
+                one.std_error[night] = point.numbers.std_error;
+                one.reference[night] = point.numbers.reference;
+                one.verdicts[night] = Some(point.numbers.verdict);
             }
             for (engine, night, version) in &part.versions {
-                versions.insert((engine.clone().into_owned(), night_of[*night]), version.clone().into_owned());
+                versions.insert((engine.clone(), night_of[*night]), version.clone());
             }
         }
         Self { nights, series, version_changes: version_changes(&versions), is_cut_short: false }
@@ -169,6 +173,16 @@ fn parts(bytes: &[u8], count: usize) -> Vec<&[u8]> {
         rest = after;
     }
     parts
+}
+
+/// The lines of a text.
+fn lines(mut rest: &[u8]) -> impl Iterator<Item = &[u8]> {
+    std::iter::from_fn(move || {
+        let end = memchr::memchr(b'\n', rest).unwrap_or(rest.len());
+        let line = (!rest.is_empty()).then(|| &rest[..end]);
+        rest = rest.get(end + 1..).unwrap_or_default();
+        line
+    })
 }
 
 /// What is taken from a line. The text is borrowed from the file unless it holds escapes.
@@ -227,10 +241,7 @@ impl RawKey<'_> {
 struct Point {
     key: usize,
     night: usize,
-    deviation: f64,
-    std_error: f64,
-    reference: f64,
-    verdict: Verdict,
+    numbers: Numbers,
 }
 
 /// A part of the file, read by one thread.
@@ -239,7 +250,7 @@ struct Part<'a> {
     nights: Vec<Cow<'a, str>>,
     keys: Vec<RawKey<'a>>,
     /// Engine, night and version, wherever that differs from the line before.
-    versions: Vec<(Cow<'a, str>, usize, Cow<'a, str>)>,
+    versions: Vec<(String, usize, String)>,
     points: Vec<Point>,
 }
 
@@ -250,42 +261,58 @@ impl<'a> Part<'a> {
         let mut known: HashMap<RawKey<'a>, usize> = HashMap::new();
         // Nights repeat the order of the night before: the key that follows is the one that followed then.
         let mut follower: Vec<usize> = vec![];
+        let mut heads: Vec<Option<Head<'a>>> = vec![];
         let mut before = 0;
-        for (k, line) in bytes.split(|b| *b == b'\n').enumerate().filter(|(_, line)| !line.is_empty()) {
+        for (k, line) in lines(bytes).enumerate().filter(|(_, line)| !line.is_empty()) {
+            let guess = follower.get(before).copied().filter(|g| *g < part.keys.len());
+            if let Some((key, night)) = guess.zip(part.nights.len().checked_sub(1))
+                && let Some(head) = &heads[key]
+                && let Some(numbers) = head.numbers(line, &part.nights[night])
+            {
+                part.version(night, &head.engine, &head.version);
+                part.points.push(Point { key, night, numbers });
+                before = key;
+                continue;
+            }
             let row: Row<'a> = serde_json::from_slice(line).map_err(|e| (k + 1, e.to_string()))?;
+            let numbers = row.numbers();
+            let head = Head::of(line, &row.night, row.engine.clone(), row.version.clone());
             if part.nights.last() != Some(&row.night) {
                 part.nights.push(row.night);
             }
             let night = part.nights.len() - 1;
-            let of_version =
-                part.versions.last().is_some_and(|(e, n, v)| (e, *n, v) == (&row.engine, night, &row.version));
-            if !of_version {
-                part.versions.push((row.engine.clone(), night, row.version));
-            }
+            part.version(night, &row.engine, &row.version);
             let Row { engine, procedure, case, model, meter, basis, source, .. } = row;
             let raw = RawKey { engine, procedure, case, model, meter, basis, source };
-            let guess = follower.get(before).copied().filter(|g| part.keys.get(*g) == Some(&raw));
-            let key = guess.unwrap_or_else(|| {
-                *known.entry(raw).or_insert_with_key(|raw| {
-                    part.keys.push(raw.clone());
-                    part.keys.len() - 1
-                })
+            let key = *known.entry(raw).or_insert_with_key(|raw| {
+                part.keys.push(raw.clone());
+                part.keys.len() - 1
             });
-            if follower.len() < part.keys.len() {
-                follower.resize(part.keys.len(), usize::MAX);
-            }
-            follower[before] = key;
+            follower.resize(part.keys.len(), usize::MAX);
+            heads.resize_with(part.keys.len(), || None);
+            (follower[before], heads[key]) = (key, head);
             before = key;
-            part.points.push(Point {
-                key,
-                night,
-                deviation: row.deviation.unwrap_or(f64::NAN),
-                std_error: row.std_error.unwrap_or(0.0),
-                reference: row.reference.unwrap_or(f64::NAN),
-                verdict: row.verdict,
-            });
+            part.points.push(Point { key, night, numbers });
         }
         Ok(part)
+    }
+
+    /// Keeps the version of an engine on a night, unless the line before told it.
+    fn version(&mut self, night: usize, engine: &str, version: &str) {
+        if self.versions.last().is_none_or(|(e, n, v)| (e.as_str(), *n, v.as_str()) != (engine, night, version)) {
+            self.versions.push((engine.to_owned(), night, version.to_owned()));
+        }
+    }
+}
+
+impl Row<'_> {
+    fn numbers(&self) -> Numbers {
+        Numbers {
+            deviation: self.deviation.unwrap_or(f64::NAN),
+            std_error: self.std_error.unwrap_or(0.0),
+            reference: self.reference.unwrap_or(f64::NAN),
+            verdict: self.verdict,
+        }
     }
 }
 

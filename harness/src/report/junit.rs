@@ -2,7 +2,7 @@
 
 use quick_junit::{NonSuccessKind, Report as JUnit, TestCase, TestCaseStatus, TestSuite};
 
-use super::{RecordingSummary, Report};
+use super::{BaselineCheck, RecordingSummary, Report};
 use crate::diff::{Comparison, Verdict};
 use crate::plan::Skip;
 
@@ -12,8 +12,33 @@ pub fn junit(report: &Report) -> String {
     for case in &report.cases {
         junit.add_test_suite(suite(report, &case.name));
     }
+    if let Some(check) = &report.baseline {
+        junit.add_test_suite(accepted(check));
+    }
     // Writing to a string fails on no condition that a report can meet; an empty document would be noticed at once.
-    junit.to_string().unwrap_or_default()
+    let text = junit.to_string().unwrap_or_default();
+    // The schema of Jenkins' xUnit plug-in counts skips in each suite only, not in all of them together.
+    let (head, rest) = text.split_at(text.find("<testsuite ").unwrap_or(text.len()));
+    let (before, after) = head.split_once(" skipped=\"").unwrap_or((head, ""));
+    let after = after.split_once('"').map_or("", |(_, after)| after);
+    format!("{before}{after}{rest}")
+}
+
+/// What was held against a baseline, a suite of its own.
+fn accepted(check: &BaselineCheck) -> TestSuite {
+    let mut suite = TestSuite::new(format!("baseline {}", check.file));
+    for entry in &check.entries {
+        let mut status = TestCaseStatus::success();
+        if !entry.is_as_accepted {
+            status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+            status.set_message(entry.state.clone());
+            status.set_description(entry.details.join("\n"));
+        }
+        let mut case = TestCase::new(format!("{} {} baseline", entry.procedure, entry.engine), status);
+        case.set_classname(entry.case.clone());
+        suite.add_test_case(case);
+    }
+    suite
 }
 
 fn suite(report: &Report, name: &str) -> TestSuite {

@@ -80,6 +80,14 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
             ));
         }
     }
+    if let Some(check) = &report.baseline {
+        line(format!("\nBaseline `{}`: {}", check.file, check.counts()));
+        for (k, entry) in check.departures().enumerate() {
+            let gap = if k == 0 { "\n" } else { "" };
+            let place = format!("{} {} {}", entry.case, entry.procedure, entry.engine);
+            line(format!("{gap}- **{}** {place}: {}", entry.state.to_lowercase(), entry.details.join("; ")));
+        }
+    }
     for skip in &report.skips {
         let case = if report.is_suite() { format!("{} ", skip.case) } else { String::new() };
         writeln!(text, "\n- skipped: {case}{} {}: {}", skip.engine, skip.procedure, skip.reason).ok();

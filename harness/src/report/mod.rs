@@ -1,5 +1,6 @@
 //! The report: one record of a run, and views of it; the JSON form is the truth.
 
+mod accepted;
 mod budget;
 mod consensus;
 mod csv;
@@ -22,6 +23,7 @@ use crate::plan::Skip;
 use crate::reading::{MeterId, Quantity, Recording};
 use crate::run::{EngineStatus, Status};
 
+pub use accepted::{BaselineCheck, BaselineLine};
 pub use budget::budgets;
 pub use csv::csv;
 pub use curve::{Curve, curves};
@@ -71,6 +73,9 @@ pub struct Report {
     /// The cases, in their order.
     #[serde(default)]
     pub cases: Vec<CaseRecord>,
+    /// How the run compares with its baseline, where it was held against one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub baseline: Option<BaselineCheck>,
     /// Comparisons by verdict.
     pub summary: Summary,
 }
@@ -300,6 +305,7 @@ impl Report {
             consensus,
             published,
             curves,
+            baseline: None,
         }
     }
 
@@ -354,8 +360,9 @@ impl Report {
             Verdict::Inconclusive => Exit::Undecided,
             Verdict::Fail | Verdict::UnexpectedPass | Verdict::Missing => Exit::Failed,
         };
-        let all = self.engines.iter().map(engine).chain(self.comparisons.iter().map(verdict));
-        all.fold(Exit::Passed, Exit::worse)
+        let baseline = |b: &BaselineCheck| if b.is_as_accepted() { Exit::Passed } else { Exit::Failed };
+        let readings = self.engines.iter().map(engine).chain(self.comparisons.iter().map(verdict));
+        readings.chain(self.baseline.iter().map(baseline)).fold(Exit::Passed, Exit::worse)
     }
 
     /// The procedures of the comparisons and readings, in their order.

@@ -201,6 +201,7 @@ pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&s
         }
         writeln!(text).ok();
     }
+    baseline(report, detail, &mut text);
     match detail {
         Detail::All => notes(report, &mut text),
         Detail::Brief => brief_notes(report, &mut text),
@@ -215,6 +216,19 @@ pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&s
         writeln!(text, "files: {folder}/report.json, readings/, scenes/<engine>/, logs/").ok();
     }
     text
+}
+
+/// How the run compares with its baseline; what departs from it is told in full.
+fn baseline(report: &Report, detail: Detail, text: &mut String) {
+    let Some(check) = &report.baseline else { return };
+    writeln!(text, "Baseline {}: {}", check.file, check.counts()).ok();
+    for entry in check.departures() {
+        writeln!(text, "  {:<9} {} {} {}", entry.state, entry.case, entry.procedure, entry.engine).ok();
+        for line in &entry.details {
+            writeln!(text, "            {}", shortened(line, detail)).ok();
+        }
+    }
+    writeln!(text).ok();
 }
 
 /// Papers' tables, readings side by side, methods apart from renderers.
@@ -407,25 +421,25 @@ fn shortened(line: &str, detail: Detail) -> String {
 
 /// Failures and skips, those of a kind on one line, and how much more there is.
 fn brief_notes(report: &Report, text: &mut String) {
-    let mut groups: BTreeMap<String, std::collections::BTreeSet<(&str, &str)>> = BTreeMap::new();
+    let mut groups: BTreeMap<(String, String), std::collections::BTreeSet<(&str, &str)>> = BTreeMap::new();
     for r in &report.recordings {
         if let Some(failure) = &r.failure {
-            let line = format!("{} failed: {}", r.engine, failure.lines().next().unwrap_or_default());
-            groups.entry(line).or_default().insert((&r.case, &r.procedure));
+            let what = format!(": {}", failure.lines().next().unwrap_or_default());
+            groups.entry((format!("{} failed", r.engine), what)).or_default().insert((&r.case, &r.procedure));
         }
     }
     for skip in &report.skips {
         let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
-        let line = format!("skipped {}: {}{saved}", skip.engine, skip.reason);
-        groups.entry(line).or_default().insert((&skip.case, &skip.procedure));
+        let key = (skipped(&skip.engine), format!(": {}{saved}", skip.reason));
+        groups.entry(key).or_default().insert((&skip.case, &skip.procedure));
     }
-    for (line, jobs) in groups.iter().take(2 * BRIEF) {
+    for ((head, what), jobs) in groups.iter().take(2 * BRIEF) {
         let place = match jobs.iter().collect::<Vec<_>>()[..] {
-            [(case, procedure)] if report.is_suite() => format!("{case} {procedure}: "),
-            [(_, procedure)] => format!("{procedure}: "),
-            _ => format!("{} jobs: ", jobs.len()),
+            [(case, procedure)] if report.is_suite() => format!("{procedure} of {case}"),
+            [(_, procedure)] => (*procedure).to_owned(),
+            _ => format!("{} jobs", jobs.len()),
         };
-        writeln!(text, "  {}", shortened(&format!("{place}{line}"), Detail::Brief)).ok();
+        writeln!(text, "  {}", shortened(&format!("{head} in {place}{what}"), Detail::Brief)).ok();
     }
     let more = groups.len().saturating_sub(2 * BRIEF);
     let notes: usize = report.recordings.iter().map(|r| r.notes.len() + usize::from(r.approximation.is_some())).sum();
@@ -436,6 +450,11 @@ fn brief_notes(report: &Report, text: &mut String) {
         writeln!(text, "  {}: --all", counts.join(", ")).ok();
     }
     writeln!(text).ok();
+}
+
+/// Who is skipped: what concerns every engine alike names none.
+fn skipped(engine: &str) -> String {
+    if engine == crate::plan::EVERYONE { "skipped".to_owned() } else { format!("skipped {engine}") }
 }
 
 fn notes(report: &Report, text: &mut String) {
@@ -456,7 +475,7 @@ fn notes(report: &Report, text: &mut String) {
     }
     for skip in &report.skips {
         let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
-        let line = format!("skipped {} {}: {}{saved}", skip.engine, skip.procedure, skip.reason);
+        let line = format!("{} in {}: {}{saved}", skipped(&skip.engine), skip.procedure, skip.reason);
         lines.entry(line).or_default().push(&skip.case);
     }
     for (line, cases) in &mut lines {

@@ -2,6 +2,7 @@
 //!
 //! Plots are drawn here as SVG, so that the same report gives the same bytes; the script only filters, sorts and opens.
 
+mod accepted;
 mod beside;
 mod matrix;
 mod palette;
@@ -76,6 +77,9 @@ pub fn page(report: &Report, beside: &[Beside]) -> String {
 /// Every section with its id and its name in the navigation.
 fn sections(report: &Report, beside: &[Beside], palette: &Palette, rows: &mut Rows) -> Vec<(String, String, Markup)> {
     let mut sections = vec![("matrix".to_owned(), "Verdicts".to_owned(), matrix::section(report, palette))];
+    if let Some(check) = &report.baseline {
+        sections.push(("baseline".to_owned(), "Baseline".to_owned(), accepted::section(check)));
+    }
     for name in report.procedures() {
         let section = procedure::section(report, name, palette, rows);
         sections.push((name.to_owned(), short(name).to_owned(), section));

@@ -1,0 +1,55 @@
+//! What holding a run against its baseline said, as every view tells it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A run held against accepted readings.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct BaselineCheck {
+    /// The baseline's file.
+    pub file: String,
+    /// One a case, procedure and engine of either side.
+    pub entries: Vec<BaselineLine>,
+}
+
+/// How one engine in one procedure of one case compares with what was accepted.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct BaselineLine {
+    /// The case.
+    pub case: String,
+    /// The procedure.
+    pub procedure: String,
+    /// The engine.
+    pub engine: String,
+    /// `unchanged`, `SHIFTED`, `CHANGED`, `VANISHED`, `new` or `REFUSED`.
+    pub state: String,
+    /// Whether it repeats what was accepted; what nobody accepted does not.
+    pub is_as_accepted: bool,
+    /// The mean shift, what moved, or why it is refused.
+    pub details: Vec<String>,
+}
+
+impl BaselineCheck {
+    /// Whether everything repeats what was accepted.
+    pub fn is_as_accepted(&self) -> bool {
+        self.entries.iter().all(|e| e.is_as_accepted)
+    }
+
+    /// What asks for attention.
+    pub(super) fn departures(&self) -> impl Iterator<Item = &BaselineLine> {
+        self.entries.iter().filter(|e| !e.is_as_accepted)
+    }
+
+    /// How many entries are in which state: `4 unchanged, 1 REFUSED`.
+    pub(super) fn counts(&self) -> String {
+        let mut states: Vec<(&str, usize)> = vec![];
+        for entry in &self.entries {
+            match states.iter_mut().find(|(state, _)| *state == entry.state) {
+                Some((_, count)) => *count += 1,
+                None => states.push((&entry.state, 1)),
+            }
+        }
+        let counts: Vec<String> = states.iter().map(|(state, count)| format!("{count} {state}")).collect();
+        if counts.is_empty() { "nothing to compare".to_owned() } else { counts.join(", ") }
+    }
+}

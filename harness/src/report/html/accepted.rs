@@ -1,0 +1,28 @@
+//! How the run compares with its baseline.
+
+use maud::{Markup, html};
+
+use super::super::BaselineCheck;
+use super::{minus, title};
+
+pub(super) fn section(check: &BaselineCheck) -> Markup {
+    html! {
+        h2 id="baseline-title" { "Baseline" }
+        p.lead { "Against the readings accepted in " code { (check.file) } ": " (check.counts()) "." }
+        div.scroll tabindex="0" role="region" aria-label="Against the baseline" {
+            table {
+                thead { tr { @for name in ["case", "procedure", "engine", "state", "what moved"] { th scope="col" { (name) } } } }
+                tbody {
+                    @for entry in &check.entries {
+                        @let (class, glyph) = if entry.is_as_accepted { ("v-pass", "✓") } else { ("v-fail", "✕") };
+                        tr {
+                            th scope="row" { (entry.case) } td { (title(&entry.procedure)) } td { (entry.engine) }
+                            td class=(class) { span.glyph aria-hidden="true" { (glyph) } " " (entry.state.to_lowercase()) }
+                            td.wide { @for (k, detail) in entry.details.iter().enumerate() { @if k > 0 { br; } (minus(detail)) } }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
