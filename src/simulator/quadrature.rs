@@ -1,15 +1,16 @@
-//! Gauss-Legendre rules on the unit interval and barycentric Lagrange interpolation through their nodes.
+//! Gauss-Legendre rules on the unit interval and Lagrange interpolation through their nodes.
 //!
 //! Nodes by Newton's method on the three-term recurrence (Press et al., *Numerical Recipes*, 4.6); interpolation after
 //! Berrut and Trefethen, *Barycentric Lagrange interpolation*, SIAM Review 46 (2004).
 
-/// A Gauss-Legendre rule on 0..1 with the barycentric weights of its nodes.
+/// A Gauss-Legendre rule on 0..1 with the weights of Lagrange's polynomials through its nodes.
 #[derive(Clone, Debug)]
 pub(crate) struct Gauss {
     /// Nodes, rising.
     pub(crate) nodes: Vec<f64>,
     /// Weights, summing to 1.
     pub(crate) weights: Vec<f64>,
+    /// Reciprocals of what the product of distances to all other nodes is at each.
     barycentric: Vec<f64>,
 }
 
@@ -38,20 +39,17 @@ impl Gauss {
         Self { nodes, weights, barycentric }
     }
 
-    /// The values at `t` of the Lagrange polynomials through the nodes.
+    /// The values at `t` of the Lagrange polynomials through the nodes, as products: no division, no node to step around.
     pub(crate) fn lagrange(&self, t: f64, out: &mut [f64]) {
-        if let Some(hit) = self.nodes.iter().position(|x| *x == t) {
-            out.fill(0.0);
-            out[hit] = 1.0;
-            return;
-        }
-        let mut sum = 0.0;
+        let mut below = 1.0;
         for ((value, x), w) in out.iter_mut().zip(&self.nodes).zip(&self.barycentric) {
-            *value = w / (t - x);
-            sum += *value;
+            *value = w * below;
+            below *= t - x;
         }
-        for value in out {
-            *value /= sum;
+        let mut above = 1.0;
+        for (value, x) in out.iter_mut().zip(&self.nodes).rev() {
+            *value *= above;
+            above *= t - x;
         }
     }
 }

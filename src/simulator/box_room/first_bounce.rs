@@ -65,6 +65,9 @@ impl FirstBounce {
 
     /// Irradiance at receivers, in lux, of light reflected once.
     pub(super) fn irradiance(&self, receivers: &[Receiver]) -> Vec<f64> {
+        if receivers.len() <= TOGETHER {
+            return self.irradiance_together(receivers);
+        }
         receivers.par_chunks(TOGETHER).flat_map_iter(|together| self.irradiance_together(together)).collect()
     }
 
@@ -251,7 +254,7 @@ fn is_flush(ground: &Ground) -> bool {
 }
 
 fn patches(ground: Ground, cells: Vec<Cell>) -> Vec<Patch> {
-    cells.into_iter().map(|cell| Patch::new(cell, (0.0, 1.0), (0.0, 1.0), ground)).collect()
+    cells.into_iter().map(|cell| Patch::new(cell, ground)).collect()
 }
 
 /// The corners of a face.

@@ -104,7 +104,7 @@ pub(super) struct Grid {
     /// The rule of near elements.
     pub(super) near: Gauss,
     nodal: Gauss,
-    /// `[interval][node][point]` for intervals numbered as a heap.
+    /// `[interval][point][node]` for intervals numbered as a heap.
     kept: Vec<Vec<f64>>,
 }
 
@@ -187,22 +187,17 @@ impl Grid {
         images
     }
 
-    /// The interpolation matrix `[node][point]` of a dyadic interval, if it is kept.
+    /// The interpolation matrix `[point][node]` of a dyadic interval, if it is kept.
     pub(super) fn kept(&self, interval: usize) -> Option<&[f64]> {
         self.kept.get(interval).map(Vec::as_slice)
     }
 
-    /// Values `[node][point]` of the nodal polynomials at the near rule's points within an interval of s.
+    /// Values `[point][node]` of the nodal polynomials at the near rule's points within an interval of s.
     pub(super) fn interpolation(&self, start: f64, length: f64, matrix: &mut Vec<f64>) {
-        let points = self.near.nodes.len();
         matrix.clear();
-        matrix.resize(self.order * points, 0.0);
-        let mut values = vec![0.0; self.order];
-        for (q, x) in self.near.nodes.iter().enumerate() {
-            self.nodal.lagrange(start + length * x, &mut values);
-            for (p, value) in values.iter().enumerate() {
-                matrix[p * points + q] = *value;
-            }
+        matrix.resize(self.order * self.near.nodes.len(), 0.0);
+        for (x, values) in self.near.nodes.iter().zip(matrix.chunks_exact_mut(self.order)) {
+            self.nodal.lagrange(start + length * x, values);
         }
     }
 

@@ -18,8 +18,8 @@ const NEAR: f64 = 2.0123;
 const TIE: f64 = 1.000_123;
 /// Parts smaller than this fraction of the room are not halved further.
 const SMALLEST: f64 = 1e-13;
-/// More nodes or points along an element than any effort asks for.
-const MOST: usize = 24;
+/// As many nodes or points along an element as any effort asks for.
+const MOST: usize = 12;
 
 /// A receiving element: where it is, where it faces, and on which surface it lies, if any.
 #[derive(Clone, Copy, Debug)]
@@ -64,6 +64,13 @@ struct Part {
     s: (f64, f64),
     t: (f64, f64),
     lit: Lit,
+}
+
+/// An interval of an element's parameter, and the nodal polynomials `[point][node]` at the near rule's points in it.
+struct Span<'a> {
+    start: f64,
+    length: f64,
+    basis: &'a [f64],
 }
 
 /// How much of the face a part covers, in metres.
@@ -207,7 +214,12 @@ impl Panel<'_> {
             let (mut own_u, mut own_v) = (vec![], vec![]);
             let matrix_u = self.matrix(iu, &mut own_u);
             let matrix_v = self.matrix(iv, &mut own_v);
-            self.add_part((s0, ds, matrix_u), (t0, dt, matrix_v), block, stride);
+            self.add_part(
+                &Span { start: s0, length: ds, basis: matrix_u },
+                &Span { start: t0, length: dt, basis: matrix_v },
+                block,
+                stride,
+            );
         }
     }
 
@@ -220,39 +232,58 @@ impl Panel<'_> {
         own
     }
 
-    fn add_part(&self, u: (f64, f64, &[f64]), v: (f64, f64, &[f64]), block: &mut [f64], stride: usize) {
+    fn add_part(&self, u: &Span, v: &Span, block: &mut [f64], stride: usize) {
+        // The same code, compiled for the sizes of each effort: loops of known length take a third of the time.
+        match (self.grid.order, self.grid.near.nodes.len()) {
+            (2, 4) => self.add_part_of((2, 4), u, v, block, stride),
+            (4, 4) => self.add_part_of((4, 4), u, v, block, stride),
+            (5, 5) => self.add_part_of((5, 5), u, v, block, stride),
+            (5, 6) => self.add_part_of((5, 6), u, v, block, stride),
+            (6, 8) => self.add_part_of((6, 8), u, v, block, stride),
+            (8, 8) => self.add_part_of((8, 8), u, v, block, stride),
+            (10, 10) => self.add_part_of((10, 10), u, v, block, stride),
+            sizes => self.add_part_of(sizes, u, v, block, stride),
+        }
+    }
+
+    #[expect(clippy::inline_always, reason = "the sizes are to become constants")]
+    #[inline(always)]
+    fn add_part_of(&self, (order, points): (usize, usize), u: &Span, v: &Span, block: &mut [f64], stride: usize) {
         let (view, rule) = (&self.view, &self.grid.near);
-        let (order, points) = (self.grid.order, rule.nodes.len());
+        let (nodes, weights) = (&rule.nodes[..points], &rule.weights[..points]);
+        let (basis_u, basis_v) = (&u.basis[..points * order], &v.basis[..points * order]);
         let (mut squared, mut cosine, mut weight) = ([0.0; MOST], [0.0; MOST], [0.0; MOST]);
         for q in 0..points {
-            let (y, dy) = self.along_v.at(v.0 + v.1 * rule.nodes[q]);
+            let (y, dy) = self.along_v.at(v.start + v.length * nodes[q]);
             let dv = y - view.foot_v;
             squared[q] = view.depth2 + dv * dv;
             cosine[q] = view.level + view.tilt_v * dv;
-            weight[q] = rule.weights[q] * dy * v.1 * u.1 * view.scale;
+            weight[q] = weights[q] * dy * v.length * u.length * view.scale;
         }
-        let mut inner = [[0.0; MOST]; MOST];
-        for ((node, node_weight), inner) in rule.nodes.iter().zip(&rule.weights).zip(&mut inner) {
-            let (x, dx) = self.along_u.at(u.0 + u.1 * node);
+        let mut sums = [[0.0; MOST]; MOST];
+        for p in 0..points {
+            let (x, dx) = self.along_u.at(u.start + u.length * nodes[p]);
             let du = x - view.foot_u;
-            let (w, u2, cu) = (node_weight * dx, du * du, view.tilt_u * du);
+            let (w, u2, cu) = (weights[p] * dx, du * du, view.tilt_u * du);
             let mut kernel = [0.0; MOST];
             for q in 0..points {
                 let r2 = u2 + squared[q];
                 kernel[q] = w * weight[q] * (cosine[q] + cu) / (r2 * r2);
             }
-            for (b, basis) in v.2.chunks_exact(points).enumerate() {
-                inner[b] = basis.iter().zip(&kernel).map(|(l, k)| l * k).sum();
-            }
-        }
-        for (a, basis) in u.2.chunks_exact(points).enumerate() {
-            let mut sums = [0.0; MOST];
-            for (l, inner) in basis.iter().zip(&inner) {
+            let mut inner = [0.0; MOST];
+            for q in 0..points {
                 for b in 0..order {
-                    sums[b] += l * inner[b];
+                    inner[b] += kernel[q] * basis_v[q * order + b];
                 }
             }
-            for (out, sum) in block[a * stride..][..order].iter_mut().zip(&sums) {
+            for a in 0..order {
+                for b in 0..order {
+                    sums[a][b] += basis_u[p * order + a] * inner[b];
+                }
+            }
+        }
+        for (a, sums) in sums[..order].iter().enumerate() {
+            for (out, sum) in block[a * stride..][..order].iter_mut().zip(sums) {
                 *out += sum;
             }
         }
@@ -324,6 +355,9 @@ impl Panel<'_> {
     }
 
     fn add_cut_part(&self, part: &Part, block: &mut [f64], stride: usize) {
+        if matches!(part.lit, Lit::All) || self.view.tilt_u == 0.0 {
+            return self.add_straight_part(part, block, stride);
+        }
         let (rule, order) = (&self.grid.near, self.grid.order);
         let (mut basis_u, mut basis_v) = ([0.0; MOST], [0.0; MOST]);
         let (ds, dt) = (part.s.1 - part.s.0, part.t.1 - part.t.0);
@@ -351,6 +385,19 @@ impl Panel<'_> {
                 }
             }
         }
+    }
+
+    /// A part whose lit range is the same at every u: a product like any other.
+    fn add_straight_part(&self, part: &Part, block: &mut [f64], stride: usize) {
+        let (start, length) = self.lit_range(self.along_u.at(0.5 * (part.s.0 + part.s.1)).0, part.lit);
+        let (start_t, length_t) = (start + length * part.t.0, length * (part.t.1 - part.t.0));
+        let (start_s, length_s) = (part.s.0, part.s.1 - part.s.0);
+        let (mut basis_u, mut basis_v) = (vec![], vec![]);
+        self.grid.interpolation(start_s, length_s, &mut basis_u);
+        self.grid.interpolation(start_t, length_t, &mut basis_v);
+        let u = Span { start: start_s, length: length_s, basis: &basis_u };
+        let v = Span { start: start_t, length: length_t, basis: &basis_v };
+        self.add_part(&u, &v, block, stride);
     }
 }
 

@@ -14,6 +14,8 @@ mod symmetry;
 #[cfg(test)]
 mod tests;
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 
 use crate::geometry::Room;
@@ -44,6 +46,8 @@ pub(super) struct Effort {
 
 /// Entries of the operator at most: 128 MiB.
 const MOST_ENTRIES: usize = 1 << 24;
+/// Fewer meters than this are read sooner than another thread wakes.
+const FEW: usize = 8;
 /// The largest relative error that each effort is the first choice for.
 const FIRST_EFFORT: [f64; 5] = [f64::INFINITY, 2e-2, 2e-5, 5e-6, 5e-7];
 /// The ladder of efforts; the rules of the first bounce grow with the order, or neighbours would share their errors.
@@ -133,8 +137,15 @@ impl EmptyRoom {
         meters: &[Meter],
         relative_error: f64,
     ) -> (Vec<Bounded>, String) {
-        // Entering the pool of threads once: each small job that is sent there on its own costs as much as it does.
-        rayon::scope(|_| self.climb(room, luminaires, bounces, meters, relative_error))
+        // Entering the pool of threads once: each small job that is sent there on its own costs as much as it does. Where
+        // a few meters read what is solved, even that costs as much as they do.
+        let level = first_level(relative_error);
+        let is_solved = [level, level + 1].iter().all(|level| self.fields.iter().any(|(at, _)| at == level));
+        if is_solved && meters.len() < FEW {
+            self.climb(room, luminaires, bounces, meters, relative_error)
+        } else {
+            rayon::scope(|_| self.climb(room, luminaires, bounces, meters, relative_error))
+        }
     }
 
     fn climb(
@@ -146,7 +157,7 @@ impl EmptyRoom {
         relative_error: f64,
     ) -> (Vec<Bounded>, String) {
         let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires));
-        let mut level = FIRST_EFFORT.iter().rposition(|error| relative_error <= *error).unwrap_or(0);
+        let mut level = first_level(relative_error);
         let mut readings = vec![];
         loop {
             if self.fields.iter().all(|(at, _)| *at != level) {
@@ -178,6 +189,11 @@ impl EmptyRoom {
     }
 }
 
+/// The effort to begin with.
+fn first_level(relative_error: f64) -> usize {
+    FIRST_EFFORT.iter().rposition(|error| relative_error <= *error).unwrap_or(0)
+}
+
 /// The solved light field of a room at one effort, ready for any meter.
 #[derive(Debug)]
 pub(super) struct BoxField {
@@ -187,7 +203,7 @@ pub(super) struct BoxField {
     exitance: Vec<f64>,
     gathers: Gathers,
     /// What the probes read, for the error's sake.
-    probes: Probes,
+    probes: OnceLock<Probes>,
     /// Relative flux that interpolating the first bounce between the nodes would lose or gain.
     imbalance: f64,
 }
@@ -216,8 +232,8 @@ impl BoxField {
             Bounces::AtMost(_) | Bounces::Converged => Gathers::All,
         };
         if gathers != Gathers::All {
-            return Self { exitance: vec![0.0; grid.len()], grid, first, gathers, probes: vec![], imbalance: 0.0 }
-                .probed();
+            let exitance = vec![0.0; grid.len()];
+            return Self { exitance, grid, first, gathers, probes: OnceLock::new(), imbalance: 0.0 };
         }
         let orbits = Orbits::new(&grid, &symmetries.of_room);
         let light = orbits.under(&symmetries.of_light);
@@ -240,12 +256,11 @@ impl BoxField {
             interreflect(|u| operator.apply(&exitance(u, &rho)), &light.unfold(&known), bounces)
         };
         let exitance = exitance(&irradiance, &rho);
-        Self { exitance, grid, first, gathers, probes: vec![], imbalance }.probed()
+        Self { exitance, grid, first, gathers, probes: OnceLock::new(), imbalance }
     }
 
-    fn probed(self) -> Self {
-        let probes = self.illuminance(&error::probes(self.grid.size_m));
-        Self { probes, ..self }
+    fn probes(&self) -> &Probes {
+        self.probes.get_or_init(|| self.illuminance(&error::probes(self.grid.size_m)))
     }
 
     /// Area-mean indirect exitance in lm/m².
@@ -264,9 +279,14 @@ impl BoxField {
         let receivers: Vec<_> = meters.iter().map(receiver).collect();
         let mut lux = self.first.irradiance(&receivers);
         if self.gathers == Gathers::All {
-            lux.par_iter_mut().zip(&receivers).for_each(|(lux, receiver)| {
+            let gather = |(lux, receiver): (&mut f64, &Receiver)| {
                 *lux += gmres::dot(&balanced_row(&self.grid, receiver), &self.exitance);
-            });
+            };
+            if receivers.len() < FEW {
+                lux.iter_mut().zip(&receivers).for_each(gather);
+            } else {
+                lux.par_iter_mut().zip(&receivers).for_each(gather);
+            }
         }
         lux
     }

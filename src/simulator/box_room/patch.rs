@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::cells::{Cell, LuminaireFrame};
+use super::cells::{Cell, LuminaireFrame, Row};
 use super::grid::Face;
 use super::kernel::Receiver;
 use crate::geometry::Room;
@@ -38,6 +38,10 @@ pub(super) struct Patch {
     /// Parameter ranges within the cell.
     s: (f64, f64),
     t: (f64, f64),
+    /// Lines at its start, middle and end along s.
+    rows: [Row; 3],
+    /// Where the start, middle and end of each of them along t meet the face.
+    hits_m: [[DVec3; 3]; 3],
     pub(super) centre_m: DVec3,
     pub(super) half_m: DVec3,
     pub(super) half_length_m: f64,
@@ -94,10 +98,22 @@ impl Rules {
 }
 
 impl Patch {
-    pub(super) fn new(cell: Cell, s: (f64, f64), t: (f64, f64), ground: Ground) -> Self {
+    /// A cell as a whole.
+    pub(super) fn new(cell: Cell, ground: Ground) -> Self {
         let parts = [0.0, 0.5, 1.0];
-        let rows = parts.map(|i| ground.frame.row(&cell, s.0 + i * (s.1 - s.0)));
-        let p = rows.map(|row| parts.map(|j| ground.hit(row.direction(t.0 + j * (t.1 - t.0)).0)));
+        let rows = parts.map(|s| ground.frame.row(&cell, s));
+        let hits_m = rows.map(|row| parts.map(|t| ground.hit(row.direction(t).0)));
+        Self::of_hits(cell, ((0.0, 1.0), (0.0, 1.0)), &rows, hits_m, ground.rules)
+    }
+
+    fn of_hits(
+        cell: Cell,
+        (s, t): ((f64, f64), (f64, f64)),
+        rows: &[Row; 3],
+        hits_m: [[DVec3; 3]; 3],
+        rules: &Rules,
+    ) -> Self {
+        let p = &hits_m;
         let all = || p.iter().flatten();
         let low = all().fold(DVec3::INFINITY, |m, q| m.min(*q));
         let high = all().fold(DVec3::NEG_INFINITY, |m, q| m.max(*q));
@@ -115,13 +131,26 @@ impl Patch {
             _ => Split::AlongT,
         };
         let (centre_m, half_m) = (0.5 * (low + high), 0.52 * (high - low));
-        let near = ground.rules.gauss.len();
+        let near = rules.gauss.len();
         let along_gamma = rows.iter().map(|row| row.gamma_rad() * (t.1 - t.0)).fold(0.0, f64::max);
         let angle = cell.turn_rad(s).max(along_gamma);
-        let far = 1 + ground.rules.widest_rad.iter().position(|widest| angle <= *widest).unwrap_or(near - 1);
+        let far = 1 + rules.widest_rad.iter().position(|widest| angle <= *widest).unwrap_or(near - 1);
         let sizes = [near, usize::midpoint(near, far), far].map(|n| n as u8);
         let (halves, points) = (OnceLock::new(), [const { OnceLock::new() }; RULES]);
-        Self { cell, s, t, centre_m, half_m, half_length_m: 0.5 * longest, split, sizes, halves, points }
+        Self {
+            cell,
+            s,
+            t,
+            rows: *rows,
+            hits_m,
+            centre_m,
+            half_m,
+            half_length_m: 0.5 * longest,
+            split,
+            sizes,
+            halves,
+            points,
+        }
     }
 
     /// The piece of the luminaire's table that the patch is lit by.
@@ -159,18 +188,26 @@ impl Patch {
         &self.points[rule]
     }
 
-    pub(super) fn halve(&self, ground: Ground) -> Box<[Self; 2]> {
+    /// Two halves, which meet the face where the whole does but for the lines in their own middles.
+    pub(super) fn halve(&self, ground: Ground) -> Box<[Patch; 2]> {
         let middle = |(a, b): (f64, f64)| 0.5 * (a + b);
-        let part = |s, t| Self::new(self.cell, s, t, ground);
+        let (of_s, of_t) = ((self.s.0, middle(self.s), self.s.1), (self.t.0, middle(self.t), self.t.1));
         Box::new(match self.split {
-            Split::AlongS | Split::UnevenS => {
-                let m = middle(self.s);
-                [part((self.s.0, m), self.t), part((m, self.s.1), self.t)]
-            }
-            Split::AlongT | Split::UnevenT => {
-                let m = middle(self.t);
-                [part(self.s, (self.t.0, m)), part(self.s, (m, self.t.1))]
-            }
+            Split::AlongS | Split::UnevenS => [(0, of_s.0, of_s.1), (1, of_s.1, of_s.2)].map(|(k, low, high)| {
+                let row = ground.frame.row(&self.cell, middle((low, high)));
+                let hits_m = [of_t.0, of_t.1, of_t.2].map(|t| ground.hit(row.direction(t).0));
+                let rows = [self.rows[k], row, self.rows[k + 1]];
+                let hits_m = [self.hits_m[k], hits_m, self.hits_m[k + 1]];
+                Self::of_hits(self.cell, ((low, high), self.t), &rows, hits_m, ground.rules)
+            }),
+            Split::AlongT | Split::UnevenT => [(0, of_t.0, of_t.1), (1, of_t.1, of_t.2)].map(|(k, low, high)| {
+                let t = middle((low, high));
+                let hits_m = [0, 1, 2].map(|i| {
+                    let ends = &self.hits_m[i];
+                    [ends[k], ground.hit(self.rows[i].direction(t).0), ends[k + 1]]
+                });
+                Self::of_hits(self.cell, (self.s, (low, high)), &self.rows, hits_m, ground.rules)
+            }),
         })
     }
 

@@ -345,6 +345,9 @@ fn a_cosine_table_with_rounded_figures_lights_like_the_cosine_within_its_bound()
     for (a, b) in direct(&exact).iter().zip(direct(&rounded)) {
         let off = (a.illuminance - b.illuminance).value().abs();
         assert!(off <= 1e-6 * a.illuminance.value(), "{a:?} {b:?}");
+        if b.illuminance.value() == 0.0 {
+            continue;
+        }
         // The closed formula's bound, not a quadrature's.
         assert!(bound(b.uncertainty) > 9e-6 * b.illuminance.value(), "{b:?}");
         assert!(bound(b.uncertainty) < 1.1e-5 * b.illuminance.value(), "{b:?}");
