@@ -11,8 +11,8 @@ use super::inverse_square;
 use super::zonal_cavity::{Cavity, CavityReflectances, Coefficients, ZonalFlux, coefficients};
 use super::zonal_multiplier::ZonalMultipliers;
 use super::{Calculated, NotApplicable, Validity};
-use crate::geometry::Room;
 use crate::geometry::configuration_factor::element_to_parallel_rectangle;
+use crate::geometry::{Room, Surface};
 use crate::photometry::direction;
 use crate::scene::{Luminaire, Meter, Scene};
 use crate::units::{Lumen, LumenPerSquareMetre, Lux};
@@ -81,6 +81,11 @@ impl Exitances {
     /// Zonal cavity solution for a work plane at `work_plane_m` above the floor.
     pub fn of(scene: &Scene, work_plane_m: f64) -> Result<Self, NotApplicable> {
         let room = scene.room.ok_or_else(|| refuse("the scene has no room"))?;
+        if Surface::ALL.iter().all(|s| room.reflectance.of(*s) == 0.0)
+            && scene.obstacles.iter().any(|o| o.reflectance > 0.0)
+        {
+            return Err(refuse("only bodies reflect, the room does not; the method knows surfaces of the room alone"));
+        }
         let height = luminaire_height(scene, work_plane_m, &room)?;
         let zonal = scene.luminaires.iter().map(zonal_flux).fold(ZonalFlux([0.0; 18]), |sum, one| sum.plus(&one));
         let flux = zonal.down_lm() + zonal.up_lm();

@@ -164,3 +164,14 @@ fn total_is_direct_plus_indirect() {
     let direct = 100.0 * 8.0 / (9.0 + 36.0 + 64.0_f64).powf(1.5);
     assert_relative_eq!((total.illuminance - indirect).value(), direct, max_relative = 1e-12);
 }
+
+#[test]
+fn a_room_that_reflects_by_bodies_alone_is_refused_and_not_read_as_dark() {
+    let mut scene = uplight_scene();
+    scene.room = Some(Room { reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0), ..room() });
+    assert_relative_eq!(indirect_illuminance(&scene, &on_work_plane(2.0, 2.0)).unwrap().illuminance.value(), 0.0);
+    let shape = Shape::Box { min_m: DVec3::ZERO, max_m: DVec3::new(20.0, 20.0, 0.1) };
+    scene.obstacles = vec![Obstacle { shape, reflectance: 0.5 }];
+    let refused = indirect_illuminance(&scene, &on_work_plane(2.0, 2.0)).unwrap_err();
+    assert!(refused.to_string().contains("only bodies reflect"), "{refused}");
+}
