@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::Effort;
 use super::cells::{Cell, LuminaireFrame};
-use super::grid::Face;
+use super::grid::{Face, Grid};
 use super::kernel::Receiver;
 use super::patch::{Ground, Patch, Points, Rules};
 use super::symmetry::reflectance;
@@ -23,6 +23,8 @@ use crate::scene::Luminaire;
 
 /// Cells are not halved below this fraction of the room.
 const SMALLEST: f64 = 1e-12;
+/// How long a patch may be, against elements, that crosses their border: polynomials on either side are nearly the same.
+const ACROSS: f64 = 1.0 / 16.0;
 /// Receivers that walk the patches together: what is not kept is made once for all of them.
 const TOGETHER: usize = 32;
 /// Bytes of halved patches and of points that are kept for the next receivers; beyond that they are made anew.
@@ -99,6 +101,41 @@ impl FirstBounce {
             }
         }
         sums
+    }
+
+    /// Flux in lumens that falls on the surfaces, shared out among the nodes of a grid: its moments with their polynomials.
+    pub(super) fn at_nodes(&self, grid: &Grid) -> Vec<f64> {
+        let mut at_nodes = vec![0.0; grid.len()];
+        for face in Face::ALL {
+            for source in &self.sources {
+                let ground = self.ground(source, face);
+                for patch in &source.faces[face.0] {
+                    self.deposit(patch, ground, grid, &mut at_nodes);
+                }
+            }
+        }
+        at_nodes
+    }
+
+    fn deposit(&self, patch: &Patch, ground: Ground, grid: &Grid, at_nodes: &mut [f64]) {
+        let smallest = SMALLEST * self.room.size_m.max_element();
+        let (extent, is_within) = grid.extent(ground.face, patch.centre_m, patch.half_m);
+        let serves = !patch.is_uneven() && (is_within || extent <= ACROSS);
+        if serves || patch.half_length_m <= smallest {
+            // Polynomials of an element vary little over a small part of it.
+            let rule = match extent {
+                ..0.25 => Patch::FAR,
+                ..0.5 => Patch::MIDDLING,
+                _ => Patch::NEAR,
+            };
+            for (point_m, flux) in patch.sample(rule, ground).each() {
+                grid.deposit(ground.face, point_m, flux, at_nodes);
+            }
+        } else {
+            for half in patch.halve(ground).iter() {
+                self.deposit(half, ground, grid, at_nodes);
+            }
+        }
     }
 
     /// The flux in lumens that the surfaces reflect at the first bounce; a closed room loses none of it.

@@ -12,6 +12,9 @@ use crate::simulator::quadrature::Gauss;
 /// Dyadic intervals whose interpolation matrices are kept.
 const KEPT_INTERVALS: usize = 128;
 
+/// Nodes along an element at most.
+const MOST_NODES: usize = 16;
+
 /// A surface of the room, numbered by axis and end: `2 * axis + 1` lies at the far end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Face(pub(super) usize);
@@ -187,6 +190,39 @@ impl Grid {
         images
     }
 
+    /// Shares flux at a point of a face out among the nodes of the element there, as their polynomials weigh it.
+    pub(super) fn deposit(&self, face: Face, point_m: DVec3, flux: f64, at_nodes: &mut [f64]) {
+        let (_, u, v) = face.axes();
+        let mut values = [[0.0; MOST_NODES]; 2];
+        let [first_u, first_v] = [0, 1].map(|k| {
+            let axis = [u, v][k];
+            let number = self.axes[axis].element_at(point_m[axis]);
+            let s = self.axes[axis].elements[number].parameter(point_m[axis]);
+            self.basis(s, &mut values[k][..self.order]);
+            number * self.order
+        });
+        let count_v = self.counts(face).1;
+        for (i, along_u) in values[0][..self.order].iter().enumerate() {
+            let start = self.offsets[face.0] + (first_u + i) * count_v + first_v;
+            for (node, along_v) in at_nodes[start..start + self.order].iter_mut().zip(&values[1]) {
+                *node += flux * along_u * along_v;
+            }
+        }
+    }
+
+    /// The longer side of a part of a face against the element in its middle, and whether it lies within that.
+    pub(super) fn extent(&self, face: Face, centre_m: DVec3, half_m: DVec3) -> (f64, bool) {
+        let (_, u, v) = face.axes();
+        let sides = [u, v].map(|axis| {
+            let (low, high) = (centre_m[axis] - half_m[axis], centre_m[axis] + half_m[axis]);
+            let Element { start_m, end_m, .. } = self.axes[axis].elements[self.axes[axis].element_at(centre_m[axis])];
+            // Boxes round patches are a little too large.
+            let margin = 0.05 * (high - low);
+            ((high - low) / (end_m - start_m), low >= start_m - margin && high <= end_m + margin)
+        });
+        (sides[0].0.max(sides[1].0), sides[0].1 && sides[1].1)
+    }
+
     /// The interpolation matrix `[point][node]` of a dyadic interval, if it is kept.
     pub(super) fn kept(&self, interval: usize) -> Option<&[f64]> {
         self.kept.get(interval).map(Vec::as_slice)
@@ -208,6 +244,11 @@ impl Grid {
 }
 
 impl Axis {
+    /// The element at a coordinate.
+    fn element_at(&self, x_m: f64) -> usize {
+        self.elements.partition_point(|e| e.end_m < x_m).min(self.elements.len() - 1)
+    }
+
     fn new(length_m: f64, count: usize, nodal: &Gauss) -> Self {
         let boundary = |k: usize| length_m * k as f64 / count as f64;
         let elements: Vec<_> = (0..count)

@@ -22,7 +22,7 @@ const SMALLEST: f64 = 1e-13;
 const MOST: usize = 12;
 
 /// A receiving element: where it is, where it faces, and on which surface it lies, if any.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Receiver {
     pub(super) position_m: DVec3,
     pub(super) normal: DVec3,

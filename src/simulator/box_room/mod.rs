@@ -5,6 +5,7 @@
 //! Numerical Solution of Integral Equations of the Second Kind* (1997), chapters 3 (iterated collocation) and 9.
 
 mod cells;
+mod crowd;
 mod error;
 mod first_bounce;
 mod grid;
@@ -14,13 +15,14 @@ mod symmetry;
 #[cfg(test)]
 mod tests;
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 
 use crate::geometry::Room;
 use crate::scene::{Bounces, Luminaire, Meter};
 use crate::simulator::{Bounded, gmres};
+use crowd::Crowd;
 use error::{Probes, Reading};
 use first_bounce::FirstBounce;
 use grid::Grid;
@@ -48,6 +50,9 @@ pub(super) struct Effort {
 const MOST_ENTRIES: usize = 1 << 24;
 /// Fewer meters than this are read sooner than another thread wakes.
 const FEW: usize = 8;
+/// Luminaires up to which each one's light is integrated for each node, where errors this small are asked for and where not.
+const FEW_LUMINAIRES: [usize; 2] = [256, 32];
+const PROJECTION_REACHES: f64 = 1e-3;
 /// The largest relative error that each effort is the first choice for.
 const FIRST_EFFORT: [f64; 5] = [f64::INFINITY, 2e-2, 2e-5, 5e-6, 5e-7];
 /// The ladder of efforts; the rules of the first bounce grow with the order, or neighbours would share their errors.
@@ -122,6 +127,8 @@ pub(super) const EFFORTS: [Effort; 8] = [
 #[derive(Debug, Default)]
 pub(super) struct EmptyRoom {
     symmetries: Option<Symmetries>,
+    /// The luminaires, where they are many.
+    crowd: Option<Arc<Crowd>>,
     /// By place in [`EFFORTS`].
     fields: Vec<(usize, BoxField)>,
 }
@@ -157,11 +164,19 @@ impl EmptyRoom {
         relative_error: f64,
     ) -> (Vec<Bounded>, String) {
         let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires));
+        let few = FEW_LUMINAIRES[usize::from(relative_error >= PROJECTION_REACHES)];
+        if luminaires.len() > few && self.crowd.is_none() {
+            self.crowd = Some(Arc::new(Crowd::new(room, luminaires)));
+        }
         let mut level = first_level(relative_error);
         let mut readings = vec![];
         loop {
             if self.fields.iter().all(|(at, _)| *at != level) {
-                let field = BoxField::solve(room, luminaires, symmetries, bounces, &EFFORTS[level]);
+                let first = match &self.crowd {
+                    Some(crowd) => First::Many(Arc::clone(crowd)),
+                    None => First::Few(FirstBounce::new(room, luminaires, &EFFORTS[level])),
+                };
+                let field = BoxField::solve(room, first, symmetries, bounces, &EFFORTS[level]);
                 self.fields.push((level, field));
             }
             let field = self.fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field);
@@ -181,8 +196,12 @@ impl EmptyRoom {
                 Some(_) => continue,
             };
             let Effort { order, elements_per_half, .. } = EFFORTS[level - 1];
+            let light = match &self.crowd {
+                Some(_) => format!("{} point luminaires projected on it", luminaires.len()),
+                None => "point luminaires".to_owned(),
+            };
             let text = format!(
-                "hp collocation, order {order} with {elements_per_half} element(s) a half side: empty box, point luminaires; {why}"
+                "hp collocation, order {order} with {elements_per_half} element(s) a half side: empty box, {light}; {why}"
             );
             return (values, text);
         }
@@ -198,7 +217,7 @@ fn first_level(relative_error: f64) -> usize {
 #[derive(Debug)]
 pub(super) struct BoxField {
     grid: Grid,
-    first: FirstBounce,
+    first: First,
     /// Indirect exitance at the nodes in lm/m²: what is gathered on top of the first bounce.
     exitance: Vec<f64>,
     gathers: Gathers,
@@ -206,6 +225,22 @@ pub(super) struct BoxField {
     probes: OnceLock<Probes>,
     /// Relative flux that interpolating the first bounce between the nodes would lose or gain.
     imbalance: f64,
+}
+
+/// Light that is reflected once.
+#[derive(Debug)]
+enum First {
+    Few(FirstBounce),
+    Many(Arc<Crowd>),
+}
+
+impl First {
+    fn irradiance(&self, receivers: &[Receiver]) -> Vec<f64> {
+        match self {
+            Self::Few(few) => few.irradiance(receivers),
+            Self::Many(many) => many.irradiance(receivers),
+        }
+    }
 }
 
 /// What a meter sums up.
@@ -217,15 +252,8 @@ enum Gathers {
 }
 
 impl BoxField {
-    fn solve(
-        room: &Room,
-        luminaires: &[Luminaire],
-        symmetries: &Symmetries,
-        bounces: Bounces,
-        effort: &Effort,
-    ) -> Self {
+    fn solve(room: &Room, first: First, symmetries: &Symmetries, bounces: Bounces, effort: &Effort) -> Self {
         let grid = Grid::new(room.size_m, effort);
-        let first = FirstBounce::new(room, luminaires, effort);
         let gathers = match bounces {
             Bounces::AtMost(0) => Gathers::Nothing,
             Bounces::AtMost(1) => Gathers::FirstBounce,
@@ -239,7 +267,13 @@ impl BoxField {
         let light = orbits.under(&symmetries.of_light);
         let operator = Operator::new(&grid, orbits);
         let rho: Vec<f64> = (0..grid.len()).map(|node| symmetry::reflectance(room, grid.place(node).0)).collect();
-        let (known, imbalance) = known(&grid, &first, &light);
+        let (known, imbalance) = match &first {
+            First::Few(few) => known(&grid, few, &light),
+            First::Many(many) => {
+                let lux = operator.apply(&exitance(&many.projected(&grid, effort), &rho));
+                (light.representatives.iter().map(|node| lux[*node]).collect(), crowd::MISPLACED)
+            }
+        };
         // Where the light is symmetrical enough, its orbits are the unknowns, and their matrix is no larger.
         let irradiance = if light.images.len().pow(2) >= operator.orbits.images.len() {
             let rows = operator.folded(&light);

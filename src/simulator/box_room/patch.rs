@@ -172,6 +172,8 @@ impl Patch {
     pub(super) const RULES: usize = RULES;
     /// The rule for receivers far away.
     pub(super) const FAR: usize = RULES - 1;
+    /// The rule for receivers neither far nor near.
+    pub(super) const MIDDLING: usize = 1;
     /// The rule for the nearest receivers.
     pub(super) const NEAR: usize = 0;
 
@@ -249,6 +251,15 @@ impl Points {
     /// Flux at all points.
     pub(super) fn flux(&self) -> f64 {
         self.0[self.0.len() / 4 * 3..].iter().sum()
+    }
+
+    /// Each point and its flux.
+    pub(super) fn each(&self) -> impl Iterator<Item = (DVec3, f64)> {
+        let count = self.0.len() / 4;
+        (0..count).map(move |k| {
+            let [x, y, z, flux] = [0, 1, 2, 3].map(|part| self.0[part * count + k]);
+            (DVec3::new(x, y, z), flux)
+        })
     }
 
     pub(super) fn irradiance(&self, receiver: &Receiver, face: Face) -> f64 {

@@ -9,8 +9,10 @@ use glam::{DMat3, DVec3};
 use crate::geometry::{Reflectances, Room};
 use crate::photometry::{LuminousIntensityDistribution, Photometry};
 use crate::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
+use crate::simulator::box_room::first_bounce::FirstBounce;
+use crate::simulator::box_room::grid::Grid;
 use crate::simulator::box_room::symmetry::Symmetries;
-use crate::simulator::box_room::{BoxField, EFFORTS, Effort};
+use crate::simulator::box_room::{BoxField, EFFORTS, Effort, First};
 use crate::simulator::quadrature::Gauss;
 use crate::simulator::{Accuracy, Estimate, Prepared, Uncertainty, illuminance};
 
@@ -244,7 +246,8 @@ fn a_luminaire_turned_against_its_table_turned_back_reads_the_same() {
 
 fn solve(scene: &Scene, effort: &Effort) -> BoxField {
     let (room, luminaires) = (scene.room.unwrap(), &scene.luminaires);
-    BoxField::solve(&room, luminaires, &Symmetries::of(&room, luminaires), Bounces::Converged, effort)
+    let first = First::Few(FirstBounce::new(&room, luminaires, effort));
+    BoxField::solve(&room, first, &Symmetries::of(&room, luminaires), Bounces::Converged, effort)
 }
 
 /// Area-mean indirect illuminance of a 4 m cube of one reflectance with 10 000 lm at its centre, from the nodes.
@@ -353,4 +356,61 @@ fn dimming_and_further_meters_solve_nothing_again() {
     for (estimate, whole) in dimmed.illuminance(&meters[..2]).unwrap().estimates.iter().zip(&whole.estimates) {
         assert_relative_eq!(pair(estimate).0, 0.25 * pair(whole).0, max_relative = 1e-6);
     }
+}
+
+#[test]
+fn a_crowd_of_luminaires_lights_like_its_parts_within_their_bounds() {
+    let mut worst = 0.0_f64;
+    for case in 0..2 {
+        let mut random = Random(200 + case);
+        let (mut scene, meters) = random_scene(&mut random);
+        let size_m = scene.room.unwrap().size_m;
+        let first = scene.luminaires[0].clone();
+        scene.luminaires.resize_with(36, || {
+            let [azimuth, tilt, roll] = random.within(0.0, 360.0).to_array();
+            let position_m = size_m * random.within(0.02, 0.98);
+            Luminaire { position_m, orientation: orientation(azimuth, tilt, roll), ..first.clone() }
+        });
+        let mut parts = vec![(0.0, 0.0); meters.len()];
+        for some in scene.luminaires.chunks(18) {
+            let some = Scene { luminaires: some.to_vec(), ..scene.clone() };
+            for (sum, (value, bound)) in parts.iter_mut().zip(indirect(&some, &meters, 1e-2)) {
+                *sum = (sum.0 + value, sum.1 + bound);
+            }
+        }
+        for asked in [1e-1, 1e-2] {
+            for (part, whole) in parts.iter().zip(indirect(&scene, &meters, asked)) {
+                let error = (part.0 - whole.0).abs();
+                assert!(error <= part.1 + whole.1, "case {case}: {whole:?} differs from {part:?}");
+                worst = worst.max(error / whole.0);
+            }
+        }
+    }
+    assert!(worst < 1e-2, "light is in the wrong place: {worst}");
+}
+
+#[test]
+fn what_is_shared_out_among_nodes_is_all_the_flux_at_the_place_where_it_lands() {
+    let (scene, _) = random_scene(&mut Random(7));
+    let room = Room { reflectance: Reflectances::with_equal_walls(0.5, 0.5, 0.5), ..scene.room.unwrap() };
+    let grid = Grid::new(room.size_m, &EFFORTS[2]);
+    let light = FirstBounce::new(&room, &scene.luminaires, &EFFORTS[2]);
+    let (at_nodes, flux) = (light.at_nodes(&grid), 2.0 * light.reflected_flux());
+    assert_relative_eq!(at_nodes.iter().sum::<f64>(), flux, max_relative = 1e-4);
+    // First moments: where each lumen lands, by the directions of the luminaire alone.
+    let luminaire = &scene.luminaires[0];
+    let (mut landed, mut sum) = (DVec3::ZERO, 0.0);
+    let mut random = Random(8);
+    for _ in 0..400_000 {
+        let (z, turn) = (2.0 * random.next() - 1.0, 2.0 * PI * random.next());
+        let across = (1.0 - z * z).sqrt();
+        let direction = DVec3::new(across * turn.cos(), across * turn.sin(), z);
+        let ends = DVec3::select(direction.cmpgt(DVec3::ZERO), room.size_m, DVec3::ZERO);
+        let distance = ((ends - luminaire.position_m) / direction).min_element();
+        let weight = luminaire.intensity_towards(direction).value();
+        landed += weight * (luminaire.position_m + distance * direction);
+        sum += weight;
+    }
+    let mean = (0..grid.len()).map(|k| at_nodes[k] * grid.node(k).0).sum::<DVec3>() / flux;
+    assert!((mean - landed / sum).length() < 0.01 * room.size_m.length(), "{mean} {}", landed / sum);
 }
