@@ -53,7 +53,7 @@ fn row(
     errors.sort_by(f64::total_cmp);
     let bound = pairs().map(|(e, t)| half_width(e.uncertainty) / t).fold(0.0, f64::max);
     let (median, worst) = (errors[errors.len() / 2], errors[errors.len() - 1]);
-    println!("| {case} | {asked:.0e} | {median:.1e} | {worst:.1e} | {bound:.1e} | {ms:.2} | {} |", solution.solver);
+    println!("| {case} | {asked:e} | {median:.1e} | {worst:.1e} | {bound:.1e} | {ms:.2} | {} |", solution.solver);
     Ok(())
 }
 
