@@ -8,6 +8,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::diagnose;
 use super::measuring::{self, Bar};
+use crate::diff::KnownDeviations;
 use crate::engines::Site;
 use crate::measure::Shelf;
 use crate::process;
@@ -87,6 +88,7 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
         return Err(miette::miette!("there is neither direct nor indirect illuminance to stress in these specs"));
     }
     let subjects = measuring::subjects(&args.engines, site)?;
+    let record = KnownDeviations::built_in().into_diagnostic()?;
     let mut reports = vec![];
     for case in &cases {
         let folder = measuring::folder(args.out.as_ref(), "stress", &case.path);
@@ -100,6 +102,7 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
             laws: &args.laws,
             seed: args.seed,
             coordinates: if args.raw { Coordinates::Raw } else { Coordinates::Fitted },
+            known: if args.raw { &[] } else { record.breaks() },
         };
         let report = stress::stress(case, &subjects, &options, &Bar::new());
         let name = if cases.len() == 1 {

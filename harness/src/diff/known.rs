@@ -11,6 +11,8 @@ const ON_RECORD: &str = include_str!("../../../reference/known_deviations.yaml")
 #[serde(deny_unknown_fields)]
 pub struct KnownDeviations {
     known_deviations: Vec<KnownDeviation>,
+    #[serde(default)]
+    known_breaks: Vec<KnownBreak>,
 }
 
 /// One known deviation: a range of relative deviations, its cause and its source.
@@ -34,6 +36,29 @@ struct KnownDeviation {
     source: String,
 }
 
+/// A law of `luxproof stress` that an engine is known to break from some magnitude on.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KnownBreak {
+    /// The engine.
+    pub engine: String,
+    /// The case that it was measured with.
+    pub case: String,
+    /// The law.
+    pub law: String,
+    /// How it breaks: drift, `silent_loss`, nan, crash or hang.
+    pub how: String,
+    /// The mildest magnitude at which it does.
+    pub from: f64,
+    /// The largest deviation measured, relative; none where nothing is read.
+    #[serde(default)]
+    pub relative: Option<f64>,
+    /// Why.
+    pub cause: String,
+    /// How that is known.
+    pub source: String,
+}
+
 /// Why the record cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("reference/known_deviations.yaml: {0}")]
@@ -43,12 +68,19 @@ impl KnownDeviations {
     /// The record that the program was built with.
     pub fn built_in() -> Result<Self, KnownDeviationError> {
         let record: Self = crate::spec::from_yaml(ON_RECORD).map_err(KnownDeviationError)?;
-        for known in &record.known_deviations {
-            if known.cause.trim().is_empty() || known.source.trim().is_empty() {
-                return Err(KnownDeviationError(format!("a deviation of {} lacks cause or source", known.engine)));
+        let deviations = record.known_deviations.iter().map(|k| (&k.engine, &k.cause, &k.source));
+        let breaks = record.known_breaks.iter().map(|k| (&k.engine, &k.cause, &k.source));
+        for (engine, cause, source) in deviations.chain(breaks) {
+            if cause.trim().is_empty() || source.trim().is_empty() {
+                return Err(KnownDeviationError(format!("a deviation of {engine} lacks cause or source")));
             }
         }
         Ok(record)
+    }
+
+    /// What is on record of the laws that an engine breaks.
+    pub fn breaks(&self) -> &[KnownBreak] {
+        &self.known_breaks
     }
 
     /// The verdict in the light of the record, with the cause where it applies.

@@ -27,7 +27,7 @@ use crate::spec::ToleranceOverride;
 use input::Input;
 
 pub use consensus::{Consensus, Witness};
-pub use known::{KnownDeviationError, KnownDeviations, Subject};
+pub use known::{KnownBreak, KnownDeviationError, KnownDeviations, Subject};
 pub use paper_split::{PaperSplit, Share, Stage, Stages, shares};
 pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use spending::{LOOKS, share_of_error};

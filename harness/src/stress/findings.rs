@@ -7,11 +7,15 @@ use serde::Serialize;
 use super::Subject;
 use super::judge::Compared;
 use super::laws::Law;
+use crate::diff::KnownBreak;
 use crate::measure::{Failure, FailureKind};
 use crate::spec::Case;
 
 /// The deviations whose first magnitude is told.
 pub(super) const THRESHOLDS: [f64; 3] = [1e-3, 1e-2, 0.1];
+
+/// How much larger than on record a deviation may be and still be the known one.
+const MARGIN: f64 = 1.25;
 
 /// How a law breaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -130,6 +134,10 @@ pub struct LawReport {
     pub untried: usize,
     /// Every point, from mild to extreme.
     pub points: Vec<PointReport>,
+    /// The causes on record, where all that breaks is known.
+    pub known: Vec<String>,
+    /// The causes on record of what does not break any more.
+    pub gone: Vec<String>,
 }
 
 /// What one point shows.
@@ -157,7 +165,7 @@ pub struct PointReport {
 pub(super) type Found = (usize, &'static Law, &'static str, usize, Option<Finding>);
 
 impl StressReport {
-    pub(super) fn new(case: &Case, subjects: &[Subject], found: Vec<Found>) -> Self {
+    pub(super) fn new(case: &Case, subjects: &[Subject], found: Vec<Found>, record: &[KnownBreak]) -> Self {
         let engines = subjects.iter().map(|s| (s.engine.id().name().to_owned(), s.version.clone())).collect();
         let mut laws: Vec<LawReport> = vec![];
         for (subject, law, procedure, step, finding) in found {
@@ -170,6 +178,10 @@ impl StressReport {
             laws[k].points.push(PointReport::new(procedure, law.magnitudes[step], finding));
         }
         laws.iter_mut().for_each(LawReport::conclude);
+        for law in &mut laws {
+            let of_law = record.iter().filter(|k| k.case == case.name && k.engine == law.engine && k.law == law.law);
+            law.look_up(&of_law.collect::<Vec<_>>());
+        }
         Self { case: case.name.clone(), engines, laws }
     }
 
@@ -193,6 +205,8 @@ impl LawReport {
             refused_at: None,
             untried: 0,
             points: vec![],
+            known: vec![],
+            gone: vec![],
         }
     }
 
@@ -215,6 +229,27 @@ impl LawReport {
                 }
             }
         }
+    }
+}
+
+impl LawReport {
+    /// Holds what breaks against what is on record of this law.
+    fn look_up(&mut self, record: &[&KnownBreak]) {
+        let explains = |k: &&KnownBreak, p: &PointReport| {
+            p.how.is_some_and(|how| how.name() == k.how)
+                && find_step(&self.law, p.magnitude) >= find_step(&self.law, k.from)
+                && p.deviation.is_none_or(|d| k.relative.is_some_and(|most| d <= MARGIN * most))
+        };
+        let broken = || self.points.iter().filter(|p| p.how.is_some());
+        let cause = |k: &&&KnownBreak| k.cause.clone();
+        if broken().all(|p| record.iter().any(|k| explains(k, p))) {
+            self.known = record.iter().filter(|k| broken().any(|p| explains(k, p))).map(|k| cause(&k)).collect();
+        }
+        let is_gone = |k: &&&KnownBreak| {
+            let mut there = self.points.iter().filter(|p| p.magnitude == k.from && p.tried).peekable();
+            there.peek().is_some() && there.all(|p| p.how.is_none() && !p.refused)
+        };
+        self.gone = record.iter().filter(is_gone).map(|k| cause(&k)).collect();
     }
 }
 

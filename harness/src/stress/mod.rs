@@ -18,6 +18,7 @@ use self::findings::{Finding, How};
 pub use self::findings::{LawReport, PointReport, StressReport};
 use self::judge::Reading;
 use self::laws::{Against, Law, Place, Variant};
+use crate::diff::KnownBreak;
 use crate::engines::Job;
 use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, Subject, task};
 use crate::procedures;
@@ -44,6 +45,8 @@ pub struct Options<'a> {
     pub seed: u64,
     /// Which coordinates renderers get.
     pub coordinates: Coordinates,
+    /// What is on record of engines as luxproof drives them.
+    pub known: &'a [KnownBreak],
 }
 
 /// Which coordinates renderers get.
@@ -107,7 +110,7 @@ pub fn stress(case: &Case, subjects: &[Subject], options: &Options<'_>, progress
     });
     let findings = lock(&queue).findings.clone();
     let of = |k: usize| (points[k].subject, points[k].law, points[k].procedure, points[k].step, findings[k].clone());
-    StressReport::new(case, subjects, (0..points.len()).map(of).collect())
+    StressReport::new(case, subjects, (0..points.len()).map(of).collect(), options.known)
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {

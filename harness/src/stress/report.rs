@@ -77,9 +77,13 @@ impl StressReport {
             let list: Vec<String> = order.iter().map(|k| format!("{k}: {}", by_magnitude[k])).collect();
             let why = law.points.iter().find_map(|p| p.how.and(p.text.as_deref())).map(first_line);
             let why = why.map(|w| format!(" ({w})")).unwrap_or_default();
+            let known = match law.known.join("; ") {
+                known if known.is_empty() => String::new(),
+                known => format!(" Known: {known}."),
+            };
             writeln!(
                 text,
-                "{bullet}{} {}: {}. At {} {}{why}",
+                "{bullet}{} {}: {}. At {} {}{why}.{known}",
                 law.engine,
                 law.law,
                 law.what,
@@ -88,13 +92,17 @@ impl StressReport {
             )
             .ok();
         }
+        for law in self.laws.iter().filter(|l| !l.gone.is_empty()) {
+            let gone = law.gone.join("; ");
+            writeln!(text, "{bullet}{} {}: on record, but seen no more: {gone}.", law.engine, law.law).ok();
+        }
         text
     }
 }
 
 const LEGEND: &str = "ok: no deviation of .1 % or more beyond the noise at any magnitude (noise of the worst reading in brackets: \
 smaller deviations may hide there). Otherwise the first magnitude at which the deviation exceeds .1, 1 and 10 %, or how it breaks. \
-refuses: the engine says itself that it cannot. n untried: time was up, or a milder magnitude hung already.";
+known: on record in reference/known_deviations.yaml. refuses: the engine says itself that it cannot. n untried: time was up, or a milder magnitude hung already.";
 
 fn cell(law: &LawReport) -> String {
     let mut parts = vec![];
@@ -115,6 +123,9 @@ fn cell(law: &LawReport) -> String {
             parts.push(format!("ok ({})", law.resolution.map_or("?".to_owned(), percent)));
         }
         None => {}
+    }
+    if !law.known.is_empty() {
+        parts.push("known".to_owned());
     }
     if let Some(at) = law.refused_at {
         parts.push(format!("refuses @ {at:e}"));

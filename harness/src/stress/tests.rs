@@ -60,6 +60,10 @@ fn axial() -> Case {
 }
 
 fn stressed(folder: &std::path::Path, laws: &[&str], time: Duration) -> StressReport {
+    stressed_knowing(folder, laws, time, &[])
+}
+
+fn stressed_knowing(folder: &std::path::Path, laws: &[&str], time: Duration, known: &[KnownBreak]) -> StressReport {
     let laws: Vec<String> = laws.iter().map(|l| (*l).to_owned()).collect();
     let options = Options {
         laboratory: Laboratory { site: Site::at(folder.to_owned()), own_solvers: OwnSolvers::Here },
@@ -71,6 +75,7 @@ fn stressed(folder: &std::path::Path, laws: &[&str], time: Duration) -> StressRe
         laws: &laws,
         seed: 1,
         coordinates: Coordinates::Fitted,
+        known,
     };
     let subjects = [Subject { engine: Box::new(Fragile), version: "1".into() }];
     stress(&axial(), &subjects, &options, &Silent)
@@ -102,6 +107,44 @@ fn what_breaks_is_reported_at_its_magnitude_and_in_its_way() {
     let text = report.terminal();
     assert!(text.contains("0.1 % @ 1e2, 1.0 % @ 1e4, 10 % @ 1e4") && text.contains("nan @ 1e6"), "{text}");
     assert!(report.markdown().lines().any(|l| l.starts_with("| mirror") && l.contains("ok")));
+}
+
+#[test]
+fn what_is_on_record_is_told_as_known_and_what_is_gone_as_gone() {
+    let folder = tempfile::tempdir().unwrap();
+    let known = |law: &str, how: &str, from: f64, relative: Option<f64>| KnownBreak {
+        engine: "fragile".into(),
+        case: "axial".into(),
+        law: law.into(),
+        how: how.into(),
+        from,
+        relative,
+        cause: format!("{law} by {how}"),
+        source: "this test".into(),
+    };
+    let all = ["scale_up", "scale_down", "mirror"];
+    let read = |record: &[KnownBreak]| stressed_knowing(folder.path(), &all, LONG, record);
+    let law = |report: &StressReport, id: &str| report.laws.iter().find(|l| l.law == id).unwrap().clone();
+
+    let up = known("scale_up", "drift", 100.0, Some(0.2));
+    let report = read(&[up.clone(), known("mirror", "drift", 1.0, Some(0.1))]);
+    assert_eq!(law(&report, "scale_up").known, ["scale_up by drift"]);
+    assert_eq!(law(&report, "scale_down").known, [""; 0]);
+    assert_eq!(law(&report, "mirror").gone, ["mirror by drift"]);
+    let text = report.markdown();
+    assert!(text.contains("10 % @ 1e4, known |") && text.contains(" Known: scale_up by drift."), "{text}");
+    assert!(text.contains("- fragile mirror: on record, but seen no more: mirror by drift."), "{text}");
+
+    // Too early, too large, in another way, of another engine or case: no excuse.
+    for other in [
+        KnownBreak { from: 1e4, ..up.clone() },
+        KnownBreak { relative: Some(0.1), ..up.clone() },
+        KnownBreak { how: "crash".into(), ..up.clone() },
+        KnownBreak { engine: "mitsuba".into(), ..up.clone() },
+        KnownBreak { case: "cachet".into(), ..up },
+    ] {
+        assert_eq!(law(&read(&[other]), "scale_up").known, [""; 0]);
+    }
 }
 
 #[test]

@@ -77,6 +77,12 @@ pub struct StressLaw {
     /// In which way it breaks.
     #[serde(default)]
     pub how: Option<String>,
+    /// The first magnitude that the engine refuses.
+    #[serde(default)]
+    pub refused_at: Option<f64>,
+    /// The causes on record, where all that breaks is known.
+    #[serde(default)]
+    pub known: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -133,6 +139,8 @@ fn stress_cell(law: Option<&&StressLaw>) -> Markup {
     let breaks: Vec<(&str, f64)> =
         ["0.001", "0.01", "0.1"].iter().filter_map(|k| Some((*k, law.breaks_at.get(*k).copied().flatten()?))).collect();
     let class = match (law.worst_deviation, law.how.as_deref()) {
+        (_, Some(_)) if !law.known.is_empty() => "v-known",
+        (None, None) => "quiet",
         (_, Some("nan" | "crash" | "hang" | "silent_loss")) | (None, _) => "v-fail",
         (Some(d), _) if d.abs() >= 0.1 => "v-fail",
         (Some(d), _) if d.abs() >= 0.001 => "v-undecided",
@@ -145,8 +153,22 @@ fn stress_cell(law: Option<&&StressLaw>) -> Markup {
     };
     html! {
         td class=(class) {
-            div { (law.worst_deviation.map_or("no reading".to_owned(), super::percent)) @if let Some(how) = &law.how { " " (how.replace('_', " ")) } }
+            div {
+                (law.worst_deviation.map_or_else(|| without_reading(law).to_owned(), super::percent))
+                @if let Some(how) = &law.how { " " (how.replace('_', " ")) }
+            }
             @if let Some((key, at)) = breaks.first() { div.most { (name(key)) " at " (format!("{at:.0e}")) } }
+            @if let (Some(at), Some(_)) = (law.refused_at, law.worst_deviation) { div.most { "refuses at " (format!("{at:.0e}")) } }
+            @for cause in &law.known { div.most { "known: " (cause) } }
         }
+    }
+}
+
+/// What stands where nothing was read.
+fn without_reading(law: &StressLaw) -> &'static str {
+    match (&law.how, law.refused_at) {
+        (Some(_), _) => "no reading:",
+        (None, Some(_)) => "refuses",
+        (None, None) => "not tried",
     }
 }
