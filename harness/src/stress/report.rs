@@ -144,7 +144,9 @@ fn percent(x: f64) -> String {
     }
 }
 
+/// The start of a message, without the temporary files that it names.
 fn first_line(text: &str) -> String {
-    let line: String = text.lines().next().unwrap_or_default().chars().take(120).collect();
+    let line = text.lines().next().unwrap_or_default();
+    let line: String = line.split("; its messages are in").next().unwrap_or_default().chars().take(120).collect();
     line.trim_end_matches(':').to_owned()
 }
