@@ -119,6 +119,7 @@ pub(super) fn stress_section(beside: &[Beside], palette: &Palette) -> Option<Mar
         }
     }
     engines.sort_by_key(|e| palette.order(e));
+    let known: Vec<&StressLaw> = laws.iter().copied().filter(|l| !l.known.is_empty()).collect();
     Some(html! {
         h2 id="stress-title" { "Numerical stability" }
         p.lead { "The largest deviation from each law, and the magnitude at which it first passes 0.1 %, 1 % and 10 %." }
@@ -130,6 +131,13 @@ pub(super) fn stress_section(beside: &[Beside], palette: &Palette) -> Option<Mar
                     @for e in &engines { (stress_cell(laws.iter().find(|l| l.law == name && l.engine == *e))) }
                 } } }
             }
+        }
+        @if !known.is_empty() {
+            h3 { "On record" }
+            dl.facts { @for law in known {
+                dt { (palette.label(&law.engine)) " " (law.law.replace('_', " ")) }
+                dd { (law.known.join("; ")) }
+            } }
         }
     })
 }
@@ -154,21 +162,22 @@ fn stress_cell(law: Option<&&StressLaw>) -> Markup {
     html! {
         td class=(class) {
             div {
-                (law.worst_deviation.map_or_else(|| without_reading(law).to_owned(), super::percent))
+                (worst(law))
                 @if let Some(how) = &law.how { " " (how.replace('_', " ")) }
             }
-            @if let Some((key, at)) = breaks.first() { div.most { (name(key)) " at " (format!("{at:.0e}")) } }
-            @if let (Some(at), Some(_)) = (law.refused_at, law.worst_deviation) { div.most { "refuses at " (format!("{at:.0e}")) } }
-            @for cause in &law.known { div.most { "known: " (cause) } }
+            @if let Some((key, at)) = breaks.first() { div.most { (name(key)) " at " (format!("{at:e}")) } }
+            @if let (Some(at), Some(_)) = (law.refused_at, law.worst_deviation) { div.most { "refuses at " (format!("{at:e}")) } }
+            @if !law.known.is_empty() { div.most { "known" } }
         }
     }
 }
 
-/// What stands where nothing was read.
-fn without_reading(law: &StressLaw) -> &'static str {
-    match (&law.how, law.refused_at) {
-        (Some(_), _) => "no reading:",
-        (None, Some(_)) => "refuses",
-        (None, None) => "not tried",
+/// The largest deviation, or why there is none; where nothing came of a reading, what others deviate by says little.
+fn worst(law: &StressLaw) -> String {
+    match (law.worst_deviation, law.how.as_deref()) {
+        (_, Some("nan" | "crash" | "hang")) => String::new(),
+        (Some(deviation), _) => super::percent(deviation).trim_start_matches('+').to_owned(),
+        (None, _) if law.refused_at.is_some() => "refuses".to_owned(),
+        (None, _) => "not tried".to_owned(),
     }
 }
