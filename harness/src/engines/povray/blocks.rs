@@ -13,6 +13,7 @@ use crate::process::Invocation;
 
 use super::ID;
 use super::export::{self, Light};
+use super::frame::Frame;
 use super::pixels::{self, Readout, Seen};
 use super::settings::{FIRST_REFLECTION_RAYS, LONG_POOL, POOL, Preset, Settings};
 
@@ -264,7 +265,8 @@ impl<'a> Bench<'a> {
     }
 
     fn keep_readouts(&self, readouts: &[Readout]) -> Result<(), EngineError> {
-        self.workbench.write(&[SceneFile::text("readouts.inc", export::readouts(readouts))])
+        let light = Frame::of(self.job, self.settings.recentre).light;
+        self.workbench.write(&[SceneFile::text("readouts.inc", export::readouts(readouts, light))])
     }
 
     /// One run of POV-Ray, one pixel a meter.

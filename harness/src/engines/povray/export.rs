@@ -82,10 +82,10 @@ pub(super) fn first_readouts(job: &Job, part: Light) -> Vec<Readout> {
 }
 
 /// The file that gives every disc its read-out, included where it is asked for with `Declare=Readouts=1`.
-pub(super) fn readouts(readouts: &[Readout]) -> String {
+pub(super) fn readouts(readouts: &[Readout], light: f64) -> String {
     let entry = |r: &Readout| match r {
-        Readout::Coarse(scale) => format!("<{scale:e}, 0>"),
-        Readout::Fine(expected) => format!("<{expected:e}, 1>"),
+        Readout::Coarse(scale) => format!("<{:e}, 0>", light * scale),
+        Readout::Fine(expected) => format!("<{:e}, 1>", light * expected),
     };
     let entries: Vec<String> = readouts.iter().map(entry).collect();
     format!("#declare Readout = array[{}] {{\n  {}\n}};\n", entries.len(), entries.join(",\n  "))
@@ -133,6 +133,14 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
         vector(frame.centre_m)
     )
     .ok();
+    if (frame.light - 1.0).abs() > f64::EPSILON {
+        writeln!(
+            text,
+            "// All light, and the illuminances that pixels stand for, are {:e} times those of the spec.",
+            frame.light
+        )
+        .ok();
+    }
     text.push_str("#version 3.7;\n");
     let indirect = u8::from(part == Light::Indirect);
     writeln!(text, "#ifndef (Indirect) #declare Indirect = {indirect}; #end").ok();
@@ -177,7 +185,7 @@ fn meters(job: &Job, frame: Frame) -> String {
         .collect();
     text.push_str(&rows.join(",\n"));
     text.push_str("\n};\n// Illuminance that the pixel's scale stands for, in lux.\n#ifdef (Readouts) #include \"readouts.inc\" #else\n");
-    let first = |part| readouts(&first_readouts(job, part));
+    let first = |part| readouts(&first_readouts(job, part), frame.light);
     if job.scene.room.is_some() && job.transport != Transport::Direct {
         write!(text, "#if (Indirect)\n{}#else\n{}#end\n", first(Light::Indirect), first(Light::Direct)).ok();
     } else {
@@ -277,7 +285,7 @@ fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame) 
         matrix.join(", ")
     )
     .ok();
-    let candela = candela(luminaire) * frame.scale * frame.scale;
+    let candela = candela(luminaire) * frame.scale * frame.scale * frame.light;
     let place = |part: &Part| vector(frame.point(luminaire.position_m + axes * part.offset_m));
     let instances = |points: usize| -> String {
         let line = |part: &Part| format!("Luminaire({}, {})\n", place(part), candela * part.share);

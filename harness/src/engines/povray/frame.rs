@@ -9,6 +9,7 @@ use luminaire::scene::Shape;
 
 use crate::engines::Job;
 
+use super::export::candela;
 use super::settings::Recentring;
 
 /// From metres of the spec to units of the scene: (p - centre) scale.
@@ -18,13 +19,15 @@ pub(super) struct Frame {
     pub(super) centre_m: DVec3,
     /// Scene units a metre; intensities grow with its square, so that lux stay lux.
     pub(super) scale: f64,
+    /// Units of the scene's light a lux: 1 unless lux are so many or so few that POV-Ray would cut them off.
+    pub(super) light: f64,
 }
 
 impl Frame {
     /// The frame of a job.
     pub(super) fn of(job: &Job, recentring: Recentring) -> Self {
         if recentring == Recentring::Off {
-            return Self { centre_m: DVec3::ZERO, scale: 1.0 };
+            return Self { centre_m: DVec3::ZERO, scale: 1.0, light: 1.0 };
         }
         let (low, high) = match job.scene.room {
             Some(room) => (DVec3::ZERO, room.size_m),
@@ -32,12 +35,13 @@ impl Frame {
         };
         let size_m = (high - low).max_element();
         let centre_m = low.midpoint(high);
-        let metres = Self { centre_m, scale: 1.0 };
+        let light = light(job, size_m);
+        let metres = Self { centre_m, scale: 1.0, light };
         let handy = (1.0..=200.0).contains(&size_m) || size_m <= 0.0;
         // Meters that need room for their discs get it by the scale of everything else.
         let free =
             seats(job, metres).iter().zip(&job.stations).all(|(seat, s)| *seat == metres.point(s.meter.position_m));
-        if handy && free { metres } else { Self { centre_m, scale: LARGE / size_m.max(f64::MIN_POSITIVE) } }
+        if handy && free { metres } else { Self { centre_m, scale: LARGE / size_m.max(f64::MIN_POSITIVE), light } }
     }
 
     /// A point of the spec in scene units.
@@ -48,6 +52,19 @@ impl Frame {
 
 /// Extent in units of a scene that is scaled, so large that POV-Ray's absolute tolerances and ours vanish in it.
 const LARGE: f64 = 1000.0;
+
+/// Illuminances that POV-Ray's bounds of brightness do no harm to, in lux.
+const HANDY_LX: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
+
+/// A power of ten that brings the illuminance to be expected across a scene near 1; 1 where it is handy as it is.
+///
+/// POV-Ray drops what is dimmer than `adc_bailout` and loses reflected light of 1e9 lx.
+fn light(job: &Job, size_m: f64) -> f64 {
+    let candela: f64 = job.scene.luminaires.iter().map(candela).sum();
+    let expected_lx = candela / (size_m * size_m);
+    let handy = HANDY_LX.contains(&expected_lx) || !(expected_lx.is_normal());
+    if handy { 1.0 } else { 10_f64.powi(-(expected_lx.log10().round() as i32)) }
+}
 
 fn extent_m(job: &Job) -> (DVec3, DVec3) {
     let meters = job.stations.iter().map(|s| s.meter.position_m);

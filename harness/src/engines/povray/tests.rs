@@ -112,6 +112,33 @@ fn direct_light_of_s1_is_exact_to_1e_6_and_within_its_bound() {
 }
 
 #[test]
+fn light_of_any_amount_in_rooms_of_any_size_is_read() {
+    let (bright, dim) = (s1(Transport::Direct), in_eight_blocks(s1(INDIRECT), 20));
+    let plain = read(&dim);
+    for (flux, size) in [(1e10, 1.0), (1e-11, 1.0), (1.0, 1e6), (1.0, 1e-6)] {
+        let changed = |job: &Job| {
+            let mut job = job.clone();
+            let room = job.scene.room.as_mut().unwrap();
+            room.size_m *= size;
+            for lamp in &mut job.scene.luminaires {
+                lamp.flux_scale *= flux;
+                lamp.position_m *= size;
+            }
+            job.stations.iter_mut().for_each(|s| s.meter.position_m *= size);
+            job
+        };
+        let times = flux / (size * size);
+        let exact = S1_DIRECT_LX.map(|lx| times * lx);
+        let direct = read(&changed(&bright));
+        assert!(worst_relative(&direct, &exact) < 1e-5, "{flux:e} {size:e}: {direct:?}");
+        // The same rays, but for the rounding of where they start.
+        let indirect = read(&changed(&dim));
+        let expected: Vec<f64> = plain.estimates.iter().map(|e| times * e.value_lx).collect();
+        assert!(worst_relative(&indirect, &expected) < 0.1, "{flux:e} {size:e}: {indirect:?} {expected:?}");
+    }
+}
+
+#[test]
 fn turned_asymmetric_luminaires_are_read_back_over_the_full_grid() {
     let c_deg: Vec<f64> = (0..24).map(|k| 15.0 * f64::from(k)).collect();
     let gamma_deg: Vec<f64> = (0..=36).map(|k| 5.0 * f64::from(k)).collect();
