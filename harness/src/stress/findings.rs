@@ -246,8 +246,12 @@ impl LawReport {
             self.known = record.iter().filter(|k| broken().any(|p| explains(k, p))).map(|k| cause(&k)).collect();
         }
         let is_gone = |k: &&&KnownBreak| {
+            // Noise as large as what is on record hides it.
+            let is_fine = |p: &PointReport| {
+                p.how.is_none() && !p.refused && p.noise.is_none_or(|noise| k.relative.is_none_or(|most| noise < most))
+            };
             let mut there = self.points.iter().filter(|p| p.magnitude == k.from && p.tried).peekable();
-            there.peek().is_some() && there.all(|p| p.how.is_none() && !p.refused)
+            there.peek().is_some() && there.all(is_fine)
         };
         self.gone = record.iter().filter(is_gone).map(|k| cause(&k)).collect();
     }

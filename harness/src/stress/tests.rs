@@ -148,6 +148,20 @@ fn what_is_on_record_is_told_as_known_and_what_is_gone_as_gone() {
 }
 
 #[test]
+fn the_record_names_laws_magnitudes_and_ways_that_there_are() {
+    let record = crate::diff::KnownDeviations::built_in().unwrap();
+    assert!(!record.breaks().is_empty());
+    let ways = [How::Drift, How::SilentLoss, How::Nan, How::Crash, How::Hang].map(How::name);
+    let engines: Vec<String> = crate::engines::all().iter().map(|e| e.id().name().to_owned()).collect();
+    for known in record.breaks() {
+        let law = laws::find(&known.law).unwrap_or_else(|| panic!("no law {}", known.law));
+        assert!(law.magnitudes.contains(&known.from), "{known:?}");
+        assert!(ways.contains(&known.how.as_str()) && engines.contains(&known.engine), "{known:?}");
+        assert_eq!(known.relative.is_none(), ["hang", "crash", "nan"].contains(&known.how.as_str()), "{known:?}");
+    }
+}
+
+#[test]
 fn a_run_cut_short_goes_on_where_it_stopped() {
     let folder = tempfile::tempdir().unwrap();
     let nothing = stressed(folder.path(), &["mirror"], Duration::ZERO);

@@ -12,8 +12,8 @@ use crate::simulator::quadrature::Gauss;
 /// Dyadic intervals whose interpolation matrices are kept.
 const KEPT_INTERVALS: usize = 128;
 
-/// Nodes along an element at most.
-const MOST_NODES: usize = 16;
+/// As many nodes or points along an element as any effort asks for.
+pub(super) const MOST: usize = 12;
 
 /// A surface of the room, numbered by axis and end: `2 * axis + 1` lies at the far end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -193,7 +193,7 @@ impl Grid {
     /// Shares flux at a point of a face out among the nodes of the element there, as their polynomials weigh it.
     pub(super) fn deposit(&self, face: Face, point_m: DVec3, flux: f64, at_nodes: &mut [f64]) {
         let (_, u, v) = face.axes();
-        let mut values = [[0.0; MOST_NODES]; 2];
+        let mut values = [[0.0; MOST]; 2];
         let [first_u, first_v] = [0, 1].map(|k| {
             let axis = [u, v][k];
             let number = self.axes[axis].element_at(point_m[axis]);

@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use super::grid::{Axis, Element, Face, Grid, dyadic};
+use super::grid::{Axis, Element, Face, Grid, MOST, dyadic};
 
 /// Elements at least this many half-widths away are far.
 ///
@@ -18,8 +18,6 @@ const NEAR: f64 = 2.0123;
 const TIE: f64 = 1.000_123;
 /// Parts smaller than this fraction of the room are not halved further.
 const SMALLEST: f64 = 1e-13;
-/// As many nodes or points along an element as any effort asks for.
-const MOST: usize = 12;
 
 /// A receiving element: where it is, where it faces, and on which surface it lies, if any.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -237,7 +235,6 @@ impl Panel<'_> {
         match (self.grid.order, self.grid.near.nodes.len()) {
             (2, 4) => self.add_part_of((2, 4), u, v, block, stride),
             (4, 4) => self.add_part_of((4, 4), u, v, block, stride),
-            (5, 5) => self.add_part_of((5, 5), u, v, block, stride),
             (5, 6) => self.add_part_of((5, 6), u, v, block, stride),
             (6, 8) => self.add_part_of((6, 8), u, v, block, stride),
             (8, 8) => self.add_part_of((8, 8), u, v, block, stride),
