@@ -14,6 +14,8 @@
 //! Invariants: SI and `f64` inside; degrees in files, radians in arithmetic; the simulator and the calculators
 //! never import each other, so that each can bear witness against the other.
 
+#![warn(missing_docs)]
+
 pub mod calculators;
 pub mod geometry;
 pub mod photometry;

@@ -8,9 +8,9 @@ use std::io::Write;
 use std::sync::OnceLock;
 
 use divan::Bencher;
-use luxproof::diff::{Basis, Verdict};
-use luxproof::history::{Entry, History, changes};
-use luxproof::reading::Quantity;
+use luxproof::judge::{Basis, Verdict};
+use luxproof::record::Quantity;
+use luxproof::trend::history::{Entry, History, changes};
 
 const NIGHTS: u64 = 365;
 const COMPARISONS: u64 = 2000;

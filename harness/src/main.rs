@@ -13,7 +13,7 @@ fn main() -> ExitCode {
     let level = ["warn", "info", "debug", "trace"][usize::from(cli.verbosity()).min(3)];
     let filter = EnvFilter::new(format!("luxproof={level}"));
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
-    if let Err(error) = ctrlc::set_handler(luxproof::process::interrupt) {
+    if let Err(error) = ctrlc::set_handler(luxproof::system::process::interrupt) {
         tracing::warn!(%error, "Ctrl-C will not stop renderers in order");
     }
     let exit = cli.run().unwrap_or_else(|error| {

@@ -39,7 +39,7 @@ fn read(engine: &str, procedure: &str, budget: Budget, settings: &[(&str, u32)])
         log,
         jobs: 2,
         limit: Duration::from_secs(300),
-        peak: luxproof::process::PeakMemory::default(),
+        peak: luxproof::system::process::PeakMemory::default(),
     };
     (engine.read(&job, &bench).unwrap().estimates, declared)
 }

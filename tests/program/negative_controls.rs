@@ -7,11 +7,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
-use luxproof::diff::{Comparison, Judge, KnownDeviations, Tolerances, Verdict};
+use luxproof::audit::run::{Machine, Options, Progress, run};
 use luxproof::engines::Site;
+use luxproof::judge::{Comparison, Judge, KnownDeviations, Tolerances, Verdict};
 use luxproof::plan::{Selection, plan};
-use luxproof::reading::Recording;
-use luxproof::run::{Machine, Options, Progress, run};
+use luxproof::record::Recording;
 use luxproof::spec::Case;
 
 struct Silent;
@@ -36,7 +36,7 @@ fn recordings(case: &Case, engine: &str) -> Vec<Recording> {
     let plan = plan(case, &selection(engine), &site).unwrap();
     let options = Options { site, out: out.path().to_owned(), machine: Machine::new(2), cache: None };
     let outcome = run(case, &plan, &options, &Silent).unwrap();
-    let mine: Vec<Recording> = outcome.recordings.into_iter().filter(|r| r.engine == engine).collect();
+    let mine: Vec<Recording> = outcome.recordings.into_iter().filter(|r| r.key.engine == engine).collect();
     assert!(!mine.is_empty(), "{engine} did not run; run `luxproof engines install`");
     mine
 }
@@ -60,14 +60,15 @@ fn judged(truth: &Case, exported: &Case, engine: &str) -> Vec<Comparison> {
     let subject = recordings(exported, engine);
     let plan = plan(truth, &selection(engine), &Site::of_user().unwrap()).unwrap();
     let of_task = |task: &luxproof::procedures::Task| {
-        let both: Vec<&Recording> = witness.iter().chain(&subject).filter(|r| r.procedure == task.procedure).collect();
+        let both: Vec<&Recording> =
+            witness.iter().chain(&subject).filter(|r| r.key.procedure == task.procedure).collect();
         judge.compare(task, &both)
     };
-    plan.tasks.iter().flat_map(of_task).filter(|c| c.engine == engine).collect()
+    plan.tasks.iter().flat_map(of_task).filter(|c| c.key.engine == engine).collect()
 }
 
 fn failed(comparisons: &[Comparison], procedure: &str) -> usize {
-    comparisons.iter().filter(|c| c.procedure == procedure && c.verdict == Verdict::Fail).count()
+    comparisons.iter().filter(|c| c.key.procedure == procedure && c.verdict == Verdict::Fail).count()
 }
 
 fn wrong_exports_fail(engine: &str) {

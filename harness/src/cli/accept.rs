@@ -7,8 +7,8 @@ use clap::Args;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::views::read_report;
-use crate::baseline::{Baseline, Comparability, Decision, State, compare, review};
 use crate::report::{Exit, Report};
+use crate::trend::baseline::{Baseline, Comparability, Decision, State, compare, review};
 
 /// Where baselines are kept unless something else is said.
 const FOLDER: &str = "baselines";
@@ -49,8 +49,8 @@ pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
             return Err(miette::miette!(help = "say why these readings are right", "an empty reason"));
         }
         Some(reason) => {
-            let open = |e: &&crate::baseline::Entry| {
-                let change = changes.entries.iter().find(|c| e.key() == (&c.case, &c.procedure, &c.engine));
+            let open = |e: &&crate::trend::baseline::Entry| {
+                let change = changes.entries.iter().find(|c| e.key == c.key);
                 change.is_none_or(|c| c.state != State::Unchanged)
             };
             let accepted = candidates.iter().filter(open).map(|e| e.accepted_for(reason.trim(), &now)).collect();
@@ -76,11 +76,11 @@ pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
 }
 
 /// What may become a baseline: runs that gave readings, all of them finite.
-fn sound(candidate: Baseline) -> Vec<crate::baseline::Entry> {
-    let is_sound = |e: &crate::baseline::Entry| {
+fn sound(candidate: Baseline) -> Vec<crate::trend::baseline::Entry> {
+    let is_sound = |e: &crate::trend::baseline::Entry| {
         let sound = !e.readings.is_empty() && e.readings.iter().all(|r| r.value.is_finite() && r.value >= 0.0);
         if !sound {
-            eprintln!("{} {} of {}: without sound readings, never accepted", e.engine, e.procedure, e.case);
+            eprintln!("{} {} of {}: without sound readings, never accepted", e.key.engine, e.key.procedure, e.key.case);
         }
         sound
     };

@@ -8,13 +8,14 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::diagnose;
 use super::measuring::{self, Bar};
-use crate::bench::{self, BenchReport, Knobs, Options, Progress};
 use crate::engines::Site;
+use crate::experiments::bench::{self, BenchReport, Knobs, Options, Progress};
 use crate::measure::Shelf;
-use crate::process;
+use crate::record::ProcedureId;
 use crate::report::Exit;
-use crate::run;
-use crate::spec::{Procedures, suite};
+use crate::spec::suite;
+use crate::system::files;
+use crate::system::process;
 
 #[derive(Debug, Args)]
 pub(super) struct BenchArgs {
@@ -26,7 +27,7 @@ pub(super) struct BenchArgs {
     engines: Vec<String>,
     /// Procedures to bench, by name [default: all of the spec but luminous intensity]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
-    procedures: Vec<String>,
+    procedures: Vec<ProcedureId>,
     /// Readings a rung, each with a seed of its own
     #[arg(long, default_value_t = 3, value_name = "N")]
     repetitions: usize,
@@ -74,9 +75,6 @@ impl Progress for Bar {
 
 /// Benches every case and prints one report over all.
 pub(super) fn run(args: &BenchArgs, site: &Site) -> Result<Exit, Diagnostic> {
-    if let Some(odd) = args.procedures.iter().find(|p| !Procedures::NAMES.contains(&p.as_str())) {
-        return Err(miette::miette!("there is no procedure `{odd}`; there are {}", Procedures::NAMES.join(", ")));
-    }
     if !args.seconds.iter().chain([&args.minutes]).all(|s| s.is_finite() && *s >= 0.0) || args.seconds.is_empty() {
         return Err(miette::miette!("--seconds and --minutes must be numbers from 0"));
     }
@@ -100,7 +98,7 @@ pub(super) fn run(args: &BenchArgs, site: &Site) -> Result<Exit, Diagnostic> {
         bench::bench(case, &subjects, &options, &bar, &mut report);
     }
     drop(bar);
-    run::keep(&folder.join("bench.json"), &report).into_diagnostic()?;
+    files::keep_json(&folder.join("bench.json"), &report).into_diagnostic()?;
     for format in &args.format {
         let text = match format {
             BenchFormat::Terminal => report.terminal(),

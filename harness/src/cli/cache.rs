@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 use etcetera::BaseStrategy;
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
-use crate::cache::Cache;
+use crate::measure::cache::Cache;
 use crate::report::Exit;
 
 #[derive(Debug, Args)]

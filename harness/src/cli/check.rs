@@ -41,14 +41,14 @@ pub(super) fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
                 writeln!(
                     out,
                     "    run  {:<10} at most about {:.0} s{note}",
-                    engine.engine.id(),
+                    engine.engine.name(),
                     left(run) * cost_s(engine.engine.as_ref(), case.budget)
                 )
                 .into_diagnostic()?;
             }
-            for skip in plan.skips.iter().filter(|s| s.procedure == task.procedure) {
+            for skip in plan.skips.iter().filter(|s| s.key.procedure == task.procedure) {
                 let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
-                writeln!(out, "    skip {:<10} {}{saved}", skip.engine, skip.reason).into_diagnostic()?;
+                writeln!(out, "    skip {:<10} {}{saved}", skip.key.engine, skip.reason).into_diagnostic()?;
             }
         }
         let absent = plan.engines.iter().any(|p| p.asked == Asked::ByName && p.is_absent());

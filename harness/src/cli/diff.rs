@@ -8,8 +8,8 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::accept::read_run;
 use super::print;
-use crate::baseline::{Baseline, Changes, Comparability, EntryChange, MeterChange, State, compare};
 use crate::report::{BaselineCheck, BaselineLine, Exit};
+use crate::trend::baseline::{Baseline, Changes, Comparability, EntryChange, MeterChange, State, compare};
 
 #[derive(Debug, Args)]
 pub(super) struct DiffArgs {
@@ -43,8 +43,16 @@ pub(super) fn diff(args: &DiffArgs) -> Result<Exit, Diagnostic> {
 pub(super) fn text(changes: &Changes) -> String {
     let mut text = String::new();
     for entry in &changes.entries {
-        writeln!(text, "{:<9} {} {} {}{}", name(entry.state), entry.case, entry.procedure, entry.engine, mean(entry))
-            .ok();
+        writeln!(
+            text,
+            "{:<9} {} {} {}{}",
+            name(entry.state),
+            entry.key.case,
+            entry.key.procedure,
+            entry.key.engine,
+            mean(entry)
+        )
+        .ok();
         for detail in details(entry) {
             writeln!(text, "            {detail}").ok();
         }
@@ -72,9 +80,7 @@ pub(super) fn check(changes: &Changes, file: &Path) -> BaselineCheck {
         let mean = mean(entry);
         let mean = mean.strip_prefix(": ").map(str::to_owned);
         BaselineLine {
-            case: entry.case.clone(),
-            procedure: entry.procedure.clone(),
-            engine: entry.engine.clone(),
+            key: entry.key.clone(),
             state: name(entry.state).to_owned(),
             is_as_accepted: entry.state == State::Unchanged,
             details: mean.into_iter().chain(details(entry)).collect(),

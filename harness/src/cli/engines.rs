@@ -5,14 +5,15 @@ use std::collections::BTreeMap;
 use clap::{Args, Subcommand};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
-use crate::diff::Tolerances;
-use crate::doctor;
-use crate::engines::calibration::{self, Calibrated, Earlier};
-use crate::engines::{self, EngineId, InstallState, Site};
-use crate::process;
+use crate::audit::doctor;
+use crate::calibration::{self, Calibrated, Earlier};
+use crate::engines::{self, InstallState, Site};
+use crate::judge::Tolerances;
+use crate::record::EngineName;
 use crate::report::Exit;
-use crate::slots::Slots;
 use crate::spec::suggestion;
+use crate::system::process;
+use crate::system::slots::Slots;
 
 #[derive(Debug, Args)]
 pub(super) struct EnginesArgs {
@@ -41,8 +42,8 @@ pub(super) fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Di
         EnginesAction::List => {
             for engine in engines::all() {
                 match engine.probe(site) {
-                    Ok(version) => println!("{:<10} {}", engine.id(), version.0),
-                    Err(absent) => println!("{:<10} absent: {absent}", engine.id()),
+                    Ok(version) => println!("{:<10} {}", engine.name(), version.0),
+                    Err(absent) => println!("{:<10} absent: {absent}", engine.name()),
                 }
             }
             println!("engines are kept in {}", site.root().display());
@@ -50,8 +51,8 @@ pub(super) fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Di
         }
         EnginesAction::Install { names } => {
             known_engines(&names)?;
-            let wanted = engines::all().into_iter().map(|e| e.id());
-            let wanted = wanted.filter(|e| names.is_empty() || names.iter().any(|n| n == e.name()));
+            let wanted = engines::all().into_iter().map(|e| e.name());
+            let wanted = wanted.filter(|e| names.is_empty() || names.iter().any(|n| e.as_str() == n));
             Ok(report_installation(site, &wanted.collect::<Vec<_>>()))
         }
         EnginesAction::Doctor { names } => {
@@ -65,7 +66,7 @@ fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
     let tolerances = Tolerances::built_in().into_diagnostic()?;
     let mut exit = Exit::Passed;
     for engine in engines::all() {
-        if names.is_empty() || names.iter().any(|n| n == engine.id().name()) {
+        if names.is_empty() || names.iter().any(|n| engine.name() == *n) {
             let finding = doctor::examine(engine.as_ref(), site, &tolerances);
             println!("{} {:<10} {}", if finding.healthy { "ok  " } else { "FAIL" }, finding.engine, finding.text);
             exit = exit.worse(if finding.healthy { Exit::Passed } else { Exit::Engine });
@@ -78,7 +79,7 @@ fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
 /// Measures an engine's calibration again, keeps it and prints it.
 fn calibrate_anew(engine: &dyn engines::Engine, site: &Site) -> Exit {
     let Ok(version) = engine.probe(site) else { return Exit::Passed };
-    if crate::plan::REFERENCES.contains(&engine.id().name()) {
+    if engine.is_witness() {
         return Exit::Passed;
     }
     match calibration::calibrate(
@@ -90,19 +91,19 @@ fn calibrate_anew(engine: &dyn engines::Engine, site: &Site) -> Exit {
         Earlier::Ignored,
     ) {
         Ok(found) => {
-            println!("     {:<10} {}", engine.id(), calibration_line(&found));
+            println!("     {:<10} {}", engine.name(), calibration_line(&found));
             Exit::Passed
         }
         Err(error) => {
-            println!("FAIL {:<10} {error}", engine.id());
+            println!("FAIL {:<10} {error}", engine.name());
             Exit::Engine
         }
     }
 }
 
 pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
-    let known: Vec<EngineId> = engines::all().iter().map(|e| e.id()).collect();
-    let known: Vec<&str> = known.iter().map(EngineId::name).collect();
+    let known: Vec<EngineName> = engines::all().iter().map(|e| e.name()).collect();
+    let known: Vec<&str> = known.iter().map(EngineName::as_str).collect();
     for name in names {
         if !known.contains(&name.as_str()) {
             let help = suggestion(name, known.iter().copied());
@@ -112,7 +113,7 @@ pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
     Ok(())
 }
 
-pub(super) fn report_installation(site: &Site, wanted: &[EngineId]) -> Exit {
+pub(super) fn report_installation(site: &Site, wanted: &[EngineName]) -> Exit {
     let outcomes = engines::install(site, wanted, |step| eprintln!("{step}"));
     for outcome in &outcomes {
         eprintln!("{}: {}", outcome.component, outcome.detail);

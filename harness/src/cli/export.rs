@@ -8,6 +8,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 use super::diagnostic::diagnose;
 use crate::engines::{self, Site};
 use crate::plan::{Selection, plan};
+use crate::record::ProcedureId;
 use crate::report::Exit;
 use crate::spec::{Case, suite};
 
@@ -23,7 +24,7 @@ pub(super) struct ExportArgs {
     out: PathBuf,
     /// Procedures to export, by name [default: all of the spec]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
-    procedures: Vec<String>,
+    procedures: Vec<ProcedureId>,
 }
 
 pub(super) fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic> {
@@ -45,7 +46,7 @@ fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Resul
     let selection =
         Selection { engines: vec![args.engine.clone()], procedures: args.procedures.clone(), ..Selection::default() };
     let plan = plan(case, &selection, site).map_err(diagnose)?;
-    let chosen = |e: usize| plan.engines[e].engine.id().name() == args.engine;
+    let chosen = |e: usize| plan.engines[e].engine.name() == args.engine;
     let mut exported = 0;
     // An export needs no installed engine: what is skipped for absence is exported all the same.
     for (e, planned) in plan.engines.iter().enumerate().filter(|(e, _)| chosen(*e)) {
@@ -56,7 +57,7 @@ fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Resul
                 continue;
             }
             let files = planned.engine.export(&job).into_diagnostic()?;
-            let folder = out.join(task.procedure);
+            let folder = out.join(task.procedure.name());
             std::fs::create_dir_all(&folder).into_diagnostic()?;
             for file in &files {
                 let path = folder.join(&file.name);

@@ -6,8 +6,8 @@ use clap::{Args, Subcommand};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::views::read_report;
-use crate::history::{History, add, changes, entries, site};
 use crate::report::Exit;
+use crate::trend::history::{History, add, changes, entries, site};
 
 #[derive(Debug, Args)]
 pub(super) struct HistoryArgs {

@@ -18,14 +18,14 @@ pub(super) fn subjects(names: &[String], site: &Site) -> Result<Vec<Subject>, Di
     known_engines(names)?;
     let mut present = vec![];
     for engine in engines::all() {
-        let is_named = names.iter().any(|n| n == engine.id().name());
+        let is_named = names.iter().any(|n| engine.name() == *n);
         if !names.is_empty() && !is_named {
             continue;
         }
         match engine.probe(site) {
             Ok(version) => present.push(Subject { engine, version: version.0 }),
-            Err(absent) if is_named => return Err(miette::miette!("{}: {absent}", engine.id())),
-            Err(absent) => eprintln!("{}: {absent}", engine.id()),
+            Err(absent) if is_named => return Err(miette::miette!("{}: {absent}", engine.name())),
+            Err(absent) => eprintln!("{}: {absent}", engine.name()),
         }
     }
     Ok(present)

@@ -10,6 +10,7 @@ mod engines;
 mod export;
 mod history;
 mod measuring;
+pub(crate) mod photometry;
 mod progress;
 mod run_specs;
 mod sampling;
@@ -23,9 +24,10 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
+use self::photometry::PhotometryArgs;
 use crate::engines::{ExternalJob, ExternalReadings, Site};
-use crate::photometry_command::{self, PhotometryArgs};
 use crate::plan::{Selection, Skipping};
+use crate::record::ProcedureId;
 use crate::report::{Exit, Report};
 use crate::spec::Spec;
 
@@ -90,7 +92,7 @@ struct Selected {
     engines: Vec<String>,
     /// Procedures to run, by name [default: all of the spec]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
-    procedures: Vec<String>,
+    procedures: Vec<ProcedureId>,
     /// Only cases whose name matches: a glob, or a part of the name; may be given several times [default: all]
     #[arg(long, value_name = "PATTERN")]
     filter: Vec<String>,
@@ -177,7 +179,7 @@ impl Cli {
             Command::Check(args) => check::check(&args, &site),
             Command::Export(args) => export::export(&args, &site),
             Command::Engines(args) => engines::manage_engines(&args, &site),
-            Command::Photometry(args) => photometry_command::run(&args),
+            Command::Photometry(args) => photometry::run(&args),
             Command::Report(mut args) => {
                 args.views.all |= self.verbose > 0;
                 views::view(&args)

@@ -7,9 +7,11 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::engines::calibration_line;
-use crate::engines::calibration::Calibrated;
-use crate::plan::{Plan, REFERENCES, Run};
-use crate::run;
+use crate::audit::run;
+use crate::calibration::Calibrated;
+use crate::engines::Engine;
+use crate::plan::{Plan, Run};
+use crate::record::ProcedureId;
 
 /// The progress of all cases of a run together, on stderr.
 pub(super) struct Progress {
@@ -19,7 +21,6 @@ pub(super) struct Progress {
     work: Mutex<Work>,
 }
 
-/// The progress of one case.
 pub(super) struct CaseProgress<'a> {
     of: &'a Progress,
     case: String,
@@ -76,7 +77,7 @@ impl Progress {
         let mut work = Work::default();
         for (plan, budget_s) in plans {
             work.jobs += plan.runs.len();
-            let costs = |r: &&Run| !REFERENCES.contains(&plan.engines[r.engine].engine.id().name());
+            let costs = |r: &&Run| !plan.engines[r.engine].engine.is_witness();
             work.budget_s += budget_s * plan.runs.iter().filter(costs).count() as f64;
         }
         let is_terminal = std::io::stderr().is_terminal();
@@ -121,11 +122,11 @@ impl run::Progress for CaseProgress<'_> {
         self.of.line(&format!("{engine}: calibrated before its first use: {}", calibration_line(found)));
     }
 
-    fn ended(&self, engine: &str, procedure: &str, wall: Duration, failure: Option<&str>) {
-        tracing::info!(engine, procedure, wall_s = wall.as_secs_f64(), "done");
-        let work = self.of.done(if REFERENCES.contains(&engine) { 0.0 } else { self.budget_s });
+    fn ended(&self, engine: &dyn Engine, procedure: ProcedureId, wall: Duration, failure: Option<&str>) {
+        let name = format!("{}: {}: {procedure}", self.case, engine.name());
+        tracing::info!(wall_s = wall.as_secs_f64(), "{name} is done");
+        let work = self.of.done(if engine.is_witness() { 0.0 } else { self.budget_s });
         self.of.bar.inc(1);
-        let name = format!("{}: {engine}: {procedure}", self.case);
         match failure {
             Some(failure) => self.of.line(&format!("{name} failed: {failure}")),
             None if self.of.is_terminal => (),

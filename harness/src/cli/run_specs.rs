@@ -1,6 +1,5 @@
 //! `luxproof run`: every case of the specs, folders and patterns given, one report over all.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Instant, SystemTime};
@@ -14,20 +13,23 @@ use super::engines::report_installation;
 use super::progress::Progress;
 use super::sampling::sample_on;
 use super::views::print_reports;
-use crate::baseline::{self, Baseline, Comparability, Entry};
-use crate::cache::Cache;
+use crate::audit::run;
+use crate::audit::sequential;
 use crate::diagnosis;
-use crate::diff::{Comparison, Consensus, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
-use crate::engines::{self, EngineId, Site};
+use crate::engines::{self, Site};
+use crate::judge::{Comparison, Consensus, Judge, KnownDeviations, Published, PublishedTable, Split, Tolerances};
+use crate::measure::Machine;
+use crate::measure::cache::Cache;
 use crate::plan::{Asked, Plan, Planner, Scope, Skip};
 use crate::procedures::Task;
-use crate::process;
-use crate::reading::Recording;
+use crate::record::Status;
+use crate::record::{EngineName, Recording};
 use crate::report::{self, BaselineCheck, Exit, Ingredients, Report, SpecRecord};
-use crate::run::{self, Machine, Status};
-use crate::sequential;
-use crate::slots::side_by_side;
 use crate::spec::{Case, filtered, suite};
+use crate::system::files;
+use crate::system::process;
+use crate::system::slots::side_by_side;
+use crate::trend::baseline::{self, Baseline, Comparability, Entry};
 
 /// Runs all cases, judges and prints.
 pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Diagnostic> {
@@ -45,10 +47,10 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
     };
     let mut plans = planned().map_err(diagnose)?;
     if args.install {
-        let names: Vec<EngineId> = engines::all().iter().map(|e| e.id()).collect();
+        let names: Vec<EngineName> = engines::all().iter().map(|e| e.name()).collect();
         let wanted = names
             .into_iter()
-            .filter(|n| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| w == n.name()));
+            .filter(|n| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| n == w));
         report_installation(site, &wanted.collect::<Vec<_>>());
         // With what is there now.
         plans = planned().map_err(diagnose)?;
@@ -69,7 +71,7 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
         let folder = if cases.len() == 1 { root.clone() } else { root.join(within(&root, case)) };
         let stopped = stop.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let report = run_case(case, plan, tables.published[k].as_ref(), &suite, stopped.as_ref(), &folder)?;
-        let named = |id: &str| plan.engines.iter().any(|p| p.engine.id().name() == id && p.asked == Asked::ByName);
+        let named = |id: &str| plan.engines.iter().any(|p| p.engine.name() == id && p.asked == Asked::ByName);
         let exit = report.exit(named);
         let mut stop = stop.lock().unwrap_or_else(PoisonError::into_inner);
         if process::is_interrupted() {
@@ -95,7 +97,7 @@ pub(super) fn run_specs(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Ex
         report.baseline = Some(check);
     }
     if cases.len() > 1 || report.baseline.is_some() {
-        run::keep(&root.join("report.json"), &report).into_diagnostic()?;
+        files::keep_json(&root.join("report.json"), &report).into_diagnostic()?;
     }
     print_reports(&[(report, root)], &args.views)?;
     Ok(exit)
@@ -107,11 +109,11 @@ fn hold_against_baseline(report: &Report, path: &Path, root: &Path) -> Result<Ba
     let kept = if place.exists() { Baseline::read(&place).into_diagnostic()?.entries } else { vec![] };
     let candidate = Baseline::candidate(report);
     // What was not asked of this run is not missed in it.
-    let skipped = report.skips.iter().map(|s| (s.case.as_str(), s.procedure.as_str(), s.engine.as_str()));
-    let asked: Vec<_> = candidate.entries.iter().map(Entry::key).chain(skipped).collect();
-    let kept: Vec<Entry> = kept.into_iter().filter(|e| asked.contains(&e.key())).collect();
+    let skipped = report.skips.iter().map(|s| &s.key);
+    let asked: Vec<_> = candidate.entries.iter().map(|e| &e.key).chain(skipped).collect();
+    let kept: Vec<Entry> = kept.into_iter().filter(|e| asked.contains(&&e.key)).collect();
     let changes = baseline::compare(&kept, &candidate.entries, Comparability::SameInstrument);
-    run::keep(&root.join("baseline-changes.json"), &changes).into_diagnostic()?;
+    files::keep_json(&root.join("baseline-changes.json"), &changes).into_diagnostic()?;
     let check = super::diff::check(&changes, &place);
     if !check.is_as_accepted() {
         let file = root.join("baseline-candidate.json");
@@ -268,21 +270,10 @@ fn run_case(
         consensus,
         published: tables,
         curves: plan.tasks.iter().flat_map(|task| report::curves(&case.name, task)).collect(),
-        commands: commands(plan, suite.site),
     };
     let report = Report::new(ingredients, comparisons);
-    run::keep(&folder.join("report.json"), &report).into_diagnostic()?;
+    files::keep_json(&folder.join("report.json"), &report).into_diagnostic()?;
     Ok(report)
-}
-
-/// What repeats each run of a plan by hand.
-fn commands(plan: &Plan, site: &Site) -> BTreeMap<(String, String), String> {
-    let of = |run: &crate::plan::Run| {
-        let engine = &plan.engines[run.engine].engine;
-        let command = engine.command_by_hand(&run.job, site)?;
-        Some(((plan.tasks[run.task].procedure.to_owned(), engine.id().name().to_owned()), command))
-    };
-    plan.runs.iter().filter_map(of).collect()
 }
 
 /// What follows from the recordings of a case.
@@ -299,7 +290,7 @@ fn judged(case: &Case, plan: &Plan, recordings: &[Recording], judge: &Judge<'_>)
     let mut judged = Judged::default();
     for task in &plan.tasks {
         let task: &Task = task;
-        let mine: Vec<&Recording> = recordings.iter().filter(|r| r.procedure == task.procedure).collect();
+        let mine: Vec<&Recording> = recordings.iter().filter(|r| r.key.procedure == task.procedure).collect();
         let mut comparisons = judge.compare(task, &mine);
         diagnosis::diagnose(task, &mut comparisons);
         sequential::tell_the_price(&mut comparisons, &mine);

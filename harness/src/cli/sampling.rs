@@ -4,13 +4,15 @@ use std::path::Path;
 
 use clap::ValueEnum;
 
-use crate::diff::Judge;
+use crate::audit::run::Outcome;
+use crate::audit::sequential::{self, Ask, Sampler};
 use crate::engines::Measurement;
-use crate::plan::{Plan, Planned, REFERENCES, Run};
-use crate::reading::Recording;
-use crate::run::{self, Outcome, Reader, RunError, Source};
-use crate::sequential::{self, Ask, Sampler};
+use crate::judge::Judge;
+use crate::measure::{Reader, Source};
+use crate::plan::{Plan, Planned, Run};
+use crate::record::Recording;
 use crate::spec::Case;
+use crate::system::files::{self, FileError};
 
 /// When sampling stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -29,9 +31,9 @@ impl Sampling {
             return;
         }
         for run in &mut plan.runs {
-            let engine = plan.engines[run.engine].engine.id();
-            if !REFERENCES.contains(&engine.name()) {
-                let tolerance = judge.tolerance(&plan.tasks[run.task], engine.name());
+            let engine = plan.engines[run.engine].engine.name();
+            if !plan.engines[run.engine].engine.is_witness() {
+                let tolerance = judge.tolerance(&plan.tasks[run.task], engine.as_str());
                 run.job.budget = sequential::first_look(run.job.budget, tolerance.relative);
                 run.shortcut.job.budget = run.job.budget;
             }
@@ -47,17 +49,18 @@ pub(super) fn sample_on(
     reader: &Reader,
     outcome: &mut Outcome,
     told: &dyn Fn(&str),
-) -> Result<(), RunError> {
+) -> Result<(), FileError> {
     for run in &plan.runs {
         let (planned, task) = (&plan.engines[run.engine], &plan.tasks[run.task]);
-        let engine = planned.engine.id();
-        let is_mine = |r: &Recording| r.engine == engine.name() && r.procedure == task.procedure;
-        if REFERENCES.contains(&engine.name()) {
+        let engine = planned.engine.name();
+        let is_mine = |r: &Recording| r.key.engine == engine.as_str() && r.key.procedure == task.procedure;
+        if planned.engine.is_witness() {
             continue;
         }
         let Some(mine) = outcome.recordings.iter().position(is_mine) else { continue };
         let mut subject = outcome.recordings[mine].clone();
-        let others = outcome.recordings.iter().filter(|r| r.procedure == task.procedure && r.engine != engine.name());
+        let others =
+            outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure && r.key.engine != engine.as_str());
         let others: Vec<&Recording> = others.collect();
         let mut looks = Looks { planned, run, reader, told, from_cache: 0 };
         let before_s = subject.wall_s;
@@ -66,18 +69,19 @@ pub(super) fn sample_on(
             subject.notes.extend(sequential::saved(&subject, case.budget));
         }
         outcome.from_cache += looks.from_cache;
-        if let Some(status) = outcome.engines.iter_mut().find(|e| e.id == engine.name()) {
+        if let Some(status) = outcome.engines.iter_mut().find(|e| e.id == engine.as_str()) {
             status.wall_s += subject.wall_s - before_s;
         }
         outcome.recordings[mine] = subject;
-        let of_engine: Vec<&Recording> = outcome.recordings.iter().filter(|r| r.engine == engine.name()).collect();
-        keep(&reader.out, engine.name(), &of_engine)?;
+        let of_engine: Vec<&Recording> =
+            outcome.recordings.iter().filter(|r| r.key.engine == engine.as_str()).collect();
+        keep(&reader.out, engine.as_str(), &of_engine)?;
     }
     Ok(())
 }
 
-fn keep(out: &Path, engine: &str, recordings: &[&Recording]) -> Result<(), RunError> {
-    run::keep(&out.join("readings").join(format!("{engine}.json")), &recordings)
+fn keep(out: &Path, engine: &str, recordings: &[&Recording]) -> Result<(), FileError> {
+    files::keep_json(&out.join("readings").join(format!("{engine}.json")), &recordings)
 }
 
 /// Further looks of one engine at one task: jobs of the undecided stations alone, each with a seed of its own.
@@ -94,7 +98,7 @@ impl Sampler for Looks<'_> {
         let Run { job, .. } = self.run;
         (self.told)(&format!(
             "{}: {} of {} meters of {} are undecided: look {}, {:.0} s at most",
-            self.planned.engine.id(),
+            self.planned.engine.name(),
             ask.targets.len(),
             job.stations.len(),
             job.procedure,

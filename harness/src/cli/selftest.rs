@@ -4,8 +4,8 @@ use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::print;
+use crate::experiments::selftest::{calibrations, selftest};
 use crate::report::Exit;
-use crate::selftest::{calibrations, selftest};
 
 #[derive(Debug, Args)]
 pub(super) struct SelftestArgs {

@@ -8,14 +8,15 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::diagnose;
 use super::measuring::{self, Bar};
-use crate::diff::KnownDeviations;
 use crate::engines::Site;
+use crate::experiments::stress::{self, Coordinates, Options, Progress, StressReport};
+use crate::judge::KnownDeviations;
+use crate::laws;
 use crate::measure::Shelf;
-use crate::process;
 use crate::report::Exit;
-use crate::run;
 use crate::spec::{Budget, Case, suggestion, suite};
-use crate::stress::{self, Coordinates, Options, Progress, StressReport, laws};
+use crate::system::files;
+use crate::system::process;
 
 #[derive(Debug, Args)]
 pub(super) struct StressArgs {
@@ -110,7 +111,7 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
         } else {
             format!("stress-{}.json", case.name.replace('/', "-"))
         };
-        run::keep(&folder.join(name), &report).into_diagnostic()?;
+        files::keep_json(&folder.join(name), &report).into_diagnostic()?;
         reports.push(report);
     }
     super::print(&view(&reports, args.format).into_diagnostic()?)?;

@@ -21,13 +21,11 @@ const MOST_BOUNCES: u32 = 8;
 /// The largest number of a half-precision float.
 const HALF_MAX: f64 = 65504.0;
 
-/// One fault.
 pub struct Fault {
     /// A short name, the same in every task.
     pub id: &'static str,
     /// What went wrong, for people.
     pub what: String,
-    /// What it does.
     pub effect: Effect,
 }
 

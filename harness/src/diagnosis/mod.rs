@@ -8,8 +8,9 @@ mod faults;
 
 use std::collections::BTreeSet;
 
-use crate::diff::{Basis, Comparison, Verdict};
+use crate::judge::{Basis, Comparison, Verdict};
 use crate::procedures::Task;
+use crate::record::EngineName;
 
 pub use faults::{Effect, Fault, faults, truth};
 
@@ -37,9 +38,9 @@ pub struct Cause {
 
 /// Names the cause of failures among one task's comparisons, where one is found.
 pub fn diagnose(task: &Task, comparisons: &mut [Comparison]) {
-    let key = |c: &Comparison| Some((c.engine.clone(), c.reference.as_ref()?.basis));
+    let key = |c: &Comparison| Some((c.key.engine.clone(), c.reference.as_ref()?.basis));
     let failed = comparisons.iter().filter(|c| c.verdict == Verdict::Fail);
-    let groups: BTreeSet<(String, Basis)> = failed.filter_map(key).collect();
+    let groups: BTreeSet<(EngineName, Basis)> = failed.filter_map(key).collect();
     for group in groups {
         // Printed values and calculators are off by more than a renderer's fault.
         if !matches!(group.1, Basis::ClosedForm | Basis::Exact) || group.0 == "iesna" {
@@ -63,7 +64,6 @@ fn named(causes: &[Cause]) -> Option<String> {
 /// Readings beside what they should be.
 #[derive(Clone, Debug)]
 pub struct Readings {
-    /// As read.
     pub read: Vec<f64>,
     /// As they should be.
     pub right: Vec<f64>,
@@ -79,7 +79,9 @@ impl Readings {
             let reference = comparison.reference.as_ref()?;
             readings.read.push(comparison.value.filter(|v| v.is_finite())?);
             readings.right.push(reference.value);
-            readings.uncertainty.push(comparison.std_error.unwrap_or(0.0).hypot(reference.uncertainty));
+            readings
+                .uncertainty
+                .push(comparison.uncertainty.standard_error().unwrap_or(0.0).hypot(reference.uncertainty));
         }
         Some(readings)
     }

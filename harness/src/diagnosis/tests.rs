@@ -5,7 +5,7 @@ use luminaire::scene::{Bounces, Transport};
 use super::*;
 use crate::engines::fixtures;
 use crate::procedures::Target;
-use crate::reading::{MeterId, Quantity};
+use crate::record::{MeterId, Quantity};
 
 fn task(transport: Transport) -> Task {
     let job = fixtures::s1(transport);
@@ -16,7 +16,7 @@ fn task(transport: Transport) -> Task {
         per_lux: 1.0,
     };
     let targets = job.stations.iter().enumerate().map(target).collect();
-    Task { procedure: "test", scene: job.scene, transport, quantity: Quantity::Illuminance, targets }
+    Task { procedure: job.procedure, scene: job.scene, transport, quantity: Quantity::Illuminance, targets }
 }
 
 fn found(task: &Task, right: &[f64], read: Vec<f64>) -> Vec<Cause> {

@@ -14,10 +14,9 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 pub use self::form::{ExternalJob, ExternalReadings};
-use super::{
-    Absent, Engine, EngineError, EngineId, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
-};
-use crate::process::Invocation;
+use super::{Absent, Engine, EngineError, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked};
+use crate::record::{EngineName, ProcedureId, UnknownProcedure};
+use crate::system::process::Invocation;
 
 /// The environment variable that names an empty folder for the adapter's own files, kept with the run.
 const FOLDER_VARIABLE: &str = "LUXPROOF_SCENE_DIR";
@@ -28,11 +27,11 @@ const JOB_FILE: &str = "job.json";
 /// An engine that is a program of the user's.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct External {
-    id: EngineId,
+    id: EngineName,
     /// The program and its arguments, as in the spec.
     command: Vec<String>,
     /// The procedures that it takes part in; `None` for all.
-    procedures: Option<Vec<String>>,
+    procedures: Option<Vec<ProcedureId>>,
     /// The spec's folder, in which it runs.
     folder: PathBuf,
 }
@@ -44,7 +43,7 @@ impl External {
         settings: &BTreeMap<String, serde_json::Value>,
         folder: &Path,
     ) -> Result<Self, EngineError> {
-        let id = EngineId::of_spec(name.to_owned());
+        let id = EngineName::from(name);
         let error = |key: &str, what: &str| EngineError::Setting {
             engine: id.clone(),
             key: key.to_owned(),
@@ -55,13 +54,12 @@ impl External {
             Some(Ok(words)) if words.first().is_some_and(|w| !w.is_empty()) => words,
             _ => return Err(error("command", "must be a list of a program and its arguments")),
         };
-        let procedures = words("procedures")
-            .transpose()
-            .map_err(|_| error("procedures", "must be a list of procedures that it can do"))?;
-        let known = crate::spec::Procedures::NAMES;
-        if let Some(odd) = procedures.iter().flatten().find(|p| !known.contains(&p.as_str())) {
-            return Err(error("procedures", &format!("there is no `{odd}`; there are {}", known.join(", "))));
-        }
+        let wrong = |what: &str| error("procedures", what);
+        let procedures =
+            words("procedures").transpose().map_err(|_| wrong("must be a list of procedures that it can do"))?;
+        let parsed =
+            |names: Vec<String>| names.iter().map(|name| name.parse()).collect::<Result<_, UnknownProcedure>>();
+        let procedures = procedures.map(parsed).transpose().map_err(|unknown| wrong(&unknown.to_string()))?;
         // The name becomes a folder of the run.
         if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
             return Err(error("command", "an engine's name holds letters, digits, - and _ only"));
@@ -97,7 +95,7 @@ impl External {
 }
 
 impl Engine for External {
-    fn id(&self) -> EngineId {
+    fn name(&self) -> EngineName {
         self.id.clone()
     }
 

@@ -8,8 +8,8 @@ use luminaire::geometry::{Reflectances, Room};
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
 
-use super::{Budget, Estimate, Job, Measurement, Station};
-use crate::reading::MeterId;
+use super::{Budget, Job, Measurement, Station};
+use crate::record::{Estimate, MeterId, ProcedureId};
 
 pub(crate) const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
 pub(super) const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
@@ -68,10 +68,19 @@ pub(crate) fn stations(points_m: &[[f64; 3]], normal: DVec3) -> Vec<Station> {
     points_m.iter().enumerate().map(station).collect()
 }
 
+/// The procedure that reads such light.
+pub(crate) const fn procedure_of(transport: Transport) -> ProcedureId {
+    match transport {
+        Transport::Direct => ProcedureId::DirectIlluminance,
+        Transport::Indirect(_) => ProcedureId::IndirectIlluminance,
+        Transport::Total(_) => ProcedureId::TotalIlluminance,
+    }
+}
+
 pub(crate) fn job(scene: Scene, stations: Vec<Station>, transport: Transport) -> Job {
     Job {
         case: "test case".into(),
-        procedure: "test procedure".into(),
+        procedure: procedure_of(transport),
         scene,
         stations,
         transport,
@@ -117,7 +126,7 @@ pub(crate) fn exact_direct_lx(job: &Job) -> Vec<f64> {
 }
 
 pub(crate) fn relative_deviations(measurement: &Measurement, exact: &[f64]) -> Vec<f64> {
-    measurement.estimates.iter().zip(exact).map(|(e, x)| e.value_lx / x - 1.0).collect()
+    measurement.estimates.iter().zip(exact).map(|(e, x)| e.value / x - 1.0).collect()
 }
 
 pub(crate) fn worst(deviations: &[f64]) -> f64 {
@@ -126,6 +135,6 @@ pub(crate) fn worst(deviations: &[f64]) -> f64 {
 
 /// The largest deviation in standard errors.
 pub(crate) fn worst_z(measurement: &Measurement, exact: &[f64]) -> f64 {
-    let z = |(e, x): (&Estimate, &f64)| (e.value_lx - x) / e.std_error_lx.unwrap();
+    let z = |(e, x): (&Estimate, &f64)| (e.value - x) / e.uncertainty.standard_error().unwrap();
     worst(&measurement.estimates.iter().zip(exact).map(z).collect::<Vec<_>>())
 }

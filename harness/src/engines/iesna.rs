@@ -3,22 +3,24 @@
 use luminaire::calculators::{Calculated, NotApplicable, Validity, exitance_difference, inverse_square};
 use luminaire::scene::{Bounces, Meter, Scene, Transport};
 
-use super::{
-    Absent, Engine, EngineError, EngineId, Estimate, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
-    checked,
-};
+use super::{Absent, Engine, EngineError, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked};
+use crate::record::{EngineName, Estimate, Role, Uncertainty};
 
 /// The methods of [`luminaire::calculators`].
 pub(super) struct Iesna;
 
-const ID: EngineId = EngineId::new("iesna");
+pub(super) const ID: EngineName = EngineName::new("iesna");
 
 /// Rounding of the inverse-square method in `f64`, relative: a few operations and two arctangents.
 const ROUNDING: f64 = 1e-13;
 
 impl Engine for Iesna {
-    fn id(&self) -> EngineId {
+    fn name(&self) -> EngineName {
         ID
+    }
+
+    fn role(&self) -> Role {
+        Role::Witness
     }
 
     fn probe(&self, _site: &Site) -> Result<Version, Absent> {
@@ -58,11 +60,11 @@ impl Engine for Iesna {
             let what = |error: NotApplicable| format!("{}: {error}", station.id);
             let calculated = calculate(job, &station.meter)
                 .map_err(|error| EngineError::Solver { engine: ID, what: what(error) })?;
-            let value_lx = calculated.illuminance.value();
+            let value = calculated.illuminance.value();
             // The inverse-square method is exact for what it is meant for; the others know no bound.
             let exact = job.transport == Transport::Direct && calculated.validity == Validity::Supported;
-            let error_bound_lx = exact.then_some(ROUNDING * value_lx);
-            measurement.estimates.push(Estimate { value_lx, std_error_lx: None, error_bound_lx });
+            let uncertainty = if exact { Uncertainty::Bound(ROUNDING * value) } else { Uncertainty::Unstated };
+            measurement.estimates.push(Estimate { value, uncertainty });
             if let Validity::Approximate(why) = calculated.validity {
                 notes.push(why);
             }

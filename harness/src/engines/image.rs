@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use super::{EngineError, EngineId, Workbench};
+use super::{EngineError, Workbench};
+use crate::record::EngineName;
 
 /// The small program that reads them.
 const DRIVER: &str = include_str!("../../drivers/read_image.py");
 
 /// The pixels of an RGB image, row by row; integer formats as 0..=1.
-pub(super) fn read_rgb(engine: &EngineId, workbench: &Workbench, path: &Path) -> Result<Vec<[f64; 3]>, EngineError> {
+pub(super) fn read_rgb(engine: &EngineName, workbench: &Workbench, path: &Path) -> Result<Vec<[f64; 3]>, EngineError> {
     let output = |what: String| EngineError::Output { engine: engine.clone(), what };
     let python = workbench.site.python().ok_or_else(|| {
         output("OpenImageIO is not there to read its image; run `luxproof engines install`".to_owned())
@@ -49,17 +50,17 @@ mod tests {
             log: folder.path().join("log"),
             jobs: 1,
             limit: Duration::from_secs(60),
-            peak: crate::process::PeakMemory::default(),
+            peak: crate::system::process::PeakMemory::default(),
         };
         let path = folder.path().join("two.ppm");
         let mut bytes = b"P6\n2 1\n65535\n".to_vec();
         bytes.extend([0x00, 0x00, 0xff, 0xff, 0x80, 0x00, 0x00, 0x01, 0x12, 0x34, 0xff, 0xfe]);
         std::fs::write(&path, &bytes).unwrap();
-        let read = read_rgb(&EngineId::new("povray"), &workbench, &path).unwrap();
+        let read = read_rgb(&EngineName::new("povray"), &workbench, &path).unwrap();
         let step = |n: u16| f64::from(n) / 65535.0;
         assert_eq!(read, [[0.0, 1.0, step(0x8000)], [step(1), step(0x1234), step(0xfffe)]]);
         std::fs::write(&path, &bytes[..bytes.len() - 3]).unwrap();
-        assert!(read_rgb(&EngineId::new("povray"), &workbench, &path).is_err());
+        assert!(read_rgb(&EngineName::new("povray"), &workbench, &path).is_err());
     }
 
     #[test]

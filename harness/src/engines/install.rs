@@ -8,9 +8,10 @@ mod venv;
 use std::fs::File;
 use std::time::Duration;
 
-use crate::process::ProcessError;
+use crate::system::process::ProcessError;
 
-use super::{EngineId, Site};
+use super::Site;
+use crate::record::EngineName;
 
 /// What became of one component.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,7 +65,7 @@ const LIMIT: Duration = Duration::from_secs(3600);
 /// Installs what the named engines need (all engines if `engines` is empty), and says per component what was done.
 ///
 /// `progress` is told of each step before it starts. Another installation into the same site is waited for.
-pub fn install(site: &Site, engines: &[EngineId], mut progress: impl FnMut(&str)) -> Vec<InstallOutcome> {
+pub fn install(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str)) -> Vec<InstallOutcome> {
     let components = components(engines);
     // Held to the end, so that two installations never write the same folder.
     let lock = match lock(site) {
@@ -77,8 +78,8 @@ pub fn install(site: &Site, engines: &[EngineId], mut progress: impl FnMut(&str)
 }
 
 /// What the named engines need; all of it if none is named.
-fn components(engines: &[EngineId]) -> Vec<Component> {
-    let of = |engine: &EngineId| match engine.name() {
+fn components(engines: &[EngineName]) -> Vec<Component> {
+    let of = |engine: &EngineName| match engine.as_str() {
         "mitsuba" => &[Component::PythonPackages, Component::LibLlvm][..],
         "povray" => &[Component::PythonPackages, Component::PovRay],
         "radiance" => &[Component::PythonPackages],
@@ -155,10 +156,10 @@ mod tests {
     fn every_engine_gets_what_it_needs_and_no_more() {
         use Component::{LibLlvm, PovRay, PythonPackages};
         assert_eq!(components(&[]), [PythonPackages, PovRay, LibLlvm]);
-        assert_eq!(components(&[EngineId::new("radiance")]), [PythonPackages]);
-        assert_eq!(components(&[EngineId::new("povray"), EngineId::new("radiance")]), [PythonPackages, PovRay]);
-        assert_eq!(components(&[EngineId::new("mitsuba")]), [PythonPackages, LibLlvm]);
-        assert_eq!(components(&[EngineId::new("simulator"), EngineId::new("iesna")]), []);
+        assert_eq!(components(&[EngineName::new("radiance")]), [PythonPackages]);
+        assert_eq!(components(&[EngineName::new("povray"), EngineName::new("radiance")]), [PythonPackages, PovRay]);
+        assert_eq!(components(&[EngineName::new("mitsuba")]), [PythonPackages, LibLlvm]);
+        assert_eq!(components(&[EngineName::new("simulator"), EngineName::new("iesna")]), []);
     }
 
     #[test]
@@ -166,7 +167,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         std::fs::write(&file, "").unwrap();
-        let outcomes = install(&Site::at(file.join("site")), &[EngineId::new("radiance")], |_| {});
+        let outcomes = install(&Site::at(file.join("site")), &[EngineName::new("radiance")], |_| {});
         assert_eq!(outcomes.len(), 1);
         assert_eq!(outcomes[0].state, InstallState::Failed);
         assert!(outcomes[0].detail.contains("site"), "{}", outcomes[0].detail);

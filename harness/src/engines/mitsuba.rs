@@ -16,11 +16,10 @@ use luminaire::scene::{Luminaire, LuminaireModel, Shape, Transport};
 
 use self::backend::Backend;
 use self::settings::{Preset, Settings};
-use super::{
-    Absent, Engine, EngineError, EngineId, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench,
-};
+use super::{Absent, Engine, EngineError, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench};
+use crate::record::EngineName;
 
-const ID: EngineId = EngineId::new("mitsuba");
+const ID: EngineName = EngineName::new("mitsuba");
 
 /// Nearer than this to a surface, a point luminaire's spot is too small for paths to find, in parts of the scene's size.
 const CLOSE: f64 = 2.5e-3;
@@ -32,7 +31,7 @@ pub(super) struct Mitsuba {
 }
 
 impl Engine for Mitsuba {
-    fn id(&self) -> EngineId {
+    fn name(&self) -> EngineName {
         ID
     }
 

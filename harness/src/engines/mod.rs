@@ -3,7 +3,6 @@
 //! Adding one: write `engines/<name>.rs` with a type that implements [`Engine`], and add its line to [`all`]; or leave this
 //! program as it is and name a program of your own in a spec, see [`external`]. `docs/adding-an-engine.md` walks through both.
 
-pub mod calibration;
 mod external;
 #[cfg(test)]
 pub(crate) mod fixtures;
@@ -15,12 +14,10 @@ mod povray;
 mod radiance;
 #[cfg(test)]
 mod repetition_tests;
-mod simulator;
+pub(crate) mod simulator;
 mod site;
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -28,10 +25,10 @@ use luminaire::scene::{Meter, Obstacle, Scene, Shape, Transport};
 use serde::{Deserialize, Serialize};
 
 use crate::procedures::{Target, Task};
-use crate::process::{Invocation, PeakMemory, ProcessError};
-use crate::reading::MeterId;
-use crate::slots::{Share, Slots};
+use crate::record::{EngineName, Estimate, MeterId, ProcedureId, Role, Uncertainty};
 use crate::spec::Case;
+use crate::system::process::{Invocation, PeakMemory, ProcessError};
+use crate::system::slots::{Share, Slots};
 
 pub use crate::spec::Budget;
 pub use external::{ExternalJob, ExternalReadings};
@@ -60,44 +57,31 @@ pub fn external(
     Ok(Box::new(external::External::new(name, settings, folder)?))
 }
 
-/// The name of an engine in specs, on the command line and in reports.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
-#[serde(transparent)]
-pub struct EngineId(Cow<'static, str>);
-
-impl EngineId {
-    /// The name of an engine of our own list.
-    pub const fn new(name: &'static str) -> Self {
-        Self(Cow::Borrowed(name))
-    }
-
-    /// The name that a spec gives to a program of its own.
-    pub const fn of_spec(name: String) -> Self {
-        Self(Cow::Owned(name))
-    }
-
-    /// The name itself.
-    pub fn name(&self) -> &str {
-        &self.0
-    }
-}
-
-impl fmt::Display for EngineId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(&self.0)
-    }
-}
-
 /// The component of every engine that gets its candela table from our own reader of photometric files.
 pub const FILE_READER: &str = "luxproof's reader of photometric files";
 
 /// The component of our own solvers, which look intensities up alike.
 const OWN_LOOKUP: &str = "luminaire's interpolation of candela tables";
 
+/// The exact simulation, which others are judged by.
+pub const SIMULATOR: EngineName = simulator::ID;
+/// The IESNA methods, which others are judged by where they are closed forms.
+pub const IESNA: EngineName = iesna::ID;
+
 /// Something that reads illuminance at meters of a scene.
 pub trait Engine: Send + Sync {
     /// Its name.
-    fn id(&self) -> EngineId;
+    fn name(&self) -> EngineName;
+
+    /// What it takes part for.
+    fn role(&self) -> Role {
+        Role::Renderer
+    }
+
+    /// Whether others are judged by it.
+    fn is_witness(&self) -> bool {
+        self.role() == Role::Witness
+    }
 
     /// Whether it can run here, and its version.
     fn probe(&self, site: &Site) -> Result<Version, Absent>;
@@ -134,7 +118,7 @@ pub trait Engine: Send + Sync {
     /// The job without what makes no difference to this engine's readings: two jobs that are equal then are one to it. For
     /// most, the names of case and procedure are comments.
     fn essence(&self, job: &Job) -> Job {
-        Job { case: String::new(), procedure: String::new(), ..job.clone() }
+        Job { case: String::new(), ..job.clone() }
     }
 
     /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
@@ -172,8 +156,7 @@ pub fn geometry_mib(job: &Job) -> u64 {
 pub struct Job {
     /// The case, for comments in exported scenes.
     pub case: String,
-    /// The procedure's name, likewise.
-    pub procedure: String,
+    pub procedure: ProcedureId,
     /// Room, obstacles and the luminaires that are on. No room means free field.
     pub scene: Scene,
     /// Where illuminance is read.
@@ -194,7 +177,7 @@ impl Job {
         let station = |target: &Target| Station { id: target.id.clone(), meter: target.meter, expected_lx: None };
         Self {
             case: case.name.clone(),
-            procedure: task.procedure.to_owned(),
+            procedure: task.procedure,
             scene: task.scene.clone(),
             stations: task.targets.iter().map(station).collect(),
             transport: task.transport,
@@ -208,7 +191,6 @@ impl Job {
 /// A meter with its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Station {
-    /// Its name in reports.
     pub id: MeterId,
     /// Where it is and which way it looks.
     pub meter: Meter,
@@ -225,9 +207,7 @@ pub struct Version(pub String);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{reason}; {remedy}")]
 pub struct Absent {
-    /// What is missing.
     pub reason: String,
-    /// What to do.
     pub remedy: String,
 }
 
@@ -243,7 +223,6 @@ pub enum Support {
         /// Its size, relative.
         size: Option<f64>,
     },
-    /// Not at all.
     No(String),
 }
 
@@ -252,7 +231,6 @@ pub enum Support {
 pub struct SceneFile {
     /// Its name within the scene's folder.
     pub name: String,
-    /// Its bytes.
     pub bytes: Vec<u8>,
 }
 
@@ -300,24 +278,12 @@ impl Workbench {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measurement {
-    /// One a station, in the stations' order.
+    /// Illuminance in lux, one a station, in the stations' order.
     pub estimates: Vec<Estimate>,
     /// What was set, for whoever repeats it: samples, seeds, arguments, variant.
     pub settings: BTreeMap<String, String>,
     /// What the reader of the report should know of this run.
     pub notes: Vec<String>,
-}
-
-/// An illuminance with what is known of its error.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Estimate {
-    /// Illuminance in lux.
-    pub value_lx: f64,
-    /// Standard error of a Monte Carlo mean, in lux.
-    pub std_error_lx: Option<f64>,
-    /// Distance within which the true value lies, in lux, for deterministic methods.
-    pub error_bound_lx: Option<f64>,
 }
 
 /// Why an engine that was there gave no reading.
@@ -331,43 +297,28 @@ pub enum EngineError {
     Io {
         /// The file.
         path: String,
-        /// The system's reason.
         source: std::io::Error,
     },
     /// The program ended well but what it gave is not a result.
     #[error("{engine} exited without an error, but {what}")]
-    Output {
-        /// The engine.
-        engine: EngineId,
-        /// What is wrong with it.
-        what: String,
-    },
+    Output { engine: EngineName, what: String },
+    /// What it read is no number.
+    #[error("{engine} exited without an error, but read {value} lx ({uncertainty:?}) at {meter}")]
+    NotFinite { engine: EngineName, meter: MeterId, value: f64, uncertainty: Uncertainty },
     /// A setting from the spec makes no sense to the engine.
     #[error("engines.{engine}.{key}: {what}")]
     Setting {
-        /// The engine.
-        engine: EngineId,
+        engine: EngineName,
         /// The setting.
         key: String,
-        /// What is wrong with it.
         what: String,
     },
     /// It cannot do what was asked, as it says itself once it has seen the job: a skip, no failure.
     #[error("{engine} declines: {why}")]
-    Declined {
-        /// The engine.
-        engine: EngineId,
-        /// Why.
-        why: String,
-    },
+    Declined { engine: EngineName, why: String },
     /// Our own solver gave up.
     #[error("{engine}: {what}")]
-    Solver {
-        /// The engine.
-        engine: EngineId,
-        /// Why.
-        what: String,
-    },
+    Solver { engine: EngineName, what: String },
 }
 
 impl EngineError {
@@ -378,7 +329,7 @@ impl EngineError {
 }
 
 /// Checks what every engine must hold: one finite, non-negative value a station.
-pub fn checked(engine: &EngineId, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
+pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
     let (found, wanted) = (measurement.estimates.len(), job.stations.len());
     if found != wanted {
         return Err(EngineError::Output {
@@ -387,25 +338,17 @@ pub fn checked(engine: &EngineId, job: &Job, measurement: Measurement) -> Result
         });
     }
     for (estimate, station) in measurement.estimates.iter().zip(&job.stations) {
-        let errors = [estimate.std_error_lx, estimate.error_bound_lx];
-        let sound = |v: f64| v.is_finite() && v >= 0.0;
-        if !sound(estimate.value_lx) || !errors.into_iter().flatten().all(sound) {
-            let what = format!("read {} lx (error {errors:?}) at {}", estimate.value_lx, station.id);
-            return Err(EngineError::Output { engine: engine.clone(), what });
+        let Estimate { value, uncertainty } = *estimate;
+        let (engine, meter) = (engine.clone(), station.id.clone());
+        if !value.is_finite() || !uncertainty.is_finite() {
+            return Err(EngineError::NotFinite { engine, meter, value, uncertainty });
+        }
+        if value < 0.0 || !uncertainty.is_sound() {
+            let what = format!("read {value} lx ({uncertainty:?}) at {meter}");
+            return Err(EngineError::Output { engine, what });
         }
     }
     Ok(measurement)
-}
-
-/// Mean and standard error of `K` independent estimates; the error is `None` for fewer than two.
-pub fn mean_and_std_error(values: &[f64]) -> (f64, Option<f64>) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    if values.len() < 2 {
-        return (mean, None);
-    }
-    let sum_of_squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-    (mean, Some((sum_of_squares / (n - 1.0) / n).sqrt()))
 }
 
 #[cfg(test)]
@@ -414,14 +357,14 @@ mod tests {
     use glam::DVec3;
     use luminaire::scene::Scene;
 
-    const ENGINE: EngineId = EngineId::new("test");
+    const ENGINE: EngineName = EngineName::new("test");
 
     fn job(stations: usize) -> Job {
         let meter = Meter { position_m: DVec3::ONE, normal: DVec3::Z };
         let station = |k| Station { id: MeterId::new("m", k), meter, expected_lx: None };
         Job {
             case: "case".into(),
-            procedure: "direct_illuminance".into(),
+            procedure: ProcedureId::DirectIlluminance,
             scene: Scene::default(),
             stations: (0..stations).map(station).collect(),
             transport: Transport::Direct,
@@ -432,7 +375,7 @@ mod tests {
     }
 
     fn measurement(values: &[f64]) -> Measurement {
-        let estimate = |&value_lx| Estimate { value_lx, std_error_lx: Some(0.0), error_bound_lx: None };
+        let estimate = |&value| Estimate { value, uncertainty: Uncertainty::sampled(0.0, None) };
         Measurement { estimates: values.iter().map(estimate).collect(), ..Measurement::default() }
     }
 
@@ -443,13 +386,7 @@ mod tests {
             assert!(checked(&ENGINE, &job(2), measurement(bad)).is_err(), "{bad:?}");
         }
         let mut odd = measurement(&[1.0]);
-        odd.estimates[0].std_error_lx = Some(f64::NAN);
+        odd.estimates[0].uncertainty = Uncertainty::sampled(f64::NAN, None);
         assert!(checked(&ENGINE, &job(1), odd).is_err());
-    }
-
-    #[test]
-    fn standard_error_is_that_of_the_mean() {
-        assert_eq!(mean_and_std_error(&[1.0, 3.0]), (2.0, Some(1.0)));
-        assert_eq!(mean_and_std_error(&[5.0]), (5.0, None));
     }
 }

@@ -21,21 +21,19 @@ use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 
 use super::{
-    Absent, Engine, EngineError, EngineId, Estimate, Job, Knob, Measurement, SceneFile, Site, Support, Version,
-    Workbench, checked,
+    Absent, Engine, EngineError, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
 };
-use crate::process;
+use crate::record::{EngineName, Estimate};
+use crate::system::process;
 use export::Light;
 use settings::{Preset, Settings};
 
-/// The engine's name.
-const ID: EngineId = EngineId::new("povray");
+const ID: EngineName = EngineName::new("povray");
 
-/// POV-Ray.
 pub(super) struct PovRay;
 
 impl Engine for PovRay {
-    fn id(&self) -> EngineId {
+    fn name(&self) -> EngineName {
         ID
     }
 
@@ -70,7 +68,7 @@ impl Engine for PovRay {
         let program = blocks::program(site).unwrap_or_else(|_| "povray".into());
         let command = |light, image: &str| {
             let (here, nothing) = (std::path::Path::new("."), std::time::Duration::ZERO);
-            let invocation = crate::process::Invocation::new(&program, here, nothing, "");
+            let invocation = crate::system::process::Invocation::new(&program, here, nothing, "");
             let arguments = export::arguments(job, light, 0, 0, image);
             blocks::hermetic(invocation, site).args(arguments).command_line_with_env()
         };
@@ -102,17 +100,14 @@ impl Engine for PovRay {
 }
 
 fn darkness(job: &Job) -> Measurement {
-    let dark = Estimate { value_lx: 0.0, std_error_lx: None, error_bound_lx: Some(0.0) };
     let notes = vec!["nothing that was never reflected is indirect: not rendered".to_owned()];
-    Measurement { estimates: vec![dark; job.stations.len()], notes, ..Measurement::default() }
+    Measurement { estimates: vec![Estimate::DARK; job.stations.len()], notes, ..Measurement::default() }
 }
 
-/// Direct and indirect light together; the direct part's bound is far below the indirect part's standard error.
+/// Direct and indirect light together.
 fn sum(direct: &Measurement, mut indirect: Measurement) -> Measurement {
     for (total, part) in indirect.estimates.iter_mut().zip(&direct.estimates) {
-        total.value_lx += part.value_lx;
-        let squares = total.std_error_lx.map(|e| e.hypot(part.error_bound_lx.unwrap_or(0.0)));
-        total.std_error_lx = squares;
+        *total = total.plus(part);
     }
     for (key, value) in &direct.settings {
         indirect.settings.entry(key.clone()).or_insert_with(|| value.clone());

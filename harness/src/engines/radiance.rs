@@ -22,11 +22,11 @@ use self::sampling::Sampler;
 use self::settings::{Photometrist, Preset, Settings};
 use self::tools::Tools;
 use super::{
-    Absent, Engine, EngineError, EngineId, Estimate, Job, Knob, Measurement, SceneFile, Site, Station, Support,
-    Version, Workbench, checked,
+    Absent, Engine, EngineError, Job, Knob, Measurement, SceneFile, Site, Station, Support, Version, Workbench, checked,
 };
+use crate::record::{EngineName, Estimate, Uncertainty};
 
-const ID: EngineId = EngineId::new("radiance");
+const ID: EngineName = EngineName::new("radiance");
 
 /// Radiance keeps colours and candela tables in 32-bit floats; measured against the inverse-square law.
 const FLOAT_READ_OUT: f64 = 5e-7;
@@ -38,7 +38,7 @@ const NOT_REPEATABLE: &str = "rtrace seeds its random numbers from the clock, so
 pub(super) struct Radiance;
 
 impl Engine for Radiance {
-    fn id(&self) -> EngineId {
+    fn name(&self) -> EngineName {
         ID
     }
 
@@ -139,7 +139,7 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
     measurement.notes.push(NOT_REPEATABLE.into());
     let parts = blocks.estimates().into_iter().zip(part_lx).zip(&direct);
     let estimate = |((total, part_lx), direct)| match job.transport {
-        Transport::Total(_) => sum(reflected(total, part_lx), direct),
+        Transport::Total(_) => reflected(total, part_lx).plus(direct),
         _ => reflected(total, part_lx),
     };
     measurement.estimates = parts.map(estimate).collect();
@@ -158,30 +158,24 @@ fn direct(sampler: &Sampler<'_>, options: &Options) -> Result<Vec<Estimate>, Eng
     Ok(pairs.map(|(value_lx, station)| determined(job, value_lx, station)).collect())
 }
 
-fn determined(job: &Job, value_lx: f64, station: &Station) -> Estimate {
-    let bound = FLOAT_READ_OUT * value_lx + float_error::of_tables_lx(&job.scene, &station.meter);
-    Estimate { value_lx, std_error_lx: None, error_bound_lx: Some(bound) }
+fn determined(job: &Job, value: f64, station: &Station) -> Estimate {
+    let bound = FLOAT_READ_OUT * value + float_error::of_tables_lx(&job.scene, &station.meter);
+    Estimate { value, uncertainty: Uncertainty::Bound(bound) }
 }
 
-/// A mean of blocks with its standard error; the read-out adds to it.
-fn sampled((mean_lx, error_lx): (f64, Option<f64>)) -> Estimate {
-    let std_error_lx = error_lx.map(|e| e.hypot(FLOAT_READ_OUT * mean_lx));
-    Estimate { value_lx: mean_lx, std_error_lx, error_bound_lx: None }
+/// A mean of blocks; the read-out adds to its error.
+fn sampled(mean: Estimate) -> Estimate {
+    Estimate { uncertainty: mean.uncertainty.within(FLOAT_READ_OUT * mean.value), ..mean }
 }
 
 /// All light less the direct part of it, which rtrace finds anew each time to the last digit.
-fn reflected(total: (f64, Option<f64>), part_lx: f64) -> Estimate {
+fn reflected(total: Estimate, part_lx: f64) -> Estimate {
     let all = sampled(total);
-    let value_lx = all.value_lx - part_lx;
+    let value = all.value - part_lx;
     // Below its error a difference has no sign.
-    let lost = value_lx < 0.0 && all.std_error_lx.is_some_and(|e| value_lx > -4.0 * e);
-    Estimate { value_lx: if lost { 0.0 } else { value_lx }, ..all }
-}
-
-fn sum(reflected: Estimate, direct: &Estimate) -> Estimate {
-    let error = |e: f64| e.hypot(direct.std_error_lx.or(direct.error_bound_lx).unwrap_or(0.0));
-    let value_lx = reflected.value_lx + direct.value_lx;
-    Estimate { value_lx, std_error_lx: reflected.std_error_lx.map(error), error_bound_lx: None }
+    let lost =
+        value < 0.0 && all.uncertainty.standard_error().is_some_and(|e| value > -4.0 * e - all.uncertainty.bound());
+    Estimate { value: if lost { 0.0 } else { value }, ..all }
 }
 
 fn output(what: String) -> EngineError {

@@ -24,7 +24,7 @@ fn repetitions(engine: &dyn Engine, settings: &[(&str, serde_json::Value)], budg
             log,
             jobs: 2,
             limit: Duration::from_secs(120),
-            peak: crate::process::PeakMemory::default(),
+            peak: crate::system::process::PeakMemory::default(),
         };
         let settings = settings.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
         let job = Job { budget, seed, settings, ..s1(CONVERGED) };
@@ -38,8 +38,8 @@ fn repetitions(engine: &dyn Engine, settings: &[(&str, serde_json::Value)], budg
 fn unbiased_with_honest_errors(found: &[Measurement], bias: f64) {
     let mut squares = 0.0;
     for (k, exact) in S1_INDIRECT_LX.into_iter().enumerate() {
-        let off = |m: &Measurement| m.estimates[k].value_lx - exact;
-        let error = |m: &Measurement| m.estimates[k].std_error_lx.unwrap();
+        let off = |m: &Measurement| m.estimates[k].value - exact;
+        let error = |m: &Measurement| m.estimates[k].uncertainty.standard_error().unwrap();
         let mean = found.iter().map(off).sum::<f64>() / found.len() as f64;
         let pooled = found.iter().map(|m| error(m).powi(2)).sum::<f64>().sqrt() / found.len() as f64;
         // 35 degrees of freedom: beyond 4.5 once in ten thousand.

@@ -1,24 +1,28 @@
 //! The engine `simulator`: our own exact solutions, read like any renderer.
 
 use luminaire::scene::LuminaireModel;
-use luminaire::simulator::{self, Accuracy, Uncertainty};
+use luminaire::simulator::{self, Accuracy};
 
 use super::{
-    Absent, Engine, EngineError, EngineId, Estimate, Job, Knob, Measurement, SceneFile, Site, Support, Version,
-    Workbench, checked,
+    Absent, Engine, EngineError, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
 };
+use crate::record::{EngineName, Estimate, Role};
 
 /// The exact simulation of [`luminaire::simulator`].
-pub(super) struct Simulator;
+pub(crate) struct Simulator;
 
-const ID: EngineId = EngineId::new("simulator");
+pub(super) const ID: EngineName = EngineName::new("simulator");
 
 /// How much finer than the budget's error the simulator works: a witness whose own error counts for nothing.
 const MARGIN: f64 = 0.1;
 
 impl Engine for Simulator {
-    fn id(&self) -> EngineId {
+    fn name(&self) -> EngineName {
         ID
+    }
+
+    fn role(&self) -> Role {
+        Role::Witness
     }
 
     fn probe(&self, _site: &Site) -> Result<Version, Absent> {
@@ -43,7 +47,7 @@ impl Engine for Simulator {
 
     /// An impostor is a way to sample an opening: to an exact solution it is the opening itself.
     fn essence(&self, job: &Job) -> Job {
-        let mut job = Job { case: String::new(), procedure: String::new(), ..job.clone() };
+        let mut job = Job { case: String::new(), ..job.clone() };
         for luminaire in &mut job.scene.luminaires {
             if luminaire.model == LuminaireModel::Impostor {
                 luminaire.model = LuminaireModel::Area;
@@ -81,9 +85,5 @@ impl Engine for Simulator {
 }
 
 fn estimate(found: &simulator::Estimate) -> Estimate {
-    let (std_error_lx, error_bound_lx) = match found.uncertainty {
-        Uncertainty::Bound(bound) => (None, Some(bound)),
-        Uncertainty::StandardError { value, .. } => (Some(value), None),
-    };
-    Estimate { value_lx: found.illuminance.value(), std_error_lx, error_bound_lx }
+    Estimate { value: found.illuminance.value(), uncertainty: found.uncertainty.into() }
 }

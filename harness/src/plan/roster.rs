@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{Asked, REFERENCES, Selection, unknown};
+use super::{Asked, Selection, unknown};
 use crate::engines::{self, Absent, Engine, Site, Version};
-use crate::slots::side_by_side;
+use crate::record::EngineName;
 use crate::spec::{Case, SpecError};
+use crate::system::slots::side_by_side;
 
 /// An engine and why it takes part.
 pub(super) type Chosen = (Arc<dyn Engine>, Asked);
@@ -15,7 +16,7 @@ pub(super) type Chosen = (Arc<dyn Engine>, Asked);
 /// Our own engines, shared by all cases, and what they say of their version.
 pub(super) struct Roster {
     engines: Vec<Arc<dyn Engine>>,
-    probed: BTreeMap<String, Result<Version, Absent>>,
+    probed: BTreeMap<EngineName, Result<Version, Absent>>,
 }
 
 impl Roster {
@@ -49,34 +50,35 @@ impl Roster {
                 return Err(unknown("engine", name, ids.iter().map(String::as_str), "--engines"));
             }
         }
-        let asked = |id: &str| {
-            if selection.engines.iter().any(|n| n == id) {
+        let asked = |engine: &dyn Engine| {
+            let id = engine.name();
+            if selection.engines.iter().any(|n| id == *n) {
                 Some(Asked::ByName)
-            } else if REFERENCES.contains(&id) {
+            } else if engine.is_witness() {
                 Some(Asked::AsReference)
             } else if !selection.engines.is_empty() {
                 None
             } else if case.engines.is_none() {
                 Some(Asked::ByDefault)
             } else {
-                in_spec.iter().any(|n| *n == id).then_some(Asked::ByName)
+                in_spec.iter().any(|n| id == **n).then_some(Asked::ByName)
             }
         };
-        Ok(all.into_iter().filter_map(|engine| asked(engine.id().name()).map(|asked| (engine, asked))).collect())
+        Ok(all.into_iter().filter_map(|engine| asked(engine.as_ref()).map(|asked| (engine, asked))).collect())
     }
 
     /// The versions of engines, side by side; those of our own list are remembered for the next case.
     pub(super) fn probe(&mut self, engines: &[Arc<dyn Engine>], site: &Site) -> Vec<Result<Version, Absent>> {
         let is_ours = |e: &Arc<dyn Engine>| self.engines.iter().any(|ours| Arc::ptr_eq(ours, e));
-        let known = |e: &Arc<dyn Engine>| self.probed.get(e.id().name()).filter(|_| is_ours(e)).cloned();
+        let known = |e: &Arc<dyn Engine>| self.probed.get(&e.name()).filter(|_| is_ours(e)).cloned();
         let found = side_by_side(engines.len(), engines, |e| known(e).unwrap_or_else(|| e.probe(site)));
         let ours = engines.iter().zip(&found).filter(|(e, _)| is_ours(e));
-        let ours: Vec<_> = ours.map(|(e, found)| (e.id().name().to_owned(), found.clone())).collect();
+        let ours: Vec<_> = ours.map(|(e, found)| (e.name(), found.clone())).collect();
         self.probed.extend(ours);
         found
     }
 }
 
 fn names(engines: &[Arc<dyn Engine>]) -> Vec<String> {
-    engines.iter().map(|e| e.id().name().to_owned()).collect()
+    engines.iter().map(|e| e.name().to_string()).collect()
 }

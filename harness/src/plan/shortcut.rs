@@ -12,7 +12,8 @@ mod tests;
 
 use luminaire::scene::Transport;
 
-use crate::engines::{Estimate, Job, Measurement};
+use crate::engines::{Job, Measurement};
+use crate::record::{Estimate, ProcedureId};
 
 pub(super) use repeated::Repeated;
 
@@ -50,7 +51,6 @@ pub enum Fill {
 pub struct Omission {
     /// Whether it is meters or light paths that are left out.
     pub scope: super::Scope,
-    /// Why.
     pub reason: String,
     /// The part of the run's work that this saves, 0 to 1.
     pub share: f64,
@@ -67,7 +67,7 @@ impl Shortcut {
     pub(super) fn of(job: &Job) -> Self {
         let mut shortcut = Self::none(job);
         bounces::shorten(&mut shortcut);
-        if job.procedure != "luminous_intensity" {
+        if job.procedure != ProcedureId::LuminousIntensity {
             dark::shorten(&mut shortcut, job);
             symmetry::shorten(&mut shortcut, job);
         }
@@ -83,11 +83,10 @@ impl Shortcut {
 
     /// The readings of the job that was asked, from those of the job that was rendered.
     pub fn complete(&self, rendered: Measurement, asked: &Job) -> Measurement {
-        let dark = Estimate { value_lx: 0.0, std_error_lx: None, error_bound_lx: Some(0.0) };
-        let of = |k: usize| rendered.estimates.get(k).map_or(dark, |e| scaled(*e, self.factor));
+        let of = |k: usize| rendered.estimates.get(k).map_or(Estimate::DARK, |e| e.times(self.factor));
         let estimate = |fill: &Fill| match fill {
             Fill::Rendered(k) | Fill::Mirrors { station: k, .. } => of(*k),
-            Fill::Dark => dark,
+            Fill::Dark => Estimate::DARK,
         };
         let estimates = self.fill.iter().map(estimate).collect();
         let mut settings = rendered.settings;
@@ -149,14 +148,6 @@ impl Shortcut {
 
     fn omit(&mut self, scope: super::Scope, share: f64, reason: String) {
         self.omissions.push(Omission { scope, reason, share });
-    }
-}
-
-fn scaled(estimate: Estimate, factor: f64) -> Estimate {
-    Estimate {
-        value_lx: estimate.value_lx * factor,
-        std_error_lx: estimate.std_error_lx.map(|e| e * factor),
-        error_bound_lx: estimate.error_bound_lx.map(|e| e * factor),
     }
 }
 

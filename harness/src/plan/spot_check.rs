@@ -1,7 +1,8 @@
 //! Spot checks: a random part of what is not rendered is rendered all the same, and must be what the shortcut says.
 
 use super::Run;
-use crate::engines::{Estimate, Job, Measurement};
+use crate::engines::{Job, Measurement};
+use crate::record::{Estimate, Uncertainty};
 
 /// The part of what is not rendered that is looked at, one reading at least.
 const PART: f64 = 0.05;
@@ -34,32 +35,25 @@ impl Run {
 
     /// Holds what a spot check read against what a shortcut says; the error names the first reading that is another.
     pub fn hold(&self, said: &Measurement, seen: &Measurement) -> Result<(), String> {
-        let brightest = said.estimates.iter().chain(&seen.estimates).map(|e| e.value_lx).fold(0.0, f64::max);
+        let brightest = said.estimates.iter().chain(&seen.estimates).map(|e| e.value).fold(0.0, f64::max);
         for (&station, seen) in self.spot_check.iter().zip(&seen.estimates) {
             let said = &said.estimates[station];
-            let noise = COVERAGE * spread(said).hypot(spread(seen)) + bound(said) + bound(seen);
-            let allowed = noise + self.declared * said.value_lx.max(seen.value_lx) + ROUNDING * brightest;
-            let apart = (said.value_lx - seen.value_lx).abs();
+            let apart_by_chance = Uncertainty::of_sum([(1.0, said.uncertainty), (-1.0, seen.uncertainty)]);
+            let noise = COVERAGE * apart_by_chance.standard_error().unwrap_or(0.0) + apart_by_chance.bound();
+            let allowed = noise + self.declared * said.value.max(seen.value) + ROUNDING * brightest;
+            let apart = (said.value - seen.value).abs();
             if apart.is_nan() || allowed.is_nan() || apart > allowed {
                 return Err(format!(
                     "spot check: {} reads {} lx where {} lx follow from a shortcut ({}); --no-skips renders everything",
                     self.job.stations[station].id,
-                    seen.value_lx,
-                    said.value_lx,
+                    seen.value,
+                    said.value,
                     self.shortcut.omissions.iter().map(|o| o.reason.as_str()).collect::<Vec<_>>().join("; ")
                 ));
             }
         }
         Ok(())
     }
-}
-
-fn spread(estimate: &Estimate) -> f64 {
-    estimate.std_error_lx.unwrap_or(0.0)
-}
-
-fn bound(estimate: &Estimate) -> f64 {
-    estimate.error_bound_lx.unwrap_or(0.0)
 }
 
 #[cfg(test)]
@@ -82,8 +76,9 @@ mod tests {
         Run { engine: 0, task: 0, job, approximation: None, declared: 0.0, shortcut, spot_check: vec![] }
     }
 
-    fn measurement(values: &[f64], std_error_lx: Option<f64>) -> Measurement {
-        let estimate = |&value_lx| Estimate { value_lx, std_error_lx, error_bound_lx: None };
+    fn measurement(values: &[f64], std_error: Option<f64>) -> Measurement {
+        let uncertainty = std_error.map_or(Uncertainty::Unstated, |e| Uncertainty::sampled(e, None));
+        let estimate = |&value| Estimate { value, uncertainty };
         Measurement { estimates: values.iter().map(estimate).collect(), ..Measurement::default() }
     }
 

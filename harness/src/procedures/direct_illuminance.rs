@@ -3,21 +3,21 @@
 use luminaire::scene::Transport;
 
 use super::{Procedure, Task, targets_of_sets};
-use crate::reading::Quantity;
+use crate::record::{ProcedureId, Quantity};
 use crate::spec::Case;
 
 /// Light straight from the luminaires at meters in the room.
 pub(super) struct DirectIlluminance;
 
 impl Procedure for DirectIlluminance {
-    fn name(&self) -> &'static str {
-        "direct_illuminance"
+    fn id(&self) -> ProcedureId {
+        ProcedureId::DirectIlluminance
     }
 
     fn task(&self, case: &Case) -> Option<Task> {
         let asked = case.procedures.direct_illuminance.as_ref()?;
         Some(Task {
-            procedure: self.name(),
+            procedure: self.id(),
             scene: case.scene.clone(),
             transport: Transport::Direct,
             quantity: Quantity::Illuminance,

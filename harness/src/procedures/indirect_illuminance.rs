@@ -3,21 +3,21 @@
 use luminaire::scene::Transport;
 
 use super::{Procedure, Task, targets_of_sets};
-use crate::reading::Quantity;
+use crate::record::{ProcedureId, Quantity};
 use crate::spec::Case;
 
 /// Light that was reflected at least once, at meters in the room.
 pub(super) struct IndirectIlluminance;
 
 impl Procedure for IndirectIlluminance {
-    fn name(&self) -> &'static str {
-        "indirect_illuminance"
+    fn id(&self) -> ProcedureId {
+        ProcedureId::IndirectIlluminance
     }
 
     fn task(&self, case: &Case) -> Option<Task> {
         let asked = case.procedures.indirect_illuminance.as_ref()?;
         Some(Task {
-            procedure: self.name(),
+            procedure: self.id(),
             scene: case.scene.clone(),
             transport: Transport::Indirect(asked.bounces.into()),
             quantity: Quantity::Illuminance,

@@ -6,15 +6,15 @@ use luminaire::photometry::direction;
 use luminaire::scene::{Meter, Scene, Transport};
 
 use super::{Direction, Procedure, Target, Task};
-use crate::reading::{MeterId, Quantity};
+use crate::record::{MeterId, ProcedureId, Quantity};
 use crate::spec::{Angles, Case};
 
 /// The luminaire alone, seen from a sphere of meters around it.
 pub(super) struct LuminousIntensity;
 
 impl Procedure for LuminousIntensity {
-    fn name(&self) -> &'static str {
-        "luminous_intensity"
+    fn id(&self) -> ProcedureId {
+        ProcedureId::LuminousIntensity
     }
 
     fn task(&self, case: &Case) -> Option<Task> {
@@ -37,7 +37,7 @@ impl Procedure for LuminousIntensity {
         };
         let angles = c_deg.iter().flat_map(|&c| gamma_deg.iter().map(move |&g| (c, g)));
         Some(Task {
-            procedure: self.name(),
+            procedure: self.id(),
             scene: Scene { room: None, obstacles: vec![], luminaires: vec![luminaire.clone()] },
             transport: Transport::Direct,
             quantity: Quantity::LuminousIntensity,

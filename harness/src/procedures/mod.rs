@@ -5,12 +5,12 @@ mod indirect_illuminance;
 mod luminous_intensity;
 mod total_illuminance;
 
-use luminaire::scene::{Bounces, Meter, Scene, Transport};
+use luminaire::scene::{Meter, Scene, Transport};
 
-use crate::reading::{MeterId, Quantity};
+use crate::record::{Light, MeterId, ProcedureId, Quantity};
 use crate::spec::{Case, Names};
 
-/// Every procedure, in the order of reports; the names are those of [`crate::spec::Procedures::NAMES`].
+/// Every procedure, in the order of reports.
 pub const ALL: [&dyn Procedure; 4] = [
     &luminous_intensity::LuminousIntensity,
     &direct_illuminance::DirectIlluminance,
@@ -20,8 +20,7 @@ pub const ALL: [&dyn Procedure; 4] = [
 
 /// A way to put engines to the test.
 pub trait Procedure: Sync {
-    /// Its name in specs and reports.
-    fn name(&self) -> &'static str;
+    fn id(&self) -> ProcedureId;
 
     /// What is to be measured in this case; `None` where the spec does not ask for it.
     fn task(&self, case: &Case) -> Option<Task>;
@@ -30,8 +29,7 @@ pub trait Procedure: Sync {
 /// What one procedure measures in one case.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// The procedure's name.
-    pub procedure: &'static str,
+    pub procedure: ProcedureId,
     /// The scene with only what this procedure needs.
     pub scene: Scene,
     /// Which light counts.
@@ -51,27 +49,15 @@ impl Task {
         if let [one] = models[..] { one.to_owned() } else { "mixed".to_owned() }
     }
 
-    /// Which light counts, in words.
-    pub fn light(&self) -> String {
-        match self.transport {
-            Transport::Direct => "direct".to_owned(),
-            Transport::Indirect(n) => format!("indirect, {}", bounces(n)),
-            Transport::Total(n) => format!("total, {}", bounces(n)),
-        }
-    }
-}
-
-fn bounces(bounces: Bounces) -> String {
-    match bounces {
-        Bounces::Converged => "all bounces".to_owned(),
-        Bounces::AtMost(n) => format!("{n} bounces"),
+    /// Which light counts.
+    pub const fn light(&self) -> Light {
+        Light(self.transport)
     }
 }
 
 /// One place of measurement and how its illuminance becomes a reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Target {
-    /// The meter's name.
     pub id: MeterId,
     /// Where illuminance is read.
     pub meter: Meter,
@@ -86,7 +72,6 @@ pub struct Target {
 pub struct Direction {
     /// C plane.
     pub c_deg: f64,
-    /// From the nadir.
     pub gamma_deg: f64,
 }
 
@@ -108,10 +93,9 @@ fn targets_of_sets(case: &Case, names: &Names) -> Vec<Target> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spec::Procedures;
 
     #[test]
-    fn every_name_of_the_spec_has_its_procedure() {
-        assert_eq!(ALL.map(Procedure::name), Procedures::NAMES);
+    fn every_procedure_stands_in_the_order_of_reports() {
+        assert_eq!(ALL.map(Procedure::id), ProcedureId::ALL);
     }
 }

@@ -1,5 +1,6 @@
 //! What holding a run against its baseline said, as every view tells it.
 
+use crate::record::ReadingKey;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,12 +16,8 @@ pub struct BaselineCheck {
 /// How one engine in one procedure of one case compares with what was accepted.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct BaselineLine {
-    /// The case.
-    pub case: String,
-    /// The procedure.
-    pub procedure: String,
-    /// The engine.
-    pub engine: String,
+    #[serde(flatten)]
+    pub key: ReadingKey,
     /// `unchanged`, `SHIFTED`, `CHANGED`, `VANISHED`, `new` or `REFUSED`.
     pub state: String,
     /// Whether it repeats what was accepted; what nobody accepted does not.

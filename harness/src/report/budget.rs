@@ -5,7 +5,7 @@ use std::fmt::Write;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 use super::Report;
-use crate::diff::{Basis, Comparison, ErrorBudget, Source};
+use crate::judge::{Basis, Comparison, ErrorBudget, Source};
 
 /// More comparisons of a kind than this are not all listed: those with the widest interval for their tolerance are.
 const LISTED: usize = 8;
@@ -14,7 +14,7 @@ const LISTED: usize = 8;
 pub fn budgets(report: &Report) -> String {
     let mut text =
         "Error budgets: standard uncertainties in percent of the reference (GUM); interval = k u\n".to_owned();
-    let kind = |c: &Comparison| (c.case.clone(), c.procedure.clone(), c.engine.clone(), basis(c));
+    let kind = |c: &Comparison| (c.key.case.clone(), c.key.procedure.clone(), c.key.engine.clone(), basis(c));
     let mut kinds: Vec<_> = vec![];
     for comparison in report.comparisons.iter().filter(|c| c.budget.is_some()) {
         if !kinds.contains(&kind(comparison)) {

@@ -1,7 +1,7 @@
 //! CSV: one line a comparison, all digits, for spreadsheets and statistics.
 
 use super::Report;
-use crate::diff::Comparison;
+use crate::judge::Comparison;
 
 const HEAD: [&str; 25] = [
     "case",
@@ -46,9 +46,9 @@ fn record(c: &Comparison) -> [String; 25] {
     let number = |v: Option<f64>| v.map(|v| v.to_string()).unwrap_or_default();
     let reference = c.reference.as_ref();
     [
-        c.case.clone(),
-        c.procedure.clone(),
-        c.engine.clone(),
+        c.key.case.clone(),
+        c.key.procedure.to_string(),
+        c.key.engine.to_string(),
         c.model.clone(),
         c.meter.0.clone(),
         c.at_m[0].to_string(),
@@ -61,7 +61,7 @@ fn record(c: &Comparison) -> [String; 25] {
         number(c.c_deg),
         c.quantity.unit().to_owned(),
         number(c.value),
-        number(c.std_error),
+        number(c.uncertainty.standard_error()),
         number(reference.map(|r| r.value)),
         number(reference.map(|r| r.uncertainty)),
         reference.map_or("", |r| r.basis.name()).to_owned(),

@@ -4,15 +4,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::procedures::Task;
+use crate::record::ProcedureId;
 
 /// What the file says in one half plane, at the angles of its table; straight in between.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Curve {
-    /// The case.
     pub case: String,
     /// The procedure that reads it back.
-    pub procedure: String,
-    /// The luminaire.
+    pub procedure: ProcedureId,
     pub luminaire: String,
     /// C plane in degrees.
     pub c_deg: f64,

@@ -2,9 +2,10 @@
 
 use quick_junit::{NonSuccessKind, Report as JUnit, TestCase, TestCaseStatus, TestSuite};
 
-use super::{BaselineCheck, RecordingSummary, Report};
-use crate::diff::{Comparison, Verdict};
+use super::{BaselineCheck, Report};
+use crate::judge::{Comparison, Verdict};
 use crate::plan::Skip;
+use crate::record::Recording;
 
 /// The report as JUnit XML: one suite a case.
 pub fn junit(report: &Report) -> String {
@@ -34,8 +35,8 @@ fn accepted(check: &BaselineCheck) -> TestSuite {
             status.set_message(entry.state.clone());
             status.set_description(entry.details.join("\n"));
         }
-        let mut case = TestCase::new(format!("{} {} baseline", entry.procedure, entry.engine), status);
-        case.set_classname(entry.case.clone());
+        let mut case = TestCase::new(format!("{} {} baseline", entry.key.procedure, entry.key.engine), status);
+        case.set_classname(entry.key.case.clone());
         suite.add_test_case(case);
     }
     suite
@@ -43,13 +44,16 @@ fn accepted(check: &BaselineCheck) -> TestSuite {
 
 fn suite(report: &Report, name: &str) -> TestSuite {
     let mut suite = TestSuite::new(name);
-    for recording in report.recordings.iter().filter(|r| r.case == name) {
+    for recording in report.recordings.iter().filter(|r| r.key.case == name) {
         let of_run = |c: &&Comparison| {
-            c.case == recording.case && c.procedure == recording.procedure && c.engine == recording.engine
+            c.key.case == recording.key.case
+                && c.key.procedure == recording.key.procedure
+                && c.key.engine == recording.key.engine
         };
         let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(of_run).collect();
-        let mut case = TestCase::new(format!("{} {}", recording.procedure, recording.engine), status(&comparisons));
-        case.set_classname(recording.case.clone());
+        let mut case =
+            TestCase::new(format!("{} {}", recording.key.procedure, recording.key.engine), status(&comparisons));
+        case.set_classname(recording.key.case.clone());
         case.set_time(std::time::Duration::from_secs_f64(recording.wall_s.max(0.0)));
         // What was left out of a job that ran is told with it: a job is one test case.
         let left_out: Vec<String> = report.skips.iter().filter(|s| is_of(s, recording)).map(reason).collect();
@@ -58,21 +62,23 @@ fn suite(report: &Report, name: &str) -> TestSuite {
         }
         suite.add_test_case(case);
     }
-    for skip in report.skips.iter().filter(|s| s.case == name) {
+    for skip in report.skips.iter().filter(|s| s.key.case == name) {
         if report.recordings.iter().any(|r| is_of(skip, r)) {
             continue;
         }
         let mut status = TestCaseStatus::skipped();
         status.set_message(reason(skip));
-        let mut case = TestCase::new(format!("{} {}", skip.procedure, skip.engine), status);
-        case.set_classname(skip.case.clone());
+        let mut case = TestCase::new(format!("{} {}", skip.key.procedure, skip.key.engine), status);
+        case.set_classname(skip.key.case.clone());
         suite.add_test_case(case);
     }
     suite
 }
 
-fn is_of(skip: &Skip, recording: &RecordingSummary) -> bool {
-    skip.case == recording.case && skip.procedure == recording.procedure && skip.engine == recording.engine
+fn is_of(skip: &Skip, recording: &Recording) -> bool {
+    skip.key.case == recording.key.case
+        && skip.key.procedure == recording.key.procedure
+        && skip.key.engine == recording.key.engine
 }
 
 fn reason(skip: &Skip) -> String {

@@ -67,11 +67,11 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
         );
         for c in worst {
             let number = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.5}"));
-            let case = if report.is_suite() { format!("{} ", c.case) } else { String::new() };
+            let case = if report.is_suite() { format!("{} ", c.key.case) } else { String::new() };
             line(format!(
                 "| {case}{} {} | {} | {} | {} | {} | {} |",
-                c.engine,
-                c.procedure,
+                c.key.engine,
+                c.key.procedure,
                 c.meter,
                 number(c.value),
                 number(c.reference.as_ref().map(|r| r.value)),
@@ -84,13 +84,13 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
         line(format!("\nBaseline `{}`: {}", check.file, check.counts()));
         for (k, entry) in check.departures().enumerate() {
             let gap = if k == 0 { "\n" } else { "" };
-            let place = format!("{} {} {}", entry.case, entry.procedure, entry.engine);
+            let place = format!("{} {} {}", entry.key.case, entry.key.procedure, entry.key.engine);
             line(format!("{gap}- **{}** {place}: {}", entry.state.to_lowercase(), entry.details.join("; ")));
         }
     }
     for skip in &report.skips {
-        let case = if report.is_suite() { format!("{} ", skip.case) } else { String::new() };
-        writeln!(text, "\n- skipped: {case}{} {}: {}", skip.engine, skip.procedure, skip.reason).ok();
+        let case = if report.is_suite() { format!("{} ", skip.key.case) } else { String::new() };
+        writeln!(text, "\n- skipped: {case}{} {}: {}", skip.key.engine, skip.key.procedure, skip.reason).ok();
     }
     if let Some(link) = link {
         writeln!(text, "\n[The whole report]({link})").ok();

@@ -13,15 +13,14 @@ mod paper_split;
 mod split;
 mod terminal;
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::diff::{Comparison, Consensus, PaperSplit, PublishedTable, Split, Verdict};
+use crate::judge::{Comparison, Consensus, PaperSplit, PublishedTable, Split, Verdict};
 use crate::plan::Skip;
-use crate::reading::{MeterId, Quantity, Recording};
-use crate::run::{EngineStatus, Status};
+use crate::record::{EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Status};
 
 pub use accepted::{BaselineCheck, BaselineLine};
 pub use budget::budgets;
@@ -52,7 +51,7 @@ pub struct Report {
     /// Every reading of every engine, once.
     pub readings: Vec<ReadingRecord>,
     /// How each engine was run on each procedure.
-    pub recordings: Vec<RecordingSummary>,
+    pub recordings: Vec<Recording>,
     /// What was not run, and why.
     pub skips: Vec<Skip>,
     /// Where an approximate method differs from a renderer: what of it is the method's and what the renderer's.
@@ -96,70 +95,18 @@ pub struct SpecRecord {
     pub path: String,
     /// SHA-256 of the spec and of every file that it names.
     pub sha256: String,
-    /// Its title.
     pub title: String,
 }
 
 /// One reading of one engine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReadingRecord {
-    /// The case.
-    pub case: String,
-    /// The procedure.
-    pub procedure: String,
-    /// The engine.
-    pub engine: String,
+    #[serde(flatten)]
+    pub key: ReadingKey,
     /// The luminaire model.
     pub model: String,
-    /// The meter.
-    pub meter: MeterId,
-    /// What was read.
-    pub quantity: Quantity,
-    /// The value, in the quantity's unit.
-    pub value: f64,
-    /// Standard error of a Monte Carlo mean.
-    pub std_error: Option<f64>,
-    /// Distance within which the true value lies, for deterministic methods.
-    pub error_bound: Option<f64>,
-}
-
-/// How one engine was run on one procedure: what it takes to repeat it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct RecordingSummary {
-    /// The case.
-    pub case: String,
-    /// The procedure.
-    pub procedure: String,
-    /// The engine.
-    pub engine: String,
-    /// The luminaire model.
-    #[serde(default)]
-    pub model: String,
-    /// Which light counted.
-    #[serde(default)]
-    pub light: String,
-    /// Its version.
-    pub version: String,
-    /// SHA-256 of the spec and of every file that it names.
-    pub input_sha256: String,
-    /// Seed.
-    pub seed: u64,
-    /// What the engine set.
-    pub settings: BTreeMap<String, String>,
-    /// Where the engine only approximates.
-    pub approximation: Option<String>,
-    /// What the engine noted.
-    pub notes: Vec<String>,
-    /// Relative standard uncertainty of the engine as an instrument, from its calibration; verdicts carry it.
-    #[serde(default)]
-    pub instrument_uncertainty: f64,
-    /// The command that repeats it by hand in the folder that `luxproof export` makes, where there is one.
-    #[serde(default)]
-    pub command: Option<String>,
-    /// Why there are no readings, if there are none.
-    pub failure: Option<String>,
-    /// Wall-clock seconds.
-    pub wall_s: f64,
+    #[serde(flatten)]
+    pub reading: Reading,
 }
 
 /// Comparisons by verdict, and skips.
@@ -167,7 +114,6 @@ pub struct RecordingSummary {
 pub struct Summary {
     /// Passed.
     pub pass: usize,
-    /// Failed.
     pub fail: usize,
     /// Undecided within the budget.
     pub inconclusive: usize,
@@ -243,7 +189,6 @@ impl Summary {
 
 /// What a report is made of, besides the comparisons.
 pub struct Ingredients<'a> {
-    /// The case.
     pub case: String,
     /// What was run.
     pub spec: SpecRecord,
@@ -265,8 +210,6 @@ pub struct Ingredients<'a> {
     pub published: Vec<PublishedTable>,
     /// Curves of the photometric files.
     pub curves: Vec<Curve>,
-    /// What repeats an engine's part by hand, by procedure and engine.
-    pub commands: BTreeMap<(String, String), String>,
 }
 
 impl Report {
@@ -284,9 +227,7 @@ impl Report {
             consensus,
             published,
             curves,
-            commands,
         } = ingredients;
-        let command = |r: &Recording| commands.get(&(r.procedure.clone(), r.engine.clone())).cloned();
         Self {
             luxproof: 1,
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -296,7 +237,7 @@ impl Report {
             spec,
             engines,
             readings: recordings.iter().flat_map(readings).collect(),
-            recordings: recordings.iter().map(|r| RecordingSummary::of(r, command(r))).collect(),
+            recordings: recordings.iter().map(|r| Recording { readings: vec![], ..r.clone() }).collect(),
             summary: Summary::of(&comparisons, &skips),
             comparisons,
             skips,
@@ -336,7 +277,7 @@ impl Report {
             all
         })?;
         let summary = Summary::of(&joined.comparisons, &joined.skips);
-        let order = |e: &EngineStatus| crate::engines::all().iter().position(|known| known.id().name() == e.id);
+        let order = |e: &EngineStatus| crate::engines::all().iter().position(|known| known.name() == e.id);
         let mut engines = joined.engines;
         engines.sort_by_key(order);
         let joined = Self { spec, engines, summary, ..joined };
@@ -366,54 +307,18 @@ impl Report {
     }
 
     /// The procedures of the comparisons and readings, in their order.
-    fn procedures(&self) -> Vec<&str> {
-        let mut names: Vec<&str> = vec![];
-        for name in
-            self.recordings.iter().map(|r| r.procedure.as_str()).chain(self.skips.iter().map(|s| s.procedure.as_str()))
-        {
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        }
-        names.sort_by_key(|n| crate::spec::Procedures::NAMES.iter().position(|k| k == n));
-        names
+    fn procedures(&self) -> BTreeSet<ProcedureId> {
+        let recorded = self.recordings.iter().map(|r| r.key.procedure);
+        recorded.chain(self.skips.iter().map(|s| s.key.procedure)).collect()
     }
 }
 
 fn readings(recording: &Recording) -> impl Iterator<Item = ReadingRecord> {
     recording.readings.iter().map(|reading| ReadingRecord {
-        case: recording.case.clone(),
-        procedure: recording.procedure.clone(),
-        engine: recording.engine.clone(),
+        key: recording.key.clone(),
         model: recording.model.clone(),
-        meter: reading.meter.clone(),
-        quantity: reading.quantity,
-        value: reading.value,
-        std_error: reading.std_error,
-        error_bound: reading.error_bound,
+        reading: reading.clone(),
     })
-}
-
-impl RecordingSummary {
-    fn of(recording: &Recording, command: Option<String>) -> Self {
-        Self {
-            case: recording.case.clone(),
-            procedure: recording.procedure.clone(),
-            engine: recording.engine.clone(),
-            model: recording.model.clone(),
-            light: recording.light.clone(),
-            version: recording.version.clone(),
-            input_sha256: recording.input_sha256.clone(),
-            seed: recording.seed,
-            settings: recording.settings.clone(),
-            approximation: recording.approximation.clone(),
-            notes: recording.notes.clone(),
-            instrument_uncertainty: recording.instrument_uncertainty,
-            command,
-            failure: recording.failure.clone(),
-            wall_s: recording.wall_s,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::terminal::{percent, published_column, value};
-use super::{ReadingRecord, RecordingSummary, Report};
-use crate::diff::{Basis, PublishedTable};
-use crate::reading::Quantity;
+use super::{ReadingRecord, Report};
+use crate::judge::{Basis, PublishedTable};
+use crate::record::Quantity;
+use crate::record::Recording;
 
 /// A drawn table: a heading, and rows of as many cells.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -14,7 +15,6 @@ pub(super) struct Grid {
     pub(super) title: String,
     /// Headings of the columns.
     pub(super) head: Vec<String>,
-    /// The rows.
     pub(super) rows: Vec<Vec<String>>,
 }
 
@@ -39,10 +39,10 @@ fn grid(report: &Report, table: &PublishedTable) -> Grid {
         let note = if column.reference { "its reference" } else { "" };
         rows.push(std::iter::once(format!("paper {}", column.name)).chain(cells).chain([note.to_owned()]).collect());
     }
-    let mine = |r: &&RecordingSummary| r.procedure == table.procedure && table.cases.contains(&r.case);
-    let mut recordings: Vec<&RecordingSummary> = report.recordings.iter().filter(mine).collect();
+    let mine = |r: &&Recording| r.key.procedure == table.procedure && table.cases.contains(&r.key.case);
+    let mut recordings: Vec<&Recording> = report.recordings.iter().filter(mine).collect();
     let order = |engine: &str| report.engines.iter().position(|e| e.id == engine);
-    recordings.sort_by_key(|r| order(&r.engine));
+    recordings.sort_by_key(|r| order(&r.key.engine));
     let mut seen: Vec<(String, Vec<String>)> = vec![];
     for recording in recordings {
         let cells: Vec<String> = table.rows.iter().map(|r| reading(report, recording, &r.meter.0)).collect();
@@ -52,37 +52,35 @@ fn grid(report: &Report, table: &PublishedTable) -> Grid {
             continue;
         }
         let taken = seen.iter().any(|(other, _)| *other == label);
-        let shown = if taken { format!("{label} ({})", recording.case) } else { label.clone() };
+        let shown = if taken { format!("{label} ({})", recording.key.case) } else { label.clone() };
         seen.push((label, cells.clone()));
         rows.push(std::iter::once(shown).chain(cells).chain([furthest(report, recording)]).collect());
     }
     Grid { title: table.title.clone(), head, rows }
 }
 
-fn label(recording: &RecordingSummary) -> String {
-    if recording.engine == "iesna" {
+fn label(recording: &Recording) -> String {
+    if recording.key.engine == "iesna" {
         let method = recording.settings.get("method").map(|m| format!(", {m}"));
         return format!("iesna{}", method.unwrap_or_default());
     }
-    let bounces = recording.light.split_once(", ").map(|(_, bounces)| format!(", {bounces}"));
-    format!("{}, {}{}", recording.engine, recording.model, bounces.unwrap_or_default())
+    let light = recording.light.to_string();
+    let bounces = light.split_once(", ").map(|(_, bounces)| format!(", {bounces}"));
+    format!("{}, {}{}", recording.key.engine, recording.model, bounces.unwrap_or_default())
 }
 
-fn reading(report: &Report, recording: &RecordingSummary, meter: &str) -> String {
-    let is_it = |r: &&ReadingRecord| {
-        r.meter.0 == meter
-            && r.engine == recording.engine
-            && r.procedure == recording.procedure
-            && r.case == recording.case
-    };
+fn reading(report: &Report, recording: &Recording, meter: &str) -> String {
+    let is_it = |r: &&ReadingRecord| r.reading.meter.0 == meter && r.key == recording.key;
     report.readings.iter().find(is_it).map_or_else(|| "-".to_owned(), value)
 }
 
 /// The largest relative deviation from each column of the paper that the recording is held against.
-fn furthest(report: &Report, recording: &RecordingSummary) -> String {
+fn furthest(report: &Report, recording: &Recording) -> String {
     let mut worst: BTreeMap<&str, f64> = BTreeMap::new();
     for c in &report.comparisons {
-        let mine = c.case == recording.case && c.procedure == recording.procedure && c.engine == recording.engine;
+        let mine = c.key.case == recording.key.case
+            && c.key.procedure == recording.key.procedure
+            && c.key.engine == recording.key.engine;
         let reference = c.reference.as_ref().filter(|r| mine && r.basis == Basis::Published);
         if let Some((reference, deviation)) = reference.zip(c.relative_deviation) {
             let most = worst.entry(published_column(&reference.source)).or_insert(deviation);

@@ -1,8 +1,11 @@
 //! A paper's deviations split into shares: the readings of all cases that lie between its printed values, and the table of shares.
 
+use luminaire::scene::Bounces;
+
 use super::paper::Grid;
-use super::{ReadingRecord, RecordingSummary, Report};
-use crate::diff::{PaperSplit, PublishedColumn, PublishedRow, PublishedTable, Share, Stage, Stages, shares};
+use super::{ReadingRecord, Report};
+use crate::judge::{PaperSplit, PublishedColumn, PublishedRow, PublishedTable, Share, Stage, Stages, shares};
+use crate::record::Recording;
 
 /// The coverage factor of the intervals: JCGM 100:2008, 6.3.3.
 const COVERAGE: f64 = 2.0;
@@ -26,20 +29,17 @@ fn split(
     column: &PublishedColumn,
     row: &PublishedRow,
 ) -> Option<PaperSplit> {
-    let cut = format!("{} bounces", table.bounces?);
-    let read = |engine: &str, model: &str, bounces: &str| {
-        let is_it = |r: &&RecordingSummary| {
-            r.engine == engine
-                && r.procedure == table.procedure
-                && table.cases.contains(&r.case)
+    let cut = Some(Bounces::AtMost(table.bounces?));
+    let read = |engine: &str, model: &str, bounces: Option<Bounces>| {
+        let is_it = |r: &&Recording| {
+            r.key.engine == engine
+                && r.key.procedure == table.procedure
+                && table.cases.contains(&r.key.case)
                 && (model.is_empty() || r.model == model)
-                && (bounces.is_empty() || r.light.ends_with(bounces))
+                && (bounces.is_none() || r.light.bounces() == bounces)
         };
         report.recordings.iter().filter(is_it).find_map(|recording| {
-            let mine = |r: &&ReadingRecord| {
-                r.meter == row.meter
-                    && (&r.case, &r.procedure, &r.engine) == (&recording.case, &recording.procedure, &recording.engine)
-            };
+            let mine = |r: &&ReadingRecord| r.reading.meter == row.meter && r.key == recording.key;
             report.readings.iter().find(mine).map(|r| stage(r, recording))
         })
     };
@@ -51,11 +51,11 @@ fn split(
     };
     let stages = Stages {
         printed_method: printed(&method.name)?,
-        method: read(&method.engine, "", "")?,
-        exact: read("simulator", &method.model, "all bounces")?,
-        exact_cut: read("simulator", &method.model, &cut)?,
-        exact_model: read("simulator", &column.model, &cut)?,
-        rendered: read(&column.engine, &column.model, &cut)?,
+        method: read(&method.engine, "", None)?,
+        exact: read("simulator", &method.model, Some(Bounces::Converged))?,
+        exact_cut: read("simulator", &method.model, cut)?,
+        exact_model: read("simulator", &column.model, cut)?,
+        rendered: read(&column.engine, &column.model, cut)?,
         printed: printed(&column.name)?,
     };
     let [whole, of_method, photometry, renderer, remainder] = shares(&stages, table.flux.as_ref(), COVERAGE);
@@ -72,10 +72,9 @@ fn split(
     })
 }
 
-fn stage(reading: &ReadingRecord, recording: &RecordingSummary) -> Stage {
-    let bound = reading.error_bound.unwrap_or(0.0) / 3f64.sqrt();
-    let instrument = recording.instrument_uncertainty * reading.value;
-    Stage { value: reading.value, uncertainty: reading.std_error.unwrap_or(0.0).hypot(bound).hypot(instrument) }
+fn stage(reading: &ReadingRecord, recording: &Recording) -> Stage {
+    let instrument = recording.instrument_uncertainty * reading.reading.value;
+    Stage { value: reading.reading.value, uncertainty: reading.reading.uncertainty.standard().hypot(instrument) }
 }
 
 /// The splits as a table; `None` of none.

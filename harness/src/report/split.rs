@@ -1,7 +1,7 @@
 //! Lines that tell a method's share of a deviation from the renderer's.
 
 use super::Report;
-use crate::diff::Split;
+use crate::judge::Split;
 
 /// The widest split of each case, procedure and engine, in their order.
 pub(super) fn widest(report: &Report) -> Vec<&Split> {

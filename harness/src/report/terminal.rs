@@ -6,8 +6,8 @@ use std::fmt::Write;
 use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArrangement, Table, presets};
 
 use super::{ReadingRecord, Report, consensus, paper, paper_split, split};
-use crate::diff::{Basis, Comparison, Verdict};
-use crate::run::Status;
+use crate::judge::{Basis, Comparison, Verdict};
+use crate::record::{ProcedureId, Reading, ReadingKey, Role, Status, Uncertainty};
 
 /// More meters than this are summarised instead of listed.
 const LISTED_METERS: usize = 8;
@@ -35,10 +35,8 @@ pub enum Detail {
 
 /// One row of the verdict matrix.
 pub(super) struct Row {
-    /// The case.
     pub(super) case: String,
-    /// The procedure.
-    pub(super) procedure: String,
+    pub(super) procedure: ProcedureId,
     /// What its references rest on.
     pub(super) basis: String,
     /// One an engine, in the report's order.
@@ -110,7 +108,7 @@ pub(super) fn matrix(report: &Report) -> Vec<Row> {
     let of_case = |case| report.procedures().into_iter().map(move |procedure| (case, procedure));
     let mut rows = vec![];
     for (case, procedure) in cases().flat_map(of_case) {
-        let is_mine = |c: &&Comparison| c.case == case && c.procedure == procedure;
+        let is_mine = |c: &&Comparison| c.key.case == case && c.key.procedure == procedure;
         let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(is_mine).collect();
         let mut bases: Vec<Option<Basis>> = comparisons.iter().map(|c| c.reference.as_ref().map(|r| r.basis)).collect();
         bases.sort_unstable();
@@ -120,7 +118,7 @@ pub(super) fn matrix(report: &Report) -> Vec<Row> {
                 comparisons.iter().copied().filter(|c| c.reference.as_ref().map(|r| r.basis) == basis).collect();
             rows.push(Row {
                 case: case.to_owned(),
-                procedure: procedure.to_owned(),
+                procedure,
                 basis: basis.map_or("none", Basis::name).to_owned(),
                 cells: report.engines.iter().map(|e| cell(report, case, procedure, &e.id, &of_row)).collect(),
             });
@@ -129,13 +127,13 @@ pub(super) fn matrix(report: &Report) -> Vec<Row> {
     rows
 }
 
-fn cell(report: &Report, case: &str, procedure: &str, engine: &str, of_row: &[&Comparison]) -> Cell {
-    let mine: Vec<&&Comparison> = of_row.iter().filter(|c| c.engine == engine).collect();
+fn cell(report: &Report, case: &str, procedure: ProcedureId, engine: &str, of_row: &[&Comparison]) -> Cell {
+    let mine: Vec<&&Comparison> = of_row.iter().filter(|c| c.key.engine == engine).collect();
     let Some(verdict) = mine.iter().map(|c| c.verdict).max() else {
-        let is = |c: &str, p: &str, e: &str| c == case && p == procedure && e == engine;
-        return if report.recordings.iter().any(|r| is(&r.case, &r.procedure, &r.engine)) && judges_others(engine) {
+        let is = |key: &ReadingKey| key.is_of(case, procedure) && key.engine == *engine;
+        return if report.recordings.iter().any(|r| is(&r.key) && r.role == Role::Witness) {
             Cell::IsReference
-        } else if report.skips.iter().any(|s| is(&s.case, &s.procedure, &s.engine)) {
+        } else if report.skips.iter().any(|s| is(&s.key)) {
             Cell::Skipped
         } else {
             Cell::Empty
@@ -150,10 +148,6 @@ fn cell(report: &Report, case: &str, procedure: &str, engine: &str, of_row: &[&C
     }
 }
 
-fn judges_others(engine: &str) -> bool {
-    crate::plan::REFERENCES.contains(&engine)
-}
-
 /// The worst comparison of each engine, procedure and basis, worst first: by verdict, then by deviation over tolerance.
 pub(super) fn worst(report: &Report, count: usize) -> Vec<&Comparison> {
     let strain = |c: &Comparison| {
@@ -163,8 +157,9 @@ pub(super) fn worst(report: &Report, count: usize) -> Vec<&Comparison> {
     let mut all: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.deviation != Some(0.0)).collect();
     all.sort_by(|a, b| b.verdict.cmp(&a.verdict).then(strain(b).total_cmp(&strain(a))));
     // One of each kind: twenty meters that fail alike are one finding.
-    let kind =
-        |c: &Comparison| (c.procedure.clone(), c.engine.clone(), c.reference.as_ref().map(|r| r.basis), c.verdict);
+    let kind = |c: &Comparison| {
+        (c.key.procedure.clone(), c.key.engine.clone(), c.reference.as_ref().map(|r| r.basis), c.verdict)
+    };
     let mut seen = std::collections::BTreeSet::new();
     all.retain(|c| seen.insert(kind(c)));
     all.truncate(count);
@@ -196,7 +191,7 @@ pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&s
     if !worst.is_empty() {
         writeln!(text, "Worst deviations (by verdict, then deviation over tolerance)").ok();
         for c in worst {
-            let case = if report.is_suite() { format!("{}: ", c.case) } else { String::new() };
+            let case = if report.is_suite() { format!("{}: ", c.key.case) } else { String::new() };
             writeln!(text, "  {}", shortened(&format!("{case}{}", deviation_line(c)), detail)).ok();
         }
         writeln!(text).ok();
@@ -223,7 +218,7 @@ fn baseline(report: &Report, detail: Detail, text: &mut String) {
     let Some(check) = &report.baseline else { return };
     writeln!(text, "Baseline {}: {}", check.file, check.counts()).ok();
     for entry in check.departures() {
-        writeln!(text, "  {:<9} {} {} {}", entry.state, entry.case, entry.procedure, entry.engine).ok();
+        writeln!(text, "  {:<9} {} {} {}", entry.state, entry.key.case, entry.key.procedure, entry.key.engine).ok();
         for line in &entry.details {
             writeln!(text, "            {}", shortened(line, detail)).ok();
         }
@@ -237,7 +232,7 @@ fn tables(report: &Report, style: Style, text: &mut String) {
         writeln!(text, "{}\n", drawn(&grid, style)).ok();
     }
     // In a suite the readings of a procedure are those of many rooms: they stay in the files.
-    let in_paper = |p: &&str| report.published.iter().any(|t| t.procedure == **p);
+    let in_paper = |p: &ProcedureId| report.published.iter().any(|t| t.procedure == *p);
     for procedure in report.procedures().into_iter().filter(|p| !report.is_suite() && !in_paper(p)) {
         if let Some(table) = readings(report, procedure, style) {
             writeln!(text, "{table}\n").ok();
@@ -254,7 +249,7 @@ fn tables(report: &Report, style: Style, text: &mut String) {
 }
 
 fn engines_line(report: &Report) -> String {
-    let of = |e: &crate::run::EngineStatus| match (e.status, &e.version) {
+    let of = |e: &crate::record::EngineStatus| match (e.status, &e.version) {
         (Status::Ran, Some(version)) => format!("{} {version} ({:.1} s)", e.id, e.wall_s),
         (Status::Failed, Some(version)) => format!("{} {version} FAILED", e.id),
         (Status::Absent, _) => format!("{} absent", e.id),
@@ -285,7 +280,7 @@ fn header(words: impl IntoIterator<Item = String>) -> Vec<TableCell> {
 
 fn verdicts(report: &Report, style: Style) -> String {
     let mut table = table();
-    let engines = report.engines.iter().map(|e| e.id.clone());
+    let engines = report.engines.iter().map(|e| e.id.to_string());
     let heads = if report.is_suite() { &["Verdicts", "procedure", "against"][..] } else { &["Verdicts", "against"] };
     table.set_header(header(heads.iter().map(|h| (*h).to_owned()).chain(engines)));
     let mut case = String::new();
@@ -306,25 +301,25 @@ fn verdicts(report: &Report, style: Style) -> String {
 }
 
 /// The readings of one procedure, engines side by side.
-fn readings(report: &Report, procedure: &str, style: Style) -> Option<String> {
-    let records: Vec<&ReadingRecord> = report.readings.iter().filter(|r| r.procedure == procedure).collect();
-    let unit = records.first()?.quantity.unit();
+fn readings(report: &Report, procedure: ProcedureId, style: Style) -> Option<String> {
+    let records: Vec<&ReadingRecord> = report.readings.iter().filter(|r| r.key.procedure == procedure).collect();
+    let unit = records.first()?.reading.quantity.unit();
     let mut meters: Vec<_> = vec![];
     for record in &records {
-        if !meters.contains(&&record.meter) {
-            meters.push(&record.meter);
+        if !meters.contains(&&record.reading.meter) {
+            meters.push(&record.reading.meter);
         }
     }
     if meters.len() > LISTED_METERS {
         return None;
     }
     let engines: Vec<&str> =
-        report.engines.iter().map(|e| e.id.as_str()).filter(|e| records.iter().any(|r| r.engine == *e)).collect();
+        report.engines.iter().map(|e| e.id.as_str()).filter(|e| records.iter().any(|r| r.key.engine == *e)).collect();
     let mut table = table();
     let heads = [format!("{procedure} [{unit}]")].into_iter().chain(engines.iter().map(|e| (*e).to_owned()));
     table.set_header(header(heads));
     for meter in meters {
-        let of = |engine: &&str| records.iter().find(|r| r.meter == *meter && r.engine == **engine);
+        let of = |engine: &&str| records.iter().find(|r| r.reading.meter == *meter && r.key.engine == **engine);
         let values = engines.iter().map(|e| of(e).map_or("-".to_owned(), |r| value(r)));
         table.add_row([place(report, procedure, &meter.0)].into_iter().chain(values));
     }
@@ -354,8 +349,8 @@ pub(super) fn published_column(source: &str) -> &str {
     head.rsplit(", ").next().unwrap_or(head)
 }
 
-fn place(report: &Report, procedure: &str, meter: &str) -> String {
-    let c = report.comparisons.iter().find(|c| c.procedure == procedure && c.meter.0 == meter);
+fn place(report: &Report, procedure: ProcedureId, meter: &str) -> String {
+    let c = report.comparisons.iter().find(|c| c.key.procedure == procedure && c.meter.0 == meter);
     match c.and_then(|c| c.gamma_deg.zip(c.c_deg)) {
         Some((gamma, plane)) => format!("  C {plane} gamma {gamma}"),
         None => c.map_or(format!("  {meter}"), |c| format!("  {meter} ({}, {}, {})", c.at_m[0], c.at_m[1], c.at_m[2])),
@@ -364,13 +359,13 @@ fn place(report: &Report, procedure: &str, meter: &str) -> String {
 
 /// Six significant digits, and the standard error in the last two digits that it reaches: `0.9431(12)`.
 pub(super) fn value(record: &ReadingRecord) -> String {
-    match record.std_error {
-        Some(e) if e > 0.0 && record.value > 0.0 => {
+    match record.reading.uncertainty.standard_error() {
+        Some(e) if e > 0.0 && record.reading.value > 0.0 => {
             let decimals = (1.0 - e.log10().floor()).clamp(0.0, 9.0) as usize;
             let in_units = (e * 10f64.powf(decimals as f64)).round();
-            format!("{:.decimals$}({in_units})", record.value)
+            format!("{:.decimals$}({in_units})", record.reading.value)
         }
-        _ => significant(record.value),
+        _ => significant(record.reading.value),
     }
 }
 
@@ -404,8 +399,8 @@ fn deviation_line(c: &Comparison) -> String {
     format!(
         "{:<9} {} {} {} {} against {against}{deviation}{why}",
         mark(c.verdict),
-        c.engine,
-        c.procedure,
+        c.key.engine,
+        c.key.procedure,
         c.meter,
         number(c.value)
     )
@@ -421,22 +416,25 @@ fn shortened(line: &str, detail: Detail) -> String {
 
 /// Failures and skips, those of a kind on one line, and how much more there is.
 fn brief_notes(report: &Report, text: &mut String) {
-    let mut groups: BTreeMap<(String, String), std::collections::BTreeSet<(&str, &str)>> = BTreeMap::new();
+    let mut groups: BTreeMap<(String, String), std::collections::BTreeSet<(&str, ProcedureId)>> = BTreeMap::new();
     for r in &report.recordings {
         if let Some(failure) = &r.failure {
             let what = format!(": {}", failure.lines().next().unwrap_or_default());
-            groups.entry((format!("{} failed", r.engine), what)).or_default().insert((&r.case, &r.procedure));
+            groups
+                .entry((format!("{} failed", r.key.engine), what))
+                .or_default()
+                .insert((&r.key.case, r.key.procedure));
         }
     }
     for skip in &report.skips {
         let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
-        let key = (skipped(&skip.engine), format!(": {}{saved}", skip.reason));
-        groups.entry(key).or_default().insert((&skip.case, &skip.procedure));
+        let key = (skipped(&skip.key.engine), format!(": {}{saved}", skip.reason));
+        groups.entry(key).or_default().insert((&skip.key.case, skip.key.procedure));
     }
     for ((head, what), jobs) in groups.iter().take(2 * BRIEF) {
         let place = match jobs.iter().collect::<Vec<_>>()[..] {
             [(case, procedure)] if report.is_suite() => format!("{procedure} of {case}"),
-            [(_, procedure)] => (*procedure).to_owned(),
+            [(_, procedure)] => procedure.to_string(),
             _ => format!("{} jobs", jobs.len()),
         };
         writeln!(text, "  {}", shortened(&format!("{head} in {place}{what}"), Detail::Brief)).ok();
@@ -454,29 +452,29 @@ fn brief_notes(report: &Report, text: &mut String) {
 
 /// Who is skipped: what concerns every engine alike names none.
 fn skipped(engine: &str) -> String {
-    if engine == crate::plan::EVERYONE { "skipped".to_owned() } else { format!("skipped {engine}") }
+    if crate::plan::EVERYONE == *engine { "skipped".to_owned() } else { format!("skipped {engine}") }
 }
 
 fn notes(report: &Report, text: &mut String) {
     // The cases that each line is about: what holds for one alone is told with its name.
     let mut lines: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for recording in &report.recordings {
-        let of = format!("{} {}", recording.engine, recording.procedure);
-        let mut note = |line: String| lines.entry(line).or_default().push(&recording.case);
+        let of = format!("{} {}", recording.key.engine, recording.key.procedure);
+        let mut note = |line: String| lines.entry(line).or_default().push(&recording.key.case);
         if let Some(approximation) = &recording.approximation {
             note(format!("{of}: approximate, {approximation}"));
         }
         // What the approximation says already need not be said again.
         let said = |note: &&String| recording.approximation.as_ref().is_some_and(|a| a.contains(note.as_str()));
-        recording.notes.iter().filter(|n| !said(n)).for_each(|n| note(format!("{}: {n}", recording.engine)));
+        recording.notes.iter().filter(|n| !said(n)).for_each(|n| note(format!("{}: {n}", recording.key.engine)));
         if let Some(failure) = &recording.failure {
             note(format!("{of} failed: {}", failure.lines().next().unwrap_or_default()));
         }
     }
     for skip in &report.skips {
         let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
-        let line = format!("{} in {}: {}{saved}", skipped(&skip.engine), skip.procedure, skip.reason);
-        lines.entry(line).or_default().push(&skip.case);
+        let line = format!("{} in {}: {}{saved}", skipped(&skip.key.engine), skip.key.procedure, skip.reason);
+        lines.entry(line).or_default().push(&skip.key.case);
     }
     for (line, cases) in &mut lines {
         cases.dedup();
@@ -495,19 +493,18 @@ fn notes(report: &Report, text: &mut String) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reading::{MeterId, Quantity};
+    use crate::record::{MeterId, Quantity};
 
     fn reading(value: f64, std_error: Option<f64>) -> ReadingRecord {
         ReadingRecord {
-            case: "c".into(),
-            procedure: "p".into(),
-            engine: "e".into(),
+            key: ReadingKey::new("c", ProcedureId::DirectIlluminance, "e"),
             model: "point".into(),
-            meter: MeterId::new("m", 0),
-            quantity: Quantity::Illuminance,
-            value,
-            std_error,
-            error_bound: None,
+            reading: Reading {
+                meter: MeterId::new("m", 0),
+                quantity: Quantity::Illuminance,
+                value,
+                uncertainty: std_error.map_or(Uncertainty::Exact, |e| Uncertainty::sampled(e, None)),
+            },
         }
     }
 

@@ -17,6 +17,7 @@ use super::model::{
     ToleranceOverride,
 };
 use super::{Source, SpecError, suggestion};
+use crate::record::ProcedureId;
 
 /// Nearest a meter or a luminaire may come to a surface, relative to the room's largest extent.
 ///
@@ -52,7 +53,7 @@ pub struct Case {
     /// The published tables, absolute or relative to the working directory.
     pub published: Option<PathBuf>,
     /// Overrides of the default tolerances, by procedure.
-    pub tolerances: BTreeMap<String, ToleranceOverride>,
+    pub tolerances: BTreeMap<ProcedureId, ToleranceOverride>,
     /// The text, for the places of later errors.
     pub source: Source,
 }
@@ -116,7 +117,7 @@ impl<'a> Builder<'a> {
         }
         self.procedures(&spec.procedures, &spec.luminaires, &meters)?;
         self.budget(spec.budget)?;
-        self.tolerances(&spec.tolerances)?;
+        let tolerances = self.tolerances(&spec.tolerances)?;
         let published = spec.published.map(|file| self.beside(&file));
         if let Some(file) = &published {
             let bytes = self.read("published", file)?;
@@ -135,7 +136,7 @@ impl<'a> Builder<'a> {
             only_engines: None,
             budget: spec.budget,
             published,
-            tolerances: spec.tolerances,
+            tolerances,
             source: self.source.clone(),
         })
     }
@@ -354,20 +355,23 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    fn tolerances(&self, tolerances: &BTreeMap<String, ToleranceOverride>) -> Result<(), SpecError> {
-        for (procedure, tolerance) in tolerances {
-            if !Procedures::NAMES.contains(&procedure.as_str()) {
-                let help = suggestion(procedure, Procedures::NAMES.into_iter());
-                let message = format!("`{procedure}` is no procedure");
-                return Err(self.source.error_at("tolerances", message, help));
-            }
+    fn tolerances(
+        &self,
+        tolerances: &BTreeMap<String, ToleranceOverride>,
+    ) -> Result<BTreeMap<ProcedureId, ToleranceOverride>, SpecError> {
+        let one = |(name, tolerance): (&String, &ToleranceOverride)| {
+            let procedure = name.parse::<ProcedureId>().map_err(|_| {
+                let help = suggestion(name, ProcedureId::ALL.map(ProcedureId::name).into_iter());
+                self.source.error_at("tolerances", format!("`{name}` is no procedure"), help)
+            })?;
             let values = [tolerance.relative, tolerance.absolute_lx, tolerance.absolute_cd];
-            if !values.iter().all(|v| v.is_finite() && *v >= 0.0) {
-                let at = format!("tolerances.{procedure}");
-                return Err(self.source.error_at(&at, "a tolerance is a number from 0", "give positive numbers"));
+            if values.iter().all(|v| v.is_finite() && *v >= 0.0) {
+                return Ok((procedure, *tolerance));
             }
-        }
-        Ok(())
+            let at = format!("tolerances.{name}");
+            Err(self.source.error_at(&at, "a tolerance is a number from 0", "give positive numbers"))
+        };
+        tolerances.iter().map(one).collect()
     }
 
     fn beside(&self, file: &Path) -> PathBuf {
@@ -380,12 +384,6 @@ impl<'a> Builder<'a> {
             self.source.error_at(at, message, "paths are relative to the spec's folder")
         })
     }
-}
-
-impl Procedures {
-    /// The procedures' names in specs and reports, in their order.
-    pub const NAMES: [&str; 4] =
-        ["luminous_intensity", "direct_illuminance", "indirect_illuminance", "total_illuminance"];
 }
 
 /// What is wrong with a meter at this point, and what to do.

@@ -28,9 +28,7 @@ pub struct SpecError {
     pub line: Option<usize>,
     /// Column, counted from 1.
     pub column: Option<usize>,
-    /// What is wrong.
     pub message: String,
-    /// What to do.
     pub help: Option<String>,
 }
 
@@ -42,9 +40,7 @@ fn place(file: &Path, line: Option<usize>, column: Option<usize>) -> String {
 /// A spec file as it was read: its text, kept for the places of errors.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// The path as given.
     pub path: PathBuf,
-    /// The text.
     pub text: String,
     /// The places of the overrides that lie over it, such as `cases[1]`; none but in a case of a suite.
     overrides: Vec<String>,

@@ -9,7 +9,8 @@ use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Scene, Shap
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::super::{EngineError, EngineId, Estimate, Job, Measurement, Station};
+use crate::engines::{EngineError, Job, Measurement, Station};
+use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
 use crate::spec::Budget;
 
 /// The version of both forms.
@@ -23,7 +24,7 @@ pub struct ExternalJob {
     /// The case.
     case: String,
     /// The procedure.
-    procedure: String,
+    procedure: ProcedureId,
     /// Which light counts: straight from the luminaires, reflected at least once, or both.
     light: Light,
     /// Light reflected more often than this does not count; null: all of it counts.
@@ -145,6 +146,26 @@ struct ReadingForm {
     /// Distance within which the true value lies, for deterministic methods.
     #[serde(default)]
     error_bound_lx: Option<f64>,
+    /// Of the standard error: one less than the independent samples that it was estimated from.
+    #[serde(default)]
+    degrees_of_freedom: Option<f64>,
+    /// Whether the value is claimed to be right to its last digit.
+    #[serde(default)]
+    exact: bool,
+}
+
+impl ReadingForm {
+    fn uncertainty(&self) -> Uncertainty {
+        let bound = self.error_bound_lx.unwrap_or(0.0);
+        match (self.exact, self.std_error_lx, self.error_bound_lx) {
+            (true, ..) => Uncertainty::Exact,
+            (_, Some(value), _) => {
+                Uncertainty::StandardError { value, degrees_of_freedom: self.degrees_of_freedom, bound }
+            }
+            (_, None, Some(bound)) => Uncertainty::Bound(bound),
+            (_, None, None) => Uncertainty::Unstated,
+        }
+    }
 }
 
 impl ExternalJob {
@@ -160,7 +181,7 @@ impl ExternalJob {
         Self {
             luxproof_job: VERSION,
             case: job.case.clone(),
-            procedure: job.procedure.clone(),
+            procedure: job.procedure,
             light,
             bounces,
             room: room(&job.scene),
@@ -250,7 +271,7 @@ fn meter(station: &Station) -> MeterForm {
 }
 
 /// Reads what an adapter printed; every meter must be there once, in order.
-pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineId) -> Result<Measurement, EngineError> {
+pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Result<Measurement, EngineError> {
     let output = |what: String| EngineError::Output { engine: engine.clone(), what };
     let answer: ExternalReadings = serde_json::from_slice(stdout).map_err(|e| {
         let start: String = String::from_utf8_lossy(stdout).chars().take(200).collect();
@@ -268,11 +289,7 @@ pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineId) -> Result
         if reading.meter != station.id.0 {
             return Err(output(format!("gave `{}` where `{}` was asked for", reading.meter, station.id)));
         }
-        estimates.push(Estimate {
-            value_lx: reading.illuminance_lx,
-            std_error_lx: reading.std_error_lx,
-            error_bound_lx: reading.error_bound_lx,
-        });
+        estimates.push(Estimate { value: reading.illuminance_lx, uncertainty: reading.uncertainty() });
     }
     Ok(Measurement { estimates, settings: answer.settings, notes: answer.notes })
 }

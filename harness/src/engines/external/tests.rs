@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::*;
 use crate::engines::fixtures::{CONVERGED, lopsided, luminaire, s1};
-use crate::process::ProcessError;
+use crate::system::process::ProcessError;
 
 fn adapter(script: &str, folder: &Path) -> External {
     let settings = BTreeMap::from([("command".to_owned(), json!(["sh", "-c", script]))]);
@@ -24,7 +24,7 @@ fn read_within(script: &str, limit: Duration) -> Result<Measurement, EngineError
         log: folder.path().join("log"),
         jobs: 1,
         limit,
-        peak: crate::process::PeakMemory::default(),
+        peak: crate::system::process::PeakMemory::default(),
     };
     adapter(script, folder.path()).read(&s1(Transport::Direct), &bench)
 }
@@ -43,7 +43,7 @@ fn prints(rows: &[(&str, &str)]) -> String {
 #[test]
 fn what_an_adapter_prints_is_what_is_read() {
     let found = read(&prints(&[("m[0]", "1"), ("m[1]", "2.5"), ("m[2]", "0"), ("m[3]", "4")])).unwrap();
-    assert_eq!(found.estimates.iter().map(|e| e.value_lx).collect::<Vec<_>>(), [1.0, 2.5, 0.0, 4.0]);
+    assert_eq!(found.estimates.iter().map(|e| e.value).collect::<Vec<_>>(), [1.0, 2.5, 0.0, 4.0]);
     assert!(found.settings["command"].starts_with('/'), "{:?}", found.settings);
 }
 
@@ -122,9 +122,9 @@ fn procedures_left_out_are_not_run() {
         serde_json::from_value(json!({"command": ["x"], "procedures": ["direct_illuminance"]})).unwrap();
     let engine = External::new("mine", &settings, Path::new(".")).unwrap();
     let mut job = s1(Transport::Direct);
-    job.procedure = "direct_illuminance".into();
+    job.procedure = ProcedureId::DirectIlluminance;
     assert_eq!(engine.supports(&job), Support::Yes);
-    job.procedure = "indirect_illuminance".into();
+    job.procedure = ProcedureId::IndirectIlluminance;
     assert!(matches!(engine.supports(&job), Support::No(_)));
 }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::{InstallError, LIMIT};
 use crate::engines::Site;
-use crate::process::Invocation;
+use crate::system::process::Invocation;
 
 /// The libLLVM packages that Mitsuba works with, the best known first.
 const LLVM_PACKAGES: [&str; 5] = ["libllvm19", "libllvm20", "libllvm18", "libllvm17t64", "libllvm17"];

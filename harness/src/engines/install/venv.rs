@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::{InstallError, LIMIT};
 use crate::engines::Site;
-use crate::process::Invocation;
+use crate::system::process::Invocation;
 
 /// The exact packages, in pip's requirements format.
 const LOCK: &str = include_str!("../../../engines.lock");

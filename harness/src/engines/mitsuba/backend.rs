@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::settings::Settings;
 use crate::engines::{Absent, Site, Version, Workbench};
-use crate::process::Invocation;
+use crate::system::process::Invocation;
 
 const PROBE: &str = include_str!("../../../drivers/mitsuba_probe.py");
 const REMEDY: &str = "run `luxproof engines install mitsuba`";

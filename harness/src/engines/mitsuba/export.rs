@@ -24,7 +24,6 @@ const GONIOMETRIC: &str = include_str!("../../../drivers/mitsuba_goniometric.py"
 /// Russian roulette stops a path with 5 % at least, so that above this reflectance rare long paths carry the light.
 const HIGH_REFLECTANCE: f64 = 0.95;
 
-/// All files of a job.
 pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.frame);
     let tables = Tables::of(job);
@@ -95,7 +94,7 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
     });
     let driver_job = DriverJob {
         case: &job.case,
-        procedure: &job.procedure,
+        procedure: job.procedure.name(),
         scene,
         variant: &settings.variant,
         transport: match job.transport {
@@ -150,7 +149,7 @@ fn emitter(luminaire: &Luminaire, table: &str, frame: &Frame) -> String {
 
 /// The first lines of a scene file.
 fn header(job: &Job, what: &str) -> String {
-    let (case, procedure) = (comment_text(&job.case), comment_text(&job.procedure));
+    let (case, procedure) = (comment_text(&job.case), job.procedure);
     format!(
         r#"<?xml version="1.0" encoding="utf-8"?>
 <!-- {case}: {procedure}.

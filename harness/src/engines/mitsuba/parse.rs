@@ -8,7 +8,8 @@ use serde::Deserialize;
 use super::output;
 use super::precision::float_error_lx;
 use super::settings::{Preset, Settings};
-use crate::engines::{EngineError, Estimate, Job, Measurement};
+use crate::engines::{EngineError, Job, Measurement};
+use crate::record::{Estimate, Uncertainty};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -25,6 +26,7 @@ struct Row {
     id: String,
     value: f64,
     std_error: f64,
+    degrees_of_freedom: Option<f64>,
 }
 
 /// Reads the driver's answer; every meter must be there once, in order.
@@ -44,12 +46,12 @@ pub(super) fn measurement(stdout: &[u8], job: &Job, settings: &Settings) -> Resu
         }
         // Direct light of points is deterministic: what is left is the rounding of 32-bit floats.
         let exact = settings.preset != Preset::Default && job.transport == Transport::Direct;
-        let sampled = row.std_error > 0.0 || !exact;
-        estimates.push(Estimate {
-            value_lx: row.value,
-            std_error_lx: sampled.then_some(row.std_error),
-            error_bound_lx: (!sampled).then(|| float_error_lx(job, settings, k)),
-        });
+        let uncertainty = if row.std_error > 0.0 || !exact {
+            Uncertainty::sampled(row.std_error, row.degrees_of_freedom)
+        } else {
+            Uncertainty::Bound(float_error_lx(job, settings, k))
+        };
+        estimates.push(Estimate { value: row.value, uncertainty });
     }
     let versions = answer.versions.into_iter().map(|(k, v)| (format!("version_{k}"), v));
     Ok(Measurement { estimates, settings: answer.settings.into_iter().chain(versions).collect(), notes: answer.notes })

@@ -12,7 +12,7 @@ use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Obstacle, Scen
 
 use super::*;
 use crate::engines::{Budget, Station};
-use crate::reading::MeterId;
+use crate::record::MeterId;
 
 mod failures;
 mod scenes;
@@ -77,7 +77,7 @@ fn stations(points_m: &[[f64; 3]], normal: DVec3) -> Vec<Station> {
 fn job(scene: Scene, stations: Vec<Station>, transport: Transport) -> Job {
     Job {
         case: "test case".into(),
-        procedure: "test procedure".into(),
+        procedure: crate::engines::fixtures::procedure_of(transport),
         scene,
         stations,
         transport,
@@ -131,7 +131,7 @@ fn workbench(folder: &Path) -> Workbench {
         log: folder.join("log"),
         jobs: 2,
         limit,
-        peak: crate::process::PeakMemory::default(),
+        peak: crate::system::process::PeakMemory::default(),
     }
 }
 
@@ -157,7 +157,7 @@ fn read_tampered(job: &Job, tamper: impl Fn(&str, String) -> String) -> Measurem
 }
 
 fn relative_deviations(measurement: &Measurement, exact: &[f64]) -> Vec<f64> {
-    measurement.estimates.iter().zip(exact).map(|(e, x)| e.value_lx / x - 1.0).collect()
+    measurement.estimates.iter().zip(exact).map(|(e, x)| e.value / x - 1.0).collect()
 }
 
 fn worst(deviations: &[f64]) -> f64 {
@@ -166,7 +166,7 @@ fn worst(deviations: &[f64]) -> f64 {
 
 /// The largest deviation in standard errors.
 fn worst_z(measurement: &Measurement, exact: &[f64]) -> f64 {
-    let z = |(e, x): (&crate::engines::Estimate, &f64)| (e.value_lx - x) / e.std_error_lx.unwrap();
+    let z = |(e, x): (&crate::record::Estimate, &f64)| (e.value - x) / e.uncertainty.standard_error().unwrap();
     worst(&measurement.estimates.iter().zip(exact).map(z).collect::<Vec<_>>())
 }
 
@@ -177,8 +177,8 @@ fn direct_light_follows_the_inverse_square_law_in_single_precision() {
     let deviations = relative_deviations(&found, &S1_DIRECT_LX);
     assert!(worst(&deviations) < 1e-5, "{deviations:?}");
     for (estimate, exact) in found.estimates.iter().zip(S1_DIRECT_LX) {
-        let bound = estimate.error_bound_lx.unwrap();
-        assert!((estimate.value_lx - exact).abs() <= bound && bound < 1e-4 * exact, "{estimate:?} for {exact}");
+        let bound = estimate.uncertainty.bound();
+        assert!((estimate.value - exact).abs() <= bound && bound < 1e-4 * exact, "{estimate:?} for {exact}");
     }
 }
 
@@ -187,7 +187,7 @@ fn indirect_light_is_the_converged_value_within_its_standard_error() {
     let found = read(&s1(CONVERGED));
     let deviations = relative_deviations(&found, &S1_INDIRECT_LX);
     assert!(worst(&deviations) < 4e-3 && worst_z(&found, &S1_INDIRECT_LX) < 4.0, "{found:?}");
-    assert!(found.estimates.iter().all(|e| e.std_error_lx.unwrap() < 1.05e-3 * e.value_lx), "{found:?}");
+    assert!(found.estimates.iter().all(|e| e.uncertainty.standard_error().unwrap() < 1.05e-3 * e.value), "{found:?}");
 }
 
 #[test]
@@ -199,7 +199,7 @@ fn n_bounces_are_n_diffuse_reflections() {
     assert!(worst_z(&found, &S1_SEVEN_LX) < 4.0, "{found:?}");
     assert!(worst_z(&found, &S1_INDIRECT_LX) > 8.0, "{found:?}");
     let none = read(&s1(Transport::Indirect(Bounces::AtMost(0))));
-    assert!(none.estimates.iter().all(|e| e.value_lx == 0.0), "{none:?}");
+    assert!(none.estimates.iter().all(|e| e.value == 0.0), "{none:?}");
 }
 
 #[test]
@@ -214,9 +214,9 @@ fn total_is_direct_plus_indirect() {
     indirect.transport = CONVERGED;
     let (total, indirect) = (read(&total), read(&indirect));
     for ((total, indirect), direct) in total.estimates.iter().zip(&indirect.estimates).zip(direct) {
-        let sum = direct + indirect.value_lx;
-        let error = total.std_error_lx.unwrap().hypot(indirect.std_error_lx.unwrap());
-        assert!((total.value_lx - sum).abs() < 4.0 * error + 1e-5 * sum, "{total:?} {indirect:?} {direct}");
+        let sum = direct + indirect.value;
+        let error = total.uncertainty.standard_error().unwrap().hypot(indirect.uncertainty.standard_error().unwrap());
+        assert!((total.value - sum).abs() < 4.0 * error + 1e-5 * sum, "{total:?} {indirect:?} {direct}");
     }
 }
 
@@ -231,9 +231,9 @@ fn asymmetric_and_turned_luminaires_read_their_own_table() {
         let (found, exact) = (read(&job), exact_direct_lx(&job));
         let scale = exact.iter().copied().fold(0.0, f64::max);
         for (estimate, exact) in found.estimates.iter().zip(exact) {
-            let bound = estimate.error_bound_lx.unwrap();
-            assert!((estimate.value_lx - exact).abs() < 1e-4 * exact + 1e-5 * scale, "{estimate:?} for {exact}");
-            assert!((estimate.value_lx - exact).abs() <= bound, "{estimate:?} for {exact}");
+            let bound = estimate.uncertainty.bound();
+            assert!((estimate.value - exact).abs() < 1e-4 * exact + 1e-5 * scale, "{estimate:?} for {exact}");
+            assert!((estimate.value - exact).abs() <= bound, "{estimate:?} for {exact}");
         }
     }
 }
@@ -256,7 +256,7 @@ fn several_luminaires_add_up_and_obstacles_throw_shadows() {
         shaded.scene.obstacles = vec![Obstacle { shape, reflectance: 0.3 }];
         shaded.stations[0].meter.position_m = DVec3::new(3.0, 4.0, 5.4);
         let found = read(&shaded);
-        assert_eq!(found.estimates[0].value_lx, 0.0);
+        assert_eq!(found.estimates[0].value, 0.0);
         assert!(worst(&relative_deviations(&found, &exact_direct_lx(&shaded))[1..]) < 1e-5, "{found:?}");
     }
 }

@@ -8,8 +8,9 @@ use std::time::Instant;
 use luminaire::scene::{Bounces, Transport};
 
 use crate::engines::image::read_rgb;
-use crate::engines::{EngineError, Estimate, Job, Measurement, SceneFile, Site, Workbench, mean_and_std_error};
-use crate::process::Invocation;
+use crate::engines::{EngineError, Job, Measurement, SceneFile, Site, Workbench};
+use crate::record::{Estimate, Uncertainty};
+use crate::system::process::Invocation;
 
 use super::ID;
 use super::export::{self, Light};
@@ -34,7 +35,6 @@ pub(super) struct Bench<'a> {
     program: PathBuf,
 }
 
-/// The program at a site.
 pub(super) fn program(site: &Site) -> Result<PathBuf, EngineError> {
     let what = "povray is not installed; run `luxproof engines install`".to_owned();
     site.program("povray").ok_or(EngineError::Solver { engine: ID, what })
@@ -116,7 +116,7 @@ impl<'a> Bench<'a> {
             let Look::Done { lx, resolution_lx } = *look else { continue };
             // Bilinear maps in single precision are off by a share of the largest intensity, not of this one.
             let bound = resolution_lx + DIRECT_RELATIVE * lx + self.table_error() * scale_of(*scale);
-            estimates.push(Estimate { value_lx: lx, std_error_lx: None, error_bound_lx: Some(bound) });
+            estimates.push(Estimate { value: lx, uncertainty: Uncertainty::Bound(bound) });
         }
         let mut settings = self.common_settings(run);
         settings.insert("looks".into(), taken.to_string());
@@ -153,10 +153,7 @@ impl<'a> Bench<'a> {
                 break;
             }
         }
-        let estimates = (0..self.job.stations.len()).map(|k| {
-            let (value_lx, std_error_lx) = mean_and_std_error(&of_station(&blocks, k));
-            Estimate { value_lx, std_error_lx, error_bound_lx: None }
-        });
+        let estimates = (0..self.job.stations.len()).map(|k| Estimate::of_samples(&of_station(&blocks, k)));
         let mut settings = self.common_settings(run);
         settings.insert("blocks".into(), blocks.len().to_string());
         settings.insert("seeds".into(), format!("{}..={}", self.seed(1), self.seed(blocks.len())));
@@ -370,9 +367,9 @@ fn of_station(blocks: &[Vec<f64>], k: usize) -> Vec<f64> {
 
 /// The largest relative standard error of any meter that sees light.
 fn worst_error(blocks: &[Vec<f64>]) -> f64 {
-    let relative = |k| match mean_and_std_error(&of_station(blocks, k)) {
-        (mean, Some(error)) if mean > 0.0 => error / mean,
-        _ => 0.0,
+    let relative = |k| {
+        let Estimate { value, uncertainty } = Estimate::of_samples(&of_station(blocks, k));
+        uncertainty.standard_error().filter(|_| value > 0.0).map_or(0.0, |error| error / value)
     };
     (0..blocks.first().map_or(0, Vec::len)).map(relative).fold(0.0, f64::max)
 }

@@ -124,7 +124,7 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
          // Seed > 0 turns the whole scene, and Blanks > 0 sets as many pixels (add them to +W) before the meters': either\n\
          // gives radiosity other sample directions and changes nothing else.\n",
         one_line(&job.case),
-        one_line(&job.procedure)
+        job.procedure
     );
     writeln!(
         text,

@@ -52,7 +52,6 @@ pub(super) fn parts(opening: LuminousOpening, n: usize) -> Option<Vec<Part>> {
 pub(super) struct TooNear {
     /// The meter.
     pub(super) station: String,
-    /// The luminaire.
     pub(super) luminaire: String,
     /// Its distance from the opening in metres.
     pub(super) distance_m: f64,

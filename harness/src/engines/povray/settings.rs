@@ -30,7 +30,6 @@ pub(super) const KNOBS: &[Knob] = &[
 /// How POV-Ray is set up for a job.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Settings {
-    /// The preset's name.
     pub(super) preset: Preset,
     /// Rays a radiosity sample.
     pub(super) count: u32,

@@ -15,7 +15,7 @@ use crate::engines::fixtures::{
     self, CONVERGED as INDIRECT, S1_DIRECT_LX, S1_INDIRECT_LX, S1_SEVEN_LX, axial_uplight as uplight, exact_direct_lx,
     goniometer, lopsided, quadrant, s1,
 };
-use crate::process::ProcessError;
+use crate::system::process::ProcessError;
 
 /// A fault and how to put it into a job.
 type Tamper = (&'static str, fn(&mut Job));
@@ -34,7 +34,7 @@ fn workbench(folder: &Path) -> Workbench {
         log: folder.join("log"),
         jobs: 2,
         limit,
-        peak: crate::process::PeakMemory::default(),
+        peak: crate::system::process::PeakMemory::default(),
     }
 }
 
@@ -66,7 +66,7 @@ fn in_eight_blocks(mut job: Job, count: u32) -> Job {
 
 fn worst_relative(measured: &Measurement, exact: &[f64]) -> f64 {
     let pairs = measured.estimates.iter().zip(exact);
-    pairs.map(|(e, x)| (e.value_lx / x - 1.0).abs()).fold(0.0, f64::max)
+    pairs.map(|(e, x)| (e.value / x - 1.0).abs()).fold(0.0, f64::max)
 }
 
 fn exported(job: &Job) -> String {
@@ -107,7 +107,7 @@ fn direct_light_of_s1_is_exact_to_1e_6_and_within_its_bound() {
     let measured = read(&s1(Transport::Direct));
     assert!(worst_relative(&measured, &S1_DIRECT_LX) < 1e-6, "{measured:?}");
     for (estimate, exact) in measured.estimates.iter().zip(S1_DIRECT_LX) {
-        assert!((estimate.value_lx - exact).abs() <= estimate.error_bound_lx.unwrap(), "{estimate:?} {exact}");
+        assert!((estimate.value - exact).abs() <= estimate.uncertainty.bound(), "{estimate:?} {exact}");
     }
 }
 
@@ -136,7 +136,7 @@ fn light_of_any_amount_in_rooms_of_any_size_is_read() {
         }
         // The same rays, but for the rounding of where they start.
         let indirect = read(&changed(&dim));
-        let expected: Vec<f64> = plain.estimates.iter().map(|e| times * e.value_lx).collect();
+        let expected: Vec<f64> = plain.estimates.iter().map(|e| times * e.value).collect();
         assert!(worst_relative(&indirect, &expected) < 0.1, "{flux:e} {size:e}: {indirect:?} {expected:?}");
     }
 }
@@ -155,9 +155,9 @@ fn turned_asymmetric_luminaires_are_read_back_over_the_full_grid() {
         let largest = exact.iter().copied().fold(0.0, f64::max);
         for ((estimate, exact), station) in measured.estimates.iter().zip(&exact).zip(&job.stations) {
             // At the edge of a table that ends with light, here gamma 90, it falls to zero within a thousandth of a degree.
-            let off = (estimate.value_lx - exact).abs();
-            assert!(off <= 1e-6 * largest, "{}: {} lx, exact {exact}", station.id, estimate.value_lx);
-            assert!(off <= estimate.error_bound_lx.unwrap(), "{}: off {off}, {estimate:?}", station.id);
+            let off = (estimate.value - exact).abs();
+            assert!(off <= 1e-6 * largest, "{}: {} lx, exact {exact}", station.id, estimate.value);
+            assert!(off <= estimate.uncertainty.bound(), "{}: off {off}, {estimate:?}", station.id);
         }
     }
 }
@@ -185,11 +185,7 @@ fn several_luminaires_add_up_in_scenes_of_any_size() {
         let exact = exact_direct_lx(&job);
         let measured = read(&job);
         for (estimate, exact) in measured.estimates.iter().zip(&exact) {
-            assert!(
-                (estimate.value_lx - exact).abs() <= 2e-6 * exact,
-                "{size}: {} lx, exact {exact}",
-                estimate.value_lx
-            );
+            assert!((estimate.value - exact).abs() <= 2e-6 * exact, "{size}: {} lx, exact {exact}", estimate.value);
         }
     }
 }
@@ -199,8 +195,8 @@ fn a_meter_that_faces_away_reads_nothing() {
     let mut job = s1(Transport::Direct);
     job.stations[1].meter.normal = DVec3::Z;
     let measured = read(&job);
-    assert_eq!(measured.estimates[1].value_lx, 0.0);
-    assert!(measured.estimates[0].value_lx > 0.8);
+    assert_eq!(measured.estimates[1].value, 0.0);
+    assert!(measured.estimates[0].value > 0.8);
 }
 
 #[test]
@@ -217,8 +213,8 @@ fn a_box_between_luminaire_and_meter_casts_a_shadow_and_a_mesh_the_same() {
         let mut job = s1(Transport::Direct);
         job.scene.obstacles = vec![Obstacle { shape, reflectance: 0.5 }];
         let measured = read(&job);
-        assert_eq!(measured.estimates[3].value_lx, 0.0);
-        assert!((measured.estimates[0].value_lx / S1_DIRECT_LX[0] - 1.0).abs() < 1e-6);
+        assert_eq!(measured.estimates[3].value, 0.0);
+        assert!((measured.estimates[0].value / S1_DIRECT_LX[0] - 1.0).abs() < 1e-6);
     }
 }
 
@@ -243,8 +239,8 @@ fn a_flat_opening_is_the_mean_of_its_points() {
 
 fn within_errors_and_named_bias(measured: &Measurement, exact: &[f64]) {
     for (estimate, exact) in measured.estimates.iter().zip(exact) {
-        let error = estimate.std_error_lx.unwrap();
-        let off = (estimate.value_lx - exact).abs();
+        let error = estimate.uncertainty.standard_error().unwrap();
+        let off = (estimate.value - exact).abs();
         // Eight blocks: Student's t of seven degrees of freedom is 4.8 at two in a thousand.
         assert!(off < 4.8 * error + AUDIT_BIAS * exact, "{estimate:?}, exact {exact}");
         assert!(error > 0.0 && error < 0.03 * exact, "{estimate:?}");
@@ -274,7 +270,7 @@ fn reflections_are_cut_at_the_number_asked_for() {
     within_errors_and_named_bias(&read(&seven), &S1_SEVEN_LX);
     let first = read(&in_eight_blocks(s1(Transport::Indirect(Bounces::AtMost(1))), 200));
     within_errors_and_named_bias(&first, &[0.4827964416, 0.6295558520, 0.6295558520, 0.8360829517]);
-    assert_eq!(read(&s1(Transport::Indirect(Bounces::AtMost(0)))).estimates[0].value_lx, 0.0);
+    assert_eq!(read(&s1(Transport::Indirect(Bounces::AtMost(0)))).estimates[0].value, 0.0);
 }
 
 /// Four different walls, two luminaires without symmetry, meters that luminaires shine on from every side.

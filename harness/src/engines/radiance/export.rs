@@ -21,7 +21,6 @@ pub(super) const WEIGHTS: [f64; 3] = [0.265, 0.670, 0.065];
 
 /// `rtrace -I` reads this far in front of the point it is given, in Radiance's units, whatever the scene's size.
 const READ_AHEAD: f64 = 1e-4;
-/// All files of a job.
 pub(super) fn files(job: &Job, settings: &Settings, options: &Options) -> Vec<SceneFile> {
     let scale = scale(job, settings.scaling);
     let mut files = vec![
@@ -85,7 +84,7 @@ fn run_sh(job: &Job, settings: &Settings, options: &Options) -> String {
 
 fn title(job: &Job) -> String {
     let line = |s: &str| s.replace(['\n', '\r'], " ");
-    format!("luxproof: case {}, procedure {}", line(&job.case), line(&job.procedure))
+    format!("luxproof: case {}, procedure {}", line(&job.case), job.procedure)
 }
 
 fn scene_rad(job: &Job, settings: &Settings, scale: f64) -> String {

@@ -9,7 +9,7 @@ use luminaire::scene::{Bounces, Transport};
 
 use super::*;
 use crate::engines::fixtures::s1;
-use crate::process::ProcessError;
+use crate::system::process::ProcessError;
 
 /// A site whose rtrace is a shell script; the other programs do nothing.
 fn fake_site(root: &Path, rtrace: &str) -> Site {
@@ -38,7 +38,7 @@ fn failure(rtrace: &str, transport: Transport, limit_s: f64) -> EngineError {
         log: folder.path().join("log"),
         jobs: 2,
         limit,
-        peak: crate::process::PeakMemory::default(),
+        peak: crate::system::process::PeakMemory::default(),
     };
     Radiance.read(&s1(transport), &bench).unwrap_err()
 }
@@ -126,7 +126,7 @@ fn ies2rad_that_makes_no_light_is_an_error() {
         log: folder.path().join("log"),
         jobs: 1,
         limit: Duration::from_secs(20),
-        peak: crate::process::PeakMemory::default(),
+        peak: crate::system::process::PeakMemory::default(),
     };
     let mut job = s1(Transport::Direct);
     job.settings.insert("photometry".into(), "ies2rad".into());

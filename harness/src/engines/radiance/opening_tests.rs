@@ -83,9 +83,9 @@ fn a_turned_box_of_light_reads_as_the_path_tracer_has_it() {
                 Uncertainty::Bound(bound) => bound,
                 Uncertainty::StandardError { value, .. } => value,
             };
-            let error = estimate.std_error_lx.unwrap().hypot(theirs);
-            let off = (estimate.value_lx - exact.illuminance.value()).abs();
-            assert!(off < 4.0 * error + 2e-3 * estimate.value_lx, "{estimate:?} for {exact:?}");
+            let error = estimate.uncertainty.standard_error().unwrap().hypot(theirs);
+            let off = (estimate.value - exact.illuminance.value()).abs();
+            assert!(off < 4.0 * error + 2e-3 * estimate.value, "{estimate:?} for {exact:?}");
         }
     }
 }
@@ -123,7 +123,7 @@ const S2_INDIRECT_LX: [f64; 6] = [51.0232, 53.0644, 48.966, 53.512, 50.245, 18.7
 fn furniture_and_flush_panels_give_the_direct_light_of_case_s2() {
     let found = read(&s2(Transport::Direct));
     assert!(worst(&relative_deviations(&found, &S2_DIRECT_LX)) < 1e-2, "{found:?}");
-    assert_eq!(found.estimates[5].value_lx, 0.0);
+    assert_eq!(found.estimates[5].value, 0.0);
 }
 
 #[test]
@@ -135,9 +135,9 @@ fn furniture_and_flush_panels_give_the_indirect_light_of_case_s2() {
     let found = read(&job);
     for (estimate, exact) in found.estimates.iter().zip(S2_INDIRECT_LX) {
         // Lost light is named in advance; on top of it there is the standard error alone.
-        let error = 4.0 * estimate.std_error_lx.unwrap() + 1e-3 * exact;
+        let error = 4.0 * estimate.uncertainty.standard_error().unwrap() + 1e-3 * exact;
         let within = exact * (1.0 - size) - error..exact + error;
-        assert!(size < 0.04 && within.contains(&estimate.value_lx), "{size} {exact} {found:?}");
+        assert!(size < 0.04 && within.contains(&estimate.value), "{size} {exact} {found:?}");
     }
 }
 
@@ -148,7 +148,7 @@ fn pendant_cd(model: LuminaireModel, settings: &[(&str, &str)]) -> Vec<f64> {
     let lamp = Luminaire { photometry, model, ..luminaire("pendant", DVec3::ZERO, axial_uplight()) };
     let mut job = goniometer(&lamp, 10.0, &[0.0], &[90.0, 95.0, 115.0, 135.0, 155.0, 175.0, 180.0]);
     job.settings.extend(settings.iter().map(|(k, v)| ((*k).to_owned(), (*v).into())));
-    read(&job).estimates.iter().map(|e| 100.0 * e.value_lx).collect()
+    read(&job).estimates.iter().map(|e| 100.0 * e.value).collect()
 }
 
 fn off(found: &[f64], published: &[f64]) -> f64 {

@@ -13,7 +13,8 @@ use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options};
 use super::settings::{Preset, Settings};
 use super::tools::Tools;
 use super::{export, output};
-use crate::engines::{EngineError, Job, Workbench, mean_and_std_error};
+use crate::engines::{EngineError, Job, Workbench};
+use crate::record::Estimate;
 
 /// Blocks that every reading rests on, at least.
 const FEWEST_BLOCKS: usize = 8;
@@ -48,17 +49,17 @@ pub(super) struct Sampler<'a> {
 
 impl Blocks {
     /// Mean and standard error at each station.
-    pub(super) fn estimates(&self) -> Vec<(f64, Option<f64>)> {
+    pub(super) fn estimates(&self) -> Vec<Estimate> {
         let stations = self.values.first().map_or(0, Vec::len);
         let of = |s: usize| self.values.iter().map(|block| block[s]).collect::<Vec<_>>();
-        (0..stations).map(|s| mean_and_std_error(&of(s))).collect()
+        (0..stations).map(|s| Estimate::of_samples(&of(s))).collect()
     }
 
     /// The largest standard error relative to the reading it belongs to.
     fn worst_error(&self, subtract_lx: &[f64]) -> f64 {
-        let relative = |((mean, error), subtract): ((f64, Option<f64>), &f64)| {
-            let error = error.unwrap_or(f64::INFINITY);
-            if error == 0.0 { 0.0 } else { error / (mean - subtract).max(f64::MIN_POSITIVE) }
+        let relative = |(all, subtract): (Estimate, &f64)| {
+            let error = all.uncertainty.standard_error().unwrap_or(f64::INFINITY);
+            if error == 0.0 { 0.0 } else { error / (all.value - subtract).max(f64::MIN_POSITIVE) }
         };
         self.estimates().into_iter().zip(subtract_lx).map(relative).fold(0.0, f64::max)
     }

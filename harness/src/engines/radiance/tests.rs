@@ -20,7 +20,7 @@ fn workbench(folder: &Path) -> Workbench {
         log: folder.join("log"),
         jobs: 2,
         limit,
-        peak: crate::process::PeakMemory::default(),
+        peak: crate::system::process::PeakMemory::default(),
     }
 }
 
@@ -51,8 +51,8 @@ fn direct_light_follows_the_inverse_square_law_in_single_precision() {
     let deviations = relative_deviations(&found, &S1_DIRECT_LX);
     assert!(worst(&deviations) < 1e-6, "{deviations:?}");
     for (estimate, exact) in found.estimates.iter().zip(S1_DIRECT_LX) {
-        let bound = estimate.error_bound_lx.unwrap();
-        assert!((estimate.value_lx - exact).abs() <= bound && bound < 1e-6 * exact, "{estimate:?} for {exact}");
+        let bound = estimate.uncertainty.bound();
+        assert!((estimate.value - exact).abs() <= bound && bound < 1e-6 * exact, "{estimate:?} for {exact}");
     }
 }
 
@@ -61,7 +61,7 @@ fn indirect_light_is_the_converged_value_within_its_standard_error() {
     let found = read(&within(2e-3, s1(CONVERGED)));
     let deviations = relative_deviations(&found, &S1_INDIRECT_LX);
     assert!(worst(&deviations) < 8e-3 && worst_z(&found, &S1_INDIRECT_LX) < 4.0, "{found:?}");
-    assert!(found.estimates.iter().all(|e| e.std_error_lx.unwrap() < 2.01e-3 * e.value_lx), "{found:?}");
+    assert!(found.estimates.iter().all(|e| e.uncertainty.standard_error().unwrap() < 2.01e-3 * e.value), "{found:?}");
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn n_bounces_are_n_diffuse_reflections() {
     assert!(worst_z(&found, &S1_SEVEN_LX) < 4.0, "{found:?}");
     assert!(worst_z(&found, &S1_INDIRECT_LX) > 5.0, "{found:?}");
     let none = read(&s1(Transport::Indirect(Bounces::AtMost(0))));
-    assert!(none.estimates.iter().all(|e| e.value_lx == 0.0), "{none:?}");
+    assert!(none.estimates.iter().all(|e| e.value == 0.0), "{none:?}");
 }
 
 #[test]
@@ -88,9 +88,9 @@ fn total_is_direct_plus_indirect() {
     indirect.transport = CONVERGED;
     let (total, indirect) = (read(&within(2e-3, total)), read(&within(2e-3, indirect)));
     for ((total, indirect), direct) in total.estimates.iter().zip(&indirect.estimates).zip(direct) {
-        let sum = direct + indirect.value_lx;
-        let error = total.std_error_lx.unwrap().hypot(indirect.std_error_lx.unwrap());
-        assert!((total.value_lx - sum).abs() < 4.0 * error + 1e-5 * sum, "{total:?} {indirect:?} {direct}");
+        let sum = direct + indirect.value;
+        let error = total.uncertainty.standard_error().unwrap().hypot(indirect.uncertainty.standard_error().unwrap());
+        assert!((total.value - sum).abs() < 4.0 * error + 1e-5 * sum, "{total:?} {indirect:?} {direct}");
     }
 }
 
@@ -105,9 +105,9 @@ fn asymmetric_and_turned_luminaires_read_their_own_table() {
         let (found, exact) = (read(&job), exact_direct_lx(&job));
         let scale = exact.iter().copied().fold(0.0, f64::max);
         for (estimate, exact) in found.estimates.iter().zip(exact) {
-            let bound = estimate.error_bound_lx.unwrap();
-            assert!((estimate.value_lx - exact).abs() < 1e-4 * exact + 1e-5 * scale, "{estimate:?} for {exact}");
-            assert!((estimate.value_lx - exact).abs() <= bound, "{estimate:?} for {exact}");
+            let bound = estimate.uncertainty.bound();
+            assert!((estimate.value - exact).abs() < 1e-4 * exact + 1e-5 * scale, "{estimate:?} for {exact}");
+            assert!((estimate.value - exact).abs() <= bound, "{estimate:?} for {exact}");
         }
     }
 }
@@ -130,7 +130,7 @@ fn several_luminaires_add_up_and_obstacles_throw_shadows() {
         shaded.scene.obstacles = vec![Obstacle { shape, reflectance: 0.3 }];
         shaded.stations[0].meter.position_m = DVec3::new(3.0, 4.0, 5.4);
         let found = read(&shaded);
-        assert_eq!(found.estimates[0].value_lx, 0.0);
+        assert_eq!(found.estimates[0].value, 0.0);
         assert!(worst(&relative_deviations(&found, &exact_direct_lx(&shaded))[1..]) < 1e-5, "{found:?}");
     }
 }
@@ -224,5 +224,5 @@ fn the_fast_preset_is_right_and_the_defaults_are_off_by_far_more_than_their_stan
 fn free_field_has_no_indirect_light() {
     let mut job = s1(CONVERGED);
     job.scene.room = None;
-    assert!(read(&job).estimates.iter().all(|e| e.value_lx == 0.0 && e.std_error_lx == Some(0.0)));
+    assert!(read(&job).estimates.iter().all(|e| e.value == 0.0 && e.uncertainty.standard_error() == Some(0.0)));
 }

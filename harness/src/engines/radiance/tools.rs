@@ -7,7 +7,7 @@ use luminaire::scene::Luminaire;
 use super::export::Route;
 use super::{ID, export, output};
 use crate::engines::{Absent, EngineError, Site, Version, Workbench};
-use crate::process::{self, Invocation};
+use crate::system::process::{self, Invocation};
 
 /// Where the programs and their library are.
 #[derive(Clone, Debug)]

@@ -54,7 +54,7 @@ fn at_unit_flux(engine: &dyn Engine, job: &Job, flux: f64) -> Option<Vec<u8>> {
     if matches!(job.transport, Transport::Total(luminaire::scene::Bounces::AtMost(0))) {
         job.transport = Transport::Direct;
     }
-    let mut name = engine.id().name().as_bytes().to_vec();
+    let mut name = engine.name().as_bytes().to_vec();
     name.push(0);
     name.extend(serde_json::to_vec(&job.settings).ok()?);
     name.extend(ExternalJob::of(&job).to_json().ok()?);

@@ -6,6 +6,7 @@ use luminaire::simulator::{Accuracy, illuminance};
 
 use super::*;
 use crate::engines::fixtures;
+use crate::record::Uncertainty;
 
 const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
 
@@ -26,9 +27,8 @@ fn exact(job: &Job) -> Measurement {
     let accuracy = Accuracy { relative_error: 1e-6, seed: 1 };
     let solution = illuminance(&job.scene, &meters, job.transport, &accuracy).unwrap();
     let estimate = |e: &luminaire::simulator::Estimate| Estimate {
-        value_lx: e.illuminance.value(),
-        std_error_lx: None,
-        error_bound_lx: None,
+        value: e.illuminance.value(),
+        uncertainty: Uncertainty::Unstated,
     };
     Measurement { estimates: solution.estimates.iter().map(estimate).collect(), ..Measurement::default() }
 }
@@ -40,10 +40,10 @@ fn holds(job: &Job) -> Shortcut {
     let whole = exact(job);
     let rendered = if shortcut.job.stations.is_empty() { Measurement::default() } else { exact(&shortcut.job) };
     let completed = shortcut.complete(rendered, job);
-    let brightest = whole.estimates.iter().map(|e| e.value_lx).fold(0.0, f64::max);
+    let brightest = whole.estimates.iter().map(|e| e.value).fold(0.0, f64::max);
     assert_eq!(completed.estimates.len(), job.stations.len());
     for ((c, w), s) in completed.estimates.iter().zip(&whole.estimates).zip(&job.stations) {
-        assert!((c.value_lx - w.value_lx).abs() <= 1e-5 * brightest, "{}: {} for {}", s.id, c.value_lx, w.value_lx);
+        assert!((c.value - w.value).abs() <= 1e-5 * brightest, "{}: {} for {}", s.id, c.value, w.value);
     }
     shortcut
 }
@@ -85,7 +85,7 @@ fn whatever_breaks_the_symmetry_has_every_meter_rendered() {
     assert_eq!(broken(&|job| job.scene.luminaires[0].photometry = fixtures::photometry(fixtures::lopsided())), 16);
     assert_eq!(broken(&|job| job.scene.obstacles.push(desk.clone())), 16);
     // The angles of procedure 1 are what it is about: all are read.
-    assert_eq!(broken(&|job| job.procedure = "luminous_intensity".into()), 16);
+    assert_eq!(broken(&|job| job.procedure = ProcedureId::LuminousIntensity), 16);
     let twin = |job: &mut Job| {
         let mut twin = job.scene.luminaires[0].clone();
         twin.position_m.x = 1.0;
@@ -149,7 +149,7 @@ fn black_rooms_have_no_reflected_light_and_one_flat_surface_reflects_once() {
 #[test]
 fn a_job_that_differs_in_flux_alone_is_rescaled_and_an_equal_one_is_rendered_once() {
     let engines = crate::engines::all();
-    let radiance = engines.iter().find(|e| e.id().name() == "radiance").unwrap();
+    let radiance = engines.iter().find(|e| e.name() == "radiance").unwrap();
     let first = symmetric_job(DVec3::new(6.0, 4.0, 3.0), CONVERGED);
     let mut repeated = Repeated::default();
     let mut of = |job: &Job| {
@@ -167,7 +167,7 @@ fn a_job_that_differs_in_flux_alone_is_rescaled_and_an_equal_one_is_rendered_onc
     assert!((rescaled.factor - 0.3).abs() < 1e-12);
     let (completed, whole) = (rescaled.complete(exact(&rescaled.job), &dimmed), exact(&dimmed));
     for (c, w) in completed.estimates.iter().zip(&whole.estimates) {
-        assert!((c.value_lx / w.value_lx - 1.0).abs() < 1e-5, "{c:?} {w:?}");
+        assert!((c.value / w.value - 1.0).abs() < 1e-5, "{c:?} {w:?}");
     }
     let other = of(&Job { case: "seed".into(), seed: 2, ..first.clone() });
     assert_eq!(other.omissions.len(), 1);

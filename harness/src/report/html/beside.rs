@@ -6,6 +6,7 @@ use maud::{Markup, html};
 use serde::Deserialize;
 
 use super::palette::Palette;
+use crate::record::{EngineName, ProcedureId};
 
 /// A file of further measurements.
 #[derive(Clone, Debug)]
@@ -32,14 +33,10 @@ pub enum BesideError {
 /// One engine's error against run time.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BenchCurve {
-    /// The engine.
-    pub engine: String,
-    /// The procedure.
-    pub procedure: String,
-    /// The solver.
+    pub engine: EngineName,
+    pub procedure: ProcedureId,
     #[serde(default)]
     pub solver: Option<String>,
-    /// The preset.
     #[serde(default)]
     pub preset: Option<String>,
     /// Its rungs.
@@ -51,7 +48,6 @@ pub struct BenchCurve {
 pub struct BenchPoint {
     /// Wall-clock seconds.
     pub wall_s: f64,
-    /// Relative error.
     pub relative_error: Option<f64>,
     /// Lower end of its interval.
     #[serde(default)]
@@ -64,9 +60,7 @@ pub struct BenchPoint {
 /// How one engine keeps one law.
 #[derive(Clone, Debug, Deserialize)]
 pub struct StressLaw {
-    /// The engine.
-    pub engine: String,
-    /// The law.
+    pub engine: EngineName,
     pub law: String,
     /// Largest relative deviation.
     #[serde(default)]

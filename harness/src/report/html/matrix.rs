@@ -6,7 +6,8 @@ use super::super::Report;
 use super::super::terminal::{Cell, matrix};
 use super::palette::Palette;
 use super::{class, glyph, percent, title, verdict_name};
-use crate::diff::Verdict;
+use crate::judge::Verdict;
+use crate::record::ProcedureId;
 
 pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
     let rows = matrix(report);
@@ -31,10 +32,10 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
                         }
                         @for row in rows.iter().filter(|r| r.case == case) {
                             tr {
-                                th scope="row" { (title(&row.procedure)) }
+                                th scope="row" { (title(row.procedure)) }
                                 td.basis { (row.basis) }
                                 @for (engine, cell) in report.engines.iter().zip(&row.cells) {
-                                    (drawn(cell, [case, &row.procedure, &row.basis, &engine.id]))
+                                    (drawn(cell, row.procedure, [case, &row.basis, &engine.id]))
                                 }
                             }
                         }
@@ -50,7 +51,7 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
     }
 }
 
-fn drawn(cell: &Cell, [case, procedure, basis, engine]: [&str; 4]) -> Markup {
+fn drawn(cell: &Cell, procedure: ProcedureId, [case, basis, engine]: [&str; 3]) -> Markup {
     match cell {
         Cell::IsReference => html! { td.quiet { "reference" } },
         Cell::Skipped => html! { td.quiet { a href="#skips" { "not run" } } },

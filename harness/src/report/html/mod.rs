@@ -15,7 +15,8 @@ mod skips;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::Report;
-use crate::diff::Verdict;
+use crate::judge::Verdict;
+use crate::record::ProcedureId;
 use palette::Palette;
 use rows::Rows;
 
@@ -82,7 +83,7 @@ fn sections(report: &Report, beside: &[Beside], palette: &Palette, rows: &mut Ro
     }
     for name in report.procedures() {
         let section = procedure::section(report, name, palette, rows);
-        sections.push((name.to_owned(), short(name).to_owned(), section));
+        sections.push((name.to_string(), short(name).to_owned(), section));
     }
     sections.push(("time".to_owned(), "Run time".to_owned(), plot::times::section(report, beside, palette)));
     if let Some(stress) = beside::stress_section(beside, palette) {
@@ -164,19 +165,18 @@ fn verdict_name(verdict: Verdict) -> &'static str {
 }
 
 /// A procedure's name in the navigation.
-fn short(procedure: &str) -> &str {
+const fn short(procedure: ProcedureId) -> &'static str {
     match procedure {
-        "luminous_intensity" => "Intensity",
-        "direct_illuminance" => "Direct",
-        "indirect_illuminance" => "Indirect",
-        "total_illuminance" => "Total",
-        other => other,
+        ProcedureId::LuminousIntensity => "Intensity",
+        ProcedureId::DirectIlluminance => "Direct",
+        ProcedureId::IndirectIlluminance => "Indirect",
+        ProcedureId::TotalIlluminance => "Total",
     }
 }
 
 /// A procedure's name as a heading.
-fn title(procedure: &str) -> String {
-    let words = procedure.replace('_', " ");
+fn title(procedure: ProcedureId) -> String {
+    let words = procedure.name().replace('_', " ");
     let mut letters = words.chars();
     letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }

@@ -6,6 +6,7 @@
 use maud::{Markup, html};
 
 use super::super::Report;
+use crate::record::EngineName;
 
 /// Colour on paper and on black.
 const COLOURS: [(&str, &str); 8] = [
@@ -23,7 +24,7 @@ const KNOWN: [&str; 7] = ["simulator", "iesna", "mitsuba", "radiance", "povray",
 
 /// The engines of a report with their colours and marks.
 pub(super) struct Palette {
-    engines: Vec<(String, usize)>,
+    engines: Vec<(EngineName, usize)>,
 }
 
 impl Palette {
@@ -50,13 +51,12 @@ impl Palette {
 
     /// Index of an engine's colour and mark; engines that only another file knows take what is left.
     pub(super) fn index(&self, engine: &str) -> usize {
-        let found = self.engines.iter().find(|(id, _)| id == engine).map(|(_, k)| *k);
+        let found = self.engines.iter().find(|(id, _)| *id == *engine).map(|(_, k)| *k);
         found.or_else(|| KNOWN.iter().position(|k| *k == engine)).unwrap_or(COLOURS.len() - 1)
     }
 
-    /// The engine's order in the report.
     pub(super) fn order(&self, engine: &str) -> usize {
-        self.engines.iter().position(|(id, _)| id == engine).unwrap_or(self.engines.len())
+        self.engines.iter().position(|(id, _)| *id == *engine).unwrap_or(self.engines.len())
     }
 
     /// The engine's mark at a place of a plot.

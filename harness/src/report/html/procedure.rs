@@ -6,16 +6,17 @@ use super::super::{Report, paper};
 use super::palette::Palette;
 use super::plot::{self, Group};
 use super::rows::{Rows, strain};
-use super::{class, glyph, minus, percent, plural, title, verdict_name};
-use crate::diff::{Comparison, Verdict};
+use super::{class, glyph, minus, percent, title, verdict_name};
+use crate::judge::{Comparison, Verdict};
+use crate::record::ProcedureId;
 
 /// Rows shown until all are asked for.
 const FIRST: usize = 12;
 /// More rows than this a procedure stay in report.json: the file must open on a telephone.
 const MOST: usize = 3000;
 
-pub(super) fn section(report: &Report, procedure: &str, palette: &Palette, rows: &mut Rows) -> Markup {
-    let mut mine: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.procedure == procedure).collect();
+pub(super) fn section(report: &Report, procedure: ProcedureId, palette: &Palette, rows: &mut Rows) -> Markup {
+    let mut mine: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.key.procedure == procedure).collect();
     let groups: Vec<Group<'_>> = plot::groups(report, procedure);
     let plots = plot::panels(report, &groups, palette);
     let severity = |c: &Comparison| strain(c).map_or(f64::INFINITY, f64::abs);
@@ -38,7 +39,7 @@ pub(super) fn section(report: &Report, procedure: &str, palette: &Palette, rows:
     }
 }
 
-fn table(report: &Report, procedure: &str, mine: &[&Comparison], palette: &Palette, rows: &mut Rows) -> Markup {
+fn table(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palette: &Palette, rows: &mut Rows) -> Markup {
     let suite = report.is_suite();
     html! {
         h3 { "Readings" }
@@ -72,8 +73,8 @@ fn row(c: &Comparison, number: usize, hidden: bool, suite: bool, palette: &Palet
     let basis = c.reference.as_ref().map_or("none", |r| r.basis.name());
     html! {
         tr data-row=(number) hidden[hidden] {
-            td { (palette.label(&c.engine)) }
-            @if suite { td.c-c { (c.case) } }
+            td { (palette.label(&c.key.engine)) }
+            @if suite { td.c-c { (c.key.case) } }
             td { (c.meter) " " span.place { (place(c)) } }
             td.number.c-v { (value(c.value)) " " span.unit { (unit) } }
             td.number.c-r { (value(c.reference.as_ref().map(|r| r.value))) " " span.unit { (unit) } }
@@ -81,7 +82,7 @@ fn row(c: &Comparison, number: usize, hidden: bool, suite: bool, palette: &Palet
             td.number { (c.relative_deviation.map_or("–".to_owned(), percent)) }
             td.c-s { (bar(c)) }
             td class={ "v-" (class(c.verdict)) } { span.glyph aria-hidden="true" { (glyph(c.verdict)) } " " span.word { (verdict_name(c.verdict)) } }
-            td { button.more type="button" aria-label={ "Error budget of " (c.engine) " at " (c.meter) } { "budget" } }
+            td { button.more type="button" aria-label={ "Error budget of " (c.key.engine) " at " (c.meter) } { "budget" } }
         }
     }
 }
@@ -108,8 +109,8 @@ fn short(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-fn filters(report: &Report, procedure: &str, mine: &[&Comparison], palette: &Palette) -> Markup {
-    let mut cases: Vec<&str> = mine.iter().map(|c| c.case.as_str()).collect();
+fn filters(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palette: &Palette) -> Markup {
+    let mut cases: Vec<&str> = mine.iter().map(|c| c.key.case.as_str()).collect();
     cases.sort_by_key(|case| report.cases.iter().position(|c| c.name == *case));
     cases.dedup();
     let mut bases: Vec<&str> = mine.iter().map(|c| c.reference.as_ref().map_or("none", |r| r.basis.name())).collect();
@@ -126,7 +127,7 @@ fn filters(report: &Report, procedure: &str, mine: &[&Comparison], palette: &Pal
     html! {
         form.filters aria-label={ "Filter the readings of " (title(procedure)) } {
             fieldset { legend { "Engines" }
-                @for engine in report.engines.iter().filter(|e| mine.iter().any(|c| c.engine == e.id)) {
+                @for engine in report.engines.iter().filter(|e| mine.iter().any(|c| c.key.engine == e.id)) {
                     label.chip { input type="checkbox" checked value=(engine.id) data-filter="engine"; (palette.label(&engine.id)) }
                 }
             }
@@ -157,15 +158,13 @@ fn printed(grid: &paper::Grid) -> Markup {
     }
 }
 
-fn meaning(procedure: &str) -> String {
-    let text = match procedure {
-        "luminous_intensity" => {
+const fn meaning(procedure: ProcedureId) -> &'static str {
+    match procedure {
+        ProcedureId::LuminousIntensity => {
             "The luminous intensity distribution read back from illuminance at a distance in free field, I = E d², over the curve of the photometric file."
         }
-        "direct_illuminance" => "Illuminance straight from the luminaires, without any reflected light.",
-        "indirect_illuminance" => "Illuminance by light that was reflected at least once.",
-        "total_illuminance" => "Direct and reflected light together.",
-        _ => return plural(1, "procedure"),
-    };
-    text.to_owned()
+        ProcedureId::DirectIlluminance => "Illuminance straight from the luminaires, without any reflected light.",
+        ProcedureId::IndirectIlluminance => "Illuminance by light that was reflected at least once.",
+        ProcedureId::TotalIlluminance => "Direct and reflected light together.",
+    }
 }

@@ -2,10 +2,11 @@
 
 use maud::{Markup, html};
 
-use super::super::{RecordingSummary, Report};
+use super::super::Report;
 use super::palette::Palette;
 use super::{duration, title};
-use crate::run::Status;
+use crate::record::Recording;
+use crate::record::Status;
 
 pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
     html! {
@@ -32,7 +33,7 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
         }
         h3 { "Settings" }
         @for engine in &report.engines {
-            @let mine: Vec<&RecordingSummary> = report.recordings.iter().filter(|r| r.engine == engine.id).collect();
+            @let mine: Vec<&Recording> = report.recordings.iter().filter(|r| r.key.engine == engine.id).collect();
             @if !mine.is_empty() {
                 details { summary { (palette.label(&engine.id)) " " span.quiet { (super::plural(mine.len(), "run")) } }
                     div.scroll tabindex="0" role="region" aria-label={ "Settings of " (engine.id) } { (settings(&mine)) }
@@ -42,14 +43,14 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
     }
 }
 
-fn settings(recordings: &[&RecordingSummary]) -> Markup {
+fn settings(recordings: &[&Recording]) -> Markup {
     html! {
         table.settings {
             thead { tr { th scope="col" { "case" } th scope="col" { "procedure" } th scope="col" { "luminaire, light" } th.number scope="col" { "seed" }
                 th.number scope="col" { "run time" } th.number scope="col" { "instrument" } th scope="col" { "settings and command" } } }
             tbody {
                 @for r in recordings {
-                    tr { th scope="row" { (r.case) } td { (title(&r.procedure)) } td { (r.model) ", " (r.light) } td.number { (r.seed) }
+                    tr { th scope="row" { (r.key.case) } td { (title(r.key.procedure)) } td { (r.model) ", " (r.light) } td.number { (r.seed) }
                         td.number { (duration(r.wall_s)) } td.number { (format!("{:.1e}", r.instrument_uncertainty)) }
                         td.wide { dl {
                             @for (key, value) in &r.settings { div { dt { (key.replace('_', " ")) } dd { code { (value) } } } }
@@ -67,13 +68,13 @@ fn commands(report: &Report) -> String {
     let engines: Vec<&str> = report.engines.iter().filter(|e| e.status == Status::Ran).map(|e| e.id.as_str()).collect();
     let mut lines = vec![format!("luxproof run {} --engines {} --seed {seed}", report.spec.path, engines.join(","))];
     for engine in engines {
-        let with_command = report.recordings.iter().find(|r| r.engine == engine && r.command.is_some());
+        let with_command = report.recordings.iter().find(|r| r.key.engine == engine && r.command.is_some());
         let Some((r, command)) = with_command.and_then(|r| r.command.as_ref().map(|c| (r, c))) else { continue };
-        let path = report.cases.iter().find(|c| c.name == r.case).map_or(&report.spec.path, |c| &c.spec.path);
-        let case = if report.is_suite() { format!("{}/", r.case) } else { String::new() };
+        let path = report.cases.iter().find(|c| c.name == r.key.case).map_or(&report.spec.path, |c| &c.spec.path);
+        let case = if report.is_suite() { format!("{}/", r.key.case) } else { String::new() };
         lines.push(format!(
             "luxproof export {path} --engine {engine} --out by-hand && cd by-hand/{case}{} && {command}",
-            r.procedure
+            r.key.procedure
         ));
     }
     lines.join("\n")

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use super::palette::Palette;
-use crate::diff::Comparison;
+use crate::judge::Comparison;
 
 /// Rows that have been given out, with the words they share.
 #[derive(Default)]
@@ -22,8 +22,15 @@ impl Rows {
             components.map(|part| json!([self.word(part.source.name()), short(Some(part.uncertainty))])).collect();
         let source = c.reference.as_ref().map_or("", |r| r.source.as_str());
         let basis = c.reference.as_ref().map_or("none", |r| r.basis.name());
-        let words = [&c.case, &c.engine, basis, source, c.diagnosis.as_deref().unwrap_or_default(), c.verdict.name()]
-            .map(|w| self.word(w));
+        let words = [
+            c.key.case.as_str(),
+            &c.key.engine,
+            basis,
+            source,
+            c.diagnosis.as_deref().unwrap_or_default(),
+            c.verdict.name(),
+        ]
+        .map(|w| self.word(w));
         let budget = c.budget.as_ref();
         let row = json!([
             words,
@@ -37,7 +44,7 @@ impl Rows {
             components,
             c.quantity.unit(),
             short(strain(c)),
-            palette.index(&c.engine),
+            palette.index(&c.key.engine),
             short(budget.map(|b| b.combined)),
             short(budget.map(|b| b.expanded)),
             short(budget.map(|b| b.coverage_factor)),

@@ -7,6 +7,7 @@ use maud::{Markup, html};
 use super::super::{Report, split};
 use super::{minus, plural, title};
 use crate::plan::Scope;
+use crate::record::EngineName;
 
 pub(super) fn section(report: &Report) -> Markup {
     let groups = skips(report);
@@ -45,21 +46,21 @@ pub(super) fn section(report: &Report) -> Markup {
     }
 }
 
-type Group = (String, String, String, String);
+type Group = (EngineName, String, String, String);
 
 fn skips(report: &Report) -> BTreeMap<Group, Vec<&str>> {
     let mut groups: BTreeMap<Group, Vec<&str>> = BTreeMap::new();
     for skip in &report.skips {
         let what = match skip.scope {
             Scope::Engine => "all of it".to_owned(),
-            Scope::Procedure => title(&skip.procedure),
-            Scope::Meter => format!("{}, some meters", title(&skip.procedure)),
-            Scope::LightPath => format!("{}, some light paths", title(&skip.procedure)),
+            Scope::Procedure => title(skip.key.procedure),
+            Scope::Meter => format!("{}, some meters", title(skip.key.procedure)),
+            Scope::LightPath => format!("{}, some light paths", title(skip.key.procedure)),
         };
-        let key = (skip.engine.clone(), what, skip.reason.clone(), skip.saved.clone().unwrap_or_default());
+        let key = (skip.key.engine.clone(), what, skip.reason.clone(), skip.saved.clone().unwrap_or_default());
         let cases = groups.entry(key).or_default();
-        if !cases.contains(&skip.case.as_str()) {
-            cases.push(&skip.case);
+        if !cases.contains(&skip.key.case.as_str()) {
+            cases.push(&skip.key.case);
         }
     }
     groups
@@ -69,14 +70,14 @@ fn notes(report: &Report) -> BTreeMap<String, Vec<&str>> {
     let mut lines: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for r in &report.recordings {
         let approximate =
-            r.approximation.iter().map(|a| format!("{}, {}: approximate, {a}", r.engine, title(&r.procedure)));
+            r.approximation.iter().map(|a| format!("{}, {}: approximate, {a}", r.key.engine, title(r.key.procedure)));
         let said = |note: &&String| r.approximation.as_ref().is_some_and(|a| a.contains(note.as_str()));
-        let noted = r.notes.iter().filter(|n| !said(n)).map(|n| format!("{}: {n}", r.engine));
-        let failed = r.failure.iter().map(|f| format!("{}, {} failed: {f}", r.engine, title(&r.procedure)));
+        let noted = r.notes.iter().filter(|n| !said(n)).map(|n| format!("{}: {n}", r.key.engine));
+        let failed = r.failure.iter().map(|f| format!("{}, {} failed: {f}", r.key.engine, title(r.key.procedure)));
         for line in approximate.chain(noted).chain(failed) {
             let cases = lines.entry(line).or_default();
-            if !cases.contains(&r.case.as_str()) {
-                cases.push(&r.case);
+            if !cases.contains(&r.key.case.as_str()) {
+                cases.push(&r.key.case);
             }
         }
     }

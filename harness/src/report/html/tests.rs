@@ -7,7 +7,7 @@ use super::*;
 const ENGINES: [&str; 5] = ["simulator", "iesna", "mitsuba", "radiance", "povray"];
 
 /// One reading on a grid of 16 by 12 meters.
-fn comparison(procedure: &str, engine: &str, case: &str, k: usize) -> Value {
+fn comparison(procedure: ProcedureId, engine: &str, case: &str, k: usize) -> Value {
     let (x, y) = (0.5 + (k % 16) as f64, 0.5 + (k / 16) as f64);
     let value = 300.0 + 7.3 * x - 3.1 * (y - 6.0).powi(2);
     let deviation = value * 0.0123456789 * (k as f64).sin();
@@ -27,11 +27,11 @@ fn comparison(procedure: &str, engine: &str, case: &str, k: usize) -> Value {
     })
 }
 
-fn report(procedures: &[&str], case: &str, title: &str) -> Report {
+fn report(procedures: &[ProcedureId], case: &str, title: &str) -> Report {
     let mut comparisons = vec![];
     for procedure in procedures {
         for engine in ENGINES {
-            comparisons.extend((0..192).map(|k| comparison(procedure, engine, case, k)));
+            comparisons.extend((0..192).map(|k| comparison(*procedure, engine, case, k)));
         }
     }
     let spec = json!({"path": "specs/room.yaml", "sha256": "ab", "title": title});
@@ -40,7 +40,7 @@ fn report(procedures: &[&str], case: &str, title: &str) -> Report {
         "luxproof": 1, "tool_version": "0.1.0", "started": "2026-01-01T00:00:00Z", "wall_s": 12.0, "spec": spec,
         "engines": ENGINES.map(engine), "comparisons": comparisons, "readings": [], "skips": [],
         "recordings": procedures.iter().flat_map(|p| ENGINES.map(|e| json!({
-            "case": case, "procedure": p, "engine": e, "version": "1.0", "input_sha256": "ab", "seed": 1, "settings": {},
+            "case": case, "procedure": p, "engine": e, "light": "direct", "version": "1.0", "input_sha256": "ab", "seed": 1, "settings": {},
             "approximation": null, "notes": [], "failure": null, "wall_s": 1.5}))).collect::<Vec<_>>(),
         "cases": [{"name": case, "spec": spec}],
         "summary": {"pass": 0, "fail": 0, "inconclusive": 0, "known_deviation": 0, "unexpected_pass": 0, "missing": 0, "skipped": 0}
@@ -50,14 +50,15 @@ fn report(procedures: &[&str], case: &str, title: &str) -> Report {
 
 #[test]
 fn two_procedures_of_192_meters_and_five_engines_stay_below_three_megabytes() {
-    let page = page(&report(&["direct_illuminance", "indirect_illuminance"], "room", "a room"), &[]);
+    let page =
+        page(&report(&[ProcedureId::DirectIlluminance, ProcedureId::IndirectIlluminance], "room", "a room"), &[]);
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
     assert_eq!(page.matches("<tr data-row=").count(), 2 * 5 * 192, "every reading has its row");
 }
 
 #[test]
 fn a_grid_is_drawn_as_isolux_lines_and_one_map_an_engine() {
-    let page = page(&report(&["indirect_illuminance"], "room", "a room"), &[]);
+    let page = page(&report(&[ProcedureId::IndirectIlluminance], "room", "a room"), &[]);
     assert!(page.contains("class=\"isolux\""));
     for engine in ENGINES {
         assert!(page.contains(&format!("workplane, {engine}")), "no map of {engine}");
@@ -67,14 +68,14 @@ fn a_grid_is_drawn_as_isolux_lines_and_one_map_an_engine() {
 #[test]
 fn no_text_becomes_markup() {
     let evil = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'";
-    let page = page(&report(&["direct_illuminance"], evil, evil), &[]);
+    let page = page(&report(&[ProcedureId::DirectIlluminance], evil, evil), &[]);
     assert!(!page.contains("<img"), "markup from a title");
     assert_eq!(page.matches("</script>").count(), 2, "only the page's own two scripts end");
 }
 
 #[test]
 fn the_page_names_no_other_place_and_is_the_same_every_time() {
-    let report = report(&["direct_illuminance"], "room", "a room");
+    let report = report(&[ProcedureId::DirectIlluminance], "room", "a room");
     let page = page(&report, &[]);
     assert_eq!(page, super::page(&report, &[]));
     let own = page.replace("http://www.w3.org/2000/svg", "");
@@ -93,10 +94,10 @@ fn stress_and_bench_show_beside_the_report_and_anything_else_is_refused() {
     let stress = r#"{"laws": [{"engine": "mitsuba", "law": "scale", "worst_deviation": 0.02, "breaks_at": {"0.001": 1e5, "0.1": null}, "how": "drift"},
         {"engine": "povray", "law": "scale", "worst_deviation": 1.0, "breaks_at": {"0.1": 1e6}, "how": "silent_loss", "known": ["32-bit floats"]},
         {"engine": "radiance", "law": "scale", "refused_at": 1e4}]}"#;
-    let bench = r#"{"curves": [{"engine": "radiance", "procedure": "direct_illuminance", "solver": null, "preset": "fast",
+    let bench = r#"{"curves": [{"engine": "radiance", "procedure": ProcedureId::DirectIlluminance, "solver": null, "preset": "fast",
         "points": [{"effort": 1, "wall_s": 0.1, "relative_error": 0.01}, {"effort": 2, "wall_s": 1.0, "relative_error": 0.003}], "time_to": {}}]}"#;
     let beside: Vec<Beside> = [stress, bench].map(|text| Beside::from_json(text).unwrap()).into();
-    let page = page(&report(&["direct_illuminance"], "room", "a room"), &beside);
+    let page = page(&report(&[ProcedureId::DirectIlluminance], "room", "a room"), &beside);
     assert!(page.contains("id=\"stress\"") && page.contains("0.1 % at 1e5"));
     assert!(page.contains("<dd>32-bit floats</dd>") && page.contains(">refuses<"), "known and refused are told");
     assert!(page.contains("the ladder of luxproof bench"));

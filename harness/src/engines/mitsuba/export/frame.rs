@@ -23,7 +23,6 @@ pub(in crate::engines::mitsuba) struct Frame {
 }
 
 impl Frame {
-    /// The frame of a job.
     pub(in crate::engines::mitsuba) fn of(job: &Job, choice: FrameChoice) -> Self {
         let raw = Self { origin_m: DVec3::ZERO, scale: 1.0 };
         let (Some((min_m, max_m)), FrameChoice::Recentred) = (bounds_m(job), choice) else { return raw };

@@ -3,7 +3,7 @@
 use std::os::unix::fs::PermissionsExt;
 
 use super::*;
-use crate::process::ProcessError;
+use crate::system::process::ProcessError;
 
 /// Reads S1 through an interpreter that passes the probe and then runs `script`.
 fn read_with(script: &str, limit_s: f64) -> EngineError {

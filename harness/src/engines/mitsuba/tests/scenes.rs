@@ -78,7 +78,7 @@ fn panels_over_furniture_give_the_exact_light() {
     let direct = read(&s2(Transport::Direct));
     let deviations = relative_deviations(&direct, &DIRECT_LX);
     assert!(worst(&deviations) < 1e-2, "{deviations:?}");
-    assert_eq!(direct.estimates[5].value_lx, 0.0);
+    assert_eq!(direct.estimates[5].value, 0.0);
     let indirect = read(&s2(CONVERGED));
     let deviations = relative_deviations(&indirect, &INDIRECT_LX);
     assert!(worst(&deviations) < 2e-2 && worst_z(&indirect, &INDIRECT_LX) < 4.5, "{indirect:?} {deviations:?}");
@@ -126,7 +126,7 @@ fn bright_rooms_keep_all_their_light() {
     bright.budget = Budget { relative_error: 1e-2, seconds: 15.0 };
     let found = read(&bright);
     let weight = weights.iter().flat_map(|a| weights.map(|b| 0.25 * a * b));
-    let mean_lx: f64 = found.estimates.iter().zip(weight).map(|(e, w)| w * e.value_lx).sum();
+    let mean_lx: f64 = found.estimates.iter().zip(weight).map(|(e, w)| w * e.value).sum();
     let flux_lm = 400.0 * std::f64::consts::PI;
     let exact_lx = flux_lm * rho / (96.0 * (1.0 - rho));
     assert!((mean_lx / exact_lx - 1.0).abs() < 5e-3, "{mean_lx} for {exact_lx}: {found:?}");

@@ -6,7 +6,7 @@ use super::super::palette::Palette;
 use super::axis::{label, round_step, ticks};
 use super::contour::contour;
 use super::{Group, WIDTH, colours, figure, line, number, text};
-use crate::diff::Comparison;
+use crate::judge::Comparison;
 use crate::report::Report;
 
 const LEFT: f64 = 44.0;
@@ -33,7 +33,7 @@ pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette) -> V
     for name in sets {
         let of_set = |engine: &str| {
             let mut mine: Vec<&Comparison> =
-                firm.iter().copied().filter(|c| set(c) == name && c.engine == engine).collect();
+                firm.iter().copied().filter(|c| set(c) == name && c.key.engine == engine).collect();
             mine.sort_by_key(|c| index(c));
             mine
         };

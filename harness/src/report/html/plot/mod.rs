@@ -12,7 +12,8 @@ use maud::{Markup, html};
 
 use super::super::Report;
 use super::palette::Palette;
-use crate::diff::{Basis, Comparison};
+use crate::judge::{Basis, Comparison};
+use crate::record::ProcedureId;
 
 /// Width of every panel in user units; a telephone shows one at about its natural size.
 pub(super) const WIDTH: f64 = 350.0;
@@ -22,16 +23,16 @@ const MOST_CASES: usize = 9;
 /// The comparisons of one case in one procedure.
 pub(super) struct Group<'a> {
     pub(super) case: &'a str,
-    pub(super) procedure: &'a str,
+    pub(super) procedure: ProcedureId,
     pub(super) comparisons: Vec<&'a Comparison>,
 }
 
 /// One group a case, in the cases' order, those without comparisons left out.
-pub(super) fn groups<'a>(report: &'a Report, procedure: &str) -> Vec<Group<'a>> {
+pub(super) fn groups<'a>(report: &'a Report, procedure: ProcedureId) -> Vec<Group<'a>> {
     let of_case = |case: &'a str| {
-        let mine = |c: &&Comparison| c.case == case && c.procedure == procedure;
+        let mine = |c: &&Comparison| c.key.case == case && c.key.procedure == procedure;
         let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(mine).collect();
-        let procedure = comparisons.first()?.procedure.as_str();
+        let procedure = comparisons.first()?.key.procedure;
         Some(Group { case, procedure, comparisons })
     };
     report.cases.iter().filter_map(|c| of_case(&c.name)).collect()
@@ -59,7 +60,7 @@ pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -
 impl Group<'_> {
     /// The engines of the group in the report's order.
     fn engines(&self, palette: &Palette) -> Vec<&str> {
-        let mut engines: Vec<&str> = self.comparisons.iter().map(|c| c.engine.as_str()).collect();
+        let mut engines: Vec<&str> = self.comparisons.iter().map(|c| c.key.engine.as_str()).collect();
         engines.sort_unstable();
         engines.dedup();
         engines.sort_by_key(|e| palette.order(e));

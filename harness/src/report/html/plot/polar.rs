@@ -7,7 +7,7 @@ use maud::{Markup, html};
 use super::super::palette::Palette;
 use super::axis::{label, round_step};
 use super::{Group, WIDTH, figure, legend, line, number, text};
-use crate::diff::Comparison;
+use crate::judge::Comparison;
 use crate::report::{Curve, Report};
 
 const RADIUS: f64 = 136.0;
@@ -63,7 +63,7 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Op
 fn readings<'a>(group: &'a Group<'_>, engine: &str, first: f64) -> Vec<&'a Comparison> {
     let in_planes = |c: &&Comparison| {
         let off = |plane: f64| (plane - first).rem_euclid(90.0).min((first - plane).rem_euclid(90.0));
-        c.engine == engine && c.c_deg.is_some_and(|plane| off(plane) < 1e-6)
+        c.key.engine == engine && c.c_deg.is_some_and(|plane| off(plane) < 1e-6)
     };
     let mut seen: Vec<&str> = vec![];
     let mut readings = vec![];

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::super::palette::Palette;
 use super::axis::{Deviations, label};
 use super::{Group, WIDTH, figure, line, number, text};
-use crate::diff::{Basis, Comparison};
+use crate::judge::{Basis, Comparison};
 use crate::report::Report;
 
 const LEFT: f64 = 82.0;
@@ -31,7 +31,7 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Ma
             let mine: Vec<&Comparison> = with_deviation
                 .iter()
                 .copied()
-                .filter(|c| c.engine == engine && c.reference.as_ref().is_some_and(|r| r.basis == basis))
+                .filter(|c| c.key.engine == engine && c.reference.as_ref().is_some_and(|r| r.basis == basis))
                 .collect();
             if !mine.is_empty() {
                 blocks.push(row(&mine, engine, y, &scale, palette));

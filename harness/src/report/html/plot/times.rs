@@ -6,7 +6,8 @@ use super::super::beside::{BenchCurve, Beside};
 use super::super::palette::Palette;
 use super::super::{duration, title};
 use super::{WIDTH, figure, groups, legend, line, text};
-use crate::diff::Comparison;
+use crate::judge::Comparison;
+use crate::record::ProcedureId;
 use crate::report::Report;
 
 const LEFT: f64 = 52.0;
@@ -40,23 +41,23 @@ pub(in super::super) fn section(report: &Report, beside: &[Beside], palette: &Pa
     }
 }
 
-fn curves<'a>(beside: &'a [Beside], procedure: &str) -> Vec<&'a BenchCurve> {
+fn curves<'a>(beside: &'a [Beside], procedure: ProcedureId) -> Vec<&'a BenchCurve> {
     let of = |b: &'a Beside| if let Beside::Bench(curves) = b { &curves[..] } else { &[] };
     beside.iter().flat_map(of).filter(|c| c.procedure == procedure).collect()
 }
 
-fn points(report: &Report, procedure: &str) -> Vec<Point> {
+fn points(report: &Report, procedure: ProcedureId) -> Vec<Point> {
     let mut points = vec![];
     for group in groups(report, procedure) {
         let Some(basis) = group.basis() else { continue };
-        let recordings = report.recordings.iter().filter(|r| r.case == group.case && r.procedure == procedure);
+        let recordings = report.recordings.iter().filter(|r| r.key.case == group.case && r.key.procedure == procedure);
         for recording in recordings {
             let mine = |c: &&&Comparison| {
-                c.engine == recording.engine && c.reference.as_ref().is_some_and(|r| r.basis == basis)
+                c.key.engine == recording.key.engine && c.reference.as_ref().is_some_and(|r| r.basis == basis)
             };
             let errors = group.comparisons.iter().filter(mine).filter_map(|c| c.relative_deviation).map(f64::abs);
             if let Some(error) = errors.max_by(f64::total_cmp) {
-                let engine = recording.engine.clone();
+                let engine = recording.key.engine.to_string();
                 let words = format!(
                     "{engine}, {}: {}, {}",
                     group.case,
@@ -70,7 +71,7 @@ fn points(report: &Report, procedure: &str) -> Vec<Point> {
     points
 }
 
-fn panel(report: &Report, procedure: &str, curves: &[&BenchCurve], palette: &Palette) -> Option<Markup> {
+fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palette: &Palette) -> Option<Markup> {
     let points = points(report, procedure);
     let rungs = curves.iter().flat_map(|c| &c.points).filter_map(|p| Some((p.wall_s, p.relative_error?)));
     let all: Vec<(f64, f64)> = points.iter().map(|p| (p.wall_s, p.error)).chain(rungs).collect();

@@ -1,0 +1,281 @@
+//! Runs a plan: one workbench a job, readings kept on disk as each job finishes, one engine's failure stops no other.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use crate::calibration::{Calibrated, Origin};
+use crate::engines::{Engine, EngineError, Measurement, Site};
+use crate::measure::cache::Cache;
+use crate::measure::{Machine, Reader, Source, Taken};
+use crate::plan::{Plan, Planned, Run, Scope, Skip};
+use crate::procedures::Task;
+use crate::record::{EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Status};
+use crate::spec::Case;
+use crate::system::files::{self, FileError};
+use crate::system::slots::side_by_side;
+
+/// How to run.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Where engines are installed.
+    pub site: Site,
+    /// The folder of the run's files.
+    pub out: PathBuf,
+    /// How much runs at a time; cases that run side by side share one.
+    pub machine: Arc<Machine>,
+    /// Where readings are kept between runs; `None`: nowhere, and every reading is taken anew.
+    pub cache: Option<Cache>,
+}
+
+impl Options {
+    /// Who takes the run's readings.
+    pub fn reader(&self) -> Reader {
+        Reader {
+            site: self.site.clone(),
+            out: self.out.clone(),
+            cache: self.cache.clone(),
+            machine: Arc::clone(&self.machine),
+        }
+    }
+}
+
+/// What a run gave.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// One a run of the plan, failures included, in the plan's order.
+    pub recordings: Vec<Recording>,
+    /// One an engine of the plan, in its order.
+    pub engines: Vec<EngineStatus>,
+    /// What an engine declined once it had seen the job.
+    pub skips: Vec<Skip>,
+    /// How many answers of engines came out of the cache.
+    pub from_cache: usize,
+}
+
+/// Told of every job as it starts and ends.
+pub trait Progress: Sync {
+    /// A job starts.
+    fn started(&self, engine: &str, procedure: &str);
+    /// An engine was calibrated just now: what that found and where it is kept.
+    fn calibrated(&self, _engine: &str, _found: &Calibrated) {}
+    /// A job ended, with its failure if it failed.
+    fn ended(&self, engine: &dyn Engine, procedure: ProcedureId, wall: Duration, failure: Option<&str>);
+}
+
+/// Runs every job of a plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
+pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress) -> Result<Outcome, FileError> {
+    let threads = options.machine.slots.threads();
+    let reader = options.reader();
+    let engines: Vec<usize> = (0..plan.engines.len()).collect();
+    let instruments = side_by_side(threads, &engines, |&e| instrument(plan, e, options, progress));
+    let shelf = Shelf { folder: options.out.join("readings"), recordings: Mutex::default() };
+    let runs: Vec<(usize, &Run)> = plan.runs.iter().enumerate().collect();
+    let one = |&(k, run): &(usize, &Run)| -> Result<Done, FileError> {
+        let done = measure(case, plan, run, &reader, &instruments[run.engine], progress);
+        if let Done::Recorded(recording, _) = &done {
+            shelf.keep(k, recording)?;
+        }
+        Ok(done)
+    };
+    let (mut recordings, mut skips, mut from_cache) = (vec![], vec![], 0);
+    for done in side_by_side(threads, &runs, one) {
+        match done? {
+            Done::Recorded(recording, source) => {
+                from_cache += usize::from(source == Some(Source::Cache));
+                recordings.push(*recording);
+            }
+            Done::Declined(skip) => skips.push(skip),
+        }
+    }
+    let engines = plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
+    Ok(Outcome { recordings, engines, skips, from_cache })
+}
+
+/// What became of one run of the plan.
+enum Done {
+    Recorded(Box<Recording>, Option<Source>),
+    Declined(Skip),
+}
+
+/// One run of the plan: the one place where a recording is made of what engines answer.
+fn measure(
+    case: &Case,
+    plan: &Plan,
+    run: &Run,
+    reader: &Reader,
+    instrument: &Result<Option<Calibrated>, String>,
+    progress: &dyn Progress,
+) -> Done {
+    let (planned, task) = (&plan.engines[run.engine], &plan.tasks[run.task]);
+    let engine = planned.engine.name();
+    progress.started(engine.as_str(), task.procedure.name());
+    let start = Instant::now();
+    let taken = match instrument {
+        Ok(_) => answer(planned, run, reader, task.procedure.name()),
+        // An instrument that reads known scenes wrong reads nothing.
+        Err(reason) => Err(EngineError::Solver { engine: engine.clone(), what: reason.clone() }),
+    };
+    if let Err(EngineError::Declined { why, .. }) = &taken {
+        progress.ended(planned.engine.as_ref(), task.procedure, start.elapsed(), None);
+        return Done::Declined(declined(case, planned, task, why));
+    }
+    let source = taken.as_ref().ok().map(|taken| taken.source);
+    let mut recording = record(case, planned, run, task, taken, start.elapsed());
+    recording.command = planned.engine.command_by_hand(&run.job, &reader.site);
+    if let Ok(Some(calibrated)) = instrument {
+        recording.instrument_uncertainty = calibrated.calibration.uncertainty(run.job.transport);
+        if let Ok(file) = &calibrated.kept {
+            recording.settings.insert("calibration".to_owned(), file.clone());
+        }
+    }
+    let wall = Duration::from_secs_f64(recording.wall_s);
+    progress.ended(planned.engine.as_ref(), task.procedure, wall, recording.failure.as_deref());
+    Done::Recorded(Box::new(recording), source)
+}
+
+/// What an engine answers to a run: it renders what the shortcut leaves, the rest follows, and the spot check must agree.
+fn answer(planned: &Planned, run: &Run, reader: &Reader, place: &str) -> Result<Taken, EngineError> {
+    let shortcut = &run.shortcut;
+    let rendered = if shortcut.job.stations.is_empty() {
+        Taken { measurement: Measurement::default(), wall_s: 0.0, source: Source::Nobody }
+    } else {
+        reader.read(planned, &shortcut.job, place)?
+    };
+    let mut taken = Taken { measurement: shortcut.complete(rendered.measurement, &run.job), ..rendered };
+    if let Some(job) = run.spot_check_job() {
+        let seen = reader.read(planned, &job, &format!("{place}-spot-check"))?;
+        let failed = |what| EngineError::Solver { engine: planned.engine.name(), what };
+        run.hold(&taken.measurement, &seen.measurement).map_err(failed)?;
+        taken.wall_s += seen.wall_s;
+        // What was rendered stands.
+        for (&station, estimate) in run.spot_check.iter().zip(seen.measurement.estimates) {
+            taken.measurement.estimates[station] = estimate;
+        }
+        let names: Vec<String> = job.stations.iter().map(|s| s.id.to_string()).collect();
+        taken.measurement.settings.insert("spot_checked".to_owned(), names.join(", "));
+        if taken.source == Source::Nobody {
+            taken.source = seen.source;
+        }
+    }
+    Ok(taken)
+}
+
+/// The readings' files, written as each job finishes, so that an interruption loses only what was under way.
+struct Shelf {
+    folder: PathBuf,
+    /// By place in the plan.
+    recordings: Mutex<BTreeMap<usize, Recording>>,
+}
+
+impl Shelf {
+    fn keep(&self, place: usize, recording: &Recording) -> Result<(), FileError> {
+        let mut all = self.recordings.lock().unwrap_or_else(PoisonError::into_inner);
+        all.insert(place, recording.clone());
+        let of_engine: Vec<&Recording> = all.values().filter(|r| r.key.engine == recording.key.engine).collect();
+        files::keep_json(&self.folder.join(format!("{}.json", recording.key.engine)), &of_engine)
+    }
+}
+
+/// What a case gives that is not run at all: a skip for every run of its plan, and engines of the given status.
+pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcome {
+    let skip = |run: &Run| Skip {
+        key: ReadingKey::new(&case.name, plan.tasks[run.task].procedure, plan.engines[run.engine].engine.name()),
+        scope: Scope::Procedure,
+        reason: reason.to_owned(),
+        saved: Some("the whole run".to_owned()),
+    };
+    let engine = |(e, planned): (usize, &Planned)| {
+        let engine = self::status(planned, &[]);
+        if plan.runs.iter().any(|run| run.engine == e) {
+            EngineStatus { status, reason: Some(reason.to_owned()), ..engine }
+        } else {
+            engine
+        }
+    };
+    let engines = plan.engines.iter().enumerate().map(engine).collect();
+    Outcome { recordings: vec![], engines, skips: plan.runs.iter().map(skip).collect(), from_cache: 0 }
+}
+
+/// The calibration of an engine of the plan; `None` where it has nothing to do or is one of our own solvers, which are what
+/// the others are calibrated by.
+fn instrument(plan: &Plan, e: usize, options: &Options, progress: &dyn Progress) -> Result<Option<Calibrated>, String> {
+    let planned = &plan.engines[e];
+    let id = planned.engine.name();
+    let (Some(Ok(version)), Some(run)) = (&planned.found, plan.runs.iter().find(|r| r.engine == e)) else {
+        return Ok(None);
+    };
+    if planned.engine.is_witness() {
+        return Ok(None);
+    }
+    progress.started(id.as_str(), "calibration");
+    let made = |calibrated: &Calibrated| {
+        if calibrated.origin == Origin::Measured {
+            progress.calibrated(id.as_str(), calibrated);
+        }
+    };
+    options.machine.calibration(planned.engine.as_ref(), version, &run.job, &options.site, made).map(Some)
+}
+
+fn declined(case: &Case, planned: &Planned, task: &Task, why: &str) -> Skip {
+    Skip {
+        key: ReadingKey::new(&case.name, task.procedure, planned.engine.name()),
+        scope: Scope::Procedure,
+        reason: format!("it declines: {why}"),
+        saved: None,
+    }
+}
+
+fn record(
+    case: &Case,
+    planned: &Planned,
+    run: &Run,
+    task: &Task,
+    taken: Result<Taken, EngineError>,
+    wall: Duration,
+) -> Recording {
+    let engine = planned.engine.name();
+    let (measurement, wall_s, failure) = match taken {
+        Ok(taken) => (taken.measurement, taken.wall_s, None),
+        Err(error) => {
+            tracing::error!(%engine, procedure = %task.procedure, "{error}");
+            (Measurement::default(), wall.as_secs_f64(), Some(error.to_string()))
+        }
+    };
+    let readings = measurement.estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
+        meter: target.id.clone(),
+        quantity: task.quantity,
+        value: estimate.value * target.per_lux,
+        uncertainty: estimate.uncertainty.times(target.per_lux),
+    });
+    Recording {
+        version: planned.version().unwrap_or_default(),
+        model: task.model(),
+        input_sha256: case.sha256.clone(),
+        seed: run.job.seed,
+        settings: measurement.settings.clone(),
+        role: planned.engine.role(),
+        approximation: run.approximation.clone(),
+        notes: measurement.notes.clone(),
+        wall_s,
+        components: planned.engine.components(&run.job).into_iter().map(str::to_owned).collect(),
+        failure,
+        readings: readings.collect(),
+        ..Recording::of(ReadingKey::new(&case.name, task.procedure, engine), task.light())
+    }
+}
+
+fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
+    let id = planned.engine.name();
+    let mine: Vec<&Recording> = recordings.iter().filter(|r| r.key.engine == id.as_str()).collect();
+    let failures: Vec<&str> = mine.iter().filter_map(|r| r.failure.as_deref()).collect();
+    let (status, reason) = match &planned.found {
+        Some(Err(absent)) => (Status::Absent, Some(absent.to_string())),
+        Some(Ok(_)) if !failures.is_empty() => (Status::Failed, Some(failures.join("; "))),
+        None => (Status::Skipped, Some("it supports nothing that was asked: not started".to_owned())),
+        Some(Ok(_)) if mine.is_empty() => (Status::Skipped, Some("it declined all that was asked".to_owned())),
+        Some(Ok(_)) => (Status::Ran, None),
+    };
+    EngineStatus { id, version: planned.version(), status, reason, wall_s: mine.iter().map(|r| r.wall_s).sum() }
+}

@@ -1,0 +1,254 @@
+//! Self-calibration: before an engine version is first used with some settings, it reads four scenes whose answers are closed
+//! forms; what it is off becomes the instrument uncertainty that its later verdicts carry (JCGM 100:2008, 4.3).
+//!
+//! - **Point**: one candle power at .5, 1, 2 and 10 m: inverse-square law; shows the bias of a falloff or of a read-out.
+//! - **Asymmetric**: a table without symmetry, turned, over nodes, mid-nodes and both poles; shows mirrored or wrapped tables.
+//! - **Shadow**: a box between luminaire and meters in a black room; shows light that leaks or meters that are missed.
+//! - **Furnace**: a cube that its luminaire lights evenly, so that reflected light is the same everywhere in every direction,
+//!   E = rho / (1 - rho) x flux / area, to 5e-4; shows what a method of reflected light loses or gains.
+//!
+//! What an engine declares of its method ([`Support::Approximate`]) is not the instrument's and stays in its readings.
+
+mod scenes;
+mod store;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use luminaire::scene::Transport;
+use serde::{Deserialize, Serialize};
+
+use self::scenes::KnownScene;
+use crate::record::EngineName;
+use crate::system::slots::{Slots, side_by_side};
+
+use crate::engines::{self, Engine, EngineError, Job, Site, Support, Version, Workbench, checked};
+
+/// A deviation beyond this, noise and declared approximations apart, is no uncertainty but a broken instrument.
+const IMPLAUSIBLE: f64 = 0.05;
+/// Standard errors within which a deviation counts as noise.
+const COVERAGE: f64 = 2.0;
+/// Past this a calibration scene hangs.
+const LIMIT: Duration = Duration::from_secs(60);
+
+/// What a calibration found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    pub engine: EngineName,
+    pub version: String,
+    /// The version of this program, whose read-out it is.
+    pub tool_version: String,
+    /// The engine's settings.
+    pub settings: BTreeMap<String, serde_json::Value>,
+    /// What it read of each scene.
+    pub parts: Vec<Part>,
+}
+
+/// What an engine read of one calibration scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// The scene: point, asymmetric, shadow or furnace.
+    pub scene: String,
+    /// Whether it is one of reflected light.
+    pub reflected: bool,
+    /// The largest deviation from the closed form, relative.
+    pub deviation: f64,
+    /// Standard error of the readings' mean, relative.
+    pub std_error: f64,
+    /// What the engine declares of its method, relative.
+    pub declared: f64,
+    /// The instrument's standard uncertainty that follows, relative.
+    pub uncertainty: f64,
+    /// Why the scene was left out.
+    pub left_out: Option<String>,
+}
+
+/// A calibration and where it is kept.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibrated {
+    /// What was found.
+    pub calibration: Calibration,
+    /// Whether it was measured just now.
+    pub origin: Origin,
+    /// The file that keeps it, or why none does.
+    pub kept: Result<String, String>,
+}
+
+/// Where a calibration comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// Read from the file of an earlier one.
+    Kept,
+    /// Measured just now.
+    Measured,
+}
+
+/// Why an engine cannot be used as an instrument.
+#[derive(Debug, thiserror::Error)]
+pub enum CalibrationError {
+    /// It is far off where the answer is known.
+    #[error(
+        "calibration: {engine} reads the scene `{scene}` {:.1} % off its closed form at {meter} ({value_lx} lx for {exact_lx} \
+         lx), which is no uncertainty but a fault; see `luxproof engines doctor`",
+        100.0 * deviation
+    )]
+    Implausible {
+        engine: EngineName,
+        /// The calibration scene.
+        scene: &'static str,
+        /// The meter that is furthest off.
+        meter: String,
+        /// What it reads.
+        value_lx: f64,
+        /// What is right.
+        exact_lx: f64,
+        /// Relative deviation.
+        deviation: f64,
+    },
+    /// It failed in a calibration scene.
+    #[error("calibration: {0}")]
+    Engine(#[from] EngineError),
+}
+
+/// Whether a calibration of earlier counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Earlier {
+    /// It does, where one is kept.
+    Counts,
+    /// It does not: everything is measured afresh.
+    Ignored,
+}
+
+/// The calibration of an engine with some settings: kept from an earlier one, else measured and kept.
+pub fn calibrate(
+    engine: &dyn Engine,
+    version: &Version,
+    settings: &BTreeMap<String, serde_json::Value>,
+    site: &Site,
+    slots: &Slots,
+    earlier: Earlier,
+) -> Result<Calibrated, CalibrationError> {
+    let scenes = scenes::all(settings);
+    let path = store::path(engine, version, settings, site, &scenes)?;
+    let kept = if earlier == Earlier::Counts { store::read(&path) } else { None };
+    if let Some(calibration) = kept {
+        return Ok(Calibrated { calibration, origin: Origin::Kept, kept: Ok(path.display().to_string()) });
+    }
+    let parts = side_by_side(scenes.len(), &scenes, |scene| part(engine, scene, site, slots));
+    let calibration = Calibration {
+        engine: engine.name(),
+        version: version.0.clone(),
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        settings: settings.clone(),
+        parts: parts.into_iter().collect::<Result<_, _>>()?,
+    };
+    let noise = calibration.parts.iter().map(|p| p.std_error).fold(0.0, f64::max);
+    let kept = if noise > scenes::BUDGET.relative_error {
+        Err(format!("noise of {noise:.1e}, as on a machine with other work"))
+    } else {
+        store::keep(&path, &calibration).map(|()| path.display().to_string())
+    };
+    Ok(Calibrated { calibration, origin: Origin::Measured, kept })
+}
+
+impl Calibration {
+    /// Relative standard uncertainty of the instrument for a kind of light: the worst of its scenes.
+    pub fn uncertainty(&self, transport: Transport) -> f64 {
+        let counts = |p: &&Part| !p.reflected || transport != Transport::Direct;
+        self.parts.iter().filter(counts).map(|p| p.uncertainty).fold(0.0, f64::max)
+    }
+
+    /// A line for people.
+    pub fn summary(&self) -> String {
+        let part = |p: &Part| match &p.left_out {
+            Some(why) => format!("{} left out ({why})", p.scene),
+            None if p.std_error > 0.0 => format!("{} {:.1e} (noise {:.1e})", p.scene, p.deviation, p.std_error),
+            None => format!("{} {:.1e}", p.scene, p.deviation),
+        };
+        let direct = self.uncertainty(Transport::Direct);
+        let all = self.uncertainty(Transport::Indirect(luminaire::scene::Bounces::Converged));
+        let parts = self.parts.iter().map(part).collect::<Vec<_>>().join(", ");
+        format!("instrument uncertainty {direct:.1e} direct, {all:.1e} reflected; worst deviations: {parts}")
+    }
+}
+
+fn part(engine: &dyn Engine, scene: &KnownScene, site: &Site, slots: &Slots) -> Result<Part, CalibrationError> {
+    let left_out = |why: String| Part {
+        scene: scene.name.to_owned(),
+        reflected: scene.is_reflected(),
+        deviation: 0.0,
+        std_error: 0.0,
+        declared: 0.0,
+        uncertainty: 0.0,
+        left_out: Some(why),
+    };
+    let declared = match engine.supports(&scene.job) {
+        Support::Yes => 0.0,
+        Support::Approximate { size, .. } => size.unwrap_or(0.0),
+        Support::No(why) => return Ok(left_out(why)),
+    };
+    match read(engine, &scene.job, site, slots) {
+        Ok(estimates) => judge(engine.name(), scene, declared, &estimates),
+        Err(EngineError::Declined { why, .. }) => Ok(left_out(why)),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn read(
+    engine: &dyn Engine,
+    job: &Job,
+    site: &Site,
+    slots: &Slots,
+) -> Result<Vec<crate::record::Estimate>, EngineError> {
+    let held = slots.take(engines::share(engine, job, slots));
+    let jobs = held.threads();
+    let folder = tempfile::tempdir().map_err(|e| EngineError::io(&std::env::temp_dir(), e))?;
+    let log = folder.path().join("log");
+    let scene_dir = folder.path().join("scene");
+    std::fs::create_dir(&scene_dir).map_err(|e| EngineError::io(&scene_dir, e))?;
+    let workbench = Workbench {
+        site: site.clone(),
+        scene_dir,
+        log,
+        jobs,
+        limit: LIMIT,
+        peak: crate::system::process::PeakMemory::default(),
+    };
+    Ok(checked(&engine.name(), job, engine.read(job, &workbench)?)?.estimates)
+}
+
+/// Deviations from the closed form as an uncertainty; pure.
+fn judge(
+    engine: EngineName,
+    scene: &KnownScene,
+    declared: f64,
+    estimates: &[crate::record::Estimate],
+) -> Result<Part, CalibrationError> {
+    let (mut worst, mut excess, mut noise) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for ((estimate, known), station) in estimates.iter().zip(&scene.known).zip(&scene.job.stations) {
+        let deviation = (estimate.value - known.exact_lx) / known.scale_lx;
+        let std_error = estimate.uncertainty.standard_error().unwrap_or(0.0) / known.scale_lx;
+        let unexplained = (deviation.abs() - declared - COVERAGE * std_error).max(0.0);
+        // Written so that NaN, too, is implausible.
+        if !(unexplained <= IMPLAUSIBLE && std_error <= IMPLAUSIBLE) {
+            return Err(CalibrationError::Implausible {
+                engine,
+                scene: scene.name,
+                meter: station.id.to_string(),
+                value_lx: estimate.value,
+                exact_lx: known.exact_lx,
+                deviation,
+            });
+        }
+        worst = worst.max(deviation.abs());
+        excess = excess.max(unexplained);
+        noise += std_error * std_error;
+    }
+    let std_error = noise.sqrt() / estimates.len() as f64;
+    // A bound is a rectangular distribution (GUM 4.3.7); what the noise hides may be as large as the noise.
+    let uncertainty = (excess / 3f64.sqrt()).hypot(std_error);
+    let (scene, reflected) = (scene.name.to_owned(), scene.is_reflected());
+    Ok(Part { scene, reflected, deviation: worst, std_error, declared, uncertainty, left_out: None })
+}

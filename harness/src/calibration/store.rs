@@ -1,0 +1,62 @@
+//! Where calibrations are kept: one file an engine version, settings and exported scenes, in the engines' folder.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::system::files;
+
+use super::Calibration;
+use super::scenes::KnownScene;
+use crate::engines::{Engine, EngineError, Site, Version};
+
+/// The file of a calibration. Its name changes with everything that a reading may depend on: version, settings and the
+/// scenes as they are exported, drivers included.
+pub(super) fn path(
+    engine: &dyn Engine,
+    version: &Version,
+    settings: &BTreeMap<String, serde_json::Value>,
+    site: &Site,
+    scenes: &[KnownScene],
+) -> Result<PathBuf, EngineError> {
+    let mut hash = Sha256::new();
+    let mut part = |bytes: &[u8]| {
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    };
+    part(env!("CARGO_PKG_VERSION").as_bytes());
+    part(version.0.as_bytes());
+    for (key, value) in settings {
+        part(key.as_bytes());
+        part(value.to_string().as_bytes());
+    }
+    for scene in scenes {
+        if matches!(engine.supports(&scene.job), crate::engines::Support::No(_)) {
+            continue;
+        }
+        for file in engine.export(&scene.job)? {
+            part(file.name.as_bytes());
+            part(&file.bytes);
+        }
+    }
+    let digits = hash.finalize().iter().take(8).fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").ok();
+        text
+    });
+    Ok(site.root().join("calibration").join(format!("{}-{digits}.json", engine.name())))
+}
+
+/// A kept calibration; `None` where there is none or it cannot be read, which is reason to measure again.
+pub(super) fn read(path: &Path) -> Option<Calibration> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let calibration: Calibration = serde_json::from_str(&text).ok()?;
+    let sound = |u: f64| u.is_finite() && u >= 0.0;
+    calibration.parts.iter().all(|p| sound(p.uncertainty)).then_some(calibration)
+}
+
+/// Keeps a calibration so that a reader sees all of it or nothing; the error is why it could not be kept.
+pub(super) fn keep(path: &Path, calibration: &Calibration) -> Result<(), String> {
+    files::replace_json(path, calibration).map_err(|e| format!("{}: {e}", path.display()))
+}

@@ -1,0 +1,190 @@
+//! `luxproof photometry FILE...`: what a photometric file says, what is doubtful in it, its diagram, its conversion.
+
+mod polar;
+mod sarif;
+mod summary;
+
+#[cfg(test)]
+mod tests;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use luminaire::calculators::zonal_cavity::{UtilizationTable, ZonalFlux};
+use luminaire::photometry::{self, Photometry, ReadError, Severity, Written, eulumdat, lm63};
+use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr, miette};
+
+use crate::cli::diagnostic::diagnose;
+use crate::report::Exit;
+use crate::spec::SpecError;
+
+use summary::Summary;
+
+/// Arguments of `luxproof photometry`.
+#[derive(Debug, Args)]
+pub(crate) struct PhotometryArgs {
+    /// Photometric files: LM-63 (.ies), EULUMDAT (.ldt), TM-33 (.xml)
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Print JSON, short for --format json
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
+    /// Print what was tolerated or is doubtful instead of the summary
+    #[arg(long)]
+    lint: bool,
+    /// Print coefficients of utilization over room cavity ratios and reflectances instead of the summary
+    #[arg(long, conflicts_with_all = ["lint", "json", "format"])]
+    utilization: bool,
+    /// How to print
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = Format::Terminal)]
+    format: Format,
+    /// Draw the polar intensity diagram of the one FILE
+    #[arg(long, value_name = "SVG")]
+    polar: Option<PathBuf>,
+    /// Write the one FILE in another format, by extension: .ldt is EULUMDAT, .ies is LM-63-2019
+    #[arg(long, value_name = "OUT")]
+    convert: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Terminal,
+    Json,
+    /// Static analysis results for code-review tools; with --lint
+    Sarif,
+}
+
+/// A file and what became of reading it.
+struct Reading {
+    file: PathBuf,
+    read: Result<Photometry, ReadError>,
+}
+
+/// Reads the files, prints to stdout, writes what was asked for; a refused file makes the exit code 2.
+pub(crate) fn run(args: &PhotometryArgs) -> Result<Exit, Diagnostic> {
+    let format = if args.json { Format::Json } else { args.format };
+    if format == Format::Sarif && !args.lint {
+        return Err(miette!(help = "add --lint", "--format sarif prints lints only"));
+    }
+    if args.files.len() > 1 && (args.polar.is_some() || args.convert.is_some()) {
+        return Err(miette!(help = "give one FILE", "--polar and --convert write one file"));
+    }
+    let read = |file: &PathBuf| Reading { file: file.clone(), read: photometry::read_file(file) };
+    let readings: Vec<Reading> = args.files.iter().map(read).collect();
+    let text = match format {
+        Format::Json => json(&readings)?,
+        Format::Sarif => sarif::log(&readings)?,
+        Format::Terminal if args.lint => lints(&readings),
+        Format::Terminal if args.utilization => utilization(&readings)?,
+        Format::Terminal => summaries(&readings),
+    };
+    print!("{text}");
+    for reading in &readings {
+        if let Ok(photometry) = &reading.read {
+            write_files(args, &reading.file, photometry)?;
+        }
+    }
+    let mut exit = Exit::Passed;
+    for reading in readings {
+        if let Err(error) = reading.read {
+            exit = Exit::Usage;
+            eprintln!("{:?}", diagnose(spec_error(&error)));
+        }
+    }
+    Ok(exit)
+}
+
+fn json(readings: &[Reading]) -> Result<String, Diagnostic> {
+    let records: Vec<serde_json::Value> = readings.iter().map(Reading::record).collect::<Result<_, _>>()?;
+    Ok(serde_json::to_string_pretty(&records).into_diagnostic()? + "\n")
+}
+
+impl Reading {
+    fn record(&self) -> Result<serde_json::Value, Diagnostic> {
+        match &self.read {
+            Ok(photometry) => serde_json::to_value(Summary::of(&self.file, photometry)).into_diagnostic(),
+            Err(error) => Ok(serde_json::json!({
+                "file": self.file.display().to_string(),
+                "error": {"line": error.line, "column": error.column, "message": error.message(), "help": error.help()},
+            })),
+        }
+    }
+}
+
+/// One line a lint, as compilers print them.
+fn lints(readings: &[Reading]) -> String {
+    let mut text = String::new();
+    for reading in readings {
+        let file = reading.file.display();
+        for lint in reading.read.iter().flat_map(|photometry| &photometry.lints) {
+            let place = if lint.line > 0 { format!("{file}:{}", lint.line) } else { file.to_string() };
+            let severity = if lint.severity == Severity::Warning { "warning" } else { "note" };
+            // Writing to a string cannot fail.
+            writeln!(text, "{place}: {severity}: {} [{}]", lint.message, lint.code).ok();
+        }
+    }
+    text
+}
+
+fn summaries(readings: &[Reading]) -> String {
+    let read = |reading: &Reading| reading.read.as_ref().ok().map(|p| Summary::of(&reading.file, p).to_string());
+    readings.iter().filter_map(read).collect::<Vec<String>>().join("\n")
+}
+
+/// The customary table of each file, by its lamps' flux or, in absolute photometry, its own.
+fn utilization(readings: &[Reading]) -> Result<String, Diagnostic> {
+    let mut tables = vec![];
+    for reading in readings {
+        let Ok(photometry) = &reading.read else { continue };
+        let distribution = &photometry.distribution;
+        let (lumens, whose) = match photometry.lamp_lumens {
+            Some(lumens) => (lumens, "of lamp flux"),
+            None => (distribution.flux().value(), "of luminaire flux (absolute photometry)"),
+        };
+        let table = UtilizationTable::customary(&ZonalFlux::of(distribution), lumens)
+            .into_diagnostic()
+            .wrap_err_with(|| reading.file.display().to_string())?;
+        tables.push(format!("{}: {whose}, {lumens:.1} lm\n{table}", reading.file.display()));
+    }
+    Ok(tables.join("\n"))
+}
+
+fn write_files(args: &PhotometryArgs, file: &Path, photometry: &Photometry) -> Result<(), Diagnostic> {
+    if let Some(out) = &args.polar {
+        let name = file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        save(out, &polar::diagram(&name, photometry))?;
+    }
+    if let Some(out) = &args.convert {
+        let written = convert(out, photometry)?;
+        save(out, &written.text)?;
+        for loss in &written.losses {
+            eprintln!("{}: {loss}", out.display());
+        }
+    }
+    Ok(())
+}
+
+fn convert(out: &Path, photometry: &Photometry) -> Result<Written, Diagnostic> {
+    let extension = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("ldt") => Ok(eulumdat::write(photometry)),
+        Some("ies") => Ok(lm63::write_2019(photometry)),
+        _ => Err(miette!(help = "name a .ldt or .ies file", "{} names no format to write", out.display())),
+    }
+}
+
+fn save(path: &Path, text: &str) -> Result<(), Diagnostic> {
+    std::fs::write(path, text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
+fn spec_error(error: &ReadError) -> SpecError {
+    let known = |n: usize| (n > 0).then_some(n);
+    SpecError {
+        file: error.file.clone(),
+        line: known(error.line),
+        column: known(error.column),
+        message: error.message(),
+        help: Some(error.help().into()),
+    }
+}

@@ -1,0 +1,188 @@
+//! A curve of error against time, what follows from it, and which points no other beats.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::Truth;
+use super::fit::{self, Fit};
+use crate::measure::Outcome;
+use crate::record::{ProcedureId, ReadingKey};
+
+/// Relative errors whose time is told.
+pub(super) const TARGETS: [f64; 4] = [0.1, 0.01, 1e-3, 1e-4];
+/// Readings darker than this part of the brightest are held against that instead of themselves.
+const FAINT: f64 = 0.01;
+
+/// What is left of a time without the start-up at least, in parts of it.
+const LEAST_NET: f64 = 0.05;
+
+/// Error against time of one engine, solver and preset at one procedure.
+#[derive(Clone, Debug, Serialize)]
+pub struct Curve {
+    #[serde(flatten)]
+    pub key: ReadingKey,
+    /// What solved it; empty where the engine has one solver only.
+    pub solver: String,
+    /// The preset; empty where there are none.
+    pub preset: String,
+    /// Seconds of a job of next to no work.
+    pub start_up_s: f64,
+    /// Seconds of this job with the least effort that the engine can do with.
+    pub set_up_s: f64,
+    /// By rising effort.
+    pub points: Vec<BenchPoint>,
+    /// How far off the reference may be, relative; errors below are not told from none.
+    pub reference_floor: f64,
+    /// Wall-clock seconds to a relative error; null where it was not reached or lies below the reference's floor.
+    pub time_to: BTreeMap<String, Option<f64>>,
+    /// The same, start-up apart.
+    pub time_to_net: BTreeMap<String, Option<f64>>,
+    /// Of the error over the time, start-up apart, in a log-log plot.
+    pub slope: Option<f64>,
+    /// The error that more time does not go below, where the curve leaves its slope.
+    pub bias_floor: Option<f64>,
+    /// One over variance (relative) and time, start-up apart, at the largest effort; null without variance.
+    pub efficiency: Option<f64>,
+}
+
+/// One rung of the ladder, over all repetitions.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BenchPoint {
+    /// Seconds of budget, or one over the relative error asked for.
+    pub effort: f64,
+    /// Median wall-clock seconds.
+    pub wall_s: f64,
+    /// Median processor seconds.
+    pub cpu_s: f64,
+    /// Most memory of any process, in MiB.
+    pub peak_mib: Option<f64>,
+    /// Root mean square over meters and repetitions.
+    pub relative_error: f64,
+    /// Lower end of its 95 % interval.
+    pub relative_error_low: f64,
+    /// Upper end of its 95 % interval.
+    pub relative_error_high: f64,
+    /// The largest at any meter in any repetition.
+    pub worst_error: f64,
+    /// Mean relative variance between repetitions.
+    pub variance: f64,
+    pub repetitions: usize,
+}
+
+impl BenchPoint {
+    pub(super) fn of(effort: f64, outcomes: &[Outcome], truth: &Truth) -> Self {
+        let scale = |v: f64| scale(v, &truth.values_lx);
+        let stations = truth.values_lx.len();
+        let relative = |o: &Outcome| -> Vec<f64> {
+            o.estimates.iter().zip(&truth.values_lx).map(|(e, v)| (e.value - v) / scale(*v)).collect()
+        };
+        let errors: Vec<Vec<f64>> = outcomes.iter().map(relative).collect();
+        let n = errors.len() as f64;
+        let square = |e: &Vec<f64>| e.iter().map(|x| x * x).sum::<f64>() / stations as f64;
+        let relative_error = (errors.iter().map(square).sum::<f64>() / n).sqrt();
+        let of_station = |s: usize| {
+            let mean = errors.iter().map(|e| e[s]).sum::<f64>() / n;
+            errors.iter().map(|e| (e[s] - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)
+        };
+        let variance = (0..stations).map(of_station).sum::<f64>() / stations as f64;
+        let known = truth.floor();
+        let is_random = variance > 1e-6 * relative_error * relative_error;
+        let (low, high) = if is_random { fit::interval_of_rms(errors.len()) } else { (1.0, 1.0) };
+        Self {
+            effort,
+            wall_s: median(outcomes.iter().map(|o| o.wall_s)),
+            cpu_s: median(outcomes.iter().map(|o| o.cpu_s)),
+            peak_mib: outcomes.iter().filter_map(|o| o.peak_mib).reduce(f64::max),
+            relative_error,
+            relative_error_low: (low * relative_error - known).max(0.0),
+            relative_error_high: high * relative_error + known,
+            worst_error: errors.iter().flatten().fold(0.0, |w: f64, x| w.max(x.abs())),
+            variance,
+            repetitions: errors.len(),
+        }
+    }
+}
+
+/// What an error at a meter of that value counts against, in lx.
+pub(super) fn scale(value_lx: f64, all_lx: &[f64]) -> f64 {
+    let brightest = all_lx.iter().copied().fold(0.0, f64::max);
+    value_lx.max(FAINT * brightest).max(f64::MIN_POSITIVE)
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = values.collect();
+    all.sort_by(f64::total_cmp);
+    if all.is_empty() { 0.0 } else { 0.5 * (all[(all.len() - 1) / 2] + all[all.len() / 2]) }
+}
+
+impl Curve {
+    /// One without points yet.
+    pub(super) fn of(key: ReadingKey) -> Self {
+        Self {
+            key,
+            solver: String::new(),
+            preset: String::new(),
+            start_up_s: 0.0,
+            set_up_s: 0.0,
+            points: vec![],
+            reference_floor: 0.0,
+            time_to: BTreeMap::new(),
+            time_to_net: BTreeMap::new(),
+            slope: None,
+            bias_floor: None,
+            efficiency: None,
+        }
+    }
+
+    /// Fills in what follows from the points.
+    pub(super) fn conclude(&mut self) {
+        // A difference of two times that are nearly alike is not known better than that.
+        let net = |p: &BenchPoint| (p.wall_s - self.start_up_s).max(LEAST_NET * p.wall_s);
+        let points: Vec<(f64, f64)> = self.points.iter().map(|p| (net(p), p.relative_error)).collect();
+        let whole: Vec<(f64, f64)> = self.points.iter().map(|p| (p.wall_s, p.relative_error)).collect();
+        let told = |t: &f64| *t >= self.reference_floor;
+        let time = |points: &[(f64, f64)], t: f64| Some(t).filter(told).and_then(|t| fit::time_to(points, t));
+        let times = |points: &[(f64, f64)]| TARGETS.map(|t| (t.to_string(), time(points, t))).into();
+        self.time_to = times(&whole);
+        self.time_to_net = times(&points);
+        if let Some(Fit { slope, floor }) = fit::fit(&points) {
+            self.slope = Some(slope);
+            self.bias_floor = floor;
+        }
+        let last = self.points.last().filter(|p| p.variance > 0.0);
+        self.efficiency = last.map(|p| 1.0 / (p.variance * net(p)));
+    }
+
+    /// Its name in tables and plots.
+    pub fn name(&self) -> String {
+        let solver = if self.key.engine == "simulator" { &self.solver } else { "" };
+        let parts = [self.key.engine.as_str(), self.preset.as_str(), solver];
+        parts.into_iter().filter(|p| !p.is_empty()).collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// The points of one case and procedure that no other point beats in both time and error.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Pareto {
+    pub case: String,
+    pub procedure: ProcedureId,
+    /// Curve, wall-clock seconds and relative error, by rising time; an error below the reference's floor counts as it.
+    pub front: Vec<(String, f64, f64)>,
+}
+
+impl Pareto {
+    pub(super) fn of(case: &str, procedure: ProcedureId, curves: &[Curve], floor: f64) -> Self {
+        let mine = curves.iter().filter(|c| c.key.case == case && c.key.procedure == procedure);
+        let mut all: Vec<(String, f64, f64)> =
+            mine.flat_map(|c| c.points.iter().map(|p| (c.name(), p.wall_s, p.relative_error.max(floor)))).collect();
+        all.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
+        let mut front: Vec<(String, f64, f64)> = vec![];
+        for point in all {
+            if front.last().is_none_or(|best| point.2 < best.2) {
+                front.push(point);
+            }
+        }
+        Self { case: case.to_owned(), procedure, front }
+    }
+}

@@ -1,0 +1,5 @@
+//! Experiments on engines and on this program itself: laws under stress, run time against error, faults put in on purpose.
+
+pub mod bench;
+pub mod selftest;
+pub mod stress;

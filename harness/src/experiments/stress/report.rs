@@ -1,0 +1,153 @@
+//! Views of a stress report: the matrix of what breaks where, for a terminal and as Markdown.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use super::findings::{How, LawReport, StressReport};
+use crate::record::EngineName;
+
+impl StressReport {
+    /// The matrix for a terminal.
+    pub fn terminal(&self) -> String {
+        let mut table = comfy_table::Table::new();
+        table
+            .load_style(comfy_table::presets::NOTHING)
+            .set_content_arrangement(comfy_table::ContentArrangement::Disabled);
+        let (head, rows) = self.matrix();
+        table.set_header(head);
+        table.add_rows(rows);
+        format!("{}: breaks at\n\n{table}\n\n{LEGEND}\n{}", self.case, self.remarks("  "))
+    }
+
+    /// The matrix and every broken law as Markdown.
+    pub fn markdown(&self) -> String {
+        let (head, rows) = self.matrix();
+        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+        let mut text = format!("## {}\n\n{}", self.case, line(&head));
+        text.push_str(&line(&vec!["---".to_owned(); head.len()]));
+        text.extend(rows.iter().map(|row| line(row)));
+        format!("{text}\n{LEGEND}\n\n{}", self.remarks("- "))
+    }
+
+    fn matrix(&self) -> (Vec<String>, Vec<Vec<String>>) {
+        let engines: Vec<&EngineName> = self.engines.keys().collect();
+        let mut head = vec!["law".to_owned(), "magnitude".to_owned()];
+        head.extend(engines.iter().map(|e| format!("{e} {}", self.engines[*e].split(' ').next().unwrap_or_default())));
+        let mut rows: Vec<Vec<String>> = vec![];
+        let mut seen: Vec<&str> = vec![];
+        for law in &self.laws {
+            if seen.contains(&law.law.as_str()) {
+                continue;
+            }
+            seen.push(&law.law);
+            let of = |engine: &&EngineName| {
+                self.laws.iter().find(|l| l.law == law.law && l.engine == **engine).map_or(String::new(), cell)
+            };
+            let mut row = vec![law.law.clone(), law.unit.to_owned()];
+            row.extend(engines.iter().map(of));
+            rows.push(row);
+        }
+        (head, rows)
+    }
+
+    /// What each broken law says, where it breaks and how.
+    fn remarks(&self, bullet: &str) -> String {
+        let mut text = String::new();
+        for law in self.laws.iter().filter(|l| l.how.is_some()) {
+            let mut by_magnitude: BTreeMap<String, String> = BTreeMap::new();
+            let mut order = vec![];
+            for point in law.points.iter().filter(|p| p.how.is_some()) {
+                let key = format!("{:e}", point.magnitude);
+                let what = match (point.deviation, point.how) {
+                    (Some(d), how) => {
+                        format!("{}{}", percent(d), if how == Some(How::SilentLoss) { " lost" } else { "" })
+                    }
+                    (None, Some(how)) => how.name().to_owned(),
+                    _ => String::new(),
+                };
+                let what = format!("{what} ({})", point.procedure.name().split('_').next().unwrap_or_default());
+                if !order.contains(&key) {
+                    order.push(key.clone());
+                }
+                let all = by_magnitude.entry(key).or_default();
+                if !all.is_empty() {
+                    all.push_str(", ");
+                }
+                all.push_str(&what);
+            }
+            let list: Vec<String> = order.iter().map(|k| format!("{k}: {}", by_magnitude[k])).collect();
+            let why = law.points.iter().find_map(|p| p.how.and(p.text.as_deref())).map(first_line);
+            let why = why.map(|w| format!(" ({w})")).unwrap_or_default();
+            let known = match law.known.join("; ") {
+                known if known.is_empty() => String::new(),
+                known => format!(" Known: {known}."),
+            };
+            writeln!(
+                text,
+                "{bullet}{} {}: {}. At {} {}{why}.{known}",
+                law.engine,
+                law.law,
+                law.what,
+                law.unit,
+                list.join("; ")
+            )
+            .ok();
+        }
+        for law in self.laws.iter().filter(|l| !l.gone.is_empty()) {
+            let gone = law.gone.join("; ");
+            writeln!(text, "{bullet}{} {}: on record, but seen no more: {gone}.", law.engine, law.law).ok();
+        }
+        text
+    }
+}
+
+const LEGEND: &str = "ok: no deviation of .1 % or more beyond the noise at any magnitude (noise of the worst reading in brackets: \
+smaller deviations may hide there). Otherwise the first magnitude at which the deviation exceeds .1, 1 and 10 %, or how it breaks. \
+known: on record in reference/known_deviations.yaml. refuses: the engine says itself that it cannot. n untried: time was up, or a milder magnitude hung already.";
+
+fn cell(law: &LawReport) -> String {
+    let mut parts = vec![];
+    for (threshold, at) in &law.breaks_at {
+        let threshold: f64 = threshold.parse().unwrap_or(0.0);
+        parts.push(format!("{} @ {at:e}", percent(threshold)));
+    }
+    match law.how {
+        Some(How::Drift) => {}
+        Some(how) => {
+            let first = law.points.iter().find(|p| p.how == Some(how)).map_or(0.0, |p| p.magnitude);
+            if parts.len() == 3 && law.breaks_at.values().all(|m| *m == first) {
+                parts.clear();
+            }
+            parts.push(format!("{} @ {first:e}", how.name()));
+        }
+        None if law.worst_deviation.is_some() => {
+            parts.push(format!("ok ({})", law.resolution.map_or("?".to_owned(), percent)));
+        }
+        None => {}
+    }
+    if !law.known.is_empty() {
+        parts.push("known".to_owned());
+    }
+    if let Some(at) = law.refused_at {
+        parts.push(format!("refuses @ {at:e}"));
+    }
+    if law.untried > 0 {
+        parts.push(format!("{} untried", law.untried));
+    }
+    parts.join(", ")
+}
+
+fn percent(x: f64) -> String {
+    match 100.0 * x {
+        p if p >= 9.95 => format!("{p:.0} %"),
+        p if p >= 0.095 => format!("{p:.1} %"),
+        p => format!("{p:.1e} %"),
+    }
+}
+
+/// The start of a message, without the temporary files that it names.
+fn first_line(text: &str) -> String {
+    let line = text.lines().next().unwrap_or_default();
+    let line: String = line.split("; its messages are in").next().unwrap_or_default().chars().take(120).collect();
+    line.trim_end_matches(':').to_owned()
+}

@@ -1,0 +1,504 @@
+//! Who is wrong: which of several independent witnesses departs from the others, the reference included.
+//!
+//! Each hypothesis says that one component departs: a witness's own code, or something that several witnesses share, which
+//! then departs in all of them at once; or that none does. Readings are normal about an unknown truth (flat prior), with the
+//! covariance that the hypothesis gives them; its probability follows by Bayes' rule (Kass & Raftery, J. Am. Statist. Assoc. 90,
+//! 1995). So witnesses that share a component count once, and the reference has no privilege.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Basis, Component, Judge, of_reading, witness_of};
+use crate::engines::FILE_READER;
+use crate::procedures::Task;
+use crate::record::{ProcedureId, ReadingKey, Recording, Uncertainty};
+
+/// Independent witnesses that a statement takes.
+const FEWEST: usize = 3;
+/// Odds from which a departure is named: what is left is less than one in twenty.
+const NAMED: f64 = 19.0;
+/// Odds are told up to here: beyond, the assumptions are less sure than they are.
+const HIGHEST_ODDS: f64 = 1e4;
+/// Sound witnesses differ by a standard deviation of this share of their tolerance.
+const ALLOWANCE: f64 = 1.0 / 3.0;
+/// Of the variance by which sound witnesses differ, what two that share a component have in common.
+const SHARED: f64 = 0.5;
+/// A component that departs does so by up to this many times the reading.
+const LARGEST_DEPARTURE: f64 = 10.0;
+/// Rounding of readings: keeps covariances regular where tolerance and uncertainty are zero.
+const ROUNDING: f64 = 1e-12;
+
+/// What the statement assumes.
+const ASSUMPTIONS: &str = "at most one component is wrong, each as likely beforehand as none; sound witnesses differ by a third \
+                           of their tolerance (standard deviation); all meters of a procedure count as one; a departure may \
+                           be of any size from the tolerance to ten times the reading, evenly in its logarithm";
+
+/// What the witnesses of one procedure of a case say of each other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Consensus {
+    pub case: String,
+    pub procedure: ProcedureId,
+    /// Everyone who read it.
+    pub witnesses: Vec<Witness>,
+    /// How many of them are independent: those that share a component count once.
+    pub independent: usize,
+    /// At how many meters any two differ by more than their tolerances.
+    pub differing: usize,
+    /// Who departs, where the odds are good enough to name them; several where it is what they share.
+    pub departs: Vec<String>,
+    /// What departs: a witness's own code, or what several share.
+    pub component: Option<String>,
+    /// Odds of that against everything else.
+    pub odds: Option<f64>,
+    /// The same as a sentence.
+    pub text: String,
+    /// What it assumes, and what it is blind to.
+    pub assumptions: String,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Witness {
+    /// The engine, or where values were derived.
+    pub name: String,
+    /// Whether others are judged by it here.
+    pub is_reference: bool,
+    /// What it shares with others.
+    pub shares: Vec<String>,
+    /// Its deviation from the others' weighted mean where they differ most, relative.
+    pub deviation: Option<f64>,
+    /// The probability that its own code departs.
+    pub probability: f64,
+}
+
+/// A witness with its readings.
+struct Testimony {
+    name: String,
+    shares: Vec<String>,
+    /// Value and standard uncertainty at each target.
+    readings: Vec<Option<(f64, f64)>>,
+    /// What its tolerance allows at each target, in the quantity's unit.
+    allowed: Vec<f64>,
+}
+
+/// Something that may be wrong, and which of the witnesses have it.
+struct Suspect {
+    name: String,
+    holders: Vec<usize>,
+}
+
+/// The witnesses' statement about one task; `None` where nobody read anything.
+pub(super) fn consensus(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
+    let case = recordings.first()?.key.case.clone();
+    let testimonies = testimonies(judge, task, recordings);
+    if testimonies.is_empty() {
+        return None;
+    }
+    let suspects = suspects(&testimonies);
+    let independent = independent(&testimonies);
+    let telling: Vec<usize> = (0..task.targets.len()).filter(|k| differ(&testimonies, *k)).collect();
+    let probabilities = if telling.is_empty() || independent < FEWEST {
+        vec![0.0; suspects.len()]
+    } else {
+        probabilities(&testimonies, &suspects, &telling)
+    };
+    let reference = witness_of(task).0;
+    let witnesses = testimonies.iter().enumerate().map(|(i, t)| Witness {
+        name: t.name.clone(),
+        is_reference: reference == t.name,
+        shares: t.shares.clone(),
+        deviation: deviation(&testimonies, i, &telling),
+        probability: suspects.iter().zip(&probabilities).find(|(s, _)| s.name == t.name).map_or(0.0, |(_, p)| *p),
+    });
+    let mut found = Consensus {
+        case,
+        procedure: task.procedure,
+        witnesses: witnesses.collect(),
+        independent,
+        differing: telling.len(),
+        departs: vec![],
+        component: None,
+        odds: None,
+        text: String::new(),
+        assumptions: assumptions(&testimonies),
+    };
+    found.text = told(&mut found, &suspects, &probabilities, &testimonies);
+    Some(found)
+}
+
+fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<Testimony> {
+    let (reference, basis, _) = witness_of(task);
+    let tolerance = |engine: &str| judge.tolerances.of(task.procedure, basis, engine, task.quantity, judge.overrides);
+    // The reference is as good as what the best of the others is held to.
+    let strictest =
+        recordings.iter().map(|r| tolerance(&r.key.engine)).min_by(|a, b| a.relative.total_cmp(&b.relative));
+    let combined = |components: &[Component]| components.iter().map(|c| c.uncertainty.powi(2)).sum::<f64>().sqrt();
+    let of_engine = |recording: &&Recording| {
+        let allowed = if recording.key.engine == reference {
+            strictest.unwrap_or_default()
+        } else {
+            tolerance(&recording.key.engine)
+        };
+        let readings = task.targets.iter().enumerate().map(|(k, _)| {
+            let reading = recording.readings.get(k).filter(|r| r.value.is_finite())?;
+            Some((reading.value, combined(&of_reading(recording, reading))))
+        });
+        let readings: Vec<_> = readings.collect();
+        let around = |r: &Option<(f64, f64)>| r.map_or(0.0, |(value, _)| allowed.around(value));
+        Testimony {
+            name: recording.key.engine.to_string(),
+            shares: recording.components.clone(),
+            allowed: readings.iter().map(around).collect(),
+            readings,
+        }
+    };
+    let mut testimonies: Vec<Testimony> = recordings.iter().filter(|r| !r.readings.is_empty()).map(of_engine).collect();
+    testimonies.extend(derived(judge, task));
+    testimonies
+}
+
+/// Values derived from a formula, where the case has any: they rest on none of our code.
+fn derived(judge: &Judge<'_>, task: &Task) -> Option<Testimony> {
+    const NAME: &str = "derived values";
+    let published = judge.published?;
+    let readings: Vec<_> = task
+        .targets
+        .iter()
+        .map(|target| {
+            let mut references = published.references(task, target, NAME).into_iter();
+            references.find(|r| r.basis != Basis::Published).map(|r| (r.value, r.uncertainty))
+        })
+        .collect();
+    let tolerance = judge.tolerances.of(task.procedure, Basis::ClosedForm, NAME, task.quantity, judge.overrides);
+    let around = |r: &Option<(f64, f64)>| r.map_or(0.0, |(value, _)| tolerance.around(value));
+    readings.iter().any(Option::is_some).then(|| Testimony {
+        name: NAME.to_owned(),
+        shares: vec![],
+        allowed: readings.iter().map(around).collect(),
+        readings,
+    })
+}
+
+/// Each witness's own code, and what some of them share but not all: what all share shifts nobody against another.
+fn suspects(testimonies: &[Testimony]) -> Vec<Suspect> {
+    let own = testimonies.iter().enumerate().map(|(i, t)| Suspect { name: t.name.clone(), holders: vec![i] });
+    let mut suspects: Vec<Suspect> = own.collect();
+    for name in testimonies.iter().flat_map(|t| &t.shares) {
+        let has = |i: &usize| testimonies[*i].shares.contains(name);
+        let holders: Vec<usize> = (0..testimonies.len()).filter(has).collect();
+        let known = suspects.iter().any(|s| s.name == *name);
+        if !known && holders.len() > 1 && holders.len() < testimonies.len() {
+            suspects.push(Suspect { name: name.clone(), holders });
+        }
+    }
+    suspects
+}
+
+/// How many groups are left when witnesses that share something go together. The reader of photometric files, which nearly
+/// all have, does not tie them: that it departs is a hypothesis of its own, or else a blind spot that is told.
+fn independent(testimonies: &[Testimony]) -> usize {
+    let mut group: Vec<usize> = (0..testimonies.len()).collect();
+    for i in 0..testimonies.len() {
+        for j in 0..i {
+            let tie = |s: &&String| *s != FILE_READER && testimonies[j].shares.contains(s);
+            if testimonies[i].shares.iter().any(|s| tie(&s)) {
+                let (from, to) = (group[i], group[j]);
+                group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
+            }
+        }
+    }
+    group.sort_unstable();
+    group.dedup();
+    group.len()
+}
+
+/// Whether any two witnesses are further apart at a target than the wider of their tolerances and twice their noise.
+fn differ(testimonies: &[Testimony], k: usize) -> bool {
+    let at = |t: &Testimony| t.readings[k].map(|(value, u)| (value, u, t.allowed[k]));
+    let all: Vec<(f64, f64, f64)> = testimonies.iter().filter_map(at).collect();
+    all.iter().enumerate().any(|(i, a)| {
+        all[..i].iter().any(|b| (a.0 - b.0).abs() > a.2.max(b.2) + 2.0 * a.1.hypot(b.1) + ROUNDING * a.0.abs())
+    })
+}
+
+/// The probability of each suspect; what is missing to one is that nobody departs.
+fn probabilities(testimonies: &[Testimony], suspects: &[Suspect], telling: &[usize]) -> Vec<f64> {
+    let evidence = |suspect: Option<&Suspect>| -> f64 {
+        let mean = |departure: Option<f64>| {
+            let at = |k: &usize| log_likelihood(testimonies, suspects, suspect, departure, *k);
+            telling.iter().map(at).sum::<f64>() / telling.len() as f64
+        };
+        let Some(_) = suspect else { return mean(None) };
+        let smallest = telling.iter().map(|k| relative_allowance(testimonies, *k)).fold(f64::INFINITY, f64::min);
+        let mut sizes = vec![smallest.clamp(1e-6, LARGEST_DEPARTURE)];
+        while let Some(last) = sizes.last().copied().filter(|s| *s < LARGEST_DEPARTURE) {
+            sizes.push(2.0 * last);
+        }
+        let logs: Vec<f64> = sizes.iter().map(|size| mean(Some(*size))).collect();
+        log_of_sum(&logs) - (logs.len() as f64).ln()
+    };
+    let mut logs = vec![evidence(None)];
+    logs.extend(suspects.iter().map(|s| evidence(Some(s))));
+    let total = log_of_sum(&logs);
+    logs[1..].iter().map(|l| (l - total).exp()).collect()
+}
+
+fn log_of_sum(logs: &[f64]) -> f64 {
+    let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    largest + logs.iter().map(|l| (l - largest).exp()).sum::<f64>().ln()
+}
+
+/// The smallest tolerance at a target, relative to the middle reading.
+fn relative_allowance(testimonies: &[Testimony], k: usize) -> f64 {
+    let allowed = testimonies.iter().filter(|t| t.readings[k].is_some()).map(|t| t.allowed[k]);
+    allowed.fold(f64::INFINITY, f64::min) / middle(testimonies, k)
+}
+
+/// The median of the readings at a target: a scale that one wrong witness does not move.
+fn middle(testimonies: &[Testimony], k: usize) -> f64 {
+    let mut values: Vec<f64> = testimonies.iter().filter_map(|t| t.readings[k]).map(|(value, _)| value.abs()).collect();
+    values.sort_by(f64::total_cmp);
+    // Darkness has no scale of its own: the largest reading there is one.
+    let largest = values.last().copied().unwrap_or(0.0);
+    values.get(values.len() / 2).copied().filter(|m| *m > 0.0).unwrap_or(largest).max(f64::MIN_POSITIVE)
+}
+
+/// Logarithm of the likelihood of the readings at one target, the truth integrated out.
+fn log_likelihood(
+    testimonies: &[Testimony],
+    suspects: &[Suspect],
+    departing: Option<&Suspect>,
+    departure: Option<f64>,
+    k: usize,
+) -> f64 {
+    let scale = middle(testimonies, k);
+    let present: Vec<usize> = (0..testimonies.len()).filter(|i| testimonies[*i].readings[k].is_some()).collect();
+    let values: Vec<f64> =
+        present.iter().filter_map(|i| testimonies[*i].readings[k]).map(|(value, _)| value / scale - 1.0).collect();
+    let covariance = |i: usize, j: usize| -> f64 {
+        let (a, b) = (&testimonies[i], &testimonies[j]);
+        let mut sum = 0.0;
+        if i == j {
+            let noise = a.readings[k].map_or(0.0, |(_, u)| u);
+            sum += (noise / scale).powi(2) + (ALLOWANCE * a.allowed[k] / scale).powi(2) + ROUNDING.powi(2);
+        } else {
+            let both = |s: &&Suspect| s.holders.contains(&i) && s.holders.contains(&j);
+            if suspects.iter().any(|s| both(&s)) {
+                sum += SHARED * (ALLOWANCE * a.allowed[k].min(b.allowed[k]) / scale).powi(2);
+            }
+        }
+        if departing.is_some_and(|s| s.holders.contains(&i) && s.holders.contains(&j)) {
+            sum += departure.unwrap_or(0.0).powi(2);
+        }
+        sum
+    };
+    let matrix: Vec<Vec<f64>> = present.iter().map(|i| present.iter().map(|j| covariance(*i, *j)).collect()).collect();
+    gaussian(&matrix, &values).unwrap_or(f64::NEG_INFINITY)
+}
+
+/// Log-likelihood of normal values about a common unknown mean, which has a flat prior; by Cholesky's factors.
+fn gaussian(matrix: &[Vec<f64>], values: &[f64]) -> Option<f64> {
+    let n = values.len();
+    let mut lower = vec![vec![0.0; n]; n];
+    for i in 0..n {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|m| lower[i][m] * lower[j][m]).sum();
+            let left = matrix[i][j] - sum;
+            lower[i][j] = if i == j { Some(left).filter(|l| *l > 0.0)?.sqrt() } else { left / lower[j][j] };
+        }
+    }
+    let solve = |b: &[f64]| {
+        let mut x = vec![0.0; n];
+        for i in 0..n {
+            let sum: f64 = (0..i).map(|m| lower[i][m] * x[m]).sum();
+            x[i] = (b[i] - sum) / lower[i][i];
+        }
+        x
+    };
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let (ones, values) = (solve(&vec![1.0; n]), solve(values));
+    let weight = dot(&ones, &ones);
+    let mean = dot(&ones, &values) / weight;
+    let residual: f64 = values.iter().zip(&ones).map(|(v, o)| (v - mean * o).powi(2)).sum();
+    let log_determinant: f64 = 2.0 * (0..n).map(|i| lower[i][i].ln()).sum::<f64>();
+    Some(-0.5 * (log_determinant + weight.ln() + residual + (n as f64 - 1.0) * std::f64::consts::TAU.ln()))
+}
+
+/// A witness's deviation from the weighted mean of the others, averaged over the telling targets, relative.
+fn deviation(testimonies: &[Testimony], i: usize, telling: &[usize]) -> Option<f64> {
+    let all: Vec<usize> = (0..testimonies[i].readings.len()).collect();
+    let targets = if telling.is_empty() { &all } else { telling };
+    let at = |k: &usize| {
+        let (mine, _) = testimonies[i].readings[*k]?;
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (j, other) in testimonies.iter().enumerate().filter(|(j, _)| *j != i) {
+            let Some((value, u)) = other.readings[*k] else { continue };
+            let variance = u.powi(2) + (ALLOWANCE * testimonies[j].allowed[*k]).powi(2) + (ROUNDING * value).powi(2);
+            let weight = variance.max(f64::MIN_POSITIVE).recip();
+            (sum, weights) = (sum + weight * value, weights + weight);
+        }
+        Some(mine * weights / sum - 1.0).filter(|d| d.is_finite())
+    };
+    let found: Vec<f64> = targets.iter().filter_map(at).collect();
+    (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64)
+}
+
+/// Fills in who departs, and tells it.
+fn told(found: &mut Consensus, suspects: &[Suspect], probabilities: &[f64], testimonies: &[Testimony]) -> String {
+    let (count, telling) = (testimonies.len(), found.differing);
+    if telling == 0 {
+        return format!("{count} witnesses, {} of them independent, agree", found.independent);
+    }
+    if found.independent < FEWEST {
+        return format!(
+            "witnesses differ, but only {} of {count} are independent: three could tell who departs",
+            found.independent
+        );
+    }
+    let mut order: Vec<usize> = (0..suspects.len()).collect();
+    order.sort_by(|a, b| probabilities[*b].total_cmp(&probabilities[*a]));
+    let best = order[0];
+    let odds = (probabilities[best] / (1.0 - probabilities[best]).max(0.1 / HIGHEST_ODDS)).min(HIGHEST_ODDS);
+    if odds < NAMED {
+        let likely = order.iter().filter(|k| probabilities[**k] > 0.05);
+        let likely: Vec<String> =
+            likely.map(|k| format!("{} ({:.0} %)", suspects[*k].name, 100.0 * probabilities[*k])).collect();
+        let whom = if likely.is_empty() { "nobody in particular".to_owned() } else { likely.join(" or ") };
+        return format!("witnesses differ at {telling} meters, and it is open who departs: {whom}");
+    }
+    let suspect = &suspects[best];
+    let names: Vec<&str> = suspect.holders.iter().map(|i| testimonies[*i].name.as_str()).collect();
+    found.departs = names.iter().map(|n| (*n).to_owned()).collect();
+    found.component = Some(suspect.name.clone());
+    found.odds = Some(odds);
+    let is_reference = found.witnesses.iter().any(|w| w.is_reference && found.departs.contains(&w.name));
+    let who = names.join(" and ");
+    let shared = if names.len() > 1 { format!(", by what they share: {}", suspect.name) } else { String::new() };
+    let by = suspect.holders.iter().filter_map(|i| found.witnesses[*i].deviation);
+    let by =
+        by.max_by(|a, b| a.abs().total_cmp(&b.abs())).map_or(String::new(), |d| format!(" by {:+.1} %", 100.0 * d));
+    let at = if odds >= HIGHEST_ODDS { "more than 10000".to_owned() } else { format!("{odds:.0}") };
+    format!(
+        "{}{who} depart{} from the others{by} at {telling} meters{shared}; odds {at} to 1",
+        if is_reference { "the reference itself: " } else { "" },
+        if names.len() > 1 { "" } else { "s" },
+    )
+}
+
+fn assumptions(testimonies: &[Testimony]) -> String {
+    let of_all = |s: &&String| testimonies.len() > 1 && testimonies.iter().all(|t| t.shares.contains(s));
+    let blind: Vec<&str> = testimonies[0].shares.iter().filter(of_all).map(String::as_str).collect();
+    if blind.is_empty() {
+        return ASSUMPTIONS.to_owned();
+    }
+    format!("{ASSUMPTIONS}; blind to what all have: {}", blind.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use glam::DVec3;
+    use luminaire::scene::{Bounces, Meter, Scene, Transport};
+
+    use super::*;
+    use crate::judge::{KnownDeviations, Tolerances};
+    use crate::procedures::Target;
+    use crate::record::{MeterId, Quantity, Reading};
+
+    const METERS: usize = 12;
+    const LOOKUP: &str = "lookup";
+
+    /// Readings of witnesses that are off by a factor each, with half a per mille of noise in the renderers.
+    fn statement(factors: &[(&str, &[&str], f64)], seed: u64) -> Consensus {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let target = |k| Target {
+            id: MeterId::new("grid", k),
+            meter: Meter { position_m: DVec3::ZERO, normal: DVec3::Z },
+            direction: None,
+            per_lux: 1.0,
+        };
+        let task = Task {
+            procedure: ProcedureId::IndirectIlluminance,
+            scene: Scene::default(),
+            transport: Transport::Indirect(Bounces::Converged),
+            quantity: Quantity::Illuminance,
+            targets: (0..METERS).map(target).collect(),
+        };
+        let recording = |(engine, shares, factor): &(&str, &[&str], f64)| {
+            let noise = if ["simulator", "iesna"].contains(engine) { 0.0 } else { 5e-4 };
+            let reading = |k| Reading {
+                meter: MeterId::new("grid", k),
+                quantity: Quantity::Illuminance,
+                value: (10.0 + k as f64) * factor * (1.0 + noise * crate::system::random::normal(&mut random)),
+                uncertainty: Uncertainty::sampled(noise * (10.0 + k as f64), None),
+            };
+            Recording {
+                components: [FILE_READER].iter().chain(*shares).map(|s| (*s).to_owned()).collect(),
+                readings: (0..METERS).map(reading).collect(),
+                ..Recording::of(ReadingKey::new("c", task.procedure, *engine), task.light())
+            }
+        };
+        let recordings: Vec<Recording> = factors.iter().map(recording).collect();
+        let (tolerances, known) = (Tolerances::built_in().unwrap(), KnownDeviations::built_in().unwrap());
+        let overrides = BTreeMap::new();
+        let judge = Judge { tolerances: &tolerances, known: &known, overrides: &overrides, published: None };
+        consensus(&judge, &task, &recordings.iter().collect::<Vec<_>>()).unwrap()
+    }
+
+    #[test]
+    fn whoever_departs_is_named_and_the_reference_has_no_privilege() {
+        let engines = ["simulator", "mitsuba", "radiance", "povray"];
+        for wrong in engines {
+            for factor in [0.95, 1.06, std::f64::consts::PI, 0.1] {
+                let all: Vec<(&str, &[&str], f64)> =
+                    engines.iter().map(|e| (*e, &[][..], if *e == wrong { factor } else { 1.0 })).collect();
+                let found = statement(&all, 1);
+                assert_eq!(found.departs, [wrong], "{factor}: {}", found.text);
+                assert_eq!(found.text.starts_with("the reference itself"), wrong == "simulator", "{}", found.text);
+                let told = found.witnesses.iter().find(|w| w.name == wrong).unwrap().deviation.unwrap();
+                assert!((told - (factor - 1.0)).abs() < 0.02 * factor, "{told} {factor}");
+            }
+        }
+    }
+
+    #[test]
+    fn three_are_enough_and_two_are_not() {
+        let three = statement(&[("simulator", &[], 1.06), ("mitsuba", &[], 1.0), ("radiance", &[], 1.0)], 2);
+        assert_eq!(three.departs, ["simulator"], "{}", three.text);
+        let two = statement(&[("simulator", &[], 1.06), ("mitsuba", &[], 1.0)], 2);
+        assert!(two.departs.is_empty() && two.text.contains("only 2 of 2 are independent"), "{}", two.text);
+    }
+
+    #[test]
+    fn witnesses_that_share_a_component_do_not_outvote_the_others() {
+        // Two of three share their lookup: they count once, so that nobody can say who is wrong.
+        let of_three = statement(&[("simulator", &[LOOKUP], 1.1), ("a", &[LOOKUP], 1.1), ("b", &[], 1.0)], 3);
+        assert_eq!((of_three.independent, of_three.departs.len()), (2, 0), "{}", of_three.text);
+        // With two others against them it is what they share that departs, not the others, and not one of the two.
+        let of_four =
+            statement(&[("simulator", &[LOOKUP], 1.1), ("a", &[LOOKUP], 1.1), ("b", &[], 1.0), ("c", &[], 1.0)], 3);
+        assert_eq!(of_four.departs, ["simulator", "a"], "{}", of_four.text);
+        assert_eq!(of_four.component.as_deref(), Some(LOOKUP));
+        // Without sharing it would be two against two.
+        let split = statement(&[("simulator", &[], 1.1), ("a", &[], 1.1), ("b", &[], 1.0), ("c", &[], 1.0)], 3);
+        assert!(split.departs.is_empty(), "{}", split.text);
+    }
+
+    #[test]
+    fn where_all_agree_within_their_tolerances_nobody_is_named() {
+        let engines = ["simulator", "mitsuba", "radiance", "povray"];
+        for seed in 0..100 {
+            let mut random = fastrand::Rng::with_seed(1000 + seed);
+            let all: Vec<(&str, &[&str], f64)> =
+                engines.iter().map(|e| (*e, &[][..], 1.0 + 0.01 * (2.0 * random.f64() - 1.0))).collect();
+            let found = statement(&all, seed);
+            assert!(found.departs.is_empty(), "{}", found.text);
+        }
+    }
+
+    #[test]
+    fn what_all_share_is_told_as_a_blind_spot() {
+        let found = statement(&[("simulator", &[], 1.0), ("mitsuba", &[], 1.0), ("radiance", &[], 1.0)], 4);
+        assert!(found.assumptions.contains(FILE_READER), "{}", found.assumptions);
+    }
+}

@@ -1,0 +1,346 @@
+//! The diffing layer: readings against references that carry their own uncertainty; it sees nothing but readings.
+
+mod consensus;
+mod family;
+mod input;
+mod known;
+mod paper_split;
+mod published;
+mod spending;
+mod split;
+#[cfg(test)]
+pub(crate) mod tests;
+mod tolerance;
+mod uncertainty;
+mod verdict;
+
+use std::collections::BTreeMap;
+
+use luminaire::scene::LuminaireModel;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::engines;
+use crate::procedures::{Target, Task};
+use crate::record::{EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, Uncertainty};
+use crate::spec::ToleranceOverride;
+
+use input::Input;
+
+pub use consensus::{Consensus, Witness};
+pub use known::{KnownBreak, KnownDeviationError, KnownDeviations, Subject};
+pub use paper_split::{PaperSplit, Share, Stage, Stages, shares};
+pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
+pub use spending::{LOOKS, share_of_error};
+pub use split::Split;
+pub use tolerance::{Tolerance, ToleranceError, Tolerances};
+pub use uncertainty::{Component, ErrorBudget, Shape, Source};
+pub use verdict::{Verdict, judge};
+
+/// What a reference rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Basis {
+    /// A formula in closed form.
+    ClosedForm,
+    /// The simulator, with its error bound.
+    Exact,
+    /// An IESNA calculation method.
+    Iesna,
+    /// Printed values.
+    Published,
+    /// Another engine.
+    Engine,
+}
+
+impl Basis {
+    /// The name used in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ClosedForm => "closed form",
+            Self::Exact => "exact",
+            Self::Iesna => "IESNA",
+            Self::Published => "published",
+            Self::Engine => "engine",
+        }
+    }
+}
+
+/// What a reading is held against.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Reference {
+    pub value: f64,
+    /// Its standard uncertainty, likewise.
+    pub uncertainty: f64,
+    /// Of a sampled reference's standard error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom: Option<f64>,
+    /// Its expanded over its standard uncertainty, at the coverage of verdicts; null where it has none.
+    #[serde(default)]
+    pub coverage_factor: Option<f64>,
+    /// What it rests on.
+    pub basis: Basis,
+    /// Formula, solver or paper.
+    pub source: String,
+}
+
+/// One reading against one reference.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Comparison {
+    #[serde(flatten)]
+    pub key: ReadingKey,
+    /// The luminaire model.
+    pub model: String,
+    pub meter: MeterId,
+    /// Its position in metres.
+    pub at_m: [f64; 3],
+    pub normal: [f64; 3],
+    /// Direction seen from the luminaire, for procedure 1.
+    pub gamma_deg: Option<f64>,
+    pub c_deg: Option<f64>,
+    pub quantity: Quantity,
+    /// The reading; null where it is missing.
+    pub value: Option<f64>,
+    /// What is stated of its error.
+    #[serde(flatten)]
+    pub uncertainty: Uncertainty,
+    /// What it is held against; null where there is nothing.
+    pub reference: Option<Reference>,
+    /// Reading minus reference.
+    pub deviation: Option<f64>,
+    /// Deviation over reference.
+    pub relative_deviation: Option<f64>,
+    /// How far it may lie off.
+    pub tolerance: Tolerance,
+    pub verdict: Verdict,
+    /// Why, where that is known.
+    pub diagnosis: Option<String>,
+    /// What the deviation may owe to chance and ignorance; null where there is no deviation.
+    #[serde(default)]
+    pub budget: Option<ErrorBudget>,
+    /// How probable a deviation this large would be, were the engine just within the tolerance.
+    #[serde(default)]
+    pub p_value: Option<f64>,
+}
+
+/// What judging needs besides the readings.
+pub struct Judge<'a> {
+    /// Tolerances and coverage factor.
+    pub tolerances: &'a Tolerances,
+    /// Deviations on record.
+    pub known: &'a KnownDeviations,
+    /// The spec's own tolerances.
+    pub overrides: &'a BTreeMap<ProcedureId, ToleranceOverride>,
+    /// Tables of a paper.
+    pub published: Option<&'a Published>,
+}
+
+impl Judge<'_> {
+    /// What of each deviation of an approximate method from a renderer is whose; `recordings` as for [`Self::compare`].
+    pub fn split(&self, task: &Task, recordings: &[&Recording]) -> Vec<Split> {
+        split::splits(task, recordings, self.tolerances.coverage_factor())
+    }
+
+    /// What an engine is held to in a task, by what others are judged by there.
+    pub fn tolerance(&self, task: &Task, engine: &str) -> Tolerance {
+        self.tolerances.of(task.procedure, witness_of(task).1, engine, task.quantity, self.overrides)
+    }
+
+    /// Who of the engines departs from the others, the reference included; `recordings` as for [`Self::compare`].
+    pub fn consensus(&self, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
+        consensus::consensus(self, task, recordings)
+    }
+
+    /// Holds every reading of one task against every reference there is for it.
+    ///
+    /// `recordings` are those of this task, one an engine. An engine that failed is `missing` at every meter. What fails, fails
+    /// at the family-wise level of all comparisons of its engine here.
+    pub fn compare(&self, task: &Task, recordings: &[&Recording]) -> Vec<Comparison> {
+        let input = self.published.map(|_| Input::of(task));
+        let mut comparisons = vec![];
+        for recording in recordings {
+            let (mut family, mut shares) = (vec![], vec![]);
+            for (k, target) in task.targets.iter().enumerate() {
+                let reading = recording.readings.get(k);
+                let mut references = reference_from_witness(task, recordings, k, &recording.key.engine);
+                for reference in self.published.iter().flat_map(|p| p.references(task, target, &recording.key.engine)) {
+                    references.push(Held::published(reference, input.as_ref(), target, reading));
+                }
+                if references.is_empty() && (reading.is_none() || recording.role == Role::Renderer) {
+                    // Nothing to hold it against, or nothing to hold: that is said, never passed over.
+                    family.push(self.comparison(task, recording, k, None));
+                }
+                for held in references {
+                    family.push(self.comparison(task, recording, k, Some(held)));
+                }
+                shares.resize(family.len(), share_of_reading(recording, k));
+            }
+            self.decide(&mut family, &shares);
+            comparisons.extend(family);
+        }
+        comparisons
+    }
+
+    /// Verdicts of all comparisons of one engine in one procedure of one case; of its error each may spend its share.
+    fn decide(&self, family: &mut [Comparison], shares: &[f64]) {
+        let tested: Vec<usize> = (0..family.len()).filter(|k| family[*k].p_value.is_some()).collect();
+        let p_values: Vec<f64> = tested.iter().filter_map(|k| Some(family[*k].p_value? / shares[*k])).collect();
+        let rejected = family::rejected(&p_values, self.tolerances.family_wise_error());
+        for (k, rejected) in tested.into_iter().zip(rejected) {
+            let of_one = &mut family[k].verdict;
+            if *of_one == Verdict::Fail && !rejected {
+                *of_one = Verdict::Inconclusive;
+            }
+        }
+        for comparison in family {
+            let Some(basis) = comparison.reference.as_ref().map(|r| r.basis) else { continue };
+            let subject = Subject {
+                key: &comparison.key,
+                model: &comparison.model,
+                basis,
+                relative_deviation: comparison.relative_deviation,
+            };
+            let (verdict, cause) = self.known.revise(comparison.verdict, &subject);
+            comparison.verdict = verdict;
+            comparison.diagnosis = cause.or(comparison.diagnosis.take());
+        }
+    }
+
+    fn comparison(&self, task: &Task, recording: &Recording, k: usize, held: Option<Held>) -> Comparison {
+        let (target, reading) = (&task.targets[k], recording.readings.get(k));
+        let basis = held.as_ref().map(|h| h.reference.basis);
+        let tolerance = basis.map_or_else(Tolerance::default, |basis| {
+            self.tolerances.of(task.procedure, basis, &recording.key.engine, task.quantity, self.overrides)
+        });
+        let pair = reading.zip(held.as_ref());
+        let difference = pair.map(|(a, b)| a.value - b.reference.value);
+        let budget = pair.map(|(reading, held)| {
+            let components = of_reading(recording, reading).into_iter().chain(held.components.iter().copied());
+            let tail = uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor());
+            ErrorBudget::new(components.collect(), tail * share_of_reading(recording, k))
+        });
+        let missing = match (reading, &held) {
+            (None, _) => recording.failure.clone().or_else(|| Some("no reading".to_owned())),
+            (_, None) => Some("no reference".to_owned()),
+            _ => None,
+        };
+        let held = held.map(|held| held.covered(uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor())));
+        let mut comparison = Comparison {
+            key: recording.key.clone(),
+            model: recording.model.clone(),
+            meter: target.id.clone(),
+            at_m: target.meter.position_m.to_array(),
+            normal: target.meter.normal.to_array(),
+            gamma_deg: target.direction.map(|d| d.gamma_deg),
+            c_deg: target.direction.map(|d| d.c_deg),
+            quantity: task.quantity,
+            value: reading.map(|r| r.value),
+            uncertainty: reading.map_or(Uncertainty::Unstated, |r| r.uncertainty),
+            reference: held.map(|h| h.reference),
+            deviation: difference.filter(|d| d.is_finite()),
+            relative_deviation: None,
+            tolerance,
+            verdict: Verdict::Missing,
+            diagnosis: missing,
+            budget,
+            p_value: None,
+        };
+        let Some(((value, reference), budget)) =
+            comparison.value.zip(comparison.reference.as_ref()).zip(comparison.budget.as_ref())
+        else {
+            return comparison;
+        };
+        comparison.relative_deviation = Some((value - reference.value) / reference.value).filter(|d| d.is_finite());
+        let sound = value >= 0.0 && reference.value >= 0.0;
+        let deviation = if sound { value - reference.value } else { f64::NAN };
+        let allowed = tolerance.around(reference.value);
+        comparison.verdict = judge(deviation, budget.expanded, allowed);
+        if comparison.verdict != Verdict::Missing {
+            comparison.p_value = Some(budget.p_value(deviation, allowed));
+        }
+        comparison
+    }
+}
+
+/// A reference with what is uncertain of it.
+struct Held {
+    reference: Reference,
+    components: Vec<Component>,
+}
+
+impl Held {
+    /// Tells the coverage factor of the reference alone, for an error beyond it with the probability `tail` on either side.
+    fn covered(mut self, tail: f64) -> Self {
+        let alone = ErrorBudget::new(self.components.clone(), tail);
+        self.reference.coverage_factor = Some(alone.coverage_factor).filter(|_| alone.combined > 0.0);
+        self
+    }
+
+    /// A printed or derived value, which does not rest on the photometric file.
+    fn published(reference: Reference, input: Option<&Input<'_>>, target: &Target, reading: Option<&Reading>) -> Self {
+        let rounding = Component {
+            source: Source::Rounding,
+            uncertainty: reference.uncertainty,
+            ..Component::within(Source::Rounding, 0.0)
+        };
+        let input = input.zip(reading).map(|(i, r)| Component::within(Source::Input, i.bound(target, r.value)));
+        Self { reference, components: std::iter::once(rounding).chain(input).collect() }
+    }
+}
+
+/// The share of its error that a decision about a reading may spend: all of it where only one look was planned.
+fn share_of_reading(recording: &Recording, k: usize) -> f64 {
+    let is_sampled = recording.readings.get(k).is_some_and(|r| r.uncertainty.is_sampled());
+    recording.looks.get(k).filter(|_| is_sampled).map_or(1.0, |look| share_of_error(*look))
+}
+
+/// What is uncertain of a reading.
+fn of_reading(recording: &Recording, reading: &Reading) -> Vec<Component> {
+    let uncertainty = &reading.uncertainty;
+    let chance = uncertainty.standard_error().unwrap_or(0.0);
+    let instrument = recording.instrument_uncertainty * reading.value.abs();
+    vec![
+        Component::normal(Source::MonteCarlo, chance, uncertainty.degrees_of_freedom()),
+        Component::within(Source::Discretisation, uncertainty.bound()),
+        Component::normal(Source::Instrument, instrument, None),
+    ]
+}
+
+/// Which of our own engines others are judged by in a procedure, and on what basis.
+fn witness_of(task: &Task) -> (EngineName, Basis, &'static str) {
+    let points_only = task.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
+    match (task.procedure, points_only && task.scene.obstacles.is_empty()) {
+        (ProcedureId::LuminousIntensity, true) => {
+            (engines::IESNA, Basis::ClosedForm, "photometric file, bilinear in (C, gamma)")
+        }
+        (ProcedureId::DirectIlluminance, true) => (engines::IESNA, Basis::ClosedForm, "inverse square"),
+        _ => (engines::SIMULATOR, Basis::Exact, "luminaire::simulator"),
+    }
+}
+
+fn reference_from_witness(task: &Task, recordings: &[&Recording], k: usize, engine: &EngineName) -> Vec<Held> {
+    let (witness, basis, source) = witness_of(task);
+    if *engine == witness {
+        return vec![];
+    }
+    let recording = recordings.iter().find(|r| r.key.engine == witness);
+    let reading = recording.and_then(|r| r.readings.get(k).map(|reading| (r, reading)));
+    let held = reading.map(|(recording, reading)| Held {
+        reference: Reference {
+            value: reading.value,
+            uncertainty: reading.uncertainty.standard(),
+            degrees_of_freedom: reading.uncertainty.degrees_of_freedom(),
+            coverage_factor: None,
+            basis,
+            source: match recording.settings.get("solver") {
+                Some(solver) if basis == Basis::Exact => format!("{source}: {solver}"),
+                _ => source.to_owned(),
+            },
+        },
+        components: of_reading(recording, reading)
+            .into_iter()
+            .map(|component| Component { source: Source::Reference, ..component })
+            .collect(),
+    });
+    held.into_iter().collect()
+}

@@ -1,0 +1,152 @@
+//! What of the distance between a paper's calculation and its renderer is the method's, the photometry's, the renderer's.
+//!
+//! Between the two printed values lie readings of ours that differ in one thing each; every share is one such step, relative
+//! to the printed calculation, so that they add up exactly:
+//!
+//! printed calculation -> the same method on our file -> exact, all reflections -> exact, as many reflections as the paper ->
+//! the same of the paper's luminaire model -> our run of its renderer -> printed rendering.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::PublishedFlux;
+use crate::record::MeterId;
+
+/// One place and column of a paper, split.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PaperSplit {
+    /// The table's name in the paper.
+    pub table: String,
+    pub meter: MeterId,
+    /// The place, in words.
+    pub place: String,
+    /// The column that is held against the calculation.
+    pub column: String,
+    /// Printed rendering over printed calculation, less 1.
+    pub whole: Share,
+    /// The method's error on our file, by the exact solution with all reflections.
+    pub method: Share,
+    /// The luminaire: other flux than our file's behind the printed calculation, and the model against a point.
+    pub photometry: Share,
+    /// The renderer: the reflections that it is not told to follow, and its own error.
+    pub renderer: Share,
+    /// What is left: printed digits that our run of the renderer does not reproduce.
+    pub remainder: Share,
+}
+
+/// A share of the whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Share {
+    /// Relative to the printed calculation.
+    pub value: f64,
+    /// Half width of its interval.
+    pub uncertainty: f64,
+}
+
+/// A value with its standard uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stage {
+    pub value: f64,
+    /// Its standard uncertainty.
+    pub uncertainty: f64,
+}
+
+/// The values between which the steps lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stages {
+    /// As the paper prints its calculation.
+    pub printed_method: Stage,
+    /// The same method on our file.
+    pub method: Stage,
+    /// Exact, with all reflections, of a point.
+    pub exact: Stage,
+    /// The same with the paper's number of reflections.
+    pub exact_cut: Stage,
+    /// The same of the paper's luminaire model.
+    pub exact_model: Stage,
+    /// Our run of the paper's renderer.
+    pub rendered: Stage,
+    /// As the paper prints its rendering.
+    pub printed: Stage,
+}
+
+/// The shares of whole, method, photometry, renderer and remainder, in this order.
+///
+/// The flux of the paper's luminaire is known within an interval only. A table of another flux that gives the paper's rendering
+/// as well would give the method another value in proportion: the step from the printed calculation to the method on our file
+/// and the one from there to the exact value are uncertain by the same amount and in opposite directions.
+pub fn shares(stages: &Stages, flux: Option<&PublishedFlux>, coverage: f64) -> [Share; 5] {
+    let unit = stages.printed_method.value;
+    let of_flux = flux.map_or(0.0, |f| f.half_width_lm / 3f64.sqrt() / f.value_lm * stages.method.value);
+    let share = |steps: &[(Stage, Stage)], further: f64| {
+        let value = steps.iter().map(|(from, to)| to.value - from.value).sum::<f64>() / unit;
+        // Stages that one step ends at and the next begins with cancel, as their errors do.
+        let mut ends: Vec<Stage> = vec![];
+        for stage in steps.iter().flat_map(|(from, to)| [*from, *to]) {
+            match ends.iter().position(|e| *e == stage) {
+                Some(k) => drop(ends.remove(k)),
+                None => ends.push(stage),
+            }
+        }
+        let variance = ends.iter().map(|s| s.uncertainty.powi(2)).sum::<f64>() + further.powi(2);
+        Share { value, uncertainty: coverage * variance.sqrt() / unit }
+    };
+    let Stages { printed_method, method, exact, exact_cut, exact_model, rendered, printed } = *stages;
+    [
+        share(&[(printed_method, printed)], 0.0),
+        share(&[(method, exact)], of_flux),
+        share(&[(printed_method, method), (exact_cut, exact_model)], of_flux),
+        share(&[(exact, exact_cut), (exact_model, rendered)], 0.0),
+        share(&[(rendered, printed)], 0.0),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stage(value: f64, uncertainty: f64) -> Stage {
+        Stage { value, uncertainty }
+    }
+
+    fn stages() -> Stages {
+        Stages {
+            printed_method: stage(2.25, 0.006),
+            method: stage(2.042, 0.0),
+            exact: stage(2.002, 1e-5),
+            exact_cut: stage(1.983, 1e-5),
+            exact_model: stage(1.9835, 3e-4),
+            rendered: stage(1.985, 2e-3),
+            printed: stage(1.98, 0.0058),
+        }
+    }
+
+    #[test]
+    fn the_shares_add_up_to_the_whole() {
+        let [whole, parts @ ..] = shares(&stages(), None, 2.0);
+        assert!((parts.iter().map(|s| s.value).sum::<f64>() - whole.value).abs() < 1e-15);
+        assert!((whole.value - (1.98 / 2.25 - 1.0)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_method_that_is_right_and_a_renderer_that_is_have_no_share() {
+        let mut same = stages();
+        same.exact = same.method;
+        same.exact_cut = stage(2.042, 0.0);
+        same.exact_model = stage(2.042, 0.0);
+        same.rendered = stage(2.042, 0.0);
+        let [whole, method, photometry, renderer, remainder] = shares(&same, None, 2.0);
+        assert_eq!((method.value, renderer.value), (0.0, 0.0));
+        assert!((photometry.value + remainder.value - whole.value).abs() < 1e-15);
+    }
+
+    #[test]
+    fn an_unknown_flux_makes_method_and_photometry_uncertain_but_not_the_rest() {
+        let flux = PublishedFlux { value_lm: 4450.0, half_width_lm: 250.0, source: "test".into() };
+        let [whole, method, photometry, renderer, _] = shares(&stages(), Some(&flux), 2.0);
+        let expected = 2.0 * 250.0 / 3f64.sqrt() / 4450.0 * 2.042 / 2.25;
+        assert!((method.uncertainty - expected).abs() < 1e-4, "{method:?}");
+        assert!(photometry.uncertainty >= expected);
+        assert!(whole.uncertainty < 0.01 && renderer.uncertainty < 0.01);
+    }
+}

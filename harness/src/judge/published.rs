@@ -1,0 +1,333 @@
+//! Published tables as references: printed cells with the interval that their rounding leaves.
+//!
+//! The format is described at the top of `reference/published/cachet.yaml`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::DVec3;
+use luminaire::scene::{Bounces, Transport};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Basis, Reference};
+use crate::procedures::{Target, Task};
+use crate::record::{MeterId, ProcedureId};
+
+/// The tables of one paper.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Published {
+    #[serde(rename = "luxproof_published")]
+    version: u32,
+    citation: Citation,
+    rounding: Rounding,
+    /// What is known of the luminaire's flux beyond our file.
+    #[serde(default)]
+    flux: Option<PublishedFlux>,
+    tables: BTreeMap<ProcedureId, Table>,
+}
+
+/// The flux of a paper's luminaire, as far as its tables tell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PublishedFlux {
+    /// In lumens.
+    pub value_lm: f64,
+    /// Half the width of the interval that holds it.
+    pub half_width_lm: f64,
+    /// How that is known.
+    pub source: String,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Citation {
+    title: String,
+    /// What the values are, where they are not a paper's.
+    #[serde(default = "published")]
+    basis: Basis,
+}
+
+const fn published() -> Basis {
+    Basis::Published
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Rounding {
+    units_in_last_digit: f64,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    name: String,
+    quantity: crate::record::Quantity,
+    #[serde(default)]
+    bounces: Option<u32>,
+    columns: BTreeMap<String, Column>,
+    rows: Vec<Row>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Column {
+    reference: bool,
+    engine: String,
+    model: String,
+    /// Further luminaire models that the column may be held against.
+    #[serde(default)]
+    also: Vec<String>,
+    #[serde(default, rename = "distance_m")]
+    _distance_m: Option<f64>,
+    #[serde(default)]
+    bounces: Option<u32>,
+    meaning: String,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    #[serde(default)]
+    gamma_deg: Option<f64>,
+    #[serde(default)]
+    c_deg: Option<f64>,
+    #[serde(default)]
+    at_m: Option<[f64; 3]>,
+    #[serde(default)]
+    normal: Option<[f64; 3]>,
+    cells: BTreeMap<String, String>,
+}
+
+/// A published table as it is printed, with the meters that its rows belong to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PublishedTable {
+    /// The paper.
+    pub title: String,
+    /// The table's name in it.
+    pub name: String,
+    /// The procedure that reads its values.
+    pub procedure: ProcedureId,
+    /// What they are.
+    pub quantity: crate::record::Quantity,
+    /// The cases that are held against it.
+    pub cases: Vec<String>,
+    /// Diffuse reflections that its renderings include, where that matters.
+    #[serde(default)]
+    pub bounces: Option<u32>,
+    /// Units of the last printed digit that a cell is uncertain by.
+    #[serde(default)]
+    pub units_in_last_digit: f64,
+    /// The luminaire's flux, as far as the tables tell.
+    #[serde(default)]
+    pub flux: Option<PublishedFlux>,
+    pub columns: Vec<PublishedColumn>,
+    /// Its rows, in the order of the meters.
+    pub rows: Vec<PublishedRow>,
+}
+
+impl PublishedTable {
+    /// Whether both are the same table of the same paper.
+    pub fn is_the_same(&self, other: &Self) -> bool {
+        (&self.title, &self.name, &self.procedure) == (&other.title, &other.name, &other.procedure)
+    }
+}
+
+/// A column of a published table.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct PublishedColumn {
+    /// Its name.
+    pub name: String,
+    /// Whether it is what the paper judges its other columns by.
+    pub reference: bool,
+    /// What it holds, in a sentence.
+    pub meaning: String,
+    /// The engine whose readings stand beside it.
+    #[serde(default)]
+    pub engine: String,
+    /// The luminaire model, likewise.
+    #[serde(default)]
+    pub model: String,
+}
+
+/// A row of a published table.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct PublishedRow {
+    /// The meter at its place.
+    pub meter: MeterId,
+    /// The place: gamma in degrees, or the position in metres.
+    pub place: String,
+    /// The printed digits by column.
+    pub cells: BTreeMap<String, String>,
+}
+
+/// A printed value with the interval it stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// The printed value.
+    pub value: f64,
+    /// Half the width of its interval.
+    pub half_width: f64,
+}
+
+/// Why published tables cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: {message}")]
+pub struct PublishedError {
+    pub file: String,
+    pub message: String,
+}
+
+impl Published {
+    /// Reads and checks the tables.
+    pub fn read(path: &Path) -> Result<Self, PublishedError> {
+        let fail = |message: String| PublishedError { file: path.display().to_string(), message };
+        let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
+        let published: Self = crate::spec::from_yaml(&text).map_err(fail)?;
+        if published.version != 1 {
+            return Err(fail(format!("format version {} is not known; this program reads 1", published.version)));
+        }
+        let cells = published.tables.values().flat_map(|t| t.rows.iter().flat_map(|r| r.cells.values()));
+        if let Some(bad) = cells.into_iter().find(|c| published.cell(c, 0).is_none()) {
+            return Err(fail(format!("the cell \"{bad}\" is no number")));
+        }
+        Ok(published)
+    }
+
+    /// The references that the paper holds for a reading of `engine` at one target.
+    ///
+    /// The paper's own reference columns of a closed form judge every engine; every other column stands beside the
+    /// readings of the engine that it names; both of the same luminaire model. A column at a fixed number of bounces is compared with readings at that number.
+    pub fn references(&self, task: &Task, target: &Target, engine: &str) -> Vec<Reference> {
+        let Some(table) = self.tables.get(&task.procedure).filter(|t| t.quantity == task.quantity) else {
+            return vec![];
+        };
+        let Some(row) = table.rows.iter().find(|r| r.is_at(target)) else { return vec![] };
+        let model = task.model();
+        // Derived values judge every engine, whatever they are of; a paper's those of the same luminaire model.
+        let derived = self.citation.basis != Basis::Published;
+        let closed_form = matches!(task.transport, Transport::Direct);
+        let compared = |column: &Column| {
+            let same_bounces = match (column.bounces.filter(|_| table.bounces.is_some()), task.transport) {
+                (Some(n), Transport::Indirect(b) | Transport::Total(b)) => b == Bounces::AtMost(n),
+                _ => true,
+            };
+            let same_model = column.model == model || column.also.contains(&model);
+            same_bounces && (derived || (same_model && (column.engine == engine || (column.reference && closed_form))))
+        };
+        let columns = table.columns.iter().filter(|(_, column)| compared(column));
+        let reference = |(name, column): (&String, &Column)| {
+            let cell = self.cell(row.cells.get(name)?, table.decimals(name))?;
+            Some(Reference {
+                value: cell.value,
+                // A rectangular distribution over the rounding interval (GUM 4.3.7).
+                uncertainty: cell.half_width / 3f64.sqrt(),
+                degrees_of_freedom: None,
+                coverage_factor: None,
+                basis: self.citation.basis,
+                source: format!("{}, {}, {name}: {}", self.citation.title, table.name, column.meaning),
+            })
+        };
+        columns.filter_map(reference).collect()
+    }
+
+    /// The table of a task as printed, rows at its targets alone; `None` where the paper has none, or these are derived
+    /// values and no paper's.
+    pub fn table(&self, task: &Task, case: &str) -> Option<PublishedTable> {
+        if self.citation.basis != Basis::Published {
+            return None;
+        }
+        let table = self.tables.get(&task.procedure).filter(|t| t.quantity == task.quantity)?;
+        let row = |target: &Target| {
+            let row = table.rows.iter().find(|r| r.is_at(target))?;
+            let place = match target.direction {
+                Some(d) => format!("{}", d.gamma_deg),
+                None => format!("({})", target.meter.position_m.to_array().map(|x| x.to_string()).join(", ")),
+            };
+            let cells = row.cells.iter().map(|(column, printed)| (column.clone(), printed.clone())).collect();
+            Some(PublishedRow { meter: target.id.clone(), place, cells })
+        };
+        let rows: Vec<PublishedRow> = task.targets.iter().filter_map(row).collect();
+        let column = |(name, column): (&String, &Column)| PublishedColumn {
+            name: name.clone(),
+            reference: column.reference,
+            meaning: column.meaning.clone(),
+            engine: column.engine.clone(),
+            model: column.model.clone(),
+        };
+        (!rows.is_empty()).then(|| PublishedTable {
+            title: self.citation.title.clone(),
+            name: table.name.clone(),
+            procedure: task.procedure,
+            quantity: table.quantity,
+            cases: vec![case.to_owned()],
+            bounces: table.bounces,
+            units_in_last_digit: self.rounding.units_in_last_digit,
+            flux: self.flux.clone(),
+            columns: table.columns.iter().map(column).collect(),
+            rows,
+        })
+    }
+
+    /// A printed cell; one without decimals stands for the interval of a column that prints `decimals`.
+    fn cell(&self, printed: &str, decimals: usize) -> Option<Cell> {
+        let value: f64 = printed.trim().parse().ok().filter(|v: &f64| v.is_finite())?;
+        let unit = 10f64.powi(-i32::try_from(decimals_of(printed).max(decimals)).ok()?);
+        Some(Cell { value, half_width: unit * self.rounding.units_in_last_digit })
+    }
+}
+
+fn decimals_of(printed: &str) -> usize {
+    printed.split_once('.').map_or(0, |(_, fraction)| fraction.trim().len())
+}
+
+impl Table {
+    /// The decimals of a column: those of its longest cell, since a bare 0 among them is as exact as they are.
+    fn decimals(&self, column: &str) -> usize {
+        self.rows.iter().filter_map(|r| r.cells.get(column)).map(|c| decimals_of(c)).max().unwrap_or(0)
+    }
+}
+
+impl Row {
+    /// Within 1e-6 m or 1e-6 degrees, as the format says.
+    fn is_at(&self, target: &Target) -> bool {
+        const SAME: f64 = 1e-6;
+        match (self.gamma_deg, self.c_deg, target.direction) {
+            (Some(gamma), Some(c), Some(d)) => (gamma - d.gamma_deg).abs() <= SAME && (c - d.c_deg).abs() <= SAME,
+            _ => match (self.at_m, self.normal, target.direction) {
+                (Some(at), Some(normal), None) => {
+                    DVec3::from(at).distance(target.meter.position_m) <= SAME
+                        && DVec3::from(normal).normalize_or_zero().distance(target.meter.normal) <= SAME
+                }
+                _ => false,
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derived_values_say_what_they_rest_on() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/analytic/values");
+        for (name, basis) in [("cie-5.6", Basis::ClosedForm), ("s2", Basis::Exact)] {
+            let published = Published::read(&folder.join(format!("{name}.yaml"))).unwrap();
+            assert_eq!(published.citation.basis, basis, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_cell_stands_for_the_interval_of_its_printed_digits() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/published/cachet.yaml");
+        let published = Published::read(&path).unwrap();
+        assert_eq!(published.cell("2.70", 0), Some(Cell { value: 2.70, half_width: 0.01 }));
+        assert_eq!(published.cell("35.7", 1), Some(Cell { value: 35.7, half_width: 0.1 }));
+        assert_eq!(published.cell("0", 0), Some(Cell { value: 0.0, half_width: 1.0 }));
+        assert_eq!(published.cell("n/a", 0), None);
+        // The zero of lum1 stands in a column of two decimals.
+        let table = &published.tables[&ProcedureId::LuminousIntensity];
+        assert_eq!((table.decimals("lum1"), table.decimals("ies_file")), (2, 1));
+        assert_eq!(published.cell("0", 2), Some(Cell { value: 0.0, half_width: 0.01 }));
+    }
+}

@@ -1,0 +1,146 @@
+//! What of a deviation between an approximate method and a renderer is the method's, and what the renderer's.
+
+use luminaire::calculators::{DeviationSplit, Uncertain};
+use luminaire::scene::Transport;
+use luminaire::units::Lux;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::witness_of;
+use crate::engines;
+use crate::procedures::Task;
+use crate::record::{EngineName, Light, MeterId, ProcedureId, Reading, ReadingKey, Recording, Role, Uncertainty};
+
+/// One method against one renderer at one meter; every share is relative to the renderer's value, and they add up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Split {
+    pub case: String,
+    pub procedure: ProcedureId,
+    /// The approximate method.
+    pub method: String,
+    /// The renderer.
+    pub engine: EngineName,
+    /// The luminaire model.
+    pub model: String,
+    pub meter: MeterId,
+    /// Method over renderer, less 1.
+    pub whole: f64,
+    /// What the method's own error makes of it.
+    pub of_method: f64,
+    /// What the renderer's error makes of it.
+    pub of_renderer: f64,
+    /// Half width of the interval of both shares.
+    pub uncertainty: f64,
+    /// The same as a sentence.
+    pub text: String,
+}
+
+/// Splits at every meter of a task where the IESNA method, the exact solution and a renderer gave a reading.
+///
+/// Where the IESNA method is itself what others are judged by, there is nothing to split.
+pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> Vec<Split> {
+    let of = |engine: EngineName| recordings.iter().find(|r| r.key.engine == engine);
+    let (Some(method), Some(exact)) = (of(engines::IESNA), of(engines::SIMULATOR)) else { return vec![] };
+    if witness_of(task).0 == engines::IESNA {
+        return vec![];
+    }
+    // `instrument` is the relative standard uncertainty that calibration left.
+    let uncertain = |reading: &Reading, instrument: f64| Uncertain {
+        value: Lux(reading.value),
+        half_width: Lux(coverage * reading.uncertainty.standard().hypot(instrument * reading.value)),
+    };
+    let mut splits = vec![];
+    for renderer in recordings.iter().filter(|r| r.role == Role::Renderer) {
+        for rendered in &renderer.readings {
+            let at = |r: &Recording| r.readings.iter().find(|reading| reading.meter == rendered.meter).cloned();
+            let (Some(method), Some(exact)) = (at(method), at(exact)) else { continue };
+            let Some(split) = DeviationSplit::new(
+                Lux(method.value),
+                uncertain(&exact, 0.0),
+                uncertain(rendered, renderer.instrument_uncertainty),
+            ) else {
+                continue;
+            };
+            let method = name_of_method(task.transport);
+            splits.push(Split {
+                case: renderer.key.case.clone(),
+                procedure: task.procedure,
+                method: method.to_owned(),
+                engine: renderer.key.engine.clone(),
+                model: renderer.model.clone(),
+                meter: rendered.meter.clone(),
+                whole: split.whole,
+                of_method: split.method,
+                of_renderer: split.renderer,
+                uncertainty: split.uncertainty,
+                text: format!("{method} differs from {} by {split}", display_name(&renderer.key.engine)),
+            });
+        }
+    }
+    splits
+}
+
+const fn name_of_method(transport: Transport) -> &'static str {
+    match transport {
+        Transport::Direct => "inverse square",
+        Transport::Indirect(_) => "IP-ED",
+        Transport::Total(_) => "inverse square + IP-ED",
+    }
+}
+
+/// Renderers as their makers write them.
+fn display_name(engine: &str) -> &str {
+    match engine {
+        "radiance" => "Radiance",
+        "mitsuba" => "Mitsuba",
+        "povray" => "POV-Ray",
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Quantity;
+    use luminaire::scene::{Bounces, Scene};
+
+    fn recording(engine: &str, value: f64, std_error: f64) -> Recording {
+        let reading = Reading {
+            meter: MeterId::new("plane", 0),
+            quantity: Quantity::Illuminance,
+            value,
+            uncertainty: Uncertainty::sampled(std_error, None),
+        };
+        let role = if engine == "radiance" { Role::Renderer } else { Role::Witness };
+        let key = ReadingKey::new("c", ProcedureId::IndirectIlluminance, engine);
+        let light = Light(Transport::Indirect(Bounces::Converged));
+        Recording { role, model: "point".into(), readings: vec![reading], ..Recording::of(key, light) }
+    }
+
+    fn task(transport: Transport) -> Task {
+        let procedure = crate::engines::fixtures::procedure_of(transport);
+        Task { procedure, scene: Scene::default(), transport, quantity: Quantity::Illuminance, targets: vec![] }
+    }
+
+    #[test]
+    fn a_deviation_is_told_apart_with_its_uncertainty() {
+        let all =
+            [recording("iesna", 1.089, 0.0), recording("simulator", 1.002, 0.0), recording("radiance", 1.0, 5e-4)];
+        let all: Vec<&Recording> = all.iter().collect();
+        let found = splits(&task(Transport::Indirect(Bounces::Converged)), &all, 2.0);
+        assert_eq!(found.len(), 1);
+        assert_eq!(
+            found[0].text,
+            "IP-ED differs from Radiance by +8.9 %: +8.7 % is the method's, +0.2 % the renderer's, +-0.1 %"
+        );
+        assert!((found[0].whole - found[0].of_method - found[0].of_renderer).abs() < 1e-15);
+    }
+
+    #[test]
+    fn where_the_method_is_exact_there_is_nothing_to_split() {
+        let all = [recording("iesna", 1.0, 0.0), recording("simulator", 1.0, 0.0), recording("radiance", 1.0, 0.0)];
+        let all: Vec<&Recording> = all.iter().collect();
+        assert!(splits(&task(Transport::Direct), &all, 2.0).is_empty());
+        assert!(splits(&task(Transport::Indirect(Bounces::Converged)), &all[..2], 2.0).is_empty());
+    }
+}

@@ -1,0 +1,128 @@
+//! Laws of the verdict: how often noise alone fails, and what a budget is made of.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use luminaire::scene::{Bounces, Meter, Scene, Transport};
+
+use super::*;
+use crate::record::{Estimate, Light};
+use crate::system::random::normal;
+
+/// A task of so many meters of indirect light in an empty scene; what is read there is made up.
+pub(crate) fn task(meters: usize) -> Task {
+    let target = |k| Target {
+        id: MeterId::new("grid", k),
+        meter: Meter { position_m: DVec3::ZERO, normal: DVec3::Z },
+        direction: None,
+        per_lux: 1.0,
+    };
+    Task {
+        procedure: ProcedureId::IndirectIlluminance,
+        scene: Scene::default(),
+        transport: Transport::Indirect(Bounces::Converged),
+        quantity: Quantity::Illuminance,
+        targets: (0..meters).map(target).collect(),
+    }
+}
+
+/// What an engine says of such a task.
+pub(crate) fn recording(engine: &str, estimates: &[Estimate]) -> Recording {
+    let reading = |(k, estimate): (usize, &Estimate)| Reading {
+        meter: MeterId::new("grid", k),
+        quantity: Quantity::Illuminance,
+        value: estimate.value,
+        uncertainty: estimate.uncertainty,
+    };
+    let role = if engine == "simulator" { Role::Witness } else { Role::Renderer };
+    let key = ReadingKey::new("c", ProcedureId::IndirectIlluminance, engine);
+    let light = Light(Transport::Indirect(Bounces::Converged));
+    let readings = estimates.iter().enumerate().map(reading).collect();
+    Recording { role, model: "point".into(), readings, ..Recording::of(key, light) }
+}
+
+fn sampled(value: f64, error: f64, degrees_of_freedom: f64) -> Estimate {
+    Estimate { value, uncertainty: Uncertainty::sampled(error, Some(degrees_of_freedom)) }
+}
+
+/// The share of runs in which any of 192 noisy meters fails that truly lie `deviation` off a reference of 1.
+fn false_failures(deviation: f64, blocks: usize, seed: u64) -> f64 {
+    const METERS: usize = 192;
+    const RUNS: usize = 400;
+    let (tolerances, known) = (Tolerances::built_in().unwrap(), KnownDeviations::built_in().unwrap());
+    let overrides = BTreeMap::new();
+    let judge = Judge { tolerances: &tolerances, known: &known, overrides: &overrides, published: None };
+    let (task, exact) = (task(METERS), recording("simulator", &[Estimate::exact(1.0); METERS]));
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut failed = 0;
+    for _ in 0..RUNS {
+        let mut reading = || {
+            let values: Vec<f64> = (0..blocks).map(|_| 1.0 + deviation + 0.004 * normal(&mut random)).collect();
+            Estimate::of_samples(&values)
+        };
+        let readings: Vec<Estimate> = (0..METERS).map(|_| reading()).collect();
+        let subject = recording("radiance", &readings);
+        let comparisons = judge.compare(&task, &[&exact, &subject]);
+        failed += usize::from(comparisons.iter().any(|c| c.verdict == Verdict::Fail));
+    }
+    failed as f64 / RUNS as f64
+}
+
+#[test]
+fn a_grid_of_192_meters_at_the_edge_of_its_tolerance_falsely_fails_in_one_run_of_twenty_at_most() {
+    // The tolerance is 2 %; eight blocks a meter, so that the standard error itself is a guess. Three standard deviations of
+    // the share over 400 runs are .033.
+    for (deviation, seed) in [(0.02, 1), (-0.02, 2)] {
+        let share = false_failures(deviation, 8, seed);
+        assert!(share <= 0.05 + 0.033, "{share}");
+        assert!(share > 0.005, "a test that never rejects shows nothing: {share}");
+    }
+    let well_inside = false_failures(0.01, 8, 3);
+    assert!(well_inside <= 0.01, "{well_inside}");
+}
+
+#[test]
+fn the_same_grid_without_correction_fails_nearly_always() {
+    // The negative control of the test above: 192 single tests at 2.3 %.
+    let mut random = fastrand::Rng::with_seed(4);
+    let single = |random: &mut fastrand::Rng| {
+        let values: Vec<f64> = (0..8).map(|_| 0.02 + 0.004 * normal(random)).collect();
+        let Estimate { value, uncertainty } = Estimate::of_samples(&values);
+        judge(value, 2.0 * uncertainty.standard_error().unwrap(), 0.02) == Verdict::Fail
+    };
+    let runs = (0..100).filter(|_| (0..192).any(|_| single(&mut random))).count();
+    assert!(runs > 90, "{runs}");
+}
+
+#[test]
+fn a_real_failure_at_one_meter_of_192_still_fails() {
+    let (tolerances, known) = (Tolerances::built_in().unwrap(), KnownDeviations::built_in().unwrap());
+    let overrides = BTreeMap::new();
+    let judge = Judge { tolerances: &tolerances, known: &known, overrides: &overrides, published: None };
+    let mut readings = vec![sampled(1.0, 0.001, 15.0); 192];
+    readings[100].value = 1.03;
+    let exact = recording("simulator", &[Estimate::exact(1.0); 192]);
+    let comparisons = judge.compare(&task(192), &[&exact, &recording("radiance", &readings)]);
+    let failed: Vec<&Comparison> = comparisons.iter().filter(|c| c.verdict == Verdict::Fail).collect();
+    assert_eq!(failed.len(), 1);
+    assert_eq!(failed[0].meter, MeterId::new("grid", 100));
+}
+
+#[test]
+fn a_budget_names_what_it_is_made_of() {
+    let (tolerances, known) = (Tolerances::built_in().unwrap(), KnownDeviations::built_in().unwrap());
+    let overrides = BTreeMap::new();
+    let judge = Judge { tolerances: &tolerances, known: &known, overrides: &overrides, published: None };
+    let mut exact = recording("simulator", &[Estimate::exact(2.0)]);
+    exact.readings[0].uncertainty = Uncertainty::Bound(0.0003);
+    let mut subject = recording("radiance", &[sampled(2.01, 0.004, 8.0)]);
+    subject.instrument_uncertainty = 0.001;
+    let comparisons = judge.compare(&task(1), &[&exact, &subject]);
+    let budget = comparisons[0].budget.as_ref().unwrap();
+    let of = |source| budget.components.iter().find(|c| c.source == source).unwrap();
+    assert_eq!(of(Source::MonteCarlo).degrees_of_freedom, Some(8.0));
+    assert!((of(Source::Instrument).uncertainty - 0.00201).abs() < 1e-15);
+    assert!((of(Source::Reference).uncertainty - 0.0003 / 3f64.sqrt()).abs() < 1e-15);
+    assert!(budget.components.iter().all(|c| !matches!(c.source, Source::Rounding | Source::Input)));
+    assert!((budget.combined - 0.004_f64.hypot(0.00201).hypot(0.0003 / 3f64.sqrt())).abs() < 1e-12);
+}

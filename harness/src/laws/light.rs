@@ -1,0 +1,238 @@
+//! Laws of light: it adds up, it scales, and a table is what it says, however fine, narrow or dark.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction};
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Transport};
+
+use super::surfaces::{furnace, known_direct};
+use super::{Against, Law, Light, Variant};
+use crate::engines::{Job, Station};
+use crate::record::MeterId;
+
+pub(super) const FLUX_UP: Law = Law {
+    id: "flux_up",
+    what: "tables scaled to a largest intensity: illuminance in proportion",
+    unit: "cd",
+    magnitudes: &[1e4, 1e6, 1e9, 1e12],
+    light: Light::Either,
+    variant: brightened,
+};
+
+pub(super) const FLUX_DOWN: Law = Law {
+    id: "flux_down",
+    what: "tables scaled to a largest intensity: illuminance in proportion",
+    unit: "cd",
+    magnitudes: &[1.0, 1e-3, 1e-6, 1e-9],
+    light: Light::Either,
+    variant: brightened,
+};
+
+pub(super) const DIM_SCALE: Law = Law {
+    id: "dimming",
+    what: "the factor on a luminaire's flux: illuminance in proportion",
+    unit: "factor",
+    magnitudes: &[1e-3, 1e-6, 1e-9],
+    light: Light::Either,
+    variant: |job, factor| {
+        let mut job = job.clone();
+        job.scene.luminaires.iter_mut().for_each(|l| l.flux_scale *= factor);
+        Some(Variant { job, against: Against::Base(factor) })
+    },
+};
+
+pub(super) const SUPERPOSITION: Law = Law {
+    id: "superposition",
+    what: "several luminaires: the sum of what each gives alone",
+    unit: "luminaires",
+    magnitudes: &[2.0, 4.0],
+    light: Light::Either,
+    variant: superposed,
+};
+
+pub(super) const MANY_LUMINAIRES: Law = Law {
+    id: "many_luminaires",
+    what: "the flux spread over many luminaires: inverse squares add up, and reflected light in a furnace is what the flux makes it",
+    unit: "luminaires",
+    magnitudes: &[1.0, 10.0, 100.0, 1000.0],
+    light: Light::Either,
+    variant: many,
+};
+
+pub(super) const FINE_TABLE: Law = Law {
+    id: "fine_table",
+    what: "the same table with more angles: the same light",
+    unit: "deg",
+    magnitudes: &[1.0, 0.1, 0.01],
+    light: Light::Either,
+    variant: refined,
+};
+
+pub(super) const NEEDLE_BEAM: Law = Law {
+    id: "needle_beam",
+    what: "all flux in a narrow beam: inverse square on its axis, and reflected light in a furnace is what the flux makes it",
+    unit: "deg",
+    magnitudes: &[10.0, 1.0, 0.1, 0.01],
+    light: Light::Either,
+    variant: |job, width_deg| beam(job, [0.0, width_deg], 0.0),
+};
+
+pub(super) const ONE_GAMMA: Law = Law {
+    id: "one_gamma",
+    what: "all flux at one angle from the nadir: inverse square there, and reflected light in a furnace is what the flux makes it",
+    unit: "deg",
+    magnitudes: &[10.0, 1.0, 0.1, 1e-3],
+    light: Light::Either,
+    variant: |job, width_deg| beam(job, [37.0, 37.0 + width_deg], 37.0 + 0.5 * width_deg),
+};
+
+pub(super) const DARK: Law = Law {
+    id: "dark",
+    what: "luminaires of 0 lm: 0 lx",
+    unit: "lm",
+    magnitudes: &[0.0],
+    light: Light::Either,
+    variant: |job, _| {
+        let mut job = job.clone();
+        retable(&mut job, |table| Some(table.scaled(0.0)))?;
+        let against = Against::Known(vec![0.0; job.stations.len()]);
+        Some(Variant { job, against })
+    },
+};
+
+pub(super) const SEEDS: Law = Law {
+    id: "seeds",
+    what: "another seed: the same light within the standard errors stated",
+    unit: "seed",
+    magnitudes: &[2.0, 3.0, 4.0, 5.0],
+    light: Light::Reflected,
+    // The seed of a magnitude is set where it is read.
+    variant: |job, _| Some(Variant { job: job.clone(), against: Against::Base(1.0) }),
+};
+
+/// Gives every luminaire another table.
+fn retable(
+    job: &mut Job,
+    table: impl Fn(&LuminousIntensityDistribution) -> Option<LuminousIntensityDistribution>,
+) -> Option<()> {
+    for luminaire in &mut job.scene.luminaires {
+        let mut photometry = Photometry::clone(&luminaire.photometry);
+        photometry.distribution = table(&photometry.distribution)?;
+        luminaire.photometry = Arc::new(photometry);
+    }
+    Some(())
+}
+
+fn brightened(job: &Job, peak_cd: f64) -> Option<Variant> {
+    let peak = |l: &Luminaire| l.photometry.distribution.max_intensity().value();
+    let brightest_cd = job.scene.luminaires.iter().map(peak).fold(0.0, f64::max);
+    let factor = peak_cd / brightest_cd;
+    let mut job = job.clone();
+    retable(&mut job, |table| Some(table.scaled(factor)))?;
+    (brightest_cd > 0.0).then_some(Variant { job, against: Against::Base(factor) })
+}
+
+fn superposed(job: &Job, count: f64) -> Option<Variant> {
+    let count = count as usize;
+    let mut all = job.clone();
+    if all.scene.luminaires.len() > 1 {
+        if count > all.scene.luminaires.len() {
+            return None;
+        }
+        all.scene.luminaires.truncate(count);
+    } else {
+        let only = all.scene.luminaires.first()?.clone();
+        all.scene.luminaires = (0..count).map(|k| aside(&only, job, k)).collect::<Option<_>>()?;
+    }
+    let alone = |l: &Luminaire| {
+        let mut one = all.clone();
+        one.scene.luminaires = vec![l.clone()];
+        one
+    };
+    let against = Against::Sum(all.scene.luminaires.iter().map(alone).collect());
+    Some(Variant { job: all, against })
+}
+
+/// The `k`-th of several copies of a luminaire, spread over the room at about its height.
+fn aside(luminaire: &Luminaire, job: &Job, k: usize) -> Option<Luminaire> {
+    let size_m = job.scene.room?.size_m;
+    let step = k as f64 * DVec3::new(0.233, 0.171, 0.029);
+    // Back and forth between a tenth and nine tenths of the room.
+    let folded = |x: f64| 0.9 - 0.8 * (((x - 0.1) / 0.8).rem_euclid(2.0) - 1.0).abs();
+    let part = luminaire.position_m / size_m + step;
+    let position_m =
+        if k == 0 { luminaire.position_m } else { size_m * DVec3::new(folded(part.x), folded(part.y), folded(part.z)) };
+    Some(Luminaire { id: format!("{}_{k}", luminaire.id), position_m, ..luminaire.clone() })
+}
+
+fn many(job: &Job, count: f64) -> Option<Variant> {
+    let (room, count) = (job.scene.room?, count as usize);
+    let mut job = job.clone();
+    let mut first = job.scene.luminaires.first()?.clone();
+    first.model = LuminaireModel::Point;
+    first.flux_scale /= count as f64;
+    let columns = (count as f64).sqrt().ceil() as usize;
+    let rows = count.div_ceil(columns);
+    let height = (first.position_m.z / room.size_m.z).clamp(0.05, 0.95);
+    let place = |k: usize| {
+        let across = |k: usize, n: usize| 0.15 + 0.7 * (k as f64 + 0.5) / n as f64;
+        room.size_m * DVec3::new(across(k % columns, columns), across(k / columns, rows), height)
+    };
+    let copy = |k: usize| Luminaire { id: format!("{}_{k}", first.id), position_m: place(k), ..first.clone() };
+    job.scene.luminaires = (0..count).map(copy).collect();
+    job.scene.obstacles.clear();
+    if job.transport == Transport::Direct { known_direct(job) } else { furnace(job, 0.5) }
+}
+
+fn refined(job: &Job, step_deg: f64) -> Option<Variant> {
+    let mut job = job.clone();
+    retable(&mut job, |table| {
+        let (first, last) = (table.gamma_deg()[0], *table.gamma_deg().last()?);
+        let steps = ((last - first) / step_deg).round() as usize;
+        let mut gamma_deg: Vec<f64> = (0..steps).map(|k| first + k as f64 * step_deg).collect();
+        gamma_deg.extend(table.gamma_deg());
+        gamma_deg.sort_by(f64::total_cmp);
+        // Nodes that differ by rounding alone are one.
+        let mut nodes: Vec<f64> = vec![];
+        for gamma in gamma_deg {
+            let known = table.gamma_deg().contains(&gamma);
+            match nodes.last_mut() {
+                Some(near) if gamma - *near < 1e-6 * step_deg => {
+                    if known {
+                        *near = gamma;
+                    }
+                }
+                _ => nodes.push(gamma),
+            }
+        }
+        Some(table.resampled(table.c_deg().to_vec(), nodes).ok()?.distribution)
+    })?;
+    Some(Variant { job, against: Against::Base(1.0) })
+}
+
+/// One luminaire with the flux that there was, between two angles, aimed as the table is: at the nadir.
+fn beam(job: &Job, [from_deg, to_deg]: [f64; 2], towards_deg: f64) -> Option<Variant> {
+    let flux_lm: f64 =
+        job.scene.luminaires.iter().map(|l| l.photometry.distribution.flux().value() * l.flux_scale).sum();
+    let unit = LuminousIntensityDistribution::axial(vec![from_deg, to_deg], vec![1.0, 1.0]).ok()?;
+    let factor = flux_lm / unit.flux().value();
+    let mut job = job.clone();
+    let room = job.scene.room?;
+    let mut one = job.scene.luminaires.first()?.clone();
+    one.photometry = Arc::new(Photometry::of(unit.scaled(factor)));
+    one.orientation = DMat3::IDENTITY;
+    one.flux_scale = 1.0;
+    one.model = LuminaireModel::Point;
+    job.scene.obstacles.clear();
+    job.scene.luminaires = vec![one.clone()];
+    if job.transport != Transport::Direct {
+        return furnace(job, 0.5);
+    }
+    // On its way to the floor, or to a wall, whichever is nearer.
+    let path = direction(20.0, towards_deg);
+    let reach_m = 0.5 * one.position_m.min(room.size_m - one.position_m).min_element();
+    let meter = Meter { position_m: one.position_m + reach_m * path, normal: -path };
+    job.stations = vec![Station { id: MeterId::new("beam", 0), meter, expected_lx: None }];
+    known_direct(job)
+}

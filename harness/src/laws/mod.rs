@@ -1,0 +1,135 @@
+//! Metamorphic laws: what a change of a scene must do to its readings, whatever the scene; one entry a law.
+//!
+//! A law needs no second opinion: the same engine reads the scene before and after, or a closed form holds for any room.
+
+mod light;
+mod meters;
+mod similarity;
+mod surfaces;
+#[cfg(test)]
+mod tests;
+
+use luminaire::scene::Transport;
+use serde::{Deserialize, Serialize};
+
+use crate::engines::Job;
+
+/// Every law, in the order of reports.
+pub const ALL: [&Law; 27] = [
+    &similarity::SCALE_UP,
+    &similarity::SCALE_DOWN,
+    &similarity::TRANSLATION,
+    &similarity::TRANSLATED_ROOM,
+    &similarity::TURNED_ROOM,
+    &similarity::ROOM_ON_ITS_SIDE,
+    &similarity::TURNED_LUMINAIRE,
+    &similarity::MIRROR,
+    &light::FLUX_UP,
+    &light::FLUX_DOWN,
+    &light::SUPERPOSITION,
+    &light::MANY_LUMINAIRES,
+    &surfaces::WALL_PATCHES,
+    &surfaces::THIN_PANEL,
+    &surfaces::SLIVER,
+    &surfaces::REFLECTANCE,
+    &surfaces::NEAR_CEILING,
+    &meters::NEAR_SURFACE,
+    &meters::NEAR_EDGE,
+    &meters::NEAR_CORNER,
+    &meters::BESIDE_LUMINAIRE,
+    &light::FINE_TABLE,
+    &light::NEEDLE_BEAM,
+    &light::ONE_GAMMA,
+    &light::DARK,
+    &light::DIM_SCALE,
+    &light::SEEDS,
+];
+
+/// What a change of a job must do to its readings.
+pub struct Law {
+    /// Its name.
+    pub id: &'static str,
+    pub what: &'static str,
+    /// What the magnitude is, with its unit.
+    pub unit: &'static str,
+    /// From mild to extreme.
+    pub magnitudes: &'static [f64],
+    /// Which light it is about.
+    pub light: Light,
+    /// The changed job and what it must read; `None` where the law says nothing of such a job.
+    pub variant: fn(&Job, f64) -> Option<Variant>,
+}
+
+/// Which light a law is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Light {
+    /// Direct light alone.
+    Direct,
+    /// Reflected light alone.
+    Reflected,
+    Either,
+}
+
+impl Light {
+    /// Whether a law about this light concerns a job.
+    pub const fn concerns(self, transport: Transport) -> bool {
+        match transport {
+            Transport::Direct => matches!(self, Self::Direct | Self::Either),
+            Transport::Indirect(_) => matches!(self, Self::Reflected | Self::Either),
+            // Both parts are tried apart.
+            Transport::Total(_) => false,
+        }
+    }
+}
+
+/// A changed job and what it must read.
+#[derive(Clone, Debug)]
+pub struct Variant {
+    pub job: Job,
+    /// What it must read.
+    pub against: Against,
+}
+
+/// What a changed job must read.
+#[derive(Clone, Debug)]
+pub enum Against {
+    /// At each station what the unchanged job reads there, times this.
+    Base(f64),
+    /// At each station the sum of what these jobs read there.
+    Sum(Vec<Job>),
+    /// At each station a closed form, in lux.
+    Known(Vec<f64>),
+    /// A closed form for the weighted mean over all stations.
+    Mean {
+        /// One a station; they add up to 1.
+        weights: Vec<f64>,
+        /// The mean in lux.
+        value_lx: f64,
+        /// How far off the weights' quadrature may be, relative.
+        quadrature: f64,
+    },
+    /// At each station what the exact simulation reads at a finer accuracy; to itself that is a test of its own bounds.
+    Witness,
+}
+
+/// One job of a law, so that another process finds it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    pub law: String,
+    pub magnitude: f64,
+    /// 0 for the changed job, from 1 for those whose readings it must add up to.
+    pub part: usize,
+}
+
+pub fn find(id: &str) -> Option<&'static Law> {
+    ALL.into_iter().find(|law| law.id == id)
+}
+
+pub fn job(base: &Job, place: &Place) -> Option<Job> {
+    let variant = (find(&place.law)?.variant)(base, place.magnitude)?;
+    match (place.part, variant.against) {
+        (0, _) => Some(variant.job),
+        (k, Against::Sum(mut parts)) if k <= parts.len() => Some(parts.swap_remove(k - 1)),
+        _ => None,
+    }
+}

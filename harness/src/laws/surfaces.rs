@@ -1,0 +1,154 @@
+//! Laws of surfaces: how a wall is cut does not matter, and in a closed room of one reflectance the mean of all light is known.
+
+use glam::DVec3;
+use luminaire::calculators::inverse_square;
+use luminaire::geometry::{Reflectances, Room, Surface};
+use luminaire::scene::{LuminaireModel, Meter, Obstacle, Shape, Transport};
+
+use super::{Against, Law, Light, Variant};
+use crate::engines::{Job, Station};
+use crate::record::MeterId;
+
+pub(super) const WALL_PATCHES: Law = Law {
+    id: "wall_patches",
+    what: "a wall covered with thin plates of its own reflectance: the same reflected light",
+    unit: "plates",
+    magnitudes: &[1.0, 4.0, 16.0, 64.0],
+    light: Light::Reflected,
+    variant: |job, plates| covered(job, plates.sqrt() as usize, 1.0, 1e-5),
+};
+
+pub(super) const THIN_PANEL: Law = Law {
+    id: "thin_panel",
+    what: "a plate of the wall's own reflectance on it, ever thinner: the same reflected light",
+    unit: "thickness / room",
+    magnitudes: &[1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9],
+    light: Light::Reflected,
+    variant: |job, thickness| covered(job, 1, 0.5, thickness),
+};
+
+pub(super) const SLIVER: Law = Law {
+    id: "sliver",
+    what: "a strip of the wall's own reflectance on it, ever narrower: the same reflected light",
+    unit: "aspect",
+    magnitudes: &[10.0, 1e2, 1e4, 1e6],
+    light: Light::Reflected,
+    variant: |job, aspect| covered(job, 1, 1.0 / aspect, 1e-5_f64.min(0.1 / aspect)),
+};
+
+pub(super) const REFLECTANCE: Law = Law {
+    id: "reflectance",
+    what: "a closed room of one reflectance: the mean of reflected light is flux x rho / (area x (1 - rho))",
+    unit: "rho",
+    magnitudes: &[0.0, 0.5, 0.9, 0.99, 0.999, 1.0 - 1e-6, 1.0 - 1e-9],
+    light: Light::Reflected,
+    variant: |job, rho| furnace(emptied(job), rho),
+};
+
+pub(super) const NEAR_CEILING: Law = Law {
+    id: "near_ceiling",
+    what: "luminaires ever closer below the ceiling of a closed room of one reflectance: the same mean of reflected light",
+    unit: "m",
+    magnitudes: &[1.0, 0.1, 1e-2, 1e-3, 1e-6, 0.0],
+    light: Light::Reflected,
+    variant: |job, below_m| {
+        let mut job = emptied(job);
+        let height_m = job.scene.room?.size_m.z;
+        job.scene.luminaires.iter_mut().for_each(|l| l.position_m.z = height_m - below_m);
+        if below_m < height_m { furnace(job, 0.5) } else { None }
+    },
+};
+
+/// The job's room without bodies, its luminaires as points.
+fn emptied(job: &Job) -> Job {
+    let mut job = job.clone();
+    job.scene.obstacles.clear();
+    job.scene.luminaires.iter_mut().for_each(|l| l.model = LuminaireModel::Point);
+    job
+}
+
+/// The wall x = 0 under `n` x `n` plates, of which each is `part` as wide as its share.
+fn covered(job: &Job, n: usize, part: f64, thickness: f64) -> Option<Variant> {
+    let room = job.scene.room?;
+    let thick = thickness * room.size_m.max_element();
+    let reflectance = room.reflectance.of(Surface::WallXMin);
+    let mut job = job.clone();
+    let meters = job.stations.iter().map(|s| s.meter.position_m.x);
+    let nearest = meters.chain(job.scene.luminaires.iter().map(|l| l.position_m.x)).fold(f64::INFINITY, f64::min);
+    let in_the_way = job.scene.obstacles.iter().any(|o| match &o.shape {
+        Shape::Box { min_m, .. } => min_m.x <= thick,
+        Shape::Mesh { vertices_m, .. } => vertices_m.iter().any(|v| v.x <= thick),
+    });
+    if nearest <= 100.0 * thick || in_the_way {
+        return None;
+    }
+    let share = room.size_m / n as f64;
+    for k in 0..n * n {
+        let (i, j) = ((k % n) as f64, (k / n) as f64);
+        let (y, z) = ((i + 0.5 * (1.0 - part)) * share.y, j * share.z);
+        // Neighbours share their edges to the last digit.
+        let last = |i: f64, of: f64, size: f64| if part == 1.0 { (i + 1.0) * of } else { size };
+        let min_m = DVec3::new(0.0, y, z);
+        let max_m = DVec3::new(thick, last(i, share.y, y + part * share.y), (j + 1.0) * share.z).min(room.size_m);
+        job.scene.obstacles.push(Obstacle { shape: Shape::Box { min_m, max_m }, reflectance });
+    }
+    matches!(job.transport, Transport::Indirect(_)).then_some(Variant { job, against: Against::Base(1.0) })
+}
+
+/// Gauss-Legendre nodes and weights on -1..1 (Abramowitz & Stegun 25.4.29, n = 6).
+const GAUSS: [(f64, f64); 6] = [
+    (-0.932_469_514_203_152, 0.171_324_492_379_170),
+    (-0.661_209_386_466_265, 0.360_761_573_048_139),
+    (-0.238_619_186_083_197, 0.467_913_934_572_691),
+    (0.238_619_186_083_197, 0.467_913_934_572_691),
+    (0.661_209_386_466_265, 0.360_761_573_048_139),
+    (0.932_469_514_203_152, 0.171_324_492_379_170),
+];
+/// How far off the surfaces a furnace is read, in parts of the room.
+const OFF: f64 = 1e-4;
+/// How far off the mean over those nodes may be, relative, in parts of 1 - rho: reflected light is the more even the brighter
+/// the room. Measured by the simulator in case S1: 1.1e-3 as it is, 3.7e-3 with all light in a cone.
+const QUADRATURE: f64 = 4.5e-3;
+
+/// The job in its room painted alike all over, read on all six surfaces.
+///
+/// All that is emitted is absorbed in the end: the mean over the area of reflected light is flux x rho / (area x (1 - rho)).
+pub(super) fn furnace(mut job: Job, rho: f64) -> Option<Variant> {
+    let size_m = job.scene.room?.size_m;
+    let room = Room { size_m, reflectance: Reflectances::with_equal_walls(rho, rho, rho) };
+    job.scene.room = Some(room);
+    if !matches!(job.transport, Transport::Indirect(_)) {
+        return None;
+    }
+    let area_m2: f64 = Surface::ALL.iter().map(|s| room.area_m2(*s)).sum();
+    let (mut stations, mut weights) = (vec![], vec![]);
+    for surface in Surface::ALL {
+        let (corners, normal) = (room.corners(surface), surface.inward_normal());
+        let (u, v) = (corners[1] - corners[0], corners[3] - corners[0]);
+        for (x, wx) in GAUSS.map(crowded) {
+            for (y, wy) in GAUSS.map(crowded) {
+                let at = corners[0] + 0.5 * (1.0 + x) * u + 0.5 * (1.0 + y) * v;
+                let meter = Meter { position_m: at + OFF * size_m.min_element() * normal, normal };
+                stations.push(Station { id: MeterId::new(surface.name(), stations.len()), meter, expected_lx: None });
+                weights.push(0.25 * wx * wy * room.area_m2(surface) / area_m2);
+            }
+        }
+    }
+    let flux = |l: &luminaire::scene::Luminaire| l.photometry.distribution.flux().value() * l.flux_scale;
+    let flux_lm: f64 = job.scene.luminaires.iter().map(flux).sum();
+    job.stations = stations;
+    let value_lx = flux_lm * rho / (area_m2 * (1.0 - rho));
+    Some(Variant { job, against: Against::Mean { weights, value_lx, quadrature: QUADRATURE * (1.0 - rho) } })
+}
+
+/// A node moved towards the nearer edge, where reflected light is least smooth: x becomes (3 x - x^3) / 2.
+fn crowded((x, weight): (f64, f64)) -> (f64, f64) {
+    (0.5 * (3.0 * x - x.powi(3)), 1.5 * (1.0 - x * x) * weight)
+}
+
+/// Direct light of point luminaires in an empty room: the inverse-square law.
+pub(super) fn known_direct(job: Job) -> Option<Variant> {
+    let at = |s: &Station| Some(inverse_square::direct_illuminance(&job.scene, &s.meter).ok()?.illuminance.value());
+    let known = job.stations.iter().map(at).collect::<Option<Vec<f64>>>()?;
+    Some(Variant { job, against: Against::Known(known) })
+}

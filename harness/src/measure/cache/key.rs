@@ -1,0 +1,109 @@
+//! The key of a reading: a hash of everything that the reading depends on; pure.
+
+use sha2::{Digest, Sha256};
+
+use crate::engines::{Engine, EngineError, ExternalJob, Job, Version};
+use crate::record::ProcedureId;
+use crate::spec::hexadecimal;
+
+/// Names an entry of the cache.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Key {
+    engine: String,
+    digits: String,
+}
+
+impl Key {
+    #[cfg(test)]
+    pub(super) fn named(engine: &str, digits: &str) -> Self {
+        Self { engine: engine.to_owned(), digits: digits.to_owned() }
+    }
+
+    /// The engine's name, which is the folder of its entries.
+    pub fn engine(&self) -> &str {
+        &self.engine
+    }
+
+    /// 64 hexadecimal digits.
+    pub fn digits(&self) -> &str {
+        &self.digits
+    }
+}
+
+/// The key of what an engine reads of a job.
+///
+/// In it go the files that the engine exports, drivers included; its version and settings; scene, stations, transport, budget and seed of
+/// the job; and this program's read-out. The names of case and procedure do not (see [`Engine::essence`]): equal jobs of
+/// different cases share an entry. Nor does the number of threads: a reading is as good on any number.
+pub fn key(engine: &dyn Engine, version: &Version, job: &Job) -> Result<Key, EngineError> {
+    let id = engine.name();
+    let job = engine.essence(job);
+    let unwritable = |e: serde_json::Error| EngineError::Solver { engine: id.clone(), what: format!("its job: {e}") };
+    let mut hash = Sha256::new();
+    let mut part = |bytes: &[u8]| {
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    };
+    part(env!("LUXPROOF_READ_OUT").as_bytes());
+    part(env!("CARGO_PKG_VERSION").as_bytes());
+    part(id.as_str().as_bytes());
+    part(version.0.as_bytes());
+    part(&ExternalJob::of(&job).to_json().map_err(unwritable)?);
+    part(&serde_json::to_vec(&job.settings).map_err(unwritable)?);
+    for station in &job.stations {
+        part(&station.expected_lx.map_or(vec![], |e| e.to_le_bytes().to_vec()));
+    }
+    for file in engine.export(&job)? {
+        part(file.name.as_bytes());
+        part(&file.bytes);
+    }
+    Ok(Key { engine: id.as_str().to_owned(), digits: hexadecimal(&hash.finalize()) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engines::{all, fixtures};
+    use luminaire::scene::{LuminaireModel, Transport};
+
+    #[test]
+    fn whatever_may_change_a_reading_changes_the_key_and_names_do_not() {
+        let job = fixtures::s1(Transport::Total(luminaire::scene::Bounces::Converged));
+        for engine in all() {
+            let of = |job: &Job| key(engine.as_ref(), &Version("1".into()), job).unwrap();
+            let plain = of(&job);
+            assert_eq!(
+                plain,
+                of(&Job { case: "other".into(), procedure: ProcedureId::DirectIlluminance, ..job.clone() })
+            );
+            assert_ne!(plain, key(engine.as_ref(), &Version("2".into()), &job).unwrap());
+            let mut others = vec![
+                Job { seed: 2, ..job.clone() },
+                Job { transport: Transport::Direct, ..job.clone() },
+                Job { stations: job.stations[1..].to_vec(), ..job.clone() },
+                Job { budget: crate::spec::Budget { seconds: 1.5, ..job.budget }, ..job.clone() },
+            ];
+            let mut dimmed = job.clone();
+            dimmed.scene.luminaires[0].flux_scale *= 1.0 + 1e-15;
+            others.push(dimmed);
+            let mut moved = job.clone();
+            moved.stations[0].meter.position_m.x += 1e-12;
+            others.push(moved);
+            for (k, other) in others.iter().enumerate() {
+                assert_ne!(plain, of(other), "{} {k}", engine.name());
+            }
+        }
+    }
+
+    #[test]
+    fn an_impostor_is_its_opening_to_the_simulator_alone() {
+        let mut area = fixtures::s1(Transport::Direct);
+        area.scene.luminaires[0].model = LuminaireModel::Area;
+        let mut impostor = area.clone();
+        impostor.scene.luminaires[0].model = LuminaireModel::Impostor;
+        for engine in all().iter().filter(|e| ["simulator", "radiance"].contains(&e.name().as_str())) {
+            let of = |job: &Job| key(engine.as_ref(), &Version("1".into()), job).unwrap();
+            assert_eq!(of(&area) == of(&impostor), engine.name() == "simulator");
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! The cache: readings under the hash of everything that they depend on, so that nothing is rendered twice.
+//!
+//! An entry is one file whose name is its key. It is written beside its place and renamed into it, so that a reader sees all
+//! of it or nothing whenever the writer is killed, and it carries its key and a checksum, so that what was damaged since is found out and
+//! read anew. Any number of runs may share a cache: whoever comes last replaces an entry by an equally good one.
+
+mod entry;
+mod key;
+mod upkeep;
+
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+
+use crate::system::files;
+
+pub use entry::{Answer, Entry};
+pub use key::{Key, key};
+pub use upkeep::{Contents, Pruned};
+
+/// A folder of entries.
+#[derive(Clone, Debug)]
+pub struct Cache {
+    root: PathBuf,
+}
+
+/// What a cache knows of a key.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Lookup {
+    Found(Entry),
+    /// Nothing.
+    Unknown,
+    /// A file that is no sound entry of this key, and what is wrong with it.
+    Damaged(String),
+}
+
+impl Cache {
+    /// The cache in a given folder, which need not exist yet.
+    pub fn at(root: impl Into<PathBuf>) -> Self {
+        Self { root: root.into() }
+    }
+
+    /// The folder.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The file of an entry.
+    pub fn path(&self, key: &Key) -> PathBuf {
+        self.root.join(key.engine()).join(key.digits()).with_extension("json")
+    }
+
+    /// Looks a key up; an entry that was found counts as used today.
+    pub fn find(&self, key: &Key) -> Lookup {
+        let path = self.path(key);
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Lookup::Unknown,
+            Err(error) => return Lookup::Damaged(format!("{} cannot be read: {error}", path.display())),
+        };
+        match entry::parse(&text, key.digits()) {
+            Ok(entry) => {
+                // Only pruning asks when an entry was used last: not to know is no reason to fail.
+                std::fs::File::open(&path).and_then(|f| f.set_modified(std::time::SystemTime::now())).ok();
+                Lookup::Found(entry)
+            }
+            Err(why) => Lookup::Damaged(format!("{} {why}", path.display())),
+        }
+    }
+
+    /// Keeps an entry. A reader, and a run that goes on after this one was killed, sees all of it or nothing.
+    pub fn keep(&self, key: &Key, entry: &Entry) -> std::io::Result<()> {
+        files::replace(&self.path(key), entry::text(entry, key.digits())?.as_bytes())
+    }
+}

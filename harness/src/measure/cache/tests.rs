@@ -1,0 +1,98 @@
+//! Laws of the cache: what was kept comes back to the bit, and nothing else ever does.
+
+use std::time::Duration;
+
+use super::*;
+use crate::engines::Measurement;
+use crate::record::{Estimate, ProcedureId, Uncertainty};
+
+fn sample() -> Entry {
+    let estimates = [0.1 + 0.2, 1.0 / 3.0, 5e-324, 1.797_693_134_862_315_7e308, 9.007_199_254_740_993e15]
+        .map(|value| Estimate { value, uncertainty: Uncertainty::sampled(value / 7.0, Some(7.0)) });
+    let measurement = Measurement {
+        estimates: estimates.into(),
+        settings: [("seed".to_owned(), "1".to_owned())].into(),
+        notes: vec!["a note with \"quotes\" and µ".to_owned()],
+    };
+    Entry {
+        engine: "radiance".into(),
+        version: "6.0a".into(),
+        case: "case".into(),
+        procedure: ProcedureId::DirectIlluminance,
+        wall_s: 1.234_567_890_123_456_7,
+        answer: Answer::Read(measurement),
+    }
+}
+
+fn a_key(digit: char) -> Key {
+    Key::named("radiance", &digit.to_string().repeat(64))
+}
+
+#[test]
+fn an_entry_comes_back_to_the_last_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::at(folder.path().join("not there yet"));
+    assert_eq!(cache.find(&a_key('a')), Lookup::Unknown);
+    let mut random = fastrand::Rng::with_seed(3);
+    for _ in 0..2000 {
+        let mut entry = sample();
+        let Answer::Read(measurement) = &mut entry.answer else { unreachable!() };
+        measurement.estimates[0].value = f64::from_bits(random.u64(0..0x7ff0_0000_0000_0000));
+        let text = entry::text(&entry, a_key('a').digits()).unwrap();
+        assert_eq!(entry::parse(&text, a_key('a').digits()).unwrap(), entry);
+    }
+    cache.keep(&a_key('a'), &sample()).unwrap();
+    assert_eq!(cache.find(&a_key('a')), Lookup::Found(sample()));
+    assert_eq!(cache.find(&a_key('b')), Lookup::Unknown);
+}
+
+#[test]
+fn whatever_is_cut_flipped_or_foreign_is_found_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::at(folder.path());
+    cache.keep(&a_key('a'), &sample()).unwrap();
+    let path = cache.path(&a_key('a'));
+    let sound = std::fs::read(&path).unwrap();
+    for cut in 0..sound.len() - 1 {
+        std::fs::write(&path, &sound[..cut]).unwrap();
+        // What lacks white space at its end only is whole.
+        let whole = sound[cut..].iter().all(u8::is_ascii_whitespace);
+        assert_eq!(matches!(cache.find(&a_key('a')), Lookup::Damaged(_)), !whole, "cut at {cut}");
+    }
+    for place in 0..sound.len() {
+        for bit in 0..8 {
+            let mut bytes = sound.clone();
+            bytes[place] ^= 1 << bit;
+            // White space may change, and digits beyond a double's precision: never what the entry says.
+            if let Ok(entry) =
+                String::from_utf8(bytes).map_or(Err(String::new()), |t| entry::parse(&t, a_key('a').digits()))
+            {
+                assert_eq!(entry, sample(), "bit {bit} of byte {place}");
+            }
+        }
+    }
+    std::fs::write(cache.path(&a_key('b')), &sound).unwrap();
+    assert!(matches!(cache.find(&a_key('b')), Lookup::Damaged(why) if why.contains("another key")));
+    cache.keep(&a_key('b'), &sample()).unwrap();
+    assert_eq!(cache.find(&a_key('b')), Lookup::Found(sample()));
+}
+
+#[test]
+fn pruning_takes_damaged_and_unused_entries_and_leaves_a_live_writers_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::at(folder.path());
+    cache.keep(&a_key('a'), &sample()).unwrap();
+    std::fs::write(cache.path(&a_key('b')), "{").unwrap();
+    let (live, left) = ("radiance/.unfinished-live", "radiance/.unfinished-left");
+    std::fs::write(folder.path().join(live), "{").unwrap();
+    let old = std::fs::File::create(folder.path().join(left)).unwrap();
+    old.set_modified(std::time::SystemTime::now() - Duration::from_secs(7200)).unwrap();
+    let contents = cache.contents().unwrap();
+    assert_eq!((contents.engines["radiance"].0, contents.damaged.len(), contents.unfinished), (1, 1, 2));
+    let pruned = cache.prune(Duration::from_secs(86_400)).unwrap();
+    assert_eq!((pruned.unused, pruned.damaged, pruned.unfinished), (0, 1, 1));
+    assert_eq!(cache.find(&a_key('a')), Lookup::Found(sample()));
+    assert!(folder.path().join(live).exists());
+    assert_eq!(cache.prune(Duration::ZERO).unwrap().unused, 1);
+    assert_eq!(cache.find(&a_key('a')), Lookup::Unknown);
+}

@@ -1,0 +1,123 @@
+//! Upkeep of the cache: what is in it, and taking out what is damaged, unfinished or long unused.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use super::{Cache, entry};
+use crate::system::files::UNFINISHED;
+
+/// A file that was begun longer ago than this has no writer any more.
+const WRITERS_LIVE: Duration = Duration::from_secs(3600);
+
+/// What a cache holds.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Contents {
+    /// Sound entries and their bytes, by engine.
+    pub engines: BTreeMap<String, (usize, u64)>,
+    /// What is wrong with the others.
+    pub damaged: Vec<String>,
+    /// Files that a writer began; those of writers that were killed stay until they are pruned.
+    pub unfinished: usize,
+}
+
+/// What pruning took out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pruned {
+    /// Entries not used for longer than asked.
+    pub unused: usize,
+    /// Entries that were no sound ones.
+    pub damaged: usize,
+    /// What killed writers left.
+    pub unfinished: usize,
+    /// Bytes freed.
+    pub bytes: u64,
+}
+
+enum Kind {
+    Entry,
+    Damaged(String),
+    Unfinished,
+}
+
+impl Cache {
+    /// What is in the cache; checks every entry.
+    pub fn contents(&self) -> io::Result<Contents> {
+        let mut contents = Contents::default();
+        for file in self.files()? {
+            match kind(&file) {
+                Kind::Entry => {
+                    let (entries, bytes) = contents.engines.entry(folder_name(&file)).or_default();
+                    *entries += 1;
+                    *bytes += file.metadata().map_or(0, |m| m.len());
+                }
+                Kind::Damaged(why) => contents.damaged.push(format!("{} {why}", file.display())),
+                Kind::Unfinished => contents.unfinished += 1,
+            }
+        }
+        Ok(contents)
+    }
+
+    /// Takes out what is damaged, what killed writers left, and entries that nobody used for so long.
+    pub fn prune(&self, unused_for: Duration) -> io::Result<Pruned> {
+        let now = SystemTime::now();
+        let mut pruned = Pruned::default();
+        for file in self.files()? {
+            let Ok(metadata) = file.metadata() else { continue };
+            let idle = metadata.modified().ok().and_then(|then| now.duration_since(then).ok()).unwrap_or_default();
+            let count = match kind(&file) {
+                Kind::Entry if idle >= unused_for => &mut pruned.unused,
+                Kind::Damaged(_) => &mut pruned.damaged,
+                Kind::Unfinished if idle >= WRITERS_LIVE => &mut pruned.unfinished,
+                Kind::Entry | Kind::Unfinished => continue,
+            };
+            match std::fs::remove_file(&file) {
+                Ok(()) => {
+                    *count += 1;
+                    pruned.bytes += metadata.len();
+                }
+                // Another pruning was quicker.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(pruned)
+    }
+
+    /// Every file of the engines' folders, sorted; none where there is no cache yet.
+    fn files(&self) -> io::Result<Vec<PathBuf>> {
+        let mut files = vec![];
+        for folder in list(self.root())?.into_iter().filter(|f| f.is_dir()) {
+            files.extend(list(&folder)?.into_iter().filter(|f| f.is_file()));
+        }
+        files.sort();
+        Ok(files)
+    }
+}
+
+fn list(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    match folder.read_dir() {
+        Ok(entries) => entries.map(|e| Ok(e?.path())).collect(),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(vec![]),
+        Err(error) => Err(error),
+    }
+}
+
+fn folder_name(file: &Path) -> String {
+    let folder = file.parent().and_then(Path::file_name);
+    folder.map_or_else(String::new, |f| f.to_string_lossy().into_owned())
+}
+
+fn kind(file: &Path) -> Kind {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    if name.starts_with(UNFINISHED) {
+        return Kind::Unfinished;
+    }
+    let key = name.trim_end_matches(".json");
+    let checked = std::fs::read_to_string(file).map_err(|e| format!("cannot be read: {e}"));
+    match checked.and_then(|text| entry::parse(&text, key)) {
+        Ok(_) => Kind::Entry,
+        Err(why) => Kind::Damaged(why),
+    }
+}

@@ -1,0 +1,317 @@
+//! The plan: which engine runs which procedure of a case, what is skipped, and why.
+
+mod roster;
+mod shortcut;
+mod spot_check;
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::engines::{self, Absent, Engine, Job, Site, Support, Version};
+use crate::procedures::{self, Task};
+use crate::record::{EngineName, ProcedureId, ReadingKey};
+use crate::spec::{Budget, Case, SpecError, suggestion};
+use luminaire::scene::Transport;
+
+use roster::Roster;
+use shortcut::Repeated;
+pub use shortcut::{Fill, Omission, Shortcut};
+
+/// What is to be done for one case. Runs + skips of whole procedures or engines = procedures x engines, always.
+pub struct Plan {
+    /// The procedures' tasks, in order.
+    pub tasks: Vec<Task>,
+    /// The engines that take part, in order.
+    pub engines: Vec<Planned>,
+    /// What will run.
+    pub runs: Vec<Run>,
+    /// What will not, and why.
+    pub skips: Vec<Skip>,
+}
+
+/// An engine of the plan.
+pub struct Planned {
+    /// The engine; one that knows itself by now is shared by all cases.
+    pub engine: Arc<dyn Engine>,
+    /// Whether it is there; `None`: it has nothing to do here and was not asked.
+    pub found: Option<Result<Version, Absent>>,
+    /// Why it takes part.
+    pub asked: Asked,
+}
+
+impl Planned {
+    /// The engine's version, where it is there.
+    pub fn version(&self) -> Option<String> {
+        self.found.as_ref()?.as_ref().ok().map(|v| v.0.clone())
+    }
+
+    /// Whether it was looked for in vain.
+    pub fn is_absent(&self) -> bool {
+        matches!(self.found, Some(Err(_)))
+    }
+}
+
+/// Why an engine takes part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// It was named, on the command line or in the spec: its absence is an error.
+    ByName,
+    /// No engine was named: all that are there take part.
+    ByDefault,
+    /// Others are judged by it.
+    AsReference,
+}
+
+/// One engine on one procedure.
+pub struct Run {
+    /// Index into [`Plan::engines`].
+    pub engine: usize,
+    /// Index into [`Plan::tasks`].
+    pub task: usize,
+    /// What the engine is asked.
+    pub job: Job,
+    /// Where the engine only approximates what is asked.
+    pub approximation: Option<String>,
+    /// How much that is, relative, where it is known.
+    pub declared: f64,
+    /// The least that has to be rendered for it.
+    pub shortcut: Shortcut,
+    /// Stations that are rendered all the same, to be held against what the shortcut says.
+    pub spot_check: Vec<usize>,
+}
+
+/// Something that is not run, with its reason.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Skip {
+    #[serde(flatten)]
+    pub key: ReadingKey,
+    /// How much is skipped.
+    pub scope: Scope,
+    pub reason: String,
+    /// What that saves, where it saves something.
+    pub saved: Option<String>,
+}
+
+/// How much is skipped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Scope {
+    Engine,
+    /// One procedure of an engine.
+    Procedure,
+    Meter,
+    /// One kind of light path.
+    LightPath,
+}
+
+impl Scope {
+    /// Whether nothing is read; where single meters or light paths are left out, their readings follow from others.
+    pub const fn leaves_no_reading(self) -> bool {
+        matches!(self, Self::Engine | Self::Procedure)
+    }
+}
+
+/// What the user chose on the command line.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// Engines by name; empty for what the spec says.
+    pub engines: Vec<String>,
+    /// Empty for all of the spec.
+    pub procedures: Vec<ProcedureId>,
+    /// Seed of every random choice.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// What an engine of the plan is asked for a task, whether it is there or not.
+    pub fn job(&self, case: &Case, engine: usize, task: &Task, seed: u64) -> Job {
+        job(case, &self.engines[engine].engine.name(), task, seed)
+    }
+}
+
+/// Plans one case by itself, with all shortcuts.
+pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, SpecError> {
+    Planner::new(selection, site, Skipping::Allowed).plan(case)
+}
+
+/// Whether readings may be left out that follow from others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Skipping {
+    /// They may.
+    Allowed,
+    /// Everything is rendered.
+    Nothing,
+}
+
+/// Plans the cases of a run one after the other: it remembers which engines are there and which jobs there were.
+pub struct Planner<'a> {
+    selection: &'a Selection,
+    site: &'a Site,
+    skipping: Skipping,
+    roster: Roster,
+    repeated: Repeated,
+}
+
+impl<'a> Planner<'a> {
+    /// A planner that has seen no case yet.
+    pub fn new(selection: &'a Selection, site: &'a Site, skipping: Skipping) -> Self {
+        Self { selection, site, skipping, roster: Roster::new(), repeated: Repeated::default() }
+    }
+
+    /// Plans the next case.
+    pub fn plan(&mut self, case: &Case) -> Result<Plan, SpecError> {
+        let tasks = tasks(case, self.selection)?;
+        let chosen = self.roster.chosen(case, self.selection)?;
+        let offers: Vec<Vec<Offer>> =
+            chosen.iter().map(|(engine, _)| self.offers(case, engine.as_ref(), &tasks)).collect();
+        // Who has nothing to do is not even asked for a version.
+        let busy = |e: &usize| offers[*e].iter().any(|o| matches!(o, Offer::Run(_)));
+        let busy: Vec<usize> = (0..chosen.len()).filter(busy).collect();
+        let engines: Vec<Arc<dyn Engine>> = busy.iter().map(|e| Arc::clone(&chosen[*e].0)).collect();
+        let mut found: Vec<Option<Result<Version, Absent>>> = vec![None; chosen.len()];
+        for (e, answer) in busy.into_iter().zip(self.roster.probe(&engines, self.site)) {
+            found[e] = Some(answer);
+        }
+        let mut plan = Plan { tasks, engines: vec![], runs: vec![], skips: vec![] };
+        for (e, ((engine, asked), (found, offers))) in chosen.into_iter().zip(found.into_iter().zip(offers)).enumerate()
+        {
+            let absence = found.as_ref().and_then(|f| f.as_ref().err()).map(ToString::to_string);
+            for (task, offer) in plan.tasks.iter().zip(offers) {
+                let skip = |scope, reason, saved| skip(case, task, engine.as_ref(), (scope, reason, saved));
+                match (&absence, offer) {
+                    (Some(absent), _) => plan.skips.push(skip(Scope::Engine, absent.clone(), None)),
+                    (None, Offer::Skip(scope, reason)) => {
+                        plan.skips.push(skip(scope, reason, Some("the whole run".to_owned())));
+                    }
+                    (None, Offer::Run(run)) => plan.runs.push(Run { engine: e, ..*run }),
+                }
+            }
+            plan.engines.push(Planned { engine, found, asked });
+        }
+        if self.skipping == Skipping::Allowed {
+            self.shorten(case, &mut plan);
+        }
+        Ok(plan)
+    }
+
+    /// What an engine makes of each task, from the job alone.
+    fn offers(&self, case: &Case, engine: &dyn Engine, tasks: &[Task]) -> Vec<Offer> {
+        let id = engine.name();
+        let is_left_out =
+            case.only_engines.as_ref().is_some_and(|own| !own.iter().any(|o| o == id.as_str())) && !engine.is_witness();
+        let offer = |(t, task): (usize, &Task)| {
+            if is_left_out {
+                return Offer::Skip(Scope::Engine, "the case is not for this engine".into());
+            }
+            let job = job(case, &id, task, self.selection.seed);
+            let (approximation, declared) = match engine.supports(&job) {
+                Support::Yes => (None, 0.0),
+                Support::Approximate { why, size } => {
+                    let text = size.map(|s| format!(" (about {:.1} %)", 100.0 * s)).unwrap_or_default();
+                    (Some(format!("{why}{text}")), size.unwrap_or(0.0))
+                }
+                Support::No(reason) => return Offer::Skip(Scope::Procedure, reason),
+            };
+            let shortcut = Shortcut::none(&job);
+            Offer::Run(Box::new(Run { engine: 0, task: t, job, approximation, declared, shortcut, spot_check: vec![] }))
+        };
+        tasks.iter().enumerate().map(offer).collect()
+    }
+
+    /// Finds the shortcuts of a plan, writes them among its skips and draws what is rendered all the same.
+    fn shorten(&mut self, case: &Case, plan: &mut Plan) {
+        for run in &mut plan.runs {
+            let planned = &plan.engines[run.engine];
+            if planned.asked != Asked::AsReference && !planned.engine.is_witness() {
+                run.shortcut = Shortcut::of(&run.job);
+            }
+            self.repeated.shorten(&mut run.shortcut, planned.engine.as_ref());
+            let all_s = cost_s(planned.engine.as_ref(), case.budget);
+            for omission in &run.shortcut.omissions {
+                let saved = format!(
+                    "{:.0} % of the run, at most about {:.0} s",
+                    100.0 * omission.share,
+                    omission.share * all_s
+                );
+                let what = (omission.scope, omission.reason.clone(), Some(saved));
+                plan.skips.push(skip(case, &plan.tasks[run.task], planned.engine.as_ref(), what));
+            }
+        }
+        plan.skips.extend(facts(case, &plan.tasks));
+        let engines = &plan.engines;
+        let is_witness = |run: &Run| engines[run.engine].engine.is_witness();
+        spot_check::draw(&mut plan.runs, is_witness, self.selection.seed);
+    }
+}
+
+/// What no engine does in a case, whatever its shortcuts.
+fn facts(case: &Case, tasks: &[Task]) -> Vec<Skip> {
+    let fact = |task: &Task, engine: EngineName, reason: &str| Skip {
+        key: ReadingKey::new(&case.name, task.procedure, engine),
+        scope: Scope::LightPath,
+        reason: reason.to_owned(),
+        saved: None,
+    };
+    let direct = tasks.iter().filter(|t| t.transport == Transport::Direct && t.scene.room.is_some());
+    let of = |task: &Task| {
+        let mut found = vec![fact(task, EVERYONE, "direct light only: no reflection is followed")];
+        if task.scene.obstacles.is_empty() {
+            let reason = "the room is empty and convex, nothing hides a luminaire: no visibility is tested";
+            found.push(fact(task, engines::SIMULATOR, reason));
+        }
+        found
+    };
+    direct.flat_map(of).collect()
+}
+
+/// Stands for all engines in what is skipped by definition.
+pub(crate) const EVERYONE: EngineName = EngineName::new("all");
+
+/// What an engine makes of a task.
+enum Offer {
+    Run(Box<Run>),
+    Skip(Scope, String),
+}
+
+/// What a run of a whole job may cost, in seconds: the budget for renderers, next to nothing for our own solvers.
+pub fn cost_s(engine: &dyn Engine, budget: Budget) -> f64 {
+    if engine.is_witness() { budget.seconds.min(1.0) } else { budget.seconds }
+}
+
+fn skip(case: &Case, task: &Task, engine: &dyn Engine, what: (Scope, String, Option<String>)) -> Skip {
+    let (scope, reason, saved) = what;
+    Skip { key: ReadingKey::new(&case.name, task.procedure, engine.name()), scope, reason, saved }
+}
+
+impl Selection {
+    /// Whether a case holds any of the chosen procedures.
+    pub fn concerns(&self, case: &Case) -> bool {
+        procedures::ALL.iter().any(|p| self.wants(p.id()) && p.task(case).is_some())
+    }
+
+    fn wants(&self, procedure: ProcedureId) -> bool {
+        self.procedures.is_empty() || self.procedures.contains(&procedure)
+    }
+}
+
+fn tasks(case: &Case, selection: &Selection) -> Result<Vec<Task>, SpecError> {
+    let tasks: Vec<Task> =
+        procedures::ALL.iter().filter(|p| selection.wants(p.id())).filter_map(|p| p.task(case)).collect();
+    if tasks.is_empty() {
+        let message = "none of the procedures chosen with --procedures is in this spec";
+        return Err(case.source.error_at("procedures", message, "choose one that is, or leave the option out"));
+    }
+    Ok(tasks)
+}
+
+fn job(case: &Case, engine: &EngineName, task: &Task, seed: u64) -> Job {
+    Job { seed, settings: case.settings_of(engine.as_str()), ..Job::of_task(case, task) }
+}
+
+fn unknown<'a>(kind: &str, name: &str, known: impl Iterator<Item = &'a str> + Clone, option: &str) -> SpecError {
+    let help = suggestion(name, known);
+    let message = format!("there is no {kind} `{name}`");
+    SpecError { file: option.into(), line: None, column: None, message, help: Some(help) }
+}

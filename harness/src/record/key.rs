@@ -1,0 +1,184 @@
+//! Names of what is read: case, procedure, engine and meter, each written once.
+
+use std::borrow::{Borrow, Cow};
+use std::fmt;
+use std::ops::Deref;
+use std::str::FromStr;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a recording is of: one engine on one procedure of one case.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub struct ReadingKey {
+    pub case: String,
+    pub procedure: ProcedureId,
+    pub engine: EngineName,
+}
+
+impl ReadingKey {
+    pub fn new(case: impl Into<String>, procedure: ProcedureId, engine: impl Into<EngineName>) -> Self {
+        Self { case: case.into(), procedure, engine: engine.into() }
+    }
+
+    /// Whether it is of this procedure of this case, whoever reads it.
+    pub fn is_of(&self, case: &str, procedure: ProcedureId) -> bool {
+        self.case == case && self.procedure == procedure
+    }
+}
+
+impl fmt::Display for ReadingKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} of {}", self.engine, self.procedure, self.case)
+    }
+}
+
+/// A procedure; [`crate::procedures`] says what each measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ProcedureId {
+    /// Procedure 1: the luminous intensity distribution read back.
+    LuminousIntensity,
+    /// Procedure 2: light straight from the luminaires.
+    DirectIlluminance,
+    /// Procedure 3: light that was reflected at least once.
+    IndirectIlluminance,
+    /// Direct and indirect together.
+    TotalIlluminance,
+}
+
+impl ProcedureId {
+    /// In the order of reports.
+    pub const ALL: [Self; 4] =
+        [Self::LuminousIntensity, Self::DirectIlluminance, Self::IndirectIlluminance, Self::TotalIlluminance];
+
+    /// As specs, command lines and reports write it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::LuminousIntensity => "luminous_intensity",
+            Self::DirectIlluminance => "direct_illuminance",
+            Self::IndirectIlluminance => "indirect_illuminance",
+            Self::TotalIlluminance => "total_illuminance",
+        }
+    }
+}
+
+impl fmt::Display for ProcedureId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// There is no such procedure.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no procedure `{name}`; there are {}", ProcedureId::ALL.map(ProcedureId::name).join(", "))]
+pub struct UnknownProcedure {
+    pub name: String,
+}
+
+impl FromStr for ProcedureId {
+    type Err = UnknownProcedure;
+
+    fn from_str(name: &str) -> Result<Self, UnknownProcedure> {
+        Self::ALL.into_iter().find(|p| p.name() == name).ok_or_else(|| UnknownProcedure { name: name.to_owned() })
+    }
+}
+
+/// The name of an engine in specs, on the command line and in reports.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct EngineName(Cow<'static, str>);
+
+impl EngineName {
+    /// The name of an engine of our own catalogue.
+    pub const fn new(name: &'static str) -> Self {
+        Self(Cow::Borrowed(name))
+    }
+
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl From<&str> for EngineName {
+    fn from(name: &str) -> Self {
+        Self(Cow::Owned(name.to_owned()))
+    }
+}
+
+impl From<String> for EngineName {
+    fn from(name: String) -> Self {
+        Self(Cow::Owned(name))
+    }
+}
+
+impl Deref for EngineName {
+    type Target = str;
+
+    fn deref(&self) -> &str {
+        &self.0
+    }
+}
+
+impl Borrow<str> for EngineName {
+    fn borrow(&self) -> &str {
+        self
+    }
+}
+
+impl PartialEq<str> for EngineName {
+    fn eq(&self, other: &str) -> bool {
+        &**self == other
+    }
+}
+
+impl PartialEq<String> for EngineName {
+    fn eq(&self, other: &String) -> bool {
+        self.as_str() == other
+    }
+}
+
+impl PartialEq<&str> for EngineName {
+    fn eq(&self, other: &&str) -> bool {
+        &**self == *other
+    }
+}
+
+impl fmt::Display for EngineName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self)
+    }
+}
+
+/// A meter of a case: `<set>[k]`, or `<luminaire>[k]` for readings of luminous intensity.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct MeterId(pub String);
+
+impl MeterId {
+    /// The `k`-th meter of a set.
+    pub fn new(set: &str, k: usize) -> Self {
+        Self(format!("{set}[{k}]"))
+    }
+}
+
+impl fmt::Display for MeterId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_procedure_is_found_by_the_name_that_files_carry() {
+        for procedure in ProcedureId::ALL {
+            assert_eq!(procedure.name().parse(), Ok(procedure));
+            assert_eq!(serde_json::to_value(procedure).unwrap(), procedure.name());
+        }
+        let text = "glare".parse::<ProcedureId>().unwrap_err().to_string();
+        assert!(text.contains("`glare`") && text.contains("direct_illuminance"), "{text}");
+    }
+}

@@ -1,0 +1,182 @@
+//! Readings: what one engine says at one meter, with its uncertainty.
+
+mod key;
+mod light;
+mod role;
+mod status;
+mod uncertainty;
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
+pub use light::{Light, UnknownLight};
+pub use role::Role;
+pub use status::{EngineStatus, Status};
+pub use uncertainty::Uncertainty;
+
+/// The physical quantity of a reading and its unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub enum Quantity {
+    /// Illuminance in lux.
+    #[serde(rename = "illuminance_lx")]
+    Illuminance,
+    /// Luminous intensity in candela.
+    #[serde(rename = "luminous_intensity_cd")]
+    LuminousIntensity,
+}
+
+impl Quantity {
+    /// The unit's symbol.
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Illuminance => "lx",
+            Self::LuminousIntensity => "cd",
+        }
+    }
+}
+
+/// A value with what is stated of its error, both in one unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Estimate {
+    pub value: f64,
+    #[serde(flatten)]
+    pub uncertainty: Uncertainty,
+}
+
+impl Estimate {
+    /// Darkness, for certain.
+    pub const DARK: Self = Self { value: 0.0, uncertainty: Uncertainty::Bound(0.0) };
+
+    /// The mean of independent samples; of a single one nothing is known.
+    pub fn of_samples(samples: &[f64]) -> Self {
+        let n = samples.len() as f64;
+        let value = samples.iter().sum::<f64>() / n;
+        if samples.len() < 2 {
+            return Self { value, uncertainty: Uncertainty::Unstated };
+        }
+        let sum_of_squares: f64 = samples.iter().map(|s| (s - value).powi(2)).sum();
+        let std_error = (sum_of_squares / (n - 1.0) / n).sqrt();
+        Self { value, uncertainty: Uncertainty::sampled(std_error, Some(n - 1.0)) }
+    }
+
+    /// A value without error.
+    pub const fn exact(value: f64) -> Self {
+        Self { value, uncertainty: Uncertainty::Exact }
+    }
+
+    /// The weighted sum of estimates of one run, whose errors may be all one: they add up.
+    pub fn of_one_run(weights: &[f64], estimates: &[Self]) -> Self {
+        let pairs = || weights.iter().zip(estimates);
+        let uncertainty = Uncertainty::of_dependent_sum(pairs().map(|(w, e)| (*w, e.uncertainty)));
+        Self { value: pairs().map(|(w, e)| w * e.value).sum(), uncertainty }
+    }
+
+    /// The sum with an independent one.
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        let uncertainty = Uncertainty::of_sum([(1.0, self.uncertainty), (1.0, other.uncertainty)]);
+        Self { value: self.value + other.value, uncertainty }
+    }
+
+    /// That of the value times a factor.
+    #[must_use]
+    pub fn times(&self, factor: f64) -> Self {
+        Self { value: factor * self.value, uncertainty: self.uncertainty.times(factor) }
+    }
+}
+
+/// One value at one meter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Reading {
+    pub meter: MeterId,
+    pub quantity: Quantity,
+    /// How much, in the quantity's unit.
+    pub value: f64,
+    #[serde(flatten)]
+    pub uncertainty: Uncertainty,
+}
+
+/// Everything one engine said of one procedure of one case, with what is needed to say it again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Recording {
+    #[serde(flatten)]
+    pub key: ReadingKey,
+    /// The engine's version, as it names itself.
+    pub version: String,
+    /// What the engine takes part for.
+    #[serde(default)]
+    pub role: Role,
+    /// The luminaire model: point, area, impostor, or mixed.
+    pub model: String,
+    /// Which light counted.
+    pub light: Light,
+    /// SHA-256 of the spec and of every file that it names.
+    pub input_sha256: String,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// What the engine set: arguments, samples, seeds, variant.
+    pub settings: BTreeMap<String, String>,
+    /// Where the engine only approximates what was asked.
+    pub approximation: Option<String>,
+    /// What the reader of a report should know.
+    pub notes: Vec<String>,
+    /// Wall-clock seconds.
+    pub wall_s: f64,
+    /// Relative standard uncertainty of the engine as an instrument, from its calibration; 0 for our own solvers.
+    #[serde(default)]
+    pub instrument_uncertainty: f64,
+    /// What it shares with other engines: witnesses that share a component count once.
+    #[serde(default)]
+    pub components: Vec<String>,
+    /// At which of several planned looks each reading was last sampled, counted from 1; empty where one look was planned.
+    #[serde(default)]
+    pub looks: Vec<u32>,
+    /// The command that repeats it by hand in the folder that `luxproof export` makes, where there is one.
+    #[serde(default)]
+    pub command: Option<String>,
+    /// Why there are no readings, if there are none.
+    pub failure: Option<String>,
+    /// The readings, one a meter; a report lists them by themselves.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub readings: Vec<Reading>,
+}
+
+impl Recording {
+    /// One without readings yet.
+    pub fn of(key: ReadingKey, light: Light) -> Self {
+        Self {
+            key,
+            version: String::new(),
+            role: Role::Renderer,
+            model: String::new(),
+            light,
+            input_sha256: String::new(),
+            seed: 1,
+            settings: BTreeMap::new(),
+            approximation: None,
+            notes: vec![],
+            wall_s: 0.0,
+            instrument_uncertainty: 0.0,
+            components: vec![],
+            looks: vec![],
+            command: None,
+            failure: None,
+            readings: vec![],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn standard_error_is_that_of_the_mean() {
+        let estimate = |value, uncertainty| Estimate { value, uncertainty };
+        assert_eq!(Estimate::of_samples(&[1.0, 3.0]), estimate(2.0, Uncertainty::sampled(1.0, Some(1.0))));
+        assert_eq!(Estimate::of_samples(&[5.0]), estimate(5.0, Uncertainty::Unstated));
+    }
+}

@@ -1,0 +1,54 @@
+//! How an engine fared in a run.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::EngineName;
+
+/// How an engine fared.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EngineStatus {
+    /// The engine.
+    pub id: EngineName,
+    /// Its version, where it is there.
+    pub version: Option<String>,
+    /// How it fared.
+    pub status: Status,
+    /// Why it did not run.
+    pub reason: Option<String>,
+    /// Wall-clock seconds over all procedures.
+    pub wall_s: f64,
+}
+
+impl EngineStatus {
+    /// Takes in how the same engine fared in another case: a failure outlasts everything, and one run counts as ran.
+    pub fn join(&mut self, other: Self) {
+        let weight = |s: Status| match s {
+            Status::Skipped => 0,
+            Status::Absent => 1,
+            Status::Ran => 2,
+            Status::Failed => 3,
+        };
+        self.wall_s += other.wall_s;
+        if weight(other.status) > weight(self.status) {
+            *self = Self { wall_s: self.wall_s, ..other };
+        } else if other.status == Status::Failed {
+            let reasons: Vec<String> = [self.reason.take(), other.reason].into_iter().flatten().collect();
+            self.reason = Some(reasons.join("; "));
+        }
+    }
+}
+
+/// How an engine fared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// Every job gave readings.
+    Ran,
+    /// It is not there.
+    Absent,
+    /// At least one job failed.
+    Failed,
+    /// It can do nothing that was asked.
+    Skipped,
+}

@@ -1,0 +1,264 @@
+//! What an engine states of the error of a value: a bound, a standard error with its degrees of freedom, exactness, or nothing.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How far off a value may be, in the value's unit. In files it is flattened beside the value, as `uncertainty` with `std_error` and `error_bound`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "Written", into = "Written")]
+pub enum Uncertainty {
+    /// Nothing is stated: no claim is made.
+    #[default]
+    Unstated,
+    /// The value is claimed to be what the method gives, to the last digit.
+    Exact,
+    /// The value of the method lies within this distance.
+    Bound(f64),
+    /// The value is a mean of independent samples.
+    StandardError {
+        /// One standard error of the mean.
+        value: f64,
+        /// Of the standard error, itself estimated from few samples; `None` where nobody says.
+        degrees_of_freedom: Option<f64>,
+        /// What no number of samples shows, beside it: the mean's expectation lies within this distance; mostly 0.
+        bound: f64,
+    },
+}
+
+impl Uncertainty {
+    /// A standard error alone.
+    pub const fn sampled(value: f64, degrees_of_freedom: Option<f64>) -> Self {
+        Self::StandardError { value, degrees_of_freedom, bound: 0.0 }
+    }
+
+    /// One standard error, where the value was sampled.
+    pub const fn standard_error(&self) -> Option<f64> {
+        match self {
+            Self::StandardError { value, .. } => Some(*value),
+            _ => None,
+        }
+    }
+
+    /// Of the standard error, where they are known.
+    pub const fn degrees_of_freedom(&self) -> Option<f64> {
+        match self {
+            Self::StandardError { degrees_of_freedom, .. } => *degrees_of_freedom,
+            _ => None,
+        }
+    }
+
+    /// The distance that does not shrink with further samples; 0 where none is stated.
+    pub const fn bound(&self) -> f64 {
+        match self {
+            Self::Bound(bound) | Self::StandardError { bound, .. } => *bound,
+            Self::Unstated | Self::Exact => 0.0,
+        }
+    }
+
+    /// Whether further samples would make it smaller.
+    pub fn is_sampled(&self) -> bool {
+        self.standard_error().is_some_and(|e| e > 0.0)
+    }
+
+    /// Standard uncertainty; a bound counts as a rectangular distribution (JCGM 100:2008, 4.3.7).
+    pub fn standard(&self) -> f64 {
+        self.standard_error().unwrap_or(0.0).hypot(self.bound() / 3f64.sqrt())
+    }
+
+    /// That of the value times a factor.
+    #[must_use]
+    pub fn times(&self, factor: f64) -> Self {
+        Self::of_sum([(factor, *self)])
+    }
+
+    /// A further distance within which the value lies.
+    #[must_use]
+    pub fn within(&self, further: f64) -> Self {
+        Self::of_sum([(1.0, *self), (1.0, Self::Bound(further))])
+    }
+
+    /// That of a weighted sum of values whose samples are independent: standard errors add in quadrature, their degrees of
+    /// freedom as Welch and Satterthwaite have it (JCGM 100:2008, G.4.1); bounds err alike and add up.
+    pub fn of_sum(terms: impl IntoIterator<Item = (f64, Self)>) -> Self {
+        let (mut variance, mut fourth) = (0.0, 0.0);
+        let all = Self::of_dependent_sum(terms.into_iter().inspect(|(weight, term)| {
+            let square = (weight * term.standard_error().unwrap_or(0.0)).powi(2);
+            variance += square;
+            fourth += term.degrees_of_freedom().map_or(0.0, |freedom| square * square / freedom);
+        }));
+        match all {
+            Self::StandardError { bound, degrees_of_freedom, .. } => {
+                let effective = if fourth > 0.0 { Some(variance * variance / fourth) } else { degrees_of_freedom };
+                Self::StandardError { value: variance.sqrt(), degrees_of_freedom: effective, bound }
+            }
+            other => other,
+        }
+    }
+
+    /// The same where samples may depend on one another: standard errors add up, which is the most that they can be, and have
+    /// the fewest degrees of freedom of any.
+    pub fn of_dependent_sum(terms: impl IntoIterator<Item = (f64, Self)>) -> Self {
+        let (mut value, mut bound, mut degrees_of_freedom) = (0.0, 0.0, None::<f64>);
+        let (mut is_sampled, mut is_bounded, mut is_exact) = (false, false, false);
+        for (weight, term) in terms {
+            is_exact |= term == Self::Exact;
+            is_bounded |= matches!(term, Self::Bound(_));
+            is_sampled |= matches!(term, Self::StandardError { .. });
+            value += weight.abs() * term.standard_error().unwrap_or(0.0);
+            bound += weight.abs() * term.bound();
+            degrees_of_freedom = [degrees_of_freedom, term.degrees_of_freedom()].into_iter().flatten().reduce(f64::min);
+        }
+        match (is_sampled, is_bounded, is_exact) {
+            (true, ..) => Self::StandardError { value, degrees_of_freedom, bound },
+            (_, true, _) => Self::Bound(bound),
+            (_, _, true) => Self::Exact,
+            _ => Self::Unstated,
+        }
+    }
+
+    /// Tells the degrees of freedom of a standard error that says none itself.
+    pub fn grant(&mut self, degrees: Option<f64>) {
+        if let Self::StandardError { degrees_of_freedom, .. } = self {
+            *degrees_of_freedom = degrees_of_freedom.or(degrees);
+        }
+    }
+
+    /// Whether what is stated are numbers.
+    pub fn is_finite(&self) -> bool {
+        self.standard_error().is_none_or(f64::is_finite) && self.bound().is_finite()
+    }
+
+    /// Whether they can be errors.
+    pub fn is_sound(&self) -> bool {
+        self.is_finite()
+            && self.standard_error().is_none_or(|e| e >= 0.0)
+            && self.bound() >= 0.0
+            && self.degrees_of_freedom().is_none_or(|f| f > 0.0)
+    }
+}
+
+/// The form in files; those of before `uncertainty` was written have the other two alone.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
+struct Written {
+    /// What is stated of the error; null where nothing is.
+    #[serde(default)]
+    uncertainty: Option<Stated>,
+    /// Standard error of a Monte Carlo mean.
+    #[serde(default)]
+    std_error: Option<f64>,
+    /// Distance within which the true value lies, for deterministic methods.
+    #[serde(default)]
+    error_bound: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
+struct Stated {
+    kind: Kind,
+    /// The bound or the standard error; 0 where the value is exact.
+    value: f64,
+    /// Of a standard error, where they are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    degrees_of_freedom: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+enum Kind {
+    Bound,
+    StandardError,
+    Exact,
+}
+
+impl From<Uncertainty> for Written {
+    fn from(uncertainty: Uncertainty) -> Self {
+        let (std_error, bound) = (uncertainty.standard_error(), uncertainty.bound());
+        let stated = |kind, value, degrees_of_freedom| Some(Stated { kind, value, degrees_of_freedom });
+        let stated = match uncertainty {
+            Uncertainty::Unstated => None,
+            Uncertainty::Exact => stated(Kind::Exact, 0.0, None),
+            Uncertainty::Bound(bound) => stated(Kind::Bound, bound, None),
+            Uncertainty::StandardError { value, degrees_of_freedom, .. } => {
+                stated(Kind::StandardError, value, degrees_of_freedom)
+            }
+        };
+        let is_bound = matches!(uncertainty, Uncertainty::Bound(_)) || bound > 0.0;
+        Self { uncertainty: stated, std_error, error_bound: is_bound.then_some(bound) }
+    }
+}
+
+/// Two statements about one error do not fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("an uncertainty must be a finite number, not negative, with positive degrees of freedom")]
+struct Unsound;
+
+impl TryFrom<Written> for Uncertainty {
+    type Error = Unsound;
+
+    fn try_from(written: Written) -> Result<Self, Unsound> {
+        let bound = written.error_bound.unwrap_or(0.0);
+        let read = match (written.uncertainty, written.std_error, written.error_bound) {
+            (Some(Stated { kind: Kind::Exact, .. }), ..) => Self::Exact,
+            (Some(Stated { kind: Kind::Bound, value, .. }), ..) => Self::Bound(value),
+            (Some(Stated { kind: Kind::StandardError, value, degrees_of_freedom }), ..) => {
+                Self::StandardError { value, degrees_of_freedom, bound }
+            }
+            (None, Some(value), _) => Self::StandardError { value, degrees_of_freedom: None, bound },
+            (None, None, Some(bound)) => Self::Bound(bound),
+            (None, None, None) => Self::Unstated,
+        };
+        if read.is_sound() { Ok(read) } else { Err(Unsound) }
+    }
+}
+
+impl From<luminaire::simulator::Uncertainty> for Uncertainty {
+    fn from(solved: luminaire::simulator::Uncertainty) -> Self {
+        match solved {
+            luminaire::simulator::Uncertainty::Bound(bound) => Self::Bound(bound),
+            luminaire::simulator::Uncertainty::StandardError { value, degrees_of_freedom } => {
+                Self::sampled(value, Some(f64::from(degrees_of_freedom)))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SAMPLED: Uncertainty = Uncertainty::sampled(3.0, Some(7.0));
+
+    #[test]
+    fn files_keep_what_is_stated_and_old_ones_are_read() {
+        let both = Uncertainty::StandardError { value: 3.0, degrees_of_freedom: Some(7.0), bound: 0.5 };
+        for stated in [Uncertainty::Unstated, Uncertainty::Exact, Uncertainty::Bound(0.1), SAMPLED, both] {
+            let text = serde_json::to_string(&stated).unwrap();
+            assert_eq!(serde_json::from_str::<Uncertainty>(&text).unwrap(), stated, "{text}");
+        }
+        let old = |text: &str| serde_json::from_str::<Uncertainty>(text).unwrap();
+        assert_eq!(old(r#"{"std_error": 3.0, "error_bound": null}"#), Uncertainty::sampled(3.0, None));
+        assert_eq!(old(r#"{"std_error": null, "error_bound": 0.1}"#), Uncertainty::Bound(0.1));
+        assert_eq!(old("{}"), Uncertainty::Unstated);
+        for senseless in [
+            r#"{"std_error": -1.0}"#,
+            r#"{"uncertainty": {"kind": "standard_error", "value": 1, "degrees_of_freedom": 0}}"#,
+        ] {
+            assert!(serde_json::from_str::<Uncertainty>(senseless).is_err(), "{senseless}");
+        }
+    }
+
+    #[test]
+    fn independent_errors_add_in_quadrature_and_bounds_add_up() {
+        let sum = Uncertainty::of_sum([
+            (1.0, SAMPLED),
+            (-2.0, Uncertainty::sampled(2.0, Some(3.0))),
+            (1.0, Uncertainty::Bound(0.1)),
+        ]);
+        // GUM G.2b: 25^2 / (81 / 7 + 256 / 3).
+        let freedom = 625.0 / (81.0 / 7.0 + 256.0 / 3.0);
+        assert_eq!(sum.standard_error(), Some(5.0));
+        assert!((sum.degrees_of_freedom().unwrap() - freedom).abs() < 1e-12);
+        assert_eq!(sum.bound(), 0.1);
+        assert_eq!(Uncertainty::Exact.times(3.0), Uncertainty::Exact);
+        assert_eq!(SAMPLED.times(2.0), Uncertainty::sampled(6.0, Some(7.0)));
+    }
+}

@@ -1,0 +1,407 @@
+//! Runs external programs: time limit, own process group that is killed whole, stderr kept in a log file.
+//!
+//! The only file that spawns processes.
+
+use std::ffi::OsString;
+use std::fs;
+use std::io::{Read, Write};
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command as StdCommand, ExitStatus, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Set when the user asked to stop (Ctrl-C); every running process group is then killed.
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Asks all running and future processes to stop; safe to call from a signal handler's thread.
+pub fn interrupt() {
+    INTERRUPTED.store(true, Ordering::SeqCst);
+}
+
+/// Whether the user asked to stop.
+pub fn is_interrupted() -> bool {
+    INTERRUPTED.load(Ordering::SeqCst)
+}
+
+/// How many threads or processes run side by side where nobody says: one a core.
+pub fn cores() -> usize {
+    thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+/// The largest resident memory of any process of a job so far; clones share it.
+#[derive(Clone, Debug, Default)]
+pub struct PeakMemory(Arc<AtomicU64>);
+
+impl PeakMemory {
+    /// In MiB; `None` where no process was seen, or the system does not tell.
+    pub fn mib(&self) -> Option<f64> {
+        let kib = self.0.load(Ordering::Relaxed);
+        (kib > 0).then_some(kib as f64 / 1024.0)
+    }
+
+    /// Looks at a process that runs: a number, or `self`.
+    pub fn look_at(&self, process: &str) {
+        // rusage would do after the end, but counts what a fork shares with its parent as the child's own.
+        let Ok(status) = fs::read_to_string(format!("/proc/{process}/status")) else { return };
+        let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+        let kib = line.and_then(|l| l.split_whitespace().next()).and_then(|w| w.parse().ok());
+        self.0.fetch_max(kib.unwrap_or(0), Ordering::Relaxed);
+    }
+}
+
+/// Processor time of this process and of all its children that have ended.
+pub fn cpu_time() -> Duration {
+    use nix::sys::resource::{UsageWho, getrusage};
+    let of = |who| {
+        getrusage(who).map_or(Duration::ZERO, |usage| {
+            let micros = |t: nix::sys::time::TimeVal| {
+                u64::try_from(t.tv_sec()).unwrap_or(0) * 1_000_000 + u64::try_from(t.tv_usec()).unwrap_or(0)
+            };
+            Duration::from_micros(micros(usage.user_time()) + micros(usage.system_time()))
+        })
+    };
+    of(UsageWho::RUSAGE_SELF) + of(UsageWho::RUSAGE_CHILDREN)
+}
+
+/// Asks a program about itself, its version say, in a folder of its own: in a shared one another user's log could not
+/// be written.
+pub fn ask(
+    program: PathBuf,
+    question: &str,
+    prepare: impl FnOnce(Invocation) -> Invocation,
+) -> Result<Finished, ProcessError> {
+    let name = program.display().to_string();
+    let folder = tempfile::tempdir().map_err(|source| ProcessError::Start { program: name, source })?;
+    let log = folder.path().join("log");
+    prepare(Invocation::new(program, folder.path(), ANSWER_LIMIT, log)).args([question]).run()
+}
+
+/// A program that does not know its version by now hangs.
+const ANSWER_LIMIT: Duration = Duration::from_secs(20);
+
+/// One run of an external program.
+#[derive(Clone, Debug)]
+pub struct Invocation {
+    pub program: PathBuf,
+    /// Its arguments.
+    pub args: Vec<OsString>,
+    /// Environment variables set on top of ours.
+    pub env: Vec<(OsString, OsString)>,
+    /// Working directory.
+    pub cwd: PathBuf,
+    /// What it reads on standard input.
+    pub stdin: Vec<u8>,
+    /// Wall-clock limit; past it the whole process group is killed.
+    pub limit: Duration,
+    /// Where its standard error is kept.
+    pub log: PathBuf,
+    /// Told of the memory that it takes.
+    pub peak: PeakMemory,
+}
+
+/// What a program that exited with 0 gave.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// Its standard output.
+    pub stdout: Vec<u8>,
+    /// Its standard error, also kept in the log.
+    pub stderr: String,
+    /// Wall-clock time.
+    pub wall: Duration,
+}
+
+/// Why a program gave no result.
+#[derive(Debug, thiserror::Error)]
+pub enum ProcessError {
+    /// It could not be started or talked to.
+    #[error("cannot run {program}: {source}")]
+    Start { program: String, source: std::io::Error },
+    /// Its messages could not be kept.
+    #[error("cannot keep the messages of {program} in {log}: {source}")]
+    Log {
+        program: String,
+        /// The log file.
+        log: String,
+        source: std::io::Error,
+    },
+    /// It did not finish in time.
+    #[error("{program} was killed after its limit of {limit_s:.1} s; its messages are in {log}")]
+    TimedOut {
+        program: String,
+        /// The limit in seconds.
+        limit_s: f64,
+        /// The log file.
+        log: String,
+    },
+    /// It ended with an error.
+    #[error("{program} failed ({status}): {tail}\nall its messages are in {log}")]
+    Failed {
+        program: String,
+        /// Exit code or signal.
+        status: String,
+        /// Last lines of its standard error.
+        tail: String,
+        /// The log file.
+        log: String,
+    },
+    /// The user asked to stop.
+    #[error("{program} was stopped: interrupted")]
+    Interrupted { program: String },
+}
+
+impl Invocation {
+    /// An invocation without input, in `cwd`, with a limit and a log file.
+    pub fn new(program: impl Into<PathBuf>, cwd: &Path, limit: Duration, log: impl Into<PathBuf>) -> Self {
+        let (args, env, stdin) = (vec![], vec![], vec![]);
+        let peak = PeakMemory::default();
+        Self { program: program.into(), args, env, cwd: cwd.to_owned(), stdin, limit, log: log.into(), peak }
+    }
+
+    /// Adds arguments.
+    #[must_use]
+    pub fn args<A: Into<OsString>>(mut self, args: impl IntoIterator<Item = A>) -> Self {
+        self.args.extend(args.into_iter().map(Into::into));
+        self
+    }
+
+    /// Sets an environment variable.
+    #[must_use]
+    pub fn env(mut self, key: &str, value: impl Into<OsString>) -> Self {
+        self.env.push((key.into(), value.into()));
+        self
+    }
+
+    /// Sets what the program reads on standard input.
+    #[must_use]
+    pub fn stdin(mut self, bytes: Vec<u8>) -> Self {
+        self.stdin = bytes;
+        self
+    }
+
+    /// The command line as a person would type it in the working directory.
+    pub fn command_line(&self) -> String {
+        let words = std::iter::once(self.program.as_os_str()).chain(self.args.iter().map(OsString::as_os_str));
+        words.map(|w| quoted(&w.to_string_lossy())).collect::<Vec<_>>().join(" ")
+    }
+
+    /// The command line with the environment that the program needs before it.
+    pub fn command_line_with_env(&self) -> String {
+        let set = |(key, value): &(OsString, OsString)| {
+            format!("{}={} ", key.to_string_lossy(), quoted(&value.to_string_lossy()))
+        };
+        self.env.iter().map(set).collect::<String>() + &self.command_line()
+    }
+
+    /// Runs the program to its end, its limit or an interruption.
+    pub fn run(&self) -> Result<Finished, ProcessError> {
+        let start = Instant::now();
+        tracing::debug!(command = %self.command_line(), cwd = %self.cwd.display(), "run");
+        let mut child = self.spawn().map_err(|source| self.start_error(source))?;
+        let pipes = Pipes::attach(&mut child, self.stdin.clone());
+        let ended = self.wait(&mut child, start);
+        // Whatever the program started goes with it.
+        kill_group(&child);
+        let (stdout, stderr) = pipes.join();
+        let stderr = String::from_utf8_lossy(&stderr).into_owned();
+        self.keep_log(&stderr).map_err(|source| ProcessError::Log {
+            program: self.name(),
+            log: self.log_name(),
+            source,
+        })?;
+        let status = ended?;
+        if status.success() {
+            return Ok(Finished { stdout, stderr, wall: start.elapsed() });
+        }
+        let status = match (status.code(), status.signal()) {
+            (Some(code), _) => format!("exit code {code}"),
+            (None, Some(9)) => "killed by signal 9, out of memory perhaps".to_owned(),
+            (None, Some(signal)) => format!("killed by signal {signal}"),
+            (None, None) => "ended for an unknown reason".to_owned(),
+        };
+        Err(ProcessError::Failed { program: self.name(), status, tail: tail(&stderr), log: self.log_name() })
+    }
+
+    fn spawn(&self) -> std::io::Result<Child> {
+        StdCommand::new(&self.program)
+            .args(&self.args)
+            .envs(self.env.iter().map(|(k, v)| (k, v)))
+            .current_dir(&self.cwd)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .process_group(0)
+            .spawn()
+    }
+
+    fn wait(&self, child: &mut Child, start: Instant) -> Result<ExitStatus, ProcessError> {
+        let mut pause = Duration::from_micros(200);
+        let process = child.id().to_string();
+        loop {
+            self.peak.look_at(&process);
+            if let Some(status) = child.try_wait().map_err(|source| self.start_error(source))? {
+                return Ok(status);
+            }
+            let error = if is_interrupted() {
+                Some(ProcessError::Interrupted { program: self.name() })
+            } else if start.elapsed() >= self.limit {
+                let limit_s = self.limit.as_secs_f64();
+                Some(ProcessError::TimedOut { program: self.name(), limit_s, log: self.log_name() })
+            } else {
+                None
+            };
+            if let Some(error) = error {
+                kill_group(child);
+                child.wait().map_err(|source| self.start_error(source))?;
+                return Err(error);
+            }
+            thread::sleep(pause);
+            pause = (pause * 2).min(Duration::from_millis(10));
+        }
+    }
+
+    fn keep_log(&self, stderr: &str) -> std::io::Result<()> {
+        if let Some(folder) = self.log.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        let mut log = fs::OpenOptions::new().create(true).append(true).open(&self.log)?;
+        writeln!(log, "$ {}\n{stderr}", self.command_line())
+    }
+
+    fn name(&self) -> String {
+        self.program.file_name().unwrap_or(self.program.as_os_str()).to_string_lossy().into_owned()
+    }
+
+    fn log_name(&self) -> String {
+        self.log.display().to_string()
+    }
+
+    fn start_error(&self, source: std::io::Error) -> ProcessError {
+        ProcessError::Start { program: self.program.display().to_string(), source }
+    }
+}
+
+/// Threads that feed and drain a child's pipes, so that neither side can block the other.
+struct Pipes {
+    stdout: thread::JoinHandle<Vec<u8>>,
+    stderr: thread::JoinHandle<Vec<u8>>,
+}
+
+impl Pipes {
+    fn attach(child: &mut Child, input: Vec<u8>) -> Self {
+        if let Some(mut stdin) = child.stdin.take() {
+            // A program that exits without reading its input closes the pipe: its own status tells why.
+            thread::spawn(move || stdin.write_all(&input).ok());
+        }
+        Self { stdout: drain(child.stdout.take()), stderr: drain(child.stderr.take()) }
+    }
+
+    fn join(self) -> (Vec<u8>, Vec<u8>) {
+        (self.stdout.join().unwrap_or_default(), self.stderr.join().unwrap_or_default())
+    }
+}
+
+fn drain(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<u8>> {
+    thread::spawn(move || {
+        let mut bytes = vec![];
+        if let Some(mut pipe) = pipe
+            && let Err(error) = pipe.read_to_end(&mut bytes)
+        {
+            tracing::warn!(%error, "output of a program cut short");
+        }
+        bytes
+    })
+}
+
+fn kill_group(child: &Child) {
+    let group = i32::try_from(child.id()).ok().and_then(rustix::process::Pid::from_raw);
+    if let Some(group) = group {
+        // The group is gone already in the ordinary case: that is no error.
+        rustix::process::kill_process_group(group, rustix::process::Signal::KILL).ok();
+    }
+}
+
+/// The last lines of a text, for error messages.
+fn tail(text: &str) -> String {
+    let lines: Vec<&str> = text.lines().filter(|l| !l.trim().is_empty()).collect();
+    lines[lines.len().saturating_sub(8)..].join("\n")
+}
+
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=+,:@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shell(script: &str, limit_s: f64, folder: &Path) -> Result<Finished, ProcessError> {
+        Invocation::new("sh", folder, Duration::from_secs_f64(limit_s), folder.join("log")).args(["-c", script]).run()
+    }
+
+    #[test]
+    fn output_and_messages_are_kept_apart_and_stderr_is_logged() {
+        let folder = tempfile::tempdir().unwrap();
+        let done = shell("echo out; echo err >&2", 10.0, folder.path()).unwrap();
+        assert_eq!(done.stdout, b"out\n");
+        assert_eq!(done.stderr, "err\n");
+        assert!(fs::read_to_string(folder.path().join("log")).unwrap().ends_with("err\n\n"));
+    }
+
+    #[test]
+    fn a_failing_program_is_an_error_with_its_last_words() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = shell("echo no such lamp >&2; exit 3", 10.0, folder.path()).unwrap_err();
+        let text = error.to_string();
+        assert!(matches!(error, ProcessError::Failed { .. }));
+        assert!(text.contains("exit code 3") && text.contains("no such lamp"), "{text}");
+    }
+
+    #[test]
+    fn a_timeout_kills_the_grandchildren_too() {
+        let folder = tempfile::tempdir().unwrap();
+        // The grandchild would write the file after 1 s if it lived.
+        let script = "(sleep 1; touch survivor) & sleep 30";
+        let error = shell(script, 0.2, folder.path()).unwrap_err();
+        assert!(matches!(error, ProcessError::TimedOut { .. }), "{error}");
+        thread::sleep(Duration::from_millis(1300));
+        assert!(!folder.path().join("survivor").exists());
+    }
+
+    #[test]
+    fn memory_and_processor_time_of_a_program_are_seen() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = |script: &str| {
+            let invocation = Invocation::new("sh", folder.path(), Duration::from_secs(20), folder.path().join("log"));
+            let invocation = invocation.args(["-c", script]);
+            invocation.run().unwrap();
+            invocation.peak.mib().unwrap()
+        };
+        let before = cpu_time();
+        let (small, large) = (run("sleep 0.1"), run("x=$(head -c 50000000 /dev/zero | tr '\\0' a); sleep 0.1"));
+        assert!(small > 0.1 && large > small + 40.0, "{small} {large}");
+        assert!(cpu_time() > before + Duration::from_millis(5));
+    }
+
+    #[test]
+    fn a_program_that_is_not_there_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = Invocation::new("no-such-renderer", folder.path(), Duration::from_secs(1), folder.path().join("log"));
+        assert!(run.run().unwrap_err().to_string().contains("no-such-renderer"));
+    }
+
+    #[test]
+    fn command_lines_can_be_pasted_into_a_shell() {
+        let run = Invocation::new("rtrace", Path::new("."), Duration::ZERO, "log").args(["-ab", "99", "it's.oct"]);
+        assert_eq!(run.command_line(), r"rtrace -ab 99 'it'\''s.oct'");
+        let run = run.env("RAYPATH", ".:/my lib");
+        assert_eq!(run.command_line_with_env(), r"RAYPATH='.:/my lib' rtrace -ab 99 'it'\''s.oct'");
+    }
+}

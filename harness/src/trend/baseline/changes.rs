@@ -1,0 +1,242 @@
+//! What changed between two sets of readings: a mean shift told apart from noise, single meters by their own z.
+//!
+//! Per engine and procedure the weighted mean of the relative changes is tested (weights 1/u²; the uncertainty widened by the
+//! Birge ratio where meters scatter more than they say: Birge, Phys. Rev. 40 (1932) 207), then every meter. All tests
+//! of a comparison together are wrong once in a hundred times where nothing changed (Šidák, JASA 62 (1967) 626). Standard errors
+//! from few blocks have Student's t with the degrees of freedom of Welch and Satterthwaite (GUM G.4.1).
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+use super::Entry;
+use crate::record::{MeterId, Quantity, Reading, ReadingKey, Uncertainty};
+
+/// Probability that anything at all is called changed where nothing is.
+const FAMILY: f64 = 0.01;
+/// Values without uncertainty may differ by the rounding of single precision, which renderers compute in.
+const ROUNDING: f64 = 1e-6;
+
+/// What two sets must share before their readings are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Comparability {
+    /// A baseline: spec, version, luminaire model, light and settings.
+    SameInstrument,
+    /// Two runs: the spec; versions and settings may differ, which is said.
+    SameSpec,
+}
+
+/// What changed, entry by entry.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Changes {
+    /// One a case, procedure and engine of either side.
+    pub entries: Vec<EntryChange>,
+    /// How many tests were made.
+    pub tests: usize,
+    /// The level of each, so that all together keep theirs.
+    pub level: f64,
+}
+
+/// What changed for one engine in one procedure of one case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EntryChange {
+    #[serde(flatten)]
+    pub key: ReadingKey,
+    pub state: State,
+    /// What differs besides the readings, or why they are not compared.
+    pub notes: Vec<String>,
+    /// The mean shift of the sampled meters.
+    pub mean: Option<MeanShift>,
+    /// Every meter of both sides.
+    pub meters: Vec<MeterChange>,
+}
+
+/// What a comparison of two entries ends in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// Nothing beyond noise.
+    Unchanged,
+    /// All meters together moved.
+    Shifted,
+    /// Single meters moved.
+    Changed,
+    /// The new side lacks it, or lacks meters of it.
+    Vanished,
+    /// The old side lacks it.
+    New,
+    /// The two are not about the same thing.
+    Refused,
+}
+
+/// The weighted mean of the relative changes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MeanShift {
+    /// The mean, relative.
+    pub relative: f64,
+    /// Its standard uncertainty, likewise.
+    pub uncertainty: f64,
+    /// The probability of so large a shift where nothing changed.
+    pub p_value: f64,
+}
+
+/// One meter before and after.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MeterChange {
+    pub meter: MeterId,
+    /// What is read there.
+    pub quantity: Quantity,
+    /// The old value, in the quantity's unit.
+    pub old: f64,
+    pub new: f64,
+    /// Standard uncertainty of the change, likewise; zero where both are exact.
+    pub uncertainty: f64,
+    /// Of that uncertainty, where it is estimated from few samples.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom: Option<f64>,
+    /// The probability of so large a change where nothing changed.
+    pub p_value: f64,
+    /// Whether it is beyond noise.
+    pub significant: bool,
+}
+
+impl Changes {
+    /// Whether nothing asks for attention; what is new on the new side alone does not.
+    pub fn is_clean(&self) -> bool {
+        self.entries.iter().all(|e| matches!(e.state, State::Unchanged | State::New))
+    }
+}
+
+/// Compares two sets of entries.
+pub fn compare(old: &[Entry], new: &[Entry], comparability: Comparability) -> Changes {
+    let mut entries: Vec<EntryChange> = vec![];
+    for a in old {
+        entries.push(match new.iter().find(|b| b.key == a.key) {
+            None => bare(a, State::Vanished, vec!["there is no such run any more".to_owned()]),
+            Some(b) => pair(a, b, comparability),
+        });
+    }
+    for b in new.iter().filter(|b| !old.iter().any(|a| a.key == b.key)) {
+        entries.push(bare(b, State::New, vec!["there is nothing to hold it against".to_owned()]));
+    }
+    let tests = entries.iter().map(|e| e.meters.len() + usize::from(e.mean.is_some())).sum::<usize>();
+    // 1 - (1 - family)^(1 / tests), without loss of digits.
+    let level = -f64::exp_m1(f64::ln_1p(-FAMILY) / tests.max(1) as f64);
+    for entry in &mut entries {
+        decide(entry, level);
+    }
+    Changes { entries, tests, level }
+}
+
+fn decide(entry: &mut EntryChange, level: f64) {
+    for meter in &mut entry.meters {
+        // A probability that is no number never counts as agreement.
+        meter.significant = meter.p_value < level || meter.p_value.is_nan();
+    }
+    if entry.state == State::Unchanged {
+        if entry.mean.is_some_and(|m| m.p_value < level || m.p_value.is_nan()) {
+            entry.state = State::Shifted;
+        } else if entry.meters.iter().any(|m| m.significant) {
+            entry.state = State::Changed;
+        }
+    }
+}
+
+fn bare(entry: &Entry, state: State, notes: Vec<String>) -> EntryChange {
+    EntryChange { key: entry.key.clone(), state, notes, mean: None, meters: vec![] }
+}
+
+fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
+    let differing = |name: &str, x: &str, y: &str| (x != y).then(|| format!("{name}: {x} before, {y} now"));
+    let of_subject = [
+        differing("spec", &short(&a.input_sha256), &short(&b.input_sha256)),
+        differing("luminaire model", &a.model, &b.model),
+        differing("light", &a.light.to_string(), &b.light.to_string()),
+    ];
+    let mut of_instrument = vec![differing("version", &a.version, &b.version)];
+    let keys: std::collections::BTreeSet<&String> = a.settings.keys().chain(b.settings.keys()).collect();
+    for key in keys {
+        let of = |entry: &Entry| entry.settings.get(key).cloned().unwrap_or_else(|| "not set".to_owned());
+        of_instrument.push(differing(&format!("setting {key}"), &of(a), &of(b)));
+    }
+    let of_subject: Vec<String> = of_subject.into_iter().flatten().collect();
+    let of_instrument: Vec<String> = of_instrument.into_iter().flatten().collect();
+    let refused =
+        !of_subject.is_empty() || (comparability == Comparability::SameInstrument && !of_instrument.is_empty());
+    let notes: Vec<String> = of_subject.into_iter().chain(of_instrument).collect();
+    if refused {
+        return bare(a, State::Refused, notes);
+    }
+    let mut change = bare(a, State::Unchanged, notes);
+    for before in &a.readings {
+        if let Some(now) = b.readings.iter().find(|now| now.meter == before.meter && now.quantity == before.quantity) {
+            change.meters.push(meter(before, now));
+        } else {
+            change.state = State::Vanished;
+            change.notes.push(format!("{} is not read any more", before.meter));
+        }
+    }
+    change.mean = mean(&change.meters);
+    change
+}
+
+/// Enough of a hash to tell two apart.
+fn short(hash: &str) -> String {
+    hash.chars().take(12).collect()
+}
+
+fn meter(before: &Reading, now: &Reading) -> MeterChange {
+    let change = now.value - before.value;
+    let apart = Uncertainty::of_sum([(-1.0, before.uncertainty), (1.0, now.uncertainty)]);
+    let combined = before.uncertainty.standard().hypot(now.uncertainty.standard());
+    let rounding = ROUNDING * before.value.abs().max(now.value.abs());
+    let p_value = if !(change.is_finite() && combined.is_finite()) {
+        0.0
+    } else if change.abs() <= rounding {
+        1.0
+    } else if combined > 0.0 {
+        two_sided(change / combined, apart.degrees_of_freedom())
+    } else {
+        0.0
+    };
+    MeterChange {
+        meter: before.meter.clone(),
+        quantity: before.quantity,
+        old: before.value,
+        new: now.value,
+        uncertainty: combined,
+        degrees_of_freedom: apart.degrees_of_freedom(),
+        p_value,
+        significant: false,
+    }
+}
+
+/// The weighted mean shift of the meters that are sampled; `None` where fewer than two are.
+fn mean(meters: &[MeterChange]) -> Option<MeanShift> {
+    let sampled: Vec<(f64, f64)> = meters
+        .iter()
+        .filter(|m| m.uncertainty > 0.0 && m.old > 0.0 && m.uncertainty.is_finite() && m.new.is_finite())
+        .map(|m| ((m.new - m.old) / m.old, m.uncertainty / m.old))
+        .collect();
+    if sampled.len() < 2 {
+        return None;
+    }
+    let weights: f64 = sampled.iter().map(|(_, u)| u.powi(-2)).sum();
+    let relative = sampled.iter().map(|(d, u)| d * u.powi(-2)).sum::<f64>() / weights;
+    let scatter = sampled.iter().map(|(d, u)| ((d - relative) / u).powi(2)).sum::<f64>();
+    let birge = (scatter / (sampled.len() - 1) as f64).sqrt().max(1.0);
+    let uncertainty = birge / weights.sqrt();
+    // Meters of one run may share their blocks: the mean is granted no more degrees of freedom than one of them.
+    let freedom = meters.iter().filter_map(|m| m.degrees_of_freedom).reduce(f64::min);
+    let p_value = if relative.abs() <= ROUNDING { 1.0 } else { two_sided(relative / uncertainty, freedom) };
+    Some(MeanShift { relative, uncertainty, p_value })
+}
+
+/// Probability of a standardised change at least this large, either way.
+fn two_sided(z: f64, freedom: Option<f64>) -> f64 {
+    let tail = match freedom.and_then(|f| StudentsT::new(0.0, 1.0, f).ok()) {
+        Some(t) => t.sf(z.abs()),
+        None => Normal::standard().sf(z.abs()),
+    };
+    2.0 * tail
+}

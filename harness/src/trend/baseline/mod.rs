@@ -1,0 +1,220 @@
+//! Baselines: readings that somebody accepted for a reason, kept in a file that reads well in a review of changes.
+//!
+//! A baseline holds for one spec, engine, version, luminaire model, light and method; anything else is refused, never
+//! silently reused. Reading tests after Mitsuba 3's `test_renders.py`: a missing reference fails and leaves a candidate.
+
+mod changes;
+mod review;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::record::{Light, Reading, ReadingKey, Recording};
+use crate::report::Report;
+use crate::system::files;
+
+pub use changes::{Changes, Comparability, EntryChange, MeanShift, MeterChange, State, compare};
+pub use review::{Decision, review};
+
+/// Accepted readings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Baseline {
+    /// Version of the format: 1.
+    pub luxproof_baseline: u32,
+    /// One a case, procedure and engine, sorted so.
+    pub entries: Vec<Entry>,
+}
+
+/// What one engine read in one procedure of one case, and why that was accepted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    #[serde(flatten)]
+    pub key: ReadingKey,
+    /// The engine's version.
+    pub version: String,
+    /// The luminaire model.
+    pub model: String,
+    /// Which light counted.
+    pub light: Light,
+    /// SHA-256 of the spec and of every file that it names.
+    pub input_sha256: String,
+    /// What the engine set, its effort left out: another run of the same instrument has the same.
+    pub settings: BTreeMap<String, String>,
+    /// Of all standard errors, where the file is older than the readings' own.
+    #[serde(default, skip_serializing)]
+    degrees_of_freedom: Option<f64>,
+    /// When it was accepted (RFC 3339, UTC); empty in a candidate.
+    pub accepted: String,
+    /// Why it was accepted; empty in a candidate, which is refused as a baseline.
+    pub reason: String,
+    /// The readings, one a meter.
+    pub readings: Vec<Reading>,
+}
+
+/// Why a baseline or a run cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum BaselineError {
+    /// The file cannot be read or written.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: String,
+        source: std::io::Error,
+    },
+    /// It is no baseline.
+    #[error("{path}: {source}; a baseline is written by `luxproof accept`")]
+    Format {
+        /// The file.
+        path: String,
+        /// What is wrong where.
+        source: serde_json::Error,
+    },
+    /// It is of another version of the format.
+    #[error("{path}: format {found} of a baseline; this luxproof reads format 1")]
+    Version {
+        /// The file.
+        path: String,
+        /// Its version.
+        found: u32,
+    },
+    /// It holds a reading that is no measurement.
+    #[error("{path}: {key}: a negative or infinite reading is no baseline")]
+    Unsound {
+        /// The file.
+        path: String,
+        key: ReadingKey,
+    },
+    /// Nobody accepted it.
+    #[error("{path}: {key} was accepted for no reason; review it with `luxproof accept`")]
+    NotAccepted {
+        /// The file.
+        path: String,
+        key: ReadingKey,
+    },
+}
+
+/// Settings that tell of effort, chance and paths: they differ between runs of one instrument with one method. Whatever an
+/// engine sets besides counts, so that a setting nobody thought of is refused rather than overlooked.
+const EFFORT: [&str; 11] = [
+    "ambient_divisions",
+    "arguments",
+    "blocks",
+    "calibration",
+    "command",
+    "count_first_reflection",
+    "looks",
+    "rounds",
+    "rtrace",
+    "seed",
+    "seeds",
+];
+
+/// Whether a setting tells of effort: blocks and samples are counted under several names.
+fn is_effort(key: &str) -> bool {
+    EFFORT.contains(&key) || key.ends_with("_blocks") || key.contains("samples")
+}
+
+impl Entry {
+    fn of(report: &Report, recording: &Recording) -> Self {
+        let mine = report.readings.iter().filter(|r| r.key == recording.key);
+        let settings = recording.settings.iter().filter(|(key, _)| !is_effort(key));
+        Self {
+            key: recording.key.clone(),
+            version: recording.version.clone(),
+            model: recording.model.clone(),
+            light: recording.light,
+            input_sha256: recording.input_sha256.clone(),
+            settings: settings.map(|(k, v)| (k.clone(), v.clone())).collect(),
+            degrees_of_freedom: None,
+            accepted: String::new(),
+            reason: String::new(),
+            readings: mine.map(|r| r.reading.clone()).collect(),
+        }
+    }
+}
+
+impl Baseline {
+    /// The readings of a run as a candidate: accepted by nobody yet.
+    pub fn candidate(report: &Report) -> Self {
+        let mut entries: Vec<Entry> = report.recordings.iter().map(|r| Entry::of(report, r)).collect();
+        entries.sort_by(|a, b| a.key.cmp(&b.key));
+        Self { luxproof_baseline: 1, entries }
+    }
+
+    /// Reads a baseline; a candidate that nobody accepted is refused.
+    pub fn read(path: &Path) -> Result<Self, BaselineError> {
+        let name = || path.display().to_string();
+        let text = fs::read_to_string(path).map_err(|source| BaselineError::Io { path: name(), source })?;
+        let mut baseline: Self =
+            serde_json::from_str(&text).map_err(|source| BaselineError::Format { path: name(), source })?;
+        if baseline.luxproof_baseline != 1 {
+            return Err(BaselineError::Version { path: name(), found: baseline.luxproof_baseline });
+        }
+        for entry in &mut baseline.entries {
+            for reading in &mut entry.readings {
+                reading.uncertainty.grant(entry.degrees_of_freedom);
+            }
+            let key = entry.key.clone();
+            if entry.reason.trim().is_empty() {
+                return Err(BaselineError::NotAccepted { path: name(), key });
+            }
+            if entry.readings.iter().any(|r| !(r.value.is_finite() && r.value >= 0.0)) {
+                return Err(BaselineError::Unsound { path: name(), key });
+            }
+        }
+        Ok(baseline)
+    }
+
+    /// Writes it, one reading a line.
+    pub fn write(&self, path: &Path) -> Result<(), BaselineError> {
+        let fail = |source| BaselineError::Io { path: path.display().to_string(), source };
+        let text = self.text().map_err(|e| fail(e.into()))?;
+        files::replace_shared(path, text.as_bytes()).map_err(fail)
+    }
+
+    fn text(&self) -> Result<String, serde_json::Error> {
+        let mut entries = vec![];
+        for entry in &self.entries {
+            let mut lines = vec![];
+            let value = serde_json::to_value(entry)?;
+            for (key, value) in value.as_object().into_iter().flatten().filter(|(key, _)| *key != "readings") {
+                lines.push(format!("      {}: {value}", serde_json::Value::from(key.as_str())));
+            }
+            let readings: Result<Vec<String>, _> =
+                entry.readings.iter().map(|r| serde_json::to_string(r).map(|r| format!("        {r}"))).collect();
+            lines.push(format!("      \"readings\": [\n{}\n      ]", readings?.join(",\n")));
+            entries.push(format!("    {{\n{}\n    }}", lines.join(",\n")));
+        }
+        Ok(format!(
+            "{{\n  \"luxproof_baseline\": {},\n  \"entries\": [\n{}\n  ]\n}}\n",
+            self.luxproof_baseline,
+            entries.join(",\n")
+        ))
+    }
+
+    /// Puts accepted entries in the place of those that they replace.
+    pub fn accept(&mut self, accepted: Vec<Entry>) {
+        for entry in accepted {
+            self.entries.retain(|old| old.key != entry.key);
+            self.entries.push(entry);
+        }
+        self.entries.sort_by(|a, b| a.key.cmp(&b.key));
+    }
+
+    /// The file that a path names: itself, or in a folder the one of this run's spec.
+    pub fn place(path: &Path, report: &Report) -> PathBuf {
+        if path.extension().is_some_and(|e| e == "json") && !path.is_dir() {
+            return path.to_owned();
+        }
+        let spec = report.spec.path.split_whitespace().next().map(Path::new);
+        let stem = spec.and_then(Path::file_stem).and_then(|s| s.to_str()).unwrap_or("suite");
+        path.join(format!("{stem}.json"))
+    }
+}
+
+#[cfg(test)]
+mod tests;

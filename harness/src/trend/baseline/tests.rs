@@ -1,0 +1,184 @@
+//! The laws of baselines: refused unless they match, noise told apart from shifts, nothing accepted without a reason.
+
+use super::*;
+use crate::record::{MeterId, ProcedureId, Quantity, Uncertainty};
+use crate::system::random::normal;
+
+fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
+    let reading = |(k, value): (usize, &f64)| Reading {
+        meter: MeterId::new("plane", k),
+        quantity: Quantity::Illuminance,
+        value: *value,
+        uncertainty: std_error.map_or(Uncertainty::Exact, |e| Uncertainty::sampled(e, None)),
+    };
+    Entry {
+        key: ReadingKey::new("room", ProcedureId::IndirectIlluminance, "radiance"),
+        version: "6.0a".into(),
+        model: "point".into(),
+        light: "indirect, 7 bounces".parse().unwrap(),
+        input_sha256: "ab".repeat(32),
+        settings: BTreeMap::from([("preset".to_owned(), "audit".to_owned())]),
+        degrees_of_freedom: None,
+        accepted: "2026-01-01T00:00:00Z".into(),
+        reason: "first look".into(),
+        readings: values.iter().enumerate().map(reading).collect(),
+    }
+}
+
+/// Values near 100 lx with normal noise.
+fn noisy(rng: &mut fastrand::Rng, meters: usize, std_error: f64, shift: f64) -> Vec<f64> {
+    (0..meters).map(|k| (100.0 + k as f64) * (1.0 + shift) + std_error * normal(rng)).collect()
+}
+
+fn state(old: &Entry, new: &Entry) -> State {
+    compare(std::slice::from_ref(old), std::slice::from_ref(new), Comparability::SameInstrument).entries[0].state
+}
+
+#[test]
+fn noise_alone_is_called_a_change_at_most_once_in_a_hundred_runs() {
+    let mut rng = fastrand::Rng::with_seed(7);
+    let runs = 2000;
+    let alarms = (0..runs)
+        .filter(|_| {
+            let [a, b] = [0, 1].map(|_| entry(&noisy(&mut rng, 192, 0.5, 0.0), Some(0.5)));
+            state(&a, &b) != State::Unchanged
+        })
+        .count();
+    // 20 expected; 36 is three and a half standard deviations above.
+    assert!(alarms <= 36, "{alarms} of {runs}");
+}
+
+#[test]
+fn a_shift_far_below_the_noise_of_one_meter_is_found_in_the_mean() {
+    let mut rng = fastrand::Rng::with_seed(8);
+    let found = (0..100)
+        .filter(|_| {
+            let a = entry(&noisy(&mut rng, 192, 0.5, 0.0), Some(0.5));
+            let b = entry(&noisy(&mut rng, 192, 0.5, 0.003), Some(0.5));
+            state(&a, &b) == State::Shifted
+        })
+        .count();
+    // .3 % of some 195 lx is .6 lx, 0.8 of the noise of one difference, but 11 of that of their mean.
+    assert!(found == 100, "{found}");
+}
+
+#[test]
+fn one_meter_that_moved_is_named_and_the_mean_is_not_blamed() {
+    let mut rng = fastrand::Rng::with_seed(9);
+    let a = entry(&noisy(&mut rng, 100, 0.5, 0.0), Some(0.5));
+    let mut b = entry(&noisy(&mut rng, 100, 0.5, 0.0), Some(0.5));
+    b.readings[17].value += 8.0;
+    let changes = compare(&[a], &[b], Comparability::SameInstrument);
+    assert_eq!(changes.entries[0].state, State::Changed);
+    let moved: Vec<&str> =
+        changes.entries[0].meters.iter().filter(|m| m.significant).map(|m| m.meter.0.as_str()).collect();
+    assert_eq!(moved, ["plane[17]"]);
+}
+
+#[test]
+fn few_blocks_are_granted_the_wide_tails_of_student() {
+    let (a, b) = (entry(&[100.0, 100.0], Some(1.0)), entry(&[107.0, 100.0], Some(1.0)));
+    assert_eq!(state(&a, &b), State::Changed, "4.9 u of a normal distribution");
+    let few = |e: &Entry| Entry { degrees_of_freedom: Some(2.0), ..e.clone() };
+    assert_eq!(state(&few(&a), &few(&b)), State::Unchanged, "4.9 u with four degrees of freedom");
+}
+
+#[test]
+fn exact_values_may_differ_by_single_precision_only() {
+    let a = entry(&[100.0, 50.0], None);
+    assert_eq!(state(&a, &entry(&[100.000_05, 50.0], None)), State::Unchanged);
+    assert_eq!(state(&a, &entry(&[100.001, 50.0], None)), State::Changed);
+}
+
+#[test]
+fn a_reading_that_is_no_number_is_a_change() {
+    let a = entry(&[100.0, 50.0], Some(1.0));
+    for bad in [f64::NAN, f64::INFINITY] {
+        assert_eq!(state(&a, &entry(&[bad, 50.0], Some(1.0))), State::Changed);
+    }
+}
+
+#[test]
+fn a_baseline_of_another_spec_version_model_light_or_setting_is_refused() {
+    let a = entry(&[100.0, 50.0], Some(1.0));
+    let others = [
+        Entry { input_sha256: "cd".repeat(32), ..a.clone() },
+        Entry { version: "6.1".into(), ..a.clone() },
+        Entry { model: "area".into(), ..a.clone() },
+        Entry { light: "indirect, all bounces".parse().unwrap(), ..a.clone() },
+        Entry { settings: BTreeMap::new(), ..a.clone() },
+    ];
+    for other in &others {
+        let change = compare(std::slice::from_ref(&a), std::slice::from_ref(other), Comparability::SameInstrument);
+        assert_eq!(change.entries[0].state, State::Refused);
+        assert!(!change.is_clean() && change.entries[0].notes.len() == 1, "{change:?}");
+    }
+    // Between two runs a new version is what one wants to know about; another spec is still another thing.
+    let of_runs = |other: &Entry| {
+        compare(std::slice::from_ref(&a), std::slice::from_ref(other), Comparability::SameSpec).entries[0].state
+    };
+    assert_eq!(
+        others.each_ref().map(of_runs),
+        [State::Refused, State::Unchanged, State::Refused, State::Refused, State::Unchanged]
+    );
+}
+
+#[test]
+fn what_vanished_fails_and_what_is_new_is_said() {
+    let a = entry(&[100.0, 50.0], Some(1.0));
+    let gone = compare(std::slice::from_ref(&a), &[], Comparability::SameSpec);
+    assert_eq!((gone.entries[0].state, gone.is_clean()), (State::Vanished, false));
+    let new = compare(&[], std::slice::from_ref(&a), Comparability::SameSpec);
+    assert_eq!((new.entries[0].state, new.is_clean()), (State::New, true));
+    let meter_gone = entry(&[100.0], Some(1.0));
+    assert_eq!(state(&a, &meter_gone), State::Vanished);
+}
+
+#[test]
+fn a_file_comes_back_as_it_was_with_one_reading_a_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("kept/room.json");
+    let baseline = Baseline { luxproof_baseline: 1, entries: vec![entry(&[0.1, 1.0 / 3.0, 1e-300], Some(0.1))] };
+    baseline.write(&path).unwrap();
+    assert_eq!(Baseline::read(&path).unwrap(), baseline);
+    let text = fs::read_to_string(&path).unwrap();
+    assert_eq!(text.lines().filter(|l| l.contains("\"meter\"")).count(), 3, "{text}");
+}
+
+#[test]
+fn a_candidate_and_a_reading_below_zero_are_refused_as_baselines() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.json");
+    let write = |e: Entry| Baseline { luxproof_baseline: 1, entries: vec![e] }.write(&path).unwrap();
+    write(Entry { reason: " ".into(), ..entry(&[1.0], None) });
+    assert!(matches!(Baseline::read(&path), Err(BaselineError::NotAccepted { .. })));
+    write(entry(&[-1.0], None));
+    assert!(matches!(Baseline::read(&path), Err(BaselineError::Unsound { .. })));
+}
+
+fn reviewed(old: &[Entry], new: &[Entry], says: &str) -> (Decision, String) {
+    let changes = compare(old, new, Comparability::SameInstrument);
+    let mut output = vec![];
+    let decision = review(&changes, new, "2026-11-21T00:00:00Z", &mut says.as_bytes(), &mut output).unwrap();
+    (decision, String::from_utf8(output).unwrap())
+}
+
+#[test]
+fn a_review_shows_old_and_new_in_units_of_uncertainty_and_insists_on_a_reason() {
+    let (old, new) = (entry(&[100.0, 50.0], Some(1.0)), entry(&[120.0, 50.0], Some(1.0)));
+    let (decision, text) =
+        reviewed(std::slice::from_ref(&old), std::slice::from_ref(&new), "perhaps\ny\n\nnew table\n");
+    assert!(text.contains("old 100.000000 new 120.000000 lx, change +20.000000: +14.1 u  <- changed"), "{text}");
+    assert!(text.contains("needs a reason"));
+    assert_eq!(decision.accepted.len(), 1);
+    assert_eq!((decision.accepted[0].reason.as_str(), decision.declined), ("new table", 0));
+}
+
+#[test]
+fn what_is_unchanged_is_not_asked_about_and_an_ended_input_declines() {
+    let old = entry(&[100.0, 50.0], Some(1.0));
+    let (decision, text) = reviewed(std::slice::from_ref(&old), std::slice::from_ref(&old), "");
+    assert_eq!((decision.accepted.len(), decision.declined, text.as_str()), (0, 0, ""));
+    let (decision, _) = reviewed(&[], std::slice::from_ref(&old), "y\n");
+    assert_eq!((decision.accepted.len(), decision.declined), (0, 1), "no reason was given");
+}

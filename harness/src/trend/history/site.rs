@@ -1,0 +1,204 @@
+//! The nightly site: last night's verdicts, what changed and since when, and the trend of every engine in every procedure.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part};
+use super::series::History;
+use super::trend::{figure, percent, trend};
+use crate::judge::Verdict;
+
+/// The page: one file that needs nothing else. `changes` are those of the history, `reports` are links to the reports of the last night, with what they are called.
+pub fn site(history: &History, changes: &[Change], reports: &[(String, String)]) -> String {
+    let last = history.nights.last().map_or("no night yet", String::as_str);
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { "luxproof nightly, " (last) }
+                style { (PreEscaped(include_str!("site.css"))) }
+            }
+            body {
+                main {
+                    h1 { "luxproof nightly" }
+                    p.soft { (last) ", the last of " (history.nights.len()) " nights" }
+                    @if !reports.is_empty() {
+                        p {
+                            "Reports of this night: "
+                            @for (k, (name, link)) in reports.iter().enumerate() {
+                                @if k > 0 { ", " }
+                                a href=(link) { (name) }
+                            }
+                        }
+                    }
+                    (tonight(history))
+                    (changed(history, changes))
+                    h2 { "Trends" }
+                    p.soft {
+                        "A red line with a triangle is a change of the deviation, a dashed line a new version of the engine. "
+                        "The mean counts a reading by the inverse of its standard error."
+                    }
+                    div.trends {
+                        @for (engine, procedure) in history.engines_and_procedures() {
+                            (figure(history, engine, procedure, changes))
+                        }
+                    }
+                }
+            }
+        }
+    }
+    .into_string()
+}
+
+/// Verdicts of the last night, an engine and procedure a row.
+fn tonight(history: &History) -> Markup {
+    let Some(night) = history.nights.len().checked_sub(1) else { return html! {} };
+    let row = |engine: &str, procedure: &str| {
+        let members: Vec<_> =
+            history.series.iter().filter(|s| s.key.engine == engine && s.key.procedure == procedure).collect();
+        let count =
+            |of: &[Verdict]| members.iter().filter(|s| s.verdicts[night].is_some_and(|v| of.contains(&v))).count();
+        let failed = count(&[Verdict::Fail, Verdict::UnexpectedPass, Verdict::Missing]);
+        let (undecided, known) = (count(&[Verdict::Inconclusive]), count(&[Verdict::KnownDeviation]));
+        let mean = trend(&members, history.nights.len())[night];
+        html! {
+            tr {
+                th scope="row" { (engine) } td { (procedure) }
+                td.number { (count(&[Verdict::Pass])) }
+                td.number.fail[failed > 0] { (failed) }
+                td.number.undecided[undecided > 0] { (undecided) }
+                td.number.known[known > 0] { (known) }
+                td.number { @if mean.is_finite() { (percent(mean)) } @else { "–" } }
+            }
+        }
+    };
+    html! {
+        h2 { "Last night" }
+        div.scroll tabindex="0" role="region" aria-label="Last night" {
+            table {
+                thead { tr {
+                    th scope="col" { "engine" } th scope="col" { "procedure" }
+                    @for name in ["passed", "failed", "undecided", "known", "mean deviation"] {
+                        th.number scope="col" { (name) }
+                    }
+                } }
+                tbody { @for (engine, procedure) in history.engines_and_procedures() { (row(engine, procedure)) } }
+            }
+        }
+    }
+}
+
+/// What changed, the latest first.
+fn changed(history: &History, changes: &[Change]) -> Markup {
+    html! {
+        h2 { "Changes" }
+        @if changes.is_empty() {
+            p { "No deviation has changed." }
+        } @else {
+            div.scroll tabindex="0" role="region" aria-label="Changes" {
+                table {
+                    thead { tr {
+                        @for name in ["since", "noticed", "engine", "procedure", "where"] { th scope="col" { (name) } }
+                        th.number scope="col" { "by" } th.number scope="col" { "standard errors" } th scope="col" { "new version" }
+                    } }
+                    tbody {
+                        @for change in changes.iter().rev() {
+                            tr {
+                                td.date { (history.nights[change.night]) } td.date { (history.nights[change.noticed]) }
+                                td { (change.engine) } td { (change.procedure) } td { (place(change)) }
+                                td.number { (percent(change.relative)) }
+                                td.number { (format!("{:+.1}", change.standard_errors)) }
+                                td { (version(history, change).unwrap_or_default()) }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        p.soft {
+            "Found by sums over nights; at most one false alarm in "
+            (format!("{NIGHTS_PER_FALSE_ALARM:.0}")) " nights is to be expected over all series together. "
+            "One bad night is no change."
+        }
+    }
+}
+
+/// Where a change is seen, in words.
+fn place(change: &Change) -> String {
+    let name = |part: &Part| match (&part.case, &part.meter) {
+        (Some(case), Some(meter)) => format!("{case} {meter}"),
+        (Some(case), None) => case.clone(),
+        _ => "all cases together".to_owned(),
+    };
+    let cases: Vec<String> = change.seen_in.iter().filter(|p| p.meter.is_none()).map(name).collect();
+    let meters = change.seen_in.iter().filter(|p| p.meter.is_some()).count();
+    let mut text = name(&change.part);
+    if change.level == Level::EngineAndProcedure && !cases.is_empty() {
+        text += &format!("; by themselves {}", cases.join(", "));
+    }
+    if meters > 0 {
+        text += &format!("; {meters} single comparisons");
+    }
+    text
+}
+
+/// The new version of the engine at about the night of a change, if there is one.
+fn version(history: &History, change: &Change) -> Option<String> {
+    let near = |night: usize| night.abs_diff(change.night) <= 2;
+    let found = history.version_changes.iter().find(|v| v.engine == change.engine && near(v.night))?;
+    Some(format!("{} (was {})", found.to, found.from))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trend::history::changes;
+    use crate::trend::history::synthetic::{Shift, Synthetic};
+
+    fn nights(shift: Option<Shift>) -> History {
+        let base = Synthetic { nights: 60, cases: 2, meters: 4, new_version: Some(40), shift, ..Synthetic::default() };
+        History::parse(base.text().as_bytes(), 2, std::path::Path::new("history.jsonl")).unwrap()
+    }
+
+    #[test]
+    fn a_change_and_the_new_version_beside_it_stand_in_the_table_and_in_the_trend() {
+        let history = nights(Some(Shift { night: 40, standard_errors: 4.0, cases: 2, meters: 4 }));
+        let page = site(&history, &changes(&history), &[("suite".to_owned(), "suite/report.html".to_owned())]);
+        let date = &history.nights[40];
+        assert!(page.contains(&format!("<td class=\"date\">{date}</td>")), "no row for {date}");
+        assert!(page.contains("1.1 (was 1.0)"));
+        assert!(page.contains("href=\"suite/report.html\""));
+        let figure =
+            page.split("mitsuba-indirect_illuminance-title\">").nth(1).unwrap().split("</figure>").next().unwrap();
+        assert!(figure.contains("class=\"change\"") && figure.contains("class=\"mark\""), "{figure}");
+        assert!(
+            figure.contains("class=\"version\"") && figure.contains(&format!("Version 1.1 from {date}")),
+            "{figure}"
+        );
+        let quiet =
+            page.split("radiance-indirect_illuminance-title\">").nth(1).unwrap().split("</figure>").next().unwrap();
+        assert!(!quiet.contains("class=\"change\"") && !quiet.contains("class=\"version\""), "{quiet}");
+        // Nothing is fetched from anywhere.
+        assert!(!page.contains("http") && !page.contains("<script"));
+    }
+
+    #[test]
+    fn a_page_without_nights_or_without_readings_says_so() {
+        assert!(site(&History::default(), &[], &[]).contains("no night yet"));
+        let mut history = nights(None);
+        history.series[0].deviation.fill(f64::NAN);
+        history.series.truncate(1);
+        assert!(site(&history, &changes(&history), &[]).contains("No readings."));
+    }
+
+    #[test]
+    fn text_of_a_spec_cannot_become_markup() {
+        let mut history = nights(None);
+        for series in &mut history.series {
+            series.key.engine = "<b>\"x".to_owned();
+        }
+        let page = site(&history, &changes(&history), &[]);
+        assert!(page.contains("&lt;b&gt;") && !page.contains("<b>"));
+    }
+}
