@@ -1,4 +1,4 @@
-//! Type A and type B tables turned into type C on the sphere.
+//! Tables as goniometers measure them; those of type A and type B turned into type C on the sphere.
 //!
 //! Source of the frames: ANSI/IESNA LM-63-02 section 3. Photometric zero is the nadir: gamma 0 of type C, H 0 V 0 of
 //! type B, V -90 of type A. Photometric horizontal is +x: C 0 gamma 90, H 0 V 90 of type B, H 0 V 0 of type A.
@@ -6,9 +6,30 @@
 //! type A is type C with gamma = 90 + V and C = -H, and in type B a direction is
 //! (cos H sin V, -sin H, -cos H cos V). Between its nodes the file's own table is bilinear in (H, V) in degrees.
 
-use super::planes::{Goniometer, Table};
 use super::{DistributionError, LuminousIntensityDistribution, angles_deg};
 use glam::DVec3;
+
+/// How a luminaire was measured: the coordinates of its table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goniometer {
+    /// Vertical axis, angles from the horizon: automotive.
+    A,
+    /// Horizontal axis: floodlights.
+    B,
+    /// Vertical axis, angles from the nadir: everything else.
+    C,
+}
+
+/// Angles in degrees and intensities in candela as a file has them, and where they stand in it.
+pub(crate) struct Table {
+    pub(crate) vertical_deg: Vec<f64>,
+    pub(crate) vertical_at: usize,
+    pub(crate) horizontal_deg: Vec<f64>,
+    pub(crate) horizontal_at: usize,
+    /// `candela[horizontal][vertical]`.
+    pub(crate) candela: Vec<f64>,
+    pub(crate) candela_at: usize,
+}
 
 /// A table of type C that stands for one of type A or B, and how far it is from it.
 pub(super) struct Resampled {

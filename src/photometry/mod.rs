@@ -1,6 +1,7 @@
 //! Luminous intensity distributions and the files that carry them.
 
 mod analysis;
+mod details;
 mod distribution;
 mod error;
 pub mod eulumdat;
@@ -20,11 +21,12 @@ mod round_trip_tests;
 
 use std::path::Path;
 
+pub use details::Details;
 pub use distribution::{DistributionError, LuminousIntensityDistribution, Symmetry, angles_deg, direction};
 pub use error::{Problem, ReadError};
+pub use goniometer::Goniometer;
 pub use lint::{Lint, Severity};
 pub use outdoor::ClassificationZones;
-pub use planes::Goniometer;
 pub use resample::Resampled;
 pub use sampler::{DirectionSampler, SampledDirection};
 pub use write::Written;
@@ -53,18 +55,6 @@ pub struct Photometry {
     pub details: Details,
     /// What the reader tolerated or found doubtful.
     pub lints: Vec<Lint>,
-}
-
-/// What only one kind of file says.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum Details {
-    /// The photometry was not read from a file.
-    #[default]
-    None,
-    /// An LM-63 file.
-    Lm63(lm63::Lm63Details),
-    /// A EULUMDAT file.
-    Eulumdat(Box<eulumdat::EulumdatDetails>),
 }
 
 /// Reads a photometric file of any kind: by its content, then by its extension (.ies, .ldt, .xml).

@@ -1,31 +1,10 @@
 //! From the angles of a measured table to the C planes of a distribution.
 
+use super::LuminousIntensityDistribution;
 use super::error::{Problem, ReadError};
+use super::goniometer::{self, Goniometer, Table};
 use super::lint::Lints;
 use super::text::Text;
-use super::{LuminousIntensityDistribution, goniometer};
-
-/// How a luminaire was measured: the coordinates of its table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Goniometer {
-    /// Vertical axis, angles from the horizon: automotive.
-    A,
-    /// Horizontal axis: floodlights.
-    B,
-    /// Vertical axis, angles from the nadir: everything else.
-    C,
-}
-
-/// Angles in degrees and intensities in candela as a file has them, and where they stand in it.
-pub(crate) struct Table {
-    pub(crate) vertical_deg: Vec<f64>,
-    pub(crate) vertical_at: usize,
-    pub(crate) horizontal_deg: Vec<f64>,
-    pub(crate) horizontal_at: usize,
-    /// `candela[horizontal][vertical]`.
-    pub(crate) candela: Vec<f64>,
-    pub(crate) candela_at: usize,
-}
 
 /// The distribution that a table means.
 pub(crate) fn distribution(

@@ -13,8 +13,9 @@ use std::collections::HashMap;
 use roxmltree::{Document, Node, ParsingOptions};
 
 use super::error::{Problem, ReadError};
+use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
-use super::planes::{self, Goniometer, Table};
+use super::planes;
 use super::text::{Text, decode};
 use super::{Details, LuminousOpening, Photometry};
 

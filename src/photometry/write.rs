@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::{Details, Photometry};
+use super::details::{Details, Lm63Details};
+use super::{Photometry, ReadError};
 
 /// A photometric file as text, and what is lost in it.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +19,7 @@ impl Written {
     pub(super) fn checked(
         original: &Photometry,
         text: String,
-        read: impl FnOnce(&[u8]) -> Result<Photometry, super::ReadError>,
+        read: impl FnOnce(&[u8]) -> Result<Photometry, ReadError>,
     ) -> Self {
         let losses = match read(text.as_bytes()) {
             Ok(again) => losses(original, &again),
@@ -88,7 +89,7 @@ fn detail_losses(original: &Photometry, again: &Photometry, losses: &mut Vec<Str
     match (&original.details, &again.details) {
         (Details::Lm63(before), Details::Lm63(after)) => {
             // The edition is what was asked for.
-            let before = super::lm63::Lm63Details { edition: after.edition, ..before.clone() };
+            let before = Lm63Details { edition: after.edition, ..before.clone() };
             if before.goniometer != after.goniometer {
                 losses.push(format!("a table of type {:?} was written as type C", before.goniometer));
             }

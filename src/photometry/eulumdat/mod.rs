@@ -19,46 +19,7 @@ use super::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry}
 
 pub(crate) use self::fields::looks_like;
 pub use self::write::write;
-
-/// What a EULUMDAT file says beyond [`Photometry`]'s common fields; numbers in the file's own units.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EulumdatDetails {
-    /// Type indicator `Ityp`: 1 point source with axial symmetry, 2 linear, 3 other point source (0 in some files).
-    pub kind: u8,
-    /// Length or diameter, width (0 where round) and height of the luminaire in millimetres.
-    pub luminaire_mm: [f64; 3],
-    /// Height of the luminous area seen from C0, C90, C180 and C270 in millimetres.
-    pub luminous_heights_mm: [f64; 4],
-    /// Declared downward flux fraction in percent of the luminaire's flux; 0 where blank.
-    pub downward_flux_percent: f64,
-    /// Declared light output ratio of the luminaire in percent; 0 where blank.
-    pub output_ratio_percent: f64,
-    /// Conversion factor for luminous intensities.
-    pub conversion_factor: f64,
-    /// Tilt of the luminaire during measurement in degrees.
-    pub measured_tilt_deg: f64,
-    /// The lamp sets: alternatives, of which the first counts.
-    pub lamp_sets: Vec<LampSet>,
-    /// Direct ratios for the room indices 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3, 4 and 5.
-    pub direct_ratios: [f64; 10],
-}
-
-/// One set of lamps.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LampSet {
-    /// Number of lamps; negative for absolute photometry.
-    pub lamps: i32,
-    /// Type of lamps.
-    pub kind: String,
-    /// Flux of all its lamps together in lumens.
-    pub lumens: f64,
-    /// Colour appearance or colour temperature.
-    pub colour: String,
-    /// Colour rendering group or index.
-    pub rendering: String,
-    /// Watts including ballast; 0 where blank.
-    pub watts: f64,
-}
+pub use super::details::{EulumdatDetails, LampSet};
 
 /// The header lines that become keywords: their names in LM-63.
 pub(super) const COMPANY: &str = "MANUFAC";

@@ -14,8 +14,9 @@ use std::path::Path;
 use self::header::TiltLine;
 use self::numbers::{Number, Numbers};
 use super::error::{Problem, ReadError};
+use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
-use super::planes::{self, Goniometer, Table};
+use super::planes;
 use super::text::Text;
 use super::{Details, Photometry};
 
@@ -24,52 +25,10 @@ mod tests;
 
 pub(crate) use self::header::{is_edition_line, is_tilt_line};
 pub use self::write::{write_2002, write_2019};
+pub use super::details::{Edition, Lm63Details, Tilt};
 
 /// Metres in a foot, exactly.
 const METRES_PER_FOOT: f64 = 0.3048;
-
-/// An edition of LM-63.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Edition {
-    /// LM-63-1986: no first line, free labels.
-    Lm63_1986,
-    /// LM-63-1991: `IESNA91`.
-    Lm63_1991,
-    /// LM-63-1995.
-    Lm63_1995,
-    /// ANSI/IESNA LM-63-02.
-    Lm63_2002,
-    /// ANSI/IES LM-63-19.
-    Lm63_2019,
-}
-
-/// What an LM-63 file says beyond [`Photometry`]'s common fields.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Lm63Details {
-    /// The edition.
-    pub edition: Edition,
-    /// How the luminaire was measured; the distribution is always type C.
-    pub goniometer: Goniometer,
-    /// Number of lamps.
-    pub lamps: u32,
-    /// Rated lumens of one lamp, -1 for absolute photometry.
-    pub lumens_per_lamp: f64,
-    /// "Future use" of 1995 and 2002 or "file generation type" of 2019; 1 in earlier editions.
-    pub file_generation_type: f64,
-    /// How the lamp's flux depends on the luminaire's tilt; kept, never applied.
-    pub tilt: Option<Tilt>,
-}
-
-/// Relative lamp flux against the tilt of the luminaire.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tilt {
-    /// Lamp-to-luminaire geometry: 1 lamp vertical, 2 lamp horizontal and turned with the tilt, 3 horizontal, unturned.
-    pub geometry: u8,
-    /// Tilt angles in degrees.
-    pub angles_deg: Vec<f64>,
-    /// Multiplying factor at each angle.
-    pub factors: Vec<f64>,
-}
 
 /// Reads an LM-63 file; `TILT=<file>` is refused, since bytes have no folder.
 pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
@@ -294,37 +253,5 @@ pub(super) fn tilt_file_beside(path: &Path) -> impl FnOnce(&str) -> Result<Vec<u
         }
         let beside = path.with_file_name(name);
         std::fs::read(&beside).map_err(|error| format!("{}: {error}", beside.display()))
-    }
-}
-
-impl Edition {
-    /// All of them, oldest first.
-    pub const ALL: [Self; 5] = [Self::Lm63_1986, Self::Lm63_1991, Self::Lm63_1995, Self::Lm63_2002, Self::Lm63_2019];
-
-    /// The name used in reports, e.g. `LM-63-2002`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Lm63_1986 => "LM-63-1986",
-            Self::Lm63_1991 => "LM-63-1991",
-            Self::Lm63_1995 => "LM-63-1995",
-            Self::Lm63_2002 => "LM-63-2002",
-            Self::Lm63_2019 => "LM-63-2019",
-        }
-    }
-
-    /// The first line that the edition asks for.
-    pub const fn first_line(self) -> Option<&'static str> {
-        match self {
-            Self::Lm63_1986 => None,
-            Self::Lm63_1991 => Some("IESNA91"),
-            Self::Lm63_1995 => Some("IESNA:LM-63-1995"),
-            Self::Lm63_2002 => Some("IESNA:LM-63-2002"),
-            Self::Lm63_2019 => Some("IES:LM-63-2019"),
-        }
-    }
-
-    /// The year, four digits.
-    fn year(self) -> &'static str {
-        &self.name()[6..]
     }
 }

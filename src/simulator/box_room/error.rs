@@ -32,21 +32,18 @@ const CHANCE: f64 = 1.5;
 /// Rounding of sums over thousands of terms, relative.
 const ROUNDING: f64 = 1e-12;
 
-/// Illuminances in lux at fixed places of the room, so that one meter alone is not at the mercy of chance.
-pub(super) type Probes = Vec<f64>;
-
 /// What one effort says.
 #[derive(Clone, Debug)]
 pub(super) struct Reading {
     lux: Vec<f64>,
-    /// Nothing where meters are many.
-    probes: Probes,
+    /// At the probes; nothing where meters are many.
+    probes: Vec<f64>,
     imbalance: f64,
 }
 
 impl Reading {
     pub(super) fn of(field: &BoxField, meters: &[Meter]) -> Self {
-        let probes = if meters.len() < ENOUGH { field.probes().clone() } else { vec![] };
+        let probes = if meters.len() < ENOUGH { field.probes().to_vec() } else { vec![] };
         Self { lux: field.illuminance(meters), probes, imbalance: field.imbalance }
     }
 

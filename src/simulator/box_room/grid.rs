@@ -6,7 +6,6 @@
 use glam::DVec3;
 
 use super::Effort;
-use super::symmetry::{self, Operation};
 use crate::simulator::quadrature::Gauss;
 
 /// Dyadic intervals whose interpolation matrices are kept.
@@ -133,11 +132,10 @@ impl Grid {
         grid
     }
 
-    /// How many numbers the operator stores, rows once an orbit of the box's symmetries.
-    pub(super) fn matrix_entries(size_m: DVec3, effort: &Effort) -> usize {
+    /// How many nodes a grid would have.
+    pub(super) fn count(size_m: DVec3, effort: &Effort) -> usize {
         let nodes = |k| effort.order * elements(size_m, k, effort);
-        let count = 2 * (nodes(0) * nodes(1) + nodes(1) * nodes(2) + nodes(2) * nodes(0));
-        count * count / symmetry::of_geometry(size_m).len()
+        2 * (nodes(0) * nodes(1) + nodes(1) * nodes(2) + nodes(2) * nodes(0))
     }
 
     /// How many nodes there are.
@@ -168,26 +166,6 @@ impl Grid {
         x[u] = self.axes[u].nodes_m[i];
         x[v] = self.axes[v].nodes_m[j];
         (x, self.axes[u].weights_m[i] * self.axes[v].weights_m[j])
-    }
-
-    /// The node that each node falls on under a symmetry of the box.
-    pub(super) fn images(&self, operation: Operation) -> Vec<u32> {
-        let to = |axis: usize| operation.axes.iter().position(|from| *from == axis).unwrap_or(axis);
-        let mut images = Vec::with_capacity(self.len());
-        for face in Face::ALL {
-            let (n, u, v) = face.axes();
-            let end = face.0 % 2;
-            let image = Face(2 * to(n) + if operation.turns(n) { 1 - end } else { end });
-            let (count_u, count_v) = self.counts(face);
-            let stride = |axis: usize| if image.axes().1 == to(axis) { self.counts(image).1 } else { 1 };
-            let (stride_u, stride_v) = (stride(u), stride(v));
-            let along = |axis: usize, count: usize, k: usize| if operation.turns(axis) { count - 1 - k } else { k };
-            for i in 0..count_u {
-                let start = self.offsets[image.0] + along(u, count_u, i) * stride_u;
-                images.extend((0..count_v).map(|j| (start + along(v, count_v, j) * stride_v) as u32));
-            }
-        }
-        images
     }
 
     /// Shares flux at a point of a face out among the nodes of the element there, as their polynomials weigh it.

@@ -23,7 +23,7 @@ use crate::geometry::Room;
 use crate::scene::{Bounces, Luminaire, Meter};
 use crate::simulator::{Bounded, gmres};
 use crowd::Crowd;
-use error::{Probes, Reading};
+use error::Reading;
 use first_bounce::FirstBounce;
 use grid::Grid;
 use kernel::Receiver;
@@ -190,7 +190,7 @@ impl EmptyRoom {
                     format!("its bound of {worst:.0e} meets the {relative_error:.0e} asked for")
                 }
                 None => format!("the finest there is, its bound is {worst:.0e}"),
-                Some(next) if Grid::matrix_entries(room.size_m, next) > MOST_ENTRIES => {
+                Some(next) if symmetry::matrix_entries(room.size_m, next) > MOST_ENTRIES => {
                     format!("a finer matrix would not fit, its bound is {worst:.0e}")
                 }
                 Some(_) => continue,
@@ -221,8 +221,8 @@ pub(super) struct BoxField {
     /// Indirect exitance at the nodes in lm/m²: what is gathered on top of the first bounce.
     exitance: Vec<f64>,
     gathers: Gathers,
-    /// What the probes read, for the error's sake.
-    probes: OnceLock<Probes>,
+    /// Illuminances in lux at fixed places of the room, so that the error of one meter alone is not at the mercy of chance.
+    probes: OnceLock<Vec<f64>>,
     /// Relative flux that interpolating the first bounce between the nodes would lose or gain.
     imbalance: f64,
 }
@@ -293,7 +293,7 @@ impl BoxField {
         Self { exitance, grid, first, gathers, probes: OnceLock::new(), imbalance }
     }
 
-    fn probes(&self) -> &Probes {
+    fn probes(&self) -> &[f64] {
         self.probes.get_or_init(|| self.illuminance(&error::probes(self.grid.size_m)))
     }
 

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
+use super::Effort;
 use super::grid::{Face, Grid};
 use crate::geometry::{Room, Surface};
 use crate::photometry::{Symmetry, direction};
@@ -17,9 +18,9 @@ use crate::scene::Luminaire;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Operation {
     /// Bit k turns axis k round.
-    pub(super) mirrors: u8,
+    mirrors: u8,
     /// Component k of an image is component `axes[k]` of what it is the image of.
-    pub(super) axes: [usize; 3],
+    axes: [usize; 3],
 }
 
 /// All orders of three axes.
@@ -28,7 +29,7 @@ const PERMUTATIONS: [[usize; 3]; 6] = [[0, 1, 2], [1, 0, 2], [0, 2, 1], [2, 1, 0
 impl Operation {
     const IDENTITY: Self = Self { mirrors: 0, axes: PERMUTATIONS[0] };
 
-    pub(super) const fn turns(self, axis: usize) -> bool {
+    const fn turns(self, axis: usize) -> bool {
         self.mirrors >> axis & 1 == 1
     }
 
@@ -51,10 +52,15 @@ impl Operation {
 }
 
 /// The symmetries of the room's shape.
-pub(super) fn of_geometry(size_m: DVec3) -> Vec<Operation> {
+fn of_geometry(size_m: DVec3) -> Vec<Operation> {
     let keeps_size = |axes: &[usize; 3]| (0..3).all(|k| size_m[axes[k]] == size_m[k]);
     let exchanges = PERMUTATIONS.into_iter().filter(keeps_size);
     exchanges.flat_map(|axes| (0..8).map(move |mirrors| Operation { mirrors, axes })).collect()
+}
+
+/// How many numbers the operator of a grid stores, rows once an orbit of the box's symmetries.
+pub(super) fn matrix_entries(size_m: DVec3, effort: &Effort) -> usize {
+    Grid::count(size_m, effort).pow(2) / of_geometry(size_m).len()
 }
 
 /// The symmetries of a room's shape, and which of them its light shares.
@@ -147,7 +153,7 @@ pub(super) struct Orbits {
 
 impl Orbits {
     pub(super) fn new(grid: &Grid, group: &[Operation]) -> Self {
-        Self::of_images(grid.len(), group.iter().map(|op| grid.images(*op)).collect())
+        Self::of_images(grid.len(), group.iter().map(|op| images(grid, *op)).collect())
     }
 
     fn of_images(count: usize, images: Vec<Vec<u32>>) -> Self {
@@ -181,4 +187,24 @@ impl Orbits {
     pub(super) fn unfold(&self, values: &[f64]) -> Vec<f64> {
         self.orbit.iter().map(|orbit| values[*orbit as usize]).collect()
     }
+}
+
+/// The node that each node falls on under a symmetry of the box.
+fn images(grid: &Grid, operation: Operation) -> Vec<u32> {
+    let to = |axis: usize| operation.axes.iter().position(|from| *from == axis).unwrap_or(axis);
+    let mut images = Vec::with_capacity(grid.len());
+    for face in Face::ALL {
+        let (n, u, v) = face.axes();
+        let end = face.0 % 2;
+        let image = Face(2 * to(n) + if operation.turns(n) { 1 - end } else { end });
+        let (count_u, count_v) = grid.counts(face);
+        let stride = |axis: usize| if image.axes().1 == to(axis) { grid.counts(image).1 } else { 1 };
+        let (stride_u, stride_v) = (stride(u), stride(v));
+        let along = |axis: usize, count: usize, k: usize| if operation.turns(axis) { count - 1 - k } else { k };
+        for i in 0..count_u {
+            let start = grid.offsets[image.0] + along(u, count_u, i) * stride_u;
+            images.extend((0..count_v).map(|j| (start + along(v, count_v, j) * stride_v) as u32));
+        }
+    }
+    images
 }

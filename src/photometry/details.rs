@@ -1,0 +1,130 @@
+//! What only one kind of photometric file says: the readers fill it in, the writers and their comparison read it.
+
+use super::goniometer::Goniometer;
+
+/// What only one kind of file says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Details {
+    /// The photometry was not read from a file.
+    #[default]
+    None,
+    /// An LM-63 file.
+    Lm63(Lm63Details),
+    /// A EULUMDAT file.
+    Eulumdat(Box<EulumdatDetails>),
+}
+
+/// What an LM-63 file says beyond [`Photometry`](super::Photometry)'s common fields.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lm63Details {
+    /// The edition.
+    pub edition: Edition,
+    /// How the luminaire was measured; the distribution is always type C.
+    pub goniometer: Goniometer,
+    /// Number of lamps.
+    pub lamps: u32,
+    /// Rated lumens of one lamp, -1 for absolute photometry.
+    pub lumens_per_lamp: f64,
+    /// "Future use" of 1995 and 2002 or "file generation type" of 2019; 1 in earlier editions.
+    pub file_generation_type: f64,
+    /// How the lamp's flux depends on the luminaire's tilt; kept, never applied.
+    pub tilt: Option<Tilt>,
+}
+
+/// An edition of LM-63.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Edition {
+    /// LM-63-1986: no first line, free labels.
+    Lm63_1986,
+    /// LM-63-1991: `IESNA91`.
+    Lm63_1991,
+    /// LM-63-1995.
+    Lm63_1995,
+    /// ANSI/IESNA LM-63-02.
+    Lm63_2002,
+    /// ANSI/IES LM-63-19.
+    Lm63_2019,
+}
+
+impl Edition {
+    /// All of them, oldest first.
+    pub const ALL: [Self; 5] = [Self::Lm63_1986, Self::Lm63_1991, Self::Lm63_1995, Self::Lm63_2002, Self::Lm63_2019];
+
+    /// The name used in reports, e.g. `LM-63-2002`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Lm63_1986 => "LM-63-1986",
+            Self::Lm63_1991 => "LM-63-1991",
+            Self::Lm63_1995 => "LM-63-1995",
+            Self::Lm63_2002 => "LM-63-2002",
+            Self::Lm63_2019 => "LM-63-2019",
+        }
+    }
+
+    /// The first line that the edition asks for.
+    pub const fn first_line(self) -> Option<&'static str> {
+        match self {
+            Self::Lm63_1986 => None,
+            Self::Lm63_1991 => Some("IESNA91"),
+            Self::Lm63_1995 => Some("IESNA:LM-63-1995"),
+            Self::Lm63_2002 => Some("IESNA:LM-63-2002"),
+            Self::Lm63_2019 => Some("IES:LM-63-2019"),
+        }
+    }
+
+    /// The year, four digits.
+    pub(super) fn year(self) -> &'static str {
+        &self.name()[6..]
+    }
+}
+
+/// Relative lamp flux against the tilt of the luminaire.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tilt {
+    /// Lamp-to-luminaire geometry: 1 lamp vertical, 2 lamp horizontal and turned with the tilt, 3 horizontal, unturned.
+    pub geometry: u8,
+    /// Tilt angles in degrees.
+    pub angles_deg: Vec<f64>,
+    /// Multiplying factor at each angle.
+    pub factors: Vec<f64>,
+}
+
+/// What a EULUMDAT file says beyond [`Photometry`](super::Photometry)'s common fields; numbers in the file's own units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EulumdatDetails {
+    /// Type indicator `Ityp`: 1 point source with axial symmetry, 2 linear, 3 other point source (0 in some files).
+    pub kind: u8,
+    /// Length or diameter, width (0 where round) and height of the luminaire in millimetres.
+    pub luminaire_mm: [f64; 3],
+    /// Height of the luminous area seen from C0, C90, C180 and C270 in millimetres.
+    pub luminous_heights_mm: [f64; 4],
+    /// Declared downward flux fraction in percent of the luminaire's flux; 0 where blank.
+    pub downward_flux_percent: f64,
+    /// Declared light output ratio of the luminaire in percent; 0 where blank.
+    pub output_ratio_percent: f64,
+    /// Conversion factor for luminous intensities.
+    pub conversion_factor: f64,
+    /// Tilt of the luminaire during measurement in degrees.
+    pub measured_tilt_deg: f64,
+    /// The lamp sets: alternatives, of which the first counts.
+    pub lamp_sets: Vec<LampSet>,
+    /// Direct ratios for the room indices 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3, 4 and 5.
+    pub direct_ratios: [f64; 10],
+}
+
+/// One set of lamps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LampSet {
+    /// Number of lamps; negative for absolute photometry.
+    pub lamps: i32,
+    /// Type of lamps.
+    pub kind: String,
+    /// Flux of all its lamps together in lumens.
+    pub lumens: f64,
+    /// Colour appearance or colour temperature.
+    pub colour: String,
+    /// Colour rendering group or index.
+    pub rendering: String,
+    /// Watts including ballast; 0 where blank.
+    pub watts: f64,
+}
