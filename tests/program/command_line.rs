@@ -94,7 +94,7 @@ fn malformed_photometry_is_placed_in_its_own_file() {
 }
 
 #[test]
-fn an_unknown_meter_set_luminaire_and_engine_are_answered_with_the_nearest_name() {
+fn unknown_meters_luminaires_and_engines_are_answered_with_the_nearest() {
     refused("direct_illuminance: {meters: plane}", "direct_illuminance: {meters: plain}", "spec.yaml:12:", "`plane`?");
     refused("luminaire: lamp", "luminaire: lmap", "spec.yaml:11:", "`lamp`?");
     let with_engine = spec() + "engines: {radianse: {}}\n";
@@ -102,7 +102,7 @@ fn an_unknown_meter_set_luminaire_and_engine_are_answered_with_the_nearest_name(
 }
 
 #[test]
-fn an_engine_that_was_asked_for_and_is_absent_is_exit_3_and_the_others_still_run() {
+fn an_absent_engine_that_was_asked_for_is_exit_3_and_the_others_run() {
     let room = room();
     let report = room.run(&["--engines", "radiance", "--engines-dir", "nowhere", "--format", "json"]).exits(3).json();
     let statuses: Vec<(&str, &str)> = report["engines"]

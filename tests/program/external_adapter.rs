@@ -27,7 +27,7 @@ fn of_adapter<'a>(report: &'a Value, list: &str, id: &str) -> Vec<&'a Value> {
 }
 
 #[test]
-fn the_example_adapter_is_at_most_sixty_lines_and_agrees_with_the_inverse_square_method() {
+fn the_example_adapter_of_sixty_lines_agrees_with_inverse_square() {
     assert!(adapter().lines().count() <= 60);
     let folder = folder(&adapter());
     let (report, code) = run(&folder);

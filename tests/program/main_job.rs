@@ -50,7 +50,7 @@ fn case_s1_is_read_right_by_every_engine() {
 }
 
 #[test]
-fn the_published_pendant_is_read_alike_by_every_engine_and_held_against_the_paper() {
+fn every_engine_reads_the_published_pendant_alike_and_beside_the_paper() {
     let (report, code) = run("reference/specs/cachet.yaml", ALL);
     assert_eq!(code, Some(0), "{}", report["summary"]);
     let engines = report["engines"].as_array().unwrap();

@@ -56,7 +56,7 @@ fn bench_reaches_the_exact_values_with_time_memory_and_error_on_record() {
 }
 
 #[test]
-fn a_law_or_an_engine_that_is_not_there_is_a_usage_error_with_the_nearest_name() {
+fn an_unknown_law_is_a_usage_error_with_the_nearest_name() {
     let args = ["stress", &axial(), "--laws", "mirrors"];
     Folder::new(&[]).luxproof(&args).exits(2).complains("did you mean `mirror`");
 }

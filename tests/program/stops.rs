@@ -78,7 +78,7 @@ fn a_filter_runs_the_cases_it_names_and_is_refused_if_it_names_none() {
 }
 
 #[test]
-fn an_interrupted_run_leaves_a_valid_report_of_what_was_done_and_of_what_was_not() {
+fn an_interrupted_run_reports_what_was_done_and_what_was_not() {
     let folder = folder();
     folder.write("hang", "");
     // One case at a time, so that it is certain which have begun.
