@@ -14,7 +14,7 @@ use luminaire::simulator::{Accuracy, Prepared, SimulatorError, Solution, Uncerta
 /// Converged indirect illuminance of S1's four meters: hp collocation of order 12, path tracing agrees.
 const S1_INDIRECT: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
 /// x, y, indirect illuminance and standard error at S2's 184 meters: 8 scrambles of up to 2^19 paths a meter.
-const S2_INDIRECT: &str = include_str!("s2_indirect.txt");
+const S2_INDIRECT: &str = include_str!("../reference/analytic/values/s2_indirect.txt");
 
 type Failure = Box<dyn std::error::Error>;
 

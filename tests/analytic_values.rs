@@ -236,7 +236,7 @@ fn the_simulator_keeps_the_mean_of_a_closed_room() {
 }
 
 #[test]
-fn the_simulator_keeps_the_mean_of_an_integrating_box_whatever_its_shape_and_the_place_of_the_light() {
+fn a_box_of_any_shape_keeps_its_mean_wherever_the_light_hangs() {
     // The meters of integrating-box.yaml, read from the file: 9 a set, six sets in the file's order.
     let text = std::fs::read_to_string(reference("analytic/integrating-box.yaml")).unwrap();
     let scene = scene(DVec3::new(6.0, 4.0, 3.0), 0.7, "isotropic.ies", DVec3::new(2.0, 1.5, 1.2));

@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-#[path = "../examples/cachet_audit.rs"]
+#[path = "../reference/cachet_audit.rs"]
 mod cachet_audit;
 
 #[test]

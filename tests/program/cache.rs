@@ -1,90 +1,40 @@
 //! The cache in whole runs: a repeated run starts no engine and says the same, and no kill at any instant costs or falsifies a reading.
 
-#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
-
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::PathBuf;
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-const SPEC: &str = "luxproof: 1
-room:
-  size_m: [6, 4, 3]
-  reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.7}
-luminaires:
-  - {id: lamp, photometry: lamp.ies, at_m: [3, 2, 2.5], rotate_deg: {azimuth: 30, tilt: 20}, flux_scale: 0.8}
-meters:
-  plane: {points_m: [[1, 1, 0.8], [3, 2, 0.8], [5, 3.5, 0.1]], normal: [0, 0, 1]}
-procedures:
-  luminous_intensity: {luminaire: lamp, distance_m: 5, angles: photometry}
-  direct_illuminance: {meters: plane}
-engines:
-  mine: {command: [python3, '-I', '-S', adapter.py]}
-";
+use crate::support::{Answer, Folder, SKEW_LAMP, SKEW_ROOM, adapter};
 
-/// Without any symmetry.
-const LAMP: &str = "IESNA:LM-63-2002
-TILT=NONE
-1 -1 1 4 5 1 2 0 0 0
-1 1 0
-0 60 90 180
-0 45 90 180 360
-100 80 10 5
-100 70 20 5
-100 40 30 5
-100 90 12 5
-100 80 10 5
-";
-
-struct Lab {
-    folder: tempfile::TempDir,
-}
+struct Lab(Folder);
 
 impl Lab {
     /// The example adapter, which first notes that it was started.
     fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples/inverse_square.py");
-        let counting = "open('starts', 'a').write('started\\n')\n";
-        let adapter = counting.to_owned() + &fs::read_to_string(example).unwrap();
-        for (name, text) in [("spec.yaml", SPEC), ("lamp.ies", LAMP), ("adapter.py", &adapter)] {
-            fs::write(folder.path().join(name), text).unwrap();
-        }
-        Self { folder }
+        let spec = SKEW_ROOM.to_owned() + "engines:\n  mine: {command: [python3, '-I', '-S', adapter.py]}\n";
+        let adapter = "open('starts', 'a').write('started\\n')\n".to_owned() + &adapter();
+        Self(Folder::new(&[("spec.yaml", &spec), ("lamp.ies", SKEW_LAMP), ("adapter.py", &adapter)]))
     }
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn luxproof(&self, args: &[&str]) -> Command {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_luxproof"));
-        program.args(args).current_dir(self.folder.path()).env("NO_COLOR", "1");
-        program.env("LUXPROOF_ENGINES", self.path("engines")).env("LUXPROOF_CACHE", self.path("cache"));
-        program
-    }
-
-    fn run(&self, out: &str, more: &[&str]) -> Output {
+    fn run(&self, out: &str, more: &[&str]) -> Answer {
         let args = ["run", "spec.yaml", "--out", out, "--format", "json"];
-        let output = self.luxproof(&[&args, more].concat()).output().unwrap();
-        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-        output
+        self.0.luxproof(&[&args, more].concat()).exits(0)
     }
 
     fn starts(&self) -> usize {
-        fs::read_to_string(self.path("starts")).map_or(0, |t| t.lines().count())
+        if self.0.path("starts").exists() { self.0.read("starts").lines().count() } else { 0 }
     }
 
     /// Every file of readings, byte by byte, and the report without the times that a run has of its own.
     fn said(&self, out: &str) -> (BTreeMap<String, Vec<u8>>, String) {
-        let folder = self.path(out).join("readings").read_dir().unwrap();
+        let folder = self.0.path(out).join("readings").read_dir().unwrap();
         let name = |f: &fs::DirEntry| f.file_name().into_string().unwrap();
         let files = folder.map(|f| f.unwrap()).map(|f| (name(&f), fs::read(f.path()).unwrap())).collect();
-        let text = fs::read_to_string(self.path(out).join("report.json")).unwrap();
-        let mut report: Value = serde_json::from_str(&text).unwrap();
+        let mut report = self.0.json(&format!("{out}/report.json"));
         let own = report.as_object_mut().unwrap();
         assert!(own.remove("started").is_some() && own.remove("wall_s").is_some());
         (files, serde_json::to_string_pretty(&report).unwrap())
@@ -92,10 +42,9 @@ impl Lab {
 
     /// The entries of the cache, each with its text; all of them sound.
     fn entries(&self) -> BTreeMap<PathBuf, String> {
-        let info = self.luxproof(&["cache", "info"]).output().unwrap();
-        let text = String::from_utf8(info.stdout).unwrap();
-        assert!(info.status.success() && !text.contains("damaged"), "{text}");
-        let folders = self.path("cache").read_dir().map_or(vec![], |d| d.map(|f| f.unwrap().path()).collect());
+        let info = self.0.luxproof(&["cache", "info"]).exits(0).stdout;
+        assert!(!info.contains("damaged"), "{info}");
+        let folders = self.0.path("cache").read_dir().map_or(vec![], |d| d.map(|f| f.unwrap().path()).collect());
         let files = folders.iter().flat_map(|f| f.read_dir().unwrap()).map(|f| f.unwrap().path());
         let entry = |f: &PathBuf| f.extension().is_some_and(|e| e == "json");
         files.filter(entry).map(|f| (f.clone(), fs::read_to_string(f).unwrap())).collect()
@@ -121,9 +70,8 @@ fn a_repeated_run_starts_no_engine_and_says_the_same_to_the_byte() {
     // Point, asymmetric, shadow and furnace of the calibration, and two procedures.
     let starts = lab.starts();
     assert!(starts >= 5, "{starts}");
-    let again = lab.run("second", &[]);
+    lab.run("second", &[]).complains("from the cache");
     assert_eq!(lab.starts(), starts, "the engine was started again");
-    assert!(String::from_utf8_lossy(&again.stderr).contains("from the cache"));
     assert!(lab.said("first") == lab.said("second"), "a repeated run says something else");
     // Without the cache it is started, a seed of its own is a reading of its own, and neither disturbs what is kept.
     lab.run("anew", &["--no-cache"]);
@@ -150,8 +98,7 @@ fn damaged_entries_are_named_and_read_anew() {
         }
     }
     let starts = lab.starts();
-    let again = lab.run("second", &[]);
-    let messages = String::from_utf8_lossy(&again.stderr).into_owned();
+    let messages = lab.run("second", &[]).stderr;
     assert_eq!(lab.starts(), starts + 2);
     assert_eq!(messages.matches("the reading is taken anew").count(), entries.len(), "{messages}");
     assert_eq!(values(&lab.said("first").0), values(&lab.said("second").0));
@@ -175,7 +122,7 @@ fn two_hundred_kills_at_random_instants_lose_and_falsify_nothing() {
         let seed = (round / 2).to_string();
         let begin = |out: &str| {
             let args = ["run", "spec.yaml", "--out", out, "--format", "json", "--seed", &seed];
-            let mut program = lab.luxproof(&args);
+            let mut program = lab.0.command(&args);
             program.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
         };
         let mut running = vec![begin("killed")];

@@ -1,96 +1,45 @@
 //! The command line as a user meets it: errors with their place before any engine starts, exit codes, views, schemas.
 
-#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
-
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
-const SPEC: &str = "luxproof: 1
-title: a test room
-room:
-  size_m: [6, 4, 3]
-  reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.7}
-luminaires:
-  - {id: lamp, photometry: lamp.ies, at_m: [3, 2, 2.5]}
-meters:
-  plane: {points_m: [[1, 1, 0.8], [3, 2, 0.8]], normal: [0, 0, 1]}
-procedures:
+use serde_json::Value;
+
+use crate::support::{Answer, Folder, LAMP, OWN, ROOM, TWO_METERS, root};
+
+fn spec() -> String {
+    let procedures = "procedures:
   luminous_intensity: {luminaire: lamp, distance_m: 5, angles: photometry}
   direct_illuminance: {meters: plane}
   indirect_illuminance: {meters: plane}
 ";
-
-const LAMP: &str = "IESNA:LM-63-2002
-[TEST] made for this test
-TILT=NONE
-1 -1 1 3 1 1 2 0 0 0
-1 1 0
-0 60 90
-0
-100 80 0
-";
-
-struct Room {
-    folder: tempfile::TempDir,
+    [ROOM, TWO_METERS, procedures].concat()
 }
 
-impl Room {
-    fn new(spec: &str, lamp: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("spec.yaml"), spec).unwrap();
-        fs::write(folder.path().join("lamp.ies"), lamp).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self) -> &Path {
-        self.folder.path()
-    }
-
-    fn luxproof(&self, args: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_luxproof"))
-            .args(args)
-            .current_dir(self.path())
-            .env("NO_COLOR", "1")
-            .env("LUXPROOF_CACHE", self.path().join("cache"))
-            .env_remove("RUST_BACKTRACE")
-            .output()
-            .unwrap()
-    }
-
-    fn own_run(&self) -> Output {
-        self.luxproof(&["run", "spec.yaml", "--engines", "simulator,iesna", "--out", "out", "--format", "json"])
-    }
+fn room() -> Folder {
+    Folder::new(&[("spec.yaml", &spec()), ("lamp.ies", LAMP)])
 }
 
-fn reference(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference").join(path)
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).unwrap()
+fn own_run(room: &Folder) -> Answer {
+    room.run(&["--engines", OWN, "--format", "json"])
 }
 
 /// The spec with one replacement must be refused with exit 2, name the place and leave no run behind.
 #[track_caller]
 fn refused(from: &str, to: &str, place: &str, says: &str) {
-    let spec = SPEC.replace(from, to);
-    assert_ne!(spec, SPEC, "the replacement must change the spec");
-    refused_files(&spec, LAMP, place, says);
+    assert!(spec().contains(from), "the replacement must change the spec");
+    refused_files(&spec().replace(from, to), LAMP, place, says);
 }
 
 #[track_caller]
 fn refused_files(spec: &str, lamp: &str, place: &str, says: &str) {
-    let room = Room::new(spec, lamp);
-    let output = room.own_run();
+    let room = Folder::new(&[("spec.yaml", spec), ("lamp.ies", lamp)]);
+    let output = own_run(&room).exits(2);
     // Line breaks of the drawn message carry no meaning.
-    let words: Vec<&str> =
-        std::str::from_utf8(&output.stderr).unwrap().split_whitespace().filter(|w| *w != "│").collect();
+    let words: Vec<&str> = output.stderr.split_whitespace().filter(|w| *w != "│").collect();
     let error = words.join(" ");
-    assert_eq!(output.status.code(), Some(2), "{error}");
     assert!(error.contains(place), "no place `{place}` in: {error}");
     assert!(error.contains(says), "no `{says}` in: {error}");
-    assert!(!room.path().join("out").exists(), "a run was begun");
+    assert!(!room.path("out").exists(), "a run was begun");
 }
 
 #[test]
@@ -141,25 +90,21 @@ fn a_missing_photometric_file_is_named() {
 
 #[test]
 fn malformed_photometry_is_placed_in_its_own_file() {
-    refused_files(SPEC, &LAMP.replace("100 80 0", "100 eighty 0"), "lamp.ies:8:5", "eighty");
+    refused_files(&spec(), &LAMP.replace("100 80 0", "100 eighty 0"), "lamp.ies:8:5", "eighty");
 }
 
 #[test]
-fn an_unknown_meter_set_luminaire_and_engine_are_answered_with_the_nearest_name() {
+fn unknown_meters_luminaires_and_engines_are_answered_with_the_nearest() {
     refused("direct_illuminance: {meters: plane}", "direct_illuminance: {meters: plain}", "spec.yaml:12:", "`plane`?");
     refused("luminaire: lamp", "luminaire: lmap", "spec.yaml:11:", "`lamp`?");
-    let with_engine = format!("{SPEC}engines: {{radianse: {{}}}}\n");
+    let with_engine = spec() + "engines: {radianse: {}}\n";
     refused_files(&with_engine, LAMP, "spec.yaml:14:", "did you mean `radiance`?");
 }
 
 #[test]
-fn an_engine_that_was_asked_for_and_is_absent_is_exit_3_and_the_others_still_run() {
-    let room = Room::new(SPEC, LAMP);
-    let args =
-        ["run", "spec.yaml", "--engines", "radiance", "--out", "out", "--engines-dir", "nowhere", "--format", "json"];
-    let output = room.luxproof(&args);
-    assert_eq!(output.status.code(), Some(3), "{}", String::from_utf8_lossy(&output.stderr));
-    let report: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+fn an_absent_engine_that_was_asked_for_is_exit_3_and_the_others_run() {
+    let room = room();
+    let report = room.run(&["--engines", "radiance", "--engines-dir", "nowhere", "--format", "json"]).exits(3).json();
     let statuses: Vec<(&str, &str)> = report["engines"]
         .as_array()
         .unwrap()
@@ -171,13 +116,11 @@ fn an_engine_that_was_asked_for_and_is_absent_is_exit_3_and_the_others_still_run
 
 #[test]
 fn nothing_vanishes_runs_and_skips_add_up_to_procedures_times_engines() {
-    let room = Room::new(SPEC, LAMP);
-    let args = ["run", "spec.yaml", "--out", "out", "--engines-dir", "nowhere", "--format", "json"];
-    let output = room.luxproof(&args);
-    let report: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let room = room();
+    let report = room.run(&["--engines-dir", "nowhere", "--format", "json"]).json();
     let count = |key: &str| report[key].as_array().unwrap().len();
     // Meters and light paths that are left out have readings that follow from others.
-    let whole = |s: &&serde_json::Value| s["scope"] == "engine" || s["scope"] == "procedure";
+    let whole = |s: &&Value| s["scope"] == "engine" || s["scope"] == "procedure";
     let skipped = report["skips"].as_array().unwrap().iter().filter(whole).count();
     assert_eq!(count("recordings") + skipped, 3 * count("engines"));
     assert_eq!(report["summary"]["skipped"], skipped);
@@ -186,53 +129,44 @@ fn nothing_vanishes_runs_and_skips_add_up_to_procedures_times_engines() {
 
 #[test]
 fn our_own_witnesses_agree_and_every_view_of_the_run_says_so() {
-    let room = Room::new(SPEC, LAMP);
-    let output = room.own_run();
-    assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
-    let printed: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
-    let kept = fs::read_to_string(room.path().join("out/report.json")).unwrap();
-    assert_eq!(printed, serde_json::from_str::<serde_json::Value>(&kept).unwrap());
-    assert!(room.path().join("out/readings/simulator.json").exists());
+    let room = room();
+    let printed = own_run(&room).exits(0).json();
+    assert_eq!(printed, room.report());
+    assert!(room.path("out/readings/simulator.json").exists());
     for (format, says) in
         [("terminal", "luminous_intensity"), ("markdown", "| direct_illuminance |"), ("junit", "<testsuite ")]
     {
-        let view = room.luxproof(&["report", "out/report.json", "--format", format]);
-        assert_eq!(view.status.code(), Some(0));
-        assert!(stdout(&view).contains(says), "{format}: {}", stdout(&view));
+        room.luxproof(&["report", "out/report.json", "--format", format]).exits(0).prints(says);
     }
 }
 
 #[test]
 fn check_prints_the_plan_and_starts_nothing() {
-    let room = Room::new(SPEC, LAMP);
-    let output = room.luxproof(&["check", "spec.yaml"]);
-    assert_eq!(output.status.code(), Some(0));
-    assert!(stdout(&output).contains("direct_illuminance at 2 meters"), "{}", stdout(&output));
-    assert!(!room.path().join("luxproof-out").exists());
+    let room = room();
+    room.luxproof(&["check", "spec.yaml"]).exits(0).prints("direct_illuminance at 2 meters");
+    assert!(!room.path("luxproof-out").exists());
 }
 
 #[test]
 fn the_schema_knows_every_key_of_the_reference_specs() {
-    let room = Room::new(SPEC, LAMP);
-    let output = room.luxproof(&["schema", "spec"]);
-    let schema: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let room = room();
+    let schema = room.luxproof(&["schema", "spec"]).json();
     let properties = schema["properties"].as_object().unwrap();
     for name in ["cachet", "axial"] {
-        let text = fs::read_to_string(reference(&format!("specs/{name}.yaml"))).unwrap();
+        let text = fs::read_to_string(root().join(format!("reference/specs/{name}.yaml"))).unwrap();
         for key in text.lines().filter_map(|l| l.split_once(':')).map(|(k, _)| k) {
             if key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
                 assert!(properties.contains_key(key), "{name}: {key}");
             }
         }
     }
-    let report = room.luxproof(&["schema", "report"]);
-    assert!(stdout(&report).contains("relative_deviation"));
+    room.luxproof(&["schema", "report"]).prints("relative_deviation");
 }
 
 #[test]
 fn a_usage_error_is_exit_2() {
-    let room = Room::new(SPEC, LAMP);
-    assert_eq!(room.luxproof(&["run"]).status.code(), Some(2));
-    assert_eq!(room.luxproof(&["run", "no-such-spec.yaml"]).status.code(), Some(2));
-    assert_eq!(room.luxproof(&["run", "spec.yaml", "--engines", "blender"]).status.code(), Some(2));
+    let room = room();
+    room.luxproof(&["run"]).exits(2);
+    room.luxproof(&["run", "no-such-spec.yaml"]).exits(2);
+    room.luxproof(&["run", "spec.yaml", "--engines", "blender"]).exits(2);
 }

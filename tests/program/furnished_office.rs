@@ -1,13 +1,12 @@
 //! Case S2, a furnished office under luminous panels, on all three renderers against exact values.
 
-#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
-
-use std::path::Path;
 use std::time::Duration;
 
 use luxproof::engines::{Estimate, Site, Support, Workbench};
 use luxproof::plan::{Selection, plan};
 use luxproof::spec::{Budget, Case};
+
+use crate::support::{Folder, root};
 
 /// By clipped polygons.
 const DIRECT_LX: [f64; 6] = [66.24407, 226.03927, 161.02976, 123.15923, 210.12365, 0.0];
@@ -17,8 +16,7 @@ const INDIRECT_LX: [f64; 6] = [51.0232, 53.0644, 48.966, 53.512, 50.245, 18.788]
 /// What an engine reads of a procedure of case S2, and what it says beforehand of its own error, relative.
 fn read(engine: &str, procedure: &str, budget: Budget, settings: &[(&str, u32)]) -> (Vec<Estimate>, f64) {
     let site = Site::of_user().unwrap();
-    let spec = Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/analytic/s2.yaml");
-    let case = Case { budget, ..Case::load(&spec).unwrap() };
+    let case = Case { budget, ..Case::load(&root().join("reference/analytic/s2.yaml")).unwrap() };
     let selection = Selection { engines: vec![engine.into()], procedures: vec![procedure.into()], seed: 1 };
     let plan = plan(&case, &selection, &site).unwrap();
     let mine = plan.runs.iter().find(|r| plan.engines[r.engine].engine.id().name() == engine);
@@ -31,8 +29,8 @@ fn read(engine: &str, procedure: &str, budget: Budget, settings: &[(&str, u32)])
         Support::Yes => 0.0,
         Support::No(why) => panic!("{why}"),
     };
-    let folder = tempfile::tempdir().unwrap();
-    let (scene_dir, log) = (folder.path().to_owned(), folder.path().join("log"));
+    let folder = Folder::for_renderers(&[]);
+    let (scene_dir, log) = (folder.path(""), folder.path("log"));
     let bench = Workbench {
         site,
         scene_dir,
@@ -72,7 +70,7 @@ fn mitsuba_reads_the_furnished_office() {
 }
 
 #[test]
-fn radiance_reads_the_furnished_office_but_for_the_light_that_panels_swallow() {
+fn radiance_reads_the_furnished_office_but_for_what_panels_swallow() {
     direct_light_within_1_percent("radiance");
     reflected_light_within_2_percent("radiance", BUDGET, &[]);
 }

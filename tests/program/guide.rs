@@ -4,12 +4,11 @@
 //! commands run in one folder that looks like the root of a checkout. Two things differ from what a reader does: `cargo install`
 //! builds what `cargo test` has built already, and `ci/nightly` is told of that program by LUXPROOF.
 
-#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
-
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
-use std::path::{Path, PathBuf};
 use std::process::Command;
+
+use crate::support::{Answer, Folder, root};
 
 const PAGES: [&str; 6] =
     ["first-audit", "writing-a-spec", "reading-a-report", "adding-an-engine", "nightly", "methods"];
@@ -19,10 +18,6 @@ const PAGES: [&str; 6] =
 enum Step {
     Run(String),
     Write(String, String),
-}
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
 }
 
 /// The steps of a page.
@@ -51,11 +46,12 @@ fn steps_are_the_commands_and_files_of_a_page() {
 }
 
 /// A folder like the root of a checkout, with `luxproof` and `cargo` on its own path.
-fn checkout(folder: &Path) {
+fn checkout() -> Folder {
+    let folder = Folder::for_renderers(&[]);
     for name in ["reference", "ci", "docs", "harness", "Cargo.toml", "README.md"] {
-        symlink(root().join(name), folder.join(name)).unwrap();
+        symlink(root().join(name), folder.path(name)).unwrap();
     }
-    let bin = folder.join("bin");
+    let bin = folder.path("bin");
     fs::create_dir(&bin).unwrap();
     symlink(env!("CARGO_BIN_EXE_luxproof"), bin.join("luxproof")).unwrap();
     let cargo = format!(
@@ -65,36 +61,26 @@ fn checkout(folder: &Path) {
     );
     fs::write(bin.join("cargo"), cargo).unwrap();
     fs::set_permissions(bin.join("cargo"), fs::Permissions::from_mode(0o755)).unwrap();
+    folder
 }
 
 #[test]
 fn every_command_of_the_guide_runs() {
-    let folder = tempfile::tempdir().unwrap();
-    checkout(folder.path());
-    fs::create_dir(folder.path().join("luxproof-out")).unwrap();
-    let path = format!("{}:{}", folder.path().join("bin").display(), std::env::var("PATH").unwrap());
+    let folder = checkout();
+    fs::create_dir(folder.path("luxproof-out")).unwrap();
+    let path = format!("{}:{}", folder.path("bin").display(), std::env::var("PATH").unwrap());
     let mut count = 0;
     for name in PAGES {
         let page = fs::read_to_string(root().join(format!("docs/{name}.md"))).unwrap();
         for step in steps(&page) {
             match step {
-                Step::Write(file, text) => fs::write(folder.path().join(file), text).unwrap(),
+                Step::Write(file, text) => folder.write(&file, &text),
                 Step::Run(command) => {
-                    let output = Command::new("sh")
-                        .args(["-c", &command])
-                        .current_dir(folder.path())
-                        .env("PATH", &path)
-                        .env("LUXPROOF", env!("CARGO_BIN_EXE_luxproof"))
-                        .env("LUXPROOF_CACHE", folder.path().join("cache"))
-                        .output()
-                        .unwrap();
-                    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-                    let (out, messages) = (text(&output.stdout), text(&output.stderr));
-                    assert!(
-                        output.status.success(),
-                        "docs/{name}.md: `{command}`: {}\n{out}\n{messages}",
-                        output.status
-                    );
+                    let mut shell = Command::new("sh");
+                    shell.args(["-c", &command]).current_dir(folder.path("")).env("PATH", &path);
+                    shell.env("LUXPROOF", env!("CARGO_BIN_EXE_luxproof")).env("LUXPROOF_CACHE", folder.path("cache"));
+                    let Answer { code, stdout, stderr } = Answer::of(&mut shell);
+                    assert_eq!(code, Some(0), "docs/{name}.md: `{command}`\n{stdout}\n{stderr}");
                     count += 1;
                 }
             }
@@ -103,10 +89,10 @@ fn every_command_of_the_guide_runs() {
     assert!(count >= 20, "only {count} commands were found");
     // What the pages say is there, is there.
     for file in ["cie-5.2/report.html", "cie-5.3/junit.xml", "spec.schema.json", "try/site/index.html"] {
-        let length = fs::metadata(folder.path().join("luxproof-out").join(file)).map(|m| m.len());
+        let length = fs::metadata(folder.path("luxproof-out").join(file)).map(|m| m.len());
         assert!(length.is_ok_and(|l| l > 100), "{file}");
     }
-    let history = fs::read_to_string(folder.path().join("luxproof-out/try/history.jsonl")).unwrap();
+    let history = folder.read("luxproof-out/try/history.jsonl");
     assert!(history.contains("\"night\":\"2026-01-31\"") && history.contains("\"night\":\"2026-02-01\""));
 }
 

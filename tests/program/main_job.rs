@@ -1,49 +1,20 @@
 //! The main job on real renderers: the published pendant and case S1 on all five engines, against values known independently.
 
-#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
-
-use std::path::Path;
-use std::process::Command;
-use std::sync::{Mutex, PoisonError};
-
 use serde_json::Value;
 
-const ENGINES: [&str; 5] = ["simulator", "iesna", "mitsuba", "povray", "radiance"];
+use crate::support::{ENGINES, S1_DIRECT_LX, S1_INDIRECT_LX, among, run_reference};
 
 const ALL: &str = "luminous_intensity,direct_illuminance,indirect_illuminance,total_illuminance";
 
-/// Case S1, converged by two independent methods: direct at `ceiling`, indirect at `workplane`, in lux.
-const S1_DIRECT: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
-const S1_INDIRECT: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
-
-/// One run at a time: renderers keep their budgets by the clock, and two runs would halve each other's.
-static TURN: Mutex<()> = Mutex::new(());
-
 fn run(spec: &str, procedures: &str) -> (Value, Option<i32>) {
-    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let out = tempfile::tempdir().unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_luxproof"))
-        .args(["run", spec, "--engines", &ENGINES.join(","), "--procedures", procedures])
-        .args(["--no-cache", "--format", "json", "--out"])
-        .arg(out.path())
-        .current_dir(root)
-        .output()
-        .unwrap();
-    let messages = String::from_utf8_lossy(&output.stderr);
-    let report = serde_json::from_slice(&output.stdout);
-    (
-        report.unwrap_or_else(|e| panic!("no report ({e}); run `luxproof engines install`? {messages}")),
-        output.status.code(),
-    )
+    run_reference(&[spec, "--engines", &ENGINES.join(","), "--procedures", procedures])
 }
 
 fn readings<'a>(report: &'a Value, procedure: &str, engine: &str) -> Vec<&'a Value> {
-    let all = report["readings"].as_array().unwrap();
     // Of the pendant's cases, the point luminaire in the paper's seven reflections: the one that every engine knows.
     let in_case = |r: &Value| r["case"] == "axial" || r["case"] == "cachet/point-seven";
-    let found: Vec<&Value> =
-        all.iter().filter(|r| in_case(r) && r["procedure"] == procedure && r["engine"] == engine).collect();
+    let mut found = among(report, "readings", &[("procedure", procedure), ("engine", engine)]);
+    found.retain(|r| in_case(r));
     assert!(!found.is_empty(), "{engine} gave no reading of {procedure}: {}", report["engines"]);
     found
 }
@@ -65,10 +36,10 @@ fn case_s1_is_read_right_by_every_engine() {
     for (engine, tolerance) in
         [("simulator", 1e-9), ("iesna", 1e-9), ("radiance", 1e-6), ("povray", 1e-5), ("mitsuba", 1e-5)]
     {
-        agree(&report, "direct_illuminance", engine, &S1_DIRECT, tolerance);
+        agree(&report, "direct_illuminance", engine, &S1_DIRECT_LX, tolerance);
     }
     for (engine, tolerance) in [("simulator", 1e-4), ("radiance", 2e-3), ("mitsuba", 2e-3), ("povray", 6e-3)] {
-        agree(&report, "indirect_illuminance", engine, &S1_INDIRECT, tolerance);
+        agree(&report, "indirect_illuminance", engine, &S1_INDIRECT_LX, tolerance);
     }
     for engine in ["radiance", "mitsuba", "povray"] {
         for reading in readings(&report, "indirect_illuminance", engine) {
@@ -79,7 +50,7 @@ fn case_s1_is_read_right_by_every_engine() {
 }
 
 #[test]
-fn the_published_pendant_is_read_alike_by_every_engine_and_held_against_the_paper() {
+fn every_engine_reads_the_published_pendant_alike_and_beside_the_paper() {
     let (report, code) = run("reference/specs/cachet.yaml", ALL);
     assert_eq!(code, Some(0), "{}", report["summary"]);
     let engines = report["engines"].as_array().unwrap();

@@ -1,36 +1,16 @@
 //! A body from a Wavefront file in a whole run: it reads what the same body reads as a `box:`, by other solvers.
 
-#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
-
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
-use std::process::Command;
 
-use serde_json::Value;
+use crate::support::{Folder, LAMP, ROOM, among};
 
-const SPEC: &str = "luxproof: 1
-room:
-  size_m: [6, 4, 3]
-  reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.7}
-obstacles: [BODY]
-luminaires:
-  - {id: lamp, photometry: lamp.ies, at_m: [3, 2, 2.5]}
-meters:
+/// After the room and its obstacles.
+const MEASURED: &str = "meters:
   desk: {points_m: [[1, 1, 0.8], [4.2, 2, 0.1], [5, 2, 0.5]], normal: [0, 0, 1]}
 procedures:
   direct_illuminance: {meters: desk}
   indirect_illuminance: {meters: desk, bounces: converged}
 budget: {relative_error: 0.05, seconds: 30}
-";
-
-const LAMP: &str = "IESNA:LM-63-2002
-TILT=NONE
-1 -1 1 3 1 1 2 0 0 0
-1 1 0
-0 60 90
-0
-100 80 0
 ";
 
 /// Four-sided faces and half metres, as drawing programs write them; one face counts its corners from the end.
@@ -62,18 +42,12 @@ struct Reading {
     estimated: bool,
 }
 
-/// What the simulator reads, by procedure and meter.
-fn read(folder: &Path, name: &str, body: &str) -> BTreeMap<String, Reading> {
-    let spec = format!("{name}.yaml");
-    fs::write(folder.join(&spec), SPEC.replace("BODY", body)).unwrap();
-    let mut program = Command::new(env!("CARGO_BIN_EXE_luxproof"));
-    program.args(["run", &spec, "--engines", "simulator", "--out", name]).current_dir(folder).env("NO_COLOR", "1");
-    program.env("LUXPROOF_ENGINES", folder.join("engines")).env("LUXPROOF_CACHE", folder.join("cache"));
-    let output = program.output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let report = fs::read_to_string(folder.join(name).join("report.json")).unwrap();
-    let report: Value = serde_json::from_str(&report).unwrap();
-    let readings = report["readings"].as_array().unwrap().iter().filter(|r| r["engine"] == "simulator");
+/// What the simulator reads with such an obstacle, by procedure and meter.
+fn read(folder: &Folder, obstacle: &str) -> BTreeMap<String, Reading> {
+    folder.write("spec.yaml", &format!("{ROOM}obstacles: [{obstacle}]\n{MEASURED}"));
+    folder.run(&["--engines", "simulator"]).exits(0);
+    let report = folder.report();
+    let readings = among(&report, "readings", &[("engine", "simulator")]).into_iter();
     let named = readings.map(|r| {
         let error = r["std_error"].as_f64();
         let within_lux = error.map_or_else(|| r["error_bound"].as_f64().unwrap(), |e| STUDENT_T * e);
@@ -85,13 +59,10 @@ fn read(folder: &Path, name: &str, body: &str) -> BTreeMap<String, Reading> {
 
 #[test]
 fn a_crate_from_a_file_reads_what_the_same_box_reads() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("lamp.ies"), LAMP).unwrap();
-    fs::write(folder.path().join("crate.obj"), CRATE).unwrap();
-    let mesh = read(folder.path(), "mesh", "{mesh: {file: crate.obj, at_m: [3.5, 1.5, 0.4], reflectance: 0.6}}");
-    let cuboid =
-        read(folder.path(), "cuboid", "{box: {min_m: [3.5, 1.5, 0.4], max_m: [4.5, 2.5, 0.9], reflectance: 0.6}}");
-    let empty = read(folder.path(), "empty", "");
+    let folder = Folder::new(&[("lamp.ies", LAMP), ("crate.obj", CRATE)]);
+    let mesh = read(&folder, "{mesh: {file: crate.obj, at_m: [3.5, 1.5, 0.4], reflectance: 0.6}}");
+    let cuboid = read(&folder, "{box: {min_m: [3.5, 1.5, 0.4], max_m: [4.5, 2.5, 0.9], reflectance: 0.6}}");
+    let empty = read(&folder, "");
     assert_eq!((mesh.len(), cuboid.len(), empty.len()), (6, 6, 6));
     for (name, at) in &mesh {
         let exact = &cuboid[name];

@@ -1,8 +1,5 @@
 //! Negative controls: a deliberately wrong export, run on the real renderer, must fail its procedure.
 
-#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
-
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,6 +11,8 @@ use luxproof::plan::{Selection, plan};
 use luxproof::record::Recording;
 use luxproof::spec::Case;
 
+use crate::support::{Folder, root};
+
 struct Silent;
 
 impl Progress for Silent {
@@ -22,7 +21,7 @@ impl Progress for Silent {
 }
 
 fn cachet() -> Case {
-    Case::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/specs/cachet.yaml")).unwrap()
+    Case::load(&root().join("reference/specs/cachet.yaml")).unwrap()
 }
 
 fn selection(engine: &str) -> Selection {
@@ -32,9 +31,9 @@ fn selection(engine: &str) -> Selection {
 
 fn recordings(case: &Case, engine: &str) -> Vec<Recording> {
     let site = Site::of_user().unwrap();
-    let out = tempfile::tempdir().unwrap();
+    let out = Folder::for_renderers(&[]);
     let plan = plan(case, &selection(engine), &site).unwrap();
-    let options = Options { site, out: out.path().to_owned(), machine: Machine::new(2), cache: None };
+    let options = Options { site, out: out.path(""), machine: Machine::new(2), cache: None };
     let outcome = run(case, &plan, &options, &Silent).unwrap();
     let mine: Vec<Recording> = outcome.recordings.into_iter().filter(|r| r.key.engine == engine).collect();
     assert!(!mine.is_empty(), "{engine} did not run; run `luxproof engines install`");

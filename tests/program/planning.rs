@@ -1,32 +1,23 @@
 //! Planning in whole runs: what follows from other readings is not rendered, is said, is checked, and any number of jobs says the same.
 
-#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
-
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use serde_json::Value;
 
-/// A symmetric room, its uplit twin, the same at half the light, and a copy under another name.
-const SPEC: &str = "luxproof: 1
-room:
-  size_m: [6, 4, 3]
-  reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.7}
-luminaires:
-  - {id: lamp, photometry: lamp.ies, at_m: [3, 2, 2.5]}
-meters:
+use crate::support::{Folder, MINE, ROOM, adapter, among};
+
+/// A symmetric room, the same at half the light, and its uplit twin.
+const MEASURED: &str = "meters:
   plane: {grid: {origin_m: [0.5, 0.5, 0.8], u_m: [1, 0, 0], v_m: [0, 1, 0], counts: [6, 4]}, normal: [0, 0, 1]}
 procedures:
   direct_illuminance: {meters: plane}
-engines:
-  mine: {command: [python3, adapter.py]}
 cases:
   - {name: whole}
   - {name: dimmed, luminaires: {lamp: {flux_scale: 0.5}}}
   - {name: above, luminaires: {lamp: {at_m: [3, 2, 0.4]}}}
 ";
 
+/// Symmetric in both axes.
 const LAMP: &str = "IESNA:LM-63-2002
 TILT=NONE
 1 -1 1 4 3 1 2 0 0 0
@@ -38,49 +29,29 @@ TILT=NONE
 100 40 30 0
 ";
 
-struct Lab {
-    folder: tempfile::TempDir,
-}
+struct Lab(Folder);
 
 impl Lab {
     /// The example adapter with a replacement; it notes how many meters it was asked for.
     fn new(from: &str, to: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples/inverse_square.py");
-        let example = fs::read_to_string(example).unwrap();
+        let example = adapter();
         let noting = "    open('asked', 'a').write(f\"{job['case']} {len(job['meters'])}\\n\")\n    readings = []\n";
-        let adapter = example.replace("    readings = []\n", noting);
-        assert_ne!(adapter, example);
-        let changed = adapter.replace(from, to);
-        assert!(from.is_empty() || changed != adapter);
-        for (name, text) in [("spec.yaml", SPEC), ("lamp.ies", LAMP), ("adapter.py", &changed)] {
-            fs::write(folder.path().join(name), text).unwrap();
-        }
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn luxproof(&self, args: &[&str]) -> Output {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_luxproof"));
-        program.args(args).current_dir(self.folder.path()).env("NO_COLOR", "1");
-        program.env("LUXPROOF_ENGINES", self.path("engines")).env("LUXPROOF_CACHE", self.path("cache"));
-        program.output().unwrap()
+        let noting = example.replace("    readings = []\n", noting);
+        assert_ne!(noting, example);
+        let changed = noting.replace(from, to);
+        assert!(from.is_empty() || changed != noting);
+        let spec = [ROOM, MEASURED, MINE].concat();
+        Self(Folder::new(&[("spec.yaml", &spec), ("lamp.ies", LAMP), ("adapter.py", &changed)]))
     }
 
     fn run(&self, more: &[&str]) -> (Value, Option<i32>) {
-        let args = ["run", "spec.yaml", "--out", "out", "--format", "json", "--no-cache"];
-        let output = self.luxproof(&[&args, more].concat());
-        let report = serde_json::from_slice(&output.stdout);
-        (report.unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(&output.stderr))), output.status.code())
+        self.0.run(&[&["--format", "json", "--no-cache"], more].concat()).report()
     }
 
     /// The meters that the adapter was asked for in the spec's cases, since the last time.
     fn asked(&self) -> usize {
-        let text = fs::read_to_string(self.path("asked")).unwrap_or_default();
-        fs::remove_file(self.path("asked")).ok();
+        let text = fs::read_to_string(self.0.path("asked")).unwrap_or_default();
+        fs::remove_file(self.0.path("asked")).ok();
         let of_spec = text.lines().filter(|l| l.starts_with("spec/"));
         of_spec.map(|l| l.split(' ').nth(1).unwrap().parse::<usize>().unwrap()).sum()
     }
@@ -113,23 +84,19 @@ fn what_follows_is_not_rendered_and_reads_and_is_judged_the_same() {
     for ((name, a), (same, b)) in values(&whole).into_iter().zip(values(&planned)) {
         assert!(name == same && (a - b).abs() <= 1e-12 * a.abs(), "{name}: {a} and {b}");
     }
-    let skips = planned["skips"].as_array().unwrap();
     let says = |case: &str, engine: &str, what: &str| {
-        let is =
-            |s: &&Value| s["case"] == case && s["engine"] == engine && s["reason"].as_str().unwrap().contains(what);
-        let found = skips.iter().find(is).unwrap_or_else(|| panic!("{case}: no `{what}` in {skips:?}"));
+        let skips = among(&planned, "skips", &[("case", case), ("engine", engine)]);
+        let found = skips.iter().find(|s| s["reason"].as_str().unwrap().contains(what));
+        let found = found.unwrap_or_else(|| panic!("{case}: no `{what}` in {skips:?}"));
         assert!(found["saved"].as_str().unwrap().contains('%'), "{found}");
     };
     says("spec/whole", "mine", "18 of 24 meters mirror others");
     says("spec/dimmed", "simulator", "rescaled by 0.5");
     says("spec/above", "mine", "no luminaire sends light straight to 24 of 24 meters");
     assert!(whole["skips"].as_array().unwrap().is_empty());
-    let recording = planned["recordings"].as_array().unwrap().iter().find(|r| r["engine"] == "mine").unwrap();
-    assert!(
-        recording["settings"]["mirrored_meters"].as_str().unwrap().contains("plane[23] is plane[0] (x -> -x, y -> -y)")
-    );
-    let check = lab.luxproof(&["check", "spec.yaml"]);
-    assert!(String::from_utf8_lossy(&check.stdout).contains("18 of 24 meters mirror others"));
+    let mirrored = &among(&planned, "recordings", &[("engine", "mine")])[0]["settings"]["mirrored_meters"];
+    assert!(mirrored.as_str().unwrap().contains("plane[23] is plane[0] (x -> -x, y -> -y)"), "{mirrored}");
+    lab.0.luxproof(&["check", "spec.yaml"]).prints("18 of 24 meters mirror others");
 }
 
 #[test]
@@ -142,7 +109,7 @@ fn a_wrong_claim_of_symmetry_is_caught_by_the_spot_check() {
     let mut caught = 0;
     for seed in 1..=8 {
         let (report, code) = lab.run(&["--filter", "whole", "--seed", &seed.to_string()]);
-        let engine = report["engines"].as_array().unwrap().iter().find(|e| e["id"] == "mine").unwrap();
+        let engine = among(&report, "engines", &[("id", "mine")])[0];
         if code == Some(3) {
             caught += 1;
             assert!(engine["reason"].as_str().unwrap().contains("spot check: plane["), "{engine}");

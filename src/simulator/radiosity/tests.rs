@@ -237,10 +237,12 @@ fn more_bodies_than_can_be_meshed_go_to_another_solver() {
     assert!(found.solver.contains("path tracing"), "{}", found.solver);
 }
 
-/// Against path tracing at 184 meters, kept with the benchmark: x, y, lux, standard error.
+/// Against path tracing at 184 meters, which `cargo bench --bench simulator` reads too: x, y, lux, standard error.
 #[test]
 fn bounds_hold_at_every_meter_of_s2() {
-    let lines = include_str!("../../../benches/s2_indirect.txt").lines().filter(|line| !line.starts_with('#'));
+    let lines = include_str!("../../../reference/analytic/values/s2_indirect.txt")
+        .lines()
+        .filter(|line| !line.starts_with('#'));
     let truth: Vec<Vec<f64>> = lines.map(|line| line.split(' ').map(|n| n.parse().unwrap()).collect()).collect();
     assert_eq!(truth.len(), 184);
     let meters: Vec<Meter> = truth.iter().map(|v| up(v[0], v[1], 0.8)).collect();

@@ -1,6 +1,6 @@
 """Twenty seeded repetitions of case S1's reflected light on every renderer: are its standard errors honest, what is its bias?
 
-    python3 benchmarks/repetitions.py [--luxproof PATH] [--repetitions 20] [--seconds 30] [--relative-error 0.003] [ENGINE ...]
+    python3 ci/benchmarks/repetitions.py [--luxproof PATH] [--repetitions 20] [--seconds 30] [--relative-error 0.003] [ENGINE ...]
 
 A repetition is one run of the audit preset with a seed of its own. At each of the four points of the work plane it is within
 three of its standard errors of the exact value, or not; the mean over the repetitions shows a bias that no single one
@@ -14,7 +14,7 @@ import statistics
 import subprocess
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXACT_LX = [0.94314714, 1.15551735, 1.15551735, 1.42062868]  # reference/analytic/values/s1.yaml
 
 

@@ -1,0 +1,19 @@
+//! The whole program as its users meet it: one binary, one file a topic. tests/README.md says how to run part of it.
+
+#![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
+
+mod baselines;
+mod by_hand;
+mod cache;
+mod command_line;
+mod external_adapter;
+mod furnished_office;
+mod guide;
+mod main_job;
+mod measuring;
+mod mesh_files;
+mod negative_controls;
+mod planning;
+mod stops;
+mod suite;
+mod support;
