@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use luxproof::engines::{Estimate, Site, Support, Workbench};
+use luxproof::engines::{Site, Support, Workbench};
 use luxproof::plan::{Selection, plan};
+use luxproof::record::{Estimate, ProcedureId};
 use luxproof::spec::{Budget, Case};
 
 use crate::support::{Folder, root};
@@ -14,12 +15,12 @@ const DIRECT_LX: [f64; 6] = [66.24407, 226.03927, 161.02976, 123.15923, 210.1236
 const INDIRECT_LX: [f64; 6] = [51.0232, 53.0644, 48.966, 53.512, 50.245, 18.788];
 
 /// What an engine reads of a procedure of case S2, and what it says beforehand of its own error, relative.
-fn read(engine: &str, procedure: &str, budget: Budget, settings: &[(&str, u32)]) -> (Vec<Estimate>, f64) {
+fn read(engine: &str, procedure: ProcedureId, budget: Budget, settings: &[(&str, u32)]) -> (Vec<Estimate>, f64) {
     let site = Site::of_user().unwrap();
     let case = Case { budget, ..Case::load(&root().join("reference/analytic/s2.yaml")).unwrap() };
-    let selection = Selection { engines: vec![engine.into()], procedures: vec![procedure.into()], seed: 1 };
+    let selection = Selection { engines: vec![engine.into()], procedures: vec![procedure], seed: 1 };
     let plan = plan(&case, &selection, &site).unwrap();
-    let mine = plan.runs.iter().find(|r| plan.engines[r.engine].engine.id().name() == engine);
+    let mine = plan.runs.iter().find(|r| plan.engines[r.engine].engine.name() == engine);
     let run = mine.unwrap_or_else(|| panic!("{engine} does not run; run `luxproof engines install`"));
     let mut job = run.job.clone();
     job.settings.extend(settings.iter().map(|(k, v)| ((*k).to_owned(), (*v).into())));
@@ -43,21 +44,21 @@ fn read(engine: &str, procedure: &str, budget: Budget, settings: &[(&str, u32)])
 }
 
 fn direct_light_within_1_percent(engine: &str) {
-    let (found, _) = read(engine, "direct_illuminance", Budget { relative_error: 0.004, seconds: 30.0 }, &[]);
+    let (found, _) = read(engine, ProcedureId::DirectIlluminance, Budget { relative_error: 0.004, seconds: 30.0 }, &[]);
     for (k, (estimate, exact)) in found.iter().zip(DIRECT_LX).enumerate() {
-        assert!((estimate.value_lx - exact).abs() <= 0.01 * exact, "{engine} at {k}: {estimate:?} for {exact}");
+        assert!((estimate.value - exact).abs() <= 0.01 * exact, "{engine} at {k}: {estimate:?} for {exact}");
     }
 }
 
 /// Within 2 %, noise and what the engine itself declares apart.
 fn reflected_light_within_2_percent(engine: &str, budget: Budget, settings: &[(&str, u32)]) {
-    let (found, declared) = read(engine, "indirect_illuminance", budget, settings);
+    let (found, declared) = read(engine, ProcedureId::IndirectIlluminance, budget, settings);
     assert!(declared < 0.04, "{declared}");
     for (k, (estimate, exact)) in found.iter().zip(INDIRECT_LX).enumerate() {
-        let error = estimate.std_error_lx.unwrap();
+        let error = estimate.uncertainty.standard_error().unwrap();
         assert!(error < 0.04 * exact, "{engine} at {k}: {estimate:?}");
         let allowed = declared.max(0.02) * exact + 3.0 * error;
-        assert!((estimate.value_lx - exact).abs() <= allowed, "{engine} at {k}: {estimate:?} for {exact}");
+        assert!((estimate.value - exact).abs() <= allowed, "{engine} at {k}: {estimate:?} for {exact}");
     }
 }
 

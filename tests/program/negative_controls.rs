@@ -4,11 +4,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
-use luxproof::audit::run::{Machine, Options, Progress, run};
-use luxproof::engines::Site;
+use luxproof::audit::run::{Options, Progress, run};
+use luxproof::engines::{Engine, Site};
 use luxproof::judge::{Comparison, Judge, KnownDeviations, Tolerances, Verdict};
+use luxproof::measure::Machine;
 use luxproof::plan::{Selection, plan};
-use luxproof::record::Recording;
+use luxproof::record::{ProcedureId, Recording};
 use luxproof::spec::Case;
 
 use crate::support::{Folder, root};
@@ -17,7 +18,7 @@ struct Silent;
 
 impl Progress for Silent {
     fn started(&self, _engine: &str, _procedure: &str) {}
-    fn ended(&self, _engine: &str, _procedure: &str, _wall: Duration, _failure: Option<&str>) {}
+    fn ended(&self, _engine: &dyn Engine, _procedure: ProcedureId, _wall: Duration, _failure: Option<&str>) {}
 }
 
 fn cachet() -> Case {
@@ -25,7 +26,7 @@ fn cachet() -> Case {
 }
 
 fn selection(engine: &str) -> Selection {
-    let procedures = vec!["luminous_intensity".to_owned(), "direct_illuminance".to_owned()];
+    let procedures = vec![ProcedureId::LuminousIntensity, ProcedureId::DirectIlluminance];
     Selection { engines: vec![engine.to_owned()], procedures, seed: 1 }
 }
 
@@ -66,7 +67,7 @@ fn judged(truth: &Case, exported: &Case, engine: &str) -> Vec<Comparison> {
     plan.tasks.iter().flat_map(of_task).filter(|c| c.key.engine == engine).collect()
 }
 
-fn failed(comparisons: &[Comparison], procedure: &str) -> usize {
+fn failed(comparisons: &[Comparison], procedure: ProcedureId) -> usize {
     comparisons.iter().filter(|c| c.key.procedure == procedure && c.verdict == Verdict::Fail).count()
 }
 
@@ -76,15 +77,18 @@ fn wrong_exports_fail(engine: &str) {
     assert!(right.iter().all(|c| c.verdict == Verdict::Pass), "{engine} must pass untampered: {right:#?}");
 
     let by_pi = judged(&truth, &tampered(&truth, |d| d.scaled(std::f64::consts::PI)), engine);
-    assert_eq!((failed(&by_pi, "luminous_intensity"), failed(&by_pi, "direct_illuminance")), (7, 4));
+    assert_eq!(
+        (failed(&by_pi, ProcedureId::LuminousIntensity), failed(&by_pi, ProcedureId::DirectIlluminance)),
+        (7, 4)
+    );
 
     let multiplier_dropped = judged(&truth, &tampered(&truth, |d| d.scaled(0.5)), engine);
-    assert_eq!(failed(&multiplier_dropped, "luminous_intensity"), 7);
+    assert_eq!(failed(&multiplier_dropped, ProcedureId::LuminousIntensity), 7);
 
     let turned = judged(&truth, &tampered(&truth, turned_by_90), engine);
     // C 0 and C 90 agree at the horizon and at the zenith alone.
-    assert_eq!(failed(&turned, "luminous_intensity"), 5);
-    assert!(failed(&turned, "direct_illuminance") >= 2);
+    assert_eq!(failed(&turned, ProcedureId::LuminousIntensity), 5);
+    assert!(failed(&turned, ProcedureId::DirectIlluminance) >= 2);
 }
 
 fn turned_by_90(distribution: &LuminousIntensityDistribution) -> LuminousIntensityDistribution {

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{Basis, Component, Judge, of_reading, witness_of};
 use crate::engines::FILE_READER;
 use crate::procedures::Task;
-use crate::record::{ProcedureId, ReadingKey, Recording, Uncertainty};
+use crate::record::{ProcedureId, Recording};
 
 /// Independent witnesses that a statement takes.
 const FEWEST: usize = 3;

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::witness_of;
 use crate::engines;
 use crate::procedures::Task;
-use crate::record::{EngineName, Light, MeterId, ProcedureId, Reading, ReadingKey, Recording, Role, Uncertainty};
+use crate::record::{EngineName, MeterId, ProcedureId, Reading, Recording, Role};
 
 /// One method against one renderer at one meter; every share is relative to the renderer's value, and they add up.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
