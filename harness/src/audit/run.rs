@@ -243,11 +243,12 @@ fn record(
             (Measurement::default(), wall.as_secs_f64(), Some(error.to_string()))
         }
     };
-    let readings = measurement.estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
+    let estimates = if failure.is_none() { task.readings(&measurement.estimates) } else { vec![] };
+    let readings = estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
         meter: target.id.clone(),
         quantity: task.quantity,
-        value: estimate.value * target.per_lux,
-        uncertainty: estimate.uncertainty.times(target.per_lux),
+        value: estimate.value,
+        uncertainty: estimate.uncertainty,
     });
     Recording {
         version: planned.version().unwrap_or_default(),

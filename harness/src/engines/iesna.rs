@@ -9,7 +9,7 @@ use crate::record::{EngineName, Estimate, Role, Uncertainty};
 /// The methods of [`luminaire::calculators`].
 pub(super) struct Iesna;
 
-pub(super) const ID: EngineName = EngineName::new("iesna");
+const ID: EngineName = EngineName::IESNA;
 
 /// Rounding of the inverse-square method in `f64`, relative: a few operations and two arctangents.
 const ROUNDING: f64 = 1e-13;

@@ -24,7 +24,7 @@ use std::time::Duration;
 use luminaire::scene::{Meter, Obstacle, Scene, Shape, Transport};
 use serde::{Deserialize, Serialize};
 
-use crate::procedures::{Target, Task};
+use crate::procedures::Task;
 use crate::record::{EngineName, Estimate, MeterId, ProcedureId, Role, Uncertainty};
 use crate::spec::Case;
 use crate::system::process::{Invocation, PeakMemory, ProcessError};
@@ -62,11 +62,6 @@ pub const FILE_READER: &str = "luxproof's reader of photometric files";
 
 /// The component of our own solvers, which look intensities up alike.
 const OWN_LOOKUP: &str = "luminaire's interpolation of candela tables";
-
-/// The exact simulation, which others are judged by.
-pub const SIMULATOR: EngineName = simulator::ID;
-/// The IESNA methods, which others are judged by where they are closed forms.
-pub const IESNA: EngineName = iesna::ID;
 
 /// Something that reads illuminance at meters of a scene.
 pub trait Engine: Send + Sync {
@@ -174,12 +169,12 @@ pub struct Job {
 impl Job {
     /// What an engine without settings is asked for a task of a case.
     pub fn of_task(case: &Case, task: &Task) -> Self {
-        let station = |target: &Target| Station { id: target.id.clone(), meter: target.meter, expected_lx: None };
+        let station = |(id, meter)| Station { id, meter, expected_lx: None };
         Self {
             case: case.name.clone(),
             procedure: task.procedure,
             scene: task.scene.clone(),
-            stations: task.targets.iter().map(station).collect(),
+            stations: task.stations().map(station).collect(),
             transport: task.transport,
             budget: case.budget,
             seed: 1,

@@ -11,7 +11,7 @@ use crate::record::{EngineName, Estimate, Role};
 /// The exact simulation of [`luminaire::simulator`].
 pub(crate) struct Simulator;
 
-pub(super) const ID: EngineName = EngineName::new("simulator");
+const ID: EngineName = EngineName::SIMULATOR;
 
 /// How much finer than the budget's error the simulator works: a witness whose own error counts for nothing.
 const MARGIN: f64 = 0.1;

@@ -6,10 +6,8 @@ use luminaire::units::Lux;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::witness_of;
-use crate::engines;
 use crate::procedures::Task;
-use crate::record::{EngineName, MeterId, ProcedureId, Reading, Recording, Role};
+use crate::record::{EngineName, Light, MeterId, ProcedureId, Reading, ReadingKey, Recording, Role, Uncertainty};
 
 /// One method against one renderer at one meter; every share is relative to the renderer's value, and they add up.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -40,8 +38,8 @@ pub struct Split {
 /// Where the IESNA method is itself what others are judged by, there is nothing to split.
 pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> Vec<Split> {
     let of = |engine: EngineName| recordings.iter().find(|r| r.key.engine == engine);
-    let (Some(method), Some(exact)) = (of(engines::IESNA), of(engines::SIMULATOR)) else { return vec![] };
-    if witness_of(task).0 == engines::IESNA {
+    let (Some(method), Some(exact)) = (of(EngineName::IESNA), of(EngineName::SIMULATOR)) else { return vec![] };
+    if task.reference().engine() != Some(&EngineName::SIMULATOR) {
         return vec![];
     }
     // `instrument` is the relative standard uncertainty that calibration left.

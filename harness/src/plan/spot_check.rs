@@ -2,7 +2,7 @@
 
 use super::Run;
 use crate::engines::{Job, Measurement};
-use crate::record::Uncertainty;
+use crate::record::{Estimate, Uncertainty};
 
 /// The part of what is not rendered that is looked at, one reading at least.
 const PART: f64 = 0.05;

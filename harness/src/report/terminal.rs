@@ -7,7 +7,7 @@ use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArr
 
 use super::{ReadingRecord, Report, consensus, paper, paper_split, split};
 use crate::judge::{Basis, Comparison, Verdict};
-use crate::record::{ProcedureId, ReadingKey, Role, Status};
+use crate::record::{ProcedureId, Reading, ReadingKey, Role, Status, Uncertainty};
 
 /// More meters than this are summarised instead of listed.
 const LISTED_METERS: usize = 8;

@@ -7,6 +7,7 @@ use serde_yaml::{Mapping, Value};
 
 use super::model::{EngineSettings, Spec};
 use super::{Source, SpecError};
+use crate::record::ProcedureId;
 
 /// One case of a spec: its text with overrides laid over it.
 #[derive(Clone, Debug)]
@@ -208,8 +209,8 @@ procedures:
         .unwrap();
         let names: Vec<&str> = cases.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["point-seven", "point-all", "area-seven", "area-all"]);
-        assert!(cases[2].spec.procedures.direct_illuminance.is_some());
-        assert!(cases[3].spec.procedures.direct_illuminance.is_none());
+        assert!(cases[2].spec.procedures.0.contains_key(&ProcedureId::DirectIlluminance));
+        assert!(!cases[3].spec.procedures.0.contains_key(&ProcedureId::DirectIlluminance));
         assert_eq!(cases[3].spec.luminaires[0].model, ModelSpec::Area);
     }
 

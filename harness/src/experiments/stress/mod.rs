@@ -20,7 +20,6 @@ use crate::engines::Job;
 use crate::judge::KnownBreak;
 use crate::laws::{self, Against, Law, Place, Variant};
 use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, Subject, task};
-use crate::procedures;
 use crate::record::{EngineName, Estimate, ProcedureId, ReadingKey, Uncertainty};
 use crate::spec::{Budget, Case};
 use crate::system::process;
@@ -123,8 +122,8 @@ fn points(case: &Case, subjects: &[Subject], options: &Options<'_>) -> Vec<Point
     for subject in 0..subjects.len() {
         for law in laws::ALL.iter().filter(chosen) {
             // Intensities are direct light in free field, whose laws direct illuminance keeps as well.
-            let tasks = procedures::ALL.iter().filter(|p| p.id() != ProcedureId::LuminousIntensity);
-            for task in tasks.filter_map(|p| p.task(case)).filter(|t| law.light.concerns(t.transport)) {
+            let tasks = case.tasks().filter(|task| task.procedure != ProcedureId::LuminousIntensity);
+            for task in tasks.filter(|t| law.light.concerns(t.transport)) {
                 let base = Job::of_task(case, &task);
                 let says = |step: &usize| (law.variant)(&base, law.magnitudes[*step]).is_some();
                 let steps = (0..law.magnitudes.len()).filter(says);

@@ -3,6 +3,7 @@
 use sha2::{Digest, Sha256};
 
 use crate::engines::{Engine, EngineError, ExternalJob, Job, Version};
+use crate::record::ProcedureId;
 use crate::spec::hexadecimal;
 
 /// Names an entry of the cache.

@@ -1,0 +1,127 @@
+//! The table of procedures: what each is called, asks of a spec, reads and is judged by. A new procedure is a row here.
+
+use luminaire::scene::{Bounces, LuminaireModel, Scene, Transport};
+
+use super::{Form, Task};
+use crate::record::{Basis, EngineName, ProcedureId, Quantity};
+
+/// One procedure.
+pub struct Procedure {
+    pub id: ProcedureId,
+    /// As a heading.
+    pub title: &'static str,
+    /// In a navigation.
+    pub short: &'static str,
+    /// What it reads, in a sentence for users.
+    pub meaning: &'static str,
+    pub quantity: Quantity,
+    /// The keys that a spec gives it.
+    pub form: Form,
+    /// Which light counts, of so many reflections.
+    pub transport: fn(Bounces) -> Transport,
+    /// What others are judged by.
+    pub reference: fn(&Task) -> Reference,
+}
+
+/// What the readings of a task are judged by.
+#[derive(Clone, Debug)]
+pub enum Reference {
+    /// The readings of one of our own engines.
+    Witness { engine: EngineName, basis: Basis, source: &'static str },
+}
+
+impl Reference {
+    /// What they rest on.
+    pub const fn basis(&self) -> Basis {
+        match self {
+            Self::Witness { basis, .. } => *basis,
+        }
+    }
+
+    /// The engine that is the reference, where one is.
+    pub fn engine(&self) -> Option<&EngineName> {
+        match self {
+            Self::Witness { engine, .. } => Some(engine),
+        }
+    }
+}
+
+/// Every procedure, in the order of reports. Tolerances stand under the same name in `reference/tolerances.yaml`.
+pub static ALL: [Procedure; 4] = [
+    Procedure {
+        id: ProcedureId::LuminousIntensity,
+        title: "Luminous intensity",
+        short: "Intensity",
+        meaning: "The luminous intensity distribution read back from illuminance at a distance in free field, I = E d², over the curve of the photometric file.",
+        quantity: Quantity::LuminousIntensity,
+        form: Form::Angles,
+        transport: |_| Transport::Direct,
+        reference: |task| closed_form(task, "photometric file, bilinear in (C, gamma)"),
+    },
+    Procedure {
+        id: ProcedureId::DirectIlluminance,
+        title: "Direct illuminance",
+        short: "Direct",
+        meaning: "Illuminance straight from the luminaires, without any reflected light.",
+        quantity: Quantity::Illuminance,
+        form: Form::Meters,
+        transport: |_| Transport::Direct,
+        reference: |task| closed_form(task, "inverse square"),
+    },
+    Procedure {
+        id: ProcedureId::IndirectIlluminance,
+        title: "Indirect illuminance",
+        short: "Indirect",
+        meaning: "Illuminance by light that was reflected at least once.",
+        quantity: Quantity::Illuminance,
+        form: Form::MetersAndBounces,
+        transport: Transport::Indirect,
+        reference: |_| EXACT,
+    },
+    Procedure {
+        id: ProcedureId::TotalIlluminance,
+        title: "Total illuminance",
+        short: "Total",
+        meaning: "Direct and reflected light together.",
+        quantity: Quantity::Illuminance,
+        form: Form::MetersAndBounces,
+        transport: Transport::Total,
+        reference: |_| EXACT,
+    },
+];
+
+const EXACT: Reference =
+    Reference::Witness { engine: EngineName::SIMULATOR, basis: Basis::Exact, source: "luminaire::simulator" };
+
+/// Direct light of points that nothing hides is a closed form; other light is what the simulator says.
+fn closed_form(task: &Task, source: &'static str) -> Reference {
+    if is_inverse_square(&task.scene) {
+        Reference::Witness { engine: EngineName::IESNA, basis: Basis::ClosedForm, source }
+    } else {
+        EXACT
+    }
+}
+
+fn is_inverse_square(scene: &Scene) -> bool {
+    scene.obstacles.is_empty() && scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point)
+}
+
+impl ProcedureId {
+    /// Its row of the table.
+    pub fn row(self) -> &'static Procedure {
+        &ALL[self as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_procedure_has_its_row_in_the_order_of_reports() {
+        assert_eq!(ALL.each_ref().map(|p| p.id), ProcedureId::ALL);
+        for procedure in ProcedureId::ALL {
+            assert_eq!(procedure.row().id, procedure);
+        }
+    }
+}
