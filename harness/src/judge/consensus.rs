@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{Component, Judge, of_reading};
 use crate::engines::FILE_READER;
 use crate::procedures::Task;
-use crate::record::{Basis, ProcedureId, ReadingKey, Recording, Uncertainty};
+use crate::record::{Basis, ProcedureId, Recording};
 
 /// Independent witnesses that a statement takes.
 const FEWEST: usize = 3;
@@ -406,6 +406,7 @@ mod tests {
     use crate::judge::{KnownDeviations, Tolerances};
     use crate::procedures::Target;
     use crate::record::{MeterId, Quantity, Reading};
+    use crate::record::{ReadingKey, Uncertainty};
 
     const METERS: usize = 12;
     const LOOKUP: &str = "lookup";

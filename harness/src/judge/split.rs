@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::procedures::Task;
-use crate::record::{EngineName, Light, MeterId, ProcedureId, Reading, ReadingKey, Recording, Role, Uncertainty};
+use crate::record::{EngineName, MeterId, ProcedureId, Reading, Recording, Role};
 
 /// One method against one renderer at one meter; every share is relative to the renderer's value, and they add up.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -100,6 +100,7 @@ fn display_name(engine: &str) -> &str {
 mod tests {
     use super::*;
     use crate::record::Quantity;
+    use crate::record::{Light, ReadingKey, Uncertainty};
     use luminaire::scene::{Bounces, Scene};
 
     fn recording(engine: &str, value: f64, std_error: f64) -> Recording {

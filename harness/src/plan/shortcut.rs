@@ -13,7 +13,7 @@ mod tests;
 use luminaire::scene::Transport;
 
 use crate::engines::{Job, Measurement};
-use crate::record::{Estimate, ProcedureId};
+use crate::record::Estimate;
 
 pub(super) use repeated::Repeated;
 

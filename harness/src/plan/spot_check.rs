@@ -2,7 +2,7 @@
 
 use super::Run;
 use crate::engines::{Job, Measurement};
-use crate::record::{Estimate, Uncertainty};
+use crate::record::Uncertainty;
 
 /// The part of what is not rendered that is looked at, one reading at least.
 const PART: f64 = 0.05;
@@ -63,6 +63,7 @@ mod tests {
     use super::*;
     use crate::engines::fixtures;
     use crate::plan::{Fill, Shortcut};
+    use crate::record::Estimate;
 
     fn run(points: usize) -> Run {
         let points_m: Vec<[f64; 3]> = (0..points).map(|k| [k as f64, 1.0, 1.0]).collect();

@@ -3,9 +3,11 @@
 //! A procedure is a job for everyone: its readings are weighted sums of illuminances, so that engines know nothing of procedures.
 
 mod asked;
+mod form;
 pub mod table;
 mod task;
 
-pub use asked::{Angles, Asked, AtAngles, AtMeters, Form, Names, Procedures};
+pub use asked::Procedures;
+pub use form::{Angles, Asked, AtAngles, AtMeters, Form, Names};
 pub use table::{Procedure, Reference};
 pub use task::{Aspect, Direction, Target, Task};

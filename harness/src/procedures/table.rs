@@ -1,8 +1,11 @@
 //! The table of procedures: what each is called, asks of a spec, reads and is judged by. A new procedure is a row here.
 
-use luminaire::scene::{Bounces, LuminaireModel, Scene, Transport};
+use std::collections::BTreeMap;
 
-use super::{Form, Task};
+use luminaire::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
+
+use super::form::{Asked, Form};
+use super::task::{Task, around, of_sets};
 use crate::record::{Basis, EngineName, ProcedureId, Quantity};
 
 /// One procedure.
@@ -104,6 +107,28 @@ fn closed_form(task: &Task, source: &'static str) -> Reference {
 
 fn is_inverse_square(scene: &Scene) -> bool {
     scene.obstacles.is_empty() && scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point)
+}
+
+impl Procedure {
+    /// What it measures in a scene, as asked; `None` where the luminaire that is named is not there.
+    pub fn task(&self, asked: &Asked, scene: &Scene, meters: &BTreeMap<String, Vec<Meter>>) -> Option<Task> {
+        let (scene, transport, targets) = match asked {
+            Asked::Angles(asked) => {
+                let luminaire = scene.luminaires.iter().find(|l| l.id == asked.luminaire)?;
+                let alone = Scene { room: None, obstacles: vec![], luminaires: vec![luminaire.clone()] };
+                (alone, Transport::Direct, around(luminaire, asked))
+            }
+            Asked::Meters(asked) => (scene.clone(), (self.transport)(asked.bounces), of_sets(meters, asked)),
+        };
+        Some(Task { procedure: self.id, scene, transport, quantity: self.quantity, targets })
+    }
+}
+
+impl Task {
+    /// What its readings are judged by.
+    pub fn reference(&self) -> Reference {
+        (self.procedure.row().reference)(self)
+    }
 }
 
 impl ProcedureId {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use luminaire::photometry::direction;
 use luminaire::scene::{Luminaire, Meter, Scene, Transport};
 
-use super::{Angles, Asked, AtAngles, AtMeters, Procedure, Reference};
+use super::form::{Angles, AtAngles, AtMeters};
 use crate::record::{Estimate, Light, MeterId, ProcedureId, Quantity};
 
 /// What one procedure measures in one case.
@@ -53,29 +53,6 @@ pub struct Direction {
 }
 
 impl Task {
-    /// What a procedure measures in a scene, as asked; `None` where the luminaire that it names is not there.
-    pub fn new(
-        procedure: &Procedure,
-        asked: &Asked,
-        scene: &Scene,
-        meters: &BTreeMap<String, Vec<Meter>>,
-    ) -> Option<Self> {
-        let (scene, transport, targets) = match asked {
-            Asked::Angles(asked) => {
-                let luminaire = scene.luminaires.iter().find(|l| l.id == asked.luminaire)?;
-                let alone = Scene { room: None, obstacles: vec![], luminaires: vec![luminaire.clone()] };
-                (alone, Transport::Direct, around(luminaire, asked))
-            }
-            Asked::Meters(asked) => (scene.clone(), (procedure.transport)(asked.bounces), of_sets(meters, asked)),
-        };
-        Some(Self { procedure: procedure.id, scene, transport, quantity: procedure.quantity, targets })
-    }
-
-    /// What its readings are judged by.
-    pub fn reference(&self) -> Reference {
-        (self.procedure.row().reference)(self)
-    }
-
     /// The luminaire model of the scene: point, area, impostor, or mixed.
     pub fn model(&self) -> String {
         let mut models: Vec<&str> = self.scene.luminaires.iter().map(|l| l.model.name()).collect();
@@ -139,7 +116,7 @@ impl Target {
 }
 
 /// Meters on a sphere that face the photometric centre: I = E d² (IES LM-41, CIE 121: inverse-square goniophotometry).
-fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
+pub(super) fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
     let distribution = &luminaire.photometry.distribution;
     let (c_deg, gamma_deg) = match &asked.angles {
         Angles::Photometry => (distribution.c_deg(), distribution.gamma_deg()),
@@ -157,7 +134,7 @@ fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
 }
 
 /// The meters of named sets.
-fn of_sets(meters: &BTreeMap<String, Vec<Meter>>, asked: &AtMeters) -> Vec<Target> {
+pub(super) fn of_sets(meters: &BTreeMap<String, Vec<Meter>>, asked: &AtMeters) -> Vec<Target> {
     let of_set = |name: &str| {
         let meters = meters.get(name).into_iter().flatten().enumerate();
         meters.map(|(k, meter)| Target::of_one(MeterId::new(name, k), *meter, 1.0)).collect::<Vec<_>>()

@@ -7,7 +7,7 @@ use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArr
 
 use super::{ReadingRecord, Report, consensus, paper, paper_split, split};
 use crate::judge::{Basis, Comparison, Verdict};
-use crate::record::{ProcedureId, Reading, ReadingKey, Role, Status, Uncertainty};
+use crate::record::{ProcedureId, ReadingKey, Role, Status};
 
 /// More meters than this are summarised instead of listed.
 const LISTED_METERS: usize = 8;
@@ -494,6 +494,7 @@ fn notes(report: &Report, text: &mut String) {
 mod tests {
     use super::*;
     use crate::record::{MeterId, Quantity};
+    use crate::record::{Reading, Uncertainty};
 
     fn reading(value: f64, std_error: Option<f64>) -> ReadingRecord {
         ReadingRecord {

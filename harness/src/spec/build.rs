@@ -67,7 +67,7 @@ impl Case {
 
     /// What a procedure measures in it; `None` where the spec does not ask for it.
     pub fn task(&self, procedure: ProcedureId) -> Option<Task> {
-        Task::new(procedure.row(), self.procedures.0.get(&procedure)?, &self.scene, &self.meters)
+        procedure.row().task(self.procedures.0.get(&procedure)?, &self.scene, &self.meters)
     }
 
     /// What all procedures measure in it, in the order of reports.

@@ -7,7 +7,6 @@ use serde_yaml::{Mapping, Value};
 
 use super::model::{EngineSettings, Spec};
 use super::{Source, SpecError};
-use crate::record::ProcedureId;
 
 /// One case of a spec: its text with overrides laid over it.
 #[derive(Clone, Debug)]
@@ -165,6 +164,7 @@ fn lay(base: &mut Value, over: &Value) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::ProcedureId;
     use crate::spec::model::ModelSpec;
 
     const BASE: &str = "luxproof: 1

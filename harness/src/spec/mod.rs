@@ -2,7 +2,6 @@
 //!
 //! The only module that knows `serde_yaml`. Every error names file, line and column.
 
-use crate::record::ProcedureId;
 mod build;
 mod cases;
 mod locate;
@@ -139,6 +138,7 @@ pub fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Opt
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::ProcedureId;
 
     fn parse(text: &str) -> Result<Spec, SpecError> {
         Source::new("spec.yaml".into(), text.into()).parse()

@@ -3,7 +3,6 @@
 use sha2::{Digest, Sha256};
 
 use crate::engines::{Engine, EngineError, ExternalJob, Job, Version};
-use crate::record::ProcedureId;
 use crate::spec::hexadecimal;
 
 /// Names an entry of the cache.
@@ -64,6 +63,7 @@ pub fn key(engine: &dyn Engine, version: &Version, job: &Job) -> Result<Key, Eng
 mod tests {
     use super::*;
     use crate::engines::{all, fixtures};
+    use crate::record::ProcedureId;
     use luminaire::scene::{LuminaireModel, Transport};
 
     #[test]

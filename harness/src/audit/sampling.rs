@@ -4,8 +4,8 @@ use std::path::Path;
 
 use clap::ValueEnum;
 
-use crate::audit::run::Outcome;
-use crate::audit::sequential::{self, Ask, Sampler};
+use super::jobs::Outcome;
+use super::sequential::{self, Ask, Sampler};
 use crate::engines::Measurement;
 use crate::judge::Judge;
 use crate::measure::{Reader, Source};
@@ -17,7 +17,7 @@ use crate::system::files::{self, FileError};
 
 /// When sampling stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum Sampling {
+pub enum Sampling {
     /// At the relative error of the spec's budget; beyond it only what is undecided
     #[default]
     Accurate,
