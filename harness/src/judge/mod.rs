@@ -235,6 +235,9 @@ impl Judge<'_> {
     }
 }
 
+/// Rounding of a closed form in `f64`, relative: a few operations and two arctangents a luminaire.
+const ROUNDING: f64 = 1e-13;
+
 /// A reference with what is uncertain of it.
 struct Held {
     reference: Reference,
@@ -262,6 +265,20 @@ impl Held {
         let components = of_reading(recording, reading).into_iter();
         let components = components.map(|component| Component { source: Source::Reference, ..component });
         Self { reference, components: components.collect() }
+    }
+
+    /// A closed form.
+    fn formula(value: f64, source: &str) -> Self {
+        let rounding = Component::within(Source::Reference, ROUNDING * value.abs());
+        let reference = Reference {
+            value,
+            uncertainty: rounding.uncertainty,
+            degrees_of_freedom: None,
+            coverage_factor: None,
+            basis: Basis::ClosedForm,
+            source: source.to_owned(),
+        };
+        Self { reference, components: vec![rounding] }
     }
 
     /// A printed or derived value, which does not rest on the photometric file.
@@ -296,7 +313,12 @@ fn of_reading(recording: &Recording, reading: &Reading) -> Vec<Component> {
 
 /// What a task's own reference holds for a reading of an engine; the reference itself has none.
 fn reference_of_task(task: &Task, recordings: &[&Recording], k: usize, engine: &EngineName) -> Option<Held> {
-    let procedures::Reference::Witness { engine: witness, basis, source } = task.reference();
+    let (witness, basis, source) = match task.reference() {
+        procedures::Reference::Witness { engine, basis, source } => (engine, basis, source),
+        procedures::Reference::Formula { of, source } => {
+            return Some(Held::formula(of(&task.scene, task.targets[k].meter.position_m), source));
+        }
+    };
     if *engine == witness {
         return None;
     }

@@ -17,6 +17,8 @@ pub enum Form {
     Meters,
     /// `meters`, `bounces`.
     MetersAndBounces,
+    /// `meters`, `bounces`, `light`.
+    MetersAndLight,
 }
 
 /// What a spec asks of one procedure.
@@ -31,6 +33,20 @@ pub enum Asked {
 pub struct AtMeters {
     pub meters: Names,
     pub bounces: Bounces,
+    pub light: AnyLight,
+}
+
+/// The light that a spec chooses, where a procedure leaves the choice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AnyLight {
+    /// Straight from the luminaires and reflected.
+    #[default]
+    Total,
+    /// Straight from the luminaires.
+    Direct,
+    /// Reflected at least once.
+    Indirect,
 }
 
 /// Intensity from illuminance at a distance, the luminaire alone in free field.
@@ -66,12 +82,27 @@ struct MetersAndBounces {
     bounces: BouncesSpec,
 }
 
+/// Light of a spec's choice at meters.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct MetersAndLight {
+    /// A meter set or a list of sets.
+    meters: Names,
+    /// How many diffuse reflections count, where any do.
+    #[serde(default)]
+    bounces: BouncesSpec,
+    /// Which light counts.
+    #[serde(default)]
+    light: AnyLight,
+}
+
 impl Form {
     pub(super) fn schema(self, generator: &mut SchemaGenerator) -> Schema {
         match self {
             Self::Angles => generator.subschema_for::<AtAngles>(),
             Self::Meters => generator.subschema_for::<Meters>(),
             Self::MetersAndBounces => generator.subschema_for::<MetersAndBounces>(),
+            Self::MetersAndLight => generator.subschema_for::<MetersAndLight>(),
         }
     }
 
@@ -80,11 +111,15 @@ impl Form {
             Self::Angles => Asked::Angles(map.next_value()?),
             Self::Meters => {
                 let Meters { meters } = map.next_value()?;
-                Asked::Meters(AtMeters { meters, bounces: Bounces::Converged })
+                Asked::Meters(AtMeters { meters, bounces: Bounces::Converged, light: AnyLight::Total })
             }
             Self::MetersAndBounces => {
                 let MetersAndBounces { meters, bounces } = map.next_value()?;
-                Asked::Meters(AtMeters { meters, bounces: bounces.into() })
+                Asked::Meters(AtMeters { meters, bounces: bounces.into(), light: AnyLight::Total })
+            }
+            Self::MetersAndLight => {
+                let MetersAndLight { meters, bounces, light } = map.next_value()?;
+                Asked::Meters(AtMeters { meters, bounces: bounces.into(), light })
             }
         })
     }

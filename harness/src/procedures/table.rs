@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use luminaire::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
+use glam::DVec3;
+use luminaire::scene::{LuminaireModel, Meter, Scene, Transport};
 
-use super::form::{Asked, Form};
-use super::task::{Task, around, of_sets};
+use super::form::{Asked, AtMeters, Form};
+use super::task::{Aspect, Task, around, of_sets};
 use crate::record::{Basis, EngineName, ProcedureId, Quantity};
 
 /// One procedure.
@@ -20,8 +21,10 @@ pub struct Procedure {
     pub quantity: Quantity,
     /// The keys that a spec gives it.
     pub form: Form,
-    /// Which light counts, of so many reflections.
-    pub transport: fn(Bounces) -> Transport,
+    /// Which light counts.
+    pub transport: fn(&AtMeters) -> Transport,
+    /// What is added up at a meter of the spec, and how far off that sum may be, relative.
+    pub aspects: fn(Meter) -> (Vec<Aspect>, f64),
     /// What others are judged by.
     pub reference: fn(&Task) -> Reference,
 }
@@ -31,6 +34,8 @@ pub struct Procedure {
 pub enum Reference {
     /// The readings of one of our own engines.
     Witness { engine: EngineName, basis: Basis, source: &'static str },
+    /// A closed form of the scene at a place, to a rounding in `f64`.
+    Formula { of: fn(&Scene, DVec3) -> f64, source: &'static str },
 }
 
 impl Reference {
@@ -38,6 +43,7 @@ impl Reference {
     pub const fn basis(&self) -> Basis {
         match self {
             Self::Witness { basis, .. } => *basis,
+            Self::Formula { .. } => Basis::ClosedForm,
         }
     }
 
@@ -45,6 +51,7 @@ impl Reference {
     pub fn engine(&self) -> Option<&EngineName> {
         match self {
             Self::Witness { engine, .. } => Some(engine),
+            Self::Formula { .. } => None,
         }
     }
 }
@@ -59,6 +66,7 @@ pub static ALL: [Procedure; 4] = [
         quantity: Quantity::LuminousIntensity,
         form: Form::Angles,
         transport: |_| Transport::Direct,
+        aspects: as_it_looks,
         reference: |task| closed_form(task, "photometric file, bilinear in (C, gamma)"),
     },
     Procedure {
@@ -69,6 +77,7 @@ pub static ALL: [Procedure; 4] = [
         quantity: Quantity::Illuminance,
         form: Form::Meters,
         transport: |_| Transport::Direct,
+        aspects: as_it_looks,
         reference: |task| closed_form(task, "inverse square"),
     },
     Procedure {
@@ -78,7 +87,8 @@ pub static ALL: [Procedure; 4] = [
         meaning: "Illuminance by light that was reflected at least once.",
         quantity: Quantity::Illuminance,
         form: Form::MetersAndBounces,
-        transport: Transport::Indirect,
+        transport: |asked| Transport::Indirect(asked.bounces),
+        aspects: as_it_looks,
         reference: |_| EXACT,
     },
     Procedure {
@@ -88,10 +98,16 @@ pub static ALL: [Procedure; 4] = [
         meaning: "Direct and reflected light together.",
         quantity: Quantity::Illuminance,
         form: Form::MetersAndBounces,
-        transport: Transport::Total,
+        transport: |asked| Transport::Total(asked.bounces),
+        aspects: as_it_looks,
         reference: |_| EXACT,
     },
 ];
+
+/// One illuminance, on the side that the meter looks to.
+fn as_it_looks(meter: Meter) -> (Vec<Aspect>, f64) {
+    (vec![Aspect { meter, weight: 1.0 }], 0.0)
+}
 
 const EXACT: Reference =
     Reference::Witness { engine: EngineName::SIMULATOR, basis: Basis::Exact, source: "luminaire::simulator" };
@@ -118,7 +134,9 @@ impl Procedure {
                 let alone = Scene { room: None, obstacles: vec![], luminaires: vec![luminaire.clone()] };
                 (alone, Transport::Direct, around(luminaire, asked))
             }
-            Asked::Meters(asked) => (scene.clone(), (self.transport)(asked.bounces), of_sets(meters, asked)),
+            Asked::Meters(asked) => {
+                (scene.clone(), (self.transport)(asked), of_sets(meters, &asked.meters, self.aspects))
+            }
         };
         Some(Task { procedure: self.id, scene, transport, quantity: self.quantity, targets })
     }

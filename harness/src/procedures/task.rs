@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use luminaire::photometry::direction;
 use luminaire::scene::{Luminaire, Meter, Scene, Transport};
 
-use super::form::{Angles, AtAngles, AtMeters};
+use super::form::{Angles, AtAngles, Names};
 use crate::record::{Estimate, Light, MeterId, ProcedureId, Quantity};
 
 /// What one procedure measures in one case.
@@ -133,11 +133,19 @@ pub(super) fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
     angles.enumerate().map(target).collect()
 }
 
-/// The meters of named sets.
-pub(super) fn of_sets(meters: &BTreeMap<String, Vec<Meter>>, asked: &AtMeters) -> Vec<Target> {
+/// The meters of named sets, each with what is added up there.
+pub(super) fn of_sets(
+    meters: &BTreeMap<String, Vec<Meter>>,
+    names: &Names,
+    aspects: fn(Meter) -> (Vec<Aspect>, f64),
+) -> Vec<Target> {
+    let target = |name: &str, k: usize, meter: Meter| {
+        let (aspects, quadrature) = aspects(meter);
+        Target { id: MeterId::new(name, k), meter, direction: None, aspects, quadrature }
+    };
     let of_set = |name: &str| {
         let meters = meters.get(name).into_iter().flatten().enumerate();
-        meters.map(|(k, meter)| Target::of_one(MeterId::new(name, k), *meter, 1.0)).collect::<Vec<_>>()
+        meters.map(|(k, meter)| target(name, k, *meter)).collect::<Vec<_>>()
     };
-    asked.meters.iter().flat_map(of_set).collect()
+    names.iter().flat_map(of_set).collect()
 }
