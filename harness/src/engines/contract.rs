@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::Site;
 use super::blocks::Blocks;
 use super::workbench::{EngineError, SceneFile, Workbench};
-use crate::procedures::{Target, Task};
+use crate::procedures::Task;
 use crate::record::{EngineName, Estimate, MeterId, ProcedureId, Role, Uncertainty};
 use crate::spec::{Budget, Case};
 use crate::system::slots::{Share, Slots};
@@ -162,12 +162,12 @@ pub struct Job {
 impl Job {
     /// What an engine without settings is asked for a task of a case.
     pub fn of_task(case: &Case, task: &Task) -> Self {
-        let station = |target: &Target| Station { id: target.id.clone(), meter: target.meter, expected_lx: None };
+        let station = |(id, meter)| Station { id, meter, expected_lx: None };
         Self {
             case: case.name.clone(),
             procedure: task.procedure,
             scene: task.scene.clone(),
-            stations: task.targets.iter().map(station).collect(),
+            stations: task.stations().map(station).collect(),
             transport: task.transport,
             budget: case.budget,
             seed: 1,

@@ -9,7 +9,7 @@ use crate::record::{EngineName, Estimate, Role, Uncertainty};
 /// The methods of [`luminaire::calculators`].
 pub(super) struct Iesna;
 
-pub(super) const ID: EngineName = EngineName::new("iesna");
+const ID: EngineName = EngineName::IESNA;
 
 pub(super) static ENTRY: Entry = Entry {
     name: ID,

@@ -26,8 +26,6 @@ mod workbench;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::record::EngineName;
-
 pub use crate::spec::Budget;
 pub use blocks::Blocks;
 pub use catalogue::{ALL, all, display_name, entry};
@@ -39,11 +37,6 @@ pub use external::{ExternalJob, ExternalReadings};
 pub use install::{InstallOutcome, InstallState, install};
 pub use site::{Site, SiteError};
 pub use workbench::{EngineError, SceneFile, Workbench};
-
-/// The exact simulation, which others are judged by.
-pub const SIMULATOR: EngineName = simulator::ID;
-/// The IESNA methods, which others are judged by where they are closed forms.
-pub const IESNA: EngineName = iesna::ID;
 
 /// A program that a spec names as an engine of its own, `engines: {<name>: {command: [...]}}`; paths are relative to `folder`.
 ///

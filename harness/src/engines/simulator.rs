@@ -10,7 +10,7 @@ use crate::record::{EngineName, Estimate, Role};
 /// The exact simulation of [`luminaire::simulator`].
 pub(crate) struct Simulator;
 
-pub(super) const ID: EngineName = EngineName::new("simulator");
+const ID: EngineName = EngineName::SIMULATOR;
 
 pub(super) static ENTRY: Entry = Entry {
     name: ID,

@@ -13,7 +13,7 @@ mod tests;
 use luminaire::scene::Transport;
 
 use crate::engines::{Job, Measurement};
-use crate::record::{Estimate, ProcedureId};
+use crate::record::Estimate;
 
 pub(super) use repeated::Repeated;
 
@@ -67,7 +67,8 @@ impl Shortcut {
     pub(super) fn of(job: &Job) -> Self {
         let mut shortcut = Self::none(job);
         bounces::shorten(&mut shortcut);
-        if job.procedure != ProcedureId::LuminousIntensity {
+        // A luminaire alone in free field is read for its table, which no shortcut may assume.
+        if job.scene.room.is_some() {
             dark::shorten(&mut shortcut, job);
             symmetry::shorten(&mut shortcut, job);
         }

@@ -20,7 +20,6 @@ use crate::engines::{self, Job};
 use crate::judge::KnownBreak;
 use crate::laws::{self, Against, Law, Place, Variant};
 use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, Subject, task};
-use crate::procedures;
 use crate::record::{EngineName, Estimate, ProcedureId, ReadingKey, Uncertainty};
 use crate::spec::{Budget, Case};
 use crate::system::process;
@@ -123,8 +122,8 @@ fn points(case: &Case, subjects: &[Subject], options: &Options<'_>) -> Vec<Point
     for subject in 0..subjects.len() {
         for law in laws::ALL.iter().filter(chosen) {
             // Intensities are direct light in free field, whose laws direct illuminance keeps as well.
-            let tasks = procedures::ALL.iter().filter(|p| p.id() != ProcedureId::LuminousIntensity);
-            for task in tasks.filter_map(|p| p.task(case)).filter(|t| law.light.concerns(t.transport)) {
+            let tasks = case.tasks().filter(|task| task.procedure != ProcedureId::LuminousIntensity);
+            for task in tasks.filter(|t| law.light.concerns(t.transport)) {
                 let base = Job::of_task(case, &task);
                 let says = |step: &usize| (law.variant)(&base, law.magnitudes[*step]).is_some();
                 let steps = (0..law.magnitudes.len()).filter(says);
@@ -251,7 +250,7 @@ impl Bench<'_> {
         let id = subject.engine.name();
         let mut settings = self.case.settings_of(id.as_str());
         match (id.as_str(), self.options.coordinates) {
-            (name, _) if name == engines::SIMULATOR.as_str() => {
+            (name, _) if name == EngineName::SIMULATOR.as_str() => {
                 settings.insert("relative_error".into(), Self::own_accuracy(job).into());
             }
             (_, Coordinates::Fitted) => {}
@@ -265,7 +264,7 @@ impl Bench<'_> {
 
     /// The exact simulation of a changed job, finer than the simulator is asked for as an engine.
     fn witness(&self, point: &Point, job: &Job, place: Option<Place>) -> Option<Outcome> {
-        let engine = (engines::entry(&engines::SIMULATOR)?.make)();
+        let engine = (engines::entry(&EngineName::SIMULATOR)?.make)();
         let subject = Subject { engine, version: env!("CARGO_PKG_VERSION").to_owned() };
         let settings = BTreeMap::from([("relative_error".to_owned(), (0.1 * Self::own_accuracy(job)).into())]);
         self.take(&subject, point, job, place, (settings, self.options.seed))
