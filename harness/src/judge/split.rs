@@ -71,7 +71,7 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
                 of_method: split.method,
                 of_renderer: split.renderer,
                 uncertainty: split.uncertainty,
-                text: format!("{method} differs from {} by {split}", display_name(&renderer.key.engine)),
+                text: format!("{method} differs from {} by {split}", crate::engines::display_name(&renderer.key.engine)),
             });
         }
     }
@@ -83,16 +83,6 @@ const fn name_of_method(transport: Transport) -> &'static str {
         Transport::Direct => "inverse square",
         Transport::Indirect(_) => "IP-ED",
         Transport::Total(_) => "inverse square + IP-ED",
-    }
-}
-
-/// Renderers as their makers write them.
-fn display_name(engine: &str) -> &str {
-    match engine {
-        "radiance" => "Radiance",
-        "mitsuba" => "Mitsuba",
-        "povray" => "POV-Ray",
-        other => other,
     }
 }
 

@@ -90,9 +90,17 @@ impl Shortcut {
             Fill::Dark => Estimate::DARK,
         };
         let estimates = self.fill.iter().map(estimate).collect();
+        let station = |fill: &Fill| match fill {
+            Fill::Rendered(k) | Fill::Mirrors { station: k, .. } if *k < rendered.estimates.len() => {
+                Some((*k, self.factor))
+            }
+            _ => None,
+        };
+        let stations: Vec<_> = self.fill.iter().map(station).collect();
+        let samples = rendered.samples.iter().map(|part| part.rearranged(&stations)).collect();
         let mut settings = rendered.settings;
         settings.extend(self.traces(asked));
-        Measurement { estimates, settings, notes: rendered.notes }
+        Measurement { estimates, settings, notes: rendered.notes, samples }
     }
 
     /// Which meter's reading is which other's, for whoever repeats it.

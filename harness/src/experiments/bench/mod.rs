@@ -20,7 +20,7 @@ use serde::Serialize;
 pub use self::curve::{BenchPoint, Curve, Pareto};
 pub use self::knobs::KnobEffect;
 use self::ladder::ladder;
-use crate::engines::Job;
+use crate::engines::{self, Job};
 use crate::laws::Place;
 use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, Subject};
 use crate::procedures::Task;
@@ -191,7 +191,7 @@ struct Bench<'a> {
 impl Bench<'_> {
     /// The exact simulation, as finely as it goes.
     fn truth(&self, task: &Task, job: &Job) -> Option<Truth> {
-        let engine = crate::engines::all().into_iter().find(|e| e.name() == "simulator")?;
+        let engine = (engines::entry(&EngineName::SIMULATOR)?.make)();
         let subject = Subject { engine, version: env!("CARGO_PKG_VERSION").to_owned() };
         let accuracies = if is_furnished(job) { FURNISHED } else { EMPTY };
         // Something is better than nothing: coarser where the finest takes too long.
