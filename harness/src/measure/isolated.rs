@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 use crate::engines::{Engine, EngineError, Job, Site, Support, Workbench, checked};
 use crate::laws::{self, Place};
-use crate::procedures::{self, Task};
+use crate::procedures::Task;
 use crate::record::{Estimate, ProcedureId, ReadingKey};
 use crate::spec::{Budget, Case, hexadecimal};
 use crate::system::files::{self, FileError};
@@ -232,7 +232,7 @@ impl Request {
 }
 
 pub fn task(case: &Case, procedure: ProcedureId) -> Option<Task> {
-    procedures::ALL.iter().find(|p| p.id() == procedure)?.task(case)
+    case.task(procedure)
 }
 
 /// Finished readings on disk, so that an interrupted measurement goes on where it stopped.

@@ -22,6 +22,8 @@ use crate::judge::{Comparison, Consensus, PaperSplit, PublishedTable, Split, Ver
 use crate::plan::Skip;
 use crate::record::{EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Status};
 
+use crate::spec::Case;
+
 pub use accepted::{BaselineCheck, BaselineLine};
 pub use budget::budgets;
 pub use csv::csv;
@@ -96,6 +98,13 @@ pub struct SpecRecord {
     /// SHA-256 of the spec and of every file that it names.
     pub sha256: String,
     pub title: String,
+}
+
+impl SpecRecord {
+    /// That of one case.
+    pub fn of(case: &Case) -> Self {
+        Self { path: case.path.display().to_string(), sha256: case.sha256.clone(), title: case.title.clone() }
+    }
 }
 
 /// One reading of one engine.
@@ -250,8 +259,8 @@ impl Report {
         }
     }
 
-    /// One report of several cases; `None` of none.
-    pub fn joined(spec: SpecRecord, reports: Vec<Self>) -> Option<Self> {
+    /// One report of several cases, of which there is one at least.
+    pub fn joined(spec: SpecRecord, reports: Vec<Self>) -> Self {
         let joined = reports.into_iter().reduce(|mut all, one| {
             all.wall_s += one.wall_s;
             all.comparisons.extend(one.comparisons);
@@ -275,13 +284,14 @@ impl Report {
                 }
             }
             all
-        })?;
+        });
+        let Some(joined) = joined else { unreachable!("a suite without cases is refused") };
         let summary = Summary::of(&joined.comparisons, &joined.skips);
         let order = |e: &EngineStatus| crate::engines::all().iter().position(|known| known.name() == e.id);
         let mut engines = joined.engines;
         engines.sort_by_key(order);
         let joined = Self { spec, engines, summary, ..joined };
-        Some(Self { paper_splits: paper_split::splits(&joined), ..joined })
+        Self { paper_splits: paper_split::splits(&joined), ..joined }
     }
 
     /// Whether more than one case was run.
@@ -289,11 +299,11 @@ impl Report {
         self.cases.len() > 1
     }
 
-    /// The exit code that the run deserves. `asked` tells whether an engine was named by the user.
-    pub fn exit(&self, asked: impl Fn(&str) -> bool) -> Exit {
+    /// The exit code that the run deserves.
+    pub fn exit(&self) -> Exit {
         let engine = |e: &EngineStatus| match e.status {
             Status::Failed => Exit::Engine,
-            Status::Absent if asked(&e.id) => Exit::Engine,
+            Status::Absent if e.is_required => Exit::Engine,
             _ => Exit::Passed,
         };
         let verdict = |c: &Comparison| match c.verdict {

@@ -494,6 +494,7 @@ fn notes(report: &Report, text: &mut String) {
 mod tests {
     use super::*;
     use crate::record::{MeterId, Quantity};
+    use crate::record::{Reading, Uncertainty};
 
     fn reading(value: f64, std_error: Option<f64>) -> ReadingRecord {
         ReadingRecord {

@@ -20,10 +20,10 @@ use serde::Serialize;
 pub use self::curve::{BenchPoint, Curve, Pareto};
 pub use self::knobs::KnobEffect;
 use self::ladder::ladder;
-use crate::engines::Job;
+use crate::engines::{self, Job};
 use crate::laws::Place;
 use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, Subject};
-use crate::procedures::{self, Task};
+use crate::procedures::Task;
 use crate::record::{EngineName, Estimate, ProcedureId, ReadingKey};
 use crate::spec::{Budget, Case};
 use crate::system::process;
@@ -115,7 +115,7 @@ pub fn bench(
         [] => procedure != ProcedureId::LuminousIntensity,
         chosen => chosen.contains(&procedure),
     };
-    for task in procedures::ALL.iter().filter(|p| asked(p.id())).filter_map(|p| p.task(case)) {
+    for task in case.tasks().filter(|task| asked(task.procedure)) {
         let job = Job::of_task(case, &task);
         let Some(truth) = bench.truth(&task, &job) else {
             report.left_out.push(format!("{}, {}: there is no exact reference in time", case.name, task.procedure));
@@ -191,7 +191,7 @@ struct Bench<'a> {
 impl Bench<'_> {
     /// The exact simulation, as finely as it goes.
     fn truth(&self, task: &Task, job: &Job) -> Option<Truth> {
-        let engine = crate::engines::all().into_iter().find(|e| e.name() == "simulator")?;
+        let engine = (engines::entry(&EngineName::SIMULATOR)?.make)();
         let subject = Subject { engine, version: env!("CARGO_PKG_VERSION").to_owned() };
         let accuracies = if is_furnished(job) { FURNISHED } else { EMPTY };
         // Something is better than nothing: coarser where the finest takes too long.

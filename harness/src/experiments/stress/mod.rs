@@ -16,11 +16,10 @@ use luminaire::scene::LuminaireModel;
 
 use self::findings::{Finding, How};
 pub use self::findings::{LawReport, PointReport, StressReport};
-use crate::engines::Job;
+use crate::engines::{self, Job};
 use crate::judge::KnownBreak;
 use crate::laws::{self, Against, Law, Place, Variant};
 use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, Subject, task};
-use crate::procedures;
 use crate::record::{EngineName, Estimate, ProcedureId, ReadingKey, Uncertainty};
 use crate::spec::{Budget, Case};
 use crate::system::process;
@@ -123,8 +122,8 @@ fn points(case: &Case, subjects: &[Subject], options: &Options<'_>) -> Vec<Point
     for subject in 0..subjects.len() {
         for law in laws::ALL.iter().filter(chosen) {
             // Intensities are direct light in free field, whose laws direct illuminance keeps as well.
-            let tasks = procedures::ALL.iter().filter(|p| p.id() != ProcedureId::LuminousIntensity);
-            for task in tasks.filter_map(|p| p.task(case)).filter(|t| law.light.concerns(t.transport)) {
+            let tasks = case.tasks().filter(|task| task.procedure != ProcedureId::LuminousIntensity);
+            for task in tasks.filter(|t| law.light.concerns(t.transport)) {
                 let base = Job::of_task(case, &task);
                 let says = |step: &usize| (law.variant)(&base, law.magnitudes[*step]).is_some();
                 let steps = (0..law.magnitudes.len()).filter(says);
@@ -251,13 +250,13 @@ impl Bench<'_> {
         let id = subject.engine.name();
         let mut settings = self.case.settings_of(id.as_str());
         match (id.as_str(), self.options.coordinates) {
-            ("simulator", _) => drop(settings.insert("relative_error".into(), Self::own_accuracy(job).into())),
+            (name, _) if name == EngineName::SIMULATOR.as_str() => {
+                settings.insert("relative_error".into(), Self::own_accuracy(job).into());
+            }
             (_, Coordinates::Fitted) => {}
             (name, Coordinates::Raw) => {
-                let key = if name == "radiance" { "rescale" } else { "recentre" };
-                if subject.engine.knobs().iter().any(|k| k.key == key) {
-                    settings.insert(key.into(), false.into());
-                }
+                let key = engines::entry(name).and_then(|entry| entry.fits_coordinates);
+                settings.extend(key.map(|key| (key.to_owned(), false.into())));
             }
         }
         self.take(subject, point, job, place, (settings, seed))
@@ -265,7 +264,7 @@ impl Bench<'_> {
 
     /// The exact simulation of a changed job, finer than the simulator is asked for as an engine.
     fn witness(&self, point: &Point, job: &Job, place: Option<Place>) -> Option<Outcome> {
-        let engine = crate::engines::all().into_iter().find(|e| e.name() == "simulator")?;
+        let engine = (engines::entry(&EngineName::SIMULATOR)?.make)();
         let subject = Subject { engine, version: env!("CARGO_PKG_VERSION").to_owned() };
         let settings = BTreeMap::from([("relative_error".to_owned(), (0.1 * Self::own_accuracy(job)).into())]);
         self.take(&subject, point, job, place, (settings, self.options.seed))

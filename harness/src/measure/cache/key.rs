@@ -63,6 +63,7 @@ pub fn key(engine: &dyn Engine, version: &Version, job: &Job) -> Result<Key, Eng
 mod tests {
     use super::*;
     use crate::engines::{all, fixtures};
+    use crate::record::ProcedureId;
     use luminaire::scene::{LuminaireModel, Transport};
 
     #[test]

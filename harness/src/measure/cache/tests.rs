@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::*;
-use crate::engines::Measurement;
+use crate::engines::{Blocks, Measurement};
 use crate::record::{Estimate, ProcedureId, Uncertainty};
 
 fn sample() -> Entry {
@@ -13,6 +13,7 @@ fn sample() -> Entry {
         estimates: estimates.into(),
         settings: [("seed".to_owned(), "1".to_owned())].into(),
         notes: vec!["a note with \"quotes\" and µ".to_owned()],
+        samples: vec![Blocks::new(vec![vec![1.0 / 3.0; 5], vec![0.1 + 0.2; 5]])],
     };
     Entry {
         engine: "radiance".into(),

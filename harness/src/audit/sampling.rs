@@ -4,19 +4,20 @@ use std::path::Path;
 
 use clap::ValueEnum;
 
-use crate::audit::run::Outcome;
-use crate::audit::sequential::{self, Ask, Sampler};
+use super::jobs::Outcome;
+use super::sequential::{self, Ask, Sampler};
 use crate::engines::Measurement;
 use crate::judge::Judge;
 use crate::measure::{Reader, Source};
 use crate::plan::{Plan, Planned, Run};
+use crate::procedures::Task;
 use crate::record::Recording;
 use crate::spec::Case;
 use crate::system::files::{self, FileError};
 
 /// When sampling stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum Sampling {
+pub enum Sampling {
     /// At the relative error of the spec's budget; beyond it only what is undecided
     #[default]
     Accurate,
@@ -62,7 +63,7 @@ pub(super) fn sample_on(
         let others =
             outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure && r.key.engine != engine.as_str());
         let others: Vec<&Recording> = others.collect();
-        let mut looks = Looks { planned, run, reader, told, from_cache: 0 };
+        let mut looks = Looks { planned, run, task, reader, told, from_cache: 0 };
         let before_s = subject.wall_s;
         sequential::refine(judge, task, &others, &mut subject, (run.job.budget, case.budget), &mut looks);
         if run.job.budget != case.budget {
@@ -88,6 +89,7 @@ fn keep(out: &Path, engine: &str, recordings: &[&Recording]) -> Result<(), FileE
 struct Looks<'a> {
     planned: &'a Planned,
     run: &'a Run,
+    task: &'a Task,
     reader: &'a Reader,
     told: &'a dyn Fn(&str),
     from_cache: usize,
@@ -95,18 +97,18 @@ struct Looks<'a> {
 
 impl Sampler for Looks<'_> {
     fn sample(&mut self, ask: &Ask) -> Result<(Measurement, f64), String> {
-        let Run { job, .. } = self.run;
+        let (Run { job, .. }, task) = (self.run, self.task);
         (self.told)(&format!(
             "{}: {} of {} meters of {} are undecided: look {}, {:.0} s at most",
             self.planned.engine.name(),
             ask.targets.len(),
-            job.stations.len(),
+            task.targets.len(),
             job.procedure,
             ask.look,
             ask.budget.seconds
         ));
         let further = crate::engines::Job {
-            stations: ask.targets.iter().map(|k| job.stations[*k].clone()).collect(),
+            stations: ask.targets.iter().flat_map(|k| job.stations[task.stations_of(*k)].to_vec()).collect(),
             budget: ask.budget,
             seed: seed_of_look(job.seed, ask.look),
             ..job.clone()

@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::observer::Observer;
 use crate::calibration::{Calibrated, Origin};
-use crate::engines::{Engine, EngineError, Measurement, Site};
+use crate::engines::{EngineError, Measurement, Site};
 use crate::measure::cache::Cache;
 use crate::measure::{Machine, Reader, Source, Taken};
-use crate::plan::{Plan, Planned, Run, Scope, Skip};
+use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
 use crate::procedures::Task;
-use crate::record::{EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Status};
+use crate::record::{EngineStatus, Reading, ReadingKey, Recording, Status};
 use crate::spec::Case;
 use crate::system::files::{self, FileError};
 use crate::system::slots::side_by_side;
@@ -54,26 +55,16 @@ pub struct Outcome {
     pub from_cache: usize,
 }
 
-/// Told of every job as it starts and ends.
-pub trait Progress: Sync {
-    /// A job starts.
-    fn started(&self, engine: &str, procedure: &str);
-    /// An engine was calibrated just now: what that found and where it is kept.
-    fn calibrated(&self, _engine: &str, _found: &Calibrated) {}
-    /// A job ended, with its failure if it failed.
-    fn ended(&self, engine: &dyn Engine, procedure: ProcedureId, wall: Duration, failure: Option<&str>);
-}
-
 /// Runs every job of a plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
-pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress) -> Result<Outcome, FileError> {
+pub fn run(case: &Case, plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Outcome, FileError> {
     let threads = options.machine.slots.threads();
     let reader = options.reader();
     let engines: Vec<usize> = (0..plan.engines.len()).collect();
-    let instruments = side_by_side(threads, &engines, |&e| instrument(plan, e, options, progress));
+    let instruments = side_by_side(threads, &engines, |&e| instrument(case, plan, e, options, observer));
     let shelf = Shelf { folder: options.out.join("readings"), recordings: Mutex::default() };
     let runs: Vec<(usize, &Run)> = plan.runs.iter().enumerate().collect();
     let one = |&(k, run): &(usize, &Run)| -> Result<Done, FileError> {
-        let done = measure(case, plan, run, &reader, &instruments[run.engine], progress);
+        let done = measure(case, plan, run, &reader, &instruments[run.engine], observer);
         if let Done::Recorded(recording, _) = &done {
             shelf.keep(k, recording)?;
         }
@@ -106,11 +97,11 @@ fn measure(
     run: &Run,
     reader: &Reader,
     instrument: &Result<Option<Calibrated>, String>,
-    progress: &dyn Progress,
+    observer: &dyn Observer,
 ) -> Done {
     let (planned, task) = (&plan.engines[run.engine], &plan.tasks[run.task]);
     let engine = planned.engine.name();
-    progress.started(engine.as_str(), task.procedure.name());
+    observer.started(case, planned.engine.as_ref(), task.procedure.name());
     let start = Instant::now();
     let taken = match instrument {
         Ok(_) => answer(planned, run, reader, task.procedure.name()),
@@ -118,7 +109,7 @@ fn measure(
         Err(reason) => Err(EngineError::Solver { engine: engine.clone(), what: reason.clone() }),
     };
     if let Err(EngineError::Declined { why, .. }) = &taken {
-        progress.ended(planned.engine.as_ref(), task.procedure, start.elapsed(), None);
+        observer.ended(case, planned.engine.as_ref(), task.procedure, start.elapsed(), None);
         return Done::Declined(declined(case, planned, task, why));
     }
     let source = taken.as_ref().ok().map(|taken| taken.source);
@@ -131,7 +122,7 @@ fn measure(
         }
     }
     let wall = Duration::from_secs_f64(recording.wall_s);
-    progress.ended(planned.engine.as_ref(), task.procedure, wall, recording.failure.as_deref());
+    observer.ended(case, planned.engine.as_ref(), task.procedure, wall, recording.failure.as_deref());
     Done::Recorded(Box::new(recording), source)
 }
 
@@ -200,19 +191,24 @@ pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcom
 
 /// The calibration of an engine of the plan; `None` where it has nothing to do or is one of our own solvers, which are what
 /// the others are calibrated by.
-fn instrument(plan: &Plan, e: usize, options: &Options, progress: &dyn Progress) -> Result<Option<Calibrated>, String> {
+fn instrument(
+    case: &Case,
+    plan: &Plan,
+    e: usize,
+    options: &Options,
+    observer: &dyn Observer,
+) -> Result<Option<Calibrated>, String> {
     let planned = &plan.engines[e];
-    let id = planned.engine.name();
     let (Some(Ok(version)), Some(run)) = (&planned.found, plan.runs.iter().find(|r| r.engine == e)) else {
         return Ok(None);
     };
     if planned.engine.is_witness() {
         return Ok(None);
     }
-    progress.started(id.as_str(), "calibration");
+    observer.started(case, planned.engine.as_ref(), "calibration");
     let made = |calibrated: &Calibrated| {
         if calibrated.origin == Origin::Measured {
-            progress.calibrated(id.as_str(), calibrated);
+            observer.calibrated(planned.engine.as_ref(), calibrated);
         }
     };
     options.machine.calibration(planned.engine.as_ref(), version, &run.job, &options.site, made).map(Some)
@@ -243,11 +239,12 @@ fn record(
             (Measurement::default(), wall.as_secs_f64(), Some(error.to_string()))
         }
     };
-    let readings = measurement.estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
+    let estimates = if failure.is_none() { task.readings(&measurement.estimates) } else { vec![] };
+    let readings = estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
         meter: target.id.clone(),
         quantity: task.quantity,
-        value: estimate.value * target.per_lux,
-        uncertainty: estimate.uncertainty.times(target.per_lux),
+        value: estimate.value,
+        uncertainty: estimate.uncertainty,
     });
     Recording {
         version: planned.version().unwrap_or_default(),
@@ -277,5 +274,7 @@ fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
         Some(Ok(_)) if mine.is_empty() => (Status::Skipped, Some("it declined all that was asked".to_owned())),
         Some(Ok(_)) => (Status::Ran, None),
     };
-    EngineStatus { id, version: planned.version(), status, reason, wall_s: mine.iter().map(|r| r.wall_s).sum() }
+    let wall_s = mine.iter().map(|r| r.wall_s).sum();
+    let is_required = planned.asked == Asked::ByName;
+    EngineStatus { id, version: planned.version(), status, is_required, reason, wall_s }
 }
