@@ -24,7 +24,7 @@ use crate::plan::{Asked, Plan, Planner, Scope, Skip};
 use crate::procedures::Task;
 use crate::record::Status;
 use crate::record::{EngineName, Recording};
-use crate::report::{self, BaselineCheck, Exit, Ingredients, Report, SpecRecord};
+use crate::report::{self, BaselineCheck, Exit, Report, ReportInputs, SpecRecord};
 use crate::spec::{Case, filtered, suite};
 use crate::system::files;
 use crate::system::process;
@@ -258,7 +258,7 @@ fn run_case(
     // What follows from other readings follows from nothing where the case was never begun.
     let holds = |s: &&Skip| stop.is_none() || matches!(s.scope, Scope::Engine | Scope::Procedure);
     let planned_skips = plan.skips.iter().filter(holds);
-    let ingredients = Ingredients {
+    let inputs = ReportInputs {
         case: case.name.clone(),
         spec: record_of(case),
         started,
@@ -271,7 +271,7 @@ fn run_case(
         published: tables,
         curves: plan.tasks.iter().flat_map(|task| report::curves(&case.name, task)).collect(),
     };
-    let report = Report::new(ingredients, comparisons);
+    let report = Report::new(inputs, comparisons);
     files::keep_json(&folder.join("report.json"), &report).into_diagnostic()?;
     Ok(report)
 }

@@ -1,11 +1,10 @@
 //! The diffing layer: readings against references that carry their own uncertainty; it sees nothing but readings.
 
+mod comparison;
 mod consensus;
 mod family;
-mod input;
 mod known;
-mod paper_split;
-mod published;
+mod papers;
 mod spending;
 mod split;
 #[cfg(test)]
@@ -25,12 +24,12 @@ use crate::procedures::{Target, Task};
 use crate::record::{EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, Uncertainty};
 use crate::spec::ToleranceOverride;
 
-use input::Input;
+use papers::Input;
 
 pub use consensus::{Consensus, Witness};
 pub use known::{KnownBreak, KnownDeviationError, KnownDeviations, Subject};
-pub use paper_split::{PaperSplit, Share, Stage, Stages, shares};
-pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
+pub use papers::{PaperSplit, Share, Stages, shares};
+pub use papers::{Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
@@ -54,11 +53,11 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// The name used in reports.
+    /// As views call it: the exact solutions are those of our own simulator.
     pub const fn name(self) -> &'static str {
         match self {
             Self::ClosedForm => "closed form",
-            Self::Exact => "exact",
+            Self::Exact => "simulator",
             Self::Iesna => "IESNA",
             Self::Published => "published",
             Self::Engine => "engine",
