@@ -24,12 +24,10 @@ pub(super) const OWN_LOOKUP: &str = "luminaire's interpolation of candela tables
 pub trait Engine: Send + Sync {
     fn name(&self) -> EngineName;
 
-    /// What it takes part for.
     fn role(&self) -> Role {
         Role::Renderer
     }
 
-    /// Whether others are judged by it.
     fn is_witness(&self) -> bool {
         self.role() == Role::Witness
     }
@@ -116,7 +114,6 @@ impl Entry {
 /// A setting of an engine with values worth trying.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Knob {
-    /// Its key in a spec.
     pub key: &'static str,
     /// Values as YAML flow scalars, the default first.
     pub values: &'static [&'static str],
@@ -147,11 +144,8 @@ pub struct Job {
     pub procedure: ProcedureId,
     /// Room, obstacles and the luminaires that are on. No room means free field.
     pub scene: Scene,
-    /// Where illuminance is read.
     pub stations: Vec<Station>,
-    /// Which light counts.
     pub transport: Transport,
-    /// When to stop.
     pub budget: Budget,
     /// Seed of every random choice.
     pub seed: u64,
@@ -184,7 +178,6 @@ impl Job {
     }
 }
 
-/// A meter with its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Station {
     pub id: MeterId,
@@ -214,7 +207,6 @@ pub enum Support {
     Yes,
     /// With a known approximation.
     Approximate {
-        /// What is approximated.
         why: String,
         /// Its size, relative.
         size: Option<f64>,

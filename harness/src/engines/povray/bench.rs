@@ -28,7 +28,6 @@ const MAX_LOOKS: usize = 10;
 /// Below this share of its upper bound a reading is darkness.
 const DARK: f64 = 1e-12;
 
-/// Where a job's runs happen.
 pub(super) struct Bench<'a> {
     job: &'a Job,
     workbench: &'a Workbench,
@@ -49,7 +48,6 @@ pub(super) fn hermetic(invocation: Invocation, site: &Site) -> Invocation {
     }
 }
 
-/// One run's choices.
 #[derive(Clone, Copy)]
 struct Run {
     light: Light,
@@ -61,14 +59,12 @@ struct Run {
 /// Which reflections a run follows.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reflections {
-    /// As many as asked for, out of the cache.
     All,
     /// The first alone, which needs no cache.
     First,
 }
 
 impl Run {
-    /// Length of the pool of directions.
     fn pool(self) -> u32 {
         if self.reflections == Reflections::First && self.count > POOL / 10 { LONG_POOL } else { POOL }
     }
@@ -83,7 +79,6 @@ impl Run {
 }
 
 impl<'a> Bench<'a> {
-    /// A bench for a job.
     pub(super) fn new(job: &'a Job, workbench: &'a Workbench, settings: &'a Settings) -> Result<Self, EngineError> {
         Ok(Self { job, workbench, settings, program: program(&workbench.site)? })
     }
