@@ -6,9 +6,10 @@ use std::time::{Instant, SystemTime};
 
 use super::jobs::{self, Outcome};
 use super::{AuditError, Options, sampling, sequential};
+use crate::calibration::Calibrations;
 use crate::diagnosis;
 use crate::judge::{Comparison, Consensus, Judge, Policy, Published, PublishedTable, Split};
-use crate::measure::Machine;
+use crate::measure::Reader;
 use crate::plan::{Plan, Scope, Skip};
 use crate::record::{Recording, Status};
 use crate::report::{self, Ingredients, Report, SpecRecord};
@@ -20,7 +21,8 @@ use crate::system::process;
 pub(super) struct Audit<'a> {
     pub(super) policy: &'a Policy,
     pub(super) options: &'a Options<'a>,
-    pub(super) machine: Arc<Machine>,
+    pub(super) reader: Reader,
+    pub(super) calibrations: Arc<Calibrations>,
 }
 
 /// Why the cases that are left are not run.
@@ -81,16 +83,15 @@ impl Audit<'_> {
 
     fn readings(&self, case: &Case, plan: &Plan, judge: &Judge<'_>, folder: &Path) -> Result<Outcome, AuditError> {
         let options = jobs::Options {
-            site: self.options.site.clone(),
             out: folder.to_owned(),
-            machine: Arc::clone(&self.machine),
-            cache: self.options.cache.clone(),
+            reader: self.reader.clone(),
+            calibrations: Arc::clone(&self.calibrations),
         };
         let observer = self.options.observer;
         let mut outcome = jobs::run(case, plan, &options, observer)?;
         if !process::is_interrupted() {
             let told = |text: &str| observer.remarked(case, text);
-            sampling::sample_on(case, plan, judge, &options.reader(), &mut outcome, &told)?;
+            sampling::sample_on(case, plan, judge, &options, &mut outcome, &told)?;
         }
         if outcome.from_cache > 0 {
             let count = outcome.from_cache;

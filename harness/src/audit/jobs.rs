@@ -1,4 +1,4 @@
-//! Runs a plan: one workbench a job, readings kept on disk as each job finishes, one engine's failure stops no other.
+//! Runs a plan: one reading a job, readings kept on disk as each job finishes, one engine's failure stops no other.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -6,10 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::observer::Observer;
-use crate::calibration::{Calibrated, Origin};
-use crate::engines::{EngineError, Measurement, Site};
-use crate::measure::cache::Cache;
-use crate::measure::{Machine, Reader, Source, Taken};
+use crate::calibration::{Calibrated, Calibrations, Origin};
+use crate::engines::{EngineError, Measurement};
+use crate::measure::{Cost, Failure, FailureKind, Question, Reader, Source, Taken};
 use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
 use crate::procedures::Task;
 use crate::record::{EngineStatus, Reading, ReadingKey, Recording, Status};
@@ -20,25 +19,18 @@ use crate::system::slots::side_by_side;
 /// How to run.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Where engines are installed.
-    pub site: Site,
     /// The folder of the run's files.
     pub out: PathBuf,
-    /// How much runs at a time; cases that run side by side share one.
-    pub machine: Arc<Machine>,
-    /// Where readings are kept between runs; `None`: nowhere, and every reading is taken anew.
-    pub cache: Option<Cache>,
+    /// Who takes readings; cases that run side by side share its machine.
+    pub reader: Reader,
+    /// What cases share of their instruments.
+    pub calibrations: Arc<Calibrations>,
 }
 
 impl Options {
     /// Who takes the run's readings.
     pub fn reader(&self) -> Reader {
-        Reader {
-            site: self.site.clone(),
-            out: self.out.clone(),
-            cache: self.cache.clone(),
-            machine: Arc::clone(&self.machine),
-        }
+        Reader { out: Some(self.out.clone()), ..self.reader.clone() }
     }
 }
 
@@ -57,7 +49,7 @@ pub struct Outcome {
 
 /// Runs every job of a plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
 pub fn run(case: &Case, plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Outcome, FileError> {
-    let threads = options.machine.slots.threads();
+    let threads = options.reader.machine.slots.threads();
     let reader = options.reader();
     let engines: Vec<usize> = (0..plan.engines.len()).collect();
     let instruments = side_by_side(threads, &engines, |&e| instrument(case, plan, e, options, observer));
@@ -106,9 +98,9 @@ fn measure(
     let taken = match instrument {
         Ok(_) => answer(planned, run, reader, task.procedure.name()),
         // An instrument that reads known scenes wrong reads nothing.
-        Err(reason) => Err(EngineError::Solver { engine: engine.clone(), what: reason.clone() }),
+        Err(reason) => Err(EngineError::Solver { engine: engine.clone(), what: reason.clone() }.into()),
     };
-    if let Err(EngineError::Declined { why, .. }) = &taken {
+    if let Err(Failure { kind: FailureKind::Declined, text: why }) = &taken {
         observer.ended(case, planned.engine.as_ref(), task.procedure, start.elapsed(), None);
         return Done::Declined(declined(case, planned, task, why));
     }
@@ -118,7 +110,7 @@ fn measure(
     if let Ok(Some(calibrated)) = instrument {
         recording.instrument_uncertainty = calibrated.calibration.uncertainty(run.job.transport);
         if let Ok(file) = &calibrated.kept {
-            recording.settings.insert("calibration".to_owned(), file.clone());
+            recording.effort.insert("calibration".to_owned(), file.clone());
         }
     }
     let wall = Duration::from_secs_f64(recording.wall_s);
@@ -127,25 +119,26 @@ fn measure(
 }
 
 /// What an engine answers to a run: it renders what the shortcut leaves, the rest follows, and the spot check must agree.
-fn answer(planned: &Planned, run: &Run, reader: &Reader, place: &str) -> Result<Taken, EngineError> {
+fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result<Taken, Failure> {
+    let failed = |what: String| Failure::from(EngineError::Solver { engine: planned.engine.name(), what });
+    let instrument = planned.instrument().ok_or_else(|| failed("it is not there".to_owned()))?;
     let shortcut = &run.shortcut;
     let rendered = if shortcut.job.stations.is_empty() {
-        Taken { measurement: Measurement::default(), wall_s: 0.0, source: Source::Nobody }
+        Taken { measurement: Measurement::default(), cost: Cost::default(), source: Source::Nobody }
     } else {
-        reader.read(planned, &shortcut.job, place)?
+        reader.read(&Question::new(&instrument, &shortcut.job, folder))?
     };
     let mut taken = Taken { measurement: shortcut.complete(rendered.measurement, &run.job), ..rendered };
     if let Some(job) = run.spot_check_job() {
-        let seen = reader.read(planned, &job, &format!("{place}-spot-check"))?;
-        let failed = |what| EngineError::Solver { engine: planned.engine.name(), what };
+        let seen = reader.read(&Question::new(&instrument, &job, &format!("{folder}-spot-check")))?;
         run.hold(&taken.measurement, &seen.measurement).map_err(failed)?;
-        taken.wall_s += seen.wall_s;
+        taken.cost.wall_s += seen.cost.wall_s;
         // What was rendered stands.
         for (&station, estimate) in run.spot_check.iter().zip(seen.measurement.estimates) {
             taken.measurement.estimates[station] = estimate;
         }
         let names: Vec<String> = job.stations.iter().map(|s| s.id.to_string()).collect();
-        taken.measurement.settings.insert("spot_checked".to_owned(), names.join(", "));
+        taken.measurement.effort.insert("spot_checked".to_owned(), names.join(", "));
         if taken.source == Source::Nobody {
             taken.source = seen.source;
         }
@@ -199,7 +192,7 @@ fn instrument(
     observer: &dyn Observer,
 ) -> Result<Option<Calibrated>, String> {
     let planned = &plan.engines[e];
-    let (Some(Ok(version)), Some(run)) = (&planned.found, plan.runs.iter().find(|r| r.engine == e)) else {
+    let (Some(instrument), Some(run)) = (planned.instrument(), plan.runs.iter().find(|r| r.engine == e)) else {
         return Ok(None);
     };
     if planned.engine.is_witness() {
@@ -211,7 +204,7 @@ fn instrument(
             observer.calibrated(planned.engine.as_ref(), calibrated);
         }
     };
-    options.machine.calibration(planned.engine.as_ref(), version, &run.job, &options.site, made).map(Some)
+    options.calibrations.of(&instrument, &run.job, &options.reader, made).map(Some)
 }
 
 fn declined(case: &Case, planned: &Planned, task: &Task, why: &str) -> Skip {
@@ -228,18 +221,18 @@ fn record(
     planned: &Planned,
     run: &Run,
     task: &Task,
-    taken: Result<Taken, EngineError>,
+    taken: Result<Taken, Failure>,
     wall: Duration,
 ) -> Recording {
     let engine = planned.engine.name();
     let (measurement, wall_s, failure) = match taken {
-        Ok(taken) => (taken.measurement, taken.wall_s, None),
+        Ok(taken) => (taken.measurement, taken.cost.wall_s, None),
         Err(error) => {
             tracing::error!(%engine, procedure = %task.procedure, "{error}");
             (Measurement::default(), wall.as_secs_f64(), Some(error.to_string()))
         }
     };
-    let estimates = if failure.is_none() { task.readings(&measurement.estimates) } else { vec![] };
+    let estimates = if failure.is_none() { measurement.readings(&task.targets) } else { vec![] };
     let readings = estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
         meter: target.id.clone(),
         quantity: task.quantity,
@@ -251,7 +244,8 @@ fn record(
         model: task.model(),
         input_sha256: case.sha256.clone(),
         seed: run.job.seed,
-        settings: measurement.settings.clone(),
+        method: measurement.method.clone(),
+        effort: measurement.effort.clone(),
         role: planned.engine.role(),
         approximation: run.approximation.clone(),
         notes: measurement.notes.clone(),

@@ -32,8 +32,8 @@ use sha2::{Digest, Sha256};
 
 use crate::engines::Site;
 use crate::judge::{Policy, Published, PublishedError};
-use crate::measure::Machine;
 use crate::measure::cache::Cache;
+use crate::measure::{Machine, Reader};
 use crate::plan::{Plan, Planner, Selection, Skipping};
 use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, SpecError, filtered, hexadecimal, suite};
@@ -94,11 +94,12 @@ impl Options<'_> {
         }
     }
 
-    fn machine(&self) -> Arc<Machine> {
-        match self.skipping {
-            Skipping::Allowed => Machine::new(self.jobs.max(1)),
-            Skipping::Nothing => Machine::rendering_everything(self.jobs.max(1)),
-        }
+    fn reader(&self) -> Reader {
+        let machine = match self.skipping {
+            Skipping::Allowed => Machine::new(self.jobs),
+            Skipping::Nothing => Machine::rendering_everything(self.jobs),
+        };
+        Reader { cache: self.cache.clone(), ..Reader::bare(&self.site, machine) }
     }
 }
 
@@ -127,7 +128,7 @@ pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<
         options.sampling.grant(&policy.judge(case, published.as_ref()), plan);
     }
     options.observer.planned(&cases, &plans);
-    let audit = Audit { policy, options, machine: options.machine() };
+    let audit = Audit { policy, options, reader: options.reader(), calibrations: Arc::default() };
     let stop: Mutex<Option<Stop>> = Mutex::new(None);
     let one = |&k: &usize| -> Result<Report, AuditError> {
         let (case, plan) = (&cases[k], &plans[k]);

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use clap::ValueEnum;
 
-use super::jobs::Outcome;
+use super::jobs::{Options, Outcome};
 use super::sequential::{self, Ask, Sampler};
 use crate::engines::Measurement;
 use crate::judge::Judge;
-use crate::measure::{Reader, Source};
+use crate::measure::{Question, Reader, Source};
 use crate::plan::{Plan, Planned, Run};
 use crate::procedures::Task;
 use crate::record::Recording;
@@ -47,10 +47,11 @@ pub(super) fn sample_on(
     case: &Case,
     plan: &Plan,
     judge: &Judge<'_>,
-    reader: &Reader,
+    options: &Options,
     outcome: &mut Outcome,
     told: &dyn Fn(&str),
 ) -> Result<(), FileError> {
+    let reader = options.reader();
     for run in &plan.runs {
         let (planned, task) = (&plan.engines[run.engine], &plan.tasks[run.task]);
         let engine = planned.engine.name();
@@ -63,7 +64,7 @@ pub(super) fn sample_on(
         let others =
             outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure && r.key.engine != engine.as_str());
         let others: Vec<&Recording> = others.collect();
-        let mut looks = Looks { planned, run, task, reader, told, from_cache: 0 };
+        let mut looks = Looks { planned, run, task, reader: &reader, told, from_cache: 0 };
         let before_s = subject.wall_s;
         sequential::refine(judge, task, &others, &mut subject, (run.job.budget, case.budget), &mut looks);
         if run.job.budget != case.budget {
@@ -76,7 +77,7 @@ pub(super) fn sample_on(
         outcome.recordings[mine] = subject;
         let of_engine: Vec<&Recording> =
             outcome.recordings.iter().filter(|r| r.key.engine == engine.as_str()).collect();
-        keep(&reader.out, engine.as_str(), &of_engine)?;
+        keep(&options.out, engine.as_str(), &of_engine)?;
     }
     Ok(())
 }
@@ -114,9 +115,10 @@ impl Sampler for Looks<'_> {
             ..job.clone()
         };
         let place = format!("{}/look-{}", job.procedure, ask.look);
-        let taken = self.reader.read(self.planned, &further, &place).map_err(|e| e.to_string())?;
+        let instrument = self.planned.instrument().ok_or("the engine is not there")?;
+        let taken = self.reader.read(&Question::new(&instrument, &further, &place)).map_err(|e| e.to_string())?;
         self.from_cache += usize::from(taken.source == Source::Cache);
-        Ok((taken.measurement, taken.wall_s))
+        Ok((taken.measurement, taken.cost.wall_s))
     }
 }
 

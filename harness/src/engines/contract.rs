@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::Site;
 use super::blocks::Blocks;
 use super::workbench::{EngineError, SceneFile, Workbench};
-use crate::procedures::Task;
-use crate::record::{EngineName, Estimate, MeterId, ProcedureId, Role, Uncertainty};
+use crate::procedures::{Target, Task};
+use crate::record::{Effort, EngineName, Estimate, MeterId, Method, ProcedureId, Role, Uncertainty};
 use crate::spec::{Budget, Case};
 use crate::system::slots::{Share, Slots};
 
@@ -220,8 +220,10 @@ pub enum Support {
 pub struct Measurement {
     /// Illuminance in lux, one a station, in the stations' order.
     pub estimates: Vec<Estimate>,
-    /// What was set, for whoever repeats it: samples, seeds, arguments, variant.
-    pub settings: BTreeMap<String, String>,
+    /// What was done: solver, preset, variant.
+    pub method: Method,
+    /// How much of it, by which random numbers and where: samples, seeds, commands.
+    pub effort: Effort,
     /// What the reader of the report should know of this run.
     pub notes: Vec<String>,
     /// The independent parts of the readings that were sampled, in the stations' order: their spread is the estimates'
@@ -231,6 +233,21 @@ pub struct Measurement {
 }
 
 impl Measurement {
+    /// The readings of targets, whose stations these are, target by target.
+    pub fn readings<'a>(&self, targets: impl IntoIterator<Item = &'a Target>) -> Vec<Estimate> {
+        let mut first = 0;
+        let reading = |target: &Target| {
+            let weights: Vec<_> = target.aspects.iter().enumerate().map(|(k, a)| (first + k, a.weight)).collect();
+            first += weights.len();
+            let sum = self.weighted(&weights);
+            match target.quadrature {
+                0.0 => sum,
+                relative => Estimate { uncertainty: sum.uncertainty.within(relative * sum.value.abs()), ..sum },
+            }
+        };
+        targets.into_iter().map(reading).collect()
+    }
+
     /// The weighted sum of stations' estimates, with the standard error that their joint sampling gives it; where the samples
     /// are not known, the errors of stations may be all one.
     pub fn weighted(&self, weights: &[(usize, f64)]) -> Estimate {

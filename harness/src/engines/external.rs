@@ -153,7 +153,7 @@ impl Engine for External {
         let run = self.invocation(job, workbench)?;
         let finished = run.run()?;
         let mut measurement = form::measurement(&finished.stdout, job, &self.id)?;
-        measurement.settings.insert("command".into(), run.command_line());
+        measurement.effort.insert("command".into(), run.command_line());
         checked(&self.id, job, measurement)
     }
 }

@@ -59,7 +59,7 @@ impl Engine for Iesna {
 
     fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
         let mut measurement = Measurement::default();
-        measurement.settings.insert("method".into(), method(job.transport).into());
+        measurement.method.insert("method".into(), method(job.transport).into());
         let mut notes = vec![];
         for station in &job.stations {
             let what = |error: NotApplicable| format!("{}: {error}", station.id);

@@ -74,13 +74,10 @@ impl Engine for Simulator {
             .map_err(|e| failed(e.to_string()))?
             .install(|| simulator::illuminance(&job.scene, &meters, job.transport, &accuracy))
             .map_err(|e| failed(e.to_string()))?;
-        let settings = [
-            ("solver".to_owned(), solution.solver),
-            ("relative_error".to_owned(), relative_error.to_string()),
-            ("seed".to_owned(), job.seed.to_string()),
-        ];
+        let method = [("solver", solution.solver)].into();
+        let effort = [("relative_error", relative_error.to_string()), ("seed", job.seed.to_string())].into();
         let estimates = solution.estimates.iter().map(estimate).collect();
-        checked(&ID, job, Measurement { estimates, settings: settings.into(), ..Measurement::default() })
+        checked(&ID, job, Measurement { estimates, method, effort, ..Measurement::default() })
     }
 }
 

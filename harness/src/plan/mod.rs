@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::engines::{Absent, Engine, Job, Site, Support, Version};
+use crate::measure::Instrument;
 use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 use crate::spec::{Budget, Case, SpecError, suggestion};
@@ -45,6 +46,12 @@ impl Planned {
     /// The engine's version, where it is there.
     pub fn version(&self) -> Option<String> {
         self.found.as_ref()?.as_ref().ok().map(|v| v.0.clone())
+    }
+
+    /// What readings are taken with, where it is there.
+    pub fn instrument(&self) -> Option<Instrument> {
+        let version = self.found.as_ref()?.as_ref().ok()?.clone();
+        Some(Instrument { engine: Arc::clone(&self.engine), version })
     }
 
     /// Whether it was looked for in vain.

@@ -61,7 +61,7 @@ fn grid(report: &Report, table: &PublishedTable) -> Grid {
 
 fn label(recording: &Recording) -> String {
     if recording.key.engine == "iesna" {
-        let method = recording.settings.get("method").map(|m| format!(", {m}"));
+        let method = recording.method.get("method").map(|m| format!(", {m}"));
         return format!("iesna{}", method.unwrap_or_default());
     }
     let light = recording.light.to_string();

@@ -36,7 +36,7 @@ fn prints(rows: &[(&str, &str)]) -> String {
 fn what_an_adapter_prints_is_what_is_read() {
     let found = read(&prints(&[("m[0]", "1"), ("m[1]", "2.5"), ("m[2]", "0"), ("m[3]", "4")])).unwrap();
     assert_eq!(found.estimates.iter().map(|e| e.value).collect::<Vec<_>>(), [1.0, 2.5, 0.0, 4.0]);
-    assert!(found.settings["command"].starts_with('/'), "{:?}", found.settings);
+    assert!(found.effort["command"].starts_with('/'), "{:?}", found.effort);
 }
 
 #[test]

@@ -237,7 +237,7 @@ fn within_errors_and_named_bias(measured: &Measurement, exact: &[f64]) {
         assert!(off < 4.8 * error + AUDIT_BIAS * exact, "{estimate:?}, exact {exact}");
         assert!(error > 0.0 && error < 0.03 * exact, "{estimate:?}");
     }
-    assert!(measured.settings["blocks"].parse::<usize>().unwrap() >= 8);
+    assert!(measured.effort["blocks"].parse::<usize>().unwrap() >= 8);
 }
 
 #[test]

@@ -200,7 +200,7 @@ fn the_fast_preset_is_right_and_the_defaults_are_off_by_far_more_than_their_stan
         read(&job)
     };
     let fast = preset("fast");
-    assert!(fast.settings["blocks"] == "8" && worst_z(&fast, &S1_INDIRECT_LX) < 5.0, "{fast:?}");
+    assert!(fast.effort["blocks"] == "8" && worst_z(&fast, &S1_INDIRECT_LX) < 5.0, "{fast:?}");
     let defaults = preset("default");
     let off = worst(&relative_deviations(&defaults, &S1_INDIRECT_LX));
     assert!((0.2..0.35).contains(&off) && worst_z(&defaults, &S1_INDIRECT_LX) > 5.0, "{defaults:?}");
