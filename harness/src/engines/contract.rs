@@ -69,7 +69,7 @@ pub trait Engine: Send + Sync {
     /// The job without what makes no difference to this engine's readings: two jobs that are equal then are one to it. For
     /// most, the names of case and procedure are comments.
     fn essence(&self, job: &Job) -> Job {
-        Job { case: String::new(), ..job.clone() }
+        job.without_names()
     }
 
     /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
@@ -171,6 +171,11 @@ impl Job {
 }
 
 impl Job {
+    /// The same whatever case and procedure are called.
+    pub(super) fn without_names(&self) -> Self {
+        Self { case: String::new(), procedure: ProcedureId::DirectIlluminance, ..self.clone() }
+    }
+
     /// Of all surfaces of room and bodies.
     pub(super) fn largest_reflectance(&self) -> f64 {
         let room = self.scene.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
