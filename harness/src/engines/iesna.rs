@@ -6,7 +6,6 @@ use luminaire::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
 use super::{Absent, Engine, EngineError, Entry, Job, Measurement, Site, Support, Version, Workbench, checked};
 use crate::record::{EngineName, Estimate, Role, Uncertainty};
 
-/// The methods of [`luminaire::calculators`].
 pub(super) struct Iesna;
 
 const ID: EngineName = EngineName::IESNA;

@@ -7,7 +7,6 @@ use super::settings::Given;
 use super::{Absent, Engine, EngineError, Entry, Job, Knob, Measurement, Site, Support, Version, Workbench, checked};
 use crate::record::{EngineName, Estimate, Role};
 
-/// The exact simulation of [`luminaire::simulator`].
 pub(crate) struct Simulator;
 
 const ID: EngineName = EngineName::SIMULATOR;
@@ -54,7 +53,7 @@ impl Engine for Simulator {
 
     /// An impostor is a way to sample an opening: to an exact solution it is the opening itself.
     fn essence(&self, job: &Job) -> Job {
-        let mut job = Job { case: String::new(), ..job.clone() };
+        let mut job = job.without_names();
         for luminaire in &mut job.scene.luminaires {
             if luminaire.model == LuminaireModel::Impostor {
                 luminaire.model = LuminaireModel::Area;

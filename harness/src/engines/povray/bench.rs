@@ -27,7 +27,6 @@ const MAX_LOOKS: usize = 10;
 /// Below this share of its upper bound a reading is darkness.
 const DARK: f64 = 1e-12;
 
-/// Where a job's runs happen.
 pub(super) struct Bench<'a> {
     job: &'a Job,
     workbench: &'a Workbench,
@@ -48,7 +47,6 @@ pub(super) fn hermetic(invocation: Invocation, site: &Site) -> Invocation {
     }
 }
 
-/// One run's choices.
 #[derive(Clone, Copy)]
 struct Run {
     light: Light,
@@ -60,14 +58,12 @@ struct Run {
 /// Which reflections a run follows.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reflections {
-    /// As many as asked for, out of the cache.
     All,
     /// The first alone, which needs no cache.
     First,
 }
 
 impl Run {
-    /// Length of the pool of directions.
     fn pool(self) -> u32 {
         if self.reflections == Reflections::First && self.count > POOL / 10 { LONG_POOL } else { POOL }
     }
@@ -82,7 +78,6 @@ impl Run {
 }
 
 impl<'a> Bench<'a> {
-    /// A bench for a job.
     pub(super) fn new(job: &'a Job, workbench: &'a Workbench, settings: &'a Settings) -> Result<Self, EngineError> {
         Ok(Self { job, workbench, settings, program: program(&workbench.site)? })
     }

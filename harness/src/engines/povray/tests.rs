@@ -27,15 +27,7 @@ fn site() -> Site {
 }
 
 fn workbench(folder: &Path) -> Workbench {
-    let limit = Duration::from_secs(120);
-    Workbench {
-        site: site(),
-        scene_dir: folder.to_owned(),
-        log: folder.join("log"),
-        jobs: 2,
-        limit,
-        peak: crate::system::process::PeakMemory::default(),
-    }
+    Workbench { site: site(), ..fixtures::workbench(folder) }
 }
 
 fn read(job: &Job) -> Measurement {

@@ -1,6 +1,7 @@
 //! Every way in which a renderer fails, played by a false interpreter, ends in an error that says so.
 
 use std::os::unix::fs::PermissionsExt;
+use std::time::Duration;
 
 use super::*;
 use crate::system::process::ProcessError;
