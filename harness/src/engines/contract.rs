@@ -71,7 +71,7 @@ pub trait Engine: Send + Sync {
     /// The job without what makes no difference to this engine's readings: two jobs that are equal then are one to it. For
     /// most, the names of case and procedure are comments.
     fn essence(&self, job: &Job) -> Job {
-        Job { case: String::new(), ..job.clone() }
+        job.nameless()
     }
 
     /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
@@ -160,6 +160,11 @@ pub struct Job {
 }
 
 impl Job {
+    /// The same under no name: of any case, and of one procedure that stands for all.
+    pub fn nameless(&self) -> Self {
+        Self { case: String::new(), procedure: ProcedureId::LuminousIntensity, ..self.clone() }
+    }
+
     /// What an engine without settings is asked for a task of a case.
     pub fn of_task(case: &Case, task: &Task) -> Self {
         let station = |(id, meter)| Station { id, meter, expected_lx: None };

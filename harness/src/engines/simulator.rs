@@ -54,7 +54,7 @@ impl Engine for Simulator {
 
     /// An impostor is a way to sample an opening: to an exact solution it is the opening itself.
     fn essence(&self, job: &Job) -> Job {
-        let mut job = Job { case: String::new(), ..job.clone() };
+        let mut job = job.nameless();
         for luminaire in &mut job.scene.luminaires {
             if luminaire.model == LuminaireModel::Impostor {
                 luminaire.model = LuminaireModel::Area;
