@@ -35,7 +35,6 @@ const COVERAGE: f64 = 2.0;
 /// Past this a calibration scene hangs.
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// What a calibration found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     pub engine: EngineName,
@@ -43,16 +42,13 @@ pub struct Calibration {
     /// The version of this program, whose read-out it is.
     pub tool_version: String,
     pub settings: BTreeMap<String, serde_json::Value>,
-    /// What it read of each scene.
     pub parts: Vec<Part>,
 }
 
 /// What an engine read of one calibration scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Part {
-    /// The scene: point, asymmetric, shadow or furnace.
     pub scene: String,
-    /// Whether it is one of reflected light.
     pub reflected: bool,
     /// The largest deviation from the closed form, relative.
     pub deviation: f64,
@@ -62,26 +58,20 @@ pub struct Part {
     pub declared: f64,
     /// The instrument's standard uncertainty that follows, relative.
     pub uncertainty: f64,
-    /// Why the scene was left out.
     pub left_out: Option<String>,
 }
 
-/// A calibration and where it is kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibrated {
     pub calibration: Calibration,
-    /// Whether it was measured just now.
     pub origin: Origin,
     /// The file that keeps it, or why none does.
     pub kept: Result<String, String>,
 }
 
-/// Where a calibration comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
-    /// Read from the file of an earlier one.
     Kept,
-    /// Measured just now.
     Measured,
 }
 
@@ -95,7 +85,6 @@ pub enum CalibrationError {
         100.0 * deviation
     )]
     Implausible { engine: EngineName, scene: &'static str, meter: String, value_lx: f64, exact_lx: f64, deviation: f64 },
-    /// It failed in a calibration scene.
     #[error("calibration: {0}")]
     Failed(#[from] Failure),
 }

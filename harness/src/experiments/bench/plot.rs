@@ -18,7 +18,6 @@ const DASHES: [&str; 4] = ["none", "6 3", "2 3", "8 3 2 3"];
 const LEAST: f64 = 1e-9;
 
 impl BenchReport {
-    /// The plots, one below the other.
     pub fn svg(&self) -> String {
         let height = PANEL * self.pareto.len() as f64;
         let mut text = format!(

@@ -27,14 +27,11 @@ pub enum How {
     SilentLoss,
     /// What is read is no number.
     Nan,
-    /// It ends with an error.
     Crash,
-    /// It does not end.
     Hang,
 }
 
 impl How {
-    /// Its name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Drift => "drift",
@@ -47,13 +44,11 @@ impl How {
 }
 
 /// What one point shows.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Finding {
     /// The largest deviation beyond noise, relative; `None` where nothing was read.
     pub(super) deviation: Option<f64>,
-    /// The noise beside it.
     pub(super) noise: Option<f64>,
-    /// How it breaks, if it does.
     pub(super) how: Option<How>,
     /// Why nothing was read or compared.
     pub(super) text: Option<String>,
@@ -74,8 +69,7 @@ impl Finding {
             off.then_some(How::Drift)
         };
         let deviation = Some(found.beyond).filter(|d| d.is_finite());
-        let is_exact = found.is_exact;
-        Self { deviation, noise: Some(found.noise), how, text: None, is_refused: false, is_exact }
+        Self { deviation, noise: Some(found.noise), how, is_exact: found.is_exact, ..Self::default() }
     }
 
     pub(super) fn failed(failure: &Failure) -> Self {
@@ -86,25 +80,21 @@ impl Finding {
             FailureKind::Hang => Some(How::Hang),
             FailureKind::SilentLoss => Some(How::SilentLoss),
         };
-        let text = Some(failure.text.clone());
         let is_refused = matches!(failure.kind, FailureKind::Declined | FailureKind::Refused);
-        Self { deviation: None, noise: None, how, text, is_refused, is_exact: true }
+        Self { how, text: Some(failure.text.clone()), is_refused, ..Self::default() }
     }
 
     /// The changed job was read, what it is held against was not: nothing is known.
     pub(super) fn without_base(failure: &Failure) -> Self {
         let text = Some(format!("nothing to hold it against: {}", failure.text));
-        Self { deviation: None, noise: None, how: None, text, is_refused: true, is_exact: true }
+        Self { text, is_refused: true, ..Self::default() }
     }
 }
 
-/// Everything that stress found with one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct StressReport {
     pub case: String,
-    /// Engines with their versions.
     pub engines: BTreeMap<EngineName, String>,
-    /// One an engine and law.
     pub laws: Vec<LawReport>,
 }
 
@@ -128,7 +118,6 @@ pub struct LawReport {
     pub refused_at: Option<f64>,
     /// Points that time did not suffice for, or that lie beyond one that hung.
     pub untried: usize,
-    /// Every point, from mild to extreme.
     pub points: Vec<PointReport>,
     /// The causes on record, where all that breaks is known.
     pub known: Vec<String>,
@@ -142,15 +131,10 @@ pub struct PointReport {
     pub procedure: ProcedureId,
     pub magnitude: f64,
     pub tried: bool,
-    /// Deviation beyond noise, relative.
     pub deviation: Option<f64>,
-    /// Noise, relative.
     pub noise: Option<f64>,
-    /// How it breaks, if it does.
     pub how: Option<How>,
-    /// Whether the engine refuses.
     pub refused: bool,
-    /// Why nothing was read.
     pub text: Option<String>,
 }
 
@@ -178,7 +162,6 @@ impl StressReport {
         Self { case: case.name.clone(), engines, laws }
     }
 
-    /// Laws that an engine breaks.
     pub fn broken_by<'a>(&'a self, engine: &'a str) -> impl Iterator<Item = &'a LawReport> {
         self.laws.iter().filter(move |l| l.engine == engine && l.how.is_some())
     }
@@ -223,9 +206,7 @@ impl LawReport {
             }
         }
     }
-}
 
-impl LawReport {
     /// Holds what breaks against what is on record of this law.
     fn look_up(&mut self, record: &[&KnownBreak]) {
         let explains = |k: &&KnownBreak, p: &PointReport| {
@@ -258,14 +239,7 @@ fn find_step(law: &str, magnitude: f64) -> usize {
 impl PointReport {
     fn new(procedure: ProcedureId, magnitude: f64, finding: Option<Finding>) -> Self {
         let tried = finding.is_some();
-        let f = finding.unwrap_or(Finding {
-            deviation: None,
-            noise: None,
-            how: None,
-            text: None,
-            is_refused: false,
-            is_exact: true,
-        });
+        let f = finding.unwrap_or_default();
         Self {
             procedure,
             magnitude,
