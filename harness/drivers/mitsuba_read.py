@@ -1,11 +1,16 @@
 """Reads illuminance in Mitsuba 3: a job (JSON) in, readings (JSON) on standard output.
 
     python mitsuba_read.py job.json
+    python mitsuba_read.py job.json --serve
 
 Meters are no part of the scene, so nothing disturbs the light. Direct light is what `Scene.sample_emitter_direction`
 gives at a meter, which is exact for point sources. Indirect light is E = pi x the mean radiance that the scene's own
 integrator returns along cosine-distributed rays, first directions stratified. Sums are in 64-bit floats, since a film
 adds up in 32. Every block of samples has a seed of its own; the standard error is that of the mean of the blocks.
+
+By itself it reads as many blocks as the job says. With --serve it says what there is to read, and then answers each line
+of standard input, {"part": ..., "side": m, "seeds": [...]}, with one block of m x m samples a meter and emitter for
+every seed, so that luxproof can stop when the blocks' spread is small enough.
 """
 
 import argparse
@@ -13,19 +18,13 @@ import json
 import math
 import os
 import sys
-import time
-
-START = time.monotonic()
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-LEAST_BLOCKS = 8  # for a standard error
-GOOD_BLOCKS = 32  # for one that is itself good to 13 %
 LANES = 1 << 17  # rays in flight
-LEAST_SIDE = 64  # strata a side of a block, so that blocks are many strata and their errors near normal
-PLAN_MARGIN = 2.0  # the spread of two blocks is a rough guess of the error of one
+VERSIONS = {"mitsuba": mi.__version__, "drjit": dr.__version__}
 
 
 def main():
@@ -43,42 +42,69 @@ def main():
     folder = os.path.dirname(os.path.abspath(options.job))
     # Without optimize=False two luminaires of one kind may be merged into one.
     scene = mi.load_file(os.path.join(folder, job["scene"]), optimize=False)
-    json.dump(measure(scene, job), answer, allow_nan=False)
-    answer.close()
+    instrument = Instrument(scene, job)
+    for line in instrument.served(sys.stdin) if options.serve else [instrument.by_itself()]:
+        print(json.dumps(line, allow_nan=False), file=answer, flush=True)
 
 
 def arguments():
     parser = argparse.ArgumentParser(description="Reads illuminance in Mitsuba 3.")
     parser.add_argument("job", help="the job, a JSON file beside its scene")
+    parser.add_argument("--serve", action="store_true", help="read blocks as standard input asks for them")
     parser.add_argument("--threads", type=int, default=os.cpu_count(), help="worker threads; no result depends on them")
     parser.add_argument("--variant", help="Mitsuba variant to use instead of the job's")
     return parser.parse_args()
 
 
-def measure(scene, job):
-    """All readings of a job."""
-    meters = Meters(job["stations"])
-    report = Report(job)
-    emitters = list(scene.emitters())
-    if len(emitters) != job["emitters"]:
-        raise RuntimeError(f"the scene has {len(emitters)} emitters, the job says {job['emitters']}")
-    if job["film"]:
-        block = lambda m, seed: film(scene, job["film"], meters.count, seed)
-        return report.with_readings(*report.blocks(job["transport"], block, meters.count))
-    dark = np.zeros(meters.count), np.zeros(meters.count)
-    parts = []
-    if job["transport"] in ("direct", "total") and emitters:
-        block = lambda m, seed: direct(scene, meters, len(emitters), m, seed)
-        if not job["extended"]:
-            parts.append((block(1, None), dark[1]))
-        else:
-            parts.append(report.blocks("direct", block, meters.count * len(emitters)))
-    if job["transport"] in ("indirect", "total") and emitters and scene.shapes():
-        block = lambda m, seed: indirect(scene, meters, m, seed)
-        parts.append(report.blocks("indirect", block, meters.count))
-    values = sum((value for value, _ in parts), dark[0])
-    errors = np.sqrt(sum((error**2 for _, error in parts), dark[1]))
-    return report.with_readings(values, errors)
+class Instrument:
+    """The parts of a job's light: for each a function from (m, seed) to a block, and the rays of a block with m = 1."""
+
+    def __init__(self, scene, job):
+        self.job = job
+        self.meters = meters = Meters(job["stations"])
+        emitters = len(scene.emitters())
+        if emitters != job["emitters"]:
+            raise RuntimeError(f"the scene has {emitters} emitters, the job says {job['emitters']}")
+        self.parts = {}
+        if job["film"]:
+            self.parts[job["transport"]] = lambda m, seed: film(scene, job["film"], meters.count, seed), meters.count
+            return
+        if job["transport"] in ("direct", "total") and emitters:
+            rays = meters.count * emitters
+            self.parts["direct"] = lambda m, seed: direct(scene, meters, emitters, m, seed), rays
+        if job["transport"] in ("indirect", "total") and emitters and scene.shapes():
+            self.parts["indirect"] = lambda m, seed: indirect(scene, meters, m, seed), meters.count
+
+    def is_sampled(self, part):
+        return bool(self.job["film"] or self.job["extended"] or part != "direct")
+
+    def block(self, part, m, seed):
+        values = self.parts[part][0](m, seed)
+        bad = [s["id"] for s, value in zip(self.job["stations"], values) if not math.isfinite(value)]
+        if bad:
+            raise RuntimeError(f"illuminance is not finite at {', '.join(bad)}")
+        return values
+
+    def served(self, requests):
+        parts = [{"name": p, "rays": self.parts[p][1], "sampled": self.is_sampled(p)} for p in self.parts]
+        stations = [s["id"] for s in self.job["stations"]]
+        yield {"versions": VERSIONS, "variant": mi.variant(), "lanes": LANES, "stations": stations, "parts": parts}
+        for request in map(json.loads, requests):
+            yield [self.block(request["part"], request["side"], seed).tolist() for seed in request["seeds"]]
+
+    def by_itself(self):
+        value, variance = np.zeros(self.meters.count), np.zeros(self.meters.count)
+        for k, part in enumerate(self.parts):
+            if not self.is_sampled(part):
+                value += self.block(part, 1, None)
+                continue
+            seeds = ((self.job["seed"], k, b) for b in range(self.job["blocks"]))
+            blocks = np.array([self.block(part, self.job["side"], seed) for seed in seeds])
+            value += blocks.mean(0)
+            variance += blocks.var(0, ddof=1) / len(blocks)
+        rows = zip((s["id"] for s in self.job["stations"]), value.tolist(), np.sqrt(variance).tolist())
+        readings = [{"id": name, "value": lux, "std_error": error} for name, lux, error in rows]
+        return {"versions": VERSIONS, "variant": mi.variant(), "readings": readings}
 
 
 def film(scene, reading, meters, seed):
@@ -176,75 +202,6 @@ def trace(scene, p, d, seed):
         ray = mi.RayDifferential3f(mi.Point3f(*p[k]), mi.Vector3f(*d[k]))
         found[k] = integrator.sample(scene, sampler, ray)[0][0]
     return found
-
-
-class Report:
-    """What is written down of a measurement."""
-
-    def __init__(self, job):
-        self.job = job
-        self.settings = {"seed": str(job["seed"])}
-        self.notes = []
-
-    def blocks(self, name, block, rays):
-        """Mean and standard error of independent blocks, as many as the job's budget asks for.
-
-        `block(m, seed)` estimates every meter from m x m samples for each of `rays` (meter, emitter) pairs.
-        """
-        m = self.block_side(block, rays)
-        fixed, target = self.job["fixed_blocks"], self.job["relative_error"]
-        means, slowest = [], 0.0
-        while True:
-            count = len(means)
-            if count >= LEAST_BLOCKS:
-                mean, error = mean_and_error(means)
-                worst = np.max(np.divide(error, mean, out=np.zeros_like(mean), where=mean > 0), initial=0)
-                if (fixed and count >= fixed) or (not fixed and count >= GOOD_BLOCKS and worst <= target):
-                    break
-                if time.monotonic() - START + 1.1 * slowest > self.job["seconds"]:
-                    if worst > target:
-                        self.notes.append(f"{name}: out of time at a relative standard error of {worst:.2g}")
-                    break
-            began = time.monotonic()
-            means.append(block(m, (self.job["seed"], name == "direct", count)))
-            slowest = max(slowest, time.monotonic() - began)
-        self.settings[f"{name}_blocks"] = str(count)
-        self.settings[f"{name}_samples_a_meter_and_block"] = str(m * m * rays // len(mean))
-        return mean, error
-
-    def block_side(self, block, rays):
-        """m such that a block fills the rays in flight at most, and enough blocks about reach the error and fit in the time."""
-        if self.job["fixed_samples"]:
-            return max(1, math.isqrt(self.job["fixed_samples"]))
-        full = min(256, max(2, math.isqrt(LANES // rays)))
-        trial = full if is_jit() else 2
-        trials = []
-        for seed in (0, 1):  # the first one compiles kernels
-            began = time.monotonic()
-            trials.append(block(trial, (self.job["seed"], 2, seed)))
-        ray_s = (time.monotonic() - began) / (trial**2 * rays)
-        left_s = self.job["seconds"] - (time.monotonic() - START)
-        affordable = max(left_s, 0) / GOOD_BLOCKS / ray_s / rays
-        mean, error = mean_and_error(trials)
-        worst = np.max(np.divide(error, mean, out=np.zeros_like(mean), where=mean > 0), initial=0)
-        # `error` is that of the mean of two; m x m samples are at least as good as m x m independent ones.
-        needed = trial * PLAN_MARGIN * worst / self.job["relative_error"] * math.sqrt(2 / GOOD_BLOCKS)
-        return max(2, min(full, math.ceil(max(needed, LEAST_SIDE)), math.isqrt(int(affordable))))
-
-    def with_readings(self, values, errors):
-        rows = list(zip((s["id"] for s in self.job["stations"]), values.tolist(), errors.tolist()))
-        bad = [name for name, value, error in rows if not math.isfinite(value + error)]
-        if bad:
-            raise RuntimeError(f"illuminance is not finite at {', '.join(bad)}")
-        readings = [{"id": name, "value": value, "std_error": error} for name, value, error in rows]
-        versions = {"mitsuba": mi.__version__, "drjit": dr.__version__}
-        settings = {"variant": mi.variant(), **self.settings}
-        return {"versions": versions, "readings": readings, "settings": settings, "notes": self.notes}
-
-
-def mean_and_error(blocks):
-    blocks = np.array(blocks)
-    return blocks.mean(0), blocks.std(0, ddof=1) / math.sqrt(len(blocks))
 
 
 def strata(cell, m, random):

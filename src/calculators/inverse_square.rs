@@ -4,6 +4,8 @@
 //! one the five-times rule (distance at least five times the largest luminous dimension) keeps it within about 1-2.5 %.
 //! How far off it is for a Lambertian opening of the luminaire's size is worked out with Lambert's polygon formula.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
 use super::{Calculated, NotApplicable, Validity};
@@ -52,6 +54,21 @@ pub fn from_luminaire(luminaire: &Luminaire, meter: &Meter) -> Lux {
     } else {
         Lux(0.0)
     }
+}
+
+/// Mean cylindrical illuminance of a point by point luminaires that nothing hides (EN 12464-1: the mean over all vertical
+/// directions of the illuminance of a surface that faces them).
+///
+/// A surface that faces the azimuth phi gets I cos(phi - phi_0) r / d^3 of a luminaire at the horizontal distance r, and nothing
+/// from behind; the mean of the positive part of a cosine is 1 / pi: E = sum of I r / (pi d^3).
+pub fn cylindrical_illuminance(scene: &Scene, point_m: DVec3) -> Lux {
+    let of_one = |luminaire: &Luminaire| {
+        let towards_point = point_m - luminaire.position_m;
+        let horizontal_m = towards_point.truncate().length();
+        let intensity = luminaire.intensity_towards(towards_point).value();
+        intensity * horizontal_m / (PI * towards_point.length().powi(3))
+    };
+    Lux(scene.luminaires.iter().map(of_one).sum())
 }
 
 const METHOD: &str = "inverse-square method";

@@ -153,3 +153,22 @@ fn a_meter_at_the_photometric_centre_is_refused() {
     let refused = direct_illuminance(&scene, &facing_up(0.0, 0.0, 0.0));
     assert!(matches!(Validity::of(&refused), Validity::No(_)));
 }
+
+#[test]
+fn cylindrical_illuminance_is_the_mean_over_vertical_directions() {
+    const DIRECTIONS: u32 = 100_000;
+    let mut source = luminaire(isotropic(), LuminousOpening::Point, LuminaireModel::Point);
+    source.flux_scale = 0.7;
+    let mut other = source.clone();
+    other.position_m = DVec3::new(3.0, -1.0, 0.5);
+    let scene = Scene { luminaires: vec![source, other], ..Scene::default() };
+    for position_m in [DVec3::new(1.0, 0.5, -2.0), DVec3::new(-2.0, 4.0, 1.0), DVec3::new(0.0, 0.0, -2.0)] {
+        let facing = |k: u32| {
+            let azimuth = 2.0 * PI * f64::from(k) / f64::from(DIRECTIONS);
+            let meter = Meter { position_m, normal: DVec3::new(azimuth.cos(), azimuth.sin(), 0.0) };
+            scene.luminaires.iter().map(|l| from_luminaire(l, &meter).value()).sum::<f64>()
+        };
+        let mean = (0..DIRECTIONS).map(facing).sum::<f64>() / f64::from(DIRECTIONS);
+        assert_relative_eq!(cylindrical_illuminance(&scene, position_m).value(), mean, max_relative = 1e-9);
+    }
+}

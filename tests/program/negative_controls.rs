@@ -7,7 +7,7 @@ use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
 use luxproof::audit::run::{Options, Progress, run};
 use luxproof::engines::{Engine, Site};
 use luxproof::judge::{Comparison, Judge, KnownDeviations, Tolerances, Verdict};
-use luxproof::measure::Machine;
+use luxproof::measure::{Machine, Reader};
 use luxproof::plan::{Selection, plan};
 use luxproof::record::{ProcedureId, Recording};
 use luxproof::spec::Case;
@@ -34,7 +34,8 @@ fn recordings(case: &Case, engine: &str) -> Vec<Recording> {
     let site = Site::of_user().unwrap();
     let out = Folder::for_renderers(&[]);
     let plan = plan(case, &selection(engine), &site).unwrap();
-    let options = Options { site, out: out.path(""), machine: Machine::new(2), cache: None };
+    let reader = Reader::bare(&site, Machine::new(2));
+    let options = Options { out: out.path(""), reader, calibrations: Arc::default() };
     let outcome = run(case, &plan, &options, &Silent).unwrap();
     let mine: Vec<Recording> = outcome.recordings.into_iter().filter(|r| r.key.engine == engine).collect();
     assert!(!mine.is_empty(), "{engine} did not run; run `luxproof engines install`");

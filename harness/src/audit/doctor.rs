@@ -12,8 +12,9 @@ use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport};
 use luminaire::simulator::{self, Accuracy};
 
-use crate::engines::{Budget, Engine, EngineError, Job, Site, Station, Support, Workbench, checked};
+use crate::engines::{Budget, Engine, EngineError, Job, Station};
 use crate::judge::{Basis, Tolerances, Verdict, judge};
+use crate::measure::{Failure, FailureKind, Instrument, Question, Reader};
 use crate::record::{EngineName, MeterId, ProcedureId, Quantity};
 
 /// What the doctor found of one engine.
@@ -27,26 +28,30 @@ pub struct Finding {
 }
 
 /// Lets one engine read the known scene, in a folder that is thrown away.
-pub fn examine(engine: &dyn Engine, site: &Site, tolerances: &Tolerances) -> Finding {
+pub fn examine(engine: &Arc<dyn Engine>, reader: &Reader, tolerances: &Tolerances) -> Finding {
     let finding = |healthy, text| Finding { engine: engine.name(), healthy, text };
-    let version = match engine.probe(site) {
+    let version = match engine.probe(&reader.site) {
         Ok(version) => version,
         Err(absent) => return finding(false, format!("absent: {absent}")),
     };
-    let mut texts = vec![version.0];
+    let instrument = Instrument { engine: Arc::clone(engine), version };
+    let mut texts = vec![instrument.version.0.clone()];
     let mut healthy = true;
     for (procedure, transport) in [
         (ProcedureId::DirectIlluminance, Transport::Direct),
         (ProcedureId::IndirectIlluminance, Transport::Indirect(Bounces::Converged)),
     ] {
-        match check(engine, site, tolerances, procedure, transport) {
+        match check(&instrument, reader, tolerances, &known_job(procedure, transport)) {
             Ok((well, text)) => {
                 healthy &= well;
                 texts.push(text);
             }
-            Err(error) => {
+            Err(failure) if failure.kind == FailureKind::Declined => {
+                texts.push(format!("{procedure} not supported: {failure}"));
+            }
+            Err(failure) => {
                 healthy = false;
-                texts.push(format!("{procedure}: {error}"));
+                texts.push(format!("{procedure}: {failure}"));
             }
         }
     }
@@ -54,28 +59,14 @@ pub fn examine(engine: &dyn Engine, site: &Site, tolerances: &Tolerances) -> Fin
 }
 
 fn check(
-    engine: &dyn Engine,
-    site: &Site,
+    instrument: &Instrument,
+    reader: &Reader,
     tolerances: &Tolerances,
-    procedure: ProcedureId,
-    transport: Transport,
-) -> Result<(bool, String), EngineError> {
-    let job = known_job(procedure, transport);
-    let id = engine.name();
-    if let Support::No(why) = engine.supports(&job) {
-        return Ok((true, format!("{procedure} not supported: {why}")));
-    }
-    let folder = tempfile::tempdir().map_err(|e| EngineError::io(&std::env::temp_dir(), e))?;
-    let workbench = Workbench {
-        site: site.clone(),
-        scene_dir: folder.path().to_owned(),
-        log: folder.path().join("log"),
-        jobs: crate::system::process::cores(),
-        limit: std::time::Duration::from_secs(120),
-        peak: crate::system::process::PeakMemory::default(),
-    };
-    let measurement = checked(&id, &job, engine.read(&job, &workbench)?)?;
-    let expected = expected(&job).map_err(|what| EngineError::Solver { engine: id.clone(), what })?;
+    job: &Job,
+) -> Result<(bool, String), Failure> {
+    let (id, procedure) = (instrument.engine.name(), job.procedure);
+    let measurement = reader.read(&Question::new(instrument, job, procedure.name()))?.measurement;
+    let expected = expected(job).map_err(|what| EngineError::Solver { engine: id.clone(), what })?;
     let estimate = measurement.estimates[0];
     let tolerance = tolerances.of(procedure, Basis::Exact, id.as_str(), Quantity::Illuminance, &BTreeMap::new());
     let spread = tolerances.coverage_factor() * estimate.uncertainty.standard_error().unwrap_or(0.0);

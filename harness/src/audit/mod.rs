@@ -1,5 +1,199 @@
-//! From specs to a report: runs, further looks where a comparison is undecided, and the doctor's quick look at one engine.
+//! From specs to a report, as a library call that prints nothing: plans, runs, further looks, verdicts, one report.
+//!
+//! ```no_run
+//! use std::path::PathBuf;
+//!
+//! use luxproof::audit::{self, Options};
+//! use luxproof::engines::Site;
+//! use luxproof::judge::Policy;
+//!
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let options = Options::new(Site::of_user()?, PathBuf::from("out"));
+//!     let report = audit::run(&[PathBuf::from("office.yaml")], &Policy::built_in()?, &options)?;
+//!     for c in report.comparisons.iter().filter(|c| c.verdict.is_bad()) {
+//!         println!("{} at {}: {:?}", c.key, c.meter, c.relative_deviation);
+//!     }
+//!     std::process::exit(report.exit().code().into())
+//! }
+//! ```
 
+mod case;
 pub mod doctor;
-pub mod run;
+pub mod jobs;
+mod observer;
+pub mod sampling;
 pub mod sequential;
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use sha2::{Digest, Sha256};
+
+use crate::engines::Site;
+use crate::judge::{Policy, Published, PublishedError};
+use crate::measure::cache::Cache;
+use crate::measure::{Machine, Reader};
+use crate::plan::{Plan, Planner, Selection, Skipping};
+use crate::report::{Exit, Report, SpecRecord};
+use crate::spec::{Case, SpecError, filtered, hexadecimal, suite};
+use crate::system::files::{self, FileError};
+use crate::system::process;
+use crate::system::slots::side_by_side;
+
+use case::{Audit, Stop};
+pub use observer::{Observer, Silent};
+pub use sampling::Sampling;
+
+/// How to audit.
+pub struct Options<'a> {
+    /// Where engines are installed.
+    pub site: Site,
+    /// The folder of the run's files: the report, readings, scenes and logs.
+    pub out: PathBuf,
+    /// Where readings are kept between runs; `None`: every reading is taken anew, and none is kept.
+    pub cache: Option<Cache>,
+    /// Threads or processes at a time.
+    pub jobs: usize,
+    /// Engines, procedures and seed.
+    pub selection: Selection,
+    /// Only cases whose name matches any of these, globs or parts of names; empty for all.
+    pub filter: Vec<String>,
+    /// Whether readings may be left out that follow from others.
+    pub skipping: Skipping,
+    /// When sampling stops.
+    pub sampling: Sampling,
+    /// What a failed case means to those after it.
+    pub after_failure: AfterFailure,
+    /// Told of what happens.
+    pub observer: &'a dyn Observer,
+}
+
+/// What a failed case means to those after it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AfterFailure {
+    GoOn,
+    /// They are reported as skipped.
+    Stop,
+}
+
+impl Options<'_> {
+    /// Everything that the specs ask for, on all cores, without a cache.
+    pub fn new(site: Site, out: PathBuf) -> Self {
+        Self {
+            site,
+            out,
+            cache: None,
+            jobs: process::cores(),
+            selection: Selection { seed: 1, ..Selection::default() },
+            filter: vec![],
+            skipping: Skipping::Allowed,
+            sampling: Sampling::Accurate,
+            after_failure: AfterFailure::GoOn,
+            observer: &Silent,
+        }
+    }
+
+    fn reader(&self) -> Reader {
+        let machine = match self.skipping {
+            Skipping::Allowed => Machine::new(self.jobs),
+            Skipping::Nothing => Machine::rendering_everything(self.jobs),
+        };
+        Reader { cache: self.cache.clone(), ..Reader::bare(&self.site, machine) }
+    }
+}
+
+/// Why an audit could not be made at all.
+#[derive(Debug, thiserror::Error)]
+pub enum AuditError {
+    #[error(transparent)]
+    Spec(#[from] SpecError),
+    #[error(transparent)]
+    Published(#[from] PublishedError),
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+/// More cases at a time would only wait for the machine's slots, each on threads of its own.
+const MAX_CASES_AT_A_TIME: usize = 8;
+
+/// Runs every case of specs, folders and patterns and judges what engines read; files are written below [`Options::out`] alone.
+pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<Report, AuditError> {
+    let clock = Instant::now();
+    let cases = chosen(specs, options)?;
+    let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
+    let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
+    let published = published(&cases)?;
+    for ((case, plan), published) in cases.iter().zip(&mut plans).zip(&published) {
+        options.sampling.grant(&policy.judge(case, published.as_ref()), plan);
+    }
+    options.observer.planned(&cases, &plans);
+    let audit = Audit { policy, options, reader: options.reader(), calibrations: Arc::default() };
+    let stop: Mutex<Option<Stop>> = Mutex::new(None);
+    let one = |&k: &usize| -> Result<Report, AuditError> {
+        let (case, plan) = (&cases[k], &plans[k]);
+        let folder = if cases.len() == 1 { options.out.clone() } else { options.out.join(within(&options.out, case)) };
+        let stopped = stop.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let report = audit.case(case, plan, published[k].as_ref(), stopped.as_ref(), &folder)?;
+        let mut stop = stop.lock().unwrap_or_else(PoisonError::into_inner);
+        if process::is_interrupted() {
+            *stop = Some(Stop::Interrupted);
+        } else if options.after_failure == AfterFailure::Stop
+            && stop.is_none()
+            && matches!(report.exit(), Exit::Failed | Exit::Engine)
+        {
+            *stop = Some(Stop::Failed { case: case.name.clone() });
+        }
+        Ok(report)
+    };
+    // What comes after a failure must not have begun before it.
+    let side = if options.after_failure == AfterFailure::Stop { 1 } else { options.jobs.clamp(1, MAX_CASES_AT_A_TIME) };
+    let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
+    let reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let mut report = Report::joined(record(specs, &cases), reports);
+    if cases.len() > 1 {
+        // Cases ran side by side: their seconds do not add up.
+        report.wall_s = clock.elapsed().as_secs_f64();
+        files::keep_json(&options.out.join("report.json"), &report)?;
+    }
+    Ok(report)
+}
+
+/// The cases that are asked for, read and checked before any engine starts.
+pub fn chosen(specs: &[PathBuf], options: &Options<'_>) -> Result<Vec<Case>, SpecError> {
+    let mut cases = suite(specs).and_then(|all| filtered(all, &options.filter))?;
+    // Of a suite, the cases that the chosen procedures concern; a choice that concerns none is refused by the planner.
+    if cases.iter().any(|case| options.selection.concerns(case)) {
+        cases.retain(|case| options.selection.concerns(case));
+    }
+    Ok(cases)
+}
+
+/// The published tables of each case.
+pub fn published(cases: &[Case]) -> Result<Vec<Option<Published>>, PublishedError> {
+    cases.iter().map(|case| case.published.as_deref().map(Published::read).transpose()).collect()
+}
+
+/// The folder of one case of several, a spec's own name not twice.
+fn within(root: &Path, case: &Case) -> PathBuf {
+    let spec = root.file_name().and_then(|n| n.to_str()).map(|n| format!("{n}/"));
+    let own = spec.and_then(|prefix| case.name.strip_prefix(&prefix));
+    PathBuf::from(own.unwrap_or(&case.name))
+}
+
+/// What was run, all cases together.
+fn record(specs: &[PathBuf], cases: &[Case]) -> SpecRecord {
+    if let [case] = cases {
+        return SpecRecord::of(case);
+    }
+    let paths: Vec<String> = specs.iter().map(|p| p.display().to_string()).collect();
+    let mut hash = Sha256::new();
+    for case in cases {
+        hash.update(&case.sha256);
+    }
+    let title = match cases {
+        [first, ..] if cases.iter().all(|c| c.path == first.path) => first.title.clone(),
+        _ => format!("{} cases of {}", cases.len(), paths.join(", ")),
+    };
+    SpecRecord { path: paths.join(" "), sha256: hexadecimal(&hash.finalize()), title }
+}

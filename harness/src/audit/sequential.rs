@@ -37,7 +37,7 @@ pub struct Ask {
 
 /// Someone who takes further looks.
 pub trait Sampler {
-    /// One estimate for each target asked for, and the seconds that it took; the error says why there is none.
+    /// One estimate for each station of the targets asked for, and the seconds that it took; the error says why there is none.
     fn sample(&mut self, ask: &Ask) -> Result<(Measurement, f64), String>;
 }
 
@@ -89,8 +89,11 @@ pub fn refine(
         for (key, value) in measurement.settings {
             subject.settings.insert(format!("look{look}_{key}"), value);
         }
-        for (estimate, &k) in measurement.estimates.iter().zip(&ask.targets) {
-            combine(&mut subject.readings[k], total_weight, estimate, weight, task.targets[k].per_lux);
+        let mut stations = &measurement.estimates[..];
+        for &k in &ask.targets {
+            let (mine, rest) = stations.split_at(task.targets[k].aspects.len());
+            stations = rest;
+            combine(&mut subject.readings[k], total_weight, &task.targets[k].reading(mine), weight);
             subject.looks[k] = look;
         }
         total_weight += weight;
@@ -98,11 +101,11 @@ pub fn refine(
 }
 
 /// Adds a look to a reading, with weights that were fixed before.
-fn combine(reading: &mut Reading, before: f64, look: &Estimate, weight: f64, per_lux: f64) {
+fn combine(reading: &mut Reading, before: f64, look: &Estimate, weight: f64) {
     let total = before + weight;
     let mean = |a: f64, b: f64| (before * a + weight * b) / total;
-    reading.value = mean(reading.value, per_lux * look.value);
-    let parts = [(before / total, reading.uncertainty), (weight * per_lux / total, look.uncertainty)];
+    reading.value = mean(reading.value, look.value);
+    let parts = [(before / total, reading.uncertainty), (weight / total, look.uncertainty)];
     reading.uncertainty = Uncertainty::of_sum(parts);
 }
 
@@ -302,7 +305,7 @@ mod tests {
     #[test]
     fn looks_are_weighted_by_what_they_were_granted_not_by_what_they_read() {
         let mut reading = recording("e", &[estimate(1.0, 0.3)]).readings.remove(0);
-        combine(&mut reading, 1.0, &estimate(2.0, 0.1), 3.0, 1.0);
+        combine(&mut reading, 1.0, &estimate(2.0, 0.1), 3.0);
         assert!((reading.value - 1.75).abs() < 1e-15);
         assert!((reading.uncertainty.standard_error().unwrap() - 0.3_f64.hypot(0.3) / 4.0).abs() < 1e-15);
     }

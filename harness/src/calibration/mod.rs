@@ -9,6 +9,7 @@
 //!
 //! What an engine declares of its method ([`Support::Approximate`]) is not the instrument's and stays in its readings.
 
+mod calibrations;
 mod scenes;
 mod store;
 #[cfg(test)]
@@ -20,11 +21,12 @@ use std::time::Duration;
 use luminaire::scene::Transport;
 use serde::{Deserialize, Serialize};
 
+pub use self::calibrations::Calibrations;
 use self::scenes::KnownScene;
-use crate::record::EngineName;
-use crate::system::slots::{Slots, side_by_side};
-
-use crate::engines::{self, Engine, EngineError, Job, Site, Support, Version, Workbench, checked};
+use crate::engines::Support;
+use crate::measure::{Failure, FailureKind, Instrument, Question, Reader};
+use crate::record::{EngineName, Estimate};
+use crate::system::slots::side_by_side;
 
 /// A deviation beyond this, noise and declared approximations apart, is no uncertainty but a broken instrument.
 const IMPLAUSIBLE: f64 = 0.05;
@@ -40,7 +42,6 @@ pub struct Calibration {
     pub version: String,
     /// The version of this program, whose read-out it is.
     pub tool_version: String,
-    /// The engine's settings.
     pub settings: BTreeMap<String, serde_json::Value>,
     /// What it read of each scene.
     pub parts: Vec<Part>,
@@ -68,7 +69,6 @@ pub struct Part {
 /// A calibration and where it is kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibrated {
-    /// What was found.
     pub calibration: Calibration,
     /// Whether it was measured just now.
     pub origin: Origin,
@@ -94,22 +94,10 @@ pub enum CalibrationError {
          lx), which is no uncertainty but a fault; see `luxproof engines doctor`",
         100.0 * deviation
     )]
-    Implausible {
-        engine: EngineName,
-        /// The calibration scene.
-        scene: &'static str,
-        /// The meter that is furthest off.
-        meter: String,
-        /// What it reads.
-        value_lx: f64,
-        /// What is right.
-        exact_lx: f64,
-        /// Relative deviation.
-        deviation: f64,
-    },
+    Implausible { engine: EngineName, scene: &'static str, meter: String, value_lx: f64, exact_lx: f64, deviation: f64 },
     /// It failed in a calibration scene.
     #[error("calibration: {0}")]
-    Engine(#[from] EngineError),
+    Failed(#[from] Failure),
 }
 
 /// Whether a calibration of earlier counts.
@@ -121,25 +109,25 @@ pub enum Earlier {
     Ignored,
 }
 
-/// The calibration of an engine with some settings: kept from an earlier one, else measured and kept.
+/// The calibration of an instrument with some settings: kept from an earlier one, else measured and kept.
 pub fn calibrate(
-    engine: &dyn Engine,
-    version: &Version,
+    instrument: &Instrument,
     settings: &BTreeMap<String, serde_json::Value>,
-    site: &Site,
-    slots: &Slots,
+    reader: &Reader,
     earlier: Earlier,
 ) -> Result<Calibrated, CalibrationError> {
     let scenes = scenes::all(settings);
-    let path = store::path(engine, version, settings, site, &scenes)?;
+    let path = store::path(instrument, settings, &reader.site, &scenes).map_err(Failure::from)?;
     let kept = if earlier == Earlier::Counts { store::read(&path) } else { None };
     if let Some(calibration) = kept {
         return Ok(Calibrated { calibration, origin: Origin::Kept, kept: Ok(path.display().to_string()) });
     }
-    let parts = side_by_side(scenes.len(), &scenes, |scene| part(engine, scene, site, slots));
+    // What it read before says nothing of what it reads now.
+    let reader = Reader { out: None, cache: None, ..reader.clone() };
+    let parts = side_by_side(scenes.len(), &scenes, |scene| part(instrument, scene, &reader));
     let calibration = Calibration {
-        engine: engine.name(),
-        version: version.0.clone(),
+        engine: instrument.engine.name(),
+        version: instrument.version.0.clone(),
         tool_version: env!("CARGO_PKG_VERSION").to_owned(),
         settings: settings.clone(),
         parts: parts.into_iter().collect::<Result<_, _>>()?,
@@ -174,49 +162,27 @@ impl Calibration {
     }
 }
 
-fn part(engine: &dyn Engine, scene: &KnownScene, site: &Site, slots: &Slots) -> Result<Part, CalibrationError> {
-    let left_out = |why: String| Part {
-        scene: scene.name.to_owned(),
-        reflected: scene.is_reflected(),
-        deviation: 0.0,
-        std_error: 0.0,
-        declared: 0.0,
-        uncertainty: 0.0,
-        left_out: Some(why),
-    };
-    let declared = match engine.supports(&scene.job) {
-        Support::Yes => 0.0,
-        Support::Approximate { size, .. } => size.unwrap_or(0.0),
-        Support::No(why) => return Ok(left_out(why)),
-    };
-    match read(engine, &scene.job, site, slots) {
-        Ok(estimates) => judge(engine.name(), scene, declared, &estimates),
-        Err(EngineError::Declined { why, .. }) => Ok(left_out(why)),
-        Err(error) => Err(error.into()),
+fn part(instrument: &Instrument, scene: &KnownScene, reader: &Reader) -> Result<Part, CalibrationError> {
+    let question = Question { limit: LIMIT, ..Question::new(instrument, &scene.job, scene.name) };
+    match reader.read(&question) {
+        Ok(taken) => {
+            let declared = match instrument.engine.supports(&scene.job) {
+                Support::Approximate { size, .. } => size.unwrap_or(0.0),
+                Support::Yes | Support::No(_) => 0.0,
+            };
+            judge(instrument.engine.name(), scene, declared, &taken.measurement.estimates)
+        }
+        Err(Failure { kind: FailureKind::Declined, text }) => Ok(Part {
+            scene: scene.name.to_owned(),
+            reflected: scene.is_reflected(),
+            deviation: 0.0,
+            std_error: 0.0,
+            declared: 0.0,
+            uncertainty: 0.0,
+            left_out: Some(text),
+        }),
+        Err(failure) => Err(failure.into()),
     }
-}
-
-fn read(
-    engine: &dyn Engine,
-    job: &Job,
-    site: &Site,
-    slots: &Slots,
-) -> Result<Vec<crate::record::Estimate>, EngineError> {
-    let held = slots.take(engines::share(engine, job, slots));
-    let jobs = held.threads();
-    let folder = tempfile::tempdir().map_err(|e| EngineError::io(&std::env::temp_dir(), e))?;
-    let log = folder.path().join("log");
-    let scene_dir = folder.path().join("scene");
-    std::fs::create_dir(&scene_dir).map_err(|e| EngineError::io(&scene_dir, e))?;
-    let workbench = Workbench {
-        site: site.clone(),
-        scene_dir,
-        log,
-        jobs,
-        limit: LIMIT,
-        peak: crate::system::process::PeakMemory::default(),
-    };
-    Ok(checked(&engine.name(), job, engine.read(job, &workbench)?)?.estimates)
 }
 
 /// Deviations from the closed form as an uncertainty; pure.
@@ -224,7 +190,7 @@ fn judge(
     engine: EngineName,
     scene: &KnownScene,
     declared: f64,
-    estimates: &[crate::record::Estimate],
+    estimates: &[Estimate],
 ) -> Result<Part, CalibrationError> {
     let (mut worst, mut excess, mut noise) = (0.0_f64, 0.0_f64, 0.0_f64);
     for ((estimate, known), station) in estimates.iter().zip(&scene.known).zip(&scene.job.stations) {

@@ -18,16 +18,13 @@ pub(super) const BUDGET: Budget = Budget { relative_error: 2e-3, seconds: 5.0 };
 #[derive(Clone, Debug)]
 pub(super) struct KnownScene {
     pub(super) name: &'static str,
-    /// What an engine is asked.
     pub(super) job: Job,
     /// One a station.
     pub(super) known: Vec<Known>,
 }
 
-/// What is right at one meter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Known {
-    /// Illuminance in lux.
     pub(super) exact_lx: f64,
     /// What a deviation is relative to: the illuminance, or in a shadow that without it.
     pub(super) scale_lx: f64,

@@ -1,7 +1,6 @@
 //! Where calibrations are kept: one file an engine version, settings and exported scenes, in the engines' folder.
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
@@ -10,13 +9,14 @@ use crate::system::files;
 
 use super::Calibration;
 use super::scenes::KnownScene;
-use crate::engines::{Engine, EngineError, Site, Version};
+use crate::engines::{EngineError, Site, Support};
+use crate::measure::Instrument;
+use crate::spec::hexadecimal;
 
 /// The file of a calibration. Its name changes with everything that a reading may depend on: version, settings and the
 /// scenes as they are exported, drivers included.
 pub(super) fn path(
-    engine: &dyn Engine,
-    version: &Version,
+    Instrument { engine, version }: &Instrument,
     settings: &BTreeMap<String, serde_json::Value>,
     site: &Site,
     scenes: &[KnownScene],
@@ -33,7 +33,7 @@ pub(super) fn path(
         part(value.to_string().as_bytes());
     }
     for scene in scenes {
-        if matches!(engine.supports(&scene.job), crate::engines::Support::No(_)) {
+        if matches!(engine.supports(&scene.job), Support::No(_)) {
             continue;
         }
         for file in engine.export(&scene.job)? {
@@ -41,10 +41,7 @@ pub(super) fn path(
             part(&file.bytes);
         }
     }
-    let digits = hash.finalize().iter().take(8).fold(String::new(), |mut text, byte| {
-        write!(text, "{byte:02x}").ok();
-        text
-    });
+    let digits = hexadecimal(&hash.finalize()[..8]);
     Ok(site.root().join("calibration").join(format!("{}-{digits}.json", engine.name())))
 }
 

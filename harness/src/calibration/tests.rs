@@ -1,13 +1,15 @@
 //! The closed forms against the simulator, and what becomes of an instrument that is off by a known amount.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use luminaire::scene::Bounces;
 
 use super::*;
 use crate::engines::simulator::Simulator;
-use crate::engines::{Absent, Measurement, SceneFile};
-use crate::record::{Estimate, Uncertainty};
+use crate::engines::{Absent, Engine, EngineError, Job, Measurement, SceneFile, Site, Version, Workbench};
+use crate::measure::Machine;
+use crate::record::Uncertainty;
 
 const VERSION: &str = "1";
 const INDIRECT: Transport = Transport::Indirect(Bounces::Converged);
@@ -56,21 +58,26 @@ fn scaled(factor: f64) -> impl Fn(&Job, usize, Estimate) -> Estimate + Send + Sy
     move |_, _, e| Estimate { value: e.value * factor, ..e }
 }
 
-fn found(engine: &dyn Engine) -> Result<Calibrated, CalibrationError> {
+fn read(
+    engine: Arc<dyn Engine>,
+    version: &str,
+    settings: &Settings,
+    site: &Site,
+) -> Result<Calibrated, CalibrationError> {
+    let instrument = Instrument { engine, version: Version(version.into()) };
+    calibrate(&instrument, settings, &Reader::bare(site, Machine::new(1)), Earlier::Counts)
+}
+
+type Settings = BTreeMap<String, serde_json::Value>;
+
+fn found(engine: impl Engine + 'static) -> Result<Calibrated, CalibrationError> {
     let folder = tempfile::tempdir().unwrap();
-    calibrate(
-        engine,
-        &Version(VERSION.into()),
-        &BTreeMap::new(),
-        &Site::at(folder.path()),
-        &Slots::new(1),
-        Earlier::Counts,
-    )
+    read(Arc::new(engine), VERSION, &Settings::new(), &Site::at(folder.path()))
 }
 
 #[test]
 fn the_closed_forms_are_what_the_simulator_has() {
-    let calibration = found(&Simulator).unwrap().calibration;
+    let calibration = found(Simulator).unwrap().calibration;
     let names: Vec<&str> = calibration.parts.iter().map(|p| p.scene.as_str()).collect();
     assert_eq!(names, ["point", "asymmetric", "shadow", "furnace"]);
     for part in &calibration.parts {
@@ -84,26 +91,26 @@ fn the_closed_forms_are_what_the_simulator_has() {
 
 #[test]
 fn a_small_bias_becomes_the_uncertainty_and_a_large_one_a_failure_with_its_scene() {
-    let calibration = found(&Faulty::new(scaled(1.003))).unwrap().calibration;
+    let calibration = found(Faulty::new(scaled(1.003))).unwrap().calibration;
     assert!((calibration.uncertainty(Transport::Direct) - 0.003 / 3f64.sqrt()).abs() < 1e-9, "{calibration:?}");
-    let error = found(&Faulty::new(scaled(0.9))).unwrap_err().to_string();
+    let error = found(Faulty::new(scaled(0.9))).unwrap_err().to_string();
     assert!(error.contains("`point`") && error.contains("-10.0 %"), "{error}");
     let leak = |job: &Job, k: usize, e: Estimate| {
         let leaks = !job.scene.obstacles.is_empty() && k == 0;
         Estimate { value: if leaks { 2.0 } else { e.value }, ..e }
     };
-    let error = found(&Faulty::new(leak)).unwrap_err().to_string();
+    let error = found(Faulty::new(leak)).unwrap_err().to_string();
     assert!(error.contains("`shadow`"), "{error}");
     let loses = |job: &Job, _: usize, e: Estimate| {
         let factor = if job.transport == Transport::Direct { 1.0 } else { 0.75 };
         Estimate { value: factor * e.value, ..e }
     };
-    let error = found(&Faulty::new(loses)).unwrap_err().to_string();
+    let error = found(Faulty::new(loses)).unwrap_err().to_string();
     assert!(error.contains("`furnace`"), "{error}");
     // What an engine declares of its method is no fault of the instrument, and no excuse for its readings either.
     let mut declared = Faulty::new(loses);
     declared.support = Support::Approximate { why: "it knows two bounces".into(), size: Some(0.26) };
-    assert_eq!(found(&declared).unwrap().calibration.uncertainty(INDIRECT), 0.0);
+    assert_eq!(found(declared).unwrap().calibration.uncertainty(INDIRECT), 0.0);
 }
 
 #[test]
@@ -112,11 +119,11 @@ fn noise_is_an_uncertainty_of_its_own_and_hides_no_bias_beyond_it() {
         value: 1.001 * e.value,
         uncertainty: Uncertainty::sampled(0.002 * e.value, None),
     };
-    let calibration = found(&Faulty::new(noisy)).unwrap().calibration;
+    let calibration = found(Faulty::new(noisy)).unwrap().calibration;
     let furnace = &calibration.parts[3];
     assert!((furnace.uncertainty - 0.001).abs() < 2e-6, "four meters, each within .2 %: {furnace:?}");
     assert!(
-        found(&Faulty::new(|_: &Job, _: usize, e: Estimate| Estimate {
+        found(Faulty::new(|_: &Job, _: usize, e: Estimate| Estimate {
             uncertainty: Uncertainty::sampled(e.value, None),
             ..e
         }))
@@ -128,7 +135,7 @@ fn noise_is_an_uncertainty_of_its_own_and_hides_no_bias_beyond_it() {
 fn what_cannot_be_read_is_left_out_with_its_reason() {
     let mut engine = Faulty::new(scaled(1.0));
     engine.support = Support::No("not today".into());
-    let calibration = found(&engine).unwrap().calibration;
+    let calibration = found(engine).unwrap().calibration;
     assert!(calibration.parts.iter().all(|p| p.left_out.as_deref() == Some("not today")));
     assert!(calibration.summary().contains("not today"));
 }
@@ -137,10 +144,8 @@ fn what_cannot_be_read_is_left_out_with_its_reason() {
 fn a_calibration_is_measured_once_a_version_and_settings() {
     let folder = tempfile::tempdir().unwrap();
     let site = Site::at(folder.path());
-    let engine = Faulty::new(scaled(1.0));
-    let read = |version: &str, settings: &BTreeMap<String, serde_json::Value>| {
-        calibrate(&engine, &Version(version.into()), settings, &site, &Slots::new(1), Earlier::Counts).unwrap()
-    };
+    let engine = Arc::new(Faulty::new(scaled(1.0)));
+    let read = |version: &str, settings: &Settings| self::read(engine.clone(), version, settings, &site).unwrap();
     let plain = BTreeMap::new();
     let first = read("1", &plain);
     assert_eq!((first.origin, engine.reads.load(Ordering::SeqCst)), (Origin::Measured, 4));
@@ -160,15 +165,6 @@ fn where_nothing_can_be_kept_the_calibration_still_counts() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     std::fs::write(&file, "").unwrap();
-    let engine = Faulty::new(scaled(1.0));
-    let found = calibrate(
-        &engine,
-        &Version(VERSION.into()),
-        &BTreeMap::new(),
-        &Site::at(file),
-        &Slots::new(1),
-        Earlier::Counts,
-    )
-    .unwrap();
+    let found = read(Arc::new(Faulty::new(scaled(1.0))), VERSION, &Settings::new(), &Site::at(file)).unwrap();
     assert!(found.kept.is_err());
 }

@@ -10,12 +10,10 @@ use super::diagnostic::diagnose;
 use super::measuring::{self, Bar};
 use crate::engines::Site;
 use crate::experiments::bench::{self, BenchReport, Knobs, Options, Progress};
-use crate::measure::Shelf;
 use crate::record::ProcedureId;
 use crate::report::Exit;
 use crate::spec::suite;
 use crate::system::files;
-use crate::system::process;
 
 #[derive(Debug, Args)]
 pub(super) struct BenchArgs {
@@ -83,10 +81,8 @@ pub(super) fn run(args: &BenchArgs, site: &Site) -> Result<Exit, Diagnostic> {
     let first = args.specs.first().map_or(std::path::Path::new("suite"), PathBuf::as_path);
     let folder = measuring::folder(args.out.as_ref(), "bench", first);
     let options = Options {
-        laboratory: measuring::laboratory(site)?,
-        shelf: Shelf::new(folder.join("readings")),
+        reader: measuring::reader(site, &folder, args.jobs)?,
         repetitions: args.repetitions.max(1),
-        jobs: args.jobs.unwrap_or_else(process::cores).max(1),
         time: Duration::from_secs_f64((60.0 * args.minutes).min(1e9)),
         seconds: &args.seconds,
         procedures: &args.procedures,

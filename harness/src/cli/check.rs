@@ -8,7 +8,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::Selected;
 use super::diagnostic::diagnose;
-use super::run_specs::Tables;
+use crate::audit;
 use crate::engines::Site;
 use crate::plan::{Asked, Planner, cost_s};
 use crate::report::Exit;
@@ -25,7 +25,7 @@ pub(super) struct CheckArgs {
 
 pub(super) fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
     let cases = suite(&args.specs).and_then(|all| filtered(all, &args.selected.filter)).map_err(diagnose)?;
-    Tables::read(&cases)?;
+    audit::published(&cases).into_diagnostic()?;
     let mut out = std::io::stdout().lock();
     let mut exit = Exit::Passed;
     let selection = args.selected.selection();

@@ -1,19 +1,20 @@
 //! `luxproof engines`: which there are, installing them, examining them.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use clap::{Args, Subcommand};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use crate::audit::doctor;
 use crate::calibration::{self, Calibrated, Earlier};
-use crate::engines::{self, InstallState, Site};
+use crate::engines::{self, Engine, InstallState, Site};
 use crate::judge::Tolerances;
+use crate::measure::{Instrument, Machine, Reader};
 use crate::record::EngineName;
 use crate::report::Exit;
 use crate::spec::suggestion;
 use crate::system::process;
-use crate::system::slots::Slots;
 
 #[derive(Debug, Args)]
 pub(super) struct EnginesArgs {
@@ -64,38 +65,34 @@ pub(super) fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Di
 
 fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
     let tolerances = Tolerances::built_in().into_diagnostic()?;
+    let reader = Reader::bare(site, Machine::rendering_everything(process::cores()));
     let mut exit = Exit::Passed;
     for engine in engines::all() {
+        let engine: Arc<dyn Engine> = engine.into();
         if names.is_empty() || names.iter().any(|n| engine.name() == *n) {
-            let finding = doctor::examine(engine.as_ref(), site, &tolerances);
+            let finding = doctor::examine(&engine, &reader, &tolerances);
             println!("{} {:<10} {}", if finding.healthy { "ok  " } else { "FAIL" }, finding.engine, finding.text);
             exit = exit.worse(if finding.healthy { Exit::Passed } else { Exit::Engine });
-            exit = exit.worse(calibrate_anew(engine.as_ref(), site));
+            exit = exit.worse(calibrate_anew(engine, &reader));
         }
     }
     Ok(exit)
 }
 
 /// Measures an engine's calibration again, keeps it and prints it.
-fn calibrate_anew(engine: &dyn engines::Engine, site: &Site) -> Exit {
-    let Ok(version) = engine.probe(site) else { return Exit::Passed };
+fn calibrate_anew(engine: Arc<dyn Engine>, reader: &Reader) -> Exit {
+    let Ok(version) = engine.probe(&reader.site) else { return Exit::Passed };
     if engine.is_witness() {
         return Exit::Passed;
     }
-    match calibration::calibrate(
-        engine,
-        &version,
-        &BTreeMap::new(),
-        site,
-        &Slots::new(process::cores()),
-        Earlier::Ignored,
-    ) {
+    let name = engine.name();
+    match calibration::calibrate(&Instrument { engine, version }, &BTreeMap::new(), reader, Earlier::Ignored) {
         Ok(found) => {
-            println!("     {:<10} {}", engine.name(), calibration_line(&found));
+            println!("     {:<10} {}", name, calibration_line(&found));
             Exit::Passed
         }
         Err(error) => {
-            println!("FAIL {:<10} {error}", engine.name());
+            println!("FAIL {:<10} {error}", name);
             Exit::Engine
         }
     }

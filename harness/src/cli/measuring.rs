@@ -1,4 +1,4 @@
-//! What `bench` and `stress` share on the command line: engines to take, the laboratory, a bar with the time left.
+//! What `bench` and `stress` share on the command line: engines to take, the reader, a bar with the time left.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -10,11 +10,13 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::engines::known_engines;
 use crate::engines::{self, Site};
-use crate::measure::{self, Laboratory, OwnSolvers, Subject};
+use crate::measure::cache::Cache;
+use crate::measure::{self, Instrument, Isolation, Machine, Reader};
 use crate::report::Exit;
+use crate::system::process;
 
 /// The engines that were named, or all that are there; one that was named and is absent is an error.
-pub(super) fn subjects(names: &[String], site: &Site) -> Result<Vec<Subject>, Diagnostic> {
+pub(super) fn subjects(names: &[String], site: &Site) -> Result<Vec<Instrument>, Diagnostic> {
     known_engines(names)?;
     let mut present = vec![];
     for engine in engines::all() {
@@ -23,7 +25,7 @@ pub(super) fn subjects(names: &[String], site: &Site) -> Result<Vec<Subject>, Di
             continue;
         }
         match engine.probe(site) {
-            Ok(version) => present.push(Subject { engine, version: version.0 }),
+            Ok(version) => present.push(Instrument { engine: engine.into(), version }),
             Err(absent) if is_named => return Err(miette::miette!("{}: {absent}", engine.name())),
             Err(absent) => eprintln!("{}: {absent}", engine.name()),
         }
@@ -31,10 +33,12 @@ pub(super) fn subjects(names: &[String], site: &Site) -> Result<Vec<Subject>, Di
     Ok(present)
 }
 
-/// A laboratory that runs our own solvers in processes of this program.
-pub(super) fn laboratory(site: &Site) -> Result<Laboratory, Diagnostic> {
-    let own_solvers = OwnSolvers::Apart(std::env::current_exe().into_diagnostic()?);
-    Ok(Laboratory { site: site.clone(), own_solvers })
+/// Keeps readings in the measurement's own folder and runs our own solvers in processes of this program.
+pub(super) fn reader(site: &Site, folder: &Path, jobs: Option<usize>) -> Result<Reader, Diagnostic> {
+    let machine = Machine::new(jobs.unwrap_or_else(process::cores));
+    let isolation = Isolation::Subprocess(std::env::current_exe().into_diagnostic()?);
+    let cache = Some(Cache::at(folder.join("readings")));
+    Ok(Reader { cache, isolation, ..Reader::bare(site, machine) })
 }
 
 /// The folder of a measurement's files: the one given, or `luxproof-out/<command>/<spec name>`.
@@ -48,8 +52,8 @@ pub(super) fn read_one(site: &Site) -> Result<Exit, Diagnostic> {
     let mut text = String::new();
     std::io::stdin().read_to_string(&mut text).into_diagnostic()?;
     let request = serde_json::from_str(&text).into_diagnostic()?;
-    let outcome = measure::answer(&request, site).map_err(|e| miette::miette!("{e}"))?;
-    super::print(&serde_json::to_string(&outcome).into_diagnostic()?)?;
+    let taken = measure::answer(&request, site).map_err(|e| miette::miette!("{e}"))?;
+    super::print(&serde_json::to_string(&taken).into_diagnostic()?)?;
     Ok(Exit::Passed)
 }
 

@@ -12,8 +12,7 @@ mod history;
 mod measuring;
 pub(crate) mod photometry;
 mod progress;
-mod run_specs;
-mod sampling;
+mod run;
 mod selftest;
 mod stress;
 mod views;
@@ -25,6 +24,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use self::photometry::PhotometryArgs;
+use crate::audit::Sampling;
 use crate::engines::{ExternalJob, ExternalReadings, Site};
 use crate::plan::{Selection, Skipping};
 use crate::record::ProcedureId;
@@ -143,7 +143,7 @@ struct RunArgs {
     no_cache: bool,
     /// When sampling stops
     #[arg(long, value_enum, value_name = "WHEN", default_value_t)]
-    sampling: sampling::Sampling,
+    sampling: Sampling,
 }
 
 #[derive(Debug, Args)]
@@ -173,7 +173,7 @@ impl Cli {
         match self.command {
             Command::Run(mut args) => {
                 args.views.all |= self.verbose > 0;
-                run_specs::run_specs(&args, &site, &cache::folder(self.cache_dir)?)
+                run::run(&args, &site, &cache::folder(self.cache_dir)?)
             }
             Command::Cache(args) => cache::manage(&args, &cache::folder(self.cache_dir)?),
             Command::Check(args) => check::check(&args, &site),

@@ -7,11 +7,12 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::engines::calibration_line;
-use crate::audit::run;
+use crate::audit::Observer;
 use crate::calibration::Calibrated;
 use crate::engines::Engine;
 use crate::plan::{Plan, Run};
 use crate::record::ProcedureId;
+use crate::spec::Case;
 
 /// The progress of all cases of a run together, on stderr.
 pub(super) struct Progress {
@@ -19,13 +20,6 @@ pub(super) struct Progress {
     is_terminal: bool,
     start: Instant,
     work: Mutex<Work>,
-}
-
-pub(super) struct CaseProgress<'a> {
-    of: &'a Progress,
-    case: String,
-    /// What a renderer may take for one of its jobs, in seconds.
-    budget_s: f64,
 }
 
 /// What there is to do and what is done. Renderers cost; our own solvers take next to nothing and are only counted.
@@ -72,31 +66,19 @@ fn seconds(s: f64) -> Duration {
 }
 
 impl Progress {
-    /// Of all plans, with the seconds that each allows a renderer's job.
-    pub(super) fn of<'a>(plans: impl Iterator<Item = (&'a Plan, f64)>) -> Self {
-        let mut work = Work::default();
-        for (plan, budget_s) in plans {
-            work.jobs += plan.runs.len();
-            let costs = |r: &&Run| !plan.engines[r.engine].engine.is_witness();
-            work.budget_s += budget_s * plan.runs.iter().filter(costs).count() as f64;
-        }
+    /// Before anything is planned.
+    pub(super) fn new() -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let target = if is_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(work.jobs as u64), target);
+        let bar = ProgressBar::with_draw_target(None, target);
         if let Ok(style) = ProgressStyle::with_template("{spinner} [{bar:24}] {pos}/{len} {msg} [{elapsed}]") {
             bar.set_style(style.progress_chars("=> "));
         }
-        bar.enable_steady_tick(Duration::from_millis(100));
-        Self { bar, is_terminal, start: Instant::now(), work: Mutex::new(work) }
-    }
-
-    /// Of one of its cases, with the seconds that it allows a renderer's job.
-    pub(super) fn case(&self, name: &str, budget_s: f64) -> CaseProgress<'_> {
-        CaseProgress { of: self, case: name.to_owned(), budget_s }
+        Self { bar, is_terminal, start: Instant::now(), work: Mutex::default() }
     }
 
     /// Prints a line above the bar.
-    pub(super) fn line(&self, text: &str) {
+    fn line(&self, text: &str) {
         self.bar.suspend(|| eprintln!("{text}"));
     }
 
@@ -112,26 +94,41 @@ impl Progress {
     }
 }
 
-impl run::Progress for CaseProgress<'_> {
-    fn started(&self, engine: &str, procedure: &str) {
-        let left = self.of.work().left(self.of.start.elapsed());
-        self.of.bar.set_message(format!("{}: {engine}: {procedure}, {left}", self.case));
-    }
-
-    fn calibrated(&self, engine: &str, found: &Calibrated) {
-        self.of.line(&format!("{engine}: calibrated before its first use: {}", calibration_line(found)));
-    }
-
-    fn ended(&self, engine: &dyn Engine, procedure: ProcedureId, wall: Duration, failure: Option<&str>) {
-        let name = format!("{}: {}: {procedure}", self.case, engine.name());
-        tracing::info!(wall_s = wall.as_secs_f64(), "{name} is done");
-        let work = self.of.done(if engine.is_witness() { 0.0 } else { self.budget_s });
-        self.of.bar.inc(1);
-        match failure {
-            Some(failure) => self.of.line(&format!("{name} failed: {failure}")),
-            None if self.of.is_terminal => (),
-            None => self.of.line(&format!("[{}/{}] {name} {:.1} s", work.jobs_done, work.jobs, wall.as_secs_f64())),
+impl Observer for Progress {
+    fn planned(&self, cases: &[Case], plans: &[Plan]) {
+        let mut work = self.work.lock().unwrap_or_else(PoisonError::into_inner);
+        for (case, plan) in cases.iter().zip(plans) {
+            let costs = |r: &&Run| !plan.engines[r.engine].engine.is_witness();
+            work.jobs += plan.runs.len();
+            work.budget_s += case.budget.seconds * plan.runs.iter().filter(costs).count() as f64;
         }
+        self.bar.set_length(work.jobs as u64);
+        self.bar.enable_steady_tick(Duration::from_millis(100));
+    }
+
+    fn started(&self, case: &Case, engine: &dyn Engine, what: &str) {
+        let left = self.work().left(self.start.elapsed());
+        self.bar.set_message(format!("{}: {}: {what}, {left}", case.name, engine.name()));
+    }
+
+    fn calibrated(&self, engine: &dyn Engine, found: &Calibrated) {
+        self.line(&format!("{}: calibrated before its first use: {}", engine.name(), calibration_line(found)));
+    }
+
+    fn ended(&self, case: &Case, engine: &dyn Engine, procedure: ProcedureId, wall: Duration, failure: Option<&str>) {
+        let name = format!("{}: {}: {procedure}", case.name, engine.name());
+        tracing::info!(wall_s = wall.as_secs_f64(), "{name} is done");
+        let work = self.done(if engine.is_witness() { 0.0 } else { case.budget.seconds });
+        self.bar.inc(1);
+        match failure {
+            Some(failure) => self.line(&format!("{name} failed: {failure}")),
+            None if self.is_terminal => (),
+            None => self.line(&format!("[{}/{}] {name} {:.1} s", work.jobs_done, work.jobs, wall.as_secs_f64())),
+        }
+    }
+
+    fn remarked(&self, case: &Case, text: &str) {
+        self.line(&format!("{}: {text}", case.name));
     }
 }
 

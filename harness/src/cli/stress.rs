@@ -12,11 +12,10 @@ use crate::engines::Site;
 use crate::experiments::stress::{self, Coordinates, Options, Progress, StressReport};
 use crate::judge::KnownDeviations;
 use crate::laws;
-use crate::measure::Shelf;
+use crate::record::EngineName;
 use crate::report::Exit;
 use crate::spec::{Budget, Case, suggestion, suite};
 use crate::system::files;
-use crate::system::process;
 
 #[derive(Debug, Args)]
 pub(super) struct StressArgs {
@@ -94,9 +93,7 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
     for case in &cases {
         let folder = measuring::folder(args.out.as_ref(), "stress", &case.path);
         let options = Options {
-            laboratory: measuring::laboratory(site)?,
-            shelf: Shelf::new(folder.join("readings")),
-            jobs: args.jobs.unwrap_or_else(process::cores).max(1),
+            reader: measuring::reader(site, &folder, args.jobs)?,
             time: Duration::from_secs_f64((60.0 * args.minutes).min(1e9)),
             budget: Budget { relative_error: 1e-3, seconds: args.seconds },
             limit: Duration::from_secs_f64(args.limit.clamp(1.0, 1e9)),
@@ -115,7 +112,7 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
         reports.push(report);
     }
     super::print(&view(&reports, args.format).into_diagnostic()?)?;
-    let broken = reports.iter().any(|r| r.broken_by("simulator").next().is_some());
+    let broken = reports.iter().any(|r| r.broken_by(&EngineName::SIMULATOR).next().is_some());
     Ok(if broken { Exit::Failed } else { Exit::Passed })
 }
 

@@ -100,7 +100,7 @@ fn print_page(reports: &[(Report, PathBuf)], beside: &[Beside]) -> String {
 pub(super) fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
     let report = read_report(&args.result)?;
     let folder = args.result.parent().map_or_else(PathBuf::new, Path::to_owned);
-    let exit = report.exit(|_| false);
+    let exit = report.exit();
     if args.budget {
         print(&report::budgets(&report))?;
     } else {

@@ -11,6 +11,7 @@ use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 use luminaire::simulator::{self, Accuracy};
 
 use crate::procedures::Task;
+use crate::record::Estimate;
 
 /// Readings are predicted to this relative error at least; they turn out a hundred times better.
 const ACCURACY: f64 = 1e-2;
@@ -45,7 +46,7 @@ pub enum Effect {
 
 /// The light of a task, by the simulator; `None` where that cannot be had in a moment.
 pub fn truth(task: &Task) -> Option<Vec<f64>> {
-    let meters: Vec<_> = task.targets.iter().map(|t| t.meter).collect();
+    let meters: Vec<_> = task.stations().map(|(_, meter)| meter).collect();
     let bare =
         task.scene.obstacles.is_empty() && task.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
     if !bare && task.transport != Transport::Direct {
@@ -53,7 +54,8 @@ pub fn truth(task: &Task) -> Option<Vec<f64>> {
     }
     let accuracy = Accuracy { relative_error: ACCURACY, seed: 1 };
     let solution = simulator::illuminance(&task.scene, &meters, task.transport, &accuracy).ok()?;
-    Some(solution.estimates.iter().zip(&task.targets).map(|(e, t)| e.illuminance.value() * t.per_lux).collect())
+    let stations: Vec<Estimate> = solution.estimates.iter().map(|e| Estimate::exact(e.illuminance.value())).collect();
+    Some(task.readings(&stations).iter().map(|reading| reading.value).collect())
 }
 
 /// Every fault that would show in a task whose right readings are `right`.

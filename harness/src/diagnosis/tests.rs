@@ -9,12 +9,7 @@ use crate::record::{MeterId, Quantity};
 
 fn task(transport: Transport) -> Task {
     let job = fixtures::s1(transport);
-    let target = |(k, s): (usize, &crate::engines::Station)| Target {
-        id: MeterId::new("m", k),
-        meter: s.meter,
-        direction: None,
-        per_lux: 1.0,
-    };
+    let target = |(k, s): (usize, &crate::engines::Station)| Target::of_one(MeterId::new("m", k), s.meter, 1.0);
     let targets = job.stations.iter().enumerate().map(target).collect();
     Task { procedure: job.procedure, scene: job.scene, transport, quantity: Quantity::Illuminance, targets }
 }

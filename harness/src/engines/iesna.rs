@@ -1,15 +1,25 @@
 //! The engine `iesna`: inverse-square method and infinite plane - exitance difference, read like any renderer.
 
 use luminaire::calculators::{Calculated, NotApplicable, Validity, exitance_difference, inverse_square};
-use luminaire::scene::{Bounces, Meter, Scene, Transport};
+use luminaire::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
 
-use super::{Absent, Engine, EngineError, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked};
+use super::{Absent, Engine, EngineError, Entry, Job, Measurement, Site, Support, Version, Workbench, checked};
 use crate::record::{EngineName, Estimate, Role, Uncertainty};
 
 /// The methods of [`luminaire::calculators`].
 pub(super) struct Iesna;
 
-pub(super) const ID: EngineName = EngineName::new("iesna");
+const ID: EngineName = EngineName::IESNA;
+
+pub(super) static ENTRY: Entry = Entry {
+    name: ID,
+    display_name: "iesna",
+    colour: ("#8c6100", "#e6b84d"),
+    installs: &[],
+    models: &[LuminaireModel::Point, LuminaireModel::Area, LuminaireModel::Impostor],
+    fits_coordinates: None,
+    make: || Box::new(Iesna),
+};
 
 /// Rounding of the inverse-square method in `f64`, relative: a few operations and two arctangents.
 const ROUNDING: f64 = 1e-13;
@@ -46,10 +56,6 @@ impl Engine for Iesna {
 
     fn components(&self, _job: &Job) -> Vec<&'static str> {
         vec![super::FILE_READER, super::OWN_LOOKUP]
-    }
-
-    fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
-        Ok(vec![])
     }
 
     fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {

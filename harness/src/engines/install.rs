@@ -11,20 +11,19 @@ use std::time::Duration;
 use crate::system::process::ProcessError;
 
 use super::Site;
+use super::catalogue::ALL;
+use super::contract::Component;
 use crate::record::EngineName;
 
 /// What became of one component.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InstallOutcome {
-    /// The component, e.g. `Python packages`.
     pub component: &'static str,
-    /// How it ended.
     pub state: InstallState,
     /// One line for the user: where it is, or what is wrong and what to do.
     pub detail: String,
 }
 
-/// How the installation of a component ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstallState {
     /// It was there already; nothing was done.
@@ -37,24 +36,14 @@ pub enum InstallState {
     Failed,
 }
 
-/// A part of the installation that engines share.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Component {
-    PythonPackages,
-    PovRay,
-    LibLlvm,
-}
-
 /// Why a component could not be installed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum InstallError {
-    /// A program of the installation failed.
     #[error(transparent)]
     Process(#[from] ProcessError),
     /// The site's folder could not be changed.
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
-    /// Something that the installation needs is missing.
     #[error("{what}; {remedy}")]
     Missing { what: String, remedy: String },
 }
@@ -79,15 +68,9 @@ pub fn install(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&st
 
 /// What the named engines need; all of it if none is named.
 fn components(engines: &[EngineName]) -> Vec<Component> {
-    let of = |engine: &EngineName| match engine.as_str() {
-        "mitsuba" => &[Component::PythonPackages, Component::LibLlvm][..],
-        "povray" => &[Component::PythonPackages, Component::PovRay],
-        "radiance" => &[Component::PythonPackages],
-        _ => &[],
-    };
     let all = [Component::PythonPackages, Component::PovRay, Component::LibLlvm];
-    let wanted = |c: &Component| engines.is_empty() || engines.iter().any(|e| of(e).contains(c));
-    all.into_iter().filter(wanted).collect()
+    let named = || ALL.iter().filter(|entry| engines.is_empty() || engines.contains(&entry.name));
+    all.into_iter().filter(|c| named().any(|entry| entry.installs.contains(c))).collect()
 }
 
 fn lock(site: &Site) -> Result<File, InstallError> {

@@ -1,25 +1,40 @@
 //! Mitsuba 3 (Jakob et al. 2022): its own emitter sampling and path integrator, read without meters in the scene.
 
 mod backend;
+mod driver;
 mod export;
-mod parse;
 mod precision;
 mod settings;
 #[cfg(test)]
 mod tests;
 
 use std::sync::Mutex;
+use std::time::Instant;
 
 use glam::DVec3;
 use luminaire::geometry::Surface;
 use luminaire::scene::{Luminaire, LuminaireModel, Shape, Transport};
 
 use self::backend::Backend;
-use self::settings::{Preset, Settings};
-use super::{Absent, Engine, EngineError, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench};
+use self::driver::Driver;
+use self::settings::Settings;
+use super::settings::Preset;
+use super::{
+    Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench,
+};
 use crate::record::EngineName;
 
 const ID: EngineName = EngineName::new("mitsuba");
+
+pub(super) static ENTRY: Entry = Entry {
+    name: ID,
+    display_name: "Mitsuba",
+    colour: ("#0067a8", "#62b5ea"),
+    installs: &[Component::PythonPackages, Component::LibLlvm],
+    models: &[LuminaireModel::Point, LuminaireModel::Area],
+    fits_coordinates: Some("recentre"),
+    make: || Box::new(Mitsuba::default()),
+};
 
 /// Nearer than this to a surface, a point luminaire's spot is too small for paths to find, in parts of the scene's size.
 const CLOSE: f64 = 2.5e-3;
@@ -40,12 +55,9 @@ impl Engine for Mitsuba {
     }
 
     fn supports(&self, job: &Job) -> Support {
-        let has = |model| job.scene.luminaires.iter().any(|l| l.model == model);
-        if has(LuminaireModel::Impostor) {
-            return Support::No("Mitsuba has no impostor sources; use the model `point` or `area`".into());
-        }
         let stock = Settings::of(job).is_ok_and(|s| s.preset == Preset::Default);
-        if let Some(why) = export::obstacle_to_stock(job).filter(|_| stock) {
+        let to_stock = || export::obstacle_to_stock(job).filter(|_| stock);
+        if let Some(why) = ENTRY.objection(job).or_else(to_stock) {
             return Support::No(why);
         }
         if let (Some(id), Transport::Indirect(_) | Transport::Total(_)) =
@@ -89,11 +101,11 @@ impl Mitsuba {
         settings: &Settings,
         workbench: &Workbench,
     ) -> Result<Measurement, EngineError> {
+        let started = Instant::now();
         workbench.write(files)?;
-        let backend = self.backend(&workbench.site).map_err(|absent| output(absent.to_string()))?;
+        let backend = self.backend(&workbench.site).map_err(|absent| EngineError::output(ID, absent.to_string()))?;
         let (run, fallback) = backend.invocation(workbench, settings);
-        let finished = run.run()?;
-        let mut measurement = parse::measurement(&finished.stdout, job, settings)?;
+        let mut measurement = Driver::new(job, settings, run.converse()?, started).measurement()?;
         measurement.notes.extend(fallback);
         measurement.settings.insert("command".into(), run.command_line());
         super::checked(&ID, job, measurement)
@@ -106,10 +118,6 @@ impl Mitsuba {
             None => Ok(known.insert(Backend::find(site)?).clone()),
         }
     }
-}
-
-fn output(what: String) -> EngineError {
-    EngineError::Output { engine: ID, what }
 }
 
 /// A luminaire that lights a surface at a distance that is tiny against the scene.

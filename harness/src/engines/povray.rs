@@ -6,7 +6,7 @@
 //! an honest standard error of their mean. The first reflection is read without the cache, which takes nine tenths of the
 //! variance away. What all blocks share, the bias of interpolating the later ones, is named beside the readings.
 
-mod blocks;
+mod bench;
 mod export;
 mod frame;
 mod opening;
@@ -20,15 +20,27 @@ mod tests;
 use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 
+use super::settings::{Coordinates, Preset};
 use super::{
-    Absent, Engine, EngineError, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
+    Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Support, Version,
+    Workbench, checked,
 };
 use crate::record::{EngineName, Estimate};
 use crate::system::process;
 use export::Light;
-use settings::{Preset, Settings};
+use settings::Settings;
 
 const ID: EngineName = EngineName::new("povray");
+
+pub(super) static ENTRY: Entry = Entry {
+    name: ID,
+    display_name: "POV-Ray",
+    colour: ("#007a5a", "#3fc79d"),
+    installs: &[Component::PythonPackages, Component::PovRay],
+    models: &[LuminaireModel::Point, LuminaireModel::Area],
+    fits_coordinates: Some("recentre"),
+    make: || Box::new(PovRay),
+};
 
 pub(super) struct PovRay;
 
@@ -43,8 +55,8 @@ impl Engine for PovRay {
         if site.python_package("OpenImageIO").is_none() {
             return Err(absent("OpenImageIO, which reads its images, is not there".to_owned()));
         }
-        let program = blocks::program(site).map_err(|e| absent(e.to_string()))?;
-        let done = process::ask(program, "--version", |asked| blocks::hermetic(asked, site));
+        let program = bench::program(site).map_err(|e| absent(e.to_string()))?;
+        let done = process::ask(program, "--version", |asked| bench::hermetic(asked, site));
         let done = done.map_err(|e| absent(e.to_string()))?;
         let said = format!("{}\n{}", String::from_utf8_lossy(&done.stdout), done.stderr);
         let version = said.lines().find_map(|l| l.trim().strip_prefix("POV-Ray "));
@@ -65,12 +77,12 @@ impl Engine for PovRay {
 
     fn command_by_hand(&self, job: &Job, site: &Site) -> Option<String> {
         Settings::of(job).ok()?;
-        let program = blocks::program(site).unwrap_or_else(|_| "povray".into());
+        let program = bench::program(site).unwrap_or_else(|_| "povray".into());
         let command = |light, image: &str| {
             let (here, nothing) = (std::path::Path::new("."), std::time::Duration::ZERO);
             let invocation = crate::system::process::Invocation::new(&program, here, nothing, "");
             let arguments = export::arguments(job, light, 0, 0, image);
-            blocks::hermetic(invocation, site).args(arguments).command_line_with_env()
+            bench::hermetic(invocation, site).args(arguments).command_line_with_env()
         };
         Some(match job.transport {
             Transport::Direct => command(Light::Direct, "direct.ppm"),
@@ -88,7 +100,7 @@ impl Engine for PovRay {
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
         let settings = Settings::of(job)?;
         workbench.write(&self.export(job)?)?;
-        let bench = blocks::Bench::new(job, workbench, &settings)?;
+        let bench = bench::Bench::new(job, workbench, &settings)?;
         let measurement = match job.transport {
             Transport::Direct | Transport::Total(Bounces::AtMost(0)) => bench.direct()?,
             Transport::Indirect(Bounces::AtMost(0)) => darkness(job),
@@ -116,12 +128,9 @@ fn sum(direct: &Measurement, mut indirect: Measurement) -> Measurement {
 }
 
 fn support(job: &Job) -> Support {
-    for luminaire in &job.scene.luminaires {
-        if let Some(why) = unsupported_luminaire(luminaire) {
-            return Support::No(why);
-        }
-    }
-    if let Some(why) = filters_in_the_way(job).or_else(|| too_near(job)) {
+    let unsupported = || job.scene.luminaires.iter().find_map(unsupported_luminaire);
+    let objection = ENTRY.objection(job).or_else(unsupported);
+    if let Some(why) = objection.or_else(|| filters_in_the_way(job)).or_else(|| too_near(job)) {
         return Support::No(why);
     }
     let bounces = match job.transport {
@@ -143,8 +152,8 @@ fn cache_error(mean_reflectance: f64, bounces: Bounces, preset: Preset) -> Suppo
         Preset::Fast => 0.05,
     };
     let cut = match bounces {
-        Bounces::AtMost(n) if n <= settings::DEEPEST => 0.0,
-        _ => mean_reflectance.powi(settings::DEEPEST as i32),
+        Bounces::AtMost(n) if n <= settings::MAX_RECURSION => 0.0,
+        _ => mean_reflectance.powi(settings::MAX_RECURSION as i32),
     };
     let mut why =
         "radiosity interpolates a cache of irradiance (Ward et al. 1988), whose bias all blocks share".to_owned();
@@ -175,11 +184,10 @@ const AUDIT_BIAS: f64 = 0.005;
 fn unsupported_luminaire(luminaire: &Luminaire) -> Option<String> {
     let id = &luminaire.id;
     let planes = luminaire.photometry.distribution.full_circle().c_deg().len();
-    if planes > pigment::MOST_ENTRIES {
-        return Some(format!("{id} has {planes} C planes; a map of POV-Ray holds {}", pigment::MOST_ENTRIES));
+    if planes > pigment::MAX_ENTRIES {
+        return Some(format!("{id} has {planes} C planes; a map of POV-Ray holds {}", pigment::MAX_ENTRIES));
     }
     match luminaire.model {
-        LuminaireModel::Impostor => Some(format!("{id}: POV-Ray has no impostor surfaces")),
         LuminaireModel::Area if opening::parts(luminaire.photometry.opening, 1).is_none() => {
             Some(format!("{id}: only flat luminous openings are modelled in POV-Ray"))
         }
@@ -189,9 +197,9 @@ fn unsupported_luminaire(luminaire: &Luminaire) -> Option<String> {
 
 /// A luminaire's filter dims whatever passes through it: another luminaire's light towards a meter must not.
 fn filters_in_the_way(job: &Job) -> Option<String> {
-    let recentring = Settings::of(job).map_or(settings::Recentring::On, |s| s.recentre);
-    let radius_m = 1.5 * export::FILTER_RADIUS / frame::Frame::of(job, recentring).scale;
-    let lit: Vec<&Luminaire> = job.scene.luminaires.iter().filter(|l| export::candela(l) > 0.0).collect();
+    let coordinates = Settings::of(job).map_or(Coordinates::Fitted, |s| s.coordinates);
+    let radius_m = 1.5 * export::FILTER_RADIUS / frame::Frame::of(job, coordinates).scale;
+    let lit: Vec<&Luminaire> = job.scene.luminaires.iter().filter(|l| frame::candela(l) > 0.0).collect();
     for (k, a) in lit.iter().enumerate() {
         for (_, b) in lit.iter().enumerate().filter(|(j, _)| *j != k) {
             if a.position_m.distance(b.position_m) < 2.0 * radius_m {

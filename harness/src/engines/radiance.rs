@@ -7,6 +7,7 @@ mod float_error;
 #[cfg(test)]
 mod opening_tests;
 mod options;
+mod route;
 mod sampling;
 mod settings;
 #[cfg(test)]
@@ -15,18 +16,30 @@ mod tools;
 
 use std::time::Instant;
 
-use luminaire::scene::Transport;
+use luminaire::scene::{LuminaireModel, Transport};
 
 use self::options::{Options, Sources};
-use self::sampling::Sampler;
-use self::settings::{Photometrist, Preset, Settings};
+use self::sampling::{Sampled, Sampler};
+use self::settings::{Photometrist, Settings};
 use self::tools::Tools;
+use super::settings::Preset;
 use super::{
-    Absent, Engine, EngineError, Job, Knob, Measurement, SceneFile, Site, Station, Support, Version, Workbench, checked,
+    Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Station, Support, Version,
+    Workbench, checked,
 };
 use crate::record::{EngineName, Estimate, Uncertainty};
 
 const ID: EngineName = EngineName::new("radiance");
+
+pub(super) static ENTRY: Entry = Entry {
+    name: ID,
+    display_name: "Radiance",
+    colour: ("#b84a00", "#f08a4b"),
+    installs: &[Component::PythonPackages],
+    models: &[LuminaireModel::Point, LuminaireModel::Area, LuminaireModel::Impostor],
+    fits_coordinates: Some("rescale"),
+    make: || Box::new(Radiance),
+};
 
 /// Radiance keeps colours and candela tables in 32-bit floats; measured against the inverse-square law.
 const FLOAT_READ_OUT: f64 = 5e-7;
@@ -111,47 +124,57 @@ fn printed_options(job: &Job, settings: &Settings) -> Options {
 fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
     let started = Instant::now();
     let settings = Settings::of(job)?;
-    let tools = Tools::find(&workbench.site).map_err(|absent| output(absent.to_string()))?;
+    let tools = Tools::find(&workbench.site).map_err(|absent| EngineError::output(ID, absent.to_string()))?;
     workbench.write(files)?;
     for (k, luminaire) in job.scene.luminaires.iter().enumerate() {
-        tools.ies2rad(workbench, k, luminaire, export::route(luminaire, &settings))?;
+        tools.ies2rad(workbench, k, luminaire, route::route(luminaire, &settings))?;
     }
     tools.compile(workbench)?;
-    let rows = export::rows(job, export::scale(job, settings.scaling));
+    let rows = export::rows(job, export::scale(job, settings.coordinates));
     let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows, started };
     let options = printed_options(job, &settings);
     let mut measurement = Measurement::default();
     measurement.settings.insert("seed".into(), job.seed.to_string());
 
-    let direct = direct(&sampler, &options)?;
+    let direct = match job.transport {
+        Transport::Indirect(_) => vec![],
+        _ => direct(&sampler, &options, &mut measurement)?,
+    };
     if job.transport == Transport::Direct {
         measurement.settings.insert("rtrace".into(), options.direct.join(" "));
         measurement.estimates = direct;
         return checked(&ID, job, measurement);
     }
     let part_lx = tools.rtrace(workbench, &options.part_of_total, &sampler.rows)?;
-    let nothing = vec![0.0; part_lx.len()];
-    let asked = if matches!(job.transport, Transport::Total(_)) { &nothing } else { &part_lx };
-    let blocks = sampler.total(asked)?;
-    measurement.settings.insert("rtrace".into(), blocks.options.join(" "));
-    measurement.settings.insert("blocks".into(), blocks.count().to_string());
-    measurement.settings.insert("ambient_divisions".into(), blocks.divisions.to_string());
+    let is_total = matches!(job.transport, Transport::Total(_));
+    let Sampled { blocks, divisions, options, shortfall } = sampler.total(if is_total { &[] } else { &part_lx })?;
+    let (count, divisions) = (blocks.count().to_string(), divisions.to_string());
+    let settings = [("rtrace", options.join(" ")), ("blocks", count), ("ambient_divisions", divisions)];
+    measurement.settings.extend(settings.map(|(key, value)| (key.to_owned(), value)));
     measurement.notes.push(NOT_REPEATABLE.into());
-    let parts = blocks.estimates().into_iter().zip(part_lx).zip(&direct);
-    let estimate = |((total, part_lx), direct)| match job.transport {
-        Transport::Total(_) => reflected(total, part_lx).plus(direct),
-        _ => reflected(total, part_lx),
+    measurement.notes.extend(shortfall);
+    let reflected = blocks.estimates().into_iter().zip(part_lx).map(|(total, part_lx)| reflected(total, part_lx));
+    measurement.estimates = if is_total {
+        reflected.zip(&direct).map(|(reflected, direct)| reflected.plus(direct)).collect()
+    } else {
+        reflected.collect()
     };
-    measurement.estimates = parts.map(estimate).collect();
+    measurement.samples.push(blocks);
     checked(&ID, job, measurement)
 }
 
 /// Direct light at every station: read once where rtrace's answer is determined, in blocks where it is sampled.
-fn direct(sampler: &Sampler<'_>, options: &Options) -> Result<Vec<Estimate>, EngineError> {
+fn direct(
+    sampler: &Sampler<'_>,
+    options: &Options,
+    measurement: &mut Measurement,
+) -> Result<Vec<Estimate>, EngineError> {
     let Sampler { job, settings, .. } = *sampler;
     if Sources::of(job, settings) == Sources::Openings && settings.preset != Preset::Default {
         let blocks = sampler.direct(options)?;
-        return Ok(blocks.estimates().into_iter().map(sampled).collect());
+        let estimates = blocks.estimates().into_iter().map(sampled).collect();
+        measurement.samples.push(blocks);
+        return Ok(estimates);
     }
     let direct_lx = sampler.tools.rtrace(sampler.workbench, &options.direct, &sampler.rows)?;
     let pairs = direct_lx.into_iter().zip(&job.stations);
@@ -176,8 +199,4 @@ fn reflected(total: Estimate, part_lx: f64) -> Estimate {
     let lost =
         value < 0.0 && all.uncertainty.standard_error().is_some_and(|e| value > -4.0 * e - all.uncertainty.bound());
     Estimate { value: if lost { 0.0 } else { value }, ..all }
-}
-
-fn output(what: String) -> EngineError {
-    EngineError::Output { engine: ID, what }
 }

@@ -3,15 +3,26 @@
 use luminaire::scene::LuminaireModel;
 use luminaire::simulator::{self, Accuracy};
 
-use super::{
-    Absent, Engine, EngineError, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
-};
+use super::settings::Given;
+use super::{Absent, Engine, EngineError, Entry, Job, Knob, Measurement, Site, Support, Version, Workbench, checked};
 use crate::record::{EngineName, Estimate, Role};
 
 /// The exact simulation of [`luminaire::simulator`].
 pub(crate) struct Simulator;
 
-pub(super) const ID: EngineName = EngineName::new("simulator");
+const ID: EngineName = EngineName::SIMULATOR;
+
+pub(super) static ENTRY: Entry = Entry {
+    name: ID,
+    display_name: "simulator",
+    colour: ("#3d4148", "#d5d8dd"),
+    installs: &[],
+    models: &[LuminaireModel::Point, LuminaireModel::Area, LuminaireModel::Impostor],
+    fits_coordinates: None,
+    make: || Box::new(Simulator),
+};
+
+const KNOBS: &[Knob] = &[Knob { key: "relative_error", values: &["0.001", "0.1", "0.00001"] }];
 
 /// How much finer than the budget's error the simulator works: a witness whose own error counts for nothing.
 const MARGIN: f64 = 0.1;
@@ -37,12 +48,8 @@ impl Engine for Simulator {
         vec![super::FILE_READER, super::OWN_LOOKUP]
     }
 
-    fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
-        Ok(vec![])
-    }
-
     fn knobs(&self) -> &'static [Knob] {
-        &[Knob { key: "relative_error", values: &["0.001", "0.1", "0.00001"] }]
+        KNOBS
     }
 
     /// An impostor is a way to sample an opening: to an exact solution it is the opening itself.
@@ -57,14 +64,8 @@ impl Engine for Simulator {
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
-        let relative_error = match job.settings.get("relative_error") {
-            None => MARGIN * job.budget.relative_error,
-            Some(value) => value.as_f64().filter(|e| *e > 0.0).ok_or_else(|| EngineError::Setting {
-                engine: ID,
-                key: "relative_error".into(),
-                what: format!("{value} is not a positive number"),
-            })?,
-        };
+        let asked = Given::of(job, ID, KNOBS)?.number("relative_error", 1e-12..=1.0)?;
+        let relative_error = asked.unwrap_or(MARGIN * job.budget.relative_error);
         let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();
         let accuracy = Accuracy { relative_error, seed: job.seed };
         let failed = |what: String| EngineError::Solver { engine: ID, what };
@@ -80,7 +81,7 @@ impl Engine for Simulator {
             ("seed".to_owned(), job.seed.to_string()),
         ];
         let estimates = solution.estimates.iter().map(estimate).collect();
-        checked(&ID, job, Measurement { estimates, settings: settings.into(), notes: vec![] })
+        checked(&ID, job, Measurement { estimates, settings: settings.into(), ..Measurement::default() })
     }
 }
 

@@ -8,10 +8,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Basis, Component, Judge, of_reading, witness_of};
+use super::{Component, Judge, of_reading};
 use crate::engines::FILE_READER;
 use crate::procedures::Task;
-use crate::record::{ProcedureId, Recording};
+use crate::record::{Basis, ProcedureId, Recording};
 
 /// Independent witnesses that a statement takes.
 const FEWEST: usize = 3;
@@ -101,10 +101,11 @@ pub(super) fn consensus(judge: &Judge<'_>, task: &Task, recordings: &[&Recording
     } else {
         probabilities(&testimonies, &suspects, &telling)
     };
-    let reference = witness_of(task).0;
+    let reference = task.reference();
+    let reference = reference.engine();
     let witnesses = testimonies.iter().enumerate().map(|(i, t)| Witness {
         name: t.name.clone(),
-        is_reference: reference == t.name,
+        is_reference: reference.is_some_and(|r| *r == t.name),
         shares: t.shares.clone(),
         deviation: deviation(&testimonies, i, &telling),
         probability: suspects.iter().zip(&probabilities).find(|(s, _)| s.name == t.name).map_or(0.0, |(_, p)| *p),
@@ -126,14 +127,15 @@ pub(super) fn consensus(judge: &Judge<'_>, task: &Task, recordings: &[&Recording
 }
 
 fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<Testimony> {
-    let (reference, basis, _) = witness_of(task);
+    let reference = task.reference();
+    let (reference, basis) = (reference.engine(), reference.basis());
     let tolerance = |engine: &str| judge.tolerances.of(task.procedure, basis, engine, task.quantity, judge.overrides);
     // The reference is as good as what the best of the others is held to.
     let strictest =
         recordings.iter().map(|r| tolerance(&r.key.engine)).min_by(|a, b| a.relative.total_cmp(&b.relative));
     let combined = |components: &[Component]| components.iter().map(|c| c.uncertainty.powi(2)).sum::<f64>().sqrt();
     let of_engine = |recording: &&Recording| {
-        let allowed = if recording.key.engine == reference {
+        let allowed = if reference == Some(&recording.key.engine) {
             strictest.unwrap_or_default()
         } else {
             tolerance(&recording.key.engine)
@@ -404,6 +406,7 @@ mod tests {
     use crate::judge::{KnownDeviations, Tolerances};
     use crate::procedures::Target;
     use crate::record::{MeterId, Quantity, Reading};
+    use crate::record::{ReadingKey, Uncertainty};
 
     const METERS: usize = 12;
     const LOOKUP: &str = "lookup";
@@ -411,12 +414,8 @@ mod tests {
     /// Readings of witnesses that are off by a factor each, with half a per mille of noise in the renderers.
     fn statement(factors: &[(&str, &[&str], f64)], seed: u64) -> Consensus {
         let mut random = fastrand::Rng::with_seed(seed);
-        let target = |k| Target {
-            id: MeterId::new("grid", k),
-            meter: Meter { position_m: DVec3::ZERO, normal: DVec3::Z },
-            direction: None,
-            per_lux: 1.0,
-        };
+        let target =
+            |k| Target::of_one(MeterId::new("grid", k), Meter { position_m: DVec3::ZERO, normal: DVec3::Z }, 1.0);
         let task = Task {
             procedure: ProcedureId::IndirectIlluminance,
             scene: Scene::default(),

@@ -5,6 +5,7 @@ mod consensus;
 mod family;
 mod known;
 mod papers;
+mod policy;
 mod spending;
 mod split;
 #[cfg(test)]
@@ -15,55 +16,26 @@ mod verdict;
 
 use std::collections::BTreeMap;
 
-use luminaire::scene::LuminaireModel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::engines;
-use crate::procedures::{Target, Task};
+use crate::procedures::{self, Target, Task};
 use crate::record::{EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, Uncertainty};
 use crate::spec::ToleranceOverride;
 
 use papers::Input;
 
+pub use crate::record::Basis;
 pub use consensus::{Consensus, Witness};
 pub use known::{KnownBreak, KnownDeviationError, KnownDeviations, Subject};
 pub use papers::{PaperSplit, Share, Stages, shares};
 pub use papers::{Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
+pub use policy::{Policy, PolicyError};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 pub use uncertainty::{Component, ErrorBudget, Shape, Source};
 pub use verdict::{Verdict, judge};
-
-/// What a reference rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Basis {
-    /// A formula in closed form.
-    ClosedForm,
-    /// The simulator, with its error bound.
-    Exact,
-    /// An IESNA calculation method.
-    Iesna,
-    /// Printed values.
-    Published,
-    /// Another engine.
-    Engine,
-}
-
-impl Basis {
-    /// As views call it: the exact solutions are those of our own simulator.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::ClosedForm => "closed form",
-            Self::Exact => "simulator",
-            Self::Iesna => "IESNA",
-            Self::Published => "published",
-            Self::Engine => "engine",
-        }
-    }
-}
 
 /// What a reading is held against.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -142,7 +114,7 @@ impl Judge<'_> {
 
     /// What an engine is held to in a task, by what others are judged by there.
     pub fn tolerance(&self, task: &Task, engine: &str) -> Tolerance {
-        self.tolerances.of(task.procedure, witness_of(task).1, engine, task.quantity, self.overrides)
+        self.tolerances.of(task.procedure, task.reference().basis(), engine, task.quantity, self.overrides)
     }
 
     /// Who of the engines departs from the others, the reference included; `recordings` as for [`Self::compare`].
@@ -161,7 +133,8 @@ impl Judge<'_> {
             let (mut family, mut shares) = (vec![], vec![]);
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.readings.get(k);
-                let mut references = reference_from_witness(task, recordings, k, &recording.key.engine);
+                let mut references: Vec<Held> =
+                    reference_of_task(task, recordings, k, &recording.key.engine).into_iter().collect();
                 for reference in self.published.iter().flat_map(|p| p.references(task, target, &recording.key.engine)) {
                     references.push(Held::published(reference, input.as_ref(), target, reading));
                 }
@@ -261,6 +234,9 @@ impl Judge<'_> {
     }
 }
 
+/// Rounding of a closed form in `f64`, relative: a few operations and two arctangents a luminaire.
+const ROUNDING: f64 = 1e-13;
+
 /// A reference with what is uncertain of it.
 struct Held {
     reference: Reference,
@@ -273,6 +249,35 @@ impl Held {
         let alone = ErrorBudget::new(self.components.clone(), tail);
         self.reference.coverage_factor = Some(alone.coverage_factor).filter(|_| alone.combined > 0.0);
         self
+    }
+
+    /// A reading of a witness.
+    fn reading(recording: &Recording, reading: &Reading, basis: Basis, source: String) -> Self {
+        let reference = Reference {
+            value: reading.value,
+            uncertainty: reading.uncertainty.standard(),
+            degrees_of_freedom: reading.uncertainty.degrees_of_freedom(),
+            coverage_factor: None,
+            basis,
+            source,
+        };
+        let components = of_reading(recording, reading).into_iter();
+        let components = components.map(|component| Component { source: Source::Reference, ..component });
+        Self { reference, components: components.collect() }
+    }
+
+    /// A closed form.
+    fn formula(value: f64, source: &str) -> Self {
+        let rounding = Component::within(Source::Reference, ROUNDING * value.abs());
+        let reference = Reference {
+            value,
+            uncertainty: rounding.uncertainty,
+            degrees_of_freedom: None,
+            coverage_factor: None,
+            basis: Basis::ClosedForm,
+            source: source.to_owned(),
+        };
+        Self { reference, components: vec![rounding] }
     }
 
     /// A printed or derived value, which does not rest on the photometric file.
@@ -305,41 +310,22 @@ fn of_reading(recording: &Recording, reading: &Reading) -> Vec<Component> {
     ]
 }
 
-/// Which of our own engines others are judged by in a procedure, and on what basis.
-fn witness_of(task: &Task) -> (EngineName, Basis, &'static str) {
-    let points_only = task.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
-    match (task.procedure, points_only && task.scene.obstacles.is_empty()) {
-        (ProcedureId::LuminousIntensity, true) => {
-            (engines::IESNA, Basis::ClosedForm, "photometric file, bilinear in (C, gamma)")
+/// What a task's own reference holds for a reading of an engine; the reference itself has none.
+fn reference_of_task(task: &Task, recordings: &[&Recording], k: usize, engine: &EngineName) -> Option<Held> {
+    let (witness, basis, source) = match task.reference() {
+        procedures::Reference::Witness { engine, basis, source } => (engine, basis, source),
+        procedures::Reference::Formula { of, source } => {
+            return Some(Held::formula(of(&task.scene, task.targets[k].meter.position_m), source));
         }
-        (ProcedureId::DirectIlluminance, true) => (engines::IESNA, Basis::ClosedForm, "inverse square"),
-        _ => (engines::SIMULATOR, Basis::Exact, "luminaire::simulator"),
-    }
-}
-
-fn reference_from_witness(task: &Task, recordings: &[&Recording], k: usize, engine: &EngineName) -> Vec<Held> {
-    let (witness, basis, source) = witness_of(task);
+    };
     if *engine == witness {
-        return vec![];
+        return None;
     }
-    let recording = recordings.iter().find(|r| r.key.engine == witness);
-    let reading = recording.and_then(|r| r.readings.get(k).map(|reading| (r, reading)));
-    let held = reading.map(|(recording, reading)| Held {
-        reference: Reference {
-            value: reading.value,
-            uncertainty: reading.uncertainty.standard(),
-            degrees_of_freedom: reading.uncertainty.degrees_of_freedom(),
-            coverage_factor: None,
-            basis,
-            source: match recording.settings.get("solver") {
-                Some(solver) if basis == Basis::Exact => format!("{source}: {solver}"),
-                _ => source.to_owned(),
-            },
-        },
-        components: of_reading(recording, reading)
-            .into_iter()
-            .map(|component| Component { source: Source::Reference, ..component })
-            .collect(),
-    });
-    held.into_iter().collect()
+    let recording = recordings.iter().find(|r| r.key.engine == witness)?;
+    let reading = recording.readings.get(k)?;
+    let source = match recording.settings.get("solver") {
+        Some(solver) if basis == Basis::Exact => format!("{source}: {solver}"),
+        _ => source.to_owned(),
+    };
+    Some(Held::reading(recording, reading, basis, source))
 }

@@ -6,8 +6,6 @@ use luminaire::units::Lux;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::witness_of;
-use crate::engines;
 use crate::procedures::Task;
 use crate::record::{EngineName, MeterId, ProcedureId, Reading, Recording, Role};
 
@@ -37,8 +35,8 @@ pub struct Split {
 /// Where the IESNA method is itself what others are judged by, there is nothing to split.
 pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> Vec<Split> {
     let of = |engine: EngineName| recordings.iter().find(|r| r.key.engine == engine);
-    let (Some(method), Some(exact)) = (of(engines::IESNA), of(engines::SIMULATOR)) else { return vec![] };
-    if witness_of(task).0 == engines::IESNA {
+    let (Some(method), Some(exact)) = (of(EngineName::IESNA), of(EngineName::SIMULATOR)) else { return vec![] };
+    if task.reference().engine() != Some(&EngineName::SIMULATOR) {
         return vec![];
     }
     // `instrument` is the relative standard uncertainty that calibration left.
@@ -70,7 +68,10 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
                 of_method: split.method,
                 of_renderer: split.renderer,
                 uncertainty: split.uncertainty,
-                text: format!("{method} differs from {} by {split}", display_name(&renderer.key.engine)),
+                text: format!(
+                    "{method} differs from {} by {split}",
+                    crate::engines::display_name(&renderer.key.engine)
+                ),
             });
         }
     }
@@ -85,20 +86,11 @@ const fn name_of_method(transport: Transport) -> &'static str {
     }
 }
 
-/// Renderers as their makers write them.
-fn display_name(engine: &str) -> &str {
-    match engine {
-        "radiance" => "Radiance",
-        "mitsuba" => "Mitsuba",
-        "povray" => "POV-Ray",
-        other => other,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::record::Quantity;
+    use crate::record::{Light, ReadingKey, Uncertainty};
     use luminaire::scene::{Bounces, Scene};
 
     fn recording(engine: &str, value: f64, std_error: f64) -> Recording {

@@ -11,12 +11,7 @@ use crate::system::random::normal;
 
 /// A task of so many meters of indirect light in an empty scene; what is read there is made up.
 pub(crate) fn task(meters: usize) -> Task {
-    let target = |k| Target {
-        id: MeterId::new("grid", k),
-        meter: Meter { position_m: DVec3::ZERO, normal: DVec3::Z },
-        direction: None,
-        per_lux: 1.0,
-    };
+    let target = |k| Target::of_one(MeterId::new("grid", k), Meter { position_m: DVec3::ZERO, normal: DVec3::Z }, 1.0);
     Task {
         procedure: ProcedureId::IndirectIlluminance,
         scene: Scene::default(),

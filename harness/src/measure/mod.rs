@@ -1,10 +1,16 @@
 //! The one way to a reading: out of the cache or by the engine, within the machine's slots, in this process or one apart.
 
+mod answer;
 pub mod cache;
-mod isolated;
 mod machine;
+mod outcome;
+mod question;
 mod reader;
+mod subprocess;
 
-pub use isolated::*;
+pub use answer::answer;
 pub use machine::Machine;
-pub use reader::{Reader, Source, Taken};
+pub use outcome::{Cost, Failure, FailureKind, Source, Taken};
+pub use question::{Instrument, Question, Trial};
+pub use reader::Reader;
+pub use subprocess::{Isolation, READ_ONE};

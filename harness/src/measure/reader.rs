@@ -3,17 +3,19 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use crate::engines::{EngineError, Job, Measurement, Site, Workbench, checked, share};
-use crate::measure::cache::{Answer, Cache, Entry, Key, Lookup, key};
-use crate::plan::Planned;
-use crate::spec::Budget;
-use crate::system::process;
+use super::cache::{Cache, Entry, Key, Lookup};
+use super::machine::Machine;
+use super::outcome::{Cost, Failure, FailureKind, Source, Taken};
+use super::question::Question;
+use super::subprocess::{self, Isolation, Request};
+use crate::engines::{Engine, EngineError, Job, Measurement, Site, Support, Workbench, checked, share};
+use crate::record::ReadingKey;
+use crate::system::process::{self, PeakMemory, ProcessError};
+use crate::system::slots::Share;
 
-use super::Machine;
-
-/// Takes readings for a run: everything that measures goes through [`Reader::read`].
+/// Takes readings: everything that measures goes through [`Reader::read`].
 ///
 /// A reading is a function of its job: the job's seed chooses the block of random numbers, its budget says how far to go.
 /// Whoever wants more of an engine asks it for further jobs, each with a seed block and a slice of the budget of its own, and combines
@@ -23,153 +25,162 @@ use super::Machine;
 pub struct Reader {
     /// Where engines are installed.
     pub site: Site,
-    /// The folder of the run's files.
-    pub out: PathBuf,
+    /// The folder that scenes and logs stay in; `None`: they are thrown away.
+    pub out: Option<PathBuf>,
     /// Where earlier readings are; `None`: every reading is taken anew, and none is kept.
     pub cache: Option<Cache>,
     /// How much of the machine an engine may have.
     pub machine: Arc<Machine>,
-}
-
-/// Readings that were taken.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Taken {
-    /// What the engine gave.
-    pub measurement: Measurement,
-    /// Wall-clock seconds that it took the engine, now or when it was asked first.
-    pub wall_s: f64,
-    /// Who gave it.
-    pub source: Source,
-}
-
-/// Who gave a reading.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// The engine, just now.
-    Engine,
-    /// The cache or this run, from an earlier answer of the engine.
-    Cache,
-    /// Nobody had to be asked.
-    Nobody,
+    pub isolation: Isolation,
+    /// No reading starts after this; what is in the cache is still found.
+    pub until: Option<Instant>,
 }
 
 impl Reader {
-    /// The engine's answer to a job; scene files and logs go under `place`, the procedure's name or a folder below it.
-    pub fn read(&self, planned: &Planned, job: &Job, place: &str) -> Result<Taken, EngineError> {
-        let engine = planned.engine.name();
-        if process::is_interrupted() {
-            return Err(process::ProcessError::Interrupted { program: engine.as_str().to_owned() }.into());
+    /// One that reads in this process, and keeps neither readings nor files.
+    pub fn bare(site: &Site, machine: Arc<Machine>) -> Self {
+        Self { site: site.clone(), out: None, cache: None, machine, isolation: Isolation::InProcess, until: None }
+    }
+
+    pub fn read(&self, question: &Question<'_>) -> Result<Taken, Failure> {
+        if let Support::No(why) = question.instrument.engine.supports(question.job) {
+            return Err(Failure::new(FailureKind::Declined, why));
         }
-        let mut bench = self.workbench(engine.as_str(), job, place)?;
-        let key = key_of(planned, job)?;
+        let key = question.key()?;
         // Whoever asks the same at the same time waits for this answer.
-        let answered = key.as_ref().and_then(|key| self.machine.answered(key));
+        let answered = self.machine.answered(&key);
         let mut answered = answered.as_ref().map(|a| a.lock().unwrap_or_else(PoisonError::into_inner));
         let known = answered.as_ref().and_then(|a| (**a).clone());
-        let kept = self.cache.as_ref().zip(key);
-        if let Some(entry) = known.or_else(|| kept.as_ref().and_then(|(cache, key)| find(cache, key))) {
-            bench.write(&planned.engine.export(job)?)?;
-            self.note(&bench, &format!("read in {:.3} s for {} {}", entry.wall_s, entry.case, entry.procedure))?;
-            tidy(&bench);
+        let (entry, source) = match known.or_else(|| self.find(&key)) {
+            Some(entry) => {
+                self.lay_out(question, &entry)?;
+                (entry, Source::Cache)
+            }
+            None => (self.ask(question)?, Source::Engine),
+        };
+        if question.is_final(&entry) {
+            if source == Source::Engine {
+                self.keep(&key, &entry);
+            }
             if let Some(answered) = &mut answered {
                 **answered = Some(entry.clone());
             }
-            return taken(planned, job, entry);
         }
-        // Its seconds count from when it has what it needs.
+        let measurement = checked(&entry.key.engine, question.job, entry.answer?)?;
+        Ok(Taken { measurement, cost: entry.cost, source })
+    }
+
+    /// The engine's own answer.
+    fn ask(&self, question: &Question<'_>) -> Result<Entry, Failure> {
+        let Question { instrument, job, trial, .. } = *question;
+        let engine = instrument.engine.as_ref();
+        let name = engine.name();
+        if process::is_interrupted() {
+            return Err(EngineError::from(ProcessError::Interrupted { program: name.to_string() }).into());
+        }
+        if self.until.is_some_and(|until| Instant::now() >= until) {
+            return Err(Failure::new(FailureKind::TimeUp, "no time was left for it"));
+        }
+        let mut place = self.place(question)?;
         let slots = &self.machine.slots;
-        let held = slots.take(share(planned.engine.as_ref(), job, slots));
-        bench.jobs = held.threads();
-        let start = Instant::now();
-        let answer = match planned.engine.read(job, &bench).and_then(|m| checked(&engine, job, m)) {
-            Ok(measurement) => Answer::Read(measurement),
-            Err(EngineError::Declined { why, .. }) => Answer::Declined(why),
-            Err(error) => return Err(error),
+        let held = slots.take(match trial {
+            Some(trial) => Share { threads: trial.threads, memory_mib: engine.memory_mib(job, trial.threads) },
+            None => share(engine, job, slots),
+        });
+        place.bench.jobs = held.threads();
+        // Its seconds count from when it has what it needs.
+        let clock = Instant::now();
+        let answer = match (&self.isolation, trial) {
+            (Isolation::Subprocess(program), Some(trial)) if engine.is_witness() => {
+                subprocess::read(program, &Request::of(question, trial), &place.bench).map(|t| (t.measurement, t.cost))
+            }
+            _ => in_process(engine, job, &place.bench),
         };
-        let wall_s = start.elapsed().as_secs_f64();
-        drop(held);
-        tidy(&bench);
-        let entry = Entry {
-            engine: engine.clone(),
-            version: planned.version().unwrap_or_default(),
-            case: job.case.clone(),
-            procedure: job.procedure.clone(),
-            wall_s,
-            answer,
+        let (answer, cost) = match answer {
+            Ok((measurement, cost)) => (Ok(measurement), cost),
+            Err(failure) => (Err(failure), Cost { wall_s: clock.elapsed().as_secs_f64(), ..Cost::default() }),
         };
-        if let Some((cache, key)) = &kept
-            && let Err(error) = cache.keep(key, &entry)
-        {
-            tracing::warn!("{engine}: a reading could not be kept in {}: {error}", cache.path(key).display());
-        }
-        if let Some(answered) = &mut answered {
-            **answered = Some(entry.clone());
-        }
-        match entry.answer {
-            Answer::Read(measurement) => Ok(Taken { measurement, wall_s, source: Source::Engine }),
-            Answer::Declined(why) => Err(EngineError::Declined { engine, why }),
+        let key = ReadingKey::new(&job.case, job.procedure, name);
+        Ok(Entry { key, version: instrument.version.0.clone(), cost, answer })
+    }
+
+    fn find(&self, key: &Key) -> Option<Entry> {
+        match self.cache.as_ref()?.find(key) {
+            Lookup::Found(entry) => Some(entry),
+            Lookup::Unknown => None,
+            Lookup::Damaged(what) => {
+                tracing::warn!("{}: the cache's {what}; the reading is taken anew", key.engine());
+                None
+            }
         }
     }
 
-    fn workbench(&self, engine: &str, job: &Job, place: &str) -> Result<Workbench, EngineError> {
-        let log = absolute(&self.out.join("logs").join(format!("{engine}.{}.log", place.replace('/', "."))))?;
+    fn keep(&self, key: &Key, entry: &Entry) {
+        if let Some(cache) = &self.cache
+            && let Err(error) = cache.keep(key, entry)
+        {
+            let path = cache.path(key);
+            tracing::warn!("{}: a reading could not be kept in {}: {error}", entry.key.engine, path.display());
+        }
+    }
+
+    /// The files of a reading that was not run, where files stay.
+    fn lay_out(&self, question: &Question<'_>, entry: &Entry) -> Result<(), EngineError> {
+        if self.out.is_none() {
+            return Ok(());
+        }
+        let place = self.place(question)?;
+        let bench = &place.bench;
+        bench.write(&question.instrument.engine.export(question.job)?)?;
+        let text =
+            format!("not run: read in {:.3} s for {} {}\n", entry.cost.wall_s, entry.key.case, entry.key.procedure);
+        let logs = bench.log.parent().map_or(Ok(()), fs::create_dir_all);
+        logs.and_then(|()| fs::write(&bench.log, text)).map_err(|e| EngineError::io(&bench.log, e))
+    }
+
+    fn place(&self, question: &Question<'_>) -> Result<WorkPlace, EngineError> {
+        let temporary = match &self.out {
+            Some(_) => None,
+            None => Some(tempfile::tempdir().map_err(|e| EngineError::io(&std::env::temp_dir(), e))?),
+        };
+        let out = self.out.as_deref().or(temporary.as_ref().map(tempfile::TempDir::path)).unwrap_or(Path::new("."));
+        let (engine, folder) = (question.instrument.engine.name(), question.folder);
+        let log = absolute(&out.join("logs").join(format!("{engine}.{}.log", folder.replace('/', "."))))?;
         fs::remove_file(&log).or_else(ignore_absence).map_err(|e| EngineError::io(&log, e))?;
-        Ok(Workbench {
+        let bench = Workbench {
             site: self.site.clone(),
-            scene_dir: fresh(&self.out.join("scenes").join(engine).join(place))?,
+            scene_dir: fresh(&out.join("scenes").join(engine.as_str()).join(folder))?,
             log,
             jobs: 1,
-            limit: limit(job.budget),
-            peak: process::PeakMemory::default(),
-        })
-    }
-
-    fn note(&self, bench: &Workbench, text: &str) -> Result<(), EngineError> {
-        let fail = |e| EngineError::io(&bench.log, e);
-        fs::create_dir_all(self.out.join("logs")).map_err(fail)?;
-        fs::write(&bench.log, format!("not run: {text}\n")).map_err(fail)
+            limit: question.limit,
+            peak: PeakMemory::default(),
+        };
+        Ok(WorkPlace { bench, _temporary: temporary })
     }
 }
 
-/// The key of a job; `None` where nothing asks for one.
-fn key_of(planned: &Planned, job: &Job) -> Result<Option<Key>, EngineError> {
-    match &planned.found {
-        Some(Ok(version)) => key(planned.engine.as_ref(), version, job).map(Some),
-        _ => Ok(None),
+fn in_process(engine: &dyn Engine, job: &Job, bench: &Workbench) -> Result<(Measurement, Cost), Failure> {
+    let (clock, cpu) = (Instant::now(), process::cpu_time());
+    let measurement = checked(&engine.name(), job, engine.read(job, bench)?)?;
+    let (wall, cpu) = (clock.elapsed(), process::cpu_time().saturating_sub(cpu));
+    if bench.peak.mib().is_none() {
+        bench.peak.look_at("self");
     }
+    let cost = Cost { wall_s: wall.as_secs_f64(), cpu_s: cpu.as_secs_f64(), peak_mib: bench.peak.mib() };
+    Ok((measurement, cost))
 }
 
-fn find(cache: &Cache, key: &Key) -> Option<Entry> {
-    match cache.find(key) {
-        Lookup::Found(entry) => Some(entry),
-        Lookup::Unknown => None,
-        Lookup::Damaged(what) => {
-            tracing::warn!("{}: the cache's {what}; the reading is taken anew", key.engine());
-            None
-        }
+/// A workbench, and the folder that goes with it.
+struct WorkPlace {
+    bench: Workbench,
+    _temporary: Option<tempfile::TempDir>,
+}
+
+impl Drop for WorkPlace {
+    /// Our own solvers write no scene: an empty folder would only puzzle.
+    fn drop(&mut self) {
+        fs::remove_dir(&self.bench.scene_dir).ok();
     }
-}
-
-/// An entry as the engine's own answer, held to what every answer is held to.
-fn taken(planned: &Planned, job: &Job, entry: Entry) -> Result<Taken, EngineError> {
-    let engine = planned.engine.name();
-    match entry.answer {
-        Answer::Read(measurement) => {
-            let measurement = checked(&engine, job, measurement)?;
-            Ok(Taken { measurement, wall_s: entry.wall_s, source: Source::Cache })
-        }
-        Answer::Declined(why) => Err(EngineError::Declined { engine, why }),
-    }
-}
-
-/// Our own solvers write no scene: an empty folder would only puzzle.
-fn tidy(bench: &Workbench) {
-    fs::remove_dir(&bench.scene_dir).ok();
-}
-
-/// Far beyond the budget, which engines keep by themselves: this is for those that hang.
-fn limit(budget: Budget) -> Duration {
-    Duration::from_secs_f64((2.0 * budget.seconds + 120.0).min(1e9))
 }
 
 /// An empty folder, absolute, so that programs can run inside it.

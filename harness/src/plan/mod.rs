@@ -9,8 +9,9 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::engines::{self, Absent, Engine, Job, Site, Support, Version};
-use crate::procedures::{self, Task};
+use crate::engines::{Absent, Engine, Job, Site, Support, Version};
+use crate::measure::Instrument;
+use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 use crate::spec::{Budget, Case, SpecError, suggestion};
 use luminaire::scene::Transport;
@@ -45,6 +46,12 @@ impl Planned {
     /// The engine's version, where it is there.
     pub fn version(&self) -> Option<String> {
         self.found.as_ref()?.as_ref().ok().map(|v| v.0.clone())
+    }
+
+    /// What readings are taken with, where it is there.
+    pub fn instrument(&self) -> Option<Instrument> {
+        let version = self.found.as_ref()?.as_ref().ok()?.clone();
+        Some(Instrument { engine: Arc::clone(&self.engine), version })
     }
 
     /// Whether it was looked for in vain.
@@ -259,7 +266,7 @@ fn facts(case: &Case, tasks: &[Task]) -> Vec<Skip> {
         let mut found = vec![fact(task, EVERYONE, "direct light only: no reflection is followed")];
         if task.scene.obstacles.is_empty() {
             let reason = "the room is empty and convex, nothing hides a luminaire: no visibility is tested";
-            found.push(fact(task, engines::SIMULATOR, reason));
+            found.push(fact(task, EngineName::SIMULATOR, reason));
         }
         found
     };
@@ -288,7 +295,7 @@ fn skip(case: &Case, task: &Task, engine: &dyn Engine, what: (Scope, String, Opt
 impl Selection {
     /// Whether a case holds any of the chosen procedures.
     pub fn concerns(&self, case: &Case) -> bool {
-        procedures::ALL.iter().any(|p| self.wants(p.id()) && p.task(case).is_some())
+        case.tasks().any(|task| self.wants(task.procedure))
     }
 
     fn wants(&self, procedure: ProcedureId) -> bool {
@@ -297,8 +304,7 @@ impl Selection {
 }
 
 fn tasks(case: &Case, selection: &Selection) -> Result<Vec<Task>, SpecError> {
-    let tasks: Vec<Task> =
-        procedures::ALL.iter().filter(|p| selection.wants(p.id())).filter_map(|p| p.task(case)).collect();
+    let tasks: Vec<Task> = case.tasks().filter(|task| selection.wants(task.procedure)).collect();
     if tasks.is_empty() {
         let message = "none of the procedures chosen with --procedures is in this spec";
         return Err(case.source.error_at("procedures", message, "choose one that is, or leave the option out"));

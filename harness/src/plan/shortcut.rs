@@ -13,7 +13,7 @@ mod tests;
 use luminaire::scene::Transport;
 
 use crate::engines::{Job, Measurement};
-use crate::record::{Estimate, ProcedureId};
+use crate::record::Estimate;
 
 pub(super) use repeated::Repeated;
 
@@ -67,7 +67,8 @@ impl Shortcut {
     pub(super) fn of(job: &Job) -> Self {
         let mut shortcut = Self::none(job);
         bounces::shorten(&mut shortcut);
-        if job.procedure != ProcedureId::LuminousIntensity {
+        // A luminaire alone in free field is read for its table, which no shortcut may assume.
+        if job.scene.room.is_some() {
             dark::shorten(&mut shortcut, job);
             symmetry::shorten(&mut shortcut, job);
         }
@@ -89,9 +90,17 @@ impl Shortcut {
             Fill::Dark => Estimate::DARK,
         };
         let estimates = self.fill.iter().map(estimate).collect();
+        let station = |fill: &Fill| match fill {
+            Fill::Rendered(k) | Fill::Mirrors { station: k, .. } if *k < rendered.estimates.len() => {
+                Some((*k, self.factor))
+            }
+            _ => None,
+        };
+        let stations: Vec<_> = self.fill.iter().map(station).collect();
+        let samples = rendered.samples.iter().map(|part| part.rearranged(&stations)).collect();
         let mut settings = rendered.settings;
         settings.extend(self.traces(asked));
-        Measurement { estimates, settings, notes: rendered.notes }
+        Measurement { estimates, settings, notes: rendered.notes, samples }
     }
 
     /// Which meter's reading is which other's, for whoever repeats it.

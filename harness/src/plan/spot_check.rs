@@ -63,6 +63,7 @@ mod tests {
     use super::*;
     use crate::engines::fixtures;
     use crate::plan::{Fill, Shortcut};
+    use crate::record::Estimate;
 
     fn run(points: usize) -> Run {
         let points_m: Vec<[f64; 3]> = (0..points).map(|k| [k as f64, 1.0, 1.0]).collect();

@@ -52,6 +52,17 @@ impl ProcedureId {
     pub const ALL: [Self; 4] =
         [Self::LuminousIntensity, Self::DirectIlluminance, Self::IndirectIlluminance, Self::TotalIlluminance];
 
+    /// All names, in the same order.
+    pub const NAMES: [&str; Self::ALL.len()] = {
+        let mut names = [""; Self::ALL.len()];
+        let mut k = 0;
+        while k < names.len() {
+            names[k] = Self::ALL[k].name();
+            k += 1;
+        }
+        names
+    };
+
     /// As specs, command lines and reports write it.
     pub const fn name(self) -> &'static str {
         match self {
@@ -71,7 +82,7 @@ impl fmt::Display for ProcedureId {
 
 /// There is no such procedure.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no procedure `{name}`; there are {}", ProcedureId::ALL.map(ProcedureId::name).join(", "))]
+#[error("there is no procedure `{name}`; there are {}", ProcedureId::NAMES.join(", "))]
 pub struct UnknownProcedure {
     pub name: String,
 }
@@ -94,6 +105,11 @@ impl EngineName {
     pub const fn new(name: &'static str) -> Self {
         Self(Cow::Borrowed(name))
     }
+
+    /// The exact simulation, by which others are judged.
+    pub const SIMULATOR: Self = Self::new("simulator");
+    /// The IESNA methods, by which others are judged where they are closed forms.
+    pub const IESNA: Self = Self::new("iesna");
 
     pub fn as_str(&self) -> &str {
         &self.0

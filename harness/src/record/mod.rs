@@ -1,5 +1,6 @@
 //! Readings: what one engine says at one meter, with its uncertainty.
 
+mod basis;
 mod key;
 mod light;
 mod role;
@@ -11,6 +12,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use basis::Basis;
 pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
 pub use light::{Light, UnknownLight};
 pub use role::Role;

@@ -14,6 +14,9 @@ pub struct EngineStatus {
     pub version: Option<String>,
     /// How it fared.
     pub status: Status,
+    /// Whether it was named, so that its absence is an error.
+    #[serde(default)]
+    pub is_required: bool,
     /// Why it did not run.
     pub reason: Option<String>,
     /// Wall-clock seconds over all procedures.

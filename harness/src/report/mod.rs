@@ -23,6 +23,8 @@ use crate::judge::{Comparison, Consensus, PaperSplit, PublishedTable, Split};
 use crate::plan::Skip;
 use crate::record::{EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Status};
 
+use crate::spec::Case;
+
 pub use accepted::{BaselineCheck, BaselineLine};
 pub use budget::budgets;
 pub use csv::csv;
@@ -95,6 +97,13 @@ pub struct SpecRecord {
     pub title: String,
 }
 
+impl SpecRecord {
+    /// That of one case.
+    pub fn of(case: &Case) -> Self {
+        Self { path: case.path.display().to_string(), sha256: case.sha256.clone(), title: case.title.clone() }
+    }
+}
+
 /// One reading of one engine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReadingRecord {
@@ -145,8 +154,8 @@ impl Report {
         }
     }
 
-    /// One report of several cases; `None` of none.
-    pub fn joined(spec: SpecRecord, reports: Vec<Self>) -> Option<Self> {
+    /// One report of several cases, of which there is one at least.
+    pub fn joined(spec: SpecRecord, reports: Vec<Self>) -> Self {
         let joined = reports.into_iter().reduce(|mut all, one| {
             all.wall_s += one.wall_s;
             all.comparisons.extend(one.comparisons);
@@ -170,13 +179,14 @@ impl Report {
                 }
             }
             all
-        })?;
+        });
+        let Some(joined) = joined else { unreachable!("a suite without cases is refused") };
         let summary = Summary::of(&joined.comparisons, &joined.skips);
         let order = |e: &EngineStatus| crate::engines::all().iter().position(|known| known.name() == e.id);
         let mut engines = joined.engines;
         engines.sort_by_key(order);
         let joined = Self { spec, engines, summary, ..joined };
-        Some(Self { paper_splits: papers::splits(&joined), ..joined })
+        Self { paper_splits: papers::splits(&joined), ..joined }
     }
 
     fn is_suite(&self) -> bool {
@@ -188,11 +198,11 @@ impl Report {
         if self.is_suite() { format!("{case}{after}") } else { String::new() }
     }
 
-    /// The exit code that the run deserves. `asked` tells whether an engine was named by the user.
-    pub fn exit(&self, asked: impl Fn(&str) -> bool) -> Exit {
+    /// The exit code that the run deserves.
+    pub fn exit(&self) -> Exit {
         let engine = |e: &EngineStatus| match e.status {
             Status::Failed => Exit::Engine,
-            Status::Absent if asked(&e.id) => Exit::Engine,
+            Status::Absent if e.is_required => Exit::Engine,
             _ => Exit::Passed,
         };
         let baseline = |b: &BaselineCheck| if b.is_as_accepted() { Exit::Passed } else { Exit::Failed };

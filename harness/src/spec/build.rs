@@ -13,10 +13,10 @@ use sha2::{Digest, Sha256};
 
 use super::cases::Variant;
 use super::model::{
-    Angles, Budget, EngineSettings, GridSpec, LuminaireSpec, MeterSet, ModelSpec, ObstacleSpec, Procedures, Spec,
-    ToleranceOverride,
+    Budget, EngineSettings, GridSpec, LuminaireSpec, MeterSet, ModelSpec, ObstacleSpec, Spec, ToleranceOverride,
 };
 use super::{Source, SpecError, suggestion};
+use crate::procedures::{Angles, Asked, AtAngles, Names, Procedures, Task};
 use crate::record::ProcedureId;
 
 /// Nearest a meter or a luminaire may come to a surface, relative to the room's largest extent.
@@ -63,6 +63,16 @@ impl Case {
     pub fn settings_of(&self, engine: &str) -> BTreeMap<String, serde_json::Value> {
         let of_engine = self.engines.as_ref().and_then(|all| all.get(engine));
         of_engine.map(|EngineSettings(settings)| settings.clone()).unwrap_or_default()
+    }
+
+    /// What a procedure measures in it; `None` where the spec does not ask for it.
+    pub fn task(&self, procedure: ProcedureId) -> Option<Task> {
+        procedure.row().task(self.procedures.0.get(&procedure)?, &self.scene, &self.meters)
+    }
+
+    /// What all procedures measure in it, in the order of reports.
+    pub fn tasks(&self) -> impl Iterator<Item = Task> {
+        ProcedureId::ALL.into_iter().filter_map(|procedure| self.task(procedure))
     }
 
     /// Reads, checks and builds the case of a spec file, without the overrides of its `cases`.
@@ -300,25 +310,37 @@ impl<'a> Builder<'a> {
         luminaires: &[LuminaireSpec],
         meters: &BTreeMap<String, Vec<Meter>>,
     ) -> Result<(), SpecError> {
-        let sets = [
-            ("direct_illuminance", procedures.direct_illuminance.as_ref().map(|p| &p.meters)),
-            ("indirect_illuminance", procedures.indirect_illuminance.as_ref().map(|p| &p.meters)),
-            ("total_illuminance", procedures.total_illuminance.as_ref().map(|p| &p.meters)),
-        ];
-        if procedures.luminous_intensity.is_none() && sets.iter().all(|(_, names)| names.is_none()) {
+        if procedures.0.is_empty() {
             return Err(self.source.error_at("procedures", "there are none", "give at least one procedure"));
         }
-        for (procedure, names) in sets {
-            for name in names.into_iter().flat_map(super::model::Names::iter) {
-                if !meters.contains_key(name) {
-                    let message = format!("there is no meter set `{name}`");
-                    let help = suggestion(name, meters.keys().map(String::as_str));
-                    return Err(self.source.error_at(&format!("procedures.{procedure}.meters"), message, help));
-                }
+        for (procedure, asked) in &procedures.0 {
+            match asked {
+                Asked::Meters(asked) => self.meter_sets(*procedure, &asked.meters, meters)?,
+                Asked::Angles(asked) => self.angles(*procedure, asked, luminaires)?,
             }
         }
-        let Some(intensity) = &procedures.luminous_intensity else { return Ok(()) };
-        let at = |field: &str| format!("procedures.luminous_intensity.{field}");
+        Ok(())
+    }
+
+    fn meter_sets(
+        &self,
+        procedure: ProcedureId,
+        names: &Names,
+        meters: &BTreeMap<String, Vec<Meter>>,
+    ) -> Result<(), SpecError> {
+        let Some(name) = names.iter().find(|name| !meters.contains_key(*name)) else { return Ok(()) };
+        let message = format!("there is no meter set `{name}`");
+        let help = suggestion(name, meters.keys().map(String::as_str));
+        Err(self.source.error_at(&format!("procedures.{procedure}.meters"), message, help))
+    }
+
+    fn angles(
+        &self,
+        procedure: ProcedureId,
+        intensity: &AtAngles,
+        luminaires: &[LuminaireSpec],
+    ) -> Result<(), SpecError> {
+        let at = |field: &str| format!("procedures.{procedure}.{field}");
         if !luminaires.iter().any(|l| l.id == intensity.luminaire) {
             let message = format!("there is no luminaire `{}`", intensity.luminaire);
             let help = suggestion(&intensity.luminaire, luminaires.iter().map(|l| l.id.as_str()));
@@ -361,7 +383,7 @@ impl<'a> Builder<'a> {
     ) -> Result<BTreeMap<ProcedureId, ToleranceOverride>, SpecError> {
         let one = |(name, tolerance): (&String, &ToleranceOverride)| {
             let procedure = name.parse::<ProcedureId>().map_err(|_| {
-                let help = suggestion(name, ProcedureId::ALL.map(ProcedureId::name).into_iter());
+                let help = suggestion(name, ProcedureId::NAMES.into_iter());
                 self.source.error_at("tolerances", format!("`{name}` is no procedure"), help)
             })?;
             let values = [tolerance.relative, tolerance.absolute_lx, tolerance.absolute_cd];

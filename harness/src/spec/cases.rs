@@ -164,6 +164,7 @@ fn lay(base: &mut Value, over: &Value) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::ProcedureId;
     use crate::spec::model::ModelSpec;
 
     const BASE: &str = "luxproof: 1
@@ -208,8 +209,8 @@ procedures:
         .unwrap();
         let names: Vec<&str> = cases.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["point-seven", "point-all", "area-seven", "area-all"]);
-        assert!(cases[2].spec.procedures.direct_illuminance.is_some());
-        assert!(cases[3].spec.procedures.direct_illuminance.is_none());
+        assert!(cases[2].spec.procedures.0.contains_key(&ProcedureId::DirectIlluminance));
+        assert!(!cases[3].spec.procedures.0.contains_key(&ProcedureId::DirectIlluminance));
         assert_eq!(cases[3].spec.luminaires[0].model, ModelSpec::Area);
     }
 

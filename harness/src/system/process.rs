@@ -4,12 +4,13 @@
 
 use std::ffi::OsString;
 use std::fs;
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command as StdCommand, ExitStatus, Stdio};
+use std::process::{Child, ChildStdin, Command as StdCommand, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -147,6 +148,9 @@ pub enum ProcessError {
         /// The log file.
         log: String,
     },
+    /// It ended well while an answer was still expected of it.
+    #[error("{program} ended without an answer; its messages are in {log}")]
+    Silent { program: String, log: String },
     /// The user asked to stop.
     #[error("{program} was stopped: interrupted")]
     Interrupted { program: String },
@@ -205,7 +209,29 @@ impl Invocation {
         // Whatever the program started goes with it.
         kill_group(&child);
         let (stdout, stderr) = pipes.join();
-        let stderr = String::from_utf8_lossy(&stderr).into_owned();
+        let stderr = self.conclude(ended, &stderr)?;
+        Ok(Finished { stdout, stderr, wall: start.elapsed() })
+    }
+
+    /// Starts the program and talks with it, line by line.
+    pub fn converse(&self) -> Result<Conversation, ProcessError> {
+        tracing::debug!(command = %self.command_line(), cwd = %self.cwd.display(), "converse");
+        let mut child = self.spawn().map_err(|source| self.start_error(source))?;
+        let stderr = Some(drain(child.stderr.take()));
+        let (sender, lines) = mpsc::channel();
+        if let Some(stdout) = child.stdout.take() {
+            thread::spawn(move || {
+                // Ends with the pipe, or when nobody listens any more.
+                BufReader::new(stdout).lines().map_while(Result::ok).try_for_each(|line| sender.send(line)).ok();
+            });
+        }
+        let stdin = child.stdin.take();
+        Ok(Conversation { invocation: self.clone(), start: Instant::now(), child, stdin, lines, stderr })
+    }
+
+    /// Keeps what a program that ended said; an error where it did not end well.
+    fn conclude(&self, ended: Result<ExitStatus, ProcessError>, stderr: &[u8]) -> Result<String, ProcessError> {
+        let stderr = String::from_utf8_lossy(stderr).into_owned();
         self.keep_log(&stderr).map_err(|source| ProcessError::Log {
             program: self.name(),
             log: self.log_name(),
@@ -213,7 +239,7 @@ impl Invocation {
         })?;
         let status = ended?;
         if status.success() {
-            return Ok(Finished { stdout, stderr, wall: start.elapsed() });
+            return Ok(stderr);
         }
         let status = match (status.code(), status.signal()) {
             (Some(code), _) => format!("exit code {code}"),
@@ -244,15 +270,7 @@ impl Invocation {
             if let Some(status) = child.try_wait().map_err(|source| self.start_error(source))? {
                 return Ok(status);
             }
-            let error = if is_interrupted() {
-                Some(ProcessError::Interrupted { program: self.name() })
-            } else if start.elapsed() >= self.limit {
-                let limit_s = self.limit.as_secs_f64();
-                Some(ProcessError::TimedOut { program: self.name(), limit_s, log: self.log_name() })
-            } else {
-                None
-            };
-            if let Some(error) = error {
+            if let Some(error) = self.overrun(start) {
                 kill_group(child);
                 child.wait().map_err(|source| self.start_error(source))?;
                 return Err(error);
@@ -260,6 +278,16 @@ impl Invocation {
             thread::sleep(pause);
             pause = (pause * 2).min(Duration::from_millis(10));
         }
+    }
+
+    /// Why the program must not go on, if it must not.
+    fn overrun(&self, start: Instant) -> Option<ProcessError> {
+        if is_interrupted() {
+            return Some(ProcessError::Interrupted { program: self.name() });
+        }
+        let limit_s = self.limit.as_secs_f64();
+        let error = || ProcessError::TimedOut { program: self.name(), limit_s, log: self.log_name() };
+        (start.elapsed() >= self.limit).then(error)
     }
 
     fn keep_log(&self, stderr: &str) -> std::io::Result<()> {
@@ -280,6 +308,75 @@ impl Invocation {
 
     fn start_error(&self, source: std::io::Error) -> ProcessError {
         ProcessError::Start { program: self.program.display().to_string(), source }
+    }
+}
+
+/// A program that answers each line on its standard input with a line on its standard output. Its limit is that of
+/// [`Invocation`], from its start to its end; dropped before its end, it is killed.
+pub struct Conversation {
+    invocation: Invocation,
+    start: Instant,
+    child: Child,
+    stdin: Option<ChildStdin>,
+    lines: mpsc::Receiver<String>,
+    /// Joined once its messages are in the log.
+    stderr: Option<thread::JoinHandle<Vec<u8>>>,
+}
+
+/// So often a program that is listened to is looked at.
+const LISTEN: Duration = Duration::from_millis(10);
+
+impl Conversation {
+    /// The answer to a line.
+    pub fn ask(&mut self, line: &str) -> Result<String, ProcessError> {
+        if let Some(stdin) = &mut self.stdin {
+            // A program that has ended has closed the pipe: its own status tells why.
+            writeln!(stdin, "{line}").and_then(|()| stdin.flush()).ok();
+        }
+        self.listen()
+    }
+
+    /// The next line that it prints.
+    pub fn listen(&mut self) -> Result<String, ProcessError> {
+        loop {
+            self.invocation.peak.look_at(&self.child.id().to_string());
+            match self.lines.recv_timeout(LISTEN) {
+                Ok(line) => return Ok(line),
+                Err(mpsc::RecvTimeoutError::Timeout) => {}
+                Err(mpsc::RecvTimeoutError::Disconnected) => {
+                    self.end()?;
+                    let (program, log) = (self.invocation.name(), self.invocation.log_name());
+                    return Err(ProcessError::Silent { program, log });
+                }
+            }
+            if let Some(error) = self.invocation.overrun(self.start) {
+                return Err(error);
+            }
+        }
+    }
+
+    /// Says no more, and waits until the program has ended.
+    pub fn end(&mut self) -> Result<(), ProcessError> {
+        self.stdin = None;
+        let ended = self.invocation.wait(&mut self.child, self.start);
+        self.close(ended)
+    }
+
+    fn close(&mut self, ended: Result<ExitStatus, ProcessError>) -> Result<(), ProcessError> {
+        kill_group(&self.child);
+        let Some(stderr) = self.stderr.take() else { return Ok(()) };
+        self.invocation.conclude(ended, &stderr.join().unwrap_or_default()).map(|_| ())
+    }
+}
+
+impl Drop for Conversation {
+    fn drop(&mut self) {
+        if self.stderr.is_some() {
+            kill_group(&self.child);
+            let ended = self.child.wait().map_err(|source| self.invocation.start_error(source));
+            // Whoever drops it knows of an error already.
+            self.close(ended).ok();
+        }
     }
 }
 
@@ -371,6 +468,35 @@ mod tests {
         let script = "(sleep 1; touch survivor) & sleep 30";
         let error = shell(script, 0.2, folder.path()).unwrap_err();
         assert!(matches!(error, ProcessError::TimedOut { .. }), "{error}");
+        thread::sleep(Duration::from_millis(1300));
+        assert!(!folder.path().join("survivor").exists());
+    }
+
+    fn conversation(script: &str, limit_s: f64, folder: &Path) -> Conversation {
+        let limit = Duration::from_secs_f64(limit_s);
+        Invocation::new("sh", folder, limit, folder.join("log")).args(["-c", script]).converse().unwrap()
+    }
+
+    #[test]
+    fn a_conversation_answers_line_by_line_and_its_messages_are_logged() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut echo =
+            conversation("echo ready; while read x; do echo \"<$x>\"; done; echo bye >&2", 10.0, folder.path());
+        assert_eq!(echo.listen().unwrap(), "ready");
+        assert_eq!([echo.ask("one").unwrap(), echo.ask("two").unwrap()], ["<one>", "<two>"]);
+        echo.end().unwrap();
+        assert!(echo.invocation.peak.mib().is_some());
+        assert!(fs::read_to_string(folder.path().join("log")).unwrap().ends_with("bye\n\n"));
+    }
+
+    #[test]
+    fn a_conversation_with_no_answer_says_why() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = |script, limit_s| conversation(script, limit_s, folder.path()).ask("?").unwrap_err();
+        let failed = error("read x; echo no such lamp >&2; exit 3", 10.0).to_string();
+        assert!(failed.contains("exit code 3") && failed.contains("no such lamp"), "{failed}");
+        assert!(matches!(error("read x", 10.0), ProcessError::Silent { .. }));
+        assert!(matches!(error("(sleep 1; touch survivor) & sleep 30", 0.2), ProcessError::TimedOut { .. }));
         thread::sleep(Duration::from_millis(1300));
         assert!(!folder.path().join("survivor").exists());
     }

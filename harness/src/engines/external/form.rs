@@ -291,5 +291,5 @@ pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Resu
         }
         estimates.push(Estimate { value: reading.illuminance_lx, uncertainty: reading.uncertainty() });
     }
-    Ok(Measurement { estimates, settings: answer.settings, notes: answer.notes })
+    Ok(Measurement { estimates, settings: answer.settings, notes: answer.notes, ..Measurement::default() })
 }

@@ -81,7 +81,8 @@ impl Backend {
     /// The command that reads an exported job, and a remark if it cannot use the variant asked for.
     pub(super) fn invocation(&self, workbench: &Workbench, settings: &Settings) -> (Invocation, Option<String>) {
         let threads = workbench.jobs.max(1).to_string();
-        let mut run = workbench.invoke(&self.python).args(["mitsuba_read.py", "job.json", "--threads", &threads]);
+        let mut run =
+            workbench.invoke(&self.python).args(["mitsuba_read.py", "job.json", "--serve", "--threads", &threads]);
         // Scene folders stay as exported.
         run = run.env("PYTHONDONTWRITEBYTECODE", "1");
         match &self.llvm {

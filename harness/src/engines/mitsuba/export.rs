@@ -15,7 +15,9 @@ use serde::Serialize;
 pub(super) use self::frame::Frame;
 pub(super) use self::stock::obstacle_to_stock;
 use self::tables::Tables;
-use super::settings::{Preset, Settings};
+use super::ID;
+use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
+use crate::engines::settings::Preset;
 use crate::engines::{EngineError, Job, SceneFile};
 
 const READ: &str = include_str!("../../../drivers/mitsuba_read.py");
@@ -25,7 +27,7 @@ const GONIOMETRIC: &str = include_str!("../../../drivers/mitsuba_goniometric.py"
 const HIGH_REFLECTANCE: f64 = 0.95;
 
 pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, EngineError> {
-    let frame = Frame::of(job, settings.frame);
+    let frame = Frame::of(job, settings.coordinates);
     let tables = Tables::of(job);
     let mut files = vec![
         SceneFile::text("scene.xml", scene_xml(job, &frame, &tables)),
@@ -56,10 +58,9 @@ struct DriverJob<'a> {
     transport: &'static str,
     emitters: usize,
     extended: bool,
-    relative_error: f64,
-    seconds: f64,
-    fixed_blocks: u32,
-    fixed_samples: usize,
+    /// How many blocks it reads by itself, and how many samples along the side of each.
+    blocks: usize,
+    side: usize,
     film: Option<Film>,
     seed: u64,
     stations: Vec<DriverStation<'a>>,
@@ -81,11 +82,13 @@ struct DriverStation<'a> {
 
 fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, EngineError> {
     let film = Film { tile: stock::TILE, factor: stock::pixel_factor(job) };
-    let (fixed_blocks, fixed_samples, scene, film) = match settings.preset {
-        Preset::Audit => (0, 0, "scene.xml", None),
-        Preset::Fast => (8, 1024, "scene.xml", None),
-        // Four samples a pixel are Mitsuba's own choice.
-        Preset::Default => (8, 4 * stock::TILE * stock::TILE, "stock.xml", Some(film)),
+    let (scene, film) = match settings.preset {
+        Preset::Audit | Preset::Fast => ("scene.xml", None),
+        Preset::Default => ("stock.xml", Some(film)),
+    };
+    let (blocks, side) = match settings.preset {
+        Preset::Audit => (2 * FIXED_BLOCKS, 2 * FIXED_SIDE),
+        Preset::Fast | Preset::Default => (FIXED_BLOCKS, FIXED_SIDE),
     };
     let stations = job.stations.iter().map(|s| DriverStation {
         id: &s.id.0,
@@ -96,7 +99,7 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
         case: &job.case,
         procedure: job.procedure.name(),
         scene,
-        variant: &settings.variant,
+        variant: settings.variant,
         transport: match job.transport {
             Transport::Direct => "direct",
             Transport::Indirect(_) => "indirect",
@@ -104,15 +107,14 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
         },
         emitters: job.scene.luminaires.len(),
         extended: job.scene.luminaires.iter().any(opening::is_extended),
-        relative_error: job.budget.relative_error,
-        seconds: job.budget.seconds,
-        fixed_blocks,
-        fixed_samples,
+        blocks,
+        side,
         film,
         seed: job.seed,
         stations: stations.collect(),
     };
-    serde_json::to_string_pretty(&driver_job).map_err(|e| super::output(format!("the job cannot be written: {e}")))
+    serde_json::to_string_pretty(&driver_job)
+        .map_err(|e| EngineError::output(ID, format!("the job cannot be written: {e}")))
 }
 
 fn scene_xml(job: &Job, frame: &Frame, tables: &Tables) -> String {
@@ -164,7 +166,7 @@ fn header(job: &Job, what: &str) -> String {
 ///
 /// Mitsuba's depth counts the segments of a path from the meter to the luminaire: N reflections are depth N + 1.
 fn integrator(job: &Job, kind: &str) -> String {
-    let highest = highest_reflectance(job);
+    let highest = job.largest_reflectance();
     let (max_depth, rr_depth, why) = match job.transport {
         Transport::Direct => (1, 5, "direct light only".to_owned()),
         Transport::Indirect(Bounces::AtMost(n)) | Transport::Total(Bounces::AtMost(n)) => {
@@ -196,14 +198,8 @@ fn integrator(job: &Job, kind: &str) -> String {
 
 /// Reflections after which at most `share` of the light is left where every surface reflects `reflectance`.
 fn reflections_until(reflectance: f64, share: f64) -> i64 {
-    const MOST: f64 = 1e5;
-    (share.max(1e-9).ln() / reflectance.ln()).clamp(1.0, MOST).ceil() as i64
-}
-
-fn highest_reflectance(job: &Job) -> f64 {
-    use luminaire::geometry::Surface;
-    let room = job.scene.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
-    room.chain(job.scene.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
+    const MAX: f64 = 1e5;
+    (share.max(1e-9).ln() / reflectance.ln()).clamp(1.0, MAX).ceil() as i64
 }
 
 /// Text that may stand in an XML comment.

@@ -16,7 +16,7 @@ const ROUNDINGS: f64 = 16.0;
 
 /// Bound in lux at station `k`, for light that comes straight from points; steps at a table's edge excepted.
 pub(super) fn float_error_lx(job: &Job, settings: &Settings, k: usize) -> f64 {
-    let frame = Frame::of(job, settings.frame);
+    let frame = Frame::of(job, settings.coordinates);
     let meter = job.stations[k].meter;
     let at = frame.to_scene(meter.position_m);
     job.scene.luminaires.iter().map(|l| luminaire_error_lx(l, &frame, at, meter.position_m)).sum()

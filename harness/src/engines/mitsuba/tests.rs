@@ -1,126 +1,19 @@
 //! The real renderer against closed forms and the converged values of case S1, and what happens when it fails.
 
-use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Duration;
 
 use glam::DVec3;
-use luminaire::geometry::{Reflectances, Room};
-use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction};
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
+use luminaire::geometry::Reflectances;
+use luminaire::photometry::LuminousIntensityDistribution;
+use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport, orientation};
 
 use super::*;
-use crate::engines::{Budget, Station};
-use crate::record::MeterId;
+use crate::engines::Budget;
+use crate::engines::fixtures::*;
 
 mod failures;
 mod scenes;
-
-const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
-const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
-const S1_INDIRECT_LX: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
-/// Indirect light cut at seven reflections.
-const S1_SEVEN_LX: [f64; 4] = [0.93537, 1.14730, 1.14730, 1.41182];
-
-fn photometry(distribution: LuminousIntensityDistribution) -> Arc<Photometry> {
-    Arc::new(Photometry::of(distribution))
-}
-
-fn luminaire(id: &str, at_m: DVec3, distribution: LuminousIntensityDistribution) -> Luminaire {
-    Luminaire {
-        id: id.into(),
-        photometry: photometry(distribution),
-        position_m: at_m,
-        orientation: orientation(0.0, 0.0, 0.0),
-        flux_scale: 1.0,
-        model: LuminaireModel::Point,
-    }
-}
-
-fn axial_uplight() -> LuminousIntensityDistribution {
-    let gamma = vec![0.0, 89.0, 90.0, 95.0, 115.0, 135.0, 155.0, 175.0, 180.0];
-    let candela = vec![0.0, 0.0, 4.5, 35.7, 218.3, 421.6, 576.4, 662.3, 664.4];
-    LuminousIntensityDistribution::axial(gamma, candela).unwrap()
-}
-
-/// No symmetry at all, uneven planes; every plane meets at the poles.
-fn lopsided() -> LuminousIntensityDistribution {
-    let c = vec![0.0, 20.0, 90.0, 135.0, 250.0, 360.0];
-    let gamma = vec![0.0, 15.0, 40.0, 70.0, 90.0, 130.0, 180.0];
-    let value = |c: f64, g: f64| {
-        let swing = (g.to_radians().sin()) * (0.6 * c.to_radians().cos() + 0.3 * (2.0 * c.to_radians()).sin());
-        500.0 + 300.0 * g.to_radians().cos() + 250.0 * swing
-    };
-    let candela = c.iter().flat_map(|&c| gamma.iter().map(move |&g| value(c % 360.0, g))).collect();
-    LuminousIntensityDistribution::new(c, gamma, candela).unwrap()
-}
-
-fn quadrant() -> LuminousIntensityDistribution {
-    let c = vec![0.0, 30.0, 90.0];
-    let candela = [[900.0, 700.0, 80.0, 0.0], [900.0, 820.0, 150.0, 0.0], [900.0, 1000.0, 400.0, 0.0]].concat();
-    LuminousIntensityDistribution::new(c, vec![0.0, 30.0, 60.0, 90.0], candela).unwrap()
-}
-
-fn room(size_m: DVec3, floor: f64, walls: f64, ceiling: f64) -> Room {
-    Room { size_m, reflectance: Reflectances::with_equal_walls(floor, walls, ceiling) }
-}
-
-fn stations(points_m: &[[f64; 3]], normal: DVec3) -> Vec<Station> {
-    let station = |(k, p): (usize, &[f64; 3])| {
-        let meter = Meter { position_m: DVec3::from_array(*p), normal };
-        Station { id: MeterId::new("m", k), meter, expected_lx: None }
-    };
-    points_m.iter().enumerate().map(station).collect()
-}
-
-fn job(scene: Scene, stations: Vec<Station>, transport: Transport) -> Job {
-    Job {
-        case: "test case".into(),
-        procedure: crate::engines::fixtures::procedure_of(transport),
-        scene,
-        stations,
-        transport,
-        budget: Budget { relative_error: 1e-3, seconds: 20.0 },
-        seed: 1,
-        settings: BTreeMap::new(),
-    }
-}
-
-fn s1(transport: Transport) -> Job {
-    let scene = Scene {
-        room: Some(room(DVec3::splat(20.0), 0.2, 0.5, 0.8)),
-        obstacles: vec![],
-        luminaires: vec![luminaire("axial", DVec3::splat(10.0), axial_uplight())],
-    };
-    let (z, normal) = if transport == Transport::Direct { (17.0, DVec3::NEG_Z) } else { (2.0, DVec3::Z) };
-    job(scene, stations(&[[2.0, 2.0, z], [2.0, 10.0, z], [10.0, 2.0, z], [10.0, 10.0, z]], normal), transport)
-}
-
-/// Every (C, gamma) of a grid, read at `distance_m` in free field.
-fn goniometer(luminaire: &Luminaire, distance_m: f64, c_deg: &[f64], gamma_deg: &[f64]) -> Job {
-    let towards = |c: f64, g: f64| luminaire.orientation * direction(c, g);
-    let station = |(k, d): (usize, DVec3)| {
-        let meter = Meter { position_m: luminaire.position_m + distance_m * d, normal: -d };
-        Station { id: MeterId::new("g", k), meter, expected_lx: None }
-    };
-    let directions = c_deg.iter().flat_map(|&c| gamma_deg.iter().map(move |&g| towards(c, g)));
-    let stations = directions.enumerate().map(station).collect();
-    job(Scene { luminaires: vec![luminaire.clone()], ..Scene::default() }, stations, Transport::Direct)
-}
-
-/// Inverse-square law in an empty convex room or free field.
-fn exact_direct_lx(job: &Job) -> Vec<f64> {
-    let at = |station: &Station| {
-        let from = |l: &Luminaire| {
-            let ray = station.meter.position_m - l.position_m;
-            let cosine = (-ray.normalize().dot(station.meter.normal)).max(0.0);
-            l.intensity_towards(ray).value() * cosine / ray.length_squared()
-        };
-        job.scene.luminaires.iter().map(from).sum()
-    };
-    job.stations.iter().map(at).collect()
-}
 
 fn workbench(folder: &Path) -> Workbench {
     let site = Site::of_user().unwrap();
@@ -154,20 +47,6 @@ fn read_tampered(job: &Job, tamper: impl Fn(&str, String) -> String) -> Measurem
     };
     let files: Vec<_> = export::files(job, &settings).unwrap().into_iter().map(edited).collect();
     engine.read_files(&files, job, &settings, &bench).unwrap()
-}
-
-fn relative_deviations(measurement: &Measurement, exact: &[f64]) -> Vec<f64> {
-    measurement.estimates.iter().zip(exact).map(|(e, x)| e.value / x - 1.0).collect()
-}
-
-fn worst(deviations: &[f64]) -> f64 {
-    deviations.iter().fold(0.0, |w: f64, d| if d.is_nan() { f64::INFINITY } else { w.max(d.abs()) })
-}
-
-/// The largest deviation in standard errors.
-fn worst_z(measurement: &Measurement, exact: &[f64]) -> f64 {
-    let z = |(e, x): (&crate::record::Estimate, &f64)| (e.value - x) / e.uncertainty.standard_error().unwrap();
-    worst(&measurement.estimates.iter().zip(exact).map(z).collect::<Vec<_>>())
 }
 
 #[test]

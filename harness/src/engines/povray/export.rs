@@ -13,7 +13,7 @@ use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport};
 
 use crate::engines::{Job, SceneFile};
 
-use super::frame::Frame;
+use super::frame::{Frame, candela, seats};
 use super::opening::{self, Part};
 use super::pigment;
 use super::pixels::Readout;
@@ -42,7 +42,7 @@ pub(super) enum Light {
 
 /// Writes the scene.
 pub(super) fn scene(job: &Job, settings: &Settings) -> SceneFile {
-    let frame = Frame::of(job, settings.recentre);
+    let frame = Frame::of(job, settings.coordinates);
     let mut text = head(job, settings, frame);
     text.push_str(&meters(job, frame));
     text.push_str(&luminaires(job, frame));
@@ -70,11 +70,11 @@ pub(super) fn arguments(job: &Job, light: Light, seed: u32, blanks: usize, image
 pub(super) fn blanks(seed: u32, parts: u32) -> usize {
     // Fibonacci hashing (Knuth, The Art of Computer Programming, vol. 3, 6.4) spreads successive seeds evenly.
     let spread = f64::from(seed.wrapping_mul(2_654_435_769)) / 2_f64.powi(32);
-    1 + (spread * f64::from(parts.clamp(1, MOST_BLANKS))) as usize
+    1 + (spread * f64::from(parts.clamp(1, MAX_BLANKS))) as usize
 }
 
 /// The tube of blanks is this long at most, so that POV-Ray's least cell stays shorter than their spacing.
-const MOST_BLANKS: u32 = 200;
+const MAX_BLANKS: u32 = 200;
 
 /// What a scene's discs show where no other read-out is given to them.
 pub(super) fn first_readouts(job: &Job, part: Light) -> Vec<Readout> {
@@ -176,7 +176,7 @@ const TURN: &str = "#declare S = seed(Seed);
 fn meters(job: &Job, frame: Frame) -> String {
     let count = job.stations.len();
     let mut text = format!("\n// Meters: position, normal.\n#declare Meters = array[{count}][2] {{\n");
-    let seats = super::frame::seats(job, frame);
+    let seats = seats(job, frame);
     let rows: Vec<String> = job
         .stations
         .iter()
@@ -313,11 +313,6 @@ pub(super) fn parts(luminaire: &Luminaire, points: usize) -> Vec<Part> {
         LuminaireModel::Point => whole,
         _ => opening::parts(luminaire.photometry.opening, points).unwrap_or(whole),
     }
-}
-
-/// The largest intensity, flux scale included.
-pub(super) fn candela(luminaire: &Luminaire) -> f64 {
-    luminaire.photometry.distribution.max_intensity().value() * luminaire.flux_scale
 }
 
 fn surroundings(job: &Job, frame: Frame) -> String {

@@ -5,12 +5,10 @@
 
 use glam::DVec3;
 use luminaire::geometry::Surface;
-use luminaire::scene::Shape;
+use luminaire::scene::{Luminaire, Shape};
 
 use crate::engines::Job;
-
-use super::export::candela;
-use super::settings::Recentring;
+use crate::engines::settings::Coordinates;
 
 /// From metres of the spec to units of the scene: (p - centre) scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,8 +23,8 @@ pub(super) struct Frame {
 
 impl Frame {
     /// The frame of a job.
-    pub(super) fn of(job: &Job, recentring: Recentring) -> Self {
-        if recentring == Recentring::Off {
+    pub(super) fn of(job: &Job, coordinates: Coordinates) -> Self {
+        if coordinates == Coordinates::Raw {
             return Self { centre_m: DVec3::ZERO, scale: 1.0, light: 1.0 };
         }
         let (low, high) = match job.scene.room {
@@ -64,6 +62,11 @@ fn light(job: &Job, size_m: f64) -> f64 {
     let expected_lx = candela / (size_m * size_m);
     let handy = HANDY_LX.contains(&expected_lx) || !(expected_lx.is_normal());
     if handy { 1.0 } else { 10_f64.powi(-(expected_lx.log10().round() as i32)) }
+}
+
+/// The largest intensity, flux scale included.
+pub(super) fn candela(luminaire: &Luminaire) -> f64 {
+    luminaire.photometry.distribution.max_intensity().value() * luminaire.flux_scale
 }
 
 fn extent_m(job: &Job) -> (DVec3, DVec3) {

@@ -9,7 +9,7 @@ use std::fmt::Write;
 use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
 
 /// Entries that a map of POV-Ray holds at most (`MAX_BLEND_MAP_ENTRIES`).
-pub(super) const MOST_ENTRIES: usize = 256;
+pub(super) const MAX_ENTRIES: usize = 256;
 
 /// Where a table ends with light short of a pole, it falls to zero within this.
 const EDGE_DEG: f64 = 1e-3;
@@ -44,12 +44,12 @@ fn of_plane(gamma_deg: &[f64], candela: &[f64], largest: f64) -> String {
         format!("function {{ AngleGamma(x,y,z)/360 }} color_map {{\n{}    }}", rows.concat())
     };
     let last = gamma_deg.len() - 1;
-    if last < MOST_ENTRIES {
+    if last < MAX_ENTRIES {
         return format!("    {}\n", map(0..=last));
     }
     let mut text = "    function { AngleGamma(x,y,z)/360 } pigment_map {\n".to_owned();
-    for first in (0..last).step_by(MOST_ENTRIES - 1) {
-        let end = (first + MOST_ENTRIES - 1).min(last);
+    for first in (0..last).step_by(MAX_ENTRIES - 1) {
+        let end = (first + MAX_ENTRIES - 1).min(last);
         let piece = map(first..=end);
         for edge in [first, end] {
             writeln!(text, "    [{}/360 {piece}]", gamma_deg[edge]).ok();

@@ -9,9 +9,10 @@ use glam::DVec3;
 use luminaire::geometry::Surface;
 use luminaire::scene::{Obstacle, Shape, Transport};
 
-pub(super) use self::luminaires::{EDGE_DEG, Route, disc_error, ies2rad_options, route, swallowed, unsupported};
+pub(super) use self::luminaires::{EDGE_DEG, disc_error, ies2rad_options, swallowed, unsupported};
 use super::options::Options;
-use super::settings::{Scaling, Settings};
+use super::settings::Settings;
+use crate::engines::settings::Coordinates;
 use crate::engines::{Job, SceneFile};
 
 /// Lumens a watt, by which Radiance's radiometric quantities are photometric (`WHTEFFICACY` in its sources).
@@ -21,8 +22,9 @@ pub(super) const WEIGHTS: [f64; 3] = [0.265, 0.670, 0.065];
 
 /// `rtrace -I` reads this far in front of the point it is given, in Radiance's units, whatever the scene's size.
 const READ_AHEAD: f64 = 1e-4;
+
 pub(super) fn files(job: &Job, settings: &Settings, options: &Options) -> Vec<SceneFile> {
-    let scale = scale(job, settings.scaling);
+    let scale = scale(job, settings.coordinates);
     let mut files = vec![
         SceneFile::text("scene.rad", scene_rad(job, settings, scale)),
         SceneFile::text("meters.txt", meters_txt(job, scale)),
@@ -33,8 +35,8 @@ pub(super) fn files(job: &Job, settings: &Settings, options: &Options) -> Vec<Sc
 }
 
 /// Radiance's units a metre: 1 for ordinary rooms, a power of ten where its absolute tolerances (1e-6) come near.
-pub(super) fn scale(job: &Job, scaling: Scaling) -> f64 {
-    let Some(room) = job.scene.room.filter(|_| scaling == Scaling::Fitted) else {
+pub(super) fn scale(job: &Job, coordinates: Coordinates) -> f64 {
+    let Some(room) = job.scene.room.filter(|_| coordinates == Coordinates::Fitted) else {
         return 1.0;
     };
     let (least, largest) = (room.size_m.min_element(), room.size_m.max_element());

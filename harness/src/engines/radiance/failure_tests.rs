@@ -107,16 +107,6 @@ fn a_wheel_without_its_programs_is_absent_with_the_remedy() {
 }
 
 #[test]
-fn settings_that_make_no_sense_are_errors_that_name_them() {
-    for (key, value) in [("preset", "best"), ("ambient_divisions", "0"), ("impostor_height_m", "0"), ("speed", "1")] {
-        let mut job = s1(Transport::Direct);
-        job.settings.insert(key.into(), serde_json::from_str(value).unwrap_or_else(|_| value.into()));
-        let error = Radiance.export(&job).unwrap_err().to_string();
-        assert!(error.contains(&format!("engines.radiance.{key}")), "{error}");
-    }
-}
-
-#[test]
 fn ies2rad_that_makes_no_light_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let site = fake_site(folder.path(), &triples(4, ONE));

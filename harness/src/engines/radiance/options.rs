@@ -2,9 +2,10 @@
 
 use luminaire::scene::{Bounces, Transport};
 
-use super::export::{Route, route};
-use super::settings::{Preset, Settings};
+use super::route::{Route, route};
+use super::settings::Settings;
 use crate::engines::Job;
+use crate::engines::settings::Preset;
 
 /// Arguments without and with reflected light.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,7 +25,7 @@ pub(super) const FAST_DIVISIONS: u32 = 1024;
 /// What is left of the light after the last bounce of a converged run, relative, where the limit on bounces allows.
 const REMAINDER: f64 = 1e-7;
 /// Bounces beyond which rtrace's recursion comes near the end of an 8 MiB stack.
-const MOST_BOUNCES: u32 = 10_000;
+const MAX_BOUNCES: u32 = 10_000;
 /// Bounces of `preset: default` where all are asked for: rtrace's own default is none, and its default cache takes a few
 /// seconds a meter with two (case S1), 20 with three.
 const DEFAULT_BOUNCES: u32 = 2;
@@ -111,9 +112,9 @@ pub(super) fn bounces(job: &Job) -> u32 {
         None => 0,
         Some(Bounces::AtMost(n)) => n,
         Some(Bounces::Converged) => {
-            let rho = largest_reflectance(job);
+            let rho = job.largest_reflectance();
             let enough = if rho < 1.0 { (REMAINDER.ln() / rho.ln()).ceil() } else { f64::INFINITY };
-            (enough.min(f64::from(MOST_BOUNCES)) as u32).max(1)
+            (enough.min(f64::from(MAX_BOUNCES)) as u32).max(1)
         }
     }
 }
@@ -121,12 +122,7 @@ pub(super) fn bounces(job: &Job) -> u32 {
 /// The largest part of the light that a converged run can miss for the limit on bounces.
 pub(super) fn remainder(job: &Job) -> f64 {
     match reflections(job) {
-        Some(Bounces::Converged) => largest_reflectance(job).powi(bounces(job) as i32),
+        Some(Bounces::Converged) => job.largest_reflectance().powi(bounces(job) as i32),
         _ => 0.0,
     }
-}
-
-fn largest_reflectance(job: &Job) -> f64 {
-    let room = job.scene.room.iter().flat_map(|r| luminaire::geometry::Surface::ALL.map(|s| r.reflectance.of(s)));
-    room.chain(job.scene.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
 }

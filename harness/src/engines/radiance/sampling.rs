@@ -1,8 +1,8 @@
-//! Reflected light by independent blocks, more of them until the standard error or the time of the budget is met.
+//! rtrace's blocks: one is an estimate at every station with a fixed number of ambient divisions.
 //!
-//! A block is one estimate at every station with a fixed number of ambient divisions. rtrace draws anew for each row,
-//! so that the repetitions of a row in one process are independent. It seeds itself from the clock, in seconds: processes
-//! that start together start from different places of one random sequence, reached by rows outside the scene.
+//! rtrace draws anew for each row, so that the repetitions of a row in one process are independent. It seeds itself from the
+//! clock, in seconds: processes that start together start from different places of one random sequence, reached by rows
+//! outside the scene.
 
 use std::thread;
 use std::time::Instant;
@@ -10,32 +10,24 @@ use std::time::Instant;
 use glam::DVec3;
 
 use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options};
-use super::settings::{Preset, Settings};
+use super::settings::Settings;
 use super::tools::Tools;
-use super::{export, output};
+use super::{ID, export};
+use crate::engines::blocks::{Blocks, MIN_BLOCKS, Sampling};
+use crate::engines::settings::Preset;
 use crate::engines::{EngineError, Job, Workbench};
-use crate::record::Estimate;
 
-/// Blocks that every reading rests on, at least.
-const FEWEST_BLOCKS: usize = 8;
 /// Ambient divisions of the trial from which effort is planned.
 const TRIAL_DIVISIONS: u32 = 64;
 /// Planned beyond what the trial's own, uncertain, error suggests.
 const PLAN_MARGIN: f64 = 1.5;
+/// Blocks that effort is planned for.
+const PLANNED_BLOCKS: usize = 2 * MIN_BLOCKS;
 /// Starting places of the random sequence that differ by the job's seed, for jobs that start within one second.
-const SEEDS: u64 = 16;
+const SEEDS: u64 = 8;
 /// Starting places reserved for the processes of one job.
-const PROCESSES_A_SEED: usize = 16;
-
-/// What the blocks gave.
-pub(super) struct Blocks {
-    /// `values[block][station]`: illuminance by direct and reflected light in lux.
-    values: Vec<Vec<f64>>,
-    /// Ambient divisions of every block.
-    pub(super) divisions: u32,
-    /// The arguments of rtrace.
-    pub(super) options: Vec<String>,
-}
+const PROCESSES_A_SEED: usize = 32;
+const MAX_PARALLEL: usize = 8;
 
 /// One job on its bench.
 pub(super) struct Sampler<'a> {
@@ -47,141 +39,114 @@ pub(super) struct Sampler<'a> {
     pub(super) started: Instant,
 }
 
-impl Blocks {
-    /// Mean and standard error at each station.
-    pub(super) fn estimates(&self) -> Vec<Estimate> {
-        let stations = self.values.first().map_or(0, Vec::len);
-        let of = |s: usize| self.values.iter().map(|block| block[s]).collect::<Vec<_>>();
-        (0..stations).map(|s| Estimate::of_samples(&of(s))).collect()
-    }
-
-    /// The largest standard error relative to the reading it belongs to.
-    fn worst_error(&self, subtract_lx: &[f64]) -> f64 {
-        let relative = |(all, subtract): (Estimate, &f64)| {
-            let error = all.uncertainty.standard_error().unwrap_or(f64::INFINITY);
-            if error == 0.0 { 0.0 } else { error / (all.value - subtract).max(f64::MIN_POSITIVE) }
-        };
-        self.estimates().into_iter().zip(subtract_lx).map(relative).fold(0.0, f64::max)
-    }
-
-    pub(super) fn count(&self) -> usize {
-        self.values.len()
-    }
+/// Blocks of all light.
+pub(super) struct Sampled {
+    pub(super) blocks: Blocks,
+    pub(super) divisions: u32,
+    /// The arguments of rtrace.
+    pub(super) options: Vec<String>,
+    /// Whether the error asked for was missed, and by how much.
+    pub(super) shortfall: Option<String>,
 }
 
-/// Where sampling may stop, whether or not the error is small enough.
+/// Share of the time after which direct light is no longer sampled, whether or not its error is small enough.
 const DIRECT_SHARE: f64 = 0.3;
 /// Direct light that is subtracted or is all that is asked for should add little to the error.
 const DIRECT_ERROR: f64 = 0.3;
 
 impl Sampler<'_> {
-    /// Direct light of openings, whose samples are jittered: blocks in one process, doubled until they are good enough.
+    /// Direct light of openings, whose samples are jittered; in one process a wave.
     pub(super) fn direct(&self, options: &Options) -> Result<Blocks, EngineError> {
-        let mut blocks = Blocks { values: vec![], divisions: 0, options: options.direct.clone() };
-        let until_s = DIRECT_SHARE * self.job.budget.seconds;
-        let nothing = vec![0.0; self.rows.len()];
-        for start in 0..PROCESSES_A_SEED {
-            let round_started = Instant::now();
-            let more = self.process(&blocks.options, start, blocks.count().max(FEWEST_BLOCKS))?;
-            blocks.values.extend(more);
-            let enough = blocks.worst_error(&nothing) <= DIRECT_ERROR * self.job.budget.relative_error;
-            let spent_s = self.started.elapsed().as_secs_f64();
-            if enough || spent_s + 2.0 * round_started.elapsed().as_secs_f64() > until_s {
-                break;
-            }
-        }
-        Ok(blocks)
+        let mut places = 0..PROCESSES_A_SEED;
+        let within = Sampling::within(self.job.budget, self.started);
+        let rule = Sampling {
+            relative_error: DIRECT_ERROR * within.relative_error,
+            until: within.until - within.until.saturating_duration_since(self.started).mul_f64(1.0 - DIRECT_SHARE),
+            max_waves: places.len(),
+            ..within
+        };
+        rule.run(|numbers| self.side_by_side(&options.direct, &[numbers.len()], &mut places))
     }
 
-    /// Blocks of all light as the preset asks for; `subtract_lx` is direct light that does not count for the error asked.
-    pub(super) fn total(&self, subtract_lx: &[f64]) -> Result<Blocks, EngineError> {
-        match self.settings.preset {
+    /// Blocks of all light as the preset asks for; `known_lx` is direct light that does not count for the error asked.
+    pub(super) fn total(&self, known_lx: &[f64]) -> Result<Sampled, EngineError> {
+        let mut places = 0..PROCESSES_A_SEED;
+        let fixed =
+            Sampling { side_by_side: self.parallel(), ..Sampling::fixed(MIN_BLOCKS, self.job.budget, self.started) };
+        let given = self.settings.ambient_divisions;
+        let (divisions, rule) = match self.settings.preset {
+            // Of rtrace's own cache a few blocks do where time is short.
+            Preset::Default => (FAST_DIVISIONS, Sampling { min_blocks: 2, ..fixed }),
+            Preset::Fast => (given.unwrap_or(FAST_DIVISIONS), fixed),
+            Preset::Audit => self.planned(known_lx, &mut places)?,
+        };
+        let options = self.options(divisions);
+        let blocks = rule.run(|numbers| match self.settings.preset {
             // The cache of a process makes its blocks alike: one process a block.
-            Preset::Default => self.fixed(FAST_DIVISIONS, 1),
-            Preset::Fast => self.fixed(self.settings.ambient_divisions.unwrap_or(FAST_DIVISIONS), FEWEST_BLOCKS),
-            Preset::Audit => self.within_budget(subtract_lx),
-        }
+            Preset::Default => self.side_by_side(&options, &vec![1; numbers.len()], &mut places),
+            _ => self.side_by_side(&options, &shares(numbers.len(), self.parallel()), &mut places),
+        })?;
+        Ok(Sampled { shortfall: rule.shortfall(&blocks), blocks, divisions, options })
     }
 
-    /// The fewest blocks in processes of `repeats` each; where time runs out before, as many as there are, but two.
-    fn fixed(&self, divisions: u32, repeats: usize) -> Result<Blocks, EngineError> {
-        let mut blocks = self.empty(divisions);
-        let processes = FEWEST_BLOCKS / repeats;
-        for first in (0..processes).step_by(self.parallel()) {
-            let round_started = Instant::now();
-            let starts: Vec<usize> = (first..processes.min(first + self.parallel())).collect();
-            blocks.values.extend(self.round(&blocks.options, &starts, repeats)?);
-            if blocks.count() >= 2 && round_started.elapsed().as_secs_f64() > self.seconds_left() {
-                break;
-            }
-        }
-        Ok(blocks)
-    }
-
-    fn within_budget(&self, subtract_lx: &[f64]) -> Result<Blocks, EngineError> {
+    /// Divisions a block, from a trial, and how many blocks.
+    fn planned<'k>(
+        &self,
+        known_lx: &'k [f64],
+        places: &mut impl Iterator<Item = usize>,
+    ) -> Result<(u32, Sampling<'k>), EngineError> {
         let trial_started = Instant::now();
-        let mut trial = self.empty(TRIAL_DIVISIONS);
-        trial.values = self.round(&trial.options, &[0], FEWEST_BLOCKS)?;
-        let division_s = trial_started.elapsed().as_secs_f64() / (FEWEST_BLOCKS as f64 * f64::from(TRIAL_DIVISIONS));
-        let divisions = self.settings.ambient_divisions.unwrap_or_else(|| self.plan(&trial, division_s, subtract_lx));
-        let mut block_s = division_s * f64::from(divisions);
-
-        let mut blocks = self.empty(divisions);
+        let trial = Blocks::new(self.side_by_side(&self.options(TRIAL_DIVISIONS), &[MIN_BLOCKS], places)?);
+        let division_s = trial_started.elapsed().as_secs_f64() / (MIN_BLOCKS as f64 * f64::from(TRIAL_DIVISIONS));
+        let excess = trial.worst_error(known_lx) / self.job.budget.relative_error;
+        let divisions = self.settings.ambient_divisions.unwrap_or_else(|| self.divisions(excess, division_s));
         let parallel = self.parallel();
-        let mut wanted = 2 * FEWEST_BLOCKS;
-        let mut process = 1;
-        loop {
-            let affordable = (self.seconds_left() * parallel as f64 / block_s) as usize;
-            // Fewer than the fewest blocks make no honest error, so those are made whatever the budget says.
-            let count = wanted.min(affordable).max(FEWEST_BLOCKS.saturating_sub(blocks.count()));
-            let repeats = count.div_ceil(parallel);
-            if count == 0 {
-                return Ok(blocks);
-            }
-            let round_started = Instant::now();
-            let starts: Vec<usize> = (process..process + parallel).collect();
-            blocks.values.extend(self.round(&blocks.options, &starts, repeats)?);
-            process += parallel;
-            block_s = round_started.elapsed().as_secs_f64() / repeats as f64;
-            let excess = blocks.worst_error(subtract_lx) / self.job.budget.relative_error;
-            if excess <= 1.0 || process + parallel > PROCESSES_A_SEED {
-                return Ok(blocks);
-            }
-            let missing = (blocks.count() as f64 * (PLAN_MARGIN * (excess * excess - 1.0))).ceil();
-            // With the last starting places, all that is missing at once; before that, twice as many at most.
-            let last = process + 2 * parallel > PROCESSES_A_SEED;
-            wanted = if last { missing as usize } else { (missing as usize).min(3 * blocks.count()) };
-        }
+        let rule = Sampling {
+            known_lx,
+            enough_blocks: PLANNED_BLOCKS,
+            max_waves: (PROCESSES_A_SEED - 1) / parallel,
+            side_by_side: parallel,
+            block_s: Some(division_s * f64::from(divisions)),
+            ..Sampling::within(self.job.budget, self.started)
+        };
+        Ok((divisions, rule))
     }
 
     /// Divisions a block so that the fewest blocks about meet the budget.
-    fn plan(&self, trial: &Blocks, division_s: f64, subtract_lx: &[f64]) -> u32 {
-        let excess = trial.worst_error(subtract_lx) / self.job.budget.relative_error;
+    fn divisions(&self, excess: f64, division_s: f64) -> u32 {
+        let left_s = self.job.budget.seconds - self.started.elapsed().as_secs_f64();
         let needed = f64::from(TRIAL_DIVISIONS) * PLAN_MARGIN * excess * excess / 2.0;
-        let affordable = 0.5 * self.seconds_left() * self.parallel() as f64 / (2.0 * FEWEST_BLOCKS as f64 * division_s);
+        let affordable = 0.5 * left_s.max(0.0) * self.parallel() as f64 / (PLANNED_BLOCKS as f64 * division_s);
         let divisions = needed.min(affordable).clamp(f64::from(TRIAL_DIVISIONS), f64::from(AUDIT_DIVISIONS));
         // rtrace takes a square number of them.
         (divisions.sqrt().ceil() as u32).pow(2)
     }
 
-    /// One process a starting place side by side, each with `repeats` blocks.
-    fn round(&self, options: &[String], starts: &[usize], repeats: usize) -> Result<Vec<Vec<f64>>, EngineError> {
-        let results: Vec<_> = thread::scope(|scope| {
-            let start = |&start: &usize| scope.spawn(move || self.process(options, start, repeats));
-            let running: Vec<_> = starts.iter().map(start).collect();
-            running.into_iter().map(thread::ScopedJoinHandle::join).collect()
-        });
-        let mut blocks = vec![];
-        for result in results {
-            blocks.extend(result.map_err(|_| output("a thread that talked to rtrace panicked".into()))??);
+    /// Processes of so many blocks each, side by side, each from a starting place of its own.
+    fn side_by_side(
+        &self,
+        options: &[String],
+        blocks: &[usize],
+        places: &mut impl Iterator<Item = usize>,
+    ) -> Result<Vec<Vec<f64>>, EngineError> {
+        let mut read = vec![];
+        for some in blocks.chunks(self.parallel()) {
+            let results: Vec<_> = thread::scope(|scope| {
+                let start = |(&count, place)| scope.spawn(move || self.process(options, place, count));
+                let running: Vec<_> = some.iter().zip(&mut *places).map(start).collect();
+                running.into_iter().map(thread::ScopedJoinHandle::join).collect()
+            });
+            for result in results {
+                read.extend(result.map_err(|_| EngineError::output(ID, "a thread that talked to rtrace panicked"))??);
+            }
         }
-        Ok(blocks)
+        Ok(read)
     }
 
-    fn process(&self, options: &[String], start: usize, repeats: usize) -> Result<Vec<Vec<f64>>, EngineError> {
-        let skip = start + PROCESSES_A_SEED * (self.job.seed % SEEDS) as usize;
+    fn process(&self, options: &[String], place: usize, blocks: usize) -> Result<Vec<Vec<f64>>, EngineError> {
+        let skip = place + PROCESSES_A_SEED * (self.job.seed % SEEDS) as usize;
         let mut rows = vec![self.row_outside(); skip];
-        rows.extend(std::iter::repeat_n(&self.rows, repeats).flatten());
+        rows.extend(std::iter::repeat_n(&self.rows, blocks).flatten());
         let read = self.tools.rtrace(self.workbench, options, &rows)?;
         Ok(read[skip..].chunks(self.rows.len()).map(<[f64]>::to_vec).collect())
     }
@@ -189,19 +154,20 @@ impl Sampler<'_> {
     /// A meter beyond everything that looks away: costs next to nothing and moves the random sequence on.
     fn row_outside(&self) -> [f64; 6] {
         let size = self.job.scene.room.map_or(1.0, |r| r.size_m.max_element());
-        let p = DVec3::splat(-10.0 * size * export::scale(self.job, self.settings.scaling));
+        let p = DVec3::splat(-10.0 * size * export::scale(self.job, self.settings.coordinates));
         [p.x, p.y, p.z, 0.0, 0.0, -1.0]
     }
 
-    fn empty(&self, divisions: u32) -> Blocks {
-        Blocks { values: vec![], divisions, options: Options::of(self.job, self.settings, divisions).total }
+    fn options(&self, divisions: u32) -> Vec<String> {
+        Options::of(self.job, self.settings, divisions).total
     }
 
     fn parallel(&self) -> usize {
-        self.workbench.jobs.clamp(1, PROCESSES_A_SEED / 2)
+        self.workbench.jobs.clamp(1, MAX_PARALLEL)
     }
+}
 
-    fn seconds_left(&self) -> f64 {
-        (self.job.budget.seconds - self.started.elapsed().as_secs_f64()).max(0.0)
-    }
+/// A number in so many nearly equal parts, none of them 0.
+fn shares(whole: usize, parts: usize) -> Vec<usize> {
+    (0..parts).map(|k| (whole + k) / parts).filter(|share| *share > 0).collect()
 }

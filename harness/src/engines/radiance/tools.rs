@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use luminaire::scene::Luminaire;
 
-use super::export::Route;
-use super::{ID, export, output};
+use super::route::Route;
+use super::{ID, export};
 use crate::engines::{Absent, EngineError, Site, Version, Workbench};
 use crate::system::process::{self, Invocation};
 
@@ -68,7 +68,7 @@ impl Tools {
         let text = std::fs::read_to_string(&made).map_err(|source| EngineError::io(&made, source))?;
         // ies2rad knows no box of illum; its light becomes one.
         if !text.contains("' light '") {
-            return Err(output(format!("{} holds no light", made.display())));
+            return Err(EngineError::output(ID, format!("{} holds no light", made.display())));
         }
         let path = workbench.scene_dir.join(format!("luminaire-{k}.rad"));
         std::fs::write(&path, text.replace("' light '", kind)).map_err(|source| EngineError::io(&path, source))
@@ -112,13 +112,13 @@ pub(super) fn parse(stdout: &[u8], rows: usize) -> Result<Vec<f64>, EngineError>
     let (values, rest) = stdout.as_chunks::<8>();
     let values: Vec<f64> = values.iter().map(|b| f64::from_le_bytes(*b)).collect();
     if !rest.is_empty() || values.len() != 3 * rows {
-        return Err(output(format!("rtrace gave {} bytes for {rows} rows of 24", stdout.len())));
+        return Err(EngineError::output(ID, format!("rtrace gave {} bytes for {rows} rows of 24", stdout.len())));
     }
     let (triples, _) = values.as_chunks::<3>();
     let lux = |rgb: &[f64; 3]| export::EFFICACY * rgb.iter().zip(export::WEIGHTS).map(|(c, w)| c * w).sum::<f64>();
     let lux: Vec<f64> = triples.iter().map(lux).collect();
     match lux.iter().position(|e| !e.is_finite() || *e < 0.0) {
-        Some(row) => Err(EngineError::Output { engine: ID, what: format!("rtrace read {} lx in row {row}", lux[row]) }),
+        Some(row) => Err(EngineError::output(ID, format!("rtrace read {} lx in row {row}", lux[row]))),
         None => Ok(lux),
     }
 }

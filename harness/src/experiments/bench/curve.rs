@@ -6,14 +6,12 @@ use serde::Serialize;
 
 use super::Truth;
 use super::fit::{self, Fit};
-use crate::measure::Outcome;
-use crate::record::{ProcedureId, ReadingKey};
+use crate::experiments::deviation;
+use crate::measure::Taken;
+use crate::record::{EngineName, ProcedureId, ReadingKey};
 
 /// Relative errors whose time is told.
 pub(super) const TARGETS: [f64; 4] = [0.1, 0.01, 1e-3, 1e-4];
-/// Readings darker than this part of the brightest are held against that instead of themselves.
-const FAINT: f64 = 0.01;
-
 /// What is left of a time without the start-up at least, in parts of it.
 const LEAST_NET: f64 = 0.05;
 
@@ -71,13 +69,13 @@ pub struct BenchPoint {
 }
 
 impl BenchPoint {
-    pub(super) fn of(effort: f64, outcomes: &[Outcome], truth: &Truth) -> Self {
-        let scale = |v: f64| scale(v, &truth.values_lx);
-        let stations = truth.values_lx.len();
-        let relative = |o: &Outcome| -> Vec<f64> {
-            o.estimates.iter().zip(&truth.values_lx).map(|(e, v)| (e.value - v) / scale(*v)).collect()
+    pub(super) fn of(effort: f64, taken: &[Taken], truth: &Truth) -> Self {
+        let (stations, brightest_lx) = (truth.values_lx.len(), truth.brightest_lx());
+        let relative = |taken: &Taken| -> Vec<f64> {
+            let pairs = taken.measurement.estimates.iter().zip(&truth.values_lx);
+            pairs.map(|(e, v)| (e.value - v) / deviation::scale(*v, brightest_lx)).collect()
         };
-        let errors: Vec<Vec<f64>> = outcomes.iter().map(relative).collect();
+        let errors: Vec<Vec<f64>> = taken.iter().map(relative).collect();
         let n = errors.len() as f64;
         let square = |e: &Vec<f64>| e.iter().map(|x| x * x).sum::<f64>() / stations as f64;
         let relative_error = (errors.iter().map(square).sum::<f64>() / n).sqrt();
@@ -91,9 +89,9 @@ impl BenchPoint {
         let (low, high) = if is_random { fit::interval_of_rms(errors.len()) } else { (1.0, 1.0) };
         Self {
             effort,
-            wall_s: median(outcomes.iter().map(|o| o.wall_s)),
-            cpu_s: median(outcomes.iter().map(|o| o.cpu_s)),
-            peak_mib: outcomes.iter().filter_map(|o| o.peak_mib).reduce(f64::max),
+            wall_s: median(taken.iter().map(|t| t.cost.wall_s)),
+            cpu_s: median(taken.iter().map(|t| t.cost.cpu_s)),
+            peak_mib: taken.iter().filter_map(|t| t.cost.peak_mib).reduce(f64::max),
             relative_error,
             relative_error_low: (low * relative_error - known).max(0.0),
             relative_error_high: high * relative_error + known,
@@ -102,12 +100,6 @@ impl BenchPoint {
             repetitions: errors.len(),
         }
     }
-}
-
-/// What an error at a meter of that value counts against, in lx.
-pub(super) fn scale(value_lx: f64, all_lx: &[f64]) -> f64 {
-    let brightest = all_lx.iter().copied().fold(0.0, f64::max);
-    value_lx.max(FAINT * brightest).max(f64::MIN_POSITIVE)
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
@@ -156,7 +148,7 @@ impl Curve {
 
     /// Its name in tables and plots.
     pub fn name(&self) -> String {
-        let solver = if self.key.engine == "simulator" { &self.solver } else { "" };
+        let solver = if self.key.engine == EngineName::SIMULATOR { &self.solver } else { "" };
         let parts = [self.key.engine.as_str(), self.preset.as_str(), solver];
         parts.into_iter().filter(|p| !p.is_empty()).collect::<Vec<_>>().join(" ")
     }

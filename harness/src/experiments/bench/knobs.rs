@@ -2,11 +2,10 @@
 
 use serde::Serialize;
 
-use super::{Bench, Effort, LIMIT, Settings, Subject};
-use crate::engines::{Engine, Job};
-use crate::experiments::stress::judge;
-use crate::measure::Outcome;
-use crate::procedures::Task;
+use super::{Bench, Settings};
+use crate::engines::Job;
+use crate::experiments::deviation::compare;
+use crate::measure::{Failure, Instrument, Taken};
 use crate::record::ReadingKey;
 use crate::spec::Budget;
 
@@ -53,70 +52,60 @@ impl Effect {
     }
 }
 
-/// What one reading of the check may take.
+/// Sampling effort of one reading of the check.
 const BUDGET: Budget = Budget { relative_error: 0.005, seconds: 1.5 };
 /// Times differ that differ by this factor.
 const SLOWER: f64 = 1.5;
 
 impl Bench<'_> {
     /// Every value of every setting of an engine but its default.
-    pub(super) fn knob_effects(&self, subject: &Subject, task: &Task, job: &Job) -> Vec<KnobEffect> {
-        let own = self.case.settings_of(&subject.engine.name());
-        let effort = Effort { budget: BUDGET, seed: self.options.seed, limit: LIMIT };
-        let read = |settings: &Settings| self.take(subject, task.procedure, job, settings, effort, None);
-        let knobs: Vec<_> = subject.engine.knobs().iter().filter(|k| !own.contains_key(k.key)).collect();
+    pub(super) fn knob_effects(&self, subject: &Instrument, job: &Job) -> Vec<KnobEffect> {
+        let (case, engine) = (self.trials.case, subject.engine.as_ref());
+        let own = case.settings_of(&engine.name());
+        let read = |settings: &Settings| self.trials.take(subject, job, settings, self.effort(BUDGET, 0), (None, 0));
+        let knobs: Vec<_> = engine.knobs().iter().filter(|k| !own.contains_key(k.key)).collect();
         let tries = knobs.iter().flat_map(|k| k.values.iter().skip(1).map(move |v| (k.key, *v)));
-        let Some(before) = (!knobs.is_empty()).then(|| read(&own)).flatten() else { return vec![] };
-        if before.failure.is_some() {
-            return vec![];
-        }
-        let effect = |(key, value): (&str, &str)| {
+        let Some(Ok(before)) = (!knobs.is_empty()).then(|| read(&own)).flatten() else { return vec![] };
+        let exported = |s: &Settings| engine.export(&Job { settings: s.clone(), budget: BUDGET, ..job.clone() }).ok();
+        let effect = |(knob, value): (&str, &str)| {
             let mut settings = own.clone();
-            settings.insert(key.to_owned(), scalar(value));
+            settings.insert(knob.to_owned(), scalar(value));
             let after = read(&settings)?;
-            let exported = |s: &Settings| {
-                let job = Job { settings: s.clone(), budget: BUDGET, ..job.clone() };
-                subject.engine.export(&job).ok()
-            };
+            let key = ReadingKey::new(&case.name, job.procedure, engine.name());
             let same_scene = exported(&own) == exported(&settings);
-            Some(self.effect(subject.engine.as_ref(), task, (key, value), &before, &after, same_scene))
+            Some(KnobEffect::of(key, (knob, value), &before, &after, same_scene))
         };
         tries.filter_map(effect).collect()
     }
+}
 
-    fn effect(
-        &self,
-        engine: &dyn Engine,
-        task: &Task,
+impl KnobEffect {
+    fn of(
+        key: ReadingKey,
         (knob, value): (&str, &str),
-        before: &Outcome,
-        after: &Outcome,
+        before: &Taken,
+        after: &Result<Taken, Failure>,
         same_scene: bool,
-    ) -> KnobEffect {
-        let (a, b) = (&after.estimates, &before.estimates);
-        let found = judge::compare(a, b, 0.0);
-        let time_ratio = after.wall_s / before.wall_s.max(1e-9);
-        let same_time = (1.0 / SLOWER..SLOWER).contains(&time_ratio) || after.wall_s.max(before.wall_s) < 0.02;
-        let same_noise = judge::compare(b, b, 0.0).noise / judge::compare(a, a, 0.0).noise.max(f64::MIN_POSITIVE);
-        let effect = if after.failure.is_some() {
-            Effect::Fails
-        } else if found.beyond > 0.0 {
+    ) -> Self {
+        let (knob, value) = (knob.to_owned(), value.to_owned());
+        let Ok(after) = after else {
+            return Self { key, knob, value, effect: Effect::Fails, deviation: None, noise: None, time_ratio: None };
+        };
+        let (a, b) = (&after.measurement.estimates, &before.measurement.estimates);
+        let found = compare(a, b, 0.0);
+        let (after_s, before_s) = (after.cost.wall_s, before.cost.wall_s);
+        let time_ratio = after_s / before_s.max(1e-9);
+        let same_time = (1.0 / SLOWER..SLOWER).contains(&time_ratio) || after_s.max(before_s) < 0.02;
+        let noise_ratio = compare(b, b, 0.0).noise / compare(a, a, 0.0).noise.max(f64::MIN_POSITIVE);
+        let effect = if found.beyond > 0.0 {
             Effect::Result
-        } else if same_scene && same_time && (0.5..2.0).contains(&same_noise) {
+        } else if same_scene && same_time && (0.5..2.0).contains(&noise_ratio) {
             Effect::Nothing
         } else {
             Effect::Effort
         };
-        let read = after.failure.is_none();
-        KnobEffect {
-            key: ReadingKey::new(&self.case.name, task.procedure, engine.name()),
-            knob: knob.to_owned(),
-            value: value.to_owned(),
-            effect,
-            deviation: read.then_some(found.beyond),
-            noise: read.then_some(found.noise),
-            time_ratio: read.then_some(time_ratio),
-        }
+        let (deviation, noise, time_ratio) = (Some(found.beyond), Some(found.noise), Some(time_ratio));
+        Self { key, knob, value, effect, deviation, noise, time_ratio }
     }
 }
 

@@ -1,12 +1,11 @@
 //! Ladders of effort: what an engine is asked for, rung by rung.
 
-use crate::engines::{Engine, Job};
-use crate::measure::Outcome;
-use crate::spec::Budget;
-
 use luminaire::scene::Transport;
 
 use super::Settings;
+use crate::engines::{Engine, Job, Measurement};
+use crate::record::EngineName;
+use crate::spec::Budget;
 
 /// One rung: an effort of one preset.
 pub(super) struct Rung {
@@ -37,7 +36,7 @@ pub(super) fn ladder(engine: &dyn Engine, job: &Job, furnished: bool, own: &Sett
         setting: (!preset.is_empty()).then(|| ("preset", preset.into())),
         is_timed: true,
     };
-    if engine.name() == "simulator" {
+    if engine.name() == EngineName::SIMULATOR {
         let errors: &[f64] = if furnished { &FURNISHED } else { &EMPTY };
         let rung = |&relative_error: &f64| Rung {
             preset: String::new(),
@@ -48,7 +47,7 @@ pub(super) fn ladder(engine: &dyn Engine, job: &Job, furnished: bool, own: &Sett
         };
         return errors.iter().map(rung).collect();
     }
-    let sampled = job.transport != Transport::Direct && engine.name() != "iesna";
+    let sampled = job.transport != Transport::Direct && engine.name() != EngineName::IESNA;
     let longest = seconds.iter().copied().fold(0.0, f64::max);
     let presets = engine.knobs().iter().find(|k| k.key == "preset").map_or(&[][..], |k| k.values);
     // A spec that chooses a preset gets that one.
@@ -81,8 +80,8 @@ impl Rung {
 }
 
 /// What solved it, as the engine says: the first words of its solver, or its method or variant.
-pub(super) fn solver(outcome: &Outcome) -> String {
-    let said = ["solver", "method", "variant"].into_iter().find_map(|key| outcome.settings.get(key));
+pub(super) fn solver(measurement: &Measurement) -> String {
+    let said = ["solver", "method", "variant"].into_iter().find_map(|key| measurement.settings.get(key));
     let text = said.map_or("", String::as_str);
     text.split([',', ':']).next().unwrap_or_default().trim().to_owned()
 }

@@ -1,6 +1,6 @@
 //! Bench: run time against error, for every engine, solver and preset along a ladder of effort.
 //!
-//! Every reading is taken afresh or from this measurement's own shelf, never from a cache of results.
+//! Every reading is taken afresh or from this measurement's own folder, never from those of runs.
 
 mod curve;
 mod fit;
@@ -12,7 +12,7 @@ mod report;
 mod tests;
 
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use luminaire::scene::{LuminaireModel, Transport};
 use serde::Serialize;
@@ -20,24 +20,20 @@ use serde::Serialize;
 pub use self::curve::{BenchPoint, Curve, Pareto};
 pub use self::knobs::KnobEffect;
 use self::ladder::ladder;
+use super::deviation;
+use super::trials::{Effort, Settings, Trials, simulator};
 use crate::engines::Job;
-use crate::laws::Place;
-use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, Subject};
-use crate::procedures::{self, Task};
+use crate::measure::{Failure, Instrument, Reader, Taken};
 use crate::record::{EngineName, Estimate, ProcedureId, ReadingKey};
 use crate::spec::{Budget, Case};
 use crate::system::process;
 
 /// How to bench.
 pub struct Options<'a> {
-    /// Where readings are taken.
-    pub laboratory: Laboratory,
-    /// Where finished readings are kept.
-    pub shelf: Shelf,
+    /// Who takes readings, each on all slots of its machine.
+    pub reader: Reader,
     /// Readings a rung, each with a seed of its own.
     pub repetitions: usize,
-    /// Threads or processes that a reading may use.
-    pub jobs: usize,
     /// No reading starts after this.
     pub time: Duration,
     /// Seconds of the rungs of renderers whose light is sampled.
@@ -101,40 +97,36 @@ pub struct Reference {
 /// Benches engines with one case and adds what it finds to a report.
 pub fn bench(
     case: &Case,
-    subjects: &[Subject],
+    subjects: &[Instrument],
     options: &Options<'_>,
     progress: &dyn Progress,
     report: &mut BenchReport,
 ) {
-    let bench = Bench { case, options, progress, until: Instant::now() + options.time };
+    let bench = Bench { trials: Trials::new(case, &options.reader, options.time), options, progress };
     report.machine = machine();
     for subject in subjects {
-        report.engines.insert(subject.engine.name(), subject.version.clone());
+        report.engines.insert(subject.engine.name(), subject.version.0.clone());
     }
     let asked = |procedure: ProcedureId| match options.procedures {
         [] => procedure != ProcedureId::LuminousIntensity,
         chosen => chosen.contains(&procedure),
     };
-    for task in procedures::ALL.iter().filter(|p| asked(p.id())).filter_map(|p| p.task(case)) {
+    for task in case.tasks().filter(|task| asked(task.procedure)) {
         let job = Job::of_task(case, &task);
-        let Some(truth) = bench.truth(&task, &job) else {
+        let Some(truth) = bench.truth(&job) else {
             report.left_out.push(format!("{}, {}: there is no exact reference in time", case.name, task.procedure));
             continue;
         };
         for subject in subjects {
-            match bench.curves(subject, &task, &job, &truth) {
+            match bench.curves(subject, &job, &truth) {
                 Ok(curves) => report.curves.extend(curves),
                 Err(why) => {
-                    report.left_out.push(format!(
-                        "{}, {}, {}: {why}",
-                        case.name,
-                        task.procedure,
-                        subject.engine.name()
-                    ));
+                    let key = ReadingKey::new(&case.name, task.procedure, subject.engine.name());
+                    report.left_out.push(format!("{}, {}, {}: {why}", key.case, key.procedure, key.engine));
                 }
             }
             if options.knobs == Knobs::Tried {
-                report.knobs.extend(bench.knob_effects(subject, &task, &job));
+                report.knobs.extend(bench.knob_effects(subject, &job));
             }
         }
         report.pareto.push(Pareto::of(&case.name, task.procedure, &report.curves, truth.floor()));
@@ -146,7 +138,7 @@ pub fn bench(
             wall_s: truth.wall_s,
         });
     }
-    if Instant::now() >= bench.until && !options.time.is_zero() {
+    if bench.trials.is_over() && !options.time.is_zero() {
         report
             .left_out
             .push(format!("{}: time was up before all was tried; the same command goes on from there", case.name));
@@ -154,11 +146,11 @@ pub fn bench(
 }
 
 /// The exact values and how far off they may be.
-pub(crate) struct Truth {
-    pub(crate) values_lx: Vec<f64>,
-    pub(crate) uncertainty_lx: Vec<f64>,
-    pub(crate) solver: String,
-    pub(crate) wall_s: f64,
+struct Truth {
+    values_lx: Vec<f64>,
+    uncertainty_lx: Vec<f64>,
+    solver: String,
+    wall_s: f64,
 }
 
 /// Accuracies of the exact reference, from what is tried first to what has to do: where bodies and openings allow no
@@ -173,64 +165,58 @@ const REFERENCE_LIMIT: Duration = Duration::from_secs(90);
 /// Past this a reading is not waited for.
 const LIMIT: Duration = Duration::from_secs(300);
 
-/// What one reading may take.
-#[derive(Clone, Copy)]
-struct Effort {
-    budget: Budget,
-    seed: u64,
-    limit: Duration,
-}
-
 struct Bench<'a> {
-    case: &'a Case,
+    trials: Trials<'a>,
     options: &'a Options<'a>,
     progress: &'a dyn Progress,
-    until: Instant,
 }
 
 impl Bench<'_> {
     /// The exact simulation, as finely as it goes.
-    fn truth(&self, task: &Task, job: &Job) -> Option<Truth> {
-        let engine = crate::engines::all().into_iter().find(|e| e.name() == "simulator")?;
-        let subject = Subject { engine, version: env!("CARGO_PKG_VERSION").to_owned() };
+    fn truth(&self, job: &Job) -> Option<Truth> {
         let accuracies = if is_furnished(job) { FURNISHED } else { EMPTY };
         // Something is better than nothing: coarser where the finest takes too long.
         accuracies.into_iter().find_map(|accuracy| {
-            let settings = BTreeMap::from([("relative_error".to_owned(), accuracy.into())]);
-            let effort = Effort { budget: job.budget, seed: self.options.seed, limit: REFERENCE_LIMIT };
-            let outcome = self.take(&subject, task.procedure, job, &settings, effort, None)?;
-            outcome.failure.is_none().then(|| Truth::of(&outcome))
+            let settings = Settings::from([("relative_error".to_owned(), accuracy.into())]);
+            let effort = Effort { limit: REFERENCE_LIMIT, ..self.effort(job.budget, 0) };
+            self.trials.take(&simulator(), job, &settings, effort, (None, 0))?.ok().map(|taken| Truth::of(&taken))
         })
     }
 
-    fn curves(&self, subject: &Subject, task: &Task, job: &Job, truth: &Truth) -> Result<Vec<Curve>, String> {
-        let settings = self.case.settings_of(&subject.engine.name());
-        let rungs = ladder(subject.engine.as_ref(), job, is_furnished(job), &settings, self.options.seconds);
+    fn effort(&self, budget: Budget, repetition: usize) -> Effort {
+        let threads = self.options.reader.machine.slots.threads();
+        Effort { budget, seed: self.options.seed + repetition as u64, limit: LIMIT, threads }
+    }
+
+    fn curves(&self, subject: &Instrument, job: &Job, truth: &Truth) -> Result<Vec<Curve>, String> {
+        let (case, name) = (self.trials.case, subject.engine.name());
+        let own = case.settings_of(&name);
+        let rungs = ladder(subject.engine.as_ref(), job, is_furnished(job), &own, self.options.seconds);
         let repetitions = self.options.repetitions.max(1);
         self.progress.planned(rungs.iter().map(|r| r.expected_s() * repetitions as f64).sum());
-        let start_up_s = self.start_up(subject, task, job, &settings);
-        let set_up_s = self.set_up(subject, task, job, &settings);
+        let (start_up_s, set_up_s) = (self.start_up(subject, job, &own), self.set_up(subject, job, &own));
         let mut curves: Vec<Curve> = vec![];
         let (mut last_wall_s, mut last_preset, mut refusal) = (0.0, "", None);
         for rung in &rungs {
             // A rung below what the last one took anyway would only repeat it.
             let repeats = rung.preset == last_preset && rung.budget.seconds < 0.8 * last_wall_s && rung.is_timed;
-            let mut outcomes = vec![];
+            let mut taken = vec![];
             for k in 0..repetitions {
                 if !repeats {
-                    let settings = rung.settings(&settings);
-                    let effort = Effort { budget: rung.budget, seed: self.options.seed + k as u64, limit: LIMIT };
-                    outcomes.extend(self.take(subject, task.procedure, job, &settings, effort, None));
+                    let settings = rung.settings(&own);
+                    match self.trials.take(subject, job, &settings, self.effort(rung.budget, k), (None, 0)) {
+                        Some(Ok(one)) => taken.push(one),
+                        Some(Err(failure)) => refusal = refusal.or(Some(failure)),
+                        None => {}
+                    }
                 }
-                let what = format!("{}: {} {} {:e}", subject.engine.name(), task.procedure, rung.preset, rung.effort);
+                let what = format!("{name}: {} {} {:e}", job.procedure, rung.preset, rung.effort);
                 self.progress.ended(&what, rung.expected_s());
             }
-            refusal = refusal.or(outcomes.iter().find_map(|o| o.failure.as_ref()).map(|f| f.text.clone()));
-            outcomes.retain(|o| o.failure.is_none());
-            let Some(first) = outcomes.first() else { continue };
-            (last_wall_s, last_preset) = (first.wall_s, rung.preset.as_str());
-            let solver = ladder::solver(first);
-            let point = BenchPoint::of(rung.effort, &outcomes, truth);
+            let Some(first) = taken.first() else { continue };
+            (last_wall_s, last_preset) = (first.cost.wall_s, rung.preset.as_str());
+            let solver = ladder::solver(&first.measurement);
+            let point = BenchPoint::of(rung.effort, &taken, truth);
             let known = curves.iter_mut().find(|c| c.solver == solver && c.preset == rung.preset);
             match known {
                 Some(curve) => curve.points.push(point),
@@ -241,82 +227,33 @@ impl Bench<'_> {
                     set_up_s,
                     reference_floor: truth.floor(),
                     points: vec![point],
-                    ..Curve::of(ReadingKey::new(&self.case.name, task.procedure, subject.engine.name()))
+                    ..Curve::of(ReadingKey::new(&case.name, job.procedure, name.clone()))
                 }),
             }
         }
         curves.iter_mut().for_each(Curve::conclude);
         match refusal {
-            Some(why) if curves.is_empty() => Err(why.lines().next().unwrap_or_default().to_owned()),
+            Some(Failure { text, .. }) if curves.is_empty() => Err(text.lines().next().unwrap_or_default().to_owned()),
             _ => Ok(curves),
         }
     }
 
-    /// Seconds of a job with next to no work: direct light at one meter. Our own solvers have no start-up.
-    fn start_up(&self, subject: &Subject, task: &Task, job: &Job, settings: &Settings) -> f64 {
-        let mut least = job.clone();
-        least.transport = Transport::Direct;
-        least.stations.truncate(1);
-        self.least(subject, task, &least, settings, "start_up")
+    /// Seconds of a job with next to no work: direct light at one meter.
+    fn start_up(&self, subject: &Instrument, job: &Job, settings: &Settings) -> f64 {
+        let stations = job.stations.first().cloned().into_iter().collect();
+        self.set_up(subject, &Job { transport: Transport::Direct, stations, ..job.clone() }, settings)
     }
 
-    /// Seconds of the job itself with as little effort as the engine can do with.
-    fn set_up(&self, subject: &Subject, task: &Task, job: &Job, settings: &Settings) -> f64 {
-        self.least(subject, task, job, settings, "set_up")
-    }
-
-    fn least(&self, subject: &Subject, task: &Task, job: &Job, settings: &Settings, name: &str) -> f64 {
+    /// Seconds of a job with as little effort as the engine can do with. Our own solvers have no start-up.
+    fn set_up(&self, subject: &Instrument, job: &Job, settings: &Settings) -> f64 {
         if subject.engine.is_witness() {
             return 0.0;
         }
-        let budget = Budget { relative_error: 1e3, seconds: 0.0 };
-        let place = |k: usize| Some(Place { law: name.to_owned(), magnitude: 0.0, part: k });
-        let times = (0..2).filter_map(|k| {
-            let effort = Effort { budget, seed: self.options.seed, limit: LIMIT };
-            let taken = self.take(subject, task.procedure, job, settings, effort, place(k))?;
-            taken.failure.is_none().then_some(taken.wall_s)
-        });
-        times.reduce(f64::min).unwrap_or(0.0)
-    }
-
-    fn take(
-        &self,
-        subject: &Subject,
-        procedure: ProcedureId,
-        job: &Job,
-        settings: &Settings,
-        effort: Effort,
-        place: Option<Place>,
-    ) -> Option<Outcome> {
-        let Effort { budget, seed, limit } = effort;
-        let request = Request {
-            spec: self.case.path.clone(),
-            spec_sha256: self.case.sha256.clone(),
-            key: ReadingKey::new(&self.case.name, procedure, subject.engine.name()),
-            version: subject.version.clone(),
-            place,
-            settings: settings.clone(),
-            budget,
-            seed,
-            jobs: self.options.jobs,
-            limit_s: limit.as_secs_f64(),
-        };
-        if let Some(kept) = self.options.shelf.find(&request) {
-            return Some(kept);
-        }
-        if Instant::now() >= self.until || process::is_interrupted() {
-            return None;
-        }
-        let job = Job { settings: settings.clone(), budget, seed, ..job.clone() };
-        let outcome = self.options.laboratory.read(subject.engine.as_ref(), &job, &request);
-        if let Err(error) = self.options.shelf.keep(&request, &outcome) {
-            tracing::warn!(%error, "a finished reading could not be kept");
-        }
-        (outcome.failure_kind() != Some(FailureKind::Interrupted)).then_some(outcome)
+        let effort = self.effort(Budget { relative_error: 1e3, seconds: 0.0 }, 0);
+        let take = |repetition| self.trials.take(subject, job, settings, effort, (None, repetition))?.ok();
+        (0..2).filter_map(take).map(|taken| taken.cost.wall_s).reduce(f64::min).unwrap_or(0.0)
     }
 }
-
-type Settings = BTreeMap<String, serde_json::Value>;
 
 fn is_furnished(job: &Job) -> bool {
     let points = job.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
@@ -324,23 +261,26 @@ fn is_furnished(job: &Job) -> bool {
 }
 
 impl Truth {
-    fn of(outcome: &Outcome) -> Self {
+    fn of(taken: &Taken) -> Self {
+        let estimates = &taken.measurement.estimates;
         let error = |e: &Estimate| 2.0 * e.uncertainty.standard_error().unwrap_or(0.0) + e.uncertainty.bound();
         Self {
-            values_lx: outcome.estimates.iter().map(|e| e.value).collect(),
-            uncertainty_lx: outcome.estimates.iter().map(error).collect(),
-            solver: outcome.settings.get("solver").cloned().unwrap_or_default(),
-            wall_s: outcome.wall_s,
+            values_lx: estimates.iter().map(|e| e.value).collect(),
+            uncertainty_lx: estimates.iter().map(error).collect(),
+            solver: taken.measurement.settings.get("solver").cloned().unwrap_or_default(),
+            wall_s: taken.cost.wall_s,
         }
     }
 
+    fn brightest_lx(&self) -> f64 {
+        self.values_lx.iter().copied().fold(0.0, f64::max)
+    }
+
     /// Root mean square over meters of how far off it may be, relative as errors are.
-    pub(crate) fn floor(&self) -> f64 {
-        let parts = self
-            .uncertainty_lx
-            .iter()
-            .zip(&self.values_lx)
-            .map(|(u, v)| (u / curve::scale(*v, &self.values_lx)).powi(2));
+    fn floor(&self) -> f64 {
+        let brightest_lx = self.brightest_lx();
+        let relative = |(u, v): (&f64, &f64)| (u / deviation::scale(*v, brightest_lx)).powi(2);
+        let parts = self.uncertainty_lx.iter().zip(&self.values_lx).map(relative);
         (parts.sum::<f64>() / self.values_lx.len().max(1) as f64).sqrt()
     }
 }

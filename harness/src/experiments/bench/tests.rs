@@ -1,8 +1,9 @@
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::*;
 use crate::engines::{Absent, Engine, EngineError, Knob, Measurement, SceneFile, Site, Support, Version, Workbench};
-use crate::measure::OwnSolvers;
+use crate::measure::Machine;
 use crate::record::{EngineName, Estimate, Uncertainty};
 
 /// An engine of known law: error .02 / sqrt(seconds) of either sign by seed, above a bias of .1 %.
@@ -55,17 +56,15 @@ fn benched(knobs: Knobs) -> BenchReport {
     let folder = tempfile::tempdir().unwrap();
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/specs/axial.yaml");
     let options = Options {
-        laboratory: Laboratory { site: Site::at(folder.path().to_owned()), own_solvers: OwnSolvers::Here },
-        shelf: Shelf::new(folder.path().join("readings")),
+        reader: Reader::bare(&Site::at(folder.path()), Machine::new(1)),
         repetitions: 2,
-        jobs: 1,
         time: Duration::from_secs(100),
         seconds: &[0.5, 5.0, 50.0, 500.0, 5000.0, 50000.0],
         procedures: &[ProcedureId::IndirectIlluminance],
         seed: 1,
         knobs,
     };
-    let subjects = [Subject { engine: Box::new(KnownLaw), version: "1".into() }];
+    let subjects = [Instrument { engine: Arc::new(KnownLaw), version: Version("1".into()) }];
     let mut report = BenchReport::default();
     bench(&Case::load(&path).unwrap(), &subjects, &options, &Silent, &mut report);
     report

@@ -100,7 +100,7 @@ pub fn selftest(runs: usize, clean_runs: usize, seed: u64) -> Result<Scorecard, 
     for case in cases(folder.path())? {
         let judge = Judge { tolerances: &tolerances, known: &known, overrides: &case.tolerances, published: None };
         let mut random = fastrand::Rng::with_seed(seed);
-        let subjects = procedures::ALL.iter().filter_map(|p| p.task(&case));
+        let subjects = case.tasks();
         let subjects: Vec<Subject> = subjects.filter_map(|task| Subject::of(&case, task)).collect();
         card.faults.extend(scores(&case, &subjects, &judge, runs, &mut random));
         for _ in 0..clean_runs {

@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::Subject;
-use super::judge::Compared;
+use crate::experiments::deviation::Compared;
 use crate::judge::KnownBreak;
 use crate::laws::Law;
-use crate::measure::{Failure, FailureKind};
+use crate::measure::{Failure, FailureKind, Instrument};
 use crate::record::{EngineName, ProcedureId};
 use crate::spec::Case;
 
@@ -81,14 +80,14 @@ impl Finding {
 
     pub(super) fn failed(failure: &Failure) -> Self {
         let how = match failure.kind {
-            FailureKind::Refused | FailureKind::Interrupted => None,
+            FailureKind::Declined | FailureKind::Refused | FailureKind::Interrupted | FailureKind::TimeUp => None,
             FailureKind::Nan => Some(How::Nan),
             FailureKind::Crash => Some(How::Crash),
             FailureKind::Hang => Some(How::Hang),
             FailureKind::SilentLoss => Some(How::SilentLoss),
         };
         let text = Some(failure.text.clone());
-        let is_refused = failure.kind == FailureKind::Refused;
+        let is_refused = matches!(failure.kind, FailureKind::Declined | FailureKind::Refused);
         Self { deviation: None, noise: None, how, text, is_refused, is_exact: true }
     }
 
@@ -159,8 +158,8 @@ pub struct PointReport {
 pub(super) type Found = (usize, &'static Law, ProcedureId, usize, Option<Finding>);
 
 impl StressReport {
-    pub(super) fn new(case: &Case, subjects: &[Subject], found: Vec<Found>, record: &[KnownBreak]) -> Self {
-        let engines = subjects.iter().map(|s| (s.engine.name(), s.version.clone())).collect();
+    pub(super) fn new(case: &Case, subjects: &[Instrument], found: Vec<Found>, record: &[KnownBreak]) -> Self {
+        let engines = subjects.iter().map(|s| (s.engine.name(), s.version.0.clone())).collect();
         let mut laws: Vec<LawReport> = vec![];
         for (subject, law, procedure, step, finding) in found {
             let engine = subjects[subject].engine.name();

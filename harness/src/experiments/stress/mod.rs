@@ -1,13 +1,10 @@
 //! Stress: every law at every magnitude on every engine, within a time, resumable; what breaks where.
 
 mod findings;
-pub(crate) mod judge;
-
 mod report;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -16,34 +13,28 @@ use luminaire::scene::LuminaireModel;
 
 use self::findings::{Finding, How};
 pub use self::findings::{LawReport, PointReport, StressReport};
-use crate::engines::Job;
+use super::deviation;
+use super::trials::{Effort, Settings, Trials, simulator};
+use crate::engines::{self, Job};
 use crate::judge::KnownBreak;
 use crate::laws::{self, Against, Law, Place, Variant};
-use crate::measure::{FailureKind, Laboratory, Outcome, Request, Shelf, Subject, task};
-use crate::procedures;
-use crate::record::{EngineName, Estimate, ProcedureId, ReadingKey, Uncertainty};
+use crate::measure::{Failure, Instrument, Reader, Taken};
+use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
 use crate::spec::{Budget, Case};
-use crate::system::process;
 
 /// How to stress.
 pub struct Options<'a> {
-    /// Where readings are taken.
-    pub laboratory: Laboratory,
-    /// Where finished readings are kept.
-    pub shelf: Shelf,
-    /// Readings at a time.
-    pub jobs: usize,
+    /// Who takes readings, as many at a time as its machine has slots.
+    pub reader: Reader,
     /// No reading starts after this.
     pub time: Duration,
-    /// What one reading may take.
+    /// Sampling effort of one reading.
     pub budget: Budget,
     /// Past this one hangs.
     pub limit: Duration,
     /// The laws by name; empty for all.
     pub laws: &'a [String],
-    /// Seed of every random choice.
     pub seed: u64,
-    /// Which coordinates renderers get.
     pub coordinates: Coordinates,
     /// What is on record of engines as luxproof drives them.
     pub known: &'a [KnownBreak],
@@ -88,13 +79,13 @@ impl Point {
 }
 
 /// Stresses engines with a case.
-pub fn stress(case: &Case, subjects: &[Subject], options: &Options<'_>, progress: &dyn Progress) -> StressReport {
+pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progress: &dyn Progress) -> StressReport {
     let points = points(case, subjects, options);
     progress.planned(points.len());
-    let bench = Bench { case, subjects, options, until: Instant::now() + options.time };
+    let bench = Bench { trials: Trials::new(case, &options.reader, options.time), subjects, options };
     let queue = Mutex::new(Queue::new(points.len(), subjects.len()));
     thread::scope(|scope| {
-        for _ in 0..options.jobs.max(1) {
+        for _ in 0..options.reader.machine.slots.threads() {
             scope.spawn(|| {
                 loop {
                     // The lock is let go of at the end of the statement.
@@ -117,14 +108,14 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-fn points(case: &Case, subjects: &[Subject], options: &Options<'_>) -> Vec<Point> {
+fn points(case: &Case, subjects: &[Instrument], options: &Options<'_>) -> Vec<Point> {
     let mut points = vec![];
     let chosen = |law: &&&'static Law| options.laws.is_empty() || options.laws.iter().any(|l| l == law.id);
     for subject in 0..subjects.len() {
         for law in laws::ALL.iter().filter(chosen) {
             // Intensities are direct light in free field, whose laws direct illuminance keeps as well.
-            let tasks = procedures::ALL.iter().filter(|p| p.id() != ProcedureId::LuminousIntensity);
-            for task in tasks.filter_map(|p| p.task(case)).filter(|t| law.light.concerns(t.transport)) {
+            let tasks = case.tasks().filter(|task| task.procedure != ProcedureId::LuminousIntensity);
+            for task in tasks.filter(|t| law.light.concerns(t.transport)) {
                 let base = Job::of_task(case, &task);
                 let says = |step: &usize| (law.variant)(&base, law.magnitudes[*step]).is_some();
                 let steps = (0..law.magnitudes.len()).filter(says);
@@ -173,10 +164,9 @@ impl Queue {
 
 /// Takes the readings of points and judges them.
 struct Bench<'a> {
-    case: &'a Case,
-    subjects: &'a [Subject],
+    trials: Trials<'a>,
+    subjects: &'a [Instrument],
     options: &'a Options<'a>,
-    until: Instant,
 }
 
 /// Beyond this a deviation of noisy readings has to show again with another seed.
@@ -204,115 +194,81 @@ impl Bench<'_> {
     fn once(&self, point: &Point, variant: &Variant, seed: u64) -> Option<Finding> {
         let of_law = |part| Some(Place { law: point.law.id.to_owned(), magnitude: point.magnitude(), part });
         let own_seed = if point.law.id == "seeds" { seed + point.magnitude() as u64 } else { seed };
-        let changed = self.read(point, &variant.job, of_law(0), own_seed)?;
-        if let Some(failure) = &changed.failure {
-            return if failure.kind == FailureKind::Interrupted { None } else { Some(Finding::failed(failure)) };
-        }
+        let read = match self.read(point, &variant.job, of_law(0), own_seed)? {
+            Ok(changed) => changed.measurement.estimates,
+            Err(failure) => return Some(Finding::failed(&failure)),
+        };
         // What the engine reads of the job as it is: the scale on which darkness counts.
-        let base = self.read(point, &point.base, None, seed)?;
-        let brightest_lx = base.estimates.iter().map(|e| e.value).fold(0.0, f64::max);
-        let read = &changed.estimates;
+        let base = self.read(point, &point.base, None, seed)?.map(|taken| taken.measurement.estimates);
+        let brightest_lx = base.iter().flatten().map(|e| e.value).fold(0.0, f64::max);
         let right = match &variant.against {
-            Against::Base(factor) => match &base.failure {
-                None => base.estimates.iter().map(|e| e.times(*factor)).collect(),
-                Some(failure) => return Some(Finding::without_base(failure)),
-            },
+            Against::Base(factor) => base.map(|base| base.iter().map(|e| e.times(*factor)).collect()),
             Against::Sum(parts) => {
                 let mut sum = vec![Estimate::exact(0.0); read.len()];
                 for (k, part) in parts.iter().enumerate() {
-                    let part = self.read(point, part, of_law(k + 1), seed)?;
-                    if let Some(failure) = &part.failure {
-                        return Some(Finding::without_base(failure));
+                    match self.read(point, part, of_law(k + 1), seed)? {
+                        Ok(part) => sum = deviation::sum(&sum, &part.measurement.estimates),
+                        Err(failure) => return Some(Finding::without_base(&failure)),
                     }
-                    judge::add(&mut sum, &part.estimates);
                 }
-                sum
+                Ok(sum)
             }
-            Against::Known(values) => values.iter().map(|v| Estimate::exact(*v)).collect(),
+            Against::Known(values) => Ok(values.iter().map(|v| Estimate::exact(*v)).collect()),
             Against::Mean { weights, value_lx, quadrature } => {
                 let right = Estimate { value: *value_lx, uncertainty: Uncertainty::Bound(quadrature * value_lx) };
-                let found = judge::compare(&[Estimate::of_one_run(weights, read)], &[right], brightest_lx);
+                let found = deviation::compare(&[Estimate::of_one_run(weights, &read)], &[right], brightest_lx);
                 return Some(Finding::of(&found));
             }
-            Against::Witness => {
-                let witness = self.witness(point, &variant.job, of_law(0))?;
-                if let Some(failure) = &witness.failure {
-                    return Some(Finding::without_base(failure));
-                }
-                witness.estimates
-            }
+            Against::Witness => self.witness(&variant.job, of_law(0))?.map(|taken| taken.measurement.estimates),
         };
-        Some(Finding::of(&judge::compare(read, &right, brightest_lx)))
+        Some(match right {
+            Ok(right) => Finding::of(&deviation::compare(&read, &right, brightest_lx)),
+            Err(failure) => Finding::without_base(&failure),
+        })
     }
 
-    /// One reading by the point's engine, from the shelf or fresh; `None` where the time is up.
-    fn read(&self, point: &Point, job: &Job, place: Option<Place>, seed: u64) -> Option<Outcome> {
+    /// One reading by the point's engine; `None` where the time is over.
+    fn read(&self, point: &Point, job: &Job, variant: Option<Place>, seed: u64) -> Option<Result<Taken, Failure>> {
         let subject = &self.subjects[point.subject];
-        let id = subject.engine.name();
-        let mut settings = self.case.settings_of(id.as_str());
-        match (id.as_str(), self.options.coordinates) {
-            ("simulator", _) => drop(settings.insert("relative_error".into(), Self::own_accuracy(job).into())),
-            (_, Coordinates::Fitted) => {}
-            (name, Coordinates::Raw) => {
-                let key = if name == "radiance" { "rescale" } else { "recentre" };
-                if subject.engine.knobs().iter().any(|k| k.key == key) {
-                    settings.insert(key.into(), false.into());
-                }
+        let name = subject.engine.name();
+        let mut settings = self.trials.case.settings_of(&name);
+        if name == EngineName::SIMULATOR {
+            settings.insert("relative_error".into(), own_accuracy(job).into());
+        } else if self.options.coordinates == Coordinates::Raw {
+            let key = engines::entry(&name).and_then(|entry| entry.fits_coordinates);
+            if let Some(key) = key {
+                settings.insert(key.into(), false.into());
             }
         }
-        self.take(subject, point, job, place, (settings, seed))
+        self.take(subject, job, &settings, seed, variant)
     }
 
     /// The exact simulation of a changed job, finer than the simulator is asked for as an engine.
-    fn witness(&self, point: &Point, job: &Job, place: Option<Place>) -> Option<Outcome> {
-        let engine = crate::engines::all().into_iter().find(|e| e.name() == "simulator")?;
-        let subject = Subject { engine, version: env!("CARGO_PKG_VERSION").to_owned() };
-        let settings = BTreeMap::from([("relative_error".to_owned(), (0.1 * Self::own_accuracy(job)).into())]);
-        self.take(&subject, point, job, place, (settings, self.options.seed))
-    }
-
-    /// How fine the simulator works: much finer than what is looked for, where its fast solvers reach that.
-    fn own_accuracy(job: &Job) -> f64 {
-        let points = job.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
-        if points && job.scene.obstacles.is_empty() { 1e-4 } else { 5e-3 }
+    fn witness(&self, job: &Job, variant: Option<Place>) -> Option<Result<Taken, Failure>> {
+        let settings = Settings::from([("relative_error".to_owned(), (0.1 * own_accuracy(job)).into())]);
+        self.take(&simulator(), job, &settings, self.options.seed, variant)
     }
 
     fn take(
         &self,
-        subject: &Subject,
-        point: &Point,
+        subject: &Instrument,
         job: &Job,
-        place: Option<Place>,
-        (settings, seed): (BTreeMap<String, serde_json::Value>, u64),
-    ) -> Option<Outcome> {
-        let request = Request {
-            spec: self.case.path.clone(),
-            spec_sha256: self.case.sha256.clone(),
-            key: ReadingKey::new(&self.case.name, point.procedure, subject.engine.name()),
-            version: subject.version.clone(),
-            place,
-            settings: settings.clone(),
-            budget: self.options.budget,
-            seed,
-            jobs: 1,
-            limit_s: self.options.limit.as_secs_f64(),
-        };
-        if let Some(kept) = self.options.shelf.find(&request) {
-            return Some(kept);
-        }
-        if Instant::now() >= self.until || process::is_interrupted() {
-            return None;
-        }
-        let job = Job { settings, budget: self.options.budget, seed, ..job.clone() };
-        let outcome = self.options.laboratory.read(subject.engine.as_ref(), &job, &request);
-        if let Err(error) = self.options.shelf.keep(&request, &outcome) {
-            tracing::warn!(%error, "a finished reading could not be kept");
-        }
-        (outcome.failure_kind() != Some(FailureKind::Interrupted)).then_some(outcome)
+        settings: &Settings,
+        seed: u64,
+        variant: Option<Place>,
+    ) -> Option<Result<Taken, Failure>> {
+        let Options { budget, limit, .. } = *self.options;
+        self.trials.take(subject, job, settings, Effort { budget, seed, limit, threads: 1 }, (variant, 0))
     }
+}
+
+/// How fine the simulator works: much finer than what is looked for, where its fast solvers reach that.
+fn own_accuracy(job: &Job) -> f64 {
+    let points = job.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
+    if points && job.scene.obstacles.is_empty() { 1e-4 } else { 5e-3 }
 }
 
 /// Whether a case holds anything to stress.
 pub fn concerns(case: &Case) -> bool {
-    [ProcedureId::DirectIlluminance, ProcedureId::IndirectIlluminance].into_iter().any(|p| task(case, p).is_some())
+    [ProcedureId::DirectIlluminance, ProcedureId::IndirectIlluminance].into_iter().any(|p| case.task(p).is_some())
 }

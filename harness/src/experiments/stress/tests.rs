@@ -1,9 +1,11 @@
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::*;
 use crate::engines::{Absent, Engine, EngineError, Measurement, SceneFile, Site, Support, Version, Workbench};
 use crate::laws::Place;
-use crate::measure::OwnSolvers;
+use crate::measure::Machine;
+use crate::measure::cache::Cache;
 use crate::record::{EngineName, Estimate};
 
 /// Reads the inverse-square law, and breaks where it is told to.
@@ -68,9 +70,10 @@ fn stressed(folder: &std::path::Path, laws: &[&str], time: Duration) -> StressRe
 fn stressed_knowing(folder: &std::path::Path, laws: &[&str], time: Duration, known: &[KnownBreak]) -> StressReport {
     let laws: Vec<String> = laws.iter().map(|l| (*l).to_owned()).collect();
     let options = Options {
-        laboratory: Laboratory { site: Site::at(folder.to_owned()), own_solvers: OwnSolvers::Here },
-        shelf: Shelf::new(folder.join("readings")),
-        jobs: 2,
+        reader: Reader {
+            cache: Some(Cache::at(folder.join("readings"))),
+            ..Reader::bare(&Site::at(folder.to_owned()), Machine::new(2))
+        },
         time,
         budget: Budget { relative_error: 1e-3, seconds: 1.0 },
         limit: Duration::from_secs(10),
@@ -79,7 +82,7 @@ fn stressed_knowing(folder: &std::path::Path, laws: &[&str], time: Duration, kno
         coordinates: Coordinates::Fitted,
         known,
     };
-    let subjects = [Subject { engine: Box::new(Fragile), version: "1".into() }];
+    let subjects = [Instrument { engine: Arc::new(Fragile), version: Version("1".into()) }];
     stress(&axial(), &subjects, &options, &Silent)
 }
 
@@ -177,7 +180,7 @@ fn a_run_cut_short_goes_on_where_it_stopped() {
 #[test]
 fn a_place_leads_another_process_to_the_same_job() {
     let case = axial();
-    let base = Job::of_task(&case, &task(&case, ProcedureId::IndirectIlluminance).unwrap());
+    let base = Job::of_task(&case, &case.task(ProcedureId::IndirectIlluminance).unwrap());
     let place = |part| Place { law: "superposition".into(), magnitude: 2.0, part };
     let luminaires = |part| laws::job(&base, &place(part)).unwrap().scene.luminaires.len();
     assert_eq!((luminaires(0), luminaires(1), luminaires(2)), (2, 1, 1));

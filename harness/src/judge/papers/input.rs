@@ -7,7 +7,7 @@
 use luminaire::photometry::Photometry;
 use luminaire::scene::Transport;
 
-use crate::procedures::{Target, Task};
+use crate::procedures::{Aspect, Target, Task};
 
 /// Finer tables than this, in candela, are not written by photometers.
 const FINEST_DECIMALS: i32 = 6;
@@ -32,16 +32,17 @@ impl<'a> Input<'a> {
     pub(in crate::judge) fn bound(&self, target: &Target, value: f64) -> f64 {
         let luminaires = || self.task.scene.luminaires.iter().zip(&self.half_digits_cd);
         if self.task.transport == Transport::Direct {
-            let lux = luminaires().map(|(luminaire, half)| {
-                let towards = luminaire.position_m - target.meter.position_m;
-                let cosine = (towards.dot(target.meter.normal) / towards.length()).max(0.0);
+            let seen = luminaires().flat_map(|pair| target.aspects.iter().map(move |aspect| (pair, aspect)));
+            let parts = seen.map(|((luminaire, half), Aspect { meter, weight })| {
+                let towards = luminaire.position_m - meter.position_m;
+                let cosine = (towards.dot(meter.normal) / towards.length()).max(0.0);
                 if luminaire.intensity_towards(-towards).value() > 0.0 {
-                    half * cosine / towards.length_squared()
+                    weight * half * cosine / towards.length_squared()
                 } else {
                     0.0
                 }
             });
-            return lux.sum::<f64>() * target.per_lux;
+            return parts.sum();
         }
         let flux: f64 = luminaires().map(|(l, _)| l.flux_scale * l.photometry.distribution.flux().value()).sum();
         let off: f64 = self.half_digits_cd.iter().map(|half| 4.0 * std::f64::consts::PI * half).sum();

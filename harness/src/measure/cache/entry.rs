@@ -4,34 +4,23 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::engines::Measurement;
-use crate::record::{EngineName, ProcedureId};
+use crate::measure::outcome::{Cost, Failure};
+use crate::record::ReadingKey;
 use crate::spec::hexadecimal;
 
 /// Version of the form of an entry.
-const FORM: u32 = 1;
+const FORM: u32 = 2;
 
 /// What an engine answered to a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Entry {
-    pub engine: EngineName,
+    /// What it was first asked for; other cases may have the same job.
+    #[serde(flatten)]
+    pub key: ReadingKey,
     pub version: String,
-    /// The case that it was first asked for; others may have the same job.
-    pub case: String,
-    pub procedure: ProcedureId,
-    /// Wall-clock seconds that the answer cost.
-    pub wall_s: f64,
-    pub answer: Answer,
-}
-
-/// An answer that would be the same another time. A failure is none: it is tried again.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Answer {
-    /// Readings.
-    Read(Measurement),
-    /// It cannot do the job, and why.
-    Declined(String),
+    #[serde(flatten)]
+    pub cost: Cost,
+    pub answer: Result<Measurement, Failure>,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -18,7 +18,7 @@ impl Key {
         Self { engine: engine.to_owned(), digits: digits.to_owned() }
     }
 
-    /// The engine's name, which is the folder of its entries.
+    /// The folder of its entries.
     pub fn engine(&self) -> &str {
         &self.engine
     }
@@ -26,6 +26,12 @@ impl Key {
     /// 64 hexadecimal digits.
     pub fn digits(&self) -> &str {
         &self.digits
+    }
+
+    /// The key of the same where these conditions matter as well.
+    pub fn under(&self, conditions: &str) -> Self {
+        let digits = hexadecimal(&Sha256::digest(format!("{} {conditions}", self.digits)));
+        Self { engine: self.engine.clone(), digits }
     }
 }
 
@@ -63,6 +69,7 @@ pub fn key(engine: &dyn Engine, version: &Version, job: &Job) -> Result<Key, Eng
 mod tests {
     use super::*;
     use crate::engines::{all, fixtures};
+    use crate::record::ProcedureId;
     use luminaire::scene::{LuminaireModel, Transport};
 
     #[test]
@@ -88,6 +95,7 @@ mod tests {
             let mut moved = job.clone();
             moved.stations[0].meter.position_m.x += 1e-12;
             others.push(moved);
+            assert!(plain != plain.under("2 threads") && plain.under("1 thread") != plain.under("2 threads"));
             for (k, other) in others.iter().enumerate() {
                 assert_ne!(plain, of(other), "{} {k}", engine.name());
             }

@@ -15,11 +15,10 @@ use std::path::{Path, PathBuf};
 
 use crate::system::files;
 
-pub use entry::{Answer, Entry};
+pub use entry::Entry;
 pub use key::{Key, key};
 pub use upkeep::{Contents, Pruned};
 
-/// A folder of entries.
 #[derive(Clone, Debug)]
 pub struct Cache {
     root: PathBuf,
@@ -29,7 +28,6 @@ pub struct Cache {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lookup {
     Found(Entry),
-    /// Nothing.
     Unknown,
     /// A file that is no sound entry of this key, and what is wrong with it.
     Damaged(String),
@@ -41,12 +39,10 @@ impl Cache {
         Self { root: root.into() }
     }
 
-    /// The folder.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// The file of an entry.
     pub fn path(&self, key: &Key) -> PathBuf {
         self.root.join(key.engine()).join(key.digits()).with_extension("json")
     }

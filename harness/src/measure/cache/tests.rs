@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use super::*;
-use crate::engines::Measurement;
-use crate::record::{Estimate, ProcedureId, Uncertainty};
+use crate::engines::{Blocks, Measurement};
+use crate::measure::{Cost, Failure, FailureKind};
+use crate::record::{Estimate, ProcedureId, ReadingKey, Uncertainty};
 
 fn sample() -> Entry {
     let estimates = [0.1 + 0.2, 1.0 / 3.0, 5e-324, 1.797_693_134_862_315_7e308, 9.007_199_254_740_993e15]
@@ -13,14 +14,13 @@ fn sample() -> Entry {
         estimates: estimates.into(),
         settings: [("seed".to_owned(), "1".to_owned())].into(),
         notes: vec!["a note with \"quotes\" and µ".to_owned()],
+        samples: vec![Blocks::new(vec![vec![1.0 / 3.0; 5], vec![0.1 + 0.2; 5]])],
     };
     Entry {
-        engine: "radiance".into(),
+        key: ReadingKey::new("case", ProcedureId::DirectIlluminance, "radiance"),
         version: "6.0a".into(),
-        case: "case".into(),
-        procedure: ProcedureId::DirectIlluminance,
-        wall_s: 1.234_567_890_123_456_7,
-        answer: Answer::Read(measurement),
+        cost: Cost { wall_s: 1.234_567_890_123_456_7, cpu_s: 0.1, peak_mib: Some(20.3) },
+        answer: Ok(measurement),
     }
 }
 
@@ -36,14 +36,16 @@ fn an_entry_comes_back_to_the_last_bit() {
     let mut random = fastrand::Rng::with_seed(3);
     for _ in 0..2000 {
         let mut entry = sample();
-        let Answer::Read(measurement) = &mut entry.answer else { unreachable!() };
-        measurement.estimates[0].value = f64::from_bits(random.u64(0..0x7ff0_0000_0000_0000));
+        entry.answer.as_mut().unwrap().estimates[0].value = f64::from_bits(random.u64(0..0x7ff0_0000_0000_0000));
         let text = entry::text(&entry, a_key('a').digits()).unwrap();
         assert_eq!(entry::parse(&text, a_key('a').digits()).unwrap(), entry);
     }
     cache.keep(&a_key('a'), &sample()).unwrap();
     assert_eq!(cache.find(&a_key('a')), Lookup::Found(sample()));
     assert_eq!(cache.find(&a_key('b')), Lookup::Unknown);
+    let hung = Entry { answer: Err(Failure::new(FailureKind::Hang, "past its limit")), ..sample() };
+    cache.keep(&a_key('b'), &hung).unwrap();
+    assert_eq!(cache.find(&a_key('b')), Lookup::Found(hung));
 }
 
 #[test]

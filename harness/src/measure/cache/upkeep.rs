@@ -11,7 +11,6 @@ use crate::system::files::UNFINISHED;
 /// A file that was begun longer ago than this has no writer any more.
 const WRITERS_LIVE: Duration = Duration::from_secs(3600);
 
-/// What a cache holds.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Contents {
     /// Sound entries and their bytes, by engine.
@@ -22,16 +21,12 @@ pub struct Contents {
     pub unfinished: usize,
 }
 
-/// What pruning took out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pruned {
     /// Entries not used for longer than asked.
     pub unused: usize,
-    /// Entries that were no sound ones.
     pub damaged: usize,
-    /// What killed writers left.
     pub unfinished: usize,
-    /// Bytes freed.
     pub bytes: u64,
 }
 

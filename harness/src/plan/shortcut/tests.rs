@@ -6,6 +6,7 @@ use luminaire::simulator::{Accuracy, illuminance};
 
 use super::*;
 use crate::engines::fixtures;
+use crate::record::ProcedureId;
 use crate::record::Uncertainty;
 
 const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);

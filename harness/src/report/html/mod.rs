@@ -47,7 +47,7 @@ pub fn page(report: &Report, beside: &[Beside]) -> String {
                 noscript { style { "tr[hidden]{display:table-row}.filters,.theme,.all,.more{display:none}" } }
             }
             body {
-                (palette.marks())
+                (Palette::marks())
                 a.skip href="#main" { "Skip to the report" }
                 nav aria-label="Sections" {
                     div.bar {

@@ -6,21 +6,24 @@
 use maud::{Markup, html};
 
 use super::super::Report;
-use crate::record::EngineName;
+use crate::engines;
+use crate::record::{EngineName, EngineStatus};
 
-/// Colour on paper and on black.
-const COLOURS: [(&str, &str); 8] = [
-    ("#3d4148", "#d5d8dd"),
-    ("#8c6100", "#e6b84d"),
-    ("#0067a8", "#62b5ea"),
-    ("#b84a00", "#f08a4b"),
-    ("#007a5a", "#3fc79d"),
-    ("#a8457f", "#e294c3"),
-    ("#5b4bb5", "#a89cf0"),
-    ("#7a6a58", "#c9b8a4"),
-];
-/// Engines that have their colour for good, so that two reports read alike.
-const KNOWN: [&str; 7] = ["simulator", "iesna", "mitsuba", "radiance", "povray", "cycles", "luxcore"];
+/// Colours on paper and on black of engines that are none of ours; the last is for those that only another file knows.
+const SPARE: [(&str, &str); 3] = [("#a8457f", "#e294c3"), ("#5b4bb5", "#a89cf0"), ("#7a6a58", "#c9b8a4")];
+
+/// Colours on paper and on black: those of our own engines first, for good, so that two reports read alike.
+fn colours() -> impl Iterator<Item = (&'static str, &'static str)> {
+    engines::ALL.into_iter().map(|entry| entry.colour).chain(SPARE)
+}
+
+const OWN: usize = engines::ALL.len();
+const COLOURS: usize = OWN + SPARE.len();
+
+/// Index of the colour of one of our own engines.
+fn fixed(engine: &str) -> Option<usize> {
+    engines::ALL.iter().position(|entry| entry.name == *engine)
+}
 
 /// The engines of a report with their colours and marks.
 pub(super) struct Palette {
@@ -29,30 +32,23 @@ pub(super) struct Palette {
 
 impl Palette {
     pub(super) fn of(report: &Report) -> Self {
-        let fixed = |id: &str| KNOWN.iter().position(|k| *k == id);
-        let mut next = KNOWN.len();
-        let engines = report.engines.iter().map(|e| {
-            let index = fixed(&e.id).unwrap_or_else(|| {
-                next += 1;
-                next - 1
-            });
-            (e.id.clone(), index % COLOURS.len())
-        });
-        Self { engines: engines.collect() }
+        let mut spare = (OWN..COLOURS).cycle();
+        let index = |e: &EngineStatus| fixed(&e.id).or_else(|| spare.next()).unwrap_or(COLOURS - 1);
+        Self { engines: report.engines.iter().map(|e| e.id.clone()).zip(report.engines.iter().map(index)).collect() }
     }
 
     /// Custom properties `--e0` ... for the style sheet.
     pub(super) fn style() -> String {
-        let colour = |(k, (paper, black)): (usize, &(&str, &str))| format!("--e{k}:light-dark({paper},{black});");
-        let colours: String = COLOURS.iter().enumerate().map(colour).collect();
+        let colour = |(k, (paper, black)): (usize, (&str, &str))| format!("--e{k}:light-dark({paper},{black});");
+        let colours: String = colours().enumerate().map(colour).collect();
         let uses = |k| format!(".e{k}{{fill:var(--e{k})}}.ring .e{k},.line.e{k}{{stroke:var(--e{k})}}");
-        format!(":root{{{colours}}}{}", (0..COLOURS.len()).map(uses).collect::<String>())
+        format!(":root{{{colours}}}{}", (0..COLOURS).map(uses).collect::<String>())
     }
 
     /// Index of an engine's colour and mark; engines that only another file knows take what is left.
     pub(super) fn index(&self, engine: &str) -> usize {
         let found = self.engines.iter().find(|(id, _)| *id == *engine).map(|(_, k)| *k);
-        found.or_else(|| KNOWN.iter().position(|k| *k == engine)).unwrap_or(COLOURS.len() - 1)
+        found.or_else(|| fixed(engine)).unwrap_or(COLOURS - 1)
     }
 
     pub(super) fn order(&self, engine: &str) -> usize {
@@ -66,13 +62,9 @@ impl Palette {
     }
 
     /// Every mark once, for [`Self::label`] to refer to.
-    pub(super) fn marks(&self) -> Markup {
-        let mut known: Vec<usize> = self.engines.iter().map(|(_, k)| *k).chain([COLOURS.len() - 1]).collect();
-        known.extend(0..KNOWN.len());
-        known.sort_unstable();
-        known.dedup();
+    pub(super) fn marks() -> Markup {
         html! {
-            svg.marks aria-hidden="true" { @for k in known {
+            svg.marks aria-hidden="true" { @for k in 0..COLOURS {
                 symbol id={ "k" (k) } viewBox="0 0 12 12" { path class={ "mark e" (k) } d=(shape(k, 6.0, 6.0, 4.4)) {} }
             } }
         }

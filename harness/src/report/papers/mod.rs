@@ -6,9 +6,8 @@ use std::collections::BTreeMap;
 
 use super::Report;
 use super::words::{largest, percent, published_column, value};
-use crate::engines;
 use crate::judge::{Basis, PublishedTable};
-use crate::record::{MeterId, Quantity, Reading, ReadingKey, Recording};
+use crate::record::{EngineName, MeterId, Quantity, Reading, ReadingKey, Recording};
 
 pub(super) use shares::splits;
 
@@ -62,9 +61,9 @@ pub(super) fn grid(report: &Report, table: &PublishedTable) -> Grid {
 }
 
 fn label(recording: &Recording) -> String {
-    if recording.key.engine == engines::IESNA {
+    if recording.key.engine == EngineName::IESNA {
         let method = recording.settings.get("method").map(|m| format!(", {m}"));
-        return format!("{}{}", engines::IESNA, method.unwrap_or_default());
+        return format!("{}{}", EngineName::IESNA, method.unwrap_or_default());
     }
     let light = recording.light.to_string();
     let bounces = light.split_once(", ").map(|(_, bounces)| format!(", {bounces}"));

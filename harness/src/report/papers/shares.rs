@@ -3,9 +3,8 @@
 use luminaire::scene::Bounces;
 
 use super::{Grid, Report, reading};
-use crate::engines;
 use crate::judge::{PaperSplit, PublishedColumn, PublishedRow, PublishedTable, Share, Stages, shares};
-use crate::record::{Estimate, Reading, Recording, Uncertainty};
+use crate::record::{EngineName, Estimate, Reading, Recording, Uncertainty};
 
 /// The coverage factor of the intervals: JCGM 100:2008, 6.3.3.
 const COVERAGE: f64 = 2.0;
@@ -45,9 +44,9 @@ fn split(
     let stages = Stages {
         printed_method: table.printed(row, &method.name)?,
         method: read(&method.engine, "", None)?,
-        exact: read(&engines::SIMULATOR, &method.model, all)?,
-        exact_cut: read(&engines::SIMULATOR, &method.model, cut)?,
-        exact_model: read(&engines::SIMULATOR, paper, cut)?,
+        exact: read(&EngineName::SIMULATOR, &method.model, all)?,
+        exact_cut: read(&EngineName::SIMULATOR, &method.model, cut)?,
+        exact_model: read(&EngineName::SIMULATOR, paper, cut)?,
         rendered: read(&column.engine, paper, cut)?,
         printed: table.printed(row, &column.name)?,
     };

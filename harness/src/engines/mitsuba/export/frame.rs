@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use luminaire::scene::Shape;
 
 use crate::engines::Job;
-use crate::engines::mitsuba::settings::FrameChoice;
+use crate::engines::settings::Coordinates;
 
 /// Farther from the origin than this, in scene sizes, a scene is moved there.
 const FAR: f64 = 2.0;
@@ -23,9 +23,9 @@ pub(in crate::engines::mitsuba) struct Frame {
 }
 
 impl Frame {
-    pub(in crate::engines::mitsuba) fn of(job: &Job, choice: FrameChoice) -> Self {
+    pub(in crate::engines::mitsuba) fn of(job: &Job, coordinates: Coordinates) -> Self {
         let raw = Self { origin_m: DVec3::ZERO, scale: 1.0 };
-        let (Some((min_m, max_m)), FrameChoice::Recentred) = (bounds_m(job), choice) else { return raw };
+        let (Some((min_m, max_m)), Coordinates::Fitted) = (bounds_m(job), coordinates) else { return raw };
         let (centre_m, size_m) = (0.5 * (min_m + max_m), (max_m - min_m).max_element());
         let far = centre_m.abs().max_element() > FAR * size_m;
         let origin_m = if far { centre_m } else { DVec3::ZERO };

@@ -12,17 +12,18 @@ use super::frame::Frame;
 use super::surfaces::list;
 use super::tables::Tables;
 use super::{comment_text, has_surfaces, header, integrator};
-use crate::engines::mitsuba::settings::{Preset, Settings};
+use crate::engines::mitsuba::settings::Settings;
+use crate::engines::settings::Preset;
 use crate::engines::{Job, SceneFile, Station};
 
-/// Pixels along a side of a meter's tile: more samples in one pixel would drown in its 32-bit sum.
+/// Pixels along a side of a meter's tile, each of Mitsuba's own four samples: more samples in one pixel would drown in its 32-bit sum.
 pub(super) const TILE: usize = 16;
 /// Meters that fit side by side on a film.
-const MOST_METERS: usize = 256;
+const MAX_METERS: usize = 256;
 /// Radius of the filter sphere in parts of the scene's size ...
 const RADIUS: f64 = 7e-3;
 /// ... and where it is lost: Mitsuba ends shadow rays 8.9e-4 of their length before the light.
-const LEAST_RADIUS: f64 = 1.8e-3;
+const MIN_RADIUS: f64 = 1.8e-3;
 /// Radius of a meter's patch in parts of the scene's size.
 const PATCH: f64 = 3e-4;
 /// Rows of an opacity image: a quarter of a degree.
@@ -38,11 +39,11 @@ pub(in crate::engines::mitsuba) fn obstacle_to_stock(job: &Job) -> Option<String
     if job.scene.luminaires.iter().any(|l| l.model != LuminaireModel::Point) {
         return Some("a stock Mitsuba scene has goniometric light from points only".into());
     }
-    if job.stations.len() > MOST_METERS {
-        return Some(format!("a stock Mitsuba scene reads {MOST_METERS} meters at most"));
+    if job.stations.len() > MAX_METERS {
+        return Some(format!("a stock Mitsuba scene reads {MAX_METERS} meters at most"));
     }
     let size_m = size_m(job);
-    job.scene.luminaires.iter().find(|l| radius_m(job, l) < LEAST_RADIUS * size_m).map(|l| {
+    job.scene.luminaires.iter().find(|l| radius_m(job, l) < MIN_RADIUS * size_m).map(|l| {
         format!("`{}` is so close to something else that the sphere which shapes its light would be lost", l.id)
     })
 }

@@ -3,7 +3,7 @@
 use luminaire::photometry::LuminousIntensityDistribution;
 use serde::Serialize;
 
-use crate::engines::mitsuba::output;
+use crate::engines::mitsuba::ID;
 use crate::engines::{EngineError, Job, SceneFile};
 
 /// Distributions without repetition, and which luminaire has which.
@@ -55,7 +55,8 @@ impl<'a> Tables<'a> {
             let full = distribution.full_circle();
             let candela = (0..full.c_deg().len()).map(|c| full.plane(c)).collect();
             let table = TableFile { c_deg: full.c_deg(), gamma_deg: full.gamma_deg(), candela };
-            let json = serde_json::to_string(&table).map_err(|e| output(format!("a table cannot be written: {e}")))?;
+            let json = serde_json::to_string(&table)
+                .map_err(|e| EngineError::output(ID, format!("a table cannot be written: {e}")))?;
             Ok(SceneFile::text(&name(k), json))
         };
         self.distinct.iter().enumerate().map(file).collect()

@@ -23,12 +23,15 @@ fn read_with(script: &str, limit_s: f64) -> EngineError {
     Mitsuba::default().read(&s1(Transport::Direct), &bench).unwrap_err()
 }
 
-fn answer(rows: &str) -> String {
-    format!(r#"echo '{{"versions": {{}}, "settings": {{}}, "notes": [], "readings": [{rows}]}}'"#)
-}
-
-fn row(k: usize, value: &str) -> String {
-    format!(r#"{{"id": "m[{k}]", "value": {value}, "std_error": 0}}"#)
+/// A driver that says it reads these stations, and answers the one request for direct light with a line.
+fn driver(stations: &[usize], answer: &str) -> String {
+    let stations: Vec<_> = stations.iter().map(|k| format!(r#""m[{k}]""#)).collect();
+    let part = r#"{"name": "direct", "rays": 4, "sampled": false}"#;
+    let greeting = format!(
+        r#"{{"versions": {{}}, "variant": "llvm_ad_mono", "lanes": 131072, "stations": [{}], "parts": [{part}]}}"#,
+        stations.join(", ")
+    );
+    format!("echo '{greeting}'; read request; echo '{answer}'; cat > /dev/null")
 }
 
 #[test]
@@ -45,38 +48,21 @@ fn a_crash_a_hang_and_an_out_of_memory_kill_are_told_apart() {
 
 #[test]
 fn answers_that_are_no_readings_are_errors() {
-    let rows = |values: &[&str]| {
-        let rows: Vec<_> = values.iter().enumerate().map(|(k, v)| row(k, v)).collect();
-        answer(&rows.join(","))
-    };
-    let good = ["1", "2", "3", "4"];
+    let answers = |answer| driver(&[0, 1, 2, 3], answer);
     for (script, said) in [
-        (rows(&good[..3]), "gave 3 readings for 4 meters"),
-        (rows(&["1", "2", "3", "4", "5"]), "gave 5 readings for 4 meters"),
-        (rows(&["1", "NaN", "3", "4"]), "no JSON of readings"),
-        (rows(&["1", "null", "3", "4"]), "no JSON of readings"),
-        (rows(&["1", "2", "-3", "4"]), "read -3 lx"),
-        (answer(&[row(0, "1"), row(2, "1"), row(1, "1"), row(3, "1")].join(",")), "gave `m[2]`"),
+        (answers("[[1, 2, 3]]"), "gave 3 readings for 4 meters"),
+        (answers("[[1, 2, 3, 4, 5]]"), "gave 5 readings for 4 meters"),
+        (answers("[[1, 2, 3, 4], [1, 2, 3, 4]]"), "gave 2 blocks of 1"),
+        (answers("[[1, NaN, 3, 4]]"), "no JSON of readings"),
+        (answers("[[1, null, 3, 4]]"), "no JSON of readings"),
+        (answers("[[1, 2, -3, 4]]"), "read -3 lx"),
+        (driver(&[0, 1, 2], "[[1, 2, 3]]"), "gave 3 readings for 4 meters"),
+        (driver(&[0, 2, 1, 3], "[[1, 1, 1, 1]]"), "gave `m[2]`"),
         ("echo warming up".into(), "no JSON of readings"),
-        (":".into(), "no JSON of readings"),
+        (":".into(), "ended without an answer"),
     ] {
         let error = read_with(&script, 30.0);
         assert!(error.to_string().contains(said), "{script}: {error}");
-    }
-}
-
-#[test]
-fn settings_that_make_no_sense_are_named() {
-    for (key, value, said) in [
-        ("variant", "llvm_ad_spectral", "llvm_ad_mono"),
-        ("variant", "cycles", "does not read luminance"),
-        ("preset", "best", "audit, fast or default"),
-        ("samples", "9", "no such setting"),
-    ] {
-        let mut job = s1(Transport::Direct);
-        job.settings.insert(key.into(), value.into());
-        let error = Mitsuba::default().export(&job).unwrap_err();
-        assert!(error.to_string().contains(said) && error.to_string().contains(key), "{error}");
     }
 }
 

@@ -1,6 +1,8 @@
 //! Scenes beyond the empty cube: extended luminaires, obstacles, bright rooms, far and tiny coordinates.
 
-use luminaire::photometry::{HorizontalAxis, LuminousOpening};
+use std::sync::Arc;
+
+use luminaire::photometry::{HorizontalAxis, LuminousOpening, Photometry};
 use luminaire::simulator::{Accuracy, illuminance};
 
 use super::*;

@@ -9,10 +9,11 @@ use std::fmt::Write;
 use glam::{DMat3, DVec3};
 use luminaire::geometry::Surface;
 use luminaire::photometry::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, lm63};
-use luminaire::scene::{Luminaire, LuminaireModel, Meter, Shape, Transport};
+use luminaire::scene::{Luminaire, Meter, Shape, Transport};
 
 use super::{EFFICACY, box_faces, polygon};
-use crate::engines::radiance::settings::{Photometrist, Settings};
+use crate::engines::radiance::route::{Route, route};
+use crate::engines::radiance::settings::Settings;
 use crate::engines::{Job, SceneFile};
 
 /// A table that stops with light at its edge falls to zero within this angle; Radiance would extrapolate it.
@@ -23,37 +24,12 @@ const IES2RAD_EDGE_DEG: f64 = 0.01;
 const FACE_OFFSET: f64 = 1e-5;
 /// Radius of the sphere that stands for a point luminaire, in Radiance's units; 1e-6 and less are refused by Radiance.
 const POINT_RADIUS: f64 = 1e-3;
-const SMALLEST_RADIUS: f64 = 2e-6;
+const MIN_RADIUS: f64 = 2e-6;
 /// Diameter over length above which Radiance warns that its sampling of a cylinder is poor.
 const SLENDER: f64 = 0.4;
 
 /// Deviation of a square from the disc of its area, Lambertian, on axis, one diameter away.
 const DISC_AT_ONE_DIAMETER: f64 = 0.024;
-
-/// By which way a luminaire becomes a light source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::engines::radiance) enum Route {
-    /// A tiny sphere.
-    Point,
-    /// The luminous opening, with the table at full precision.
-    Opening,
-    /// ies2rad's surfaces, as light.
-    Ies2radLight,
-    /// ies2rad's surfaces, as an impostor (illum).
-    Ies2radIllum,
-}
-
-/// The way of a luminaire.
-pub(in crate::engines::radiance) fn route(luminaire: &Luminaire, settings: &Settings) -> Route {
-    match (luminaire.model, settings.photometrist) {
-        (LuminaireModel::Impostor, _) => Route::Ies2radIllum,
-        (_, Photometrist::Ies2rad) => Route::Ies2radLight,
-        (LuminaireModel::Area, Photometrist::Exporter) if luminaire.photometry.opening != LuminousOpening::Point => {
-            Route::Opening
-        }
-        (LuminaireModel::Area | LuminaireModel::Point, Photometrist::Exporter) => Route::Point,
-    }
-}
 
 /// Why a luminaire's opening cannot be said to Radiance, if it cannot.
 pub(in crate::engines::radiance) fn unsupported(luminaire: &Luminaire, settings: &Settings) -> Option<String> {
@@ -371,5 +347,5 @@ fn point_radius(job: &Job, luminaire: &Luminaire, scale: f64) -> f64 {
         Shape::Mesh { .. } => None,
     });
     let nearest = to_stations.chain(to_room).chain(to_boxes).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
-    POINT_RADIUS.min(0.01 * nearest * scale).max(SMALLEST_RADIUS)
+    POINT_RADIUS.min(0.01 * nearest * scale).max(MIN_RADIUS)
 }

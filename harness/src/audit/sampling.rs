@@ -4,19 +4,20 @@ use std::path::Path;
 
 use clap::ValueEnum;
 
-use crate::audit::run::Outcome;
-use crate::audit::sequential::{self, Ask, Sampler};
+use super::jobs::{Options, Outcome};
+use super::sequential::{self, Ask, Sampler};
 use crate::engines::Measurement;
 use crate::judge::Judge;
-use crate::measure::{Reader, Source};
+use crate::measure::{Question, Reader, Source};
 use crate::plan::{Plan, Planned, Run};
+use crate::procedures::Task;
 use crate::record::Recording;
 use crate::spec::Case;
 use crate::system::files::{self, FileError};
 
 /// When sampling stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum Sampling {
+pub enum Sampling {
     /// At the relative error of the spec's budget; beyond it only what is undecided
     #[default]
     Accurate,
@@ -46,10 +47,11 @@ pub(super) fn sample_on(
     case: &Case,
     plan: &Plan,
     judge: &Judge<'_>,
-    reader: &Reader,
+    options: &Options,
     outcome: &mut Outcome,
     told: &dyn Fn(&str),
 ) -> Result<(), FileError> {
+    let reader = options.reader();
     for run in &plan.runs {
         let (planned, task) = (&plan.engines[run.engine], &plan.tasks[run.task]);
         let engine = planned.engine.name();
@@ -62,7 +64,7 @@ pub(super) fn sample_on(
         let others =
             outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure && r.key.engine != engine.as_str());
         let others: Vec<&Recording> = others.collect();
-        let mut looks = Looks { planned, run, reader, told, from_cache: 0 };
+        let mut looks = Looks { planned, run, task, reader: &reader, told, from_cache: 0 };
         let before_s = subject.wall_s;
         sequential::refine(judge, task, &others, &mut subject, (run.job.budget, case.budget), &mut looks);
         if run.job.budget != case.budget {
@@ -75,7 +77,7 @@ pub(super) fn sample_on(
         outcome.recordings[mine] = subject;
         let of_engine: Vec<&Recording> =
             outcome.recordings.iter().filter(|r| r.key.engine == engine.as_str()).collect();
-        keep(&reader.out, engine.as_str(), &of_engine)?;
+        keep(&options.out, engine.as_str(), &of_engine)?;
     }
     Ok(())
 }
@@ -88,6 +90,7 @@ fn keep(out: &Path, engine: &str, recordings: &[&Recording]) -> Result<(), FileE
 struct Looks<'a> {
     planned: &'a Planned,
     run: &'a Run,
+    task: &'a Task,
     reader: &'a Reader,
     told: &'a dyn Fn(&str),
     from_cache: usize,
@@ -95,26 +98,27 @@ struct Looks<'a> {
 
 impl Sampler for Looks<'_> {
     fn sample(&mut self, ask: &Ask) -> Result<(Measurement, f64), String> {
-        let Run { job, .. } = self.run;
+        let (Run { job, .. }, task) = (self.run, self.task);
         (self.told)(&format!(
             "{}: {} of {} meters of {} are undecided: look {}, {:.0} s at most",
             self.planned.engine.name(),
             ask.targets.len(),
-            job.stations.len(),
+            task.targets.len(),
             job.procedure,
             ask.look,
             ask.budget.seconds
         ));
         let further = crate::engines::Job {
-            stations: ask.targets.iter().map(|k| job.stations[*k].clone()).collect(),
+            stations: ask.targets.iter().flat_map(|k| job.stations[task.stations_of(*k)].to_vec()).collect(),
             budget: ask.budget,
             seed: seed_of_look(job.seed, ask.look),
             ..job.clone()
         };
         let place = format!("{}/look-{}", job.procedure, ask.look);
-        let taken = self.reader.read(self.planned, &further, &place).map_err(|e| e.to_string())?;
+        let instrument = self.planned.instrument().ok_or("the engine is not there")?;
+        let taken = self.reader.read(&Question::new(&instrument, &further, &place)).map_err(|e| e.to_string())?;
         self.from_cache += usize::from(taken.source == Source::Cache);
-        Ok((taken.measurement, taken.wall_s))
+        Ok((taken.measurement, taken.cost.wall_s))
     }
 }
 

@@ -13,26 +13,29 @@ const LOST: f64 = 0.5;
 
 /// What a comparison found, relative.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Compared {
+pub(super) struct Compared {
     /// The largest deviation beyond noise.
-    pub(crate) beyond: f64,
+    pub(super) beyond: f64,
     /// The largest noise: what could not have been seen.
-    pub(crate) noise: f64,
+    pub(super) noise: f64,
     /// Whether most of the light was gone somewhere.
-    pub(crate) is_lost: bool,
+    pub(super) is_lost: bool,
     /// Whether neither side is random.
-    pub(crate) is_exact: bool,
+    pub(super) is_exact: bool,
 }
 
 /// At each station the sum of two readings.
-pub(crate) fn add(sum: &mut [Estimate], part: &[Estimate]) {
-    for (sum, part) in sum.iter_mut().zip(part) {
-        *sum = sum.plus(part);
-    }
+pub(super) fn sum(a: &[Estimate], b: &[Estimate]) -> Vec<Estimate> {
+    a.iter().zip(b).map(|(a, b)| a.plus(b)).collect()
+}
+
+/// What an error at a station of that value counts against, in lx.
+pub(super) fn scale(value_lx: f64, brightest_lx: f64) -> f64 {
+    value_lx.max(FAINT * brightest_lx).max(f64::MIN_POSITIVE)
 }
 
 /// Compares station by station; `brightest_lx` is the scale where all that is right is dark.
-pub(crate) fn compare(read: &[Estimate], right: &[Estimate], brightest_lx: f64) -> Compared {
+pub(super) fn compare(read: &[Estimate], right: &[Estimate], brightest_lx: f64) -> Compared {
     let brightest = right.iter().map(|r| r.value).fold(0.0, f64::max);
     let least = if brightest > 0.0 { FAINT * brightest } else { brightest_lx.max(f64::MIN_POSITIVE) };
     let mut found = Compared { beyond: 0.0, noise: 0.0, is_lost: false, is_exact: true };

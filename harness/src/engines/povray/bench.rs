@@ -1,13 +1,16 @@
 //! Runs POV-Ray: direct light in a few looks of rising magnification, reflected light in blocks until the budget is met.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::thread;
 use std::time::Instant;
 
 use luminaire::scene::{Bounces, Transport};
 
+use crate::engines::blocks::{MIN_BLOCKS, Sampling};
 use crate::engines::image::read_rgb;
+use crate::engines::settings::Preset;
 use crate::engines::{EngineError, Job, Measurement, SceneFile, Site, Workbench};
 use crate::record::{Estimate, Uncertainty};
 use crate::system::process::Invocation;
@@ -16,14 +19,12 @@ use super::ID;
 use super::export::{self, Light};
 use super::frame::Frame;
 use super::pixels::{self, Readout, Seen};
-use super::settings::{FIRST_REFLECTION_RAYS, LONG_POOL, POOL, Preset, Settings};
+use super::settings::{FIRST_REFLECTION_RAYS, LONG_POOL, POOL, Settings};
 
-/// Independent blocks of radiosity at least.
-const FEWEST_BLOCKS: usize = 8;
 /// Rays a sample at least, where the budget is short.
-const FEWEST_RAYS: f64 = 25.0;
+const MIN_RAYS: f64 = 25.0;
 /// Looks at direct light at most: each narrows a reading by 1e3 at least.
-const MOST_LOOKS: usize = 10;
+const MAX_LOOKS: usize = 10;
 /// Below this share of its upper bound a reading is darkness.
 const DARK: f64 = 1e-12;
 
@@ -42,11 +43,10 @@ pub(super) fn program(site: &Site) -> Result<PathBuf, EngineError> {
 
 /// An invocation that finds the libraries of an unpacked Debian package.
 pub(super) fn hermetic(invocation: Invocation, site: &Site) -> Invocation {
-    if !invocation.program.starts_with(site.debian()) {
-        return invocation;
+    match site.library_path().filter(|_| invocation.program.starts_with(site.debian())) {
+        Some(path) => invocation.env("LD_LIBRARY_PATH", path),
+        None => invocation,
     }
-    let triple = format!("usr/lib/{}-linux-gnu", std::env::consts::ARCH);
-    invocation.env("LD_LIBRARY_PATH", site.debian().join(triple).into_os_string())
 }
 
 /// One run's choices.
@@ -95,9 +95,12 @@ impl<'a> Bench<'a> {
         let mut looks: Vec<Look> = first.iter().map(|r| Look::Again(*r)).collect();
         let mut taken = 0;
         while let Some(k) = looks.iter().position(|l| matches!(l, Look::Again(_))) {
-            if taken == MOST_LOOKS {
+            if taken == MAX_LOOKS {
                 let id = &self.job.stations[k].id;
-                return Err(output(format!("direct light at {id} was not read after {MOST_LOOKS} looks")));
+                return Err(EngineError::output(
+                    ID,
+                    format!("direct light at {id} was not read after {MAX_LOOKS} looks"),
+                ));
             }
             taken += 1;
             let readouts: Vec<Readout> = looks.iter().map(Look::readout).collect();
@@ -120,57 +123,47 @@ impl<'a> Bench<'a> {
         }
         let mut settings = self.common_settings(run);
         settings.insert("looks".into(), taken.to_string());
-        Ok(Measurement { estimates, settings, notes: vec![] })
+        Ok(Measurement { estimates, settings, ..Measurement::default() })
     }
 
     /// Reflected light: blocks of turned scenes.
     pub(super) fn indirect(&self) -> Result<Measurement, EngineError> {
-        let start = Instant::now();
+        let started = Instant::now();
         let budget = self.job.budget;
         let count = self.settings.count;
         let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, reflections: Reflections::All };
         let pilot = self.pilot(run)?;
         let jobs = self.workbench.jobs.max(1);
         let mut notes = vec![];
-        let left_s = budget.seconds - start.elapsed().as_secs_f64();
-        let waves = FEWEST_BLOCKS.div_ceil(jobs) as f64;
+        let left_s = budget.seconds - started.elapsed().as_secs_f64();
+        let waves = MIN_BLOCKS.div_ceil(jobs) as f64;
         // Time grows a little faster than rays; the runs of the first reflection add about a third.
         let share = (0.65 * left_s / (waves * pilot.wall_s)).max(1e-3).powf(0.8);
         if share < 1.0 && self.settings.preset == Preset::Audit {
-            run.count = (f64::from(run.count) * share).max(FEWEST_RAYS) as u32;
+            run.count = (f64::from(run.count) * share).max(MIN_RAYS) as u32;
             notes.push(format!("{} rays a sample instead of {}: the budget is short", run.count, self.settings.count));
         }
         self.keep_readouts(&pilot.readouts)?;
-        let mut blocks: Vec<Vec<f64>> = vec![];
-        let mut wave_s = pilot.wall_s;
-        loop {
-            let wave = Instant::now();
-            let first = blocks.len() + 1;
-            blocks.extend(self.wave(run, first, jobs, &pilot)?);
-            wave_s = wave_s.max(wave.elapsed().as_secs_f64());
-            let over = start.elapsed().as_secs_f64() + wave_s > budget.seconds;
-            if blocks.len() >= FEWEST_BLOCKS && (over || worst_error(&blocks) <= budget.relative_error) {
-                break;
-            }
-        }
-        let estimates = (0..self.job.stations.len()).map(|k| Estimate::of_samples(&of_station(&blocks, k)));
+        let rule = Sampling { side_by_side: jobs, ..Sampling::within(budget, started) };
+        let blocks = rule.run(|numbers| self.wave(run, numbers, jobs, &pilot))?;
+        notes.extend(rule.shortfall(&blocks));
         let mut settings = self.common_settings(run);
-        settings.insert("blocks".into(), blocks.len().to_string());
-        settings.insert("seeds".into(), format!("{}..={}", self.seed(1), self.seed(blocks.len())));
+        settings.insert("blocks".into(), blocks.count().to_string());
+        settings.insert("seeds".into(), format!("{}..={}", self.seed(1), self.seed(blocks.count())));
         settings.insert("count".into(), run.count.to_string());
         if self.settings.preset != Preset::Default {
             settings.insert("count_first_reflection".into(), (FIRST_REFLECTION_RAYS * run.count).to_string());
         }
         settings.insert("error_bound".into(), self.settings.error_bound.to_string());
         settings.insert("recursion_limit".into(), self.settings.recursion_limit.to_string());
-        Ok(Measurement { estimates: estimates.collect(), settings, notes })
+        Ok(Measurement { estimates: blocks.estimates(), settings, notes, samples: vec![blocks] })
     }
 
     /// A first block, which finds each meter's scale and how long a block takes.
     fn pilot(&self, run: Run) -> Result<Pilot, EngineError> {
         let mut readouts = export::first_readouts(self.job, Light::Indirect);
         let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();
-        for _ in 0..MOST_LOOKS {
+        for _ in 0..MAX_LOOKS {
             let start = Instant::now();
             let seen = self.look(run, &readouts)?;
             let wall_s = start.elapsed().as_secs_f64();
@@ -202,22 +195,27 @@ impl<'a> Bench<'a> {
                 return Ok(Pilot { readouts, wall_s });
             }
         }
-        Err(output(format!("reflected light was not read after {MOST_LOOKS} looks")))
+        Err(EngineError::output(ID, format!("reflected light was not read after {MAX_LOOKS} looks")))
     }
 
-    /// Several blocks side by side, each a process of one thread.
-    fn wave(&self, run: Run, first: usize, jobs: usize, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
-        thread::scope(|scope| {
-            let block = |k: usize| {
-                let run = Run { seed: self.seed(k), ..run };
-                scope.spawn(move || self.block(run, pilot))
-            };
-            let running: Vec<_> = (first..first + jobs).map(block).collect();
-            let join = |h: thread::ScopedJoinHandle<'_, Result<Vec<f64>, EngineError>>| {
-                h.join().unwrap_or_else(|_| Err(output("a block's thread panicked".to_owned())))
-            };
-            running.into_iter().map(join).collect::<Vec<_>>().into_iter().collect()
-        })
+    /// Blocks, `jobs` of them side by side, each a process of one thread.
+    fn wave(&self, run: Run, numbers: Range<usize>, jobs: usize, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
+        let mut blocks = vec![];
+        for first in numbers.clone().step_by(jobs) {
+            let results: Vec<_> = thread::scope(|scope| {
+                let block = |k: usize| {
+                    // The pilot is the first of the sequence of seeds.
+                    let run = Run { seed: self.seed(k + 1), ..run };
+                    scope.spawn(move || self.block(run, pilot))
+                };
+                let running: Vec<_> = (first..numbers.end.min(first + jobs)).map(block).collect();
+                running.into_iter().map(thread::ScopedJoinHandle::join).collect()
+            });
+            for result in results {
+                blocks.push(result.map_err(|_| EngineError::output(ID, "a block's thread panicked"))??);
+            }
+        }
+        Ok(blocks)
     }
 
     /// One block's reading of every meter.
@@ -250,7 +248,10 @@ impl<'a> Bench<'a> {
             Seen::Missed => Err(self.missed(k)),
             Seen::Above => {
                 let id = &self.job.stations[k].id;
-                Err(output(format!("block {} reads {id} hundreds of times off the first block", run.seed)))
+                Err(EngineError::output(
+                    ID,
+                    format!("block {} reads {id} hundreds of times off the first block", run.seed),
+                ))
             }
         };
         seen.into_iter().enumerate().map(value).collect()
@@ -262,7 +263,7 @@ impl<'a> Bench<'a> {
     }
 
     fn keep_readouts(&self, readouts: &[Readout]) -> Result<(), EngineError> {
-        let light = Frame::of(self.job, self.settings.recentre).light;
+        let light = Frame::of(self.job, self.settings.coordinates).light;
         self.workbench.write(&[SceneFile::text("readouts.inc", export::readouts(readouts, light))])
     }
 
@@ -276,11 +277,10 @@ impl<'a> Bench<'a> {
         std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
         let blanks = run.blanks();
         if pixels.len() != blanks + readouts.len() {
-            return Err(output(format!(
-                "gave {} pixels for {} meters and {blanks} blanks",
-                pixels.len(),
-                readouts.len()
-            )));
+            return Err(EngineError::output(
+                ID,
+                format!("gave {} pixels for {} meters and {blanks} blanks", pixels.len(), readouts.len()),
+            ));
         }
         Ok(readouts.iter().zip(pixels.into_iter().skip(blanks)).map(|(r, p)| pixels::decode(*r, p)).collect())
     }
@@ -313,7 +313,10 @@ impl<'a> Bench<'a> {
     }
 
     fn missed(&self, k: usize) -> EngineError {
-        output(format!("the disc of {} was not seen: something hides it from 2 mm away", self.job.stations[k].id))
+        EngineError::output(
+            ID,
+            format!("the disc of {} was not seen: something hides it from 2 mm away", self.job.stations[k].id),
+        )
     }
 }
 
@@ -359,21 +362,4 @@ fn scale_of(readout: Readout) -> f64 {
     match readout {
         Readout::Coarse(scale) | Readout::Fine(scale) => scale,
     }
-}
-
-fn of_station(blocks: &[Vec<f64>], k: usize) -> Vec<f64> {
-    blocks.iter().map(|b| b[k]).collect()
-}
-
-/// The largest relative standard error of any meter that sees light.
-fn worst_error(blocks: &[Vec<f64>]) -> f64 {
-    let relative = |k| {
-        let Estimate { value, uncertainty } = Estimate::of_samples(&of_station(blocks, k));
-        uncertainty.standard_error().filter(|_| value > 0.0).map_or(0.0, |error| error / value)
-    };
-    (0..blocks.first().map_or(0, Vec::len)).map(relative).fold(0.0, f64::max)
-}
-
-fn output(what: String) -> EngineError {
-    EngineError::Output { engine: ID, what }
 }

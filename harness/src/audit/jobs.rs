@@ -1,17 +1,17 @@
-//! Runs a plan: one workbench a job, readings kept on disk as each job finishes, one engine's failure stops no other.
+//! Runs a plan: one reading a job, readings kept on disk as each job finishes, one engine's failure stops no other.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::calibration::{Calibrated, Origin};
-use crate::engines::{Engine, EngineError, Measurement, Site};
-use crate::measure::cache::Cache;
-use crate::measure::{Machine, Reader, Source, Taken};
-use crate::plan::{Plan, Planned, Run, Scope, Skip};
+use super::observer::Observer;
+use crate::calibration::{Calibrated, Calibrations, Origin};
+use crate::engines::{EngineError, Measurement};
+use crate::measure::{Cost, Failure, FailureKind, Question, Reader, Source, Taken};
+use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
 use crate::procedures::Task;
-use crate::record::{EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Status};
+use crate::record::{EngineStatus, Reading, ReadingKey, Recording, Status};
 use crate::spec::Case;
 use crate::system::files::{self, FileError};
 use crate::system::slots::side_by_side;
@@ -19,25 +19,18 @@ use crate::system::slots::side_by_side;
 /// How to run.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Where engines are installed.
-    pub site: Site,
     /// The folder of the run's files.
     pub out: PathBuf,
-    /// How much runs at a time; cases that run side by side share one.
-    pub machine: Arc<Machine>,
-    /// Where readings are kept between runs; `None`: nowhere, and every reading is taken anew.
-    pub cache: Option<Cache>,
+    /// Who takes readings; cases that run side by side share its machine.
+    pub reader: Reader,
+    /// What cases share of their instruments.
+    pub calibrations: Arc<Calibrations>,
 }
 
 impl Options {
     /// Who takes the run's readings.
     pub fn reader(&self) -> Reader {
-        Reader {
-            site: self.site.clone(),
-            out: self.out.clone(),
-            cache: self.cache.clone(),
-            machine: Arc::clone(&self.machine),
-        }
+        Reader { out: Some(self.out.clone()), ..self.reader.clone() }
     }
 }
 
@@ -54,26 +47,16 @@ pub struct Outcome {
     pub from_cache: usize,
 }
 
-/// Told of every job as it starts and ends.
-pub trait Progress: Sync {
-    /// A job starts.
-    fn started(&self, engine: &str, procedure: &str);
-    /// An engine was calibrated just now: what that found and where it is kept.
-    fn calibrated(&self, _engine: &str, _found: &Calibrated) {}
-    /// A job ended, with its failure if it failed.
-    fn ended(&self, engine: &dyn Engine, procedure: ProcedureId, wall: Duration, failure: Option<&str>);
-}
-
 /// Runs every job of a plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
-pub fn run(case: &Case, plan: &Plan, options: &Options, progress: &dyn Progress) -> Result<Outcome, FileError> {
-    let threads = options.machine.slots.threads();
+pub fn run(case: &Case, plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Outcome, FileError> {
+    let threads = options.reader.machine.slots.threads();
     let reader = options.reader();
     let engines: Vec<usize> = (0..plan.engines.len()).collect();
-    let instruments = side_by_side(threads, &engines, |&e| instrument(plan, e, options, progress));
+    let instruments = side_by_side(threads, &engines, |&e| instrument(case, plan, e, options, observer));
     let shelf = Shelf { folder: options.out.join("readings"), recordings: Mutex::default() };
     let runs: Vec<(usize, &Run)> = plan.runs.iter().enumerate().collect();
     let one = |&(k, run): &(usize, &Run)| -> Result<Done, FileError> {
-        let done = measure(case, plan, run, &reader, &instruments[run.engine], progress);
+        let done = measure(case, plan, run, &reader, &instruments[run.engine], observer);
         if let Done::Recorded(recording, _) = &done {
             shelf.keep(k, recording)?;
         }
@@ -106,19 +89,19 @@ fn measure(
     run: &Run,
     reader: &Reader,
     instrument: &Result<Option<Calibrated>, String>,
-    progress: &dyn Progress,
+    observer: &dyn Observer,
 ) -> Done {
     let (planned, task) = (&plan.engines[run.engine], &plan.tasks[run.task]);
     let engine = planned.engine.name();
-    progress.started(engine.as_str(), task.procedure.name());
+    observer.started(case, planned.engine.as_ref(), task.procedure.name());
     let start = Instant::now();
     let taken = match instrument {
         Ok(_) => answer(planned, run, reader, task.procedure.name()),
         // An instrument that reads known scenes wrong reads nothing.
-        Err(reason) => Err(EngineError::Solver { engine: engine.clone(), what: reason.clone() }),
+        Err(reason) => Err(EngineError::Solver { engine: engine.clone(), what: reason.clone() }.into()),
     };
-    if let Err(EngineError::Declined { why, .. }) = &taken {
-        progress.ended(planned.engine.as_ref(), task.procedure, start.elapsed(), None);
+    if let Err(Failure { kind: FailureKind::Declined, text: why }) = &taken {
+        observer.ended(case, planned.engine.as_ref(), task.procedure, start.elapsed(), None);
         return Done::Declined(declined(case, planned, task, why));
     }
     let source = taken.as_ref().ok().map(|taken| taken.source);
@@ -131,24 +114,25 @@ fn measure(
         }
     }
     let wall = Duration::from_secs_f64(recording.wall_s);
-    progress.ended(planned.engine.as_ref(), task.procedure, wall, recording.failure.as_deref());
+    observer.ended(case, planned.engine.as_ref(), task.procedure, wall, recording.failure.as_deref());
     Done::Recorded(Box::new(recording), source)
 }
 
 /// What an engine answers to a run: it renders what the shortcut leaves, the rest follows, and the spot check must agree.
-fn answer(planned: &Planned, run: &Run, reader: &Reader, place: &str) -> Result<Taken, EngineError> {
+fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result<Taken, Failure> {
+    let failed = |what: String| Failure::from(EngineError::Solver { engine: planned.engine.name(), what });
+    let instrument = planned.instrument().ok_or_else(|| failed("it is not there".to_owned()))?;
     let shortcut = &run.shortcut;
     let rendered = if shortcut.job.stations.is_empty() {
-        Taken { measurement: Measurement::default(), wall_s: 0.0, source: Source::Nobody }
+        Taken { measurement: Measurement::default(), cost: Cost::default(), source: Source::Nobody }
     } else {
-        reader.read(planned, &shortcut.job, place)?
+        reader.read(&Question::new(&instrument, &shortcut.job, folder))?
     };
     let mut taken = Taken { measurement: shortcut.complete(rendered.measurement, &run.job), ..rendered };
     if let Some(job) = run.spot_check_job() {
-        let seen = reader.read(planned, &job, &format!("{place}-spot-check"))?;
-        let failed = |what| EngineError::Solver { engine: planned.engine.name(), what };
+        let seen = reader.read(&Question::new(&instrument, &job, &format!("{folder}-spot-check")))?;
         run.hold(&taken.measurement, &seen.measurement).map_err(failed)?;
-        taken.wall_s += seen.wall_s;
+        taken.cost.wall_s += seen.cost.wall_s;
         // What was rendered stands.
         for (&station, estimate) in run.spot_check.iter().zip(seen.measurement.estimates) {
             taken.measurement.estimates[station] = estimate;
@@ -200,22 +184,27 @@ pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcom
 
 /// The calibration of an engine of the plan; `None` where it has nothing to do or is one of our own solvers, which are what
 /// the others are calibrated by.
-fn instrument(plan: &Plan, e: usize, options: &Options, progress: &dyn Progress) -> Result<Option<Calibrated>, String> {
+fn instrument(
+    case: &Case,
+    plan: &Plan,
+    e: usize,
+    options: &Options,
+    observer: &dyn Observer,
+) -> Result<Option<Calibrated>, String> {
     let planned = &plan.engines[e];
-    let id = planned.engine.name();
-    let (Some(Ok(version)), Some(run)) = (&planned.found, plan.runs.iter().find(|r| r.engine == e)) else {
+    let (Some(instrument), Some(run)) = (planned.instrument(), plan.runs.iter().find(|r| r.engine == e)) else {
         return Ok(None);
     };
     if planned.engine.is_witness() {
         return Ok(None);
     }
-    progress.started(id.as_str(), "calibration");
+    observer.started(case, planned.engine.as_ref(), "calibration");
     let made = |calibrated: &Calibrated| {
         if calibrated.origin == Origin::Measured {
-            progress.calibrated(id.as_str(), calibrated);
+            observer.calibrated(planned.engine.as_ref(), calibrated);
         }
     };
-    options.machine.calibration(planned.engine.as_ref(), version, &run.job, &options.site, made).map(Some)
+    options.calibrations.of(&instrument, &run.job, &options.reader, made).map(Some)
 }
 
 fn declined(case: &Case, planned: &Planned, task: &Task, why: &str) -> Skip {
@@ -232,22 +221,23 @@ fn record(
     planned: &Planned,
     run: &Run,
     task: &Task,
-    taken: Result<Taken, EngineError>,
+    taken: Result<Taken, Failure>,
     wall: Duration,
 ) -> Recording {
     let engine = planned.engine.name();
     let (measurement, wall_s, failure) = match taken {
-        Ok(taken) => (taken.measurement, taken.wall_s, None),
+        Ok(taken) => (taken.measurement, taken.cost.wall_s, None),
         Err(error) => {
             tracing::error!(%engine, procedure = %task.procedure, "{error}");
             (Measurement::default(), wall.as_secs_f64(), Some(error.to_string()))
         }
     };
-    let readings = measurement.estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
+    let estimates = if failure.is_none() { task.readings(&measurement.estimates) } else { vec![] };
+    let readings = estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
         meter: target.id.clone(),
         quantity: task.quantity,
-        value: estimate.value * target.per_lux,
-        uncertainty: estimate.uncertainty.times(target.per_lux),
+        value: estimate.value,
+        uncertainty: estimate.uncertainty,
     });
     Recording {
         version: planned.version().unwrap_or_default(),
@@ -277,5 +267,7 @@ fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
         Some(Ok(_)) if mine.is_empty() => (Status::Skipped, Some("it declined all that was asked".to_owned())),
         Some(Ok(_)) => (Status::Ran, None),
     };
-    EngineStatus { id, version: planned.version(), status, reason, wall_s: mine.iter().map(|r| r.wall_s).sum() }
+    let wall_s = mine.iter().map(|r| r.wall_s).sum();
+    let is_required = planned.asked == Asked::ByName;
+    EngineStatus { id, version: planned.version(), status, is_required, reason, wall_s }
 }

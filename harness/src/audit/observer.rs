@@ -1,0 +1,36 @@
+//! Who is told of what happens in an audit.
+
+use std::time::Duration;
+
+use crate::calibration::Calibrated;
+use crate::engines::Engine;
+use crate::plan::Plan;
+use crate::record::ProcedureId;
+use crate::spec::Case;
+
+/// Told of what happens in an audit; nothing is asked of it.
+pub trait Observer: Sync {
+    /// All cases are planned; their plans lie beside them.
+    fn planned(&self, _cases: &[Case], _plans: &[Plan]) {}
+    /// A job starts.
+    fn started(&self, _case: &Case, _engine: &dyn Engine, _what: &str) {}
+    /// An engine was calibrated just now: what that found and where it is kept.
+    fn calibrated(&self, _engine: &dyn Engine, _found: &Calibrated) {}
+    /// A job ended, with its failure if it failed.
+    fn ended(
+        &self,
+        _case: &Case,
+        _engine: &dyn Engine,
+        _procedure: ProcedureId,
+        _wall: Duration,
+        _failure: Option<&str>,
+    ) {
+    }
+    /// Something that a person who watches wants to know.
+    fn remarked(&self, _case: &Case, _text: &str) {}
+}
+
+/// Whom nobody needs to tell.
+pub struct Silent;
+
+impl Observer for Silent {}

@@ -1,0 +1,91 @@
+//! `luxproof run`: an audit of the specs, folders and patterns given, held against a baseline where one is named, and printed.
+
+use std::path::{Path, PathBuf};
+
+use miette::{IntoDiagnostic, Report as Diagnostic};
+
+use super::RunArgs;
+use super::diagnostic::diagnose;
+use super::engines::report_installation;
+use super::progress::Progress;
+use super::views::print_reports;
+use crate::audit::{self, AfterFailure, AuditError, Options};
+use crate::engines::{self, Site};
+use crate::judge::Policy;
+use crate::measure::cache::Cache;
+use crate::report::{BaselineCheck, Exit, Report};
+use crate::system::files;
+use crate::system::process;
+use crate::trend::baseline::{self, Baseline, Comparability, Entry};
+
+/// Audits, judges and prints.
+pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Diagnostic> {
+    let progress = Progress::new();
+    let options = Options {
+        cache: Some(cache.clone()).filter(|_| !args.no_cache),
+        jobs: args.jobs.unwrap_or_else(process::cores),
+        selection: args.selected.selection(),
+        filter: args.selected.filter.clone(),
+        skipping: args.selected.skipping(),
+        sampling: args.sampling,
+        after_failure: if args.fail_fast { AfterFailure::Stop } else { AfterFailure::GoOn },
+        observer: &progress,
+        ..Options::new(site.clone(), out_folder(args))
+    };
+    if args.install {
+        // Every spec is read and checked before anything is fetched.
+        audit::chosen(&args.specs, &options).map_err(diagnose)?;
+        let is_wanted =
+            |name: &str| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| w == name);
+        let wanted: Vec<_> = engines::all().iter().map(|e| e.name()).filter(|name| is_wanted(name)).collect();
+        report_installation(site, &wanted);
+    }
+    let report = audit::run(&args.specs, &Policy::built_in().into_diagnostic()?, &options);
+    let mut report = report.map_err(|error| match error {
+        AuditError::Spec(error) => diagnose(error),
+        other => Diagnostic::from_err(other),
+    })?;
+    let root = options.out.clone();
+    drop(progress);
+    if let Some(path) = &args.baseline {
+        let check = hold_against_baseline(&report, path, &root)?;
+        report.baseline = Some(check);
+        files::keep_json(&root.join("report.json"), &report).into_diagnostic()?;
+    }
+    let exit = report.exit();
+    print_reports(&[(report, root)], &args.views)?;
+    Ok(exit)
+}
+
+/// Holds a run against its baseline; what does not match it fails and is left as a candidate in the run's folder.
+fn hold_against_baseline(report: &Report, path: &Path, root: &Path) -> Result<BaselineCheck, Diagnostic> {
+    let place = Baseline::place(path, report);
+    let kept = if place.exists() { Baseline::read(&place).into_diagnostic()?.entries } else { vec![] };
+    let candidate = Baseline::candidate(report);
+    // What was not asked of this run is not missed in it.
+    let skipped = report.skips.iter().map(|s| &s.key);
+    let asked: Vec<_> = candidate.entries.iter().map(|e| &e.key).chain(skipped).collect();
+    let kept: Vec<Entry> = kept.into_iter().filter(|e| asked.contains(&&e.key)).collect();
+    let changes = baseline::compare(&kept, &candidate.entries, Comparability::SameInstrument);
+    files::keep_json(&root.join("baseline-changes.json"), &changes).into_diagnostic()?;
+    let check = super::diff::check(&changes, &place);
+    if !check.is_as_accepted() {
+        let file = root.join("baseline-candidate.json");
+        candidate.write(&file).into_diagnostic()?;
+        let accept = format!("luxproof accept {} --baseline {}", root.display(), path.display());
+        eprintln!("baseline: left as a candidate: {}; to review it: {accept}", file.display());
+    }
+    Ok(check)
+}
+
+/// The folder of the run: by default that of the one spec or folder, or one for all where there are several.
+fn out_folder(args: &RunArgs) -> PathBuf {
+    let of_one = |path: &PathBuf| path.file_stem().map(|stem| Path::new("luxproof-out").join(stem));
+    match (&args.out, &args.specs[..]) {
+        (Some(folder), _) => folder.clone(),
+        (None, [one]) if !one.display().to_string().contains('*') => {
+            of_one(one).unwrap_or_else(|| "luxproof-out/suite".into())
+        }
+        _ => "luxproof-out/suite".into(),
+    }
+}

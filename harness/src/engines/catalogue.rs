@@ -1,0 +1,36 @@
+//! The engines that everybody has, one line each.
+
+use super::contract::{Engine, Entry};
+use super::{iesna, mitsuba, povray, radiance, simulator};
+
+/// In the order of reports: our own witnesses first.
+pub const ALL: [&Entry; 5] = [&simulator::ENTRY, &iesna::ENTRY, &mitsuba::ENTRY, &radiance::ENTRY, &povray::ENTRY];
+
+pub fn all() -> Vec<Box<dyn Engine>> {
+    ALL.iter().map(|entry| (entry.make)()).collect()
+}
+
+pub fn entry(name: &str) -> Option<&'static Entry> {
+    ALL.into_iter().find(|entry| entry.name == *name)
+}
+
+/// An engine as its makers write it; one of the user's by its name.
+pub fn display_name(name: &str) -> &str {
+    entry(name).map_or(name, |entry| entry.display_name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_are_what_their_engines_say_of_themselves() {
+        for entry in ALL {
+            let engine = (entry.make)();
+            assert_eq!(engine.name(), entry.name);
+            let is_setting = |key: &&str| engine.knobs().iter().any(|k| k.key == *key);
+            assert!(entry.fits_coordinates.as_ref().is_none_or(is_setting), "{}", entry.name);
+        }
+        assert_eq!((display_name("povray"), display_name("mine")), ("POV-Ray", "mine"));
+    }
+}

@@ -1,0 +1,319 @@
+//! The contract between the program and an engine: what an engine is asked, what it gives, and what is known of it.
+
+use std::collections::BTreeMap;
+
+use luminaire::geometry::Surface;
+use luminaire::scene::{LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
+use serde::{Deserialize, Serialize};
+
+use super::Site;
+use super::blocks::Blocks;
+use super::workbench::{EngineError, SceneFile, Workbench};
+use crate::procedures::Task;
+use crate::record::{EngineName, Estimate, MeterId, ProcedureId, Role, Uncertainty};
+use crate::spec::{Budget, Case};
+use crate::system::slots::{Share, Slots};
+
+/// The component of every engine that gets its candela table from our own reader of photometric files.
+pub const FILE_READER: &str = "luxproof's reader of photometric files";
+
+/// The component of our own solvers, which look intensities up alike.
+pub(super) const OWN_LOOKUP: &str = "luminaire's interpolation of candela tables";
+
+/// Something that reads illuminance at meters of a scene.
+pub trait Engine: Send + Sync {
+    fn name(&self) -> EngineName;
+
+    /// What it takes part for.
+    fn role(&self) -> Role {
+        Role::Renderer
+    }
+
+    /// Whether others are judged by it.
+    fn is_witness(&self) -> bool {
+        self.role() == Role::Witness
+    }
+
+    /// Whether it can run here, and its version.
+    fn probe(&self, site: &Site) -> Result<Version, Absent>;
+
+    /// Whether it can do this job, exactly or nearly; decided from the job alone, before anything starts.
+    fn supports(&self, job: &Job) -> Support;
+
+    /// What it shares with other engines, by name: what one error would put off for all who have it. Witnesses that share a
+    /// component count once; their own code need not be named.
+    fn components(&self, _job: &Job) -> Vec<&'static str> {
+        vec![FILE_READER]
+    }
+
+    /// The job as native files, runnable by hand; pure. Our own solvers have none.
+    fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
+        Ok(vec![])
+    }
+
+    /// The command that runs an exported scene, as a person would type it in the scene's folder; it names the engine that is
+    /// installed at the site, or else relies on one on PATH.
+    fn command_by_hand(&self, _job: &Job, _site: &Site) -> Option<String> {
+        None
+    }
+
+    /// The settings whose effect on time and result is worth knowing, with values to try; `preset` first where there is one.
+    fn knobs(&self) -> &'static [Knob] {
+        &[]
+    }
+
+    /// Memory that a job takes on so many threads or processes, in MiB; an estimate on the safe side, of which as much runs side
+    /// by side as there is room for. Twice what case S2 took and more, a process each.
+    fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
+        threads as u64 * (256 + geometry_mib(job))
+    }
+
+    /// The job without what makes no difference to this engine's readings: two jobs that are equal then are one to it. For
+    /// most, the names of case and procedure are comments.
+    fn essence(&self, job: &Job) -> Job {
+        Job { case: String::new(), ..job.clone() }
+    }
+
+    /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
+    fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError>;
+}
+
+/// What is known of an engine of our own before it is asked anything; [`super::catalogue`] lists them.
+pub struct Entry {
+    pub name: EngineName,
+    /// As its makers write it.
+    pub display_name: &'static str,
+    /// Of its mark in plots: on paper and on black.
+    pub colour: (&'static str, &'static str),
+    /// What `luxproof engines install` fetches for it.
+    pub installs: &'static [Component],
+    /// The models of luminaires that it has a source for.
+    pub models: &'static [LuminaireModel],
+    /// The setting that, `false`, leaves it the coordinates of the spec, where it would get handier ones.
+    pub fits_coordinates: Option<&'static str>,
+    pub make: fn() -> Box<dyn Engine>,
+}
+
+/// A part of the installation, which engines may share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Component {
+    /// Mitsuba, Radiance and what reads POV-Ray's images, as `engines.lock` pins them.
+    PythonPackages,
+    PovRay,
+    LibLlvm,
+}
+
+impl Entry {
+    /// Why it cannot be given the luminaires of a job, if it cannot.
+    pub fn objection(&self, job: &Job) -> Option<String> {
+        let other = job.scene.luminaires.iter().find(|l| !self.models.contains(&l.model))?;
+        let known = self.models.iter().map(|m| format!("`{}`", m.name())).collect::<Vec<_>>().join(" or ");
+        let (name, model) = (self.display_name, other.model.name());
+        Some(format!("{}: {name} has no source of the model `{model}`; use {known}", other.id))
+    }
+}
+
+/// A setting of an engine with values worth trying.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Knob {
+    /// Its key in a spec.
+    pub key: &'static str,
+    /// Values as YAML flow scalars, the default first.
+    pub values: &'static [&'static str],
+}
+
+/// What of the machine an engine is given for a job: one thread for what is determined or quick, many for reflected light, whose
+/// readings are as good as the seconds of the budget allow.
+pub fn share(engine: &dyn Engine, job: &Job, slots: &Slots) -> Share {
+    let threads = if job.transport == Transport::Direct { 1 } else { slots.threads_a_reading() };
+    Share { threads, memory_mib: engine.memory_mib(job, threads) }
+}
+
+/// What meshes take in a renderer, about 1 KiB a triangle with its hierarchy, and meters in their read-out.
+pub(super) fn geometry_mib(job: &Job) -> u64 {
+    let triangles = |o: &Obstacle| match &o.shape {
+        Shape::Box { .. } => 12,
+        Shape::Mesh { triangles, .. } => triangles.len(),
+    };
+    let triangles: usize = job.scene.obstacles.iter().map(triangles).sum();
+    ((triangles + job.stations.len()) / 1024) as u64
+}
+
+/// One procedure of one case, as an engine is asked for it.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// The case, for comments in exported scenes.
+    pub case: String,
+    pub procedure: ProcedureId,
+    /// Room, obstacles and the luminaires that are on. No room means free field.
+    pub scene: Scene,
+    /// Where illuminance is read.
+    pub stations: Vec<Station>,
+    /// Which light counts.
+    pub transport: Transport,
+    /// When to stop.
+    pub budget: Budget,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// The engine's own settings from the spec, e.g. `variant: llvm_ad_mono`.
+    pub settings: BTreeMap<String, serde_json::Value>,
+}
+
+impl Job {
+    /// What an engine without settings is asked for a task of a case.
+    pub fn of_task(case: &Case, task: &Task) -> Self {
+        let station = |(id, meter)| Station { id, meter, expected_lx: None };
+        Self {
+            case: case.name.clone(),
+            procedure: task.procedure,
+            scene: task.scene.clone(),
+            stations: task.stations().map(station).collect(),
+            transport: task.transport,
+            budget: case.budget,
+            seed: 1,
+            settings: BTreeMap::new(),
+        }
+    }
+}
+
+impl Job {
+    /// Of all surfaces of room and bodies.
+    pub(super) fn largest_reflectance(&self) -> f64 {
+        let room = self.scene.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
+        room.chain(self.scene.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
+    }
+}
+
+/// A meter with its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Station {
+    pub id: MeterId,
+    /// Where it is and which way it looks.
+    pub meter: Meter,
+    /// What it is expected to read at most, in lux, if known: lets engines choose a read-out scale. Never copied to a result.
+    pub expected_lx: Option<f64>,
+}
+
+/// An engine's version, as it names itself.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Version(pub String);
+
+/// Why an engine is not there, and how to get it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{reason}; {remedy}")]
+pub struct Absent {
+    pub reason: String,
+    pub remedy: String,
+}
+
+/// Whether an engine can do a job.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Support {
+    /// To its full accuracy.
+    Yes,
+    /// With a known approximation.
+    Approximate {
+        /// What is approximated.
+        why: String,
+        /// Its size, relative.
+        size: Option<f64>,
+    },
+    No(String),
+}
+
+/// What an engine gives for a job.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Measurement {
+    /// Illuminance in lux, one a station, in the stations' order.
+    pub estimates: Vec<Estimate>,
+    /// What was set, for whoever repeats it: samples, seeds, arguments, variant.
+    pub settings: BTreeMap<String, String>,
+    /// What the reader of the report should know of this run.
+    pub notes: Vec<String>,
+    /// The independent parts of the readings that were sampled, in the stations' order: their spread is the estimates'
+    /// standard error. Empty where nothing was sampled or nobody says.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub samples: Vec<Blocks>,
+}
+
+impl Measurement {
+    /// The weighted sum of stations' estimates, with the standard error that their joint sampling gives it; where the samples
+    /// are not known, the errors of stations may be all one.
+    pub fn weighted(&self, weights: &[(usize, f64)]) -> Estimate {
+        let terms = || weights.iter().map(|&(k, weight)| (weight, self.estimates[k]));
+        let apart = Uncertainty::of_dependent_sum(terms().map(|(weight, e)| (weight, e.uncertainty)));
+        let sampled = !self.samples.is_empty() && self.samples.iter().all(|part| part.count() > 1);
+        let uncertainty = match apart {
+            Uncertainty::StandardError { bound, .. } if sampled => {
+                let parts = self.samples.iter().map(|part| (1.0, part.weighted(weights).uncertainty));
+                Uncertainty::of_sum(parts).within(bound)
+            }
+            apart => apart,
+        };
+        Estimate { value: terms().map(|(weight, e)| weight * e.value).sum(), uncertainty }
+    }
+}
+
+/// Checks what every engine must hold: one finite, non-negative value a station.
+pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
+    let (found, wanted) = (measurement.estimates.len(), job.stations.len());
+    if found != wanted {
+        return Err(EngineError::Output {
+            engine: engine.clone(),
+            what: format!("gave {found} readings for {wanted} meters"),
+        });
+    }
+    for (estimate, station) in measurement.estimates.iter().zip(&job.stations) {
+        let Estimate { value, uncertainty } = *estimate;
+        let (engine, meter) = (engine.clone(), station.id.clone());
+        if !value.is_finite() || !uncertainty.is_finite() {
+            return Err(EngineError::NotFinite { engine, meter, value, uncertainty });
+        }
+        if value < 0.0 || !uncertainty.is_sound() {
+            let what = format!("read {value} lx ({uncertainty:?}) at {meter}");
+            return Err(EngineError::Output { engine, what });
+        }
+    }
+    Ok(measurement)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    const ENGINE: EngineName = EngineName::new("test");
+
+    fn job(stations: usize) -> Job {
+        let meter = Meter { position_m: DVec3::ONE, normal: DVec3::Z };
+        let station = |k| Station { id: MeterId::new("m", k), meter, expected_lx: None };
+        Job {
+            case: "case".into(),
+            procedure: ProcedureId::DirectIlluminance,
+            scene: Scene::default(),
+            stations: (0..stations).map(station).collect(),
+            transport: Transport::Direct,
+            budget: Budget::default(),
+            seed: 1,
+            settings: BTreeMap::new(),
+        }
+    }
+
+    fn measurement(values: &[f64]) -> Measurement {
+        let estimate = |&value| Estimate { value, uncertainty: Uncertainty::sampled(0.0, None) };
+        Measurement { estimates: values.iter().map(estimate).collect(), ..Measurement::default() }
+    }
+
+    #[test]
+    fn missing_rows_nan_infinity_and_negative_readings_are_errors() {
+        assert!(checked(&ENGINE, &job(2), measurement(&[1.0, 0.0])).is_ok());
+        for bad in [&[1.0][..], &[1.0, f64::NAN], &[1.0, f64::INFINITY], &[-1e-9, 1.0], &[1.0, 1.0, 1.0]] {
+            assert!(checked(&ENGINE, &job(2), measurement(bad)).is_err(), "{bad:?}");
+        }
+        let mut odd = measurement(&[1.0]);
+        odd.estimates[0].uncertainty = Uncertainty::sampled(f64::NAN, None);
+        assert!(checked(&ENGINE, &job(1), odd).is_err());
+    }
+}

@@ -1,0 +1,193 @@
+//! Talks with the driver in Mitsuba's interpreter: how large a block is, which blocks, and what their readings are.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use super::ID;
+use super::precision::float_error_lx;
+use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
+use crate::engines::blocks::{Blocks, Sampling};
+use crate::engines::settings::Preset;
+use crate::engines::{EngineError, Job, Measurement};
+use crate::record::{Estimate, Uncertainty};
+use crate::system::process::Conversation;
+
+/// For a standard error that is itself good to 13 %.
+const ENOUGH_BLOCKS: usize = 32;
+/// Strata along a side at least, so that blocks are many strata and their errors near normal; at most, to check often.
+const MIN_SIDE: usize = 64;
+const MAX_SIDE: usize = 256;
+/// The same of the trial where no kernels are compiled and a path costs much.
+const SCALAR_TRIAL_SIDE: usize = 2;
+/// The spread of two blocks is a rough guess of the error of one.
+const PLAN_MARGIN: f64 = 2.0;
+
+/// What the driver says first.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Greeting {
+    versions: BTreeMap<String, String>,
+    variant: String,
+    /// Rays in flight at most.
+    lanes: usize,
+    stations: Vec<String>,
+    parts: Vec<Part>,
+}
+
+/// A part of the light that adds to the readings, independently of the others.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Part {
+    name: String,
+    /// Rays of a block of one sample: meters, times emitters where each is sampled.
+    rays: usize,
+    sampled: bool,
+}
+
+#[derive(Serialize)]
+struct Request<'a> {
+    part: &'a str,
+    side: usize,
+    seeds: Vec<Option<[u64; 3]>>,
+}
+
+/// Which of the independent sequences of a job's random numbers.
+#[derive(Clone, Copy)]
+enum Stream {
+    Reflected = 0,
+    Direct = 1,
+    Trial = 2,
+}
+
+/// One job's conversation.
+pub(super) struct Driver<'a> {
+    job: &'a Job,
+    settings: &'a Settings,
+    conversation: Conversation,
+    started: Instant,
+}
+
+impl<'a> Driver<'a> {
+    /// `started` is when the seconds of the budget began.
+    pub(super) fn new(job: &'a Job, settings: &'a Settings, conversation: Conversation, started: Instant) -> Self {
+        Self { job, settings, conversation, started }
+    }
+
+    pub(super) fn measurement(mut self) -> Result<Measurement, EngineError> {
+        let greeting: Greeting = parse(&self.conversation.listen()?)?;
+        self.check_stations(&greeting.stations)?;
+        let mut found =
+            Measurement { estimates: vec![Estimate::DARK; self.job.stations.len()], ..Measurement::default() };
+        let versions = greeting.versions.iter().map(|(k, v)| (format!("version_{k}"), v.clone()));
+        found.settings =
+            [("seed".into(), self.job.seed.to_string()), ("variant".into(), greeting.variant.clone())].into();
+        found.settings.extend(versions);
+        for part in &greeting.parts {
+            let of_part =
+                if part.sampled { self.sampled(part, &greeting, &mut found)? } else { self.determined(part)? };
+            found.estimates.iter_mut().zip(of_part).for_each(|(sum, part)| *sum = sum.plus(&part));
+        }
+        self.conversation.end()?;
+        Ok(found)
+    }
+
+    fn check_stations(&self, found: &[String]) -> Result<(), EngineError> {
+        let wanted = &self.job.stations;
+        if found.len() != wanted.len() {
+            let what = format!("gave {} readings for {} meters", found.len(), wanted.len());
+            return Err(EngineError::output(ID, what));
+        }
+        match found.iter().zip(wanted).find(|(found, wanted)| **found != wanted.id.0) {
+            Some((found, wanted)) => {
+                Err(EngineError::output(ID, format!("gave `{found}` where `{}` was asked for", wanted.id)))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Direct light of points: what is left is the rounding of 32-bit floats.
+    fn determined(&mut self, part: &Part) -> Result<Vec<Estimate>, EngineError> {
+        let block = self.ask(&Request { part: &part.name, side: 1, seeds: vec![None] })?.concat();
+        let bound = |k| Uncertainty::Bound(float_error_lx(self.job, self.settings, k));
+        Ok(block.into_iter().enumerate().map(|(k, value)| Estimate { value, uncertainty: bound(k) }).collect())
+    }
+
+    fn sampled(
+        &mut self,
+        part: &Part,
+        greeting: &Greeting,
+        found: &mut Measurement,
+    ) -> Result<Vec<Estimate>, EngineError> {
+        let stream = if part.name == "direct" { Stream::Direct } else { Stream::Reflected };
+        let (side, rule) = match self.settings.preset {
+            Preset::Audit => self.plan(part, greeting)?,
+            Preset::Fast | Preset::Default => {
+                (FIXED_SIDE, Sampling::fixed(FIXED_BLOCKS, self.job.budget, self.started))
+            }
+        };
+        let blocks = rule.run(|numbers| self.blocks(part, side, stream, numbers))?;
+        let samples = side * side * part.rays / self.job.stations.len().max(1);
+        let of_part = [("blocks", blocks.count()), ("samples_a_meter_and_block", samples)];
+        found.settings.extend(of_part.map(|(key, value)| (format!("{}_{key}", part.name), value.to_string())));
+        found.notes.extend(rule.shortfall(&blocks).map(|why| format!("{}: {why}", part.name)));
+        let estimates = blocks.estimates();
+        found.samples.push(blocks);
+        Ok(estimates)
+    }
+
+    /// Samples along a side of a block so that a block fills the rays in flight at most, and enough blocks about reach the
+    /// error and fit in the time.
+    fn plan(&mut self, part: &Part, greeting: &Greeting) -> Result<(usize, Sampling<'static>), EngineError> {
+        let full = (greeting.lanes / part.rays.max(1)).isqrt().clamp(2, MAX_SIDE);
+        let trial_side = if greeting.variant.starts_with("scalar") { SCALAR_TRIAL_SIDE } else { full };
+        // The first one compiles kernels.
+        let mut trials = self.blocks(part, trial_side, Stream::Trial, 0..1)?;
+        let second = Instant::now();
+        trials.extend(self.blocks(part, trial_side, Stream::Trial, 1..2)?);
+        let sample_s = second.elapsed().as_secs_f64() / (trial_side * trial_side) as f64;
+        let budget = self.job.budget;
+        let left_s = (budget.seconds - self.started.elapsed().as_secs_f64()).max(0.0);
+        let affordable = ((left_s / ENOUGH_BLOCKS as f64 / sample_s) as usize).isqrt();
+        // The error is that of the mean of two; m x m samples are at least as good as m x m independent ones.
+        let excess = Blocks::new(trials).worst_error(&[]) / budget.relative_error;
+        let needed = trial_side as f64 * PLAN_MARGIN * excess * (2.0 / ENOUGH_BLOCKS as f64).sqrt();
+        let side = (needed.ceil() as usize).max(MIN_SIDE).min(full).min(affordable).max(2);
+        let block_s = Some(sample_s * (side * side) as f64);
+        let within = Sampling::within(budget, self.started);
+        Ok((side, Sampling { enough_blocks: ENOUGH_BLOCKS, block_s, ..within }))
+    }
+
+    fn blocks(
+        &mut self,
+        part: &Part,
+        side: usize,
+        stream: Stream,
+        numbers: std::ops::Range<usize>,
+    ) -> Result<Vec<Vec<f64>>, EngineError> {
+        let seeds = numbers.map(|k| Some([self.job.seed, stream as u64, k as u64])).collect();
+        self.ask(&Request { part: &part.name, side, seeds })
+    }
+
+    fn ask(&mut self, request: &Request<'_>) -> Result<Vec<Vec<f64>>, EngineError> {
+        let line = serde_json::to_string(request).map_err(|e| EngineError::output(ID, e.to_string()))?;
+        let blocks: Vec<Vec<f64>> = parse(&self.conversation.ask(&line)?)?;
+        let (found, wanted) = (blocks.len(), request.seeds.len());
+        if found != wanted {
+            return Err(EngineError::output(ID, format!("gave {found} blocks of {wanted}")));
+        }
+        let wanted = self.job.stations.len();
+        match blocks.iter().find(|block| block.len() != wanted) {
+            Some(block) => Err(EngineError::output(ID, format!("gave {} readings for {wanted} meters", block.len()))),
+            None => Ok(blocks),
+        }
+    }
+}
+
+fn parse<'de, T: Deserialize<'de>>(line: &'de str) -> Result<T, EngineError> {
+    serde_json::from_str(line).map_err(|e| {
+        let start: String = line.chars().take(200).collect();
+        EngineError::output(ID, format!("its answer is no JSON of readings ({e}): `{start}`"))
+    })
+}

@@ -1,0 +1,89 @@
+//! Where an engine works: folders, logs and limits of a job; what its files are and why they may give no reading.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use super::Site;
+use crate::record::{EngineName, MeterId, Uncertainty};
+use crate::system::process::{Invocation, PeakMemory, ProcessError};
+
+/// A file of an exported scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneFile {
+    pub name: String,
+    pub bytes: Vec<u8>,
+}
+
+impl SceneFile {
+    pub fn text(name: &str, text: impl Into<String>) -> Self {
+        Self { name: name.to_owned(), bytes: text.into().into_bytes() }
+    }
+}
+
+/// Where an engine works: its installation, its folders and what it may use.
+#[derive(Clone, Debug)]
+pub struct Workbench {
+    pub site: Site,
+    /// The folder of this job's scene files; exists, belongs to this job alone.
+    pub scene_dir: PathBuf,
+    /// The log that every process of this job appends its messages to.
+    pub log: PathBuf,
+    /// Threads or processes at a time.
+    pub jobs: usize,
+    /// Past this the job is killed.
+    pub limit: Duration,
+    /// Told of the memory that the job's processes took.
+    pub peak: PeakMemory,
+}
+
+impl Workbench {
+    /// An invocation in the scene's folder with this job's log and limit.
+    pub fn invoke(&self, program: impl Into<PathBuf>) -> Invocation {
+        Invocation { peak: self.peak.clone(), ..Invocation::new(program, &self.scene_dir, self.limit, &self.log) }
+    }
+
+    /// Writes exported files into the scene's folder.
+    pub fn write(&self, files: &[SceneFile]) -> Result<(), EngineError> {
+        for file in files {
+            let path = self.scene_dir.join(&file.name);
+            std::fs::write(&path, &file.bytes).map_err(|source| EngineError::io(&path, source))?;
+        }
+        Ok(())
+    }
+}
+
+/// Why an engine that was there gave no reading.
+#[derive(Debug, thiserror::Error)]
+pub enum EngineError {
+    /// A process failed.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
+    /// A file could not be written or read.
+    #[error("{path}: {source}")]
+    Io { path: String, source: std::io::Error },
+    /// The program ended well but what it gave is not a result.
+    #[error("{engine} exited without an error, but {what}")]
+    Output { engine: EngineName, what: String },
+    /// What it read is no number.
+    #[error("{engine} exited without an error, but read {value} lx ({uncertainty:?}) at {meter}")]
+    NotFinite { engine: EngineName, meter: MeterId, value: f64, uncertainty: Uncertainty },
+    /// A setting from the spec makes no sense to the engine.
+    #[error("engines.{engine}.{key}: {what}")]
+    Setting { engine: EngineName, key: String, what: String },
+    /// It cannot do what was asked, as it says itself once it has seen the job: a skip, no failure.
+    #[error("{engine} declines: {why}")]
+    Declined { engine: EngineName, why: String },
+    /// Our own solver gave up.
+    #[error("{engine}: {what}")]
+    Solver { engine: EngineName, what: String },
+}
+
+impl EngineError {
+    pub fn io(path: &Path, source: std::io::Error) -> Self {
+        Self::Io { path: path.display().to_string(), source }
+    }
+
+    pub fn output(engine: EngineName, what: impl Into<String>) -> Self {
+        Self::Output { engine, what: what.into() }
+    }
+}

@@ -1,0 +1,90 @@
+//! What came of a reading: estimates and their cost, or why it came to nothing; a file and another process can carry both.
+
+use serde::{Deserialize, Serialize};
+
+use crate::engines::{EngineError, Measurement};
+use crate::system::process::ProcessError;
+
+/// What a reading took the engine, now or when it was asked first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Wall-clock seconds.
+    pub wall_s: f64,
+    /// Processor seconds of this process and its children meanwhile; beside other readings theirs are among them.
+    pub cpu_s: f64,
+    /// Resident memory of the largest process, in MiB.
+    pub peak_mib: Option<f64>,
+}
+
+/// Readings that were taken.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Taken {
+    pub measurement: Measurement,
+    pub cost: Cost,
+    pub source: Source,
+}
+
+/// Who gave a reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Source {
+    /// The engine, just now.
+    Engine,
+    /// The cache or this run, from an earlier answer of the engine.
+    Cache,
+    /// Nobody had to be asked.
+    Nobody,
+}
+
+/// Why a reading came to nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[error("{text}")]
+pub struct Failure {
+    pub kind: FailureKind,
+    pub text: String,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FailureKind {
+    /// The engine says that it cannot do such a job: a skip.
+    Declined,
+    /// It cannot do this one: a setting makes no sense to it, or its solver gave up.
+    Refused,
+    /// It gave something that is no number.
+    Nan,
+    /// It ended with an error or was killed.
+    Crash,
+    /// It did not end in time.
+    Hang,
+    /// It ended well and readings were missing.
+    SilentLoss,
+    /// The user asked to stop.
+    Interrupted,
+    /// It was not begun: the time for beginning was over.
+    TimeUp,
+}
+
+impl Failure {
+    pub fn new(kind: FailureKind, text: impl Into<String>) -> Self {
+        Self { kind, text: text.into() }
+    }
+
+    pub(super) fn crash(text: impl Into<String>) -> Self {
+        Self::new(FailureKind::Crash, text)
+    }
+}
+
+impl From<EngineError> for Failure {
+    fn from(error: EngineError) -> Self {
+        let kind = match &error {
+            EngineError::Process(ProcessError::TimedOut { .. }) => FailureKind::Hang,
+            EngineError::Process(ProcessError::Interrupted { .. }) => FailureKind::Interrupted,
+            EngineError::Process(_) | EngineError::Io { .. } => FailureKind::Crash,
+            EngineError::NotFinite { .. } => FailureKind::Nan,
+            EngineError::Output { .. } => FailureKind::SilentLoss,
+            EngineError::Setting { .. } | EngineError::Solver { .. } => FailureKind::Refused,
+            EngineError::Declined { why, .. } => return Self::new(FailureKind::Declined, why),
+        };
+        Self::new(kind, error.to_string())
+    }
+}

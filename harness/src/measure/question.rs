@@ -1,0 +1,65 @@
+//! What is asked: a job of an instrument, and under which conditions.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::cache::{Entry, Key, key};
+use super::outcome::FailureKind;
+use crate::engines::{Engine, EngineError, Job, Version};
+use crate::laws::Place;
+use crate::spec::Case;
+
+/// An engine that is there, in the version that it is.
+#[derive(Clone)]
+pub struct Instrument {
+    pub engine: Arc<dyn Engine>,
+    pub version: Version,
+}
+
+/// A reading to take.
+#[derive(Clone, Copy)]
+pub struct Question<'a> {
+    pub instrument: &'a Instrument,
+    pub job: &'a Job,
+    /// Where scene files and log go: the procedure's name, or a folder below it.
+    pub folder: &'a str,
+    /// Past this it is killed.
+    pub limit: Duration,
+    /// Of a reading that is one of an experiment.
+    pub trial: Option<&'a Trial<'a>>,
+}
+
+/// What makes a reading one of an experiment: its time and its failure are results too.
+#[derive(Clone, Debug)]
+pub struct Trial<'a> {
+    pub case: &'a Case,
+    /// Which variant of the procedure's job; `None` for the job itself.
+    pub variant: Option<Place>,
+    /// Which of several readings of one job.
+    pub repetition: usize,
+    pub threads: usize,
+}
+
+impl<'a> Question<'a> {
+    /// One that is killed far beyond its budget, which engines keep by themselves: that is for those that hang.
+    pub fn new(instrument: &'a Instrument, job: &'a Job, folder: &'a str) -> Self {
+        let limit = Duration::from_secs_f64((2.0 * job.budget.seconds + 120.0).min(1e9));
+        Self { instrument, job, folder, limit, trial: None }
+    }
+
+    /// Of a trial, time and failure depend on threads and limit as well.
+    pub(super) fn key(&self) -> Result<Key, EngineError> {
+        let key = key(self.instrument.engine.as_ref(), &self.instrument.version, self.job)?;
+        let Some(trial) = self.trial else { return Ok(key) };
+        Ok(key.under(&format!("{} threads, {:?}, {}", trial.threads, self.limit, trial.repetition)))
+    }
+
+    /// What answers the key as well another time. A failure is tried again, but that of a trial is what it found.
+    pub(super) fn is_final(&self, entry: &Entry) -> bool {
+        match entry.answer.as_ref().map_err(|failure| failure.kind) {
+            Ok(_) | Err(FailureKind::Declined) => true,
+            Err(FailureKind::Interrupted | FailureKind::TimeUp) => false,
+            Err(_) => self.trial.is_some(),
+        }
+    }
+}

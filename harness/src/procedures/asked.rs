@@ -1,0 +1,61 @@
+//! What a spec asks for: procedures by name, each in its form.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::Deserialize;
+use serde::de::{Deserializer, Error, MapAccess, Visitor};
+
+use super::{Asked, table};
+use crate::record::ProcedureId;
+
+/// What is measured, by procedure; at least one.
+#[derive(Clone, Debug, Default)]
+pub struct Procedures(pub BTreeMap<ProcedureId, Asked>);
+
+impl JsonSchema for Procedures {
+    fn schema_name() -> Cow<'static, str> {
+        "Procedures".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let property = |procedure: &table::Procedure| {
+            let mut schema = procedure.form.schema(generator);
+            schema.insert("description".to_owned(), procedure.meaning.into());
+            (procedure.id.name().to_owned(), schema.to_value())
+        };
+        let properties: serde_json::Map<_, _> = table::ALL.iter().map(property).collect();
+        json_schema!({
+            "type": "object", "description": "What is measured; at least one.",
+            "properties": properties, "additionalProperties": false,
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for Procedures {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct ByName;
+        impl<'de> Visitor<'de> for ByName {
+            type Value = Procedures;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("procedures by name")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Procedures, A::Error> {
+                const NAMES: [&str; ProcedureId::ALL.len()] = ProcedureId::NAMES;
+                let mut all = BTreeMap::new();
+                while let Some(name) = map.next_key::<String>()? {
+                    let id: ProcedureId = name.parse().map_err(|_| A::Error::unknown_field(&name, &NAMES))?;
+                    if all.insert(id, id.row().form.read(&mut map)?).is_some() {
+                        return Err(A::Error::duplicate_field(id.name()));
+                    }
+                }
+                Ok(Procedures(all))
+            }
+        }
+        deserializer.deserialize_map(ByName)
+    }
+}

@@ -1,0 +1,282 @@
+//! The forms in which a spec asks for a procedure, unknown keys refused.
+
+use std::fmt;
+
+use luminaire::scene::Bounces;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::Deserialize;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor};
+
+/// The keys that a spec gives a procedure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// `luminaire`, `distance_m`, `angles`.
+    Angles,
+    /// `meters`.
+    Meters,
+    /// `meters`, `bounces`.
+    MetersAndBounces,
+    /// `meters`, `bounces`, `light`.
+    MetersAndLight,
+}
+
+/// What a spec asks of one procedure.
+#[derive(Clone, Debug)]
+pub enum Asked {
+    Angles(AtAngles),
+    Meters(AtMeters),
+}
+
+/// Illuminance at meters of the room.
+#[derive(Clone, Debug)]
+pub struct AtMeters {
+    pub meters: Names,
+    pub bounces: Bounces,
+    pub light: AnyLight,
+}
+
+/// The light that a spec chooses, where a procedure leaves the choice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AnyLight {
+    /// Straight from the luminaires and reflected.
+    #[default]
+    Total,
+    /// Straight from the luminaires.
+    Direct,
+    /// Reflected at least once.
+    Indirect,
+}
+
+/// Intensity from illuminance at a distance, the luminaire alone in free field.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "LuminousIntensity")]
+pub struct AtAngles {
+    /// Which luminaire.
+    pub luminaire: String,
+    /// Measuring distance in metres.
+    pub distance_m: f64,
+    /// Where: the photometric file's own angles, or lists.
+    #[serde(default)]
+    pub angles: Angles,
+}
+
+/// Light of a fixed number of reflections at meters.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Meters {
+    /// A meter set or a list of sets.
+    meters: Names,
+}
+
+/// Light of some reflections at meters.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct MetersAndBounces {
+    /// A meter set or a list of sets.
+    meters: Names,
+    /// How many diffuse reflections count.
+    #[serde(default)]
+    bounces: BouncesSpec,
+}
+
+/// Light of a spec's choice at meters.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct MetersAndLight {
+    /// A meter set or a list of sets.
+    meters: Names,
+    /// How many diffuse reflections count, where any do.
+    #[serde(default)]
+    bounces: BouncesSpec,
+    /// Which light counts.
+    #[serde(default)]
+    light: AnyLight,
+}
+
+impl Form {
+    pub(super) fn schema(self, generator: &mut SchemaGenerator) -> Schema {
+        match self {
+            Self::Angles => generator.subschema_for::<AtAngles>(),
+            Self::Meters => generator.subschema_for::<Meters>(),
+            Self::MetersAndBounces => generator.subschema_for::<MetersAndBounces>(),
+            Self::MetersAndLight => generator.subschema_for::<MetersAndLight>(),
+        }
+    }
+
+    pub(super) fn read<'de, A: MapAccess<'de>>(self, map: &mut A) -> Result<Asked, A::Error> {
+        Ok(match self {
+            Self::Angles => Asked::Angles(map.next_value()?),
+            Self::Meters => {
+                let Meters { meters } = map.next_value()?;
+                Asked::Meters(AtMeters { meters, bounces: Bounces::Converged, light: AnyLight::Total })
+            }
+            Self::MetersAndBounces => {
+                let MetersAndBounces { meters, bounces } = map.next_value()?;
+                Asked::Meters(AtMeters { meters, bounces: bounces.into(), light: AnyLight::Total })
+            }
+            Self::MetersAndLight => {
+                let MetersAndLight { meters, bounces, light } = map.next_value()?;
+                Asked::Meters(AtMeters { meters, bounces: bounces.into(), light })
+            }
+        })
+    }
+}
+
+/// Directions of an intensity, in the luminaire's own frame.
+#[derive(Clone, Debug, Default, JsonSchema)]
+#[schemars(untagged)]
+pub enum Angles {
+    /// Every node of the file's table.
+    #[default]
+    #[schemars(with = "PhotometryWord")]
+    Photometry,
+    /// Every combination of the listed angles.
+    Listed(AngleLists),
+}
+
+#[derive(JsonSchema)]
+#[schemars(rename_all = "lowercase")]
+#[allow(dead_code, reason = "the shape of a word in the schema")]
+enum PhotometryWord {
+    Photometry,
+}
+
+/// Lists of angles in degrees.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AngleLists {
+    /// From the nadir.
+    pub gamma_deg: Vec<f64>,
+    /// C planes.
+    pub c_deg: Vec<f64>,
+}
+
+impl<'de> Deserialize<'de> for Angles {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = Angles;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the word `photometry`, or {gamma_deg: [...], c_deg: [...]}")
+            }
+
+            fn visit_str<E: Error>(self, word: &str) -> Result<Angles, E> {
+                match word {
+                    "photometry" => Ok(Angles::Photometry),
+                    other => Err(E::custom(format!("`{other}` is no choice of angles; expected {EXPECTED_ANGLES}"))),
+                }
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Angles, A::Error> {
+                AngleLists::deserialize(MapAccessDeserializer::new(map)).map(Angles::Listed)
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+const EXPECTED_ANGLES: &str = "`photometry` or {gamma_deg: [...], c_deg: [...]}";
+
+/// One name or a list of names.
+#[derive(Clone, Debug, JsonSchema)]
+#[schemars(untagged)]
+pub enum Names {
+    /// One.
+    One(String),
+    /// Several.
+    Many(Vec<String>),
+}
+
+impl Names {
+    /// The names in order.
+    pub fn iter(&self) -> impl Iterator<Item = &str> {
+        match self {
+            Self::One(name) => std::slice::from_ref(name).iter().map(String::as_str),
+            Self::Many(names) => names.iter().map(String::as_str),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Names {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = Names;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a meter set or a list of names")
+            }
+
+            fn visit_str<E: Error>(self, name: &str) -> Result<Names, E> {
+                Ok(Names::One(name.to_owned()))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Names, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(Names::Many)
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}
+
+/// How many diffuse reflections count: `converged` or a number.
+#[derive(Clone, Copy, Debug, Default, JsonSchema)]
+#[schemars(untagged)]
+enum BouncesSpec {
+    /// All of them.
+    #[default]
+    #[schemars(with = "ConvergedWord")]
+    Converged,
+    /// At most so many.
+    AtMost(u32),
+}
+
+#[derive(JsonSchema)]
+#[schemars(rename_all = "lowercase")]
+#[allow(dead_code, reason = "the shape of a word in the schema")]
+enum ConvergedWord {
+    Converged,
+}
+
+impl From<BouncesSpec> for Bounces {
+    fn from(spec: BouncesSpec) -> Self {
+        match spec {
+            BouncesSpec::Converged => Self::Converged,
+            BouncesSpec::AtMost(n) => Self::AtMost(n),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for BouncesSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl Visitor<'_> for Either {
+            type Value = BouncesSpec;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the word `converged` or a number of diffuse reflections from 1")
+            }
+
+            fn visit_str<E: Error>(self, word: &str) -> Result<BouncesSpec, E> {
+                match word {
+                    "converged" => Ok(BouncesSpec::Converged),
+                    other => {
+                        Err(E::custom(format!("`{other}` is no number of bounces; expected `converged` or 1, 2, ...")))
+                    }
+                }
+            }
+
+            fn visit_u64<E: Error>(self, n: u64) -> Result<BouncesSpec, E> {
+                match u32::try_from(n) {
+                    Ok(n) if n >= 1 => Ok(BouncesSpec::AtMost(n)),
+                    _ => Err(E::custom(format!("bounces: {n} is out of range; give 1 or more, or `converged`"))),
+                }
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
+}

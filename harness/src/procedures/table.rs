@@ -1,0 +1,170 @@
+//! The table of procedures: what each is called, asks of a spec, reads and is judged by. A new procedure is a row here.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use luminaire::scene::{LuminaireModel, Meter, Scene, Transport};
+
+use super::form::{Asked, AtMeters, Form};
+use super::task::{Aspect, Task, around, of_sets};
+use crate::record::{Basis, EngineName, ProcedureId, Quantity};
+
+/// One procedure.
+pub struct Procedure {
+    pub id: ProcedureId,
+    /// As a heading.
+    pub title: &'static str,
+    /// In a navigation.
+    pub short: &'static str,
+    /// What it reads, in a sentence for users.
+    pub meaning: &'static str,
+    pub quantity: Quantity,
+    /// The keys that a spec gives it.
+    pub form: Form,
+    /// Which light counts.
+    pub transport: fn(&AtMeters) -> Transport,
+    /// What is added up at a meter of the spec, and how far off that sum may be, relative.
+    pub aspects: fn(Meter) -> (Vec<Aspect>, f64),
+    /// What others are judged by.
+    pub reference: fn(&Task) -> Reference,
+}
+
+/// What the readings of a task are judged by.
+#[derive(Clone, Debug)]
+pub enum Reference {
+    /// The readings of one of our own engines.
+    Witness { engine: EngineName, basis: Basis, source: &'static str },
+    /// A closed form of the scene at a place, to a rounding in `f64`.
+    Formula { of: fn(&Scene, DVec3) -> f64, source: &'static str },
+}
+
+impl Reference {
+    /// What they rest on.
+    pub const fn basis(&self) -> Basis {
+        match self {
+            Self::Witness { basis, .. } => *basis,
+            Self::Formula { .. } => Basis::ClosedForm,
+        }
+    }
+
+    /// The engine that is the reference, where one is.
+    pub fn engine(&self) -> Option<&EngineName> {
+        match self {
+            Self::Witness { engine, .. } => Some(engine),
+            Self::Formula { .. } => None,
+        }
+    }
+}
+
+/// Every procedure, in the order of reports. Tolerances stand under the same name in `reference/tolerances.yaml`.
+pub static ALL: [Procedure; 4] = [
+    Procedure {
+        id: ProcedureId::LuminousIntensity,
+        title: "Luminous intensity",
+        short: "Intensity",
+        meaning: "The luminous intensity distribution read back from illuminance at a distance in free field, I = E d², over the curve of the photometric file.",
+        quantity: Quantity::LuminousIntensity,
+        form: Form::Angles,
+        transport: |_| Transport::Direct,
+        aspects: as_it_looks,
+        reference: |task| closed_form(task, "photometric file, bilinear in (C, gamma)"),
+    },
+    Procedure {
+        id: ProcedureId::DirectIlluminance,
+        title: "Direct illuminance",
+        short: "Direct",
+        meaning: "Illuminance straight from the luminaires, without any reflected light.",
+        quantity: Quantity::Illuminance,
+        form: Form::Meters,
+        transport: |_| Transport::Direct,
+        aspects: as_it_looks,
+        reference: |task| closed_form(task, "inverse square"),
+    },
+    Procedure {
+        id: ProcedureId::IndirectIlluminance,
+        title: "Indirect illuminance",
+        short: "Indirect",
+        meaning: "Illuminance by light that was reflected at least once.",
+        quantity: Quantity::Illuminance,
+        form: Form::MetersAndBounces,
+        transport: |asked| Transport::Indirect(asked.bounces),
+        aspects: as_it_looks,
+        reference: |_| EXACT,
+    },
+    Procedure {
+        id: ProcedureId::TotalIlluminance,
+        title: "Total illuminance",
+        short: "Total",
+        meaning: "Direct and reflected light together.",
+        quantity: Quantity::Illuminance,
+        form: Form::MetersAndBounces,
+        transport: |asked| Transport::Total(asked.bounces),
+        aspects: as_it_looks,
+        reference: |_| EXACT,
+    },
+];
+
+/// One illuminance, on the side that the meter looks to.
+fn as_it_looks(meter: Meter) -> (Vec<Aspect>, f64) {
+    (vec![Aspect { meter, weight: 1.0 }], 0.0)
+}
+
+const EXACT: Reference =
+    Reference::Witness { engine: EngineName::SIMULATOR, basis: Basis::Exact, source: "luminaire::simulator" };
+
+/// Direct light of points that nothing hides is a closed form; other light is what the simulator says.
+fn closed_form(task: &Task, source: &'static str) -> Reference {
+    if is_inverse_square(&task.scene) {
+        Reference::Witness { engine: EngineName::IESNA, basis: Basis::ClosedForm, source }
+    } else {
+        EXACT
+    }
+}
+
+fn is_inverse_square(scene: &Scene) -> bool {
+    scene.obstacles.is_empty() && scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point)
+}
+
+impl Procedure {
+    /// What it measures in a scene, as asked; `None` where the luminaire that is named is not there.
+    pub fn task(&self, asked: &Asked, scene: &Scene, meters: &BTreeMap<String, Vec<Meter>>) -> Option<Task> {
+        let (scene, transport, targets) = match asked {
+            Asked::Angles(asked) => {
+                let luminaire = scene.luminaires.iter().find(|l| l.id == asked.luminaire)?;
+                let alone = Scene { room: None, obstacles: vec![], luminaires: vec![luminaire.clone()] };
+                (alone, Transport::Direct, around(luminaire, asked))
+            }
+            Asked::Meters(asked) => {
+                (scene.clone(), (self.transport)(asked), of_sets(meters, &asked.meters, self.aspects))
+            }
+        };
+        Some(Task { procedure: self.id, scene, transport, quantity: self.quantity, targets })
+    }
+}
+
+impl Task {
+    /// What its readings are judged by.
+    pub fn reference(&self) -> Reference {
+        (self.procedure.row().reference)(self)
+    }
+}
+
+impl ProcedureId {
+    /// Its row of the table.
+    pub fn row(self) -> &'static Procedure {
+        &ALL[self as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_procedure_has_its_row_in_the_order_of_reports() {
+        assert_eq!(ALL.each_ref().map(|p| p.id), ProcedureId::ALL);
+        for procedure in ProcedureId::ALL {
+            assert_eq!(procedure.row().id, procedure);
+        }
+    }
+}

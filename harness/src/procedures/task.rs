@@ -1,0 +1,151 @@
+//! What one procedure measures in one scene: targets, each a weighted sum of illuminances.
+
+use std::collections::BTreeMap;
+
+use luminaire::photometry::direction;
+use luminaire::scene::{Luminaire, Meter, Scene, Transport};
+
+use super::form::{Angles, AtAngles, Names};
+use crate::record::{Estimate, Light, MeterId, ProcedureId, Quantity};
+
+/// What one procedure measures in one case.
+#[derive(Clone, Debug)]
+pub struct Task {
+    pub procedure: ProcedureId,
+    /// The scene with only what this procedure needs.
+    pub scene: Scene,
+    /// Which light counts.
+    pub transport: Transport,
+    pub quantity: Quantity,
+    /// Where readings are taken.
+    pub targets: Vec<Target>,
+}
+
+/// One reading: the weighted sum of illuminances at one place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    pub id: MeterId,
+    /// Where it is, for reports.
+    pub meter: Meter,
+    /// The direction seen from the luminaire, for intensities.
+    pub direction: Option<Direction>,
+    /// What is added up; most readings are one illuminance.
+    pub aspects: Vec<Aspect>,
+    /// How far off the weighted sum may be of what it stands for, relative: 0 but for a quadrature.
+    pub quadrature: f64,
+}
+
+/// An illuminance that counts in a reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aspect {
+    pub meter: Meter,
+    /// The reading's unit a lux: 1, or distance squared for an intensity.
+    pub weight: f64,
+}
+
+/// A direction in a luminaire's own frame, in degrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction {
+    /// C plane.
+    pub c_deg: f64,
+    /// From the nadir.
+    pub gamma_deg: f64,
+}
+
+impl Task {
+    /// The luminaire model of the scene: point, area, impostor, or mixed.
+    pub fn model(&self) -> String {
+        let mut models: Vec<&str> = self.scene.luminaires.iter().map(|l| l.model.name()).collect();
+        models.sort_unstable();
+        models.dedup();
+        if let [one] = models[..] { one.to_owned() } else { "mixed".to_owned() }
+    }
+
+    /// Which light counts.
+    pub const fn light(&self) -> Light {
+        Light(self.transport)
+    }
+
+    /// Every illuminance that is needed, target by target, with its name.
+    pub fn stations(&self) -> impl Iterator<Item = (MeterId, Meter)> {
+        self.targets.iter().flat_map(Target::stations)
+    }
+
+    /// The part of [`Self::stations`] that one target needs.
+    pub fn stations_of(&self, target: usize) -> std::ops::Range<usize> {
+        let first = self.targets[..target].iter().map(|t| t.aspects.len()).sum();
+        first..first + self.targets[target].aspects.len()
+    }
+
+    /// One reading a target, of illuminances at all stations.
+    pub fn readings(&self, stations: &[Estimate]) -> Vec<Estimate> {
+        let mut rest = stations;
+        let reading = |target: &Target| {
+            let (mine, others) = rest.split_at(target.aspects.len().min(rest.len()));
+            rest = others;
+            target.reading(mine)
+        };
+        self.targets.iter().map(reading).collect()
+    }
+}
+
+impl Target {
+    /// One illuminance, times a weight.
+    pub fn of_one(id: MeterId, meter: Meter, weight: f64) -> Self {
+        Self { id, meter, direction: None, aspects: vec![Aspect { meter, weight }], quadrature: 0.0 }
+    }
+
+    /// The illuminances that it needs, with their names: its own, or one a meter.
+    pub fn stations(&self) -> impl Iterator<Item = (MeterId, Meter)> {
+        let name = |k: usize| match self.aspects.len() {
+            1 => self.id.clone(),
+            _ => MeterId::new(&self.id.0, k),
+        };
+        self.aspects.iter().enumerate().map(move |(k, aspect)| (name(k), aspect.meter))
+    }
+
+    /// The reading of illuminances at its stations, which are taken in one run.
+    pub fn reading(&self, stations: &[Estimate]) -> Estimate {
+        let weights: Vec<f64> = self.aspects.iter().map(|a| a.weight).collect();
+        let sum = Estimate::of_one_run(&weights, stations);
+        if self.quadrature == 0.0 {
+            return sum;
+        }
+        Estimate { uncertainty: sum.uncertainty.within(self.quadrature * sum.value.abs()), ..sum }
+    }
+}
+
+/// Meters on a sphere that face the photometric centre: I = E d² (IES LM-41, CIE 121: inverse-square goniophotometry).
+pub(super) fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
+    let distribution = &luminaire.photometry.distribution;
+    let (c_deg, gamma_deg) = match &asked.angles {
+        Angles::Photometry => (distribution.c_deg(), distribution.gamma_deg()),
+        Angles::Listed(lists) => (lists.c_deg.as_slice(), lists.gamma_deg.as_slice()),
+    };
+    let target = |(k, (c_deg, gamma_deg)): (usize, (f64, f64))| {
+        let outward = luminaire.orientation * direction(c_deg, gamma_deg);
+        let meter = Meter { position_m: luminaire.position_m + outward * asked.distance_m, normal: -outward };
+        let id = MeterId::new(&luminaire.id, k);
+        let target = Target::of_one(id, meter, asked.distance_m * asked.distance_m);
+        Target { direction: Some(Direction { c_deg, gamma_deg }), ..target }
+    };
+    let angles = c_deg.iter().flat_map(|&c| gamma_deg.iter().map(move |&g| (c, g)));
+    angles.enumerate().map(target).collect()
+}
+
+/// The meters of named sets, each with what is added up there.
+pub(super) fn of_sets(
+    meters: &BTreeMap<String, Vec<Meter>>,
+    names: &Names,
+    aspects: fn(Meter) -> (Vec<Aspect>, f64),
+) -> Vec<Target> {
+    let target = |name: &str, k: usize, meter: Meter| {
+        let (aspects, quadrature) = aspects(meter);
+        Target { id: MeterId::new(name, k), meter, direction: None, aspects, quadrature }
+    };
+    let of_set = |name: &str| {
+        let meters = meters.get(name).into_iter().flatten().enumerate();
+        meters.map(|(k, meter)| target(name, k, *meter)).collect::<Vec<_>>()
+    };
+    names.iter().flat_map(of_set).collect()
+}
