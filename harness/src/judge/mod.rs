@@ -323,7 +323,7 @@ fn reference_of_task(task: &Task, recordings: &[&Recording], k: usize, engine: &
     }
     let recording = recordings.iter().find(|r| r.key.engine == witness)?;
     let reading = recording.readings.get(k)?;
-    let source = match recording.settings.get("solver") {
+    let source = match recording.method.get("solver") {
         Some(solver) if basis == Basis::Exact => format!("{source}: {solver}"),
         _ => source.to_owned(),
     };

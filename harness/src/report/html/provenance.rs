@@ -42,7 +42,7 @@ fn settings(label: &str, recordings: &[&Recording]) -> Markup {
             tr { th scope="row" { (r.key.case) } td { (title(r.key.procedure)) } td { (r.model) ", " (r.light) } td.number { (r.seed) }
                 td.number { (duration(r.wall_s)) } td.number { (format!("{:.1e}", r.instrument_uncertainty)) }
                 td.wide { dl.settings {
-                    @for (key, value) in &r.settings { div { dt { (key.replace('_', " ")) } dd { code { (value) } } } }
+                    @for (key, value) in r.method.iter().chain(r.effort.iter()) { div { dt { (key.replace('_', " ")) } dd { code { (value) } } } }
                     @if let Some(command) = &r.command { div { dt { "by hand" } dd { code { (command) } } } }
                 } }
             }

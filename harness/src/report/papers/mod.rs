@@ -62,7 +62,7 @@ pub(super) fn grid(report: &Report, table: &PublishedTable) -> Grid {
 
 fn label(recording: &Recording) -> String {
     if recording.key.engine == EngineName::IESNA {
-        let method = recording.settings.get("method").map(|m| format!(", {m}"));
+        let method = recording.method.get("method").map(|m| format!(", {m}"));
         return format!("{}{}", EngineName::IESNA, method.unwrap_or_default());
     }
     let light = recording.light.to_string();

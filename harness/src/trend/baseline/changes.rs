@@ -157,9 +157,9 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
         differing("light", &a.light.to_string(), &b.light.to_string()),
     ];
     let mut of_instrument = vec![differing("version", &a.version, &b.version)];
-    let keys: std::collections::BTreeSet<&String> = a.settings.keys().chain(b.settings.keys()).collect();
+    let keys: std::collections::BTreeSet<&String> = a.method.keys().chain(b.method.keys()).collect();
     for key in keys {
-        let of = |entry: &Entry| entry.settings.get(key).cloned().unwrap_or_else(|| "not set".to_owned());
+        let of = |entry: &Entry| entry.method.get(key).cloned().unwrap_or_else(|| "not set".to_owned());
         of_instrument.push(differing(&format!("setting {key}"), &of(a), &of(b)));
     }
     let of_subject: Vec<String> = of_subject.into_iter().flatten().collect();

@@ -6,13 +6,12 @@
 mod changes;
 mod review;
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::record::{Light, Reading, ReadingKey, Recording};
+use crate::record::{Light, Method, Reading, ReadingKey, Recording};
 use crate::report::Report;
 use crate::system::files::{self, FileError};
 
@@ -39,8 +38,9 @@ pub struct Entry {
     pub light: Light,
     /// SHA-256 of the spec and of every file that it names.
     pub input_sha256: String,
-    /// What the engine set, its effort left out: another run of the same instrument has the same.
-    pub settings: BTreeMap<String, String>,
+    /// What the engine did: another run of the same instrument does the same.
+    #[serde(alias = "settings")]
+    pub method: Method,
     /// Of all standard errors, where the file is older than the readings' own.
     #[serde(default, skip_serializing)]
     degrees_of_freedom: Option<f64>,
@@ -66,38 +66,16 @@ pub enum BaselineError {
     NotAccepted { path: String, key: ReadingKey },
 }
 
-/// Settings that tell of effort, chance and paths: they differ between runs of one instrument with one method. Whatever an
-/// engine sets besides counts, so that a setting nobody thought of is refused rather than overlooked.
-const EFFORT: [&str; 11] = [
-    "ambient_divisions",
-    "arguments",
-    "blocks",
-    "calibration",
-    "command",
-    "count_first_reflection",
-    "looks",
-    "rounds",
-    "rtrace",
-    "seed",
-    "seeds",
-];
-
-/// Whether a setting tells of effort: blocks and samples are counted under several names.
-fn is_effort(key: &str) -> bool {
-    EFFORT.contains(&key) || key.ends_with("_blocks") || key.contains("samples")
-}
-
 impl Entry {
     fn of(report: &Report, recording: &Recording) -> Self {
         let mine = report.readings.iter().filter(|r| r.key == recording.key);
-        let settings = recording.settings.iter().filter(|(key, _)| !is_effort(key));
         Self {
             key: recording.key.clone(),
             version: recording.version.clone(),
             model: recording.model.clone(),
             light: recording.light,
             input_sha256: recording.input_sha256.clone(),
-            settings: settings.map(|(k, v)| (k.clone(), v.clone())).collect(),
+            method: recording.method.clone(),
             degrees_of_freedom: None,
             accepted: String::new(),
             reason: String::new(),

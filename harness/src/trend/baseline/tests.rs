@@ -1,7 +1,7 @@
 //! The laws of baselines: refused unless they match, noise told apart from shifts, nothing accepted without a reason.
 
 use super::*;
-use crate::record::{MeterId, ProcedureId, Quantity, Uncertainty};
+use crate::record::{MeterId, Method, ProcedureId, Quantity, Uncertainty};
 use crate::system::random::normal;
 
 fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
@@ -17,7 +17,7 @@ fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
         model: "point".into(),
         light: "indirect, 7 bounces".parse().unwrap(),
         input_sha256: "ab".repeat(32),
-        settings: BTreeMap::from([("preset".to_owned(), "audit".to_owned())]),
+        method: [("preset", "audit")].into(),
         degrees_of_freedom: None,
         accepted: "2026-01-01T00:00:00Z".into(),
         reason: "first look".into(),
@@ -115,7 +115,7 @@ fn a_baseline_of_another_spec_version_model_light_or_setting_is_refused() {
         Entry { version: "6.1".into(), ..a.clone() },
         Entry { model: "area".into(), ..a.clone() },
         Entry { light: "indirect, all bounces".parse().unwrap(), ..a.clone() },
-        Entry { settings: BTreeMap::new(), ..a.clone() },
+        Entry { method: Method::default(), ..a.clone() },
     ];
     for other in &others {
         let change = compared(&[&a], &[other], Comparability::SameInstrument);
