@@ -84,7 +84,7 @@ fn sections(report: &Report, beside: &[Beside], palette: &Palette, rows: &mut Ro
     }
     for name in report.procedures() {
         let section = procedure::section(report, name, palette, rows);
-        sections.push((name.to_string(), short(name).to_owned(), section));
+        sections.push((name.to_string(), name.row().short.to_owned(), section));
     }
     sections.push(("time".to_owned(), "Run time".to_owned(), plot::times::section(report, beside, palette)));
     if let Some(stress) = beside::stress_section(beside, palette) {
@@ -165,16 +165,6 @@ fn glyph(verdict: Verdict) -> &'static str {
         Verdict::Fail => "✕",
         Verdict::UnexpectedPass => "!",
         Verdict::Missing => "∅",
-    }
-}
-
-/// A procedure's name in the navigation.
-const fn short(procedure: ProcedureId) -> &'static str {
-    match procedure {
-        ProcedureId::LuminousIntensity => "Intensity",
-        ProcedureId::DirectIlluminance => "Direct",
-        ProcedureId::IndirectIlluminance => "Indirect",
-        ProcedureId::TotalIlluminance => "Total",
     }
 }
 

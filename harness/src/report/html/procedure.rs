@@ -28,7 +28,7 @@ pub(super) fn section(report: &Report, procedure: ProcedureId, palette: &Palette
     mine.truncate(MOST);
     html! {
         h2 id={ (procedure) "-title" } { (title(procedure)) }
-        p.lead { (meaning(procedure)) }
+        p.lead { (procedure.row().meaning) }
         @if !plots.is_empty() { div.panels { @for panel in plots { (panel) } } }
         @for table in report.published.iter().filter(|t| t.procedure == procedure) { (printed(&papers::grid(report, table))) }
         @if all == 0 {
@@ -138,16 +138,5 @@ fn printed(grid: &papers::Grid) -> Markup {
                 }
             }
         }
-    }
-}
-
-const fn meaning(procedure: ProcedureId) -> &'static str {
-    match procedure {
-        ProcedureId::LuminousIntensity => {
-            "The luminous intensity distribution read back from illuminance at a distance in free field, I = E d², over the curve of the photometric file."
-        }
-        ProcedureId::DirectIlluminance => "Illuminance straight from the luminaires, without any reflected light.",
-        ProcedureId::IndirectIlluminance => "Illuminance by light that was reflected at least once.",
-        ProcedureId::TotalIlluminance => "Direct and reflected light together.",
     }
 }
