@@ -9,11 +9,11 @@ use std::sync::OnceLock;
 
 use divan::Bencher;
 use luxproof::judge::{Basis, Verdict};
-use luxproof::record::Quantity;
-use luxproof::trend::history::{Entry, History, changes};
+use luxproof::record::{MeterId, ProcedureId, Quantity, ReadingKey};
+use luxproof::trend::history::{History, Line, Numbers, changes};
 
 const NIGHTS: u64 = 365;
-const COMPARISONS: u64 = 2000;
+const METERS: usize = 20;
 
 fn main() {
     divan::main();
@@ -26,11 +26,12 @@ fn year() -> &'static tempfile::NamedTempFile {
         let file = tempfile::NamedTempFile::new().unwrap();
         let mut out = std::io::BufWriter::new(file.as_file());
         let mut random = fastrand::Rng::with_seed(1);
+        let (readings, meters) = (readings(), (0..METERS).map(|k| MeterId::new("workplane", k)).collect::<Vec<_>>());
         for night in 0..NIGHTS {
             let day = std::time::UNIX_EPOCH + std::time::Duration::from_secs(86_400 * (20_454 + night));
             let date = humantime::format_rfc3339_seconds(day).to_string()[..10].to_owned();
-            for k in 0..COMPARISONS {
-                serde_json::to_writer(&mut out, &entry(k, &date, &mut random)).unwrap();
+            for reading in &readings {
+                serde_json::to_writer(&mut out, &line(&date, reading, &meters, &mut random)).unwrap();
                 out.write_all(b"\n").unwrap();
             }
         }
@@ -41,30 +42,33 @@ fn year() -> &'static tempfile::NamedTempFile {
     })
 }
 
-/// A comparison of five engines and four procedures, five cases of twenty meters each, with noise of sum of uniforms.
-fn entry<'a>(k: u64, date: &'a str, random: &mut fastrand::Rng) -> Entry<'a> {
-    let noise = 0.01 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
-    let rounded = |v: f64, digits: usize| format!("{v:.digits$e}").parse::<f64>().unwrap();
+/// Of five engines in four procedures of five cases.
+fn readings() -> Vec<ReadingKey> {
     let engines = ["iesna", "mitsuba", "povray", "radiance", "simulator"];
-    let procedures = ["direct_illuminance", "indirect_illuminance", "luminous_intensity", "total_illuminance"];
-    Entry {
-        night: date.into(),
-        case: format!("cachet/case-{}", k / 20 % 5).into(),
-        procedure: procedures[(k / 100 % 4) as usize].into(),
-        engine: engines[(k / 400) as usize].into(),
-        version: "3.9.1 (Dr.Jit 1.5.0, LLVM 19.1.7)".into(),
-        model: "point".into(),
-        meter: format!("workplane[{}]", k % 20).into(),
-        quantity: Quantity::Illuminance,
-        basis: Some(Basis::Exact),
-        source: "exact indirect light by radiosity, 7 reflections".into(),
-        value: Some(rounded(2.5 + noise, 8)),
-        std_error: Some(rounded(0.01 * (0.9 + 0.2 * random.f64()), 3)),
-        reference: Some(2.5),
-        deviation: Some(rounded(noise, 5)),
-        u: Some(rounded(0.01, 3)),
-        verdict: Verdict::Pass,
+    let procedures = || engines.iter().flat_map(|engine| ProcedureId::ALL.map(|procedure| (*engine, procedure)));
+    let case = |k| procedures().map(move |(e, p)| ReadingKey::new(format!("cachet/case-{k}"), p, e));
+    (0..5).flat_map(case).collect()
+}
+
+/// What is read on a night, with noise of sums of uniforms.
+fn line<'a>(date: &'a str, of: &'a ReadingKey, meters: &'a [MeterId], random: &mut fastrand::Rng) -> Line<'a> {
+    let rounded = |v: f64, digits: usize| format!("{v:.digits$e}").parse::<f64>().unwrap();
+    let mut line = Line::new(date, of, Quantity::Illuminance, Verdict::Pass);
+    line.version = "3.9.1 (Dr.Jit 1.5.0, LLVM 19.1.7)".into();
+    line.model = "point".into();
+    line.basis = Some(Basis::Exact);
+    line.source = "exact indirect light by radiosity, 7 reflections".into();
+    for (k, meter) in meters.iter().enumerate() {
+        let noise = 0.01 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+        let numbers = Numbers {
+            reference: rounded(2.5 + (k as f64).sqrt(), 8),
+            deviation: rounded(noise, 5),
+            std_error: rounded(0.01 * (0.9 + 0.2 * random.f64()), 3),
+            u: rounded(0.01 * (1.0 + 0.2 * random.f64()), 3),
+        };
+        line.push(meter, numbers);
     }
+    line
 }
 
 #[divan::bench(sample_count = 5, sample_size = 1)]

@@ -45,7 +45,7 @@ fn the_example_adapter_of_sixty_lines_agrees_with_inverse_square() {
     assert!(skips[0]["reason"].as_str().unwrap().contains("direct light only"));
     let recording = of_adapter(&report, "recordings", "engine")[0];
     assert!(recording["version"].as_str().unwrap().starts_with("sha256:"), "{recording}");
-    assert!(recording["settings"]["python"].as_str().unwrap().starts_with('3'), "{recording}");
+    assert!(recording["method"]["python"].as_str().unwrap().starts_with('3'), "{recording}");
 }
 
 #[test]

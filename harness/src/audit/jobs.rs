@@ -110,7 +110,7 @@ fn measure(
     if let Ok(Some(calibrated)) = instrument {
         recording.instrument_uncertainty = calibrated.calibration.uncertainty(run.job.transport);
         if let Ok(file) = &calibrated.kept {
-            recording.settings.insert("calibration".to_owned(), file.clone());
+            recording.effort.insert("calibration".to_owned(), file.clone());
         }
     }
     let wall = Duration::from_secs_f64(recording.wall_s);
@@ -138,7 +138,7 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
             taken.measurement.estimates[station] = estimate;
         }
         let names: Vec<String> = job.stations.iter().map(|s| s.id.to_string()).collect();
-        taken.measurement.settings.insert("spot_checked".to_owned(), names.join(", "));
+        taken.measurement.effort.insert("spot_checked".to_owned(), names.join(", "));
         if taken.source == Source::Nobody {
             taken.source = seen.source;
         }
@@ -232,7 +232,7 @@ fn record(
             (Measurement::default(), wall.as_secs_f64(), Some(error.to_string()))
         }
     };
-    let estimates = if failure.is_none() { task.readings(&measurement.estimates) } else { vec![] };
+    let estimates = if failure.is_none() { measurement.readings(&task.targets) } else { vec![] };
     let readings = estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
         meter: target.id.clone(),
         quantity: task.quantity,
@@ -244,7 +244,8 @@ fn record(
         model: task.model(),
         input_sha256: case.sha256.clone(),
         seed: run.job.seed,
-        settings: measurement.settings.clone(),
+        method: measurement.method.clone(),
+        effort: measurement.effort.clone(),
         role: planned.engine.role(),
         approximation: run.approximation.clone(),
         notes: measurement.notes.clone(),

@@ -86,14 +86,10 @@ pub fn refine(
         };
         subject.notes.push(format!("look {look}: {} undecided meters were asked for more", ask.targets.len()));
         subject.wall_s += wall_s;
-        for (key, value) in measurement.settings {
-            subject.settings.insert(format!("look{look}_{key}"), value);
-        }
-        let mut stations = &measurement.estimates[..];
-        for &k in &ask.targets {
-            let (mine, rest) = stations.split_at(task.targets[k].aspects.len());
-            stations = rest;
-            combine(&mut subject.readings[k], total_weight, &task.targets[k].reading(mine), weight);
+        subject.effort.extend(measurement.effort.iter().map(|(k, v)| (format!("look{look}_{k}"), v.clone())));
+        let estimates = measurement.readings(ask.targets.iter().map(|k| &task.targets[*k]));
+        for (&k, estimate) in ask.targets.iter().zip(&estimates) {
+            combine(&mut subject.readings[k], total_weight, estimate, weight);
             subject.looks[k] = look;
         }
         total_weight += weight;

@@ -8,7 +8,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::views::read_report;
 use crate::report::{Exit, Report};
-use crate::trend::baseline::{Baseline, Comparability, Decision, State, compare, review};
+use crate::trend::baseline::{Baseline, Comparability, Decision, Entry, State, compare, review};
 
 /// Where baselines are kept unless something else is said.
 const FOLDER: &str = "baselines";
@@ -41,7 +41,8 @@ pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
     } else {
         Baseline { luxproof_baseline: 1, entries: vec![] }
     };
-    let candidates = sound(Baseline::candidate(&report));
+    let mut candidates = Baseline::candidate(&report).entries;
+    candidates.retain(may_be_accepted);
     let changes = compare(&baseline.entries, &candidates, Comparability::SameInstrument);
     let now = humantime::format_rfc3339_seconds(std::time::SystemTime::now()).to_string();
     let decision = match &args.reason {
@@ -49,10 +50,9 @@ pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
             return Err(miette::miette!(help = "say why these readings are right", "an empty reason"));
         }
         Some(reason) => {
-            let open = |e: &&crate::trend::baseline::Entry| {
-                let change = changes.entries.iter().find(|c| e.key == c.key);
-                change.is_none_or(|c| c.state != State::Unchanged)
-            };
+            let is_unchanged =
+                |e: &Entry| changes.entries.iter().any(|c| e.key == c.key && c.state == State::Unchanged);
+            let open = |e: &&Entry| !is_unchanged(e);
             let accepted = candidates.iter().filter(open).map(|e| e.accepted_for(reason.trim(), &now)).collect();
             Decision { accepted, declined: 0 }
         }
@@ -75,14 +75,10 @@ pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
     Ok(Exit::Passed)
 }
 
-/// What may become a baseline: runs that gave readings, all of them finite.
-fn sound(candidate: Baseline) -> Vec<crate::trend::baseline::Entry> {
-    let is_sound = |e: &crate::trend::baseline::Entry| {
-        let sound = !e.readings.is_empty() && e.readings.iter().all(|r| r.value.is_finite() && r.value >= 0.0);
-        if !sound {
-            eprintln!("{} {} of {}: without sound readings, never accepted", e.key.engine, e.key.procedure, e.key.case);
-        }
-        sound
-    };
-    candidate.entries.into_iter().filter(is_sound).collect()
+/// Whether an entry may become a baseline; told where it may not.
+fn may_be_accepted(entry: &Entry) -> bool {
+    if !entry.is_sound() {
+        eprintln!("{}: without sound readings, never accepted", entry.key);
+    }
+    entry.is_sound()
 }

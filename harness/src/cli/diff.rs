@@ -1,6 +1,5 @@
 //! `luxproof diff`: what changed between two runs, a mean shift told apart from noise.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -8,6 +7,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::accept::read_run;
 use super::print;
+use crate::record::ReadingKey;
 use crate::report::{BaselineCheck, BaselineLine, Exit};
 use crate::trend::baseline::{Baseline, Changes, Comparability, EntryChange, MeterChange, State, compare};
 
@@ -43,42 +43,21 @@ pub(super) fn diff(args: &DiffArgs) -> Result<Exit, Diagnostic> {
 pub(super) fn text(changes: &Changes) -> String {
     let mut text = String::new();
     for entry in &changes.entries {
-        writeln!(
-            text,
-            "{:<9} {} {} {}{}",
-            name(entry.state),
-            entry.key.case,
-            entry.key.procedure,
-            entry.key.engine,
-            mean(entry)
-        )
-        .ok();
-        for detail in details(entry) {
-            writeln!(text, "            {detail}").ok();
-        }
+        let ReadingKey { case, procedure, engine } = &entry.key;
+        let mean = entry.mean.map_or_else(String::new, |mean| format!(": mean {mean}"));
+        text += &format!("{:<9} {case} {procedure} {engine}{mean}\n", name(entry.state));
+        text.extend(details(entry).map(|detail| format!("            {detail}\n")));
     }
     let count = |state| changes.entries.iter().filter(|e| e.state == state).count();
-    writeln!(
-        text,
-        "{} unchanged, {} shifted, {} changed, {} vanished, {} new, {} refused; {} tests, each at {:.1e}",
-        count(State::Unchanged),
-        count(State::Shifted),
-        count(State::Changed),
-        count(State::Vanished),
-        count(State::New),
-        count(State::Refused),
-        changes.tests,
-        changes.level
-    )
-    .ok();
-    text
+    let counts = [State::Unchanged, State::Shifted, State::Changed, State::Vanished, State::New, State::Refused]
+        .map(|state| format!("{} {}", count(state), name(state).to_lowercase()));
+    text + &format!("{}; {} tests, each at {:.1e}\n", counts.join(", "), changes.tests, changes.level)
 }
 
 /// Changes as a report keeps them. Nothing that nobody accepted counts as accepted, be it new.
 pub(super) fn check(changes: &Changes, file: &Path) -> BaselineCheck {
     let line = |entry: &EntryChange| {
-        let mean = mean(entry);
-        let mean = mean.strip_prefix(": ").map(str::to_owned);
+        let mean = entry.mean.map(|mean| format!("mean {mean}"));
         BaselineLine {
             key: entry.key.clone(),
             state: name(entry.state).to_owned(),
@@ -90,7 +69,7 @@ pub(super) fn check(changes: &Changes, file: &Path) -> BaselineCheck {
 }
 
 /// What differs besides the readings, and the meters that moved, five at most.
-fn details(entry: &EntryChange) -> Vec<String> {
+fn details(entry: &EntryChange) -> impl Iterator<Item = String> {
     let moved = |m: &MeterChange| {
         let in_u =
             if m.uncertainty > 0.0 { format!(", {:+.1} u", (m.new - m.old) / m.uncertainty) } else { String::new() };
@@ -98,14 +77,7 @@ fn details(entry: &EntryChange) -> Vec<String> {
         format!("{} {:.6} -> {:.6} {}: {relative:+.4} %{in_u}", m.meter, m.old, m.new, m.quantity.unit())
     };
     let meters = entry.meters.iter().filter(|m| m.significant).take(5).map(moved);
-    entry.notes.iter().cloned().chain(meters).collect()
-}
-
-fn mean(entry: &EntryChange) -> String {
-    entry.mean.map_or_else(String::new, |m| {
-        let in_u = m.relative / m.uncertainty;
-        format!(": mean {:+.4} % +- {:.4} % ({in_u:+.1} u)", 100.0 * m.relative, 100.0 * m.uncertainty)
-    })
+    entry.notes.iter().cloned().chain(meters)
 }
 
 const fn name(state: State) -> &'static str {

@@ -7,7 +7,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::views::read_report;
 use crate::report::Exit;
-use crate::trend::history::{History, add, changes, entries, site};
+use crate::trend::history::{History, Line, add, changes, lines, site};
 
 #[derive(Debug, Args)]
 pub(super) struct HistoryArgs {
@@ -17,7 +17,7 @@ pub(super) struct HistoryArgs {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Add the comparisons of reports, one line each; a night that is added again takes the place of its lines
+    /// Add the comparisons of reports; a night that is added again takes the place of its lines
     Add {
         /// report.json of a run
         #[arg(required = true, value_name = "REPORT")]
@@ -48,7 +48,6 @@ fn link(text: &str) -> Result<(String, String), String> {
     Ok((name.to_owned(), path.to_owned()))
 }
 
-/// Does what the command line asks of a history.
 pub(super) fn history(args: &HistoryArgs) -> Result<Exit, Diagnostic> {
     match &args.action {
         Action::Add { reports, history, night } => {
@@ -63,18 +62,24 @@ pub(super) fn history(args: &HistoryArgs) -> Result<Exit, Diagnostic> {
 
 fn add_report(path: &Path, history: &Path, night: Option<&str>) -> Result<(), Diagnostic> {
     let report = read_report(path)?;
-    let entries = entries(&report, night).into_diagnostic()?;
-    let replaced = add(history, &entries).into_diagnostic()?;
-    let instead = if replaced > 0 { format!(" in place of {replaced}") } else { String::new() };
-    println!("{}: {} comparisons added{instead}", history.display(), entries.len());
+    let lines = lines(&report, night).into_diagnostic()?;
+    let added = add(history, &lines).into_diagnostic()?;
+    tell_of_cut(history, added.cut_short);
+    let count: usize = lines.iter().map(Line::count).sum();
+    let instead = if added.replaced > 0 { format!(" in place of {} lines", added.replaced) } else { String::new() };
+    println!("{}: {count} comparisons added{instead}", history.display());
     Ok(())
+}
+
+fn tell_of_cut(history: &Path, line: Option<usize>) {
+    if let Some(line) = line {
+        eprintln!("{}:{line}: the last line is cut short and left out", history.display());
+    }
 }
 
 fn draw(path: &Path, out: &Path, reports: &[(String, String)]) -> Result<(), Diagnostic> {
     let history = History::read(path).into_diagnostic()?;
-    if history.is_cut_short {
-        eprintln!("{}: the last line is cut short and left out", path.display());
-    }
+    tell_of_cut(path, history.cut_short);
     std::fs::create_dir_all(out).into_diagnostic().wrap_err_with(|| out.display().to_string())?;
     let page = out.join("index.html");
     let changes = changes(&history);

@@ -10,6 +10,7 @@ use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 use luminaire::simulator::{self, Accuracy};
 
+use crate::engines::Measurement;
 use crate::procedures::Task;
 use crate::record::Estimate;
 
@@ -54,8 +55,9 @@ pub fn truth(task: &Task) -> Option<Vec<f64>> {
     }
     let accuracy = Accuracy { relative_error: ACCURACY, seed: 1 };
     let solution = simulator::illuminance(&task.scene, &meters, task.transport, &accuracy).ok()?;
-    let stations: Vec<Estimate> = solution.estimates.iter().map(|e| Estimate::exact(e.illuminance.value())).collect();
-    Some(task.readings(&stations).iter().map(|reading| reading.value).collect())
+    let estimates = solution.estimates.iter().map(|e| Estimate::exact(e.illuminance.value())).collect();
+    let measurement = Measurement { estimates, ..Measurement::default() };
+    Some(measurement.readings(&task.targets).iter().map(|reading| reading.value).collect())
 }
 
 /// Every fault that would show in a task whose right readings are `right`.

@@ -4,14 +4,14 @@ use super::contract::{Engine, Entry};
 use super::{iesna, mitsuba, povray, radiance, simulator};
 
 /// In the order of reports: our own witnesses first.
-pub const ALL: [&Entry; 5] = [&simulator::ENTRY, &iesna::ENTRY, &mitsuba::ENTRY, &radiance::ENTRY, &povray::ENTRY];
+pub const ALL: &[&Entry] = &[&simulator::ENTRY, &iesna::ENTRY, &mitsuba::ENTRY, &radiance::ENTRY, &povray::ENTRY];
 
 pub fn all() -> Vec<Box<dyn Engine>> {
     ALL.iter().map(|entry| (entry.make)()).collect()
 }
 
 pub fn entry(name: &str) -> Option<&'static Entry> {
-    ALL.into_iter().find(|entry| entry.name == *name)
+    ALL.iter().copied().find(|entry| entry.name == *name)
 }
 
 /// An engine as its makers write it; one of the user's by its name.

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::Site;
 use super::blocks::Blocks;
 use super::workbench::{EngineError, SceneFile, Workbench};
-use crate::procedures::Task;
-use crate::record::{EngineName, Estimate, MeterId, ProcedureId, Role, Uncertainty};
+use crate::procedures::{Target, Task};
+use crate::record::{Effort, EngineName, Estimate, MeterId, Method, ProcedureId, Role, Uncertainty};
 use crate::spec::{Budget, Case};
 use crate::system::slots::{Share, Slots};
 
@@ -24,12 +24,10 @@ pub(super) const OWN_LOOKUP: &str = "luminaire's interpolation of candela tables
 pub trait Engine: Send + Sync {
     fn name(&self) -> EngineName;
 
-    /// What it takes part for.
     fn role(&self) -> Role {
         Role::Renderer
     }
 
-    /// Whether others are judged by it.
     fn is_witness(&self) -> bool {
         self.role() == Role::Witness
     }
@@ -71,7 +69,7 @@ pub trait Engine: Send + Sync {
     /// The job without what makes no difference to this engine's readings: two jobs that are equal then are one to it. For
     /// most, the names of case and procedure are comments.
     fn essence(&self, job: &Job) -> Job {
-        job.nameless()
+        job.without_names()
     }
 
     /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
@@ -116,7 +114,6 @@ impl Entry {
 /// A setting of an engine with values worth trying.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Knob {
-    /// Its key in a spec.
     pub key: &'static str,
     /// Values as YAML flow scalars, the default first.
     pub values: &'static [&'static str],
@@ -147,11 +144,8 @@ pub struct Job {
     pub procedure: ProcedureId,
     /// Room, obstacles and the luminaires that are on. No room means free field.
     pub scene: Scene,
-    /// Where illuminance is read.
     pub stations: Vec<Station>,
-    /// Which light counts.
     pub transport: Transport,
-    /// When to stop.
     pub budget: Budget,
     /// Seed of every random choice.
     pub seed: u64,
@@ -160,11 +154,6 @@ pub struct Job {
 }
 
 impl Job {
-    /// The same under no name: of any case, and of one procedure that stands for all.
-    pub fn nameless(&self) -> Self {
-        Self { case: String::new(), procedure: ProcedureId::LuminousIntensity, ..self.clone() }
-    }
-
     /// What an engine without settings is asked for a task of a case.
     pub fn of_task(case: &Case, task: &Task) -> Self {
         let station = |(id, meter)| Station { id, meter, expected_lx: None };
@@ -182,6 +171,11 @@ impl Job {
 }
 
 impl Job {
+    /// The same whatever case and procedure are called.
+    pub(super) fn without_names(&self) -> Self {
+        Self { case: String::new(), procedure: ProcedureId::DirectIlluminance, ..self.clone() }
+    }
+
     /// Of all surfaces of room and bodies.
     pub(super) fn largest_reflectance(&self) -> f64 {
         let room = self.scene.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
@@ -189,7 +183,6 @@ impl Job {
     }
 }
 
-/// A meter with its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Station {
     pub id: MeterId,
@@ -219,7 +212,6 @@ pub enum Support {
     Yes,
     /// With a known approximation.
     Approximate {
-        /// What is approximated.
         why: String,
         /// Its size, relative.
         size: Option<f64>,
@@ -233,8 +225,10 @@ pub enum Support {
 pub struct Measurement {
     /// Illuminance in lux, one a station, in the stations' order.
     pub estimates: Vec<Estimate>,
-    /// What was set, for whoever repeats it: samples, seeds, arguments, variant.
-    pub settings: BTreeMap<String, String>,
+    /// What was done: solver, preset, variant.
+    pub method: Method,
+    /// How much of it, by which random numbers and where: samples, seeds, commands.
+    pub effort: Effort,
     /// What the reader of the report should know of this run.
     pub notes: Vec<String>,
     /// The independent parts of the readings that were sampled, in the stations' order: their spread is the estimates'
@@ -244,6 +238,21 @@ pub struct Measurement {
 }
 
 impl Measurement {
+    /// The readings of targets, whose stations these are, target by target.
+    pub fn readings<'a>(&self, targets: impl IntoIterator<Item = &'a Target>) -> Vec<Estimate> {
+        let mut first = 0;
+        let reading = |target: &Target| {
+            let weights: Vec<_> = target.aspects.iter().enumerate().map(|(k, a)| (first + k, a.weight)).collect();
+            first += weights.len();
+            let sum = self.weighted(&weights);
+            match target.quadrature {
+                0.0 => sum,
+                relative => Estimate { uncertainty: sum.uncertainty.within(relative * sum.value.abs()), ..sum },
+            }
+        };
+        targets.into_iter().map(reading).collect()
+    }
+
     /// The weighted sum of stations' estimates, with the standard error that their joint sampling gives it; where the samples
     /// are not known, the errors of stations may be all one.
     pub fn weighted(&self, weights: &[(usize, f64)]) -> Estimate {

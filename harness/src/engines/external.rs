@@ -21,7 +21,6 @@ use crate::system::process::Invocation;
 /// The environment variable that names an empty folder for the adapter's own files, kept with the run.
 const FOLDER_VARIABLE: &str = "LUXPROOF_SCENE_DIR";
 
-/// The file that holds the job.
 const JOB_FILE: &str = "job.json";
 
 /// An engine that is a program of the user's.
@@ -37,7 +36,6 @@ pub(super) struct External {
 }
 
 impl External {
-    /// The engine that a spec describes.
     pub(super) fn new(
         name: &str,
         settings: &BTreeMap<String, serde_json::Value>,
@@ -155,7 +153,7 @@ impl Engine for External {
         let run = self.invocation(job, workbench)?;
         let finished = run.run()?;
         let mut measurement = form::measurement(&finished.stdout, job, &self.id)?;
-        measurement.settings.insert("command".into(), run.command_line());
+        measurement.effort.insert("command".into(), run.command_line());
         checked(&self.id, job, measurement)
     }
 }

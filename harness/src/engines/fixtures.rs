@@ -1,21 +1,36 @@
 //! Jobs with known answers that the tests of every engine share.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use glam::DVec3;
 use luminaire::geometry::{Reflectances, Room};
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
 
-use super::{Budget, Job, Measurement, Station};
+use super::{Budget, Job, Measurement, Site, Station, Workbench};
 use crate::record::{Estimate, MeterId, ProcedureId};
+use crate::system::process::PeakMemory;
 
 pub(crate) const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
 pub(super) const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
 pub(crate) const S1_INDIRECT_LX: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
 /// Indirect light cut at seven reflections.
 pub(super) const S1_SEVEN_LX: [f64; 4] = [0.93537, 1.14730, 1.14730, 1.41182];
+
+/// A bench with the engines that are installed, two processes at a time.
+pub(crate) fn workbench(folder: &Path) -> Workbench {
+    Workbench {
+        site: Site::of_user().unwrap(),
+        scene_dir: folder.to_owned(),
+        log: folder.join("log"),
+        jobs: 2,
+        limit: Duration::from_secs(120),
+        peak: PeakMemory::default(),
+    }
+}
 
 pub(crate) fn photometry(distribution: LuminousIntensityDistribution) -> Arc<Photometry> {
     Arc::new(Photometry::of(distribution))

@@ -6,7 +6,6 @@ use luminaire::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
 use super::{Absent, Engine, EngineError, Entry, Job, Measurement, Site, Support, Version, Workbench, checked};
 use crate::record::{EngineName, Estimate, Role, Uncertainty};
 
-/// The methods of [`luminaire::calculators`].
 pub(super) struct Iesna;
 
 const ID: EngineName = EngineName::IESNA;
@@ -60,7 +59,7 @@ impl Engine for Iesna {
 
     fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
         let mut measurement = Measurement::default();
-        measurement.settings.insert("method".into(), method(job.transport).into());
+        measurement.method.insert("method".into(), method(job.transport).into());
         let mut notes = vec![];
         for station in &job.stations {
             let what = |error: NotApplicable| format!("{}: {error}", station.id);

@@ -15,7 +15,6 @@ use super::catalogue::ALL;
 use super::contract::Component;
 use crate::record::EngineName;
 
-/// What became of one component.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InstallOutcome {
     pub component: &'static str,
@@ -36,7 +35,6 @@ pub enum InstallState {
     Failed,
 }
 
-/// Why a component could not be installed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum InstallError {
     #[error(transparent)]

@@ -107,7 +107,7 @@ impl Mitsuba {
         let (run, fallback) = backend.invocation(workbench, settings);
         let mut measurement = Driver::new(job, settings, run.converse()?, started).measurement()?;
         measurement.notes.extend(fallback);
-        measurement.settings.insert("command".into(), run.command_line());
+        measurement.effort.insert("command".into(), run.command_line());
         super::checked(&ID, job, measurement)
     }
 

@@ -121,8 +121,8 @@ fn sum(direct: &Measurement, mut indirect: Measurement) -> Measurement {
     for (total, part) in indirect.estimates.iter_mut().zip(&direct.estimates) {
         *total = total.plus(part);
     }
-    for (key, value) in &direct.settings {
-        indirect.settings.entry(key.clone()).or_insert_with(|| value.clone());
+    for (key, value) in direct.effort.iter() {
+        indirect.effort.entry(key.clone()).or_insert_with(|| value.clone());
     }
     indirect
 }

@@ -47,7 +47,6 @@ const FLOAT_READ_OUT: f64 = 5e-7;
 const NOT_REPEATABLE: &str = "rtrace seeds its random numbers from the clock, so reflected light repeats within its \
                               standard error only; its fixed sequence (-u-) is biased by .3 %";
 
-/// The engine.
 pub(super) struct Radiance;
 
 impl Engine for Radiance {
@@ -134,14 +133,14 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
     let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows, started };
     let options = printed_options(job, &settings);
     let mut measurement = Measurement::default();
-    measurement.settings.insert("seed".into(), job.seed.to_string());
+    measurement.effort.insert("seed".into(), job.seed.to_string());
 
     let direct = match job.transport {
         Transport::Indirect(_) => vec![],
         _ => direct(&sampler, &options, &mut measurement)?,
     };
     if job.transport == Transport::Direct {
-        measurement.settings.insert("rtrace".into(), options.direct.join(" "));
+        measurement.effort.insert("rtrace".into(), options.direct.join(" "));
         measurement.estimates = direct;
         return checked(&ID, job, measurement);
     }
@@ -150,7 +149,7 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
     let Sampled { blocks, divisions, options, shortfall } = sampler.total(if is_total { &[] } else { &part_lx })?;
     let (count, divisions) = (blocks.count().to_string(), divisions.to_string());
     let settings = [("rtrace", options.join(" ")), ("blocks", count), ("ambient_divisions", divisions)];
-    measurement.settings.extend(settings.map(|(key, value)| (key.to_owned(), value)));
+    measurement.effort.extend(settings.map(|(key, value)| (key.to_owned(), value)));
     measurement.notes.push(NOT_REPEATABLE.into());
     measurement.notes.extend(shortfall);
     let reflected = blocks.estimates().into_iter().zip(part_lx).map(|(total, part_lx)| reflected(total, part_lx));

@@ -7,7 +7,6 @@ use super::settings::Given;
 use super::{Absent, Engine, EngineError, Entry, Job, Knob, Measurement, Site, Support, Version, Workbench, checked};
 use crate::record::{EngineName, Estimate, Role};
 
-/// The exact simulation of [`luminaire::simulator`].
 pub(crate) struct Simulator;
 
 const ID: EngineName = EngineName::SIMULATOR;
@@ -54,7 +53,7 @@ impl Engine for Simulator {
 
     /// An impostor is a way to sample an opening: to an exact solution it is the opening itself.
     fn essence(&self, job: &Job) -> Job {
-        let mut job = job.nameless();
+        let mut job = job.without_names();
         for luminaire in &mut job.scene.luminaires {
             if luminaire.model == LuminaireModel::Impostor {
                 luminaire.model = LuminaireModel::Area;
@@ -75,13 +74,10 @@ impl Engine for Simulator {
             .map_err(|e| failed(e.to_string()))?
             .install(|| simulator::illuminance(&job.scene, &meters, job.transport, &accuracy))
             .map_err(|e| failed(e.to_string()))?;
-        let settings = [
-            ("solver".to_owned(), solution.solver),
-            ("relative_error".to_owned(), relative_error.to_string()),
-            ("seed".to_owned(), job.seed.to_string()),
-        ];
+        let method = [("solver", solution.solver)].into();
+        let effort = [("relative_error", relative_error.to_string()), ("seed", job.seed.to_string())].into();
         let estimates = solution.estimates.iter().map(estimate).collect();
-        checked(&ID, job, Measurement { estimates, settings: settings.into(), ..Measurement::default() })
+        checked(&ID, job, Measurement { estimates, method, effort, ..Measurement::default() })
     }
 }
 

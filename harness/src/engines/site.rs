@@ -18,7 +18,6 @@ pub struct Site {
 pub struct SiteError(String);
 
 impl Site {
-    /// The site in a given folder.
     pub fn at(root: impl Into<PathBuf>) -> Self {
         Self { root: root.into() }
     }
@@ -29,7 +28,6 @@ impl Site {
         Ok(Self::at(strategy.data_dir().join("luxproof").join("engines")))
     }
 
-    /// The folder itself.
     pub fn root(&self) -> &Path {
         &self.root
     }
@@ -51,7 +49,6 @@ impl Site {
         versions.flatten().map(package).find(|p| p.is_dir())
     }
 
-    /// The root of unpacked Debian packages.
     pub fn debian(&self) -> PathBuf {
         self.root.join("debian")
     }
@@ -82,14 +79,23 @@ impl Site {
         env::join_paths(present).ok().filter(|p| !p.is_empty())
     }
 
-    /// The libLLVM that suits Mitsuba best: 19 if there is one, else the newest from 17 on.
-    ///
-    /// Older ones are refused by Mitsuba (14) or end its process (15, 16).
-    pub fn llvm(&self) -> Option<PathBuf> {
-        let versioned = self.libraries("libLLVM").into_iter().filter_map(|p| llvm_major(&p).map(|v| (v, p)));
-        let usable = versioned.filter(|(major, _)| *major >= 17);
-        usable.max_by_key(|(major, _)| (*major == 19, *major)).map(|(_, path)| path)
+    /// The libLLVMs that Mitsuba may work with, best first: 19 is proven, newer ones come next; Mitsuba refuses 14, and 15
+    /// and 16 end its process.
+    pub fn llvms(&self) -> Vec<PathBuf> {
+        llvms(self.libraries("libLLVM"))
     }
+
+    pub fn llvm(&self) -> Option<PathBuf> {
+        self.llvms().into_iter().next()
+    }
+}
+
+fn llvms(libraries: Vec<PathBuf>) -> Vec<PathBuf> {
+    let known = libraries.into_iter().map(|path| path.canonicalize().unwrap_or(path));
+    let mut known: Vec<_> = known.filter_map(|p| llvm_major(&p).filter(|major| *major >= 17).map(|v| (v, p))).collect();
+    known.sort_by_key(|(major, path)| (*major != 19, std::cmp::Reverse(*major), path.clone()));
+    known.dedup();
+    known.into_iter().map(|(_, path)| path).collect()
 }
 
 /// The major version in `libLLVM.so.19.1`, `libLLVM-17.so.1` or `libLLVM-17.so`.
@@ -119,6 +125,15 @@ mod tests {
         ] {
             assert_eq!(llvm_major(Path::new(name)), major, "{name}");
         }
+    }
+
+    #[test]
+    fn proven_llvm_comes_first_and_versions_that_abort_are_left_out() {
+        let files =
+            ["libLLVM-14.0.6.so.1", "libLLVM-15.so", "libLLVM.so.22.1", "libLLVM-19.so", "libLLVM.so.17", "libLLVM.so"];
+        let found = llvms(files.iter().map(|f| PathBuf::from("/none").join(f)).collect());
+        let names: Vec<_> = found.iter().map(|p| p.file_name().unwrap().to_str().unwrap()).collect();
+        assert_eq!(names, ["libLLVM-19.so", "libLLVM.so.22.1", "libLLVM.so.17"]);
     }
 
     #[test]

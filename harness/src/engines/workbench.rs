@@ -7,7 +7,6 @@ use super::Site;
 use crate::record::{EngineName, MeterId, Uncertainty};
 use crate::system::process::{Invocation, PeakMemory, ProcessError};
 
-/// A file of an exported scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
     pub name: String,
@@ -55,16 +54,13 @@ impl Workbench {
 /// Why an engine that was there gave no reading.
 #[derive(Debug, thiserror::Error)]
 pub enum EngineError {
-    /// A process failed.
     #[error(transparent)]
     Process(#[from] ProcessError),
-    /// A file could not be written or read.
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
     /// The program ended well but what it gave is not a result.
     #[error("{engine} exited without an error, but {what}")]
     Output { engine: EngineName, what: String },
-    /// What it read is no number.
     #[error("{engine} exited without an error, but read {value} lx ({uncertainty:?}) at {meter}")]
     NotFinite { engine: EngineName, meter: MeterId, value: f64, uncertainty: Uncertainty },
     /// A setting from the spec makes no sense to the engine.

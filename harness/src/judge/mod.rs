@@ -1,12 +1,11 @@
 //! The diffing layer: readings against references that carry their own uncertainty; it sees nothing but readings.
 
+mod comparison;
 mod consensus;
 mod family;
-mod input;
 mod known;
-mod paper_split;
+mod papers;
 mod policy;
-mod published;
 mod spending;
 mod split;
 #[cfg(test)]
@@ -24,14 +23,14 @@ use crate::procedures::{self, Target, Task};
 use crate::record::{EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, Uncertainty};
 use crate::spec::ToleranceOverride;
 
-use input::Input;
+use papers::Input;
 
 pub use crate::record::Basis;
 pub use consensus::{Consensus, Witness};
 pub use known::{KnownBreak, KnownDeviationError, KnownDeviations, Subject};
-pub use paper_split::{PaperSplit, Share, Stage, Stages, shares};
+pub use papers::{PaperSplit, Share, Stages, shares};
+pub use papers::{Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use policy::{Policy, PolicyError};
-pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
@@ -324,7 +323,7 @@ fn reference_of_task(task: &Task, recordings: &[&Recording], k: usize, engine: &
     }
     let recording = recordings.iter().find(|r| r.key.engine == witness)?;
     let reading = recording.readings.get(k)?;
-    let source = match recording.settings.get("solver") {
+    let source = match recording.method.get("solver") {
         Some(solver) if basis == Basis::Exact => format!("{source}: {solver}"),
         _ => source.to_owned(),
     };

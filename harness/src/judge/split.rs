@@ -14,11 +14,8 @@ use crate::record::{EngineName, MeterId, ProcedureId, Reading, Recording, Role};
 pub struct Split {
     pub case: String,
     pub procedure: ProcedureId,
-    /// The approximate method.
     pub method: String,
-    /// The renderer.
     pub engine: EngineName,
-    /// The luminaire model.
     pub model: String,
     pub meter: MeterId,
     /// Method over renderer, less 1.

@@ -27,12 +27,12 @@ impl Verdict {
         matches!(self, Self::Fail | Self::UnexpectedPass | Self::Missing)
     }
 
-    /// The name used in reports.
+    /// As views call it; in JSON an undecided comparison is `inconclusive`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Pass => "pass",
             Self::KnownDeviation => "known deviation",
-            Self::Inconclusive => "inconclusive",
+            Self::Inconclusive => "undecided",
             Self::Fail => "fail",
             Self::UnexpectedPass => "unexpected pass",
             Self::Missing => "missing",

@@ -98,9 +98,9 @@ impl Shortcut {
         };
         let stations: Vec<_> = self.fill.iter().map(station).collect();
         let samples = rendered.samples.iter().map(|part| part.rearranged(&stations)).collect();
-        let mut settings = rendered.settings;
-        settings.extend(self.traces(asked));
-        Measurement { estimates, settings, notes: rendered.notes, samples }
+        let mut method = rendered.method;
+        method.extend(self.traces(asked));
+        Measurement { estimates, method, effort: rendered.effort, notes: rendered.notes, samples }
     }
 
     /// Which meter's reading is which other's, for whoever repeats it.

@@ -6,7 +6,7 @@ use luminaire::photometry::direction;
 use luminaire::scene::{Luminaire, Meter, Scene, Transport};
 
 use super::form::{Angles, AtAngles, Names};
-use crate::record::{Estimate, Light, MeterId, ProcedureId, Quantity};
+use crate::record::{Light, MeterId, ProcedureId, Quantity};
 
 /// What one procedure measures in one case.
 #[derive(Clone, Debug)]
@@ -76,17 +76,6 @@ impl Task {
         let first = self.targets[..target].iter().map(|t| t.aspects.len()).sum();
         first..first + self.targets[target].aspects.len()
     }
-
-    /// One reading a target, of illuminances at all stations.
-    pub fn readings(&self, stations: &[Estimate]) -> Vec<Estimate> {
-        let mut rest = stations;
-        let reading = |target: &Target| {
-            let (mine, others) = rest.split_at(target.aspects.len().min(rest.len()));
-            rest = others;
-            target.reading(mine)
-        };
-        self.targets.iter().map(reading).collect()
-    }
 }
 
 impl Target {
@@ -102,16 +91,6 @@ impl Target {
             _ => MeterId::new(&self.id.0, k),
         };
         self.aspects.iter().enumerate().map(move |(k, aspect)| (name(k), aspect.meter))
-    }
-
-    /// The reading of illuminances at its stations, which are taken in one run.
-    pub fn reading(&self, stations: &[Estimate]) -> Estimate {
-        let weights: Vec<f64> = self.aspects.iter().map(|a| a.weight).collect();
-        let sum = Estimate::of_one_run(&weights, stations);
-        if self.quadrature == 0.0 {
-            return sum;
-        }
-        Estimate { uncertainty: sum.uncertainty.within(self.quadrature * sum.value.abs()), ..sum }
     }
 }
 

@@ -3,11 +3,10 @@
 mod basis;
 mod key;
 mod light;
+mod method;
 mod role;
 mod status;
 mod uncertainty;
-
-use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,6 +14,7 @@ use serde::{Deserialize, Serialize};
 pub use basis::Basis;
 pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
 pub use light::{Light, UnknownLight};
+pub use method::{Effort, Method};
 pub use role::Role;
 pub use status::{EngineStatus, Status};
 pub use uncertainty::Uncertainty;
@@ -112,6 +112,7 @@ pub struct Recording {
     #[serde(default)]
     pub role: Role,
     /// The luminaire model: point, area, impostor, or mixed.
+    #[serde(default)]
     pub model: String,
     /// Which light counted.
     pub light: Light,
@@ -119,8 +120,12 @@ pub struct Recording {
     pub input_sha256: String,
     /// Seed of every random choice.
     pub seed: u64,
-    /// What the engine set: arguments, samples, seeds, variant.
-    pub settings: BTreeMap<String, String>,
+    /// What the engine did. Files of before effort was told apart have both under `settings`.
+    #[serde(alias = "settings")]
+    pub method: Method,
+    /// How much of it, by which random numbers and where.
+    #[serde(default)]
+    pub effort: Effort,
     /// Where the engine only approximates what was asked.
     pub approximation: Option<String>,
     /// What the reader of a report should know.
@@ -157,7 +162,8 @@ impl Recording {
             light,
             input_sha256: String::new(),
             seed: 1,
-            settings: BTreeMap::new(),
+            method: Method::default(),
+            effort: Effort::default(),
             approximation: None,
             notes: vec![],
             wall_s: 0.0,

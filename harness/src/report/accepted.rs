@@ -1,13 +1,13 @@
 //! What holding a run against its baseline said, as every view tells it.
 
-use crate::record::ReadingKey;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::record::ReadingKey;
 
 /// A run held against accepted readings.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct BaselineCheck {
-    /// The baseline's file.
     pub file: String,
     /// One a case, procedure and engine of either side.
     pub entries: Vec<BaselineLine>,
@@ -27,7 +27,6 @@ pub struct BaselineLine {
 }
 
 impl BaselineCheck {
-    /// Whether everything repeats what was accepted.
     pub fn is_as_accepted(&self) -> bool {
         self.entries.iter().all(|e| e.is_as_accepted)
     }

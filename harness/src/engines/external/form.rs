@@ -126,8 +126,10 @@ pub struct ExternalReadings {
     readings: Vec<ReadingForm>,
     /// Instead of readings: why it cannot do this job, which is then skipped for this reason.
     declined: Option<String>,
-    /// What was set, for whoever repeats it: versions, samples, arguments.
+    /// What was done, for whoever repeats it: versions, solver, options.
     settings: BTreeMap<String, String>,
+    /// How much of it: samples, seeds, seconds; a baseline does not ask for the same.
+    effort: BTreeMap<String, String>,
     /// What the reader of the report should know.
     notes: Vec<String>,
 }
@@ -291,5 +293,6 @@ pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Resu
         }
         estimates.push(Estimate { value: reading.illuminance_lx, uncertainty: reading.uncertainty() });
     }
-    Ok(Measurement { estimates, settings: answer.settings, notes: answer.notes, ..Measurement::default() })
+    let (method, effort) = (answer.settings.into_iter().collect(), answer.effort.into_iter().collect());
+    Ok(Measurement { estimates, method, effort, notes: answer.notes, ..Measurement::default() })
 }

@@ -7,7 +7,7 @@ use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport, or
 use serde_json::json;
 
 use super::*;
-use crate::engines::fixtures::{CONVERGED, lopsided, luminaire, s1};
+use crate::engines::fixtures::{CONVERGED, lopsided, luminaire, s1, workbench};
 use crate::system::process::ProcessError;
 
 fn adapter(script: &str, folder: &Path) -> External {
@@ -17,15 +17,7 @@ fn adapter(script: &str, folder: &Path) -> External {
 
 fn read_within(script: &str, limit: Duration) -> Result<Measurement, EngineError> {
     let folder = tempfile::tempdir().unwrap();
-    let site = Site::at(folder.path());
-    let bench = Workbench {
-        site,
-        scene_dir: folder.path().into(),
-        log: folder.path().join("log"),
-        jobs: 1,
-        limit,
-        peak: crate::system::process::PeakMemory::default(),
-    };
+    let bench = Workbench { site: Site::at(folder.path()), limit, ..workbench(folder.path()) };
     adapter(script, folder.path()).read(&s1(Transport::Direct), &bench)
 }
 
@@ -44,7 +36,7 @@ fn prints(rows: &[(&str, &str)]) -> String {
 fn what_an_adapter_prints_is_what_is_read() {
     let found = read(&prints(&[("m[0]", "1"), ("m[1]", "2.5"), ("m[2]", "0"), ("m[3]", "4")])).unwrap();
     assert_eq!(found.estimates.iter().map(|e| e.value).collect::<Vec<_>>(), [1.0, 2.5, 0.0, 4.0]);
-    assert!(found.settings["command"].starts_with('/'), "{:?}", found.settings);
+    assert!(found.effort["command"].starts_with('/'), "{:?}", found.effort);
 }
 
 #[test]

@@ -40,7 +40,7 @@ impl Backend {
             return Err(absent("the Python package `mitsuba` is missing".into()));
         }
         let backend = |llvm, versions| Self { root: site.root().to_owned(), python: python.clone(), llvm, versions };
-        for library in candidates(site.libraries("libLLVM")) {
+        for library in site.llvms() {
             match probe(&python, "llvm_ad_mono", Some(&library)) {
                 Ok(versions) => return Ok(backend(Some(library), versions)),
                 Err(reason) => tracing::debug!(library = %library.display(), reason, "unusable libLLVM"),
@@ -54,7 +54,6 @@ impl Backend {
         self.root == site.root()
     }
 
-    /// As on a machine without libLLVM.
     #[cfg(test)]
     pub(super) fn without_llvm(self) -> Self {
         Self { llvm: None, ..self }
@@ -114,38 +113,9 @@ fn probe(python: &Path, variant: &str, llvm: Option<&Path>) -> Result<Versions, 
     serde_json::from_str(answer).map_err(|e| format!("the probe of Mitsuba answered `{answer}`: {e}"))
 }
 
-/// Libraries that may work, best first: 19 is proven, newer ones come next, before 17 Dr.Jit refuses or aborts.
-fn candidates(libraries: Vec<PathBuf>) -> Vec<PathBuf> {
-    let mut known: Vec<(u32, PathBuf)> = libraries
-        .into_iter()
-        .map(|path| path.canonicalize().unwrap_or(path))
-        .filter_map(|path| Some((llvm_major(path.file_name()?.to_str()?)?, path)))
-        .filter(|(major, _)| *major >= 17)
-        .collect();
-    known.sort_by_key(|(major, path)| (*major != 19, std::cmp::Reverse(*major), path.clone()));
-    known.dedup();
-    known.into_iter().map(|(_, path)| path).collect()
-}
-
-/// The major version in `libLLVM.so.19.1`, `libLLVM-19.so` or `libLLVM-14.0.6.so.1`.
-fn llvm_major(file_name: &str) -> Option<u32> {
-    let rest = file_name.strip_prefix("libLLVM")?;
-    let rest = rest.strip_prefix(".so.").or_else(|| rest.strip_prefix('-'))?;
-    rest.split(['.', '-']).next()?.parse().ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn proven_llvm_comes_first_and_versions_that_abort_are_left_out() {
-        let files =
-            ["libLLVM-14.0.6.so.1", "libLLVM-15.so", "libLLVM.so.22.1", "libLLVM-19.so", "libLLVM.so.17", "libLLVM.so"];
-        let found = candidates(files.iter().map(|f| PathBuf::from("/none").join(f)).collect());
-        let names: Vec<_> = found.iter().map(|p| p.file_name().unwrap().to_str().unwrap()).collect();
-        assert_eq!(names, ["libLLVM-19.so", "libLLVM.so.22.1", "libLLVM.so.17"]);
-    }
 
     #[test]
     fn a_site_without_python_says_what_to_run() {

@@ -81,9 +81,8 @@ impl<'a> Driver<'a> {
         let mut found =
             Measurement { estimates: vec![Estimate::DARK; self.job.stations.len()], ..Measurement::default() };
         let versions = greeting.versions.iter().map(|(k, v)| (format!("version_{k}"), v.clone()));
-        found.settings =
-            [("seed".into(), self.job.seed.to_string()), ("variant".into(), greeting.variant.clone())].into();
-        found.settings.extend(versions);
+        found.effort = [("seed", self.job.seed)].into();
+        found.method = versions.chain([("variant".to_owned(), greeting.variant.clone())]).collect();
         for part in &greeting.parts {
             let of_part =
                 if part.sampled { self.sampled(part, &greeting, &mut found)? } else { self.determined(part)? };
@@ -130,7 +129,7 @@ impl<'a> Driver<'a> {
         let blocks = rule.run(|numbers| self.blocks(part, side, stream, numbers))?;
         let samples = side * side * part.rays / self.job.stations.len().max(1);
         let of_part = [("blocks", blocks.count()), ("samples_a_meter_and_block", samples)];
-        found.settings.extend(of_part.map(|(key, value)| (format!("{}_{key}", part.name), value.to_string())));
+        found.effort.extend(of_part.map(|(key, value)| (format!("{}_{key}", part.name), value.to_string())));
         found.notes.extend(rule.shortfall(&blocks).map(|why| format!("{}: {why}", part.name)));
         let estimates = blocks.estimates();
         found.samples.push(blocks);

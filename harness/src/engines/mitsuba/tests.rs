@@ -1,8 +1,5 @@
 //! The real renderer against closed forms and the converged values of case S1, and what happens when it fails.
 
-use std::path::Path;
-use std::time::Duration;
-
 use glam::DVec3;
 use luminaire::geometry::Reflectances;
 use luminaire::photometry::LuminousIntensityDistribution;
@@ -14,19 +11,6 @@ use crate::engines::fixtures::*;
 
 mod failures;
 mod scenes;
-
-fn workbench(folder: &Path) -> Workbench {
-    let site = Site::of_user().unwrap();
-    let limit = Duration::from_secs(120);
-    Workbench {
-        site,
-        scene_dir: folder.to_owned(),
-        log: folder.join("log"),
-        jobs: 2,
-        limit,
-        peak: crate::system::process::PeakMemory::default(),
-    }
-}
 
 fn read(job: &Job) -> Measurement {
     read_tampered(job, |_, text| text)

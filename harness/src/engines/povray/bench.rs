@@ -1,6 +1,5 @@
 //! Runs POV-Ray: direct light in a few looks of rising magnification, reflected light in blocks until the budget is met.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::thread;
@@ -12,7 +11,7 @@ use crate::engines::blocks::{MIN_BLOCKS, Sampling};
 use crate::engines::image::read_rgb;
 use crate::engines::settings::Preset;
 use crate::engines::{EngineError, Job, Measurement, SceneFile, Site, Workbench};
-use crate::record::{Estimate, Uncertainty};
+use crate::record::{Effort, Estimate, Method, Uncertainty};
 use crate::system::process::Invocation;
 
 use super::ID;
@@ -28,7 +27,6 @@ const MAX_LOOKS: usize = 10;
 /// Below this share of its upper bound a reading is darkness.
 const DARK: f64 = 1e-12;
 
-/// Where a job's runs happen.
 pub(super) struct Bench<'a> {
     job: &'a Job,
     workbench: &'a Workbench,
@@ -49,7 +47,6 @@ pub(super) fn hermetic(invocation: Invocation, site: &Site) -> Invocation {
     }
 }
 
-/// One run's choices.
 #[derive(Clone, Copy)]
 struct Run {
     light: Light,
@@ -61,14 +58,12 @@ struct Run {
 /// Which reflections a run follows.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reflections {
-    /// As many as asked for, out of the cache.
     All,
     /// The first alone, which needs no cache.
     First,
 }
 
 impl Run {
-    /// Length of the pool of directions.
     fn pool(self) -> u32 {
         if self.reflections == Reflections::First && self.count > POOL / 10 { LONG_POOL } else { POOL }
     }
@@ -83,7 +78,6 @@ impl Run {
 }
 
 impl<'a> Bench<'a> {
-    /// A bench for a job.
     pub(super) fn new(job: &'a Job, workbench: &'a Workbench, settings: &'a Settings) -> Result<Self, EngineError> {
         Ok(Self { job, workbench, settings, program: program(&workbench.site)? })
     }
@@ -121,9 +115,8 @@ impl<'a> Bench<'a> {
             let bound = resolution_lx + DIRECT_RELATIVE * lx + self.table_error() * scale_of(*scale);
             estimates.push(Estimate { value: lx, uncertainty: Uncertainty::Bound(bound) });
         }
-        let mut settings = self.common_settings(run);
-        settings.insert("looks".into(), taken.to_string());
-        Ok(Measurement { estimates, settings, ..Measurement::default() })
+        let effort = Effort::from([("looks", taken.to_string()), ("arguments", self.printed_arguments(run))]);
+        Ok(Measurement { estimates, method: self.method(), effort, ..Measurement::default() })
     }
 
     /// Reflected light: blocks of turned scenes.
@@ -147,16 +140,19 @@ impl<'a> Bench<'a> {
         let rule = Sampling { side_by_side: jobs, ..Sampling::within(budget, started) };
         let blocks = rule.run(|numbers| self.wave(run, numbers, jobs, &pilot))?;
         notes.extend(rule.shortfall(&blocks));
-        let mut settings = self.common_settings(run);
-        settings.insert("blocks".into(), blocks.count().to_string());
-        settings.insert("seeds".into(), format!("{}..={}", self.seed(1), self.seed(blocks.count())));
-        settings.insert("count".into(), run.count.to_string());
+        let mut effort = Effort::from([
+            ("arguments", self.printed_arguments(run)),
+            ("blocks", blocks.count().to_string()),
+            ("seeds", format!("{}..={}", self.seed(1), self.seed(blocks.count()))),
+            ("count", run.count.to_string()),
+        ]);
         if self.settings.preset != Preset::Default {
-            settings.insert("count_first_reflection".into(), (FIRST_REFLECTION_RAYS * run.count).to_string());
+            effort.insert("count_first_reflection".into(), (FIRST_REFLECTION_RAYS * run.count).to_string());
         }
-        settings.insert("error_bound".into(), self.settings.error_bound.to_string());
-        settings.insert("recursion_limit".into(), self.settings.recursion_limit.to_string());
-        Ok(Measurement { estimates: blocks.estimates(), settings, notes, samples: vec![blocks] })
+        let mut method = self.method();
+        method.insert("error_bound".into(), self.settings.error_bound.to_string());
+        method.insert("recursion_limit".into(), self.settings.recursion_limit.to_string());
+        Ok(Measurement { estimates: blocks.estimates(), method, effort, notes, samples: vec![blocks] })
     }
 
     /// A first block, which finds each meter's scale and how long a block takes.
@@ -305,11 +301,12 @@ impl<'a> Bench<'a> {
         if self.job.scene.luminaires.iter().all(axial) { AXIAL_TABLE } else { BILINEAR_TABLE }
     }
 
-    fn common_settings(&self, run: Run) -> BTreeMap<String, String> {
-        let arguments = self.arguments(run, "image.ppm").join(" ");
-        [("arguments", arguments), ("preset", self.settings.preset.name().to_owned())]
-            .map(|(k, v)| (k.to_owned(), v))
-            .into()
+    fn printed_arguments(&self, run: Run) -> String {
+        self.arguments(run, "image.ppm").join(" ")
+    }
+
+    fn method(&self) -> Method {
+        [("preset", self.settings.preset.name())].into()
     }
 
     fn missed(&self, k: usize) -> EngineError {

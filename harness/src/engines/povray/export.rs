@@ -19,7 +19,6 @@ use super::pigment;
 use super::pixels::Readout;
 use super::settings::{POOL, Settings};
 
-/// The scene's file name.
 pub(super) const SCENE: &str = "scene.pov";
 
 /// Radius of the filter round a light, in scene units; POV-Ray silently ignores one of 1e-3.
@@ -34,13 +33,10 @@ const POINTS_INDIRECT: usize = 2;
 /// Which light a scene lets its meters see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Light {
-    /// Straight from the luminaires.
     Direct,
-    /// Reflected at least once.
     Indirect,
 }
 
-/// Writes the scene.
 pub(super) fn scene(job: &Job, settings: &Settings) -> SceneFile {
     let frame = Frame::of(job, settings.coordinates);
     let mut text = head(job, settings, frame);

@@ -22,7 +22,6 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The frame of a job.
     pub(super) fn of(job: &Job, coordinates: Coordinates) -> Self {
         if coordinates == Coordinates::Raw {
             return Self { centre_m: DVec3::ZERO, scale: 1.0, light: 1.0 };

@@ -50,7 +50,6 @@ pub(super) fn parts(opening: LuminousOpening, n: usize) -> Option<Vec<Part>> {
 /// A meter nearer to an opening than twice the widest gap between its point lights.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TooNear {
-    /// The meter.
     pub(super) station: String,
     pub(super) luminaire: String,
     /// Its distance from the opening in metres.

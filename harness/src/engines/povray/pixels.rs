@@ -18,7 +18,6 @@ pub(super) enum Readout {
 pub(super) enum Seen {
     /// An illuminance in lux and half the step of the channel it came from.
     Value {
-        /// Illuminance in lux.
         lx: f64,
         /// Half a step of the read-out, in lux.
         resolution_lx: f64,
@@ -31,7 +30,6 @@ pub(super) enum Seen {
     Missed,
 }
 
-/// Decodes one pixel.
 pub(super) fn decode(readout: Readout, [red, green, blue]: [f64; 3]) -> Seen {
     match readout {
         Readout::Coarse(scale) => coarse(scale, red, green, blue),

@@ -27,15 +27,7 @@ fn site() -> Site {
 }
 
 fn workbench(folder: &Path) -> Workbench {
-    let limit = Duration::from_secs(120);
-    Workbench {
-        site: site(),
-        scene_dir: folder.to_owned(),
-        log: folder.join("log"),
-        jobs: 2,
-        limit,
-        peak: crate::system::process::PeakMemory::default(),
-    }
+    Workbench { site: site(), ..fixtures::workbench(folder) }
 }
 
 fn read(job: &Job) -> Measurement {
@@ -245,7 +237,7 @@ fn within_errors_and_named_bias(measured: &Measurement, exact: &[f64]) {
         assert!(off < 4.8 * error + AUDIT_BIAS * exact, "{estimate:?}, exact {exact}");
         assert!(error > 0.0 && error < 0.03 * exact, "{estimate:?}");
     }
-    assert!(measured.settings["blocks"].parse::<usize>().unwrap() >= 8);
+    assert!(measured.effort["blocks"].parse::<usize>().unwrap() >= 8);
 }
 
 #[test]

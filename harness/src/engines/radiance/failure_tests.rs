@@ -8,7 +8,7 @@ use std::time::Duration;
 use luminaire::scene::{Bounces, Transport};
 
 use super::*;
-use crate::engines::fixtures::s1;
+use crate::engines::fixtures::{s1, workbench};
 use crate::system::process::ProcessError;
 
 /// A site whose rtrace is a shell script; the other programs do nothing.
@@ -32,14 +32,7 @@ fn failure(rtrace: &str, transport: Transport, limit_s: f64) -> EngineError {
     let scene_dir = folder.path().join("scene");
     fs::create_dir(&scene_dir).unwrap();
     let limit = Duration::from_secs_f64(limit_s);
-    let bench = Workbench {
-        site,
-        scene_dir,
-        log: folder.path().join("log"),
-        jobs: 2,
-        limit,
-        peak: crate::system::process::PeakMemory::default(),
-    };
+    let bench = Workbench { site, limit, scene_dir, ..workbench(folder.path()) };
     Radiance.read(&s1(transport), &bench).unwrap_err()
 }
 
@@ -110,14 +103,7 @@ fn a_wheel_without_its_programs_is_absent_with_the_remedy() {
 fn ies2rad_that_makes_no_light_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let site = fake_site(folder.path(), &triples(4, ONE));
-    let bench = Workbench {
-        site,
-        scene_dir: folder.path().into(),
-        log: folder.path().join("log"),
-        jobs: 1,
-        limit: Duration::from_secs(20),
-        peak: crate::system::process::PeakMemory::default(),
-    };
+    let bench = Workbench { site, ..workbench(folder.path()) };
     let mut job = s1(Transport::Direct);
     job.settings.insert("photometry".into(), "ies2rad".into());
     fs::write(folder.path().join("ies2rad-0.rad"), "# nothing\n").unwrap();

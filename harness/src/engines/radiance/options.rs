@@ -10,9 +10,7 @@ use crate::engines::settings::Preset;
 /// Arguments without and with reflected light.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Options {
-    /// Direct light alone.
     pub(super) direct: Vec<String>,
-    /// Direct and reflected light.
     pub(super) total: Vec<String>,
     /// Direct light just as it is part of `total`: the difference is reflected light, free of the noise of the direct.
     pub(super) part_of_total: Vec<String>,
@@ -47,7 +45,6 @@ pub(super) enum Sources {
 }
 
 impl Sources {
-    /// What the luminaires of a job need.
     pub(super) fn of(job: &Job, settings: &Settings) -> Self {
         let has = |wanted: &[Route]| job.scene.luminaires.iter().any(|l| wanted.contains(&route(l, settings)));
         if has(&[Route::Opening]) {

@@ -7,7 +7,6 @@ use super::settings::{Photometrist, Settings};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Route {
-    /// A tiny sphere.
     Point,
     /// The luminous opening, with the table at full precision.
     Opening,

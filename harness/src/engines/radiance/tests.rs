@@ -1,8 +1,6 @@
 //! The real renderer against closed forms and the converged values of case S1, and what happens when it fails.
 
 use std::f64::consts::PI;
-use std::path::Path;
-use std::time::Duration;
 
 use glam::DVec3;
 use luminaire::geometry::Reflectances;
@@ -11,18 +9,6 @@ use luminaire::scene::{Bounces, Obstacle, Shape, orientation};
 use super::*;
 use crate::engines::Budget;
 use crate::engines::fixtures::*;
-
-fn workbench(folder: &Path) -> Workbench {
-    let limit = Duration::from_secs(120);
-    Workbench {
-        site: Site::of_user().unwrap(),
-        scene_dir: folder.to_owned(),
-        log: folder.join("log"),
-        jobs: 2,
-        limit,
-        peak: crate::system::process::PeakMemory::default(),
-    }
-}
 
 pub(super) fn read(job: &Job) -> Measurement {
     read_tampered(job, |_, text| text)
@@ -214,7 +200,7 @@ fn the_fast_preset_is_right_and_the_defaults_are_off_by_far_more_than_their_stan
         read(&job)
     };
     let fast = preset("fast");
-    assert!(fast.settings["blocks"] == "8" && worst_z(&fast, &S1_INDIRECT_LX) < 5.0, "{fast:?}");
+    assert!(fast.effort["blocks"] == "8" && worst_z(&fast, &S1_INDIRECT_LX) < 5.0, "{fast:?}");
     let defaults = preset("default");
     let off = worst(&relative_deviations(&defaults, &S1_INDIRECT_LX));
     assert!((0.2..0.35).contains(&off) && worst_z(&defaults, &S1_INDIRECT_LX) > 5.0, "{defaults:?}");

@@ -9,7 +9,6 @@ use super::{ID, export};
 use crate::engines::{Absent, EngineError, Site, Version, Workbench};
 use crate::system::process::{self, Invocation};
 
-/// Where the programs and their library are.
 #[derive(Clone, Debug)]
 pub(super) struct Tools {
     package: PathBuf,

@@ -78,7 +78,7 @@ impl Rung {
 
 /// What solved it, as the engine says: the first words of its solver, or its method or variant.
 pub(super) fn solver(measurement: &Measurement) -> String {
-    let said = ["solver", "method", "variant"].into_iter().find_map(|key| measurement.settings.get(key));
+    let said = ["solver", "method", "variant"].into_iter().find_map(|key| measurement.method.get(key));
     let text = said.map_or("", String::as_str);
     text.split([',', ':']).next().unwrap_or_default().trim().to_owned()
 }

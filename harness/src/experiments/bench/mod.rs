@@ -254,7 +254,7 @@ impl Truth {
         Self {
             values_lx: estimates.iter().map(|e| e.value).collect(),
             uncertainty_lx: estimates.iter().map(error).collect(),
-            solver: taken.measurement.settings.get("solver").cloned().unwrap_or_default(),
+            solver: taken.measurement.method.get("solver").cloned().unwrap_or_default(),
             wall_s: taken.cost.wall_s,
         }
     }

@@ -12,7 +12,8 @@ fn sample() -> Entry {
         .map(|value| Estimate { value, uncertainty: Uncertainty::sampled(value / 7.0, Some(7.0)) });
     let measurement = Measurement {
         estimates: estimates.into(),
-        settings: [("seed".to_owned(), "1".to_owned())].into(),
+        method: [("solver", "a")].into(),
+        effort: [("seed", "1")].into(),
         notes: vec!["a note with \"quotes\" and µ".to_owned()],
         samples: vec![Blocks::new(vec![vec![1.0 / 3.0; 5], vec![0.1 + 0.2; 5]])],
     };

@@ -6,7 +6,6 @@ use luminaire::simulator::{Accuracy, illuminance};
 
 use super::*;
 use crate::engines::fixtures;
-use crate::record::ProcedureId;
 use crate::record::Uncertainty;
 
 const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
@@ -61,7 +60,7 @@ fn of_an_oblong_room_a_quarter_is_rendered_and_of_a_square_one_with_an_axial_lam
     square.scene.luminaires[0].photometry = fixtures::photometry(table.unwrap());
     let shortcut = holds(&square);
     assert_eq!(shortcut.job.stations.len(), 3);
-    let settings = shortcut.complete(exact(&shortcut.job), &square).settings;
+    let settings = shortcut.complete(exact(&shortcut.job), &square).method;
     // Every meter that is filled in is traced to the one that was rendered.
     assert_eq!(settings["mirrored_meters"].matches(" is ").count(), 13, "{settings:?}");
     assert!(shortcut.omissions.iter().all(|o| !o.reason.is_empty() && o.share > 0.0 && o.share <= 1.0));
@@ -85,8 +84,8 @@ fn whatever_breaks_the_symmetry_has_every_meter_rendered() {
     assert_eq!(broken(&|job| job.scene.luminaires[0].orientation = orientation(20.0, 0.0, 0.0)), 8);
     assert_eq!(broken(&|job| job.scene.luminaires[0].photometry = fixtures::photometry(fixtures::lopsided())), 16);
     assert_eq!(broken(&|job| job.scene.obstacles.push(desk.clone())), 16);
-    // The angles of procedure 1 are what it is about: all are read.
-    assert_eq!(broken(&|job| job.procedure = ProcedureId::LuminousIntensity), 16);
+    // In free field, where procedure 1 reads its angles, all are read: they are what it is about.
+    assert_eq!(broken(&|job| job.scene.room = None), 16);
     let twin = |job: &mut Job| {
         let mut twin = job.scene.luminaires[0].clone();
         twin.position_m.x = 1.0;

@@ -8,22 +8,17 @@ use serde::Deserialize;
 use super::palette::Palette;
 use crate::record::{EngineName, ProcedureId};
 
-/// A file of further measurements.
 #[derive(Clone, Debug)]
 pub enum Beside {
-    /// Error against run time.
     Bench(Vec<BenchCurve>),
-    /// Where invariances break.
     Stress(Vec<StressLaw>),
 }
 
 /// Why a file cannot be shown beside a report.
 #[derive(Debug, thiserror::Error)]
 pub enum BesideError {
-    /// It is no JSON.
     #[error("it is no JSON: {0}")]
     Json(#[from] serde_json::Error),
-    /// It is something else.
     #[error(
         "it holds neither `curves` (of `luxproof bench --format json`) nor `laws` (of `luxproof stress --format json`)"
     )]
@@ -35,25 +30,14 @@ pub enum BesideError {
 pub struct BenchCurve {
     pub engine: EngineName,
     pub procedure: ProcedureId,
-    #[serde(default)]
-    pub solver: Option<String>,
-    #[serde(default)]
-    pub preset: Option<String>,
-    /// Its rungs.
     pub points: Vec<BenchPoint>,
 }
 
-/// One rung of a curve.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct BenchPoint {
-    /// Wall-clock seconds.
     pub wall_s: f64,
     pub relative_error: Option<f64>,
-    /// Lower end of its interval.
-    #[serde(default)]
     pub relative_error_low: Option<f64>,
-    /// Upper end of its interval.
-    #[serde(default)]
     pub relative_error_high: Option<f64>,
 }
 
@@ -62,17 +46,13 @@ pub struct BenchPoint {
 pub struct StressLaw {
     pub engine: EngineName,
     pub law: String,
-    /// Largest relative deviation.
-    #[serde(default)]
     pub worst_deviation: Option<f64>,
     /// Magnitude at which the deviation first passes the fraction.
     #[serde(default)]
     pub breaks_at: BTreeMap<String, Option<f64>>,
     /// In which way it breaks.
-    #[serde(default)]
     pub how: Option<String>,
     /// The first magnitude that the engine refuses.
-    #[serde(default)]
     pub refused_at: Option<f64>,
     /// The causes on record, where all that breaks is known.
     #[serde(default)]
@@ -161,7 +141,7 @@ fn stress_cell(law: Option<&&StressLaw>) -> Markup {
             }
             @if let Some((key, at)) = breaks.first() { div.most { (name(key)) " at " (format!("{at:e}")) } }
             @if let (Some(at), Some(_)) = (law.refused_at, law.worst_deviation) { div.most { "refuses at " (format!("{at:e}")) } }
-            @if !law.known.is_empty() { div.most { "known" } }
+            @if !law.known.is_empty() { div.most { "known deviation" } }
         }
     }
 }

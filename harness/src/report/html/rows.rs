@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
+use super::super::words::trimmed;
 use super::palette::Palette;
 use crate::judge::Comparison;
 
@@ -21,11 +22,10 @@ impl Rows {
         let components: Vec<Value> =
             components.map(|part| json!([self.word(part.source.name()), short(Some(part.uncertainty))])).collect();
         let source = c.reference.as_ref().map_or("", |r| r.source.as_str());
-        let basis = c.reference.as_ref().map_or("none", |r| r.basis.name());
         let words = [
             c.key.case.as_str(),
             &c.key.engine,
-            basis,
+            c.basis_name(),
             source,
             c.diagnosis.as_deref().unwrap_or_default(),
             c.verdict.name(),
@@ -35,15 +35,15 @@ impl Rows {
         let row = json!([
             words,
             c.meter.0,
-            super::procedure::place(c),
+            place(c),
             short(c.value),
             short(c.reference.as_ref().map(|r| r.value)),
             short(c.deviation),
             short(c.relative_deviation),
-            short(Some(c.tolerance.around(c.reference.as_ref().map_or(0.0, |r| r.value)))),
+            short(Some(c.allowed())),
             components,
             c.quantity.unit(),
-            short(strain(c)),
+            short(c.normalized_error()),
             palette.index(&c.key.engine),
             short(budget.map(|b| b.combined)),
             short(budget.map(|b| b.expanded)),
@@ -77,8 +77,13 @@ fn short(value: Option<f64>) -> Value {
         .map_or(Value::Null, |v| json!(v))
 }
 
-/// The deviation over what is allowed; `None` where either is missing or nothing is allowed.
-pub(super) fn strain(c: &Comparison) -> Option<f64> {
-    let allowed = c.tolerance.around(c.reference.as_ref()?.value);
-    c.deviation.map(|d| d / allowed).filter(|s| s.is_finite())
+/// Where a reading was taken, in words.
+pub(super) fn place(c: &Comparison) -> String {
+    let number = |value| trimmed(value, 3);
+    match c.gamma_deg.zip(c.c_deg) {
+        Some((gamma, plane)) => format!("C {} γ {}", number(plane), number(gamma)),
+        None => {
+            format!("({}, {}, {}) m", number(c.at_m[0]), number(c.at_m[1]), number(c.at_m[2]))
+        }
+    }
 }

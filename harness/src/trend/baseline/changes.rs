@@ -5,6 +5,8 @@
 //! of a comparison together are wrong once in a hundred times where nothing changed (Šidák, JASA 62 (1967) 626). Standard errors
 //! from few blocks have Student's t with the degrees of freedom of Welch and Satterthwaite (GUM G.4.1).
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
@@ -26,12 +28,11 @@ pub enum Comparability {
     SameSpec,
 }
 
-/// What changed, entry by entry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Changes {
     /// One a case, procedure and engine of either side.
     pub entries: Vec<EntryChange>,
-    /// How many tests were made.
+    /// How many were made.
     pub tests: usize,
     /// The level of each, so that all together keep theirs.
     pub level: f64,
@@ -51,7 +52,6 @@ pub struct EntryChange {
     pub meters: Vec<MeterChange>,
 }
 
-/// What a comparison of two entries ends in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum State {
@@ -69,22 +69,19 @@ pub enum State {
     Refused,
 }
 
-/// The weighted mean of the relative changes.
+/// The weighted mean of the relative changes, `+0.3000 % +- 0.1000 % (+3.0 u)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeanShift {
-    /// The mean, relative.
     pub relative: f64,
-    /// Its standard uncertainty, likewise.
+    /// Standard uncertainty of it.
     pub uncertainty: f64,
     /// The probability of so large a shift where nothing changed.
     pub p_value: f64,
 }
 
-/// One meter before and after.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeterChange {
     pub meter: MeterId,
-    /// What is read there.
     pub quantity: Quantity,
     /// The old value, in the quantity's unit.
     pub old: f64,
@@ -96,8 +93,15 @@ pub struct MeterChange {
     pub degrees_of_freedom: Option<f64>,
     /// The probability of so large a change where nothing changed.
     pub p_value: f64,
-    /// Whether it is beyond noise.
+    /// Beyond noise.
     pub significant: bool,
+}
+
+impl fmt::Display for MeanShift {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (relative, uncertainty) = (100.0 * self.relative, 100.0 * self.uncertainty);
+        write!(f, "{relative:+.4} % +- {uncertainty:.4} % ({:+.1} u)", self.relative / self.uncertainty)
+    }
 }
 
 impl Changes {
@@ -107,7 +111,6 @@ impl Changes {
     }
 }
 
-/// Compares two sets of entries.
 pub fn compare(old: &[Entry], new: &[Entry], comparability: Comparability) -> Changes {
     let mut entries: Vec<EntryChange> = vec![];
     for a in old {
@@ -154,9 +157,9 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
         differing("light", &a.light.to_string(), &b.light.to_string()),
     ];
     let mut of_instrument = vec![differing("version", &a.version, &b.version)];
-    let keys: std::collections::BTreeSet<&String> = a.settings.keys().chain(b.settings.keys()).collect();
+    let keys: std::collections::BTreeSet<&String> = a.method.keys().chain(b.method.keys()).collect();
     for key in keys {
-        let of = |entry: &Entry| entry.settings.get(key).cloned().unwrap_or_else(|| "not set".to_owned());
+        let of = |entry: &Entry| entry.method.get(key).cloned().unwrap_or_else(|| "not set".to_owned());
         of_instrument.push(differing(&format!("setting {key}"), &of(a), &of(b)));
     }
     let of_subject: Vec<String> = of_subject.into_iter().flatten().collect();

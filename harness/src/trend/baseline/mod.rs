@@ -6,24 +6,22 @@
 mod changes;
 mod review;
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::record::{Light, Reading, ReadingKey, Recording};
+use crate::record::{Light, Method, Reading, ReadingKey, Recording};
 use crate::report::Report;
-use crate::system::files;
+use crate::system::files::{self, FileError};
 
 pub use changes::{Changes, Comparability, EntryChange, MeanShift, MeterChange, State, compare};
 pub use review::{Decision, review};
 
-/// Accepted readings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Baseline {
-    /// Version of the format: 1.
+    /// Version of the format.
     pub luxproof_baseline: u32,
     /// One a case, procedure and engine, sorted so.
     pub entries: Vec<Entry>,
@@ -34,16 +32,15 @@ pub struct Baseline {
 pub struct Entry {
     #[serde(flatten)]
     pub key: ReadingKey,
-    /// The engine's version.
+    /// The engine's.
     pub version: String,
-    /// The luminaire model.
     pub model: String,
-    /// Which light counted.
     pub light: Light,
     /// SHA-256 of the spec and of every file that it names.
     pub input_sha256: String,
-    /// What the engine set, its effort left out: another run of the same instrument has the same.
-    pub settings: BTreeMap<String, String>,
+    /// What the engine did: another run of the same instrument does the same.
+    #[serde(alias = "settings")]
+    pub method: Method,
     /// Of all standard errors, where the file is older than the readings' own.
     #[serde(default, skip_serializing)]
     degrees_of_freedom: Option<f64>,
@@ -51,89 +48,48 @@ pub struct Entry {
     pub accepted: String,
     /// Why it was accepted; empty in a candidate, which is refused as a baseline.
     pub reason: String,
-    /// The readings, one a meter.
+    /// One a meter.
     pub readings: Vec<Reading>,
 }
 
-/// Why a baseline or a run cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum BaselineError {
-    /// The file cannot be read or written.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: String,
-        source: std::io::Error,
-    },
-    /// It is no baseline.
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error("{path}: {source}; a baseline is written by `luxproof accept`")]
-    Format {
-        /// The file.
-        path: String,
-        /// What is wrong where.
-        source: serde_json::Error,
-    },
-    /// It is of another version of the format.
+    Format { path: String, source: serde_json::Error },
     #[error("{path}: format {found} of a baseline; this luxproof reads format 1")]
-    Version {
-        /// The file.
-        path: String,
-        /// Its version.
-        found: u32,
-    },
-    /// It holds a reading that is no measurement.
+    Version { path: String, found: u32 },
     #[error("{path}: {key}: a negative or infinite reading is no baseline")]
-    Unsound {
-        /// The file.
-        path: String,
-        key: ReadingKey,
-    },
-    /// Nobody accepted it.
+    Unsound { path: String, key: ReadingKey },
     #[error("{path}: {key} was accepted for no reason; review it with `luxproof accept`")]
-    NotAccepted {
-        /// The file.
-        path: String,
-        key: ReadingKey,
-    },
-}
-
-/// Settings that tell of effort, chance and paths: they differ between runs of one instrument with one method. Whatever an
-/// engine sets besides counts, so that a setting nobody thought of is refused rather than overlooked.
-const EFFORT: [&str; 11] = [
-    "ambient_divisions",
-    "arguments",
-    "blocks",
-    "calibration",
-    "command",
-    "count_first_reflection",
-    "looks",
-    "rounds",
-    "rtrace",
-    "seed",
-    "seeds",
-];
-
-/// Whether a setting tells of effort: blocks and samples are counted under several names.
-fn is_effort(key: &str) -> bool {
-    EFFORT.contains(&key) || key.ends_with("_blocks") || key.contains("samples")
+    NotAccepted { path: String, key: ReadingKey },
 }
 
 impl Entry {
     fn of(report: &Report, recording: &Recording) -> Self {
         let mine = report.readings.iter().filter(|r| r.key == recording.key);
-        let settings = recording.settings.iter().filter(|(key, _)| !is_effort(key));
         Self {
             key: recording.key.clone(),
             version: recording.version.clone(),
             model: recording.model.clone(),
             light: recording.light,
             input_sha256: recording.input_sha256.clone(),
-            settings: settings.map(|(k, v)| (k.clone(), v.clone())).collect(),
+            method: recording.method.clone(),
             degrees_of_freedom: None,
             accepted: String::new(),
             reason: String::new(),
             readings: mine.map(|r| r.reading.clone()).collect(),
         }
+    }
+
+    fn has_sound_values(&self) -> bool {
+        self.readings.iter().all(|r| r.value.is_finite() && r.value >= 0.0)
+    }
+
+    /// Whether it may become a baseline: there are readings, and all of them are measurements.
+    pub fn is_sound(&self) -> bool {
+        !self.readings.is_empty() && self.has_sound_values()
     }
 }
 
@@ -148,7 +104,7 @@ impl Baseline {
     /// Reads a baseline; a candidate that nobody accepted is refused.
     pub fn read(path: &Path) -> Result<Self, BaselineError> {
         let name = || path.display().to_string();
-        let text = fs::read_to_string(path).map_err(|source| BaselineError::Io { path: name(), source })?;
+        let text = fs::read_to_string(path).map_err(|source| FileError { path: name(), source })?;
         let mut baseline: Self =
             serde_json::from_str(&text).map_err(|source| BaselineError::Format { path: name(), source })?;
         if baseline.luxproof_baseline != 1 {
@@ -162,7 +118,7 @@ impl Baseline {
             if entry.reason.trim().is_empty() {
                 return Err(BaselineError::NotAccepted { path: name(), key });
             }
-            if entry.readings.iter().any(|r| !(r.value.is_finite() && r.value >= 0.0)) {
+            if !entry.has_sound_values() {
                 return Err(BaselineError::Unsound { path: name(), key });
             }
         }
@@ -171,9 +127,9 @@ impl Baseline {
 
     /// Writes it, one reading a line.
     pub fn write(&self, path: &Path) -> Result<(), BaselineError> {
-        let fail = |source| BaselineError::Io { path: path.display().to_string(), source };
+        let fail = |source| FileError { path: path.display().to_string(), source };
         let text = self.text().map_err(|e| fail(e.into()))?;
-        files::replace_shared(path, text.as_bytes()).map_err(fail)
+        Ok(files::replace_shared(path, text.as_bytes()).map_err(fail)?)
     }
 
     fn text(&self) -> Result<String, serde_json::Error> {

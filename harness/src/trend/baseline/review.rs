@@ -2,13 +2,12 @@
 
 use std::io::{BufRead, Write};
 
-use super::{Changes, Entry, EntryChange, State};
+use super::{Changes, Entry, EntryChange, MeterChange, State};
 use crate::record::ReadingKey;
 
-/// What the reviewer decided.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decision {
-    /// What was accepted, with its reason and time.
+    /// With reason and time.
     pub accepted: Vec<Entry>,
     /// How many were declined.
     pub declined: usize,
@@ -89,13 +88,7 @@ fn describe(change: &EntryChange, entry: &Entry, output: &mut dyn Write) -> std:
         writeln!(output, "  {note}")?;
     }
     if let Some(mean) = change.mean {
-        let in_u = mean.relative / mean.uncertainty;
-        writeln!(
-            output,
-            "  mean shift {:+.4} % +- {:.4} %: {in_u:+.1} u",
-            100.0 * mean.relative,
-            100.0 * mean.uncertainty
-        )?;
+        writeln!(output, "  mean shift {mean}")?;
     }
     if change.meters.is_empty() {
         for reading in entry.readings.iter().take(SHOWN) {
@@ -109,12 +102,8 @@ fn describe(change: &EntryChange, entry: &Entry, output: &mut dyn Write) -> std:
         let change = m.new - m.old;
         let in_u = if m.uncertainty > 0.0 { format!("{:+.1} u", change / m.uncertainty) } else { "exact".to_owned() };
         let mark = if m.significant { "  <- changed" } else { "" };
-        let unit = m.quantity.unit();
-        writeln!(
-            output,
-            "  {:<16} old {:.6} new {:.6} {unit}, change {change:+.6}: {in_u}{mark}",
-            m.meter, m.old, m.new
-        )?;
+        let (MeterChange { meter, old, new, .. }, unit) = (m, m.quantity.unit());
+        writeln!(output, "  {meter:<16} old {old:.6} new {new:.6} {unit}, change {change:+.6}: {in_u}{mark}")?;
     }
     more(meters.len(), output)
 }
@@ -124,7 +113,6 @@ fn more(meters: usize, output: &mut dyn Write) -> std::io::Result<()> {
 }
 
 impl Entry {
-    /// The same, accepted.
     #[must_use]
     pub fn accepted_for(&self, reason: &str, now: &str) -> Self {
         Self { reason: reason.to_owned(), accepted: now.to_owned(), ..self.clone() }

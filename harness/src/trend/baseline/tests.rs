@@ -1,7 +1,7 @@
 //! The laws of baselines: refused unless they match, noise told apart from shifts, nothing accepted without a reason.
 
 use super::*;
-use crate::record::{MeterId, ProcedureId, Quantity, Uncertainty};
+use crate::record::{MeterId, Method, ProcedureId, Quantity, Uncertainty};
 use crate::system::random::normal;
 
 fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
@@ -17,7 +17,7 @@ fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
         model: "point".into(),
         light: "indirect, 7 bounces".parse().unwrap(),
         input_sha256: "ab".repeat(32),
-        settings: BTreeMap::from([("preset".to_owned(), "audit".to_owned())]),
+        method: [("preset", "audit")].into(),
         degrees_of_freedom: None,
         accepted: "2026-01-01T00:00:00Z".into(),
         reason: "first look".into(),
@@ -30,8 +30,13 @@ fn noisy(rng: &mut fastrand::Rng, meters: usize, std_error: f64, shift: f64) -> 
     (0..meters).map(|k| (100.0 + k as f64) * (1.0 + shift) + std_error * normal(rng)).collect()
 }
 
+fn compared(old: &[&Entry], new: &[&Entry], comparability: Comparability) -> Changes {
+    let [old, new] = [old, new].map(|side| side.iter().map(|e| (*e).clone()).collect::<Vec<_>>());
+    compare(&old, &new, comparability)
+}
+
 fn state(old: &Entry, new: &Entry) -> State {
-    compare(std::slice::from_ref(old), std::slice::from_ref(new), Comparability::SameInstrument).entries[0].state
+    compared(&[old], &[new], Comparability::SameInstrument).entries[0].state
 }
 
 #[test]
@@ -70,8 +75,7 @@ fn one_meter_that_moved_is_named_and_the_mean_is_not_blamed() {
     b.readings[17].value += 8.0;
     let changes = compare(&[a], &[b], Comparability::SameInstrument);
     assert_eq!(changes.entries[0].state, State::Changed);
-    let moved: Vec<&str> =
-        changes.entries[0].meters.iter().filter(|m| m.significant).map(|m| m.meter.0.as_str()).collect();
+    let moved: Vec<_> = changes.entries[0].meters.iter().filter(|m| m.significant).map(|m| &m.meter.0).collect();
     assert_eq!(moved, ["plane[17]"]);
 }
 
@@ -79,8 +83,13 @@ fn one_meter_that_moved_is_named_and_the_mean_is_not_blamed() {
 fn few_blocks_are_granted_the_wide_tails_of_student() {
     let (a, b) = (entry(&[100.0, 100.0], Some(1.0)), entry(&[107.0, 100.0], Some(1.0)));
     assert_eq!(state(&a, &b), State::Changed, "4.9 u of a normal distribution");
-    let few = |e: &Entry| Entry { degrees_of_freedom: Some(2.0), ..e.clone() };
-    assert_eq!(state(&few(&a), &few(&b)), State::Unchanged, "4.9 u with four degrees of freedom");
+    // A file may grant them once for all of its readings.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("old.json");
+    let text = Baseline { luxproof_baseline: 1, entries: vec![a, b] }.text().unwrap();
+    fs::write(&path, text.replace("\"reason\"", "\"degrees_of_freedom\": 2.0, \"reason\"")).unwrap();
+    let few = Baseline::read(&path).unwrap().entries;
+    assert_eq!(state(&few[0], &few[1]), State::Unchanged, "4.9 u with four degrees of freedom");
 }
 
 #[test]
@@ -106,17 +115,15 @@ fn a_baseline_of_another_spec_version_model_light_or_setting_is_refused() {
         Entry { version: "6.1".into(), ..a.clone() },
         Entry { model: "area".into(), ..a.clone() },
         Entry { light: "indirect, all bounces".parse().unwrap(), ..a.clone() },
-        Entry { settings: BTreeMap::new(), ..a.clone() },
+        Entry { method: Method::default(), ..a.clone() },
     ];
     for other in &others {
-        let change = compare(std::slice::from_ref(&a), std::slice::from_ref(other), Comparability::SameInstrument);
+        let change = compared(&[&a], &[other], Comparability::SameInstrument);
         assert_eq!(change.entries[0].state, State::Refused);
         assert!(!change.is_clean() && change.entries[0].notes.len() == 1, "{change:?}");
     }
     // Between two runs a new version is what one wants to know about; another spec is still another thing.
-    let of_runs = |other: &Entry| {
-        compare(std::slice::from_ref(&a), std::slice::from_ref(other), Comparability::SameSpec).entries[0].state
-    };
+    let of_runs = |other: &Entry| compared(&[&a], &[other], Comparability::SameSpec).entries[0].state;
     assert_eq!(
         others.each_ref().map(of_runs),
         [State::Refused, State::Unchanged, State::Refused, State::Refused, State::Unchanged]
@@ -126,9 +133,9 @@ fn a_baseline_of_another_spec_version_model_light_or_setting_is_refused() {
 #[test]
 fn what_vanished_fails_and_what_is_new_is_said() {
     let a = entry(&[100.0, 50.0], Some(1.0));
-    let gone = compare(std::slice::from_ref(&a), &[], Comparability::SameSpec);
+    let gone = compared(&[&a], &[], Comparability::SameSpec);
     assert_eq!((gone.entries[0].state, gone.is_clean()), (State::Vanished, false));
-    let new = compare(&[], std::slice::from_ref(&a), Comparability::SameSpec);
+    let new = compared(&[], &[&a], Comparability::SameSpec);
     assert_eq!((new.entries[0].state, new.is_clean()), (State::New, true));
     let meter_gone = entry(&[100.0], Some(1.0));
     assert_eq!(state(&a, &meter_gone), State::Vanished);
@@ -166,8 +173,7 @@ fn reviewed(old: &[Entry], new: &[Entry], says: &str) -> (Decision, String) {
 #[test]
 fn a_review_shows_old_and_new_in_units_of_uncertainty_and_insists_on_a_reason() {
     let (old, new) = (entry(&[100.0, 50.0], Some(1.0)), entry(&[120.0, 50.0], Some(1.0)));
-    let (decision, text) =
-        reviewed(std::slice::from_ref(&old), std::slice::from_ref(&new), "perhaps\ny\n\nnew table\n");
+    let (decision, text) = reviewed(&[old], &[new], "perhaps\ny\n\nnew table\n");
     assert!(text.contains("old 100.000000 new 120.000000 lx, change +20.000000: +14.1 u  <- changed"), "{text}");
     assert!(text.contains("needs a reason"));
     assert_eq!(decision.accepted.len(), 1);
@@ -176,9 +182,9 @@ fn a_review_shows_old_and_new_in_units_of_uncertainty_and_insists_on_a_reason() 
 
 #[test]
 fn what_is_unchanged_is_not_asked_about_and_an_ended_input_declines() {
-    let old = entry(&[100.0, 50.0], Some(1.0));
-    let (decision, text) = reviewed(std::slice::from_ref(&old), std::slice::from_ref(&old), "");
+    let old = [entry(&[100.0, 50.0], Some(1.0))];
+    let (decision, text) = reviewed(&old, &old, "");
     assert_eq!((decision.accepted.len(), decision.declined, text.as_str()), (0, 0, ""));
-    let (decision, _) = reviewed(&[], std::slice::from_ref(&old), "y\n");
+    let (decision, _) = reviewed(&[], &old, "y\n");
     assert_eq!((decision.accepted.len(), decision.declined), (0, 1), "no reason was given");
 }

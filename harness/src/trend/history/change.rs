@@ -1,11 +1,11 @@
-//! Change points: sums over nights of what each brings that the nights before did not foretell.
+//! Change points: sums over nights of what each brings that the nights before did not predict.
 //!
 //! Page, Continuous inspection schemes, Biometrika 41 (1954), with the self-starting form of Hawkins, Self-starting Cusum
-//! charts for location and scale, The Statistician 36 (1987): every night is foretold by the mean of the nights before it, so
+//! charts for location and scale, The Statistician 36 (1987): every night is predicted by the mean of the nights before it, so
 //! that neither the true deviation nor its spread need be known, and no night counts twice.
 //!
-//! A series' residual is its deviation less the mean of the nights before, in standard errors, times sqrt(n / (n + 1)). The
-//! residuals of a group of series are added over the square root of their number and divided by their own spread over the
+//! A series' innovation is its deviation less the mean of the nights before, in standard errors, times sqrt(n / (n + 1)). The
+//! innovations of a group of series are added over the square root of their number and divided by their own spread over the
 //! nights before, which gives Student's t, and that the normal deviate U (Wallace, Bounds on normal approximations to
 //! Student's and the chi-square distributions, Ann. Math. Statist. 30 (1959)). The spread of a single comparison is moderated by that
 //! of its case (Smyth, Linear models and empirical Bayes methods, Stat. Appl. Genet. Mol. Biol. 3 (2004)).
@@ -16,15 +16,16 @@
 
 use std::collections::BTreeMap;
 
+use super::innovation::{Innovation, MAX_SPREADS, MIN_ERROR, MIN_LEARNED, RunningMean, Spread, spread_of_all};
 use super::limits::{Limits, REFERENCE_VALUE, WINDOW};
 use super::series::{History, Series};
-use super::told::{LEARNING, MOST, SMALLEST_ERROR, Spread, Told, spread_of_all};
+use crate::record::{EngineName, MeterId, ProcedureId};
 
 /// Over all groups of a history together there is at most one false alarm in so many nights, in the mean.
 pub const NIGHTS_PER_FALSE_ALARM: f64 = 30.0;
 
 /// One night alone is no change: it takes a sum no further than this share of its limit.
-const ONE_NIGHT: f64 = 0.9;
+const MAX_OF_ONE_NIGHT: f64 = 0.9;
 
 /// Changes in the same direction of one engine and procedure dated so close together are one change seen several times ...
 const SAME_CHANGE: usize = 3;
@@ -54,18 +55,17 @@ impl Level {
     }
 }
 
-/// A deviation that has changed and stayed.
+/// A deviation that has changed and stayed; nights are counted from the first of the history.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
     /// How many series changed together.
     pub level: Level,
-    pub engine: String,
-    pub procedure: String,
+    pub engine: EngineName,
+    pub procedure: ProcedureId,
     /// Where, below engine and procedure.
     pub part: Part,
-    /// The first night after the change, by estimate.
+    /// The first after the change, by estimate.
     pub night: usize,
-    /// The night on which it was noticed.
     pub noticed: usize,
     /// How far the deviation moved, in standard errors of a reading, in the mean over the group.
     pub standard_errors: f64,
@@ -78,10 +78,10 @@ pub struct Change {
 /// A case of an engine and procedure, or one comparison of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Part {
-    /// The case; none for all.
+    /// None for all.
     pub case: Option<String>,
-    /// The meter; none for all of the case.
-    pub meter: Option<String>,
+    /// None for all of the case.
+    pub meter: Option<MeterId>,
 }
 
 /// The changes of a history, by night and level. What several levels see of one engine and procedure at once is one change.
@@ -91,7 +91,7 @@ pub fn changes(history: &History) -> Vec<Change> {
         let same = |c: &&mut Change| {
             let is_one_of_it = change.level == Level::Comparison && c.level < Level::Comparison;
             let after = if is_one_of_it { SAME_CHANGE_OF_ONE } else { SAME_CHANGE };
-            (&c.engine, &c.procedure) == (&change.engine, &change.procedure)
+            (&c.engine, c.procedure) == (&change.engine, change.procedure)
                 && (c.night..=c.night + SAME_CHANGE + after).contains(&(change.night + SAME_CHANGE))
                 && (c.standard_errors > 0.0) == (change.standard_errors > 0.0)
         };
@@ -105,25 +105,25 @@ pub fn changes(history: &History) -> Vec<Change> {
 }
 
 fn at_level(history: &History, level: Level) -> Vec<Change> {
-    let mut groups: BTreeMap<(&str, &str, &str, usize), Vec<&Series>> = BTreeMap::new();
+    let mut groups: BTreeMap<(Case<'_>, usize), Vec<&Series>> = BTreeMap::new();
     for (k, series) in history.series.iter().enumerate() {
-        let key = &series.key;
-        let case = if level == Level::EngineAndProcedure { "" } else { key.case.as_str() };
+        let (engine, procedure, case) = case_of(series);
+        let case = if level == Level::EngineAndProcedure { "" } else { case };
         let number = if level == Level::Comparison { k } else { 0 };
-        groups.entry((&key.engine, &key.procedure, case, number)).or_default().push(series);
+        groups.entry(((engine, procedure, case), number)).or_default().push(series);
     }
     let limits = Limits::of(groups.len() as f64 * NIGHTS_PER_FALSE_ALARM / level.share());
     let cases = if level == Level::Comparison { spreads_of_cases(history) } else { BTreeMap::new() };
     let mut found = vec![];
-    for ((engine, procedure, case, _), members) in groups {
+    for ((of @ (engine, procedure, case), _), members) in groups {
         let part = Part {
             case: (level != Level::EngineAndProcedure).then(|| case.to_owned()),
             meter: (level == Level::Comparison).then(|| members[0].key.meter.clone()),
         };
         let named = |alarm: Alarm| Change {
             level,
-            engine: engine.to_owned(),
-            procedure: procedure.to_owned(),
+            engine: engine.clone(),
+            procedure,
             part: part.clone(),
             night: alarm.night,
             noticed: alarm.noticed,
@@ -131,18 +131,25 @@ fn at_level(history: &History, level: Level) -> Vec<Change> {
             relative: alarm.shift.1,
             seen_in: vec![],
         };
-        let watch = Watch { limits, peers: cases.get(&(engine, procedure, case)).map_or(&[], Vec::as_slice) };
+        let watch = Watch { limits, peers: cases.get(&of).map_or(&[], Vec::as_slice) };
         found.extend(watch.alarms(&members, history.nights.len()).into_iter().map(named));
     }
     found
 }
 
+/// A case of an engine and procedure.
+type Case<'h> = (&'h EngineName, ProcedureId, &'h str);
+
+fn case_of(series: &Series) -> Case<'_> {
+    let reading = &series.key.reading;
+    (&reading.engine, reading.procedure, &reading.case)
+}
+
 /// The spread that all comparisons of a case show together before each night.
-fn spreads_of_cases(history: &History) -> BTreeMap<(&str, &str, &str), Vec<Spread>> {
+fn spreads_of_cases(history: &History) -> BTreeMap<Case<'_>, Vec<Spread>> {
     let mut cases: BTreeMap<_, Vec<&Series>> = BTreeMap::new();
     for series in &history.series {
-        let key = &series.key;
-        cases.entry((key.engine.as_str(), key.procedure.as_str(), key.case.as_str())).or_default().push(series);
+        cases.entry(case_of(series)).or_default().push(series);
     }
     cases.into_iter().map(|(case, members)| (case, spread_of_all(&members, history.nights.len()))).collect()
 }
@@ -167,7 +174,7 @@ struct Watch<'a> {
 
 impl Watch<'_> {
     /// The changes of one group. After each the estimates start anew with the night after it was noticed: the nights since the
-    /// change were picked for being unusual, and would foretell the next ones wrong.
+    /// change were picked for being unusual, and would predict the next ones wrong.
     fn alarms(&self, members: &[&Series], nights: usize) -> Vec<Alarm> {
         let mut found: Vec<Alarm> = vec![];
         let mut start = 0;
@@ -181,22 +188,18 @@ impl Watch<'_> {
 
     /// The first alarm of a segment without earlier changes.
     fn first_alarm(&self, members: &[&Series], segment: std::ops::Range<usize>) -> Option<Noticed> {
-        let most = REFERENCE_VALUE + ONE_NIGHT * self.limits.sum;
-        let mut told = vec![Told::default(); members.len()];
+        let most = REFERENCE_VALUE + MAX_OF_ONE_NIGHT * self.limits.sum;
+        let mut means = vec![RunningMean::default(); members.len()];
         let mut spread = Spread::default();
         let mut deviates = vec![];
         let (mut sums, mut zero) = ([0.0_f64; 2], [0; 2]);
         for night in segment {
-            let heard = members.iter().zip(&mut told).filter_map(|(series, told)| told.hear(series, night));
-            let (sum, count) = heard.fold((0.0, 0.0_f64), |(sum, count), residual| (sum + residual, count + 1.0));
-            if count == 0.0 {
-                continue;
-            }
-            let residual = sum / count.sqrt();
+            let updates = members.iter().zip(&mut means).filter_map(|(series, mean)| mean.update(series, night));
+            let Some(innovation) = Innovation::of_group(updates) else { continue };
             let known = self.peers.get(night).map_or(spread, |peers| spread.moderated_by(*peers));
-            let deviate = known.deviate(residual).clamp(-most, most);
-            let is_learning = spread.count < LEARNING;
-            spread.hear(residual);
+            let deviate = known.deviate(innovation).clamp(-most, most);
+            let is_learning = spread.count < MIN_LEARNED;
+            spread.update(innovation);
             if is_learning {
                 continue;
             }
@@ -210,7 +213,7 @@ impl Watch<'_> {
                 }
             }
             let last = &deviates[deviates.len().saturating_sub(WINDOW)..];
-            if self.limits.are_exceeded_by(last.iter().map(|(_, deviate)| deviate.clamp(-MOST, MOST))) {
+            if self.limits.are_exceeded_by(last.iter().map(|(_, deviate)| deviate.clamp(-MAX_SPREADS, MAX_SPREADS))) {
                 return Some(Noticed { change: most_likely(last), noticed: night });
             }
         }
@@ -243,7 +246,7 @@ fn shift(members: &[&Series], start: usize, change: usize, noticed: usize) -> (f
         let moved = mean(&series.deviation, change..noticed + 1) - mean(&series.deviation, start..change);
         let reference = mean(&series.reference, start..noticed + 1).abs();
         let squares: Vec<f64> = series.std_error.iter().map(|e| e * e).collect();
-        let error = mean(&squares, start..noticed + 1).sqrt().max(SMALLEST_ERROR * reference).max(f64::MIN_POSITIVE);
+        let error = mean(&squares, start..noticed + 1).sqrt().max(MIN_ERROR * reference).max(f64::MIN_POSITIVE);
         if moved.is_finite() {
             errors += moved / error;
             relative += if reference > 0.0 { moved / reference } else { 0.0 };
@@ -266,7 +269,7 @@ mod tests {
     fn found(base: &Synthetic, shift: Shift, level: Level, within: usize) -> (usize, usize) {
         let part = Part {
             case: (level != Level::EngineAndProcedure).then(|| "suite/case-0".to_owned()),
-            meter: (level == Level::Comparison).then(|| "workplane[0]".to_owned()),
+            meter: (level == Level::Comparison).then(|| MeterId::new("workplane", 0)),
         };
         let (mut noticed, mut dated) = (0, 0);
         for seed in SEEDS {
@@ -274,9 +277,7 @@ mod tests {
             let history =
                 Synthetic { seed, shift: Some(shift), nights: shift.night + within, ..base.clone() }.history();
             let mine = |c: &&Change| {
-                (c.engine.as_str(), c.procedure.as_str()) == ("mitsuba", "indirect_illuminance")
-                    && c.noticed >= shift.night
-                    && (c.part == part || c.seen_in.contains(&part))
+                is_of_shifted(c) && c.noticed >= shift.night && (c.part == part || c.seen_in.contains(&part))
             };
             if let Some(change) = changes(&history).iter().find(mine) {
                 noticed += 1;
@@ -284,6 +285,10 @@ mod tests {
             }
         }
         (noticed, dated)
+    }
+
+    fn is_of_shifted(change: &Change) -> bool {
+        change.engine == "mitsuba" && change.procedure == ProcedureId::IndirectIlluminance
     }
 
     const SEEN: Shift = Shift { night: 0, standard_errors: 2.0, cases: 5, meters: 20 };
@@ -336,12 +341,8 @@ mod tests {
             let found = at_level(&history, Level::Comparison);
             for case in 0..shift.cases {
                 let case = Some(format!("suite/case-{case}"));
-                let part = Part { case, meter: Some("workplane[0]".to_owned()) };
-                let mine = |c: &&Change| {
-                    (c.engine.as_str(), c.procedure.as_str()) == ("mitsuba", "indirect_illuminance")
-                        && c.noticed >= shift.night
-                        && c.part == part
-                };
+                let part = Part { case, meter: Some(MeterId::new("workplane", 0)) };
+                let mine = |c: &&Change| is_of_shifted(c) && c.noticed >= shift.night && c.part == part;
                 delays.push(found.iter().find(mine).map(|change| change.noticed + 1 - shift.night));
             }
         }
@@ -352,14 +353,7 @@ mod tests {
     fn a_shift_of_one_reading_among_two_thousand_is_noticed_half_the_time_within_five_nights_and_soon_otherwise() {
         let delays = delays_of_single_readings(SEEDS);
         let within = |nights: usize| delays.iter().flatten().filter(|d| **d <= nights).count();
-        println!(
-            "{} within 5, {} within 7, {} within 10, {} within 21 of {}",
-            within(5),
-            within(7),
-            within(10),
-            within(21),
-            delays.len()
-        );
+        println!("within 5, 7, 10, 21 nights: {:?} of {}", [5, 7, 10, 21].map(within), delays.len());
         assert!(20 * within(5) >= 7 * delays.len(), "{delays:?}");
         assert!(10 * within(10) >= 8 * delays.len(), "{delays:?}");
         assert!(20 * within(21) >= 19 * delays.len(), "{delays:?}");

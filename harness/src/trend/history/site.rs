@@ -3,9 +3,10 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part};
+use super::figure::{figure, mean_deviation, percent};
 use super::series::History;
-use super::trend::{figure, percent, trend};
 use crate::judge::Verdict;
+use crate::record::{EngineName, ProcedureId};
 
 /// The page: one file that needs nothing else. `changes` are those of the history, `reports` are links to the reports of the last night, with what they are called.
 pub fn site(history: &History, changes: &[Change], reports: &[(String, String)]) -> String {
@@ -54,14 +55,13 @@ pub fn site(history: &History, changes: &[Change], reports: &[(String, String)])
 /// Verdicts of the last night, an engine and procedure a row.
 fn tonight(history: &History) -> Markup {
     let Some(night) = history.nights.len().checked_sub(1) else { return html! {} };
-    let row = |engine: &str, procedure: &str| {
-        let members: Vec<_> =
-            history.series.iter().filter(|s| s.key.engine == engine && s.key.procedure == procedure).collect();
+    let row = |engine: &EngineName, procedure: ProcedureId| {
+        let members = history.of_engine(engine, procedure);
         let count =
             |of: &[Verdict]| members.iter().filter(|s| s.verdicts[night].is_some_and(|v| of.contains(&v))).count();
         let failed = count(&[Verdict::Fail, Verdict::UnexpectedPass, Verdict::Missing]);
         let (undecided, known) = (count(&[Verdict::Inconclusive]), count(&[Verdict::KnownDeviation]));
-        let mean = trend(&members, history.nights.len())[night];
+        let mean = mean_deviation(&members, history.nights.len())[night];
         html! {
             tr {
                 th scope="row" { (engine) } td { (procedure) }
@@ -158,7 +158,7 @@ mod tests {
 
     fn nights(shift: Option<Shift>) -> History {
         let base = Synthetic { nights: 60, cases: 2, meters: 4, new_version: Some(40), shift, ..Synthetic::default() };
-        History::parse(base.text().as_bytes(), 2, std::path::Path::new("history.jsonl")).unwrap()
+        History::parse(base.text().as_bytes(), std::path::Path::new("history.jsonl")).unwrap()
     }
 
     #[test]
@@ -196,7 +196,7 @@ mod tests {
     fn text_of_a_spec_cannot_become_markup() {
         let mut history = nights(None);
         for series in &mut history.series {
-            series.key.engine = "<b>\"x".to_owned();
+            series.key.reading.engine = "<b>\"x".into();
         }
         let page = site(&history, &changes(&history), &[]);
         assert!(page.contains("&lt;b&gt;") && !page.contains("<b>"));

@@ -1,13 +1,17 @@
 //! Synthetic nights of known truth: constant deviations, normal noise, standard errors as eight blocks would state them.
 
+use super::line::{Line, Numbers};
 use super::series::{History, Key, Series};
 use crate::judge::{Basis, Verdict};
-use crate::record::Quantity;
-use crate::trend::history::Entry;
+use crate::record::{MeterId, ProcedureId, Quantity, ReadingKey};
 
-pub(super) const ENGINES: [&str; 5] = ["iesna", "mitsuba", "povray", "radiance", "simulator"];
-pub(super) const PROCEDURES: [&str; 4] =
-    ["direct_illuminance", "indirect_illuminance", "luminous_intensity", "total_illuminance"];
+const ENGINES: [&str; 5] = ["iesna", "mitsuba", "povray", "radiance", "simulator"];
+const PROCEDURES: [ProcedureId; 4] = [
+    ProcedureId::DirectIlluminance,
+    ProcedureId::IndirectIlluminance,
+    ProcedureId::LuminousIntensity,
+    ProcedureId::TotalIlluminance,
+];
 
 /// A history to be made: the defaults are a year of 2000 comparisons a night.
 #[derive(Clone, Debug)]
@@ -48,8 +52,9 @@ impl Synthetic {
             for procedure in PROCEDURES {
                 let common: Vec<f64> = (0..self.nights).map(|_| random.draw()).collect();
                 for case in 0..self.cases {
+                    let reading = ReadingKey::new(format!("suite/case-{case}"), procedure, engine);
                     for meter in 0..self.meters {
-                        series.push(self.one(engine, procedure, case, meter, &common, &mut random));
+                        series.push(self.one(&reading, case, meter, &common, &mut random));
                     }
                 }
             }
@@ -57,34 +62,39 @@ impl Synthetic {
         History { nights: (0..self.nights).map(date).collect(), series, ..History::default() }
     }
 
-    /// The lines of its file.
+    /// The text of its file.
     pub(super) fn text(&self) -> String {
         let history = self.history();
         let mut text = String::new();
-        for night in 0..self.nights {
-            for series in &history.series {
-                let is_new = series.key.engine == "mitsuba" && self.new_version.is_some_and(|n| night >= n);
-                let version = if is_new { "1.1" } else { "1.0" };
-                text += &serde_json::to_string(&entry(series, night, &history.nights[night], version)).unwrap();
+        for (night, date) in history.nights.iter().enumerate() {
+            for series in history.series.chunks(self.meters) {
+                text += &serde_json::to_string(&self.line(series, night, date)).unwrap();
                 text += "\n";
             }
         }
         text
     }
 
-    fn one(
-        &self,
-        engine: &str,
-        procedure: &str,
-        case: usize,
-        meter: usize,
-        common: &[f64],
-        random: &mut Normal,
-    ) -> Series {
+    /// What a night says of the meters of one engine, procedure and case.
+    fn line<'a>(&self, meters: &'a [Series], night: usize, date: &'a str) -> Line<'a> {
+        let key = &meters[0].key;
+        let is_new = key.reading.engine == "mitsuba" && self.new_version.is_some_and(|n| night >= n);
+        let mut line = Line::new(date, &key.reading, Quantity::Illuminance, Verdict::Pass);
+        line.version = if is_new { "1.1" } else { "1.0" }.into();
+        (line.model, line.basis, line.source) = (key.model.as_str().into(), key.basis, key.source.as_str().into());
+        for series in meters {
+            let (reference, deviation) = (series.reference[night], series.deviation[night]);
+            let std_error = series.std_error[night];
+            line.push(&series.key.meter, Numbers { reference, deviation, std_error, u: std_error });
+        }
+        line
+    }
+
+    fn one(&self, of: &ReadingKey, case: usize, meter: usize, common: &[f64], random: &mut Normal) -> Series {
         let (reference, error) = (100.0 + meter as f64, 0.05 * (1.0 + case as f64));
         let bias = 0.3 * random.draw();
         let shifted =
-            |s: &Shift| (engine, procedure) == ("mitsuba", PROCEDURES[1]) && case < s.cases && meter < s.meters;
+            |s: &Shift| of.engine == "mitsuba" && of.procedure == PROCEDURES[1] && case < s.cases && meter < s.meters;
         let shift = self.shift.filter(shifted);
         let (own, shared) = ((1.0 - self.common).sqrt(), self.common.sqrt());
         let mut deviation = vec![];
@@ -96,38 +106,14 @@ impl Synthetic {
             std_error.push(error * (squares / 7.0).sqrt());
         }
         let key = Key {
-            engine: engine.to_owned(),
-            procedure: procedure.to_owned(),
-            case: format!("suite/case-{case}"),
+            reading: of.clone(),
             model: "point".to_owned(),
-            meter: format!("workplane[{meter}]"),
+            meter: MeterId::new("workplane", meter),
             basis: Some(Basis::Exact),
             source: "exact indirect light by radiosity, all bounces".to_owned(),
         };
         let verdicts = vec![Some(Verdict::Pass); self.nights];
         Series { key, deviation, std_error, reference: vec![reference; self.nights], verdicts }
-    }
-}
-
-fn entry<'a>(series: &'a Series, night: usize, date: &'a str, version: &'a str) -> Entry<'a> {
-    let key = &series.key;
-    Entry {
-        night: date.into(),
-        case: key.case.as_str().into(),
-        procedure: key.procedure.as_str().into(),
-        engine: key.engine.as_str().into(),
-        version: version.into(),
-        model: key.model.as_str().into(),
-        meter: key.meter.as_str().into(),
-        quantity: Quantity::Illuminance,
-        basis: key.basis,
-        source: key.source.as_str().into(),
-        value: Some(series.reference[night] + series.deviation[night]),
-        std_error: Some(series.std_error[night]),
-        reference: Some(series.reference[night]),
-        deviation: Some(series.deviation[night]),
-        u: Some(series.std_error[night]),
-        verdict: Verdict::Pass,
     }
 }
 

@@ -34,7 +34,6 @@ impl Frame {
         Self { origin_m, scale }
     }
 
-    /// A world point in scene units.
     pub(in crate::engines::mitsuba) fn to_scene(self, point_m: DVec3) -> DVec3 {
         (point_m - self.origin_m) * self.scale
     }

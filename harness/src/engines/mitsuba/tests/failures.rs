@@ -1,6 +1,7 @@
 //! Every way in which a renderer fails, played by a false interpreter, ends in an error that says so.
 
 use std::os::unix::fs::PermissionsExt;
+use std::time::Duration;
 
 use super::*;
 use crate::system::process::ProcessError;
@@ -75,7 +76,7 @@ fn without_llvm_the_scalar_variant_runs_and_the_report_says_so() {
     let job = s1(Transport::Direct);
     let found = engine.read(&job, &bench).unwrap();
     assert!(worst(&relative_deviations(&found, &S1_DIRECT_LX)) < 1e-5, "{found:?}");
-    assert_eq!(found.settings["variant"], "scalar_rgb");
+    assert_eq!(found.method["variant"], "scalar_rgb");
     assert!(found.notes.iter().any(|n| n.contains("scalar_rgb ran instead of llvm_ad_mono")), "{found:?}");
     let mut indirect = s1(CONVERGED);
     indirect.budget = Budget { relative_error: 1e-3, seconds: 4.0 };

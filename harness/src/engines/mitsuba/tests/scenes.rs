@@ -162,8 +162,8 @@ fn the_stock_scene_reads_the_same_light_within_its_own_errors() {
 #[test]
 fn the_fast_preset_takes_a_fixed_number_of_samples() {
     let found = read(&with_preset(s1(CONVERGED), "fast"));
-    assert_eq!(found.settings["indirect_blocks"], "8");
-    assert_eq!(found.settings["indirect_samples_a_meter_and_block"], "1024");
+    assert_eq!(found.effort["indirect_blocks"], "8");
+    assert_eq!(found.effort["indirect_samples_a_meter_and_block"], "1024");
     assert!(worst_z(&found, &S1_INDIRECT_LX) < 6.0, "{found:?}");
 }
 

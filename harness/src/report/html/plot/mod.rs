@@ -11,6 +11,7 @@ pub(super) mod times;
 use maud::{Markup, html};
 
 use super::super::Report;
+use super::super::words::trimmed;
 use super::palette::Palette;
 use crate::judge::{Basis, Comparison};
 use crate::record::ProcedureId;
@@ -30,15 +31,12 @@ pub(super) struct Group<'a> {
 /// One group a case, in the cases' order, those without comparisons left out.
 pub(super) fn groups<'a>(report: &'a Report, procedure: ProcedureId) -> Vec<Group<'a>> {
     let of_case = |case: &'a str| {
-        let mine = |c: &&Comparison| c.key.case == case && c.key.procedure == procedure;
-        let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(mine).collect();
-        let procedure = comparisons.first()?.key.procedure;
-        Some(Group { case, procedure, comparisons })
+        let comparisons = report.comparisons.iter().filter(|c| c.key.is_of(case, procedure)).collect();
+        Group { case, procedure, comparisons }
     };
-    report.cases.iter().filter_map(|c| of_case(&c.name)).collect()
+    report.cases.iter().map(|c| of_case(&c.name)).filter(|g| !g.comparisons.is_empty()).collect()
 }
 
-/// The panels of a procedure.
 pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -> Vec<Markup> {
     let mut shown: Vec<&Group<'_>> = groups.iter().collect();
     if shown.len() > MOST_CASES {
@@ -69,12 +67,12 @@ impl Group<'_> {
 
     /// The firmest basis: what the group is drawn against.
     fn basis(&self) -> Option<Basis> {
-        self.comparisons.iter().filter_map(|c| c.reference.as_ref().map(|r| r.basis)).min()
+        self.comparisons.iter().filter_map(|c| c.basis()).min()
     }
 
     /// The panel's title: the case where there are several.
     fn title(&self, report: &Report, what: &str) -> String {
-        if report.is_suite() { format!("{}: {what}", self.case) } else { what.to_owned() }
+        format!("{}{what}", report.of_suite(self.case, ": "))
     }
 }
 
@@ -89,20 +87,17 @@ fn figure(title: &str, height: f64, drawing: &Markup, caption: &Markup) -> Marku
     }
 }
 
-/// Text in a drawing.
 fn text(class: &str, anchor: &str, [x, y]: [f64; 2], words: &str) -> Markup {
     html! { text class=(class) text-anchor=(anchor) x=(number(x)) y=(number(y)) { (words) } }
 }
 
-/// A straight line in a drawing.
 fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Markup {
     html! { path class=(class) d={ "M" (number(x1)) " " (number(y1)) "L" (number(x2)) " " (number(y2)) } {} }
 }
 
 /// A coordinate without needless digits.
 fn number(value: f64) -> String {
-    let text = format!("{value:.1}");
-    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+    trimmed(value, 1)
 }
 
 /// The engines of a plot, each behind its mark.

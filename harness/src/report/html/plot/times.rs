@@ -4,11 +4,13 @@ use maud::{Markup, html};
 
 use super::super::beside::{BenchCurve, Beside};
 use super::super::palette::Palette;
-use super::super::{duration, title};
-use super::{WIDTH, figure, groups, legend, line, text};
+use super::super::{duration, percent, title};
+use super::axis::label;
+use super::{WIDTH, figure, groups, legend, line, number, text};
 use crate::judge::Comparison;
 use crate::record::ProcedureId;
 use crate::report::Report;
+use crate::report::words::largest;
 
 const LEFT: f64 = 52.0;
 const TOP: f64 = 8.0;
@@ -50,20 +52,13 @@ fn points(report: &Report, procedure: ProcedureId) -> Vec<Point> {
     let mut points = vec![];
     for group in groups(report, procedure) {
         let Some(basis) = group.basis() else { continue };
-        let recordings = report.recordings.iter().filter(|r| r.key.case == group.case && r.key.procedure == procedure);
+        let recordings = report.recordings.iter().filter(|r| r.key.is_of(group.case, procedure));
         for recording in recordings {
-            let mine = |c: &&&Comparison| {
-                c.key.engine == recording.key.engine && c.reference.as_ref().is_some_and(|r| r.basis == basis)
-            };
-            let errors = group.comparisons.iter().filter(mine).filter_map(|c| c.relative_deviation).map(f64::abs);
-            if let Some(error) = errors.max_by(f64::total_cmp) {
+            let mine = |c: &&&Comparison| c.key.engine == recording.key.engine && c.basis() == Some(basis);
+            let errors = group.comparisons.iter().filter(mine).filter_map(|c| c.relative_deviation);
+            if let Some(error) = largest(errors).map(f64::abs) {
                 let engine = recording.key.engine.to_string();
-                let words = format!(
-                    "{engine}, {}: {}, {}",
-                    group.case,
-                    duration(recording.wall_s),
-                    super::super::percent(error)
-                );
+                let words = format!("{engine}, {}: {}, {}", group.case, duration(recording.wall_s), percent(error));
                 points.push(Point { engine, words, wall_s: recording.wall_s, error });
             }
         }
@@ -150,11 +145,8 @@ fn labels<'a>(
 fn drawn(curve: &BenchCurve, palette: &Palette, place: &impl Fn(f64, f64) -> [f64; 2]) -> Markup {
     let mut rungs: Vec<_> = curve.points.iter().filter_map(|p| Some((p, p.relative_error?))).collect();
     rungs.sort_by(|a, b| a.0.wall_s.total_cmp(&b.0.wall_s));
-    let path: Vec<String> = rungs
-        .iter()
-        .map(|(p, e)| place(p.wall_s, *e))
-        .map(|[x, y]| format!("{} {}", super::number(x), super::number(y)))
-        .collect();
+    let path: Vec<String> =
+        rungs.iter().map(|(p, e)| place(p.wall_s, *e)).map(|[x, y]| format!("{} {}", number(x), number(y))).collect();
     let class = format!("line e{}", palette.index(&curve.engine));
     html! {
         @if path.len() > 1 { path class=(class) d={ "M" (path.join("L")) } {} }
@@ -181,13 +173,5 @@ impl Decades {
 
 /// A tick of a logarithmic axis.
 fn power(exponent: i32) -> String {
-    match exponent {
-        -2 => "0.01".to_owned(),
-        -1 => "0.1".to_owned(),
-        0 => "1".to_owned(),
-        1 => "10".to_owned(),
-        2 => "100".to_owned(),
-        3 => "1000".to_owned(),
-        e => super::super::power(e),
-    }
+    if (-2..=3).contains(&exponent) { label(10f64.powi(exponent)) } else { super::super::power(exponent) }
 }

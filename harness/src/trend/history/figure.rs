@@ -1,9 +1,10 @@
-//! The trend of an engine in a procedure: its mean deviation over the nights, as a picture.
+//! The trend of an engine in a procedure as a picture: its mean deviation over the nights.
 
 use maud::{Markup, html};
 
 use super::change::Change;
 use super::series::{History, Series, VersionChange};
+use crate::record::{EngineName, ProcedureId};
 
 const WIDTH: f64 = 480.0;
 const HEIGHT: f64 = 170.0;
@@ -15,7 +16,7 @@ const BOTTOM: f64 = 22.0;
 ///
 /// With e the relative standard error of a reading over all nights this is sum(d / e) / sum(1 / e): what change points are
 /// found in, in units that mean something. Series that miss nights are left out of all if others do not.
-pub(super) fn trend(members: &[&Series], nights: usize) -> Vec<f64> {
+pub(super) fn mean_deviation(members: &[&Series], nights: usize) -> Vec<f64> {
     let there = |s: &Series| s.deviation.iter().filter(|d| d.is_finite()).count();
     let most = members.iter().map(|s| there(s)).max().unwrap_or(0);
     let mut sums = vec![(0.0, 0.0); nights];
@@ -32,13 +33,11 @@ pub(super) fn trend(members: &[&Series], nights: usize) -> Vec<f64> {
     sums.into_iter().map(|(sum, weight)| if weight > 0.0 { sum / weight } else { f64::NAN }).collect()
 }
 
-/// The picture with its caption.
-pub(super) fn figure(history: &History, engine: &str, procedure: &str, changes: &[Change]) -> Markup {
-    let members: Vec<&Series> =
-        history.series.iter().filter(|s| s.key.engine == engine && s.key.procedure == procedure).collect();
-    let values = trend(&members, history.nights.len());
-    let mine: Vec<&Change> = changes.iter().filter(|c| c.engine == engine && c.procedure == procedure).collect();
-    let versions: Vec<&VersionChange> = history.version_changes.iter().filter(|v| v.engine == engine).collect();
+pub(super) fn figure(history: &History, engine: &EngineName, procedure: ProcedureId, changes: &[Change]) -> Markup {
+    let members = history.of_engine(engine, procedure);
+    let values = mean_deviation(&members, history.nights.len());
+    let mine: Vec<&Change> = changes.iter().filter(|c| c.engine == *engine && c.procedure == procedure).collect();
+    let versions: Vec<&VersionChange> = history.version_changes.iter().filter(|v| v.engine == *engine).collect();
     let id = format!("{engine}-{procedure}");
     let last = values.iter().rev().find(|v| v.is_finite());
     let frame = Frame::of(&values);
@@ -74,7 +73,6 @@ pub(super) fn figure(history: &History, engine: &str, procedure: &str, changes: 
     }
 }
 
-/// A relative deviation as people read it.
 pub(super) fn percent(relative: f64) -> String {
     let percent = 100.0 * relative;
     match percent.abs() {

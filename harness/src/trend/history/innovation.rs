@@ -1,26 +1,38 @@
-//! What the nights before have told of a series: its mean, its standard error, and how far residuals spread.
+//! Innovations: what a night brings that the nights before it did not predict, and how far these spread.
 
 use super::series::Series;
 
-/// So many residuals estimate the spread before any is judged by it.
-pub(super) const LEARNING: usize = 6;
+/// So many innovations estimate the spread before any is judged by it.
+pub(super) const MIN_LEARNED: usize = 6;
 
-/// A residual moves the estimates by no more than so many times the spread.
-pub(super) const MOST: f64 = 4.0;
+/// An innovation moves the estimates by no more than so many times the spread.
+pub(super) const MAX_SPREADS: f64 = 4.0;
 
-/// The smallest standard error, relative to the reference: for engines that state none. A change far below any tolerance is one still.
-pub(super) const SMALLEST_ERROR: f64 = 1e-6;
+/// Of a standard error, relative to the reference: for engines that state none. A change far below any tolerance is one still.
+pub(super) const MIN_ERROR: f64 = 1e-6;
 
-/// The smallest spread of a group's residuals, in standard errors: for what repeats exactly.
-const SMALLEST_SPREAD: f64 = 0.1;
+/// Of a group's innovations, in standard errors: for what repeats exactly.
+const MIN_SPREAD: f64 = 0.1;
 
 /// The spread of all comparisons of a case counts for so many nights in that of each.
-const PEERS: usize = 50;
+const MAX_PEER_NIGHTS: usize = 50;
 
 /// A standard error so many times the usual is believed; one below may be chance, being estimated from few blocks.
 const UNUSUAL: f64 = 2.0;
 
-/// The spread of residuals, which single wild nights do not widen.
+/// A night's deviation less the one predicted, in standard errors of their difference.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Innovation(f64);
+
+impl Innovation {
+    /// That of a group: the sum over the square root of their number; `None` without any.
+    pub(super) fn of_group(members: impl Iterator<Item = Self>) -> Option<Self> {
+        let (sum, count) = members.fold((0.0, 0.0_f64), |(sum, count), one| (sum + one.0, count + 1.0));
+        (count > 0.0).then(|| Self(sum / count.sqrt()))
+    }
+}
+
+/// The spread of innovations, which single wild nights do not widen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Spread {
     squares: f64,
@@ -29,22 +41,22 @@ pub(super) struct Spread {
 
 impl Spread {
     fn value(&self) -> f64 {
-        (self.squares / self.count.max(1) as f64).sqrt().max(SMALLEST_SPREAD)
+        (self.squares / self.count.max(1) as f64).sqrt().max(MIN_SPREAD)
     }
 
-    /// The most that a residual may move an estimate by; there is no telling at first.
-    fn most(&self) -> f64 {
-        if self.count < LEARNING { f64::INFINITY } else { MOST * self.value() }
+    /// The most that an innovation may move an estimate by; there is no telling at first.
+    fn max_step(&self) -> f64 {
+        if self.count < MIN_LEARNED { f64::INFINITY } else { MAX_SPREADS * self.value() }
     }
 
-    pub(super) fn hear(&mut self, residual: f64) {
-        self.squares += residual.clamp(-self.most(), self.most()).powi(2);
+    pub(super) fn update(&mut self, Innovation(innovation): Innovation) {
+        self.squares += innovation.clamp(-self.max_step(), self.max_step()).powi(2);
         self.count += 1;
     }
 
     /// This spread together with that of its peers, as far as they know more.
     pub(super) fn moderated_by(mut self, peers: Self) -> Self {
-        let weight = PEERS.min(peers.count.saturating_sub(self.count));
+        let weight = MAX_PEER_NIGHTS.min(peers.count.saturating_sub(self.count));
         if weight > 0 {
             self.squares += peers.squares * weight as f64 / peers.count as f64;
             self.count += weight;
@@ -52,24 +64,24 @@ impl Spread {
         self
     }
 
-    /// The standard normal deviate as likely as a residual.
-    pub(super) fn deviate(&self, residual: f64) -> f64 {
-        normal_deviate(residual / self.value(), self.count)
+    /// The standard normal deviate as likely as an innovation.
+    pub(super) fn deviate(&self, Innovation(innovation): Innovation) -> f64 {
+        normal_deviate(innovation / self.value(), self.count)
     }
 }
 
-/// What the nights of a segment have told of one series so far.
+/// The mean deviation of a series over the nights of a segment so far, which predicts the next.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Told {
+pub(super) struct RunningMean {
     nights: f64,
     mean: f64,
     square_of_errors: f64,
     spread: Spread,
 }
 
-impl Told {
-    /// Takes in a night; its residual in standard errors, where there is a night before to foretell it.
-    pub(super) fn hear(&mut self, series: &Series, night: usize) -> Option<f64> {
+impl RunningMean {
+    /// Takes in a night; `None` without a reading, or without a night before that predicts it.
+    pub(super) fn update(&mut self, series: &Series, night: usize) -> Option<Innovation> {
         let deviation = series.deviation[night];
         if !deviation.is_finite() {
             return None;
@@ -80,29 +92,29 @@ impl Told {
         self.square_of_errors += tonight.powi(2);
         let usual = (self.square_of_errors / self.nights).sqrt();
         let error = if tonight > UNUSUAL * usual { tonight } else { usual };
-        let error = error.max(SMALLEST_ERROR * series.reference[night].abs()).max(f64::MIN_POSITIVE);
+        let error = error.max(MIN_ERROR * series.reference[night].abs()).max(f64::MIN_POSITIVE);
         if n == 0.0 {
             self.mean = deviation;
             return None;
         }
-        let residual = (deviation - self.mean) * (n / (n + 1.0)).sqrt() / error;
-        let most = self.spread.most() * error;
+        let innovation = Innovation((deviation - self.mean) * (n / (n + 1.0)).sqrt() / error);
+        let most = self.spread.max_step() * error;
         self.mean += (deviation - self.mean).clamp(-most, most) / self.nights;
-        self.spread.hear(residual);
-        Some(residual)
+        self.spread.update(innovation);
+        Some(innovation)
     }
 }
 
-/// The spread of the residuals of all members together before each night.
+/// The spread of the innovations of all members together before each night.
 pub(super) fn spread_of_all(members: &[&Series], nights: usize) -> Vec<Spread> {
-    let mut told = vec![Told::default(); members.len()];
+    let mut means = vec![RunningMean::default(); members.len()];
     let mut all = Spread::default();
     let mut before = vec![];
     for night in 0..nights {
         before.push(all);
-        for (told, series) in told.iter_mut().zip(members) {
-            if let Some(residual) = told.hear(series, night) {
-                all.hear(residual);
+        for (mean, series) in means.iter_mut().zip(members) {
+            if let Some(innovation) = mean.update(series, night) {
+                all.update(innovation);
             }
         }
     }

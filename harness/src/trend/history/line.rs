@@ -1,0 +1,345 @@
+//! One line of the history: what an engine said in one procedure of one case on one night, the numbers of its meters as lists.
+//!
+//! A line stands by itself, so that lines can be taken out, reordered, or merged from two histories. All that it says in words
+//! holds for all of its meters; comparisons with another verdict or reference have a line of their own. A line of format 1,
+//! written until November 2026, is one of a single meter with numbers in place of lists.
+
+use std::borrow::Cow;
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::file::HistoryError;
+use crate::judge::{Basis, Comparison, Verdict};
+use crate::record::{MeterId, ProcedureId, Quantity, ReadingKey};
+use crate::report::Report;
+
+/// The format that is written; all up to it are read.
+const FORMAT: u32 = 2;
+
+/// What an engine said in one procedure of one case on one night. Lists hold NaN, null in the file, where there is no number.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Line<'a> {
+    /// A date: YYYY-MM-DD.
+    #[serde(borrow)]
+    night: Cow<'a, str>,
+    #[serde(borrow)]
+    case: Cow<'a, str>,
+    #[serde(default = "first_format", deserialize_with = "known_format")]
+    format: u32,
+    pub procedure: ProcedureId,
+    #[serde(borrow)]
+    pub engine: Cow<'a, str>,
+    /// The engine's.
+    #[serde(borrow)]
+    pub version: Cow<'a, str>,
+    #[serde(borrow)]
+    pub model: Cow<'a, str>,
+    pub quantity: Quantity,
+    /// What the reference rests on; null without a reference.
+    pub basis: Option<Basis>,
+    /// Formula, solver or paper of the reference.
+    #[serde(borrow)]
+    pub source: Cow<'a, str>,
+    pub verdict: Verdict,
+    #[serde(borrow, default)]
+    meters: Vec<Meters<'a>>,
+    /// Of format 1.
+    #[serde(borrow, default, skip_serializing)]
+    meter: Option<Cow<'a, str>>,
+    #[serde(default, deserialize_with = "numbers", skip_serializing_if = "is_void")]
+    reference: Vec<f64>,
+    #[serde(default, deserialize_with = "numbers")]
+    deviation: Vec<f64>,
+    #[serde(default, deserialize_with = "numbers", skip_serializing_if = "is_void")]
+    std_error: Vec<f64>,
+    #[serde(default, deserialize_with = "numbers", skip_serializing_if = "is_void")]
+    u: Vec<f64>,
+}
+
+/// Meters in the order of the numbers.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(untagged)]
+pub(super) enum Meters<'a> {
+    /// `set[first]` to `set[last]`.
+    Run(#[serde(borrow)] Cow<'a, str>, usize, usize),
+    One(#[serde(borrow)] Cow<'a, str>),
+}
+
+/// The numbers of one meter, in the quantity's unit; NaN where there is none.
+#[derive(Clone, Copy, Debug)]
+pub struct Numbers {
+    pub reference: f64,
+    /// The reading is the reference plus this.
+    pub deviation: f64,
+    /// Of the reading: what repeats differently from night to night.
+    pub std_error: f64,
+    /// Combined standard uncertainty of the deviation: reading, instrument, reference.
+    pub u: f64,
+}
+
+/// What series are told apart by, save their meters.
+pub(super) type Subject<'l> = (&'l str, ProcedureId, &'l str, &'l str, Option<Basis>, &'l str);
+
+impl<'a> Line<'a> {
+    /// A line without meters, version, model and reference.
+    pub fn new(night: &'a str, key: &'a ReadingKey, quantity: Quantity, verdict: Verdict) -> Self {
+        Self {
+            night: night.into(),
+            case: key.case.as_str().into(),
+            format: FORMAT,
+            procedure: key.procedure,
+            engine: key.engine.as_str().into(),
+            version: "".into(),
+            model: "".into(),
+            quantity,
+            basis: None,
+            source: "".into(),
+            verdict,
+            meters: vec![],
+            meter: None,
+            reference: vec![],
+            deviation: vec![],
+            std_error: vec![],
+            u: vec![],
+        }
+    }
+
+    pub fn push(&mut self, meter: &'a MeterId, numbers: Numbers) {
+        let id = meter.0.as_str();
+        let place = id.strip_suffix(']').and_then(|id| id.rsplit_once('['));
+        let place = place.and_then(|(set, k)| Some((set, k.parse::<usize>().ok()?)));
+        match (place.filter(|(set, k)| MeterId::new(set, *k) == *meter), self.meters.last_mut()) {
+            (Some((set, k)), Some(Meters::Run(of, _, last))) if of == set && last.checked_add(1) == Some(k) => {
+                *last = k
+            }
+            (Some((set, k)), _) => self.meters.push(Meters::Run(set.into(), k, k)),
+            (None, _) => self.meters.push(Meters::One(id.into())),
+        }
+        self.reference.push(numbers.reference);
+        self.deviation.push(numbers.deviation);
+        self.std_error.push(numbers.std_error);
+        self.u.push(numbers.u);
+    }
+
+    /// Reads a line of a file.
+    pub(super) fn parse(text: &'a [u8]) -> Result<Self, String> {
+        let mut line: Self = serde_json::from_slice(text).map_err(|e| e.to_string())?;
+        line.meters.extend(line.meter.take().map(Meters::One));
+        let count = line.meters.iter().try_fold(0_usize, |count, meters| count.checked_add(meters.count()?));
+        let lists = [&line.reference, &line.std_error, &line.u];
+        let lists = lists.into_iter().filter(|list| !list.is_empty()).chain([&line.deviation]);
+        if let Some(wrong) = lists.map(Vec::len).find(|length| Some(*length) != count) {
+            return Err(format!("{wrong} numbers for {} meters", count.unwrap_or(usize::MAX)));
+        }
+        Ok(line)
+    }
+
+    pub fn night(&self) -> &str {
+        &self.night
+    }
+
+    /// How every line of this night and case begins, of whatever format.
+    pub(super) fn head(&self) -> String {
+        let text = |t: &str| serde_json::Value::from(t).to_string();
+        format!("{{\"night\":{},\"case\":{},", text(&self.night), text(&self.case))
+    }
+
+    pub(super) fn subject(&self) -> Subject<'_> {
+        (&self.case, self.procedure, &self.engine, &self.model, self.basis, &self.source)
+    }
+
+    pub(super) fn meters(&self) -> &[Meters<'a>] {
+        &self.meters
+    }
+
+    /// How many comparisons it holds.
+    pub fn count(&self) -> usize {
+        self.deviation.len()
+    }
+
+    /// The numbers of the `k`-th meter.
+    pub(super) fn numbers(&self, k: usize) -> Numbers {
+        let [reference, deviation, std_error, u] = [&self.reference, &self.deviation, &self.std_error, &self.u]
+            .map(|numbers| numbers.get(k).copied().unwrap_or(f64::NAN));
+        Numbers { reference, deviation, std_error, u }
+    }
+
+    fn says_the_same_of_its_meters(&self, other: &Self) -> bool {
+        (&self.night, self.subject(), &self.version) == (&other.night, other.subject(), &other.version)
+            && (self.quantity, self.verdict) == (other.quantity, other.verdict)
+    }
+}
+
+impl Meters<'_> {
+    /// `None` of a run that ends before it begins.
+    fn count(&self) -> Option<usize> {
+        match self {
+            Self::Run(_, first, last) => last.checked_sub(*first)?.checked_add(1),
+            Self::One(_) => Some(1),
+        }
+    }
+
+    pub(super) fn ids(&self) -> Vec<MeterId> {
+        match self {
+            Self::Run(set, first, last) => (*first..=*last).map(|k| MeterId::new(set, k)).collect(),
+            Self::One(id) => vec![MeterId(id.to_string())],
+        }
+    }
+}
+
+/// The lines of a report, for the night of its start or for the one given.
+pub fn lines<'a>(report: &'a Report, night: Option<&'a str>) -> Result<Vec<Line<'a>>, HistoryError> {
+    let night = night.or_else(|| report.started.get(..10)).unwrap_or_default();
+    if !is_date(night) {
+        return Err(HistoryError::Night { night: night.to_owned() });
+    }
+    let mut lines: Vec<Line<'a>> = vec![];
+    for c in &report.comparisons {
+        let recording = report.recordings.iter().find(|r| r.key == c.key && r.model == c.model);
+        let reference = c.reference.as_ref();
+        let new = Line {
+            version: recording.map_or("", |r| r.version.as_str()).into(),
+            model: c.model.as_str().into(),
+            basis: reference.map(|r| r.basis),
+            source: reference.map_or("", |r| r.source.as_str()).into(),
+            ..Line::new(night, &c.key, c.quantity, c.verdict)
+        };
+        let place = lines.iter().rposition(|line| line.says_the_same_of_its_meters(&new)).unwrap_or(lines.len());
+        if place == lines.len() {
+            lines.push(new);
+        }
+        lines[place].push(&c.meter, Numbers::of(c, recording.map_or(0.0, |r| r.instrument_uncertainty)));
+    }
+    Ok(lines)
+}
+
+impl Numbers {
+    /// Rounded to what they are worth: a year of nights stays readable.
+    fn of(comparison: &Comparison, instrument: f64) -> Self {
+        let std_error = comparison.uncertainty.standard_error();
+        let instrument = instrument * comparison.value.unwrap_or(0.0);
+        let reference = comparison.reference.as_ref();
+        let u = reference.map(|r| std_error.unwrap_or(0.0).hypot(instrument).hypot(r.uncertainty));
+        Self {
+            reference: rounded(reference.map(|r| r.value), 9),
+            deviation: rounded(comparison.deviation, 6),
+            std_error: rounded(std_error, 4),
+            u: rounded(u, 4),
+        }
+    }
+}
+
+/// Rounds to significant digits; what is no finite number is NaN.
+fn rounded(value: Option<f64>, digits: usize) -> f64 {
+    let value = value.filter(|v| v.is_finite());
+    value.and_then(|v| format!("{v:.*e}", digits - 1).parse().ok()).unwrap_or(f64::NAN)
+}
+
+/// Whether a text is a date of the form that sorts by time.
+fn is_date(text: &str) -> bool {
+    let shape = text.len() == 10 && text.bytes().enumerate().all(|(k, b)| (b == b'-') == (k == 4 || k == 7));
+    shape && humantime::parse_rfc3339_weak(&format!("{text} 00:00:00")).is_ok()
+}
+
+const fn first_format() -> u32 {
+    1
+}
+
+fn known_format<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
+    let format = u32::deserialize(from)?;
+    let later = || D::Error::custom(format!("format {format}; this luxproof reads formats 1 to {FORMAT}"));
+    if (1..=FORMAT).contains(&format) { Ok(format) } else { Err(later()) }
+}
+
+fn is_void(numbers: &[f64]) -> bool {
+    numbers.iter().all(|n| n.is_nan())
+}
+
+/// Reads a list of numbers, or the one number of format 1; null is NaN.
+fn numbers<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "expected numbers or null, in a list")]
+    enum List {
+        Many(Vec<Option<f64>>),
+        One(Option<f64>),
+    }
+    let list = match List::deserialize(from)? {
+        List::Many(list) => list,
+        List::One(number) => vec![number],
+    };
+    Ok(list.into_iter().map(|n| n.unwrap_or(f64::NAN)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FORMAT_1: &str = r#"{"night":"2026-01-02","case":"a\"b","procedure":"direct_illuminance","engine":"e","version":"1","model":"point","meter":"m[0-3]","quantity":"illuminance_lx","basis":"exact","source":"","value":1.5,"std_error":null,"reference":1,"deviation":0.5,"u":1e-3,"verdict":"pass"}"#;
+
+    fn key() -> ReadingKey {
+        ReadingKey::new("room", ProcedureId::DirectIlluminance, "radiance")
+    }
+
+    #[test]
+    fn meters_in_a_row_are_a_run_and_every_line_reads_back_as_written() {
+        let key = key();
+        let ids =
+            ["m[0]", "m[1]", "m[3]", "n[4]", "n[04]", "odd[5-6]", "n[]", "n[7]", "n[8]"].map(|id| MeterId(id.into()));
+        let mut line = Line::new("2026-01-31", &key, Quantity::Illuminance, Verdict::Pass);
+        for (k, id) in ids.iter().enumerate() {
+            let value = if k == 2 { f64::NAN } else { k as f64 / 3.0 };
+            line.push(id, Numbers { reference: 1.0, deviation: value, std_error: f64::NAN, u: 1e-7 });
+        }
+        let text = serde_json::to_string(&line).unwrap();
+        assert!(text.starts_with(&line.head()), "{text}");
+        let meters = r#""meters":[["m",0,1],["m",3,3],["n",4,4],"n[04]","odd[5-6]","n[]",["n",7,8]]"#;
+        assert!(text.contains(meters) && !text.contains("std_error"), "{text}");
+        let read = Line::parse(text.as_bytes()).unwrap();
+        assert_eq!(serde_json::to_string(&read).unwrap(), text);
+        assert_eq!(read.meters.iter().flat_map(Meters::ids).collect::<Vec<_>>(), ids);
+        assert!(read.numbers(2).deviation.is_nan() && read.numbers(1).std_error.is_nan());
+        assert_eq!((read.numbers(1).deviation, read.numbers(8).u), (1.0 / 3.0, 1e-7));
+    }
+
+    #[test]
+    fn a_line_of_format_1_is_one_of_a_single_meter() {
+        let line = Line::parse(FORMAT_1.as_bytes()).unwrap();
+        assert_eq!(line.subject(), ("a\"b", ProcedureId::DirectIlluminance, "e", "point", Some(Basis::Exact), ""));
+        assert_eq!(line.meters, [Meters::One("m[0-3]".into())]);
+        let Numbers { reference, deviation, std_error, u } = line.numbers(0);
+        assert_eq!((reference, deviation, u), (1.0, 0.5, 1e-3));
+        assert!(std_error.is_nan());
+    }
+
+    #[test]
+    fn a_line_whose_lists_do_not_fit_its_meters_or_of_a_later_format_is_refused() {
+        let one = r#""meter":"m[0-3]""#;
+        for (from, to, says) in [
+            (one, r#""meters":[["m",0,1]]"#, "1 numbers for 2 meters"),
+            (one, r#""meters":[["m",1,0]]"#, "1 numbers for"),
+            (one, r#""meters":[["m",0,18446744073709551615]]"#, "1 numbers for"),
+            (one, r#""meters":[["m",0]]"#, "did not match"),
+            (one, r#""n":0"#, "1 numbers for 0 meters"),
+            ("1e-3", "[1,2]", "2 numbers for 1 meters"),
+            ("1e-3", "\"small\"", "expected numbers or null"),
+            ("\"deviation\"", "\"drift\"", "0 numbers for 1 meters"),
+            ("\"version\"", "\"format\":3,\"version\"", "format 3; this luxproof reads"),
+            ("\"pass\"", "\"perhaps\"", "unknown variant"),
+        ] {
+            let error = Line::parse(FORMAT_1.replace(from, to).as_bytes()).unwrap_err();
+            assert!(error.contains(says), "{to}: {error}");
+        }
+    }
+
+    #[test]
+    fn nights_are_dates_and_numbers_keep_what_they_are_worth() {
+        let good = ["2026-01-31", "2024-02-29"];
+        let bad = ["", "2026-1-31", "2026-13-01", "20260131", "2026-01-31T", "tonight..."];
+        assert!(good.iter().all(|n| is_date(n)) && !bad.iter().any(|n| is_date(n)));
+        assert_eq!(rounded(Some(1.732_05), 4), 1.732);
+        assert_eq!(rounded(Some(-1.23456789e-12), 3), -1.23e-12);
+        assert_eq!(rounded(Some(0.0), 3), 0.0);
+        assert!(rounded(Some(f64::NAN), 3).is_nan() && rounded(None, 3).is_nan());
+    }
+}
