@@ -26,6 +26,7 @@ use self::scenes::KnownScene;
 use crate::engines::Support;
 use crate::measure::{Failure, FailureKind, Instrument, Question, Reader};
 use crate::record::{EngineName, Estimate};
+use crate::system::files;
 use crate::system::slots::side_by_side;
 
 /// A deviation beyond this, noise and declared approximations apart, is no uncertainty but a broken instrument.
@@ -46,7 +47,7 @@ pub struct Calibration {
 }
 
 /// What an engine read of one calibration scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Part {
     pub scene: String,
     pub reflected: bool,
@@ -125,7 +126,8 @@ pub fn calibrate(
     let kept = if noise > scenes::BUDGET.relative_error {
         Err(format!("noise of {noise:.1e}, as on a machine with other work"))
     } else {
-        store::keep(&path, &calibration).map(|()| path.display().to_string())
+        let kept = files::replace_json(&path, &calibration);
+        kept.map(|()| path.display().to_string()).map_err(|e| format!("{}: {e}", path.display()))
     };
     Ok(Calibrated { calibration, origin: Origin::Measured, kept })
 }
@@ -164,11 +166,8 @@ fn part(instrument: &Instrument, scene: &KnownScene, reader: &Reader) -> Result<
         Err(Failure { kind: FailureKind::Declined, text }) => Ok(Part {
             scene: scene.name.to_owned(),
             reflected: scene.is_reflected(),
-            deviation: 0.0,
-            std_error: 0.0,
-            declared: 0.0,
-            uncertainty: 0.0,
             left_out: Some(text),
+            ..Part::default()
         }),
         Err(failure) => Err(failure.into()),
     }

@@ -43,19 +43,21 @@ impl How {
     }
 }
 
-/// What one point shows.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Finding {
+/// What one point shows; nothing where it was not tried.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Finding {
     /// The largest deviation beyond noise, relative; `None` where nothing was read.
-    pub(super) deviation: Option<f64>,
-    pub(super) noise: Option<f64>,
-    pub(super) how: Option<How>,
-    /// Why nothing was read or compared.
-    pub(super) text: Option<String>,
+    pub deviation: Option<f64>,
+    pub noise: Option<f64>,
+    pub how: Option<How>,
     /// Whether the engine said itself that it cannot.
-    pub(super) is_refused: bool,
+    #[serde(rename = "refused")]
+    pub is_refused: bool,
+    /// Why nothing was read or compared.
+    pub text: Option<String>,
     /// Whether neither side is random.
-    pub(super) is_exact: bool,
+    #[serde(skip)]
+    pub is_exact: bool,
 }
 
 impl Finding {
@@ -125,17 +127,13 @@ pub struct LawReport {
     pub gone: Vec<String>,
 }
 
-/// What one point shows.
 #[derive(Clone, Debug, Serialize)]
 pub struct PointReport {
     pub procedure: ProcedureId,
     pub magnitude: f64,
     pub tried: bool,
-    pub deviation: Option<f64>,
-    pub noise: Option<f64>,
-    pub how: Option<How>,
-    pub refused: bool,
-    pub text: Option<String>,
+    #[serde(flatten)]
+    pub found: Finding,
 }
 
 /// A point's engine, law, procedure, step and finding.
@@ -152,7 +150,8 @@ impl StressReport {
                 laws.push(LawReport::empty(engine, law));
                 laws.len() - 1
             });
-            laws[k].points.push(PointReport::new(procedure, law.magnitudes[step], finding));
+            let (magnitude, tried) = (law.magnitudes[step], finding.is_some());
+            laws[k].points.push(PointReport { procedure, magnitude, tried, found: finding.unwrap_or_default() });
         }
         laws.iter_mut().for_each(LawReport::conclude);
         for law in &mut laws {
@@ -191,16 +190,16 @@ impl LawReport {
         let rising = |p: &PointReport| find_step(&self.law, p.magnitude);
         self.points.sort_by_key(rising);
         for point in &self.points {
-            self.worst_deviation = [self.worst_deviation, point.deviation].into_iter().flatten().reduce(f64::max);
-            self.resolution = [self.resolution, point.noise].into_iter().flatten().reduce(f64::max);
-            self.how = self.how.max(point.how);
+            self.worst_deviation = [self.worst_deviation, point.found.deviation].into_iter().flatten().reduce(f64::max);
+            self.resolution = [self.resolution, point.found.noise].into_iter().flatten().reduce(f64::max);
+            self.how = self.how.max(point.found.how);
             self.untried += usize::from(!point.tried);
-            if point.refused && self.refused_at.is_none() {
+            if point.found.is_refused && self.refused_at.is_none() {
                 self.refused_at = Some(point.magnitude);
             }
             for threshold in THRESHOLDS {
-                let fails = point.how.is_some_and(|h| h != How::Drift && point.deviation.is_none());
-                if fails || point.deviation.is_some_and(|d| d >= threshold) {
+                let fails = point.found.how.is_some_and(|h| h != How::Drift && point.found.deviation.is_none());
+                if fails || point.found.deviation.is_some_and(|d| d >= threshold) {
                     self.breaks_at.entry(threshold.to_string()).or_insert(point.magnitude);
                 }
             }
@@ -210,11 +209,11 @@ impl LawReport {
     /// Holds what breaks against what is on record of this law.
     fn look_up(&mut self, record: &[&KnownBreak]) {
         let explains = |k: &&KnownBreak, p: &PointReport| {
-            p.how.is_some_and(|how| how.name() == k.how)
+            p.found.how.is_some_and(|how| how.name() == k.how)
                 && find_step(&self.law, p.magnitude) >= find_step(&self.law, k.from)
-                && p.deviation.is_none_or(|d| k.relative.is_some_and(|most| d <= MARGIN * most))
+                && p.found.deviation.is_none_or(|d| k.relative.is_some_and(|most| d <= MARGIN * most))
         };
-        let broken = || self.points.iter().filter(|p| p.how.is_some());
+        let broken = || self.points.iter().filter(|p| p.found.how.is_some());
         let cause = |k: &&&KnownBreak| k.cause.clone();
         if broken().all(|p| record.iter().any(|k| explains(k, p))) {
             self.known = record.iter().filter(|k| broken().any(|p| explains(k, p))).map(|k| cause(&k)).collect();
@@ -222,7 +221,9 @@ impl LawReport {
         let is_gone = |k: &&&KnownBreak| {
             // Noise as large as what is on record hides it.
             let is_fine = |p: &PointReport| {
-                p.how.is_none() && !p.refused && p.noise.is_none_or(|noise| k.relative.is_none_or(|most| noise < most))
+                p.found.how.is_none()
+                    && !p.found.is_refused
+                    && p.found.noise.is_none_or(|noise| k.relative.is_none_or(|most| noise < most))
             };
             let mut there = self.points.iter().filter(|p| p.magnitude == k.from && p.tried).peekable();
             there.peek().is_some() && there.all(is_fine)
@@ -234,21 +235,4 @@ impl LawReport {
 fn find_step(law: &str, magnitude: f64) -> usize {
     let law = crate::laws::find(law);
     law.and_then(|l| l.magnitudes.iter().position(|m| *m == magnitude)).unwrap_or(0)
-}
-
-impl PointReport {
-    fn new(procedure: ProcedureId, magnitude: f64, finding: Option<Finding>) -> Self {
-        let tried = finding.is_some();
-        let f = finding.unwrap_or_default();
-        Self {
-            procedure,
-            magnitude,
-            tried,
-            deviation: f.deviation,
-            noise: f.noise,
-            how: f.how,
-            refused: f.is_refused,
-            text: f.text,
-        }
-    }
 }

@@ -87,7 +87,7 @@ pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progr
                     let Some(k) = next else { break };
                     let clock = Instant::now();
                     let finding = bench.finding(&points[k]);
-                    progress.ended(&bench.id(points[k].subject), points[k].law.id, points[k].magnitude());
+                    progress.ended(&subjects[points[k].subject].engine.name(), points[k].law.id, points[k].magnitude());
                     lock(&queue).ended(&points, k, finding, clock.elapsed());
                 }
             });
@@ -167,10 +167,6 @@ const DOUBTFUL: f64 = 1e-3;
 const OTHER_SEED: u64 = 1000;
 
 impl Bench<'_> {
-    fn id(&self, subject: usize) -> EngineName {
-        self.subjects[subject].engine.name()
-    }
-
     /// What a point shows; `None` where the time is up.
     fn finding(&self, point: &Point) -> Option<Finding> {
         let variant = (point.law.variant)(&point.base, point.magnitude())?;
