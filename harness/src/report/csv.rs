@@ -14,7 +14,10 @@ pub fn csv(report: &Report) -> String {
     writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
 }
 
-const COLUMNS: [(&str, fn(&Comparison) -> String); 25] = [
+/// Its name, and what stands in it.
+type Column = (&'static str, fn(&Comparison) -> String);
+
+const COLUMNS: [Column; 25] = [
     ("case", |c| c.key.case.clone()),
     ("procedure", |c| c.key.procedure.to_string()),
     ("engine", |c| c.key.engine.to_string()),

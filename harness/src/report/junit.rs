@@ -25,7 +25,6 @@ pub fn junit(report: &Report) -> String {
     format!("{before}{after}{rest}")
 }
 
-/// What was held against a baseline, a suite of its own.
 fn accepted(check: &BaselineCheck) -> TestSuite {
     let mut suite = TestSuite::new(format!("baseline {}", check.file));
     for entry in &check.entries {

@@ -36,13 +36,15 @@ pub(super) struct Note<'a> {
     pub(super) kind: Kind,
     pub(super) engine: &'a EngineName,
     pub(super) text: String,
-    /// Case and procedure of each.
-    pub(super) jobs: BTreeSet<(&'a str, ProcedureId)>,
+    pub(super) jobs: BTreeSet<Job<'a>>,
 }
+
+/// A case and a procedure.
+type Job<'a> = (&'a str, ProcedureId);
 
 /// Each once, whatever number of jobs it holds of; by kind, then by engine.
 pub(super) fn notes(report: &Report) -> Vec<Note<'_>> {
-    let mut notes: BTreeMap<(Kind, &EngineName, String), BTreeSet<(&str, ProcedureId)>> = BTreeMap::new();
+    let mut notes: BTreeMap<_, BTreeSet<Job<'_>>> = BTreeMap::new();
     for (kind, key, text) in recorded(report).chain(report.skips.iter().map(|s| (kind(s), &s.key, reason(s)))) {
         notes.entry((kind, &key.engine, text)).or_default().insert((&key.case, key.procedure));
     }

@@ -7,7 +7,7 @@ use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArr
 
 use super::matrix::{Cell, matrix, worst};
 use super::notes::{Kind, Note, departures, notes, splits};
-use super::words::{mark, percent, plural, significant, value};
+use super::words::{mark, percent, plural, significant, unique, value};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
 use crate::record::{EngineStatus, ProcedureId, Status};
@@ -18,7 +18,6 @@ const LISTED_METERS: usize = 8;
 const BRIEF: usize = 4;
 const BRIEF_WIDTH: usize = 156;
 
-/// How the report is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     Plain,
@@ -26,7 +25,6 @@ pub enum Style {
     Colour,
 }
 
-/// How much the report tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
     /// What fits a screen: verdicts, the worst, what was skipped, where the files are.
@@ -44,7 +42,6 @@ const fn colour(verdict: Verdict) -> Color {
     }
 }
 
-/// The report as text for a terminal.
 pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&str>) -> String {
     let mut text = String::new();
     writeln!(text, "\nluxproof {}: {}", report.tool_version, report.spec.title).ok();
@@ -170,12 +167,7 @@ fn verdicts(report: &Report, style: Style) -> String {
 fn readings(report: &Report, procedure: ProcedureId, style: Style) -> Option<String> {
     let records: Vec<&ReadingRecord> = report.readings.iter().filter(|r| r.key.procedure == procedure).collect();
     let unit = records.first()?.reading.quantity.unit();
-    let mut meters: Vec<_> = vec![];
-    for record in &records {
-        if !meters.contains(&&record.reading.meter) {
-            meters.push(&record.reading.meter);
-        }
-    }
+    let meters = unique(records.iter().map(|r| &r.reading.meter));
     if meters.len() > LISTED_METERS {
         return None;
     }

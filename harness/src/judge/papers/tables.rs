@@ -94,7 +94,6 @@ struct Row {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PublishedTable {
     pub title: String,
-    /// The table's name in it.
     pub name: String,
     /// The procedure that reads its values.
     pub procedure: ProcedureId,
@@ -143,7 +142,6 @@ pub struct PublishedColumn {
 /// A row of a published table.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct PublishedRow {
-    /// The meter at its place.
     pub meter: MeterId,
     /// The place: gamma in degrees, or the position in metres.
     pub place: String,
@@ -160,7 +158,6 @@ pub struct PublishedError {
 }
 
 impl Published {
-    /// Reads and checks the tables.
     pub fn read(path: &Path) -> Result<Self, PublishedError> {
         let fail = |message: String| PublishedError { file: path.display().to_string(), message };
         let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 use serde::Deserialize;
 
+use super::super::words::unique;
 use super::palette::Palette;
 use crate::record::{EngineName, ProcedureId};
 
@@ -83,16 +84,8 @@ pub(super) fn stress_section(beside: &[Beside], palette: &Palette) -> Option<Mar
     if laws.is_empty() {
         return None;
     }
-    let (mut engines, mut names): (Vec<&str>, Vec<&str>) = (vec![], vec![]);
-    for law in &laws {
-        if !engines.contains(&law.engine.as_str()) {
-            engines.push(&law.engine);
-        }
-        if !names.contains(&law.law.as_str()) {
-            names.push(&law.law);
-        }
-    }
-    engines.sort_by_key(|e| palette.order(e));
+    let engines = palette.in_order(laws.iter().map(|law| law.engine.as_str()));
+    let names = unique(laws.iter().map(|law| law.law.as_str()));
     let known: Vec<&StressLaw> = laws.iter().copied().filter(|l| !l.known.is_empty()).collect();
     Some(html! {
         h2 id="stress-title" { "Numerical stability" }

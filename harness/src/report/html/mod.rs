@@ -76,7 +76,6 @@ pub fn page(report: &Report, beside: &[Beside]) -> String {
     page.into_string()
 }
 
-/// Every section with its id and its name in the navigation.
 fn sections(report: &Report, beside: &[Beside], palette: &Palette, rows: &mut Rows) -> Vec<(String, String, Markup)> {
     let mut sections = vec![("matrix".to_owned(), "Verdicts".to_owned(), matrix::section(report, palette))];
     if let Some(check) = &report.baseline {

@@ -3,6 +3,8 @@
 //! Colours after Okabe and Ito, "Color Universal Design" (2008), darkened on paper and lightened on black until text in them
 //! keeps a contrast of 4.5 to 1.
 
+use std::collections::BTreeSet;
+
 use maud::{Markup, html};
 
 use super::super::Report;
@@ -25,7 +27,6 @@ fn fixed(engine: &str) -> Option<usize> {
     engines::ALL.iter().position(|entry| entry.name == *engine)
 }
 
-/// The engines of a report with their colours and marks.
 pub(super) struct Palette {
     engines: Vec<(EngineName, usize)>,
 }
@@ -51,11 +52,13 @@ impl Palette {
         found.or_else(|| fixed(engine)).unwrap_or(COLOURS - 1)
     }
 
-    pub(super) fn order(&self, engine: &str) -> usize {
-        self.engines.iter().position(|(id, _)| *id == *engine).unwrap_or(self.engines.len())
+    /// Engines, each once: those of the report in its order, then others.
+    pub(super) fn in_order<'a>(&self, engines: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+        let mut engines = Vec::from_iter(BTreeSet::from_iter(engines));
+        engines.sort_by_key(|e| self.engines.iter().position(|(id, _)| *id == **e).unwrap_or(self.engines.len()));
+        engines
     }
 
-    /// The engine's mark at a place of a plot.
     pub(super) fn mark(&self, engine: &str, [x, y]: [f64; 2], radius: f64) -> Markup {
         let index = self.index(engine);
         html! { path class={ "mark e" (index) } d=(shape(index, x, y, radius)) {} }
@@ -70,7 +73,6 @@ impl Palette {
         }
     }
 
-    /// The engine's name behind its mark.
     pub(super) fn label(&self, engine: &str) -> Markup {
         let index = self.index(engine);
         html! {

@@ -123,7 +123,6 @@ fn filters(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palett
     }
 }
 
-/// A paper's table with ours beside it.
 fn printed(grid: &papers::Grid) -> Markup {
     html! {
         details.printed { summary { (grid.head[0]) " of “" (grid.title) "”, with ours beside it" }

@@ -20,7 +20,6 @@ const BAR: f64 = 52.0;
 /// Fewer meters to a side than this are no map.
 const LEAST: usize = 3;
 
-/// Isolux panel and deviation maps of every grid of a group.
 pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette) -> Vec<Markup> {
     let Some(basis) = group.basis() else { return vec![] };
     let firm: Vec<&Comparison> =

@@ -56,13 +56,8 @@ pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -
 }
 
 impl Group<'_> {
-    /// The engines of the group in the report's order.
     fn engines(&self, palette: &Palette) -> Vec<&str> {
-        let mut engines: Vec<&str> = self.comparisons.iter().map(|c| c.key.engine.as_str()).collect();
-        engines.sort_unstable();
-        engines.dedup();
-        engines.sort_by_key(|e| palette.order(e));
-        engines
+        palette.in_order(self.comparisons.iter().map(|c| c.key.engine.as_str()))
     }
 
     /// The firmest basis: what the group is drawn against.
@@ -100,7 +95,6 @@ fn number(value: f64) -> String {
     trimmed(value, 1)
 }
 
-/// The engines of a plot, each behind its mark.
 fn legend(engines: &[&str], palette: &Palette) -> Markup {
     html! { span.keys { @for engine in engines { (palette.label(engine)) " " } } }
 }

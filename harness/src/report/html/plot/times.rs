@@ -85,11 +85,8 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let (time, error) = (span(|p| p.0, LEAST_TIME_S), span(|p| p.1, LEAST_ERROR));
     let width = WIDTH - LEFT - 12.0;
     let place = |wall_s: f64, e: f64| [LEFT + width * time.part(wall_s), TOP + PLOT * (1.0 - error.part(e))];
-    let mut engines: Vec<&str> =
-        points.iter().map(|p| p.engine.as_str()).chain(curves.iter().map(|c| c.engine.as_str())).collect();
-    engines.sort_unstable();
-    engines.dedup();
-    engines.sort_by_key(|e| palette.order(e));
+    let engines =
+        palette.in_order(points.iter().map(|p| p.engine.as_str()).chain(curves.iter().map(|c| c.engine.as_str())));
     let labels = labels(&points, &engines, &place);
     let drawing = html! {
         @for decade in time.low..=time.high {
