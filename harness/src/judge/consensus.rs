@@ -28,7 +28,6 @@ const LARGEST_DEPARTURE: f64 = 10.0;
 /// Rounding of readings: keeps covariances regular where tolerance and uncertainty are zero.
 const ROUNDING: f64 = 1e-12;
 
-/// What the statement assumes.
 const ASSUMPTIONS: &str = "at most one component is wrong, each as likely beforehand as none; sound witnesses differ by a third \
                            of their tolerance (standard deviation); all meters of a procedure count as one; a departure may \
                            be of any size from the tolerance to ten times the reading, evenly in its logarithm";
@@ -38,7 +37,6 @@ const ASSUMPTIONS: &str = "at most one component is wrong, each as likely before
 pub struct Consensus {
     pub case: String,
     pub procedure: ProcedureId,
-    /// Everyone who read it.
     pub witnesses: Vec<Witness>,
     /// How many of them are independent: those that share a component count once.
     pub independent: usize,
@@ -62,7 +60,6 @@ pub struct Witness {
     pub name: String,
     /// Whether others are judged by it here.
     pub is_reference: bool,
-    /// What it shares with others.
     pub shares: Vec<String>,
     /// Its deviation from the others' weighted mean where they differ most, relative.
     pub deviation: Option<f64>,
@@ -70,7 +67,6 @@ pub struct Witness {
     pub probability: f64,
 }
 
-/// A witness with its readings.
 struct Testimony {
     name: String,
     shares: Vec<String>,
@@ -397,16 +393,9 @@ fn assumptions(testimonies: &[Testimony]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
-    use glam::DVec3;
-    use luminaire::scene::{Bounces, Meter, Scene, Transport};
-
     use super::*;
-    use crate::judge::{KnownDeviations, Tolerances};
-    use crate::procedures::Target;
-    use crate::record::{MeterId, Quantity, Reading};
-    use crate::record::{ReadingKey, Uncertainty};
+    use crate::judge::tests::{built_in, recording, task};
+    use crate::record::{Estimate, Uncertainty};
 
     const METERS: usize = 12;
     const LOOKUP: &str = "lookup";
@@ -414,34 +403,17 @@ mod tests {
     /// Readings of witnesses that are off by a factor each, with half a per mille of noise in the renderers.
     fn statement(factors: &[(&str, &[&str], f64)], seed: u64) -> Consensus {
         let mut random = fastrand::Rng::with_seed(seed);
-        let target =
-            |k| Target::of_one(MeterId::new("grid", k), Meter { position_m: DVec3::ZERO, normal: DVec3::Z }, 1.0);
-        let task = Task {
-            procedure: ProcedureId::IndirectIlluminance,
-            scene: Scene::default(),
-            transport: Transport::Indirect(Bounces::Converged),
-            quantity: Quantity::Illuminance,
-            targets: (0..METERS).map(target).collect(),
-        };
-        let recording = |(engine, shares, factor): &(&str, &[&str], f64)| {
+        let witness = |(engine, shares, factor): &(&str, &[&str], f64)| {
             let noise = if ["simulator", "iesna"].contains(engine) { 0.0 } else { 5e-4 };
-            let reading = |k| Reading {
-                meter: MeterId::new("grid", k),
-                quantity: Quantity::Illuminance,
+            let estimate = |k: usize| Estimate {
                 value: (10.0 + k as f64) * factor * (1.0 + noise * crate::system::random::normal(&mut random)),
                 uncertainty: Uncertainty::sampled(noise * (10.0 + k as f64), None),
             };
-            Recording {
-                components: [FILE_READER].iter().chain(*shares).map(|s| (*s).to_owned()).collect(),
-                readings: (0..METERS).map(reading).collect(),
-                ..Recording::of(ReadingKey::new("c", task.procedure, *engine), task.light())
-            }
+            let components = [FILE_READER].iter().chain(*shares).map(|s| (*s).to_owned()).collect();
+            Recording { components, ..recording(engine, &(0..METERS).map(estimate).collect::<Vec<_>>()) }
         };
-        let recordings: Vec<Recording> = factors.iter().map(recording).collect();
-        let (tolerances, known) = (Tolerances::built_in().unwrap(), KnownDeviations::built_in().unwrap());
-        let overrides = BTreeMap::new();
-        let judge = Judge { tolerances: &tolerances, known: &known, overrides: &overrides, published: None };
-        consensus(&judge, &task, &recordings.iter().collect::<Vec<_>>()).unwrap()
+        let recordings: Vec<Recording> = factors.iter().map(witness).collect();
+        consensus(&built_in(), &task(METERS), &recordings.iter().collect::<Vec<_>>()).unwrap()
     }
 
     #[test]

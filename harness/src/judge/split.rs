@@ -89,26 +89,16 @@ const fn name_of_method(transport: Transport) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Quantity;
-    use crate::record::{Light, ReadingKey, Uncertainty};
-    use luminaire::scene::{Bounces, Scene};
+    use crate::judge::tests;
+    use crate::record::{Estimate, Uncertainty};
+    use luminaire::scene::Bounces;
 
     fn recording(engine: &str, value: f64, std_error: f64) -> Recording {
-        let reading = Reading {
-            meter: MeterId::new("plane", 0),
-            quantity: Quantity::Illuminance,
-            value,
-            uncertainty: Uncertainty::sampled(std_error, None),
-        };
-        let role = if engine == "radiance" { Role::Renderer } else { Role::Witness };
-        let key = ReadingKey::new("c", ProcedureId::IndirectIlluminance, engine);
-        let light = Light(Transport::Indirect(Bounces::Converged));
-        Recording { role, model: "point".into(), readings: vec![reading], ..Recording::of(key, light) }
+        tests::recording(engine, &[Estimate { value, uncertainty: Uncertainty::sampled(std_error, None) }])
     }
 
     fn task(transport: Transport) -> Task {
-        let procedure = crate::engines::fixtures::procedure_of(transport);
-        Task { procedure, scene: Scene::default(), transport, quantity: Quantity::Illuminance, targets: vec![] }
+        Task { procedure: crate::engines::fixtures::procedure_of(transport), transport, ..tests::task(0) }
     }
 
     #[test]

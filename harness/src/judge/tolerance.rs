@@ -27,7 +27,6 @@ impl Tolerance {
     }
 }
 
-/// The table of tolerances.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tolerances {
@@ -61,13 +60,11 @@ struct Rule {
     source: String,
 }
 
-/// Why the table of tolerances cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("reference/tolerances.yaml: {0}")]
 pub struct ToleranceError(String);
 
 impl Tolerances {
-    /// The table that the program was built with.
     pub fn built_in() -> Result<Self, ToleranceError> {
         crate::spec::from_yaml::<Self>(DEFAULTS).map_err(ToleranceError)?.checked()
     }

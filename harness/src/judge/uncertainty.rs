@@ -35,7 +35,6 @@ impl Source {
     pub const ALL: [Self; 6] =
         [Self::MonteCarlo, Self::Instrument, Self::Discretisation, Self::Reference, Self::Rounding, Self::Input];
 
-    /// The name used in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::MonteCarlo => "Monte Carlo",
@@ -61,11 +60,9 @@ pub enum Shape {
 /// One component of an error budget.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Component {
-    /// Where it comes from.
     pub source: Source,
     /// Standard uncertainty, in the quantity's unit.
     pub uncertainty: f64,
-    /// How its errors are spread.
     pub shape: Shape,
     /// Degrees of freedom of the standard uncertainty, where it is itself estimated from few values.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -67,7 +67,6 @@ pub enum Exit {
 }
 
 impl Exit {
-    /// The process exit code.
     pub const fn code(self) -> u8 {
         match self {
             Self::Passed => 0,

@@ -7,7 +7,6 @@ use crate::judge::{Comparison, Verdict};
 use crate::plan::Skip;
 use crate::record::ReadingKey;
 
-/// The report as JUnit XML: one suite a case.
 pub fn junit(report: &Report) -> String {
     let mut junit = JUnit::new("luxproof");
     for case in &report.cases {
@@ -25,7 +24,6 @@ pub fn junit(report: &Report) -> String {
     format!("{before}{after}{rest}")
 }
 
-/// What was held against a baseline, a suite of its own.
 fn accepted(check: &BaselineCheck) -> TestSuite {
     let mut suite = TestSuite::new(format!("baseline {}", check.file));
     for entry in &check.entries {

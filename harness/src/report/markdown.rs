@@ -7,8 +7,6 @@ use super::notes::{Kind, departures, notes, splits};
 use super::words::{mark, percent, significant};
 use super::{Report, papers};
 
-/// The report as Markdown.
-///
 /// `link` leads to the whole report, where it is published.
 pub fn markdown(report: &Report, link: Option<&str>) -> String {
     let mut text = String::new();

@@ -18,15 +18,12 @@ const LISTED_METERS: usize = 8;
 const BRIEF: usize = 4;
 const BRIEF_WIDTH: usize = 156;
 
-/// How the report is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     Plain,
-    /// With ANSI colours.
     Colour,
 }
 
-/// How much the report tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
     /// What fits a screen: verdicts, the worst, what was skipped, where the files are.
@@ -44,7 +41,6 @@ const fn colour(verdict: Verdict) -> Color {
     }
 }
 
-/// The report as text for a terminal.
 pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&str>) -> String {
     let mut text = String::new();
     writeln!(text, "\nluxproof {}: {}", report.tool_version, report.spec.title).ok();
@@ -93,7 +89,6 @@ fn baseline(report: &Report, detail: Detail, text: &mut String) {
     writeln!(text).ok();
 }
 
-/// Papers' tables, readings side by side, methods apart from renderers.
 fn tables(report: &Report, style: Style, text: &mut String) {
     for grid in papers::grids(report) {
         let places = 1..grid.head.len() - 1;

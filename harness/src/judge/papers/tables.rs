@@ -14,7 +14,6 @@ use crate::judge::{Basis, Reference};
 use crate::procedures::{Target, Task};
 use crate::record::{Estimate, MeterId, ProcedureId, Quantity, Uncertainty};
 
-/// The tables of one paper.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
@@ -34,7 +33,6 @@ pub struct PublishedFlux {
     pub value_lm: f64,
     /// Half the width of the interval that holds it.
     pub half_width_lm: f64,
-    /// How that is known.
     pub source: String,
 }
 
@@ -106,7 +104,6 @@ pub struct PublishedTable {
     /// Units of the last printed digit that a cell is uncertain by.
     #[serde(default)]
     pub units_in_last_digit: f64,
-    /// The luminaire's flux, as far as the tables tell.
     pub flux: Option<PublishedFlux>,
     pub columns: Vec<PublishedColumn>,
     /// Its rows, in the order of the meters.
@@ -125,7 +122,6 @@ impl PublishedTable {
     }
 }
 
-/// A column of a published table.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct PublishedColumn {
     pub name: String,
@@ -140,7 +136,6 @@ pub struct PublishedColumn {
     pub model: String,
 }
 
-/// A row of a published table.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct PublishedRow {
     /// The meter at its place.
@@ -151,7 +146,6 @@ pub struct PublishedRow {
     pub cells: BTreeMap<String, String>,
 }
 
-/// Why published tables cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {message}")]
 pub struct PublishedError {
@@ -160,7 +154,6 @@ pub struct PublishedError {
 }
 
 impl Published {
-    /// Reads and checks the tables.
     pub fn read(path: &Path) -> Result<Self, PublishedError> {
         let fail = |message: String| PublishedError { file: path.display().to_string(), message };
         let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
@@ -199,14 +192,8 @@ impl Published {
         let columns = table.columns.iter().filter(|(_, column)| compared(column));
         let reference = |(name, column): (&String, &Column)| {
             let cell = self.cell(row.cells.get(name)?, table.decimals(name))?;
-            Some(Reference {
-                value: cell.value,
-                uncertainty: cell.uncertainty.standard(),
-                degrees_of_freedom: None,
-                coverage_factor: None,
-                basis: self.citation.basis,
-                source: format!("{}, {}, {name}: {}", self.citation.title, table.name, column.meaning),
-            })
+            let source = format!("{}, {}, {name}: {}", self.citation.title, table.name, column.meaning);
+            Some(Reference::of(cell.value, &cell.uncertainty, self.citation.basis, source))
         };
         columns.filter_map(reference).collect()
     }

@@ -14,7 +14,6 @@ pub enum Beside {
     Stress(Vec<StressLaw>),
 }
 
-/// Why a file cannot be shown beside a report.
 #[derive(Debug, thiserror::Error)]
 pub enum BesideError {
     #[error("it is no JSON: {0}")]
@@ -25,7 +24,6 @@ pub enum BesideError {
     Unknown,
 }
 
-/// One engine's error against run time.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BenchCurve {
     pub engine: EngineName,
@@ -41,7 +39,6 @@ pub struct BenchPoint {
     pub relative_error_high: Option<f64>,
 }
 
-/// How one engine keeps one law.
 #[derive(Clone, Debug, Deserialize)]
 pub struct StressLaw {
     pub engine: EngineName,
@@ -50,7 +47,6 @@ pub struct StressLaw {
     /// Magnitude at which the deviation first passes the fraction.
     #[serde(default)]
     pub breaks_at: BTreeMap<String, Option<f64>>,
-    /// In which way it breaks.
     pub how: Option<String>,
     /// The first magnitude that the engine refuses.
     pub refused_at: Option<f64>,
@@ -76,7 +72,6 @@ impl Beside {
     }
 }
 
-/// The stress matrix, if any file holds one.
 pub(super) fn stress_section(beside: &[Beside], palette: &Palette) -> Option<Markup> {
     let laws: Vec<&StressLaw> =
         beside.iter().filter_map(|b| if let Beside::Stress(laws) = b { Some(laws) } else { None }).flatten().collect();

@@ -25,7 +25,6 @@ fn fixed(engine: &str) -> Option<usize> {
     engines::ALL.iter().position(|entry| entry.name == *engine)
 }
 
-/// The engines of a report with their colours and marks.
 pub(super) struct Palette {
     engines: Vec<(EngineName, usize)>,
 }
@@ -55,7 +54,6 @@ impl Palette {
         self.engines.iter().position(|(id, _)| *id == *engine).unwrap_or(self.engines.len())
     }
 
-    /// The engine's mark at a place of a plot.
     pub(super) fn mark(&self, engine: &str, [x, y]: [f64; 2], radius: f64) -> Markup {
         let index = self.index(engine);
         html! { path class={ "mark e" (index) } d=(shape(index, x, y, radius)) {} }
@@ -70,7 +68,6 @@ impl Palette {
         }
     }
 
-    /// The engine's name behind its mark.
     pub(super) fn label(&self, engine: &str) -> Markup {
         let index = self.index(engine);
         html! {

@@ -21,7 +21,6 @@ pub(super) const WIDTH: f64 = 350.0;
 /// More cases than this a procedure are left to the table.
 const MOST_CASES: usize = 9;
 
-/// The comparisons of one case in one procedure.
 pub(super) struct Group<'a> {
     pub(super) case: &'a str,
     pub(super) procedure: ProcedureId,

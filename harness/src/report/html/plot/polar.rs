@@ -95,7 +95,6 @@ impl Scale {
     }
 }
 
-/// Rings with their values and rays with their angles.
 fn rays(scale: &Scale, [up, down]: [bool; 2], step: f64, rings: u32) -> Markup {
     let [x, y] = scale.centre;
     let ring = |k: u32| {

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::super::beside::{BenchCurve, Beside};
 use super::super::palette::Palette;
-use super::super::{duration, percent, title};
+use super::super::{duration, percent};
 use super::axis::label;
 use super::{WIDTH, figure, groups, legend, line, number, text};
 use crate::judge::Comparison;
@@ -110,7 +110,7 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let caption = html! {
         (legend(&engines, palette)) @if floor { " At the lower edge: 10⁻⁶ % or less." } @if !curves.is_empty() { " Lines: the ladder of luxproof bench." }
     };
-    Some(figure(&title(procedure), TOP + PLOT + 38.0, &drawing, &caption))
+    Some(figure(procedure.row().title, TOP + PLOT + 38.0, &drawing, &caption))
 }
 
 /// Where each engine is named: at its middle mark, pushed down until names do not meet.
