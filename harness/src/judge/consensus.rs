@@ -82,44 +82,47 @@ struct Suspect {
     holders: Vec<usize>,
 }
 
-/// The witnesses' statement about one task; `None` where nobody read anything.
-pub(super) fn consensus(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
-    let case = recordings.first()?.key.case.clone();
-    let testimonies = testimonies(judge, task, recordings);
-    if testimonies.is_empty() {
-        return None;
+impl Judge<'_> {
+    /// Who of the engines departs from the others, the reference included; `recordings` as for [`Self::compare`]. `None` where
+    /// nobody read anything.
+    pub fn consensus(&self, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
+        let case = recordings.first()?.key.case.clone();
+        let testimonies = testimonies(self, task, recordings);
+        if testimonies.is_empty() {
+            return None;
+        }
+        let suspects = suspects(&testimonies);
+        let independent = independent(&testimonies);
+        let telling: Vec<usize> = (0..task.targets.len()).filter(|k| differ(&testimonies, *k)).collect();
+        let probabilities = if telling.is_empty() || independent < FEWEST {
+            vec![0.0; suspects.len()]
+        } else {
+            probabilities(&testimonies, &suspects, &telling)
+        };
+        let reference = task.reference();
+        let reference = reference.engine();
+        let witnesses = testimonies.iter().enumerate().map(|(i, t)| Witness {
+            name: t.name.clone(),
+            is_reference: reference.is_some_and(|r| *r == t.name),
+            shares: t.shares.clone(),
+            deviation: deviation(&testimonies, i, &telling),
+            probability: suspects.iter().zip(&probabilities).find(|(s, _)| s.name == t.name).map_or(0.0, |(_, p)| *p),
+        });
+        let mut found = Consensus {
+            case,
+            procedure: task.procedure,
+            witnesses: witnesses.collect(),
+            independent,
+            differing: telling.len(),
+            departs: vec![],
+            component: None,
+            odds: None,
+            text: String::new(),
+            assumptions: assumptions(&testimonies),
+        };
+        found.text = told(&mut found, &suspects, &probabilities, &testimonies);
+        Some(found)
     }
-    let suspects = suspects(&testimonies);
-    let independent = independent(&testimonies);
-    let telling: Vec<usize> = (0..task.targets.len()).filter(|k| differ(&testimonies, *k)).collect();
-    let probabilities = if telling.is_empty() || independent < FEWEST {
-        vec![0.0; suspects.len()]
-    } else {
-        probabilities(&testimonies, &suspects, &telling)
-    };
-    let reference = task.reference();
-    let reference = reference.engine();
-    let witnesses = testimonies.iter().enumerate().map(|(i, t)| Witness {
-        name: t.name.clone(),
-        is_reference: reference.is_some_and(|r| *r == t.name),
-        shares: t.shares.clone(),
-        deviation: deviation(&testimonies, i, &telling),
-        probability: suspects.iter().zip(&probabilities).find(|(s, _)| s.name == t.name).map_or(0.0, |(_, p)| *p),
-    });
-    let mut found = Consensus {
-        case,
-        procedure: task.procedure,
-        witnesses: witnesses.collect(),
-        independent,
-        differing: telling.len(),
-        departs: vec![],
-        component: None,
-        odds: None,
-        text: String::new(),
-        assumptions: assumptions(&testimonies),
-    };
-    found.text = told(&mut found, &suspects, &probabilities, &testimonies);
-    Some(found)
 }
 
 fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<Testimony> {
@@ -413,7 +416,7 @@ mod tests {
             Recording { components, ..recording(engine, &(0..METERS).map(estimate).collect::<Vec<_>>()) }
         };
         let recordings: Vec<Recording> = factors.iter().map(witness).collect();
-        consensus(&built_in(), &task(METERS), &recordings.iter().collect::<Vec<_>>()).unwrap()
+        built_in().consensus(&task(METERS), &recordings.iter().collect::<Vec<_>>()).unwrap()
     }
 
     #[test]

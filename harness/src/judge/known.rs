@@ -27,7 +27,6 @@ struct KnownDeviation {
     /// Only with this luminaire model, where one is named.
     #[serde(default)]
     model: Option<String>,
-    /// Lowest and highest relative deviation.
     relative: [f64; 2],
     /// Whether every reading is expected to deviate, so that a pass is news.
     always: bool,
@@ -63,12 +62,11 @@ impl KnownDeviations {
         let record: Self = crate::spec::from_yaml(ON_RECORD).map_err(KnownDeviationError)?;
         let deviations = record.known_deviations.iter().map(|k| (&k.engine, &k.cause, &k.source));
         let breaks = record.known_breaks.iter().map(|k| (&k.engine, &k.cause, &k.source));
-        for (engine, cause, source) in deviations.chain(breaks) {
-            if cause.trim().is_empty() || source.trim().is_empty() {
-                return Err(KnownDeviationError(format!("a deviation of {engine} lacks cause or source")));
-            }
+        let lacks = |(_, cause, source): &(_, &String, &String)| cause.trim().is_empty() || source.trim().is_empty();
+        match deviations.chain(breaks).find(lacks) {
+            Some((engine, ..)) => Err(KnownDeviationError(format!("a deviation of {engine} lacks cause or source"))),
+            None => Ok(record),
         }
-        Ok(record)
     }
 
     pub fn breaks(&self) -> &[KnownBreak] {

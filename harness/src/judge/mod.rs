@@ -37,7 +37,6 @@ pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 pub use uncertainty::{Component, ErrorBudget, Shape, Source};
 pub use verdict::{Verdict, judge};
 
-/// What a reading is held against.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Reference {
     pub value: f64,
@@ -61,12 +60,10 @@ impl Reference {
     }
 }
 
-/// One reading against one reference.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Comparison {
     #[serde(flatten)]
     pub key: ReadingKey,
-    /// The luminaire model.
     pub model: String,
     pub meter: MeterId,
     pub at_m: [f64; 3],
@@ -96,7 +93,6 @@ pub struct Comparison {
     pub p_value: Option<f64>,
 }
 
-/// What judging needs besides the readings.
 pub struct Judge<'a> {
     pub tolerances: &'a Tolerances,
     pub known: &'a KnownDeviations,
@@ -116,11 +112,6 @@ impl Judge<'_> {
         self.tolerances.of(task.procedure, task.reference().basis(), engine, task.quantity, self.overrides)
     }
 
-    /// Who of the engines departs from the others, the reference included; `recordings` as for [`Self::compare`].
-    pub fn consensus(&self, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
-        consensus::consensus(self, task, recordings)
-    }
-
     /// Holds every reading of one task against every reference there is for it.
     ///
     /// `recordings` are those of this task, one an engine. An engine that failed is `missing` at every meter. What fails, fails
@@ -132,18 +123,16 @@ impl Judge<'_> {
             let (mut family, mut shares) = (vec![], vec![]);
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.readings.get(k);
-                let mut references: Vec<Held> =
-                    reference_of_task(task, recordings, k, &recording.key.engine).into_iter().collect();
-                for reference in self.published.iter().flat_map(|p| p.references(task, target, &recording.key.engine)) {
-                    references.push(Held::published(reference, input.as_ref(), target, reading));
-                }
+                let engine = &recording.key.engine;
+                let printed = self.published.iter().flat_map(|p| p.references(task, target, engine));
+                let printed = printed.map(|reference| Held::published(reference, input.as_ref(), target, reading));
+                let references: Vec<Held> =
+                    reference_of_task(task, recordings, k, engine).into_iter().chain(printed).collect();
                 if references.is_empty() && (reading.is_none() || recording.role == Role::Renderer) {
                     // Nothing to hold it against, or nothing to hold: that is said, never passed over.
                     family.push(self.comparison(task, recording, k, None));
                 }
-                for held in references {
-                    family.push(self.comparison(task, recording, k, Some(held)));
-                }
+                family.extend(references.into_iter().map(|held| self.comparison(task, recording, k, Some(held))));
                 shares.resize(family.len(), share_of_reading(recording, k));
             }
             self.decide(&mut family, &shares);
@@ -165,12 +154,8 @@ impl Judge<'_> {
         }
         for comparison in family {
             let Some(basis) = comparison.reference.as_ref().map(|r| r.basis) else { continue };
-            let subject = Subject {
-                key: &comparison.key,
-                model: &comparison.model,
-                basis,
-                relative_deviation: comparison.relative_deviation,
-            };
+            let Comparison { key, model, relative_deviation, .. } = &*comparison;
+            let subject = Subject { key, model, basis, relative_deviation: *relative_deviation };
             let (verdict, cause) = self.known.revise(comparison.verdict, &subject);
             comparison.verdict = verdict;
             comparison.diagnosis = cause.or(comparison.diagnosis.take());

@@ -70,10 +70,8 @@ impl Tolerances {
     }
 
     fn checked(self) -> Result<Self, ToleranceError> {
-        for rule in &self.rules {
-            if rule.source.trim().is_empty() {
-                return Err(ToleranceError(format!("a tolerance of {} has no source", rule.procedure)));
-            }
+        if let Some(rule) = self.rules.iter().find(|r| r.source.trim().is_empty()) {
+            return Err(ToleranceError(format!("a tolerance of {} has no source", rule.procedure)));
         }
         let sound = self.coverage_factor.value.is_finite() && self.coverage_factor.value > 0.0;
         if !sound || self.coverage_factor.source.trim().is_empty() {
@@ -150,11 +148,10 @@ mod tests {
 
     #[test]
     fn a_spec_overrides_the_table() {
-        let table = Tolerances::built_in().unwrap();
         let strict = ToleranceOverride { relative: 1e-4, absolute_lx: 1e-3, absolute_cd: 0.0 };
         let overrides = BTreeMap::from([(ProcedureId::DirectIlluminance, strict)]);
-        let found =
-            table.of(ProcedureId::DirectIlluminance, Basis::ClosedForm, "povray", Quantity::Illuminance, &overrides);
+        let (procedure, table) = (ProcedureId::DirectIlluminance, Tolerances::built_in().unwrap());
+        let found = table.of(procedure, Basis::ClosedForm, "povray", Quantity::Illuminance, &overrides);
         assert_eq!(found, Tolerance { relative: 1e-4, absolute: 1e-3 });
     }
 }

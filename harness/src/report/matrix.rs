@@ -21,13 +21,11 @@ pub(super) enum Cell {
     /// The engine is what others are judged by here.
     IsReference,
     Skipped,
-    /// Nothing to compare.
     Empty,
     Judged {
         verdict: Verdict,
         /// How many comparisons have it.
         having: usize,
-        /// How many there are.
         of: usize,
         /// The largest relative deviation, signed.
         deviation: Option<f64>,

@@ -7,7 +7,7 @@ use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArr
 
 use super::matrix::{Cell, matrix, worst};
 use super::notes::{Kind, Note, departures, notes, splits};
-use super::words::{mark, percent, plural, significant, value};
+use super::words::{mark, percent, plural, significant, unique, value};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
 use crate::record::{EngineStatus, ProcedureId, Status};
@@ -165,12 +165,7 @@ fn verdicts(report: &Report, style: Style) -> String {
 fn readings(report: &Report, procedure: ProcedureId, style: Style) -> Option<String> {
     let records: Vec<&ReadingRecord> = report.readings.iter().filter(|r| r.key.procedure == procedure).collect();
     let unit = records.first()?.reading.quantity.unit();
-    let mut meters: Vec<_> = vec![];
-    for record in &records {
-        if !meters.contains(&&record.reading.meter) {
-            meters.push(&record.reading.meter);
-        }
-    }
+    let meters = unique(records.iter().map(|r| &r.reading.meter));
     if meters.len() > LISTED_METERS {
         return None;
     }

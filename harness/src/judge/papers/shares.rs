@@ -12,13 +12,11 @@ use serde::{Deserialize, Serialize};
 use super::PublishedFlux;
 use crate::record::{Estimate, MeterId};
 
-/// One place and column of a paper, split.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PaperSplit {
     /// The table's name in the paper.
     pub table: String,
     pub meter: MeterId,
-    /// The place, in words.
     pub place: String,
     /// The column that is held against the calculation.
     pub column: String,

@@ -94,7 +94,6 @@ pub struct PublishedTable {
     pub title: String,
     /// The table's name in it.
     pub name: String,
-    /// The procedure that reads its values.
     pub procedure: ProcedureId,
     pub quantity: Quantity,
     /// The cases that are held against it.
@@ -127,7 +126,6 @@ pub struct PublishedColumn {
     pub name: String,
     /// Whether it is what the paper judges its other columns by.
     pub reference: bool,
-    /// What it holds, in a sentence.
     pub meaning: String,
     /// The engine whose readings stand beside it.
     #[serde(default)]
@@ -142,7 +140,6 @@ pub struct PublishedRow {
     pub meter: MeterId,
     /// The place: gamma in degrees, or the position in metres.
     pub place: String,
-    /// The printed digits by column.
     pub cells: BTreeMap<String, String>,
 }
 

@@ -198,7 +198,6 @@ fn minus(text: &str) -> String {
     result
 }
 
-/// A power of ten: 10⁻⁶.
 fn power(exponent: i32) -> String {
     let digits = ["⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"];
     let raised: String = exponent.abs().to_string().bytes().map(|b| digits[usize::from(b - b'0')]).collect();

@@ -3,6 +3,8 @@
 //! Colours after Okabe and Ito, "Color Universal Design" (2008), darkened on paper and lightened on black until text in them
 //! keeps a contrast of 4.5 to 1.
 
+use std::collections::BTreeSet;
+
 use maud::{Markup, html};
 
 use super::super::Report;
@@ -20,7 +22,6 @@ fn colours() -> impl Iterator<Item = (&'static str, &'static str)> {
 const OWN: usize = engines::ALL.len();
 const COLOURS: usize = OWN + SPARE.len();
 
-/// Index of the colour of one of our own engines.
 fn fixed(engine: &str) -> Option<usize> {
     engines::ALL.iter().position(|entry| entry.name == *engine)
 }
@@ -48,6 +49,13 @@ impl Palette {
     pub(super) fn index(&self, engine: &str) -> usize {
         let found = self.engines.iter().find(|(id, _)| *id == *engine).map(|(_, k)| *k);
         found.or_else(|| fixed(engine)).unwrap_or(COLOURS - 1)
+    }
+
+    /// Each once, in the report's order; those that are not in it come last, by name.
+    pub(super) fn sorted<'a>(&self, engines: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+        let mut engines = Vec::from_iter(engines.collect::<BTreeSet<_>>());
+        engines.sort_by_key(|e| self.order(e));
+        engines
     }
 
     pub(super) fn order(&self, engine: &str) -> usize {

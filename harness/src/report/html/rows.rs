@@ -77,7 +77,6 @@ fn short(value: Option<f64>) -> Value {
         .map_or(Value::Null, |v| json!(v))
 }
 
-/// Where a reading was taken, in words.
 pub(super) fn place(c: &Comparison) -> String {
     let number = |value| trimmed(value, 3);
     match c.gamma_deg.zip(c.c_deg) {

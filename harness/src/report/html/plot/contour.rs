@@ -32,7 +32,6 @@ pub(super) fn contour(values: &[f64], counts: [usize; 2], level: f64) -> Vec<Seg
     segments
 }
 
-/// Where the level is crossed between two neighbours, if it is.
 fn crossing(a: [usize; 2], b: [usize; 2], value_a: f64, value_b: f64, level: f64) -> Option<[f64; 2]> {
     if (value_a >= level) == (value_b >= level) {
         return None;

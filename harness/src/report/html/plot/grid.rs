@@ -20,7 +20,6 @@ const BAR: f64 = 52.0;
 /// Fewer meters to a side than this are no map.
 const LEAST: usize = 3;
 
-/// Isolux panel and deviation maps of every grid of a group.
 pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette) -> Vec<Markup> {
     let Some(basis) = group.basis() else { return vec![] };
     let firm: Vec<&Comparison> =
@@ -61,7 +60,6 @@ fn index(c: &Comparison) -> usize {
 /// A regular grid of meters, read off their places: origin + i u + j v, i fastest.
 struct Lattice {
     counts: [usize; 2],
-    /// Lengths of the steps in metres.
     step_m: [f64; 2],
     /// First coordinate along each axis, and the axis' name.
     axes: [(f64, String); 2],

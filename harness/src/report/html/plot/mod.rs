@@ -55,13 +55,8 @@ pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -
 }
 
 impl Group<'_> {
-    /// The engines of the group in the report's order.
     fn engines(&self, palette: &Palette) -> Vec<&str> {
-        let mut engines: Vec<&str> = self.comparisons.iter().map(|c| c.key.engine.as_str()).collect();
-        engines.sort_unstable();
-        engines.dedup();
-        engines.sort_by_key(|e| palette.order(e));
-        engines
+        palette.sorted(self.comparisons.iter().map(|c| c.key.engine.as_str()))
     }
 
     /// The firmest basis: what the group is drawn against.
@@ -75,7 +70,6 @@ impl Group<'_> {
     }
 }
 
-/// A panel: a title, the drawing with its description, what to read from it.
 fn figure(title: &str, height: f64, drawing: &Markup, caption: &Markup) -> Markup {
     html! {
         figure {
@@ -94,12 +88,10 @@ fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Markup {
     html! { path class=(class) d={ "M" (number(x1)) " " (number(y1)) "L" (number(x2)) " " (number(y2)) } {} }
 }
 
-/// A coordinate without needless digits.
 fn number(value: f64) -> String {
     trimmed(value, 1)
 }
 
-/// The engines of a plot, each behind its mark.
 fn legend(engines: &[&str], palette: &Palette) -> Markup {
     html! { span.keys { @for engine in engines { (palette.label(engine)) " " } } }
 }

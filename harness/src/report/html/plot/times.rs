@@ -29,11 +29,8 @@ struct Point {
 }
 
 pub(in super::super) fn section(report: &Report, beside: &[Beside], palette: &Palette) -> Markup {
-    let panels: Vec<Markup> = report
-        .procedures()
-        .into_iter()
-        .filter_map(|procedure| panel(report, procedure, &curves(beside, procedure), palette))
-        .collect();
+    let of = |procedure| panel(report, procedure, &curves(beside, procedure), palette);
+    let panels: Vec<Markup> = report.procedures().into_iter().filter_map(of).collect();
     html! {
         h2 id="time-title" { "Run time against error" }
         @if panels.is_empty() { p.lead { "No engine was held against another's readings." } } @else {
@@ -85,11 +82,8 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let (time, error) = (span(|p| p.0, LEAST_TIME_S), span(|p| p.1, LEAST_ERROR));
     let width = WIDTH - LEFT - 12.0;
     let place = |wall_s: f64, e: f64| [LEFT + width * time.part(wall_s), TOP + PLOT * (1.0 - error.part(e))];
-    let mut engines: Vec<&str> =
-        points.iter().map(|p| p.engine.as_str()).chain(curves.iter().map(|c| c.engine.as_str())).collect();
-    engines.sort_unstable();
-    engines.dedup();
-    engines.sort_by_key(|e| palette.order(e));
+    let of_curves = curves.iter().map(|c| c.engine.as_str());
+    let engines = palette.sorted(points.iter().map(|p| p.engine.as_str()).chain(of_curves));
     let labels = labels(&points, &engines, &place);
     let drawing = html! {
         @for decade in time.low..=time.high {
@@ -171,7 +165,6 @@ impl Decades {
     }
 }
 
-/// A tick of a logarithmic axis.
 fn power(exponent: i32) -> String {
     if (-2..=3).contains(&exponent) { label(10f64.powi(exponent)) } else { super::super::power(exponent) }
 }
