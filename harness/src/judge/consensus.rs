@@ -8,7 +8,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Component, Judge, of_reading};
+use super::{Component, Judge, Tolerance, of_reading};
 use crate::engines::FILE_READER;
 use crate::procedures::Task;
 use crate::record::{Basis, ProcedureId, Recording};
@@ -76,6 +76,13 @@ struct Testimony {
     allowed: Vec<f64>,
 }
 
+impl Testimony {
+    fn new(name: &str, shares: Vec<String>, readings: Vec<Option<(f64, f64)>>, tolerance: Tolerance) -> Self {
+        let around = |r: &Option<(f64, f64)>| r.map_or(0.0, |(value, _)| tolerance.around(value));
+        Self { name: name.to_owned(), shares, allowed: readings.iter().map(around).collect(), readings }
+    }
+}
+
 /// Something that may be wrong, and which of the witnesses have it.
 struct Suspect {
     name: String,
@@ -139,18 +146,12 @@ fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec
         } else {
             tolerance(&recording.key.engine)
         };
-        let readings = task.targets.iter().enumerate().map(|(k, _)| {
+        let read = |k: usize| {
             let reading = recording.readings.get(k).filter(|r| r.value.is_finite())?;
             Some((reading.value, combined(&of_reading(recording, reading))))
-        });
-        let readings: Vec<_> = readings.collect();
-        let around = |r: &Option<(f64, f64)>| r.map_or(0.0, |(value, _)| allowed.around(value));
-        Testimony {
-            name: recording.key.engine.to_string(),
-            shares: recording.components.clone(),
-            allowed: readings.iter().map(around).collect(),
-            readings,
-        }
+        };
+        let readings = (0..task.targets.len()).map(read).collect();
+        Testimony::new(&recording.key.engine, recording.components.clone(), readings, allowed)
     };
     let mut testimonies: Vec<Testimony> = recordings.iter().filter(|r| !r.readings.is_empty()).map(of_engine).collect();
     testimonies.extend(derived(judge, task));
@@ -161,22 +162,13 @@ fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec
 fn derived(judge: &Judge<'_>, task: &Task) -> Option<Testimony> {
     const NAME: &str = "derived values";
     let published = judge.published?;
-    let readings: Vec<_> = task
-        .targets
-        .iter()
-        .map(|target| {
-            let mut references = published.references(task, target, NAME).into_iter();
-            references.find(|r| r.basis != Basis::Published).map(|r| (r.value, r.uncertainty))
-        })
-        .collect();
+    let read = |target| {
+        let mut references = published.references(task, target, NAME).into_iter();
+        references.find(|r| r.basis != Basis::Published).map(|r| (r.value, r.uncertainty))
+    };
+    let readings: Vec<_> = task.targets.iter().map(read).collect();
     let tolerance = judge.tolerances.of(task.procedure, Basis::ClosedForm, NAME, task.quantity, judge.overrides);
-    let around = |r: &Option<(f64, f64)>| r.map_or(0.0, |(value, _)| tolerance.around(value));
-    readings.iter().any(Option::is_some).then(|| Testimony {
-        name: NAME.to_owned(),
-        shares: vec![],
-        allowed: readings.iter().map(around).collect(),
-        readings,
-    })
+    readings.iter().any(Option::is_some).then(|| Testimony::new(NAME, vec![], readings, tolerance))
 }
 
 /// Each witness's own code, and what some of them share but not all: what all share shifts nobody against another.
@@ -186,8 +178,7 @@ fn suspects(testimonies: &[Testimony]) -> Vec<Suspect> {
     for name in testimonies.iter().flat_map(|t| &t.shares) {
         let has = |i: &usize| testimonies[*i].shares.contains(name);
         let holders: Vec<usize> = (0..testimonies.len()).filter(has).collect();
-        let known = suspects.iter().any(|s| s.name == *name);
-        if !known && holders.len() > 1 && holders.len() < testimonies.len() {
+        if suspects.iter().all(|s| s.name != *name) && holders.len() > 1 && holders.len() < testimonies.len() {
             suspects.push(Suspect { name: name.clone(), holders });
         }
     }
@@ -277,17 +268,15 @@ fn log_likelihood(
         present.iter().filter_map(|i| testimonies[*i].readings[k]).map(|(value, _)| value / scale - 1.0).collect();
     let covariance = |i: usize, j: usize| -> f64 {
         let (a, b) = (&testimonies[i], &testimonies[j]);
+        let both = |s: &Suspect| s.holders.contains(&i) && s.holders.contains(&j);
         let mut sum = 0.0;
         if i == j {
             let noise = a.readings[k].map_or(0.0, |(_, u)| u);
             sum += (noise / scale).powi(2) + (ALLOWANCE * a.allowed[k] / scale).powi(2) + ROUNDING.powi(2);
-        } else {
-            let both = |s: &&Suspect| s.holders.contains(&i) && s.holders.contains(&j);
-            if suspects.iter().any(|s| both(&s)) {
-                sum += SHARED * (ALLOWANCE * a.allowed[k].min(b.allowed[k]) / scale).powi(2);
-            }
+        } else if suspects.iter().any(both) {
+            sum += SHARED * (ALLOWANCE * a.allowed[k].min(b.allowed[k]) / scale).powi(2);
         }
-        if departing.is_some_and(|s| s.holders.contains(&i) && s.holders.contains(&j)) {
+        if departing.is_some_and(both) {
             sum += departure.unwrap_or(0.0).powi(2);
         }
         sum
@@ -302,16 +291,14 @@ fn gaussian(matrix: &[Vec<f64>], values: &[f64]) -> Option<f64> {
     let mut lower = vec![vec![0.0; n]; n];
     for i in 0..n {
         for j in 0..=i {
-            let sum: f64 = (0..j).map(|m| lower[i][m] * lower[j][m]).sum();
-            let left = matrix[i][j] - sum;
+            let left = matrix[i][j] - (0..j).map(|m| lower[i][m] * lower[j][m]).sum::<f64>();
             lower[i][j] = if i == j { Some(left).filter(|l| *l > 0.0)?.sqrt() } else { left / lower[j][j] };
         }
     }
     let solve = |b: &[f64]| {
         let mut x = vec![0.0; n];
         for i in 0..n {
-            let sum: f64 = (0..i).map(|m| lower[i][m] * x[m]).sum();
-            x[i] = (b[i] - sum) / lower[i][i];
+            x[i] = (b[i] - (0..i).map(|m| lower[i][m] * x[m]).sum::<f64>()) / lower[i][i];
         }
         x
     };

@@ -30,9 +30,8 @@ pub struct Split {
     pub text: String,
 }
 
-/// Splits at every meter of a task where the IESNA method, the exact solution and a renderer gave a reading.
-///
-/// Where the IESNA method is itself what others are judged by, there is nothing to split.
+/// Splits at every meter of a task where the IESNA method, the exact solution and a renderer gave a reading; none where the
+/// IESNA method is itself what others are judged by.
 pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> Vec<Split> {
     let of = |engine: EngineName| recordings.iter().find(|r| r.key.engine == engine);
     let (Some(method), Some(exact)) = (of(EngineName::IESNA), of(EngineName::SIMULATOR)) else { return vec![] };
@@ -49,14 +48,10 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
         for rendered in &renderer.readings {
             let at = |r: &Recording| r.readings.iter().find(|reading| reading.meter == rendered.meter).cloned();
             let (Some(method), Some(exact)) = (at(method), at(exact)) else { continue };
-            let Some(split) = DeviationSplit::new(
-                Lux(method.value),
-                uncertain(&exact, 0.0),
-                uncertain(rendered, renderer.instrument_uncertainty),
-            ) else {
-                continue;
-            };
-            let method = name_of_method(task.transport);
+            let value = uncertain(rendered, renderer.instrument_uncertainty);
+            let split = DeviationSplit::new(Lux(method.value), uncertain(&exact, 0.0), value);
+            let Some(split) = split else { continue };
+            let (method, name) = (name_of_method(task.transport), crate::engines::display_name(&renderer.key.engine));
             splits.push(Split {
                 case: renderer.key.case.clone(),
                 procedure: task.procedure,
@@ -68,10 +63,7 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
                 of_method: split.method,
                 of_renderer: split.renderer,
                 uncertainty: split.uncertainty,
-                text: format!(
-                    "{method} differs from {} by {split}",
-                    crate::engines::display_name(&renderer.key.engine)
-                ),
+                text: format!("{method} differs from {name} by {split}"),
             });
         }
     }

@@ -127,8 +127,7 @@ mod tests {
     use super::*;
 
     fn of(procedure: ProcedureId, basis: Basis, engine: &str) -> Tolerance {
-        let table = Tolerances::built_in().unwrap();
-        table.of(procedure, basis, engine, Quantity::Illuminance, &BTreeMap::new())
+        Tolerances::built_in().unwrap().of(procedure, basis, engine, Quantity::Illuminance, &BTreeMap::new())
     }
 
     #[test]

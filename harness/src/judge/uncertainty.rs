@@ -12,7 +12,6 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal, StudentsT};
 /// Components below this share of the widest one change no quantile that anybody reads.
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// Where an uncertainty comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
@@ -47,7 +46,6 @@ impl Source {
     }
 }
 
-/// How errors of a component are spread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
@@ -77,8 +75,7 @@ impl Component {
 
     /// A component that lies evenly within a bound (GUM 4.3.7).
     pub fn within(source: Source, bound: f64) -> Self {
-        let uncertainty = bound / 3f64.sqrt();
-        Self { source, uncertainty, shape: Shape::Rectangular, degrees_of_freedom: None }
+        Self { source, uncertainty: bound / 3f64.sqrt(), shape: Shape::Rectangular, degrees_of_freedom: None }
     }
 }
 

@@ -35,7 +35,6 @@ pub use junit::junit;
 pub use markdown::markdown;
 pub use terminal::{Detail, Style, terminal};
 
-/// Everything that is known of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Report {
     /// Version of the format: 1.
@@ -159,12 +158,10 @@ impl Report {
             }
             all
         });
-        let Some(joined) = joined else { unreachable!("a suite without cases is refused") };
+        let Some(mut joined) = joined else { unreachable!("a suite without cases is refused") };
         let summary = Summary::of(&joined.comparisons, &joined.skips);
-        let order = |e: &EngineStatus| crate::engines::all().iter().position(|known| known.name() == e.id);
-        let mut engines = joined.engines;
-        engines.sort_by_key(order);
-        let joined = Self { spec, engines, summary, ..joined };
+        joined.engines.sort_by_key(|e| crate::engines::all().iter().position(|known| known.name() == e.id));
+        let joined = Self { spec, summary, ..joined };
         Self { paper_splits: papers::splits(&joined), ..joined }
     }
 

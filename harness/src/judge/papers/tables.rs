@@ -186,13 +186,12 @@ impl Published {
             let same_model = column.model == model || column.also.contains(&model);
             same_bounces && (derived || (same_model && (column.engine == engine || (column.reference && closed_form))))
         };
-        let columns = table.columns.iter().filter(|(_, column)| compared(column));
         let reference = |(name, column): (&String, &Column)| {
             let cell = self.cell(row.cells.get(name)?, table.decimals(name))?;
             let source = format!("{}, {}, {name}: {}", self.citation.title, table.name, column.meaning);
             Some(Reference::of(cell.value, &cell.uncertainty, self.citation.basis, source))
         };
-        columns.filter_map(reference).collect()
+        table.columns.iter().filter(|(_, column)| compared(column)).filter_map(reference).collect()
     }
 
     /// The table of a task as printed, rows at its targets alone; `None` where the paper has none, or these are derived

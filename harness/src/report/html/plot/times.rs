@@ -49,8 +49,7 @@ fn points(report: &Report, procedure: ProcedureId) -> Vec<Point> {
     let mut points = vec![];
     for group in groups(report, procedure) {
         let Some(basis) = group.basis() else { continue };
-        let recordings = report.recordings.iter().filter(|r| r.key.is_of(group.case, procedure));
-        for recording in recordings {
+        for recording in report.recordings.iter().filter(|r| r.key.is_of(group.case, procedure)) {
             let mine = |c: &&&Comparison| c.key.engine == recording.key.engine && c.basis() == Some(basis);
             let errors = group.comparisons.iter().filter(mine).filter_map(|c| c.relative_deviation);
             if let Some(error) = largest(errors).map(f64::abs) {
@@ -70,11 +69,8 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let span = |pick: fn(&(f64, f64)) -> f64, least: f64| {
         let (low, high) =
             all.iter().map(pick).map(|v| v.max(least)).fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
-        Decades {
-            low: low.log10().floor() as i32,
-            high: (high.log10().ceil() as i32).max(low.log10().floor() as i32 + 1),
-            least,
-        }
+        let low = low.log10().floor() as i32;
+        Decades { low, high: (high.log10().ceil() as i32).max(low + 1), least }
     };
     if all.is_empty() {
         return None;
