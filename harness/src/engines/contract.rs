@@ -20,11 +20,9 @@ pub const FILE_READER: &str = "luxproof's reader of photometric files";
 /// The component of our own solvers, which look intensities up alike.
 pub(super) const OWN_LOOKUP: &str = "luminaire's interpolation of candela tables";
 
-/// Something that reads illuminance at meters of a scene.
 pub trait Engine: Send + Sync {
     fn name(&self) -> EngineName;
 
-    /// What it takes part for.
     fn role(&self) -> Role {
         Role::Renderer
     }
@@ -34,7 +32,6 @@ pub trait Engine: Send + Sync {
         self.role() == Role::Witness
     }
 
-    /// Whether it can run here, and its version.
     fn probe(&self, site: &Site) -> Result<Version, Absent>;
 
     /// Whether it can do this job, exactly or nearly; decided from the job alone, before anything starts.
@@ -87,14 +84,12 @@ pub struct Entry {
     pub colour: (&'static str, &'static str),
     /// What `luxproof engines install` fetches for it.
     pub installs: &'static [Component],
-    /// The models of luminaires that it has a source for.
     pub models: &'static [LuminaireModel],
     /// The setting that, `false`, leaves it the coordinates of the spec, where it would get handier ones.
     pub fits_coordinates: Option<&'static str>,
     pub make: fn() -> Box<dyn Engine>,
 }
 
-/// A part of the installation, which engines may share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Component {
     /// Mitsuba, Radiance and what reads POV-Ray's images, as `engines.lock` pins them.
@@ -104,7 +99,6 @@ pub enum Component {
 }
 
 impl Entry {
-    /// Why it cannot be given the luminaires of a job, if it cannot.
     pub fn objection(&self, job: &Job) -> Option<String> {
         let other = job.scene.luminaires.iter().find(|l| !self.models.contains(&l.model))?;
         let known = self.models.iter().map(|m| format!("`{}`", m.name())).collect::<Vec<_>>().join(" or ");
@@ -113,10 +107,8 @@ impl Entry {
     }
 }
 
-/// A setting of an engine with values worth trying.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Knob {
-    /// Its key in a spec.
     pub key: &'static str,
     /// Values as YAML flow scalars, the default first.
     pub values: &'static [&'static str],
@@ -147,13 +139,9 @@ pub struct Job {
     pub procedure: ProcedureId,
     /// Room, obstacles and the luminaires that are on. No room means free field.
     pub scene: Scene,
-    /// Where illuminance is read.
     pub stations: Vec<Station>,
-    /// Which light counts.
     pub transport: Transport,
-    /// When to stop.
     pub budget: Budget,
-    /// Seed of every random choice.
     pub seed: u64,
     /// The engine's own settings from the spec, e.g. `variant: llvm_ad_mono`.
     pub settings: BTreeMap<String, serde_json::Value>,
@@ -174,32 +162,25 @@ impl Job {
             settings: BTreeMap::new(),
         }
     }
-}
 
-impl Job {
-    /// Of all surfaces of room and bodies.
     pub(super) fn largest_reflectance(&self) -> f64 {
         let room = self.scene.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
         room.chain(self.scene.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
     }
 }
 
-/// A meter with its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Station {
     pub id: MeterId,
-    /// Where it is and which way it looks.
     pub meter: Meter,
     /// What it is expected to read at most, in lux, if known: lets engines choose a read-out scale. Never copied to a result.
     pub expected_lx: Option<f64>,
 }
 
-/// An engine's version, as it names itself.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
 pub struct Version(pub String);
 
-/// Why an engine is not there, and how to get it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{reason}; {remedy}")]
 pub struct Absent {
@@ -207,14 +188,10 @@ pub struct Absent {
     pub remedy: String,
 }
 
-/// Whether an engine can do a job.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Support {
-    /// To its full accuracy.
     Yes,
-    /// With a known approximation.
     Approximate {
-        /// What is approximated.
         why: String,
         /// Its size, relative.
         size: Option<f64>,
@@ -222,7 +199,6 @@ pub enum Support {
     No(String),
 }
 
-/// What an engine gives for a job.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measurement {
@@ -299,23 +275,13 @@ pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engines::fixtures;
     use glam::DVec3;
 
     const ENGINE: EngineName = EngineName::new("test");
 
     fn job(stations: usize) -> Job {
-        let meter = Meter { position_m: DVec3::ONE, normal: DVec3::Z };
-        let station = |k| Station { id: MeterId::new("m", k), meter, expected_lx: None };
-        Job {
-            case: "case".into(),
-            procedure: ProcedureId::DirectIlluminance,
-            scene: Scene::default(),
-            stations: (0..stations).map(station).collect(),
-            transport: Transport::Direct,
-            budget: Budget::default(),
-            seed: 1,
-            settings: BTreeMap::new(),
-        }
+        fixtures::job(Scene::default(), fixtures::stations(&vec![[1.0; 3]; stations], DVec3::Z), Transport::Direct)
     }
 
     fn measurement(values: &[f64]) -> Measurement {

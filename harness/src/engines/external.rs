@@ -21,14 +21,11 @@ use crate::system::process::Invocation;
 /// The environment variable that names an empty folder for the adapter's own files, kept with the run.
 const FOLDER_VARIABLE: &str = "LUXPROOF_SCENE_DIR";
 
-/// The file that holds the job.
 const JOB_FILE: &str = "job.json";
 
-/// An engine that is a program of the user's.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct External {
     id: EngineName,
-    /// The program and its arguments, as in the spec.
     command: Vec<String>,
     /// The procedures that it takes part in; `None` for all.
     procedures: Option<Vec<ProcedureId>>,
@@ -37,7 +34,6 @@ pub(super) struct External {
 }
 
 impl External {
-    /// The engine that a spec describes.
     pub(super) fn new(
         name: &str,
         settings: &BTreeMap<String, serde_json::Value>,

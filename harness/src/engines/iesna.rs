@@ -6,7 +6,6 @@ use luminaire::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
 use super::{Absent, Engine, EngineError, Entry, Job, Measurement, Site, Support, Version, Workbench, checked};
 use crate::record::{EngineName, Estimate, Role, Uncertainty};
 
-/// The methods of [`luminaire::calculators`].
 pub(super) struct Iesna;
 
 const ID: EngineName = EngineName::IESNA;
@@ -108,7 +107,6 @@ const fn method(transport: Transport) -> &'static str {
     }
 }
 
-/// What the methods do with a limit on bounces.
 const fn cut(transport: Transport) -> Option<&'static str> {
     match transport {
         Transport::Indirect(Bounces::AtMost(_)) | Transport::Total(Bounces::AtMost(_)) => {

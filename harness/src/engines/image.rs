@@ -5,7 +5,6 @@ use std::path::Path;
 use super::{EngineError, Workbench};
 use crate::record::EngineName;
 
-/// The small program that reads them.
 const DRIVER: &str = include_str!("../../drivers/read_image.py");
 
 /// The pixels of an RGB image, row by row; integer formats as 0..=1.
@@ -19,7 +18,6 @@ pub(super) fn read_rgb(engine: &EngineName, workbench: &Workbench, path: &Path) 
     pixels(&done.stdout).map_err(|what| output(format!("OpenImageIO {what} of {}", path.display())))
 }
 
-/// Decodes what the driver prints.
 fn pixels(bytes: &[u8]) -> Result<Vec<[f64; 3]>, String> {
     let end = bytes.iter().position(|b| *b == b'\n').ok_or("gave no header")?;
     let header = std::str::from_utf8(&bytes[..end]).map_err(|_| "gave no text header")?;
@@ -38,20 +36,12 @@ fn pixels(bytes: &[u8]) -> Result<Vec<[f64; 3]>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engines::Site;
-    use std::time::Duration;
+    use crate::engines::{Site, fixtures};
 
     #[test]
     fn a_sixteen_bit_pixmap_is_read_to_the_last_step_and_a_short_one_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let workbench = Workbench {
-            site: Site::of_user().unwrap(),
-            scene_dir: folder.path().to_owned(),
-            log: folder.path().join("log"),
-            jobs: 1,
-            limit: Duration::from_secs(60),
-            peak: crate::system::process::PeakMemory::default(),
-        };
+        let workbench = fixtures::workbench(Site::of_user().unwrap(), folder.path());
         let path = folder.path().join("two.ppm");
         let mut bytes = b"P6\n2 1\n65535\n".to_vec();
         bytes.extend([0x00, 0x00, 0xff, 0xff, 0x80, 0x00, 0x00, 0x01, 0x12, 0x34, 0xff, 0xfe]);

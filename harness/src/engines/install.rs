@@ -15,7 +15,6 @@ use super::catalogue::ALL;
 use super::contract::Component;
 use crate::record::EngineName;
 
-/// What became of one component.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InstallOutcome {
     pub component: &'static str,
@@ -26,22 +25,17 @@ pub struct InstallOutcome {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstallState {
-    /// It was there already; nothing was done.
     Present,
-    /// It is there now.
     Installed,
     /// It is not there, but the engines work without it, more slowly.
     Optional,
-    /// It is not there, and an engine needs it.
     Failed,
 }
 
-/// Why a component could not be installed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum InstallError {
     #[error(transparent)]
     Process(#[from] ProcessError),
-    /// The site's folder could not be changed.
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
     #[error("{what}; {remedy}")]
@@ -66,7 +60,6 @@ pub fn install(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&st
     outcomes
 }
 
-/// What the named engines need; all of it if none is named.
 fn components(engines: &[EngineName]) -> Vec<Component> {
     let all = [Component::PythonPackages, Component::PovRay, Component::LibLlvm];
     let named = || ALL.iter().filter(|entry| engines.is_empty() || engines.contains(&entry.name));

@@ -116,7 +116,6 @@ fn darkness(job: &Job) -> Measurement {
     Measurement { estimates: vec![Estimate::DARK; job.stations.len()], notes, ..Measurement::default() }
 }
 
-/// Direct and indirect light together.
 fn sum(direct: &Measurement, mut indirect: Measurement) -> Measurement {
     for (total, part) in indirect.estimates.iter_mut().zip(&direct.estimates) {
         *total = total.plus(part);
@@ -238,7 +237,6 @@ fn distance_to_segment(point: glam::DVec3, from: glam::DVec3, to: glam::DVec3) -
     point.distance(from + t * along)
 }
 
-/// Reflectance of the room, averaged over area.
 fn mean_reflectance(room: &Room) -> f64 {
     let over = |f: &dyn Fn(Surface) -> f64| Surface::ALL.iter().map(|&s| f(s)).sum::<f64>();
     over(&|s| room.area_m2(s) * room.reflectance.of(s)) / over(&|s| room.area_m2(s))

@@ -47,7 +47,6 @@ const FLOAT_READ_OUT: f64 = 5e-7;
 const NOT_REPEATABLE: &str = "rtrace seeds its random numbers from the clock, so reflected light repeats within its \
                               standard error only; its fixed sequence (-u-) is biased by .3 %";
 
-/// The engine.
 pub(super) struct Radiance;
 
 impl Engine for Radiance {

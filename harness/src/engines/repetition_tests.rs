@@ -3,9 +3,7 @@
 //! Few and small, so that every test run affords them; `benchmarks/repetitions.py` does twenty at audit
 //! size, and `benchmarks/repetitions.md` has its figures.
 
-use std::time::Duration;
-
-use super::fixtures::{CONVERGED, S1_INDIRECT_LX, s1};
+use super::fixtures::{CONVERGED, S1_INDIRECT_LX, s1, workbench};
 use super::mitsuba::Mitsuba;
 use super::povray::PovRay;
 use super::radiance::Radiance;
@@ -17,15 +15,7 @@ fn repetitions(engine: &dyn Engine, settings: &[(&str, serde_json::Value)], budg
     let site = Site::of_user().unwrap();
     let read = |seed| {
         let folder = tempfile::tempdir().unwrap();
-        let (scene_dir, log) = (folder.path().to_owned(), folder.path().join("log"));
-        let bench = Workbench {
-            site: site.clone(),
-            scene_dir,
-            log,
-            jobs: 2,
-            limit: Duration::from_secs(120),
-            peak: crate::system::process::PeakMemory::default(),
-        };
+        let bench = workbench(site.clone(), folder.path());
         let settings = settings.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
         let job = Job { budget, seed, settings, ..s1(CONVERGED) };
         engine.read(&job, &bench).unwrap()

@@ -7,7 +7,6 @@ use super::settings::Given;
 use super::{Absent, Engine, EngineError, Entry, Job, Knob, Measurement, Site, Support, Version, Workbench, checked};
 use crate::record::{EngineName, Estimate, Role};
 
-/// The exact simulation of [`luminaire::simulator`].
 pub(crate) struct Simulator;
 
 const ID: EngineName = EngineName::SIMULATOR;

@@ -12,13 +12,11 @@ pub struct Site {
     root: PathBuf,
 }
 
-/// Why there is no place for engines.
 #[derive(Debug, thiserror::Error)]
 #[error("no folder for engines: {0}; name one with --engines-dir")]
 pub struct SiteError(String);
 
 impl Site {
-    /// The site in a given folder.
     pub fn at(root: impl Into<PathBuf>) -> Self {
         Self { root: root.into() }
     }
@@ -29,29 +27,24 @@ impl Site {
         Ok(Self::at(strategy.data_dir().join("luxproof").join("engines")))
     }
 
-    /// The folder itself.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// The virtual environment of the pinned Python packages.
     pub fn venv(&self) -> PathBuf {
         self.root.join("venv")
     }
 
-    /// The virtual environment's interpreter, if it is there.
     pub fn python(&self) -> Option<PathBuf> {
         Some(self.venv().join("bin/python")).filter(|p| p.exists())
     }
 
-    /// The folder of an installed Python package, if it is there.
     pub fn python_package(&self, name: &str) -> Option<PathBuf> {
         let versions = std::fs::read_dir(self.venv().join("lib")).ok()?;
         let package = |v: std::fs::DirEntry| v.path().join("site-packages").join(name);
         versions.flatten().map(package).find(|p| p.is_dir())
     }
 
-    /// The root of unpacked Debian packages.
     pub fn debian(&self) -> PathBuf {
         self.root.join("debian")
     }

@@ -7,7 +7,6 @@ use super::Site;
 use crate::record::{EngineName, MeterId, Uncertainty};
 use crate::system::process::{Invocation, PeakMemory, ProcessError};
 
-/// A file of an exported scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
     pub name: String,
@@ -20,7 +19,6 @@ impl SceneFile {
     }
 }
 
-/// Where an engine works: its installation, its folders and what it may use.
 #[derive(Clone, Debug)]
 pub struct Workbench {
     pub site: Site,
@@ -32,17 +30,14 @@ pub struct Workbench {
     pub jobs: usize,
     /// Past this the job is killed.
     pub limit: Duration,
-    /// Told of the memory that the job's processes took.
     pub peak: PeakMemory,
 }
 
 impl Workbench {
-    /// An invocation in the scene's folder with this job's log and limit.
     pub fn invoke(&self, program: impl Into<PathBuf>) -> Invocation {
         Invocation { peak: self.peak.clone(), ..Invocation::new(program, &self.scene_dir, self.limit, &self.log) }
     }
 
-    /// Writes exported files into the scene's folder.
     pub fn write(&self, files: &[SceneFile]) -> Result<(), EngineError> {
         for file in files {
             let path = self.scene_dir.join(&file.name);
@@ -52,28 +47,21 @@ impl Workbench {
     }
 }
 
-/// Why an engine that was there gave no reading.
 #[derive(Debug, thiserror::Error)]
 pub enum EngineError {
-    /// A process failed.
     #[error(transparent)]
     Process(#[from] ProcessError),
-    /// A file could not be written or read.
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
-    /// The program ended well but what it gave is not a result.
     #[error("{engine} exited without an error, but {what}")]
     Output { engine: EngineName, what: String },
-    /// What it read is no number.
     #[error("{engine} exited without an error, but read {value} lx ({uncertainty:?}) at {meter}")]
     NotFinite { engine: EngineName, meter: MeterId, value: f64, uncertainty: Uncertainty },
-    /// A setting from the spec makes no sense to the engine.
     #[error("engines.{engine}.{key}: {what}")]
     Setting { engine: EngineName, key: String, what: String },
     /// It cannot do what was asked, as it says itself once it has seen the job: a skip, no failure.
     #[error("{engine} declines: {why}")]
     Declined { engine: EngineName, why: String },
-    /// Our own solver gave up.
     #[error("{engine}: {what}")]
     Solver { engine: EngineName, what: String },
 }

@@ -13,7 +13,6 @@ use crate::engines::{EngineError, Job, Measurement, Station};
 use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
 use crate::spec::Budget;
 
-/// The version of both forms.
 const VERSION: u32 = 1;
 
 /// What an adapter reads on its standard input: everything in metres, candela, lux and world coordinates with z up.
@@ -171,7 +170,6 @@ impl ReadingForm {
 }
 
 impl ExternalJob {
-    /// The form of a job.
     pub fn of(job: &Job) -> Self {
         let (light, bounces) = match job.transport {
             Transport::Direct => (Light::Direct, None),
@@ -196,7 +194,6 @@ impl ExternalJob {
         }
     }
 
-    /// The text that an adapter reads.
     pub fn to_json(&self) -> Result<Vec<u8>, serde_json::Error> {
         serde_json::to_vec_pretty(self)
     }

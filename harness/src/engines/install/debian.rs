@@ -12,7 +12,6 @@ use crate::system::process::Invocation;
 /// The libLLVM packages that Mitsuba works with, the best known first.
 const LLVM_PACKAGES: [&str; 5] = ["libllvm19", "libllvm20", "libllvm18", "libllvm17t64", "libllvm17"];
 
-/// Installs POV-Ray; returns where it is.
 pub(super) fn install_povray(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install POV-Ray 3.7 so that `povray` is on PATH (macOS: `brew install povray`)";
     let apt = Apt::find(site, "POV-Ray", remedy)?;
@@ -27,7 +26,6 @@ pub(super) fn install_povray(site: &Site, progress: &mut dyn FnMut(&str)) -> Res
     Ok(found.display().to_string())
 }
 
-/// Installs a libLLVM that Mitsuba works with; returns where it is.
 pub(super) fn install_llvm(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install LLVM 17 or later (macOS: `brew install llvm`)";
     Apt::find(site, "libLLVM", remedy)?.install(&LLVM_PACKAGES, progress)?;
@@ -40,7 +38,6 @@ fn not_there(what: &str, remedy: &str) -> InstallError {
     InstallError::Missing { what, remedy: remedy.to_owned() }
 }
 
-/// The package manager, and whether we may use it on the system.
 struct Apt<'a> {
     site: &'a Site,
     program: PathBuf,
@@ -93,7 +90,6 @@ impl<'a> Apt<'a> {
         self.unpack()
     }
 
-    /// Unpacks every downloaded package into the site's `debian` folder.
     fn unpack(&self) -> Result<(), InstallError> {
         let archives = self.state().join("cache/archives");
         let entries = fs::read_dir(&archives).map_err(|e| InstallError::io(&archives, e))?;

@@ -11,16 +11,13 @@ use super::{InstallError, LIMIT};
 use crate::engines::Site;
 use crate::system::process::Invocation;
 
-/// The exact packages, in pip's requirements format.
 const LOCK: &str = include_str!("../../../engines.lock");
 
-/// Whether the environment of this very lock is in place.
 pub(super) fn is_current(site: &Site) -> bool {
     let linked = fs::read_link(site.venv()).is_ok_and(|target| target == Path::new(&folder_name()));
     linked && site.python().is_some()
 }
 
-/// Makes the environment and puts it in place; returns where it is.
 pub(super) fn install(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let folder = site.root().join(folder_name());
     remove(&folder)?;

@@ -14,7 +14,6 @@ const REMEDY: &str = "run `luxproof engines install mitsuba`";
 /// A probe takes about a second; a machine under load may need many.
 const PROBE_LIMIT: Duration = Duration::from_secs(60);
 
-/// An interpreter with Mitsuba and what works there.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Backend {
     root: PathBuf,
@@ -49,7 +48,6 @@ impl Backend {
         probe(&python, "scalar_rgb", None).map(|versions| backend(None, versions)).map_err(absent)
     }
 
-    /// Whether it was found at this site.
     pub(super) fn is_of(&self, site: &Site) -> bool {
         self.root == site.root()
     }
@@ -60,14 +58,12 @@ impl Backend {
         Self { llvm: None, ..self }
     }
 
-    /// Versions of the renderer and of what compiles its kernels.
     pub(super) fn version(&self) -> Version {
         let Versions { mitsuba, drjit, llvm } = &self.versions;
         let llvm = llvm.as_ref().map_or("no usable LLVM".to_owned(), |v| format!("LLVM {v}"));
         Version(format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"))
     }
 
-    /// The command that reads an exported job with what is installed here.
     pub(super) fn command_by_hand(&self) -> String {
         let run =
             Invocation::new(&self.python, Path::new("."), Duration::ZERO, "").args(["mitsuba_read.py", "job.json"]);

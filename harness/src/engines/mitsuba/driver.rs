@@ -24,7 +24,6 @@ const SCALAR_TRIAL_SIDE: usize = 2;
 /// The spread of two blocks is a rough guess of the error of one.
 const PLAN_MARGIN: f64 = 2.0;
 
-/// What the driver says first.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Greeting {
@@ -36,7 +35,6 @@ struct Greeting {
     parts: Vec<Part>,
 }
 
-/// A part of the light that adds to the readings, independently of the others.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Part {
@@ -53,7 +51,6 @@ struct Request<'a> {
     seeds: Vec<Option<[u64; 3]>>,
 }
 
-/// Which of the independent sequences of a job's random numbers.
 #[derive(Clone, Copy)]
 enum Stream {
     Reflected = 0,
@@ -61,7 +58,6 @@ enum Stream {
     Trial = 2,
 }
 
-/// One job's conversation.
 pub(super) struct Driver<'a> {
     job: &'a Job,
     settings: &'a Settings,

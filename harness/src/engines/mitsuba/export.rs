@@ -48,7 +48,6 @@ fn has_surfaces(job: &Job) -> bool {
     job.scene.room.is_some() || !job.scene.obstacles.is_empty()
 }
 
-/// What the driver is asked for.
 #[derive(Serialize)]
 struct DriverJob<'a> {
     case: &'a str,
@@ -66,7 +65,6 @@ struct DriverJob<'a> {
     stations: Vec<DriverStation<'a>>,
 }
 
-/// How a rendered film is read instead.
 #[derive(Serialize)]
 struct Film {
     tile: usize,
@@ -149,7 +147,6 @@ fn emitter(luminaire: &Luminaire, table: &str, frame: &Frame) -> String {
     )
 }
 
-/// The first lines of a scene file.
 fn header(job: &Job, what: &str) -> String {
     let (case, procedure) = (comment_text(&job.case), job.procedure);
     format!(
@@ -202,7 +199,6 @@ fn reflections_until(reflectance: f64, share: f64) -> i64 {
     (share.max(1e-9).ln() / reflectance.ln()).clamp(1.0, MAX).ceil() as i64
 }
 
-/// Text that may stand in an XML comment.
 fn comment_text(text: &str) -> String {
     text.replace("--", "- -")
 }

@@ -27,7 +27,6 @@ const MAX_LOOKS: usize = 10;
 /// Below this share of its upper bound a reading is darkness.
 const DARK: f64 = 1e-12;
 
-/// Where a job's runs happen.
 pub(super) struct Bench<'a> {
     job: &'a Job,
     workbench: &'a Workbench,
@@ -48,7 +47,6 @@ pub(super) fn hermetic(invocation: Invocation, site: &Site) -> Invocation {
     }
 }
 
-/// One run's choices.
 #[derive(Clone, Copy)]
 struct Run {
     light: Light,
@@ -57,7 +55,6 @@ struct Run {
     reflections: Reflections,
 }
 
-/// Which reflections a run follows.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reflections {
     /// As many as asked for, out of the cache.
@@ -67,7 +64,6 @@ enum Reflections {
 }
 
 impl Run {
-    /// Length of the pool of directions.
     fn pool(self) -> u32 {
         if self.reflections == Reflections::First && self.count > POOL / 10 { LONG_POOL } else { POOL }
     }
@@ -82,7 +78,6 @@ impl Run {
 }
 
 impl<'a> Bench<'a> {
-    /// A bench for a job.
     pub(super) fn new(job: &'a Job, workbench: &'a Workbench, settings: &'a Settings) -> Result<Self, EngineError> {
         Ok(Self { job, workbench, settings, program: program(&workbench.site)? })
     }
@@ -124,7 +119,6 @@ impl<'a> Bench<'a> {
         Ok(Measurement { estimates, method: self.method(), effort, ..Measurement::default() })
     }
 
-    /// Reflected light: blocks of turned scenes.
     pub(super) fn indirect(&self) -> Result<Measurement, EngineError> {
         let started = Instant::now();
         let budget = self.job.budget;
@@ -219,8 +213,6 @@ impl<'a> Bench<'a> {
         Ok(blocks)
     }
 
-    /// One block's reading of every meter.
-    ///
     /// The first reflection, most of the noise, is read once more with many rays and no cache, and exchanged for the
     /// one of the same few rays: E = E(all, few rays) - E(first, the same rays) + E(first, many rays).
     fn block(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
@@ -268,7 +260,6 @@ impl<'a> Bench<'a> {
         self.workbench.write(&[SceneFile::text("readouts.inc", export::readouts(readouts, light))])
     }
 
-    /// One run of POV-Ray, one pixel a meter.
     fn render(&self, run: Run, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
         let image = format!("seed{}.ppm", run.seed);
         let path = self.workbench.scene_dir.join(&image);
@@ -333,7 +324,6 @@ struct Pilot {
     wall_s: f64,
 }
 
-/// Where reading one meter's direct light stands.
 #[derive(Clone, Copy)]
 enum Look {
     Again(Readout),

@@ -19,7 +19,6 @@ use super::pigment;
 use super::pixels::Readout;
 use super::settings::{POOL, Settings};
 
-/// The scene's file name.
 pub(super) const SCENE: &str = "scene.pov";
 
 /// Radius of the filter round a light, in scene units; POV-Ray silently ignores one of 1e-3.
@@ -31,16 +30,12 @@ const POINTS_PAST_OBSTACLES: usize = 12;
 /// For indirect light, which does not see the difference.
 const POINTS_INDIRECT: usize = 2;
 
-/// Which light a scene lets its meters see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Light {
-    /// Straight from the luminaires.
     Direct,
-    /// Reflected at least once.
     Indirect,
 }
 
-/// Writes the scene.
 pub(super) fn scene(job: &Job, settings: &Settings) -> SceneFile {
     let frame = Frame::of(job, settings.coordinates);
     let mut text = head(job, settings, frame);
@@ -306,7 +301,6 @@ pub(super) fn points(job: &Job) -> usize {
     if few_do { POINTS } else { POINTS_PAST_OBSTACLES }
 }
 
-/// The point lights that stand for a luminaire.
 pub(super) fn parts(luminaire: &Luminaire, points: usize) -> Vec<Part> {
     let whole = vec![Part { offset_m: DVec3::ZERO, share: 1.0 }];
     match luminaire.model {

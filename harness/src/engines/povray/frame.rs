@@ -22,7 +22,6 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The frame of a job.
     pub(super) fn of(job: &Job, coordinates: Coordinates) -> Self {
         if coordinates == Coordinates::Raw {
             return Self { centre_m: DVec3::ZERO, scale: 1.0, light: 1.0 };
@@ -42,7 +41,6 @@ impl Frame {
         if handy && free { metres } else { Self { centre_m, scale: LARGE / size_m.max(f64::MIN_POSITIVE), light } }
     }
 
-    /// A point of the spec in scene units.
     pub(super) fn point(self, p_m: DVec3) -> DVec3 {
         (p_m - self.centre_m) * self.scale
     }

@@ -7,12 +7,9 @@ use super::settings::Settings;
 use crate::engines::Job;
 use crate::engines::settings::Preset;
 
-/// Arguments without and with reflected light.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Options {
-    /// Direct light alone.
     pub(super) direct: Vec<String>,
-    /// Direct and reflected light.
     pub(super) total: Vec<String>,
     /// Direct light just as it is part of `total`: the difference is reflected light, free of the noise of the direct.
     pub(super) part_of_total: Vec<String>,
@@ -34,7 +31,6 @@ const DEFAULT_BOUNCES: u32 = 2;
 /// least near .1 to .2 (case S1: 8e-6 s against 11e-6 at .5 and 2e-5 at .01); at .8 rtrace would cut the divisions.
 const ROULETTE: f64 = 0.15;
 
-/// How the luminaires' light is sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sources {
     /// One sample to the centre: exact for points.
@@ -47,7 +43,6 @@ pub(super) enum Sources {
 }
 
 impl Sources {
-    /// What the luminaires of a job need.
     pub(super) fn of(job: &Job, settings: &Settings) -> Self {
         let has = |wanted: &[Route]| job.scene.luminaires.iter().any(|l| wanted.contains(&route(l, settings)));
         if has(&[Route::Opening]) {
@@ -71,7 +66,6 @@ impl Sources {
 }
 
 impl Options {
-    /// The arguments for a job with a number of ambient divisions.
     pub(super) fn of(job: &Job, settings: &Settings, divisions: u32) -> Self {
         let words = |text: String| -> Vec<String> { text.split(' ').map(str::to_owned).collect() };
         // -I: irradiance at points.
@@ -98,7 +92,6 @@ impl Options {
     }
 }
 
-/// The limit on reflections, if reflected light is asked for.
 fn reflections(job: &Job) -> Option<Bounces> {
     match job.transport {
         Transport::Direct => None,

@@ -29,7 +29,6 @@ const SEEDS: u64 = 8;
 const PROCESSES_A_SEED: usize = 32;
 const MAX_PARALLEL: usize = 8;
 
-/// One job on its bench.
 pub(super) struct Sampler<'a> {
     pub(super) job: &'a Job,
     pub(super) settings: &'a Settings,
@@ -39,13 +38,10 @@ pub(super) struct Sampler<'a> {
     pub(super) started: Instant,
 }
 
-/// Blocks of all light.
 pub(super) struct Sampled {
     pub(super) blocks: Blocks,
     pub(super) divisions: u32,
-    /// The arguments of rtrace.
     pub(super) options: Vec<String>,
-    /// Whether the error asked for was missed, and by how much.
     pub(super) shortfall: Option<String>,
 }
 

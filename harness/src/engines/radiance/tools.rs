@@ -9,13 +9,11 @@ use super::{ID, export};
 use crate::engines::{Absent, EngineError, Site, Version, Workbench};
 use crate::system::process::{self, Invocation};
 
-/// Where the programs and their library are.
 #[derive(Clone, Debug)]
 pub(super) struct Tools {
     package: PathBuf,
 }
 
-/// The octree that oconv makes of `scene.rad`.
 const OCTREE: &str = "scene.oct";
 
 impl Tools {
@@ -41,7 +39,6 @@ impl Tools {
         Ok(Version(version.to_owned()))
     }
 
-    /// Compiles `scene.rad` of the scene's folder.
     pub(super) fn compile(&self, workbench: &Workbench) -> Result<(), EngineError> {
         let run = self.prepared(workbench.invoke(self.program("oconv"))).args(["-f", "scene.rad"]);
         let octree = run.run()?.stdout;
@@ -88,7 +85,6 @@ impl Tools {
         parse(&finished.stdout, rows.len())
     }
 
-    /// The command that runs an exported scene with the programs of this package.
     pub(super) fn command_by_hand(&self) -> String {
         let (here, nothing) = (std::path::Path::new("."), std::time::Duration::ZERO);
         self.prepared(Invocation::new("sh", here, nothing, "")).args(["run.sh"]).command_line_with_env()

@@ -173,7 +173,6 @@ fn meters(job: &Job, settings: &Settings, frame: &Frame) -> String {
     )
 }
 
-/// A white patch and an eye in front of it.
 fn patch_and_eye(station: &Station, frame: &Frame, size: f64) -> (String, String) {
     let (at, normal) = (frame.to_scene(station.meter.position_m), station.meter.normal);
     let radius = PATCH * size;
