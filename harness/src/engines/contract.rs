@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use luminaire::geometry::Surface;
-use luminaire::scene::{LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
+use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
 use serde::{Deserialize, Serialize};
 
 use super::Site;
@@ -163,6 +163,14 @@ impl Job {
         }
     }
 
+    /// The limit on reflections, if reflected light is asked for.
+    pub(super) const fn reflections(&self) -> Option<Bounces> {
+        match self.transport {
+            Transport::Direct => None,
+            Transport::Indirect(bounces) | Transport::Total(bounces) => Some(bounces),
+        }
+    }
+
     pub(super) fn largest_reflectance(&self) -> f64 {
         let room = self.scene.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
         room.chain(self.scene.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
@@ -208,7 +216,6 @@ pub struct Measurement {
     pub method: Method,
     /// How much of it, by which random numbers and where: samples, seeds, commands.
     pub effort: Effort,
-    /// What the reader of the report should know of this run.
     pub notes: Vec<String>,
     /// The independent parts of the readings that were sampled, in the stations' order: their spread is the estimates'
     /// standard error. Empty where nothing was sampled or nobody says.
@@ -249,15 +256,30 @@ impl Measurement {
     }
 }
 
+/// Checks that what was read is named as the meters, in their order.
+pub(super) fn same_meters<'a>(
+    engine: &EngineName,
+    job: &Job,
+    found: impl ExactSizeIterator<Item = &'a str>,
+) -> Result<(), EngineError> {
+    count_readings(engine, job, found.len())?;
+    match found.zip(&job.stations).find(|(found, wanted)| *found != wanted.id.0) {
+        Some((found, wanted)) => {
+            Err(EngineError::output(engine.clone(), format!("gave `{found}` where `{}` was asked for", wanted.id)))
+        }
+        None => Ok(()),
+    }
+}
+
+fn count_readings(engine: &EngineName, job: &Job, found: usize) -> Result<(), EngineError> {
+    let wanted = job.stations.len();
+    let wrong = || EngineError::output(engine.clone(), format!("gave {found} readings for {wanted} meters"));
+    (found == wanted).then_some(()).ok_or_else(wrong)
+}
+
 /// Checks what every engine must hold: one finite, non-negative value a station.
 pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
-    let (found, wanted) = (measurement.estimates.len(), job.stations.len());
-    if found != wanted {
-        return Err(EngineError::Output {
-            engine: engine.clone(),
-            what: format!("gave {found} readings for {wanted} meters"),
-        });
-    }
+    count_readings(engine, job, measurement.estimates.len())?;
     for (estimate, station) in measurement.estimates.iter().zip(&job.stations) {
         let Estimate { value, uncertainty } = *estimate;
         let (engine, meter) = (engine.clone(), station.id.clone());

@@ -6,9 +6,10 @@ mod debian;
 mod venv;
 
 use std::fs::File;
+use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::system::process::ProcessError;
+use crate::system::process::{Invocation, ProcessError};
 
 use super::Site;
 use super::catalogue::ALL;
@@ -72,6 +73,10 @@ fn lock(site: &Site) -> Result<File, InstallError> {
     let file = File::create(&path).map_err(|e| InstallError::io(&path, e))?;
     file.lock().map_err(|e| InstallError::io(&path, e))?;
     Ok(file)
+}
+
+fn step(site: &Site, program: impl Into<PathBuf>) -> Invocation {
+    Invocation::new(program, site.root(), LIMIT, site.root().join("install.log"))
 }
 
 impl Component {

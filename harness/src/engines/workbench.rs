@@ -47,6 +47,11 @@ impl Workbench {
     }
 }
 
+/// An invocation only to be printed, for a person in the scene's folder.
+pub(super) fn by_hand(program: impl Into<PathBuf>) -> Invocation {
+    Invocation::new(program, Path::new("."), Duration::ZERO, "")
+}
+
 #[derive(Debug, thiserror::Error)]
 pub enum EngineError {
     #[error(transparent)]
@@ -69,6 +74,12 @@ pub enum EngineError {
 impl EngineError {
     pub fn io(path: &Path, source: std::io::Error) -> Self {
         Self::Io { path: path.display().to_string(), source }
+    }
+
+    /// What should have been JSON, by its start.
+    pub(super) fn no_readings(engine: EngineName, answer: &str, error: &serde_json::Error) -> Self {
+        let start: String = answer.chars().take(200).collect();
+        Self::output(engine, format!("its answer is no JSON of readings ({error}): `{start}`"))
     }
 
     pub fn output(engine: EngineName, what: impl Into<String>) -> Self {

@@ -5,9 +5,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{InstallError, LIMIT};
+use super::{InstallError, step};
 use crate::engines::Site;
-use crate::system::process::Invocation;
 
 /// The libLLVM packages that Mitsuba works with, the best known first.
 const LLVM_PACKAGES: [&str; 5] = ["libllvm19", "libllvm20", "libllvm18", "libllvm17t64", "libllvm17"];
@@ -18,7 +17,7 @@ pub(super) fn install_povray(site: &Site, progress: &mut dyn FnMut(&str)) -> Res
     apt.install(&["povray"], progress)?;
     let found = site.program("povray").ok_or_else(|| not_there("povray", remedy))?;
     // Seen to start, with the libraries that were unpacked beside it.
-    let mut check = apt.step(&found).args(["--version"]);
+    let mut check = step(site, &found).args(["--version"]);
     if let Some(path) = site.library_path() {
         check = check.env("LD_LIBRARY_PATH", path);
     }
@@ -102,7 +101,7 @@ impl<'a> Apt<'a> {
         let root = self.site.debian();
         fs::create_dir_all(&root).map_err(|e| InstallError::io(&root, e))?;
         for package in &packages {
-            self.step("dpkg").args(["-x".as_ref(), package.as_os_str(), root.as_os_str()]).run()?;
+            step(self.site, "dpkg").args(["-x".as_ref(), package.as_os_str(), root.as_os_str()]).run()?;
             fs::remove_file(package).map_err(|e| InstallError::io(package, e))?;
         }
         Ok(())
@@ -110,7 +109,7 @@ impl<'a> Apt<'a> {
 
     /// Runs apt-get, on our own lists and cache where the system's are not ours to change.
     fn apt(&self, args: &[&str]) -> Result<(), InstallError> {
-        let run = self.step(&self.program).env("DEBIAN_FRONTEND", "noninteractive").env("LC_ALL", "C");
+        let run = step(self.site, &self.program).env("DEBIAN_FRONTEND", "noninteractive").env("LC_ALL", "C");
         if self.system_wide {
             run.args(["-o", "DPkg::Lock::Timeout=600"]).args(args).run()?;
             return Ok(());
@@ -130,10 +129,6 @@ impl<'a> Apt<'a> {
 
     fn state(&self) -> PathBuf {
         self.site.root().join("apt")
-    }
-
-    fn step(&self, program: impl Into<PathBuf>) -> Invocation {
-        Invocation::new(program, self.site.root(), LIMIT, self.site.root().join("install.log"))
     }
 }
 

@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::{InstallError, LIMIT};
+use super::{InstallError, step};
 use crate::engines::Site;
-use crate::system::process::Invocation;
 
 const LOCK: &str = include_str!("../../../engines.lock");
 
@@ -83,10 +82,6 @@ fn remove(path: &Path) -> Result<(), InstallError> {
         Ok(_) => fs::remove_file(path),
     };
     removed.map_err(|e| InstallError::io(path, e))
-}
-
-fn step(site: &Site, program: impl Into<PathBuf>) -> Invocation {
-    Invocation::new(program, site.root(), LIMIT, site.root().join("install.log"))
 }
 
 fn folder_name() -> String {

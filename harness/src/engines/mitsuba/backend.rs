@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde::Deserialize;
 
 use super::settings::Settings;
+use crate::engines::workbench::by_hand;
 use crate::engines::{Absent, Site, Version, Workbench};
 use crate::system::process::Invocation;
 
@@ -65,8 +66,7 @@ impl Backend {
     }
 
     pub(super) fn command_by_hand(&self) -> String {
-        let run =
-            Invocation::new(&self.python, Path::new("."), Duration::ZERO, "").args(["mitsuba_read.py", "job.json"]);
+        let run = by_hand(&self.python).args(["mitsuba_read.py", "job.json"]);
         match &self.llvm {
             Some(library) => run.env("DRJIT_LIBLLVM_PATH", library),
             None => run.args(["--variant", "scalar_rgb"]),

@@ -164,17 +164,11 @@ fn header(job: &Job, what: &str) -> String {
 /// Mitsuba's depth counts the segments of a path from the meter to the luminaire: N reflections are depth N + 1.
 fn integrator(job: &Job, kind: &str) -> String {
     let highest = job.largest_reflectance();
-    let (max_depth, rr_depth, why) = match job.transport {
-        Transport::Direct => (1, 5, "direct light only".to_owned()),
-        Transport::Indirect(Bounces::AtMost(n)) | Transport::Total(Bounces::AtMost(n)) => {
-            (i64::from(n) + 1, 5, format!("{n} diffuse reflections"))
-        }
-        Transport::Indirect(Bounces::Converged) | Transport::Total(Bounces::Converged)
-            if highest < HIGH_REFLECTANCE =>
-        {
-            (-1, 5, "all reflections".to_owned())
-        }
-        Transport::Indirect(Bounces::Converged) | Transport::Total(Bounces::Converged) => {
+    let (max_depth, rr_depth, why) = match job.reflections() {
+        None => (1, 5, "direct light only".to_owned()),
+        Some(Bounces::AtMost(n)) => (i64::from(n) + 1, 5, format!("{n} diffuse reflections")),
+        Some(Bounces::Converged) if highest < HIGH_REFLECTANCE => (-1, 5, "all reflections".to_owned()),
+        Some(Bounces::Converged) => {
             let n = reflections_until(highest, 0.1 * job.budget.relative_error);
             let why = format!(
                 "{n} reflections leave less than a tenth of the relative error asked for; no Russian roulette, which \

@@ -18,7 +18,6 @@ fn read(job: &Job) -> Measurement {
     read_tampered(job, |_, text| text)
 }
 
-/// Reads after every text file went through `tamper(name, text)`.
 fn read_tampered(job: &Job, tamper: impl Fn(&str, String) -> String) -> Measurement {
     let engine = Mitsuba::default();
     let folder = tempfile::tempdir().unwrap();

@@ -91,10 +91,7 @@ impl<'a> Bench<'a> {
         while let Some(k) = looks.iter().position(|l| matches!(l, Look::Again(_))) {
             if taken == MAX_LOOKS {
                 let id = &self.job.stations[k].id;
-                return Err(EngineError::output(
-                    ID,
-                    format!("direct light at {id} was not read after {MAX_LOOKS} looks"),
-                ));
+                return Err(output(format!("direct light at {id} was not read after {MAX_LOOKS} looks")));
             }
             taken += 1;
             let readouts: Vec<Readout> = looks.iter().map(Look::readout).collect();
@@ -190,7 +187,7 @@ impl<'a> Bench<'a> {
                 return Ok(Pilot { readouts, wall_s });
             }
         }
-        Err(EngineError::output(ID, format!("reflected light was not read after {MAX_LOOKS} looks")))
+        Err(output(format!("reflected light was not read after {MAX_LOOKS} looks")))
     }
 
     /// Blocks, `jobs` of them side by side, each a process of one thread.
@@ -241,10 +238,7 @@ impl<'a> Bench<'a> {
             Seen::Missed => Err(self.missed(k)),
             Seen::Above => {
                 let id = &self.job.stations[k].id;
-                Err(EngineError::output(
-                    ID,
-                    format!("block {} reads {id} hundreds of times off the first block", run.seed),
-                ))
+                Err(output(format!("block {} reads {id} hundreds of times off the first block", run.seed)))
             }
         };
         seen.into_iter().enumerate().map(value).collect()
@@ -269,10 +263,8 @@ impl<'a> Bench<'a> {
         std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
         let blanks = run.blanks();
         if pixels.len() != blanks + readouts.len() {
-            return Err(EngineError::output(
-                ID,
-                format!("gave {} pixels for {} meters and {blanks} blanks", pixels.len(), readouts.len()),
-            ));
+            let (found, wanted) = (pixels.len(), readouts.len());
+            return Err(output(format!("gave {found} pixels for {wanted} meters and {blanks} blanks")));
         }
         Ok(readouts.iter().zip(pixels.into_iter().skip(blanks)).map(|(r, p)| pixels::decode(*r, p)).collect())
     }
@@ -306,10 +298,8 @@ impl<'a> Bench<'a> {
     }
 
     fn missed(&self, k: usize) -> EngineError {
-        EngineError::output(
-            ID,
-            format!("the disc of {} was not seen: something hides it from 2 mm away", self.job.stations[k].id),
-        )
+        let id = &self.job.stations[k].id;
+        output(format!("the disc of {id} was not seen: something hides it from 2 mm away"))
     }
 }
 
@@ -318,6 +308,10 @@ const DIRECT_RELATIVE: f64 = 5e-7;
 /// A map's error relative to the largest intensity, as measured: one plane, and several.
 const AXIAL_TABLE: f64 = 2e-7;
 const BILINEAR_TABLE: f64 = 1e-6;
+
+fn output(what: String) -> EngineError {
+    EngineError::output(ID, what)
+}
 
 struct Pilot {
     readouts: Vec<Readout>,

@@ -12,7 +12,6 @@ use crate::engines::Budget;
 use crate::engines::fixtures::{self, CONVERGED as INDIRECT, axial_uplight as uplight, *};
 use crate::system::process::ProcessError;
 
-/// A fault and how to put it into a job.
 type Tamper = (&'static str, fn(&mut Job));
 
 fn site() -> Site {
@@ -280,7 +279,6 @@ fn out_of_the_box_povray_is_far_off_and_says_so() {
     assert!(off > 0.05 && off < size, "off by {off}, said to be within {size}");
 }
 
-/// A site whose povray is a shell script.
 fn read_with(script: &str, limit_s: f64) -> EngineError {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path().join("engines");

@@ -1,6 +1,6 @@
 //! The arguments of rtrace for each preset.
 
-use luminaire::scene::{Bounces, Transport};
+use luminaire::scene::Bounces;
 
 use super::route::{Route, route};
 use super::settings::Settings;
@@ -70,7 +70,7 @@ impl Options {
         let words = |text: String| -> Vec<String> { text.split(' ').map(str::to_owned).collect() };
         // -I: irradiance at points.
         if settings.preset == Preset::Default {
-            let bounces = match reflections(job) {
+            let bounces = match job.reflections() {
                 Some(Bounces::AtMost(n)) => n,
                 Some(Bounces::Converged) => DEFAULT_BOUNCES,
                 None => 0,
@@ -92,16 +92,9 @@ impl Options {
     }
 }
 
-fn reflections(job: &Job) -> Option<Bounces> {
-    match job.transport {
-        Transport::Direct => None,
-        Transport::Indirect(bounces) | Transport::Total(bounces) => Some(bounces),
-    }
-}
-
 /// `-ab`: how many bounces are followed.
 pub(super) fn bounces(job: &Job) -> u32 {
-    match reflections(job) {
+    match job.reflections() {
         None => 0,
         Some(Bounces::AtMost(n)) => n,
         Some(Bounces::Converged) => {
@@ -114,7 +107,7 @@ pub(super) fn bounces(job: &Job) -> u32 {
 
 /// The largest part of the light that a converged run can miss for the limit on bounces.
 pub(super) fn remainder(job: &Job) -> f64 {
-    match reflections(job) {
+    match job.reflections() {
         Some(Bounces::Converged) => job.largest_reflectance().powi(bounces(job) as i32),
         _ => 0.0,
     }

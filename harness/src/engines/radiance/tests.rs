@@ -14,7 +14,6 @@ pub(super) fn within(relative_error: f64, job: Job) -> Job {
     Job { budget: Budget { relative_error, seconds: 60.0 }, ..job }
 }
 
-/// Reads after every file went through `tamper(name, text)`.
 fn read_tampered(job: &Job, tamper: impl Fn(&str, String) -> String) -> Measurement {
     let folder = tempfile::tempdir().unwrap();
     let bench = workbench(Site::of_user().unwrap(), folder.path());
