@@ -1,13 +1,12 @@
 //! The arguments of rtrace for each preset.
 
-use luminaire::scene::{Bounces, Transport};
+use luminaire::scene::Bounces;
 
 use super::route::{Route, route};
 use super::settings::Settings;
 use crate::engines::Job;
 use crate::engines::settings::Preset;
 
-/// Arguments without and with reflected light.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Options {
     pub(super) direct: Vec<String>,
@@ -32,7 +31,6 @@ const DEFAULT_BOUNCES: u32 = 2;
 /// least near .1 to .2 (case S1: 8e-6 s against 11e-6 at .5 and 2e-5 at .01); at .8 rtrace would cut the divisions.
 const ROULETTE: f64 = 0.15;
 
-/// How the luminaires' light is sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sources {
     /// One sample to the centre: exact for points.
@@ -68,12 +66,11 @@ impl Sources {
 }
 
 impl Options {
-    /// The arguments for a job with a number of ambient divisions.
     pub(super) fn of(job: &Job, settings: &Settings, divisions: u32) -> Self {
         let words = |text: String| -> Vec<String> { text.split(' ').map(str::to_owned).collect() };
         // -I: irradiance at points.
         if settings.preset == Preset::Default {
-            let bounces = match reflections(job) {
+            let bounces = match job.reflections() {
                 Some(Bounces::AtMost(n)) => n,
                 Some(Bounces::Converged) => DEFAULT_BOUNCES,
                 None => 0,
@@ -95,17 +92,9 @@ impl Options {
     }
 }
 
-/// The limit on reflections, if reflected light is asked for.
-fn reflections(job: &Job) -> Option<Bounces> {
-    match job.transport {
-        Transport::Direct => None,
-        Transport::Indirect(bounces) | Transport::Total(bounces) => Some(bounces),
-    }
-}
-
 /// `-ab`: how many bounces are followed.
 pub(super) fn bounces(job: &Job) -> u32 {
-    match reflections(job) {
+    match job.reflections() {
         None => 0,
         Some(Bounces::AtMost(n)) => n,
         Some(Bounces::Converged) => {
@@ -118,7 +107,7 @@ pub(super) fn bounces(job: &Job) -> u32 {
 
 /// The largest part of the light that a converged run can miss for the limit on bounces.
 pub(super) fn remainder(job: &Job) -> f64 {
-    match reflections(job) {
+    match job.reflections() {
         Some(Bounces::Converged) => job.largest_reflectance().powi(bounces(job) as i32),
         _ => 0.0,
     }
