@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::words::unique;
 use crate::record::ReadingKey;
 
-/// A run held against accepted readings.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct BaselineCheck {
     pub file: String,
@@ -31,21 +31,15 @@ impl BaselineCheck {
         self.entries.iter().all(|e| e.is_as_accepted)
     }
 
-    /// What asks for attention.
     pub(super) fn departures(&self) -> impl Iterator<Item = &BaselineLine> {
         self.entries.iter().filter(|e| !e.is_as_accepted)
     }
 
     /// How many entries are in which state: `4 unchanged, 1 REFUSED`.
     pub(super) fn counts(&self) -> String {
-        let mut states: Vec<(&str, usize)> = vec![];
-        for entry in &self.entries {
-            match states.iter_mut().find(|(state, _)| *state == entry.state) {
-                Some((_, count)) => *count += 1,
-                None => states.push((&entry.state, 1)),
-            }
-        }
-        let counts: Vec<String> = states.iter().map(|(state, count)| format!("{count} {state}")).collect();
+        let of = |state: &String| self.entries.iter().filter(|e| e.state == *state).count();
+        let states = unique(self.entries.iter().map(|e| &e.state));
+        let counts: Vec<String> = states.iter().map(|state| format!("{} {state}", of(state))).collect();
         if counts.is_empty() { "nothing to compare".to_owned() } else { counts.join(", ") }
     }
 }

@@ -15,8 +15,7 @@ pub fn budgets(report: &Report) -> String {
     let mut text =
         "Error budgets: standard uncertainties in percent of the reference (GUM); interval = k u\n".to_owned();
     let kind = |c: &Comparison| (c.key.case.clone(), c.key.procedure, c.key.engine.clone(), c.basis_name());
-    let kinds = unique(report.comparisons.iter().filter(|c| c.budget.is_some()).map(kind));
-    for found in kinds {
+    for found in unique(report.comparisons.iter().filter(|c| c.budget.is_some()).map(kind)) {
         let of_kind = report.comparisons.iter().filter(|c| kind(c) == found);
         let mut mine: Vec<(&Comparison, &ErrorBudget)> =
             of_kind.filter_map(|c| c.budget.as_ref().map(|b| (c, b))).collect();

@@ -1,9 +1,8 @@
-//! CSV: one line a comparison, all digits, for spreadsheets and statistics.
+//! CSV (RFC 4180): one line a comparison, all digits, for spreadsheets and statistics.
 
 use super::Report;
 use crate::judge::{Basis, Comparison};
 
-/// The comparisons as CSV (RFC 4180).
 pub fn csv(report: &Report) -> String {
     let mut writer = csv::Writer::from_writer(vec![]);
     // Writing to memory fails on no condition that a report can meet; a file without lines would be noticed at once.

@@ -28,16 +28,14 @@ pub fn curves(case: &str, task: &Task) -> Vec<Curve> {
     let [luminaire] = &task.scene.luminaires[..] else { return vec![] };
     let distribution = &luminaire.photometry.distribution;
     let gamma_deg = distribution.gamma_deg();
+    let intensity_cd = |c, gamma| distribution.intensity(c, gamma).value() * luminaire.flux_scale;
     let of_plane = |c_deg: f64| Curve {
         case: case.to_owned(),
         procedure: task.procedure,
         luminaire: luminaire.id.clone(),
         c_deg,
         gamma_deg: gamma_deg.to_vec(),
-        intensity_cd: gamma_deg
-            .iter()
-            .map(|&gamma| distribution.intensity(c_deg, gamma).value() * luminaire.flux_scale)
-            .collect(),
+        intensity_cd: gamma_deg.iter().map(|&gamma| intensity_cd(c_deg, gamma)).collect(),
     };
     planes.into_iter().map(of_plane).collect()
 }

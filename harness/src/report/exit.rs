@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 use crate::judge::{Comparison, Verdict};
 use crate::plan::Skip;
 
-/// Comparisons by verdict, and skips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
     pub pass: usize,
@@ -19,7 +18,6 @@ pub struct Summary {
     pub known_deviation: usize,
     /// Deviations on record that are gone.
     pub unexpected_pass: usize,
-    /// Without reading or reference.
     pub missing: usize,
     /// Procedures of engines without a reading; what was read without rendering is among the skips, but not here.
     pub skipped: usize,
@@ -67,7 +65,6 @@ pub enum Exit {
 }
 
 impl Exit {
-    /// The process exit code.
     pub const fn code(self) -> u8 {
         match self {
             Self::Passed => 0,

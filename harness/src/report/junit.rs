@@ -7,7 +7,6 @@ use crate::judge::{Comparison, Verdict};
 use crate::plan::Skip;
 use crate::record::ReadingKey;
 
-/// The report as JUnit XML: one suite a case.
 pub fn junit(report: &Report) -> String {
     let mut junit = JUnit::new("luxproof");
     for case in &report.cases {
@@ -28,12 +27,11 @@ pub fn junit(report: &Report) -> String {
 fn accepted(check: &BaselineCheck) -> TestSuite {
     let mut suite = TestSuite::new(format!("baseline {}", check.file));
     for entry in &check.entries {
-        let mut status = TestCaseStatus::success();
-        if !entry.is_as_accepted {
-            status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-            status.set_message(entry.state.clone());
-            status.set_description(entry.details.join("\n"));
-        }
+        let status = if entry.is_as_accepted {
+            TestCaseStatus::success()
+        } else {
+            failure(entry.state.clone(), entry.details.join("\n"))
+        };
         suite.add_test_case(test_case(&entry.key, " baseline", status));
     }
     suite
@@ -52,10 +50,8 @@ fn suite(report: &Report, name: &str) -> TestSuite {
         }
         suite.add_test_case(case);
     }
-    for skip in report.skips.iter().filter(|s| s.key.case == name) {
-        if report.recordings.iter().any(|r| r.key == skip.key) {
-            continue;
-        }
+    let is_unread = |s: &&Skip| report.recordings.iter().all(|r| r.key != s.key);
+    for skip in report.skips.iter().filter(|s| s.key.case == name).filter(is_unread) {
         let mut status = TestCaseStatus::skipped();
         status.set_message(told(skip));
         suite.add_test_case(test_case(&skip.key, "", status));
@@ -77,10 +73,8 @@ fn status(comparisons: &[&Comparison]) -> TestCaseStatus {
     let bad: Vec<&&Comparison> = comparisons.iter().filter(|c| c.verdict.is_bad()).collect();
     let undecided = comparisons.iter().filter(|c| c.verdict == Verdict::Inconclusive).count();
     if !bad.is_empty() {
-        let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-        status.set_message(format!("{} of {} comparisons failed", bad.len(), comparisons.len()));
-        status.set_description(bad.iter().map(|c| line(c)).collect::<Vec<_>>().join("\n"));
-        status
+        let message = format!("{} of {} comparisons failed", bad.len(), comparisons.len());
+        failure(message, bad.iter().map(|c| line(c)).collect::<Vec<_>>().join("\n"))
     } else if undecided > 0 {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
         status.set_message(format!("{undecided} of {} comparisons undecided within budget", comparisons.len()));
@@ -88,6 +82,12 @@ fn status(comparisons: &[&Comparison]) -> TestCaseStatus {
     } else {
         TestCaseStatus::success()
     }
+}
+
+fn failure(message: String, description: String) -> TestCaseStatus {
+    let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+    status.set_message(message).set_description(description);
+    status
 }
 
 fn line(c: &Comparison) -> String {

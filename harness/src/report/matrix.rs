@@ -21,13 +21,11 @@ pub(super) enum Cell {
     /// The engine is what others are judged by here.
     IsReference,
     Skipped,
-    /// Nothing to compare.
     Empty,
     Judged {
         verdict: Verdict,
         /// How many comparisons have it.
         having: usize,
-        /// How many there are.
         of: usize,
         /// The largest relative deviation, signed.
         deviation: Option<f64>,
@@ -50,14 +48,12 @@ impl Cell {
 }
 
 pub(super) fn matrix(report: &Report) -> Vec<Row> {
-    let cases = || report.cases.iter().map(|c| c.name.as_str());
     let of_case = |case| report.procedures().into_iter().map(move |procedure| (case, procedure));
     let mut rows = vec![];
-    for (case, procedure) in cases().flat_map(of_case) {
+    for (case, procedure) in report.cases.iter().map(|c| c.name.as_str()).flat_map(of_case) {
         let comparisons: Vec<&Comparison> =
             report.comparisons.iter().filter(|c| c.key.is_of(case, procedure)).collect();
-        let bases: BTreeSet<Option<Basis>> = comparisons.iter().map(|c| c.basis()).collect();
-        for basis in bases {
+        for basis in comparisons.iter().map(|c| c.basis()).collect::<BTreeSet<Option<Basis>>>() {
             let of_row: Vec<&Comparison> = comparisons.iter().copied().filter(|c| c.basis() == basis).collect();
             let key = |engine: &EngineName| ReadingKey::new(case, procedure, engine.clone());
             rows.push(Row {

@@ -15,6 +15,7 @@ mod terminal;
 mod words;
 
 use std::collections::BTreeSet;
+use std::time::SystemTime;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,7 +23,6 @@ use serde::{Deserialize, Serialize};
 use crate::judge::{Comparison, Consensus, PaperSplit, PublishedTable, Split};
 use crate::plan::Skip;
 use crate::record::{EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Status};
-
 use crate::spec::Case;
 
 pub use accepted::{BaselineCheck, BaselineLine};
@@ -35,15 +35,13 @@ pub use junit::junit;
 pub use markdown::markdown;
 pub use terminal::{Detail, Style, terminal};
 
-/// Everything that is known of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Report {
     /// Version of the format: 1.
     pub luxproof: u32,
     pub tool_version: String,
     /// When the run started (RFC 3339, UTC).
     pub started: String,
-    /// Wall-clock seconds of the run.
     pub wall_s: f64,
     pub spec: SpecRecord,
     pub engines: Vec<EngineStatus>,
@@ -70,17 +68,14 @@ pub struct Report {
     /// What the photometric files say where their luminous intensity is read back.
     #[serde(default)]
     pub curves: Vec<Curve>,
-    /// The cases, in their order.
     #[serde(default)]
     pub cases: Vec<CaseRecord>,
     /// How the run compares with its baseline, where it was held against one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baseline: Option<BaselineCheck>,
-    /// Comparisons by verdict.
     pub summary: Summary,
 }
 
-/// One case of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct CaseRecord {
     pub name: String,
@@ -88,7 +83,7 @@ pub struct CaseRecord {
 }
 
 /// What was run.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct SpecRecord {
     /// The spec's path as given.
     pub path: String,
@@ -98,13 +93,11 @@ pub struct SpecRecord {
 }
 
 impl SpecRecord {
-    /// That of one case.
     pub fn of(case: &Case) -> Self {
         Self { path: case.path.display().to_string(), sha256: case.sha256.clone(), title: case.title.clone() }
     }
 }
 
-/// One reading of one engine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReadingRecord {
     #[serde(flatten)]
@@ -114,43 +107,28 @@ pub struct ReadingRecord {
     pub reading: Reading,
 }
 
-/// What a report of one case is made of, besides the comparisons.
-pub struct ReportInputs<'a> {
-    pub case: String,
-    pub spec: SpecRecord,
-    pub started: std::time::SystemTime,
-    pub wall_s: f64,
-    pub engines: Vec<EngineStatus>,
-    pub recordings: &'a [Recording],
-    pub skips: Vec<Skip>,
-    pub splits: Vec<Split>,
-    pub consensus: Vec<Consensus>,
-    pub published: Vec<PublishedTable>,
-    pub curves: Vec<Curve>,
-}
-
 impl Report {
-    pub fn new(inputs: ReportInputs<'_>, comparisons: Vec<Comparison>) -> Self {
-        let recordings = inputs.recordings;
+    /// What readings and skips of a case say by themselves; what else is known of the run the caller adds.
+    pub fn new(
+        case: &Case,
+        started: SystemTime,
+        recordings: &[Recording],
+        comparisons: Vec<Comparison>,
+        skips: Vec<Skip>,
+    ) -> Self {
+        let spec = SpecRecord::of(case);
         Self {
             luxproof: 1,
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
-            started: humantime::format_rfc3339_seconds(inputs.started).to_string(),
-            wall_s: inputs.wall_s,
-            cases: vec![CaseRecord { name: inputs.case, spec: inputs.spec.clone() }],
-            spec: inputs.spec,
-            engines: inputs.engines,
+            started: humantime::format_rfc3339_seconds(started).to_string(),
+            cases: vec![CaseRecord { name: case.name.clone(), spec: spec.clone() }],
+            spec,
             readings: recordings.iter().flat_map(readings).collect(),
             recordings: recordings.iter().map(|r| Recording { readings: vec![], ..r.clone() }).collect(),
-            summary: Summary::of(&comparisons, &inputs.skips),
+            summary: Summary::of(&comparisons, &skips),
             comparisons,
-            skips: inputs.skips,
-            splits: inputs.splits,
-            paper_splits: vec![],
-            consensus: inputs.consensus,
-            published: inputs.published,
-            curves: inputs.curves,
-            baseline: None,
+            skips,
+            ..Self::default()
         }
     }
 
@@ -180,12 +158,10 @@ impl Report {
             }
             all
         });
-        let Some(joined) = joined else { unreachable!("a suite without cases is refused") };
+        let Some(mut joined) = joined else { unreachable!("a suite without cases is refused") };
         let summary = Summary::of(&joined.comparisons, &joined.skips);
-        let order = |e: &EngineStatus| crate::engines::all().iter().position(|known| known.name() == e.id);
-        let mut engines = joined.engines;
-        engines.sort_by_key(order);
-        let joined = Self { spec, engines, summary, ..joined };
+        joined.engines.sort_by_key(|e| crate::engines::all().iter().position(|known| known.name() == e.id));
+        let joined = Self { spec, summary, ..joined };
         Self { paper_splits: papers::splits(&joined), ..joined }
     }
 
@@ -198,7 +174,6 @@ impl Report {
         if self.is_suite() { format!("{case}{after}") } else { String::new() }
     }
 
-    /// The exit code that the run deserves.
     pub fn exit(&self) -> Exit {
         let engine = |e: &EngineStatus| match e.status {
             Status::Failed => Exit::Engine,

@@ -21,7 +21,6 @@ const BRIEF_WIDTH: usize = 156;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     Plain,
-    /// With ANSI colours.
     Colour,
 }
 
@@ -90,7 +89,6 @@ fn baseline(report: &Report, detail: Detail, text: &mut String) {
     writeln!(text).ok();
 }
 
-/// Papers' tables, readings side by side, methods apart from renderers.
 fn tables(report: &Report, style: Style, text: &mut String) {
     for grid in papers::grids(report) {
         let places = 1..grid.head.len() - 1;

@@ -12,7 +12,6 @@ use crate::procedures::{Aspect, Target, Task};
 /// Finer tables than this, in candela, are not written by photometers.
 const FINEST_DECIMALS: i32 = 6;
 
-/// What the tables' last digits leave open in one task.
 pub(in crate::judge) struct Input<'a> {
     task: &'a Task,
     /// Half the last digit of each luminaire's table, in candela, dimming included.

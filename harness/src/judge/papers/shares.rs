@@ -12,7 +12,6 @@ use serde::{Deserialize, Serialize};
 use super::PublishedFlux;
 use crate::record::{Estimate, MeterId};
 
-/// One place and column of a paper, split.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PaperSplit {
     pub table: String,
@@ -32,7 +31,6 @@ pub struct PaperSplit {
     pub remainder: Share,
 }
 
-/// A share of the whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Share {
     /// Relative to the printed calculation.
@@ -41,22 +39,15 @@ pub struct Share {
     pub uncertainty: f64,
 }
 
-/// The values between which the steps lie.
+/// The values between which the steps lie, in the order told above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stages {
-    /// As the paper prints its calculation.
     pub printed_method: Estimate,
-    /// The same method on our file.
     pub method: Estimate,
-    /// Exact, with all reflections, of a point.
     pub exact: Estimate,
-    /// The same with the paper's number of reflections.
     pub exact_cut: Estimate,
-    /// The same of the paper's luminaire model.
     pub exact_model: Estimate,
-    /// Our run of the paper's renderer.
     pub rendered: Estimate,
-    /// As the paper prints its rendering.
     pub printed: Estimate,
 }
 

@@ -14,7 +14,6 @@ use crate::judge::{Basis, Reference};
 use crate::procedures::{Target, Task};
 use crate::record::{Estimate, MeterId, ProcedureId, Quantity, Uncertainty};
 
-/// The tables of one paper.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
@@ -34,7 +33,6 @@ pub struct PublishedFlux {
     pub value_lm: f64,
     /// Half the width of the interval that holds it.
     pub half_width_lm: f64,
-    /// How that is known.
     pub source: String,
 }
 
@@ -95,7 +93,6 @@ struct Row {
 pub struct PublishedTable {
     pub title: String,
     pub name: String,
-    /// The procedure that reads its values.
     pub procedure: ProcedureId,
     pub quantity: Quantity,
     /// The cases that are held against it.
@@ -105,7 +102,6 @@ pub struct PublishedTable {
     /// Units of the last printed digit that a cell is uncertain by.
     #[serde(default)]
     pub units_in_last_digit: f64,
-    /// The luminaire's flux, as far as the tables tell.
     pub flux: Option<PublishedFlux>,
     pub columns: Vec<PublishedColumn>,
     /// Its rows, in the order of the meters.
@@ -124,13 +120,11 @@ impl PublishedTable {
     }
 }
 
-/// A column of a published table.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct PublishedColumn {
     pub name: String,
     /// Whether it is what the paper judges its other columns by.
     pub reference: bool,
-    /// What it holds, in a sentence.
     pub meaning: String,
     /// The engine whose readings stand beside it.
     #[serde(default)]
@@ -139,17 +133,14 @@ pub struct PublishedColumn {
     pub model: String,
 }
 
-/// A row of a published table.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct PublishedRow {
     pub meter: MeterId,
     /// The place: gamma in degrees, or the position in metres.
     pub place: String,
-    /// The printed digits by column.
     pub cells: BTreeMap<String, String>,
 }
 
-/// Why published tables cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {message}")]
 pub struct PublishedError {
@@ -193,19 +184,12 @@ impl Published {
             let same_model = column.model == model || column.also.contains(&model);
             same_bounces && (derived || (same_model && (column.engine == engine || (column.reference && closed_form))))
         };
-        let columns = table.columns.iter().filter(|(_, column)| compared(column));
         let reference = |(name, column): (&String, &Column)| {
             let cell = self.cell(row.cells.get(name)?, table.decimals(name))?;
-            Some(Reference {
-                value: cell.value,
-                uncertainty: cell.uncertainty.standard(),
-                degrees_of_freedom: None,
-                coverage_factor: None,
-                basis: self.citation.basis,
-                source: format!("{}, {}, {name}: {}", self.citation.title, table.name, column.meaning),
-            })
+            let source = format!("{}, {}, {name}: {}", self.citation.title, table.name, column.meaning);
+            Some(Reference::of(cell.value, &cell.uncertainty, self.citation.basis, source))
         };
-        columns.filter_map(reference).collect()
+        table.columns.iter().filter(|(_, column)| compared(column)).filter_map(reference).collect()
     }
 
     /// The table of a task as printed, rows at its targets alone; `None` where the paper has none, or these are derived

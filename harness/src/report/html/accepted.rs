@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::super::BaselineCheck;
-use super::{minus, table, title};
+use super::{minus, table};
 
 pub(super) fn section(check: &BaselineCheck) -> Markup {
     html! {
@@ -13,7 +13,7 @@ pub(super) fn section(check: &BaselineCheck) -> Markup {
             @for entry in &check.entries {
                 @let (class, glyph) = if entry.is_as_accepted { ("v-pass", "✓") } else { ("v-fail", "✕") };
                 tr {
-                    th scope="row" { (entry.key.case) } td { (title(entry.key.procedure)) } td { (entry.key.engine) }
+                    th scope="row" { (entry.key.case) } td { (entry.key.procedure.row().title) } td { (entry.key.engine) }
                     td class=(class) { span.glyph aria-hidden="true" { (glyph) } " " (entry.state.to_lowercase()) }
                     td.wide { @for (k, detail) in entry.details.iter().enumerate() { @if k > 0 { br; } (minus(detail)) } }
                 }

@@ -15,7 +15,6 @@ pub enum Beside {
     Stress(Vec<StressLaw>),
 }
 
-/// Why a file cannot be shown beside a report.
 #[derive(Debug, thiserror::Error)]
 pub enum BesideError {
     #[error("it is no JSON: {0}")]
@@ -26,7 +25,6 @@ pub enum BesideError {
     Unknown,
 }
 
-/// One engine's error against run time.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BenchCurve {
     pub engine: EngineName,
@@ -42,7 +40,6 @@ pub struct BenchPoint {
     pub relative_error_high: Option<f64>,
 }
 
-/// How one engine keeps one law.
 #[derive(Clone, Debug, Deserialize)]
 pub struct StressLaw {
     pub engine: EngineName,
@@ -51,9 +48,7 @@ pub struct StressLaw {
     /// Magnitude at which the deviation first passes the fraction.
     #[serde(default)]
     pub breaks_at: BTreeMap<String, Option<f64>>,
-    /// In which way it breaks.
     pub how: Option<String>,
-    /// The first magnitude that the engine refuses.
     pub refused_at: Option<f64>,
     /// The causes on record, where all that breaks is known.
     #[serde(default)]
@@ -67,7 +62,6 @@ struct File {
 }
 
 impl Beside {
-    /// Reads what a file holds, whichever of the two it is.
     pub fn from_json(text: &str) -> Result<Self, BesideError> {
         match serde_json::from_str::<File>(text)? {
             File { curves: Some(curves), .. } => Ok(Self::Bench(curves)),
@@ -77,15 +71,15 @@ impl Beside {
     }
 }
 
-/// The stress matrix, if any file holds one.
 pub(super) fn stress_section(beside: &[Beside], palette: &Palette) -> Option<Markup> {
     let laws: Vec<&StressLaw> =
         beside.iter().filter_map(|b| if let Beside::Stress(laws) = b { Some(laws) } else { None }).flatten().collect();
     if laws.is_empty() {
         return None;
     }
-    let engines = palette.in_order(laws.iter().map(|law| law.engine.as_str()));
-    let names = unique(laws.iter().map(|law| law.law.as_str()));
+    let names = unique(laws.iter().map(|l| l.law.as_str()));
+    let mut engines = unique(laws.iter().map(|l| l.engine.as_str()));
+    engines.sort_by_key(|e| palette.order(e));
     let known: Vec<&StressLaw> = laws.iter().copied().filter(|l| !l.known.is_empty()).collect();
     Some(html! {
         h2 id="stress-title" { "Numerical stability" }
@@ -111,8 +105,8 @@ pub(super) fn stress_section(beside: &[Beside], palette: &Palette) -> Option<Mar
 
 fn stress_cell(law: Option<&&StressLaw>) -> Markup {
     let Some(law) = law else { return html! { td.quiet { "–" } } };
-    let breaks: Vec<(&str, f64)> =
-        ["0.001", "0.01", "0.1"].iter().filter_map(|k| Some((*k, law.breaks_at.get(*k).copied().flatten()?))).collect();
+    let at = |(key, name): (&str, &'static str)| Some((name, law.breaks_at.get(key).copied().flatten()?));
+    let first_break = [("0.001", "0.1 %"), ("0.01", "1 %"), ("0.1", "10 %")].into_iter().find_map(at);
     let class = match (law.worst_deviation, law.how.as_deref()) {
         (_, Some(_)) if !law.known.is_empty() => "v-known",
         (None, None) => "quiet",
@@ -121,18 +115,10 @@ fn stress_cell(law: Option<&&StressLaw>) -> Markup {
         (Some(d), _) if d.abs() >= 0.001 => "v-undecided",
         _ => "v-pass",
     };
-    let name = |key: &str| match key {
-        "0.001" => "0.1 %",
-        "0.01" => "1 %",
-        _ => "10 %",
-    };
     html! {
         td class=(class) {
-            div {
-                (worst(law))
-                @if let Some(how) = &law.how { " " (how.replace('_', " ")) }
-            }
-            @if let Some((key, at)) = breaks.first() { div.most { (name(key)) " at " (format!("{at:e}")) } }
+            div { (worst(law)) @if let Some(how) = &law.how { " " (how.replace('_', " ")) } }
+            @if let Some((name, at)) = first_break { div.most { (name) " at " (format!("{at:e}")) } }
             @if let (Some(at), Some(_)) = (law.refused_at, law.worst_deviation) { div.most { "refuses at " (format!("{at:e}")) } }
             @if !law.known.is_empty() { div.most { "known deviation" } }
         }

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::super::Report;
 use super::super::matrix::{Cell, matrix};
 use super::palette::Palette;
-use super::{class, glyph, percent, title};
+use super::{class, glyph, percent};
 use crate::judge::Verdict;
 use crate::record::ProcedureId;
 
@@ -32,7 +32,7 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
                         }
                         @for row in rows.iter().filter(|r| r.case == case) {
                             tr {
-                                th scope="row" { (title(row.procedure)) }
+                                th scope="row" { (row.procedure.row().title) }
                                 td.basis { (row.basis) }
                                 @for (engine, cell) in report.engines.iter().zip(&row.cells) {
                                     (drawn(cell, row.procedure, [case, row.basis, &engine.id]))
@@ -59,7 +59,7 @@ fn drawn(cell: &Cell, procedure: ProcedureId, [case, basis, engine]: [&str; 3]) 
         Cell::Judged { verdict, having, of, deviation } => html! {
             td class={ "v-" (class(*verdict)) } {
                 button.open type="button" data-case=(case) data-procedure=(procedure) data-basis=(basis) data-engine=(engine){
-                    span.unseen { (engine) ", " (title(procedure)) " against " (basis) ": " (verdict.name()) " " }
+                    span.unseen { (engine) ", " (procedure.row().title) " against " (basis) ": " (verdict.name()) " " }
                     span.glyph aria-hidden="true" { (glyph(*verdict)) } " "
                     span.count { @if having == of { (of) } @else { (having) "/" (of) } }
                     @if let Some(deviation) = deviation { span.most { (percent(*deviation)) } }

@@ -17,7 +17,6 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::Report;
 use super::words::{self, plural};
 use crate::judge::Verdict;
-use crate::record::ProcedureId;
 use palette::Palette;
 use rows::Rows;
 
@@ -76,6 +75,7 @@ pub fn page(report: &Report, beside: &[Beside]) -> String {
     page.into_string()
 }
 
+/// Every section with its id and its name in the navigation.
 fn sections(report: &Report, beside: &[Beside], palette: &Palette, rows: &mut Rows) -> Vec<(String, String, Markup)> {
     let mut sections = vec![("matrix".to_owned(), "Verdicts".to_owned(), matrix::section(report, palette))];
     if let Some(check) = &report.baseline {
@@ -83,7 +83,7 @@ fn sections(report: &Report, beside: &[Beside], palette: &Palette, rows: &mut Ro
     }
     for name in report.procedures() {
         let section = procedure::section(report, name, palette, rows);
-        sections.push((name.to_string(), short(name).to_owned(), section));
+        sections.push((name.to_string(), name.row().short.to_owned(), section));
     }
     sections.push(("time".to_owned(), "Run time".to_owned(), plot::times::section(report, beside, palette)));
     if let Some(stress) = beside::stress_section(beside, palette) {
@@ -167,24 +167,6 @@ fn glyph(verdict: Verdict) -> &'static str {
     }
 }
 
-/// A procedure's name in the navigation.
-const fn short(procedure: ProcedureId) -> &'static str {
-    match procedure {
-        ProcedureId::LuminousIntensity => "Intensity",
-        ProcedureId::DirectIlluminance => "Direct",
-        ProcedureId::IndirectIlluminance => "Indirect",
-        ProcedureId::TotalIlluminance => "Total",
-    }
-}
-
-/// A procedure's name as a heading.
-fn title(procedure: ProcedureId) -> String {
-    let words = procedure.name().replace('_', " ");
-    let mut letters = words.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
-}
-
-/// Seconds as people say them.
 fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 0.01 => "< 0.01 s".to_owned(),
@@ -216,7 +198,6 @@ fn minus(text: &str) -> String {
     result
 }
 
-/// A power of ten: 10⁻⁶.
 fn power(exponent: i32) -> String {
     let digits = ["⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"];
     let raised: String = exponent.abs().to_string().bytes().map(|b| digits[usize::from(b - b'0')]).collect();

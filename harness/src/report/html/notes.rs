@@ -7,7 +7,7 @@ use maud::{Markup, html};
 use super::super::Report;
 use super::super::notes::{Kind, Note, departures, notes, splits};
 use super::super::words::plural;
-use super::{minus, table, title};
+use super::{minus, table};
 
 pub(super) fn section(report: &Report) -> Markup {
     let (notes, splits, departures) = (notes(report), splits(report), departures(report));
@@ -34,7 +34,7 @@ pub(super) fn section(report: &Report) -> Markup {
 
 fn row(note: &Note<'_>) -> Markup {
     let cases: BTreeSet<&str> = note.jobs.iter().map(|(case, _)| *case).collect();
-    let procedures: BTreeSet<String> = note.jobs.iter().map(|(_, procedure)| title(*procedure)).collect();
+    let procedures: BTreeSet<&str> = note.jobs.iter().map(|(_, procedure)| procedure.row().title).collect();
     let class = if note.kind == Kind::Failed { "v-fail" } else { "" };
     html! {
         tr { td class=(class) { (note.kind.name()) } th scope="row" { (note.engine) }

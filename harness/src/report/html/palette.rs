@@ -16,13 +16,12 @@ const SPARE: [(&str, &str); 3] = [("#a8457f", "#e294c3"), ("#5b4bb5", "#a89cf0")
 
 /// Colours on paper and on black: those of our own engines first, for good, so that two reports read alike.
 fn colours() -> impl Iterator<Item = (&'static str, &'static str)> {
-    engines::ALL.iter().map(|entry| entry.colour).chain(SPARE)
+    engines::ALL.into_iter().map(|entry| entry.colour).chain(SPARE)
 }
 
 const OWN: usize = engines::ALL.len();
 const COLOURS: usize = OWN + SPARE.len();
 
-/// Index of the colour of one of our own engines.
 fn fixed(engine: &str) -> Option<usize> {
     engines::ALL.iter().position(|entry| entry.name == *engine)
 }
@@ -52,11 +51,15 @@ impl Palette {
         found.or_else(|| fixed(engine)).unwrap_or(COLOURS - 1)
     }
 
-    /// Engines, each once: those of the report in its order, then others.
-    pub(super) fn in_order<'a>(&self, engines: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
-        let mut engines = Vec::from_iter(BTreeSet::from_iter(engines));
-        engines.sort_by_key(|e| self.engines.iter().position(|(id, _)| *id == **e).unwrap_or(self.engines.len()));
+    /// Each once, in the report's order; those that are not in it come last, by name.
+    pub(super) fn sorted<'a>(&self, engines: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+        let mut engines = Vec::from_iter(engines.collect::<BTreeSet<_>>());
+        engines.sort_by_key(|e| self.order(e));
         engines
+    }
+
+    pub(super) fn order(&self, engine: &str) -> usize {
+        self.engines.iter().position(|(id, _)| *id == *engine).unwrap_or(self.engines.len())
     }
 
     pub(super) fn mark(&self, engine: &str, [x, y]: [f64; 2], radius: f64) -> Markup {

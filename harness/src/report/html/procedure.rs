@@ -10,7 +10,7 @@ use super::super::{Report, papers};
 use super::palette::Palette;
 use super::plot::{self, Group};
 use super::rows::{Rows, place};
-use super::{class, glyph, minus, percent, title};
+use super::{class, glyph, minus, percent};
 use crate::judge::{Comparison, Verdict};
 use crate::record::ProcedureId;
 
@@ -27,8 +27,8 @@ pub(super) fn section(report: &Report, procedure: ProcedureId, palette: &Palette
     let all = mine.len();
     mine.truncate(MOST);
     html! {
-        h2 id={ (procedure) "-title" } { (title(procedure)) }
-        p.lead { (meaning(procedure)) }
+        h2 id={ (procedure) "-title" } { (procedure.row().title) }
+        p.lead { (procedure.row().meaning) }
         @if !plots.is_empty() { div.panels { @for panel in plots { (panel) } } }
         @for table in report.published.iter().filter(|t| t.procedure == procedure) { (printed(&papers::grid(report, table))) }
         @if all == 0 {
@@ -46,7 +46,7 @@ fn table(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palette:
         h3 { "Readings" }
         div.readings data-procedure=(procedure) data-first=(FIRST) {
             (filters(report, procedure, mine, palette))
-            div.scroll tabindex="0" role="region" aria-label={ "Readings of " (title(procedure)) } {
+            div.scroll tabindex="0" role="region" aria-label={ "Readings of " (procedure.row().title) } {
                 table {
                     thead { tr {
                         (head("engine", "e", "")) @if suite { (head("case", "c", "")) } (head("meter", "m", "")) (head("reading", "v", "number")) (head("reference", "r", "number"))
@@ -108,7 +108,7 @@ fn filters(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palett
     };
     let plain = |words: Vec<&str>| words.into_iter().map(|w| (w.to_owned(), w.to_owned())).collect::<Vec<_>>();
     html! {
-        form.filters aria-label={ "Filter the readings of " (title(procedure)) } {
+        form.filters aria-label={ "Filter the readings of " (procedure.row().title) } {
             fieldset { legend { "Engines" }
                 @for engine in report.engines.iter().filter(|e| mine.iter().any(|c| c.key.engine == e.id)) {
                     label.chip { input type="checkbox" checked value=(engine.id) data-filter="engine"; (palette.label(&engine.id)) }
@@ -137,16 +137,5 @@ fn printed(grid: &papers::Grid) -> Markup {
                 }
             }
         }
-    }
-}
-
-const fn meaning(procedure: ProcedureId) -> &'static str {
-    match procedure {
-        ProcedureId::LuminousIntensity => {
-            "The luminous intensity distribution read back from illuminance at a distance in free field, I = E d², over the curve of the photometric file."
-        }
-        ProcedureId::DirectIlluminance => "Illuminance straight from the luminaires, without any reflected light.",
-        ProcedureId::IndirectIlluminance => "Illuminance by light that was reflected at least once.",
-        ProcedureId::TotalIlluminance => "Direct and reflected light together.",
     }
 }

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::super::Report;
 use super::super::words::plural;
 use super::palette::Palette;
-use super::{duration, table, title};
+use super::{duration, table};
 use crate::record::{Recording, Status};
 
 pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
@@ -39,7 +39,7 @@ fn settings(label: &str, recordings: &[&Recording]) -> Markup {
     let heads = ["case", "procedure", "luminaire, light", "number seed", "number run time", "number instrument"];
     let rows = html! {
         @for r in recordings {
-            tr { th scope="row" { (r.key.case) } td { (title(r.key.procedure)) } td { (r.model) ", " (r.light) } td.number { (r.seed) }
+            tr { th scope="row" { (r.key.case) } td { (r.key.procedure.row().title) } td { (r.model) ", " (r.light) } td.number { (r.seed) }
                 td.number { (duration(r.wall_s)) } td.number { (format!("{:.1e}", r.instrument_uncertainty)) }
                 td.wide { dl.settings {
                     @for (key, value) in r.method.iter().chain(r.effort.iter()) { div { dt { (key.replace('_', " ")) } dd { code { (value) } } } }

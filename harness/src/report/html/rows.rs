@@ -22,15 +22,9 @@ impl Rows {
         let components: Vec<Value> =
             components.map(|part| json!([self.word(part.source.name()), short(Some(part.uncertainty))])).collect();
         let source = c.reference.as_ref().map_or("", |r| r.source.as_str());
-        let words = [
-            c.key.case.as_str(),
-            &c.key.engine,
-            c.basis_name(),
-            source,
-            c.diagnosis.as_deref().unwrap_or_default(),
-            c.verdict.name(),
-        ]
-        .map(|w| self.word(w));
+        let diagnosis = c.diagnosis.as_deref().unwrap_or_default();
+        let words = [&*c.key.case, &*c.key.engine, c.basis_name(), source, diagnosis, c.verdict.name()];
+        let words = words.map(|w| self.word(w));
         let budget = c.budget.as_ref();
         let row = json!([
             words,
@@ -71,19 +65,13 @@ impl Rows {
 
 /// Seven significant digits: what a page shows; all of them are in report.json.
 fn short(value: Option<f64>) -> Value {
-    value
-        .filter(|v| v.is_finite())
-        .and_then(|v| format!("{v:.6e}").parse::<f64>().ok())
-        .map_or(Value::Null, |v| json!(v))
+    json!(value.filter(|v| v.is_finite()).and_then(|v| format!("{v:.6e}").parse::<f64>().ok()))
 }
 
-/// Where a reading was taken, in words.
 pub(super) fn place(c: &Comparison) -> String {
     let number = |value| trimmed(value, 3);
     match c.gamma_deg.zip(c.c_deg) {
         Some((gamma, plane)) => format!("C {} γ {}", number(plane), number(gamma)),
-        None => {
-            format!("({}, {}, {}) m", number(c.at_m[0]), number(c.at_m[1]), number(c.at_m[2]))
-        }
+        None => format!("({}) m", c.at_m.map(number).join(", ")),
     }
 }

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::*;
+use crate::record::ProcedureId;
 
 const ENGINES: [&str; 5] = ["simulator", "iesna", "mitsuba", "radiance", "povray"];
 

@@ -27,11 +27,9 @@ pub(super) fn grids(report: &Report) -> Vec<Grid> {
 }
 
 pub(super) fn grid(report: &Report, table: &PublishedTable) -> Grid {
-    let (unit, sign) =
-        (table.quantity.unit(), if table.quantity == Quantity::LuminousIntensity { "gamma " } else { "" });
-    let places = table.rows.iter().map(|r| format!("{sign}{}", r.place));
-    let mut head = vec![format!("{} [{unit}]", table.name)];
-    head.extend(places);
+    let sign = if table.quantity == Quantity::LuminousIntensity { "gamma " } else { "" };
+    let mut head = vec![format!("{} [{}]", table.name, table.quantity.unit())];
+    head.extend(table.rows.iter().map(|r| format!("{sign}{}", r.place)));
     head.push("furthest from the paper".to_owned());
     let mut rows: Vec<Vec<String>> = vec![];
     for column in &table.columns {

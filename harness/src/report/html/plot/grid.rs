@@ -24,9 +24,8 @@ pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette) -> V
     let Some(basis) = group.basis() else { return vec![] };
     let firm: Vec<&Comparison> =
         group.comparisons.iter().copied().filter(|c| c.gamma_deg.is_none() && c.basis() == Some(basis)).collect();
-    let sets: BTreeSet<&str> = firm.iter().map(|c| set(c)).collect();
     let mut panels = vec![];
-    for name in sets {
+    for name in firm.iter().map(|c| set(c)).collect::<BTreeSet<&str>>() {
         let of_set = |engine: &str| {
             let mut mine: Vec<&Comparison> =
                 firm.iter().copied().filter(|c| set(c) == name && c.key.engine == engine).collect();
@@ -60,7 +59,6 @@ fn index(c: &Comparison) -> usize {
 /// A regular grid of meters, read off their places: origin + i u + j v, i fastest.
 struct Lattice {
     counts: [usize; 2],
-    /// Lengths of the steps in metres.
     step_m: [f64; 2],
     /// First coordinate along each axis, and the axis' name.
     axes: [(f64, String); 2],
@@ -91,8 +89,7 @@ impl Lattice {
 
     fn frame(&self) -> Frame {
         let cells = [0, 1].map(|k| self.counts[k] as f64 * self.step_m[k]);
-        let width = WIDTH - LEFT - RIGHT;
-        let scale = (width / cells[0]).min(300.0 / cells[1]);
+        let scale = ((WIDTH - LEFT - RIGHT) / cells[0]).min(300.0 / cells[1]);
         Frame { cell: [self.step_m[0] * scale, self.step_m[1] * scale], size: [cells[0] * scale, cells[1] * scale] }
     }
 }

@@ -21,7 +21,6 @@ pub(super) const WIDTH: f64 = 350.0;
 /// More cases than this a procedure are left to the table.
 const MOST_CASES: usize = 9;
 
-/// The comparisons of one case in one procedure.
 pub(super) struct Group<'a> {
     pub(super) case: &'a str,
     pub(super) procedure: ProcedureId,
@@ -57,7 +56,7 @@ pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -
 
 impl Group<'_> {
     fn engines(&self, palette: &Palette) -> Vec<&str> {
-        palette.in_order(self.comparisons.iter().map(|c| c.key.engine.as_str()))
+        palette.sorted(self.comparisons.iter().map(|c| c.key.engine.as_str()))
     }
 
     /// The firmest basis: what the group is drawn against.
@@ -71,7 +70,6 @@ impl Group<'_> {
     }
 }
 
-/// A panel: a title, the drawing with its description, what to read from it.
 fn figure(title: &str, height: f64, drawing: &Markup, caption: &Markup) -> Markup {
     html! {
         figure {
@@ -90,7 +88,6 @@ fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Markup {
     html! { path class=(class) d={ "M" (number(x1)) " " (number(y1)) "L" (number(x2)) " " (number(y2)) } {} }
 }
 
-/// A coordinate without needless digits.
 fn number(value: f64) -> String {
     trimmed(value, 1)
 }

@@ -50,11 +50,8 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Op
             }
         }
     };
-    let across = if plane(first + 90.0).is_some() {
-        format!(", dashed: C {}–{}", label(first + 90.0), label(first + 270.0))
-    } else {
-        String::new()
-    };
+    let across = plane(first + 90.0)
+        .map_or(String::new(), |_| format!(", dashed: C {}–{}", label(first + 90.0), label(first + 270.0)));
     let caption = html! {
         "Line: the photometric file, C " (label(first)) "–" (label(first + 180.0)) (across) "; marks: read back by " (legend(&engines, palette)) ". Rings in candela."
     };
@@ -68,7 +65,7 @@ fn readings<'a>(group: &'a Group<'_>, engine: &str, first: f64) -> Vec<&'a Compa
         c.key.engine == engine && c.c_deg.is_some_and(|plane| off(plane) < 1e-6)
     };
     let mut seen = BTreeSet::new();
-    group.comparisons.iter().copied().filter(in_planes).filter(|c| seen.insert(&c.meter)).collect()
+    group.comparisons.iter().copied().filter(in_planes).filter(|c| seen.insert(c.meter.0.as_str())).collect()
 }
 
 struct Scale {
@@ -90,7 +87,6 @@ impl Scale {
     }
 }
 
-/// Rings with their values and rays with their angles.
 fn rays(scale: &Scale, [up, down]: [bool; 2], step: f64, rings: u32) -> Markup {
     let [x, y] = scale.centre;
     let ring = |k: u32| {

@@ -20,10 +20,9 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Ma
     let tolerances = with_deviation.iter().filter_map(|c| allowed_percent(c)).filter(|a| *a < 100.0);
     let most = with_deviation.iter().filter_map(|c| c.relative_deviation).map(|d| 100.0 * d.abs()).chain(tolerances);
     let scale = Deviations::new(most.fold(0.1, f64::max), LEFT, WIDTH - LEFT - 12.0);
-    let bases: BTreeSet<Basis> = with_deviation.iter().filter_map(|c| c.basis()).collect();
     let mut y = 4.0;
     let mut blocks: Vec<Markup> = vec![];
-    for basis in bases {
+    for basis in with_deviation.iter().filter_map(|c| c.basis()).collect::<BTreeSet<Basis>>() {
         blocks.push(text("head", "start", [0.0, y + 14.0], &format!("against {}", basis.name())));
         y += HEAD;
         for engine in group.engines(palette) {

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::super::beside::{BenchCurve, Beside};
 use super::super::palette::Palette;
-use super::super::{duration, percent, title};
+use super::super::{duration, percent};
 use super::axis::label;
 use super::{WIDTH, figure, groups, legend, line, number, text};
 use crate::judge::Comparison;
@@ -29,11 +29,8 @@ struct Point {
 }
 
 pub(in super::super) fn section(report: &Report, beside: &[Beside], palette: &Palette) -> Markup {
-    let panels: Vec<Markup> = report
-        .procedures()
-        .into_iter()
-        .filter_map(|procedure| panel(report, procedure, &curves(beside, procedure), palette))
-        .collect();
+    let of = |procedure| panel(report, procedure, &curves(beside, procedure), palette);
+    let panels: Vec<Markup> = report.procedures().into_iter().filter_map(of).collect();
     html! {
         h2 id="time-title" { "Run time against error" }
         @if panels.is_empty() { p.lead { "No engine was held against another's readings." } } @else {
@@ -52,8 +49,7 @@ fn points(report: &Report, procedure: ProcedureId) -> Vec<Point> {
     let mut points = vec![];
     for group in groups(report, procedure) {
         let Some(basis) = group.basis() else { continue };
-        let recordings = report.recordings.iter().filter(|r| r.key.is_of(group.case, procedure));
-        for recording in recordings {
+        for recording in report.recordings.iter().filter(|r| r.key.is_of(group.case, procedure)) {
             let mine = |c: &&&Comparison| c.key.engine == recording.key.engine && c.basis() == Some(basis);
             let errors = group.comparisons.iter().filter(mine).filter_map(|c| c.relative_deviation);
             if let Some(error) = largest(errors).map(f64::abs) {
@@ -73,11 +69,8 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let span = |pick: fn(&(f64, f64)) -> f64, least: f64| {
         let (low, high) =
             all.iter().map(pick).map(|v| v.max(least)).fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
-        Decades {
-            low: low.log10().floor() as i32,
-            high: (high.log10().ceil() as i32).max(low.log10().floor() as i32 + 1),
-            least,
-        }
+        let low = low.log10().floor() as i32;
+        Decades { low, high: (high.log10().ceil() as i32).max(low + 1), least }
     };
     if all.is_empty() {
         return None;
@@ -85,8 +78,8 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let (time, error) = (span(|p| p.0, LEAST_TIME_S), span(|p| p.1, LEAST_ERROR));
     let width = WIDTH - LEFT - 12.0;
     let place = |wall_s: f64, e: f64| [LEFT + width * time.part(wall_s), TOP + PLOT * (1.0 - error.part(e))];
-    let engines =
-        palette.in_order(points.iter().map(|p| p.engine.as_str()).chain(curves.iter().map(|c| c.engine.as_str())));
+    let of_curves = curves.iter().map(|c| c.engine.as_str());
+    let engines = palette.sorted(points.iter().map(|p| p.engine.as_str()).chain(of_curves));
     let labels = labels(&points, &engines, &place);
     let drawing = html! {
         @for decade in time.low..=time.high {
@@ -107,7 +100,7 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let caption = html! {
         (legend(&engines, palette)) @if floor { " At the lower edge: 10⁻⁶ % or less." } @if !curves.is_empty() { " Lines: the ladder of luxproof bench." }
     };
-    Some(figure(&title(procedure), TOP + PLOT + 38.0, &drawing, &caption))
+    Some(figure(procedure.row().title, TOP + PLOT + 38.0, &drawing, &caption))
 }
 
 /// Where each engine is named: at its middle mark, pushed down until names do not meet.
@@ -168,7 +161,6 @@ impl Decades {
     }
 }
 
-/// A tick of a logarithmic axis.
 fn power(exponent: i32) -> String {
     if (-2..=3).contains(&exponent) { label(10f64.powi(exponent)) } else { super::super::power(exponent) }
 }
