@@ -67,17 +67,6 @@ pub(super) fn largest(deviations: impl Iterator<Item = f64>) -> Option<f64> {
     deviations.max_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
-/// Each once, in the order of first appearance.
-pub(super) fn unique<T: PartialEq>(all: impl IntoIterator<Item = T>) -> Vec<T> {
-    let mut found = vec![];
-    for one in all {
-        if !found.contains(&one) {
-            found.push(one);
-        }
-    }
-    found
-}
-
 /// The column's name within a published source, "TITLE, TABLE, COLUMN: MEANING"; titles may hold colons.
 pub(super) fn published_column(source: &str) -> &str {
     let (head, _) = source.rsplit_once(": ").unwrap_or((source, ""));

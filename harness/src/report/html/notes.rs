@@ -38,8 +38,8 @@ fn row(note: &Note<'_>) -> Markup {
     let class = if note.kind == Kind::Failed { "v-fail" } else { "" };
     html! {
         tr { td class=(class) { (note.kind.name()) } th scope="row" { (note.engine) }
-            td.wide { (Vec::from_iter(procedures).join(", ")) }
-            td.wide { @if cases.len() > 3 { (plural(cases.len(), "case")) } @else { (Vec::from_iter(cases).join(", ")) } }
+            td { (Vec::from_iter(procedures).join(", ")) }
+            td { @if cases.len() > 3 { (plural(cases.len(), "case")) } @else { (Vec::from_iter(cases).join(", ")) } }
             td.wide { (note.text) } }
     }
 }
