@@ -135,7 +135,7 @@ impl Judge<'_> {
 fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<Testimony> {
     let reference = task.reference();
     let (reference, basis) = (reference.engine(), reference.basis());
-    let tolerance = |engine: &str| judge.tolerances.of(task.procedure, basis, engine, task.quantity, judge.overrides);
+    let tolerance = |engine: &str| judge.held_to(task, basis, engine);
     // The reference is as good as what the best of the others is held to.
     let strictest =
         recordings.iter().map(|r| tolerance(&r.key.engine)).min_by(|a, b| a.relative.total_cmp(&b.relative));
@@ -167,7 +167,7 @@ fn derived(judge: &Judge<'_>, task: &Task) -> Option<Testimony> {
         references.find(|r| r.basis != Basis::Published).map(|r| (r.value, r.uncertainty))
     };
     let readings: Vec<_> = task.targets.iter().map(read).collect();
-    let tolerance = judge.tolerances.of(task.procedure, Basis::ClosedForm, NAME, task.quantity, judge.overrides);
+    let tolerance = judge.held_to(task, Basis::ClosedForm, NAME);
     readings.iter().any(Option::is_some).then(|| Testimony::new(NAME, vec![], readings, tolerance))
 }
 

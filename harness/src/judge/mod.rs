@@ -109,7 +109,11 @@ impl Judge<'_> {
 
     /// What an engine is held to in a task, by what others are judged by there.
     pub fn tolerance(&self, task: &Task, engine: &str) -> Tolerance {
-        self.tolerances.of(task.procedure, task.reference().basis(), engine, task.quantity, self.overrides)
+        self.held_to(task, task.reference().basis(), engine)
+    }
+
+    fn held_to(&self, task: &Task, basis: Basis, engine: &str) -> Tolerance {
+        self.tolerances.of(task.procedure, basis, engine, task.quantity, self.overrides)
     }
 
     /// Holds every reading of one task against every reference there is for it.
@@ -165,9 +169,7 @@ impl Judge<'_> {
     fn comparison(&self, task: &Task, recording: &Recording, k: usize, held: Option<Held>) -> Comparison {
         let (target, reading) = (&task.targets[k], recording.readings.get(k));
         let basis = held.as_ref().map(|h| h.reference.basis);
-        let tolerance = basis.map_or_else(Tolerance::default, |basis| {
-            self.tolerances.of(task.procedure, basis, &recording.key.engine, task.quantity, self.overrides)
-        });
+        let tolerance = basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();
         let pair = reading.zip(held.as_ref());
         let difference = pair.map(|(a, b)| a.value - b.reference.value);
         let tail = uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor());

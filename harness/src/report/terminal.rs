@@ -49,24 +49,12 @@ pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&s
     if detail == Detail::All || !report.is_suite() {
         tables(report, style, &mut text);
     }
-    let departures = departures(report);
-    if !departures.is_empty() {
-        writeln!(text, "Who departs from the other witnesses, the reference included").ok();
-        let most = if detail == Detail::All { usize::MAX } else { BRIEF };
-        for line in departures.iter().take(most) {
-            writeln!(text, "  {}", shortened(line, detail)).ok();
-        }
-        writeln!(text).ok();
-    }
-    let worst = worst(report, 5);
-    if !worst.is_empty() {
-        writeln!(text, "Worst deviations (by verdict, then deviation over tolerance)").ok();
-        for c in worst {
-            let line = format!("{}{}", report.of_suite(&c.key.case, ": "), deviation_line(c));
-            writeln!(text, "  {}", shortened(&line, detail)).ok();
-        }
-        writeln!(text).ok();
-    }
+    let most = if detail == Detail::All { usize::MAX } else { BRIEF };
+    let departures = departures(report).into_iter().take(most).map(|line| shortened(&line, detail));
+    section(&mut text, "Who departs from the other witnesses, the reference included", departures);
+    let line = |c: &Comparison| format!("{}{}", report.of_suite(&c.key.case, ": "), deviation_line(c));
+    let worst = worst(report, 5).into_iter().map(|c| shortened(&line(c), detail));
+    section(&mut text, "Worst deviations (by verdict, then deviation over tolerance)", worst);
     baseline(report, detail, &mut text);
     told(report, detail, &mut text);
     writeln!(text, "{} in {:.1} s", report.summary, report.wall_s).ok();
@@ -74,6 +62,14 @@ pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&s
         writeln!(text, "files: {folder}/report.json, readings/, scenes/<engine>/, logs/").ok();
     }
     text
+}
+
+/// Lines under a heading; nothing where there are none.
+fn section(text: &mut String, heading: &str, lines: impl Iterator<Item = String>) {
+    let lines: String = lines.map(|line| format!("  {line}\n")).collect();
+    if !lines.is_empty() {
+        writeln!(text, "{heading}\n{lines}").ok();
+    }
 }
 
 /// How the run compares with its baseline; what departs from it is told in full.
@@ -101,14 +97,8 @@ fn tables(report: &Report, style: Style, text: &mut String) {
             writeln!(text, "{table}\n").ok();
         }
     }
-    let splits = splits(report);
-    if !splits.is_empty() {
-        writeln!(text, "Methods apart from renderers (where they differ most)").ok();
-        for (place, split) in splits {
-            writeln!(text, "  {place}: {split}").ok();
-        }
-        writeln!(text).ok();
-    }
+    let splits = splits(report).into_iter().map(|(place, split)| format!("{place}: {split}"));
+    section(text, "Methods apart from renderers (where they differ most)", splits);
 }
 
 fn engines_line(report: &Report) -> String {

@@ -104,17 +104,15 @@ fn head(report: &Report) -> Markup {
         (Verdict::UnexpectedPass, s.unexpected_pass),
         (Verdict::Missing, s.missing),
     ];
-    let of = report.comparisons.len();
-    let cases = report.cases.len();
     html! {
         header id="top" {
             p.overline {
                 "luxproof " (report.tool_version) " · " (report.started.replace('T', " ").replace('Z', " UTC")) " · "
-                (plural(cases, "case")) " · " (plural(report.engines.len(), "engine")) " · " (duration(report.wall_s))
+                (plural(report.cases.len(), "case")) " · " (plural(report.engines.len(), "engine")) " · " (duration(report.wall_s))
             }
             h1 { (report.spec.title) }
             p.spec { code { (report.spec.path) } }
-            @if of > 0 {
+            @if !report.comparisons.is_empty() {
                 div.share aria-hidden="true" {
                     @for (verdict, count) in counts { @if count > 0 {
                         span class={ "v-" (class(verdict)) } style={ "flex-grow:" (count) } {}

@@ -8,7 +8,7 @@ use super::super::matrix::sort_worst_first;
 use super::super::words::significant;
 use super::super::{Report, papers};
 use super::palette::Palette;
-use super::plot::{self, Group};
+use super::plot;
 use super::rows::{Rows, place};
 use super::{class, glyph, minus, percent};
 use crate::judge::{Comparison, Verdict};
@@ -21,8 +21,7 @@ const MOST: usize = 3000;
 
 pub(super) fn section(report: &Report, procedure: ProcedureId, palette: &Palette, rows: &mut Rows) -> Markup {
     let mut mine: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.key.procedure == procedure).collect();
-    let groups: Vec<Group<'_>> = plot::groups(report, procedure);
-    let plots = plot::panels(report, &groups, palette);
+    let plots = plot::panels(report, &plot::groups(report, procedure), palette);
     sort_worst_first(&mut mine);
     let all = mine.len();
     mine.truncate(MOST);

@@ -39,8 +39,7 @@ pub(super) fn grid(report: &Report, table: &PublishedTable) -> Grid {
     }
     let mine = |r: &&Recording| r.key.procedure == table.procedure && table.cases.contains(&r.key.case);
     let mut recordings: Vec<&Recording> = report.recordings.iter().filter(mine).collect();
-    let order = |engine: &str| report.engines.iter().position(|e| e.id == engine);
-    recordings.sort_by_key(|r| order(&r.key.engine));
+    recordings.sort_by_key(|r| report.engines.iter().position(|e| e.id == r.key.engine));
     let mut seen: Vec<(String, Vec<String>)> = vec![];
     for recording in recordings {
         let cell = |meter| reading(report, &recording.key, meter).map_or_else(|| "-".to_owned(), value);
