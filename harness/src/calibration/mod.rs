@@ -35,7 +35,6 @@ const COVERAGE: f64 = 2.0;
 /// Past this a calibration scene hangs.
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// What a calibration found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     pub engine: EngineName,
@@ -43,7 +42,6 @@ pub struct Calibration {
     /// The version of this program, whose read-out it is.
     pub tool_version: String,
     pub settings: BTreeMap<String, serde_json::Value>,
-    /// What it read of each scene.
     pub parts: Vec<Part>,
 }
 
@@ -52,7 +50,6 @@ pub struct Calibration {
 pub struct Part {
     /// The scene: point, asymmetric, shadow or furnace.
     pub scene: String,
-    /// Whether it is one of reflected light.
     pub reflected: bool,
     /// The largest deviation from the closed form, relative.
     pub deviation: f64,
@@ -62,50 +59,38 @@ pub struct Part {
     pub declared: f64,
     /// The instrument's standard uncertainty that follows, relative.
     pub uncertainty: f64,
-    /// Why the scene was left out.
     pub left_out: Option<String>,
 }
 
-/// A calibration and where it is kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibrated {
     pub calibration: Calibration,
-    /// Whether it was measured just now.
     pub origin: Origin,
     /// The file that keeps it, or why none does.
     pub kept: Result<String, String>,
 }
 
-/// Where a calibration comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
-    /// Read from the file of an earlier one.
     Kept,
-    /// Measured just now.
     Measured,
 }
 
-/// Why an engine cannot be used as an instrument.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
-    /// It is far off where the answer is known.
     #[error(
         "calibration: {engine} reads the scene `{scene}` {:.1} % off its closed form at {meter} ({value_lx} lx for {exact_lx} \
          lx), which is no uncertainty but a fault; see `luxproof engines doctor`",
         100.0 * deviation
     )]
     Implausible { engine: EngineName, scene: &'static str, meter: String, value_lx: f64, exact_lx: f64, deviation: f64 },
-    /// It failed in a calibration scene.
     #[error("calibration: {0}")]
     Failed(#[from] Failure),
 }
 
-/// Whether a calibration of earlier counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Earlier {
-    /// It does, where one is kept.
     Counts,
-    /// It does not: everything is measured afresh.
     Ignored,
 }
 
@@ -148,7 +133,6 @@ impl Calibration {
         self.parts.iter().filter(counts).map(|p| p.uncertainty).fold(0.0, f64::max)
     }
 
-    /// A line for people.
     pub fn summary(&self) -> String {
         let part = |p: &Part| match &p.left_out {
             Some(why) => format!("{} left out ({why})", p.scene),
@@ -185,7 +169,6 @@ fn part(instrument: &Instrument, scene: &KnownScene, reader: &Reader) -> Result<
     }
 }
 
-/// Deviations from the closed form as an uncertainty; pure.
 fn judge(
     engine: EngineName,
     scene: &KnownScene,

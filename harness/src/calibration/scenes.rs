@@ -14,7 +14,6 @@ use crate::record::{MeterId, ProcedureId};
 /// A standard error that is far below the tolerances of reflected light, and a few seconds for engines that cannot meet it.
 pub(super) const BUDGET: Budget = Budget { relative_error: 2e-3, seconds: 5.0 };
 
-/// A job and what it must read.
 #[derive(Clone, Debug)]
 pub(super) struct KnownScene {
     pub(super) name: &'static str,
@@ -31,13 +30,11 @@ pub(super) struct Known {
 }
 
 impl KnownScene {
-    /// Whether it is one of reflected light.
     pub(super) fn is_reflected(&self) -> bool {
         self.job.transport != Transport::Direct
     }
 }
 
-/// All scenes, to be read with these settings.
 pub(super) fn all(settings: &BTreeMap<String, serde_json::Value>) -> Vec<KnownScene> {
     let mut scenes = vec![point(), asymmetric(), shadow(), furnace()];
     for scene in &mut scenes {
@@ -99,7 +96,6 @@ fn shadow() -> KnownScene {
     known
 }
 
-/// Reflectance of the furnace.
 const RHO: f64 = 0.5;
 
 /// A cube of 2 m whose luminaire lights every surface evenly.

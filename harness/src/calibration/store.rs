@@ -53,7 +53,6 @@ pub(super) fn read(path: &Path) -> Option<Calibration> {
     calibration.parts.iter().all(|p| sound(p.uncertainty)).then_some(calibration)
 }
 
-/// Keeps a calibration so that a reader sees all of it or nothing; the error is why it could not be kept.
 pub(super) fn keep(path: &Path, calibration: &Calibration) -> Result<(), String> {
     files::replace_json(path, calibration).map_err(|e| format!("{}: {e}", path.display()))
 }

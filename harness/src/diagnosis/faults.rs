@@ -20,28 +20,22 @@ const ACCURACY: f64 = 1e-2;
 const INVISIBLE: f64 = 1e-3;
 /// Reflections after which truncation is looked for no more: it hardly shows then.
 const MOST_BOUNCES: u32 = 8;
-/// The largest number of a half-precision float.
 const HALF_MAX: f64 = 65504.0;
 
 pub struct Fault {
     /// A short name, the same in every task.
     pub id: &'static str,
-    /// What went wrong, for people.
     pub what: String,
     pub effect: Effect,
 }
 
-/// What a fault does to readings.
 pub enum Effect {
-    /// Multiplies each.
     Factor(f64),
     /// Multiplies each by a number of its own, and all by one that is not known beforehand.
     Shape(Vec<f64>),
-    /// Gives each another value.
     Values(Vec<f64>),
     /// Cuts off what is above some level.
     Clamp,
-    /// Adds the same to each.
     Offset,
 }
 
@@ -130,7 +124,6 @@ fn factors(task: &Task) -> Vec<Fault> {
     faults
 }
 
-/// Wrong arithmetic at the meter.
 fn arithmetic(task: &Task, right: &[f64]) -> Vec<Fault> {
     let half: Vec<f64> = right.iter().map(|r| r.min(HALF_MAX)).collect();
     let mut faults = vec![
@@ -174,7 +167,6 @@ fn times(right: &[f64], factors: Vec<f64>) -> Vec<f64> {
     right.iter().zip(factors).map(|(r, f)| r * f).collect()
 }
 
-/// Wrong luminaires.
 fn of_luminaires(task: &Task) -> Vec<Fault> {
     let mut faults = vec![];
     let mut of_each = |id, what: &str, change: &dyn Fn(&mut Luminaire)| {
@@ -210,7 +202,6 @@ fn of_luminaires(task: &Task) -> Vec<Fault> {
     faults
 }
 
-/// Wrong rooms.
 fn of_room(task: &Task) -> Vec<Fault> {
     let Some(room) = task.scene.room else { return vec![] };
     let with = |id, what: &str, change: &dyn Fn(&mut Room)| {
@@ -241,7 +232,6 @@ fn of_room(task: &Task) -> Vec<Fault> {
     faults
 }
 
-/// The wrong part of the light.
 fn of_transport(task: &Task) -> Vec<Fault> {
     let mut faults = vec![];
     let mut light = |id, what: &str, transport| {

@@ -20,13 +20,10 @@ const SLACK: f64 = 5e-4;
 const FLOOR: f64 = 1e-6;
 /// Explanations that are this much worse than the best, in chi-squared, are no rivals of it.
 const RIVAL: f64 = 4.0;
-/// Rivals that are named at most.
 const MOST_RIVALS: usize = 3;
 
-/// A fault that explains readings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cause {
-    /// The fault's short name.
     pub id: &'static str,
     /// What went wrong, with the evidence.
     pub text: String,
@@ -65,7 +62,6 @@ fn named(causes: &[Cause]) -> Option<String> {
 #[derive(Clone, Debug)]
 pub struct Readings {
     pub read: Vec<f64>,
-    /// As they should be.
     pub right: Vec<f64>,
     /// Combined standard uncertainty of each pair.
     pub uncertainty: Vec<f64>,
@@ -191,7 +187,6 @@ fn explanation(fault: &Fault, readings: &Readings) -> Option<Cause> {
     })
 }
 
-/// A factor that is the same everywhere and none of those known.
 fn unnamed_factor(readings: &Readings) -> Option<Cause> {
     let n = readings.len();
     let (factor, error) = readings.factor(&readings.right)?;

@@ -111,7 +111,6 @@ pub(super) const SEEDS: Law = Law {
     variant: |job, _| Some(Variant { job: job.clone(), against: Against::Base(1.0) }),
 };
 
-/// Gives every luminaire another table.
 fn retable(
     job: &mut Job,
     table: impl Fn(&LuminousIntensityDistribution) -> Option<LuminousIntensityDistribution>,

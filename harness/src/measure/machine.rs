@@ -8,7 +8,6 @@ use crate::system::slots::Slots;
 
 #[derive(Debug)]
 pub struct Machine {
-    /// How much runs at a time.
     pub slots: Slots,
     /// `None`: equal jobs are rendered as often as they are asked.
     answers: Option<Mutex<BTreeMap<Key, Arc<Answered>>>>,

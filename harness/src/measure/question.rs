@@ -16,7 +16,6 @@ pub struct Instrument {
     pub version: Version,
 }
 
-/// A reading to take.
 #[derive(Clone, Copy)]
 pub struct Question<'a> {
     pub instrument: &'a Instrument,
@@ -25,7 +24,6 @@ pub struct Question<'a> {
     pub folder: &'a str,
     /// Past this it is killed.
     pub limit: Duration,
-    /// Of a reading that is one of an experiment.
     pub trial: Option<&'a Trial<'a>>,
 }
 
@@ -35,7 +33,6 @@ pub struct Trial<'a> {
     pub case: &'a Case,
     /// Which variant of the procedure's job; `None` for the job itself.
     pub variant: Option<Place>,
-    /// Which of several readings of one job.
     pub repetition: usize,
     pub threads: usize,
 }

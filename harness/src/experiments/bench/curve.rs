@@ -109,7 +109,6 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Curve {
-    /// One without points yet.
     pub(super) fn of(key: ReadingKey) -> Self {
         Self {
             key,
@@ -127,7 +126,6 @@ impl Curve {
         }
     }
 
-    /// Fills in what follows from the points.
     pub(super) fn conclude(&mut self) {
         // A difference of two times that are nearly alike is not known better than that.
         let net = |p: &BenchPoint| (p.wall_s - self.start_up_s).max(LEAST_NET * p.wall_s);
@@ -146,7 +144,6 @@ impl Curve {
         self.efficiency = last.map(|p| 1.0 / (p.variance * net(p)));
     }
 
-    /// Its name in tables and plots.
     pub fn name(&self) -> String {
         let solver = if self.key.engine == EngineName::SIMULATOR { &self.solver } else { "" };
         let parts = [self.key.engine.as_str(), self.preset.as_str(), solver];

@@ -14,30 +14,22 @@ use crate::spec::Budget;
 pub struct KnobEffect {
     #[serde(flatten)]
     pub key: ReadingKey,
-    /// The setting.
     pub knob: String,
-    /// The value.
     pub value: String,
     pub effect: Effect,
     /// Largest deviation beyond noise from the reading by default, relative.
     pub deviation: Option<f64>,
-    /// The noise beside it.
     pub noise: Option<f64>,
     /// Time over the time by default.
     pub time_ratio: Option<f64>,
 }
 
-/// What a setting does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Effect {
-    /// The readings differ beyond their noise.
     Result,
-    /// The readings agree; scene, time or noise differ.
     Effort,
-    /// What the engine gets, what it takes and what it reads are the same.
     Nothing,
-    /// The engine refuses it, or fails with it.
     Fails,
 }
 
@@ -109,7 +101,6 @@ impl KnobEffect {
     }
 }
 
-/// A number or truth value where it is one, else a word.
 fn scalar(text: &str) -> serde_json::Value {
     serde_json::from_str(text).unwrap_or_else(|_| text.into())
 }

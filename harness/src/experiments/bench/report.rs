@@ -4,7 +4,6 @@ use super::curve::{Curve, TARGETS};
 use super::{BenchReport, Reference};
 
 impl BenchReport {
-    /// The tables for a terminal.
     pub fn terminal(&self) -> String {
         self.text(|head, rows| {
             let mut table = comfy_table::Table::new();
@@ -17,7 +16,6 @@ impl BenchReport {
         })
     }
 
-    /// The tables as Markdown.
     pub fn markdown(&self) -> String {
         self.text(|head, rows| {
             let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
@@ -77,7 +75,6 @@ impl BenchReport {
         text
     }
 
-    /// Every point, one a line.
     pub fn csv(&self) -> String {
         let mut text =
             "case,procedure,engine,preset,solver,effort,wall_s,cpu_s,peak_mib,relative_error,relative_error_low,\

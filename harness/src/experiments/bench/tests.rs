@@ -104,7 +104,6 @@ fn views_name_the_machine_and_draw_every_point() {
     is_well_formed(&report.svg());
 }
 
-/// Every element that opens closes.
 fn is_well_formed(svg: &str) {
     let (opened, closed) = (svg.matches('<').count() - 2 * svg.matches("</").count(), svg.matches("/>").count());
     assert_eq!(opened, closed, "{svg}");

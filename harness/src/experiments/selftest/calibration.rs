@@ -12,30 +12,23 @@ use crate::judge::{Component, ErrorBudget, Source};
 use crate::record::Estimate;
 use crate::system::random::normal;
 
-/// P-values drawn for Kolmogorov's test.
 const RUNS: usize = 500;
-/// Intervals drawn for each coverage.
 const INTERVALS: usize = 10_000;
 /// Coverages that are looked at; the one of the verdicts is that of two standard deviations of a normal distribution.
 const NOMINAL: [f64; 5] = [0.5, 0.8, 0.9, 0.9545, 0.99];
-/// Below this, p-values are not uniform.
 const LEAST_KS_P: f64 = 0.01;
 /// How far coverage may lie from what it is said to be.
 const COVERAGE_WITHIN: f64 = 0.02;
 /// Independent blocks of an engine that has few.
 const FEW: usize = 8;
 
-/// How good each kind of interval is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibrations {
-    /// One a kind.
     pub intervals: Vec<Interval>,
 }
 
-/// How good one kind of interval is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
-    /// What is uncertain.
     pub kind: String,
     /// P-values under no fault, in rising order: against rank over count they lie on the diagonal.
     pub p_values: Vec<f64>,
@@ -43,27 +36,22 @@ pub struct Interval {
     pub ks_statistic: f64,
     /// The probability of a larger one by chance.
     pub ks_p: f64,
-    /// How often intervals hold the truth.
     pub coverage: Vec<Coverage>,
 }
 
-/// How often an interval holds the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
-    /// As it is said.
     pub nominal: f64,
     pub found: f64,
 }
 
 impl Calibrations {
-    /// Whether all p-values are uniform and all coverages what they are said to be.
     pub fn is_good(&self) -> bool {
         self.intervals.iter().all(Interval::is_good)
     }
 }
 
 impl Interval {
-    /// Whether its p-values are uniform and its coverages what they are said to be.
     pub fn is_good(&self) -> bool {
         let covers = |c: &Coverage| (c.found - c.nominal).abs() <= COVERAGE_WITHIN;
         self.ks_p > LEAST_KS_P && self.coverage.iter().all(covers)
@@ -73,7 +61,6 @@ impl Interval {
 /// Draws an error with the components that a budget would state of it.
 type Draw = fn(&mut fastrand::Rng) -> (f64, Vec<Component>);
 
-/// Every kind of uncertainty alone, and all together.
 const KINDS: [(&str, Draw); 8] = [
     ("Monte Carlo, many blocks", |random| {
         (0.003 * normal(random), vec![Component::normal(Source::MonteCarlo, 0.003, None)])
@@ -114,7 +101,6 @@ fn even(random: &mut fastrand::Rng, bound: f64) -> f64 {
     bound * (2.0 * random.f64() - 1.0)
 }
 
-/// Draws and judges every kind of interval.
 pub fn calibrations(seed: u64) -> Calibrations {
     let of_kind = |(k, (kind, draw)): (usize, &(&str, Draw))| {
         let mut random = fastrand::Rng::with_seed(seed.wrapping_add(k as u64));

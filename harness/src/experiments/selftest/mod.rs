@@ -39,25 +39,18 @@ const MOSTLY: f64 = 0.9;
 /// The subject's name, of which no deviation is on record.
 const SUBJECT: &str = "subject";
 
-/// What the harness makes of every fault, and of none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Scorecard {
     /// One a fault and case in which it shows.
     pub faults: Vec<Score>,
-    /// Runs without a fault, over all cases.
     pub clean_runs: usize,
-    /// Those of them in which something failed.
     pub false_alarms: usize,
 }
 
-/// What the harness makes of one fault.
 #[derive(Clone, Debug, Serialize)]
 pub struct Score {
-    /// The fault's short name.
     pub id: String,
-    /// What goes wrong.
     pub what: String,
-    /// The case that it was put into.
     pub case: String,
     /// The largest deviation that it makes, relative to the reading, or to a hundredth of the brightest.
     pub size: f64,
@@ -72,7 +65,6 @@ pub struct Score {
 }
 
 impl Score {
-    /// Whether the harness does with it what it promises.
     pub fn is_good(&self) -> bool {
         self.size < COUNTED || (!self.caught_by.is_empty() && self.diagnosed)
     }
@@ -85,7 +77,6 @@ impl Scorecard {
     }
 }
 
-/// Why the self-test could not run.
 #[derive(Debug, thiserror::Error)]
 #[error("the self-test cannot run: {0}")]
 pub struct SelftestError(String);
@@ -195,14 +186,12 @@ impl Subject {
         })
     }
 
-    /// The largest deviation, relative to the reading, or to a hundredth of the brightest.
     fn size(&self, wrong: &[f64]) -> f64 {
         let largest = self.right.iter().copied().fold(0.0, f64::max);
         let relative = |(w, r): (&f64, &f64)| (w - r).abs() / r.max(0.01 * largest);
         wrong.iter().zip(&self.right).map(relative).fold(0.0, f64::max)
     }
 
-    /// The least size of a fault, mixed with the truth, that fails.
     fn smallest(&self, judge: &Judge<'_>, wrong: &[f64]) -> Option<f64> {
         let mix = |part: f64| -> Vec<f64> { self.right.iter().zip(wrong).map(|(r, w)| r + part * (w - r)).collect() };
         let fails = |part: f64| {

@@ -22,13 +22,11 @@ use crate::measure::{Failure, Instrument, Reader, Taken};
 use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
 use crate::spec::{Budget, Case};
 
-/// How to stress.
 pub struct Options<'a> {
     /// Who takes readings, as many at a time as its machine has slots.
     pub reader: Reader,
     /// No reading starts after this.
     pub time: Duration,
-    /// Sampling effort of one reading.
     pub budget: Budget,
     /// Past this one hangs.
     pub limit: Duration,
@@ -51,9 +49,7 @@ pub enum Coordinates {
 
 /// Told of every point as it ends.
 pub trait Progress: Sync {
-    /// So many points there are.
     fn planned(&self, points: usize);
-    /// A point ended.
     fn ended(&self, engine: &str, law: &str, magnitude: f64);
 }
 
@@ -71,6 +67,11 @@ impl Point {
         self.law.magnitudes[self.step]
     }
 
+    fn report(&self, finding: Option<Finding>) -> PointReport {
+        let (tried, finding) = (finding.is_some(), finding.unwrap_or_default());
+        PointReport { procedure: self.procedure, magnitude: self.magnitude(), tried, finding }
+    }
+
     /// Extremes first: where the last magnitude holds, the others matter less.
     fn rank(&self) -> usize {
         let last = self.law.magnitudes.len() - 1;
@@ -78,12 +79,15 @@ impl Point {
     }
 }
 
-/// Stresses engines with a case.
 pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progress: &dyn Progress) -> StressReport {
     let points = points(case, subjects, options);
     progress.planned(points.len());
     let bench = Bench { trials: Trials::new(case, &options.reader, options.time), subjects, options };
-    let queue = Mutex::new(Queue::new(points.len(), subjects.len()));
+    let queue = Mutex::new(Queue {
+        findings: vec![None; points.len()],
+        taken: vec![false; points.len()],
+        spent: vec![Duration::ZERO; subjects.len()],
+    });
     thread::scope(|scope| {
         for _ in 0..options.reader.machine.slots.threads() {
             scope.spawn(|| {
@@ -93,15 +97,18 @@ pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progr
                     let Some(k) = next else { break };
                     let clock = Instant::now();
                     let finding = bench.finding(&points[k]);
-                    progress.ended(&bench.id(points[k].subject), points[k].law.id, points[k].magnitude());
-                    lock(&queue).ended(&points, k, finding, clock.elapsed());
+                    let engine = subjects[points[k].subject].engine.name();
+                    progress.ended(&engine, points[k].law.id, points[k].magnitude());
+                    let mut queue = lock(&queue);
+                    queue.spent[points[k].subject] += clock.elapsed();
+                    queue.findings[k] = finding;
                 }
             });
         }
     });
     let findings = lock(&queue).findings.clone();
-    let of = |k: usize| (points[k].subject, points[k].law, points[k].procedure, points[k].step, findings[k].clone());
-    StressReport::new(case, subjects, (0..points.len()).map(of).collect(), options.known)
+    let found = points.iter().zip(findings).map(|(point, finding)| (point.subject, point.law, point.report(finding)));
+    StressReport::new(case, subjects, &found.collect::<Vec<_>>(), options.known)
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
@@ -127,7 +134,6 @@ fn points(case: &Case, subjects: &[Instrument], options: &Options<'_>) -> Vec<Po
     points
 }
 
-/// What is under way and what is done.
 struct Queue {
     findings: Vec<Option<Finding>>,
     taken: Vec<bool>,
@@ -135,10 +141,6 @@ struct Queue {
 }
 
 impl Queue {
-    fn new(points: usize, subjects: usize) -> Self {
-        Self { findings: vec![None; points], taken: vec![false; points], spent: vec![Duration::ZERO; subjects] }
-    }
-
     /// The next point: of the engine that had the least time, the most telling one; none twice.
     fn next(&mut self, points: &[Point]) -> Option<usize> {
         let open = (0..points.len()).filter(|k| !self.taken[*k] && !self.hopeless(points, *k));
@@ -155,14 +157,8 @@ impl Queue {
         let hung = |j: usize| self.findings[j].as_ref().is_some_and(|f| f.how == Some(How::Hang));
         (0..points.len()).any(|j| hung(j) && points[j].step < point.step && alike(&points[j]))
     }
-
-    fn ended(&mut self, points: &[Point], k: usize, finding: Option<Finding>, took: Duration) {
-        self.spent[points[k].subject] += took;
-        self.findings[k] = finding;
-    }
 }
 
-/// Takes the readings of points and judges them.
 struct Bench<'a> {
     trials: Trials<'a>,
     subjects: &'a [Instrument],
@@ -175,10 +171,6 @@ const DOUBTFUL: f64 = 1e-3;
 const OTHER_SEED: u64 = 1000;
 
 impl Bench<'_> {
-    fn id(&self, subject: usize) -> EngineName {
-        self.subjects[subject].engine.name()
-    }
-
     /// What a point shows; `None` where the time is up.
     fn finding(&self, point: &Point) -> Option<Finding> {
         let variant = (point.law.variant)(&point.base, point.magnitude())?;
@@ -227,7 +219,6 @@ impl Bench<'_> {
         })
     }
 
-    /// One reading by the point's engine; `None` where the time is over.
     fn read(&self, point: &Point, job: &Job, variant: Option<Place>, seed: u64) -> Option<Result<Taken, Failure>> {
         let subject = &self.subjects[point.subject];
         let name = subject.engine.name();
@@ -236,9 +227,7 @@ impl Bench<'_> {
             settings.insert("relative_error".into(), own_accuracy(job).into());
         } else if self.options.coordinates == Coordinates::Raw {
             let key = engines::entry(&name).and_then(|entry| entry.fits_coordinates);
-            if let Some(key) = key {
-                settings.insert(key.into(), false.into());
-            }
+            settings.extend(key.map(|key| (key.into(), false.into())));
         }
         self.take(subject, job, &settings, seed, variant)
     }
@@ -268,7 +257,6 @@ fn own_accuracy(job: &Job) -> f64 {
     if points && job.scene.obstacles.is_empty() { 1e-4 } else { 5e-3 }
 }
 
-/// Whether a case holds anything to stress.
 pub fn concerns(case: &Case) -> bool {
     [ProcedureId::DirectIlluminance, ProcedureId::IndirectIlluminance].into_iter().any(|p| case.task(p).is_some())
 }

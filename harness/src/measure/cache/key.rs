@@ -5,7 +5,6 @@ use sha2::{Digest, Sha256};
 use crate::engines::{Engine, EngineError, ExternalJob, Job, Version};
 use crate::spec::hexadecimal;
 
-/// Names an entry of the cache.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
     engine: String,

@@ -24,7 +24,6 @@ pub struct Cache {
     root: PathBuf,
 }
 
-/// What a cache knows of a key.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lookup {
     Found(Entry),
