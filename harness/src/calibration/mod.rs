@@ -46,7 +46,7 @@ pub struct Calibration {
 }
 
 /// What an engine read of one calibration scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Part {
     /// The scene: point, asymmetric, shadow or furnace.
     pub scene: String,
@@ -159,11 +159,8 @@ fn part(instrument: &Instrument, scene: &KnownScene, reader: &Reader) -> Result<
         Err(Failure { kind: FailureKind::Declined, text }) => Ok(Part {
             scene: scene.name.to_owned(),
             reflected: scene.is_reflected(),
-            deviation: 0.0,
-            std_error: 0.0,
-            declared: 0.0,
-            uncertainty: 0.0,
             left_out: Some(text),
+            ..Part::default()
         }),
         Err(failure) => Err(failure.into()),
     }

@@ -142,24 +142,15 @@ fn arithmetic(task: &Task, right: &[f64]) -> Vec<Fault> {
     let distances: Vec<f64> = towards.iter().map(|d| d.length()).collect();
     let inverse = cosines.iter().map(|c| if *c > 0.0 { 1.0 / c } else { 0.0 }).collect();
     let uneven = |values: &[f64]| values.iter().any(|v| (v - values[0]).abs() > INVISIBLE * values[0]);
+    let mut add = |id, what: &str, effect| faults.push(Fault::new(id, what, effect));
     if uneven(&cosines) {
-        faults.push(Fault::new(
-            "cosine-missing",
-            "the cosine at the meter is left out",
-            Effect::Values(times(right, inverse)),
-        ));
-        let doubled = Effect::Values(times(right, cosines));
-        faults.push(Fault::new("cosine-doubled", "the cosine at the meter is applied twice", doubled));
+        add("cosine-missing", "the cosine at the meter is left out", Effect::Values(times(right, inverse)));
+        add("cosine-doubled", "the cosine at the meter is applied twice", Effect::Values(times(right, cosines)));
     }
     if uneven(&distances) {
-        let linear = distances.clone();
-        faults.push(Fault::new("distance", "light falls with distance, not with its square", Effect::Shape(linear)));
+        add("distance", "light falls with distance, not with its square", Effect::Shape(distances));
     }
-    faults.push(Fault::new(
-        "candela-squared",
-        "the candela are squared: the filter is applied to itself",
-        Effect::Shape(intensities),
-    ));
+    add("candela-squared", "the candela are squared: the filter is applied to itself", Effect::Shape(intensities));
     faults
 }
 
@@ -174,10 +165,9 @@ fn of_luminaires(task: &Task) -> Vec<Fault> {
         wrong.scene.luminaires.iter_mut().for_each(change);
         faults.extend(scene(id, what, &wrong));
     };
-    for turn in [90.0, 180.0, 270.0] {
-        let id = ["c-turned-90", "c-turned-180", "c-turned-270"][(turn / 90.0) as usize - 1];
+    for (id, turn) in [("c-turned-90", 90.0), ("c-turned-180", 180.0), ("c-turned-270", 270.0)] {
         let what = format!("the distribution is turned by {turn} degrees in C");
-        of_each(id, &what, &|l| replace(l, l.photometry.distribution.turned(turn)));
+        of_each(id, &what, &|l| replace(l, Some(l.photometry.distribution.turned(turn))));
     }
     of_each("c-mirrored", "C runs the other way round: 90 and 270 degrees are exchanged", &|l| {
         remap(l, |c, g| (-c, g));
@@ -219,35 +209,28 @@ fn of_room(task: &Task) -> Vec<Fault> {
         std::mem::swap(&mut r.reflectance.floor, &mut r.reflectance.ceiling);
     }));
     // The exponent of display gamma, as an RGB colour would be decoded.
+    let raised = |r: &mut Room, power: f64| {
+        Surface::ALL.into_iter().for_each(|s| *reflectance(r, s) = room.reflectance.of(s).powf(power));
+    };
     faults.extend(with("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", &|r| {
-        for surface in Surface::ALL {
-            *reflectance(r, surface) = room.reflectance.of(surface).powf(2.2);
-        }
+        raised(r, 2.2);
     }));
     faults.extend(with("gamma-encoded", "reflectances are encoded as colours, to the power of 1/2.2", &|r| {
-        for surface in Surface::ALL {
-            *reflectance(r, surface) = room.reflectance.of(surface).powf(1.0 / 2.2);
-        }
+        raised(r, 1.0 / 2.2);
     }));
     faults
 }
 
 fn of_transport(task: &Task) -> Vec<Fault> {
     let mut faults = vec![];
-    let mut light = |id, what: &str, transport| {
-        let wrong = Task { transport, ..task.clone() };
-        faults.extend(scene(id, what, &wrong));
-    };
+    let mut light = |id, what: &str, transport| faults.extend(scene(id, what, &Task { transport, ..task.clone() }));
     if let Transport::Indirect(bounces) | Transport::Total(bounces) = task.transport {
         let total = matches!(task.transport, Transport::Total(_));
         let of = |bounces| if total { Transport::Total(bounces) } else { Transport::Indirect(bounces) };
         let most = if let Bounces::AtMost(n) = bounces { n.min(MOST_BOUNCES) } else { MOST_BOUNCES };
         for n in 0..most {
-            light(
-                "bounces-cut",
-                &format!("light stops after {n} reflection{}", if n == 1 { "" } else { "s" }),
-                of(Bounces::AtMost(n)),
-            );
+            let what = format!("light stops after {n} reflection{}", if n == 1 { "" } else { "s" });
+            light("bounces-cut", &what, of(Bounces::AtMost(n)));
         }
         if total {
             light("direct-lost", "direct light is missing", Transport::Indirect(bounces));
@@ -270,8 +253,11 @@ fn scene(id: &'static str, what: &str, wrong: &Task) -> Option<Fault> {
     truth(wrong).map(|values| Fault::new(id, what, Effect::Values(values)))
 }
 
-fn replace(luminaire: &mut Luminaire, distribution: LuminousIntensityDistribution) {
-    luminaire.photometry = Arc::new(Photometry { distribution, ..(*luminaire.photometry).clone() });
+/// Leaves the luminaire as it is where a table's angles allow no other.
+fn replace(luminaire: &mut Luminaire, distribution: Option<LuminousIntensityDistribution>) {
+    if let Some(distribution) = distribution {
+        luminaire.photometry = Arc::new(Photometry { distribution, ..(*luminaire.photometry).clone() });
+    }
 }
 
 /// Reads the table at other angles: at its own nodes and their images, so that nothing is lost between them.
@@ -291,24 +277,18 @@ fn remap(luminaire: &mut Luminaire, source: impl Fn(f64, f64) -> (f64, f64)) {
         table.intensity(c, g).value()
     };
     let candela = c_deg.iter().flat_map(|c| at(*c)).map(value).collect();
-    if let Ok(distribution) = LuminousIntensityDistribution::new(c_deg, gamma_deg, candela) {
-        replace(luminaire, distribution);
-    }
+    replace(luminaire, LuminousIntensityDistribution::new(c_deg, gamma_deg, candela).ok());
 }
 
 fn isotropic(luminaire: &mut Luminaire) {
     let mean = luminaire.photometry.distribution.flux().value() / (4.0 * std::f64::consts::PI);
-    if let Ok(distribution) = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![mean; 2]) {
-        replace(luminaire, distribution);
-    }
+    replace(luminaire, LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![mean; 2]).ok());
 }
 
 fn averaged(luminaire: &mut Luminaire) {
     let table = &luminaire.photometry.distribution;
     let axial = LuminousIntensityDistribution::axial(table.gamma_deg().to_vec(), table.azimuth_average());
-    if let Ok(distribution) = axial {
-        replace(luminaire, distribution);
-    }
+    replace(luminaire, axial.ok());
 }
 
 fn extrapolated(luminaire: &mut Luminaire) {
@@ -316,21 +296,14 @@ fn extrapolated(luminaire: &mut Luminaire) {
     let gamma = table.gamma_deg();
     let (first, last) = (gamma[0], gamma[gamma.len() - 1]);
     let mut gamma_deg = gamma.to_vec();
-    let (low, high) = (first > 0.0, last < 180.0);
-    if low {
-        gamma_deg.insert(0, 0.0);
-    }
-    if high {
-        gamma_deg.push(180.0);
-    }
+    gamma_deg.splice(0..0, (first > 0.0).then_some(0.0));
+    gamma_deg.extend((last < 180.0).then_some(180.0));
     let row = |c: &f64| {
         let held = |g: &f64| table.intensity(*c, g.clamp(first, last)).value();
         gamma_deg.iter().map(held).collect::<Vec<_>>()
     };
     let candela = table.c_deg().iter().flat_map(row).collect();
-    if let Ok(distribution) = LuminousIntensityDistribution::new(table.c_deg().to_vec(), gamma_deg.clone(), candela) {
-        replace(luminaire, distribution);
-    }
+    replace(luminaire, LuminousIntensityDistribution::new(table.c_deg().to_vec(), gamma_deg, candela).ok());
 }
 
 fn reflectance(room: &mut Room, surface: Surface) -> &mut f64 {

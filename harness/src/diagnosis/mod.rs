@@ -47,15 +47,12 @@ pub fn diagnose(task: &Task, comparisons: &mut [Comparison]) {
         let members: Vec<&mut Comparison> = comparisons.iter_mut().filter(mine).collect();
         let Some(readings) = Readings::of(&members) else { continue };
         let faults = faults(task, &readings.right);
-        let text = named(&causes(&faults, &readings));
+        let found: Vec<String> = causes(&faults, &readings).into_iter().map(|c| c.text).collect();
+        let text = (!found.is_empty()).then(|| found.join("; or "));
         for comparison in members.into_iter().filter(|c| c.verdict == Verdict::Fail && c.diagnosis.is_none()) {
             comparison.diagnosis.clone_from(&text);
         }
     }
-}
-
-fn named(causes: &[Cause]) -> Option<String> {
-    (!causes.is_empty()).then(|| causes.iter().map(|c| c.text.clone()).collect::<Vec<_>>().join("; or "))
 }
 
 /// Readings beside what they should be.
@@ -75,9 +72,8 @@ impl Readings {
             let reference = comparison.reference.as_ref()?;
             readings.read.push(comparison.value.filter(|v| v.is_finite())?);
             readings.right.push(reference.value);
-            readings
-                .uncertainty
-                .push(comparison.uncertainty.standard_error().unwrap_or(0.0).hypot(reference.uncertainty));
+            let error = comparison.uncertainty.standard_error().unwrap_or(0.0);
+            readings.uncertainty.push(error.hypot(reference.uncertainty));
         }
         Some(readings)
     }

@@ -105,8 +105,8 @@ pub fn bench(
             match bench.curves(subject, &job, &truth) {
                 Ok(curves) => report.curves.extend(curves),
                 Err(why) => {
-                    let key = ReadingKey::new(&case.name, task.procedure, subject.engine.name());
-                    report.left_out.push(format!("{}, {}, {}: {why}", key.case, key.procedure, key.engine));
+                    let engine = subject.engine.name();
+                    report.left_out.push(format!("{}, {}, {engine}: {why}", case.name, task.procedure));
                 }
             }
             if options.knobs == Knobs::Tried {
@@ -123,9 +123,8 @@ pub fn bench(
         });
     }
     if bench.trials.is_over() && !options.time.is_zero() {
-        report
-            .left_out
-            .push(format!("{}: time was up before all was tried; the same command goes on from there", case.name));
+        let what = "time was up before all was tried; the same command goes on from there";
+        report.left_out.push(format!("{}: {what}", case.name));
     }
 }
 
@@ -198,8 +197,7 @@ impl Bench<'_> {
             (last_wall_s, last_preset) = (first.cost.wall_s, rung.preset.as_str());
             let solver = ladder::solver(&first.measurement);
             let point = BenchPoint::of(rung.effort, &taken, truth);
-            let known = curves.iter_mut().find(|c| c.solver == solver && c.preset == rung.preset);
-            match known {
+            match curves.iter_mut().find(|c| c.solver == solver && c.preset == rung.preset) {
                 Some(curve) => curve.points.push(point),
                 None => curves.push(Curve {
                     solver,

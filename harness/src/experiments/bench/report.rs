@@ -2,26 +2,15 @@
 
 use super::curve::{Curve, TARGETS};
 use super::{BenchReport, Reference};
+use crate::experiments::tables;
 
 impl BenchReport {
     pub fn terminal(&self) -> String {
-        self.text(|head, rows| {
-            let mut table = comfy_table::Table::new();
-            table
-                .load_style(comfy_table::presets::NOTHING)
-                .set_content_arrangement(comfy_table::ContentArrangement::Disabled);
-            table.set_header(head);
-            table.add_rows(rows);
-            format!("{table}\n")
-        })
+        self.text(tables::terminal)
     }
 
     pub fn markdown(&self) -> String {
-        self.text(|head, rows| {
-            let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-            let rule = vec!["---".to_owned(); head.len()];
-            [head, rule].iter().chain(&rows).map(|cells| line(cells)).collect()
-        })
+        self.text(tables::markdown)
     }
 
     fn text(&self, table: impl Fn(Vec<String>, Vec<Vec<String>>) -> String) -> String {
@@ -44,11 +33,8 @@ impl BenchReport {
                 ));
             }
             text.push_str(&table(head(), curves.iter().map(|c| row(c)).collect()));
-            let front: Vec<String> = pareto
-                .front
-                .iter()
-                .map(|(name, t, e)| format!("{} ({}, {})", name, seconds(*t), percent(*e)))
-                .collect();
+            let point = |(name, t, e): &(String, f64, f64)| format!("{name} ({}, {})", seconds(*t), percent(*e));
+            let front: Vec<String> = pareto.front.iter().map(point).collect();
             text.push_str(&format!("\nPareto front, by rising time: {}\n\n", front.join("; ")));
         }
         if !self.knobs.is_empty() {
@@ -125,25 +111,20 @@ fn row(c: &Curve) -> Vec<String> {
     }));
     let best = c.points.iter().min_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
     let cell = |f: &dyn Fn(&super::BenchPoint) -> String| best.map_or("-".to_owned(), f);
-    row.push(cell(&|p| {
-        format!(
-            "{} ({} .. {})",
-            percent(p.relative_error),
-            percent(p.relative_error_low),
-            percent(p.relative_error_high)
-        )
-    }));
-    row.push(cell(&|p| seconds(p.wall_s)));
-    row.push(cell(&|p| seconds(p.cpu_s)));
-    row.push(cell(&|p| p.peak_mib.map_or("-".to_owned(), |m| format!("{m:.0}"))));
-    row.push(c.slope.map_or("-".to_owned(), |s| format!("{s:.2}")));
-    row.push(c.bias_floor.map_or("-".to_owned(), percent));
-    row.push(c.efficiency.map_or("-".to_owned(), |e| format!("{e:.1e}")));
-    row.push(if c.start_up_s > 0.0 {
-        format!("{}, {}", seconds(c.start_up_s), seconds(c.set_up_s))
-    } else {
-        "-".to_owned()
-    });
+    let known = |value: Option<f64>, f: fn(f64) -> String| value.map_or("-".to_owned(), f);
+    row.extend([
+        cell(&|p| {
+            let ends = [p.relative_error, p.relative_error_low, p.relative_error_high].map(percent);
+            format!("{} ({} .. {})", ends[0], ends[1], ends[2])
+        }),
+        cell(&|p| seconds(p.wall_s)),
+        cell(&|p| seconds(p.cpu_s)),
+        cell(&|p| known(p.peak_mib, |m| format!("{m:.0}"))),
+        known(c.slope, |s| format!("{s:.2}")),
+        known(c.bias_floor, percent),
+        known(c.efficiency, |e| format!("{e:.1e}")),
+        if c.start_up_s > 0.0 { [c.start_up_s, c.set_up_s].map(seconds).join(", ") } else { "-".to_owned() },
+    ]);
     row
 }
 

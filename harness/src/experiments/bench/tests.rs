@@ -101,21 +101,18 @@ fn views_name_the_machine_and_draw_every_point() {
     assert!(report.terminal().contains("known") && report.markdown().contains("| known |"));
     assert_eq!(report.csv().lines().count(), 7);
     assert_eq!(report.svg().matches("<circle").count(), 6);
-    is_well_formed(&report.svg());
-}
-
-fn is_well_formed(svg: &str) {
+    let svg = report.svg();
     let (opened, closed) = (svg.matches('<').count() - 2 * svg.matches("</").count(), svg.matches("/>").count());
     assert_eq!(opened, closed, "{svg}");
 }
 
-fn benched_point() -> BenchPoint {
+fn point(wall_s: f64, relative_error: f64) -> BenchPoint {
     BenchPoint {
         effort: 1.0,
-        wall_s: 1.0,
+        wall_s,
         cpu_s: 1.0,
         peak_mib: None,
-        relative_error: 0.0,
+        relative_error,
         relative_error_low: 0.0,
         relative_error_high: 1.0,
         worst_error: 1.0,
@@ -126,28 +123,18 @@ fn benched_point() -> BenchPoint {
 
 #[test]
 fn the_front_holds_what_no_other_point_beats() {
-    let point = |wall_s: f64, relative_error: f64| BenchPoint { wall_s, relative_error, ..benched_point() };
     let key = |engine: &str| ReadingKey::new("c", ProcedureId::DirectIlluminance, engine);
     let curve = |engine: &str, points: Vec<BenchPoint>| Curve { points, ..Curve::of(key(engine)) };
     let curves =
         [curve("a", vec![point(1.0, 0.1), point(4.0, 0.05)]), curve("b", vec![point(2.0, 0.2), point(3.0, 0.01)])];
-    let front: Vec<f64> =
-        Pareto::of("c", ProcedureId::DirectIlluminance, &curves, 0.0).front.iter().map(|f| f.1).collect();
-    assert_eq!(front, [1.0, 3.0]);
+    let front = |floor: f64| Pareto::of("c", ProcedureId::DirectIlluminance, &curves, floor).front;
+    assert_eq!(front(0.0).iter().map(|f| f.1).collect::<Vec<_>>(), [1.0, 3.0]);
     // What the reference cannot tell apart is no gain.
-    assert_eq!(
-        Pareto::of("c", ProcedureId::DirectIlluminance, &curves, 0.2)
-            .front
-            .iter()
-            .map(|f| (f.1, f.2))
-            .collect::<Vec<_>>(),
-        [(1.0, 0.2)]
-    );
+    assert_eq!(front(0.2).iter().map(|f| (f.1, f.2)).collect::<Vec<_>>(), [(1.0, 0.2)]);
 }
 
 #[test]
 fn no_time_is_told_to_an_error_below_the_references_floor() {
-    let point = |wall_s: f64, relative_error: f64| BenchPoint { wall_s, relative_error, ..benched_point() };
     let concluded = |reference_floor: f64| {
         let key = ReadingKey::new("c", ProcedureId::DirectIlluminance, "e");
         let points = vec![point(1.0, 0.05), point(2.0, 5e-4)];

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::tables;
 use crate::diagnosis::{self, Effect, Fault, Readings};
 use crate::judge::{Judge, KnownDeviations, Tolerances, Verdict};
 use crate::procedures::{self, Task};
@@ -253,14 +254,10 @@ fn scores(case: &Case, subjects: &[Subject], judge: &Judge<'_>, runs: usize, ran
 
 impl fmt::Display for Scorecard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut table = comfy_table::Table::new();
-        table
-            .load_style(comfy_table::presets::NOTHING)
-            .set_content_arrangement(comfy_table::ContentArrangement::Disabled);
-        table.set_header(["", "case", "fault", "size", "smallest seen", "named", "caught by"]);
+        let head = ["", "case", "fault", "size", "smallest seen", "named", "caught by"].map(str::to_owned);
         let percent = |x: f64| if x < 10.0 { format!("{:.2} %", 100.0 * x) } else { format!("{x:.0} times") };
-        for score in &self.faults {
-            table.add_row([
+        let row = |score: &Score| {
+            vec![
                 if score.is_good() { "ok" } else { "MISSED" }.to_owned(),
                 score.case.clone(),
                 score.what.clone(),
@@ -268,18 +265,14 @@ impl fmt::Display for Scorecard {
                 score.smallest_detectable.map_or("-".to_owned(), percent),
                 format!("{:.0} %", 100.0 * score.named_in),
                 names(&score.caught_by),
-            ]);
-        }
-        writeln!(f, "{table}\n")?;
+            ]
+        };
+        writeln!(f, "{}", tables::terminal(head.into(), self.faults.iter().map(row).collect()))?;
         let counted: Vec<&Score> = self.faults.iter().filter(|s| s.size >= COUNTED).collect();
         let good = counted.iter().filter(|s| s.is_good()).count();
         let kinds: std::collections::BTreeSet<&str> = self.faults.iter().map(|s| s.id.as_str()).collect();
-        writeln!(
-            f,
-            "{} kinds of fault; {good} of {} faults of 2 % and more caught and named",
-            kinds.len(),
-            counted.len()
-        )?;
+        let (kinds, counted) = (kinds.len(), counted.len());
+        writeln!(f, "{kinds} kinds of fault; {good} of {counted} faults of 2 % and more caught and named")?;
         writeln!(f, "{} false alarms in {} runs without a fault", self.false_alarms, self.clean_runs)
     }
 }

@@ -4,27 +4,21 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::findings::{How, LawReport, PointReport, StressReport};
+use crate::experiments::tables;
 use crate::record::EngineName;
 
 impl StressReport {
     pub fn terminal(&self) -> String {
-        let mut table = comfy_table::Table::new();
-        table
-            .load_style(comfy_table::presets::NOTHING)
-            .set_content_arrangement(comfy_table::ContentArrangement::Disabled);
         let (head, rows) = self.matrix();
-        table.set_header(head);
-        table.add_rows(rows);
-        format!("{}: breaks at\n\n{table}\n\n{LEGEND}\n{}", self.case, self.remarks("  "))
+        let table = tables::terminal(head, rows);
+        format!("{}: breaks at\n\n{table}\n{LEGEND}\n{}", self.case, self.remarks("  "))
     }
 
+    /// The matrix and every broken law.
     pub fn markdown(&self) -> String {
         let (head, rows) = self.matrix();
-        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-        let mut text = format!("## {}\n\n{}", self.case, line(&head));
-        text.push_str(&line(&vec!["---".to_owned(); head.len()]));
-        text.extend(rows.iter().map(|row| line(row)));
-        format!("{text}\n{LEGEND}\n\n{}", self.remarks("- "))
+        let table = tables::markdown(head, rows);
+        format!("## {}\n\n{table}\n{LEGEND}\n\n{}", self.case, self.remarks("- "))
     }
 
     fn matrix(&self) -> (Vec<String>, Vec<Vec<String>>) {
