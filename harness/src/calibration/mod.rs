@@ -45,7 +45,6 @@ pub struct Calibration {
     pub parts: Vec<Part>,
 }
 
-/// What an engine read of one calibration scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Part {
     /// The scene: point, asymmetric, shadow or furnace.

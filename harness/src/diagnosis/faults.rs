@@ -34,7 +34,6 @@ pub enum Effect {
     /// Multiplies each by a number of its own, and all by one that is not known beforehand.
     Shape(Vec<f64>),
     Values(Vec<f64>),
-    /// Cuts off what is above some level.
     Clamp,
     Offset,
 }
@@ -54,7 +53,6 @@ pub fn truth(task: &Task) -> Option<Vec<f64>> {
     Some(measurement.readings(&task.targets).iter().map(|reading| reading.value).collect())
 }
 
-/// Every fault that would show in a task whose right readings are `right`.
 pub fn faults(task: &Task, right: &[f64]) -> Vec<Fault> {
     let mut all = factors(task);
     all.extend(arithmetic(task, right));

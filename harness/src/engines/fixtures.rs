@@ -8,8 +8,8 @@ use luminaire::geometry::{Reflectances, Room};
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
 
-use super::{Budget, Job, Measurement, Station};
-use crate::record::{Estimate, MeterId, ProcedureId};
+use super::{Absent, Budget, Engine, EngineError, Job, Knob, Measurement, Site, Station, Support, Version, Workbench};
+use crate::record::{EngineName, Estimate, MeterId, ProcedureId};
 
 pub(crate) const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
 pub(super) const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
@@ -137,4 +137,40 @@ pub(crate) fn worst(deviations: &[f64]) -> f64 {
 pub(crate) fn worst_z(measurement: &Measurement, exact: &[f64]) -> f64 {
     let z = |(e, x): (&Estimate, &f64)| (e.value - x) / e.uncertainty.standard_error().unwrap();
     worst(&measurement.estimates.iter().zip(exact).map(z).collect::<Vec<_>>())
+}
+
+/// An engine whose readings a test makes up.
+pub(crate) struct Fake<R> {
+    pub(crate) name: &'static str,
+    pub(crate) supports: fn(&Job) -> Support,
+    pub(crate) knobs: &'static [Knob],
+    pub(crate) read: R,
+}
+
+impl<R: Fn(&Job) -> Result<Measurement, EngineError> + Send + Sync> Fake<R> {
+    pub(crate) fn new(name: &'static str, read: R) -> Self {
+        Self { name, supports: |_| Support::Yes, knobs: &[], read }
+    }
+}
+
+impl<R: Fn(&Job) -> Result<Measurement, EngineError> + Send + Sync> Engine for Fake<R> {
+    fn name(&self) -> EngineName {
+        EngineName::new(self.name)
+    }
+
+    fn probe(&self, _site: &Site) -> Result<Version, Absent> {
+        Ok(Version("1".into()))
+    }
+
+    fn supports(&self, job: &Job) -> Support {
+        (self.supports)(job)
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        self.knobs
+    }
+
+    fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
+        (self.read)(job)
+    }
 }

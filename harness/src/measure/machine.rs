@@ -17,7 +17,6 @@ pub struct Machine {
 pub(super) type Answered = Mutex<Option<Entry>>;
 
 impl Machine {
-    /// So many threads or processes at a time.
     pub fn new(threads: usize) -> Arc<Self> {
         Arc::new(Self { slots: Slots::new(threads), answers: Some(Mutex::default()) })
     }

@@ -9,7 +9,6 @@ use crate::engines::{Engine, EngineError, Job, Version};
 use crate::laws::Place;
 use crate::spec::Case;
 
-/// An engine that is there, in the version that it is.
 #[derive(Clone)]
 pub struct Instrument {
     pub engine: Arc<dyn Engine>,

@@ -171,7 +171,6 @@ impl Invocation {
         Ok(Finished { stdout, stderr, wall: start.elapsed() })
     }
 
-    /// Starts the program and talks with it, line by line.
     pub fn converse(&self) -> Result<Conversation, ProcessError> {
         tracing::debug!(command = %self.command_line(), cwd = %self.cwd.display(), "converse");
         let mut child = self.spawn().map_err(|source| self.start_error(source))?;
@@ -280,7 +279,6 @@ pub struct Conversation {
     stderr: Option<thread::JoinHandle<Vec<u8>>>,
 }
 
-/// So often a program that is listened to is looked at.
 const LISTEN: Duration = Duration::from_millis(10);
 
 impl Conversation {

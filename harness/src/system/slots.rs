@@ -23,7 +23,6 @@ pub struct Slots {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Share {
-    /// Threads or processes.
     pub threads: usize,
     /// Memory in MiB, an estimate.
     pub memory_mib: u64,

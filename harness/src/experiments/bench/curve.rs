@@ -44,7 +44,6 @@ pub struct Curve {
     pub efficiency: Option<f64>,
 }
 
-/// One rung of the ladder, over all repetitions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BenchPoint {
     /// Seconds of budget, or one over the relative error asked for.
@@ -53,7 +52,6 @@ pub struct BenchPoint {
     pub wall_s: f64,
     /// Median processor seconds.
     pub cpu_s: f64,
-    /// Most memory of any process, in MiB.
     pub peak_mib: Option<f64>,
     /// Root mean square over meters and repetitions.
     pub relative_error: f64,

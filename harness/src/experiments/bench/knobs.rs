@@ -9,7 +9,6 @@ use crate::measure::{Failure, Instrument, Taken};
 use crate::record::ReadingKey;
 use crate::spec::Budget;
 
-/// What a value of a setting does, against the default.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KnobEffect {
     #[serde(flatten)]
@@ -44,7 +43,6 @@ impl Effect {
     }
 }
 
-/// Sampling effort of one reading of the check.
 const BUDGET: Budget = Budget { relative_error: 0.005, seconds: 1.5 };
 /// Times differ that differ by this factor.
 const SLOWER: f64 = 1.5;

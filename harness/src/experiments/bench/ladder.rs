@@ -7,7 +7,6 @@ use crate::engines::{Engine, Job, Measurement};
 use crate::record::EngineName;
 use crate::spec::Budget;
 
-/// One rung: an effort of one preset.
 pub(super) struct Rung {
     pub(super) preset: String,
     /// Seconds of budget, or one over the relative error asked for.

@@ -2,48 +2,26 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::*;
-use crate::engines::{Absent, Engine, EngineError, Knob, Measurement, SceneFile, Site, Support, Version, Workbench};
+use crate::engines::fixtures::{Fake, S1_INDIRECT_LX};
+use crate::engines::{EngineError, Knob, Measurement, Site, Version};
 use crate::measure::Machine;
-use crate::record::{EngineName, Estimate, Uncertainty};
-
-/// An engine of known law: error .02 / sqrt(seconds) of either sign by seed, above a bias of .1 %.
-struct KnownLaw;
+use crate::record::{Estimate, Uncertainty};
 
 const BIAS: f64 = 1e-3;
 
-impl Engine for KnownLaw {
-    fn name(&self) -> EngineName {
-        EngineName::new("known")
-    }
-
-    fn probe(&self, _site: &Site) -> Result<Version, Absent> {
-        Ok(Version("1".into()))
-    }
-
-    fn supports(&self, _job: &Job) -> Support {
-        Support::Yes
-    }
-
-    fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
-        Ok(vec![])
-    }
-
-    fn knobs(&self) -> &'static [Knob] {
-        &[Knob { key: "gain", values: &["1", "2"] }, Knob { key: "idle", values: &["true", "false"] }]
-    }
-
-    fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
-        let gain = job.settings.get("gain").and_then(serde_json::Value::as_f64).unwrap_or(1.0);
-        let noise = 0.02 / job.budget.seconds.max(1e-6).sqrt();
-        let sign = if job.seed.is_multiple_of(2) { 1.0 } else { -1.0 };
-        let estimate = |x: &f64| Estimate {
-            value: x * gain * (1.0 + BIAS + sign * noise),
-            uncertainty: Uncertainty::sampled(x * noise, None),
-        };
-        let exact = crate::engines::fixtures::S1_INDIRECT_LX;
-        Ok(Measurement { estimates: exact.iter().map(estimate).collect(), ..Measurement::default() })
-    }
+/// An engine of known law: error .02 / sqrt(seconds) of either sign by seed, above a bias of .1 %.
+fn known_law(job: &Job) -> Result<Measurement, EngineError> {
+    let gain = job.settings.get("gain").and_then(serde_json::Value::as_f64).unwrap_or(1.0);
+    let noise = 0.02 / job.budget.seconds.max(1e-6).sqrt();
+    let sign = if job.seed.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let estimate = |x: &f64| Estimate {
+        value: x * gain * (1.0 + BIAS + sign * noise),
+        uncertainty: Uncertainty::sampled(x * noise, None),
+    };
+    Ok(Measurement { estimates: S1_INDIRECT_LX.iter().map(estimate).collect(), ..Measurement::default() })
 }
+
+const KNOBS: &[Knob] = &[Knob { key: "gain", values: &["1", "2"] }, Knob { key: "idle", values: &["true", "false"] }];
 
 struct Silent;
 
@@ -64,7 +42,8 @@ fn benched(knobs: Knobs) -> BenchReport {
         seed: 1,
         knobs,
     };
-    let subjects = [Instrument { engine: Arc::new(KnownLaw), version: Version("1".into()) }];
+    let engine = Arc::new(Fake { knobs: KNOBS, ..Fake::new("known", known_law) });
+    let subjects = [Instrument { engine, version: Version("1".into()) }];
     let mut report = BenchReport::default();
     bench(&Case::load(&path).unwrap(), &subjects, &options, &Silent, &mut report);
     report

@@ -42,7 +42,6 @@ const SUBJECT: &str = "subject";
 
 #[derive(Clone, Debug, Serialize)]
 pub struct Scorecard {
-    /// One a fault and case in which it shows.
     pub faults: Vec<Score>,
     pub clean_runs: usize,
     pub false_alarms: usize,

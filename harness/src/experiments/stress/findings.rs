@@ -106,7 +106,6 @@ pub struct LawReport {
     pub engine: EngineName,
     pub law: String,
     pub what: &'static str,
-    /// What the magnitudes are.
     pub unit: &'static str,
     /// The largest deviation beyond the noise stated, relative; null where nothing was read.
     pub worst_deviation: Option<f64>,
@@ -114,7 +113,6 @@ pub struct LawReport {
     pub resolution: Option<f64>,
     /// The first magnitude tried at which the deviation exceeds .1, 1 and 10 %, or at which it breaks.
     pub breaks_at: BTreeMap<String, f64>,
-    /// The worst way in which it breaks.
     pub how: Option<How>,
     pub refused_at: Option<f64>,
     /// Points that time did not suffice for, or that lie beyond one that hung.

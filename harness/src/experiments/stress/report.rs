@@ -14,7 +14,6 @@ impl StressReport {
         format!("{}: breaks at\n\n{table}\n{LEGEND}\n{}", self.case, self.remarks("  "))
     }
 
-    /// The matrix and every broken law.
     pub fn markdown(&self) -> String {
         let (head, rows) = self.matrix();
         let table = tables::markdown(head, rows);

@@ -54,7 +54,6 @@ impl Cache {
         Ok(contents)
     }
 
-    /// Takes out what is damaged, what killed writers left, and entries that nobody used for so long.
     pub fn prune(&self, unused_for: Duration) -> io::Result<Pruned> {
         let now = SystemTime::now();
         let mut pruned = Pruned::default();
