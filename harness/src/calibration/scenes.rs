@@ -75,7 +75,6 @@ fn asymmetric() -> KnownScene {
     direct("asymmetric", Scene { luminaires: vec![lamp], ..Scene::default() }, &meters)
 }
 
-/// A table between a pendant and two of four meters, in a black room.
 fn shadow() -> KnownScene {
     let lamp = luminaire(table(&[0.0], &[0.0, 90.0, 180.0], |_, _| 100.0), DVec3::new(2.0, 2.0, 2.5));
     let (min_m, max_m) = (DVec3::new(1.5, 1.5, 1.0), DVec3::new(2.5, 2.5, 1.2));
@@ -98,7 +97,6 @@ fn shadow() -> KnownScene {
 
 const RHO: f64 = 0.5;
 
-/// A cube of 2 m whose luminaire lights every surface evenly.
 fn furnace() -> KnownScene {
     let half_m = 1.0;
     // Even illuminance E0 on a face at distance a: I cos / d^2 = E0 with d = a / cos and cos = m, the direction's largest

@@ -23,10 +23,6 @@ pub(super) struct Compared {
     pub(super) is_exact: bool,
 }
 
-pub(super) fn sum(a: &[Estimate], b: &[Estimate]) -> Vec<Estimate> {
-    a.iter().zip(b).map(|(a, b)| a.plus(b)).collect()
-}
-
 /// What an error at a station of that value counts against, in lx.
 pub(super) fn scale(value_lx: f64, brightest_lx: f64) -> f64 {
     value_lx.max(FAINT * brightest_lx).max(f64::MIN_POSITIVE)

@@ -49,7 +49,6 @@ pub enum Knobs {
     Left,
 }
 
-/// Told of every reading as it ends.
 pub trait Progress {
     /// That many seconds more are expected.
     fn planned(&self, seconds: f64);
@@ -174,8 +173,8 @@ impl Bench<'_> {
         let rungs = ladder(subject.engine.as_ref(), job, is_furnished(job), &own, self.options.seconds);
         let repetitions = self.options.repetitions.max(1);
         self.progress.planned(rungs.iter().map(|r| r.expected_s() * repetitions as f64).sum());
-        let (start_up_s, set_up_s) = (self.start_up(subject, job, &own), self.set_up(subject, job, &own));
-        let mut curves: Vec<Curve> = vec![];
+        let times_s = (self.start_up(subject, job, &own), self.set_up(subject, job, &own));
+        let mut curves: Vec<((String, String), Vec<BenchPoint>)> = vec![];
         let (mut last_wall_s, mut last_preset, mut refusal) = (0.0, "", None);
         for rung in &rungs {
             // A rung below what the last one took anyway would only repeat it.
@@ -197,23 +196,16 @@ impl Bench<'_> {
             (last_wall_s, last_preset) = (first.cost.wall_s, rung.preset.as_str());
             let solver = ladder::solver(&first.measurement);
             let point = BenchPoint::of(rung.effort, &taken, truth);
-            match curves.iter_mut().find(|c| c.solver == solver && c.preset == rung.preset) {
-                Some(curve) => curve.points.push(point),
-                None => curves.push(Curve {
-                    solver,
-                    preset: rung.preset.clone(),
-                    start_up_s,
-                    set_up_s,
-                    reference_floor: truth.floor(),
-                    points: vec![point],
-                    ..Curve::of(ReadingKey::new(&case.name, job.procedure, name.clone()))
-                }),
+            match curves.iter_mut().find(|(of, _)| *of == (solver.clone(), rung.preset.clone())) {
+                Some((_, points)) => points.push(point),
+                None => curves.push(((solver, rung.preset.clone()), vec![point])),
             }
         }
-        curves.iter_mut().for_each(Curve::conclude);
+        let key = ReadingKey::new(&case.name, job.procedure, name);
+        let curve = |(of, points)| Curve::of(key.clone(), of, times_s, truth.floor(), points);
         match refusal {
             Some(Failure { text, .. }) if curves.is_empty() => Err(text.lines().next().unwrap_or_default().to_owned()),
-            _ => Ok(curves),
+            _ => Ok(curves.into_iter().map(curve).collect()),
         }
     }
 

@@ -103,7 +103,8 @@ fn point(wall_s: f64, relative_error: f64) -> BenchPoint {
 #[test]
 fn the_front_holds_what_no_other_point_beats() {
     let key = |engine: &str| ReadingKey::new("c", ProcedureId::DirectIlluminance, engine);
-    let curve = |engine: &str, points: Vec<BenchPoint>| Curve { points, ..Curve::of(key(engine)) };
+    let curve =
+        |engine: &str, points: Vec<BenchPoint>| Curve::of(key(engine), Default::default(), (0.0, 0.0), 0.0, points);
     let curves =
         [curve("a", vec![point(1.0, 0.1), point(4.0, 0.05)]), curve("b", vec![point(2.0, 0.2), point(3.0, 0.01)])];
     let front = |floor: f64| Pareto::of("c", ProcedureId::DirectIlluminance, &curves, floor).front;
@@ -117,8 +118,7 @@ fn no_time_is_told_to_an_error_below_the_references_floor() {
     let concluded = |reference_floor: f64| {
         let key = ReadingKey::new("c", ProcedureId::DirectIlluminance, "e");
         let points = vec![point(1.0, 0.05), point(2.0, 5e-4)];
-        let mut curve = Curve { reference_floor, points, ..Curve::of(key) };
-        curve.conclude();
+        let curve = Curve::of(key, Default::default(), (0.0, 0.0), reference_floor, points);
         ["0.1", "0.01", "0.001"].map(|t| curve.time_to[t].is_some())
     };
     assert_eq!(concluded(0.0), [true, true, true]);

@@ -47,7 +47,7 @@ pub struct Scorecard {
     pub false_alarms: usize,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Score {
     pub id: String,
     pub what: String,
@@ -115,7 +115,6 @@ fn cases(folder: &Path) -> Result<Vec<Case>, SelftestError> {
     specs.map(|(name, _)| Case::load(&folder.join(name)).map_err(|e| SelftestError(e.to_string()))).collect()
 }
 
-/// One procedure of a case, with what should be read in it and every fault that would show.
 struct Subject {
     case: String,
     task: Task,
@@ -219,16 +218,8 @@ fn scores(case: &Case, subjects: &[Subject], judge: &Judge<'_>, runs: usize, ran
         }
     }
     let mut one = |(id, what): (&str, &str)| {
-        let mut score = Score {
-            id: id.to_owned(),
-            what: what.to_owned(),
-            case: case.name.clone(),
-            size: 0.0,
-            caught_by: vec![],
-            diagnosed: false,
-            named_in: 0.0,
-            smallest_detectable: None,
-        };
+        let case = case.name.clone();
+        let mut score = Score { id: id.to_owned(), what: what.to_owned(), case, ..Score::default() };
         for subject in subjects {
             let Some(wrong) = subject.wrong(id, what) else { continue };
             score.size = score.size.max(subject.size(&wrong));
@@ -256,6 +247,7 @@ impl fmt::Display for Scorecard {
         let head = ["", "case", "fault", "size", "smallest seen", "named", "caught by"].map(str::to_owned);
         let percent = |x: f64| if x < 10.0 { format!("{:.2} %", 100.0 * x) } else { format!("{x:.0} times") };
         let row = |score: &Score| {
+            let caught_by: Vec<&str> = score.caught_by.iter().map(|p| p.name()).collect();
             vec![
                 if score.is_good() { "ok" } else { "MISSED" }.to_owned(),
                 score.case.clone(),
@@ -263,7 +255,7 @@ impl fmt::Display for Scorecard {
                 percent(score.size),
                 score.smallest_detectable.map_or("-".to_owned(), percent),
                 format!("{:.0} %", 100.0 * score.named_in),
-                names(&score.caught_by),
+                if caught_by.is_empty() { "-".to_owned() } else { caught_by.join(", ") },
             ]
         };
         writeln!(f, "{}", tables::terminal(head.into(), self.faults.iter().map(row).collect()))?;
@@ -287,9 +279,4 @@ mod tests {
         let kinds: std::collections::BTreeSet<&str> = card.faults.iter().map(|s| s.id.as_str()).collect();
         assert!(kinds.len() >= 25, "{kinds:?}");
     }
-}
-
-fn names(procedures: &[ProcedureId]) -> String {
-    let names: Vec<&str> = procedures.iter().map(|p| p.name()).collect();
-    if names.is_empty() { "-".to_owned() } else { names.join(", ") }
 }

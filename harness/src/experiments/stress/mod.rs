@@ -47,13 +47,11 @@ pub enum Coordinates {
     Raw,
 }
 
-/// Told of every point as it ends.
 pub trait Progress: Sync {
     fn planned(&self, points: usize);
     fn ended(&self, engine: &str, law: &str, magnitude: f64);
 }
 
-/// One law at one magnitude on one engine's reading of one procedure.
 struct Point {
     subject: usize,
     law: &'static Law,
@@ -199,7 +197,7 @@ impl Bench<'_> {
                 let mut sum = vec![Estimate::exact(0.0); read.len()];
                 for (k, part) in parts.iter().enumerate() {
                     match self.read(point, part, of_law(k + 1), seed)? {
-                        Ok(part) => sum = deviation::sum(&sum, &part.measurement.estimates),
+                        Ok(part) => sum = sum.iter().zip(&part.measurement.estimates).map(|(a, b)| a.plus(b)).collect(),
                         Err(failure) => return Some(Finding::without_base(&failure)),
                     }
                 }
@@ -229,25 +227,17 @@ impl Bench<'_> {
             let key = engines::entry(&name).and_then(|entry| entry.fits_coordinates);
             settings.extend(key.map(|key| (key.into(), false.into())));
         }
-        self.take(subject, job, &settings, seed, variant)
+        self.trials.take(subject, job, &settings, self.effort(seed), (variant, 0))
     }
 
     /// The exact simulation of a changed job, finer than the simulator is asked for as an engine.
     fn witness(&self, job: &Job, variant: Option<Place>) -> Option<Result<Taken, Failure>> {
         let settings = Settings::from([("relative_error".to_owned(), (0.1 * own_accuracy(job)).into())]);
-        self.take(&simulator(), job, &settings, self.options.seed, variant)
+        self.trials.take(&simulator(), job, &settings, self.effort(self.options.seed), (variant, 0))
     }
 
-    fn take(
-        &self,
-        subject: &Instrument,
-        job: &Job,
-        settings: &Settings,
-        seed: u64,
-        variant: Option<Place>,
-    ) -> Option<Result<Taken, Failure>> {
-        let Options { budget, limit, .. } = *self.options;
-        self.trials.take(subject, job, settings, Effort { budget, seed, limit, threads: 1 }, (variant, 0))
+    fn effort(&self, seed: u64) -> Effort {
+        Effort { budget: self.options.budget, seed, limit: self.options.limit, threads: 1 }
     }
 }
 

@@ -17,7 +17,6 @@ impl Key {
         Self { engine: engine.to_owned(), digits: digits.to_owned() }
     }
 
-    /// The folder of its entries.
     pub fn engine(&self) -> &str {
         &self.engine
     }

@@ -15,7 +15,6 @@ const WRITERS_LIVE: Duration = Duration::from_secs(3600);
 pub struct Contents {
     /// Sound entries and their bytes, by engine.
     pub engines: BTreeMap<String, (usize, u64)>,
-    /// What is wrong with the others.
     pub damaged: Vec<String>,
     /// Files that a writer began; those of writers that were killed stay until they are pruned.
     pub unfinished: usize,
