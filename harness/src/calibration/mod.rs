@@ -178,14 +178,9 @@ fn judge(
         let unexplained = (deviation.abs() - declared - COVERAGE * std_error).max(0.0);
         // Written so that NaN, too, is implausible.
         if !(unexplained <= IMPLAUSIBLE && std_error <= IMPLAUSIBLE) {
-            return Err(CalibrationError::Implausible {
-                engine,
-                scene: scene.name,
-                meter: station.id.to_string(),
-                value_lx: estimate.value,
-                exact_lx: known.exact_lx,
-                deviation,
-            });
+            let (scene, meter) = (scene.name, station.id.to_string());
+            let (value_lx, exact_lx) = (estimate.value, known.exact_lx);
+            return Err(CalibrationError::Implausible { engine, scene, meter, value_lx, exact_lx, deviation });
         }
         worst = worst.max(deviation.abs());
         excess = excess.max(unexplained);

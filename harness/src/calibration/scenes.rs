@@ -78,14 +78,10 @@ fn asymmetric() -> KnownScene {
 fn shadow() -> KnownScene {
     let lamp = luminaire(table(&[0.0], &[0.0, 90.0, 180.0], |_, _| 100.0), DVec3::new(2.0, 2.0, 2.5));
     let (min_m, max_m) = (DVec3::new(1.5, 1.5, 1.0), DVec3::new(2.5, 2.5, 1.2));
-    let scene = Scene {
-        room: Some(Room {
-            size_m: DVec3::new(4.0, 4.0, 3.0),
-            reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0),
-        }),
-        obstacles: vec![Obstacle { shape: Shape::Box { min_m, max_m }, reflectance: 0.0 }],
-        luminaires: vec![lamp],
-    };
+    let size_m = DVec3::new(4.0, 4.0, 3.0);
+    let room = Some(Room { size_m, reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0) });
+    let obstacles = vec![Obstacle { shape: Shape::Box { min_m, max_m }, reflectance: 0.0 }];
+    let scene = Scene { room, obstacles, luminaires: vec![lamp] };
     // From 2.5 m through the edge of the table's top at 1.2 m the shadow at .5 m reaches .77 m from the axis.
     let meters =
         [[2.0, 2.0, 0.5], [2.5, 1.6, 0.5], [3.2, 2.0, 0.5], [2.0, 0.6, 0.5]].map(|p| (DVec3::from(p), DVec3::Z));

@@ -210,9 +210,8 @@ fn of_room(task: &Task) -> Vec<Fault> {
     let raised = |r: &mut Room, power: f64| {
         Surface::ALL.into_iter().for_each(|s| *reflectance(r, s) = room.reflectance.of(s).powf(power));
     };
-    faults.extend(with("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", &|r| {
-        raised(r, 2.2);
-    }));
+    faults
+        .extend(with("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", &|r| raised(r, 2.2)));
     faults.extend(with("gamma-encoded", "reflectances are encoded as colours, to the power of 1/2.2", &|r| {
         raised(r, 1.0 / 2.2);
     }));

@@ -33,7 +33,6 @@ pub struct Cause {
     score: f64,
 }
 
-/// Names the cause of failures among one task's comparisons, where one is found.
 pub fn diagnose(task: &Task, comparisons: &mut [Comparison]) {
     let key = |c: &Comparison| Some((c.key.engine.clone(), c.reference.as_ref()?.basis));
     let failed = comparisons.iter().filter(|c| c.verdict == Verdict::Fail);
@@ -55,7 +54,6 @@ pub fn diagnose(task: &Task, comparisons: &mut [Comparison]) {
     }
 }
 
-/// Readings beside what they should be.
 #[derive(Clone, Debug)]
 pub struct Readings {
     pub read: Vec<f64>,

@@ -121,14 +121,10 @@ fn reflectances(room: &Room, linear: DMat3) -> Reflectances {
         let old = Surface::ALL.into_iter().find(|old| (linear * old.inward_normal()).dot(new.inward_normal()) > 0.5);
         old.map_or(0.0, |old| room.reflectance.of(old))
     };
-    Reflectances {
-        floor: of(Surface::Floor),
-        ceiling: of(Surface::Ceiling),
-        wall_x_min: of(Surface::WallXMin),
-        wall_x_max: of(Surface::WallXMax),
-        wall_y_min: of(Surface::WallYMin),
-        wall_y_max: of(Surface::WallYMax),
-    }
+    let [floor, ceiling] = [Surface::Floor, Surface::Ceiling].map(of);
+    let [wall_x_min, wall_x_max] = [Surface::WallXMin, Surface::WallXMax].map(of);
+    let [wall_y_min, wall_y_max] = [Surface::WallYMin, Surface::WallYMax].map(of);
+    Reflectances { floor, ceiling, wall_x_min, wall_x_max, wall_y_min, wall_y_max }
 }
 
 fn obstacle(obstacle: &Obstacle, place: &impl Fn(DVec3) -> DVec3, determinant: f64) -> Obstacle {

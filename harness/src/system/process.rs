@@ -189,11 +189,8 @@ impl Invocation {
     /// Keeps what a program that ended said; an error where it did not end well.
     fn conclude(&self, ended: Result<ExitStatus, ProcessError>, stderr: &[u8]) -> Result<String, ProcessError> {
         let stderr = String::from_utf8_lossy(stderr).into_owned();
-        self.keep_log(&stderr).map_err(|source| ProcessError::Log {
-            program: self.name(),
-            log: self.log_name(),
-            source,
-        })?;
+        let unkept = |source| ProcessError::Log { program: self.name(), log: self.log_name(), source };
+        self.keep_log(&stderr).map_err(unkept)?;
         let status = ended?;
         if status.success() {
             return Ok(stderr);

@@ -258,11 +258,10 @@ impl Truth {
 
 fn machine() -> String {
     let processors = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model =
-        processors.lines().find_map(|l| l.strip_prefix("model name")).map(|l| l.trim_start_matches([' ', '\t', ':']));
+    let model = processors.lines().find_map(|l| l.strip_prefix("model name"));
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let load = load.split(' ').next().unwrap_or("?").to_owned();
     let build = if cfg!(debug_assertions) { "a development build, which is slow" } else { "a release build" };
-    let model = model.unwrap_or(std::env::consts::ARCH);
+    let model = model.map_or(std::env::consts::ARCH, |l| l.trim_start_matches([' ', '\t', ':']));
     format!("{model}, {} cores, load average {load} at the end; {build}", process::cores())
 }

@@ -132,14 +132,12 @@ fn coverage(draw: Draw, nominal: f64, random: &mut fastrand::Rng) -> Coverage {
     Coverage { nominal, found: held as f64 / INTERVALS as f64 }
 }
 
-/// The largest distance of sorted values' distribution from the uniform one.
 fn distance_from_uniform(sorted: &[f64]) -> f64 {
     let n = sorted.len() as f64;
     let at = |(k, p): (usize, &f64)| ((k + 1) as f64 / n - p).max(p - k as f64 / n);
     sorted.iter().enumerate().map(at).fold(0.0, f64::max)
 }
 
-/// The probability of a larger distance by chance.
 fn kolmogorov(distance: f64, count: usize) -> f64 {
     let root = (count as f64).sqrt();
     let x = (root + 0.12 + 0.11 / root) * distance;

@@ -91,8 +91,7 @@ pub fn selftest(runs: usize, clean_runs: usize, seed: u64) -> Result<Scorecard, 
     for case in cases(folder.path())? {
         let judge = Judge { tolerances: &tolerances, known: &known, overrides: &case.tolerances, published: None };
         let mut random = fastrand::Rng::with_seed(seed);
-        let subjects = case.tasks();
-        let subjects: Vec<Subject> = subjects.filter_map(|task| Subject::of(&case, task)).collect();
+        let subjects: Vec<Subject> = case.tasks().filter_map(|task| Subject::of(&case, task)).collect();
         card.faults.extend(scores(&case, &subjects, &judge, runs, &mut random));
         for _ in 0..clean_runs {
             let failed = |s: &Subject, random: &mut _| s.run(&judge, &s.right, random).is_some();
@@ -144,9 +143,7 @@ impl Subject {
         let subject = self.recording(SUBJECT, read, errors);
         let witnesses = exact.map(|engine| self.recording(engine, &self.right, &zero));
         let all: Vec<&Recording> = witnesses.iter().chain([&subject]).collect();
-        let mut compared = judge.compare(&self.task, &all);
-        compared.retain(|c| c.key.engine == SUBJECT);
-        compared.iter().any(|c| c.verdict == Verdict::Fail)
+        judge.compare(&self.task, &all).iter().any(|c| c.key.engine == SUBJECT && c.verdict == Verdict::Fail)
     }
 
     fn noise(&self) -> f64 {

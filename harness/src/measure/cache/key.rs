@@ -76,10 +76,8 @@ mod tests {
         for engine in all() {
             let of = |job: &Job| key(engine.as_ref(), &Version("1".into()), job).unwrap();
             let plain = of(&job);
-            assert_eq!(
-                plain,
-                of(&Job { case: "other".into(), procedure: ProcedureId::DirectIlluminance, ..job.clone() })
-            );
+            let renamed = Job { case: "other".into(), procedure: ProcedureId::DirectIlluminance, ..job.clone() };
+            assert_eq!(plain, of(&renamed));
             assert_ne!(plain, key(engine.as_ref(), &Version("2".into()), &job).unwrap());
             let mut others = vec![
                 Job { seed: 2, ..job.clone() },
