@@ -6,19 +6,17 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::file::{HistoryError, whole_lines};
-use super::line::{Line, Meters, Numbers, Subject};
+use super::file::whole_lines;
+use super::line::{HistoryError, Line, Meters, Numbers, Subject};
 use crate::judge::{Basis, Verdict};
 use crate::record::{EngineName, MeterId, ProcedureId, ReadingKey};
 use crate::system::files::FileError;
 
-/// What tells one comparison from another within a night.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key {
     pub reading: ReadingKey,
     pub model: String,
     pub meter: MeterId,
-    /// What the reference rests on.
     pub basis: Option<Basis>,
     /// Formula, solver or paper of the reference.
     pub source: String,
@@ -37,7 +35,6 @@ pub struct Series {
     pub verdicts: Vec<Option<Verdict>>,
 }
 
-/// An engine's version differs from that of the night before.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VersionChange {
     pub engine: EngineName,
@@ -49,9 +46,7 @@ pub struct VersionChange {
 
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    /// By date.
     pub nights: Vec<String>,
-    /// By key.
     pub series: Vec<Series>,
     pub version_changes: Vec<VersionChange>,
     /// The last line, from 1, where it was cut short and left out.
@@ -64,11 +59,9 @@ impl History {
         Self::parse(&bytes, path)
     }
 
-    /// Reads a history's text; `path` is for messages.
     pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Self, HistoryError> {
         let (whole, cut_short) = whole_lines(bytes);
-        let texts: Vec<(usize, &[u8])> =
-            (1..).zip(whole.split(|b| *b == b'\n')).filter(|(_, text)| !text.is_empty()).collect();
+        let texts: Vec<(usize, &[u8])> = (1..).zip(whole.split(|b| *b == b'\n')).filter(|t| !t.1.is_empty()).collect();
         let read = |&(line, text): &(usize, _)| Line::parse(text).map_err(|what| (line, what));
         // Of several lines that are wrong the first is told.
         let lines: Vec<Result<_, _>> = texts.par_iter().map(read).collect();
@@ -93,9 +86,8 @@ impl History {
                     series.len() - 1
                 })
             };
-            let places =
-                repeated.entry((line.subject(), line.meters())).or_insert_with(|| keys(line).map(&mut place).collect());
-            for (k, place) in places.iter().enumerate() {
+            let same = repeated.entry((line.subject(), line.meters()));
+            for (k, place) in same.or_insert_with(|| keys(line).map(&mut place).collect()).iter().enumerate() {
                 series[*place].set(night, line.numbers(k), line.verdict);
             }
             if !line.version.is_empty() {
@@ -111,7 +103,6 @@ impl History {
         self.series.iter().map(|s| (&s.key.reading.engine, s.key.reading.procedure)).collect()
     }
 
-    /// The series of an engine in a procedure.
     pub(super) fn of_engine(&self, engine: &EngineName, procedure: ProcedureId) -> Vec<&Series> {
         let is_of = |s: &&Series| s.key.reading.engine == *engine && s.key.reading.procedure == procedure;
         self.series.iter().filter(is_of).collect()
@@ -147,13 +138,8 @@ fn version_changes(versions: &BTreeMap<(&str, usize), &str>) -> Vec<VersionChang
     let known: Vec<_> = versions.iter().collect();
     let change = |pair: &[(&(&str, usize), &&str)]| {
         let [((of, _), from), ((engine, night), to)] = *pair else { return None };
-        let changed = || VersionChange {
-            engine: (*engine).into(),
-            night: *night,
-            from: (*from).to_owned(),
-            to: (*to).to_owned(),
-        };
-        (of == engine && from != to).then(changed)
+        let (from, to) = ((*from).to_owned(), (*to).to_owned());
+        (of == engine && from != to).then(|| VersionChange { engine: (*engine).into(), night: *night, from, to })
     };
     known.windows(2).filter_map(change).collect()
 }
@@ -182,7 +168,6 @@ mod tests {
         assert!(read.series.is_sorted_by_key(|s| &s.key));
     }
 
-    /// One comparison of a night as format 1 has it.
     fn of_format_1(night: &str, meter: usize, deviation: &str) -> String {
         format!(
             r#"{{"night":"{night}","case":"suite/case-0","procedure":"direct_illuminance","engine":"iesna","version":"1.0","model":"point","meter":"workplane[{meter}]","quantity":"illuminance_lx","basis":"exact","source":"exact indirect light by radiosity, all bounces","value":1,"std_error":null,"reference":1,"deviation":{deviation},"u":1,"verdict":"pass"}}"#
