@@ -41,7 +41,6 @@ pub(super) fn folder(chosen: Option<PathBuf>) -> Result<Cache, Diagnostic> {
     Ok(Cache::at(std::path::absolute(folder).into_diagnostic()?))
 }
 
-/// Does what `luxproof cache` asks.
 pub(super) fn manage(args: &CacheArgs, cache: &Cache) -> Result<Exit, Diagnostic> {
     let text = match args.action.unwrap_or(Action::Info) {
         Action::Info => info(cache)?,
@@ -62,20 +61,17 @@ fn info(cache: &Cache) -> Result<String, Diagnostic> {
     }
     lines.extend(contents.damaged.iter().map(|d| format!("damaged, read anew when it is asked for: {d}")));
     if contents.unfinished > 0 {
-        let count = contents.unfinished;
-        lines.push(format!("{count} files that a run is writing, or was when it was killed"));
+        lines.push(format!("{} files that a run is writing, or was when it was killed", contents.unfinished));
     }
     Ok(lines.join("\n") + "\n")
 }
 
-fn prune(cache: &Cache, unused_days: u32) -> Result<String, Diagnostic> {
-    let pruned = cache.prune(Duration::from_secs(86_400 * u64::from(unused_days))).into_diagnostic()?;
+fn prune(cache: &Cache, days: u32) -> Result<String, Diagnostic> {
+    let pruned = cache.prune(Duration::from_secs(86_400 * u64::from(days))).into_diagnostic()?;
+    let (unused, damaged, kib) = (pruned.unused, pruned.damaged, kibibytes(pruned.bytes));
+    let unfinished = pruned.unfinished;
     Ok(format!(
-        "took out {} unused for {unused_days} days, {} damaged, {} half written: {:.1} KiB\n",
-        pruned.unused,
-        pruned.damaged,
-        pruned.unfinished,
-        kibibytes(pruned.bytes)
+        "took out {unused} unused for {days} days, {damaged} damaged, {unfinished} half written: {kib:.1} KiB\n"
     ))
 }
 

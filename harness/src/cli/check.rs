@@ -36,15 +36,10 @@ pub(super) fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
         for task in &plan.tasks {
             writeln!(out, "  {} at {} meters", task.procedure, task.targets.len()).into_diagnostic()?;
             for run in plan.runs.iter().filter(|r| plan.tasks[r.task].procedure == task.procedure) {
-                let engine = &plan.engines[run.engine];
+                let engine = &plan.engines[run.engine].engine;
                 let note = run.approximation.as_ref().map(|a| format!(", approximate: {a}")).unwrap_or_default();
-                writeln!(
-                    out,
-                    "    run  {:<10} at most about {:.0} s{note}",
-                    engine.engine.name(),
-                    left(run) * cost_s(engine.engine.as_ref(), case.budget)
-                )
-                .into_diagnostic()?;
+                let cost_s = left(run) * cost_s(engine.as_ref(), case.budget);
+                writeln!(out, "    run  {:<10} at most about {cost_s:.0} s{note}", engine.name()).into_diagnostic()?;
             }
             for skip in plan.skips.iter().filter(|s| s.key.procedure == task.procedure) {
                 let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();

@@ -52,9 +52,7 @@ pub(super) fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Di
         }
         EnginesAction::Install { names } => {
             known_engines(&names)?;
-            let wanted = engines::all().into_iter().map(|e| e.name());
-            let wanted = wanted.filter(|e| names.is_empty() || names.iter().any(|n| e.as_str() == n));
-            Ok(report_installation(site, &wanted.collect::<Vec<_>>()))
+            Ok(report_installation(site, &names))
         }
         EnginesAction::Doctor { names } => {
             known_engines(&names)?;
@@ -79,7 +77,6 @@ fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
     Ok(exit)
 }
 
-/// Measures an engine's calibration again, keeps it and prints it.
 fn calibrate_anew(engine: Arc<dyn Engine>, reader: &Reader) -> Exit {
     let Ok(version) = engine.probe(&reader.site) else { return Exit::Passed };
     if engine.is_witness() {
@@ -100,18 +97,16 @@ fn calibrate_anew(engine: Arc<dyn Engine>, reader: &Reader) -> Exit {
 
 pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
     let known: Vec<EngineName> = engines::all().iter().map(|e| e.name()).collect();
-    let known: Vec<&str> = known.iter().map(EngineName::as_str).collect();
-    for name in names {
-        if !known.contains(&name.as_str()) {
-            let help = suggestion(name, known.iter().copied());
-            return Err(miette::miette!(help = help, "there is no engine `{name}`"));
-        }
-    }
-    Ok(())
+    let Some(name) = names.iter().find(|name| !known.iter().any(|k| k == *name)) else { return Ok(()) };
+    let help = suggestion(name, known.iter().map(EngineName::as_str));
+    Err(miette::miette!(help = help, "there is no engine `{name}`"))
 }
 
-pub(super) fn report_installation(site: &Site, wanted: &[EngineName]) -> Exit {
-    let outcomes = engines::install(site, wanted, |step| eprintln!("{step}"));
+/// Installs the engines that are named, or all.
+pub(super) fn report_installation(site: &Site, names: &[String]) -> Exit {
+    let wanted = engines::all().into_iter().map(|e| e.name());
+    let wanted: Vec<_> = wanted.filter(|e| names.is_empty() || names.iter().any(|n| e == n)).collect();
+    let outcomes = engines::install(site, &wanted, |step| eprintln!("{step}"));
     for outcome in &outcomes {
         eprintln!("{}: {}", outcome.component, outcome.detail);
     }

@@ -22,6 +22,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
+use serde::Serialize;
 
 use self::photometry::PhotometryArgs;
 use crate::audit::Sampling;
@@ -146,6 +147,12 @@ struct RunArgs {
     sampling: Sampling,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum TextOrJson {
+    Terminal,
+    Json,
+}
+
 #[derive(Debug, Args)]
 struct SchemaArgs {
     /// Which schema
@@ -195,7 +202,6 @@ impl Cli {
         }
     }
 
-    /// How much to log.
     pub fn verbosity(&self) -> u8 {
         self.verbose
     }
@@ -207,6 +213,10 @@ fn print(text: &str) -> Result<(), Diagnostic> {
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         written => written.into_diagnostic(),
     }
+}
+
+fn json(value: &(impl Serialize + ?Sized)) -> Result<String, Diagnostic> {
+    Ok(serde_json::to_string_pretty(value).into_diagnostic()? + "\n")
 }
 
 fn schema(args: &SchemaArgs) -> Result<Exit, Diagnostic> {

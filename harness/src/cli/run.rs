@@ -10,7 +10,7 @@ use super::engines::report_installation;
 use super::progress::Progress;
 use super::views::print_reports;
 use crate::audit::{self, AfterFailure, AuditError, Options};
-use crate::engines::{self, Site};
+use crate::engines::Site;
 use crate::judge::Policy;
 use crate::measure::cache::Cache;
 use crate::report::{BaselineCheck, Exit, Report};
@@ -18,7 +18,6 @@ use crate::system::files;
 use crate::system::process;
 use crate::trend::baseline::{self, Baseline, Comparability, Entry};
 
-/// Audits, judges and prints.
 pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Diagnostic> {
     let progress = Progress::new();
     let options = Options {
@@ -35,10 +34,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
     if args.install {
         // Every spec is read and checked before anything is fetched.
         audit::chosen(&args.specs, &options).map_err(diagnose)?;
-        let is_wanted =
-            |name: &str| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| w == name);
-        let wanted: Vec<_> = engines::all().iter().map(|e| e.name()).filter(|name| is_wanted(name)).collect();
-        report_installation(site, &wanted);
+        report_installation(site, &args.selected.engines);
     }
     let report = audit::run(&args.specs, &Policy::built_in().into_diagnostic()?, &options);
     let mut report = report.map_err(|error| match error {
@@ -48,8 +44,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
     let root = options.out.clone();
     drop(progress);
     if let Some(path) = &args.baseline {
-        let check = hold_against_baseline(&report, path, &root)?;
-        report.baseline = Some(check);
+        report.baseline = Some(hold_against_baseline(&report, path, &root)?);
         files::keep_json(&root.join("report.json"), &report).into_diagnostic()?;
     }
     let exit = report.exit();

@@ -49,7 +49,8 @@ pub(super) struct ReportArgs {
 }
 
 pub(super) fn print_reports(reports: &[(Report, PathBuf)], views: &Views) -> Result<(), Diagnostic> {
-    let beside = views.beside.iter().map(|path| read_beside(path)).collect::<Result<Vec<_>, _>>()?;
+    let beside = |path: &PathBuf| read(path, |text| Beside::from_json(text).into_diagnostic());
+    let beside = views.beside.iter().map(beside).collect::<Result<Vec<_>, _>>()?;
     let detail = if views.all { Detail::All } else { Detail::Brief };
     let style = if std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) {
         Style::Colour
@@ -109,15 +110,11 @@ pub(super) fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
     Ok(exit)
 }
 
-/// A report.json.
 pub(super) fn read_report(file: &Path) -> Result<Report, Diagnostic> {
-    let place = || file.display().to_string();
-    let text = std::fs::read_to_string(file).into_diagnostic().wrap_err_with(place)?;
-    serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)
+    read(file, |text| serde_json::from_str(text).into_diagnostic())
 }
 
-fn read_beside(path: &Path) -> Result<Beside, Diagnostic> {
-    let place = || path.display().to_string();
-    let text = std::fs::read_to_string(path).into_diagnostic().wrap_err_with(place)?;
-    Beside::from_json(&text).into_diagnostic().wrap_err_with(place)
+fn read<T>(file: &Path, parse: impl Fn(&str) -> Result<T, Diagnostic>) -> Result<T, Diagnostic> {
+    let text = std::fs::read_to_string(file).into_diagnostic();
+    text.and_then(|text| parse(&text)).wrap_err_with(|| file.display().to_string())
 }

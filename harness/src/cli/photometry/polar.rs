@@ -17,7 +17,6 @@ const LEGEND: f64 = 44.0;
 /// C0-C180 and C90-C270: the colours and dashes of the two curves.
 const CURVES: [(f64, &str, &str, &str); 2] = [(0.0, "C0-C180", "#c0272d", ""), (90.0, "C90-C270", "#1f5fa8", "6 4")];
 
-/// The diagram as a stand-alone SVG.
 pub(super) fn diagram(file: &str, photometry: &Photometry) -> String {
     let scale = Scale::of(photometry);
     let upward = [0.0, 90.0, 180.0, 270.0]
@@ -38,11 +37,8 @@ pub(super) fn diagram(file: &str, photometry: &Photometry) -> String {
     grid(&mut svg, &scale, upward);
     for (c_deg, _, colour, dashes) in CURVES {
         let points = curve(&photometry.distribution, &scale, c_deg);
-        writeln!(
-            svg,
-            "<path d=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dashes}\"/>"
-        )
-        .ok();
+        let stroke = format!("stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dashes}\"");
+        writeln!(svg, "<path d=\"{points}\" fill=\"none\" {stroke}/>").ok();
     }
     svg.push_str("</g>\n");
     legend(&mut svg, &scale, height - LEGEND);
