@@ -4,21 +4,15 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use etcetera::BaseStrategy;
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use crate::measure::cache::Cache;
 use crate::report::Exit;
 
-#[derive(Debug, Args)]
-pub(super) struct CacheArgs {
-    #[command(subcommand)]
-    action: Option<Action>,
-}
-
 #[derive(Clone, Copy, Debug, Subcommand)]
-enum Action {
+pub(super) enum Action {
     /// Where it is, how many readings of each engine it holds, what is damaged
     Info,
     /// Take out what is damaged, what killed runs left half written, and readings that no run used for long
@@ -29,7 +23,6 @@ enum Action {
     },
 }
 
-/// The cache in the folder that was chosen, or in the user's cache folder.
 pub(super) fn folder(chosen: Option<PathBuf>) -> Result<Cache, Diagnostic> {
     let folder = if let Some(folder) = chosen {
         folder
@@ -41,8 +34,8 @@ pub(super) fn folder(chosen: Option<PathBuf>) -> Result<Cache, Diagnostic> {
     Ok(Cache::at(std::path::absolute(folder).into_diagnostic()?))
 }
 
-pub(super) fn manage(args: &CacheArgs, cache: &Cache) -> Result<Exit, Diagnostic> {
-    let text = match args.action.unwrap_or(Action::Info) {
+pub(super) fn manage(action: Option<Action>, cache: &Cache) -> Result<Exit, Diagnostic> {
+    let text = match action.unwrap_or(Action::Info) {
         Action::Info => info(cache)?,
         Action::Prune { unused } => prune(cache, unused)?,
     };

@@ -1,9 +1,7 @@
 //! `luxproof check`: the plan of specs, nothing started.
 
 use std::io::Write;
-use std::path::PathBuf;
 
-use clap::Args;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::Selected;
@@ -14,22 +12,13 @@ use crate::plan::{Asked, Planner, cost_s};
 use crate::report::Exit;
 use crate::spec::{filtered, suite};
 
-#[derive(Debug, Args)]
-pub(super) struct CheckArgs {
-    /// Spec files, folders of them or patterns
-    #[arg(required = true, value_name = "SPEC")]
-    specs: Vec<PathBuf>,
-    #[command(flatten)]
-    selected: Selected,
-}
-
-pub(super) fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
-    let cases = suite(&args.specs).and_then(|all| filtered(all, &args.selected.filter)).map_err(diagnose)?;
+pub(super) fn check(selected: &Selected, site: &Site) -> Result<Exit, Diagnostic> {
+    let cases = suite(&selected.specs).and_then(|all| filtered(all, &selected.filter)).map_err(diagnose)?;
     audit::published(&cases).into_diagnostic()?;
     let mut out = std::io::stdout().lock();
     let mut exit = Exit::Passed;
-    let selection = args.selected.selection();
-    let mut planner = Planner::new(&selection, site, args.selected.skipping());
+    let selection = selected.selection();
+    let mut planner = Planner::new(&selection, site, selected.skipping());
     for case in &cases {
         let plan = planner.plan(case).map_err(diagnose)?;
         writeln!(out, "{} ({}): {}", case.name, case.path.display(), case.title).into_diagnostic()?;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use crate::audit::doctor;
@@ -16,14 +16,8 @@ use crate::report::Exit;
 use crate::spec::suggestion;
 use crate::system::process;
 
-#[derive(Debug, Args)]
-pub(super) struct EnginesArgs {
-    #[command(subcommand)]
-    action: Option<EnginesAction>,
-}
-
 #[derive(Clone, Debug, Subcommand)]
-enum EnginesAction {
+pub(super) enum EnginesAction {
     /// Which engines there are, and their versions
     List,
     /// Fetch missing engines into a folder of our own
@@ -38,8 +32,8 @@ enum EnginesAction {
     },
 }
 
-pub(super) fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Diagnostic> {
-    match args.action.clone().unwrap_or(EnginesAction::List) {
+pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site) -> Result<Exit, Diagnostic> {
+    match action.unwrap_or(EnginesAction::List) {
         EnginesAction::List => {
             for engine in engines::all() {
                 match engine.probe(site) {
@@ -78,10 +72,10 @@ fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
 }
 
 fn calibrate_anew(engine: Arc<dyn Engine>, reader: &Reader) -> Exit {
-    let Ok(version) = engine.probe(&reader.site) else { return Exit::Passed };
-    if engine.is_witness() {
-        return Exit::Passed;
-    }
+    let version = match engine.probe(&reader.site) {
+        Ok(version) if !engine.is_witness() => version,
+        _ => return Exit::Passed,
+    };
     let name = engine.name();
     match calibration::calibrate(&Instrument { engine, version }, &BTreeMap::new(), reader, Earlier::Ignored) {
         Ok(found) => {

@@ -46,7 +46,6 @@ pub(super) fn folder(out: Option<&PathBuf>, command: &str, spec: &Path) -> PathB
     out.cloned().unwrap_or_else(|| Path::new("luxproof-out").join(command).join(name))
 }
 
-/// The hidden command that takes one reading for another process of this program.
 pub(super) fn read_one(site: &Site) -> Result<Exit, Diagnostic> {
     let mut text = String::new();
     std::io::stdin().read_to_string(&mut text).into_diagnostic()?;

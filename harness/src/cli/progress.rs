@@ -14,7 +14,6 @@ use crate::plan::{Plan, Run};
 use crate::record::ProcedureId;
 use crate::spec::Case;
 
-/// The progress of all cases of a run together, on stderr.
 pub(super) struct Progress {
     bar: ProgressBar,
     is_terminal: bool,

@@ -33,10 +33,10 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
     };
     if args.install {
         // Every spec is read and checked before anything is fetched.
-        audit::chosen(&args.specs, &options).map_err(diagnose)?;
+        audit::chosen(&args.selected.specs, &options).map_err(diagnose)?;
         report_installation(site, &args.selected.engines);
     }
-    let report = audit::run(&args.specs, &Policy::built_in().into_diagnostic()?, &options);
+    let report = audit::run(&args.selected.specs, &Policy::built_in().into_diagnostic()?, &options);
     let mut report = report.map_err(|error| match error {
         AuditError::Spec(error) => diagnose(error),
         other => Diagnostic::from_err(other),
@@ -75,12 +75,10 @@ fn hold_against_baseline(report: &Report, path: &Path, root: &Path) -> Result<Ba
 
 /// The folder of the run: by default that of the one spec or folder, or one for all where there are several.
 fn out_folder(args: &RunArgs) -> PathBuf {
-    let of_one = |path: &PathBuf| path.file_stem().map(|stem| Path::new("luxproof-out").join(stem));
-    match (&args.out, &args.specs[..]) {
-        (Some(folder), _) => folder.clone(),
-        (None, [one]) if !one.display().to_string().contains('*') => {
-            of_one(one).unwrap_or_else(|| "luxproof-out/suite".into())
-        }
-        _ => "luxproof-out/suite".into(),
-    }
+    let stem = match &args.selected.specs[..] {
+        [one] if !one.display().to_string().contains('*') => one.file_stem(),
+        _ => None,
+    };
+    let name = stem.map_or(Path::new("suite"), Path::new);
+    args.out.clone().unwrap_or_else(|| Path::new("luxproof-out").join(name))
 }

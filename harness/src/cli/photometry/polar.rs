@@ -7,9 +7,7 @@ use std::fmt::Write as _;
 
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
 
-/// Radius of the outermost ring in user units.
 const RADIUS: f64 = 200.0;
-/// Space around the diagram for labels.
 const MARGIN: f64 = 40.0;
 /// Heights of the title above and the legend below.
 const TITLE: f64 = 34.0;
@@ -46,7 +44,6 @@ pub(super) fn diagram(file: &str, photometry: &Photometry) -> String {
     svg
 }
 
-/// What the rings stand for.
 struct Scale {
     unit: &'static str,
     /// Multiplies candelas into the unit.
@@ -73,7 +70,6 @@ impl Scale {
         Self { unit, factor, step, rings: (largest / step).ceil().clamp(1.0, 6.0) as u32 }
     }
 
-    /// Distance from the centre of an intensity in candela.
     fn radius(&self, candela: f64) -> f64 {
         RADIUS * candela * self.factor / (self.step * f64::from(self.rings))
     }

@@ -35,7 +35,6 @@ pub(super) struct Summary {
     beam_angle_deg: [Option<f64>; 2],
     /// Full angles to a tenth of the largest intensity.
     field_angle_deg: [Option<f64>; 2],
-    /// Spacing criterion along C0 and C90.
     spacing_criterion: [Option<f64>; 2],
     cie_flux_code: Option<[f64; 5]>,
     bug_zones_lm: BugZones,

@@ -50,7 +50,6 @@ pub struct EntryChange {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum State {
-    /// Nothing beyond noise.
     Unchanged,
     /// All meters together moved.
     Shifted,
@@ -170,7 +169,6 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
     change
 }
 
-/// Enough of a hash to tell two apart.
 fn short(hash: &str) -> String {
     hash.chars().take(12).collect()
 }

@@ -90,7 +90,6 @@ impl Entry {
 }
 
 impl Baseline {
-    /// The readings of a run as a candidate: accepted by nobody yet.
     pub fn candidate(report: &Report) -> Self {
         let mut entries: Vec<Entry> = report.recordings.iter().map(|r| Entry::of(report, r)).collect();
         entries.sort_by(|a, b| a.key.cmp(&b.key));

@@ -339,7 +339,6 @@ mod tests {
         assert!(20 * within(21) >= 19 * delays.len(), "{delays:?}");
     }
 
-    /// An engine that repeats exactly, with what the nights add.
     fn exact(nights: &[f64]) -> Vec<Change> {
         let mut history = Synthetic { nights: nights.len(), cases: 1, meters: 1, ..Synthetic::default() }.history();
         history.series.truncate(1);

@@ -65,7 +65,6 @@ pub enum HistoryError {
     Night { night: String },
 }
 
-/// Meters in the order of the numbers.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(untagged)]
 pub(super) enum Meters<'a> {
@@ -90,7 +89,6 @@ pub struct Numbers {
 pub(super) type Subject<'l> = (&'l str, ProcedureId, &'l str, &'l str, Option<Basis>, &'l str);
 
 impl<'a> Line<'a> {
-    /// A line without meters, version, model and reference.
     pub fn new(night: &'a str, key: &'a ReadingKey, quantity: Quantity, verdict: Verdict) -> Self {
         Self {
             night: night.into(),

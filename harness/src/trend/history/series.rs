@@ -31,14 +31,12 @@ pub struct Series {
     /// Standard error of the reading, likewise; 0 where it has none.
     pub std_error: Vec<f64>,
     pub reference: Vec<f64>,
-    /// None on a night without the comparison.
     pub verdicts: Vec<Option<Verdict>>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VersionChange {
     pub engine: EngineName,
-    /// The first night of the new version.
     pub night: usize,
     pub from: String,
     pub to: String,

@@ -51,7 +51,6 @@ pub fn site(history: &History, changes: &[Change], reports: &[(String, String)])
     .into_string()
 }
 
-/// Verdicts of the last night, an engine and procedure a row.
 fn tonight(history: &History) -> Markup {
     let Some(night) = history.nights.len().checked_sub(1) else { return html! {} };
     let row = |engine: &EngineName, procedure: ProcedureId| {
@@ -141,7 +140,6 @@ fn place(change: &Change) -> String {
     text
 }
 
-/// The new version of the engine at about the night of a change, if there is one.
 fn version(history: &History, change: &Change) -> Option<String> {
     let near = |night: usize| night.abs_diff(change.night) <= 2;
     let found = history.version_changes.iter().find(|v| v.engine == change.engine && near(v.night))?;
