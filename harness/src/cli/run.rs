@@ -8,7 +8,7 @@ use super::RunArgs;
 use super::diagnostic::diagnose;
 use super::engines::report_installation;
 use super::progress::Progress;
-use super::views::print_reports;
+use super::views::print_report;
 use crate::audit::{self, AfterFailure, AuditError, Options};
 use crate::engines::Site;
 use crate::judge::Policy;
@@ -47,9 +47,8 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
         report.baseline = Some(hold_against_baseline(&report, path, &root)?);
         files::keep_json(&root.join("report.json"), &report).into_diagnostic()?;
     }
-    let exit = report.exit();
-    print_reports(&[(report, root)], &args.views)?;
-    Ok(exit)
+    print_report(&report, &root, &args.views)?;
+    Ok(report.exit())
 }
 
 /// Holds a run against its baseline; what does not match it fails and is left as a candidate in the run's folder.

@@ -98,11 +98,8 @@ impl BugZones {
     fn of(photometry: &Photometry) -> Self {
         let forward_c_deg = if photometry.format.starts_with("EULUMDAT") { 90.0 } else { 0.0 };
         let zones = photometry.distribution.classification_zones(forward_c_deg);
-        Self {
-            back: zones.back.map(Lumen::value),
-            up: zones.up.map(Lumen::value),
-            forward: zones.forward.map(Lumen::value),
-        }
+        let [back, forward] = [zones.back, zones.forward].map(|zones| zones.map(Lumen::value));
+        Self { back, up: zones.up.map(Lumen::value), forward }
     }
 }
 

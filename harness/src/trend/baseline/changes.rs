@@ -102,16 +102,13 @@ impl Changes {
 }
 
 pub fn compare(old: &[Entry], new: &[Entry], comparability: Comparability) -> Changes {
-    let mut entries: Vec<EntryChange> = vec![];
-    for a in old {
-        entries.push(match new.iter().find(|b| b.key == a.key) {
-            None => bare(a, State::Vanished, vec!["there is no such run any more".to_owned()]),
-            Some(b) => pair(a, b, comparability),
-        });
-    }
-    for b in new.iter().filter(|b| !old.iter().any(|a| a.key == b.key)) {
-        entries.push(bare(b, State::New, vec!["there is nothing to hold it against".to_owned()]));
-    }
+    let of_old = old.iter().map(|a| match new.iter().find(|b| b.key == a.key) {
+        None => bare(a, State::Vanished, vec!["there is no such run any more".to_owned()]),
+        Some(b) => pair(a, b, comparability),
+    });
+    let added = new.iter().filter(|b| !old.iter().any(|a| a.key == b.key));
+    let added = added.map(|b| bare(b, State::New, vec!["there is nothing to hold it against".to_owned()]));
+    let mut entries: Vec<EntryChange> = of_old.chain(added).collect();
     let tests = entries.iter().map(|e| e.meters.len() + usize::from(e.mean.is_some())).sum::<usize>();
     // 1 - (1 - family)^(1 / tests), without loss of digits.
     let level = -f64::exp_m1(f64::ln_1p(-FAMILY) / tests.max(1) as f64);

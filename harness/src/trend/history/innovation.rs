@@ -107,10 +107,8 @@ pub(super) fn spread_of_all(members: &[&Series], nights: usize) -> Vec<Spread> {
     let mut before = vec![];
     for night in 0..nights {
         before.push(all);
-        for (mean, series) in means.iter_mut().zip(members) {
-            if let Some(innovation) = mean.update(series, night) {
-                all.update(innovation);
-            }
+        for innovation in members.iter().zip(&mut means).filter_map(|(series, mean)| mean.update(series, night)) {
+            all.update(innovation);
         }
     }
     before

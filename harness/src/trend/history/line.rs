@@ -21,7 +21,7 @@ const FORMAT: u32 = 2;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Line<'a> {
     #[serde(borrow)]
-    night: Cow<'a, str>,
+    pub(super) night: Cow<'a, str>,
     #[serde(borrow)]
     case: Cow<'a, str>,
     #[serde(default = "first_format", deserialize_with = "known_format")]
@@ -41,7 +41,7 @@ pub struct Line<'a> {
     pub source: Cow<'a, str>,
     pub verdict: Verdict,
     #[serde(borrow, default)]
-    meters: Vec<Meters<'a>>,
+    pub(super) meters: Vec<Meters<'a>>,
     /// Of format 1.
     #[serde(borrow, default, skip_serializing)]
     meter: Option<Cow<'a, str>>,
@@ -140,10 +140,6 @@ impl<'a> Line<'a> {
         Ok(line)
     }
 
-    pub fn night(&self) -> &str {
-        &self.night
-    }
-
     /// How every line of this night and case begins, of whatever format.
     pub(super) fn head(&self) -> String {
         let text = |t: &str| serde_json::Value::from(t).to_string();
@@ -152,10 +148,6 @@ impl<'a> Line<'a> {
 
     pub(super) fn subject(&self) -> Subject<'_> {
         (&self.case, self.procedure, &self.engine, &self.model, self.basis, &self.source)
-    }
-
-    pub(super) fn meters(&self) -> &[Meters<'a>] {
-        &self.meters
     }
 
     pub fn count(&self) -> usize {

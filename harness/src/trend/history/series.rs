@@ -69,7 +69,7 @@ impl History {
     }
 
     fn of(lines: &[Line<'_>]) -> Self {
-        let dates: BTreeSet<&str> = lines.iter().map(Line::night).collect();
+        let dates: BTreeSet<&str> = lines.iter().map(|line| &*line.night).collect();
         let place_of: HashMap<&str, usize> = dates.iter().copied().zip(0..).collect();
         let mut series: Vec<Series> = vec![];
         let mut known: HashMap<Key, usize> = HashMap::new();
@@ -77,14 +77,14 @@ impl History {
         let mut repeated: HashMap<(Subject<'_>, &[Meters<'_>]), Vec<usize>> = HashMap::new();
         let mut versions: BTreeMap<(&str, usize), &str> = BTreeMap::new();
         for line in lines {
-            let night = place_of[line.night()];
+            let night = place_of[&*line.night];
             let mut place = |key: Key| {
                 *known.entry(key).or_insert_with_key(|key| {
                     series.push(Series::without_readings(key.clone(), dates.len()));
                     series.len() - 1
                 })
             };
-            let same = repeated.entry((line.subject(), line.meters()));
+            let same = repeated.entry((line.subject(), &line.meters[..]));
             for (k, place) in same.or_insert_with(|| keys(line).map(&mut place).collect()).iter().enumerate() {
                 series[*place].set(night, line.numbers(k), line.verdict);
             }
@@ -114,7 +114,7 @@ fn keys<'l>(line: &'l Line<'_>) -> impl Iterator<Item = Key> + 'l {
         let (model, source) = (model.to_owned(), source.to_owned());
         Key { reading: reading.clone(), model, meter, basis, source }
     };
-    line.meters().iter().flat_map(Meters::ids).map(key)
+    line.meters.iter().flat_map(Meters::ids).map(key)
 }
 
 impl Series {
