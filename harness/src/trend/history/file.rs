@@ -22,8 +22,8 @@ pub(super) fn whole_lines(text: &[u8]) -> (&[u8], Option<usize>) {
     (whole, (!rest.is_empty()).then(|| whole.iter().filter(|b| **b == b'\n').count() + 1))
 }
 
-/// A history is made if there is none. A night that is run again takes the place of its earlier lines, case by case, so that repeating a night is harmless. The
-/// file is appended to, or replaced as a whole: never half written.
+/// A history is made if there is none, appended to, or replaced as a whole: never half written. A night that is run again
+/// takes the place of its earlier lines, case by case, so that repeating a night is harmless.
 pub fn add(path: &Path, lines: &[Line<'_>]) -> Result<Added, HistoryError> {
     let fail = |source| FileError { path: path.display().to_string(), source };
     let old = match fs::read(path) {
