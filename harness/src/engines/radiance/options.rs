@@ -1,11 +1,12 @@
 //! The arguments of rtrace for each preset.
 
-use luminaire::scene::{Bounces, Transport};
+use luminaire::scene::Bounces;
 
 use super::route::{Route, route};
 use super::settings::Settings;
 use crate::engines::Job;
 use crate::engines::settings::Preset;
+use crate::record::Light;
 
 /// Arguments without and with reflected light.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,7 +74,7 @@ impl Options {
         let words = |text: String| -> Vec<String> { text.split(' ').map(str::to_owned).collect() };
         // -I: irradiance at points.
         if settings.preset == Preset::Default {
-            let bounces = match reflections(job) {
+            let bounces = match Light(job.transport).bounces() {
                 Some(Bounces::AtMost(n)) => n,
                 Some(Bounces::Converged) => DEFAULT_BOUNCES,
                 None => 0,
@@ -95,17 +96,9 @@ impl Options {
     }
 }
 
-/// The limit on reflections, if reflected light is asked for.
-fn reflections(job: &Job) -> Option<Bounces> {
-    match job.transport {
-        Transport::Direct => None,
-        Transport::Indirect(bounces) | Transport::Total(bounces) => Some(bounces),
-    }
-}
-
 /// `-ab`: how many bounces are followed.
 pub(super) fn bounces(job: &Job) -> u32 {
-    match reflections(job) {
+    match Light(job.transport).bounces() {
         None => 0,
         Some(Bounces::AtMost(n)) => n,
         Some(Bounces::Converged) => {
@@ -118,7 +111,7 @@ pub(super) fn bounces(job: &Job) -> u32 {
 
 /// The largest part of the light that a converged run can miss for the limit on bounces.
 pub(super) fn remainder(job: &Job) -> f64 {
-    match reflections(job) {
+    match Light(job.transport).bounces() {
         Some(Bounces::Converged) => job.largest_reflectance().powi(bounces(job) as i32),
         _ => 0.0,
     }
