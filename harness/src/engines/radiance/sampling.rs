@@ -15,7 +15,7 @@ use super::tools::Tools;
 use super::{ID, export};
 use crate::engines::blocks::{Blocks, MIN_BLOCKS, Sampling};
 use crate::engines::settings::Preset;
-use crate::engines::{EngineError, Job, Workbench};
+use crate::engines::{Budget, EngineError, Job, Workbench};
 
 /// Ambient divisions of the trial from which effort is planned.
 const TRIAL_DIVISIONS: u32 = 64;
@@ -54,13 +54,9 @@ impl Sampler<'_> {
     /// Direct light of openings, whose samples are jittered; in one process a wave.
     pub(super) fn direct(&self, options: &Options) -> Result<Blocks, EngineError> {
         let mut places = 0..PROCESSES_A_SEED;
-        let within = Sampling::within(self.job.budget, self.started);
-        let rule = Sampling {
-            relative_error: DIRECT_ERROR * within.relative_error,
-            until: within.until - within.until.saturating_duration_since(self.started).mul_f64(1.0 - DIRECT_SHARE),
-            max_waves: places.len(),
-            ..within
-        };
+        let Budget { relative_error, seconds } = self.job.budget;
+        let budget = Budget { relative_error: DIRECT_ERROR * relative_error, seconds: DIRECT_SHARE * seconds };
+        let rule = Sampling { max_waves: places.len(), ..Sampling::within(budget, self.started) };
         rule.run(|numbers| self.side_by_side(&options.direct, &[numbers.len()], &mut places))
     }
 
