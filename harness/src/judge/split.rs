@@ -71,7 +71,10 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
                 of_method: split.method,
                 of_renderer: split.renderer,
                 uncertainty: split.uncertainty,
-                text: format!("{method} differs from {} by {split}", crate::engines::display_name(&renderer.key.engine)),
+                text: format!(
+                    "{method} differs from {} by {split}",
+                    crate::engines::display_name(&renderer.key.engine)
+                ),
             });
         }
     }

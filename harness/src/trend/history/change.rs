@@ -120,16 +120,9 @@ fn at_level(history: &History, level: Level) -> Vec<Change> {
             case: (level != Level::EngineAndProcedure).then(|| case.to_owned()),
             meter: (level == Level::Comparison).then(|| members[0].key.meter.clone()),
         };
-        let named = |alarm: Alarm| Change {
-            level,
-            engine: engine.clone(),
-            procedure,
-            part: part.clone(),
-            night: alarm.night,
-            noticed: alarm.noticed,
-            standard_errors: alarm.shift.0,
-            relative: alarm.shift.1,
-            seen_in: vec![],
+        let named = |(Alarm { night, noticed }, (standard_errors, relative))| {
+            let (engine, part, seen_in) = (engine.clone(), part.clone(), vec![]);
+            Change { level, engine, procedure, part, night, noticed, standard_errors, relative, seen_in }
         };
         let watch = Watch { limits, peers: cases.get(&of).map_or(&[], Vec::as_slice) };
         found.extend(watch.alarms(&members, history.nights.len()).into_iter().map(named));
@@ -155,13 +148,8 @@ fn spreads_of_cases(history: &History) -> BTreeMap<Case<'_>, Vec<Spread>> {
 }
 
 struct Alarm {
+    /// The first of the change, by estimate.
     night: usize,
-    noticed: usize,
-    shift: (f64, f64),
-}
-
-struct Noticed {
-    change: usize,
     noticed: usize,
 }
 
@@ -173,21 +161,20 @@ struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    /// The changes of one group. After each the estimates start anew with the night after it was noticed: the nights since the
+    /// The changes of one group, and how far each moved it. After each the estimates start anew with the night after it was noticed: the nights since the
     /// change were picked for being unusual, and would predict the next ones wrong.
-    fn alarms(&self, members: &[&Series], nights: usize) -> Vec<Alarm> {
-        let mut found: Vec<Alarm> = vec![];
-        let mut start = 0;
-        while let Some(night) = self.first_alarm(members, start..nights) {
-            let Noticed { change, noticed } = night;
-            found.push(Alarm { night: change, noticed, shift: shift(members, start, change, noticed) });
-            start = noticed + 1;
+    fn alarms(&self, members: &[&Series], nights: usize) -> Vec<(Alarm, (f64, f64))> {
+        let (mut found, mut start) = (vec![], 0);
+        while let Some(alarm) = self.first_alarm(members, start..nights) {
+            let (shift, next) = (shift(members, start, &alarm), alarm.noticed + 1);
+            found.push((alarm, shift));
+            start = next;
         }
         found
     }
 
     /// The first alarm of a segment without earlier changes.
-    fn first_alarm(&self, members: &[&Series], segment: std::ops::Range<usize>) -> Option<Noticed> {
+    fn first_alarm(&self, members: &[&Series], segment: std::ops::Range<usize>) -> Option<Alarm> {
         let most = REFERENCE_VALUE + MAX_OF_ONE_NIGHT * self.limits.sum;
         let mut means = vec![RunningMean::default(); members.len()];
         let mut spread = Spread::default();
@@ -209,12 +196,12 @@ impl Watch<'_> {
                 if sums[side] <= 0.0 {
                     (sums[side], zero[side]) = (0.0, deviates.len());
                 } else if sums[side] > self.limits.sum {
-                    return Some(Noticed { change: most_likely(&deviates[zero[side]..]), noticed: night });
+                    return Some(Alarm { night: most_likely(&deviates[zero[side]..]), noticed: night });
                 }
             }
             let last = &deviates[deviates.len().saturating_sub(WINDOW)..];
             if self.limits.are_exceeded_by(last.iter().map(|(_, deviate)| deviate.clamp(-MAX_SPREADS, MAX_SPREADS))) {
-                return Some(Noticed { change: most_likely(last), noticed: night });
+                return Some(Alarm { night: most_likely(last), noticed: night });
             }
         }
         None
@@ -235,7 +222,8 @@ fn most_likely(deviates: &[(usize, f64)]) -> usize {
 }
 
 /// How far a group's deviations moved at a change: in standard errors and relative to the reference.
-fn shift(members: &[&Series], start: usize, change: usize, noticed: usize) -> (f64, f64) {
+fn shift(members: &[&Series], start: usize, alarm: &Alarm) -> (f64, f64) {
+    let (change, end) = (alarm.night, alarm.noticed + 1);
     let (mut errors, mut relative, mut count) = (0.0, 0.0, 0.0);
     for series in members {
         let mean = |values: &[f64], nights: std::ops::Range<usize>| {
@@ -243,10 +231,10 @@ fn shift(members: &[&Series], start: usize, change: usize, noticed: usize) -> (f
             let (sum, count) = there.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
             sum / count
         };
-        let moved = mean(&series.deviation, change..noticed + 1) - mean(&series.deviation, start..change);
-        let reference = mean(&series.reference, start..noticed + 1).abs();
+        let moved = mean(&series.deviation, change..end) - mean(&series.deviation, start..change);
+        let reference = mean(&series.reference, start..end).abs();
         let squares: Vec<f64> = series.std_error.iter().map(|e| e * e).collect();
-        let error = mean(&squares, start..noticed + 1).sqrt().max(MIN_ERROR * reference).max(f64::MIN_POSITIVE);
+        let error = mean(&squares, start..end).sqrt().max(MIN_ERROR * reference).max(f64::MIN_POSITIVE);
         if moved.is_finite() {
             errors += moved / error;
             relative += if reference > 0.0 { moved / reference } else { 0.0 };
@@ -274,8 +262,8 @@ mod tests {
         let (mut noticed, mut dated) = (0, 0);
         for seed in SEEDS {
             let shift = Shift { night: 60 + 23 * seed as usize, ..shift };
-            let history =
-                Synthetic { seed, shift: Some(shift), nights: shift.night + within, ..base.clone() }.history();
+            let nights = shift.night + within;
+            let history = Synthetic { seed, shift: Some(shift), nights, ..base.clone() }.history();
             let mine = |c: &&Change| {
                 is_of_shifted(c) && c.noticed >= shift.night && (c.part == part || c.seen_in.contains(&part))
             };

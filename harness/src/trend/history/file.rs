@@ -19,8 +19,6 @@ pub enum HistoryError {
         line: usize,
         what: String,
     },
-    #[error("`{night}` is no date; give the night as YYYY-MM-DD")]
-    Night { night: String },
 }
 
 /// What adding took out of a history.
@@ -35,8 +33,7 @@ pub struct Added {
 /// Where the whole lines of a text end, and the number of a last one that is cut short.
 pub(super) fn whole_lines(text: &[u8]) -> (&[u8], Option<usize>) {
     let (whole, rest) = text.split_at(text.iter().rposition(|b| *b == b'\n').map_or(0, |end| end + 1));
-    let cut_short = || whole.iter().filter(|b| **b == b'\n').count() + 1;
-    (whole, (!rest.is_empty()).then(cut_short))
+    (whole, (!rest.is_empty()).then(|| whole.split(|b| *b == b'\n').count()))
 }
 
 /// Adds lines to a history, which is made if there is none.

@@ -16,6 +16,6 @@ mod synthetic;
 
 pub use change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part, changes};
 pub use file::{Added, HistoryError, add};
-pub use line::{Line, Numbers, lines};
+pub use line::{Line, NotADate, Numbers, lines};
 pub use series::{History, Key, Series, VersionChange};
 pub use site::site;
