@@ -5,8 +5,9 @@
 //! written until November 2026, is one of a single meter with numbers in place of lists.
 
 use std::borrow::Cow;
+use std::fmt;
 
-use serde::de::Error as _;
+use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::judge::{Basis, Comparison, Verdict};
@@ -117,7 +118,7 @@ impl<'a> Line<'a> {
         let place = place.and_then(|(set, k)| Some((set, k.parse::<usize>().ok()?)));
         match (place.filter(|(set, k)| MeterId::new(set, *k) == *meter), self.meters.last_mut()) {
             (Some((set, k)), Some(Meters::Run(of, _, last))) if of == set && last.checked_add(1) == Some(k) => {
-                *last = k
+                *last = k;
             }
             (Some((set, k)), _) => self.meters.push(Meters::Run(set.into(), k, k)),
             (None, _) => self.meters.push(Meters::One(id.into())),
@@ -183,11 +184,17 @@ impl Meters<'_> {
     }
 }
 
+#[derive(Debug, thiserror::Error)]
+#[error("`{night}` is no date; give the night as YYYY-MM-DD")]
+pub struct NotADate {
+    pub night: String,
+}
+
 /// The lines of a report, for the night of its start or for the one given.
-pub fn lines<'a>(report: &'a Report, night: Option<&'a str>) -> Result<Vec<Line<'a>>, HistoryError> {
+pub fn lines<'a>(report: &'a Report, night: Option<&'a str>) -> Result<Vec<Line<'a>>, NotADate> {
     let night = night.or_else(|| report.started.get(..10)).unwrap_or_default();
     if !is_date(night) {
-        return Err(HistoryError::Night { night: night.to_owned() });
+        return Err(NotADate { night: night.to_owned() });
     }
     let mut lines: Vec<Line<'a>> = vec![];
     for c in &report.comparisons {
@@ -253,17 +260,42 @@ fn is_void(numbers: &[f64]) -> bool {
 
 /// Reads a list of numbers, or the one number of format 1; null is NaN.
 fn numbers<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(untagged, expecting = "expected numbers or null, in a list")]
-    enum List {
-        Many(Vec<Option<f64>>),
-        One(Option<f64>),
+    from.deserialize_any(List)
+}
+
+/// Reads without a copy between, which `#[serde(untagged)]` would make: numbers are most of a history.
+struct List;
+
+impl<'de> Visitor<'de> for List {
+    type Value = Vec<f64>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("numbers or null, in a list")
     }
-    let list = match List::deserialize(from)? {
-        List::Many(list) => list,
-        List::One(number) => vec![number],
-    };
-    Ok(list.into_iter().map(|n| n.unwrap_or(f64::NAN)).collect())
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Vec<f64>, A::Error> {
+        let mut numbers = Vec::with_capacity(32);
+        while let Some(number) = list.next_element::<Option<f64>>()? {
+            numbers.push(number.unwrap_or(f64::NAN));
+        }
+        Ok(numbers)
+    }
+
+    fn visit_f64<E>(self, number: f64) -> Result<Vec<f64>, E> {
+        Ok(vec![number])
+    }
+
+    fn visit_i64<E>(self, number: i64) -> Result<Vec<f64>, E> {
+        Ok(vec![number as f64])
+    }
+
+    fn visit_u64<E>(self, number: u64) -> Result<Vec<f64>, E> {
+        Ok(vec![number as f64])
+    }
+
+    fn visit_unit<E>(self) -> Result<Vec<f64>, E> {
+        Ok(vec![f64::NAN])
+    }
 }
 
 #[cfg(test)]

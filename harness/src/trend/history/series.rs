@@ -192,10 +192,10 @@ mod tests {
         let old = of_format_1("2025-12-31", 0, "0.5") + &of_format_1("2025-12-31", 1, "0.25");
         let (new, both) = (parse(&new).unwrap(), parse(&(old + &new)).unwrap());
         assert_eq!((both.nights.len(), both.series.len()), (3, new.series.len()));
-        for (k, deviation) in [0.5, 0.25].into_iter().enumerate() {
-            assert_eq!(both.series[k].key, new.series[k].key);
-            assert_eq!(both.series[k].deviation[0], deviation);
-            assert_eq!(both.series[k].deviation[1..], new.series[k].deviation);
+        let of_both = |history| History::of_engine(history, &"iesna".into(), ProcedureId::DirectIlluminance);
+        for ((one, new), deviation) in of_both(&both).into_iter().zip(of_both(&new)).zip([0.5, 0.25]) {
+            assert_eq!(one.key, new.key);
+            assert_eq!((one.deviation[0], &one.deviation[1..]), (deviation, &new.deviation[..]));
         }
     }
 
