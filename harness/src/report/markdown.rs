@@ -50,6 +50,25 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
             line(format!("- {departure}"));
         }
     }
+    worst_deviations(report, &mut line);
+    if let Some(check) = &report.baseline {
+        line(format!("\nBaseline `{}`: {}", check.file, check.counts()));
+        for (k, entry) in check.departures().enumerate() {
+            let gap = if k == 0 { "\n" } else { "" };
+            let place = format!("{} {} {}", entry.key.case, entry.key.procedure, entry.key.engine);
+            line(format!("{gap}- **{}** {place}: {}", entry.state.to_lowercase(), entry.details.join("; ")));
+        }
+    }
+    for (k, note) in notes(report).iter().filter(|n| n.kind <= Kind::Shortcut).enumerate() {
+        line(format!("{}- {}", if k == 0 { "\n" } else { "" }, note.line(report)));
+    }
+    if let Some(link) = link {
+        writeln!(text, "\n[The whole report]({link})").ok();
+    }
+    text
+}
+
+fn worst_deviations(report: &Report, line: &mut impl FnMut(String)) {
     let worst = worst(report, 10);
     if !worst.is_empty() {
         line(
@@ -71,21 +90,6 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
             ));
         }
     }
-    if let Some(check) = &report.baseline {
-        line(format!("\nBaseline `{}`: {}", check.file, check.counts()));
-        for (k, entry) in check.departures().enumerate() {
-            let gap = if k == 0 { "\n" } else { "" };
-            let place = format!("{} {} {}", entry.key.case, entry.key.procedure, entry.key.engine);
-            line(format!("{gap}- **{}** {place}: {}", entry.state.to_lowercase(), entry.details.join("; ")));
-        }
-    }
-    for (k, note) in notes(report).iter().filter(|n| n.kind <= Kind::Shortcut).enumerate() {
-        line(format!("{}- {}", if k == 0 { "\n" } else { "" }, note.line(report)));
-    }
-    if let Some(link) = link {
-        writeln!(text, "\n[The whole report]({link})").ok();
-    }
-    text
 }
 
 /// Text that cannot end a cell of a table.
