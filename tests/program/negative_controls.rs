@@ -1,11 +1,11 @@
 //! Negative controls: a deliberately wrong export, run on the real renderer, must fail its procedure.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
-use luxproof::audit::run::{Options, Progress, run};
-use luxproof::engines::{Engine, Site};
+use luxproof::audit::Silent;
+use luxproof::audit::jobs::{Options, run};
+use luxproof::engines::Site;
 use luxproof::judge::{Comparison, Judge, KnownDeviations, Tolerances, Verdict};
 use luxproof::measure::{Machine, Reader};
 use luxproof::plan::{Selection, plan};
@@ -13,13 +13,6 @@ use luxproof::record::{ProcedureId, Recording};
 use luxproof::spec::Case;
 
 use crate::support::{Folder, root};
-
-struct Silent;
-
-impl Progress for Silent {
-    fn started(&self, _engine: &str, _procedure: &str) {}
-    fn ended(&self, _engine: &dyn Engine, _procedure: ProcedureId, _wall: Duration, _failure: Option<&str>) {}
-}
 
 fn cachet() -> Case {
     Case::load(&root().join("reference/specs/cachet.yaml")).unwrap()
