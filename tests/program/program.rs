@@ -6,6 +6,7 @@ mod baselines;
 mod by_hand;
 mod cache;
 mod command_line;
+mod cylindrical;
 mod external_adapter;
 mod furnished_office;
 mod guide;

@@ -12,7 +12,7 @@ use crate::judge::{Comparison, Consensus, Judge, Policy, Published, PublishedTab
 use crate::measure::Reader;
 use crate::plan::{Plan, Scope, Skip};
 use crate::record::{Recording, Status};
-use crate::report::{self, Ingredients, Report, SpecRecord};
+use crate::report::{self, Report};
 use crate::spec::Case;
 use crate::system::files;
 use crate::system::process;
@@ -63,20 +63,16 @@ impl Audit<'_> {
         let Judged { comparisons, splits, consensus, tables } = judged(case, plan, &outcome.recordings, &judge);
         // What follows from other readings follows from nothing where the case was never begun.
         let holds = |s: &&Skip| stop.is_none() || matches!(s.scope, Scope::Engine | Scope::Procedure);
-        let ingredients = Ingredients {
-            case: case.name.clone(),
-            spec: SpecRecord::of(case),
-            started,
+        let skips = plan.skips.iter().filter(holds).cloned().chain(outcome.skips).collect();
+        let report = Report {
             wall_s: clock.elapsed().as_secs_f64(),
             engines: outcome.engines,
-            recordings: &outcome.recordings,
-            skips: plan.skips.iter().filter(holds).cloned().chain(outcome.skips).collect(),
             splits,
             consensus,
             published: tables,
             curves: plan.tasks.iter().flat_map(|task| report::curves(&case.name, task)).collect(),
+            ..Report::new(case, started, &outcome.recordings, comparisons, skips)
         };
-        let report = Report::new(ingredients, comparisons);
         files::keep_json(&folder.join("report.json"), &report)?;
         Ok(report)
     }

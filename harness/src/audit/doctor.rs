@@ -79,9 +79,11 @@ fn check(
 
 fn known_job(procedure: ProcedureId, transport: Transport) -> Job {
     let reflectance = Reflectances::with_equal_walls(0.5, 0.5, 0.5);
+    let table = LuminousIntensityDistribution::axial(vec![0.0, 90.0, 180.0], vec![100.0; 3]);
+    let isotropic = table.unwrap_or_else(|e| unreachable!("a constant table is sound: {e}"));
     let luminaire = Luminaire {
         id: "isotropic".into(),
-        photometry: Arc::new(isotropic()),
+        photometry: Arc::new(Photometry::of(isotropic)),
         position_m: DVec3::splat(2.0),
         orientation: DMat3::IDENTITY,
         flux_scale: 1.0,
@@ -99,12 +101,6 @@ fn known_job(procedure: ProcedureId, transport: Transport) -> Job {
         seed: 1,
         settings: BTreeMap::new(),
     }
-}
-
-fn isotropic() -> Photometry {
-    let table = LuminousIntensityDistribution::axial(vec![0.0, 90.0, 180.0], vec![100.0; 3]);
-    let distribution = table.unwrap_or_else(|e| unreachable!("a constant table is sound: {e}"));
-    Photometry::of(distribution)
 }
 
 fn expected(job: &Job) -> Result<f64, String> {

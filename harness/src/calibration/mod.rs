@@ -26,6 +26,7 @@ use self::scenes::KnownScene;
 use crate::engines::Support;
 use crate::measure::{Failure, FailureKind, Instrument, Question, Reader};
 use crate::record::{EngineName, Estimate};
+use crate::system::files;
 use crate::system::slots::side_by_side;
 
 /// A deviation beyond this, noise and declared approximations apart, is no uncertainty but a broken instrument.
@@ -35,7 +36,6 @@ const COVERAGE: f64 = 2.0;
 /// Past this a calibration scene hangs.
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// What a calibration found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     pub engine: EngineName,
@@ -43,16 +43,13 @@ pub struct Calibration {
     /// The version of this program, whose read-out it is.
     pub tool_version: String,
     pub settings: BTreeMap<String, serde_json::Value>,
-    /// What it read of each scene.
     pub parts: Vec<Part>,
 }
 
 /// What an engine read of one calibration scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Part {
-    /// The scene: point, asymmetric, shadow or furnace.
     pub scene: String,
-    /// Whether it is one of reflected light.
     pub reflected: bool,
     /// The largest deviation from the closed form, relative.
     pub deviation: f64,
@@ -62,26 +59,20 @@ pub struct Part {
     pub declared: f64,
     /// The instrument's standard uncertainty that follows, relative.
     pub uncertainty: f64,
-    /// Why the scene was left out.
     pub left_out: Option<String>,
 }
 
-/// A calibration and where it is kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibrated {
     pub calibration: Calibration,
-    /// Whether it was measured just now.
     pub origin: Origin,
     /// The file that keeps it, or why none does.
     pub kept: Result<String, String>,
 }
 
-/// Where a calibration comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
-    /// Read from the file of an earlier one.
     Kept,
-    /// Measured just now.
     Measured,
 }
 
@@ -95,7 +86,6 @@ pub enum CalibrationError {
         100.0 * deviation
     )]
     Implausible { engine: EngineName, scene: &'static str, meter: String, value_lx: f64, exact_lx: f64, deviation: f64 },
-    /// It failed in a calibration scene.
     #[error("calibration: {0}")]
     Failed(#[from] Failure),
 }
@@ -136,7 +126,8 @@ pub fn calibrate(
     let kept = if noise > scenes::BUDGET.relative_error {
         Err(format!("noise of {noise:.1e}, as on a machine with other work"))
     } else {
-        store::keep(&path, &calibration).map(|()| path.display().to_string())
+        let kept = files::replace_json(&path, &calibration);
+        kept.map(|()| path.display().to_string()).map_err(|e| format!("{}: {e}", path.display()))
     };
     Ok(Calibrated { calibration, origin: Origin::Measured, kept })
 }
@@ -175,11 +166,8 @@ fn part(instrument: &Instrument, scene: &KnownScene, reader: &Reader) -> Result<
         Err(Failure { kind: FailureKind::Declined, text }) => Ok(Part {
             scene: scene.name.to_owned(),
             reflected: scene.is_reflected(),
-            deviation: 0.0,
-            std_error: 0.0,
-            declared: 0.0,
-            uncertainty: 0.0,
             left_out: Some(text),
+            ..Part::default()
         }),
         Err(failure) => Err(failure.into()),
     }

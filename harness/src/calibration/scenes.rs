@@ -31,7 +31,6 @@ pub(super) struct Known {
 }
 
 impl KnownScene {
-    /// Whether it is one of reflected light.
     pub(super) fn is_reflected(&self) -> bool {
         self.job.transport != Transport::Direct
     }
@@ -99,7 +98,6 @@ fn shadow() -> KnownScene {
     known
 }
 
-/// Reflectance of the furnace.
 const RHO: f64 = 0.5;
 
 /// A cube of 2 m whose luminaire lights every surface evenly.

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::diagnose;
-use super::measuring::{self, Bar};
+use super::measuring::{Bar, MeasuringArgs};
 use crate::engines::Site;
 use crate::experiments::bench::{self, BenchReport, Knobs, Options, Progress};
 use crate::record::ProcedureId;
@@ -17,12 +17,8 @@ use crate::system::files;
 
 #[derive(Debug, Args)]
 pub(super) struct BenchArgs {
-    /// Spec files, folders of them or patterns
-    #[arg(required = true, value_name = "SPEC")]
-    specs: Vec<PathBuf>,
-    /// Engines to bench, by name [default: all that are there]
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
-    engines: Vec<String>,
+    #[command(flatten)]
+    measuring: MeasuringArgs,
     /// Procedures to bench, by name [default: all of the spec but luminous intensity]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     procedures: Vec<ProcedureId>,
@@ -38,15 +34,6 @@ pub(super) struct BenchArgs {
     /// Minutes after which no reading starts, for each case; run again to go on from there
     #[arg(long, default_value_t = 7.0, value_name = "MINUTES")]
     minutes: f64,
-    /// Threads or processes that a reading may use [default: one a core]
-    #[arg(long, value_name = "N")]
-    jobs: Option<usize>,
-    /// First seed
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Folder of finished readings and of bench.json [default: luxproof-out/bench/<spec name>]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
     /// Views to print
     #[arg(long, value_enum, value_name = "FORMAT", default_values_t = [BenchFormat::Terminal])]
     format: Vec<BenchFormat>,
@@ -76,17 +63,17 @@ pub(super) fn run(args: &BenchArgs, site: &Site) -> Result<Exit, Diagnostic> {
     if !args.seconds.iter().chain([&args.minutes]).all(|s| s.is_finite() && *s >= 0.0) || args.seconds.is_empty() {
         return Err(miette::miette!("--seconds and --minutes must be numbers from 0"));
     }
-    let cases = suite(&args.specs).map_err(diagnose)?;
-    let subjects = measuring::subjects(&args.engines, site)?;
-    let first = args.specs.first().map_or(std::path::Path::new("suite"), PathBuf::as_path);
-    let folder = measuring::folder(args.out.as_ref(), "bench", first);
+    let cases = suite(&args.measuring.specs).map_err(diagnose)?;
+    let subjects = args.measuring.subjects(site)?;
+    let first = args.measuring.specs.first().map_or(std::path::Path::new("suite"), PathBuf::as_path);
+    let folder = args.measuring.folder("bench", first);
     let options = Options {
-        reader: measuring::reader(site, &folder, args.jobs)?,
+        reader: args.measuring.reader(site, &folder)?,
         repetitions: args.repetitions.max(1),
         time: Duration::from_secs_f64((60.0 * args.minutes).min(1e9)),
         seconds: &args.seconds,
         procedures: &args.procedures,
-        seed: args.seed,
+        seed: args.measuring.seed,
         knobs: if args.knobs { Knobs::Tried } else { Knobs::Left },
     };
     let (mut report, bar) = (BenchReport::default(), Bar::new());

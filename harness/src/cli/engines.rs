@@ -88,11 +88,11 @@ fn calibrate_anew(engine: Arc<dyn Engine>, reader: &Reader) -> Exit {
     let name = engine.name();
     match calibration::calibrate(&Instrument { engine, version }, &BTreeMap::new(), reader, Earlier::Ignored) {
         Ok(found) => {
-            println!("     {:<10} {}", name, calibration_line(&found));
+            println!("     {name:<10} {}", calibration_line(&found));
             Exit::Passed
         }
         Err(error) => {
-            println!("FAIL {:<10} {error}", name);
+            println!("FAIL {name:<10} {error}");
             Exit::Engine
         }
     }

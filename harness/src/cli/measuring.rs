@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
@@ -15,36 +16,58 @@ use crate::measure::{self, Instrument, Isolation, Machine, Reader};
 use crate::report::Exit;
 use crate::system::process;
 
-/// The engines that were named, or all that are there; one that was named and is absent is an error.
-pub(super) fn subjects(names: &[String], site: &Site) -> Result<Vec<Instrument>, Diagnostic> {
-    known_engines(names)?;
-    let mut present = vec![];
-    for engine in engines::all() {
-        let is_named = names.iter().any(|n| engine.name() == *n);
-        if !names.is_empty() && !is_named {
-            continue;
+/// What is measured, by how much of the machine at a time, and where it is kept.
+#[derive(Debug, Args)]
+pub(super) struct MeasuringArgs {
+    /// Spec files, folders of them or patterns
+    #[arg(required = true, value_name = "SPEC")]
+    pub(super) specs: Vec<PathBuf>,
+    /// Engines to measure, by name [default: all that are there]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    engines: Vec<String>,
+    /// Threads or processes at a time [default: one a core]
+    #[arg(long, value_name = "N")]
+    jobs: Option<usize>,
+    /// Seed of every random choice
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Folder of finished readings and of the report [default: one in luxproof-out, named after the command and the spec]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl MeasuringArgs {
+    /// The engines that were named, or all that are there; one that was named and is absent is an error.
+    pub(super) fn subjects(&self, site: &Site) -> Result<Vec<Instrument>, Diagnostic> {
+        known_engines(&self.engines)?;
+        let mut present = vec![];
+        for engine in engines::all() {
+            let is_named = self.engines.iter().any(|n| engine.name() == *n);
+            if !self.engines.is_empty() && !is_named {
+                continue;
+            }
+            match engine.probe(site) {
+                Ok(version) => present.push(Instrument { engine: engine.into(), version }),
+                Err(absent) if is_named => return Err(miette::miette!("{}: {absent}", engine.name())),
+                Err(absent) => eprintln!("{}: {absent}", engine.name()),
+            }
         }
-        match engine.probe(site) {
-            Ok(version) => present.push(Instrument { engine: engine.into(), version }),
-            Err(absent) if is_named => return Err(miette::miette!("{}: {absent}", engine.name())),
-            Err(absent) => eprintln!("{}: {absent}", engine.name()),
-        }
+        Ok(present)
     }
-    Ok(present)
-}
 
-/// Keeps readings in the measurement's own folder and runs our own solvers in processes of this program.
-pub(super) fn reader(site: &Site, folder: &Path, jobs: Option<usize>) -> Result<Reader, Diagnostic> {
-    let machine = Machine::new(jobs.unwrap_or_else(process::cores));
-    let isolation = Isolation::Subprocess(std::env::current_exe().into_diagnostic()?);
-    let cache = Some(Cache::at(folder.join("readings")));
-    Ok(Reader { cache, isolation, ..Reader::bare(site, machine) })
-}
+    /// Keeps readings in the measurement's own folder and runs our own solvers in processes of this program.
+    pub(super) fn reader(&self, site: &Site, folder: &Path) -> Result<Reader, Diagnostic> {
+        let machine = Machine::new(self.jobs.unwrap_or_else(process::cores));
+        let isolation = Isolation::Subprocess(std::env::current_exe().into_diagnostic()?);
+        let cache = Some(Cache::at(folder.join("readings")));
+        Ok(Reader { cache, isolation, ..Reader::bare(site, machine) })
+    }
 
-/// The folder of a measurement's files: the one given, or `luxproof-out/<command>/<spec name>`.
-pub(super) fn folder(out: Option<&PathBuf>, command: &str, spec: &Path) -> PathBuf {
-    let name = spec.file_stem().map_or(Path::new("suite"), Path::new);
-    out.cloned().unwrap_or_else(|| Path::new("luxproof-out").join(command).join(name))
+    /// The folder of a measurement's files: the one given, or `luxproof-out/<command>/<spec name>`.
+    pub(super) fn folder(&self, command: &str, spec: &Path) -> PathBuf {
+        let name = spec.file_stem().map_or(Path::new("suite"), Path::new);
+        self.out.clone().unwrap_or_else(|| Path::new("luxproof-out").join(command).join(name))
+    }
 }
 
 /// The hidden command that takes one reading for another process of this program.

@@ -187,7 +187,7 @@ impl Cli {
             Command::History(args) => history::history(&args),
             Command::Diff(args) => diff::diff(&args),
             Command::Accept(args) => accept::accept(&args),
-            Command::Selftest(args) => selftest::test_oneself(&args),
+            Command::Selftest(args) => selftest::run_selftest(&args),
             Command::Bench(args) => bench::run(&args, &site),
             Command::Stress(args) => stress::run(&args, &site),
             Command::ReadOne => measuring::read_one(&site),

@@ -32,7 +32,7 @@ enum CardFormat {
     Json,
 }
 
-pub(super) fn test_oneself(args: &SelftestArgs) -> Result<Exit, Diagnostic> {
+pub(super) fn run_selftest(args: &SelftestArgs) -> Result<Exit, Diagnostic> {
     if args.calibration {
         let found = calibrations(args.seed);
         print(&match args.format {

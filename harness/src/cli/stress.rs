@@ -1,13 +1,12 @@
 //! `luxproof stress`: metamorphic laws on every engine, and a matrix of what breaks where.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::diagnose;
-use super::measuring::{self, Bar};
+use super::measuring::{Bar, MeasuringArgs};
 use crate::engines::Site;
 use crate::experiments::stress::{self, Coordinates, Options, Progress, StressReport};
 use crate::judge::KnownDeviations;
@@ -19,12 +18,8 @@ use crate::system::files;
 
 #[derive(Debug, Args)]
 pub(super) struct StressArgs {
-    /// Spec files, folders of them or patterns
-    #[arg(required = true, value_name = "SPEC")]
-    specs: Vec<PathBuf>,
-    /// Engines to stress, by name [default: all that are there]
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
-    engines: Vec<String>,
+    #[command(flatten)]
+    measuring: MeasuringArgs,
     /// Laws to try, by name [default: all]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     laws: Vec<String>,
@@ -40,15 +35,6 @@ pub(super) struct StressArgs {
     /// Seconds past which a reading hangs
     #[arg(long, default_value_t = 60.0, value_name = "SECONDS")]
     limit: f64,
-    /// Readings at a time [default: one a core]
-    #[arg(long, value_name = "N")]
-    jobs: Option<usize>,
-    /// Seed of every random choice
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Folder of finished readings and of stress.json [default: luxproof-out/stress/<spec name>]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
     /// View to print
     #[arg(long, value_enum, value_name = "FORMAT", default_value_t = StressFormat::Terminal)]
     format: StressFormat,
@@ -83,22 +69,23 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
     if ![args.minutes, args.seconds, args.limit].into_iter().all(sensible) {
         return Err(miette::miette!("--minutes, --seconds and --limit must be numbers from 0"));
     }
-    let cases: Vec<Case> = suite(&args.specs).map_err(diagnose)?.into_iter().filter(stress::concerns).collect();
+    let cases: Vec<Case> =
+        suite(&args.measuring.specs).map_err(diagnose)?.into_iter().filter(stress::concerns).collect();
     if cases.is_empty() {
         return Err(miette::miette!("there is neither direct nor indirect illuminance to stress in these specs"));
     }
-    let subjects = measuring::subjects(&args.engines, site)?;
+    let subjects = args.measuring.subjects(site)?;
     let record = KnownDeviations::built_in().into_diagnostic()?;
     let mut reports = vec![];
     for case in &cases {
-        let folder = measuring::folder(args.out.as_ref(), "stress", &case.path);
+        let folder = args.measuring.folder("stress", &case.path);
         let options = Options {
-            reader: measuring::reader(site, &folder, args.jobs)?,
+            reader: args.measuring.reader(site, &folder)?,
             time: Duration::from_secs_f64((60.0 * args.minutes).min(1e9)),
             budget: Budget { relative_error: 1e-3, seconds: args.seconds },
             limit: Duration::from_secs_f64(args.limit.clamp(1.0, 1e9)),
             laws: &args.laws,
-            seed: args.seed,
+            seed: args.measuring.seed,
             coordinates: if args.raw { Coordinates::Raw } else { Coordinates::Fitted },
             known: if args.raw { &[] } else { record.breaks() },
         };

@@ -131,7 +131,6 @@ impl Sampling<'_> {
         Ok(blocks)
     }
 
-    /// What the reader should know where time ran out.
     pub(super) fn shortfall(&self, blocks: &Blocks) -> Option<String> {
         let worst = blocks.worst_error(self.known_lx);
         (worst > self.relative_error).then(|| format!("out of time at a relative standard error of {worst:.1e}"))

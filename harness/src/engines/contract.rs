@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use luminaire::geometry::Surface;
-use luminaire::scene::{LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
+use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
 use serde::{Deserialize, Serialize};
 
 use super::Site;
@@ -20,7 +20,6 @@ pub const FILE_READER: &str = "luxproof's reader of photometric files";
 /// The component of our own solvers, which look intensities up alike.
 pub(super) const OWN_LOOKUP: &str = "luminaire's interpolation of candela tables";
 
-/// Something that reads illuminance at meters of a scene.
 pub trait Engine: Send + Sync {
     fn name(&self) -> EngineName;
 
@@ -32,7 +31,6 @@ pub trait Engine: Send + Sync {
         self.role() == Role::Witness
     }
 
-    /// Whether it can run here, and its version.
     fn probe(&self, site: &Site) -> Result<Version, Absent>;
 
     /// Whether it can do this job, exactly or nearly; decided from the job alone, before anything starts.
@@ -85,14 +83,12 @@ pub struct Entry {
     pub colour: (&'static str, &'static str),
     /// What `luxproof engines install` fetches for it.
     pub installs: &'static [Component],
-    /// The models of luminaires that it has a source for.
     pub models: &'static [LuminaireModel],
     /// The setting that, `false`, leaves it the coordinates of the spec, where it would get handier ones.
     pub fits_coordinates: Option<&'static str>,
     pub make: fn() -> Box<dyn Engine>,
 }
 
-/// A part of the installation, which engines may share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Component {
     /// Mitsuba, Radiance and what reads POV-Ray's images, as `engines.lock` pins them.
@@ -102,7 +98,6 @@ pub enum Component {
 }
 
 impl Entry {
-    /// Why it cannot be given the luminaires of a job, if it cannot.
     pub fn objection(&self, job: &Job) -> Option<String> {
         let other = job.scene.luminaires.iter().find(|l| !self.models.contains(&l.model))?;
         let known = self.models.iter().map(|m| format!("`{}`", m.name())).collect::<Vec<_>>().join(" or ");
@@ -111,7 +106,6 @@ impl Entry {
     }
 }
 
-/// A setting of an engine with values worth trying.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Knob {
     pub key: &'static str,
@@ -147,7 +141,6 @@ pub struct Job {
     pub stations: Vec<Station>,
     pub transport: Transport,
     pub budget: Budget,
-    /// Seed of every random choice.
     pub seed: u64,
     /// The engine's own settings from the spec, e.g. `variant: llvm_ad_mono`.
     pub settings: BTreeMap<String, serde_json::Value>,
@@ -168,15 +161,20 @@ impl Job {
             settings: BTreeMap::new(),
         }
     }
-}
 
-impl Job {
     /// The same whatever case and procedure are called.
     pub(super) fn without_names(&self) -> Self {
         Self { case: String::new(), procedure: ProcedureId::DirectIlluminance, ..self.clone() }
     }
 
-    /// Of all surfaces of room and bodies.
+    /// The limit on reflections, if reflected light is asked for.
+    pub(super) const fn reflections(&self) -> Option<Bounces> {
+        match self.transport {
+            Transport::Direct => None,
+            Transport::Indirect(bounces) | Transport::Total(bounces) => Some(bounces),
+        }
+    }
+
     pub(super) fn largest_reflectance(&self) -> f64 {
         let room = self.scene.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
         room.chain(self.scene.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
@@ -186,18 +184,15 @@ impl Job {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Station {
     pub id: MeterId,
-    /// Where it is and which way it looks.
     pub meter: Meter,
     /// What it is expected to read at most, in lux, if known: lets engines choose a read-out scale. Never copied to a result.
     pub expected_lx: Option<f64>,
 }
 
-/// An engine's version, as it names itself.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
 pub struct Version(pub String);
 
-/// Why an engine is not there, and how to get it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{reason}; {remedy}")]
 pub struct Absent {
@@ -205,12 +200,9 @@ pub struct Absent {
     pub remedy: String,
 }
 
-/// Whether an engine can do a job.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Support {
-    /// To its full accuracy.
     Yes,
-    /// With a known approximation.
     Approximate {
         why: String,
         /// Its size, relative.
@@ -219,7 +211,6 @@ pub enum Support {
     No(String),
 }
 
-/// What an engine gives for a job.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measurement {
@@ -229,7 +220,6 @@ pub struct Measurement {
     pub method: Method,
     /// How much of it, by which random numbers and where: samples, seeds, commands.
     pub effort: Effort,
-    /// What the reader of the report should know of this run.
     pub notes: Vec<String>,
     /// The independent parts of the readings that were sampled, in the stations' order: their spread is the estimates'
     /// standard error. Empty where nothing was sampled or nobody says.
@@ -270,15 +260,30 @@ impl Measurement {
     }
 }
 
+/// Checks that what was read is named as the meters, in their order.
+pub(super) fn same_meters<'a>(
+    engine: &EngineName,
+    job: &Job,
+    found: impl ExactSizeIterator<Item = &'a str>,
+) -> Result<(), EngineError> {
+    count_readings(engine, job, found.len())?;
+    match found.zip(&job.stations).find(|(found, wanted)| *found != wanted.id.0) {
+        Some((found, wanted)) => {
+            Err(EngineError::output(engine.clone(), format!("gave `{found}` where `{}` was asked for", wanted.id)))
+        }
+        None => Ok(()),
+    }
+}
+
+fn count_readings(engine: &EngineName, job: &Job, found: usize) -> Result<(), EngineError> {
+    let wanted = job.stations.len();
+    let wrong = || EngineError::output(engine.clone(), format!("gave {found} readings for {wanted} meters"));
+    (found == wanted).then_some(()).ok_or_else(wrong)
+}
+
 /// Checks what every engine must hold: one finite, non-negative value a station.
 pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
-    let (found, wanted) = (measurement.estimates.len(), job.stations.len());
-    if found != wanted {
-        return Err(EngineError::Output {
-            engine: engine.clone(),
-            what: format!("gave {found} readings for {wanted} meters"),
-        });
-    }
+    count_readings(engine, job, measurement.estimates.len())?;
     for (estimate, station) in measurement.estimates.iter().zip(&job.stations) {
         let Estimate { value, uncertainty } = *estimate;
         let (engine, meter) = (engine.clone(), station.id.clone());
@@ -296,23 +301,13 @@ pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engines::fixtures;
     use glam::DVec3;
 
     const ENGINE: EngineName = EngineName::new("test");
 
     fn job(stations: usize) -> Job {
-        let meter = Meter { position_m: DVec3::ONE, normal: DVec3::Z };
-        let station = |k| Station { id: MeterId::new("m", k), meter, expected_lx: None };
-        Job {
-            case: "case".into(),
-            procedure: ProcedureId::DirectIlluminance,
-            scene: Scene::default(),
-            stations: (0..stations).map(station).collect(),
-            transport: Transport::Direct,
-            budget: Budget::default(),
-            seed: 1,
-            settings: BTreeMap::new(),
-        }
+        fixtures::job(Scene::default(), fixtures::stations(&vec![[1.0; 3]; stations], DVec3::Z), Transport::Direct)
     }
 
     fn measurement(values: &[f64]) -> Measurement {

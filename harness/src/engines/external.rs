@@ -23,11 +23,9 @@ const FOLDER_VARIABLE: &str = "LUXPROOF_SCENE_DIR";
 
 const JOB_FILE: &str = "job.json";
 
-/// An engine that is a program of the user's.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct External {
     id: EngineName,
-    /// The program and its arguments, as in the spec.
     command: Vec<String>,
     /// The procedures that it takes part in; `None` for all.
     procedures: Option<Vec<ProcedureId>>,

@@ -1,6 +1,7 @@
 //! Jobs with known answers that the tests of every engine share.
 
 use std::collections::BTreeMap;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,7 +9,8 @@ use std::time::Duration;
 use glam::DVec3;
 use luminaire::geometry::{Reflectances, Room};
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction};
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
+use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
+use luminaire::simulator::{self, Accuracy};
 
 use super::{Budget, Job, Measurement, Site, Station, Workbench};
 use crate::record::{Estimate, MeterId, ProcedureId};
@@ -19,18 +21,6 @@ pub(super) const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230
 pub(crate) const S1_INDIRECT_LX: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
 /// Indirect light cut at seven reflections.
 pub(super) const S1_SEVEN_LX: [f64; 4] = [0.93537, 1.14730, 1.14730, 1.41182];
-
-/// A bench with the engines that are installed, two processes at a time.
-pub(crate) fn workbench(folder: &Path) -> Workbench {
-    Workbench {
-        site: Site::of_user().unwrap(),
-        scene_dir: folder.to_owned(),
-        log: folder.join("log"),
-        jobs: 2,
-        limit: Duration::from_secs(120),
-        peak: PeakMemory::default(),
-    }
-}
 
 pub(crate) fn photometry(distribution: LuminousIntensityDistribution) -> Arc<Photometry> {
     Arc::new(Photometry::of(distribution))
@@ -83,7 +73,6 @@ pub(crate) fn stations(points_m: &[[f64; 3]], normal: DVec3) -> Vec<Station> {
     points_m.iter().enumerate().map(station).collect()
 }
 
-/// The procedure that reads such light.
 pub(crate) const fn procedure_of(transport: Transport) -> ProcedureId {
     match transport {
         Transport::Direct => ProcedureId::DirectIlluminance,
@@ -113,6 +102,35 @@ pub(crate) fn s1(transport: Transport) -> Job {
     };
     let (z, normal) = if transport == Transport::Direct { (17.0, DVec3::NEG_Z) } else { (2.0, DVec3::Z) };
     job(scene, stations(&[[2.0, 2.0, z], [2.0, 10.0, z], [10.0, 2.0, z], [10.0, 10.0, z]], normal), transport)
+}
+
+pub(super) const S2_PANELS_M: [[f64; 2]; 4] = [[2.0, 1.5], [6.0, 1.5], [2.0, 4.5], [6.0, 4.5]];
+/// Of the first five points of S2; the sixth is in the shadow.
+pub(super) const S2_DIRECT_LX: [f64; 5] = [66.24407, 226.03927, 161.02976, 123.15923, 210.12365];
+pub(super) const S2_INDIRECT_LX: [f64; 6] = [51.0232, 53.0644, 48.966, 53.512, 50.245, 18.788];
+
+/// Case S2 of the reference, whose luminaires are Lambertian panels of .6 m flush with the ceiling at `S2_PANELS_M`.
+pub(super) fn s2(luminaires: Vec<Luminaire>, transport: Transport) -> Job {
+    let boxes =
+        [([1.0, 1.0, 0.0], [2.6, 1.8, 0.75]), ([4.5, 3.5, 0.0], [6.1, 4.3, 0.75]), ([5.5, 0.5, 0.0], [7.5, 1.5, 2.2])];
+    let scene = Scene {
+        room: Some(room(DVec3::new(8.0, 6.0, 3.0), 0.2, 0.5, 0.8)),
+        obstacles: boxes.map(|(min, max)| cuboid(min, max, 0.5)).to_vec(),
+        luminaires,
+    };
+    let points = [[0.25, 0.25], [1.75, 1.25], [3.75, 2.75], [4.25, 0.75], [5.25, 3.75], [7.25, 0.25]];
+    job(scene, stations(&points.map(|[x, y]| [x, y, 0.8]), DVec3::Z), transport)
+}
+
+pub(super) fn cuboid(min: [f64; 3], max: [f64; 3], reflectance: f64) -> Obstacle {
+    let (min_m, max_m) = (DVec3::from_array(min), DVec3::from_array(max));
+    Obstacle { shape: Shape::Box { min_m, max_m }, reflectance }
+}
+
+/// Turned about every axis and dimmed, so that what is mirrored, turned back or left out shows.
+pub(super) fn turned(distribution: LuminousIntensityDistribution) -> Luminaire {
+    let lamp = luminaire("turned", DVec3::new(1.0, 2.0, 3.0), distribution);
+    Luminaire { orientation: orientation(30.0, 20.0, 10.0), flux_scale: 0.7, ..lamp }
 }
 
 /// Every (C, gamma) of a grid, read at `distance_m` in free field.
@@ -146,6 +164,40 @@ pub(crate) fn relative_deviations(measurement: &Measurement, exact: &[f64]) -> V
 
 pub(crate) fn worst(deviations: &[f64]) -> f64 {
     deviations.iter().fold(0.0, |w: f64, d| if d.is_nan() { f64::INFINITY } else { w.max(d.abs()) })
+}
+
+pub(crate) fn worst_relative(measurement: &Measurement, exact: &[f64]) -> f64 {
+    worst(&relative_deviations(measurement, exact))
+}
+
+/// Our own solution of the same job.
+pub(super) fn simulated_lx(job: &Job, relative_error: f64) -> Vec<f64> {
+    let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();
+    let accuracy = Accuracy { relative_error, seed: 1 };
+    let solution = simulator::illuminance(&job.scene, &meters, job.transport, &accuracy).unwrap();
+    solution.estimates.iter().map(|e| e.illuminance.value()).collect()
+}
+
+/// A job's bench in a folder, with more time than a test takes.
+pub(super) fn workbench(site: Site, folder: &Path) -> Workbench {
+    Workbench {
+        site,
+        scene_dir: folder.to_owned(),
+        log: folder.join("log"),
+        jobs: 2,
+        limit: Duration::from_secs(120),
+        peak: PeakMemory::default(),
+    }
+}
+
+/// Puts a shell script in a program's place.
+pub(super) fn write_program(path: &Path, script: &str) {
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    // Written under another name: a script that another thread's child still holds open cannot be run.
+    let draft = path.with_extension("draft");
+    std::fs::write(&draft, format!("#!/bin/sh\n{script}\n")).unwrap();
+    std::fs::set_permissions(&draft, std::fs::Permissions::from_mode(0o755)).unwrap();
+    std::fs::rename(draft, path).unwrap();
 }
 
 /// The largest deviation in standard errors.

@@ -107,7 +107,6 @@ const fn method(transport: Transport) -> &'static str {
     }
 }
 
-/// What the methods do with a limit on bounces.
 const fn cut(transport: Transport) -> Option<&'static str> {
     match transport {
         Transport::Indirect(Bounces::AtMost(_)) | Transport::Total(Bounces::AtMost(_)) => {

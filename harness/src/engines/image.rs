@@ -36,11 +36,12 @@ fn pixels(bytes: &[u8]) -> Result<Vec<[f64; 3]>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engines::{Site, fixtures};
 
     #[test]
     fn a_sixteen_bit_pixmap_is_read_to_the_last_step_and_a_short_one_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let workbench = crate::engines::fixtures::workbench(folder.path());
+        let workbench = fixtures::workbench(Site::of_user().unwrap(), folder.path());
         let path = folder.path().join("two.ppm");
         let mut bytes = b"P6\n2 1\n65535\n".to_vec();
         bytes.extend([0x00, 0x00, 0xff, 0xff, 0x80, 0x00, 0x00, 0x01, 0x12, 0x34, 0xff, 0xfe]);

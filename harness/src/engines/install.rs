@@ -6,9 +6,10 @@ mod debian;
 mod venv;
 
 use std::fs::File;
+use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::system::process::ProcessError;
+use crate::system::process::{Invocation, ProcessError};
 
 use super::Site;
 use super::catalogue::ALL;
@@ -25,13 +26,10 @@ pub struct InstallOutcome {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstallState {
-    /// It was there already; nothing was done.
     Present,
-    /// It is there now.
     Installed,
     /// It is not there, but the engines work without it, more slowly.
     Optional,
-    /// It is not there, and an engine needs it.
     Failed,
 }
 
@@ -39,7 +37,6 @@ pub enum InstallState {
 pub(super) enum InstallError {
     #[error(transparent)]
     Process(#[from] ProcessError),
-    /// The site's folder could not be changed.
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
     #[error("{what}; {remedy}")]
@@ -64,7 +61,6 @@ pub fn install(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&st
     outcomes
 }
 
-/// What the named engines need; all of it if none is named.
 fn components(engines: &[EngineName]) -> Vec<Component> {
     let all = [Component::PythonPackages, Component::PovRay, Component::LibLlvm];
     let named = || ALL.iter().filter(|entry| engines.is_empty() || engines.contains(&entry.name));
@@ -77,6 +73,10 @@ fn lock(site: &Site) -> Result<File, InstallError> {
     let file = File::create(&path).map_err(|e| InstallError::io(&path, e))?;
     file.lock().map_err(|e| InstallError::io(&path, e))?;
     Ok(file)
+}
+
+fn step(site: &Site, program: impl Into<PathBuf>) -> Invocation {
+    Invocation::new(program, site.root(), LIMIT, site.root().join("install.log"))
 }
 
 impl Component {

@@ -105,7 +105,7 @@ impl Mitsuba {
         workbench.write(files)?;
         let backend = self.backend(&workbench.site).map_err(|absent| EngineError::output(ID, absent.to_string()))?;
         let (run, fallback) = backend.invocation(workbench, settings);
-        let mut measurement = Driver::new(job, settings, run.converse()?, started).measurement()?;
+        let mut measurement = Driver { job, settings, conversation: run.converse()?, started }.measurement()?;
         measurement.notes.extend(fallback);
         measurement.effort.insert("command".into(), run.command_line());
         super::checked(&ID, job, measurement)

@@ -19,6 +19,8 @@ mod radiance;
 #[cfg(test)]
 mod repetition_tests;
 mod settings;
+#[cfg(test)]
+mod shared_tests;
 pub(crate) mod simulator;
 mod site;
 mod workbench;
@@ -39,8 +41,6 @@ pub use site::{Site, SiteError};
 pub use workbench::{EngineError, SceneFile, Workbench};
 
 /// A program that a spec names as an engine of its own, `engines: {<name>: {command: [...]}}`; paths are relative to `folder`.
-///
-/// The error tells which setting is wrong, and how.
 pub fn external(
     name: &str,
     settings: &BTreeMap<String, serde_json::Value>,

@@ -21,6 +21,7 @@ use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 
 use super::settings::{Coordinates, Preset};
+use super::workbench::by_hand;
 use super::{
     Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Support, Version,
     Workbench, checked,
@@ -79,10 +80,8 @@ impl Engine for PovRay {
         Settings::of(job).ok()?;
         let program = bench::program(site).unwrap_or_else(|_| "povray".into());
         let command = |light, image: &str| {
-            let (here, nothing) = (std::path::Path::new("."), std::time::Duration::ZERO);
-            let invocation = crate::system::process::Invocation::new(&program, here, nothing, "");
             let arguments = export::arguments(job, light, 0, 0, image);
-            bench::hermetic(invocation, site).args(arguments).command_line_with_env()
+            bench::hermetic(by_hand(&program), site).args(arguments).command_line_with_env()
         };
         Some(match job.transport {
             Transport::Direct => command(Light::Direct, "direct.ppm"),
@@ -116,7 +115,6 @@ fn darkness(job: &Job) -> Measurement {
     Measurement { estimates: vec![Estimate::DARK; job.stations.len()], notes, ..Measurement::default() }
 }
 
-/// Direct and indirect light together.
 fn sum(direct: &Measurement, mut indirect: Measurement) -> Measurement {
     for (total, part) in indirect.estimates.iter_mut().zip(&direct.estimates) {
         *total = total.plus(part);
@@ -133,10 +131,7 @@ fn support(job: &Job) -> Support {
     if let Some(why) = objection.or_else(|| filters_in_the_way(job)).or_else(|| too_near(job)) {
         return Support::No(why);
     }
-    let bounces = match job.transport {
-        Transport::Direct => return Support::Yes,
-        Transport::Indirect(bounces) | Transport::Total(bounces) => bounces,
-    };
+    let Some(bounces) = job.reflections() else { return Support::Yes };
     let Some(room) = job.scene.room else {
         return Support::No("in free field nothing reflects: there is no room to gather light from".to_owned());
     };
@@ -238,7 +233,6 @@ fn distance_to_segment(point: glam::DVec3, from: glam::DVec3, to: glam::DVec3) -
     point.distance(from + t * along)
 }
 
-/// Reflectance of the room, averaged over area.
 fn mean_reflectance(room: &Room) -> f64 {
     let over = |f: &dyn Fn(Surface) -> f64| Surface::ALL.iter().map(|&s| f(s)).sum::<f64>();
     over(&|s| room.area_m2(s) * room.reflectance.of(s)) / over(&|s| room.area_m2(s))

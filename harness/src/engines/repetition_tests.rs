@@ -12,9 +12,10 @@ use super::*;
 const REPETITIONS: u64 = 5;
 
 fn repetitions(engine: &dyn Engine, settings: &[(&str, serde_json::Value)], budget: Budget) -> Vec<Measurement> {
+    let site = Site::of_user().unwrap();
     let read = |seed| {
         let folder = tempfile::tempdir().unwrap();
-        let bench = workbench(folder.path());
+        let bench = workbench(site.clone(), folder.path());
         let settings = settings.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
         let job = Job { budget, seed, settings, ..s1(CONVERGED) };
         engine.read(&job, &bench).unwrap()

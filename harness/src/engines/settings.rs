@@ -9,7 +9,6 @@ use super::contract::{Job, Knob};
 use super::workbench::EngineError;
 use crate::record::EngineName;
 
-/// Sampling effort.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Preset {
     /// No short cut that costs accuracy, and as many samples as the budget asks for.
@@ -20,7 +19,6 @@ pub(super) enum Preset {
     Default,
 }
 
-/// Which coordinates a renderer gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Coordinates {
     /// Moved and scaled where its absolute tolerances or its 32-bit floats need that.
@@ -32,7 +30,6 @@ pub(super) enum Coordinates {
 impl Preset {
     pub(super) const KNOB: Knob = Knob { key: "preset", values: &["audit", "fast", "default"] };
 
-    /// As specs write it.
     pub(super) const fn name(self) -> &'static str {
         Self::KNOB.values[self as usize]
     }
@@ -70,7 +67,6 @@ impl<'a> Given<'a> {
         }
     }
 
-    /// What a word stands for.
     pub(super) fn one_of<T: Copy>(&self, key: &str, words: &[(&str, T)]) -> Result<Option<T>, EngineError> {
         let Some(value) = self.job.settings.get(key) else { return Ok(None) };
         let found = words.iter().find(|(word, _)| value.as_str() == Some(*word));

@@ -12,7 +12,6 @@ pub struct Site {
     root: PathBuf,
 }
 
-/// Why there is no place for engines.
 #[derive(Debug, thiserror::Error)]
 #[error("no folder for engines: {0}; name one with --engines-dir")]
 pub struct SiteError(String);
@@ -32,17 +31,14 @@ impl Site {
         &self.root
     }
 
-    /// The virtual environment of the pinned Python packages.
     pub fn venv(&self) -> PathBuf {
         self.root.join("venv")
     }
 
-    /// The virtual environment's interpreter, if it is there.
     pub fn python(&self) -> Option<PathBuf> {
         Some(self.venv().join("bin/python")).filter(|p| p.exists())
     }
 
-    /// The folder of an installed Python package, if it is there.
     pub fn python_package(&self, name: &str) -> Option<PathBuf> {
         let versions = std::fs::read_dir(self.venv().join("lib")).ok()?;
         let package = |v: std::fs::DirEntry| v.path().join("site-packages").join(name);

@@ -19,7 +19,6 @@ impl SceneFile {
     }
 }
 
-/// Where an engine works: its installation, its folders and what it may use.
 #[derive(Clone, Debug)]
 pub struct Workbench {
     pub site: Site,
@@ -31,17 +30,14 @@ pub struct Workbench {
     pub jobs: usize,
     /// Past this the job is killed.
     pub limit: Duration,
-    /// Told of the memory that the job's processes took.
     pub peak: PeakMemory,
 }
 
 impl Workbench {
-    /// An invocation in the scene's folder with this job's log and limit.
     pub fn invoke(&self, program: impl Into<PathBuf>) -> Invocation {
         Invocation { peak: self.peak.clone(), ..Invocation::new(program, &self.scene_dir, self.limit, &self.log) }
     }
 
-    /// Writes exported files into the scene's folder.
     pub fn write(&self, files: &[SceneFile]) -> Result<(), EngineError> {
         for file in files {
             let path = self.scene_dir.join(&file.name);
@@ -51,25 +47,26 @@ impl Workbench {
     }
 }
 
-/// Why an engine that was there gave no reading.
+/// An invocation only to be printed, for a person in the scene's folder.
+pub(super) fn by_hand(program: impl Into<PathBuf>) -> Invocation {
+    Invocation::new(program, Path::new("."), Duration::ZERO, "")
+}
+
 #[derive(Debug, thiserror::Error)]
 pub enum EngineError {
     #[error(transparent)]
     Process(#[from] ProcessError),
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
-    /// The program ended well but what it gave is not a result.
     #[error("{engine} exited without an error, but {what}")]
     Output { engine: EngineName, what: String },
     #[error("{engine} exited without an error, but read {value} lx ({uncertainty:?}) at {meter}")]
     NotFinite { engine: EngineName, meter: MeterId, value: f64, uncertainty: Uncertainty },
-    /// A setting from the spec makes no sense to the engine.
     #[error("engines.{engine}.{key}: {what}")]
     Setting { engine: EngineName, key: String, what: String },
     /// It cannot do what was asked, as it says itself once it has seen the job: a skip, no failure.
     #[error("{engine} declines: {why}")]
     Declined { engine: EngineName, why: String },
-    /// Our own solver gave up.
     #[error("{engine}: {what}")]
     Solver { engine: EngineName, what: String },
 }
@@ -77,6 +74,12 @@ pub enum EngineError {
 impl EngineError {
     pub fn io(path: &Path, source: std::io::Error) -> Self {
         Self::Io { path: path.display().to_string(), source }
+    }
+
+    /// What should have been JSON, by its start.
+    pub(super) fn no_readings(engine: EngineName, answer: &str, error: &serde_json::Error) -> Self {
+        let start: String = answer.chars().take(200).collect();
+        Self::output(engine, format!("its answer is no JSON of readings ({error}): `{start}`"))
     }
 
     pub fn output(engine: EngineName, what: impl Into<String>) -> Self {

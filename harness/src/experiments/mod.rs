@@ -4,4 +4,5 @@ pub mod bench;
 mod deviation;
 pub mod selftest;
 pub mod stress;
+mod table;
 mod trials;

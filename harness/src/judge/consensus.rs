@@ -8,7 +8,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Component, Judge, of_reading};
+use super::{Component, Judge, Tolerance, of_reading};
 use crate::engines::FILE_READER;
 use crate::procedures::Task;
 use crate::record::{Basis, ProcedureId, Recording};
@@ -28,7 +28,6 @@ const LARGEST_DEPARTURE: f64 = 10.0;
 /// Rounding of readings: keeps covariances regular where tolerance and uncertainty are zero.
 const ROUNDING: f64 = 1e-12;
 
-/// What the statement assumes.
 const ASSUMPTIONS: &str = "at most one component is wrong, each as likely beforehand as none; sound witnesses differ by a third \
                            of their tolerance (standard deviation); all meters of a procedure count as one; a departure may \
                            be of any size from the tolerance to ten times the reading, evenly in its logarithm";
@@ -38,7 +37,6 @@ const ASSUMPTIONS: &str = "at most one component is wrong, each as likely before
 pub struct Consensus {
     pub case: String,
     pub procedure: ProcedureId,
-    /// Everyone who read it.
     pub witnesses: Vec<Witness>,
     /// How many of them are independent: those that share a component count once.
     pub independent: usize,
@@ -62,7 +60,6 @@ pub struct Witness {
     pub name: String,
     /// Whether others are judged by it here.
     pub is_reference: bool,
-    /// What it shares with others.
     pub shares: Vec<String>,
     /// Its deviation from the others' weighted mean where they differ most, relative.
     pub deviation: Option<f64>,
@@ -70,7 +67,6 @@ pub struct Witness {
     pub probability: f64,
 }
 
-/// A witness with its readings.
 struct Testimony {
     name: String,
     shares: Vec<String>,
@@ -80,56 +76,66 @@ struct Testimony {
     allowed: Vec<f64>,
 }
 
+impl Testimony {
+    fn new(name: &str, shares: Vec<String>, readings: Vec<Option<(f64, f64)>>, tolerance: Tolerance) -> Self {
+        let around = |r: &Option<(f64, f64)>| r.map_or(0.0, |(value, _)| tolerance.around(value));
+        Self { name: name.to_owned(), shares, allowed: readings.iter().map(around).collect(), readings }
+    }
+}
+
 /// Something that may be wrong, and which of the witnesses have it.
 struct Suspect {
     name: String,
     holders: Vec<usize>,
 }
 
-/// The witnesses' statement about one task; `None` where nobody read anything.
-pub(super) fn consensus(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
-    let case = recordings.first()?.key.case.clone();
-    let testimonies = testimonies(judge, task, recordings);
-    if testimonies.is_empty() {
-        return None;
+impl Judge<'_> {
+    /// Who of the engines departs from the others, the reference included; `recordings` as for [`Self::compare`]. `None` where
+    /// nobody read anything.
+    pub fn consensus(&self, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
+        let case = recordings.first()?.key.case.clone();
+        let testimonies = testimonies(self, task, recordings);
+        if testimonies.is_empty() {
+            return None;
+        }
+        let suspects = suspects(&testimonies);
+        let independent = independent(&testimonies);
+        let telling: Vec<usize> = (0..task.targets.len()).filter(|k| differ(&testimonies, *k)).collect();
+        let probabilities = if telling.is_empty() || independent < FEWEST {
+            vec![0.0; suspects.len()]
+        } else {
+            probabilities(&testimonies, &suspects, &telling)
+        };
+        let reference = task.reference();
+        let reference = reference.engine();
+        let witnesses = testimonies.iter().enumerate().map(|(i, t)| Witness {
+            name: t.name.clone(),
+            is_reference: reference.is_some_and(|r| *r == t.name),
+            shares: t.shares.clone(),
+            deviation: deviation(&testimonies, i, &telling),
+            probability: suspects.iter().zip(&probabilities).find(|(s, _)| s.name == t.name).map_or(0.0, |(_, p)| *p),
+        });
+        let mut found = Consensus {
+            case,
+            procedure: task.procedure,
+            witnesses: witnesses.collect(),
+            independent,
+            differing: telling.len(),
+            departs: vec![],
+            component: None,
+            odds: None,
+            text: String::new(),
+            assumptions: assumptions(&testimonies),
+        };
+        found.text = told(&mut found, &suspects, &probabilities, &testimonies);
+        Some(found)
     }
-    let suspects = suspects(&testimonies);
-    let independent = independent(&testimonies);
-    let telling: Vec<usize> = (0..task.targets.len()).filter(|k| differ(&testimonies, *k)).collect();
-    let probabilities = if telling.is_empty() || independent < FEWEST {
-        vec![0.0; suspects.len()]
-    } else {
-        probabilities(&testimonies, &suspects, &telling)
-    };
-    let reference = task.reference();
-    let reference = reference.engine();
-    let witnesses = testimonies.iter().enumerate().map(|(i, t)| Witness {
-        name: t.name.clone(),
-        is_reference: reference.is_some_and(|r| *r == t.name),
-        shares: t.shares.clone(),
-        deviation: deviation(&testimonies, i, &telling),
-        probability: suspects.iter().zip(&probabilities).find(|(s, _)| s.name == t.name).map_or(0.0, |(_, p)| *p),
-    });
-    let mut found = Consensus {
-        case,
-        procedure: task.procedure,
-        witnesses: witnesses.collect(),
-        independent,
-        differing: telling.len(),
-        departs: vec![],
-        component: None,
-        odds: None,
-        text: String::new(),
-        assumptions: assumptions(&testimonies),
-    };
-    found.text = told(&mut found, &suspects, &probabilities, &testimonies);
-    Some(found)
 }
 
 fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<Testimony> {
     let reference = task.reference();
     let (reference, basis) = (reference.engine(), reference.basis());
-    let tolerance = |engine: &str| judge.tolerances.of(task.procedure, basis, engine, task.quantity, judge.overrides);
+    let tolerance = |engine: &str| judge.held_to(task, basis, engine);
     // The reference is as good as what the best of the others is held to.
     let strictest =
         recordings.iter().map(|r| tolerance(&r.key.engine)).min_by(|a, b| a.relative.total_cmp(&b.relative));
@@ -140,18 +146,12 @@ fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec
         } else {
             tolerance(&recording.key.engine)
         };
-        let readings = task.targets.iter().enumerate().map(|(k, _)| {
+        let read = |k: usize| {
             let reading = recording.readings.get(k).filter(|r| r.value.is_finite())?;
             Some((reading.value, combined(&of_reading(recording, reading))))
-        });
-        let readings: Vec<_> = readings.collect();
-        let around = |r: &Option<(f64, f64)>| r.map_or(0.0, |(value, _)| allowed.around(value));
-        Testimony {
-            name: recording.key.engine.to_string(),
-            shares: recording.components.clone(),
-            allowed: readings.iter().map(around).collect(),
-            readings,
-        }
+        };
+        let readings = (0..task.targets.len()).map(read).collect();
+        Testimony::new(&recording.key.engine, recording.components.clone(), readings, allowed)
     };
     let mut testimonies: Vec<Testimony> = recordings.iter().filter(|r| !r.readings.is_empty()).map(of_engine).collect();
     testimonies.extend(derived(judge, task));
@@ -162,22 +162,13 @@ fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec
 fn derived(judge: &Judge<'_>, task: &Task) -> Option<Testimony> {
     const NAME: &str = "derived values";
     let published = judge.published?;
-    let readings: Vec<_> = task
-        .targets
-        .iter()
-        .map(|target| {
-            let mut references = published.references(task, target, NAME).into_iter();
-            references.find(|r| r.basis != Basis::Published).map(|r| (r.value, r.uncertainty))
-        })
-        .collect();
-    let tolerance = judge.tolerances.of(task.procedure, Basis::ClosedForm, NAME, task.quantity, judge.overrides);
-    let around = |r: &Option<(f64, f64)>| r.map_or(0.0, |(value, _)| tolerance.around(value));
-    readings.iter().any(Option::is_some).then(|| Testimony {
-        name: NAME.to_owned(),
-        shares: vec![],
-        allowed: readings.iter().map(around).collect(),
-        readings,
-    })
+    let read = |target| {
+        let mut references = published.references(task, target, NAME).into_iter();
+        references.find(|r| r.basis != Basis::Published).map(|r| (r.value, r.uncertainty))
+    };
+    let readings: Vec<_> = task.targets.iter().map(read).collect();
+    let tolerance = judge.held_to(task, Basis::ClosedForm, NAME);
+    readings.iter().any(Option::is_some).then(|| Testimony::new(NAME, vec![], readings, tolerance))
 }
 
 /// Each witness's own code, and what some of them share but not all: what all share shifts nobody against another.
@@ -187,8 +178,7 @@ fn suspects(testimonies: &[Testimony]) -> Vec<Suspect> {
     for name in testimonies.iter().flat_map(|t| &t.shares) {
         let has = |i: &usize| testimonies[*i].shares.contains(name);
         let holders: Vec<usize> = (0..testimonies.len()).filter(has).collect();
-        let known = suspects.iter().any(|s| s.name == *name);
-        if !known && holders.len() > 1 && holders.len() < testimonies.len() {
+        if suspects.iter().all(|s| s.name != *name) && holders.len() > 1 && holders.len() < testimonies.len() {
             suspects.push(Suspect { name: name.clone(), holders });
         }
     }
@@ -278,17 +268,15 @@ fn log_likelihood(
         present.iter().filter_map(|i| testimonies[*i].readings[k]).map(|(value, _)| value / scale - 1.0).collect();
     let covariance = |i: usize, j: usize| -> f64 {
         let (a, b) = (&testimonies[i], &testimonies[j]);
+        let both = |s: &Suspect| s.holders.contains(&i) && s.holders.contains(&j);
         let mut sum = 0.0;
         if i == j {
             let noise = a.readings[k].map_or(0.0, |(_, u)| u);
             sum += (noise / scale).powi(2) + (ALLOWANCE * a.allowed[k] / scale).powi(2) + ROUNDING.powi(2);
-        } else {
-            let both = |s: &&Suspect| s.holders.contains(&i) && s.holders.contains(&j);
-            if suspects.iter().any(|s| both(&s)) {
-                sum += SHARED * (ALLOWANCE * a.allowed[k].min(b.allowed[k]) / scale).powi(2);
-            }
+        } else if suspects.iter().any(both) {
+            sum += SHARED * (ALLOWANCE * a.allowed[k].min(b.allowed[k]) / scale).powi(2);
         }
-        if departing.is_some_and(|s| s.holders.contains(&i) && s.holders.contains(&j)) {
+        if departing.is_some_and(both) {
             sum += departure.unwrap_or(0.0).powi(2);
         }
         sum
@@ -303,16 +291,14 @@ fn gaussian(matrix: &[Vec<f64>], values: &[f64]) -> Option<f64> {
     let mut lower = vec![vec![0.0; n]; n];
     for i in 0..n {
         for j in 0..=i {
-            let sum: f64 = (0..j).map(|m| lower[i][m] * lower[j][m]).sum();
-            let left = matrix[i][j] - sum;
+            let left = matrix[i][j] - (0..j).map(|m| lower[i][m] * lower[j][m]).sum::<f64>();
             lower[i][j] = if i == j { Some(left).filter(|l| *l > 0.0)?.sqrt() } else { left / lower[j][j] };
         }
     }
     let solve = |b: &[f64]| {
         let mut x = vec![0.0; n];
         for i in 0..n {
-            let sum: f64 = (0..i).map(|m| lower[i][m] * x[m]).sum();
-            x[i] = (b[i] - sum) / lower[i][i];
+            x[i] = (b[i] - (0..i).map(|m| lower[i][m] * x[m]).sum::<f64>()) / lower[i][i];
         }
         x
     };
@@ -397,16 +383,9 @@ fn assumptions(testimonies: &[Testimony]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
-    use glam::DVec3;
-    use luminaire::scene::{Bounces, Meter, Scene, Transport};
-
     use super::*;
-    use crate::judge::{KnownDeviations, Tolerances};
-    use crate::procedures::Target;
-    use crate::record::{MeterId, Quantity, Reading};
-    use crate::record::{ReadingKey, Uncertainty};
+    use crate::judge::tests::{built_in, recording, task};
+    use crate::record::{Estimate, Uncertainty};
 
     const METERS: usize = 12;
     const LOOKUP: &str = "lookup";
@@ -414,34 +393,17 @@ mod tests {
     /// Readings of witnesses that are off by a factor each, with half a per mille of noise in the renderers.
     fn statement(factors: &[(&str, &[&str], f64)], seed: u64) -> Consensus {
         let mut random = fastrand::Rng::with_seed(seed);
-        let target =
-            |k| Target::of_one(MeterId::new("grid", k), Meter { position_m: DVec3::ZERO, normal: DVec3::Z }, 1.0);
-        let task = Task {
-            procedure: ProcedureId::IndirectIlluminance,
-            scene: Scene::default(),
-            transport: Transport::Indirect(Bounces::Converged),
-            quantity: Quantity::Illuminance,
-            targets: (0..METERS).map(target).collect(),
-        };
-        let recording = |(engine, shares, factor): &(&str, &[&str], f64)| {
+        let witness = |(engine, shares, factor): &(&str, &[&str], f64)| {
             let noise = if ["simulator", "iesna"].contains(engine) { 0.0 } else { 5e-4 };
-            let reading = |k| Reading {
-                meter: MeterId::new("grid", k),
-                quantity: Quantity::Illuminance,
+            let estimate = |k: usize| Estimate {
                 value: (10.0 + k as f64) * factor * (1.0 + noise * crate::system::random::normal(&mut random)),
                 uncertainty: Uncertainty::sampled(noise * (10.0 + k as f64), None),
             };
-            Recording {
-                components: [FILE_READER].iter().chain(*shares).map(|s| (*s).to_owned()).collect(),
-                readings: (0..METERS).map(reading).collect(),
-                ..Recording::of(ReadingKey::new("c", task.procedure, *engine), task.light())
-            }
+            let components = [FILE_READER].iter().chain(*shares).map(|s| (*s).to_owned()).collect();
+            Recording { components, ..recording(engine, &(0..METERS).map(estimate).collect::<Vec<_>>()) }
         };
-        let recordings: Vec<Recording> = factors.iter().map(recording).collect();
-        let (tolerances, known) = (Tolerances::built_in().unwrap(), KnownDeviations::built_in().unwrap());
-        let overrides = BTreeMap::new();
-        let judge = Judge { tolerances: &tolerances, known: &known, overrides: &overrides, published: None };
-        consensus(&judge, &task, &recordings.iter().collect::<Vec<_>>()).unwrap()
+        let recordings: Vec<Recording> = factors.iter().map(witness).collect();
+        built_in().consensus(&task(METERS), &recordings.iter().collect::<Vec<_>>()).unwrap()
     }
 
     #[test]

@@ -7,7 +7,6 @@ use crate::record::{EngineName, ProcedureId, ReadingKey};
 
 const ON_RECORD: &str = include_str!("../../../reference/known_deviations.yaml");
 
-/// The record of known deviations.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KnownDeviations {
@@ -16,7 +15,6 @@ pub struct KnownDeviations {
     known_breaks: Vec<KnownBreak>,
 }
 
-/// One known deviation: a range of relative deviations, its cause and its source.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct KnownDeviation {
@@ -29,7 +27,6 @@ struct KnownDeviation {
     /// Only with this luminaire model, where one is named.
     #[serde(default)]
     model: Option<String>,
-    /// Lowest and highest relative deviation.
     relative: [f64; 2],
     /// Whether every reading is expected to deviate, so that a pass is news.
     always: bool,
@@ -53,30 +50,25 @@ pub struct KnownBreak {
     #[serde(default)]
     pub relative: Option<f64>,
     pub cause: String,
-    /// How that is known.
     pub source: String,
 }
 
-/// Why the record cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("reference/known_deviations.yaml: {0}")]
 pub struct KnownDeviationError(String);
 
 impl KnownDeviations {
-    /// The record that the program was built with.
     pub fn built_in() -> Result<Self, KnownDeviationError> {
         let record: Self = crate::spec::from_yaml(ON_RECORD).map_err(KnownDeviationError)?;
         let deviations = record.known_deviations.iter().map(|k| (&k.engine, &k.cause, &k.source));
         let breaks = record.known_breaks.iter().map(|k| (&k.engine, &k.cause, &k.source));
-        for (engine, cause, source) in deviations.chain(breaks) {
-            if cause.trim().is_empty() || source.trim().is_empty() {
-                return Err(KnownDeviationError(format!("a deviation of {engine} lacks cause or source")));
-            }
+        let lacks = |(_, cause, source): &(_, &String, &String)| cause.trim().is_empty() || source.trim().is_empty();
+        match deviations.chain(breaks).find(lacks) {
+            Some((engine, ..)) => Err(KnownDeviationError(format!("a deviation of {engine} lacks cause or source"))),
+            None => Ok(record),
         }
-        Ok(record)
     }
 
-    /// What is on record of the laws that an engine breaks.
     pub fn breaks(&self) -> &[KnownBreak] {
         &self.known_breaks
     }
@@ -102,13 +94,10 @@ impl KnownDeviations {
     }
 }
 
-/// What a verdict is about.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
     pub key: &'a ReadingKey,
-    /// The luminaire model.
     pub model: &'a str,
-    /// The reference's basis.
     pub basis: super::Basis,
     /// Deviation over reference, where that is defined.
     pub relative_deviation: Option<f64>,

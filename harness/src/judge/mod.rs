@@ -1,12 +1,11 @@
 //! The diffing layer: readings against references that carry their own uncertainty; it sees nothing but readings.
 
+mod comparison;
 mod consensus;
 mod family;
-mod input;
 mod known;
-mod paper_split;
+mod papers;
 mod policy;
-mod published;
 mod spending;
 mod split;
 #[cfg(test)]
@@ -24,21 +23,20 @@ use crate::procedures::{self, Target, Task};
 use crate::record::{EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, Uncertainty};
 use crate::spec::ToleranceOverride;
 
-use input::Input;
+use papers::Input;
 
 pub use crate::record::Basis;
 pub use consensus::{Consensus, Witness};
 pub use known::{KnownBreak, KnownDeviationError, KnownDeviations, Subject};
-pub use paper_split::{PaperSplit, Share, Stage, Stages, shares};
+pub use papers::{PaperSplit, Share, Stages, shares};
+pub use papers::{Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use policy::{Policy, PolicyError};
-pub use published::{Cell, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
 pub use tolerance::{Tolerance, ToleranceError, Tolerances};
 pub use uncertainty::{Component, ErrorBudget, Shape, Source};
 pub use verdict::{Verdict, judge};
 
-/// What a reading is held against.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Reference {
     pub value: f64,
@@ -50,21 +48,24 @@ pub struct Reference {
     /// Its expanded over its standard uncertainty, at the coverage of verdicts; null where it has none.
     #[serde(default)]
     pub coverage_factor: Option<f64>,
-    /// What it rests on.
     pub basis: Basis,
     /// Formula, solver or paper.
     pub source: String,
 }
 
-/// One reading against one reference.
+impl Reference {
+    fn of(value: f64, stated: &Uncertainty, basis: Basis, source: String) -> Self {
+        let (uncertainty, degrees_of_freedom) = (stated.standard(), stated.degrees_of_freedom());
+        Self { value, uncertainty, degrees_of_freedom, coverage_factor: None, basis, source }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Comparison {
     #[serde(flatten)]
     pub key: ReadingKey,
-    /// The luminaire model.
     pub model: String,
     pub meter: MeterId,
-    /// Its position in metres.
     pub at_m: [f64; 3],
     pub normal: [f64; 3],
     /// Direction seen from the luminaire, for procedure 1.
@@ -73,7 +74,6 @@ pub struct Comparison {
     pub quantity: Quantity,
     /// The reading; null where it is missing.
     pub value: Option<f64>,
-    /// What is stated of its error.
     #[serde(flatten)]
     pub uncertainty: Uncertainty,
     /// What it is held against; null where there is nothing.
@@ -82,10 +82,8 @@ pub struct Comparison {
     pub deviation: Option<f64>,
     /// Deviation over reference.
     pub relative_deviation: Option<f64>,
-    /// How far it may lie off.
     pub tolerance: Tolerance,
     pub verdict: Verdict,
-    /// Why, where that is known.
     pub diagnosis: Option<String>,
     /// What the deviation may owe to chance and ignorance; null where there is no deviation.
     #[serde(default)]
@@ -95,15 +93,11 @@ pub struct Comparison {
     pub p_value: Option<f64>,
 }
 
-/// What judging needs besides the readings.
 pub struct Judge<'a> {
-    /// Tolerances and coverage factor.
     pub tolerances: &'a Tolerances,
-    /// Deviations on record.
     pub known: &'a KnownDeviations,
     /// The spec's own tolerances.
     pub overrides: &'a BTreeMap<ProcedureId, ToleranceOverride>,
-    /// Tables of a paper.
     pub published: Option<&'a Published>,
 }
 
@@ -115,12 +109,11 @@ impl Judge<'_> {
 
     /// What an engine is held to in a task, by what others are judged by there.
     pub fn tolerance(&self, task: &Task, engine: &str) -> Tolerance {
-        self.tolerances.of(task.procedure, task.reference().basis(), engine, task.quantity, self.overrides)
+        self.held_to(task, task.reference().basis(), engine)
     }
 
-    /// Who of the engines departs from the others, the reference included; `recordings` as for [`Self::compare`].
-    pub fn consensus(&self, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
-        consensus::consensus(self, task, recordings)
+    fn held_to(&self, task: &Task, basis: Basis, engine: &str) -> Tolerance {
+        self.tolerances.of(task.procedure, basis, engine, task.quantity, self.overrides)
     }
 
     /// Holds every reading of one task against every reference there is for it.
@@ -134,18 +127,16 @@ impl Judge<'_> {
             let (mut family, mut shares) = (vec![], vec![]);
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.readings.get(k);
-                let mut references: Vec<Held> =
-                    reference_of_task(task, recordings, k, &recording.key.engine).into_iter().collect();
-                for reference in self.published.iter().flat_map(|p| p.references(task, target, &recording.key.engine)) {
-                    references.push(Held::published(reference, input.as_ref(), target, reading));
-                }
+                let engine = &recording.key.engine;
+                let printed = self.published.iter().flat_map(|p| p.references(task, target, engine));
+                let printed = printed.map(|reference| Held::published(reference, input.as_ref(), target, reading));
+                let references: Vec<Held> =
+                    reference_of_task(task, recordings, k, engine).into_iter().chain(printed).collect();
                 if references.is_empty() && (reading.is_none() || recording.role == Role::Renderer) {
                     // Nothing to hold it against, or nothing to hold: that is said, never passed over.
                     family.push(self.comparison(task, recording, k, None));
                 }
-                for held in references {
-                    family.push(self.comparison(task, recording, k, Some(held)));
-                }
+                family.extend(references.into_iter().map(|held| self.comparison(task, recording, k, Some(held))));
                 shares.resize(family.len(), share_of_reading(recording, k));
             }
             self.decide(&mut family, &shares);
@@ -167,12 +158,8 @@ impl Judge<'_> {
         }
         for comparison in family {
             let Some(basis) = comparison.reference.as_ref().map(|r| r.basis) else { continue };
-            let subject = Subject {
-                key: &comparison.key,
-                model: &comparison.model,
-                basis,
-                relative_deviation: comparison.relative_deviation,
-            };
+            let Comparison { key, model, relative_deviation, .. } = &*comparison;
+            let subject = Subject { key, model, basis, relative_deviation: *relative_deviation };
             let (verdict, cause) = self.known.revise(comparison.verdict, &subject);
             comparison.verdict = verdict;
             comparison.diagnosis = cause.or(comparison.diagnosis.take());
@@ -182,14 +169,12 @@ impl Judge<'_> {
     fn comparison(&self, task: &Task, recording: &Recording, k: usize, held: Option<Held>) -> Comparison {
         let (target, reading) = (&task.targets[k], recording.readings.get(k));
         let basis = held.as_ref().map(|h| h.reference.basis);
-        let tolerance = basis.map_or_else(Tolerance::default, |basis| {
-            self.tolerances.of(task.procedure, basis, &recording.key.engine, task.quantity, self.overrides)
-        });
+        let tolerance = basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();
         let pair = reading.zip(held.as_ref());
         let difference = pair.map(|(a, b)| a.value - b.reference.value);
+        let tail = uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor());
         let budget = pair.map(|(reading, held)| {
             let components = of_reading(recording, reading).into_iter().chain(held.components.iter().copied());
-            let tail = uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor());
             ErrorBudget::new(components.collect(), tail * share_of_reading(recording, k))
         });
         let missing = match (reading, &held) {
@@ -197,7 +182,7 @@ impl Judge<'_> {
             (_, None) => Some("no reference".to_owned()),
             _ => None,
         };
-        let held = held.map(|held| held.covered(uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor())));
+        let held = held.map(|held| held.covered(tail));
         let mut comparison = Comparison {
             key: recording.key.clone(),
             model: recording.model.clone(),
@@ -218,8 +203,8 @@ impl Judge<'_> {
             budget,
             p_value: None,
         };
-        let Some(((value, reference), budget)) =
-            comparison.value.zip(comparison.reference.as_ref()).zip(comparison.budget.as_ref())
+        let (Some(value), Some(reference), Some(budget)) =
+            (comparison.value, &comparison.reference, &comparison.budget)
         else {
             return comparison;
         };
@@ -238,7 +223,6 @@ impl Judge<'_> {
 /// Rounding of a closed form in `f64`, relative: a few operations and two arctangents a luminaire.
 const ROUNDING: f64 = 1e-13;
 
-/// A reference with what is uncertain of it.
 struct Held {
     reference: Reference,
     components: Vec<Component>,
@@ -252,42 +236,22 @@ impl Held {
         self
     }
 
-    /// A reading of a witness.
     fn reading(recording: &Recording, reading: &Reading, basis: Basis, source: String) -> Self {
-        let reference = Reference {
-            value: reading.value,
-            uncertainty: reading.uncertainty.standard(),
-            degrees_of_freedom: reading.uncertainty.degrees_of_freedom(),
-            coverage_factor: None,
-            basis,
-            source,
-        };
+        let reference = Reference::of(reading.value, &reading.uncertainty, basis, source);
         let components = of_reading(recording, reading).into_iter();
         let components = components.map(|component| Component { source: Source::Reference, ..component });
         Self { reference, components: components.collect() }
     }
 
-    /// A closed form.
     fn formula(value: f64, source: &str) -> Self {
-        let rounding = Component::within(Source::Reference, ROUNDING * value.abs());
-        let reference = Reference {
-            value,
-            uncertainty: rounding.uncertainty,
-            degrees_of_freedom: None,
-            coverage_factor: None,
-            basis: Basis::ClosedForm,
-            source: source.to_owned(),
-        };
-        Self { reference, components: vec![rounding] }
+        let bound = ROUNDING * value.abs();
+        let reference = Reference::of(value, &Uncertainty::Bound(bound), Basis::ClosedForm, source.to_owned());
+        Self { reference, components: vec![Component::within(Source::Reference, bound)] }
     }
 
     /// A printed or derived value, which does not rest on the photometric file.
     fn published(reference: Reference, input: Option<&Input<'_>>, target: &Target, reading: Option<&Reading>) -> Self {
-        let rounding = Component {
-            source: Source::Rounding,
-            uncertainty: reference.uncertainty,
-            ..Component::within(Source::Rounding, 0.0)
-        };
+        let rounding = Component { uncertainty: reference.uncertainty, ..Component::within(Source::Rounding, 0.0) };
         let input = input.zip(reading).map(|(i, r)| Component::within(Source::Input, i.bound(target, r.value)));
         Self { reference, components: std::iter::once(rounding).chain(input).collect() }
     }

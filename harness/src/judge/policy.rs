@@ -3,14 +3,12 @@
 use super::{Judge, KnownDeviationError, KnownDeviations, Published, ToleranceError, Tolerances};
 use crate::spec::Case;
 
-/// What readings are held to.
 #[derive(Clone, Debug)]
 pub struct Policy {
     pub tolerances: Tolerances,
     pub known: KnownDeviations,
 }
 
-/// Why a policy cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum PolicyError {
     #[error(transparent)]
@@ -20,7 +18,6 @@ pub enum PolicyError {
 }
 
 impl Policy {
-    /// That which the program was built with.
     pub fn built_in() -> Result<Self, PolicyError> {
         Ok(Self { tolerances: Tolerances::built_in()?, known: KnownDeviations::built_in()? })
     }

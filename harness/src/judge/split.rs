@@ -14,11 +14,8 @@ use crate::record::{EngineName, MeterId, ProcedureId, Reading, Recording, Role};
 pub struct Split {
     pub case: String,
     pub procedure: ProcedureId,
-    /// The approximate method.
     pub method: String,
-    /// The renderer.
     pub engine: EngineName,
-    /// The luminaire model.
     pub model: String,
     pub meter: MeterId,
     /// Method over renderer, less 1.
@@ -33,9 +30,8 @@ pub struct Split {
     pub text: String,
 }
 
-/// Splits at every meter of a task where the IESNA method, the exact solution and a renderer gave a reading.
-///
-/// Where the IESNA method is itself what others are judged by, there is nothing to split.
+/// Splits at every meter of a task where the IESNA method, the exact solution and a renderer gave a reading; none where the
+/// IESNA method is itself what others are judged by.
 pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> Vec<Split> {
     let of = |engine: EngineName| recordings.iter().find(|r| r.key.engine == engine);
     let (Some(method), Some(exact)) = (of(EngineName::IESNA), of(EngineName::SIMULATOR)) else { return vec![] };
@@ -52,14 +48,10 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
         for rendered in &renderer.readings {
             let at = |r: &Recording| r.readings.iter().find(|reading| reading.meter == rendered.meter).cloned();
             let (Some(method), Some(exact)) = (at(method), at(exact)) else { continue };
-            let Some(split) = DeviationSplit::new(
-                Lux(method.value),
-                uncertain(&exact, 0.0),
-                uncertain(rendered, renderer.instrument_uncertainty),
-            ) else {
-                continue;
-            };
-            let method = name_of_method(task.transport);
+            let value = uncertain(rendered, renderer.instrument_uncertainty);
+            let split = DeviationSplit::new(Lux(method.value), uncertain(&exact, 0.0), value);
+            let Some(split) = split else { continue };
+            let (method, name) = (name_of_method(task.transport), crate::engines::display_name(&renderer.key.engine));
             splits.push(Split {
                 case: renderer.key.case.clone(),
                 procedure: task.procedure,
@@ -71,10 +63,7 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
                 of_method: split.method,
                 of_renderer: split.renderer,
                 uncertainty: split.uncertainty,
-                text: format!(
-                    "{method} differs from {} by {split}",
-                    crate::engines::display_name(&renderer.key.engine)
-                ),
+                text: format!("{method} differs from {name} by {split}"),
             });
         }
     }
@@ -92,26 +81,16 @@ const fn name_of_method(transport: Transport) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Quantity;
-    use crate::record::{Light, ReadingKey, Uncertainty};
-    use luminaire::scene::{Bounces, Scene};
+    use crate::judge::tests;
+    use crate::record::{Estimate, Uncertainty};
+    use luminaire::scene::Bounces;
 
     fn recording(engine: &str, value: f64, std_error: f64) -> Recording {
-        let reading = Reading {
-            meter: MeterId::new("plane", 0),
-            quantity: Quantity::Illuminance,
-            value,
-            uncertainty: Uncertainty::sampled(std_error, None),
-        };
-        let role = if engine == "radiance" { Role::Renderer } else { Role::Witness };
-        let key = ReadingKey::new("c", ProcedureId::IndirectIlluminance, engine);
-        let light = Light(Transport::Indirect(Bounces::Converged));
-        Recording { role, model: "point".into(), readings: vec![reading], ..Recording::of(key, light) }
+        tests::recording(engine, &[Estimate { value, uncertainty: Uncertainty::sampled(std_error, None) }])
     }
 
     fn task(transport: Transport) -> Task {
-        let procedure = crate::engines::fixtures::procedure_of(transport);
-        Task { procedure, scene: Scene::default(), transport, quantity: Quantity::Illuminance, targets: vec![] }
+        Task { procedure: crate::engines::fixtures::procedure_of(transport), transport, ..tests::task(0) }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Laws of the verdict: how often noise alone fails, and what a budget is made of.
 
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 use glam::DVec3;
 use luminaire::scene::{Bounces, Meter, Scene, Transport};
@@ -8,6 +9,13 @@ use luminaire::scene::{Bounces, Meter, Scene, Transport};
 use super::*;
 use crate::record::{Estimate, Light};
 use crate::system::random::normal;
+
+/// Who judges by the built-in policy.
+pub(crate) fn built_in() -> Judge<'static> {
+    static POLICY: LazyLock<Policy> = LazyLock::new(|| Policy::built_in().unwrap());
+    const NONE: &BTreeMap<ProcedureId, ToleranceOverride> = &BTreeMap::new();
+    Judge { tolerances: &POLICY.tolerances, known: &POLICY.known, overrides: NONE, published: None }
+}
 
 /// A task of so many meters of indirect light in an empty scene; what is read there is made up.
 pub(crate) fn task(meters: usize) -> Task {
@@ -29,7 +37,7 @@ pub(crate) fn recording(engine: &str, estimates: &[Estimate]) -> Recording {
         value: estimate.value,
         uncertainty: estimate.uncertainty,
     };
-    let role = if engine == "simulator" { Role::Witness } else { Role::Renderer };
+    let role = if ["simulator", "iesna"].contains(&engine) { Role::Witness } else { Role::Renderer };
     let key = ReadingKey::new("c", ProcedureId::IndirectIlluminance, engine);
     let light = Light(Transport::Indirect(Bounces::Converged));
     let readings = estimates.iter().enumerate().map(reading).collect();
@@ -44,9 +52,6 @@ fn sampled(value: f64, error: f64, degrees_of_freedom: f64) -> Estimate {
 fn false_failures(deviation: f64, blocks: usize, seed: u64) -> f64 {
     const METERS: usize = 192;
     const RUNS: usize = 400;
-    let (tolerances, known) = (Tolerances::built_in().unwrap(), KnownDeviations::built_in().unwrap());
-    let overrides = BTreeMap::new();
-    let judge = Judge { tolerances: &tolerances, known: &known, overrides: &overrides, published: None };
     let (task, exact) = (task(METERS), recording("simulator", &[Estimate::exact(1.0); METERS]));
     let mut random = fastrand::Rng::with_seed(seed);
     let mut failed = 0;
@@ -57,7 +62,7 @@ fn false_failures(deviation: f64, blocks: usize, seed: u64) -> f64 {
         };
         let readings: Vec<Estimate> = (0..METERS).map(|_| reading()).collect();
         let subject = recording("radiance", &readings);
-        let comparisons = judge.compare(&task, &[&exact, &subject]);
+        let comparisons = built_in().compare(&task, &[&exact, &subject]);
         failed += usize::from(comparisons.iter().any(|c| c.verdict == Verdict::Fail));
     }
     failed as f64 / RUNS as f64
@@ -91,13 +96,10 @@ fn the_same_grid_without_correction_fails_nearly_always() {
 
 #[test]
 fn a_real_failure_at_one_meter_of_192_still_fails() {
-    let (tolerances, known) = (Tolerances::built_in().unwrap(), KnownDeviations::built_in().unwrap());
-    let overrides = BTreeMap::new();
-    let judge = Judge { tolerances: &tolerances, known: &known, overrides: &overrides, published: None };
     let mut readings = vec![sampled(1.0, 0.001, 15.0); 192];
     readings[100].value = 1.03;
     let exact = recording("simulator", &[Estimate::exact(1.0); 192]);
-    let comparisons = judge.compare(&task(192), &[&exact, &recording("radiance", &readings)]);
+    let comparisons = built_in().compare(&task(192), &[&exact, &recording("radiance", &readings)]);
     let failed: Vec<&Comparison> = comparisons.iter().filter(|c| c.verdict == Verdict::Fail).collect();
     assert_eq!(failed.len(), 1);
     assert_eq!(failed[0].meter, MeterId::new("grid", 100));
@@ -105,14 +107,11 @@ fn a_real_failure_at_one_meter_of_192_still_fails() {
 
 #[test]
 fn a_budget_names_what_it_is_made_of() {
-    let (tolerances, known) = (Tolerances::built_in().unwrap(), KnownDeviations::built_in().unwrap());
-    let overrides = BTreeMap::new();
-    let judge = Judge { tolerances: &tolerances, known: &known, overrides: &overrides, published: None };
     let mut exact = recording("simulator", &[Estimate::exact(2.0)]);
     exact.readings[0].uncertainty = Uncertainty::Bound(0.0003);
     let mut subject = recording("radiance", &[sampled(2.01, 0.004, 8.0)]);
     subject.instrument_uncertainty = 0.001;
-    let comparisons = judge.compare(&task(1), &[&exact, &subject]);
+    let comparisons = built_in().compare(&task(1), &[&exact, &subject]);
     let budget = comparisons[0].budget.as_ref().unwrap();
     let of = |source| budget.components.iter().find(|c| c.source == source).unwrap();
     assert_eq!(of(Source::MonteCarlo).degrees_of_freedom, Some(8.0));

@@ -27,7 +27,6 @@ impl Tolerance {
     }
 }
 
-/// The table of tolerances.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tolerances {
@@ -61,22 +60,18 @@ struct Rule {
     source: String,
 }
 
-/// Why the table of tolerances cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("reference/tolerances.yaml: {0}")]
 pub struct ToleranceError(String);
 
 impl Tolerances {
-    /// The table that the program was built with.
     pub fn built_in() -> Result<Self, ToleranceError> {
         crate::spec::from_yaml::<Self>(DEFAULTS).map_err(ToleranceError)?.checked()
     }
 
     fn checked(self) -> Result<Self, ToleranceError> {
-        for rule in &self.rules {
-            if rule.source.trim().is_empty() {
-                return Err(ToleranceError(format!("a tolerance of {} has no source", rule.procedure)));
-            }
+        if let Some(rule) = self.rules.iter().find(|r| r.source.trim().is_empty()) {
+            return Err(ToleranceError(format!("a tolerance of {} has no source", rule.procedure)));
         }
         let sound = self.coverage_factor.value.is_finite() && self.coverage_factor.value > 0.0;
         if !sound || self.coverage_factor.source.trim().is_empty() {
@@ -132,8 +127,7 @@ mod tests {
     use super::*;
 
     fn of(procedure: ProcedureId, basis: Basis, engine: &str) -> Tolerance {
-        let table = Tolerances::built_in().unwrap();
-        table.of(procedure, basis, engine, Quantity::Illuminance, &BTreeMap::new())
+        Tolerances::built_in().unwrap().of(procedure, basis, engine, Quantity::Illuminance, &BTreeMap::new())
     }
 
     #[test]
@@ -153,11 +147,10 @@ mod tests {
 
     #[test]
     fn a_spec_overrides_the_table() {
-        let table = Tolerances::built_in().unwrap();
         let strict = ToleranceOverride { relative: 1e-4, absolute_lx: 1e-3, absolute_cd: 0.0 };
         let overrides = BTreeMap::from([(ProcedureId::DirectIlluminance, strict)]);
-        let found =
-            table.of(ProcedureId::DirectIlluminance, Basis::ClosedForm, "povray", Quantity::Illuminance, &overrides);
+        let (procedure, table) = (ProcedureId::DirectIlluminance, Tolerances::built_in().unwrap());
+        let found = table.of(procedure, Basis::ClosedForm, "povray", Quantity::Illuminance, &overrides);
         assert_eq!(found, Tolerance { relative: 1e-4, absolute: 1e-3 });
     }
 }

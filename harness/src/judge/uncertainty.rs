@@ -12,7 +12,6 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal, StudentsT};
 /// Components below this share of the widest one change no quantile that anybody reads.
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// Where an uncertainty comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
@@ -35,7 +34,6 @@ impl Source {
     pub const ALL: [Self; 6] =
         [Self::MonteCarlo, Self::Instrument, Self::Discretisation, Self::Reference, Self::Rounding, Self::Input];
 
-    /// The name used in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::MonteCarlo => "Monte Carlo",
@@ -48,7 +46,6 @@ impl Source {
     }
 }
 
-/// How errors of a component are spread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
@@ -61,11 +58,9 @@ pub enum Shape {
 /// One component of an error budget.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Component {
-    /// Where it comes from.
     pub source: Source,
     /// Standard uncertainty, in the quantity's unit.
     pub uncertainty: f64,
-    /// How its errors are spread.
     pub shape: Shape,
     /// Degrees of freedom of the standard uncertainty, where it is itself estimated from few values.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -80,8 +75,7 @@ impl Component {
 
     /// A component that lies evenly within a bound (GUM 4.3.7).
     pub fn within(source: Source, bound: f64) -> Self {
-        let uncertainty = bound / 3f64.sqrt();
-        Self { source, uncertainty, shape: Shape::Rectangular, degrees_of_freedom: None }
+        Self { source, uncertainty: bound / 3f64.sqrt(), shape: Shape::Rectangular, degrees_of_freedom: None }
     }
 }
 

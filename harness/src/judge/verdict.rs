@@ -3,7 +3,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a comparison ends in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -27,12 +26,12 @@ impl Verdict {
         matches!(self, Self::Fail | Self::UnexpectedPass | Self::Missing)
     }
 
-    /// The name used in reports.
+    /// As views call it; in JSON an undecided comparison is `inconclusive`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Pass => "pass",
             Self::KnownDeviation => "known deviation",
-            Self::Inconclusive => "inconclusive",
+            Self::Inconclusive => "undecided",
             Self::Fail => "fail",
             Self::UnexpectedPass => "unexpected pass",
             Self::Missing => "missing",

@@ -20,14 +20,7 @@ pub(super) const FLUX_UP: Law = Law {
     variant: brightened,
 };
 
-pub(super) const FLUX_DOWN: Law = Law {
-    id: "flux_down",
-    what: "tables scaled to a largest intensity: illuminance in proportion",
-    unit: "cd",
-    magnitudes: &[1.0, 1e-3, 1e-6, 1e-9],
-    light: Light::Either,
-    variant: brightened,
-};
+pub(super) const FLUX_DOWN: Law = Law { id: "flux_down", magnitudes: &[1.0, 1e-3, 1e-6, 1e-9], ..FLUX_UP };
 
 pub(super) const DIM_SCALE: Law = Law {
     id: "dimming",

@@ -47,14 +47,12 @@ pub const ALL: [&Law; 27] = [
 
 /// What a change of a job must do to its readings.
 pub struct Law {
-    /// Its name.
     pub id: &'static str,
     pub what: &'static str,
     /// What the magnitude is, with its unit.
     pub unit: &'static str,
     /// From mild to extreme.
     pub magnitudes: &'static [f64],
-    /// Which light it is about.
     pub light: Light,
     /// The changed job and what it must read; `None` where the law says nothing of such a job.
     pub variant: fn(&Job, f64) -> Option<Variant>,
@@ -63,15 +61,12 @@ pub struct Law {
 /// Which light a law is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Light {
-    /// Direct light alone.
     Direct,
-    /// Reflected light alone.
     Reflected,
     Either,
 }
 
 impl Light {
-    /// Whether a law about this light concerns a job.
     pub const fn concerns(self, transport: Transport) -> bool {
         match transport {
             Transport::Direct => matches!(self, Self::Direct | Self::Either),
@@ -86,7 +81,6 @@ impl Light {
 #[derive(Clone, Debug)]
 pub struct Variant {
     pub job: Job,
-    /// What it must read.
     pub against: Against,
 }
 
@@ -103,7 +97,6 @@ pub enum Against {
     Mean {
         /// One a station; they add up to 1.
         weights: Vec<f64>,
-        /// The mean in lux.
         value_lx: f64,
         /// How far off the weights' quadrature may be, relative.
         quadrature: f64,

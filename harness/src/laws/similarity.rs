@@ -19,14 +19,8 @@ pub(super) const SCALE_UP: Law = Law {
     variant: scaled,
 };
 
-pub(super) const SCALE_DOWN: Law = Law {
-    id: "scale_down",
-    what: "all lengths times s: illuminance divided by the square of s",
-    unit: "s",
-    magnitudes: &[0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6],
-    light: Light::Either,
-    variant: scaled,
-};
+pub(super) const SCALE_DOWN: Law =
+    Law { id: "scale_down", magnitudes: &[0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6], ..SCALE_UP };
 
 pub(super) const TRANSLATION: Law = Law {
     id: "translation",

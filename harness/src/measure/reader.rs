@@ -106,7 +106,7 @@ impl Reader {
 
     fn find(&self, key: &Key) -> Option<Entry> {
         match self.cache.as_ref()?.find(key) {
-            Lookup::Found(entry) => Some(entry),
+            Lookup::Found(entry) => Some(*entry),
             Lookup::Unknown => None,
             Lookup::Damaged(what) => {
                 tracing::warn!("{}: the cache's {what}; the reading is taken anew", key.engine());

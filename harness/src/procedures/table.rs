@@ -1,11 +1,13 @@
 //! The table of procedures: what each is called, asks of a spec, reads and is judged by. A new procedure is a row here.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 use glam::DVec3;
+use luminaire::calculators::inverse_square;
 use luminaire::scene::{LuminaireModel, Meter, Scene, Transport};
 
-use super::form::{Asked, AtMeters, Form};
+use super::form::{AnyLight, Asked, AtMeters, Form};
 use super::task::{Aspect, Task, around, of_sets};
 use crate::record::{Basis, EngineName, ProcedureId, Quantity};
 
@@ -57,7 +59,7 @@ impl Reference {
 }
 
 /// Every procedure, in the order of reports. Tolerances stand under the same name in `reference/tolerances.yaml`.
-pub static ALL: [Procedure; 4] = [
+pub static ALL: [Procedure; 5] = [
     Procedure {
         id: ProcedureId::LuminousIntensity,
         title: "Luminous intensity",
@@ -102,11 +104,51 @@ pub static ALL: [Procedure; 4] = [
         aspects: as_it_looks,
         reference: |_| EXACT,
     },
+    Procedure {
+        id: ProcedureId::CylindricalIlluminance,
+        title: "Cylindrical illuminance",
+        short: "Cylindrical",
+        meaning: "Mean over all vertical directions of the illuminance at a point (EN 12464-1), wherever its meter looks: of all light, or of the part that the spec names.",
+        quantity: Quantity::Illuminance,
+        form: Form::MetersAndLight,
+        transport: |asked| match asked.light {
+            AnyLight::Total => Transport::Total(asked.bounces),
+            AnyLight::Direct => Transport::Direct,
+            AnyLight::Indirect => Transport::Indirect(asked.bounces),
+        },
+        aspects: all_around,
+        reference: |task| match task.transport {
+            Transport::Direct if is_inverse_square(&task.scene) => Reference::Formula {
+                of: |scene, point_m| inverse_square::cylindrical_illuminance(scene, point_m).value(),
+                source: "inverse square, mean over vertical directions",
+            },
+            _ => EXACT,
+        },
+    },
 ];
 
 /// One illuminance, on the side that the meter looks to.
 fn as_it_looks(meter: Meter) -> (Vec<Aspect>, f64) {
     (vec![Aspect { meter, weight: 1.0 }], 0.0)
+}
+
+/// Directions of the mean all around: odd, so that its error is that of twice as many.
+const DIRECTIONS: u32 = 31;
+
+/// The mean over all vertical directions, by the rectangle rule.
+///
+/// A surface that turns once sees each bit of light as the positive part of a cosine, whose even harmonics 2k are
+/// 2 / (4 k^2 - 1) of its mean and whose odd ones but the first are none. An odd number N of directions takes the harmonics 2 N j for
+/// the mean: it is off by 2 / (4 N^2 j^2 - 1) of it, summed over j, at most, whatever the light, since all light is positive. The sum is
+/// 1 - x cot x with x = pi / 2N.
+fn all_around(meter: Meter) -> (Vec<Aspect>, f64) {
+    let facing = |k: u32| {
+        let azimuth = 2.0 * PI * f64::from(k) / f64::from(DIRECTIONS);
+        let normal = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
+        Aspect { meter: Meter { normal, ..meter }, weight: 1.0 / f64::from(DIRECTIONS) }
+    };
+    let x = PI / f64::from(2 * DIRECTIONS);
+    ((0..DIRECTIONS).map(facing).collect(), 1.0 - x / x.tan())
 }
 
 const EXACT: Reference =
@@ -166,5 +208,19 @@ mod tests {
         for procedure in ProcedureId::ALL {
             assert_eq!(procedure.row().id, procedure);
         }
+    }
+
+    #[test]
+    fn the_mean_all_around_is_off_by_its_bound_at_most_and_nearly_reaches_it() {
+        let meter = Meter { position_m: DVec3::ZERO, normal: DVec3::Z };
+        let (aspects, bound) = all_around(meter);
+        let off = |azimuth: f64| {
+            let towards_light = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
+            let mean: f64 = aspects.iter().map(|a| a.weight * a.meter.normal.dot(towards_light).max(0.0)).sum();
+            (mean * PI - 1.0).abs()
+        };
+        let worst = (0..100_000).map(|k| off(f64::from(k) * 1e-4)).fold(0.0, f64::max);
+        assert!(worst <= bound && worst > 0.5 * bound, "{worst} {bound}");
+        assert!((8.5e-4..8.6e-4).contains(&bound), "{bound}");
     }
 }

@@ -20,11 +20,11 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// The name used in reports.
+    /// As views call it: the exact solutions are those of our own simulator.
     pub const fn name(self) -> &'static str {
         match self {
             Self::ClosedForm => "closed form",
-            Self::Exact => "exact",
+            Self::Exact => "simulator",
             Self::Iesna => "IESNA",
             Self::Published => "published",
             Self::Engine => "engine",

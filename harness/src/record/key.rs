@@ -45,12 +45,19 @@ pub enum ProcedureId {
     IndirectIlluminance,
     /// Direct and indirect together.
     TotalIlluminance,
+    /// Mean over all vertical directions at a point (EN 12464-1).
+    CylindricalIlluminance,
 }
 
 impl ProcedureId {
     /// In the order of reports.
-    pub const ALL: [Self; 4] =
-        [Self::LuminousIntensity, Self::DirectIlluminance, Self::IndirectIlluminance, Self::TotalIlluminance];
+    pub const ALL: [Self; 5] = [
+        Self::LuminousIntensity,
+        Self::DirectIlluminance,
+        Self::IndirectIlluminance,
+        Self::TotalIlluminance,
+        Self::CylindricalIlluminance,
+    ];
 
     /// All names, in the same order.
     pub const NAMES: [&str; Self::ALL.len()] = {
@@ -70,6 +77,7 @@ impl ProcedureId {
             Self::DirectIlluminance => "direct_illuminance",
             Self::IndirectIlluminance => "indirect_illuminance",
             Self::TotalIlluminance => "total_illuminance",
+            Self::CylindricalIlluminance => "cylindrical_illuminance",
         }
     }
 }

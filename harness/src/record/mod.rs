@@ -112,6 +112,7 @@ pub struct Recording {
     #[serde(default)]
     pub role: Role,
     /// The luminaire model: point, area, impostor, or mixed.
+    #[serde(default)]
     pub model: String,
     /// Which light counted.
     pub light: Light,

@@ -1,13 +1,13 @@
 //! What holding a run against its baseline said, as every view tells it.
 
-use crate::record::ReadingKey;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A run held against accepted readings.
+use super::words::unique;
+use crate::record::ReadingKey;
+
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct BaselineCheck {
-    /// The baseline's file.
     pub file: String,
     /// One a case, procedure and engine of either side.
     pub entries: Vec<BaselineLine>,
@@ -27,26 +27,19 @@ pub struct BaselineLine {
 }
 
 impl BaselineCheck {
-    /// Whether everything repeats what was accepted.
     pub fn is_as_accepted(&self) -> bool {
         self.entries.iter().all(|e| e.is_as_accepted)
     }
 
-    /// What asks for attention.
     pub(super) fn departures(&self) -> impl Iterator<Item = &BaselineLine> {
         self.entries.iter().filter(|e| !e.is_as_accepted)
     }
 
     /// How many entries are in which state: `4 unchanged, 1 REFUSED`.
     pub(super) fn counts(&self) -> String {
-        let mut states: Vec<(&str, usize)> = vec![];
-        for entry in &self.entries {
-            match states.iter_mut().find(|(state, _)| *state == entry.state) {
-                Some((_, count)) => *count += 1,
-                None => states.push((&entry.state, 1)),
-            }
-        }
-        let counts: Vec<String> = states.iter().map(|(state, count)| format!("{count} {state}")).collect();
+        let of = |state: &String| self.entries.iter().filter(|e| e.state == *state).count();
+        let states = unique(self.entries.iter().map(|e| &e.state));
+        let counts: Vec<String> = states.iter().map(|state| format!("{} {state}", of(state))).collect();
         if counts.is_empty() { "nothing to compare".to_owned() } else { counts.join(", ") }
     }
 }

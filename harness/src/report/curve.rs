@@ -10,12 +10,9 @@ use crate::record::ProcedureId;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Curve {
     pub case: String,
-    /// The procedure that reads it back.
     pub procedure: ProcedureId,
     pub luminaire: String,
-    /// C plane in degrees.
     pub c_deg: f64,
-    /// Angles from the nadir in degrees.
     pub gamma_deg: Vec<f64>,
     /// Luminous intensity at them in candela, the luminaire's flux scale included.
     pub intensity_cd: Vec<f64>,
@@ -23,26 +20,22 @@ pub struct Curve {
 
 /// The half planes that a task reads back, and those across the axis, which complete a polar diagram.
 pub fn curves(case: &str, task: &Task) -> Vec<Curve> {
+    let directions = task.targets.iter().filter_map(|t| t.direction);
     let mut planes: Vec<f64> =
-        task.targets.iter().filter_map(|t| t.direction).flat_map(|d| [d.c_deg, d.c_deg + 180.0]).collect();
-    for c in &mut planes {
-        *c = c.rem_euclid(360.0);
-    }
+        directions.flat_map(|d| [d.c_deg, d.c_deg + 180.0]).map(|c| c.rem_euclid(360.0)).collect();
     planes.sort_by(f64::total_cmp);
     planes.dedup();
     let [luminaire] = &task.scene.luminaires[..] else { return vec![] };
     let distribution = &luminaire.photometry.distribution;
+    let gamma_deg = distribution.gamma_deg();
+    let intensity_cd = |c, gamma| distribution.intensity(c, gamma).value() * luminaire.flux_scale;
     let of_plane = |c_deg: f64| Curve {
         case: case.to_owned(),
-        procedure: task.procedure.to_owned(),
+        procedure: task.procedure,
         luminaire: luminaire.id.clone(),
         c_deg,
-        gamma_deg: distribution.gamma_deg().to_vec(),
-        intensity_cd: distribution
-            .gamma_deg()
-            .iter()
-            .map(|&gamma| distribution.intensity(c_deg, gamma).value() * luminaire.flux_scale)
-            .collect(),
+        gamma_deg: gamma_deg.to_vec(),
+        intensity_cd: gamma_deg.iter().map(|&gamma| intensity_cd(c_deg, gamma)).collect(),
     };
     planes.into_iter().map(of_plane).collect()
 }

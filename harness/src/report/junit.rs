@@ -2,12 +2,11 @@
 
 use quick_junit::{NonSuccessKind, Report as JUnit, TestCase, TestCaseStatus, TestSuite};
 
-use super::{BaselineCheck, Report};
+use super::{BaselineCheck, Report, notes};
 use crate::judge::{Comparison, Verdict};
 use crate::plan::Skip;
-use crate::record::Recording;
+use crate::record::ReadingKey;
 
-/// The report as JUnit XML: one suite a case.
 pub fn junit(report: &Report) -> String {
     let mut junit = JUnit::new("luxproof");
     for case in &report.cases {
@@ -25,19 +24,15 @@ pub fn junit(report: &Report) -> String {
     format!("{before}{after}{rest}")
 }
 
-/// What was held against a baseline, a suite of its own.
 fn accepted(check: &BaselineCheck) -> TestSuite {
     let mut suite = TestSuite::new(format!("baseline {}", check.file));
     for entry in &check.entries {
-        let mut status = TestCaseStatus::success();
-        if !entry.is_as_accepted {
-            status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-            status.set_message(entry.state.clone());
-            status.set_description(entry.details.join("\n"));
-        }
-        let mut case = TestCase::new(format!("{} {} baseline", entry.key.procedure, entry.key.engine), status);
-        case.set_classname(entry.key.case.clone());
-        suite.add_test_case(case);
+        let status = if entry.is_as_accepted {
+            TestCaseStatus::success()
+        } else {
+            failure(entry.state.clone(), entry.details.join("\n"))
+        };
+        suite.add_test_case(test_case(&entry.key, " baseline", status));
     }
     suite
 }
@@ -45,62 +40,54 @@ fn accepted(check: &BaselineCheck) -> TestSuite {
 fn suite(report: &Report, name: &str) -> TestSuite {
     let mut suite = TestSuite::new(name);
     for recording in report.recordings.iter().filter(|r| r.key.case == name) {
-        let of_run = |c: &&Comparison| {
-            c.key.case == recording.key.case
-                && c.key.procedure == recording.key.procedure
-                && c.key.engine == recording.key.engine
-        };
-        let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(of_run).collect();
-        let mut case =
-            TestCase::new(format!("{} {}", recording.key.procedure, recording.key.engine), status(&comparisons));
-        case.set_classname(recording.key.case.clone());
+        let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.key == recording.key).collect();
+        let mut case = test_case(&recording.key, "", status(&comparisons));
         case.set_time(std::time::Duration::from_secs_f64(recording.wall_s.max(0.0)));
         // What was left out of a job that ran is told with it: a job is one test case.
-        let left_out: Vec<String> = report.skips.iter().filter(|s| is_of(s, recording)).map(reason).collect();
+        let left_out: Vec<String> = report.skips.iter().filter(|s| s.key == recording.key).map(told).collect();
         if !left_out.is_empty() {
             case.set_system_out(left_out.join("\n"));
         }
         suite.add_test_case(case);
     }
-    for skip in report.skips.iter().filter(|s| s.key.case == name) {
-        if report.recordings.iter().any(|r| is_of(skip, r)) {
-            continue;
-        }
+    let is_unread = |s: &&Skip| report.recordings.iter().all(|r| r.key != s.key);
+    for skip in report.skips.iter().filter(|s| s.key.case == name).filter(is_unread) {
         let mut status = TestCaseStatus::skipped();
-        status.set_message(reason(skip));
-        let mut case = TestCase::new(format!("{} {}", skip.key.procedure, skip.key.engine), status);
-        case.set_classname(skip.key.case.clone());
-        suite.add_test_case(case);
+        status.set_message(told(skip));
+        suite.add_test_case(test_case(&skip.key, "", status));
     }
     suite
 }
 
-fn is_of(skip: &Skip, recording: &Recording) -> bool {
-    skip.key.case == recording.key.case
-        && skip.key.procedure == recording.key.procedure
-        && skip.key.engine == recording.key.engine
+fn test_case(key: &ReadingKey, what: &str, status: TestCaseStatus) -> TestCase {
+    let mut case = TestCase::new(format!("{} {}{what}", key.procedure, key.engine), status);
+    case.set_classname(key.case.clone());
+    case
 }
 
-fn reason(skip: &Skip) -> String {
-    let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
-    format!("{}{saved}", skip.reason)
+fn told(skip: &Skip) -> String {
+    format!("{}: {}", notes::kind(skip).name(), notes::reason(skip))
 }
 
 fn status(comparisons: &[&Comparison]) -> TestCaseStatus {
     let bad: Vec<&&Comparison> = comparisons.iter().filter(|c| c.verdict.is_bad()).collect();
-    let undecided: Vec<&&Comparison> = comparisons.iter().filter(|c| c.verdict == Verdict::Inconclusive).collect();
+    let undecided = comparisons.iter().filter(|c| c.verdict == Verdict::Inconclusive).count();
     if !bad.is_empty() {
-        let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-        status.set_message(format!("{} of {} comparisons failed", bad.len(), comparisons.len()));
-        status.set_description(bad.iter().map(|c| line(c)).collect::<Vec<_>>().join("\n"));
-        status
-    } else if !undecided.is_empty() {
+        let message = format!("{} of {} comparisons failed", bad.len(), comparisons.len());
+        failure(message, bad.iter().map(|c| line(c)).collect::<Vec<_>>().join("\n"))
+    } else if undecided > 0 {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
-        status.set_message(format!("{} of {} comparisons undecided within budget", undecided.len(), comparisons.len()));
+        status.set_message(format!("{undecided} of {} comparisons undecided within budget", comparisons.len()));
         status
     } else {
         TestCaseStatus::success()
     }
+}
+
+fn failure(message: String, description: String) -> TestCaseStatus {
+    let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+    status.set_message(message).set_description(description);
+    status
 }
 
 fn line(c: &Comparison) -> String {

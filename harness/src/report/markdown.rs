@@ -2,38 +2,29 @@
 
 use std::fmt::Write;
 
-use super::Report;
-use super::terminal::{Cell, matrix, worst};
-use super::{consensus, paper, paper_split, split};
+use super::matrix::{Cell, matrix, worst};
+use super::notes::{Kind, departures, notes, splits};
+use super::words::{mark, percent, significant};
+use super::{Report, papers};
 
-/// The report as Markdown.
-///
 /// `link` leads to the whole report, where it is published.
 pub fn markdown(report: &Report, link: Option<&str>) -> String {
     let mut text = String::new();
-    let s = &report.summary;
     let mut line = |l: String| {
         text.push_str(&l);
         text.push('\n');
     };
     line(format!("## luxproof: {}", report.spec.title));
-    line(format!(
-        "\n{} passed, {} failed, {} undecided, {} known, {} unexpectedly passed, {} missing, {} skipped in {:.1} s\n",
-        s.pass, s.fail, s.inconclusive, s.known_deviation, s.unexpected_pass, s.missing, s.skipped, report.wall_s
-    ));
+    line(format!("\n{} in {:.1} s\n", report.summary, report.wall_s));
     let engines: Vec<&str> = report.engines.iter().map(|e| e.id.as_str()).collect();
-    line(format!(
-        "| {}procedure | reference | {} |",
-        if report.is_suite() { "case | " } else { "" },
-        engines.join(" | ")
-    ));
+    line(format!("| {}procedure | against | {} |", report.of_suite("case", " | "), engines.join(" | ")));
     line(format!("|---|---|{}", "---|".repeat(engines.len() + usize::from(report.is_suite()))));
     for row in matrix(report) {
         let cells: Vec<String> = row.cells.iter().map(Cell::text).collect();
-        let case = if report.is_suite() { format!("{} | ", row.case) } else { String::new() };
+        let case = report.of_suite(&row.case, " | ");
         line(format!("| {case}{} | {} | {} |", row.procedure, row.basis, cells.join(" | ")));
     }
-    for grid in paper::grids(report).into_iter().chain(paper_split::grid(report)) {
+    for grid in papers::grids(report) {
         line(format!(
             "\n<details><summary>{}</summary>\n\n| {} |\n|{}",
             grid.title,
@@ -45,14 +36,14 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
         }
         line("\n</details>".to_owned());
     }
-    let splits = split::widest(report);
+    let splits = splits(report);
     if !splits.is_empty() {
         line(String::new());
-        for split in splits {
-            line(format!("- {}: {}", split::place(report, split), split.text));
+        for (place, split) in splits {
+            line(format!("- {place}: {split}"));
         }
     }
-    let departures = consensus::lines(report);
+    let departures = departures(report);
     if !departures.is_empty() {
         line("\nWho departs from the other witnesses, the reference included:\n".into());
         for departure in &departures {
@@ -66,17 +57,17 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
                 .into(),
         );
         for c in worst {
-            let number = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.5}"));
-            let case = if report.is_suite() { format!("{} ", c.key.case) } else { String::new() };
+            let number = |v: Option<f64>| v.map_or("-".to_owned(), significant);
             line(format!(
-                "| {case}{} {} | {} | {} | {} | {} | {} |",
+                "| {}{} {} | {} | {} | {} | {} | {} |",
+                report.of_suite(&c.key.case, " "),
                 c.key.engine,
                 c.key.procedure,
                 c.meter,
                 number(c.value),
                 number(c.reference.as_ref().map(|r| r.value)),
-                c.relative_deviation.map_or("-".to_owned(), |d| format!("{:+.3} %", 100.0 * d)),
-                c.verdict.name()
+                c.relative_deviation.map_or("-".to_owned(), percent),
+                mark(c.verdict)
             ));
         }
     }
@@ -88,9 +79,8 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
             line(format!("{gap}- **{}** {place}: {}", entry.state.to_lowercase(), entry.details.join("; ")));
         }
     }
-    for skip in &report.skips {
-        let case = if report.is_suite() { format!("{} ", skip.key.case) } else { String::new() };
-        writeln!(text, "\n- skipped: {case}{} {}: {}", skip.key.engine, skip.key.procedure, skip.reason).ok();
+    for (k, note) in notes(report).iter().filter(|n| n.kind <= Kind::Shortcut).enumerate() {
+        line(format!("{}- {}", if k == 0 { "\n" } else { "" }, note.line(report)));
     }
     if let Some(link) = link {
         writeln!(text, "\n[The whole report]({link})").ok();

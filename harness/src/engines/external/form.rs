@@ -9,11 +9,11 @@ use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Scene, Shap
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::engines::contract::same_meters;
 use crate::engines::{EngineError, Job, Measurement, Station};
 use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
 use crate::spec::Budget;
 
-/// The version of both forms.
 const VERSION: u32 = 1;
 
 /// What an adapter reads on its standard input: everything in metres, candela, lux and world coordinates with z up.
@@ -171,7 +171,6 @@ impl ReadingForm {
 }
 
 impl ExternalJob {
-    /// The form of a job.
     pub fn of(job: &Job) -> Self {
         let (light, bounces) = match job.transport {
             Transport::Direct => (Light::Direct, None),
@@ -196,7 +195,6 @@ impl ExternalJob {
         }
     }
 
-    /// The text that an adapter reads.
     pub fn to_json(&self) -> Result<Vec<u8>, serde_json::Error> {
         serde_json::to_vec_pretty(self)
     }
@@ -274,25 +272,14 @@ fn meter(station: &Station) -> MeterForm {
 
 /// Reads what an adapter printed; every meter must be there once, in order.
 pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Result<Measurement, EngineError> {
-    let output = |what: String| EngineError::Output { engine: engine.clone(), what };
-    let answer: ExternalReadings = serde_json::from_slice(stdout).map_err(|e| {
-        let start: String = String::from_utf8_lossy(stdout).chars().take(200).collect();
-        output(format!("its answer is no JSON of readings ({e}): `{start}`"))
-    })?;
+    let answer: ExternalReadings = serde_json::from_slice(stdout)
+        .map_err(|e| EngineError::no_readings(engine.clone(), &String::from_utf8_lossy(stdout), &e))?;
     if let Some(why) = answer.declined {
         return Err(EngineError::Declined { engine: engine.clone(), why });
     }
-    let (found, wanted) = (answer.readings.len(), job.stations.len());
-    if found != wanted {
-        return Err(output(format!("gave {found} readings for {wanted} meters")));
-    }
-    let mut estimates = Vec::with_capacity(wanted);
-    for (reading, station) in answer.readings.iter().zip(&job.stations) {
-        if reading.meter != station.id.0 {
-            return Err(output(format!("gave `{}` where `{}` was asked for", reading.meter, station.id)));
-        }
-        estimates.push(Estimate { value: reading.illuminance_lx, uncertainty: reading.uncertainty() });
-    }
+    same_meters(engine, job, answer.readings.iter().map(|reading| reading.meter.as_str()))?;
+    let estimate = |r: &ReadingForm| Estimate { value: r.illuminance_lx, uncertainty: r.uncertainty() };
+    let estimates = answer.readings.iter().map(estimate).collect();
     let (method, effort) = (answer.settings.into_iter().collect(), answer.effort.into_iter().collect());
     Ok(Measurement { estimates, method, effort, notes: answer.notes, ..Measurement::default() })
 }

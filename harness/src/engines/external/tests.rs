@@ -7,7 +7,7 @@ use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport, or
 use serde_json::json;
 
 use super::*;
-use crate::engines::fixtures::{CONVERGED, lopsided, luminaire, s1, workbench};
+use crate::engines::fixtures::{CONVERGED, cuboid, lopsided, luminaire, s1, workbench};
 use crate::system::process::ProcessError;
 
 fn adapter(script: &str, folder: &Path) -> External {
@@ -17,7 +17,7 @@ fn adapter(script: &str, folder: &Path) -> External {
 
 fn read_within(script: &str, limit: Duration) -> Result<Measurement, EngineError> {
     let folder = tempfile::tempdir().unwrap();
-    let bench = Workbench { site: Site::at(folder.path()), limit, ..workbench(folder.path()) };
+    let bench = Workbench { limit, ..workbench(Site::at(folder.path()), folder.path()) };
     adapter(script, folder.path()).read(&s1(Transport::Direct), &bench)
 }
 
@@ -131,7 +131,7 @@ fn the_job_of_a_furnished_room_is_as_reviewed() {
     panel.flux_scale = 0.5;
     job.scene.luminaires.push(panel);
     job.scene.obstacles = vec![
-        Obstacle { shape: Shape::Box { min_m: DVec3::ONE, max_m: DVec3::splat(2.0) }, reflectance: 0.5 },
+        cuboid([1.0; 3], [2.0; 3], 0.5),
         Obstacle {
             shape: Shape::Mesh { vertices_m: vec![DVec3::X, DVec3::Y, DVec3::Z], triangles: vec![[0, 1, 2]] },
             reflectance: 0.3,

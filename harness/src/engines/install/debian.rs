@@ -5,21 +5,19 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{InstallError, LIMIT};
+use super::{InstallError, step};
 use crate::engines::Site;
-use crate::system::process::Invocation;
 
 /// The libLLVM packages that Mitsuba works with, the best known first.
 const LLVM_PACKAGES: [&str; 5] = ["libllvm19", "libllvm20", "libllvm18", "libllvm17t64", "libllvm17"];
 
-/// Installs POV-Ray; returns where it is.
 pub(super) fn install_povray(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install POV-Ray 3.7 so that `povray` is on PATH (macOS: `brew install povray`)";
     let apt = Apt::find(site, "POV-Ray", remedy)?;
     apt.install(&["povray"], progress)?;
     let found = site.program("povray").ok_or_else(|| not_there("povray", remedy))?;
     // Seen to start, with the libraries that were unpacked beside it.
-    let mut check = apt.step(&found).args(["--version"]);
+    let mut check = step(site, &found).args(["--version"]);
     if let Some(path) = site.library_path() {
         check = check.env("LD_LIBRARY_PATH", path);
     }
@@ -27,7 +25,6 @@ pub(super) fn install_povray(site: &Site, progress: &mut dyn FnMut(&str)) -> Res
     Ok(found.display().to_string())
 }
 
-/// Installs a libLLVM that Mitsuba works with; returns where it is.
 pub(super) fn install_llvm(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install LLVM 17 or later (macOS: `brew install llvm`)";
     Apt::find(site, "libLLVM", remedy)?.install(&LLVM_PACKAGES, progress)?;
@@ -40,7 +37,6 @@ fn not_there(what: &str, remedy: &str) -> InstallError {
     InstallError::Missing { what, remedy: remedy.to_owned() }
 }
 
-/// The package manager, and whether we may use it on the system.
 struct Apt<'a> {
     site: &'a Site,
     program: PathBuf,
@@ -93,7 +89,6 @@ impl<'a> Apt<'a> {
         self.unpack()
     }
 
-    /// Unpacks every downloaded package into the site's `debian` folder.
     fn unpack(&self) -> Result<(), InstallError> {
         let archives = self.state().join("cache/archives");
         let entries = fs::read_dir(&archives).map_err(|e| InstallError::io(&archives, e))?;
@@ -106,7 +101,7 @@ impl<'a> Apt<'a> {
         let root = self.site.debian();
         fs::create_dir_all(&root).map_err(|e| InstallError::io(&root, e))?;
         for package in &packages {
-            self.step("dpkg").args(["-x".as_ref(), package.as_os_str(), root.as_os_str()]).run()?;
+            step(self.site, "dpkg").args(["-x".as_ref(), package.as_os_str(), root.as_os_str()]).run()?;
             fs::remove_file(package).map_err(|e| InstallError::io(package, e))?;
         }
         Ok(())
@@ -114,7 +109,7 @@ impl<'a> Apt<'a> {
 
     /// Runs apt-get, on our own lists and cache where the system's are not ours to change.
     fn apt(&self, args: &[&str]) -> Result<(), InstallError> {
-        let run = self.step(&self.program).env("DEBIAN_FRONTEND", "noninteractive").env("LC_ALL", "C");
+        let run = step(self.site, &self.program).env("DEBIAN_FRONTEND", "noninteractive").env("LC_ALL", "C");
         if self.system_wide {
             run.args(["-o", "DPkg::Lock::Timeout=600"]).args(args).run()?;
             return Ok(());
@@ -134,10 +129,6 @@ impl<'a> Apt<'a> {
 
     fn state(&self) -> PathBuf {
         self.site.root().join("apt")
-    }
-
-    fn step(&self, program: impl Into<PathBuf>) -> Invocation {
-        Invocation::new(program, self.site.root(), LIMIT, self.site.root().join("install.log"))
     }
 }
 

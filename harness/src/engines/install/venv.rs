@@ -7,20 +7,16 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::{InstallError, LIMIT};
+use super::{InstallError, step};
 use crate::engines::Site;
-use crate::system::process::Invocation;
 
-/// The exact packages, in pip's requirements format.
 const LOCK: &str = include_str!("../../../engines.lock");
 
-/// Whether the environment of this very lock is in place.
 pub(super) fn is_current(site: &Site) -> bool {
     let linked = fs::read_link(site.venv()).is_ok_and(|target| target == Path::new(&folder_name()));
     linked && site.python().is_some()
 }
 
-/// Makes the environment and puts it in place; returns where it is.
 pub(super) fn install(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let folder = site.root().join(folder_name());
     remove(&folder)?;
@@ -86,10 +82,6 @@ fn remove(path: &Path) -> Result<(), InstallError> {
         Ok(_) => fs::remove_file(path),
     };
     removed.map_err(|e| InstallError::io(path, e))
-}
-
-fn step(site: &Site, program: impl Into<PathBuf>) -> Invocation {
-    Invocation::new(program, site.root(), LIMIT, site.root().join("install.log"))
 }
 
 fn folder_name() -> String {

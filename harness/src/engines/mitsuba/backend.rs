@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde::Deserialize;
 
 use super::settings::Settings;
+use crate::engines::workbench::by_hand;
 use crate::engines::{Absent, Site, Version, Workbench};
 use crate::system::process::Invocation;
 
@@ -14,7 +15,6 @@ const REMEDY: &str = "run `luxproof engines install mitsuba`";
 /// A probe takes about a second; a machine under load may need many.
 const PROBE_LIMIT: Duration = Duration::from_secs(60);
 
-/// An interpreter with Mitsuba and what works there.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Backend {
     root: PathBuf,
@@ -49,7 +49,6 @@ impl Backend {
         probe(&python, "scalar_rgb", None).map(|versions| backend(None, versions)).map_err(absent)
     }
 
-    /// Whether it was found at this site.
     pub(super) fn is_of(&self, site: &Site) -> bool {
         self.root == site.root()
     }
@@ -59,17 +58,14 @@ impl Backend {
         Self { llvm: None, ..self }
     }
 
-    /// Versions of the renderer and of what compiles its kernels.
     pub(super) fn version(&self) -> Version {
         let Versions { mitsuba, drjit, llvm } = &self.versions;
         let llvm = llvm.as_ref().map_or("no usable LLVM".to_owned(), |v| format!("LLVM {v}"));
         Version(format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"))
     }
 
-    /// The command that reads an exported job with what is installed here.
     pub(super) fn command_by_hand(&self) -> String {
-        let run =
-            Invocation::new(&self.python, Path::new("."), Duration::ZERO, "").args(["mitsuba_read.py", "job.json"]);
+        let run = by_hand(&self.python).args(["mitsuba_read.py", "job.json"]);
         match &self.llvm {
             Some(library) => run.env("DRJIT_LIBLLVM_PATH", library),
             None => run.args(["--variant", "scalar_rgb"]),

@@ -9,6 +9,7 @@ use super::ID;
 use super::precision::float_error_lx;
 use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
 use crate::engines::blocks::{Blocks, Sampling};
+use crate::engines::contract::same_meters;
 use crate::engines::settings::Preset;
 use crate::engines::{EngineError, Job, Measurement};
 use crate::record::{Estimate, Uncertainty};
@@ -24,7 +25,6 @@ const SCALAR_TRIAL_SIDE: usize = 2;
 /// The spread of two blocks is a rough guess of the error of one.
 const PLAN_MARGIN: f64 = 2.0;
 
-/// What the driver says first.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Greeting {
@@ -36,7 +36,6 @@ struct Greeting {
     parts: Vec<Part>,
 }
 
-/// A part of the light that adds to the readings, independently of the others.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Part {
@@ -53,7 +52,6 @@ struct Request<'a> {
     seeds: Vec<Option<[u64; 3]>>,
 }
 
-/// Which of the independent sequences of a job's random numbers.
 #[derive(Clone, Copy)]
 enum Stream {
     Reflected = 0,
@@ -61,23 +59,18 @@ enum Stream {
     Trial = 2,
 }
 
-/// One job's conversation.
 pub(super) struct Driver<'a> {
-    job: &'a Job,
-    settings: &'a Settings,
-    conversation: Conversation,
-    started: Instant,
+    pub(super) job: &'a Job,
+    pub(super) settings: &'a Settings,
+    pub(super) conversation: Conversation,
+    /// When the seconds of the budget began.
+    pub(super) started: Instant,
 }
 
-impl<'a> Driver<'a> {
-    /// `started` is when the seconds of the budget began.
-    pub(super) fn new(job: &'a Job, settings: &'a Settings, conversation: Conversation, started: Instant) -> Self {
-        Self { job, settings, conversation, started }
-    }
-
+impl Driver<'_> {
     pub(super) fn measurement(mut self) -> Result<Measurement, EngineError> {
         let greeting: Greeting = parse(&self.conversation.listen()?)?;
-        self.check_stations(&greeting.stations)?;
+        same_meters(&ID, self.job, greeting.stations.iter().map(String::as_str))?;
         let mut found =
             Measurement { estimates: vec![Estimate::DARK; self.job.stations.len()], ..Measurement::default() };
         let versions = greeting.versions.iter().map(|(k, v)| (format!("version_{k}"), v.clone()));
@@ -90,20 +83,6 @@ impl<'a> Driver<'a> {
         }
         self.conversation.end()?;
         Ok(found)
-    }
-
-    fn check_stations(&self, found: &[String]) -> Result<(), EngineError> {
-        let wanted = &self.job.stations;
-        if found.len() != wanted.len() {
-            let what = format!("gave {} readings for {} meters", found.len(), wanted.len());
-            return Err(EngineError::output(ID, what));
-        }
-        match found.iter().zip(wanted).find(|(found, wanted)| **found != wanted.id.0) {
-            Some((found, wanted)) => {
-                Err(EngineError::output(ID, format!("gave `{found}` where `{}` was asked for", wanted.id)))
-            }
-            None => Ok(()),
-        }
     }
 
     /// Direct light of points: what is left is the rounding of 32-bit floats.
@@ -185,8 +164,5 @@ impl<'a> Driver<'a> {
 }
 
 fn parse<'de, T: Deserialize<'de>>(line: &'de str) -> Result<T, EngineError> {
-    serde_json::from_str(line).map_err(|e| {
-        let start: String = line.chars().take(200).collect();
-        EngineError::output(ID, format!("its answer is no JSON of readings ({e}): `{start}`"))
-    })
+    serde_json::from_str(line).map_err(|e| EngineError::no_readings(ID, line, &e))
 }

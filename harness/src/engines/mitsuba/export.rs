@@ -48,7 +48,6 @@ fn has_surfaces(job: &Job) -> bool {
     job.scene.room.is_some() || !job.scene.obstacles.is_empty()
 }
 
-/// What the driver is asked for.
 #[derive(Serialize)]
 struct DriverJob<'a> {
     case: &'a str,
@@ -66,7 +65,6 @@ struct DriverJob<'a> {
     stations: Vec<DriverStation<'a>>,
 }
 
-/// How a rendered film is read instead.
 #[derive(Serialize)]
 struct Film {
     tile: usize,
@@ -149,7 +147,6 @@ fn emitter(luminaire: &Luminaire, table: &str, frame: &Frame) -> String {
     )
 }
 
-/// The first lines of a scene file.
 fn header(job: &Job, what: &str) -> String {
     let (case, procedure) = (comment_text(&job.case), job.procedure);
     format!(
@@ -167,17 +164,11 @@ fn header(job: &Job, what: &str) -> String {
 /// Mitsuba's depth counts the segments of a path from the meter to the luminaire: N reflections are depth N + 1.
 fn integrator(job: &Job, kind: &str) -> String {
     let highest = job.largest_reflectance();
-    let (max_depth, rr_depth, why) = match job.transport {
-        Transport::Direct => (1, 5, "direct light only".to_owned()),
-        Transport::Indirect(Bounces::AtMost(n)) | Transport::Total(Bounces::AtMost(n)) => {
-            (i64::from(n) + 1, 5, format!("{n} diffuse reflections"))
-        }
-        Transport::Indirect(Bounces::Converged) | Transport::Total(Bounces::Converged)
-            if highest < HIGH_REFLECTANCE =>
-        {
-            (-1, 5, "all reflections".to_owned())
-        }
-        Transport::Indirect(Bounces::Converged) | Transport::Total(Bounces::Converged) => {
+    let (max_depth, rr_depth, why) = match job.reflections() {
+        None => (1, 5, "direct light only".to_owned()),
+        Some(Bounces::AtMost(n)) => (i64::from(n) + 1, 5, format!("{n} diffuse reflections")),
+        Some(Bounces::Converged) if highest < HIGH_REFLECTANCE => (-1, 5, "all reflections".to_owned()),
+        Some(Bounces::Converged) => {
             let n = reflections_until(highest, 0.1 * job.budget.relative_error);
             let why = format!(
                 "{n} reflections leave less than a tenth of the relative error asked for; no Russian roulette, which \
@@ -202,7 +193,6 @@ fn reflections_until(reflectance: f64, share: f64) -> i64 {
     (share.max(1e-9).ln() / reflectance.ln()).clamp(1.0, MAX).ceil() as i64
 }
 
-/// Text that may stand in an XML comment.
 fn comment_text(text: &str) -> String {
     text.replace("--", "- -")
 }

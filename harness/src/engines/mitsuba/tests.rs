@@ -1,13 +1,15 @@
 //! The real renderer against closed forms and the converged values of case S1, and what happens when it fails.
 
+use std::time::Duration;
+
 use glam::DVec3;
-use luminaire::geometry::Reflectances;
 use luminaire::photometry::LuminousIntensityDistribution;
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport, orientation};
+use luminaire::scene::{Luminaire, LuminaireModel, Scene, Transport, orientation};
 
 use super::*;
 use crate::engines::Budget;
 use crate::engines::fixtures::*;
+use crate::engines::shared_tests;
 
 mod failures;
 mod scenes;
@@ -16,11 +18,10 @@ fn read(job: &Job) -> Measurement {
     read_tampered(job, |_, text| text)
 }
 
-/// Reads after every text file went through `tamper(name, text)`.
 fn read_tampered(job: &Job, tamper: impl Fn(&str, String) -> String) -> Measurement {
     let engine = Mitsuba::default();
     let folder = tempfile::tempdir().unwrap();
-    let bench = workbench(folder.path());
+    let bench = workbench(Site::of_user().unwrap(), folder.path());
     if let Err(absent) = engine.probe(&bench.site) {
         panic!("Mitsuba is needed for this test: {absent}");
     }
@@ -39,10 +40,7 @@ fn direct_light_follows_the_inverse_square_law_in_single_precision() {
     let found = read(&job);
     let deviations = relative_deviations(&found, &S1_DIRECT_LX);
     assert!(worst(&deviations) < 1e-5, "{deviations:?}");
-    for (estimate, exact) in found.estimates.iter().zip(S1_DIRECT_LX) {
-        let bound = estimate.uncertainty.bound();
-        assert!((estimate.value - exact).abs() <= bound && bound < 1e-4 * exact, "{estimate:?} for {exact}");
-    }
+    shared_tests::bounds_are_small_and_hold(&found, 1e-4);
 }
 
 #[test]
@@ -55,121 +53,38 @@ fn indirect_light_is_the_converged_value_within_its_standard_error() {
 
 #[test]
 fn n_bounces_are_n_diffuse_reflections() {
-    let mut seven = s1(Transport::Indirect(Bounces::AtMost(7)));
-    // The difference to the converged value is .6 %.
-    seven.budget.relative_error = 5e-4;
-    let found = read(&seven);
-    assert!(worst_z(&found, &S1_SEVEN_LX) < 4.0, "{found:?}");
-    assert!(worst_z(&found, &S1_INDIRECT_LX) > 8.0, "{found:?}");
-    let none = read(&s1(Transport::Indirect(Bounces::AtMost(0))));
-    assert!(none.estimates.iter().all(|e| e.value == 0.0), "{none:?}");
+    shared_tests::n_bounces_are_n_reflections(read, 5e-4, 8.0);
 }
 
 #[test]
 fn total_is_direct_plus_indirect() {
-    let mut total = s1(Transport::Total(Bounces::Converged));
-    for station in &mut total.stations {
-        station.meter.normal = DVec3::NEG_Z;
-        station.meter.position_m.z = 17.0;
-    }
-    let direct = exact_direct_lx(&total);
-    let mut indirect = total.clone();
-    indirect.transport = CONVERGED;
-    let (total, indirect) = (read(&total), read(&indirect));
-    for ((total, indirect), direct) in total.estimates.iter().zip(&indirect.estimates).zip(direct) {
-        let sum = direct + indirect.value;
-        let error = total.uncertainty.standard_error().unwrap().hypot(indirect.uncertainty.standard_error().unwrap());
-        assert!((total.value - sum).abs() < 4.0 * error + 1e-5 * sum, "{total:?} {indirect:?} {direct}");
-    }
+    shared_tests::total_is_direct_plus_indirect(|job| read(&job));
 }
 
 #[test]
 fn asymmetric_and_turned_luminaires_read_their_own_table() {
-    for distribution in [lopsided(), quadrant()] {
-        let mut lamp = luminaire("turned", DVec3::new(1.0, 2.0, 3.0), distribution);
-        lamp.orientation = orientation(30.0, 20.0, 10.0);
-        lamp.flux_scale = 0.7;
-        let every = |step: u32, end: u32| (0..=end / step).map(|k| f64::from(k * step)).collect::<Vec<_>>();
-        let job = goniometer(&lamp, 10.0, &every(15, 345), &every(5, 180));
-        let (found, exact) = (read(&job), exact_direct_lx(&job));
-        let scale = exact.iter().copied().fold(0.0, f64::max);
-        for (estimate, exact) in found.estimates.iter().zip(exact) {
-            let bound = estimate.uncertainty.bound();
-            assert!((estimate.value - exact).abs() < 1e-4 * exact + 1e-5 * scale, "{estimate:?} for {exact}");
-            assert!((estimate.value - exact).abs() <= bound, "{estimate:?} for {exact}");
-        }
-    }
+    shared_tests::turned_luminaires_read_their_own_table(read);
 }
 
 #[test]
 fn several_luminaires_add_up_and_obstacles_throw_shadows() {
-    let mut scene = s1(Transport::Direct).scene;
-    scene.luminaires.push(luminaire("lopsided", DVec3::new(4.0, 5.0, 12.0), lopsided()));
-    scene.luminaires.push(luminaire("second of its kind", DVec3::new(15.0, 5.0, 12.0), lopsided()));
-    let points = [[3.0, 4.0, 5.0], [12.0, 12.0, 6.0], [18.0, 1.0, 1.0]];
-    let free = job(scene.clone(), stations(&points, DVec3::Z), Transport::Direct);
-    assert!(worst(&relative_deviations(&read(&free), &exact_direct_lx(&free))) < 1e-5);
-
-    // A plate right above the first meter, once as a box and once as a mesh, hides every luminaire from it alone.
-    let (min_m, max_m) = (DVec3::new(2.0, 3.0, 5.5), DVec3::new(4.0, 5.0, 5.6));
-    let vertices_m = vec![min_m, max_m.with_y(min_m.y), max_m, min_m.with_y(max_m.y)];
-    let mesh = Shape::Mesh { vertices_m, triangles: vec![[0, 1, 2], [0, 2, 3]] };
-    for shape in [Shape::Box { min_m, max_m }, mesh] {
-        let mut shaded = free.clone();
-        shaded.scene.obstacles = vec![Obstacle { shape, reflectance: 0.3 }];
-        shaded.stations[0].meter.position_m = DVec3::new(3.0, 4.0, 5.4);
-        let found = read(&shaded);
-        assert_eq!(found.estimates[0].value, 0.0);
-        assert!(worst(&relative_deviations(&found, &exact_direct_lx(&shaded))[1..]) < 1e-5, "{found:?}");
-    }
+    shared_tests::luminaires_add_up_and_obstacles_throw_shadows(read);
 }
 
 #[test]
 fn a_wrong_export_is_seen() {
-    let mut lamp = luminaire("turned", DVec3::ZERO, lopsided());
-    lamp.flux_scale = 0.7;
-    let job = goniometer(&lamp, 10.0, &[0.0, 60.0, 200.0], &[30.0, 80.0]);
-    let exact = exact_direct_lx(&job);
-    let deviation = |from: &'static str, to: &'static str| {
-        let tampered = |name: &str, text: String| {
-            if name != "scene.xml" {
-                return text;
-            }
-            assert!(text.contains(from), "{text}");
-            text.replace(from, to)
-        };
-        worst(&relative_deviations(&read_tampered(&job, tampered), &exact))
-    };
-    assert!(deviation("<scene", "<scene") < 1e-5);
-    let factor_pi = deviation(r#"value="0.7""#, r#"value="2.19911""#);
-    let multiplier_dropped = deviation(r#"<float name="scale" value="0.7"/>"#, "");
-    let turned_by_90 = deviation("1 0 0 0  0 1 0 0", "0 -1 0 0  1 0 0 0");
-    assert!((factor_pi - 2.14159).abs() < 1e-4 && (multiplier_dropped - 1.0 / 0.7 + 1.0).abs() < 1e-4);
-    assert!(turned_by_90 > 0.1, "{turned_by_90}");
+    let replaced = [
+        ("<scene", "<scene"),
+        (r#"value="0.7""#, r#"value="2.19911""#),
+        (r#"<float name="scale" value="0.7"/>"#, ""),
+        ("1 0 0 0  0 1 0 0", "0 -1 0 0  1 0 0 0"),
+    ];
+    shared_tests::wrong_exports_are_seen("scene.xml", 1e-5, replaced, |job, tamper| read_tampered(job, tamper));
 }
 
 #[test]
 fn exported_files_are_these() {
-    let mut job = s1(Transport::Total(Bounces::AtMost(3)));
-    let room = job.scene.room.as_mut().unwrap();
-    room.size_m = DVec3::new(8.0, 6.0, 3.0);
-    room.reflectance =
-        Reflectances { floor: 0.2, ceiling: 0.8, wall_x_min: 0.5, wall_x_max: 0.4, wall_y_min: 0.3, wall_y_max: 0.6 };
-    let mut turned = luminaire("desk -- left", DVec3::new(2.0, 3.0, 1.5), quadrant());
-    turned.orientation = orientation(90.0, 0.0, 0.0);
-    turned.flux_scale = 0.5;
-    job.scene.luminaires[0].position_m = DVec3::new(4.0, 3.0, 2.0);
-    job.scene.luminaires.push(turned);
-    let vertices_m = vec![DVec3::new(5.0, 1.0, 0.0), DVec3::new(6.0, 1.0, 0.0), DVec3::new(5.5, 1.0, 1.0)];
-    job.scene.obstacles = vec![
-        Obstacle {
-            shape: Shape::Box { min_m: DVec3::new(1.0, 1.0, 0.0), max_m: DVec3::new(2.6, 1.8, 0.75) },
-            reflectance: 0.5,
-        },
-        Obstacle { shape: Shape::Mesh { vertices_m, triangles: vec![[0, 1, 2]] }, reflectance: 0.25 },
-    ];
-    job.stations.truncate(2);
-    let files = Mitsuba::default().export(&job).unwrap();
+    let files = Mitsuba::default().export(&shared_tests::furnished()).unwrap();
     let golden = files.iter().filter(|f| !f.name.starts_with("mitsuba_") && !f.name.starts_with("opacity-"));
     let texts = golden.map(|f| format!("==== {}\n{}\n", f.name, String::from_utf8_lossy(&f.bytes)));
     insta::assert_snapshot!(texts.collect::<Vec<_>>().concat());

@@ -55,7 +55,6 @@ struct Run {
     reflections: Reflections,
 }
 
-/// Which reflections a run follows.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Reflections {
     All,
@@ -91,10 +90,7 @@ impl<'a> Bench<'a> {
         while let Some(k) = looks.iter().position(|l| matches!(l, Look::Again(_))) {
             if taken == MAX_LOOKS {
                 let id = &self.job.stations[k].id;
-                return Err(EngineError::output(
-                    ID,
-                    format!("direct light at {id} was not read after {MAX_LOOKS} looks"),
-                ));
+                return Err(output(format!("direct light at {id} was not read after {MAX_LOOKS} looks")));
             }
             taken += 1;
             let readouts: Vec<Readout> = looks.iter().map(Look::readout).collect();
@@ -119,7 +115,6 @@ impl<'a> Bench<'a> {
         Ok(Measurement { estimates, method: self.method(), effort, ..Measurement::default() })
     }
 
-    /// Reflected light: blocks of turned scenes.
     pub(super) fn indirect(&self) -> Result<Measurement, EngineError> {
         let started = Instant::now();
         let budget = self.job.budget;
@@ -191,7 +186,7 @@ impl<'a> Bench<'a> {
                 return Ok(Pilot { readouts, wall_s });
             }
         }
-        Err(EngineError::output(ID, format!("reflected light was not read after {MAX_LOOKS} looks")))
+        Err(output(format!("reflected light was not read after {MAX_LOOKS} looks")))
     }
 
     /// Blocks, `jobs` of them side by side, each a process of one thread.
@@ -214,8 +209,6 @@ impl<'a> Bench<'a> {
         Ok(blocks)
     }
 
-    /// One block's reading of every meter.
-    ///
     /// The first reflection, most of the noise, is read once more with many rays and no cache, and exchanged for the
     /// one of the same few rays: E = E(all, few rays) - E(first, the same rays) + E(first, many rays).
     fn block(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
@@ -244,10 +237,7 @@ impl<'a> Bench<'a> {
             Seen::Missed => Err(self.missed(k)),
             Seen::Above => {
                 let id = &self.job.stations[k].id;
-                Err(EngineError::output(
-                    ID,
-                    format!("block {} reads {id} hundreds of times off the first block", run.seed),
-                ))
+                Err(output(format!("block {} reads {id} hundreds of times off the first block", run.seed)))
             }
         };
         seen.into_iter().enumerate().map(value).collect()
@@ -263,7 +253,6 @@ impl<'a> Bench<'a> {
         self.workbench.write(&[SceneFile::text("readouts.inc", export::readouts(readouts, light))])
     }
 
-    /// One run of POV-Ray, one pixel a meter.
     fn render(&self, run: Run, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
         let image = format!("seed{}.ppm", run.seed);
         let path = self.workbench.scene_dir.join(&image);
@@ -273,10 +262,8 @@ impl<'a> Bench<'a> {
         std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
         let blanks = run.blanks();
         if pixels.len() != blanks + readouts.len() {
-            return Err(EngineError::output(
-                ID,
-                format!("gave {} pixels for {} meters and {blanks} blanks", pixels.len(), readouts.len()),
-            ));
+            let (found, wanted) = (pixels.len(), readouts.len());
+            return Err(output(format!("gave {found} pixels for {wanted} meters and {blanks} blanks")));
         }
         Ok(readouts.iter().zip(pixels.into_iter().skip(blanks)).map(|(r, p)| pixels::decode(*r, p)).collect())
     }
@@ -310,10 +297,8 @@ impl<'a> Bench<'a> {
     }
 
     fn missed(&self, k: usize) -> EngineError {
-        EngineError::output(
-            ID,
-            format!("the disc of {} was not seen: something hides it from 2 mm away", self.job.stations[k].id),
-        )
+        let id = &self.job.stations[k].id;
+        output(format!("the disc of {id} was not seen: something hides it from 2 mm away"))
     }
 }
 
@@ -323,12 +308,15 @@ const DIRECT_RELATIVE: f64 = 5e-7;
 const AXIAL_TABLE: f64 = 2e-7;
 const BILINEAR_TABLE: f64 = 1e-6;
 
+fn output(what: String) -> EngineError {
+    EngineError::output(ID, what)
+}
+
 struct Pilot {
     readouts: Vec<Readout>,
     wall_s: f64,
 }
 
-/// Where reading one meter's direct light stands.
 #[derive(Clone, Copy)]
 enum Look {
     Again(Readout),

@@ -30,7 +30,6 @@ const POINTS_PAST_OBSTACLES: usize = 12;
 /// For indirect light, which does not see the difference.
 const POINTS_INDIRECT: usize = 2;
 
-/// Which light a scene lets its meters see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Light {
     Direct,
@@ -122,18 +121,13 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
         one_line(&job.case),
         job.procedure
     );
-    writeln!(
-        text,
-        "// Scene units are {} m; the origin is at {} m of the spec.",
-        1.0 / frame.scale,
-        vector(frame.centre_m)
-    )
-    .ok();
+    let (unit_m, origin_m) = (1.0 / frame.scale, vector(frame.centre_m));
+    writeln!(text, "// Scene units are {unit_m} m; the origin is at {origin_m} m of the spec.").ok();
     if (frame.light - 1.0).abs() > f64::EPSILON {
+        let light = frame.light;
         writeln!(
             text,
-            "// All light, and the illuminances that pixels stand for, are {:e} times those of the spec.",
-            frame.light
+            "// All light, and the illuminances that pixels stand for, are {light:e} times those of the spec."
         )
         .ok();
     }
@@ -148,12 +142,12 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
     text.push_str("// Rays a sample, the length of the pool that they come from, and reflections; Limit=1 reads the first reflection alone.\n");
     writeln!(text, "#ifndef (Count) #declare Count = {}; #end", settings.count).ok();
     writeln!(text, "#ifndef (Pool) #declare Pool = {POOL}; #end").ok();
-    if let Transport::Indirect(bounces) | Transport::Total(bounces) = job.transport {
+    if let Some(bounces) = job.reflections() {
         writeln!(text, "#ifndef (Limit) #declare Limit = {}; #end", settings.recursion_limit(bounces)).ok();
     }
     writeln!(text, "#declare Brightness = #if (Indirect) {}; #else 1; #end", settings.brightness).ok();
     text.push_str("global_settings {\n  assumed_gamma 1.0 max_trace_level 10 adc_bailout 1e-9\n");
-    if let Transport::Indirect(bounces) | Transport::Total(bounces) = job.transport {
+    if let Some(bounces) = job.reflections() {
         writeln!(text, "  #if (Indirect) {} #end", settings.radiosity(bounces)).ok();
     }
     text.push_str("}\n\n");
@@ -302,7 +296,6 @@ pub(super) fn points(job: &Job) -> usize {
     if few_do { POINTS } else { POINTS_PAST_OBSTACLES }
 }
 
-/// The point lights that stand for a luminaire.
 pub(super) fn parts(luminaire: &Luminaire, points: usize) -> Vec<Part> {
     let whole = vec![Part { offset_m: DVec3::ZERO, share: 1.0 }];
     match luminaire.model {

@@ -41,7 +41,6 @@ impl Frame {
         if handy && free { metres } else { Self { centre_m, scale: LARGE / size_m.max(f64::MIN_POSITIVE), light } }
     }
 
-    /// A point of the spec in scene units.
     pub(super) fn point(self, p_m: DVec3) -> DVec3 {
         (p_m - self.centre_m) * self.scale
     }

@@ -15,7 +15,6 @@ use crate::engines::Job;
 /// A part of a luminaire: where it is in the luminaire's frame and its share of the intensity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Part {
-    /// Offset from the photometric centre in metres.
     pub(super) offset_m: DVec3,
     /// Share of the intensity; all shares together make 1.
     pub(super) share: f64,
@@ -52,9 +51,7 @@ pub(super) fn parts(opening: LuminousOpening, n: usize) -> Option<Vec<Part>> {
 pub(super) struct TooNear {
     pub(super) station: String,
     pub(super) luminaire: String,
-    /// Its distance from the opening in metres.
     pub(super) distance_m: f64,
-    /// The widest gap in metres.
     pub(super) spacing_m: f64,
 }
 
@@ -93,7 +90,6 @@ fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
     (0..n).map(node).collect()
 }
 
-/// The Legendre polynomial of degree `n` and its derivative.
 fn legendre(n: usize, x: f64) -> (f64, f64) {
     let (mut before, mut here) = (1.0, x);
     for k in 2..=n {

@@ -13,20 +13,17 @@ pub(super) enum Readout {
     Fine(f64),
 }
 
-/// What a pixel says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Seen {
     /// An illuminance in lux and half the step of the channel it came from.
     Value {
         lx: f64,
-        /// Half a step of the read-out, in lux.
         resolution_lx: f64,
     },
     /// More than the scale can show.
     Above,
     /// Less than the finest channel resolves; at most this, in lux.
     Below(f64),
-    /// No disc in this pixel.
     Missed,
 }
 

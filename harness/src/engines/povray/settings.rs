@@ -24,12 +24,10 @@ pub(super) const KNOBS: &[Knob] = &[
     Knob { key: "recentre", values: &["true", "false"] },
 ];
 
-/// How POV-Ray is set up for a job: a preset of its radiosity, of which a spec may override any part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Settings {
     /// `default` is `radiosity {}`.
     pub(super) preset: Preset,
-    /// Rays a radiosity sample.
     pub(super) count: u32,
     pub(super) error_bound: f64,
     /// Factor between what the scene holds and what POV-Ray gathers: see `export`.
@@ -59,7 +57,6 @@ impl Settings {
         })
     }
 
-    /// The `radiosity` block for a number of diffuse reflections.
     pub(super) fn radiosity(&self, bounces: Bounces) -> String {
         if self.preset == Preset::Default {
             return match bounces {
@@ -75,7 +72,6 @@ impl Settings {
         )
     }
 
-    /// `recursion_limit` for a number of diffuse reflections.
     pub(super) fn recursion_limit(&self, bounces: Bounces) -> u32 {
         match bounces {
             Bounces::Converged => self.recursion_limit.clamp(1, MAX_RECURSION),

@@ -1,23 +1,17 @@
 //! What POV-Ray must read, and what a wrong export would: these run the real renderer.
 
-use std::path::Path;
 use std::time::Duration;
 
 use glam::DVec3;
 use luminaire::geometry::{Reflectances, Room};
 use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening};
 use luminaire::scene::{LuminaireModel, Meter, Obstacle, Scene, Shape, orientation};
-use luminaire::simulator::{self, Accuracy};
 
 use super::*;
 use crate::engines::Budget;
-use crate::engines::fixtures::{
-    self, CONVERGED as INDIRECT, S1_DIRECT_LX, S1_INDIRECT_LX, S1_SEVEN_LX, axial_uplight as uplight, exact_direct_lx,
-    goniometer, lopsided, quadrant, s1,
-};
+use crate::engines::fixtures::{self, CONVERGED as INDIRECT, axial_uplight as uplight, *};
 use crate::system::process::ProcessError;
 
-/// A fault and how to put it into a job.
 type Tamper = (&'static str, fn(&mut Job));
 
 fn site() -> Site {
@@ -26,19 +20,11 @@ fn site() -> Site {
     site
 }
 
-fn workbench(folder: &Path) -> Workbench {
-    Workbench { site: site(), ..fixtures::workbench(folder) }
-}
-
 fn read(job: &Job) -> Measurement {
     let folder = tempfile::tempdir().unwrap();
-    let measured = PovRay.read(job, &workbench(folder.path()));
+    let measured = PovRay.read(job, &workbench(site(), folder.path()));
     measured
         .unwrap_or_else(|e| panic!("{e}\n{}", std::fs::read_to_string(folder.path().join("log")).unwrap_or_default()))
-}
-
-fn luminaire(id: &str, distribution: LuminousIntensityDistribution, at_m: DVec3) -> Luminaire {
-    fixtures::luminaire(id, at_m, distribution)
 }
 
 fn job(scene: Scene, meters: &[(DVec3, DVec3)], transport: Transport) -> Job {
@@ -56,11 +42,6 @@ fn in_eight_blocks(mut job: Job, count: u32) -> Job {
     job
 }
 
-fn worst_relative(measured: &Measurement, exact: &[f64]) -> f64 {
-    let pairs = measured.estimates.iter().zip(exact);
-    pairs.map(|(e, x)| (e.value / x - 1.0).abs()).fold(0.0, f64::max)
-}
-
 fn exported(job: &Job) -> String {
     String::from_utf8(PovRay.export(job).unwrap().remove(0).bytes).unwrap()
 }
@@ -72,17 +53,14 @@ fn the_scene_of_s1_is_as_reviewed() {
 
 #[test]
 fn a_scene_with_turned_area_luminaires_and_obstacles_is_as_reviewed() {
-    let mut lamp = luminaire("panel", lopsided(), DVec3::new(2.0, 1.5, 2.9));
+    let mut lamp = luminaire("panel", DVec3::new(2.0, 1.5, 2.9), lopsided());
     lamp.orientation = orientation(30.0, 20.0, 0.0);
     lamp.model = LuminaireModel::Area;
     std::sync::Arc::make_mut(&mut lamp.photometry).opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
-    let room = Room { size_m: DVec3::new(8.0, 6.0, 3.0), reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8) };
+    let room = room(DVec3::new(8.0, 6.0, 3.0), 0.2, 0.5, 0.8);
     let vertices_m = vec![DVec3::new(1.0, 1.0, 1.0), DVec3::new(2.0, 1.0, 1.0), DVec3::new(1.0, 2.0, 1.0)];
     let obstacles = vec![
-        Obstacle {
-            shape: Shape::Box { min_m: DVec3::new(4.0, 3.0, 0.0), max_m: DVec3::new(5.0, 4.0, 0.75) },
-            reflectance: 0.5,
-        },
+        cuboid([4.0, 3.0, 0.0], [5.0, 4.0, 0.75], 0.5),
         Obstacle { shape: Shape::Mesh { vertices_m, triangles: vec![[0, 1, 2]] }, reflectance: 0.3 },
     ];
     let mut job = job(
@@ -138,7 +116,7 @@ fn turned_asymmetric_luminaires_are_read_back_over_the_full_grid() {
     let c_deg: Vec<f64> = (0..24).map(|k| 15.0 * f64::from(k)).collect();
     let gamma_deg: Vec<f64> = (0..=36).map(|k| 5.0 * f64::from(k)).collect();
     for distribution in [lopsided(), quadrant()] {
-        let mut lamp = luminaire("lamp", distribution, DVec3::new(3.0, -2.0, 5.0));
+        let mut lamp = luminaire("lamp", DVec3::new(3.0, -2.0, 5.0), distribution);
         lamp.orientation = orientation(30.0, 20.0, 10.0);
         lamp.flux_scale = 0.8;
         let job = goniometer(&lamp, 10.0, &c_deg, &gamma_deg);
@@ -157,13 +135,10 @@ fn turned_asymmetric_luminaires_are_read_back_over_the_full_grid() {
 #[test]
 fn several_luminaires_add_up_in_scenes_of_any_size() {
     for size in [1e-3, 1.0, 1e3] {
-        let room = Room {
-            size_m: DVec3::new(8.0, 6.0, 3.0) * size,
-            reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8),
-        };
-        let mut turned = luminaire("b", lopsided(), DVec3::new(5.0, 4.0, 2.5) * size);
+        let room = room(DVec3::new(8.0, 6.0, 3.0) * size, 0.2, 0.5, 0.8);
+        let mut turned = luminaire("b", DVec3::new(5.0, 4.0, 2.5) * size, lopsided());
         turned.orientation = orientation(75.0, -40.0, 0.0);
-        let luminaires = vec![luminaire("a", uplight(), DVec3::new(2.0, 2.0, 1.0) * size), turned];
+        let luminaires = vec![luminaire("a", DVec3::new(2.0, 2.0, 1.0) * size, uplight()), turned];
         let meters = [
             (DVec3::new(1.0, 3.0, 0.8) * size, DVec3::Z),
             (DVec3::new(6.0, 1.0, 2.0) * size, DVec3::new(-0.6, 0.0, 0.8)),
@@ -216,7 +191,7 @@ fn a_flat_opening_is_the_mean_of_its_points() {
     let gamma: Vec<f64> = (0..=180).map(|g| 0.5 * f64::from(g)).collect();
     let candela = gamma.iter().map(|g: &f64| 1000.0 * g.to_radians().cos().max(0.0)).collect();
     let lambertian = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
-    let mut lamp = luminaire("square", lambertian, DVec3::new(0.0, 0.0, 2.0));
+    let mut lamp = luminaire("square", DVec3::new(0.0, 0.0, 2.0), lambertian);
     let photometry = std::sync::Arc::make_mut(&mut lamp.photometry);
     photometry.opening = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
     lamp.model = LuminaireModel::Area;
@@ -275,9 +250,9 @@ fn uneven(transport: Transport) -> Job {
         ..Reflectances::with_equal_walls(0.2, 0.0, 0.8)
     };
     let room = Some(Room { size_m: DVec3::new(8.0, 6.0, 3.0), reflectance });
-    let mut turned = luminaire("turned", lopsided(), DVec3::new(5.5, 4.0, 2.2));
+    let mut turned = luminaire("turned", DVec3::new(5.5, 4.0, 2.2), lopsided());
     turned.orientation = orientation(75.0, -40.0, 0.0);
-    let luminaires = vec![luminaire("level", quadrant(), DVec3::new(2.0, 2.0, 2.5)), turned];
+    let luminaires = vec![luminaire("level", DVec3::new(2.0, 2.0, 2.5), quadrant()), turned];
     let meters = [
         (DVec3::new(1.0, 3.0, 0.8), DVec3::Z),
         (DVec3::new(7.0, 1.0, 0.8), DVec3::Z),
@@ -290,10 +265,7 @@ fn uneven(transport: Transport) -> Job {
 fn reflected_and_total_light_in_an_uneven_room_agree_with_the_simulator() {
     for transport in [INDIRECT, Transport::Total(Bounces::Converged)] {
         let job = in_eight_blocks(uneven(transport), 200);
-        let meters: Vec<Meter> = job.stations.iter().map(|s| s.meter).collect();
-        let accuracy = Accuracy { relative_error: 1e-4, seed: 1 };
-        let exact = simulator::illuminance(&job.scene, &meters, transport, &accuracy).unwrap();
-        let exact: Vec<f64> = exact.estimates.iter().map(|e| e.illuminance.value()).collect();
+        let exact = simulated_lx(&job, 1e-4);
         within_errors_and_named_bias(&read(&job), &exact);
     }
 }
@@ -307,19 +279,13 @@ fn out_of_the_box_povray_is_far_off_and_says_so() {
     assert!(off > 0.05 && off < size, "off by {off}, said to be within {size}");
 }
 
-/// A site whose povray is a shell script.
 fn read_with(script: &str, limit_s: f64) -> EngineError {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path().join("engines");
-    let programs = root.join("debian/usr/bin");
-    std::fs::create_dir_all(&programs).unwrap();
+    write_program(&root.join("debian/usr/bin/povray"), script);
     std::os::unix::fs::symlink(site().venv(), root.join("venv")).unwrap();
-    let program = programs.join("povray");
-    std::fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
-    std::fs::set_permissions(&program, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
-    let mut workbench = workbench(folder.path());
-    workbench.site = Site::at(root);
-    workbench.limit = Duration::from_secs_f64(limit_s);
+    let limit = Duration::from_secs_f64(limit_s);
+    let workbench = Workbench { limit, ..workbench(Site::at(root), folder.path()) };
     PovRay.read(&s1(Transport::Direct), &workbench).unwrap_err()
 }
 
@@ -366,11 +332,11 @@ fn filter_spheres_are_never_so_small_that_povray_ignores_them_and_one_that_is_wo
             assert!(radius(&exported(&job)) > 1.5e-3, "{size} {recentre}");
         }
     }
-    let mut lamp = luminaire("lamp", lopsided(), DVec3::ZERO);
+    let mut lamp = luminaire("lamp", DVec3::ZERO, lopsided());
     lamp.orientation = orientation(30.0, 20.0, 0.0);
     let job = goniometer(&lamp, 5.0, &[0.0, 90.0, 200.0], &[20.0, 90.0, 160.0]);
     let folder = tempfile::tempdir().unwrap();
-    let bench = workbench(folder.path());
+    let bench = workbench(site(), folder.path());
     let settings = Settings::of(&job).unwrap();
     let scene = exported(&job);
     let ignored = scene.replace(&format!("sphere {{ 0, {}", radius(&scene)), "sphere { 0, 0.0005");
@@ -408,7 +374,7 @@ fn what_povray_cannot_do_is_refused_with_a_reason() {
 #[test]
 fn wrong_exports_are_seen_in_the_readings() {
     let mut right = s1(Transport::Direct);
-    right.scene.luminaires[0] = luminaire("lopsided", lopsided(), DVec3::splat(10.0));
+    right.scene.luminaires[0] = luminaire("lopsided", DVec3::splat(10.0), lopsided());
     let exact = exact_direct_lx(&right);
     let tampers: [Tamper; 3] = [
         ("pi", |j| j.scene.luminaires[0].flux_scale = std::f64::consts::PI),

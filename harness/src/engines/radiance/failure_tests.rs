@@ -1,38 +1,30 @@
 //! What happens when rtrace crashes, hangs or gives nonsense: an error each time, never a number.
 
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::time::Duration;
 
 use luminaire::scene::{Bounces, Transport};
 
 use super::*;
-use crate::engines::fixtures::{s1, workbench};
+use crate::engines::fixtures::{s1, workbench, write_program};
 use crate::system::process::ProcessError;
 
 /// A site whose rtrace is a shell script; the other programs do nothing.
 fn fake_site(root: &Path, rtrace: &str) -> Site {
     let package = root.join("venv/lib/python3/site-packages/pyradiance");
-    for folder in ["bin", "lib"] {
-        fs::create_dir_all(package.join(folder)).unwrap();
-    }
+    fs::create_dir_all(package.join("lib")).unwrap();
     fs::write(package.join("lib/source.cal"), "").unwrap();
     for (name, script) in [("rtrace", rtrace), ("oconv", "true"), ("ies2rad", "true")] {
-        let path = package.join("bin").join(name);
-        fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        write_program(&package.join("bin").join(name), script);
     }
     Site::at(root)
 }
 
 fn failure(rtrace: &str, transport: Transport, limit_s: f64) -> EngineError {
     let folder = tempfile::tempdir().unwrap();
-    let site = fake_site(folder.path(), rtrace);
-    let scene_dir = folder.path().join("scene");
-    fs::create_dir(&scene_dir).unwrap();
     let limit = Duration::from_secs_f64(limit_s);
-    let bench = Workbench { site, limit, scene_dir, ..workbench(folder.path()) };
+    let bench = Workbench { limit, ..workbench(fake_site(folder.path(), rtrace), folder.path()) };
     Radiance.read(&s1(transport), &bench).unwrap_err()
 }
 
@@ -102,8 +94,7 @@ fn a_wheel_without_its_programs_is_absent_with_the_remedy() {
 #[test]
 fn ies2rad_that_makes_no_light_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
-    let site = fake_site(folder.path(), &triples(4, ONE));
-    let bench = Workbench { site, ..workbench(folder.path()) };
+    let bench = workbench(fake_site(folder.path(), &triples(4, ONE)), folder.path());
     let mut job = s1(Transport::Direct);
     job.settings.insert("photometry".into(), "ies2rad".into());
     fs::write(folder.path().join("ies2rad-0.rad"), "# nothing\n").unwrap();

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use glam::DVec3;
 use luminaire::geometry::configuration_factor::element_to_polygon;
 use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry, read_file};
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
+use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
 use luminaire::simulator::{self, Accuracy, Uncertainty};
 
 use super::tests::{read, within};
 use super::*;
-use crate::engines::fixtures::*;
+use crate::engines::fixtures::{self, *};
 
 fn with_opening(lamp: Luminaire, opening: LuminousOpening) -> Luminaire {
     let photometry = Arc::new(Photometry { opening, ..(*lamp.photometry).clone() });
@@ -90,34 +90,11 @@ fn a_turned_box_of_light_reads_as_the_path_tracer_has_it() {
     }
 }
 
-/// Case S2 of the reference: panels flush with the ceiling, furniture, exact direct and indirect values at six points.
 fn s2(transport: Transport) -> Job {
     let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
-    let boxes =
-        [([1.0, 1.0, 0.0], [2.6, 1.8, 0.75]), ([4.5, 3.5, 0.0], [6.1, 4.3, 0.75]), ([5.5, 0.5, 0.0], [7.5, 1.5, 2.2])];
-    let obstacle = |(min, max): ([f64; 3], [f64; 3])| {
-        let (min_m, max_m) = (DVec3::from_array(min), DVec3::from_array(max));
-        Obstacle { shape: Shape::Box { min_m, max_m }, reflectance: 0.5 }
-    };
-    let panels = [(2.0, 1.5), (6.0, 1.5), (2.0, 4.5), (6.0, 4.5)];
-    let scene = Scene {
-        room: Some(room(DVec3::new(8.0, 6.0, 3.0), 0.2, 0.5, 0.8)),
-        obstacles: boxes.map(obstacle).to_vec(),
-        luminaires: panels.map(|(x, y)| lambertian(DVec3::new(x, y, 3.0), opening)).to_vec(),
-    };
-    let points = [
-        [0.25, 0.25, 0.8],
-        [1.75, 1.25, 0.8],
-        [3.75, 2.75, 0.8],
-        [4.25, 0.75, 0.8],
-        [5.25, 3.75, 0.8],
-        [7.25, 0.25, 0.8],
-    ];
-    within(5e-3, job(scene, stations(&points, DVec3::Z), transport))
+    let panels = S2_PANELS_M.map(|[x, y]| lambertian(DVec3::new(x, y, 3.0), opening));
+    within(5e-3, fixtures::s2(panels.to_vec(), transport))
 }
-
-const S2_DIRECT_LX: [f64; 5] = [66.24407, 226.03927, 161.02976, 123.15923, 210.12365];
-const S2_INDIRECT_LX: [f64; 6] = [51.0232, 53.0644, 48.966, 53.512, 50.245, 18.788];
 
 #[test]
 fn furniture_and_flush_panels_give_the_direct_light_of_case_s2() {

@@ -6,9 +6,7 @@ use super::route::{Route, route};
 use super::settings::Settings;
 use crate::engines::Job;
 use crate::engines::settings::Preset;
-use crate::record::Light;
 
-/// Arguments without and with reflected light.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Options {
     pub(super) direct: Vec<String>,
@@ -33,7 +31,6 @@ const DEFAULT_BOUNCES: u32 = 2;
 /// least near .1 to .2 (case S1: 8e-6 s against 11e-6 at .5 and 2e-5 at .01); at .8 rtrace would cut the divisions.
 const ROULETTE: f64 = 0.15;
 
-/// How the luminaires' light is sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sources {
     /// One sample to the centre: exact for points.
@@ -69,12 +66,11 @@ impl Sources {
 }
 
 impl Options {
-    /// The arguments for a job with a number of ambient divisions.
     pub(super) fn of(job: &Job, settings: &Settings, divisions: u32) -> Self {
         let words = |text: String| -> Vec<String> { text.split(' ').map(str::to_owned).collect() };
         // -I: irradiance at points.
         if settings.preset == Preset::Default {
-            let bounces = match Light(job.transport).bounces() {
+            let bounces = match job.reflections() {
                 Some(Bounces::AtMost(n)) => n,
                 Some(Bounces::Converged) => DEFAULT_BOUNCES,
                 None => 0,
@@ -98,7 +94,7 @@ impl Options {
 
 /// `-ab`: how many bounces are followed.
 pub(super) fn bounces(job: &Job) -> u32 {
-    match Light(job.transport).bounces() {
+    match job.reflections() {
         None => 0,
         Some(Bounces::AtMost(n)) => n,
         Some(Bounces::Converged) => {
@@ -111,7 +107,7 @@ pub(super) fn bounces(job: &Job) -> u32 {
 
 /// The largest part of the light that a converged run can miss for the limit on bounces.
 pub(super) fn remainder(job: &Job) -> f64 {
-    match Light(job.transport).bounces() {
+    match job.reflections() {
         Some(Bounces::Converged) => job.largest_reflectance().powi(bounces(job) as i32),
         _ => 0.0,
     }

@@ -38,12 +38,10 @@ pub(super) struct Sampler<'a> {
     pub(super) started: Instant,
 }
 
-/// Blocks of all light.
 pub(super) struct Sampled {
     pub(super) blocks: Blocks,
     pub(super) divisions: u32,
     pub(super) options: Vec<String>,
-    /// Whether the error asked for was missed, and by how much.
     pub(super) shortfall: Option<String>,
 }
 

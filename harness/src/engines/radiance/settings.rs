@@ -24,7 +24,6 @@ pub(super) struct Settings {
     pub(super) coordinates: Coordinates,
 }
 
-/// Who turns photometry into Radiance's sources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Photometrist {
     /// We do, at full precision.

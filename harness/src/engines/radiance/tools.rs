@@ -6,7 +6,8 @@ use luminaire::scene::Luminaire;
 
 use super::route::Route;
 use super::{ID, export};
-use crate::engines::{Absent, EngineError, Site, Version, Workbench};
+use crate::engines::workbench::by_hand;
+use crate::engines::{Absent, EngineError, SceneFile, Site, Version, Workbench};
 use crate::system::process::{self, Invocation};
 
 #[derive(Clone, Debug)]
@@ -14,7 +15,6 @@ pub(super) struct Tools {
     package: PathBuf,
 }
 
-/// The octree that oconv makes of `scene.rad`.
 const OCTREE: &str = "scene.oct";
 
 impl Tools {
@@ -40,12 +40,9 @@ impl Tools {
         Ok(Version(version.to_owned()))
     }
 
-    /// Compiles `scene.rad` of the scene's folder.
     pub(super) fn compile(&self, workbench: &Workbench) -> Result<(), EngineError> {
         let run = self.prepared(workbench.invoke(self.program("oconv"))).args(["-f", "scene.rad"]);
-        let octree = run.run()?.stdout;
-        let path = workbench.scene_dir.join(OCTREE);
-        std::fs::write(&path, octree).map_err(|source| EngineError::io(&path, source))
+        workbench.write(&[SceneFile { name: OCTREE.to_owned(), bytes: run.run()?.stdout }])
     }
 
     /// Lets ies2rad make `luminaire-<k>.rad`, where the luminaire goes that way.
@@ -69,8 +66,7 @@ impl Tools {
         if !text.contains("' light '") {
             return Err(EngineError::output(ID, format!("{} holds no light", made.display())));
         }
-        let path = workbench.scene_dir.join(format!("luminaire-{k}.rad"));
-        std::fs::write(&path, text.replace("' light '", kind)).map_err(|source| EngineError::io(&path, source))
+        workbench.write(&[SceneFile::text(&format!("luminaire-{k}.rad"), text.replace("' light '", kind))])
     }
 
     /// Illuminance in lux of each row.
@@ -82,15 +78,12 @@ impl Tools {
     ) -> Result<Vec<f64>, EngineError> {
         let stdin = rows.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         let run = self.prepared(workbench.invoke(self.program("rtrace")));
-        let run = run.args(["-h", "-fdd"]).args(options).args([OCTREE]).stdin(stdin);
-        let finished = run.run()?;
+        let finished = run.args(["-h", "-fdd"]).args(options).args([OCTREE]).stdin(stdin).run()?;
         parse(&finished.stdout, rows.len())
     }
 
-    /// The command that runs an exported scene with the programs of this package.
     pub(super) fn command_by_hand(&self) -> String {
-        let (here, nothing) = (std::path::Path::new("."), std::time::Duration::ZERO);
-        self.prepared(Invocation::new("sh", here, nothing, "")).args(["run.sh"]).command_line_with_env()
+        self.prepared(by_hand("sh")).args(["run.sh"]).command_line_with_env()
     }
 
     fn program(&self, name: &str) -> PathBuf {

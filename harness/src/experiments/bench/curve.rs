@@ -10,7 +10,7 @@ use crate::experiments::deviation;
 use crate::measure::Taken;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 
-/// Relative errors whose time is told.
+/// Relative errors whose time is stated.
 pub(super) const TARGETS: [f64; 4] = [0.1, 0.01, 1e-3, 1e-4];
 /// What is left of a time without the start-up at least, in parts of it.
 const LEAST_NET: f64 = 0.05;
@@ -22,19 +22,16 @@ pub struct Curve {
     pub key: ReadingKey,
     /// What solved it; empty where the engine has one solver only.
     pub solver: String,
-    /// The preset; empty where there are none.
     pub preset: String,
     /// Seconds of a job of next to no work.
     pub start_up_s: f64,
     /// Seconds of this job with the least effort that the engine can do with.
     pub set_up_s: f64,
-    /// By rising effort.
     pub points: Vec<BenchPoint>,
-    /// How far off the reference may be, relative; errors below are not told from none.
+    /// How far off the reference may be, relative; smaller errors cannot be seen.
     pub reference_floor: f64,
     /// Wall-clock seconds to a relative error; null where it was not reached or lies below the reference's floor.
     pub time_to: BTreeMap<String, Option<f64>>,
-    /// The same, start-up apart.
     pub time_to_net: BTreeMap<String, Option<f64>>,
     /// Of the error over the time, start-up apart, in a log-log plot.
     pub slope: Option<f64>,
@@ -49,17 +46,13 @@ pub struct Curve {
 pub struct BenchPoint {
     /// Seconds of budget, or one over the relative error asked for.
     pub effort: f64,
-    /// Median wall-clock seconds.
     pub wall_s: f64,
-    /// Median processor seconds.
     pub cpu_s: f64,
-    /// Most memory of any process, in MiB.
     pub peak_mib: Option<f64>,
     /// Root mean square over meters and repetitions.
     pub relative_error: f64,
-    /// Lower end of its 95 % interval.
+    /// Ends of its 95 % interval.
     pub relative_error_low: f64,
-    /// Upper end of its 95 % interval.
     pub relative_error_high: f64,
     /// The largest at any meter in any repetition.
     pub worst_error: f64,
@@ -109,7 +102,6 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Curve {
-    /// One without points yet.
     pub(super) fn of(key: ReadingKey) -> Self {
         Self {
             key,
@@ -146,7 +138,6 @@ impl Curve {
         self.efficiency = last.map(|p| 1.0 / (p.variance * net(p)));
     }
 
-    /// Its name in tables and plots.
     pub fn name(&self) -> String {
         let solver = if self.key.engine == EngineName::SIMULATOR { &self.solver } else { "" };
         let parts = [self.key.engine.as_str(), self.preset.as_str(), solver];

@@ -14,9 +14,7 @@ use crate::spec::Budget;
 pub struct KnobEffect {
     #[serde(flatten)]
     pub key: ReadingKey,
-    /// The setting.
     pub knob: String,
-    /// The value.
     pub value: String,
     pub effect: Effect,
     /// Largest deviation beyond noise from the reading by default, relative.
@@ -27,7 +25,6 @@ pub struct KnobEffect {
     pub time_ratio: Option<f64>,
 }
 
-/// What a setting does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Effect {

@@ -13,11 +13,9 @@ pub(super) struct Rung {
     pub(super) preset: String,
     /// Seconds of budget, or one over the relative error asked for.
     pub(super) effort: f64,
-    /// What the engine is asked for.
     pub(super) budget: Budget,
     /// A setting on top of the spec's.
     pub(super) setting: Option<(&'static str, serde_json::Value)>,
-    /// Whether the effort is the budget's time.
     pub(super) is_timed: bool,
 }
 
@@ -64,7 +62,6 @@ pub(super) fn ladder(engine: &dyn Engine, job: &Job, furnished: bool, own: &Sett
 }
 
 impl Rung {
-    /// Seconds that it is expected to take.
     pub(super) fn expected_s(&self) -> f64 {
         if self.is_timed { self.budget.seconds.max(0.5) } else { 0.5 }
     }

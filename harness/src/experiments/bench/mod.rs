@@ -28,7 +28,6 @@ use crate::record::{EngineName, Estimate, ProcedureId, ReadingKey};
 use crate::spec::{Budget, Case};
 use crate::system::process;
 
-/// How to bench.
 pub struct Options<'a> {
     /// Who takes readings, each on all slots of its machine.
     pub reader: Reader,
@@ -40,22 +39,17 @@ pub struct Options<'a> {
     pub seconds: &'a [f64],
     /// Procedures by name; empty for all of the spec but intensities.
     pub procedures: &'a [ProcedureId],
-    /// First seed.
     pub seed: u64,
-    /// Whether settings are tried one by one.
     pub knobs: Knobs,
 }
 
 /// Whether settings are tried one by one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Knobs {
-    /// Each is.
     Tried,
-    /// None is.
     Left,
 }
 
-/// Told of every reading as it ends.
 pub trait Progress {
     /// That many seconds more are expected.
     fn planned(&self, seconds: f64);
@@ -63,34 +57,28 @@ pub trait Progress {
     fn ended(&self, what: &str, seconds: f64);
 }
 
-/// What the bench found with some cases.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct BenchReport {
     pub machine: String,
     /// Engines with their versions.
     pub engines: BTreeMap<EngineName, String>,
-    /// One an engine, solver, preset and procedure.
     pub curves: Vec<Curve>,
-    /// One a case and procedure: what errors are told against, and the error below which they are not told.
+    /// One a case and procedure.
     pub references: Vec<Reference>,
-    /// One a case and procedure: what no other engine beats in both time and error.
+    /// One a case and procedure.
     pub pareto: Vec<Pareto>,
-    /// What each setting does, where they were tried.
     pub knobs: Vec<KnobEffect>,
-    /// What could not be measured, and why.
     pub left_out: Vec<String>,
 }
 
-/// The exact values of a case and procedure.
+/// What the errors of a case and procedure are held against.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reference {
     pub case: String,
     pub procedure: ProcedureId,
-    /// What solved it, in full.
     pub solver: String,
-    /// Root mean square over meters of how far off it may be, relative: errors below are not told from none.
+    /// Root mean square over meters of how far off it may be, relative: smaller errors cannot be seen.
     pub floor: f64,
-    /// Wall-clock seconds that it took.
     pub wall_s: f64,
 }
 
@@ -160,9 +148,8 @@ struct Truth {
 /// radiosity with its own bound, in seconds.
 const FURNISHED: [f64; 2] = [1e-3, 1e-2];
 const EMPTY: [f64; 2] = [1e-7, 5e-7];
-/// Past this a try at a reference is not waited for.
+/// Past these a reading is not waited for; a coarser reference can be had.
 const REFERENCE_LIMIT: Duration = Duration::from_secs(90);
-/// Past this a reading is not waited for.
 const LIMIT: Duration = Duration::from_secs(300);
 
 struct Bench<'a> {

@@ -18,7 +18,6 @@ const DASHES: [&str; 4] = ["none", "6 3", "2 3", "8 3 2 3"];
 const LEAST: f64 = 1e-9;
 
 impl BenchReport {
-    /// The plots, one below the other.
     pub fn svg(&self) -> String {
         let height = PANEL * self.pareto.len() as f64;
         let mut text = format!(
@@ -87,33 +86,24 @@ impl Axis {
 }
 
 fn grid(x: &Axis, y: &Axis) -> String {
+    let line = |x1: f64, y1: f64, x2: f64, y2: f64| {
+        format!("<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"#ddd\"/>")
+    };
+    let words = |x: f64, y: f64, anchor: &str, words: &str| {
+        format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>\n")
+    };
     let mut text = String::new();
     for decade in x.low..=x.high {
         let at = x.place(10f64.powi(decade));
-        text.push_str(&format!(
-            "<line x1=\"{at:.1}\" y1=\"{:.1}\" x2=\"{at:.1}\" y2=\"{:.1}\" stroke=\"#ddd\"/><text x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\n",
-            y.from,
-            y.to,
-            y.from + 16.0,
-            label(decade)
-        ));
+        text += &line(at, y.from, at, y.to);
+        text += &words(at, y.from + 16.0, "middle", &label(decade));
     }
     for decade in y.low..=y.high {
         let at = y.place(10f64.powi(decade));
-        text.push_str(&format!(
-            "<line x1=\"{:.1}\" y1=\"{at:.1}\" x2=\"{:.1}\" y2=\"{at:.1}\" stroke=\"#ddd\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{} %</text>\n",
-            x.from,
-            x.to,
-            x.from - 6.0,
-            at + 4.0,
-            label(decade + 2)
-        ));
+        text += &line(x.from, at, x.to, at);
+        text += &words(x.from - 6.0, at + 4.0, "end", &format!("{} %", label(decade + 2)));
     }
-    text + &format!(
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">wall-clock seconds</text>\n",
-        0.5 * (x.from + x.to),
-        y.from + 34.0
-    )
+    text + &words(0.5 * (x.from + x.to), y.from + 34.0, "middle", "wall-clock seconds")
 }
 
 fn label(decade: i32) -> String {

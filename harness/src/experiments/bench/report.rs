@@ -2,31 +2,18 @@
 
 use super::curve::{Curve, TARGETS};
 use super::{BenchReport, Reference};
+use crate::experiments::table;
 
 impl BenchReport {
-    /// The tables for a terminal.
     pub fn terminal(&self) -> String {
-        self.text(|head, rows| {
-            let mut table = comfy_table::Table::new();
-            table
-                .load_style(comfy_table::presets::NOTHING)
-                .set_content_arrangement(comfy_table::ContentArrangement::Disabled);
-            table.set_header(head);
-            table.add_rows(rows);
-            format!("{table}\n")
-        })
+        self.text(table::terminal)
     }
 
-    /// The tables as Markdown.
     pub fn markdown(&self) -> String {
-        self.text(|head, rows| {
-            let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-            let rule = vec!["---".to_owned(); head.len()];
-            [head, rule].iter().chain(&rows).map(|cells| line(cells)).collect()
-        })
+        self.text(table::markdown)
     }
 
-    fn text(&self, table: impl Fn(Vec<String>, Vec<Vec<String>>) -> String) -> String {
+    fn text(&self, table: table::Render) -> String {
         let versions: Vec<String> = self.engines.iter().map(|(id, version)| format!("{id} {version}")).collect();
         let mut text = format!("{}.\n{}.\n\n", self.machine, versions.join(", "));
         for pareto in &self.pareto {
@@ -45,7 +32,7 @@ impl BenchReport {
                     percent(reference.floor)
                 ));
             }
-            text.push_str(&table(head(), curves.iter().map(|c| row(c)).collect()));
+            text.push_str(&table(&head(), &curves.iter().map(|c| row(c)).collect::<Vec<_>>()));
             let front: Vec<String> = pareto
                 .front
                 .iter()
@@ -68,7 +55,7 @@ impl BenchReport {
                 ]
             });
             text.push_str("What each setting does, against the default\n\n");
-            text.push_str(&table(head.map(str::to_owned).to_vec(), rows.collect()));
+            text.push_str(&table(&head.map(str::to_owned), &rows.collect::<Vec<_>>()));
             text.push('\n');
         }
         for why in &self.left_out {

@@ -28,14 +28,11 @@ const FEW: usize = 8;
 /// How good each kind of interval is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibrations {
-    /// One a kind.
     pub intervals: Vec<Interval>,
 }
 
-/// How good one kind of interval is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
-    /// What is uncertain.
     pub kind: String,
     /// P-values under no fault, in rising order: against rank over count they lie on the diagonal.
     pub p_values: Vec<f64>,
@@ -43,20 +40,17 @@ pub struct Interval {
     pub ks_statistic: f64,
     /// The probability of a larger one by chance.
     pub ks_p: f64,
-    /// How often intervals hold the truth.
     pub coverage: Vec<Coverage>,
 }
 
 /// How often an interval holds the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
-    /// As it is said.
     pub nominal: f64,
     pub found: f64,
 }
 
 impl Calibrations {
-    /// Whether all p-values are uniform and all coverages what they are said to be.
     pub fn is_good(&self) -> bool {
         self.intervals.iter().all(Interval::is_good)
     }
@@ -114,7 +108,6 @@ fn even(random: &mut fastrand::Rng, bound: f64) -> f64 {
     bound * (2.0 * random.f64() - 1.0)
 }
 
-/// Draws and judges every kind of interval.
 pub fn calibrations(seed: u64) -> Calibrations {
     let of_kind = |(k, (kind, draw)): (usize, &(&str, Draw))| {
         let mut random = fastrand::Rng::with_seed(seed.wrapping_add(k as u64));

@@ -8,6 +8,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::diagnosis::{self, Effect, Fault, Readings};
+use crate::experiments::table;
 use crate::judge::{Judge, KnownDeviations, Tolerances, Verdict};
 use crate::procedures::{self, Task};
 use crate::record::{ProcedureId, Reading, ReadingKey, Recording, Uncertainty};
@@ -42,22 +43,17 @@ const SUBJECT: &str = "subject";
 /// What the harness makes of every fault, and of none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Scorecard {
-    /// One a fault and case in which it shows.
     pub faults: Vec<Score>,
-    /// Runs without a fault, over all cases.
     pub clean_runs: usize,
     /// Those of them in which something failed.
     pub false_alarms: usize,
 }
 
 /// What the harness makes of one fault.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Score {
-    /// The fault's short name.
     pub id: String,
-    /// What goes wrong.
     pub what: String,
-    /// The case that it was put into.
     pub case: String,
     /// The largest deviation that it makes, relative to the reading, or to a hundredth of the brightest.
     pub size: f64,
@@ -72,7 +68,6 @@ pub struct Score {
 }
 
 impl Score {
-    /// Whether the harness does with it what it promises.
     pub fn is_good(&self) -> bool {
         self.size < COUNTED || (!self.caught_by.is_empty() && self.diagnosed)
     }
@@ -85,7 +80,6 @@ impl Scorecard {
     }
 }
 
-/// Why the self-test could not run.
 #[derive(Debug, thiserror::Error)]
 #[error("the self-test cannot run: {0}")]
 pub struct SelftestError(String);
@@ -230,16 +224,8 @@ fn scores(case: &Case, subjects: &[Subject], judge: &Judge<'_>, runs: usize, ran
         }
     }
     let mut one = |(id, what): (&str, &str)| {
-        let mut score = Score {
-            id: id.to_owned(),
-            what: what.to_owned(),
-            case: case.name.clone(),
-            size: 0.0,
-            caught_by: vec![],
-            diagnosed: false,
-            named_in: 0.0,
-            smallest_detectable: None,
-        };
+        let (fault, case) = ((id.to_owned(), what.to_owned()), case.name.clone());
+        let mut score = Score { id: fault.0, what: fault.1, case, ..Score::default() };
         for subject in subjects {
             let Some(wrong) = subject.wrong(id, what) else { continue };
             score.size = score.size.max(subject.size(&wrong));
@@ -264,14 +250,10 @@ fn scores(case: &Case, subjects: &[Subject], judge: &Judge<'_>, runs: usize, ran
 
 impl fmt::Display for Scorecard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut table = comfy_table::Table::new();
-        table
-            .load_style(comfy_table::presets::NOTHING)
-            .set_content_arrangement(comfy_table::ContentArrangement::Disabled);
-        table.set_header(["", "case", "fault", "size", "smallest seen", "named", "caught by"]);
+        let head = ["", "case", "fault", "size", "smallest seen", "named", "caught by"].map(str::to_owned);
         let percent = |x: f64| if x < 10.0 { format!("{:.2} %", 100.0 * x) } else { format!("{x:.0} times") };
-        for score in &self.faults {
-            table.add_row([
+        let row = |score: &Score| {
+            vec![
                 if score.is_good() { "ok" } else { "MISSED" }.to_owned(),
                 score.case.clone(),
                 score.what.clone(),
@@ -279,9 +261,10 @@ impl fmt::Display for Scorecard {
                 score.smallest_detectable.map_or("-".to_owned(), percent),
                 format!("{:.0} %", 100.0 * score.named_in),
                 names(&score.caught_by),
-            ]);
-        }
-        writeln!(f, "{table}\n")?;
+            ]
+        };
+        let table = table::terminal(&head, &self.faults.iter().map(row).collect::<Vec<_>>());
+        writeln!(f, "{table}")?;
         let counted: Vec<&Score> = self.faults.iter().filter(|s| s.size >= COUNTED).collect();
         let good = counted.iter().filter(|s| s.is_good()).count();
         let kinds: std::collections::BTreeSet<&str> = self.faults.iter().map(|s| s.id.as_str()).collect();
@@ -295,6 +278,11 @@ impl fmt::Display for Scorecard {
     }
 }
 
+fn names(procedures: &[ProcedureId]) -> String {
+    let names: Vec<&str> = procedures.iter().map(|p| p.name()).collect();
+    if names.is_empty() { "-".to_owned() } else { names.join(", ") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -306,9 +294,4 @@ mod tests {
         let kinds: std::collections::BTreeSet<&str> = card.faults.iter().map(|s| s.id.as_str()).collect();
         assert!(kinds.len() >= 25, "{kinds:?}");
     }
-}
-
-fn names(procedures: &[ProcedureId]) -> String {
-    let names: Vec<&str> = procedures.iter().map(|p| p.name()).collect();
-    if names.is_empty() { "-".to_owned() } else { names.join(", ") }
 }

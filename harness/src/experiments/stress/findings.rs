@@ -27,14 +27,11 @@ pub enum How {
     SilentLoss,
     /// What is read is no number.
     Nan,
-    /// It ends with an error.
     Crash,
-    /// It does not end.
     Hang,
 }
 
 impl How {
-    /// Its name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Drift => "drift",
@@ -46,21 +43,21 @@ impl How {
     }
 }
 
-/// What one point shows.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Finding {
+/// What one point shows; nothing where it was not tried.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Finding {
     /// The largest deviation beyond noise, relative; `None` where nothing was read.
-    pub(super) deviation: Option<f64>,
-    /// The noise beside it.
-    pub(super) noise: Option<f64>,
-    /// How it breaks, if it does.
-    pub(super) how: Option<How>,
-    /// Why nothing was read or compared.
-    pub(super) text: Option<String>,
+    pub deviation: Option<f64>,
+    pub noise: Option<f64>,
+    pub how: Option<How>,
     /// Whether the engine said itself that it cannot.
-    pub(super) is_refused: bool,
+    #[serde(rename = "refused")]
+    pub is_refused: bool,
+    /// Why nothing was read or compared.
+    pub text: Option<String>,
     /// Whether neither side is random.
-    pub(super) is_exact: bool,
+    #[serde(skip)]
+    pub is_exact: bool,
 }
 
 impl Finding {
@@ -74,8 +71,7 @@ impl Finding {
             off.then_some(How::Drift)
         };
         let deviation = Some(found.beyond).filter(|d| d.is_finite());
-        let is_exact = found.is_exact;
-        Self { deviation, noise: Some(found.noise), how, text: None, is_refused: false, is_exact }
+        Self { deviation, noise: Some(found.noise), how, is_exact: found.is_exact, ..Self::default() }
     }
 
     pub(super) fn failed(failure: &Failure) -> Self {
@@ -86,25 +82,21 @@ impl Finding {
             FailureKind::Hang => Some(How::Hang),
             FailureKind::SilentLoss => Some(How::SilentLoss),
         };
-        let text = Some(failure.text.clone());
         let is_refused = matches!(failure.kind, FailureKind::Declined | FailureKind::Refused);
-        Self { deviation: None, noise: None, how, text, is_refused, is_exact: true }
+        Self { how, text: Some(failure.text.clone()), is_refused, ..Self::default() }
     }
 
     /// The changed job was read, what it is held against was not: nothing is known.
     pub(super) fn without_base(failure: &Failure) -> Self {
         let text = Some(format!("nothing to hold it against: {}", failure.text));
-        Self { deviation: None, noise: None, how: None, text, is_refused: true, is_exact: true }
+        Self { text, is_refused: true, ..Self::default() }
     }
 }
 
-/// Everything that stress found with one case.
 #[derive(Clone, Debug, Serialize)]
 pub struct StressReport {
     pub case: String,
-    /// Engines with their versions.
     pub engines: BTreeMap<EngineName, String>,
-    /// One an engine and law.
     pub laws: Vec<LawReport>,
 }
 
@@ -128,7 +120,6 @@ pub struct LawReport {
     pub refused_at: Option<f64>,
     /// Points that time did not suffice for, or that lie beyond one that hung.
     pub untried: usize,
-    /// Every point, from mild to extreme.
     pub points: Vec<PointReport>,
     /// The causes on record, where all that breaks is known.
     pub known: Vec<String>,
@@ -136,22 +127,13 @@ pub struct LawReport {
     pub gone: Vec<String>,
 }
 
-/// What one point shows.
 #[derive(Clone, Debug, Serialize)]
 pub struct PointReport {
     pub procedure: ProcedureId,
     pub magnitude: f64,
     pub tried: bool,
-    /// Deviation beyond noise, relative.
-    pub deviation: Option<f64>,
-    /// Noise, relative.
-    pub noise: Option<f64>,
-    /// How it breaks, if it does.
-    pub how: Option<How>,
-    /// Whether the engine refuses.
-    pub refused: bool,
-    /// Why nothing was read.
-    pub text: Option<String>,
+    #[serde(flatten)]
+    pub found: Finding,
 }
 
 /// A point's engine, law, procedure, step and finding.
@@ -168,7 +150,8 @@ impl StressReport {
                 laws.push(LawReport::empty(engine, law));
                 laws.len() - 1
             });
-            laws[k].points.push(PointReport::new(procedure, law.magnitudes[step], finding));
+            let (magnitude, tried) = (law.magnitudes[step], finding.is_some());
+            laws[k].points.push(PointReport { procedure, magnitude, tried, found: finding.unwrap_or_default() });
         }
         laws.iter_mut().for_each(LawReport::conclude);
         for law in &mut laws {
@@ -178,7 +161,6 @@ impl StressReport {
         Self { case: case.name.clone(), engines, laws }
     }
 
-    /// Laws that an engine breaks.
     pub fn broken_by<'a>(&'a self, engine: &'a str) -> impl Iterator<Item = &'a LawReport> {
         self.laws.iter().filter(move |l| l.engine == engine && l.how.is_some())
     }
@@ -208,32 +190,30 @@ impl LawReport {
         let rising = |p: &PointReport| find_step(&self.law, p.magnitude);
         self.points.sort_by_key(rising);
         for point in &self.points {
-            self.worst_deviation = [self.worst_deviation, point.deviation].into_iter().flatten().reduce(f64::max);
-            self.resolution = [self.resolution, point.noise].into_iter().flatten().reduce(f64::max);
-            self.how = self.how.max(point.how);
+            self.worst_deviation = [self.worst_deviation, point.found.deviation].into_iter().flatten().reduce(f64::max);
+            self.resolution = [self.resolution, point.found.noise].into_iter().flatten().reduce(f64::max);
+            self.how = self.how.max(point.found.how);
             self.untried += usize::from(!point.tried);
-            if point.refused && self.refused_at.is_none() {
+            if point.found.is_refused && self.refused_at.is_none() {
                 self.refused_at = Some(point.magnitude);
             }
             for threshold in THRESHOLDS {
-                let fails = point.how.is_some_and(|h| h != How::Drift && point.deviation.is_none());
-                if fails || point.deviation.is_some_and(|d| d >= threshold) {
+                let fails = point.found.how.is_some_and(|h| h != How::Drift && point.found.deviation.is_none());
+                if fails || point.found.deviation.is_some_and(|d| d >= threshold) {
                     self.breaks_at.entry(threshold.to_string()).or_insert(point.magnitude);
                 }
             }
         }
     }
-}
 
-impl LawReport {
     /// Holds what breaks against what is on record of this law.
     fn look_up(&mut self, record: &[&KnownBreak]) {
         let explains = |k: &&KnownBreak, p: &PointReport| {
-            p.how.is_some_and(|how| how.name() == k.how)
+            p.found.how.is_some_and(|how| how.name() == k.how)
                 && find_step(&self.law, p.magnitude) >= find_step(&self.law, k.from)
-                && p.deviation.is_none_or(|d| k.relative.is_some_and(|most| d <= MARGIN * most))
+                && p.found.deviation.is_none_or(|d| k.relative.is_some_and(|most| d <= MARGIN * most))
         };
-        let broken = || self.points.iter().filter(|p| p.how.is_some());
+        let broken = || self.points.iter().filter(|p| p.found.how.is_some());
         let cause = |k: &&&KnownBreak| k.cause.clone();
         if broken().all(|p| record.iter().any(|k| explains(k, p))) {
             self.known = record.iter().filter(|k| broken().any(|p| explains(k, p))).map(|k| cause(&k)).collect();
@@ -241,7 +221,9 @@ impl LawReport {
         let is_gone = |k: &&&KnownBreak| {
             // Noise as large as what is on record hides it.
             let is_fine = |p: &PointReport| {
-                p.how.is_none() && !p.refused && p.noise.is_none_or(|noise| k.relative.is_none_or(|most| noise < most))
+                p.found.how.is_none()
+                    && !p.found.is_refused
+                    && p.found.noise.is_none_or(|noise| k.relative.is_none_or(|most| noise < most))
             };
             let mut there = self.points.iter().filter(|p| p.magnitude == k.from && p.tried).peekable();
             there.peek().is_some() && there.all(is_fine)
@@ -253,28 +235,4 @@ impl LawReport {
 fn find_step(law: &str, magnitude: f64) -> usize {
     let law = crate::laws::find(law);
     law.and_then(|l| l.magnitudes.iter().position(|m| *m == magnitude)).unwrap_or(0)
-}
-
-impl PointReport {
-    fn new(procedure: ProcedureId, magnitude: f64, finding: Option<Finding>) -> Self {
-        let tried = finding.is_some();
-        let f = finding.unwrap_or(Finding {
-            deviation: None,
-            noise: None,
-            how: None,
-            text: None,
-            is_refused: false,
-            is_exact: true,
-        });
-        Self {
-            procedure,
-            magnitude,
-            tried,
-            deviation: f.deviation,
-            noise: f.noise,
-            how: f.how,
-            refused: f.is_refused,
-            text: f.text,
-        }
-    }
 }

@@ -22,11 +22,9 @@ use crate::measure::{Failure, Instrument, Reader, Taken};
 use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
 use crate::spec::{Budget, Case};
 
-/// How to stress.
 pub struct Options<'a> {
     /// Who takes readings, as many at a time as its machine has slots.
     pub reader: Reader,
-    /// No reading starts after this.
     pub time: Duration,
     /// Sampling effort of one reading.
     pub budget: Budget,
@@ -49,11 +47,8 @@ pub enum Coordinates {
     Raw,
 }
 
-/// Told of every point as it ends.
 pub trait Progress: Sync {
-    /// So many points there are.
     fn planned(&self, points: usize);
-    /// A point ended.
     fn ended(&self, engine: &str, law: &str, magnitude: f64);
 }
 
@@ -78,7 +73,6 @@ impl Point {
     }
 }
 
-/// Stresses engines with a case.
 pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progress: &dyn Progress) -> StressReport {
     let points = points(case, subjects, options);
     progress.planned(points.len());
@@ -93,7 +87,7 @@ pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progr
                     let Some(k) = next else { break };
                     let clock = Instant::now();
                     let finding = bench.finding(&points[k]);
-                    progress.ended(&bench.id(points[k].subject), points[k].law.id, points[k].magnitude());
+                    progress.ended(&subjects[points[k].subject].engine.name(), points[k].law.id, points[k].magnitude());
                     lock(&queue).ended(&points, k, finding, clock.elapsed());
                 }
             });
@@ -127,7 +121,6 @@ fn points(case: &Case, subjects: &[Instrument], options: &Options<'_>) -> Vec<Po
     points
 }
 
-/// What is under way and what is done.
 struct Queue {
     findings: Vec<Option<Finding>>,
     taken: Vec<bool>,
@@ -162,7 +155,6 @@ impl Queue {
     }
 }
 
-/// Takes the readings of points and judges them.
 struct Bench<'a> {
     trials: Trials<'a>,
     subjects: &'a [Instrument],
@@ -175,10 +167,6 @@ const DOUBTFUL: f64 = 1e-3;
 const OTHER_SEED: u64 = 1000;
 
 impl Bench<'_> {
-    fn id(&self, subject: usize) -> EngineName {
-        self.subjects[subject].engine.name()
-    }
-
     /// What a point shows; `None` where the time is up.
     fn finding(&self, point: &Point) -> Option<Finding> {
         let variant = (point.law.variant)(&point.base, point.magnitude())?;

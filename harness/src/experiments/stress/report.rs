@@ -1,32 +1,23 @@
 //! Views of a stress report: the matrix of what breaks where, for a terminal and as Markdown.
 
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::findings::{How, LawReport, StressReport};
+use crate::experiments::table;
 use crate::record::EngineName;
 
 impl StressReport {
-    /// The matrix for a terminal.
+    /// The matrix of what breaks where.
     pub fn terminal(&self) -> String {
-        let mut table = comfy_table::Table::new();
-        table
-            .load_style(comfy_table::presets::NOTHING)
-            .set_content_arrangement(comfy_table::ContentArrangement::Disabled);
         let (head, rows) = self.matrix();
-        table.set_header(head);
-        table.add_rows(rows);
-        format!("{}: breaks at\n\n{table}\n\n{LEGEND}\n{}", self.case, self.remarks("  "))
+        let table = table::terminal(&head, &rows);
+        format!("{}: breaks at\n\n{table}\n{LEGEND}\n{}", self.case, self.remarks("  "))
     }
 
-    /// The matrix and every broken law as Markdown.
     pub fn markdown(&self) -> String {
         let (head, rows) = self.matrix();
-        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-        let mut text = format!("## {}\n\n{}", self.case, line(&head));
-        text.push_str(&line(&vec!["---".to_owned(); head.len()]));
-        text.extend(rows.iter().map(|row| line(row)));
-        format!("{text}\n{LEGEND}\n\n{}", self.remarks("- "))
+        let table = table::markdown(&head, &rows);
+        format!("## {}\n\n{table}\n{LEGEND}\n\n{}", self.case, self.remarks("- "))
     }
 
     fn matrix(&self) -> (Vec<String>, Vec<Vec<String>>) {
@@ -54,29 +45,21 @@ impl StressReport {
     fn remarks(&self, bullet: &str) -> String {
         let mut text = String::new();
         for law in self.laws.iter().filter(|l| l.how.is_some()) {
-            let mut by_magnitude: BTreeMap<String, String> = BTreeMap::new();
-            let mut order = vec![];
-            for point in law.points.iter().filter(|p| p.how.is_some()) {
-                let key = format!("{:e}", point.magnitude);
-                let what = match (point.deviation, point.how) {
-                    (Some(d), how) => {
-                        format!("{}{}", percent(d), if how == Some(How::SilentLoss) { " lost" } else { "" })
-                    }
-                    (None, Some(how)) => how.name().to_owned(),
-                    _ => String::new(),
+            let mut broken: Vec<(f64, Vec<String>)> = vec![];
+            for point in law.points.iter().filter(|p| p.found.how.is_some()) {
+                let what = match (point.found.deviation, point.found.how) {
+                    (Some(d), Some(How::SilentLoss)) => format!("{} lost", percent(d)),
+                    (Some(d), _) => percent(d),
+                    (None, how) => how.map_or("", How::name).to_owned(),
                 };
                 let what = format!("{what} ({})", point.procedure.name().split('_').next().unwrap_or_default());
-                if !order.contains(&key) {
-                    order.push(key.clone());
+                match broken.last_mut() {
+                    Some((magnitude, all)) if *magnitude == point.magnitude => all.push(what),
+                    _ => broken.push((point.magnitude, vec![what])),
                 }
-                let all = by_magnitude.entry(key).or_default();
-                if !all.is_empty() {
-                    all.push_str(", ");
-                }
-                all.push_str(&what);
             }
-            let list: Vec<String> = order.iter().map(|k| format!("{k}: {}", by_magnitude[k])).collect();
-            let why = law.points.iter().find_map(|p| p.how.and(p.text.as_deref())).map(first_line);
+            let list: Vec<String> = broken.iter().map(|(m, all)| format!("{m:e}: {}", all.join(", "))).collect();
+            let why = law.points.iter().find_map(|p| p.found.how.and(p.found.text.as_deref())).map(first_line);
             let why = why.map(|w| format!(" ({w})")).unwrap_or_default();
             let known = match law.known.join("; ") {
                 known if known.is_empty() => String::new(),
@@ -114,7 +97,7 @@ fn cell(law: &LawReport) -> String {
     match law.how {
         Some(How::Drift) => {}
         Some(how) => {
-            let first = law.points.iter().find(|p| p.how == Some(how)).map_or(0.0, |p| p.magnitude);
+            let first = law.points.iter().find(|p| p.found.how == Some(how)).map_or(0.0, |p| p.magnitude);
             if parts.len() == 3 && law.breaks_at.values().all(|m| *m == first) {
                 parts.clear();
             }

@@ -96,7 +96,7 @@ fn what_breaks_is_reported_at_its_magnitude_and_in_its_way() {
     let law = |id: &str| report.laws.iter().find(|l| l.law == id).unwrap();
     let direct = |id: &str| -> Vec<(f64, Option<How>)> {
         let points = law(id).points.iter().filter(|p| p.procedure == ProcedureId::DirectIlluminance);
-        points.map(|p| (p.magnitude, p.how)).collect()
+        points.map(|p| (p.magnitude, p.found.how)).collect()
     };
     assert_eq!(law("scale_up").breaks_at["0.001"], 100.0);
     assert_eq!(law("scale_up").breaks_at["0.1"], 1e4);

@@ -29,6 +29,7 @@ impl Key {
     }
 
     /// The key of the same where these conditions matter as well.
+    #[must_use]
     pub fn under(&self, conditions: &str) -> Self {
         let digits = hexadecimal(&Sha256::digest(format!("{} {conditions}", self.digits)));
         Self { engine: self.engine.clone(), digits }

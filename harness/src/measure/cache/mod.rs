@@ -27,7 +27,7 @@ pub struct Cache {
 /// What a cache knows of a key.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lookup {
-    Found(Entry),
+    Found(Box<Entry>),
     Unknown,
     /// A file that is no sound entry of this key, and what is wrong with it.
     Damaged(String),
@@ -59,7 +59,7 @@ impl Cache {
             Ok(entry) => {
                 // Only pruning asks when an entry was used last: not to know is no reason to fail.
                 std::fs::File::open(&path).and_then(|f| f.set_modified(std::time::SystemTime::now())).ok();
-                Lookup::Found(entry)
+                Lookup::Found(Box::new(entry))
             }
             Err(why) => Lookup::Damaged(format!("{} {why}", path.display())),
         }

@@ -42,11 +42,11 @@ fn an_entry_comes_back_to_the_last_bit() {
         assert_eq!(entry::parse(&text, a_key('a').digits()).unwrap(), entry);
     }
     cache.keep(&a_key('a'), &sample()).unwrap();
-    assert_eq!(cache.find(&a_key('a')), Lookup::Found(sample()));
+    assert_eq!(cache.find(&a_key('a')), Lookup::Found(Box::new(sample())));
     assert_eq!(cache.find(&a_key('b')), Lookup::Unknown);
     let hung = Entry { answer: Err(Failure::new(FailureKind::Hang, "past its limit")), ..sample() };
     cache.keep(&a_key('b'), &hung).unwrap();
-    assert_eq!(cache.find(&a_key('b')), Lookup::Found(hung));
+    assert_eq!(cache.find(&a_key('b')), Lookup::Found(Box::new(hung)));
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn whatever_is_cut_flipped_or_foreign_is_found_out() {
     std::fs::write(cache.path(&a_key('b')), &sound).unwrap();
     assert!(matches!(cache.find(&a_key('b')), Lookup::Damaged(why) if why.contains("another key")));
     cache.keep(&a_key('b'), &sample()).unwrap();
-    assert_eq!(cache.find(&a_key('b')), Lookup::Found(sample()));
+    assert_eq!(cache.find(&a_key('b')), Lookup::Found(Box::new(sample())));
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn pruning_takes_damaged_and_unused_entries_and_leaves_a_live_writers_file() {
     assert_eq!((contents.engines["radiance"].0, contents.damaged.len(), contents.unfinished), (1, 1, 2));
     let pruned = cache.prune(Duration::from_secs(86_400)).unwrap();
     assert_eq!((pruned.unused, pruned.damaged, pruned.unfinished), (0, 1, 1));
-    assert_eq!(cache.find(&a_key('a')), Lookup::Found(sample()));
+    assert_eq!(cache.find(&a_key('a')), Lookup::Found(Box::new(sample())));
     assert!(folder.path().join(live).exists());
     assert_eq!(cache.prune(Duration::ZERO).unwrap().unused, 1);
     assert_eq!(cache.find(&a_key('a')), Lookup::Unknown);

@@ -3,26 +3,21 @@
 use maud::{Markup, html};
 
 use super::super::BaselineCheck;
-use super::{minus, title};
+use super::{minus, table};
 
 pub(super) fn section(check: &BaselineCheck) -> Markup {
     html! {
         h2 id="baseline-title" { "Baseline" }
         p.lead { "Against the readings accepted in " code { (check.file) } ": " (check.counts()) "." }
-        div.scroll tabindex="0" role="region" aria-label="Against the baseline" {
-            table {
-                thead { tr { @for name in ["case", "procedure", "engine", "state", "what moved"] { th scope="col" { (name) } } } }
-                tbody {
-                    @for entry in &check.entries {
-                        @let (class, glyph) = if entry.is_as_accepted { ("v-pass", "✓") } else { ("v-fail", "✕") };
-                        tr {
-                            th scope="row" { (entry.key.case) } td { (title(entry.key.procedure)) } td { (entry.key.engine) }
-                            td class=(class) { span.glyph aria-hidden="true" { (glyph) } " " (entry.state.to_lowercase()) }
-                            td.wide { @for (k, detail) in entry.details.iter().enumerate() { @if k > 0 { br; } (minus(detail)) } }
-                        }
-                    }
+        (table("Against the baseline", &["case", "procedure", "engine", "state", "what moved"], &html! {
+            @for entry in &check.entries {
+                @let (class, glyph) = if entry.is_as_accepted { ("v-pass", "✓") } else { ("v-fail", "✕") };
+                tr {
+                    th scope="row" { (entry.key.case) } td { (entry.key.procedure.row().title) } td { (entry.key.engine) }
+                    td class=(class) { span.glyph aria-hidden="true" { (glyph) } " " (entry.state.to_lowercase()) }
+                    td.wide { @for (k, detail) in entry.details.iter().enumerate() { @if k > 0 { br; } (minus(detail)) } }
                 }
             }
-        }
+        }))
     }
 }

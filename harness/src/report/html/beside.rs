@@ -5,74 +5,50 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 use serde::Deserialize;
 
+use super::super::words::unique;
 use super::palette::Palette;
 use crate::record::{EngineName, ProcedureId};
 
-/// A file of further measurements.
 #[derive(Clone, Debug)]
 pub enum Beside {
-    /// Error against run time.
     Bench(Vec<BenchCurve>),
-    /// Where invariances break.
     Stress(Vec<StressLaw>),
 }
 
-/// Why a file cannot be shown beside a report.
 #[derive(Debug, thiserror::Error)]
 pub enum BesideError {
-    /// It is no JSON.
     #[error("it is no JSON: {0}")]
     Json(#[from] serde_json::Error),
-    /// It is something else.
     #[error(
         "it holds neither `curves` (of `luxproof bench --format json`) nor `laws` (of `luxproof stress --format json`)"
     )]
     Unknown,
 }
 
-/// One engine's error against run time.
 #[derive(Clone, Debug, Deserialize)]
 pub struct BenchCurve {
     pub engine: EngineName,
     pub procedure: ProcedureId,
-    #[serde(default)]
-    pub solver: Option<String>,
-    #[serde(default)]
-    pub preset: Option<String>,
-    /// Its rungs.
     pub points: Vec<BenchPoint>,
 }
 
-/// One rung of a curve.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct BenchPoint {
-    /// Wall-clock seconds.
     pub wall_s: f64,
     pub relative_error: Option<f64>,
-    /// Lower end of its interval.
-    #[serde(default)]
     pub relative_error_low: Option<f64>,
-    /// Upper end of its interval.
-    #[serde(default)]
     pub relative_error_high: Option<f64>,
 }
 
-/// How one engine keeps one law.
 #[derive(Clone, Debug, Deserialize)]
 pub struct StressLaw {
     pub engine: EngineName,
     pub law: String,
-    /// Largest relative deviation.
-    #[serde(default)]
     pub worst_deviation: Option<f64>,
     /// Magnitude at which the deviation first passes the fraction.
     #[serde(default)]
     pub breaks_at: BTreeMap<String, Option<f64>>,
-    /// In which way it breaks.
-    #[serde(default)]
     pub how: Option<String>,
-    /// The first magnitude that the engine refuses.
-    #[serde(default)]
     pub refused_at: Option<f64>,
     /// The causes on record, where all that breaks is known.
     #[serde(default)]
@@ -86,7 +62,6 @@ struct File {
 }
 
 impl Beside {
-    /// Reads what a file holds, whichever of the two it is.
     pub fn from_json(text: &str) -> Result<Self, BesideError> {
         match serde_json::from_str::<File>(text)? {
             File { curves: Some(curves), .. } => Ok(Self::Bench(curves)),
@@ -96,22 +71,14 @@ impl Beside {
     }
 }
 
-/// The stress matrix, if any file holds one.
 pub(super) fn stress_section(beside: &[Beside], palette: &Palette) -> Option<Markup> {
     let laws: Vec<&StressLaw> =
         beside.iter().filter_map(|b| if let Beside::Stress(laws) = b { Some(laws) } else { None }).flatten().collect();
     if laws.is_empty() {
         return None;
     }
-    let (mut engines, mut names): (Vec<&str>, Vec<&str>) = (vec![], vec![]);
-    for law in &laws {
-        if !engines.contains(&law.engine.as_str()) {
-            engines.push(&law.engine);
-        }
-        if !names.contains(&law.law.as_str()) {
-            names.push(&law.law);
-        }
-    }
+    let names = unique(laws.iter().map(|l| l.law.as_str()));
+    let mut engines = unique(laws.iter().map(|l| l.engine.as_str()));
     engines.sort_by_key(|e| palette.order(e));
     let known: Vec<&StressLaw> = laws.iter().copied().filter(|l| !l.known.is_empty()).collect();
     Some(html! {
@@ -138,8 +105,8 @@ pub(super) fn stress_section(beside: &[Beside], palette: &Palette) -> Option<Mar
 
 fn stress_cell(law: Option<&&StressLaw>) -> Markup {
     let Some(law) = law else { return html! { td.quiet { "–" } } };
-    let breaks: Vec<(&str, f64)> =
-        ["0.001", "0.01", "0.1"].iter().filter_map(|k| Some((*k, law.breaks_at.get(*k).copied().flatten()?))).collect();
+    let at = |(key, name): (&str, &'static str)| Some((name, law.breaks_at.get(key).copied().flatten()?));
+    let first_break = [("0.001", "0.1 %"), ("0.01", "1 %"), ("0.1", "10 %")].into_iter().find_map(at);
     let class = match (law.worst_deviation, law.how.as_deref()) {
         (_, Some(_)) if !law.known.is_empty() => "v-known",
         (None, None) => "quiet",
@@ -148,20 +115,12 @@ fn stress_cell(law: Option<&&StressLaw>) -> Markup {
         (Some(d), _) if d.abs() >= 0.001 => "v-undecided",
         _ => "v-pass",
     };
-    let name = |key: &str| match key {
-        "0.001" => "0.1 %",
-        "0.01" => "1 %",
-        _ => "10 %",
-    };
     html! {
         td class=(class) {
-            div {
-                (worst(law))
-                @if let Some(how) = &law.how { " " (how.replace('_', " ")) }
-            }
-            @if let Some((key, at)) = breaks.first() { div.most { (name(key)) " at " (format!("{at:e}")) } }
+            div { (worst(law)) @if let Some(how) = &law.how { " " (how.replace('_', " ")) } }
+            @if let Some((name, at)) = first_break { div.most { (name) " at " (format!("{at:e}")) } }
             @if let (Some(at), Some(_)) = (law.refused_at, law.worst_deviation) { div.most { "refuses at " (format!("{at:e}")) } }
-            @if !law.known.is_empty() { div.most { "known" } }
+            @if !law.known.is_empty() { div.most { "known deviation" } }
         }
     }
 }

@@ -3,9 +3,9 @@
 use maud::{Markup, html};
 
 use super::super::Report;
-use super::super::terminal::{Cell, matrix};
+use super::super::matrix::{Cell, matrix};
 use super::palette::Palette;
-use super::{class, glyph, percent, title, verdict_name};
+use super::{class, glyph, percent};
 use crate::judge::Verdict;
 use crate::record::ProcedureId;
 
@@ -22,7 +22,7 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
         div.scroll tabindex="0" role="region" aria-label="Verdict matrix" {
             table.matrix {
                 thead { tr {
-                    th scope="col" { "procedure" } th scope="col" { "held against" }
+                    th scope="col" { "procedure" } th scope="col" { "against" }
                     @for engine in &report.engines { th scope="col" { (palette.label(&engine.id)) } }
                 } }
                 @for case in cases {
@@ -32,10 +32,10 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
                         }
                         @for row in rows.iter().filter(|r| r.case == case) {
                             tr {
-                                th scope="row" { (title(row.procedure)) }
+                                th scope="row" { (row.procedure.row().title) }
                                 td.basis { (row.basis) }
                                 @for (engine, cell) in report.engines.iter().zip(&row.cells) {
-                                    (drawn(cell, row.procedure, [case, &row.basis, &engine.id]))
+                                    (drawn(cell, row.procedure, [case, row.basis, &engine.id]))
                                 }
                             }
                         }
@@ -45,7 +45,7 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
         }
         ul.legend {
             @for verdict in [Verdict::Pass, Verdict::KnownDeviation, Verdict::Inconclusive, Verdict::Fail, Verdict::UnexpectedPass, Verdict::Missing] {
-                li class={ "v-" (class(verdict)) } { span.glyph aria-hidden="true" { (glyph(verdict)) } " " (verdict_name(verdict)) }
+                li class={ "v-" (class(verdict)) } { span.glyph aria-hidden="true" { (glyph(verdict)) } " " (verdict.name()) }
             }
         }
     }
@@ -54,12 +54,12 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
 fn drawn(cell: &Cell, procedure: ProcedureId, [case, basis, engine]: [&str; 3]) -> Markup {
     match cell {
         Cell::IsReference => html! { td.quiet { "reference" } },
-        Cell::Skipped => html! { td.quiet { a href="#skips" { "not run" } } },
+        Cell::Skipped => html! { td.quiet { a href="#notes" { "skipped" } } },
         Cell::Empty => html! { td.quiet { "–" } },
         Cell::Judged { verdict, having, of, deviation } => html! {
             td class={ "v-" (class(*verdict)) } {
                 button.open type="button" data-case=(case) data-procedure=(procedure) data-basis=(basis) data-engine=(engine){
-                    span.unseen { (engine) ", " (title(procedure)) " against " (basis) ": " (verdict_name(*verdict)) " " }
+                    span.unseen { (engine) ", " (procedure.row().title) " against " (basis) ": " (verdict.name()) " " }
                     span.glyph aria-hidden="true" { (glyph(*verdict)) } " "
                     span.count { @if having == of { (of) } @else { (having) "/" (of) } }
                     @if let Some(deviation) = deviation { span.most { (percent(*deviation)) } }

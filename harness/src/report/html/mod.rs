@@ -5,18 +5,18 @@
 mod accepted;
 mod beside;
 mod matrix;
+mod notes;
 mod palette;
 mod plot;
 mod procedure;
 mod provenance;
 mod rows;
-mod skips;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::Report;
+use super::words::{self, plural};
 use crate::judge::Verdict;
-use crate::record::ProcedureId;
 use palette::Palette;
 use rows::Rows;
 
@@ -83,13 +83,13 @@ fn sections(report: &Report, beside: &[Beside], palette: &Palette, rows: &mut Ro
     }
     for name in report.procedures() {
         let section = procedure::section(report, name, palette, rows);
-        sections.push((name.to_string(), short(name).to_owned(), section));
+        sections.push((name.to_string(), name.row().short.to_owned(), section));
     }
     sections.push(("time".to_owned(), "Run time".to_owned(), plot::times::section(report, beside, palette)));
     if let Some(stress) = beside::stress_section(beside, palette) {
         sections.push(("stress".to_owned(), "Stress".to_owned(), stress));
     }
-    sections.push(("skips".to_owned(), "Not run".to_owned(), skips::section(report)));
+    sections.push(("notes".to_owned(), "Notes".to_owned(), notes::section(report)));
     sections.push(("provenance".to_owned(), "Provenance".to_owned(), provenance::section(report, palette)));
     sections
 }
@@ -104,17 +104,15 @@ fn head(report: &Report) -> Markup {
         (Verdict::UnexpectedPass, s.unexpected_pass),
         (Verdict::Missing, s.missing),
     ];
-    let of = report.comparisons.len();
-    let cases = report.cases.len();
     html! {
         header id="top" {
             p.overline {
                 "luxproof " (report.tool_version) " · " (report.started.replace('T', " ").replace('Z', " UTC")) " · "
-                (plural(cases, "case")) " · " (plural(report.engines.len(), "engine")) " · " (duration(report.wall_s))
+                (plural(report.cases.len(), "case")) " · " (plural(report.engines.len(), "engine")) " · " (duration(report.wall_s))
             }
             h1 { (report.spec.title) }
             p.spec { code { (report.spec.path) } }
-            @if of > 0 {
+            @if !report.comparisons.is_empty() {
                 div.share aria-hidden="true" {
                     @for (verdict, count) in counts { @if count > 0 {
                         span class={ "v-" (class(verdict)) } style={ "flex-grow:" (count) } {}
@@ -123,9 +121,23 @@ fn head(report: &Report) -> Markup {
             }
             dl.counts {
                 @for (verdict, count) in counts { @if count > 0 || verdict == Verdict::Pass || verdict == Verdict::Fail {
-                    div class={ "v-" (class(verdict)) } { dt { span.glyph aria-hidden="true" { (glyph(verdict)) } " " (verdict_name(verdict)) } dd { (count) } }
+                    div class={ "v-" (class(verdict)) } { dt { span.glyph aria-hidden="true" { (glyph(verdict)) } " " (verdict.name()) } dd { (count) } }
                 } }
-                div { dt { "not run" } dd { (s.skipped) } }
+                div { dt { "skipped" } dd { (s.skipped) } }
+            }
+        }
+    }
+}
+
+/// A table that scrolls by itself where the page is too narrow; a heading may have a class, as in `number run time`.
+fn table(label: &str, heads: &[&str], rows: &Markup) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="region" aria-label=(label) {
+            table {
+                thead { tr { @for head in heads {
+                    @if let Some(head) = head.strip_prefix("number ") { th.number scope="col" { (head) } } @else { th scope="col" { (head) } }
+                } } }
+                tbody { (rows) }
             }
         }
     }
@@ -153,39 +165,6 @@ fn glyph(verdict: Verdict) -> &'static str {
     }
 }
 
-fn verdict_name(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Pass => "passed",
-        Verdict::KnownDeviation => "known deviation",
-        Verdict::Inconclusive => "undecided",
-        Verdict::Fail => "failed",
-        Verdict::UnexpectedPass => "unexpected pass",
-        Verdict::Missing => "missing",
-    }
-}
-
-/// A procedure's name in the navigation.
-const fn short(procedure: ProcedureId) -> &'static str {
-    match procedure {
-        ProcedureId::LuminousIntensity => "Intensity",
-        ProcedureId::DirectIlluminance => "Direct",
-        ProcedureId::IndirectIlluminance => "Indirect",
-        ProcedureId::TotalIlluminance => "Total",
-    }
-}
-
-/// A procedure's name as a heading.
-fn title(procedure: ProcedureId) -> String {
-    let words = procedure.name().replace('_', " ");
-    let mut letters = words.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
-}
-
-fn plural(count: usize, noun: &str) -> String {
-    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
-}
-
-/// Seconds as people say them.
 fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 0.01 => "< 0.01 s".to_owned(),
@@ -197,7 +176,7 @@ fn duration(seconds: f64) -> String {
 
 /// A signed relative deviation with a real minus sign and powers of ten as people write them.
 fn percent(deviation: f64) -> String {
-    let text = super::terminal::percent(deviation);
+    let text = words::percent(deviation);
     match text.trim_end_matches(" %").split_once('e').map(|(m, e)| (m, e.parse())) {
         Some((mantissa, Ok(exponent))) => minus(&format!("{mantissa}·{} %", power(exponent))),
         _ => minus(&text),
@@ -217,7 +196,6 @@ fn minus(text: &str) -> String {
     result
 }
 
-/// A power of ten: 10⁻⁶.
 fn power(exponent: i32) -> String {
     let digits = ["⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"];
     let raised: String = exponent.abs().to_string().bytes().map(|b| digits[usize::from(b - b'0')]).collect();

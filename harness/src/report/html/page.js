@@ -2,7 +2,7 @@
 // Filters, sorts and opens what the page already holds; without it the page is still whole.
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
-  const [WORDS, METER, PLACE, VALUE, REFERENCE, DEVIATION, RELATIVE, ALLOWED, PARTS, UNIT, STRAIN, COLOUR,
+  const [WORDS, METER, PLACE, VALUE, REFERENCE, DEVIATION, RELATIVE, ALLOWED, PARTS, UNIT, NORMALIZED, COLOUR,
     COMBINED, EXPANDED, FACTOR, PROBABILITY] = Array(16).keys();
   const [CASE, ENGINE, BASIS, SOURCE, DIAGNOSIS, VERDICT] = Array(6).keys();
   const row = (tr) => data.rows[tr.dataset.row];
@@ -24,10 +24,10 @@
   name();
 
   // Tables of readings.
-  const severity = ["missing", "unexpected pass", "fail", "inconclusive", "known deviation", "pass"];
+  const severity = ["missing", "unexpected pass", "fail", "undecided", "known deviation", "pass"];
   const keys = {
     e: (r) => word(r, ENGINE), c: (r) => word(r, CASE), m: (r) => r[METER], v: (r) => r[VALUE], r: (r) => r[REFERENCE],
-    b: (r) => word(r, BASIS), d: (r) => r[RELATIVE], s: (r) => r[STRAIN], x: (r) => severity.indexOf(word(r, VERDICT)),
+    b: (r) => word(r, BASIS), d: (r) => r[RELATIVE], s: (r) => r[NORMALIZED], x: (r) => severity.indexOf(word(r, VERDICT)),
   };
   const order = (a, b) => {
     if (a == null || b == null) return (a == null) - (b == null);

@@ -3,6 +3,8 @@
 //! Colours after Okabe and Ito, "Color Universal Design" (2008), darkened on paper and lightened on black until text in them
 //! keeps a contrast of 4.5 to 1.
 
+use std::collections::BTreeSet;
+
 use maud::{Markup, html};
 
 use super::super::Report;
@@ -14,18 +16,16 @@ const SPARE: [(&str, &str); 3] = [("#a8457f", "#e294c3"), ("#5b4bb5", "#a89cf0")
 
 /// Colours on paper and on black: those of our own engines first, for good, so that two reports read alike.
 fn colours() -> impl Iterator<Item = (&'static str, &'static str)> {
-    engines::ALL.iter().map(|entry| entry.colour).chain(SPARE)
+    engines::ALL.into_iter().map(|entry| entry.colour).chain(SPARE)
 }
 
 const OWN: usize = engines::ALL.len();
 const COLOURS: usize = OWN + SPARE.len();
 
-/// Index of the colour of one of our own engines.
 fn fixed(engine: &str) -> Option<usize> {
     engines::ALL.iter().position(|entry| entry.name == *engine)
 }
 
-/// The engines of a report with their colours and marks.
 pub(super) struct Palette {
     engines: Vec<(EngineName, usize)>,
 }
@@ -51,11 +51,17 @@ impl Palette {
         found.or_else(|| fixed(engine)).unwrap_or(COLOURS - 1)
     }
 
+    /// Each once, in the report's order; those that are not in it come last, by name.
+    pub(super) fn sorted<'a>(&self, engines: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+        let mut engines = Vec::from_iter(engines.collect::<BTreeSet<_>>());
+        engines.sort_by_key(|e| self.order(e));
+        engines
+    }
+
     pub(super) fn order(&self, engine: &str) -> usize {
         self.engines.iter().position(|(id, _)| *id == *engine).unwrap_or(self.engines.len())
     }
 
-    /// The engine's mark at a place of a plot.
     pub(super) fn mark(&self, engine: &str, [x, y]: [f64; 2], radius: f64) -> Markup {
         let index = self.index(engine);
         html! { path class={ "mark e" (index) } d=(shape(index, x, y, radius)) {} }
@@ -70,7 +76,6 @@ impl Palette {
         }
     }
 
-    /// The engine's name behind its mark.
     pub(super) fn label(&self, engine: &str) -> Markup {
         let index = self.index(engine);
         html! {

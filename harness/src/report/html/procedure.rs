@@ -1,12 +1,16 @@
 //! One procedure: what it asks, plots where people would rather look, and every reading in a table that can be filtered.
 
+use std::collections::BTreeSet;
+
 use maud::{Markup, html};
 
-use super::super::{Report, paper};
+use super::super::matrix::sort_worst_first;
+use super::super::words::significant;
+use super::super::{Report, papers};
 use super::palette::Palette;
-use super::plot::{self, Group};
-use super::rows::{Rows, strain};
-use super::{class, glyph, minus, percent, title, verdict_name};
+use super::plot;
+use super::rows::{Rows, place};
+use super::{class, glyph, minus, percent};
 use crate::judge::{Comparison, Verdict};
 use crate::record::ProcedureId;
 
@@ -17,19 +21,15 @@ const MOST: usize = 3000;
 
 pub(super) fn section(report: &Report, procedure: ProcedureId, palette: &Palette, rows: &mut Rows) -> Markup {
     let mut mine: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.key.procedure == procedure).collect();
-    let groups: Vec<Group<'_>> = plot::groups(report, procedure);
-    let plots = plot::panels(report, &groups, palette);
-    let severity = |c: &Comparison| strain(c).map_or(f64::INFINITY, f64::abs);
-    mine.sort_by(|a, b| b.verdict.cmp(&a.verdict).then(severity(b).total_cmp(&severity(a))));
+    let plots = plot::panels(report, &plot::groups(report, procedure), palette);
+    sort_worst_first(&mut mine);
     let all = mine.len();
     mine.truncate(MOST);
     html! {
-        h2 id={ (procedure) "-title" } { (title(procedure)) }
-        p.lead { (meaning(procedure)) }
+        h2 id={ (procedure) "-title" } { (procedure.row().title) }
+        p.lead { (procedure.row().meaning) }
         @if !plots.is_empty() { div.panels { @for panel in plots { (panel) } } }
-        @for grid in paper::grids(report).iter().filter(|g| report.published.iter().any(|t| t.procedure == procedure && g.head[0].starts_with(&t.name))) {
-            (printed(grid))
-        }
+        @for table in report.published.iter().filter(|t| t.procedure == procedure) { (printed(&papers::grid(report, table))) }
         @if all == 0 {
             p { "Nothing was compared." }
         } @else {
@@ -45,7 +45,7 @@ fn table(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palette:
         h3 { "Readings" }
         div.readings data-procedure=(procedure) data-first=(FIRST) {
             (filters(report, procedure, mine, palette))
-            div.scroll tabindex="0" role="region" aria-label={ "Readings of " (title(procedure)) } {
+            div.scroll tabindex="0" role="region" aria-label={ "Readings of " (procedure.row().title) } {
                 table {
                     thead { tr {
                         (head("engine", "e", "")) @if suite { (head("case", "c", "")) } (head("meter", "m", "")) (head("reading", "v", "number")) (head("reference", "r", "number"))
@@ -69,8 +69,7 @@ fn head(name: &str, key: &str, class: &str) -> Markup {
 
 fn row(c: &Comparison, number: usize, hidden: bool, suite: bool, palette: &Palette) -> Markup {
     let unit = c.quantity.unit();
-    let value = |v: Option<f64>| v.map_or("–".to_owned(), super::super::terminal::significant);
-    let basis = c.reference.as_ref().map_or("none", |r| r.basis.name());
+    let value = |v: Option<f64>| v.map_or("–".to_owned(), significant);
     html! {
         tr data-row=(number) hidden[hidden] {
             td { (palette.label(&c.key.engine)) }
@@ -78,10 +77,10 @@ fn row(c: &Comparison, number: usize, hidden: bool, suite: bool, palette: &Palet
             td { (c.meter) " " span.place { (place(c)) } }
             td.number.c-v { (value(c.value)) " " span.unit { (unit) } }
             td.number.c-r { (value(c.reference.as_ref().map(|r| r.value))) " " span.unit { (unit) } }
-            td.c-b { (basis) }
+            td.c-b { (c.basis_name()) }
             td.number { (c.relative_deviation.map_or("–".to_owned(), percent)) }
             td.c-s { (bar(c)) }
-            td class={ "v-" (class(c.verdict)) } { span.glyph aria-hidden="true" { (glyph(c.verdict)) } " " span.word { (verdict_name(c.verdict)) } }
+            td class={ "v-" (class(c.verdict)) } { span.glyph aria-hidden="true" { (glyph(c.verdict)) } " " span.word { (c.verdict.name()) } }
             td { button.more type="button" aria-label={ "Error budget of " (c.key.engine) " at " (c.meter) } { "budget" } }
         }
     }
@@ -89,59 +88,41 @@ fn row(c: &Comparison, number: usize, hidden: bool, suite: bool, palette: &Palet
 
 /// How much of the tolerance a deviation takes, to either side.
 fn bar(c: &Comparison) -> Markup {
-    let Some(strain) = strain(c) else { return html! { "–" } };
-    let width = strain.abs().min(1.0) * 50.0;
-    let left = if strain < 0.0 { 50.0 - width } else { 50.0 };
-    let over = if strain.abs() > 1.0 { "over" } else { "" };
-    html! { span.strain role="img" aria-label={ (format!("{:.0}", 100.0 * strain)) " % of the tolerance" } { i class=(over) style=(format!("left:{left:.1}%;width:{width:.1}%")) {} } }
-}
-
-/// Where a reading was taken, in words.
-pub(super) fn place(c: &Comparison) -> String {
-    match c.gamma_deg.zip(c.c_deg) {
-        Some((gamma, plane)) => format!("C {} γ {}", short(plane), short(gamma)),
-        None => format!("({}, {}, {}) m", short(c.at_m[0]), short(c.at_m[1]), short(c.at_m[2])),
-    }
-}
-
-fn short(value: f64) -> String {
-    let text = format!("{value:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    let Some(error) = c.normalized_error() else { return html! { "–" } };
+    let width = error.abs().min(1.0) * 50.0;
+    let left = if error < 0.0 { 50.0 - width } else { 50.0 };
+    let over = if error.abs() > 1.0 { "over" } else { "" };
+    html! { span.of-tolerance role="img" aria-label={ (format!("{:.0}", 100.0 * error)) " % of the tolerance" } { i class=(over) style=(format!("left:{left:.1}%;width:{width:.1}%")) {} } }
 }
 
 fn filters(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palette: &Palette) -> Markup {
     let mut cases: Vec<&str> = mine.iter().map(|c| c.key.case.as_str()).collect();
     cases.sort_by_key(|case| report.cases.iter().position(|c| c.name == *case));
     cases.dedup();
-    let mut bases: Vec<&str> = mine.iter().map(|c| c.reference.as_ref().map_or("none", |r| r.basis.name())).collect();
-    bases.sort_unstable();
-    bases.dedup();
-    let mut verdicts: Vec<Verdict> = mine.iter().map(|c| c.verdict).collect();
-    verdicts.sort_unstable();
-    verdicts.dedup();
+    let bases: BTreeSet<&str> = mine.iter().map(|c| c.basis_name()).collect();
+    let verdicts: BTreeSet<Verdict> = mine.iter().map(|c| c.verdict).collect();
     let count = |v: Verdict| mine.iter().filter(|c| c.verdict == v).count();
     let choice = |name: &str, label: &str, options: Vec<(String, String)>| {
         html! { label { (label) " " select data-filter=(name) { option value="" { "all" } @for (value, text) in options { option value=(value) { (text) } } } } }
     };
     let plain = |words: Vec<&str>| words.into_iter().map(|w| (w.to_owned(), w.to_owned())).collect::<Vec<_>>();
     html! {
-        form.filters aria-label={ "Filter the readings of " (title(procedure)) } {
+        form.filters aria-label={ "Filter the readings of " (procedure.row().title) } {
             fieldset { legend { "Engines" }
                 @for engine in report.engines.iter().filter(|e| mine.iter().any(|c| c.key.engine == e.id)) {
                     label.chip { input type="checkbox" checked value=(engine.id) data-filter="engine"; (palette.label(&engine.id)) }
                 }
             }
             @if cases.len() > 1 { (choice("case", "Case", plain(cases))) }
-            @if bases.len() > 1 { (choice("basis", "Against", plain(bases))) }
-            (choice("verdict", "Verdict", verdicts.into_iter().map(|v| (v.name().to_owned(), format!("{} ({})", verdict_name(v), count(v)))).collect()))
+            @if bases.len() > 1 { (choice("basis", "Against", plain(bases.into_iter().collect()))) }
+            (choice("verdict", "Verdict", verdicts.into_iter().map(|v| (v.name().to_owned(), format!("{} ({})", v.name(), count(v)))).collect()))
             label { "Meter " input type="search" data-filter="meter" placeholder="name or place" size="14"; }
             button.reset type="reset" { "Reset" }
         }
     }
 }
 
-/// A paper's table with ours beside it.
-fn printed(grid: &paper::Grid) -> Markup {
+fn printed(grid: &papers::Grid) -> Markup {
     html! {
         details.printed { summary { (grid.head[0]) " of “" (grid.title) "”, with ours beside it" }
             div.scroll tabindex="0" role="region" aria-label=(grid.head[0]) {
@@ -155,16 +136,5 @@ fn printed(grid: &paper::Grid) -> Markup {
                 }
             }
         }
-    }
-}
-
-const fn meaning(procedure: ProcedureId) -> &'static str {
-    match procedure {
-        ProcedureId::LuminousIntensity => {
-            "The luminous intensity distribution read back from illuminance at a distance in free field, I = E d², over the curve of the photometric file."
-        }
-        ProcedureId::DirectIlluminance => "Illuminance straight from the luminaires, without any reflected light.",
-        ProcedureId::IndirectIlluminance => "Illuminance by light that was reflected at least once.",
-        ProcedureId::TotalIlluminance => "Direct and reflected light together.",
     }
 }

@@ -3,64 +3,52 @@
 use maud::{Markup, html};
 
 use super::super::Report;
+use super::super::words::plural;
 use super::palette::Palette;
-use super::{duration, title};
-use crate::record::Recording;
-use crate::record::Status;
+use super::{duration, table};
+use crate::record::{Recording, Status};
 
 pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
     html! {
         h2 id="provenance-title" { "Provenance" }
         p.lead { "To repeat the run, then one engine's part by hand:" }
         pre.commands tabindex="0" { code { (commands(report)) } }
-        div.scroll tabindex="0" role="region" aria-label="Engines" {
-            table {
-                thead { tr { th scope="col" { "engine" } th scope="col" { "version" } th scope="col" { "status" } th.number scope="col" { "run time" } } }
-                tbody {
-                    @for e in &report.engines {
-                        tr { th scope="row" { (palette.label(&e.id)) } td { (e.version.as_deref().unwrap_or("–")) }
-                            td.wide { (status(e.status)) @if let Some(reason) = &e.reason { ": " (reason) } } td.number { (duration(e.wall_s)) } }
-                    }
-                }
+        (table("Engines", &["engine", "version", "status", "number run time"], &html! {
+            @for e in &report.engines {
+                tr { th scope="row" { (palette.label(&e.id)) } td { (e.version.as_deref().unwrap_or("–")) }
+                    td.wide { (status(e.status)) @if let Some(reason) = &e.reason { ": " (reason) } } td.number { (duration(e.wall_s)) } }
             }
-        }
+        }))
         h3 { "Inputs" }
-        div.scroll tabindex="0" role="region" aria-label="Inputs" {
-            table {
-                thead { tr { th scope="col" { "case" } th scope="col" { "spec" } th scope="col" { "SHA-256 of the spec and all it names" } } }
-                tbody { @for c in &report.cases { tr { th scope="row" { (c.name) } td { code { (c.spec.path) } } td { code.hash { (c.spec.sha256) } } } } }
-            }
-        }
+        (table("Inputs", &["case", "spec", "SHA-256 of the spec and all it names"], &html! {
+            @for c in &report.cases { tr { th scope="row" { (c.name) } td { code { (c.spec.path) } } td { code.hash { (c.spec.sha256) } } } }
+        }))
         h3 { "Settings" }
         @for engine in &report.engines {
             @let mine: Vec<&Recording> = report.recordings.iter().filter(|r| r.key.engine == engine.id).collect();
             @if !mine.is_empty() {
-                details { summary { (palette.label(&engine.id)) " " span.quiet { (super::plural(mine.len(), "run")) } }
-                    div.scroll tabindex="0" role="region" aria-label={ "Settings of " (engine.id) } { (settings(&mine)) }
+                details { summary { (palette.label(&engine.id)) " " span.quiet { (plural(mine.len(), "run")) } }
+                    (settings(&format!("Settings of {}", engine.id), &mine))
                 }
             }
         }
     }
 }
 
-fn settings(recordings: &[&Recording]) -> Markup {
-    html! {
-        table.settings {
-            thead { tr { th scope="col" { "case" } th scope="col" { "procedure" } th scope="col" { "luminaire, light" } th.number scope="col" { "seed" }
-                th.number scope="col" { "run time" } th.number scope="col" { "instrument" } th scope="col" { "settings and command" } } }
-            tbody {
-                @for r in recordings {
-                    tr { th scope="row" { (r.key.case) } td { (title(r.key.procedure)) } td { (r.model) ", " (r.light) } td.number { (r.seed) }
-                        td.number { (duration(r.wall_s)) } td.number { (format!("{:.1e}", r.instrument_uncertainty)) }
-                        td.wide { dl {
-                            @for (key, value) in r.method.iter().chain(r.effort.iter()) { div { dt { (key.replace('_', " ")) } dd { code { (value) } } } }
-                            @if let Some(command) = &r.command { div { dt { "by hand" } dd { code { (command) } } } }
-                        } }
-                    }
-                }
+fn settings(label: &str, recordings: &[&Recording]) -> Markup {
+    let heads = ["case", "procedure", "luminaire, light", "number seed", "number run time", "number instrument"];
+    let rows = html! {
+        @for r in recordings {
+            tr { th scope="row" { (r.key.case) } td { (r.key.procedure.row().title) } td { (r.model) ", " (r.light) } td.number { (r.seed) }
+                td.number { (duration(r.wall_s)) } td.number { (format!("{:.1e}", r.instrument_uncertainty)) }
+                td.wide { dl.settings {
+                    @for (key, value) in r.method.iter().chain(r.effort.iter()) { div { dt { (key.replace('_', " ")) } dd { code { (value) } } } }
+                    @if let Some(command) = &r.command { div { dt { "by hand" } dd { code { (command) } } } }
+                } }
             }
         }
-    }
+    };
+    table(label, &[&heads[..], &["settings and command"]].concat(), &rows)
 }
 
 fn commands(report: &Report) -> String {
@@ -71,7 +59,7 @@ fn commands(report: &Report) -> String {
         let with_command = report.recordings.iter().find(|r| r.key.engine == engine && r.command.is_some());
         let Some((r, command)) = with_command.and_then(|r| r.command.as_ref().map(|c| (r, c))) else { continue };
         let path = report.cases.iter().find(|c| c.name == r.key.case).map_or(&report.spec.path, |c| &c.spec.path);
-        let case = if report.is_suite() { format!("{}/", r.key.case) } else { String::new() };
+        let case = report.of_suite(&r.key.case, "/");
         lines.push(format!(
             "luxproof export {path} --engine {engine} --out by-hand && cd by-hand/{case}{} && {command}",
             r.key.procedure
@@ -85,6 +73,6 @@ const fn status(status: Status) -> &'static str {
         Status::Ran => "ran",
         Status::Absent => "absent",
         Status::Failed => "failed",
-        Status::Skipped => "had nothing to do",
+        Status::Skipped => "skipped",
     }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
+use super::super::words::trimmed;
 use super::palette::Palette;
 use crate::judge::Comparison;
 
@@ -21,29 +22,22 @@ impl Rows {
         let components: Vec<Value> =
             components.map(|part| json!([self.word(part.source.name()), short(Some(part.uncertainty))])).collect();
         let source = c.reference.as_ref().map_or("", |r| r.source.as_str());
-        let basis = c.reference.as_ref().map_or("none", |r| r.basis.name());
-        let words = [
-            c.key.case.as_str(),
-            &c.key.engine,
-            basis,
-            source,
-            c.diagnosis.as_deref().unwrap_or_default(),
-            c.verdict.name(),
-        ]
-        .map(|w| self.word(w));
+        let diagnosis = c.diagnosis.as_deref().unwrap_or_default();
+        let words = [&*c.key.case, &*c.key.engine, c.basis_name(), source, diagnosis, c.verdict.name()];
+        let words = words.map(|w| self.word(w));
         let budget = c.budget.as_ref();
         let row = json!([
             words,
             c.meter.0,
-            super::procedure::place(c),
+            place(c),
             short(c.value),
             short(c.reference.as_ref().map(|r| r.value)),
             short(c.deviation),
             short(c.relative_deviation),
-            short(Some(c.tolerance.around(c.reference.as_ref().map_or(0.0, |r| r.value)))),
+            short(Some(c.allowed())),
             components,
             c.quantity.unit(),
-            short(strain(c)),
+            short(c.normalized_error()),
             palette.index(&c.key.engine),
             short(budget.map(|b| b.combined)),
             short(budget.map(|b| b.expanded)),
@@ -71,14 +65,13 @@ impl Rows {
 
 /// Seven significant digits: what a page shows; all of them are in report.json.
 fn short(value: Option<f64>) -> Value {
-    value
-        .filter(|v| v.is_finite())
-        .and_then(|v| format!("{v:.6e}").parse::<f64>().ok())
-        .map_or(Value::Null, |v| json!(v))
+    json!(value.filter(|v| v.is_finite()).and_then(|v| format!("{v:.6e}").parse::<f64>().ok()))
 }
 
-/// The deviation over what is allowed; `None` where either is missing or nothing is allowed.
-pub(super) fn strain(c: &Comparison) -> Option<f64> {
-    let allowed = c.tolerance.around(c.reference.as_ref()?.value);
-    c.deviation.map(|d| d / allowed).filter(|s| s.is_finite())
+pub(super) fn place(c: &Comparison) -> String {
+    let number = |value| trimmed(value, 3);
+    match c.gamma_deg.zip(c.c_deg) {
+        Some((gamma, plane)) => format!("C {} γ {}", number(plane), number(gamma)),
+        None => format!("({}) m", c.at_m.map(number).join(", ")),
+    }
 }

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::*;
+use crate::record::ProcedureId;
 
 const ENGINES: [&str; 5] = ["simulator", "iesna", "mitsuba", "radiance", "povray"];
 
@@ -94,7 +95,7 @@ fn stress_and_bench_show_beside_the_report_and_anything_else_is_refused() {
     let stress = r#"{"laws": [{"engine": "mitsuba", "law": "scale", "worst_deviation": 0.02, "breaks_at": {"0.001": 1e5, "0.1": null}, "how": "drift"},
         {"engine": "povray", "law": "scale", "worst_deviation": 1.0, "breaks_at": {"0.1": 1e6}, "how": "silent_loss", "known": ["32-bit floats"]},
         {"engine": "radiance", "law": "scale", "refused_at": 1e4}]}"#;
-    let bench = r#"{"curves": [{"engine": "radiance", "procedure": ProcedureId::DirectIlluminance, "solver": null, "preset": "fast",
+    let bench = r#"{"curves": [{"engine": "radiance", "procedure": "direct_illuminance", "solver": null, "preset": "fast",
         "points": [{"effort": 1, "wall_s": 0.1, "relative_error": 0.01}, {"effort": 2, "wall_s": 1.0, "relative_error": 0.003}], "time_to": {}}]}"#;
     let beside: Vec<Beside> = [stress, bench].map(|text| Beside::from_json(text).unwrap()).into();
     let page = page(&report(&[ProcedureId::DirectIlluminance], "room", "a room"), &beside);

@@ -68,7 +68,6 @@ pub(super) fn plain(x: f64) -> f64 {
     if x.abs() < 1e-15 { 0.0 } else { x }
 }
 
-/// Corners of the box that holds everything, in metres.
 fn bounds_m(job: &Job) -> Option<(DVec3, DVec3)> {
     let scene = &job.scene;
     let room = scene.room.iter().flat_map(|r| [DVec3::ZERO, r.size_m]);

@@ -140,14 +140,13 @@ fn filtered_point(job: &Job, luminaire: &Luminaire, table: usize, frame: &Frame)
 }
 
 fn meters(job: &Job, settings: &Settings, frame: &Frame) -> String {
-    // Mitsuba's own film keeps 16 bits.
-    let component = match settings.preset {
-        Preset::Default => "",
-        Preset::Audit | Preset::Fast => "\n            <string name=\"component_format\" value=\"float32\"/>",
-    };
-    let samples = match settings.preset {
-        Preset::Default => "",
-        Preset::Audit | Preset::Fast => " <integer name=\"sample_count\" value=\"256\"/> ",
+    let (component, samples) = match settings.preset {
+        // Mitsuba's own film keeps 16 bits.
+        Preset::Default => ("", ""),
+        Preset::Audit | Preset::Fast => (
+            "\n            <string name=\"component_format\" value=\"float32\"/>",
+            " <integer name=\"sample_count\" value=\"256\"/> ",
+        ),
     };
     let size = size_m(job) * frame.scale;
     let meter = |s: &Station| {
@@ -173,7 +172,6 @@ fn meters(job: &Job, settings: &Settings, frame: &Frame) -> String {
     )
 }
 
-/// A white patch and an eye in front of it.
 fn patch_and_eye(station: &Station, frame: &Frame, size: f64) -> (String, String) {
     let (at, normal) = (frame.to_scene(station.meter.position_m), station.meter.normal);
     let radius = PATCH * size;

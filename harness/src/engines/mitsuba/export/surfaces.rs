@@ -8,7 +8,6 @@ use super::frame::{Frame, plain};
 use super::header;
 use crate::engines::{Job, SceneFile};
 
-/// The surfaces as a scene file that others include.
 pub(super) fn room_xml(job: &Job, frame: &Frame) -> String {
     let mut xml = header(job, "The surfaces, included by the other files.");
     xml += &frame.comment();
@@ -27,7 +26,6 @@ pub(super) fn room_xml(job: &Job, frame: &Frame) -> String {
     xml + "</scene>\n"
 }
 
-/// The meshes of the obstacles, one file each.
 pub(super) fn meshes(job: &Job, frame: &Frame) -> Vec<SceneFile> {
     let obstacles = job.scene.obstacles.iter().enumerate();
     let mesh = |(k, obstacle): (usize, &luminaire::scene::Obstacle)| match &obstacle.shape {
@@ -122,7 +120,6 @@ fn diffuse(reflectance: f64) -> String {
     format!(r#"<bsdf type="diffuse"> <rgb name="reflectance" value="{reflectance}"/> </bsdf>"#)
 }
 
-/// A vector as Mitsuba reads it.
 pub(super) fn list(v: DVec3) -> String {
     format!("{}, {}, {}", plain(v.x), plain(v.y), plain(v.z))
 }

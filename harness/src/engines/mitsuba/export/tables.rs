@@ -20,7 +20,6 @@ struct TableFile<'a> {
 }
 
 impl<'a> Tables<'a> {
-    /// The distributions of a job's luminaires.
     pub(super) fn of(job: &'a Job) -> Self {
         let mut tables = Self { distinct: vec![], of_luminaire: vec![] };
         for luminaire in &job.scene.luminaires {
@@ -34,7 +33,6 @@ impl<'a> Tables<'a> {
         tables
     }
 
-    /// The distributions, each once.
     pub(super) fn distinct(&self) -> impl Iterator<Item = &'a LuminousIntensityDistribution> {
         self.distinct.iter().copied()
     }
@@ -49,7 +47,6 @@ impl<'a> Tables<'a> {
         self.of_luminaire.iter().map(|k| name(*k))
     }
 
-    /// The tables over the full circle of C.
     pub(super) fn files(&self) -> Result<Vec<SceneFile>, EngineError> {
         let file = |(k, distribution): (usize, &&LuminousIntensityDistribution)| {
             let full = distribution.full_circle();

@@ -1,8 +1,5 @@
 //! Every way in which a renderer fails, played by a false interpreter, ends in an error that says so.
 
-use std::os::unix::fs::PermissionsExt;
-use std::time::Duration;
-
 use super::*;
 use crate::system::process::ProcessError;
 
@@ -10,17 +7,11 @@ use crate::system::process::ProcessError;
 fn read_with(script: &str, limit_s: f64) -> EngineError {
     let folder = tempfile::tempdir().unwrap();
     let site = Site::at(folder.path().join("site"));
-    let (bin, package) = (site.venv().join("bin"), site.venv().join("lib/python3/site-packages/mitsuba"));
-    std::fs::create_dir_all(&bin).unwrap();
-    std::fs::create_dir_all(&package).unwrap();
+    std::fs::create_dir_all(site.venv().join("lib/python3/site-packages/mitsuba")).unwrap();
     let probe = r#"echo '{"mitsuba": "3.9.1", "drjit": "1.5.0", "llvm": null}'"#;
-    let text = format!("#!/bin/sh\nif [ \"$1\" = - ]; then cat > /dev/null; {probe}; exit 0; fi\n{script}\n");
-    // Written under another name: a script that another thread's child still holds open cannot be run.
-    let draft = bin.join("draft");
-    std::fs::write(&draft, text).unwrap();
-    std::fs::set_permissions(&draft, std::fs::Permissions::from_mode(0o755)).unwrap();
-    std::fs::rename(draft, bin.join("python")).unwrap();
-    let bench = Workbench { site, limit: Duration::from_secs_f64(limit_s), ..workbench(folder.path()) };
+    let script = format!("if [ \"$1\" = - ]; then cat > /dev/null; {probe}; exit 0; fi\n{script}");
+    write_program(&site.venv().join("bin/python"), &script);
+    let bench = Workbench { limit: Duration::from_secs_f64(limit_s), ..workbench(site, folder.path()) };
     Mitsuba::default().read(&s1(Transport::Direct), &bench).unwrap_err()
 }
 
@@ -71,7 +62,7 @@ fn answers_that_are_no_readings_are_errors() {
 fn without_llvm_the_scalar_variant_runs_and_the_report_says_so() {
     let engine = Mitsuba::default();
     let folder = tempfile::tempdir().unwrap();
-    let bench = workbench(folder.path());
+    let bench = workbench(Site::of_user().unwrap(), folder.path());
     *engine.backend.lock().unwrap() = Some(Backend::find(&bench.site).unwrap().without_llvm());
     let job = s1(Transport::Direct);
     let found = engine.read(&job, &bench).unwrap();

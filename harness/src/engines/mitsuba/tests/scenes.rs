@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use luminaire::photometry::{HorizontalAxis, LuminousOpening, Photometry};
-use luminaire::simulator::{Accuracy, illuminance};
 
 use super::*;
+use crate::engines::fixtures;
 
 /// An opening that sends out `distribution`.
 fn area(at_m: DVec3, distribution: LuminousIntensityDistribution, opening: LuminousOpening) -> Luminaire {
@@ -32,10 +32,7 @@ fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
         let far = goniometer(&lamp, 300.0, angles.0, angles.1);
         let mut both = goniometer(&lamp, 0.8, angles.0, angles.1);
         // Close by, the simulator's own sampling of the same opening is the witness.
-        let meters: Vec<_> = both.stations.iter().map(|s| s.meter).collect();
-        let accuracy = Accuracy { relative_error: 3e-3, seed: 1 };
-        let solution = illuminance(&both.scene, &meters, Transport::Direct, &accuracy).unwrap();
-        let near: Vec<_> = solution.estimates.iter().map(|e| e.illuminance.value()).collect();
+        let near = simulated_lx(&both, 3e-3);
         let as_points = exact_direct_lx(&both);
         let off = |(point, near): (&f64, &f64)| (point / near - 1.0).abs();
         assert!(as_points.iter().zip(&near).map(off).fold(0.0, f64::max) > 0.02, "{opening:?}");
@@ -47,43 +44,28 @@ fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
     }
 }
 
-/// Case S2: four Lambertian panels flush with the ceiling over three boxes. An opening has no body, so that plates of
-/// half a millimetre stand for the panels' black backs.
+/// An opening has no body, so that plates of half a millimetre stand for the panels' black backs.
 fn s2(transport: Transport) -> Job {
     let lambertian: Vec<f64> = (0..=90).map(|g| 1000.0 * f64::from(g).to_radians().cos().max(0.0)).collect();
     let downlight = LuminousIntensityDistribution::axial((0..=90).map(f64::from).collect(), lambertian).unwrap();
     let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
     let panel = |[x, y]: [f64; 2]| area(DVec3::new(x, y, 2.9994), downlight.clone(), opening);
-    let cuboid = |min: [f64; 3], max: [f64; 3], reflectance| {
-        let (min_m, max_m) = (DVec3::from_array(min), DVec3::from_array(max));
-        Obstacle { shape: Shape::Box { min_m, max_m }, reflectance }
-    };
-    let centres = [[2.0, 1.5], [6.0, 1.5], [2.0, 4.5], [6.0, 4.5]];
     let back = |[x, y]: [f64; 2]| cuboid([x - 0.3, y - 0.3, 2.9995], [x + 0.3, y + 0.3, 3.0], 0.0);
-    let boxes =
-        [([1.0, 1.0, 0.0], [2.6, 1.8, 0.75]), ([4.5, 3.5, 0.0], [6.1, 4.3, 0.75]), ([5.5, 0.5, 0.0], [7.5, 1.5, 2.2])];
-    let scene = Scene {
-        room: Some(room(DVec3::new(8.0, 6.0, 3.0), 0.2, 0.5, 0.8)),
-        obstacles: boxes.map(|(min, max)| cuboid(min, max, 0.5)).into_iter().chain(centres.map(back)).collect(),
-        luminaires: centres.map(panel).to_vec(),
-    };
-    let points = [[0.25, 0.25], [1.75, 1.25], [3.75, 2.75], [4.25, 0.75], [5.25, 3.75], [7.25, 0.25]];
-    let mut job = job(scene, stations(&points.map(|[x, y]| [x, y, 0.8]), DVec3::Z), transport);
+    let mut job = fixtures::s2(S2_PANELS_M.map(panel).to_vec(), transport);
+    job.scene.obstacles.extend(S2_PANELS_M.map(back));
     job.budget.relative_error = 4e-3;
     job
 }
 
 #[test]
 fn panels_over_furniture_give_the_exact_light() {
-    const DIRECT_LX: [f64; 5] = [66.24407, 226.03927, 161.02976, 123.15923, 210.12365];
-    const INDIRECT_LX: [f64; 6] = [51.0232, 53.0644, 48.966, 53.512, 50.245, 18.788];
     let direct = read(&s2(Transport::Direct));
-    let deviations = relative_deviations(&direct, &DIRECT_LX);
+    let deviations = relative_deviations(&direct, &S2_DIRECT_LX);
     assert!(worst(&deviations) < 1e-2, "{deviations:?}");
     assert_eq!(direct.estimates[5].value, 0.0);
     let indirect = read(&s2(CONVERGED));
-    let deviations = relative_deviations(&indirect, &INDIRECT_LX);
-    assert!(worst(&deviations) < 2e-2 && worst_z(&indirect, &INDIRECT_LX) < 4.5, "{indirect:?} {deviations:?}");
+    let deviations = relative_deviations(&indirect, &S2_INDIRECT_LX);
+    assert!(worst(&deviations) < 2e-2 && worst_z(&indirect, &S2_INDIRECT_LX) < 4.5, "{indirect:?} {deviations:?}");
 }
 
 #[test]
@@ -148,12 +130,9 @@ fn the_stock_scene_reads_the_same_light_within_its_own_errors() {
     assert!(worst_z(&indirect, &S1_INDIRECT_LX) < 6.0, "{indirect:?}");
     assert!(worst(&relative_deviations(&indirect, &S1_INDIRECT_LX)) < 0.08, "{indirect:?}");
 
-    // Turned, lopsided and dimmed, so that an image upside down or mirrored shows.
-    let mut lamp = luminaire("turned", DVec3::new(1.0, 2.0, 3.0), lopsided());
-    lamp.orientation = orientation(30.0, 20.0, 10.0);
-    lamp.flux_scale = 0.7;
+    // An image upside down or mirrored would show.
     let angles = [20.0, 90.0, 200.0, 310.0];
-    let goniometer = goniometer(&lamp, 5.0, &angles, &[0.0, 30.0, 85.0, 120.0, 160.0]);
+    let goniometer = goniometer(&turned(lopsided()), 5.0, &angles, &[0.0, 30.0, 85.0, 120.0, 160.0]);
     let exact = exact_direct_lx(&goniometer);
     let found = read(&with_preset(goniometer, "default"));
     assert!(worst(&relative_deviations(&found, &exact)) < 3e-3, "{found:?} for {exact:?}");

@@ -94,7 +94,6 @@ fn largest_section_m2(luminaire: &Luminaire) -> f64 {
     (size[0] * size[1]).max(size[1] * size[2]).max(size[2] * size[0])
 }
 
-/// The sources in `scene.rad`.
 pub(super) fn rad(job: &Job, settings: &Settings, scale: f64) -> String {
     let mut text = String::new();
     for (k, l) in job.scene.luminaires.iter().enumerate() {
@@ -119,7 +118,6 @@ pub(super) fn files(job: &Job, settings: &Settings) -> Vec<SceneFile> {
     job.scene.luminaires.iter().enumerate().map(file).collect()
 }
 
-/// What run.sh does before oconv.
 pub(super) fn commands(job: &Job, settings: &Settings) -> String {
     let mut text = String::new();
     for (k, l) in job.scene.luminaires.iter().enumerate() {
@@ -161,7 +159,6 @@ fn point(k: usize, luminaire: &Luminaire, radius: f64, scale: f64) -> String {
     text
 }
 
-/// The luminous opening in its place, every part with its share of the intensity.
 fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
     let mut text = format!("\n# Luminaire {}: its luminous opening; its table is in candela.\n", luminaire.id);
     let body = Body { k, luminaire, scale };
@@ -206,7 +203,6 @@ fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
     text
 }
 
-/// Places parts of a luminaire in the scene.
 struct Body<'a> {
     k: usize,
     luminaire: &'a Luminaire,

@@ -1,5 +1,7 @@
 //! Axes: round ticks, and a scale for deviations that is straight near zero and logarithmic beyond.
 
+use crate::report::words::trimmed;
+
 /// Round values from `low` to `high`, about `count` of them.
 pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     let step = round_step((high - low) / count.max(1) as f64);
@@ -16,12 +18,9 @@ pub(super) fn round_step(raw: f64) -> f64 {
     [1.0, 2.0, 2.5, 5.0, 10.0].map(|d| d * decade).into_iter().find(|s| *s >= raw * 0.999).unwrap_or(10.0 * decade)
 }
 
-/// A tick's label without the noise of binary fractions.
 pub(super) fn label(value: f64) -> String {
     let decimals = (3.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
-    let text = format!("{value:.decimals$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    if text == "-0" { "0".to_owned() } else { text.replace('-', "−") }
+    trimmed(value, decimals).replace('-', "−")
 }
 
 /// Relative deviations, in per cent, on a line: straight up to 0.01 %, logarithmic beyond.
@@ -50,7 +49,6 @@ impl Deviations {
         self.left + 0.5 * self.width * (1.0 + part)
     }
 
-    /// Zero and the decades to either side.
     pub(super) fn ticks(&self) -> Vec<f64> {
         let decades = [0.1, 1.0, 10.0, 100.0].into_iter().filter(|d| *d <= self.most);
         let mut ticks: Vec<f64> = decades.flat_map(|d| [-d, d]).chain([0.0]).collect();

@@ -10,12 +10,11 @@ pub(super) fn contour(values: &[f64], counts: [usize; 2], level: f64) -> Vec<Seg
     for j in 0..counts[1].saturating_sub(1) {
         for i in 0..counts[0].saturating_sub(1) {
             let corners = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
-            let crossings: Vec<[f64; 2]> = (0..4)
-                .filter_map(|k| {
-                    let (a, b) = (corners[k], corners[(k + 1) % 4]);
-                    crossing(a, b, at(a[0], a[1]), at(b[0], b[1]), level)
-                })
-                .collect();
+            let on_side = |k: usize| {
+                let (a, b) = (corners[k], corners[(k + 1) % 4]);
+                crossing(a, b, at(a[0], a[1]), at(b[0], b[1]), level)
+            };
+            let crossings: Vec<[f64; 2]> = (0..4).filter_map(on_side).collect();
             match crossings[..] {
                 [a, b] => segments.push([a, b]),
                 // A saddle: the mean of the corners tells which sides belong together.
@@ -32,7 +31,6 @@ pub(super) fn contour(values: &[f64], counts: [usize; 2], level: f64) -> Vec<Seg
     segments
 }
 
-/// Where the level is crossed between two neighbours, if it is.
 fn crossing(a: [usize; 2], b: [usize; 2], value_a: f64, value_b: f64, level: f64) -> Option<[f64; 2]> {
     if (value_a >= level) == (value_b >= level) {
         return None;

@@ -1,13 +1,17 @@
 //! Grids of meters: isolux lines over false colours of the reference, and a map of every engine's deviation.
 
+use std::collections::BTreeSet;
+
 use maud::{Markup, html};
 
 use super::super::palette::Palette;
+use super::super::percent;
 use super::axis::{label, round_step, ticks};
 use super::contour::contour;
 use super::{Group, WIDTH, colours, figure, line, number, text};
 use crate::judge::Comparison;
 use crate::report::Report;
+use crate::report::words::{largest, significant as six_digits};
 
 const LEFT: f64 = 44.0;
 const RIGHT: f64 = 10.0;
@@ -16,21 +20,12 @@ const BAR: f64 = 52.0;
 /// Fewer meters to a side than this are no map.
 const LEAST: usize = 3;
 
-/// Isolux panel and deviation maps of every grid of a group.
 pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette) -> Vec<Markup> {
     let Some(basis) = group.basis() else { return vec![] };
-    let firm: Vec<&Comparison> = group
-        .comparisons
-        .iter()
-        .copied()
-        .filter(|c| c.gamma_deg.is_none() && c.reference.as_ref().is_some_and(|r| r.basis == basis))
-        .collect();
-    let mut sets: Vec<&str> = firm.iter().map(|c| set(c)).collect();
-    sets.dedup();
-    sets.sort_unstable();
-    sets.dedup();
+    let firm: Vec<&Comparison> =
+        group.comparisons.iter().copied().filter(|c| c.gamma_deg.is_none() && c.basis() == Some(basis)).collect();
     let mut panels = vec![];
-    for name in sets {
+    for name in firm.iter().map(|c| set(c)).collect::<BTreeSet<&str>>() {
         let of_set = |engine: &str| {
             let mut mine: Vec<&Comparison> =
                 firm.iter().copied().filter(|c| set(c) == name && c.key.engine == engine).collect();
@@ -64,7 +59,6 @@ fn index(c: &Comparison) -> usize {
 /// A regular grid of meters, read off their places: origin + i u + j v, i fastest.
 struct Lattice {
     counts: [usize; 2],
-    /// Lengths of the steps in metres.
     step_m: [f64; 2],
     /// First coordinate along each axis, and the axis' name.
     axes: [(f64, String); 2],
@@ -95,8 +89,7 @@ impl Lattice {
 
     fn frame(&self) -> Frame {
         let cells = [0, 1].map(|k| self.counts[k] as f64 * self.step_m[k]);
-        let width = WIDTH - LEFT - RIGHT;
-        let scale = (width / cells[0]).min(300.0 / cells[1]);
+        let scale = ((WIDTH - LEFT - RIGHT) / cells[0]).min(300.0 / cells[1]);
         Frame { cell: [self.step_m[0] * scale, self.step_m[1] * scale], size: [cells[0] * scale, cells[1] * scale] }
     }
 }
@@ -128,7 +121,7 @@ fn isolux(title: &str, mine: &[&Comparison], lattice: &Lattice) -> Markup {
     let levels: Vec<f64> = ticks(low, high, 6).into_iter().filter(|l| *l > low && *l < high).collect();
     let unit = mine[0].quantity.unit();
     let drawing = html! {
-        (cells(mine, lattice, &frame, |k| colours::amount(part(values[k])), |k| format!("{} {unit}", super::super::super::terminal::significant(values[k]))))
+        (cells(mine, lattice, &frame, |k| colours::amount(part(values[k])), |k| format!("{} {unit}", six_digits(values[k]))))
         @for level in &levels { (isoline(&values, lattice, &frame, *level)) }
         (coordinates(lattice, &frame))
         (colour_bar(&frame, colours::amount, &[(0.0, label(significant(low))), (1.0, label(significant(high)))], &format!("illuminance [{unit}]")))
@@ -170,19 +163,20 @@ fn isoline(values: &[f64], lattice: &Lattice, frame: &Frame, level: f64) -> Mark
 
 fn map(title: &str, mine: &[&Comparison], lattice: &Lattice, most: f64) -> Markup {
     let frame = lattice.frame();
-    let percent = |k: usize| mine[k].relative_deviation.map(|d| 100.0 * d);
-    let colour = |k: usize| percent(k).map_or("none".to_owned(), |p| colours::deviation(p / most));
-    let words = |k: usize| mine[k].relative_deviation.map_or("no reading".to_owned(), super::super::percent);
-    let inside: Vec<f64> = (0..mine.len()).filter_map(percent).collect();
+    let in_percent = |k: usize| mine[k].relative_deviation.map(|d| 100.0 * d);
+    let colour = |k: usize| in_percent(k).map_or("none".to_owned(), |p| colours::deviation(p / most));
+    let words = |k: usize| mine[k].relative_deviation.map_or("no reading".to_owned(), percent);
+    let inside: Vec<f64> = (0..mine.len()).filter_map(in_percent).collect();
     let mean = inside.iter().sum::<f64>() / inside.len().max(1) as f64;
-    let worst = inside.iter().copied().fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+    let worst = largest(inside.iter().copied()).unwrap_or(0.0);
     let ends = [(0.0, format!("−{}", label(most))), (0.5, "0".to_owned()), (1.0, format!("+{}", label(most)))];
     let drawing = html! {
         (cells(mine, lattice, &frame, colour, words))
         (coordinates(lattice, &frame))
         (colour_bar(&frame, |t| colours::deviation(2.0 * t - 1.0), &ends, "deviation from the reference [%]"))
     };
-    let caption = html! { "Mean " (super::super::percent(mean / 100.0)) ", worst " (super::super::percent(worst / 100.0)) "; one scale for all engines." };
+    let caption =
+        html! { "Mean " (percent(mean / 100.0)) ", worst " (percent(worst / 100.0)) "; one scale for all engines." };
     figure(title, frame.size[1] + 46.0 + BAR, &drawing, &caption)
 }
 

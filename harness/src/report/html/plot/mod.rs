@@ -11,6 +11,7 @@ pub(super) mod times;
 use maud::{Markup, html};
 
 use super::super::Report;
+use super::super::words::trimmed;
 use super::palette::Palette;
 use crate::judge::{Basis, Comparison};
 use crate::record::ProcedureId;
@@ -20,7 +21,6 @@ pub(super) const WIDTH: f64 = 350.0;
 /// More cases than this a procedure are left to the table.
 const MOST_CASES: usize = 9;
 
-/// The comparisons of one case in one procedure.
 pub(super) struct Group<'a> {
     pub(super) case: &'a str,
     pub(super) procedure: ProcedureId,
@@ -30,15 +30,12 @@ pub(super) struct Group<'a> {
 /// One group a case, in the cases' order, those without comparisons left out.
 pub(super) fn groups<'a>(report: &'a Report, procedure: ProcedureId) -> Vec<Group<'a>> {
     let of_case = |case: &'a str| {
-        let mine = |c: &&Comparison| c.key.case == case && c.key.procedure == procedure;
-        let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(mine).collect();
-        let procedure = comparisons.first()?.key.procedure;
-        Some(Group { case, procedure, comparisons })
+        let comparisons = report.comparisons.iter().filter(|c| c.key.is_of(case, procedure)).collect();
+        Group { case, procedure, comparisons }
     };
-    report.cases.iter().filter_map(|c| of_case(&c.name)).collect()
+    report.cases.iter().map(|c| of_case(&c.name)).filter(|g| !g.comparisons.is_empty()).collect()
 }
 
-/// The panels of a procedure.
 pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -> Vec<Markup> {
     let mut shown: Vec<&Group<'_>> = groups.iter().collect();
     if shown.len() > MOST_CASES {
@@ -58,27 +55,21 @@ pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -
 }
 
 impl Group<'_> {
-    /// The engines of the group in the report's order.
     fn engines(&self, palette: &Palette) -> Vec<&str> {
-        let mut engines: Vec<&str> = self.comparisons.iter().map(|c| c.key.engine.as_str()).collect();
-        engines.sort_unstable();
-        engines.dedup();
-        engines.sort_by_key(|e| palette.order(e));
-        engines
+        palette.sorted(self.comparisons.iter().map(|c| c.key.engine.as_str()))
     }
 
     /// The firmest basis: what the group is drawn against.
     fn basis(&self) -> Option<Basis> {
-        self.comparisons.iter().filter_map(|c| c.reference.as_ref().map(|r| r.basis)).min()
+        self.comparisons.iter().filter_map(|c| c.basis()).min()
     }
 
     /// The panel's title: the case where there are several.
     fn title(&self, report: &Report, what: &str) -> String {
-        if report.is_suite() { format!("{}: {what}", self.case) } else { what.to_owned() }
+        format!("{}{what}", report.of_suite(self.case, ": "))
     }
 }
 
-/// A panel: a title, the drawing with its description, what to read from it.
 fn figure(title: &str, height: f64, drawing: &Markup, caption: &Markup) -> Markup {
     html! {
         figure {
@@ -89,23 +80,18 @@ fn figure(title: &str, height: f64, drawing: &Markup, caption: &Markup) -> Marku
     }
 }
 
-/// Text in a drawing.
 fn text(class: &str, anchor: &str, [x, y]: [f64; 2], words: &str) -> Markup {
     html! { text class=(class) text-anchor=(anchor) x=(number(x)) y=(number(y)) { (words) } }
 }
 
-/// A straight line in a drawing.
 fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Markup {
     html! { path class=(class) d={ "M" (number(x1)) " " (number(y1)) "L" (number(x2)) " " (number(y2)) } {} }
 }
 
-/// A coordinate without needless digits.
 fn number(value: f64) -> String {
-    let text = format!("{value:.1}");
-    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+    trimmed(value, 1)
 }
 
-/// The engines of a plot, each behind its mark.
 fn legend(engines: &[&str], palette: &Palette) -> Markup {
     html! { span.keys { @for engine in engines { (palette.label(engine)) " " } } }
 }

@@ -2,6 +2,8 @@
 //!
 //! As in EN 13032-2: nadir down, C 0 and C 90 to the right, C 180 and C 270 to the left.
 
+use std::collections::BTreeSet;
+
 use maud::{Markup, html};
 
 use super::super::palette::Palette;
@@ -48,11 +50,8 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Op
             }
         }
     };
-    let across = if plane(first + 90.0).is_some() {
-        format!(", dashed: C {}–{}", label(first + 90.0), label(first + 270.0))
-    } else {
-        String::new()
-    };
+    let across = plane(first + 90.0)
+        .map_or(String::new(), |_| format!(", dashed: C {}–{}", label(first + 90.0), label(first + 270.0)));
     let caption = html! {
         "Line: the photometric file, C " (label(first)) "–" (label(first + 180.0)) (across) "; marks: read back by " (legend(&engines, palette)) ". Rings in candela."
     };
@@ -65,15 +64,8 @@ fn readings<'a>(group: &'a Group<'_>, engine: &str, first: f64) -> Vec<&'a Compa
         let off = |plane: f64| (plane - first).rem_euclid(90.0).min((first - plane).rem_euclid(90.0));
         c.key.engine == engine && c.c_deg.is_some_and(|plane| off(plane) < 1e-6)
     };
-    let mut seen: Vec<&str> = vec![];
-    let mut readings = vec![];
-    for c in group.comparisons.iter().copied().filter(in_planes) {
-        if !seen.contains(&c.meter.0.as_str()) {
-            seen.push(&c.meter.0);
-            readings.push(c);
-        }
-    }
-    readings
+    let mut seen = BTreeSet::new();
+    group.comparisons.iter().copied().filter(in_planes).filter(|c| seen.insert(c.meter.0.as_str())).collect()
 }
 
 struct Scale {
@@ -95,7 +87,6 @@ impl Scale {
     }
 }
 
-/// Rings with their values and rays with their angles.
 fn rays(scale: &Scale, [up, down]: [bool; 2], step: f64, rings: u32) -> Markup {
     let [x, y] = scale.centre;
     let ring = |k: u32| {

@@ -1,5 +1,7 @@
 //! Deviations of every meter on one line an engine, over the tolerance: what agrees and what departs at a glance.
 
+use std::collections::BTreeSet;
+
 use maud::{Markup, html};
 
 use super::super::palette::Palette;
@@ -15,24 +17,17 @@ const HEAD: f64 = 22.0;
 pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Markup {
     let with_deviation: Vec<&Comparison> =
         group.comparisons.iter().copied().filter(|c| c.relative_deviation.is_some()).collect();
-    let allowed = |c: &Comparison| c.reference.as_ref().map_or(0.0, |r| 100.0 * c.tolerance.around(r.value) / r.value);
-    let tolerances = with_deviation.iter().map(|c| allowed(c)).filter(|a| a.is_finite() && *a < 100.0);
+    let tolerances = with_deviation.iter().filter_map(|c| allowed_percent(c)).filter(|a| *a < 100.0);
     let most = with_deviation.iter().filter_map(|c| c.relative_deviation).map(|d| 100.0 * d.abs()).chain(tolerances);
     let scale = Deviations::new(most.fold(0.1, f64::max), LEFT, WIDTH - LEFT - 12.0);
-    let mut bases: Vec<Basis> = with_deviation.iter().filter_map(|c| c.reference.as_ref().map(|r| r.basis)).collect();
-    bases.sort_unstable();
-    bases.dedup();
     let mut y = 4.0;
     let mut blocks: Vec<Markup> = vec![];
-    for basis in bases {
+    for basis in with_deviation.iter().filter_map(|c| c.basis()).collect::<BTreeSet<Basis>>() {
         blocks.push(text("head", "start", [0.0, y + 14.0], &format!("against {}", basis.name())));
         y += HEAD;
         for engine in group.engines(palette) {
-            let mine: Vec<&Comparison> = with_deviation
-                .iter()
-                .copied()
-                .filter(|c| c.key.engine == engine && c.reference.as_ref().is_some_and(|r| r.basis == basis))
-                .collect();
+            let is_mine = |c: &&Comparison| c.key.engine == engine && c.basis() == Some(basis);
+            let mine: Vec<&Comparison> = with_deviation.iter().copied().filter(is_mine).collect();
             if !mine.is_empty() {
                 blocks.push(row(&mine, engine, y, &scale, palette));
                 y += ROW;
@@ -52,14 +47,14 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Ma
     figure(&group.title(report, "deviations"), bottom + 36.0, &drawing, &caption)
 }
 
+fn allowed_percent(c: &Comparison) -> Option<f64> {
+    Some(100.0 * c.allowed() / c.reference.as_ref()?.value).filter(|a| a.is_finite())
+}
+
 fn row(mine: &[&Comparison], engine: &str, y: f64, scale: &Deviations, palette: &Palette) -> Markup {
     let middle = y + 0.5 * ROW;
-    let allowed = mine.iter().filter_map(|c| {
-        let reference = c.reference.as_ref()?.value;
-        Some(100.0 * c.tolerance.around(reference) / reference).filter(|a| a.is_finite())
-    });
     // Where an absolute tolerance makes it differ from meter to meter, the narrowest is drawn.
-    let allowed = allowed.fold(f64::INFINITY, f64::min);
+    let allowed = mine.iter().filter_map(|c| allowed_percent(c)).fold(f64::INFINITY, f64::min);
     let (from, to) = (scale.x(-allowed), scale.x(allowed));
     let class = format!("line e{}", palette.index(engine));
     // Within the row by turns, so that meters that agree stay visible.

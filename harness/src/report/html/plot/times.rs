@@ -4,11 +4,13 @@ use maud::{Markup, html};
 
 use super::super::beside::{BenchCurve, Beside};
 use super::super::palette::Palette;
-use super::super::{duration, title};
-use super::{WIDTH, figure, groups, legend, line, text};
+use super::super::{duration, percent};
+use super::axis::label;
+use super::{WIDTH, figure, groups, legend, line, number, text};
 use crate::judge::Comparison;
 use crate::record::ProcedureId;
 use crate::report::Report;
+use crate::report::words::largest;
 
 const LEFT: f64 = 52.0;
 const TOP: f64 = 8.0;
@@ -27,11 +29,8 @@ struct Point {
 }
 
 pub(in super::super) fn section(report: &Report, beside: &[Beside], palette: &Palette) -> Markup {
-    let panels: Vec<Markup> = report
-        .procedures()
-        .into_iter()
-        .filter_map(|procedure| panel(report, procedure, &curves(beside, procedure), palette))
-        .collect();
+    let of = |procedure| panel(report, procedure, &curves(beside, procedure), palette);
+    let panels: Vec<Markup> = report.procedures().into_iter().filter_map(of).collect();
     html! {
         h2 id="time-title" { "Run time against error" }
         @if panels.is_empty() { p.lead { "No engine was held against another's readings." } } @else {
@@ -50,20 +49,12 @@ fn points(report: &Report, procedure: ProcedureId) -> Vec<Point> {
     let mut points = vec![];
     for group in groups(report, procedure) {
         let Some(basis) = group.basis() else { continue };
-        let recordings = report.recordings.iter().filter(|r| r.key.case == group.case && r.key.procedure == procedure);
-        for recording in recordings {
-            let mine = |c: &&&Comparison| {
-                c.key.engine == recording.key.engine && c.reference.as_ref().is_some_and(|r| r.basis == basis)
-            };
-            let errors = group.comparisons.iter().filter(mine).filter_map(|c| c.relative_deviation).map(f64::abs);
-            if let Some(error) = errors.max_by(f64::total_cmp) {
+        for recording in report.recordings.iter().filter(|r| r.key.is_of(group.case, procedure)) {
+            let mine = |c: &&&Comparison| c.key.engine == recording.key.engine && c.basis() == Some(basis);
+            let errors = group.comparisons.iter().filter(mine).filter_map(|c| c.relative_deviation);
+            if let Some(error) = largest(errors).map(f64::abs) {
                 let engine = recording.key.engine.to_string();
-                let words = format!(
-                    "{engine}, {}: {}, {}",
-                    group.case,
-                    duration(recording.wall_s),
-                    super::super::percent(error)
-                );
+                let words = format!("{engine}, {}: {}, {}", group.case, duration(recording.wall_s), percent(error));
                 points.push(Point { engine, words, wall_s: recording.wall_s, error });
             }
         }
@@ -78,11 +69,8 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let span = |pick: fn(&(f64, f64)) -> f64, least: f64| {
         let (low, high) =
             all.iter().map(pick).map(|v| v.max(least)).fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
-        Decades {
-            low: low.log10().floor() as i32,
-            high: (high.log10().ceil() as i32).max(low.log10().floor() as i32 + 1),
-            least,
-        }
+        let low = low.log10().floor() as i32;
+        Decades { low, high: (high.log10().ceil() as i32).max(low + 1), least }
     };
     if all.is_empty() {
         return None;
@@ -90,11 +78,8 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let (time, error) = (span(|p| p.0, LEAST_TIME_S), span(|p| p.1, LEAST_ERROR));
     let width = WIDTH - LEFT - 12.0;
     let place = |wall_s: f64, e: f64| [LEFT + width * time.part(wall_s), TOP + PLOT * (1.0 - error.part(e))];
-    let mut engines: Vec<&str> =
-        points.iter().map(|p| p.engine.as_str()).chain(curves.iter().map(|c| c.engine.as_str())).collect();
-    engines.sort_unstable();
-    engines.dedup();
-    engines.sort_by_key(|e| palette.order(e));
+    let of_curves = curves.iter().map(|c| c.engine.as_str());
+    let engines = palette.sorted(points.iter().map(|p| p.engine.as_str()).chain(of_curves));
     let labels = labels(&points, &engines, &place);
     let drawing = html! {
         @for decade in time.low..=time.high {
@@ -115,7 +100,7 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let caption = html! {
         (legend(&engines, palette)) @if floor { " At the lower edge: 10⁻⁶ % or less." } @if !curves.is_empty() { " Lines: the ladder of luxproof bench." }
     };
-    Some(figure(&title(procedure), TOP + PLOT + 38.0, &drawing, &caption))
+    Some(figure(procedure.row().title, TOP + PLOT + 38.0, &drawing, &caption))
 }
 
 /// Where each engine is named: at its middle mark, pushed down until names do not meet.
@@ -150,11 +135,8 @@ fn labels<'a>(
 fn drawn(curve: &BenchCurve, palette: &Palette, place: &impl Fn(f64, f64) -> [f64; 2]) -> Markup {
     let mut rungs: Vec<_> = curve.points.iter().filter_map(|p| Some((p, p.relative_error?))).collect();
     rungs.sort_by(|a, b| a.0.wall_s.total_cmp(&b.0.wall_s));
-    let path: Vec<String> = rungs
-        .iter()
-        .map(|(p, e)| place(p.wall_s, *e))
-        .map(|[x, y]| format!("{} {}", super::number(x), super::number(y)))
-        .collect();
+    let path: Vec<String> =
+        rungs.iter().map(|(p, e)| place(p.wall_s, *e)).map(|[x, y]| format!("{} {}", number(x), number(y))).collect();
     let class = format!("line e{}", palette.index(&curve.engine));
     html! {
         @if path.len() > 1 { path class=(class) d={ "M" (path.join("L")) } {} }
@@ -179,15 +161,6 @@ impl Decades {
     }
 }
 
-/// A tick of a logarithmic axis.
 fn power(exponent: i32) -> String {
-    match exponent {
-        -2 => "0.01".to_owned(),
-        -1 => "0.1".to_owned(),
-        0 => "1".to_owned(),
-        1 => "10".to_owned(),
-        2 => "100".to_owned(),
-        3 => "1000".to_owned(),
-        e => super::super::power(e),
-    }
+    if (-2..=3).contains(&exponent) { label(10f64.powi(exponent)) } else { super::super::power(exponent) }
 }

@@ -10,15 +10,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::PublishedFlux;
-use crate::record::MeterId;
+use crate::record::{Estimate, MeterId};
 
-/// One place and column of a paper, split.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PaperSplit {
-    /// The table's name in the paper.
     pub table: String,
     pub meter: MeterId,
-    /// The place, in words.
     pub place: String,
     /// The column that is held against the calculation.
     pub column: String,
@@ -34,7 +31,6 @@ pub struct PaperSplit {
     pub remainder: Share,
 }
 
-/// A share of the whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Share {
     /// Relative to the printed calculation.
@@ -43,31 +39,16 @@ pub struct Share {
     pub uncertainty: f64,
 }
 
-/// A value with its standard uncertainty.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stage {
-    pub value: f64,
-    /// Its standard uncertainty.
-    pub uncertainty: f64,
-}
-
-/// The values between which the steps lie.
+/// The values between which the steps lie, in the order told above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stages {
-    /// As the paper prints its calculation.
-    pub printed_method: Stage,
-    /// The same method on our file.
-    pub method: Stage,
-    /// Exact, with all reflections, of a point.
-    pub exact: Stage,
-    /// The same with the paper's number of reflections.
-    pub exact_cut: Stage,
-    /// The same of the paper's luminaire model.
-    pub exact_model: Stage,
-    /// Our run of the paper's renderer.
-    pub rendered: Stage,
-    /// As the paper prints its rendering.
-    pub printed: Stage,
+    pub printed_method: Estimate,
+    pub method: Estimate,
+    pub exact: Estimate,
+    pub exact_cut: Estimate,
+    pub exact_model: Estimate,
+    pub rendered: Estimate,
+    pub printed: Estimate,
 }
 
 /// The shares of whole, method, photometry, renderer and remainder, in this order.
@@ -78,17 +59,17 @@ pub struct Stages {
 pub fn shares(stages: &Stages, flux: Option<&PublishedFlux>, coverage: f64) -> [Share; 5] {
     let unit = stages.printed_method.value;
     let of_flux = flux.map_or(0.0, |f| f.half_width_lm / 3f64.sqrt() / f.value_lm * stages.method.value);
-    let share = |steps: &[(Stage, Stage)], further: f64| {
+    let share = |steps: &[(Estimate, Estimate)], further: f64| {
         let value = steps.iter().map(|(from, to)| to.value - from.value).sum::<f64>() / unit;
         // Stages that one step ends at and the next begins with cancel, as their errors do.
-        let mut ends: Vec<Stage> = vec![];
+        let mut ends: Vec<Estimate> = vec![];
         for stage in steps.iter().flat_map(|(from, to)| [*from, *to]) {
             match ends.iter().position(|e| *e == stage) {
                 Some(k) => drop(ends.remove(k)),
                 None => ends.push(stage),
             }
         }
-        let variance = ends.iter().map(|s| s.uncertainty.powi(2)).sum::<f64>() + further.powi(2);
+        let variance = ends.iter().map(|s| s.uncertainty.standard().powi(2)).sum::<f64>() + further.powi(2);
         Share { value, uncertainty: coverage * variance.sqrt() / unit }
     };
     let Stages { printed_method, method, exact, exact_cut, exact_model, rendered, printed } = *stages;
@@ -104,9 +85,10 @@ pub fn shares(stages: &Stages, flux: Option<&PublishedFlux>, coverage: f64) -> [
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::Uncertainty;
 
-    fn stage(value: f64, uncertainty: f64) -> Stage {
-        Stage { value, uncertainty }
+    fn stage(value: f64, uncertainty: f64) -> Estimate {
+        Estimate { value, uncertainty: Uncertainty::sampled(uncertainty, None) }
     }
 
     fn stages() -> Stages {

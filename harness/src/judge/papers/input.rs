@@ -12,15 +12,14 @@ use crate::procedures::{Aspect, Target, Task};
 /// Finer tables than this, in candela, are not written by photometers.
 const FINEST_DECIMALS: i32 = 6;
 
-/// What the tables' last digits leave open in one task.
-pub(super) struct Input<'a> {
+pub(in crate::judge) struct Input<'a> {
     task: &'a Task,
     /// Half the last digit of each luminaire's table, in candela, dimming included.
     half_digits_cd: Vec<f64>,
 }
 
 impl<'a> Input<'a> {
-    pub(super) fn of(task: &'a Task) -> Self {
+    pub(in crate::judge) fn of(task: &'a Task) -> Self {
         let half = |l: &luminaire::scene::Luminaire| 0.5 * last_digit_cd(&l.photometry).unwrap_or(0.0) * l.flux_scale;
         Self { task, half_digits_cd: task.scene.luminaires.iter().map(half).collect() }
     }
@@ -29,7 +28,7 @@ impl<'a> Input<'a> {
     ///
     /// Direct light: the intensity between nodes is as uncertain as theirs, and lies in one direction. Reflected light: as if
     /// all entries of a table were off together, which is more than they are.
-    pub(super) fn bound(&self, target: &Target, value: f64) -> f64 {
+    pub(in crate::judge) fn bound(&self, target: &Target, value: f64) -> f64 {
         let luminaires = || self.task.scene.luminaires.iter().zip(&self.half_digits_cd);
         if self.task.transport == Transport::Direct {
             let seen = luminaires().flat_map(|pair| target.aspects.iter().map(move |aspect| (pair, aspect)));

@@ -1,37 +1,35 @@
 //! A paper's tables with our readings beside them: one row a column of the paper or an engine of ours, one column a place.
 
+mod shares;
+
 use std::collections::BTreeMap;
 
-use super::terminal::{percent, published_column, value};
-use super::{ReadingRecord, Report};
+use super::Report;
+use super::words::{largest, percent, published_column, value};
 use crate::judge::{Basis, PublishedTable};
-use crate::record::Quantity;
-use crate::record::Recording;
+use crate::record::{EngineName, MeterId, Quantity, Reading, ReadingKey, Recording};
+
+pub(super) use shares::splits;
 
 /// A drawn table: a heading, and rows of as many cells.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Grid {
-    /// The paper's title.
     pub(super) title: String,
-    /// Headings of the columns.
     pub(super) head: Vec<String>,
     pub(super) rows: Vec<Vec<String>>,
 }
 
-/// One grid a published table, in the order of the procedures.
+/// One grid a published table, in the order of the procedures, then the shares.
 pub(super) fn grids(report: &Report) -> Vec<Grid> {
-    let procedures = report.procedures();
     let mut tables: Vec<&PublishedTable> = report.published.iter().collect();
-    tables.sort_by_key(|t| procedures.iter().position(|p| *p == t.procedure));
-    tables.into_iter().map(|table| grid(report, table)).collect()
+    tables.sort_by_key(|t| t.procedure);
+    tables.into_iter().map(|table| grid(report, table)).chain(shares::grid(report)).collect()
 }
 
-fn grid(report: &Report, table: &PublishedTable) -> Grid {
-    let (unit, sign) =
-        (table.quantity.unit(), if table.quantity == Quantity::LuminousIntensity { "gamma " } else { "" });
-    let places = table.rows.iter().map(|r| format!("{sign}{}", r.place));
-    let mut head = vec![format!("{} [{unit}]", table.name)];
-    head.extend(places);
+pub(super) fn grid(report: &Report, table: &PublishedTable) -> Grid {
+    let sign = if table.quantity == Quantity::LuminousIntensity { "gamma " } else { "" };
+    let mut head = vec![format!("{} [{}]", table.name, table.quantity.unit())];
+    head.extend(table.rows.iter().map(|r| format!("{sign}{}", r.place)));
     head.push("furthest from the paper".to_owned());
     let mut rows: Vec<Vec<String>> = vec![];
     for column in &table.columns {
@@ -41,11 +39,11 @@ fn grid(report: &Report, table: &PublishedTable) -> Grid {
     }
     let mine = |r: &&Recording| r.key.procedure == table.procedure && table.cases.contains(&r.key.case);
     let mut recordings: Vec<&Recording> = report.recordings.iter().filter(mine).collect();
-    let order = |engine: &str| report.engines.iter().position(|e| e.id == engine);
-    recordings.sort_by_key(|r| order(&r.key.engine));
+    recordings.sort_by_key(|r| report.engines.iter().position(|e| e.id == r.key.engine));
     let mut seen: Vec<(String, Vec<String>)> = vec![];
     for recording in recordings {
-        let cells: Vec<String> = table.rows.iter().map(|r| reading(report, recording, &r.meter.0)).collect();
+        let cell = |meter| reading(report, &recording.key, meter).map_or_else(|| "-".to_owned(), value);
+        let cells: Vec<String> = table.rows.iter().map(|r| cell(&r.meter)).collect();
         let label = label(recording);
         // Our own solvers run in every case; what they repeat need not be read twice.
         if cells.iter().all(|c| c == "-") || seen.contains(&(label.clone(), cells.clone())) {
@@ -60,34 +58,28 @@ fn grid(report: &Report, table: &PublishedTable) -> Grid {
 }
 
 fn label(recording: &Recording) -> String {
-    if recording.key.engine == "iesna" {
+    if recording.key.engine == EngineName::IESNA {
         let method = recording.method.get("method").map(|m| format!(", {m}"));
-        return format!("iesna{}", method.unwrap_or_default());
+        return format!("{}{}", EngineName::IESNA, method.unwrap_or_default());
     }
     let light = recording.light.to_string();
     let bounces = light.split_once(", ").map(|(_, bounces)| format!(", {bounces}"));
     format!("{}, {}{}", recording.key.engine, recording.model, bounces.unwrap_or_default())
 }
 
-fn reading(report: &Report, recording: &Recording, meter: &str) -> String {
-    let is_it = |r: &&ReadingRecord| r.reading.meter.0 == meter && r.key == recording.key;
-    report.readings.iter().find(is_it).map_or_else(|| "-".to_owned(), value)
+fn reading<'a>(report: &'a Report, key: &ReadingKey, meter: &MeterId) -> Option<&'a Reading> {
+    report.readings.iter().find(|r| r.reading.meter == *meter && r.key == *key).map(|r| &r.reading)
 }
 
 /// The largest relative deviation from each column of the paper that the recording is held against.
 fn furthest(report: &Report, recording: &Recording) -> String {
-    let mut worst: BTreeMap<&str, f64> = BTreeMap::new();
-    for c in &report.comparisons {
-        let mine = c.key.case == recording.key.case
-            && c.key.procedure == recording.key.procedure
-            && c.key.engine == recording.key.engine;
-        let reference = c.reference.as_ref().filter(|r| mine && r.basis == Basis::Published);
+    let mut columns: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for c in report.comparisons.iter().filter(|c| c.key == recording.key) {
+        let reference = c.reference.as_ref().filter(|r| r.basis == Basis::Published);
         if let Some((reference, deviation)) = reference.zip(c.relative_deviation) {
-            let most = worst.entry(published_column(&reference.source)).or_insert(deviation);
-            if deviation.abs() > most.abs() {
-                *most = deviation;
-            }
+            columns.entry(published_column(&reference.source)).or_default().push(deviation);
         }
     }
-    worst.iter().map(|(column, deviation)| format!("{column} {}", percent(*deviation))).collect::<Vec<_>>().join(", ")
+    let words = columns.into_iter().filter_map(|(column, all)| Some((column, largest(all.into_iter())?)));
+    words.map(|(column, deviation)| format!("{column} {}", percent(deviation))).collect::<Vec<_>>().join(", ")
 }

@@ -2,16 +2,15 @@
 
 use luminaire::scene::Bounces;
 
-use super::paper::Grid;
-use super::{ReadingRecord, Report};
-use crate::judge::{PaperSplit, PublishedColumn, PublishedRow, PublishedTable, Share, Stage, Stages, shares};
-use crate::record::Recording;
+use super::{Grid, Report, reading};
+use crate::judge::{PaperSplit, PublishedColumn, PublishedRow, PublishedTable, Share, Stages, shares};
+use crate::record::{EngineName, Estimate, Reading, Recording, Uncertainty};
 
 /// The coverage factor of the intervals: JCGM 100:2008, 6.3.3.
 const COVERAGE: f64 = 2.0;
 
 /// Every split that the cases of a report hold the readings for.
-pub(super) fn splits(report: &Report) -> Vec<PaperSplit> {
+pub(in crate::report) fn splits(report: &Report) -> Vec<PaperSplit> {
     let mut splits = vec![];
     for table in report.published.iter().filter(|t| t.bounces.is_some()) {
         let Some(method) = table.columns.iter().find(|c| c.reference) else { continue };
@@ -32,31 +31,24 @@ fn split(
     let cut = Some(Bounces::AtMost(table.bounces?));
     let read = |engine: &str, model: &str, bounces: Option<Bounces>| {
         let is_it = |r: &&Recording| {
-            r.key.engine == engine
+            table.cases.contains(&r.key.case)
                 && r.key.procedure == table.procedure
-                && table.cases.contains(&r.key.case)
+                && r.key.engine == *engine
                 && (model.is_empty() || r.model == model)
                 && (bounces.is_none() || r.light.bounces() == bounces)
         };
-        report.recordings.iter().filter(is_it).find_map(|recording| {
-            let mine = |r: &&ReadingRecord| r.reading.meter == row.meter && r.key == recording.key;
-            report.readings.iter().find(mine).map(|r| stage(r, recording))
-        })
+        let mut recordings = report.recordings.iter().filter(is_it);
+        recordings.find_map(|recording| Some(stage(reading(report, &recording.key, &row.meter)?, recording)))
     };
-    let printed = |name: &str| {
-        let text = row.cells.get(name)?;
-        let decimals = text.split_once('.').map_or(0, |(_, fraction)| fraction.len());
-        let half_width = table.units_in_last_digit * 10f64.powi(-i32::try_from(decimals).ok()?);
-        Some(Stage { value: text.parse().ok()?, uncertainty: half_width / 3f64.sqrt() })
-    };
+    let (all, paper) = (Some(Bounces::Converged), &column.model);
     let stages = Stages {
-        printed_method: printed(&method.name)?,
+        printed_method: table.printed(row, &method.name)?,
         method: read(&method.engine, "", None)?,
-        exact: read("simulator", &method.model, Some(Bounces::Converged))?,
-        exact_cut: read("simulator", &method.model, cut)?,
-        exact_model: read("simulator", &column.model, cut)?,
-        rendered: read(&column.engine, &column.model, cut)?,
-        printed: printed(&column.name)?,
+        exact: read(&EngineName::SIMULATOR, &method.model, all)?,
+        exact_cut: read(&EngineName::SIMULATOR, &method.model, cut)?,
+        exact_model: read(&EngineName::SIMULATOR, paper, cut)?,
+        rendered: read(&column.engine, paper, cut)?,
+        printed: table.printed(row, &column.name)?,
     };
     let [whole, of_method, photometry, renderer, remainder] = shares(&stages, table.flux.as_ref(), COVERAGE);
     Some(PaperSplit {
@@ -72,9 +64,11 @@ fn split(
     })
 }
 
-fn stage(reading: &ReadingRecord, recording: &Recording) -> Stage {
-    let instrument = recording.instrument_uncertainty * reading.reading.value;
-    Stage { value: reading.reading.value, uncertainty: reading.reading.uncertainty.standard().hypot(instrument) }
+/// A reading with all that is uncertain of it, the instrument included.
+fn stage(reading: &Reading, recording: &Recording) -> Estimate {
+    let instrument = recording.instrument_uncertainty * reading.value;
+    let uncertainty = Uncertainty::sampled(reading.uncertainty.standard().hypot(instrument), None);
+    Estimate { value: reading.value, uncertainty }
 }
 
 /// The splits as a table; `None` of none.

@@ -10,11 +10,10 @@ use luminaire::scene::{Bounces, Transport};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Basis, Reference};
+use crate::judge::{Basis, Reference};
 use crate::procedures::{Target, Task};
-use crate::record::{MeterId, ProcedureId};
+use crate::record::{Estimate, MeterId, ProcedureId, Quantity, Uncertainty};
 
-/// The tables of one paper.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
@@ -23,7 +22,6 @@ pub struct Published {
     citation: Citation,
     rounding: Rounding,
     /// What is known of the luminaire's flux beyond our file.
-    #[serde(default)]
     flux: Option<PublishedFlux>,
     tables: BTreeMap<ProcedureId, Table>,
 }
@@ -32,11 +30,9 @@ pub struct Published {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PublishedFlux {
-    /// In lumens.
     pub value_lm: f64,
     /// Half the width of the interval that holds it.
     pub half_width_lm: f64,
-    /// How that is known.
     pub source: String,
 }
 
@@ -61,8 +57,7 @@ struct Rounding {
 #[serde(deny_unknown_fields)]
 struct Table {
     name: String,
-    quantity: crate::record::Quantity,
-    #[serde(default)]
+    quantity: Quantity,
     bounces: Option<u32>,
     columns: BTreeMap<String, Column>,
     rows: Vec<Row>,
@@ -77,9 +72,8 @@ struct Column {
     /// Further luminaire models that the column may be held against.
     #[serde(default)]
     also: Vec<String>,
-    #[serde(default, rename = "distance_m")]
+    #[serde(rename = "distance_m")]
     _distance_m: Option<f64>,
-    #[serde(default)]
     bounces: Option<u32>,
     meaning: String,
 }
@@ -87,13 +81,9 @@ struct Column {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Row {
-    #[serde(default)]
     gamma_deg: Option<f64>,
-    #[serde(default)]
     c_deg: Option<f64>,
-    #[serde(default)]
     at_m: Option<[f64; 3]>,
-    #[serde(default)]
     normal: Option<[f64; 3]>,
     cells: BTreeMap<String, String>,
 }
@@ -101,24 +91,17 @@ struct Row {
 /// A published table as it is printed, with the meters that its rows belong to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PublishedTable {
-    /// The paper.
     pub title: String,
-    /// The table's name in it.
     pub name: String,
-    /// The procedure that reads its values.
     pub procedure: ProcedureId,
-    /// What they are.
-    pub quantity: crate::record::Quantity,
+    pub quantity: Quantity,
     /// The cases that are held against it.
     pub cases: Vec<String>,
     /// Diffuse reflections that its renderings include, where that matters.
-    #[serde(default)]
     pub bounces: Option<u32>,
     /// Units of the last printed digit that a cell is uncertain by.
     #[serde(default)]
     pub units_in_last_digit: f64,
-    /// The luminaire's flux, as far as the tables tell.
-    #[serde(default)]
     pub flux: Option<PublishedFlux>,
     pub columns: Vec<PublishedColumn>,
     /// Its rows, in the order of the meters.
@@ -130,46 +113,34 @@ impl PublishedTable {
     pub fn is_the_same(&self, other: &Self) -> bool {
         (&self.title, &self.name, &self.procedure) == (&other.title, &other.name, &other.procedure)
     }
+
+    /// What a column prints in a row, with the interval of its digits.
+    pub fn printed(&self, row: &PublishedRow, column: &str) -> Option<Estimate> {
+        cell(row.cells.get(column)?, 0, self.units_in_last_digit)
+    }
 }
 
-/// A column of a published table.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct PublishedColumn {
-    /// Its name.
     pub name: String,
     /// Whether it is what the paper judges its other columns by.
     pub reference: bool,
-    /// What it holds, in a sentence.
     pub meaning: String,
     /// The engine whose readings stand beside it.
     #[serde(default)]
     pub engine: String,
-    /// The luminaire model, likewise.
     #[serde(default)]
     pub model: String,
 }
 
-/// A row of a published table.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct PublishedRow {
-    /// The meter at its place.
     pub meter: MeterId,
     /// The place: gamma in degrees, or the position in metres.
     pub place: String,
-    /// The printed digits by column.
     pub cells: BTreeMap<String, String>,
 }
 
-/// A printed value with the interval it stands for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cell {
-    /// The printed value.
-    pub value: f64,
-    /// Half the width of its interval.
-    pub half_width: f64,
-}
-
-/// Why published tables cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("{file}: {message}")]
 pub struct PublishedError {
@@ -178,7 +149,6 @@ pub struct PublishedError {
 }
 
 impl Published {
-    /// Reads and checks the tables.
     pub fn read(path: &Path) -> Result<Self, PublishedError> {
         let fail = |message: String| PublishedError { file: path.display().to_string(), message };
         let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
@@ -214,20 +184,12 @@ impl Published {
             let same_model = column.model == model || column.also.contains(&model);
             same_bounces && (derived || (same_model && (column.engine == engine || (column.reference && closed_form))))
         };
-        let columns = table.columns.iter().filter(|(_, column)| compared(column));
         let reference = |(name, column): (&String, &Column)| {
             let cell = self.cell(row.cells.get(name)?, table.decimals(name))?;
-            Some(Reference {
-                value: cell.value,
-                // A rectangular distribution over the rounding interval (GUM 4.3.7).
-                uncertainty: cell.half_width / 3f64.sqrt(),
-                degrees_of_freedom: None,
-                coverage_factor: None,
-                basis: self.citation.basis,
-                source: format!("{}, {}, {name}: {}", self.citation.title, table.name, column.meaning),
-            })
+            let source = format!("{}, {}, {name}: {}", self.citation.title, table.name, column.meaning);
+            Some(Reference::of(cell.value, &cell.uncertainty, self.citation.basis, source))
         };
-        columns.filter_map(reference).collect()
+        table.columns.iter().filter(|(_, column)| compared(column)).filter_map(reference).collect()
     }
 
     /// The table of a task as printed, rows at its targets alone; `None` where the paper has none, or these are derived
@@ -243,8 +205,7 @@ impl Published {
                 Some(d) => format!("{}", d.gamma_deg),
                 None => format!("({})", target.meter.position_m.to_array().map(|x| x.to_string()).join(", ")),
             };
-            let cells = row.cells.iter().map(|(column, printed)| (column.clone(), printed.clone())).collect();
-            Some(PublishedRow { meter: target.id.clone(), place, cells })
+            Some(PublishedRow { meter: target.id.clone(), place, cells: row.cells.clone() })
         };
         let rows: Vec<PublishedRow> = task.targets.iter().filter_map(row).collect();
         let column = |(name, column): (&String, &Column)| PublishedColumn {
@@ -268,12 +229,17 @@ impl Published {
         })
     }
 
-    /// A printed cell; one without decimals stands for the interval of a column that prints `decimals`.
-    fn cell(&self, printed: &str, decimals: usize) -> Option<Cell> {
-        let value: f64 = printed.trim().parse().ok().filter(|v: &f64| v.is_finite())?;
-        let unit = 10f64.powi(-i32::try_from(decimals_of(printed).max(decimals)).ok()?);
-        Some(Cell { value, half_width: unit * self.rounding.units_in_last_digit })
+    fn cell(&self, printed: &str, decimals: usize) -> Option<Estimate> {
+        cell(printed, decimals, self.rounding.units_in_last_digit)
     }
+}
+
+/// A printed cell with the interval that its rounding leaves; one without decimals stands for that of a column that prints
+/// `decimals`.
+fn cell(printed: &str, decimals: usize, units_in_last_digit: f64) -> Option<Estimate> {
+    let value: f64 = printed.trim().parse().ok().filter(|v: &f64| v.is_finite())?;
+    let unit = 10f64.powi(-i32::try_from(decimals_of(printed).max(decimals)).ok()?);
+    Some(Estimate { value, uncertainty: Uncertainty::Bound(unit * units_in_last_digit) })
 }
 
 fn decimals_of(printed: &str) -> usize {
@@ -291,15 +257,13 @@ impl Row {
     /// Within 1e-6 m or 1e-6 degrees, as the format says.
     fn is_at(&self, target: &Target) -> bool {
         const SAME: f64 = 1e-6;
-        match (self.gamma_deg, self.c_deg, target.direction) {
-            (Some(gamma), Some(c), Some(d)) => (gamma - d.gamma_deg).abs() <= SAME && (c - d.c_deg).abs() <= SAME,
-            _ => match (self.at_m, self.normal, target.direction) {
-                (Some(at), Some(normal), None) => {
-                    DVec3::from(at).distance(target.meter.position_m) <= SAME
-                        && DVec3::from(normal).normalize_or_zero().distance(target.meter.normal) <= SAME
-                }
-                _ => false,
-            },
+        match (target.direction, self.gamma_deg.zip(self.c_deg), self.at_m.zip(self.normal)) {
+            (Some(d), Some((gamma, c)), _) => (gamma - d.gamma_deg).abs() <= SAME && (c - d.c_deg).abs() <= SAME,
+            (None, _, Some((at, normal))) => {
+                DVec3::from(at).distance(target.meter.position_m) <= SAME
+                    && DVec3::from(normal).normalize_or_zero().distance(target.meter.normal) <= SAME
+            }
+            _ => false,
         }
     }
 }
@@ -321,13 +285,14 @@ mod tests {
     fn a_cell_stands_for_the_interval_of_its_printed_digits() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/published/cachet.yaml");
         let published = Published::read(&path).unwrap();
-        assert_eq!(published.cell("2.70", 0), Some(Cell { value: 2.70, half_width: 0.01 }));
-        assert_eq!(published.cell("35.7", 1), Some(Cell { value: 35.7, half_width: 0.1 }));
-        assert_eq!(published.cell("0", 0), Some(Cell { value: 0.0, half_width: 1.0 }));
+        let within = |value, half| Some(Estimate { value, uncertainty: Uncertainty::Bound(half) });
+        assert_eq!(published.cell("2.70", 0), within(2.70, 0.01));
+        assert_eq!(published.cell("35.7", 1), within(35.7, 0.1));
+        assert_eq!(published.cell("0", 0), within(0.0, 1.0));
         assert_eq!(published.cell("n/a", 0), None);
         // The zero of lum1 stands in a column of two decimals.
         let table = &published.tables[&ProcedureId::LuminousIntensity];
         assert_eq!((table.decimals("lum1"), table.decimals("ies_file")), (2, 1));
-        assert_eq!(published.cell("0", 2), Some(Cell { value: 0.0, half_width: 0.01 }));
+        assert_eq!(published.cell("0", 2), within(0.0, 0.01));
     }
 }

@@ -1,0 +1,113 @@
+//! What every view tells besides verdicts: what failed, was skipped, follows by a shortcut or is approximate; who departs; whose a
+//! deviation is.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Report;
+use crate::judge::Split;
+use crate::plan::{EVERYONE, Skip};
+use crate::record::{EngineName, ProcedureId, ReadingKey};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Kind {
+    Failed,
+    /// Not run: there is no reading.
+    Skipped,
+    /// Read with less work: meters that follow from others, light paths that carry nothing.
+    Shortcut,
+    Approximate,
+    Noted,
+}
+
+impl Kind {
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Failed => "failed",
+            Self::Skipped => "skipped",
+            Self::Shortcut => "shortcut",
+            Self::Approximate => "approximate",
+            Self::Noted => "note",
+        }
+    }
+}
+
+/// What holds of one engine in some jobs.
+pub(super) struct Note<'a> {
+    pub(super) kind: Kind,
+    pub(super) engine: &'a EngineName,
+    pub(super) text: String,
+    pub(super) jobs: BTreeSet<Job<'a>>,
+}
+
+/// A case and a procedure.
+type Job<'a> = (&'a str, ProcedureId);
+
+/// Each once, whatever number of jobs it holds of; by kind, then by engine.
+pub(super) fn notes(report: &Report) -> Vec<Note<'_>> {
+    let mut notes: BTreeMap<_, BTreeSet<Job<'_>>> = BTreeMap::new();
+    for (kind, key, text) in recorded(report).chain(report.skips.iter().map(|s| (kind(s), &s.key, reason(s)))) {
+        notes.entry((kind, &key.engine, text)).or_default().insert((&key.case, key.procedure));
+    }
+    notes.into_iter().map(|((kind, engine, text), jobs)| Note { kind, engine, text, jobs }).collect()
+}
+
+fn recorded(report: &Report) -> impl Iterator<Item = (Kind, &ReadingKey, String)> {
+    report.recordings.iter().flat_map(|r| {
+        // What the approximation says already need not be said again.
+        let said = |note: &&String| r.approximation.as_ref().is_some_and(|a| a.contains(note.as_str()));
+        let approximate = r.approximation.iter().map(|a| (Kind::Approximate, a));
+        let noted = r.notes.iter().filter(move |n| !said(n)).map(|n| (Kind::Noted, n));
+        let failed = r.failure.iter().map(|f| (Kind::Failed, f));
+        failed.chain(approximate).chain(noted).map(|(kind, text)| (kind, &r.key, text.clone()))
+    })
+}
+
+pub(super) const fn kind(skip: &Skip) -> Kind {
+    if skip.scope.leaves_no_reading() { Kind::Skipped } else { Kind::Shortcut }
+}
+
+pub(super) fn reason(skip: &Skip) -> String {
+    let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
+    format!("{}{saved}", skip.reason)
+}
+
+impl Note<'_> {
+    /// In one line: `skipped: radiance indirect_illuminance of 3 cases: it is not installed`.
+    pub(super) fn line(&self, report: &Report) -> String {
+        let who = if *self.engine == EVERYONE { String::new() } else { format!("{} ", self.engine) };
+        let text = self.text.lines().next().unwrap_or_default();
+        format!("{}: {who}{}: {text}", self.kind.name(), self.place(report))
+    }
+
+    fn place(&self, report: &Report) -> String {
+        let cases: BTreeSet<&str> = self.jobs.iter().map(|(case, _)| *case).collect();
+        let procedures: BTreeSet<&str> = self.jobs.iter().map(|(_, procedure)| procedure.name()).collect();
+        let procedures = Vec::from_iter(procedures).join(", ");
+        match Vec::from_iter(cases)[..] {
+            [one] if report.is_suite() => format!("{procedures} of {one}"),
+            [_] => procedures,
+            ref all => format!("{procedures} of {} cases", all.len()),
+        }
+    }
+}
+
+/// A line for each case and procedure whose witnesses differ by more than their tolerances.
+pub(super) fn departures(report: &Report) -> Vec<String> {
+    let differing = report.consensus.iter().filter(|c| c.differing > 0);
+    differing.map(|c| format!("{}{}: {}", report.of_suite(&c.case, " "), c.procedure, c.text)).collect()
+}
+
+/// The widest split of each case, procedure and engine, in their order: where it was read, and what it says.
+pub(super) fn splits(report: &Report) -> Vec<(String, &str)> {
+    let mut widest: Vec<&Split> = vec![];
+    for split in &report.splits {
+        let alike = |s: &Split| (&s.case, s.procedure, &s.engine) == (&split.case, split.procedure, &split.engine);
+        match widest.iter_mut().find(|s| alike(s)) {
+            Some(found) if found.whole.abs() < split.whole.abs() => *found = split,
+            Some(_) => {}
+            None => widest.push(split),
+        }
+    }
+    let place = |s: &Split| format!("{}{} {}", report.of_suite(&s.case, " "), s.procedure, s.meter);
+    widest.into_iter().map(|s| (place(s), s.text.as_str())).collect()
+}

@@ -1,0 +1,96 @@
+//! Numbers and words as every view writes them.
+
+use crate::judge::Verdict;
+use crate::record::Reading;
+
+/// Six significant digits, and the standard error in the last two digits that it reaches: `0.9431(12)`.
+pub(super) fn value(reading: &Reading) -> String {
+    match reading.uncertainty.standard_error() {
+        Some(e) if e > 0.0 && reading.value > 0.0 => {
+            let decimals = (1.0 - e.log10().floor()).clamp(0.0, 9.0) as usize;
+            let in_units = (e * 10f64.powf(decimals as f64)).round();
+            format!("{:.decimals$}({in_units})", reading.value)
+        }
+        _ => significant(reading.value),
+    }
+}
+
+/// Six significant digits.
+pub(super) fn significant(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let decimals = (5.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// So many decimals at most, none that is needless.
+pub(super) fn trimmed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// A relative deviation with a sign and two significant digits; rounding noise is shown as zero.
+pub(super) fn percent(deviation: f64) -> String {
+    let percent = 100.0 * deviation;
+    match percent.abs() {
+        p if p < 5e-8 => "0 %".to_owned(),
+        p if p < 0.001 => format!("{percent:+.0e} %"),
+        p if p < 1.0 => format!("{percent:+.3} %"),
+        _ => format!("{percent:+.1} %"),
+    }
+}
+
+pub(super) fn plural(count: usize, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}
+
+/// A verdict where only text tells it: what asks for attention is written large.
+pub(super) fn mark(verdict: Verdict) -> String {
+    if verdict.is_bad() { verdict.name().to_uppercase() } else { verdict.name().to_owned() }
+}
+
+/// Each once, in the order of their first.
+pub(super) fn unique<T: PartialEq>(all: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut seen = vec![];
+    for one in all {
+        if !seen.contains(&one) {
+            seen.push(one);
+        }
+    }
+    seen
+}
+
+/// The deviation of the largest magnitude.
+pub(super) fn largest(deviations: impl Iterator<Item = f64>) -> Option<f64> {
+    deviations.max_by(|a, b| a.abs().total_cmp(&b.abs()))
+}
+
+/// The column's name within a published source, "TITLE, TABLE, COLUMN: MEANING"; titles may hold colons.
+pub(super) fn published_column(source: &str) -> &str {
+    let (head, _) = source.rsplit_once(": ").unwrap_or((source, ""));
+    head.rsplit(", ").next().unwrap_or(head)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{MeterId, Quantity, Uncertainty};
+
+    #[test]
+    fn values_show_the_digits_they_deserve() {
+        let written = |number, uncertainty| {
+            value(&Reading { meter: MeterId::new("m", 0), quantity: Quantity::Illuminance, value: number, uncertainty })
+        };
+        assert_eq!(written(0.943_147, Uncertainty::sampled(0.001_2, None)), "0.9431(12)");
+        assert_eq!(written(1234.5678, Uncertainty::sampled(0.0, None)), "1234.57");
+        assert_eq!(written(0.0, Uncertainty::Exact), "0");
+    }
+
+    #[test]
+    fn the_published_column_is_found_behind_a_title_with_a_colon() {
+        let source = "Simulation of Luminaires in Radiance: Verification Method, Table 2, lum1: Flat polygon, of light";
+        assert_eq!(published_column(source), "lum1");
+    }
+}
