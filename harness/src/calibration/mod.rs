@@ -26,7 +26,6 @@ use self::scenes::KnownScene;
 use crate::engines::Support;
 use crate::measure::{Failure, FailureKind, Instrument, Question, Reader};
 use crate::record::{EngineName, Estimate};
-use crate::system::files;
 use crate::system::slots::side_by_side;
 
 /// A deviation beyond this, noise and declared approximations apart, is no uncertainty but a broken instrument.
@@ -46,9 +45,9 @@ pub struct Calibration {
     pub parts: Vec<Part>,
 }
 
-/// What an engine read of one calibration scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Part {
+    /// The scene: point, asymmetric, shadow or furnace.
     pub scene: String,
     pub reflected: bool,
     /// The largest deviation from the closed form, relative.
@@ -76,10 +75,8 @@ pub enum Origin {
     Measured,
 }
 
-/// Why an engine cannot be used as an instrument.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
-    /// It is far off where the answer is known.
     #[error(
         "calibration: {engine} reads the scene `{scene}` {:.1} % off its closed form at {meter} ({value_lx} lx for {exact_lx} \
          lx), which is no uncertainty but a fault; see `luxproof engines doctor`",
@@ -90,12 +87,9 @@ pub enum CalibrationError {
     Failed(#[from] Failure),
 }
 
-/// Whether a calibration of earlier counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Earlier {
-    /// It does, where one is kept.
     Counts,
-    /// It does not: everything is measured afresh.
     Ignored,
 }
 
@@ -126,8 +120,7 @@ pub fn calibrate(
     let kept = if noise > scenes::BUDGET.relative_error {
         Err(format!("noise of {noise:.1e}, as on a machine with other work"))
     } else {
-        let kept = files::replace_json(&path, &calibration);
-        kept.map(|()| path.display().to_string()).map_err(|e| format!("{}: {e}", path.display()))
+        store::keep(&path, &calibration).map(|()| path.display().to_string())
     };
     Ok(Calibrated { calibration, origin: Origin::Measured, kept })
 }
@@ -139,7 +132,6 @@ impl Calibration {
         self.parts.iter().filter(counts).map(|p| p.uncertainty).fold(0.0, f64::max)
     }
 
-    /// A line for people.
     pub fn summary(&self) -> String {
         let part = |p: &Part| match &p.left_out {
             Some(why) => format!("{} left out ({why})", p.scene),
@@ -173,7 +165,6 @@ fn part(instrument: &Instrument, scene: &KnownScene, reader: &Reader) -> Result<
     }
 }
 
-/// Deviations from the closed form as an uncertainty; pure.
 fn judge(
     engine: EngineName,
     scene: &KnownScene,
@@ -187,14 +178,9 @@ fn judge(
         let unexplained = (deviation.abs() - declared - COVERAGE * std_error).max(0.0);
         // Written so that NaN, too, is implausible.
         if !(unexplained <= IMPLAUSIBLE && std_error <= IMPLAUSIBLE) {
-            return Err(CalibrationError::Implausible {
-                engine,
-                scene: scene.name,
-                meter: station.id.to_string(),
-                value_lx: estimate.value,
-                exact_lx: known.exact_lx,
-                deviation,
-            });
+            let (scene, meter) = (scene.name, station.id.to_string());
+            let (value_lx, exact_lx) = (estimate.value, known.exact_lx);
+            return Err(CalibrationError::Implausible { engine, scene, meter, value_lx, exact_lx, deviation });
         }
         worst = worst.max(deviation.abs());
         excess = excess.max(unexplained);

@@ -14,7 +14,6 @@ use crate::record::{MeterId, ProcedureId};
 /// A standard error that is far below the tolerances of reflected light, and a few seconds for engines that cannot meet it.
 pub(super) const BUDGET: Budget = Budget { relative_error: 2e-3, seconds: 5.0 };
 
-/// A job and what it must read.
 #[derive(Clone, Debug)]
 pub(super) struct KnownScene {
     pub(super) name: &'static str,
@@ -36,7 +35,6 @@ impl KnownScene {
     }
 }
 
-/// All scenes, to be read with these settings.
 pub(super) fn all(settings: &BTreeMap<String, serde_json::Value>) -> Vec<KnownScene> {
     let mut scenes = vec![point(), asymmetric(), shadow(), furnace()];
     for scene in &mut scenes {
@@ -77,18 +75,13 @@ fn asymmetric() -> KnownScene {
     direct("asymmetric", Scene { luminaires: vec![lamp], ..Scene::default() }, &meters)
 }
 
-/// A table between a pendant and two of four meters, in a black room.
 fn shadow() -> KnownScene {
     let lamp = luminaire(table(&[0.0], &[0.0, 90.0, 180.0], |_, _| 100.0), DVec3::new(2.0, 2.0, 2.5));
     let (min_m, max_m) = (DVec3::new(1.5, 1.5, 1.0), DVec3::new(2.5, 2.5, 1.2));
-    let scene = Scene {
-        room: Some(Room {
-            size_m: DVec3::new(4.0, 4.0, 3.0),
-            reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0),
-        }),
-        obstacles: vec![Obstacle { shape: Shape::Box { min_m, max_m }, reflectance: 0.0 }],
-        luminaires: vec![lamp],
-    };
+    let size_m = DVec3::new(4.0, 4.0, 3.0);
+    let room = Some(Room { size_m, reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0) });
+    let obstacles = vec![Obstacle { shape: Shape::Box { min_m, max_m }, reflectance: 0.0 }];
+    let scene = Scene { room, obstacles, luminaires: vec![lamp] };
     // From 2.5 m through the edge of the table's top at 1.2 m the shadow at .5 m reaches .77 m from the axis.
     let meters =
         [[2.0, 2.0, 0.5], [2.5, 1.6, 0.5], [3.2, 2.0, 0.5], [2.0, 0.6, 0.5]].map(|p| (DVec3::from(p), DVec3::Z));
@@ -100,7 +93,6 @@ fn shadow() -> KnownScene {
 
 const RHO: f64 = 0.5;
 
-/// A cube of 2 m whose luminaire lights every surface evenly.
 fn furnace() -> KnownScene {
     let half_m = 1.0;
     // Even illuminance E0 on a face at distance a: I cos / d^2 = E0 with d = a / cos and cos = m, the direction's largest

@@ -10,9 +10,6 @@ use super::views::read_report;
 use crate::report::{Exit, Report};
 use crate::trend::baseline::{Baseline, Comparability, Decision, Entry, State, compare, review};
 
-/// Where baselines are kept unless something else is said.
-const FOLDER: &str = "baselines";
-
 #[derive(Debug, Args)]
 pub(super) struct AcceptArgs {
     /// Folder of a run, or its report.json
@@ -28,14 +25,13 @@ pub(super) struct AcceptArgs {
     reason: Option<String>,
 }
 
-/// The report of a run, named by its folder or its file.
 pub(super) fn read_run(run: &Path) -> Result<Report, Diagnostic> {
     if run.is_dir() { read_report(&run.join("report.json")) } else { read_report(run) }
 }
 
 pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
     let report = read_run(&args.run)?;
-    let path = Baseline::place(args.baseline.as_deref().unwrap_or(Path::new(FOLDER)), &report);
+    let path = Baseline::place(args.baseline.as_deref().unwrap_or(Path::new("baselines")), &report);
     let mut baseline = if path.exists() {
         Baseline::read(&path).into_diagnostic()?
     } else {
@@ -50,9 +46,7 @@ pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
             return Err(miette::miette!(help = "say why these readings are right", "an empty reason"));
         }
         Some(reason) => {
-            let is_unchanged =
-                |e: &Entry| changes.entries.iter().any(|c| e.key == c.key && c.state == State::Unchanged);
-            let open = |e: &&Entry| !is_unchanged(e);
+            let open = |e: &&Entry| !changes.entries.iter().any(|c| e.key == c.key && c.state == State::Unchanged);
             let accepted = candidates.iter().filter(open).map(|e| e.accepted_for(reason.trim(), &now)).collect();
             Decision { accepted, declined: 0 }
         }
@@ -75,7 +69,6 @@ pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
     Ok(Exit::Passed)
 }
 
-/// Whether an entry may become a baseline; told where it may not.
 fn may_be_accepted(entry: &Entry) -> bool {
     if !entry.is_sound() {
         eprintln!("{}: without sound readings, never accepted", entry.key);

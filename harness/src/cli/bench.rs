@@ -8,6 +8,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::diagnose;
 use super::measuring::{Bar, MeasuringArgs};
+use super::{json, print};
 use crate::engines::Site;
 use crate::experiments::bench::{self, BenchReport, Knobs, Options, Progress};
 use crate::record::ProcedureId;
@@ -50,15 +51,14 @@ enum BenchFormat {
 
 impl Progress for Bar {
     fn planned(&self, seconds: f64) {
-        Self::planned(self, (10.0 * seconds).ceil() as usize);
+        self.0.inc_length((10.0 * seconds).ceil() as u64);
     }
 
     fn ended(&self, what: &str, seconds: f64) {
-        self.ended_part(what.to_owned(), (10.0 * seconds).ceil() as u64);
+        self.advance(what.to_owned(), (10.0 * seconds).ceil() as u64);
     }
 }
 
-/// Benches every case and prints one report over all.
 pub(super) fn run(args: &BenchArgs, site: &Site) -> Result<Exit, Diagnostic> {
     if !args.seconds.iter().chain([&args.minutes]).all(|s| s.is_finite() && *s >= 0.0) || args.seconds.is_empty() {
         return Err(miette::miette!("--seconds and --minutes must be numbers from 0"));
@@ -83,14 +83,13 @@ pub(super) fn run(args: &BenchArgs, site: &Site) -> Result<Exit, Diagnostic> {
     drop(bar);
     files::keep_json(&folder.join("bench.json"), &report).into_diagnostic()?;
     for format in &args.format {
-        let text = match format {
+        print(&match format {
             BenchFormat::Terminal => report.terminal(),
-            BenchFormat::Json => serde_json::to_string_pretty(&report).into_diagnostic()? + "\n",
+            BenchFormat::Json => json(&report)?,
             BenchFormat::Markdown => report.markdown(),
             BenchFormat::Csv => report.csv(),
             BenchFormat::Svg => report.svg(),
-        };
-        super::print(&text)?;
+        })?;
     }
     Ok(Exit::Passed)
 }

@@ -4,21 +4,15 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use etcetera::BaseStrategy;
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use crate::measure::cache::Cache;
 use crate::report::Exit;
 
-#[derive(Debug, Args)]
-pub(super) struct CacheArgs {
-    #[command(subcommand)]
-    action: Option<Action>,
-}
-
 #[derive(Clone, Copy, Debug, Subcommand)]
-enum Action {
+pub(super) enum Action {
     /// Where it is, how many readings of each engine it holds, what is damaged
     Info,
     /// Take out what is damaged, what killed runs left half written, and readings that no run used for long
@@ -29,7 +23,6 @@ enum Action {
     },
 }
 
-/// The cache in the folder that was chosen, or in the user's cache folder.
 pub(super) fn folder(chosen: Option<PathBuf>) -> Result<Cache, Diagnostic> {
     let folder = if let Some(folder) = chosen {
         folder
@@ -41,9 +34,8 @@ pub(super) fn folder(chosen: Option<PathBuf>) -> Result<Cache, Diagnostic> {
     Ok(Cache::at(std::path::absolute(folder).into_diagnostic()?))
 }
 
-/// Does what `luxproof cache` asks.
-pub(super) fn manage(args: &CacheArgs, cache: &Cache) -> Result<Exit, Diagnostic> {
-    let text = match args.action.unwrap_or(Action::Info) {
+pub(super) fn manage(action: Option<Action>, cache: &Cache) -> Result<Exit, Diagnostic> {
+    let text = match action.unwrap_or(Action::Info) {
         Action::Info => info(cache)?,
         Action::Prune { unused } => prune(cache, unused)?,
     };
@@ -62,20 +54,17 @@ fn info(cache: &Cache) -> Result<String, Diagnostic> {
     }
     lines.extend(contents.damaged.iter().map(|d| format!("damaged, read anew when it is asked for: {d}")));
     if contents.unfinished > 0 {
-        let count = contents.unfinished;
-        lines.push(format!("{count} files that a run is writing, or was when it was killed"));
+        lines.push(format!("{} files that a run is writing, or was when it was killed", contents.unfinished));
     }
     Ok(lines.join("\n") + "\n")
 }
 
-fn prune(cache: &Cache, unused_days: u32) -> Result<String, Diagnostic> {
-    let pruned = cache.prune(Duration::from_secs(86_400 * u64::from(unused_days))).into_diagnostic()?;
+fn prune(cache: &Cache, days: u32) -> Result<String, Diagnostic> {
+    let pruned = cache.prune(Duration::from_secs(86_400 * u64::from(days))).into_diagnostic()?;
+    let (unused, damaged, kib) = (pruned.unused, pruned.damaged, kibibytes(pruned.bytes));
+    let unfinished = pruned.unfinished;
     Ok(format!(
-        "took out {} unused for {unused_days} days, {} damaged, {} half written: {:.1} KiB\n",
-        pruned.unused,
-        pruned.damaged,
-        pruned.unfinished,
-        kibibytes(pruned.bytes)
+        "took out {unused} unused for {days} days, {damaged} damaged, {unfinished} half written: {kib:.1} KiB\n"
     ))
 }
 

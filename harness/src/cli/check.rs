@@ -1,9 +1,7 @@
 //! `luxproof check`: the plan of specs, nothing started.
 
 use std::io::Write;
-use std::path::PathBuf;
 
-use clap::Args;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::Selected;
@@ -14,37 +12,23 @@ use crate::plan::{Asked, Planner, cost_s};
 use crate::report::Exit;
 use crate::spec::{filtered, suite};
 
-#[derive(Debug, Args)]
-pub(super) struct CheckArgs {
-    /// Spec files, folders of them or patterns
-    #[arg(required = true, value_name = "SPEC")]
-    specs: Vec<PathBuf>,
-    #[command(flatten)]
-    selected: Selected,
-}
-
-pub(super) fn check(args: &CheckArgs, site: &Site) -> Result<Exit, Diagnostic> {
-    let cases = suite(&args.specs).and_then(|all| filtered(all, &args.selected.filter)).map_err(diagnose)?;
+pub(super) fn check(selected: &Selected, site: &Site) -> Result<Exit, Diagnostic> {
+    let cases = suite(&selected.specs).and_then(|all| filtered(all, &selected.filter)).map_err(diagnose)?;
     audit::published(&cases).into_diagnostic()?;
     let mut out = std::io::stdout().lock();
     let mut exit = Exit::Passed;
-    let selection = args.selected.selection();
-    let mut planner = Planner::new(&selection, site, args.selected.skipping());
+    let selection = selected.selection();
+    let mut planner = Planner::new(&selection, site, selected.skipping());
     for case in &cases {
         let plan = planner.plan(case).map_err(diagnose)?;
         writeln!(out, "{} ({}): {}", case.name, case.path.display(), case.title).into_diagnostic()?;
         for task in &plan.tasks {
             writeln!(out, "  {} at {} meters", task.procedure, task.targets.len()).into_diagnostic()?;
             for run in plan.runs.iter().filter(|r| plan.tasks[r.task].procedure == task.procedure) {
-                let engine = &plan.engines[run.engine];
+                let engine = &plan.engines[run.engine].engine;
                 let note = run.approximation.as_ref().map(|a| format!(", approximate: {a}")).unwrap_or_default();
-                writeln!(
-                    out,
-                    "    run  {:<10} at most about {:.0} s{note}",
-                    engine.engine.name(),
-                    left(run) * cost_s(engine.engine.as_ref(), case.budget)
-                )
-                .into_diagnostic()?;
+                let cost_s = left(run) * cost_s(engine.as_ref(), case.budget);
+                writeln!(out, "    run  {:<10} at most about {cost_s:.0} s{note}", engine.name()).into_diagnostic()?;
             }
             for skip in plan.skips.iter().filter(|s| s.key.procedure == task.procedure) {
                 let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();

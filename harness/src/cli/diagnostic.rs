@@ -4,7 +4,6 @@ use miette::{LabeledSpan, NamedSource, Report, Severity, SourceSpan};
 
 use crate::spec::SpecError;
 
-/// A spec error with its source line, where it has one.
 pub(crate) fn diagnose(error: SpecError) -> Report {
     let name = error.file.display().to_string();
     let text = std::fs::read(&error.file).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).ok();
@@ -16,9 +15,7 @@ pub(crate) fn diagnose(error: SpecError) -> Report {
     };
     let mut diagnostic =
         miette::MietteDiagnostic::new(format!("{place}: {}", error.message)).with_severity(Severity::Error);
-    if let Some(help) = error.help {
-        diagnostic = diagnostic.with_help(help);
-    }
+    diagnostic.help = error.help;
     match (text, span) {
         (Some(text), Some(span)) => {
             let diagnostic = diagnostic.with_label(LabeledSpan::new_with_span(Some("here".to_owned()), span));

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
-use miette::{IntoDiagnostic, Report as Diagnostic};
+use clap::Args;
+use miette::Report as Diagnostic;
 
 use super::accept::read_run;
-use super::print;
+use super::{TextOrJson, json, print};
 use crate::record::ReadingKey;
 use crate::report::{BaselineCheck, BaselineLine, Exit};
 use crate::trend::baseline::{Baseline, Changes, Comparability, EntryChange, MeterChange, State, compare};
@@ -18,24 +18,17 @@ pub(super) struct DiffArgs {
     /// The later run: its folder or report.json
     new: PathBuf,
     /// View to print
-    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = DiffFormat::Terminal)]
-    format: DiffFormat,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum DiffFormat {
-    Terminal,
-    Json,
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = TextOrJson::Terminal)]
+    format: TextOrJson,
 }
 
 pub(super) fn diff(args: &DiffArgs) -> Result<Exit, Diagnostic> {
     let [old, new] = [&args.old, &args.new].map(|run| read_run(run).map(|r| Baseline::candidate(&r)));
     let changes = compare(&old?.entries, &new?.entries, Comparability::SameSpec);
-    let text = match args.format {
-        DiffFormat::Terminal => text(&changes),
-        DiffFormat::Json => serde_json::to_string_pretty(&changes).into_diagnostic()? + "\n",
-    };
-    print(&text)?;
+    print(&match args.format {
+        TextOrJson::Terminal => text(&changes),
+        TextOrJson::Json => json(&changes)?,
+    })?;
     Ok(if changes.is_clean() { Exit::Passed } else { Exit::Failed })
 }
 
@@ -71,9 +64,9 @@ pub(super) fn check(changes: &Changes, file: &Path) -> BaselineCheck {
 /// What differs besides the readings, and the meters that moved, five at most.
 fn details(entry: &EntryChange) -> impl Iterator<Item = String> {
     let moved = |m: &MeterChange| {
-        let in_u =
-            if m.uncertainty > 0.0 { format!(", {:+.1} u", (m.new - m.old) / m.uncertainty) } else { String::new() };
-        let relative = 100.0 * (m.new - m.old) / m.old;
+        let change = m.new - m.old;
+        let in_u = if m.uncertainty > 0.0 { format!(", {:+.1} u", change / m.uncertainty) } else { String::new() };
+        let relative = 100.0 * change / m.old;
         format!("{} {:.6} -> {:.6} {}: {relative:+.4} %{in_u}", m.meter, m.old, m.new, m.quantity.unit())
     };
     let meters = entry.meters.iter().filter(|m| m.significant).take(5).map(moved);

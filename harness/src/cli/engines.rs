@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use crate::audit::doctor;
@@ -16,14 +16,8 @@ use crate::report::Exit;
 use crate::spec::suggestion;
 use crate::system::process;
 
-#[derive(Debug, Args)]
-pub(super) struct EnginesArgs {
-    #[command(subcommand)]
-    action: Option<EnginesAction>,
-}
-
 #[derive(Clone, Debug, Subcommand)]
-enum EnginesAction {
+pub(super) enum EnginesAction {
     /// Which engines there are, and their versions
     List,
     /// Fetch missing engines into a folder of our own
@@ -38,8 +32,8 @@ enum EnginesAction {
     },
 }
 
-pub(super) fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Diagnostic> {
-    match args.action.clone().unwrap_or(EnginesAction::List) {
+pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site) -> Result<Exit, Diagnostic> {
+    match action.unwrap_or(EnginesAction::List) {
         EnginesAction::List => {
             for engine in engines::all() {
                 match engine.probe(site) {
@@ -52,9 +46,7 @@ pub(super) fn manage_engines(args: &EnginesArgs, site: &Site) -> Result<Exit, Di
         }
         EnginesAction::Install { names } => {
             known_engines(&names)?;
-            let wanted = engines::all().into_iter().map(|e| e.name());
-            let wanted = wanted.filter(|e| names.is_empty() || names.iter().any(|n| e.as_str() == n));
-            Ok(report_installation(site, &wanted.collect::<Vec<_>>()))
+            Ok(report_installation(site, &names))
         }
         EnginesAction::Doctor { names } => {
             known_engines(&names)?;
@@ -79,12 +71,11 @@ fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
     Ok(exit)
 }
 
-/// Measures an engine's calibration again, keeps it and prints it.
 fn calibrate_anew(engine: Arc<dyn Engine>, reader: &Reader) -> Exit {
-    let Ok(version) = engine.probe(&reader.site) else { return Exit::Passed };
-    if engine.is_witness() {
-        return Exit::Passed;
-    }
+    let version = match engine.probe(&reader.site) {
+        Ok(version) if !engine.is_witness() => version,
+        _ => return Exit::Passed,
+    };
     let name = engine.name();
     match calibration::calibrate(&Instrument { engine, version }, &BTreeMap::new(), reader, Earlier::Ignored) {
         Ok(found) => {
@@ -100,18 +91,16 @@ fn calibrate_anew(engine: Arc<dyn Engine>, reader: &Reader) -> Exit {
 
 pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
     let known: Vec<EngineName> = engines::all().iter().map(|e| e.name()).collect();
-    let known: Vec<&str> = known.iter().map(EngineName::as_str).collect();
-    for name in names {
-        if !known.contains(&name.as_str()) {
-            let help = suggestion(name, known.iter().copied());
-            return Err(miette::miette!(help = help, "there is no engine `{name}`"));
-        }
-    }
-    Ok(())
+    let Some(name) = names.iter().find(|name| !known.iter().any(|k| k == *name)) else { return Ok(()) };
+    let help = suggestion(name, known.iter().map(EngineName::as_str));
+    Err(miette::miette!(help = help, "there is no engine `{name}`"))
 }
 
-pub(super) fn report_installation(site: &Site, wanted: &[EngineName]) -> Exit {
-    let outcomes = engines::install(site, wanted, |step| eprintln!("{step}"));
+/// Installs the engines that are named, or all.
+pub(super) fn report_installation(site: &Site, names: &[String]) -> Exit {
+    let wanted = engines::all().into_iter().map(|e| e.name());
+    let wanted: Vec<_> = wanted.filter(|e| names.is_empty() || names.iter().any(|n| e == n)).collect();
+    let outcomes = engines::install(site, &wanted, |step| eprintln!("{step}"));
     for outcome in &outcomes {
         eprintln!("{}: {}", outcome.component, outcome.detail);
     }

@@ -41,7 +41,7 @@ pub(super) fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic>
     Ok(Exit::Passed)
 }
 
-/// Exports one case; how many files that made.
+/// How many files it made.
 fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Result<usize, Diagnostic> {
     let selection =
         Selection { engines: vec![args.engine.clone()], procedures: args.procedures.clone(), ..Selection::default() };

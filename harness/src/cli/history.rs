@@ -2,21 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::views::read_report;
 use crate::report::Exit;
 use crate::trend::history::{History, Line, add, changes, lines, site};
 
-#[derive(Debug, Args)]
-pub(super) struct HistoryArgs {
-    #[command(subcommand)]
-    action: Action,
-}
-
 #[derive(Debug, Subcommand)]
-enum Action {
+pub(super) enum Action {
     /// Add the comparisons of reports; a night that is added again takes the place of its lines
     Add {
         /// report.json of a run
@@ -48,12 +42,10 @@ fn link(text: &str) -> Result<(String, String), String> {
     Ok((name.to_owned(), path.to_owned()))
 }
 
-pub(super) fn history(args: &HistoryArgs) -> Result<Exit, Diagnostic> {
-    match &args.action {
+pub(super) fn history(action: &Action) -> Result<Exit, Diagnostic> {
+    match action {
         Action::Add { reports, history, night } => {
-            for path in reports {
-                add_report(path, history, night.as_deref())?;
-            }
+            reports.iter().try_for_each(|path| add_report(path, history, night.as_deref()))?;
         }
         Action::Site { history, out, report } => draw(history, out, report)?,
     }

@@ -2,7 +2,6 @@
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use clap::Args;
@@ -70,7 +69,6 @@ impl MeasuringArgs {
     }
 }
 
-/// The hidden command that takes one reading for another process of this program.
 pub(super) fn read_one(site: &Site) -> Result<Exit, Diagnostic> {
     let mut text = String::new();
     std::io::stdin().read_to_string(&mut text).into_diagnostic()?;
@@ -81,39 +79,20 @@ pub(super) fn read_one(site: &Site) -> Result<Exit, Diagnostic> {
 }
 
 /// A bar over things to do, with the time left by what they are expected to take.
-pub(super) struct Bar {
-    bar: ProgressBar,
-    planned: AtomicU64,
-}
+pub(super) struct Bar(pub(super) ProgressBar);
 
 impl Bar {
     pub(super) fn new() -> Self {
         let bar = ProgressBar::new(0);
-        let style = "{bar:30} {pos}/{len} {msg} [{elapsed}, {eta} left]";
-        if let Ok(style) = ProgressStyle::with_template(style) {
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} {msg} [{elapsed}, {eta} left]") {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(500));
-        Self { bar, planned: AtomicU64::new(0) }
+        Self(bar)
     }
 
-    pub(super) fn planned(&self, things: usize) {
-        self.planned.fetch_add(things as u64, Ordering::Relaxed);
-        self.bar.set_length(self.planned.load(Ordering::Relaxed));
-    }
-
-    pub(super) fn ended(&self, what: String) {
-        self.ended_part(what, 1);
-    }
-
-    pub(super) fn ended_part(&self, what: String, parts: u64) {
-        self.bar.set_message(what);
-        self.bar.inc(parts);
-    }
-}
-
-impl Drop for Bar {
-    fn drop(&mut self) {
-        self.bar.finish_and_clear();
+    pub(super) fn advance(&self, what: String, things: u64) {
+        self.0.set_message(what);
+        self.0.inc(things);
     }
 }

@@ -22,6 +22,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
+use serde::Serialize;
 
 use self::photometry::PhotometryArgs;
 use crate::audit::Sampling;
@@ -55,17 +56,21 @@ enum Command {
     /// Run every procedure of a spec on every engine, compare and report
     Run(RunArgs),
     /// Validate specs and print the plan: what would run, what is skipped and why
-    Check(check::CheckArgs),
+    Check(Selected),
     /// Write an engine's scenes, runnable by hand
     Export(export::ExportArgs),
     /// List, install or examine engines
-    Engines(engines::EnginesArgs),
+    Engines {
+        #[command(subcommand)]
+        action: Option<engines::EnginesAction>,
+    },
     /// What photometric files say: flux, symmetry, lint, polar diagram, conversion
     Photometry(PhotometryArgs),
     /// View a finished run again
     Report(views::ReportArgs),
     /// Keep a history of nightly runs and draw it
-    History(history::HistoryArgs),
+    #[command(subcommand)]
+    History(history::Action),
     /// What changed between two runs, a mean shift told apart from noise
     Diff(diff::DiffArgs),
     /// Make the readings of a run a baseline, under review and for a reason
@@ -73,7 +78,10 @@ enum Command {
     /// Put known faults into right readings and see whether the harness catches and names them
     Selftest(selftest::SelftestArgs),
     /// What the cache of readings holds; take out what is damaged or long unused
-    Cache(cache::CacheArgs),
+    Cache {
+        #[command(subcommand)]
+        action: Option<cache::Action>,
+    },
     /// Run time against error, for every engine, solver and preset
     Bench(bench::BenchArgs),
     /// Numerical stability: laws that must hold whatever the scene, driven until something breaks
@@ -82,11 +90,18 @@ enum Command {
     #[command(name = crate::measure::READ_ONE, hide = true)]
     ReadOne,
     /// Print the JSON Schema of the spec, the report, or what external adapters read and print
-    Schema(SchemaArgs),
+    Schema {
+        /// Which schema
+        #[arg(value_enum, default_value_t = SchemaOf::Spec)]
+        of: SchemaOf,
+    },
 }
 
 #[derive(Debug, Args)]
 struct Selected {
+    /// Spec files, folders of them or patterns
+    #[arg(required = true, value_name = "SPEC")]
+    specs: Vec<PathBuf>,
     /// Engines to run, by name [default: those of the spec, else all that are there]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     engines: Vec<String>,
@@ -116,9 +131,6 @@ impl Selected {
 
 #[derive(Debug, Args)]
 struct RunArgs {
-    /// Spec files, folders of them or patterns
-    #[arg(required = true, value_name = "SPEC")]
-    specs: Vec<PathBuf>,
     #[command(flatten)]
     selected: Selected,
     /// Install missing engines first
@@ -146,11 +158,10 @@ struct RunArgs {
     sampling: Sampling,
 }
 
-#[derive(Debug, Args)]
-struct SchemaArgs {
-    /// Which schema
-    #[arg(value_enum, default_value_t = SchemaOf::Spec)]
-    of: SchemaOf,
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum TextOrJson {
+    Terminal,
+    Json,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -175,27 +186,26 @@ impl Cli {
                 args.views.all |= self.verbose > 0;
                 run::run(&args, &site, &cache::folder(self.cache_dir)?)
             }
-            Command::Cache(args) => cache::manage(&args, &cache::folder(self.cache_dir)?),
+            Command::Cache { action } => cache::manage(action, &cache::folder(self.cache_dir)?),
             Command::Check(args) => check::check(&args, &site),
             Command::Export(args) => export::export(&args, &site),
-            Command::Engines(args) => engines::manage_engines(&args, &site),
+            Command::Engines { action } => engines::manage_engines(action, &site),
             Command::Photometry(args) => photometry::run(&args),
             Command::Report(mut args) => {
                 args.views.all |= self.verbose > 0;
                 views::view(&args)
             }
-            Command::History(args) => history::history(&args),
+            Command::History(action) => history::history(&action),
             Command::Diff(args) => diff::diff(&args),
             Command::Accept(args) => accept::accept(&args),
             Command::Selftest(args) => selftest::run_selftest(&args),
             Command::Bench(args) => bench::run(&args, &site),
             Command::Stress(args) => stress::run(&args, &site),
             Command::ReadOne => measuring::read_one(&site),
-            Command::Schema(args) => schema(&args),
+            Command::Schema { of } => schema(of),
         }
     }
 
-    /// How much to log.
     pub fn verbosity(&self) -> u8 {
         self.verbose
     }
@@ -209,13 +219,17 @@ fn print(text: &str) -> Result<(), Diagnostic> {
     }
 }
 
-fn schema(args: &SchemaArgs) -> Result<Exit, Diagnostic> {
-    let schema = match args.of {
+fn json(value: &(impl Serialize + ?Sized)) -> Result<String, Diagnostic> {
+    Ok(serde_json::to_string_pretty(value).into_diagnostic()? + "\n")
+}
+
+fn schema(of: SchemaOf) -> Result<Exit, Diagnostic> {
+    let schema = match of {
         SchemaOf::Spec => schemars::schema_for!(Spec),
         SchemaOf::Report => schemars::schema_for!(Report),
         SchemaOf::Job => schemars::schema_for!(ExternalJob),
         SchemaOf::Readings => schemars::schema_for!(ExternalReadings),
     };
-    println!("{}", serde_json::to_string_pretty(&schema).into_diagnostic()?);
+    print!("{}", json(&schema)?);
     Ok(Exit::Passed)
 }

@@ -1,7 +1,7 @@
 //! How far a run is: one bar with the time left on a terminal, a line a job elsewhere.
 
 use std::io::IsTerminal;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -14,7 +14,6 @@ use crate::plan::{Plan, Run};
 use crate::record::ProcedureId;
 use crate::spec::Case;
 
-/// The progress of all cases of a run together, on stderr.
 pub(super) struct Progress {
     bar: ProgressBar,
     is_terminal: bool,
@@ -43,7 +42,6 @@ impl Work {
     }
 }
 
-/// An estimate of the time left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Left {
     About(Duration),
@@ -66,7 +64,6 @@ fn seconds(s: f64) -> Duration {
 }
 
 impl Progress {
-    /// Before anything is planned.
     pub(super) fn new() -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let target = if is_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
@@ -77,26 +74,18 @@ impl Progress {
         Self { bar, is_terminal, start: Instant::now(), work: Mutex::default() }
     }
 
-    /// Prints a line above the bar.
     fn line(&self, text: &str) {
         self.bar.suspend(|| eprintln!("{text}"));
     }
 
-    fn work(&self) -> Work {
-        *self.work.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn done(&self, budget_s: f64) -> Work {
-        let mut work = self.work.lock().unwrap_or_else(PoisonError::into_inner);
-        work.jobs_done += 1;
-        work.budget_done_s += budget_s;
-        *work
+    fn work(&self) -> MutexGuard<'_, Work> {
+        self.work.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Observer for Progress {
     fn planned(&self, cases: &[Case], plans: &[Plan]) {
-        let mut work = self.work.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut work = self.work();
         for (case, plan) in cases.iter().zip(plans) {
             let costs = |r: &&Run| !plan.engines[r.engine].engine.is_witness();
             work.jobs += plan.runs.len();
@@ -118,7 +107,9 @@ impl Observer for Progress {
     fn ended(&self, case: &Case, engine: &dyn Engine, procedure: ProcedureId, wall: Duration, failure: Option<&str>) {
         let name = format!("{}: {}: {procedure}", case.name, engine.name());
         tracing::info!(wall_s = wall.as_secs_f64(), "{name} is done");
-        let work = self.done(if engine.is_witness() { 0.0 } else { case.budget.seconds });
+        let mut work = self.work();
+        work.jobs_done += 1;
+        work.budget_done_s += if engine.is_witness() { 0.0 } else { case.budget.seconds };
         self.bar.inc(1);
         match failure {
             Some(failure) => self.line(&format!("{name} failed: {failure}")),
@@ -129,12 +120,6 @@ impl Observer for Progress {
 
     fn remarked(&self, case: &Case, text: &str) {
         self.line(&format!("{}: {text}", case.name));
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        self.bar.finish_and_clear();
     }
 }
 

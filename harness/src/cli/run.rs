@@ -8,9 +8,9 @@ use super::RunArgs;
 use super::diagnostic::diagnose;
 use super::engines::report_installation;
 use super::progress::Progress;
-use super::views::print_reports;
+use super::views::print_report;
 use crate::audit::{self, AfterFailure, AuditError, Options};
-use crate::engines::{self, Site};
+use crate::engines::Site;
 use crate::judge::Policy;
 use crate::measure::cache::Cache;
 use crate::report::{BaselineCheck, Exit, Report};
@@ -18,7 +18,6 @@ use crate::system::files;
 use crate::system::process;
 use crate::trend::baseline::{self, Baseline, Comparability, Entry};
 
-/// Audits, judges and prints.
 pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Diagnostic> {
     let progress = Progress::new();
     let options = Options {
@@ -34,13 +33,10 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
     };
     if args.install {
         // Every spec is read and checked before anything is fetched.
-        audit::chosen(&args.specs, &options).map_err(diagnose)?;
-        let is_wanted =
-            |name: &str| args.selected.engines.is_empty() || args.selected.engines.iter().any(|w| w == name);
-        let wanted: Vec<_> = engines::all().iter().map(|e| e.name()).filter(|name| is_wanted(name)).collect();
-        report_installation(site, &wanted);
+        audit::chosen(&args.selected.specs, &options).map_err(diagnose)?;
+        report_installation(site, &args.selected.engines);
     }
-    let report = audit::run(&args.specs, &Policy::built_in().into_diagnostic()?, &options);
+    let report = audit::run(&args.selected.specs, &Policy::built_in().into_diagnostic()?, &options);
     let mut report = report.map_err(|error| match error {
         AuditError::Spec(error) => diagnose(error),
         other => Diagnostic::from_err(other),
@@ -48,13 +44,11 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
     let root = options.out.clone();
     drop(progress);
     if let Some(path) = &args.baseline {
-        let check = hold_against_baseline(&report, path, &root)?;
-        report.baseline = Some(check);
+        report.baseline = Some(hold_against_baseline(&report, path, &root)?);
         files::keep_json(&root.join("report.json"), &report).into_diagnostic()?;
     }
-    let exit = report.exit();
-    print_reports(&[(report, root)], &args.views)?;
-    Ok(exit)
+    print_report(&report, &root, &args.views)?;
+    Ok(report.exit())
 }
 
 /// Holds a run against its baseline; what does not match it fails and is left as a candidate in the run's folder.
@@ -80,12 +74,10 @@ fn hold_against_baseline(report: &Report, path: &Path, root: &Path) -> Result<Ba
 
 /// The folder of the run: by default that of the one spec or folder, or one for all where there are several.
 fn out_folder(args: &RunArgs) -> PathBuf {
-    let of_one = |path: &PathBuf| path.file_stem().map(|stem| Path::new("luxproof-out").join(stem));
-    match (&args.out, &args.specs[..]) {
-        (Some(folder), _) => folder.clone(),
-        (None, [one]) if !one.display().to_string().contains('*') => {
-            of_one(one).unwrap_or_else(|| "luxproof-out/suite".into())
-        }
-        _ => "luxproof-out/suite".into(),
-    }
+    let stem = match &args.selected.specs[..] {
+        [one] if !one.display().to_string().contains('*') => one.file_stem(),
+        _ => None,
+    };
+    let name = stem.map_or(Path::new("suite"), Path::new);
+    args.out.clone().unwrap_or_else(|| Path::new("luxproof-out").join(name))
 }

@@ -1,9 +1,9 @@
 //! `luxproof selftest`: the scorecard of faults, and how good intervals and p-values are.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
-use super::print;
+use super::{TextOrJson, json, print};
 use crate::experiments::selftest::{calibrations, selftest};
 use crate::report::Exit;
 
@@ -22,30 +22,23 @@ pub(super) struct SelftestArgs {
     #[arg(long)]
     calibration: bool,
     /// View of the scorecard to print
-    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = CardFormat::Terminal)]
-    format: CardFormat,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum CardFormat {
-    Terminal,
-    Json,
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t = TextOrJson::Terminal)]
+    format: TextOrJson,
 }
 
 pub(super) fn run_selftest(args: &SelftestArgs) -> Result<Exit, Diagnostic> {
     if args.calibration {
         let found = calibrations(args.seed);
         print(&match args.format {
-            CardFormat::Terminal => found.to_string(),
-            CardFormat::Json => serde_json::to_string(&found).into_diagnostic()? + "\n",
+            TextOrJson::Terminal => found.to_string(),
+            TextOrJson::Json => serde_json::to_string(&found).into_diagnostic()? + "\n",
         })?;
         return Ok(if found.is_good() { Exit::Passed } else { Exit::Failed });
     }
     let card = selftest(args.runs.max(1), args.clean_runs, args.seed).into_diagnostic()?;
-    let text = match args.format {
-        CardFormat::Terminal => card.to_string(),
-        CardFormat::Json => serde_json::to_string_pretty(&card).into_diagnostic()? + "\n",
-    };
-    print(&text)?;
+    print(&match args.format {
+        TextOrJson::Terminal => card.to_string(),
+        TextOrJson::Json => json(&card)?,
+    })?;
     Ok(if card.is_good() { Exit::Passed } else { Exit::Failed })
 }

@@ -7,6 +7,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::diagnose;
 use super::measuring::{Bar, MeasuringArgs};
+use super::{json, print};
 use crate::engines::Site;
 use crate::experiments::stress::{self, Coordinates, Options, Progress, StressReport};
 use crate::judge::KnownDeviations;
@@ -49,11 +50,11 @@ enum StressFormat {
 
 impl Progress for Bar {
     fn planned(&self, points: usize) {
-        Self::planned(self, points);
+        self.0.inc_length(points as u64);
     }
 
     fn ended(&self, engine: &str, law: &str, magnitude: f64) {
-        Self::ended(self, format!("{engine}: {law} {magnitude:e}"));
+        self.advance(format!("{engine}: {law} {magnitude:e}"), 1);
     }
 }
 
@@ -90,25 +91,21 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
             known: if args.raw { &[] } else { record.breaks() },
         };
         let report = stress::stress(case, &subjects, &options, &Bar::new());
-        let name = if cases.len() == 1 {
-            "stress.json".into()
-        } else {
-            format!("stress-{}.json", case.name.replace('/', "-"))
-        };
-        files::keep_json(&folder.join(name), &report).into_diagnostic()?;
+        let which = if cases.len() == 1 { String::new() } else { format!("-{}", case.name.replace('/', "-")) };
+        files::keep_json(&folder.join(format!("stress{which}.json")), &report).into_diagnostic()?;
         reports.push(report);
     }
-    super::print(&view(&reports, args.format).into_diagnostic()?)?;
+    print(&view(&reports, args.format)?)?;
     let broken = reports.iter().any(|r| r.broken_by(&EngineName::SIMULATOR).next().is_some());
     Ok(if broken { Exit::Failed } else { Exit::Passed })
 }
 
-fn view(reports: &[StressReport], format: StressFormat) -> Result<String, serde_json::Error> {
+fn view(reports: &[StressReport], format: StressFormat) -> Result<String, Diagnostic> {
     let joined = |one: fn(&StressReport) -> String| reports.iter().map(one).collect::<Vec<_>>().join("\n");
     Ok(match (format, reports) {
         (StressFormat::Terminal, _) => joined(StressReport::terminal),
         (StressFormat::Markdown, _) => joined(StressReport::markdown),
-        (StressFormat::Json, [one]) => serde_json::to_string_pretty(one)? + "\n",
-        (StressFormat::Json, all) => serde_json::to_string_pretty(all)? + "\n",
+        (StressFormat::Json, [one]) => json(one)?,
+        (StressFormat::Json, all) => json(all)?,
     })
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
-use super::print;
+use super::{json, print};
 use crate::report::{self, Beside, Detail, Exit, Report, Style};
 
 /// Which views of a report are printed, and how.
@@ -48,8 +48,9 @@ pub(super) struct ReportArgs {
     pub(super) views: Views,
 }
 
-pub(super) fn print_reports(reports: &[(Report, PathBuf)], views: &Views) -> Result<(), Diagnostic> {
-    let beside = views.beside.iter().map(|path| read_beside(path)).collect::<Result<Vec<_>, _>>()?;
+pub(super) fn print_report(report: &Report, folder: &Path, views: &Views) -> Result<(), Diagnostic> {
+    let beside = |path: &PathBuf| read(path, |text| Beside::from_json(text).into_diagnostic());
+    let beside = views.beside.iter().map(beside).collect::<Result<Vec<_>, _>>()?;
     let detail = if views.all { Detail::All } else { Detail::Brief };
     let style = if std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) {
         Style::Colour
@@ -58,25 +59,12 @@ pub(super) fn print_reports(reports: &[(Report, PathBuf)], views: &Views) -> Res
     };
     for format in &views.format {
         let text = match format {
-            Format::Json => {
-                let all: Vec<&Report> = reports.iter().map(|(r, _)| r).collect();
-                // One spec gives its report; several give a list of reports.
-                match all[..] {
-                    [one] => serde_json::to_string_pretty(one),
-                    _ => serde_json::to_string_pretty(&all),
-                }
-                .into_diagnostic()?
-            }
-            Format::Html => print_page(reports, &beside),
-            view => {
-                let one = |(report, folder): &(Report, PathBuf)| match view {
-                    Format::Markdown => report::markdown(report, views.link.as_deref()),
-                    Format::Csv => report::csv(report),
-                    Format::Junit => report::junit(report),
-                    _ => report::terminal(report, style, detail, Some(&folder.display().to_string())),
-                };
-                reports.iter().map(one).collect::<Vec<_>>().join("\n")
-            }
+            Format::Terminal => report::terminal(report, style, detail, Some(&folder.display().to_string())),
+            Format::Json => json(report)?,
+            Format::Markdown => report::markdown(report, views.link.as_deref()),
+            Format::Junit => report::junit(report),
+            Format::Csv => report::csv(report),
+            Format::Html => keep_page(report, folder, &beside),
         };
         print(&format!("{}\n", text.trim_end()))?;
     }
@@ -84,40 +72,31 @@ pub(super) fn print_reports(reports: &[(Report, PathBuf)], views: &Views) -> Res
 }
 
 /// The page, also kept in the run's folder; on a terminal only its place is printed.
-fn print_page(reports: &[(Report, PathBuf)], beside: &[Beside]) -> String {
-    let mut pages = vec![];
-    for (report, folder) in reports {
-        let (page, file) = (report::page(report, beside), folder.join("report.html"));
-        let kept = std::fs::write(&file, &page);
-        if let Err(error) = &kept {
-            tracing::warn!(file = %file.display(), %error, "the page is printed, not kept");
-        }
-        pages.push(if kept.is_ok() && std::io::stdout().is_terminal() { file.display().to_string() } else { page });
+fn keep_page(report: &Report, folder: &Path, beside: &[Beside]) -> String {
+    let (page, file) = (report::page(report, beside), folder.join("report.html"));
+    if let Err(error) = std::fs::write(&file, &page) {
+        tracing::warn!(file = %file.display(), %error, "the page is printed, not kept");
+    } else if std::io::stdout().is_terminal() {
+        return file.display().to_string();
     }
-    pages.join("\n")
+    page
 }
 
 pub(super) fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
     let report = read_report(&args.result)?;
-    let folder = args.result.parent().map_or_else(PathBuf::new, Path::to_owned);
-    let exit = report.exit();
     if args.budget {
         print(&report::budgets(&report))?;
     } else {
-        print_reports(&[(report, folder)], &args.views)?;
+        print_report(&report, args.result.parent().unwrap_or(Path::new("")), &args.views)?;
     }
-    Ok(exit)
+    Ok(report.exit())
 }
 
-/// A report.json.
 pub(super) fn read_report(file: &Path) -> Result<Report, Diagnostic> {
-    let place = || file.display().to_string();
-    let text = std::fs::read_to_string(file).into_diagnostic().wrap_err_with(place)?;
-    serde_json::from_str(&text).into_diagnostic().wrap_err_with(place)
+    read(file, |text| serde_json::from_str(text).into_diagnostic())
 }
 
-fn read_beside(path: &Path) -> Result<Beside, Diagnostic> {
-    let place = || path.display().to_string();
-    let text = std::fs::read_to_string(path).into_diagnostic().wrap_err_with(place)?;
-    Beside::from_json(&text).into_diagnostic().wrap_err_with(place)
+fn read<T>(file: &Path, parse: impl Fn(&str) -> Result<T, Diagnostic>) -> Result<T, Diagnostic> {
+    let text = std::fs::read_to_string(file).into_diagnostic();
+    text.and_then(|text| parse(&text)).wrap_err_with(|| file.display().to_string())
 }

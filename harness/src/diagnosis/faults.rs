@@ -20,28 +20,21 @@ const ACCURACY: f64 = 1e-2;
 const INVISIBLE: f64 = 1e-3;
 /// Reflections after which truncation is looked for no more: it hardly shows then.
 const MOST_BOUNCES: u32 = 8;
-/// The largest number of a half-precision float.
 const HALF_MAX: f64 = 65504.0;
 
 pub struct Fault {
     /// A short name, the same in every task.
     pub id: &'static str,
-    /// What went wrong, for people.
     pub what: String,
     pub effect: Effect,
 }
 
-/// What a fault does to readings.
 pub enum Effect {
-    /// Multiplies each.
     Factor(f64),
     /// Multiplies each by a number of its own, and all by one that is not known beforehand.
     Shape(Vec<f64>),
-    /// Gives each another value.
     Values(Vec<f64>),
-    /// Cuts off what is above some level.
     Clamp,
-    /// Adds the same to each.
     Offset,
 }
 
@@ -60,7 +53,6 @@ pub fn truth(task: &Task) -> Option<Vec<f64>> {
     Some(measurement.readings(&task.targets).iter().map(|reading| reading.value).collect())
 }
 
-/// Every fault that would show in a task whose right readings are `right`.
 pub fn faults(task: &Task, right: &[f64]) -> Vec<Fault> {
     let mut all = factors(task);
     all.extend(arithmetic(task, right));
@@ -130,7 +122,6 @@ fn factors(task: &Task) -> Vec<Fault> {
     faults
 }
 
-/// Wrong arithmetic at the meter.
 fn arithmetic(task: &Task, right: &[f64]) -> Vec<Fault> {
     let half: Vec<f64> = right.iter().map(|r| r.min(HALF_MAX)).collect();
     let mut faults = vec![
@@ -149,24 +140,15 @@ fn arithmetic(task: &Task, right: &[f64]) -> Vec<Fault> {
     let distances: Vec<f64> = towards.iter().map(|d| d.length()).collect();
     let inverse = cosines.iter().map(|c| if *c > 0.0 { 1.0 / c } else { 0.0 }).collect();
     let uneven = |values: &[f64]| values.iter().any(|v| (v - values[0]).abs() > INVISIBLE * values[0]);
+    let mut add = |id, what: &str, effect| faults.push(Fault::new(id, what, effect));
     if uneven(&cosines) {
-        faults.push(Fault::new(
-            "cosine-missing",
-            "the cosine at the meter is left out",
-            Effect::Values(times(right, inverse)),
-        ));
-        let doubled = Effect::Values(times(right, cosines));
-        faults.push(Fault::new("cosine-doubled", "the cosine at the meter is applied twice", doubled));
+        add("cosine-missing", "the cosine at the meter is left out", Effect::Values(times(right, inverse)));
+        add("cosine-doubled", "the cosine at the meter is applied twice", Effect::Values(times(right, cosines)));
     }
     if uneven(&distances) {
-        let linear = distances.clone();
-        faults.push(Fault::new("distance", "light falls with distance, not with its square", Effect::Shape(linear)));
+        add("distance", "light falls with distance, not with its square", Effect::Shape(distances));
     }
-    faults.push(Fault::new(
-        "candela-squared",
-        "the candela are squared: the filter is applied to itself",
-        Effect::Shape(intensities),
-    ));
+    add("candela-squared", "the candela are squared: the filter is applied to itself", Effect::Shape(intensities));
     faults
 }
 
@@ -174,7 +156,6 @@ fn times(right: &[f64], factors: Vec<f64>) -> Vec<f64> {
     right.iter().zip(factors).map(|(r, f)| r * f).collect()
 }
 
-/// Wrong luminaires.
 fn of_luminaires(task: &Task) -> Vec<Fault> {
     let mut faults = vec![];
     let mut of_each = |id, what: &str, change: &dyn Fn(&mut Luminaire)| {
@@ -182,10 +163,9 @@ fn of_luminaires(task: &Task) -> Vec<Fault> {
         wrong.scene.luminaires.iter_mut().for_each(change);
         faults.extend(scene(id, what, &wrong));
     };
-    for turn in [90.0, 180.0, 270.0] {
-        let id = ["c-turned-90", "c-turned-180", "c-turned-270"][(turn / 90.0) as usize - 1];
+    for (id, turn) in [("c-turned-90", 90.0), ("c-turned-180", 180.0), ("c-turned-270", 270.0)] {
         let what = format!("the distribution is turned by {turn} degrees in C");
-        of_each(id, &what, &|l| replace(l, l.photometry.distribution.turned(turn)));
+        of_each(id, &what, &|l| replace(l, Some(l.photometry.distribution.turned(turn))));
     }
     of_each("c-mirrored", "C runs the other way round: 90 and 270 degrees are exchanged", &|l| {
         remap(l, |c, g| (-c, g));
@@ -210,7 +190,6 @@ fn of_luminaires(task: &Task) -> Vec<Fault> {
     faults
 }
 
-/// Wrong rooms.
 fn of_room(task: &Task) -> Vec<Fault> {
     let Some(room) = task.scene.room else { return vec![] };
     let with = |id, what: &str, change: &dyn Fn(&mut Room)| {
@@ -228,36 +207,27 @@ fn of_room(task: &Task) -> Vec<Fault> {
         std::mem::swap(&mut r.reflectance.floor, &mut r.reflectance.ceiling);
     }));
     // The exponent of display gamma, as an RGB colour would be decoded.
-    faults.extend(with("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", &|r| {
-        for surface in Surface::ALL {
-            *reflectance(r, surface) = room.reflectance.of(surface).powf(2.2);
-        }
-    }));
+    let raised = |r: &mut Room, power: f64| {
+        Surface::ALL.into_iter().for_each(|s| *reflectance(r, s) = room.reflectance.of(s).powf(power));
+    };
+    faults
+        .extend(with("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", &|r| raised(r, 2.2)));
     faults.extend(with("gamma-encoded", "reflectances are encoded as colours, to the power of 1/2.2", &|r| {
-        for surface in Surface::ALL {
-            *reflectance(r, surface) = room.reflectance.of(surface).powf(1.0 / 2.2);
-        }
+        raised(r, 1.0 / 2.2);
     }));
     faults
 }
 
-/// The wrong part of the light.
 fn of_transport(task: &Task) -> Vec<Fault> {
     let mut faults = vec![];
-    let mut light = |id, what: &str, transport| {
-        let wrong = Task { transport, ..task.clone() };
-        faults.extend(scene(id, what, &wrong));
-    };
+    let mut light = |id, what: &str, transport| faults.extend(scene(id, what, &Task { transport, ..task.clone() }));
     if let Transport::Indirect(bounces) | Transport::Total(bounces) = task.transport {
         let total = matches!(task.transport, Transport::Total(_));
         let of = |bounces| if total { Transport::Total(bounces) } else { Transport::Indirect(bounces) };
         let most = if let Bounces::AtMost(n) = bounces { n.min(MOST_BOUNCES) } else { MOST_BOUNCES };
         for n in 0..most {
-            light(
-                "bounces-cut",
-                &format!("light stops after {n} reflection{}", if n == 1 { "" } else { "s" }),
-                of(Bounces::AtMost(n)),
-            );
+            let what = format!("light stops after {n} reflection{}", if n == 1 { "" } else { "s" });
+            light("bounces-cut", &what, of(Bounces::AtMost(n)));
         }
         if total {
             light("direct-lost", "direct light is missing", Transport::Indirect(bounces));
@@ -280,8 +250,11 @@ fn scene(id: &'static str, what: &str, wrong: &Task) -> Option<Fault> {
     truth(wrong).map(|values| Fault::new(id, what, Effect::Values(values)))
 }
 
-fn replace(luminaire: &mut Luminaire, distribution: LuminousIntensityDistribution) {
-    luminaire.photometry = Arc::new(Photometry { distribution, ..(*luminaire.photometry).clone() });
+/// Leaves the luminaire as it is where a table's angles allow no other.
+fn replace(luminaire: &mut Luminaire, distribution: Option<LuminousIntensityDistribution>) {
+    if let Some(distribution) = distribution {
+        luminaire.photometry = Arc::new(Photometry { distribution, ..(*luminaire.photometry).clone() });
+    }
 }
 
 /// Reads the table at other angles: at its own nodes and their images, so that nothing is lost between them.
@@ -301,24 +274,18 @@ fn remap(luminaire: &mut Luminaire, source: impl Fn(f64, f64) -> (f64, f64)) {
         table.intensity(c, g).value()
     };
     let candela = c_deg.iter().flat_map(|c| at(*c)).map(value).collect();
-    if let Ok(distribution) = LuminousIntensityDistribution::new(c_deg, gamma_deg, candela) {
-        replace(luminaire, distribution);
-    }
+    replace(luminaire, LuminousIntensityDistribution::new(c_deg, gamma_deg, candela).ok());
 }
 
 fn isotropic(luminaire: &mut Luminaire) {
     let mean = luminaire.photometry.distribution.flux().value() / (4.0 * std::f64::consts::PI);
-    if let Ok(distribution) = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![mean; 2]) {
-        replace(luminaire, distribution);
-    }
+    replace(luminaire, LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![mean; 2]).ok());
 }
 
 fn averaged(luminaire: &mut Luminaire) {
     let table = &luminaire.photometry.distribution;
     let axial = LuminousIntensityDistribution::axial(table.gamma_deg().to_vec(), table.azimuth_average());
-    if let Ok(distribution) = axial {
-        replace(luminaire, distribution);
-    }
+    replace(luminaire, axial.ok());
 }
 
 fn extrapolated(luminaire: &mut Luminaire) {
@@ -326,21 +293,14 @@ fn extrapolated(luminaire: &mut Luminaire) {
     let gamma = table.gamma_deg();
     let (first, last) = (gamma[0], gamma[gamma.len() - 1]);
     let mut gamma_deg = gamma.to_vec();
-    let (low, high) = (first > 0.0, last < 180.0);
-    if low {
-        gamma_deg.insert(0, 0.0);
-    }
-    if high {
-        gamma_deg.push(180.0);
-    }
+    gamma_deg.splice(0..0, (first > 0.0).then_some(0.0));
+    gamma_deg.extend((last < 180.0).then_some(180.0));
     let row = |c: &f64| {
         let held = |g: &f64| table.intensity(*c, g.clamp(first, last)).value();
         gamma_deg.iter().map(held).collect::<Vec<_>>()
     };
     let candela = table.c_deg().iter().flat_map(row).collect();
-    if let Ok(distribution) = LuminousIntensityDistribution::new(table.c_deg().to_vec(), gamma_deg.clone(), candela) {
-        replace(luminaire, distribution);
-    }
+    replace(luminaire, LuminousIntensityDistribution::new(table.c_deg().to_vec(), gamma_deg, candela).ok());
 }
 
 fn reflectance(room: &mut Room, surface: Surface) -> &mut f64 {

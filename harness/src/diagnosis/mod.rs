@@ -20,13 +20,10 @@ const SLACK: f64 = 5e-4;
 const FLOOR: f64 = 1e-6;
 /// Explanations that are this much worse than the best, in chi-squared, are no rivals of it.
 const RIVAL: f64 = 4.0;
-/// Rivals that are named at most.
 const MOST_RIVALS: usize = 3;
 
-/// A fault that explains readings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cause {
-    /// The fault's short name.
     pub id: &'static str,
     /// What went wrong, with the evidence.
     pub text: String,
@@ -36,7 +33,6 @@ pub struct Cause {
     score: f64,
 }
 
-/// Names the cause of failures among one task's comparisons, where one is found.
 pub fn diagnose(task: &Task, comparisons: &mut [Comparison]) {
     let key = |c: &Comparison| Some((c.key.engine.clone(), c.reference.as_ref()?.basis));
     let failed = comparisons.iter().filter(|c| c.verdict == Verdict::Fail);
@@ -50,22 +46,17 @@ pub fn diagnose(task: &Task, comparisons: &mut [Comparison]) {
         let members: Vec<&mut Comparison> = comparisons.iter_mut().filter(mine).collect();
         let Some(readings) = Readings::of(&members) else { continue };
         let faults = faults(task, &readings.right);
-        let text = named(&causes(&faults, &readings));
+        let found: Vec<String> = causes(&faults, &readings).into_iter().map(|c| c.text).collect();
+        let text = (!found.is_empty()).then(|| found.join("; or "));
         for comparison in members.into_iter().filter(|c| c.verdict == Verdict::Fail && c.diagnosis.is_none()) {
             comparison.diagnosis.clone_from(&text);
         }
     }
 }
 
-fn named(causes: &[Cause]) -> Option<String> {
-    (!causes.is_empty()).then(|| causes.iter().map(|c| c.text.clone()).collect::<Vec<_>>().join("; or "))
-}
-
-/// Readings beside what they should be.
 #[derive(Clone, Debug)]
 pub struct Readings {
     pub read: Vec<f64>,
-    /// As they should be.
     pub right: Vec<f64>,
     /// Combined standard uncertainty of each pair.
     pub uncertainty: Vec<f64>,
@@ -79,9 +70,8 @@ impl Readings {
             let reference = comparison.reference.as_ref()?;
             readings.read.push(comparison.value.filter(|v| v.is_finite())?);
             readings.right.push(reference.value);
-            readings
-                .uncertainty
-                .push(comparison.uncertainty.standard_error().unwrap_or(0.0).hypot(reference.uncertainty));
+            let error = comparison.uncertainty.standard_error().unwrap_or(0.0);
+            readings.uncertainty.push(error.hypot(reference.uncertainty));
         }
         Some(readings)
     }
@@ -191,7 +181,6 @@ fn explanation(fault: &Fault, readings: &Readings) -> Option<Cause> {
     })
 }
 
-/// A factor that is the same everywhere and none of those known.
 fn unnamed_factor(readings: &Readings) -> Option<Cause> {
     let n = readings.len();
     let (factor, error) = readings.factor(&readings.right)?;

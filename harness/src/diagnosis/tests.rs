@@ -7,11 +7,13 @@ use crate::engines::fixtures;
 use crate::procedures::Target;
 use crate::record::{MeterId, Quantity};
 
-fn task(transport: Transport) -> Task {
+fn task(transport: Transport) -> (Task, Vec<f64>) {
     let job = fixtures::s1(transport);
     let target = |(k, s): (usize, &crate::engines::Station)| Target::of_one(MeterId::new("m", k), s.meter, 1.0);
     let targets = job.stations.iter().enumerate().map(target).collect();
-    Task { procedure: job.procedure, scene: job.scene, transport, quantity: Quantity::Illuminance, targets }
+    let task = Task { procedure: job.procedure, scene: job.scene, transport, quantity: Quantity::Illuminance, targets };
+    let right = truth(&task).unwrap();
+    (task, right)
 }
 
 fn found(task: &Task, right: &[f64], read: Vec<f64>) -> Vec<Cause> {
@@ -21,8 +23,7 @@ fn found(task: &Task, right: &[f64], read: Vec<f64>) -> Vec<Cause> {
 
 #[test]
 fn a_factor_of_pi_is_named_with_its_evidence() {
-    let task = task(Transport::Direct);
-    let right = truth(&task).unwrap();
+    let (task, right) = task(Transport::Direct);
     let read = right.iter().map(|r| r * std::f64::consts::PI).collect();
     let causes = found(&task, &right, read);
     assert_eq!(causes[0].id, "factor-pi");
@@ -31,8 +32,7 @@ fn a_factor_of_pi_is_named_with_its_evidence() {
 
 #[test]
 fn light_that_stops_early_is_told_by_the_number_of_its_reflections() {
-    let task = task(Transport::Indirect(Bounces::Converged));
-    let right = truth(&task).unwrap();
+    let (task, right) = task(Transport::Indirect(Bounces::Converged));
     // Case S1 cut at five reflections, as solved by two other methods.
     let read = vec![0.91170, 1.12222, 1.12222, 1.38492];
     let causes = found(&task, &right, read);
@@ -41,23 +41,20 @@ fn light_that_stops_early_is_told_by_the_number_of_its_reflections() {
 
 #[test]
 fn what_nothing_explains_is_left_unsaid() {
-    let task = task(Transport::Direct);
-    let right = truth(&task).unwrap();
+    let (task, right) = task(Transport::Direct);
     let read: Vec<f64> = right.iter().zip([1.1, 0.8, 1.3, 0.95]).map(|(r, f)| r * f).collect();
     assert_eq!(found(&task, &right, read), []);
 }
 
 #[test]
 fn right_readings_need_no_cause() {
-    let task = task(Transport::Direct);
-    let right = truth(&task).unwrap();
+    let (task, right) = task(Transport::Direct);
     assert_eq!(found(&task, &right, right.clone()), []);
 }
 
 #[test]
 fn an_unknown_factor_is_called_one() {
-    let task = task(Transport::Direct);
-    let right = truth(&task).unwrap();
+    let (task, right) = task(Transport::Direct);
     let read = right.iter().map(|r| 1.37 * r).collect();
     let causes = found(&task, &right, read);
     assert_eq!((causes.len(), causes[0].id), (1, "factor"));

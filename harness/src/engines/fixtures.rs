@@ -12,8 +12,8 @@ use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
 use luminaire::simulator::{self, Accuracy};
 
-use super::{Budget, Job, Measurement, Site, Station, Workbench};
-use crate::record::{Estimate, MeterId, ProcedureId};
+use super::{Absent, Budget, Engine, EngineError, Job, Knob, Measurement, Site, Station, Support, Version, Workbench};
+use crate::record::{EngineName, Estimate, MeterId, ProcedureId};
 use crate::system::process::PeakMemory;
 
 pub(crate) const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
@@ -204,4 +204,40 @@ pub(super) fn write_program(path: &Path, script: &str) {
 pub(crate) fn worst_z(measurement: &Measurement, exact: &[f64]) -> f64 {
     let z = |(e, x): (&Estimate, &f64)| (e.value - x) / e.uncertainty.standard_error().unwrap();
     worst(&measurement.estimates.iter().zip(exact).map(z).collect::<Vec<_>>())
+}
+
+/// An engine whose readings a test makes up.
+pub(crate) struct Fake<R> {
+    pub(crate) name: &'static str,
+    pub(crate) supports: fn(&Job) -> Support,
+    pub(crate) knobs: &'static [Knob],
+    pub(crate) read: R,
+}
+
+impl<R: Fn(&Job) -> Result<Measurement, EngineError> + Send + Sync> Fake<R> {
+    pub(crate) fn new(name: &'static str, read: R) -> Self {
+        Self { name, supports: |_| Support::Yes, knobs: &[], read }
+    }
+}
+
+impl<R: Fn(&Job) -> Result<Measurement, EngineError> + Send + Sync> Engine for Fake<R> {
+    fn name(&self) -> EngineName {
+        EngineName::new(self.name)
+    }
+
+    fn probe(&self, _site: &Site) -> Result<Version, Absent> {
+        Ok(Version("1".into()))
+    }
+
+    fn supports(&self, job: &Job) -> Support {
+        (self.supports)(job)
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        self.knobs
+    }
+
+    fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
+        (self.read)(job)
+    }
 }

@@ -11,7 +11,6 @@ const FAINT: f64 = 0.01;
 /// Below this part of what is right, light is lost.
 const LOST: f64 = 0.5;
 
-/// What a comparison found, relative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Compared {
     /// The largest deviation beyond noise.
@@ -22,11 +21,6 @@ pub(super) struct Compared {
     pub(super) is_lost: bool,
     /// Whether neither side is random.
     pub(super) is_exact: bool,
-}
-
-/// At each station the sum of two readings.
-pub(super) fn sum(a: &[Estimate], b: &[Estimate]) -> Vec<Estimate> {
-    a.iter().zip(b).map(|(a, b)| a.plus(b)).collect()
 }
 
 /// What an error at a station of that value counts against, in lx.

@@ -4,5 +4,5 @@ pub mod bench;
 mod deviation;
 pub mod selftest;
 pub mod stress;
-mod table;
+mod tables;
 mod trials;

@@ -10,7 +10,6 @@ use crate::laws::Place;
 use crate::measure::{Failure, FailureKind, Instrument, Question, Reader, Taken, Trial};
 use crate::spec::{Budget, Case};
 
-/// The settings of an engine.
 pub(super) type Settings = BTreeMap<String, serde_json::Value>;
 
 pub(super) struct Trials<'a> {
@@ -18,7 +17,6 @@ pub(super) struct Trials<'a> {
     reader: Reader,
 }
 
-/// Sampling effort of one reading.
 #[derive(Clone, Copy)]
 pub(super) struct Effort {
     pub(super) budget: Budget,

@@ -104,15 +104,13 @@ pub(super) const SEEDS: Law = Law {
     variant: |job, _| Some(Variant { job: job.clone(), against: Against::Base(1.0) }),
 };
 
-/// Gives every luminaire another table.
 fn retable(
     job: &mut Job,
     table: impl Fn(&LuminousIntensityDistribution) -> Option<LuminousIntensityDistribution>,
 ) -> Option<()> {
     for luminaire in &mut job.scene.luminaires {
-        let mut photometry = Photometry::clone(&luminaire.photometry);
-        photometry.distribution = table(&photometry.distribution)?;
-        luminaire.photometry = Arc::new(photometry);
+        let distribution = table(&luminaire.photometry.distribution)?;
+        luminaire.photometry = Arc::new(Photometry { distribution, ..Photometry::clone(&luminaire.photometry) });
     }
     Some(())
 }
@@ -191,11 +189,7 @@ fn refined(job: &Job, step_deg: f64) -> Option<Variant> {
         for gamma in gamma_deg {
             let known = table.gamma_deg().contains(&gamma);
             match nodes.last_mut() {
-                Some(near) if gamma - *near < 1e-6 * step_deg => {
-                    if known {
-                        *near = gamma;
-                    }
-                }
+                Some(near) if gamma - *near < 1e-6 * step_deg => *near = if known { gamma } else { *near },
                 _ => nodes.push(gamma),
             }
         }

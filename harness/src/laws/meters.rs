@@ -8,13 +8,11 @@ use super::{Against, Law, Light, Variant};
 use crate::engines::{Job, Station};
 use crate::record::MeterId;
 
-const DISTANCES_M: &[f64] = &[0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
-
 pub(super) const NEAR_SURFACE: Law = Law {
     id: "meter_near_surface",
     what: "meters ever closer to floor, ceiling and a wall: what the exact values are there",
     unit: "m",
-    magnitudes: DISTANCES_M,
+    magnitudes: &[0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6],
     light: Light::Either,
     variant: |job, off_m| {
         let size_m = job.scene.room?.size_m;
@@ -31,28 +29,24 @@ pub(super) const NEAR_SURFACE: Law = Law {
 pub(super) const NEAR_EDGE: Law = Law {
     id: "meter_near_edge",
     what: "meters ever closer to edges of the room: what the exact values are there",
-    unit: "m",
-    magnitudes: DISTANCES_M,
-    light: Light::Either,
     variant: |job, off_m| {
         let size_m = job.scene.room?.size_m;
         let low = DVec3::new(off_m, 0.42 * size_m.y, off_m);
         let high = DVec3::new(off_m, 0.42 * size_m.y, size_m.z - off_m);
         at(job, &[(low, DVec3::Z), (low, DVec3::X), (high, DVec3::NEG_Z)])
     },
+    ..NEAR_SURFACE
 };
 
 pub(super) const NEAR_CORNER: Law = Law {
     id: "meter_near_corner",
     what: "meters ever closer to corners of the room: what the exact values are there",
-    unit: "m",
-    magnitudes: DISTANCES_M,
-    light: Light::Either,
     variant: |job, off_m| {
         let size_m = job.scene.room?.size_m;
         let (low, high) = (DVec3::splat(off_m), size_m - off_m);
         at(job, &[(low, DVec3::Z), (low, DVec3::ONE.normalize()), (high, DVec3::NEG_Z)])
     },
+    ..NEAR_SURFACE
 };
 
 pub(super) const BESIDE_LUMINAIRE: Law = Law {

@@ -45,7 +45,6 @@ pub const ALL: [&Law; 27] = [
     &light::SEEDS,
 ];
 
-/// What a change of a job must do to its readings.
 pub struct Law {
     pub id: &'static str,
     pub what: &'static str,
@@ -58,7 +57,6 @@ pub struct Law {
     pub variant: fn(&Job, f64) -> Option<Variant>,
 }
 
-/// Which light a law is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Light {
     Direct,
@@ -77,14 +75,12 @@ impl Light {
     }
 }
 
-/// A changed job and what it must read.
 #[derive(Clone, Debug)]
 pub struct Variant {
     pub job: Job,
     pub against: Against,
 }
 
-/// What a changed job must read.
 #[derive(Clone, Debug)]
 pub enum Against {
     /// At each station what the unchanged job reads there, times this.

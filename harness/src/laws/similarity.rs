@@ -121,14 +121,10 @@ fn reflectances(room: &Room, linear: DMat3) -> Reflectances {
         let old = Surface::ALL.into_iter().find(|old| (linear * old.inward_normal()).dot(new.inward_normal()) > 0.5);
         old.map_or(0.0, |old| room.reflectance.of(old))
     };
-    Reflectances {
-        floor: of(Surface::Floor),
-        ceiling: of(Surface::Ceiling),
-        wall_x_min: of(Surface::WallXMin),
-        wall_x_max: of(Surface::WallXMax),
-        wall_y_min: of(Surface::WallYMin),
-        wall_y_max: of(Surface::WallYMax),
-    }
+    let [floor, ceiling] = [Surface::Floor, Surface::Ceiling].map(of);
+    let [wall_x_min, wall_x_max] = [Surface::WallXMin, Surface::WallXMax].map(of);
+    let [wall_y_min, wall_y_max] = [Surface::WallYMin, Surface::WallYMax].map(of);
+    Reflectances { floor, ceiling, wall_x_min, wall_x_max, wall_y_min, wall_y_max }
 }
 
 fn obstacle(obstacle: &Obstacle, place: &impl Fn(DVec3) -> DVec3, determinant: f64) -> Obstacle {
@@ -177,22 +173,17 @@ fn mirrored(table: &LuminousIntensityDistribution) -> LuminousIntensityDistribut
     LuminousIntensityDistribution::new(c_deg, full.gamma_deg().to_vec(), candela).unwrap_or(full)
 }
 
-fn opening(opening: LuminousOpening, s: f64) -> LuminousOpening {
-    match opening {
-        LuminousOpening::Point => LuminousOpening::Point,
-        LuminousOpening::Box { x_m, y_m, height_m } => {
-            LuminousOpening::Box { x_m: s * x_m, y_m: s * y_m, height_m: s * height_m }
-        }
-        LuminousOpening::Ellipse { x_m, y_m, height_m } => {
-            LuminousOpening::Ellipse { x_m: s * x_m, y_m: s * y_m, height_m: s * height_m }
-        }
-        LuminousOpening::Ellipsoid { x_m, y_m, z_m } => {
-            LuminousOpening::Ellipsoid { x_m: s * x_m, y_m: s * y_m, z_m: s * z_m }
-        }
-        LuminousOpening::LyingCylinder { axis, length_m, diameter_m } => {
-            LuminousOpening::LyingCylinder { axis, length_m: s * length_m, diameter_m: s * diameter_m }
+fn opening(mut opening: LuminousOpening, scale: f64) -> LuminousOpening {
+    match &mut opening {
+        LuminousOpening::Point => {}
+        LuminousOpening::Box { x_m: x, y_m: y, height_m: z }
+        | LuminousOpening::Ellipse { x_m: x, y_m: y, height_m: z }
+        | LuminousOpening::Ellipsoid { x_m: x, y_m: y, z_m: z } => [x, y, z].into_iter().for_each(|m| *m *= scale),
+        LuminousOpening::LyingCylinder { length_m, diameter_m, .. } => {
+            [length_m, diameter_m].into_iter().for_each(|m| *m *= scale);
         }
     }
+    opening
 }
 
 fn moved(job: &Job, by_m: DVec3) -> Job {
@@ -251,9 +242,8 @@ fn turned_luminaire(job: &Job, turn_deg: f64) -> Option<Variant> {
         if luminaire.model != LuminaireModel::Point {
             return None;
         }
-        let mut photometry = Photometry::clone(&luminaire.photometry);
-        photometry.distribution = photometry.distribution.turned(-turn_deg);
-        luminaire.photometry = Arc::new(photometry);
+        let distribution = luminaire.photometry.distribution.turned(-turn_deg);
+        luminaire.photometry = Arc::new(Photometry { distribution, ..Photometry::clone(&luminaire.photometry) });
         luminaire.orientation *= DMat3::from_rotation_z(turn_deg.to_radians());
     }
     Some(same(turned))

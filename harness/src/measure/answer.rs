@@ -9,7 +9,6 @@ use crate::engines::{self, Job, Site};
 use crate::laws;
 use crate::spec::Case;
 
-/// Takes the reading that a request names.
 pub fn answer(request: &Request, site: &Site) -> Result<Result<Taken, Failure>, String> {
     let cases = Case::load_all(&request.spec).map_err(|e| e.to_string())?;
     let case = cases.into_iter().find(|c| c.name == request.key.case).ok_or("the case is gone")?;

@@ -8,7 +8,6 @@ use crate::system::slots::Slots;
 
 #[derive(Debug)]
 pub struct Machine {
-    /// How much runs at a time.
     pub slots: Slots,
     /// `None`: equal jobs are rendered as often as they are asked.
     answers: Option<Mutex<BTreeMap<Key, Arc<Answered>>>>,
@@ -18,7 +17,6 @@ pub struct Machine {
 pub(super) type Answered = Mutex<Option<Entry>>;
 
 impl Machine {
-    /// So many threads or processes at a time.
     pub fn new(threads: usize) -> Arc<Self> {
         Arc::new(Self { slots: Slots::new(threads), answers: Some(Mutex::default()) })
     }

@@ -8,7 +8,6 @@ use crate::system::process::ProcessError;
 /// What a reading took the engine, now or when it was asked first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// Wall-clock seconds.
     pub wall_s: f64,
     /// Processor seconds of this process and its children meanwhile; beside other readings theirs are among them.
     pub cpu_s: f64,
@@ -16,7 +15,6 @@ pub struct Cost {
     pub peak_mib: Option<f64>,
 }
 
-/// Readings that were taken.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Taken {
     pub measurement: Measurement,
@@ -24,10 +22,8 @@ pub struct Taken {
     pub source: Source,
 }
 
-/// Who gave a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Source {
-    /// The engine, just now.
     Engine,
     /// The cache or this run, from an earlier answer of the engine.
     Cache,
@@ -35,7 +31,6 @@ pub enum Source {
     Nobody,
 }
 
-/// Why a reading came to nothing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[error("{text}")]
 pub struct Failure {
@@ -50,15 +45,12 @@ pub enum FailureKind {
     Declined,
     /// It cannot do this one: a setting makes no sense to it, or its solver gave up.
     Refused,
-    /// It gave something that is no number.
     Nan,
     /// It ended with an error or was killed.
     Crash,
-    /// It did not end in time.
     Hang,
     /// It ended well and readings were missing.
     SilentLoss,
-    /// The user asked to stop.
     Interrupted,
     /// It was not begun: the time for beginning was over.
     TimeUp,

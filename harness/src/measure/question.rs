@@ -9,14 +9,12 @@ use crate::engines::{Engine, EngineError, Job, Version};
 use crate::laws::Place;
 use crate::spec::Case;
 
-/// An engine that is there, in the version that it is.
 #[derive(Clone)]
 pub struct Instrument {
     pub engine: Arc<dyn Engine>,
     pub version: Version,
 }
 
-/// A reading to take.
 #[derive(Clone, Copy)]
 pub struct Question<'a> {
     pub instrument: &'a Instrument,
@@ -25,7 +23,6 @@ pub struct Question<'a> {
     pub folder: &'a str,
     /// Past this it is killed.
     pub limit: Duration,
-    /// Of a reading that is one of an experiment.
     pub trial: Option<&'a Trial<'a>>,
 }
 
@@ -35,7 +32,6 @@ pub struct Trial<'a> {
     pub case: &'a Case,
     /// Which variant of the procedure's job; `None` for the job itself.
     pub variant: Option<Place>,
-    /// Which of several readings of one job.
     pub repetition: usize,
     pub threads: usize,
 }

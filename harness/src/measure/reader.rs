@@ -23,13 +23,11 @@ use crate::system::slots::Share;
 /// read before is never rendered again.
 #[derive(Clone, Debug)]
 pub struct Reader {
-    /// Where engines are installed.
     pub site: Site,
     /// The folder that scenes and logs stay in; `None`: they are thrown away.
     pub out: Option<PathBuf>,
     /// Where earlier readings are; `None`: every reading is taken anew, and none is kept.
     pub cache: Option<Cache>,
-    /// How much of the machine an engine may have.
     pub machine: Arc<Machine>,
     pub isolation: Isolation,
     /// No reading starts after this; what is in the cache is still found.
@@ -70,7 +68,6 @@ impl Reader {
         Ok(Taken { measurement, cost: entry.cost, source })
     }
 
-    /// The engine's own answer.
     fn ask(&self, question: &Question<'_>) -> Result<Entry, Failure> {
         let Question { instrument, job, trial, .. } = *question;
         let engine = instrument.engine.as_ref();
@@ -170,7 +167,6 @@ fn in_process(engine: &dyn Engine, job: &Job, bench: &Workbench) -> Result<(Meas
     Ok((measurement, cost))
 }
 
-/// A workbench, and the folder that goes with it.
 struct WorkPlace {
     bench: Workbench,
     _temporary: Option<tempfile::TempDir>,

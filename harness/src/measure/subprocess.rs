@@ -14,7 +14,6 @@ use crate::record::ReadingKey;
 use crate::spec::Budget;
 use crate::system::process::Invocation;
 
-/// Where our own solvers run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Isolation {
     InProcess,
@@ -56,7 +55,6 @@ impl Request {
     }
 }
 
-/// Takes a reading in another process of this program.
 pub(super) fn read(program: &Path, request: &Request, bench: &Workbench) -> Result<Taken, Failure> {
     let input = serde_json::to_vec(request).map_err(|e| Failure::crash(format!("the request is no JSON: {e}")))?;
     // The spec's path counts from where this process is.

@@ -7,7 +7,6 @@ use std::path::Path;
 
 use serde::Serialize;
 
-/// A file that could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {source}")]
 pub struct FileError {

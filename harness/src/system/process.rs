@@ -22,7 +22,6 @@ pub fn interrupt() {
     INTERRUPTED.store(true, Ordering::SeqCst);
 }
 
-/// Whether the user asked to stop.
 pub fn is_interrupted() -> bool {
     INTERRUPTED.load(Ordering::SeqCst)
 }
@@ -83,115 +82,75 @@ pub fn ask(
 /// A program that does not know its version by now hangs.
 const ANSWER_LIMIT: Duration = Duration::from_secs(20);
 
-/// One run of an external program.
 #[derive(Clone, Debug)]
 pub struct Invocation {
     pub program: PathBuf,
-    /// Its arguments.
     pub args: Vec<OsString>,
     /// Environment variables set on top of ours.
     pub env: Vec<(OsString, OsString)>,
-    /// Working directory.
     pub cwd: PathBuf,
-    /// What it reads on standard input.
     pub stdin: Vec<u8>,
     /// Wall-clock limit; past it the whole process group is killed.
     pub limit: Duration,
-    /// Where its standard error is kept.
     pub log: PathBuf,
-    /// Told of the memory that it takes.
     pub peak: PeakMemory,
 }
 
 /// What a program that exited with 0 gave.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// Its standard output.
     pub stdout: Vec<u8>,
     /// Its standard error, also kept in the log.
     pub stderr: String,
-    /// Wall-clock time.
     pub wall: Duration,
 }
 
-/// Why a program gave no result.
 #[derive(Debug, thiserror::Error)]
 pub enum ProcessError {
-    /// It could not be started or talked to.
     #[error("cannot run {program}: {source}")]
     Start { program: String, source: std::io::Error },
-    /// Its messages could not be kept.
     #[error("cannot keep the messages of {program} in {log}: {source}")]
-    Log {
-        program: String,
-        /// The log file.
-        log: String,
-        source: std::io::Error,
-    },
-    /// It did not finish in time.
+    Log { program: String, log: String, source: std::io::Error },
     #[error("{program} was killed after its limit of {limit_s:.1} s; its messages are in {log}")]
-    TimedOut {
-        program: String,
-        /// The limit in seconds.
-        limit_s: f64,
-        /// The log file.
-        log: String,
-    },
-    /// It ended with an error.
+    TimedOut { program: String, limit_s: f64, log: String },
     #[error("{program} failed ({status}): {tail}\nall its messages are in {log}")]
-    Failed {
-        program: String,
-        /// Exit code or signal.
-        status: String,
-        /// Last lines of its standard error.
-        tail: String,
-        /// The log file.
-        log: String,
-    },
-    /// It ended well while an answer was still expected of it.
+    Failed { program: String, status: String, tail: String, log: String },
     #[error("{program} ended without an answer; its messages are in {log}")]
     Silent { program: String, log: String },
-    /// The user asked to stop.
     #[error("{program} was stopped: interrupted")]
     Interrupted { program: String },
 }
 
 impl Invocation {
-    /// An invocation without input, in `cwd`, with a limit and a log file.
     pub fn new(program: impl Into<PathBuf>, cwd: &Path, limit: Duration, log: impl Into<PathBuf>) -> Self {
         let (args, env, stdin) = (vec![], vec![], vec![]);
         let peak = PeakMemory::default();
         Self { program: program.into(), args, env, cwd: cwd.to_owned(), stdin, limit, log: log.into(), peak }
     }
 
-    /// Adds arguments.
     #[must_use]
     pub fn args<A: Into<OsString>>(mut self, args: impl IntoIterator<Item = A>) -> Self {
         self.args.extend(args.into_iter().map(Into::into));
         self
     }
 
-    /// Sets an environment variable.
     #[must_use]
     pub fn env(mut self, key: &str, value: impl Into<OsString>) -> Self {
         self.env.push((key.into(), value.into()));
         self
     }
 
-    /// Sets what the program reads on standard input.
     #[must_use]
     pub fn stdin(mut self, bytes: Vec<u8>) -> Self {
         self.stdin = bytes;
         self
     }
 
-    /// The command line as a person would type it in the working directory.
     pub fn command_line(&self) -> String {
         let words = std::iter::once(self.program.as_os_str()).chain(self.args.iter().map(OsString::as_os_str));
         words.map(|w| quoted(&w.to_string_lossy())).collect::<Vec<_>>().join(" ")
     }
 
-    /// The command line with the environment that the program needs before it.
     pub fn command_line_with_env(&self) -> String {
         let set = |(key, value): &(OsString, OsString)| {
             format!("{}={} ", key.to_string_lossy(), quoted(&value.to_string_lossy()))
@@ -199,7 +158,6 @@ impl Invocation {
         self.env.iter().map(set).collect::<String>() + &self.command_line()
     }
 
-    /// Runs the program to its end, its limit or an interruption.
     pub fn run(&self) -> Result<Finished, ProcessError> {
         let start = Instant::now();
         tracing::debug!(command = %self.command_line(), cwd = %self.cwd.display(), "run");
@@ -213,7 +171,6 @@ impl Invocation {
         Ok(Finished { stdout, stderr, wall: start.elapsed() })
     }
 
-    /// Starts the program and talks with it, line by line.
     pub fn converse(&self) -> Result<Conversation, ProcessError> {
         tracing::debug!(command = %self.command_line(), cwd = %self.cwd.display(), "converse");
         let mut child = self.spawn().map_err(|source| self.start_error(source))?;
@@ -232,11 +189,8 @@ impl Invocation {
     /// Keeps what a program that ended said; an error where it did not end well.
     fn conclude(&self, ended: Result<ExitStatus, ProcessError>, stderr: &[u8]) -> Result<String, ProcessError> {
         let stderr = String::from_utf8_lossy(stderr).into_owned();
-        self.keep_log(&stderr).map_err(|source| ProcessError::Log {
-            program: self.name(),
-            log: self.log_name(),
-            source,
-        })?;
+        let unkept = |source| ProcessError::Log { program: self.name(), log: self.log_name(), source };
+        self.keep_log(&stderr).map_err(unkept)?;
         let status = ended?;
         if status.success() {
             return Ok(stderr);
@@ -280,7 +234,6 @@ impl Invocation {
         }
     }
 
-    /// Why the program must not go on, if it must not.
     fn overrun(&self, start: Instant) -> Option<ProcessError> {
         if is_interrupted() {
             return Some(ProcessError::Interrupted { program: self.name() });
@@ -323,11 +276,9 @@ pub struct Conversation {
     stderr: Option<thread::JoinHandle<Vec<u8>>>,
 }
 
-/// So often a program that is listened to is looked at.
 const LISTEN: Duration = Duration::from_millis(10);
 
 impl Conversation {
-    /// The answer to a line.
     pub fn ask(&mut self, line: &str) -> Result<String, ProcessError> {
         if let Some(stdin) = &mut self.stdin {
             // A program that has ended has closed the pipe: its own status tells why.
@@ -336,7 +287,6 @@ impl Conversation {
         self.listen()
     }
 
-    /// The next line that it prints.
     pub fn listen(&mut self) -> Result<String, ProcessError> {
         loop {
             self.invocation.peak.look_at(&self.child.id().to_string());
@@ -420,7 +370,6 @@ fn kill_group(child: &Child) {
     }
 }
 
-/// The last lines of a text, for error messages.
 fn tail(text: &str) -> String {
     let lines: Vec<&str> = text.lines().filter(|l| !l.trim().is_empty()).collect();
     lines[lines.len().saturating_sub(8)..].join("\n")

@@ -14,7 +14,6 @@ const SHARE_OF_MEMORY: f64 = 0.8;
 /// More threads than this a reading are no use: Radiance's and POV-Ray's fewest blocks are eight.
 const MOST_A_READING: usize = 8;
 
-/// What may be in use at a time.
 #[derive(Debug)]
 pub struct Slots {
     all: Share,
@@ -22,10 +21,8 @@ pub struct Slots {
     changed: Condvar,
 }
 
-/// A number of slots and an amount of memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Share {
-    /// Threads or processes.
     pub threads: usize,
     /// Memory in MiB, an estimate.
     pub memory_mib: u64,
@@ -57,7 +54,6 @@ impl Slots {
         Self { all, state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Threads or processes at a time.
     pub fn threads(&self) -> usize {
         self.all.threads
     }
@@ -92,7 +88,6 @@ impl Slots {
 }
 
 impl Held<'_> {
-    /// How many threads or processes may be used.
     pub fn threads(&self) -> usize {
         self.share.threads
     }

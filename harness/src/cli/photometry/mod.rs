@@ -55,7 +55,6 @@ enum Format {
     Sarif,
 }
 
-/// A file and what became of reading it.
 struct Reading {
     file: PathBuf,
     read: Result<Photometry, ReadError>,
@@ -97,7 +96,7 @@ pub(crate) fn run(args: &PhotometryArgs) -> Result<Exit, Diagnostic> {
 
 fn json(readings: &[Reading]) -> Result<String, Diagnostic> {
     let records: Vec<serde_json::Value> = readings.iter().map(Reading::record).collect::<Result<_, _>>()?;
-    Ok(serde_json::to_string_pretty(&records).into_diagnostic()? + "\n")
+    super::json(&records)
 }
 
 impl Reading {

@@ -7,9 +7,7 @@ use std::fmt::Write as _;
 
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
 
-/// Radius of the outermost ring in user units.
 const RADIUS: f64 = 200.0;
-/// Space around the diagram for labels.
 const MARGIN: f64 = 40.0;
 /// Heights of the title above and the legend below.
 const TITLE: f64 = 34.0;
@@ -17,7 +15,6 @@ const LEGEND: f64 = 44.0;
 /// C0-C180 and C90-C270: the colours and dashes of the two curves.
 const CURVES: [(f64, &str, &str, &str); 2] = [(0.0, "C0-C180", "#c0272d", ""), (90.0, "C90-C270", "#1f5fa8", "6 4")];
 
-/// The diagram as a stand-alone SVG.
 pub(super) fn diagram(file: &str, photometry: &Photometry) -> String {
     let scale = Scale::of(photometry);
     let upward = [0.0, 90.0, 180.0, 270.0]
@@ -38,11 +35,8 @@ pub(super) fn diagram(file: &str, photometry: &Photometry) -> String {
     grid(&mut svg, &scale, upward);
     for (c_deg, _, colour, dashes) in CURVES {
         let points = curve(&photometry.distribution, &scale, c_deg);
-        writeln!(
-            svg,
-            "<path d=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dashes}\"/>"
-        )
-        .ok();
+        let stroke = format!("stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dashes}\"");
+        writeln!(svg, "<path d=\"{points}\" fill=\"none\" {stroke}/>").ok();
     }
     svg.push_str("</g>\n");
     legend(&mut svg, &scale, height - LEGEND);
@@ -50,7 +44,6 @@ pub(super) fn diagram(file: &str, photometry: &Photometry) -> String {
     svg
 }
 
-/// What the rings stand for.
 struct Scale {
     unit: &'static str,
     /// Multiplies candelas into the unit.
@@ -77,7 +70,6 @@ impl Scale {
         Self { unit, factor, step, rings: (largest / step).ceil().clamp(1.0, 6.0) as u32 }
     }
 
-    /// Distance from the centre of an intensity in candela.
     fn radius(&self, candela: f64) -> f64 {
         RADIUS * candela * self.factor / (self.step * f64::from(self.rings))
     }

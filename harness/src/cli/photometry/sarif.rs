@@ -4,13 +4,10 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use luminaire::photometry::Severity;
-use miette::{IntoDiagnostic, Report as Diagnostic};
+use miette::Report as Diagnostic;
 use serde_json::{Value, json};
 
 use super::Reading;
-
-/// The rule of a file that was not read.
-const REFUSED: &str = "refused";
 
 pub(super) fn log(readings: &[Reading]) -> Result<String, Diagnostic> {
     let results: Vec<Value> = readings.iter().flat_map(results).collect();
@@ -22,7 +19,7 @@ pub(super) fn log(readings: &[Reading]) -> Result<String, Diagnostic> {
         "version": "2.1.0",
         "runs": [{"tool": {"driver": driver}, "results": results}],
     });
-    Ok(serde_json::to_string_pretty(&log).into_diagnostic()? + "\n")
+    crate::cli::json(&log)
 }
 
 fn results(reading: &Reading) -> Vec<Value> {
@@ -34,7 +31,7 @@ fn results(reading: &Reading) -> Vec<Value> {
         }
         Err(error) => {
             let message = format!("{}; {}", error.message(), error.help());
-            vec![result(REFUSED, "error", &message, &reading.file, error.line, error.column)]
+            vec![result("refused", "error", &message, &reading.file, error.line, error.column)]
         }
     }
 }

@@ -6,8 +6,8 @@ use std::path::Path;
 use luminaire::photometry::{Lint, LuminousOpening, Photometry, Symmetry};
 use luminaire::units::{Candela, Lumen};
 use serde::Serialize;
+use serde_json::json;
 
-/// One file's record in `--json`.
 #[derive(Debug, Serialize)]
 pub(super) struct Summary {
     file: String,
@@ -18,7 +18,7 @@ pub(super) struct Summary {
     flux_down_lm: f64,
     max_cd: f64,
     symmetry: &'static str,
-    /// The symmetry that the values themselves have.
+    /// Of the values themselves.
     detected_symmetry: &'static str,
     c_planes: Angles,
     gamma: Angles,
@@ -35,11 +35,10 @@ pub(super) struct Summary {
     beam_angle_deg: [Option<f64>; 2],
     /// Full angles to a tenth of the largest intensity.
     field_angle_deg: [Option<f64>; 2],
-    /// Spacing criterion along C0 and C90.
     spacing_criterion: [Option<f64>; 2],
     cie_flux_code: Option<[f64; 5]>,
     bug_zones_lm: BugZones,
-    lint: Vec<LintRecord>,
+    lint: Vec<serde_json::Value>,
 }
 
 /// Flux in the zones of the Luminaire Classification System (TM-15), from low to very high.
@@ -50,7 +49,6 @@ struct BugZones {
     forward: [f64; 4],
 }
 
-/// How angles are spaced.
 #[derive(Debug, Serialize)]
 struct Angles {
     count: usize,
@@ -60,19 +58,13 @@ struct Angles {
     step_deg: Option<f64>,
 }
 
-#[derive(Debug, Serialize)]
-struct LintRecord {
-    code: &'static str,
-    line: usize,
-    message: String,
-}
-
 impl Summary {
     pub(super) fn of(file: &Path, photometry: &Photometry) -> Self {
         let distribution = &photometry.distribution;
         let (flux, max) = (distribution.flux(), distribution.max_intensity());
         let within = |fraction: f64| [0.0, 90.0].map(|c| distribution.angle_within(c, fraction, max));
         let lit = max > Candela(0.0);
+        let record = |l: &Lint| json!({"code": l.code, "line": l.line, "message": l.message});
         Self {
             file: file.display().to_string(),
             format: photometry.format.clone(),
@@ -96,14 +88,8 @@ impl Summary {
             spacing_criterion: [0.0, 90.0].map(|c| distribution.spacing_criterion(c)),
             cie_flux_code: distribution.cie_flux_code(Lumen(photometry.lamp_lumens.unwrap_or(flux.value()))),
             bug_zones_lm: BugZones::of(photometry),
-            lint: photometry.lints.iter().map(LintRecord::of).collect(),
+            lint: photometry.lints.iter().map(record).collect(),
         }
-    }
-}
-
-impl LintRecord {
-    fn of(lint: &Lint) -> Self {
-        Self { code: lint.code, line: lint.line, message: lint.message.clone() }
     }
 }
 
@@ -112,11 +98,8 @@ impl BugZones {
     fn of(photometry: &Photometry) -> Self {
         let forward_c_deg = if photometry.format.starts_with("EULUMDAT") { 90.0 } else { 0.0 };
         let zones = photometry.distribution.classification_zones(forward_c_deg);
-        Self {
-            back: zones.back.map(Lumen::value),
-            up: zones.up.map(Lumen::value),
-            forward: zones.forward.map(Lumen::value),
-        }
+        let [back, forward] = [zones.back, zones.forward].map(|zones| zones.map(Lumen::value));
+        Self { back, up: zones.up.map(Lumen::value), forward }
     }
 }
 
@@ -159,26 +142,20 @@ impl fmt::Display for Summary {
             row("luminaire", luminaire.lines().next().unwrap_or_default().to_owned())?;
         }
         let up = if self.flux_lm > 0.0 { 100.0 * self.flux_up_lm / self.flux_lm } else { 0.0 };
-        row(
-            "flux",
-            format!("{:.1} lm: {:.1} up ({up:.1} %), {:.1} down", self.flux_lm, self.flux_up_lm, self.flux_down_lm),
-        )?;
+        let (lm, up_lm, down_lm) = (self.flux_lm, self.flux_up_lm, self.flux_down_lm);
+        row("flux", format!("{lm:.1} lm: {up_lm:.1} up ({up:.1} %), {down_lm:.1} down"))?;
         row("largest intensity", format!("{:.1} cd", self.max_cd))?;
-        let hidden = if self.symmetry == self.detected_symmetry {
-            String::new()
-        } else {
-            format!(" (the values are {})", self.detected_symmetry)
-        };
-        row("symmetry", format!("{}{hidden}", self.symmetry))?;
+        let (symmetry, detected) = (self.symmetry, self.detected_symmetry);
+        let hidden = if symmetry == detected { String::new() } else { format!(" (the values are {detected})") };
+        row("symmetry", format!("{symmetry}{hidden}"))?;
         row("C planes", self.c_planes.to_string())?;
         row("gamma angles", self.gamma.to_string())?;
         row("luminous opening", self.opening.clone())?;
-        match (self.lamp_lumens, self.output_ratio) {
-            (Some(lumens), Some(ratio)) => {
-                row("lamps", format!("{lumens} lm, light output ratio {:.1} %", 100.0 * ratio))?;
-            }
-            _ => row("lamps", "absolute photometry".to_owned())?,
-        }
+        let lamps = match (self.lamp_lumens, self.output_ratio) {
+            (Some(lumens), Some(ratio)) => format!("{lumens} lm, light output ratio {:.1} %", 100.0 * ratio),
+            _ => "absolute photometry".to_owned(),
+        };
+        row("lamps", lamps)?;
         if let (Some(watts), Some(efficacy)) = (self.input_watts, self.efficacy_lm_per_w) {
             row("power", format!("{watts} W, {efficacy:.1} lm/W"))?;
         }

@@ -21,9 +21,8 @@ fn arguments(line: &[&str]) -> PhotometryArgs {
 fn pendant() -> Photometry {
     let gamma: Vec<f64> = (0..=36).map(|k| 5.0 * f64::from(k)).collect();
     let plane = |wide: f64| {
-        let shape =
-            move |g: f64| if g < 90.0 { 200.0 * (g / wide).to_radians().cos().max(0.0) } else { (g - 90.0) / 3.0 };
-        gamma.iter().map(move |&g| shape(g)).collect::<Vec<f64>>()
+        let down = |g: f64| 200.0 * (g / wide).to_radians().cos().max(0.0);
+        gamma.iter().map(|&g| if g < 90.0 { down(g) } else { (g - 90.0) / 3.0 }).collect::<Vec<f64>>()
     };
     let candela = [plane(1.0), plane(1.2)].concat();
     let distribution = LuminousIntensityDistribution::new(vec![0.0, 90.0], gamma.clone(), candela).unwrap();
@@ -62,8 +61,8 @@ fn the_diagram_puts_each_intensity_at_its_angle_and_radius() {
     assert_eq!(svg.matches("<circle").count(), 4, "{svg}");
     assert!(svg.contains(">cd/klm<") && svg.contains(">150<") && svg.contains("Pendant &lt;1 &amp; 2&gt;"));
     let path = |colour: &str| {
-        let line =
-            svg.lines().find(|l| l.starts_with("<path d=\"M0") && l.contains(colour) && l.contains('Z')).unwrap();
+        let is_curve = |l: &&str| l.starts_with("<path d=\"M0") && l.contains(colour) && l.contains('Z');
+        let line = svg.lines().find(is_curve).unwrap();
         let points = line.split('"').nth(1).unwrap().trim_start_matches('M').trim_end_matches('Z').to_owned();
         let point = |p: &str| p.split(' ').map(|n| n.parse::<f64>().unwrap()).collect::<Vec<f64>>();
         points.split('L').map(point).collect::<Vec<_>>()
@@ -118,15 +117,13 @@ fn sarif_names_rule_level_and_line_of_lints_and_refusals() {
         .iter()
         .map(|r| (r["ruleId"].as_str().unwrap(), r["level"].as_str().unwrap(), region(r)["startLine"].as_u64()))
         .collect();
-    assert_eq!(
-        found,
-        [
-            ("lm63/leading-blanks", "note", Some(1)),
-            ("lm63/ballast-lamp-factor", "warning", Some(4)),
-            ("lm63/keywords", "note", None),
-            ("refused", "error", Some(7)),
-        ]
-    );
+    let expected = [
+        ("lm63/leading-blanks", "note", Some(1)),
+        ("lm63/ballast-lamp-factor", "warning", Some(4)),
+        ("lm63/keywords", "note", None),
+        ("refused", "error", Some(7)),
+    ];
+    assert_eq!(found, expected);
     assert_eq!(region(&results[3])["startColumn"], 3);
     assert_eq!(results[0]["locations"][0]["physicalLocation"]["artifactLocation"]["uri"], "a%20b.ies");
     assert!(lints(&readings).starts_with("a b.ies:1: note: blanks"));

@@ -5,33 +5,35 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::Truth;
-use super::fit::{self, Fit};
+use super::fit;
 use crate::experiments::deviation;
 use crate::measure::Taken;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 
-/// Relative errors whose time is stated.
+/// Relative errors whose time is told.
 pub(super) const TARGETS: [f64; 4] = [0.1, 0.01, 1e-3, 1e-4];
 /// What is left of a time without the start-up at least, in parts of it.
 const LEAST_NET: f64 = 0.05;
 
-/// Error against time of one engine, solver and preset at one procedure.
 #[derive(Clone, Debug, Serialize)]
 pub struct Curve {
     #[serde(flatten)]
     pub key: ReadingKey,
     /// What solved it; empty where the engine has one solver only.
     pub solver: String,
+    /// The preset; empty where there are none.
     pub preset: String,
     /// Seconds of a job of next to no work.
     pub start_up_s: f64,
     /// Seconds of this job with the least effort that the engine can do with.
     pub set_up_s: f64,
+    /// By rising effort.
     pub points: Vec<BenchPoint>,
-    /// How far off the reference may be, relative; smaller errors cannot be seen.
+    /// How far off the reference may be, relative; errors below are not told from none.
     pub reference_floor: f64,
     /// Wall-clock seconds to a relative error; null where it was not reached or lies below the reference's floor.
     pub time_to: BTreeMap<String, Option<f64>>,
+    /// The same, start-up apart.
     pub time_to_net: BTreeMap<String, Option<f64>>,
     /// Of the error over the time, start-up apart, in a log-log plot.
     pub slope: Option<f64>,
@@ -41,18 +43,20 @@ pub struct Curve {
     pub efficiency: Option<f64>,
 }
 
-/// One rung of the ladder, over all repetitions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BenchPoint {
     /// Seconds of budget, or one over the relative error asked for.
     pub effort: f64,
+    /// Median wall-clock seconds.
     pub wall_s: f64,
+    /// Median processor seconds.
     pub cpu_s: f64,
     pub peak_mib: Option<f64>,
     /// Root mean square over meters and repetitions.
     pub relative_error: f64,
-    /// Ends of its 95 % interval.
+    /// Lower end of its 95 % interval.
     pub relative_error_low: f64,
+    /// Upper end of its 95 % interval.
     pub relative_error_high: f64,
     /// The largest at any meter in any repetition.
     pub worst_error: f64,
@@ -102,40 +106,36 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Curve {
-    pub(super) fn of(key: ReadingKey) -> Self {
+    pub(super) fn of(
+        key: ReadingKey,
+        (solver, preset): (String, String),
+        (start_up_s, set_up_s): (f64, f64),
+        reference_floor: f64,
+        points: Vec<BenchPoint>,
+    ) -> Self {
+        // A difference of two times that are nearly alike is not known better than that.
+        let net = |p: &BenchPoint| (p.wall_s - start_up_s).max(LEAST_NET * p.wall_s);
+        let timed = |time: &dyn Fn(&BenchPoint) -> f64| -> Vec<(f64, f64)> {
+            points.iter().map(|p| (time(p), p.relative_error)).collect()
+        };
+        let time = |points: &[(f64, f64)], t: f64| (t >= reference_floor).then(|| fit::time_to(points, t)).flatten();
+        let times = |points: &[(f64, f64)]| TARGETS.map(|t| (t.to_string(), time(points, t))).into();
+        let fit = fit::fit(&timed(&net));
+        let last = points.last().filter(|p| p.variance > 0.0);
         Self {
             key,
-            solver: String::new(),
-            preset: String::new(),
-            start_up_s: 0.0,
-            set_up_s: 0.0,
-            points: vec![],
-            reference_floor: 0.0,
-            time_to: BTreeMap::new(),
-            time_to_net: BTreeMap::new(),
-            slope: None,
-            bias_floor: None,
-            efficiency: None,
+            solver,
+            preset,
+            start_up_s,
+            set_up_s,
+            reference_floor,
+            time_to: times(&timed(&|p| p.wall_s)),
+            time_to_net: times(&timed(&net)),
+            slope: fit.map(|f| f.slope),
+            bias_floor: fit.and_then(|f| f.floor),
+            efficiency: last.map(|p| 1.0 / (p.variance * net(p))),
+            points,
         }
-    }
-
-    /// Fills in what follows from the points.
-    pub(super) fn conclude(&mut self) {
-        // A difference of two times that are nearly alike is not known better than that.
-        let net = |p: &BenchPoint| (p.wall_s - self.start_up_s).max(LEAST_NET * p.wall_s);
-        let points: Vec<(f64, f64)> = self.points.iter().map(|p| (net(p), p.relative_error)).collect();
-        let whole: Vec<(f64, f64)> = self.points.iter().map(|p| (p.wall_s, p.relative_error)).collect();
-        let told = |t: &f64| *t >= self.reference_floor;
-        let time = |points: &[(f64, f64)], t: f64| Some(t).filter(told).and_then(|t| fit::time_to(points, t));
-        let times = |points: &[(f64, f64)]| TARGETS.map(|t| (t.to_string(), time(points, t))).into();
-        self.time_to = times(&whole);
-        self.time_to_net = times(&points);
-        if let Some(Fit { slope, floor }) = fit::fit(&points) {
-            self.slope = Some(slope);
-            self.bias_floor = floor;
-        }
-        let last = self.points.last().filter(|p| p.variance > 0.0);
-        self.efficiency = last.map(|p| 1.0 / (p.variance * net(p)));
     }
 
     pub fn name(&self) -> String {
@@ -145,7 +145,6 @@ impl Curve {
     }
 }
 
-/// The points of one case and procedure that no other point beats in both time and error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Pareto {
     pub case: String,

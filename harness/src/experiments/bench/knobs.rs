@@ -9,7 +9,6 @@ use crate::measure::{Failure, Instrument, Taken};
 use crate::record::ReadingKey;
 use crate::spec::Budget;
 
-/// What a value of a setting does, against the default.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KnobEffect {
     #[serde(flatten)]
@@ -19,7 +18,6 @@ pub struct KnobEffect {
     pub effect: Effect,
     /// Largest deviation beyond noise from the reading by default, relative.
     pub deviation: Option<f64>,
-    /// The noise beside it.
     pub noise: Option<f64>,
     /// Time over the time by default.
     pub time_ratio: Option<f64>,
@@ -28,13 +26,9 @@ pub struct KnobEffect {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Effect {
-    /// The readings differ beyond their noise.
     Result,
-    /// The readings agree; scene, time or noise differ.
     Effort,
-    /// What the engine gets, what it takes and what it reads are the same.
     Nothing,
-    /// The engine refuses it, or fails with it.
     Fails,
 }
 
@@ -49,7 +43,6 @@ impl Effect {
     }
 }
 
-/// Sampling effort of one reading of the check.
 const BUDGET: Budget = Budget { relative_error: 0.005, seconds: 1.5 };
 /// Times differ that differ by this factor.
 const SLOWER: f64 = 1.5;
@@ -106,7 +99,6 @@ impl KnobEffect {
     }
 }
 
-/// A number or truth value where it is one, else a word.
 fn scalar(text: &str) -> serde_json::Value {
     serde_json::from_str(text).unwrap_or_else(|_| text.into())
 }

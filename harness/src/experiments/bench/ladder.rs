@@ -7,9 +7,7 @@ use crate::engines::{Engine, Job, Measurement};
 use crate::record::EngineName;
 use crate::spec::Budget;
 
-/// One rung: an effort of one preset.
 pub(super) struct Rung {
-    /// The preset's name; empty where an engine has none.
     pub(super) preset: String,
     /// Seconds of budget, or one over the relative error asked for.
     pub(super) effort: f64,
@@ -25,7 +23,6 @@ const FURNISHED: [f64; 4] = [1e-1, 1e-2, 5e-3, 2e-3];
 /// Never met: the time decides.
 const UNREACHED: f64 = 1e-9;
 
-/// What an engine is asked for in turn.
 pub(super) fn ladder(engine: &dyn Engine, job: &Job, furnished: bool, own: &Settings, seconds: &[f64]) -> Vec<Rung> {
     let plain = |preset: &str, seconds: f64| Rung {
         preset: preset.to_owned(),
@@ -66,7 +63,6 @@ impl Rung {
         if self.is_timed { self.budget.seconds.max(0.5) } else { 0.5 }
     }
 
-    /// The spec's settings with its own.
     pub(super) fn settings(&self, own: &Settings) -> Settings {
         let mut settings = own.clone();
         if let Some((key, value)) = &self.setting {

@@ -43,7 +43,6 @@ pub struct Options<'a> {
     pub knobs: Knobs,
 }
 
-/// Whether settings are tried one by one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Knobs {
     Tried,
@@ -60,29 +59,25 @@ pub trait Progress {
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct BenchReport {
     pub machine: String,
-    /// Engines with their versions.
     pub engines: BTreeMap<EngineName, String>,
     pub curves: Vec<Curve>,
-    /// One a case and procedure.
+    /// One a case and procedure: what errors are told against, and the error below which they are not told.
     pub references: Vec<Reference>,
-    /// One a case and procedure.
     pub pareto: Vec<Pareto>,
     pub knobs: Vec<KnobEffect>,
     pub left_out: Vec<String>,
 }
 
-/// What the errors of a case and procedure are held against.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reference {
     pub case: String,
     pub procedure: ProcedureId,
     pub solver: String,
-    /// Root mean square over meters of how far off it may be, relative: smaller errors cannot be seen.
+    /// Root mean square over meters of how far off it may be, relative: errors below are not told from none.
     pub floor: f64,
     pub wall_s: f64,
 }
 
-/// Benches engines with one case and adds what it finds to a report.
 pub fn bench(
     case: &Case,
     subjects: &[Instrument],
@@ -109,8 +104,8 @@ pub fn bench(
             match bench.curves(subject, &job, &truth) {
                 Ok(curves) => report.curves.extend(curves),
                 Err(why) => {
-                    let key = ReadingKey::new(&case.name, task.procedure, subject.engine.name());
-                    report.left_out.push(format!("{}, {}, {}: {why}", key.case, key.procedure, key.engine));
+                    let engine = subject.engine.name();
+                    report.left_out.push(format!("{}, {}, {engine}: {why}", case.name, task.procedure));
                 }
             }
             if options.knobs == Knobs::Tried {
@@ -127,13 +122,11 @@ pub fn bench(
         });
     }
     if bench.trials.is_over() && !options.time.is_zero() {
-        report
-            .left_out
-            .push(format!("{}: time was up before all was tried; the same command goes on from there", case.name));
+        let what = "time was up before all was tried; the same command goes on from there";
+        report.left_out.push(format!("{}: {what}", case.name));
     }
 }
 
-/// The exact values and how far off they may be.
 struct Truth {
     values_lx: Vec<f64>,
     uncertainty_lx: Vec<f64>,
@@ -148,7 +141,7 @@ struct Truth {
 /// radiosity with its own bound, in seconds.
 const FURNISHED: [f64; 2] = [1e-3, 1e-2];
 const EMPTY: [f64; 2] = [1e-7, 5e-7];
-/// Past these a reading is not waited for; a coarser reference can be had.
+/// Past this a try at a reference is not waited for.
 const REFERENCE_LIMIT: Duration = Duration::from_secs(90);
 const LIMIT: Duration = Duration::from_secs(300);
 
@@ -159,7 +152,6 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    /// The exact simulation, as finely as it goes.
     fn truth(&self, job: &Job) -> Option<Truth> {
         let accuracies = if is_furnished(job) { FURNISHED } else { EMPTY };
         // Something is better than nothing: coarser where the finest takes too long.
@@ -181,8 +173,8 @@ impl Bench<'_> {
         let rungs = ladder(subject.engine.as_ref(), job, is_furnished(job), &own, self.options.seconds);
         let repetitions = self.options.repetitions.max(1);
         self.progress.planned(rungs.iter().map(|r| r.expected_s() * repetitions as f64).sum());
-        let (start_up_s, set_up_s) = (self.start_up(subject, job, &own), self.set_up(subject, job, &own));
-        let mut curves: Vec<Curve> = vec![];
+        let times_s = (self.start_up(subject, job, &own), self.set_up(subject, job, &own));
+        let mut curves: Vec<((String, String), Vec<BenchPoint>)> = vec![];
         let (mut last_wall_s, mut last_preset, mut refusal) = (0.0, "", None);
         for rung in &rungs {
             // A rung below what the last one took anyway would only repeat it.
@@ -204,24 +196,16 @@ impl Bench<'_> {
             (last_wall_s, last_preset) = (first.cost.wall_s, rung.preset.as_str());
             let solver = ladder::solver(&first.measurement);
             let point = BenchPoint::of(rung.effort, &taken, truth);
-            let known = curves.iter_mut().find(|c| c.solver == solver && c.preset == rung.preset);
-            match known {
-                Some(curve) => curve.points.push(point),
-                None => curves.push(Curve {
-                    solver,
-                    preset: rung.preset.clone(),
-                    start_up_s,
-                    set_up_s,
-                    reference_floor: truth.floor(),
-                    points: vec![point],
-                    ..Curve::of(ReadingKey::new(&case.name, job.procedure, name.clone()))
-                }),
+            match curves.iter_mut().find(|(of, _)| *of == (solver.clone(), rung.preset.clone())) {
+                Some((_, points)) => points.push(point),
+                None => curves.push(((solver, rung.preset.clone()), vec![point])),
             }
         }
-        curves.iter_mut().for_each(Curve::conclude);
+        let key = ReadingKey::new(&case.name, job.procedure, name);
+        let curve = |(of, points)| Curve::of(key.clone(), of, times_s, truth.floor(), points);
         match refusal {
             Some(Failure { text, .. }) if curves.is_empty() => Err(text.lines().next().unwrap_or_default().to_owned()),
-            _ => Ok(curves),
+            _ => Ok(curves.into_iter().map(curve).collect()),
         }
     }
 
@@ -272,14 +256,12 @@ impl Truth {
     }
 }
 
-/// The processor, its cores, the system's load and how this program was built.
 fn machine() -> String {
     let processors = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model =
-        processors.lines().find_map(|l| l.strip_prefix("model name")).map(|l| l.trim_start_matches([' ', '\t', ':']));
+    let model = processors.lines().find_map(|l| l.strip_prefix("model name"));
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let load = load.split(' ').next().unwrap_or("?").to_owned();
     let build = if cfg!(debug_assertions) { "a development build, which is slow" } else { "a release build" };
-    let model = model.unwrap_or(std::env::consts::ARCH);
+    let model = model.map_or(std::env::consts::ARCH, |l| l.trim_start_matches([' ', '\t', ':']));
     format!("{model}, {} cores, load average {load} at the end; {build}", process::cores())
 }

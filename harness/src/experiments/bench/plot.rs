@@ -12,7 +12,6 @@ const TOP: f64 = 34.0;
 const BOTTOM: f64 = 46.0;
 /// Okabe & Ito's colours, told apart by everybody.
 const COLOURS: [&str; 7] = ["#000000", "#e69f00", "#0072b2", "#009e73", "#d55e00", "#cc79a7", "#56b4e9"];
-/// Lines of one engine's presets.
 const DASHES: [&str; 4] = ["none", "6 3", "2 3", "8 3 2 3"];
 /// Errors below this are drawn at it: none at all has no place on a logarithmic axis.
 const LEAST: f64 = 1e-9;

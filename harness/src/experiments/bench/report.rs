@@ -2,18 +2,18 @@
 
 use super::curve::{Curve, TARGETS};
 use super::{BenchReport, Reference};
-use crate::experiments::table;
+use crate::experiments::tables;
 
 impl BenchReport {
     pub fn terminal(&self) -> String {
-        self.text(table::terminal)
+        self.text(tables::terminal)
     }
 
     pub fn markdown(&self) -> String {
-        self.text(table::markdown)
+        self.text(tables::markdown)
     }
 
-    fn text(&self, table: table::Render) -> String {
+    fn text(&self, table: impl Fn(Vec<String>, Vec<Vec<String>>) -> String) -> String {
         let versions: Vec<String> = self.engines.iter().map(|(id, version)| format!("{id} {version}")).collect();
         let mut text = format!("{}.\n{}.\n\n", self.machine, versions.join(", "));
         for pareto in &self.pareto {
@@ -32,12 +32,9 @@ impl BenchReport {
                     percent(reference.floor)
                 ));
             }
-            text.push_str(&table(&head(), &curves.iter().map(|c| row(c)).collect::<Vec<_>>()));
-            let front: Vec<String> = pareto
-                .front
-                .iter()
-                .map(|(name, t, e)| format!("{} ({}, {})", name, seconds(*t), percent(*e)))
-                .collect();
+            text.push_str(&table(head(), curves.iter().map(|c| row(c)).collect()));
+            let point = |(name, t, e): &(String, f64, f64)| format!("{name} ({}, {})", seconds(*t), percent(*e));
+            let front: Vec<String> = pareto.front.iter().map(point).collect();
             text.push_str(&format!("\nPareto front, by rising time: {}\n\n", front.join("; ")));
         }
         if !self.knobs.is_empty() {
@@ -55,7 +52,7 @@ impl BenchReport {
                 ]
             });
             text.push_str("What each setting does, against the default\n\n");
-            text.push_str(&table(&head.map(str::to_owned), &rows.collect::<Vec<_>>()));
+            text.push_str(&table(head.map(str::to_owned).to_vec(), rows.collect()));
             text.push('\n');
         }
         for why in &self.left_out {
@@ -64,7 +61,6 @@ impl BenchReport {
         text
     }
 
-    /// Every point, one a line.
     pub fn csv(&self) -> String {
         let mut text =
             "case,procedure,engine,preset,solver,effort,wall_s,cpu_s,peak_mib,relative_error,relative_error_low,\
@@ -115,25 +111,20 @@ fn row(c: &Curve) -> Vec<String> {
     }));
     let best = c.points.iter().min_by(|a, b| a.relative_error.total_cmp(&b.relative_error));
     let cell = |f: &dyn Fn(&super::BenchPoint) -> String| best.map_or("-".to_owned(), f);
-    row.push(cell(&|p| {
-        format!(
-            "{} ({} .. {})",
-            percent(p.relative_error),
-            percent(p.relative_error_low),
-            percent(p.relative_error_high)
-        )
-    }));
-    row.push(cell(&|p| seconds(p.wall_s)));
-    row.push(cell(&|p| seconds(p.cpu_s)));
-    row.push(cell(&|p| p.peak_mib.map_or("-".to_owned(), |m| format!("{m:.0}"))));
-    row.push(c.slope.map_or("-".to_owned(), |s| format!("{s:.2}")));
-    row.push(c.bias_floor.map_or("-".to_owned(), percent));
-    row.push(c.efficiency.map_or("-".to_owned(), |e| format!("{e:.1e}")));
-    row.push(if c.start_up_s > 0.0 {
-        format!("{}, {}", seconds(c.start_up_s), seconds(c.set_up_s))
-    } else {
-        "-".to_owned()
-    });
+    let known = |value: Option<f64>, f: fn(f64) -> String| value.map_or("-".to_owned(), f);
+    row.extend([
+        cell(&|p| {
+            let ends = [p.relative_error, p.relative_error_low, p.relative_error_high].map(percent);
+            format!("{} ({} .. {})", ends[0], ends[1], ends[2])
+        }),
+        cell(&|p| seconds(p.wall_s)),
+        cell(&|p| seconds(p.cpu_s)),
+        cell(&|p| known(p.peak_mib, |m| format!("{m:.0}"))),
+        known(c.slope, |s| format!("{s:.2}")),
+        known(c.bias_floor, percent),
+        known(c.efficiency, |e| format!("{e:.1e}")),
+        if c.start_up_s > 0.0 { [c.start_up_s, c.set_up_s].map(seconds).join(", ") } else { "-".to_owned() },
+    ]);
     row
 }
 

@@ -2,48 +2,26 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::*;
-use crate::engines::{Absent, Engine, EngineError, Knob, Measurement, SceneFile, Site, Support, Version, Workbench};
+use crate::engines::fixtures::{Fake, S1_INDIRECT_LX};
+use crate::engines::{EngineError, Knob, Measurement, Site, Version};
 use crate::measure::Machine;
-use crate::record::{EngineName, Estimate, Uncertainty};
-
-/// An engine of known law: error .02 / sqrt(seconds) of either sign by seed, above a bias of .1 %.
-struct KnownLaw;
+use crate::record::{Estimate, Uncertainty};
 
 const BIAS: f64 = 1e-3;
 
-impl Engine for KnownLaw {
-    fn name(&self) -> EngineName {
-        EngineName::new("known")
-    }
-
-    fn probe(&self, _site: &Site) -> Result<Version, Absent> {
-        Ok(Version("1".into()))
-    }
-
-    fn supports(&self, _job: &Job) -> Support {
-        Support::Yes
-    }
-
-    fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
-        Ok(vec![])
-    }
-
-    fn knobs(&self) -> &'static [Knob] {
-        &[Knob { key: "gain", values: &["1", "2"] }, Knob { key: "idle", values: &["true", "false"] }]
-    }
-
-    fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
-        let gain = job.settings.get("gain").and_then(serde_json::Value::as_f64).unwrap_or(1.0);
-        let noise = 0.02 / job.budget.seconds.max(1e-6).sqrt();
-        let sign = if job.seed.is_multiple_of(2) { 1.0 } else { -1.0 };
-        let estimate = |x: &f64| Estimate {
-            value: x * gain * (1.0 + BIAS + sign * noise),
-            uncertainty: Uncertainty::sampled(x * noise, None),
-        };
-        let exact = crate::engines::fixtures::S1_INDIRECT_LX;
-        Ok(Measurement { estimates: exact.iter().map(estimate).collect(), ..Measurement::default() })
-    }
+/// An engine of known law: error .02 / sqrt(seconds) of either sign by seed, above a bias of .1 %.
+fn known_law(job: &Job) -> Result<Measurement, EngineError> {
+    let gain = job.settings.get("gain").and_then(serde_json::Value::as_f64).unwrap_or(1.0);
+    let noise = 0.02 / job.budget.seconds.max(1e-6).sqrt();
+    let sign = if job.seed.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let estimate = |x: &f64| Estimate {
+        value: x * gain * (1.0 + BIAS + sign * noise),
+        uncertainty: Uncertainty::sampled(x * noise, None),
+    };
+    Ok(Measurement { estimates: S1_INDIRECT_LX.iter().map(estimate).collect(), ..Measurement::default() })
 }
+
+const KNOBS: &[Knob] = &[Knob { key: "gain", values: &["1", "2"] }, Knob { key: "idle", values: &["true", "false"] }];
 
 struct Silent;
 
@@ -64,7 +42,8 @@ fn benched(knobs: Knobs) -> BenchReport {
         seed: 1,
         knobs,
     };
-    let subjects = [Instrument { engine: Arc::new(KnownLaw), version: Version("1".into()) }];
+    let engine = Arc::new(Fake { knobs: KNOBS, ..Fake::new("known", known_law) });
+    let subjects = [Instrument { engine, version: Version("1".into()) }];
     let mut report = BenchReport::default();
     bench(&Case::load(&path).unwrap(), &subjects, &options, &Silent, &mut report);
     report
@@ -101,22 +80,18 @@ fn views_name_the_machine_and_draw_every_point() {
     assert!(report.terminal().contains("known") && report.markdown().contains("| known |"));
     assert_eq!(report.csv().lines().count(), 7);
     assert_eq!(report.svg().matches("<circle").count(), 6);
-    is_well_formed(&report.svg());
-}
-
-/// Every element that opens closes.
-fn is_well_formed(svg: &str) {
+    let svg = report.svg();
     let (opened, closed) = (svg.matches('<').count() - 2 * svg.matches("</").count(), svg.matches("/>").count());
     assert_eq!(opened, closed, "{svg}");
 }
 
-fn benched_point() -> BenchPoint {
+fn point(wall_s: f64, relative_error: f64) -> BenchPoint {
     BenchPoint {
         effort: 1.0,
-        wall_s: 1.0,
+        wall_s,
         cpu_s: 1.0,
         peak_mib: None,
-        relative_error: 0.0,
+        relative_error,
         relative_error_low: 0.0,
         relative_error_high: 1.0,
         worst_error: 1.0,
@@ -127,33 +102,23 @@ fn benched_point() -> BenchPoint {
 
 #[test]
 fn the_front_holds_what_no_other_point_beats() {
-    let point = |wall_s: f64, relative_error: f64| BenchPoint { wall_s, relative_error, ..benched_point() };
     let key = |engine: &str| ReadingKey::new("c", ProcedureId::DirectIlluminance, engine);
-    let curve = |engine: &str, points: Vec<BenchPoint>| Curve { points, ..Curve::of(key(engine)) };
+    let curve =
+        |engine: &str, points: Vec<BenchPoint>| Curve::of(key(engine), Default::default(), (0.0, 0.0), 0.0, points);
     let curves =
         [curve("a", vec![point(1.0, 0.1), point(4.0, 0.05)]), curve("b", vec![point(2.0, 0.2), point(3.0, 0.01)])];
-    let front: Vec<f64> =
-        Pareto::of("c", ProcedureId::DirectIlluminance, &curves, 0.0).front.iter().map(|f| f.1).collect();
-    assert_eq!(front, [1.0, 3.0]);
+    let front = |floor: f64| Pareto::of("c", ProcedureId::DirectIlluminance, &curves, floor).front;
+    assert_eq!(front(0.0).iter().map(|f| f.1).collect::<Vec<_>>(), [1.0, 3.0]);
     // What the reference cannot tell apart is no gain.
-    assert_eq!(
-        Pareto::of("c", ProcedureId::DirectIlluminance, &curves, 0.2)
-            .front
-            .iter()
-            .map(|f| (f.1, f.2))
-            .collect::<Vec<_>>(),
-        [(1.0, 0.2)]
-    );
+    assert_eq!(front(0.2).iter().map(|f| (f.1, f.2)).collect::<Vec<_>>(), [(1.0, 0.2)]);
 }
 
 #[test]
 fn no_time_is_told_to_an_error_below_the_references_floor() {
-    let point = |wall_s: f64, relative_error: f64| BenchPoint { wall_s, relative_error, ..benched_point() };
     let concluded = |reference_floor: f64| {
         let key = ReadingKey::new("c", ProcedureId::DirectIlluminance, "e");
         let points = vec![point(1.0, 0.05), point(2.0, 5e-4)];
-        let mut curve = Curve { reference_floor, points, ..Curve::of(key) };
-        curve.conclude();
+        let curve = Curve::of(key, Default::default(), (0.0, 0.0), reference_floor, points);
         ["0.1", "0.01", "0.001"].map(|t| curve.time_to[t].is_some())
     };
     assert_eq!(concluded(0.0), [true, true, true]);

@@ -12,20 +12,16 @@ use crate::judge::{Component, ErrorBudget, Source};
 use crate::record::Estimate;
 use crate::system::random::normal;
 
-/// P-values drawn for Kolmogorov's test.
 const RUNS: usize = 500;
-/// Intervals drawn for each coverage.
 const INTERVALS: usize = 10_000;
 /// Coverages that are looked at; the one of the verdicts is that of two standard deviations of a normal distribution.
 const NOMINAL: [f64; 5] = [0.5, 0.8, 0.9, 0.9545, 0.99];
-/// Below this, p-values are not uniform.
 const LEAST_KS_P: f64 = 0.01;
 /// How far coverage may lie from what it is said to be.
 const COVERAGE_WITHIN: f64 = 0.02;
 /// Independent blocks of an engine that has few.
 const FEW: usize = 8;
 
-/// How good each kind of interval is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibrations {
     pub intervals: Vec<Interval>,
@@ -43,7 +39,6 @@ pub struct Interval {
     pub coverage: Vec<Coverage>,
 }
 
-/// How often an interval holds the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
     pub nominal: f64,
@@ -57,7 +52,6 @@ impl Calibrations {
 }
 
 impl Interval {
-    /// Whether its p-values are uniform and its coverages what they are said to be.
     pub fn is_good(&self) -> bool {
         let covers = |c: &Coverage| (c.found - c.nominal).abs() <= COVERAGE_WITHIN;
         self.ks_p > LEAST_KS_P && self.coverage.iter().all(covers)
@@ -67,7 +61,6 @@ impl Interval {
 /// Draws an error with the components that a budget would state of it.
 type Draw = fn(&mut fastrand::Rng) -> (f64, Vec<Component>);
 
-/// Every kind of uncertainty alone, and all together.
 const KINDS: [(&str, Draw); 8] = [
     ("Monte Carlo, many blocks", |random| {
         (0.003 * normal(random), vec![Component::normal(Source::MonteCarlo, 0.003, None)])
@@ -139,14 +132,12 @@ fn coverage(draw: Draw, nominal: f64, random: &mut fastrand::Rng) -> Coverage {
     Coverage { nominal, found: held as f64 / INTERVALS as f64 }
 }
 
-/// The largest distance of sorted values' distribution from the uniform one.
 fn distance_from_uniform(sorted: &[f64]) -> f64 {
     let n = sorted.len() as f64;
     let at = |(k, p): (usize, &f64)| ((k + 1) as f64 / n - p).max(p - k as f64 / n);
     sorted.iter().enumerate().map(at).fold(0.0, f64::max)
 }
 
-/// The probability of a larger distance by chance.
 fn kolmogorov(distance: f64, count: usize) -> f64 {
     let root = (count as f64).sqrt();
     let x = (root + 0.12 + 0.11 / root) * distance;

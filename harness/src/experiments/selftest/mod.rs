@@ -7,8 +7,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::tables;
 use crate::diagnosis::{self, Effect, Fault, Readings};
-use crate::experiments::table;
 use crate::judge::{Judge, KnownDeviations, Tolerances, Verdict};
 use crate::procedures::{self, Task};
 use crate::record::{ProcedureId, Reading, ReadingKey, Recording, Uncertainty};
@@ -40,16 +40,13 @@ const MOSTLY: f64 = 0.9;
 /// The subject's name, of which no deviation is on record.
 const SUBJECT: &str = "subject";
 
-/// What the harness makes of every fault, and of none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Scorecard {
     pub faults: Vec<Score>,
     pub clean_runs: usize,
-    /// Those of them in which something failed.
     pub false_alarms: usize,
 }
 
-/// What the harness makes of one fault.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Score {
     pub id: String,
@@ -94,8 +91,7 @@ pub fn selftest(runs: usize, clean_runs: usize, seed: u64) -> Result<Scorecard, 
     for case in cases(folder.path())? {
         let judge = Judge { tolerances: &tolerances, known: &known, overrides: &case.tolerances, published: None };
         let mut random = fastrand::Rng::with_seed(seed);
-        let subjects = case.tasks();
-        let subjects: Vec<Subject> = subjects.filter_map(|task| Subject::of(&case, task)).collect();
+        let subjects: Vec<Subject> = case.tasks().filter_map(|task| Subject::of(&case, task)).collect();
         card.faults.extend(scores(&case, &subjects, &judge, runs, &mut random));
         for _ in 0..clean_runs {
             let failed = |s: &Subject, random: &mut _| s.run(&judge, &s.right, random).is_some();
@@ -118,7 +114,6 @@ fn cases(folder: &Path) -> Result<Vec<Case>, SelftestError> {
     specs.map(|(name, _)| Case::load(&folder.join(name)).map_err(|e| SelftestError(e.to_string()))).collect()
 }
 
-/// One procedure of a case, with what should be read in it and every fault that would show.
 struct Subject {
     case: String,
     task: Task,
@@ -148,9 +143,7 @@ impl Subject {
         let subject = self.recording(SUBJECT, read, errors);
         let witnesses = exact.map(|engine| self.recording(engine, &self.right, &zero));
         let all: Vec<&Recording> = witnesses.iter().chain([&subject]).collect();
-        let mut compared = judge.compare(&self.task, &all);
-        compared.retain(|c| c.key.engine == SUBJECT);
-        compared.iter().any(|c| c.verdict == Verdict::Fail)
+        judge.compare(&self.task, &all).iter().any(|c| c.key.engine == SUBJECT && c.verdict == Verdict::Fail)
     }
 
     fn noise(&self) -> f64 {
@@ -189,14 +182,12 @@ impl Subject {
         })
     }
 
-    /// The largest deviation, relative to the reading, or to a hundredth of the brightest.
     fn size(&self, wrong: &[f64]) -> f64 {
         let largest = self.right.iter().copied().fold(0.0, f64::max);
         let relative = |(w, r): (&f64, &f64)| (w - r).abs() / r.max(0.01 * largest);
         wrong.iter().zip(&self.right).map(relative).fold(0.0, f64::max)
     }
 
-    /// The least size of a fault, mixed with the truth, that fails.
     fn smallest(&self, judge: &Judge<'_>, wrong: &[f64]) -> Option<f64> {
         let mix = |part: f64| -> Vec<f64> { self.right.iter().zip(wrong).map(|(r, w)| r + part * (w - r)).collect() };
         let fails = |part: f64| {
@@ -224,8 +215,8 @@ fn scores(case: &Case, subjects: &[Subject], judge: &Judge<'_>, runs: usize, ran
         }
     }
     let mut one = |(id, what): (&str, &str)| {
-        let (fault, case) = ((id.to_owned(), what.to_owned()), case.name.clone());
-        let mut score = Score { id: fault.0, what: fault.1, case, ..Score::default() };
+        let case = case.name.clone();
+        let mut score = Score { id: id.to_owned(), what: what.to_owned(), case, ..Score::default() };
         for subject in subjects {
             let Some(wrong) = subject.wrong(id, what) else { continue };
             score.size = score.size.max(subject.size(&wrong));
@@ -253,6 +244,7 @@ impl fmt::Display for Scorecard {
         let head = ["", "case", "fault", "size", "smallest seen", "named", "caught by"].map(str::to_owned);
         let percent = |x: f64| if x < 10.0 { format!("{:.2} %", 100.0 * x) } else { format!("{x:.0} times") };
         let row = |score: &Score| {
+            let caught_by: Vec<&str> = score.caught_by.iter().map(|p| p.name()).collect();
             vec![
                 if score.is_good() { "ok" } else { "MISSED" }.to_owned(),
                 score.case.clone(),
@@ -260,27 +252,17 @@ impl fmt::Display for Scorecard {
                 percent(score.size),
                 score.smallest_detectable.map_or("-".to_owned(), percent),
                 format!("{:.0} %", 100.0 * score.named_in),
-                names(&score.caught_by),
+                if caught_by.is_empty() { "-".to_owned() } else { caught_by.join(", ") },
             ]
         };
-        let table = table::terminal(&head, &self.faults.iter().map(row).collect::<Vec<_>>());
-        writeln!(f, "{table}")?;
+        writeln!(f, "{}", tables::terminal(head.into(), self.faults.iter().map(row).collect()))?;
         let counted: Vec<&Score> = self.faults.iter().filter(|s| s.size >= COUNTED).collect();
         let good = counted.iter().filter(|s| s.is_good()).count();
         let kinds: std::collections::BTreeSet<&str> = self.faults.iter().map(|s| s.id.as_str()).collect();
-        writeln!(
-            f,
-            "{} kinds of fault; {good} of {} faults of 2 % and more caught and named",
-            kinds.len(),
-            counted.len()
-        )?;
+        let (kinds, counted) = (kinds.len(), counted.len());
+        writeln!(f, "{kinds} kinds of fault; {good} of {counted} faults of 2 % and more caught and named")?;
         writeln!(f, "{} false alarms in {} runs without a fault", self.false_alarms, self.clean_runs)
     }
-}
-
-fn names(procedures: &[ProcedureId]) -> String {
-    let names: Vec<&str> = procedures.iter().map(|p| p.name()).collect();
-    if names.is_empty() { "-".to_owned() } else { names.join(", ") }
 }
 
 #[cfg(test)]

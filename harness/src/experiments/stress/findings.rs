@@ -17,15 +17,12 @@ pub(super) const THRESHOLDS: [f64; 3] = [1e-3, 1e-2, 0.1];
 /// How much larger than on record a deviation may be and still be the known one.
 const MARGIN: f64 = 1.25;
 
-/// How a law breaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum How {
-    /// The readings are off.
     Drift,
     /// More than half of the light is gone, or readings are, without an error.
     SilentLoss,
-    /// What is read is no number.
     Nan,
     Crash,
     Hang,
@@ -43,21 +40,20 @@ impl How {
     }
 }
 
-/// What one point shows; nothing where it was not tried.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Finding {
+pub(super) struct Finding {
     /// The largest deviation beyond noise, relative; `None` where nothing was read.
-    pub deviation: Option<f64>,
-    pub noise: Option<f64>,
-    pub how: Option<How>,
+    pub(super) deviation: Option<f64>,
+    pub(super) noise: Option<f64>,
+    pub(super) how: Option<How>,
     /// Whether the engine said itself that it cannot.
     #[serde(rename = "refused")]
-    pub is_refused: bool,
+    pub(super) is_refused: bool,
     /// Why nothing was read or compared.
-    pub text: Option<String>,
+    pub(super) text: Option<String>,
     /// Whether neither side is random.
     #[serde(skip)]
-    pub is_exact: bool,
+    pub(super) is_exact: bool,
 }
 
 impl Finding {
@@ -82,14 +78,19 @@ impl Finding {
             FailureKind::Hang => Some(How::Hang),
             FailureKind::SilentLoss => Some(How::SilentLoss),
         };
+        let text = Some(failure.text.clone());
         let is_refused = matches!(failure.kind, FailureKind::Declined | FailureKind::Refused);
-        Self { how, text: Some(failure.text.clone()), is_refused, ..Self::default() }
+        Self { how, text, is_refused, ..Self::default() }
     }
 
     /// The changed job was read, what it is held against was not: nothing is known.
     pub(super) fn without_base(failure: &Failure) -> Self {
         let text = Some(format!("nothing to hold it against: {}", failure.text));
         Self { text, is_refused: true, ..Self::default() }
+    }
+
+    fn exceeds(&self, threshold: f64) -> bool {
+        self.deviation.map_or(self.how.is_some_and(|h| h != How::Drift), |d| d >= threshold)
     }
 }
 
@@ -100,13 +101,11 @@ pub struct StressReport {
     pub laws: Vec<LawReport>,
 }
 
-/// How one engine keeps one law.
 #[derive(Clone, Debug, Serialize)]
 pub struct LawReport {
     pub engine: EngineName,
     pub law: String,
     pub what: &'static str,
-    /// What the magnitudes are.
     pub unit: &'static str,
     /// The largest deviation beyond the noise stated, relative; null where nothing was read.
     pub worst_deviation: Option<f64>,
@@ -114,12 +113,11 @@ pub struct LawReport {
     pub resolution: Option<f64>,
     /// The first magnitude tried at which the deviation exceeds .1, 1 and 10 %, or at which it breaks.
     pub breaks_at: BTreeMap<String, f64>,
-    /// The worst way in which it breaks.
     pub how: Option<How>,
-    /// The first magnitude that the engine refuses.
     pub refused_at: Option<f64>,
     /// Points that time did not suffice for, or that lie beyond one that hung.
     pub untried: usize,
+    /// Every point, from mild to extreme.
     pub points: Vec<PointReport>,
     /// The causes on record, where all that breaks is known.
     pub known: Vec<String>,
@@ -133,32 +131,23 @@ pub struct PointReport {
     pub magnitude: f64,
     pub tried: bool,
     #[serde(flatten)]
-    pub found: Finding,
+    pub(super) finding: Finding,
 }
 
-/// A point's engine, law, procedure, step and finding.
-pub(super) type Found = (usize, &'static Law, ProcedureId, usize, Option<Finding>);
+pub(super) type Found = (usize, &'static Law, PointReport);
 
 impl StressReport {
-    pub(super) fn new(case: &Case, subjects: &[Instrument], found: Vec<Found>, record: &[KnownBreak]) -> Self {
+    /// Points come engine by engine, and law by law.
+    pub(super) fn new(case: &Case, subjects: &[Instrument], found: &[Found], record: &[KnownBreak]) -> Self {
+        let report = |of_law: &[Found]| {
+            let (engine, law) = (subjects[of_law[0].0].engine.name(), of_law[0].1);
+            let known = record.iter().filter(|k| k.case == case.name && k.engine == engine && k.law == law.id);
+            let points = of_law.iter().map(|(.., point)| point.clone()).collect();
+            LawReport::new(engine.clone(), law, points, &known.collect::<Vec<_>>())
+        };
+        let alike = |a: &Found, b: &Found| (a.0, a.1.id) == (b.0, b.1.id);
         let engines = subjects.iter().map(|s| (s.engine.name(), s.version.0.clone())).collect();
-        let mut laws: Vec<LawReport> = vec![];
-        for (subject, law, procedure, step, finding) in found {
-            let engine = subjects[subject].engine.name();
-            let same = laws.iter().position(|l| l.engine == engine && l.law == law.id);
-            let k = same.unwrap_or_else(|| {
-                laws.push(LawReport::empty(engine, law));
-                laws.len() - 1
-            });
-            let (magnitude, tried) = (law.magnitudes[step], finding.is_some());
-            laws[k].points.push(PointReport { procedure, magnitude, tried, found: finding.unwrap_or_default() });
-        }
-        laws.iter_mut().for_each(LawReport::conclude);
-        for law in &mut laws {
-            let of_law = record.iter().filter(|k| k.case == case.name && k.engine == law.engine && k.law == law.law);
-            law.look_up(&of_law.collect::<Vec<_>>());
-        }
-        Self { case: case.name.clone(), engines, laws }
+        Self { case: case.name.clone(), engines, laws: found.chunk_by(alike).map(report).collect() }
     }
 
     pub fn broken_by<'a>(&'a self, engine: &'a str) -> impl Iterator<Item = &'a LawReport> {
@@ -167,72 +156,48 @@ impl StressReport {
 }
 
 impl LawReport {
-    fn empty(engine: EngineName, law: &'static Law) -> Self {
+    fn new(engine: EngineName, law: &'static Law, mut points: Vec<PointReport>, record: &[&KnownBreak]) -> Self {
+        let step = |magnitude: f64| law.magnitudes.iter().position(|m| *m == magnitude).unwrap_or(0);
+        // Points come procedure by procedure; the first magnitude is the mildest over all of them.
+        points.sort_by_key(|p| step(p.magnitude));
+        let findings = || points.iter().map(|p| &p.finding);
+        let breaks = |threshold: f64| {
+            let at = points.iter().find(|p| p.finding.exceeds(threshold))?;
+            Some((threshold.to_string(), at.magnitude))
+        };
+        let explains = |k: &KnownBreak, p: &PointReport| {
+            p.finding.how.is_some_and(|how| how.name() == k.how)
+                && step(p.magnitude) >= step(k.from)
+                && p.finding.deviation.is_none_or(|d| k.relative.is_some_and(|most| d <= MARGIN * most))
+        };
+        let broken = || points.iter().filter(|p| p.finding.how.is_some());
+        let is_known = broken().all(|p| record.iter().any(|k| explains(k, p)));
+        let is_gone = |k: &KnownBreak| {
+            // Noise as large as what is on record hides it.
+            let is_fine = |p: &PointReport| {
+                let Finding { how, is_refused, noise, .. } = p.finding;
+                how.is_none() && !is_refused && noise.is_none_or(|noise| k.relative.is_none_or(|most| noise < most))
+            };
+            let mut there = points.iter().filter(|p| p.magnitude == k.from && p.tried).peekable();
+            there.peek().is_some() && there.all(is_fine)
+        };
+        let causes = |is_meant: &dyn Fn(&KnownBreak) -> bool| {
+            record.iter().filter(|k| is_meant(k)).map(|k| k.cause.clone()).collect::<Vec<_>>()
+        };
         Self {
             engine,
             law: law.id.to_owned(),
             what: law.what,
             unit: law.unit,
-            worst_deviation: None,
-            resolution: None,
-            breaks_at: BTreeMap::new(),
-            how: None,
-            refused_at: None,
-            untried: 0,
-            points: vec![],
-            known: vec![],
-            gone: vec![],
+            worst_deviation: findings().filter_map(|f| f.deviation).reduce(f64::max),
+            resolution: findings().filter_map(|f| f.noise).reduce(f64::max),
+            breaks_at: THRESHOLDS.into_iter().filter_map(breaks).collect(),
+            how: findings().filter_map(|f| f.how).max(),
+            refused_at: points.iter().find(|p| p.finding.is_refused).map(|p| p.magnitude),
+            untried: points.iter().filter(|p| !p.tried).count(),
+            known: causes(&|k| is_known && broken().any(|p| explains(k, p))),
+            gone: causes(&is_gone),
+            points,
         }
     }
-
-    fn conclude(&mut self) {
-        // Points come procedure by procedure; the first magnitude is the mildest over all of them.
-        let rising = |p: &PointReport| find_step(&self.law, p.magnitude);
-        self.points.sort_by_key(rising);
-        for point in &self.points {
-            self.worst_deviation = [self.worst_deviation, point.found.deviation].into_iter().flatten().reduce(f64::max);
-            self.resolution = [self.resolution, point.found.noise].into_iter().flatten().reduce(f64::max);
-            self.how = self.how.max(point.found.how);
-            self.untried += usize::from(!point.tried);
-            if point.found.is_refused && self.refused_at.is_none() {
-                self.refused_at = Some(point.magnitude);
-            }
-            for threshold in THRESHOLDS {
-                let fails = point.found.how.is_some_and(|h| h != How::Drift && point.found.deviation.is_none());
-                if fails || point.found.deviation.is_some_and(|d| d >= threshold) {
-                    self.breaks_at.entry(threshold.to_string()).or_insert(point.magnitude);
-                }
-            }
-        }
-    }
-
-    /// Holds what breaks against what is on record of this law.
-    fn look_up(&mut self, record: &[&KnownBreak]) {
-        let explains = |k: &&KnownBreak, p: &PointReport| {
-            p.found.how.is_some_and(|how| how.name() == k.how)
-                && find_step(&self.law, p.magnitude) >= find_step(&self.law, k.from)
-                && p.found.deviation.is_none_or(|d| k.relative.is_some_and(|most| d <= MARGIN * most))
-        };
-        let broken = || self.points.iter().filter(|p| p.found.how.is_some());
-        let cause = |k: &&&KnownBreak| k.cause.clone();
-        if broken().all(|p| record.iter().any(|k| explains(k, p))) {
-            self.known = record.iter().filter(|k| broken().any(|p| explains(k, p))).map(|k| cause(&k)).collect();
-        }
-        let is_gone = |k: &&&KnownBreak| {
-            // Noise as large as what is on record hides it.
-            let is_fine = |p: &PointReport| {
-                p.found.how.is_none()
-                    && !p.found.is_refused
-                    && p.found.noise.is_none_or(|noise| k.relative.is_none_or(|most| noise < most))
-            };
-            let mut there = self.points.iter().filter(|p| p.magnitude == k.from && p.tried).peekable();
-            there.peek().is_some() && there.all(is_fine)
-        };
-        self.gone = record.iter().filter(is_gone).map(|k| cause(&k)).collect();
-    }
-}
-
-fn find_step(law: &str, magnitude: f64) -> usize {
-    let law = crate::laws::find(law);
-    law.and_then(|l| l.magnitudes.iter().position(|m| *m == magnitude)).unwrap_or(0)
 }

@@ -25,8 +25,8 @@ use crate::spec::{Budget, Case};
 pub struct Options<'a> {
     /// Who takes readings, as many at a time as its machine has slots.
     pub reader: Reader,
+    /// No reading starts after this.
     pub time: Duration,
-    /// Sampling effort of one reading.
     pub budget: Budget,
     /// Past this one hangs.
     pub limit: Duration,
@@ -52,7 +52,6 @@ pub trait Progress: Sync {
     fn ended(&self, engine: &str, law: &str, magnitude: f64);
 }
 
-/// One law at one magnitude on one engine's reading of one procedure.
 struct Point {
     subject: usize,
     law: &'static Law,
@@ -66,6 +65,11 @@ impl Point {
         self.law.magnitudes[self.step]
     }
 
+    fn report(&self, finding: Option<Finding>) -> PointReport {
+        let (tried, finding) = (finding.is_some(), finding.unwrap_or_default());
+        PointReport { procedure: self.procedure, magnitude: self.magnitude(), tried, finding }
+    }
+
     /// Extremes first: where the last magnitude holds, the others matter less.
     fn rank(&self) -> usize {
         let last = self.law.magnitudes.len() - 1;
@@ -77,7 +81,11 @@ pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progr
     let points = points(case, subjects, options);
     progress.planned(points.len());
     let bench = Bench { trials: Trials::new(case, &options.reader, options.time), subjects, options };
-    let queue = Mutex::new(Queue::new(points.len(), subjects.len()));
+    let queue = Mutex::new(Queue {
+        findings: vec![None; points.len()],
+        taken: vec![false; points.len()],
+        spent: vec![Duration::ZERO; subjects.len()],
+    });
     thread::scope(|scope| {
         for _ in 0..options.reader.machine.slots.threads() {
             scope.spawn(|| {
@@ -87,15 +95,18 @@ pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progr
                     let Some(k) = next else { break };
                     let clock = Instant::now();
                     let finding = bench.finding(&points[k]);
-                    progress.ended(&subjects[points[k].subject].engine.name(), points[k].law.id, points[k].magnitude());
-                    lock(&queue).ended(&points, k, finding, clock.elapsed());
+                    let engine = subjects[points[k].subject].engine.name();
+                    progress.ended(&engine, points[k].law.id, points[k].magnitude());
+                    let mut queue = lock(&queue);
+                    queue.spent[points[k].subject] += clock.elapsed();
+                    queue.findings[k] = finding;
                 }
             });
         }
     });
     let findings = lock(&queue).findings.clone();
-    let of = |k: usize| (points[k].subject, points[k].law, points[k].procedure, points[k].step, findings[k].clone());
-    StressReport::new(case, subjects, (0..points.len()).map(of).collect(), options.known)
+    let found = points.iter().zip(findings).map(|(point, finding)| (point.subject, point.law, point.report(finding)));
+    StressReport::new(case, subjects, &found.collect::<Vec<_>>(), options.known)
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
@@ -128,10 +139,6 @@ struct Queue {
 }
 
 impl Queue {
-    fn new(points: usize, subjects: usize) -> Self {
-        Self { findings: vec![None; points], taken: vec![false; points], spent: vec![Duration::ZERO; subjects] }
-    }
-
     /// The next point: of the engine that had the least time, the most telling one; none twice.
     fn next(&mut self, points: &[Point]) -> Option<usize> {
         let open = (0..points.len()).filter(|k| !self.taken[*k] && !self.hopeless(points, *k));
@@ -147,11 +154,6 @@ impl Queue {
             |p: &Point| p.subject == point.subject && p.law.id == point.law.id && p.procedure == point.procedure;
         let hung = |j: usize| self.findings[j].as_ref().is_some_and(|f| f.how == Some(How::Hang));
         (0..points.len()).any(|j| hung(j) && points[j].step < point.step && alike(&points[j]))
-    }
-
-    fn ended(&mut self, points: &[Point], k: usize, finding: Option<Finding>, took: Duration) {
-        self.spent[points[k].subject] += took;
-        self.findings[k] = finding;
     }
 }
 
@@ -195,7 +197,7 @@ impl Bench<'_> {
                 let mut sum = vec![Estimate::exact(0.0); read.len()];
                 for (k, part) in parts.iter().enumerate() {
                     match self.read(point, part, of_law(k + 1), seed)? {
-                        Ok(part) => sum = deviation::sum(&sum, &part.measurement.estimates),
+                        Ok(part) => sum = sum.iter().zip(&part.measurement.estimates).map(|(a, b)| a.plus(b)).collect(),
                         Err(failure) => return Some(Finding::without_base(&failure)),
                     }
                 }
@@ -215,7 +217,6 @@ impl Bench<'_> {
         })
     }
 
-    /// One reading by the point's engine; `None` where the time is over.
     fn read(&self, point: &Point, job: &Job, variant: Option<Place>, seed: u64) -> Option<Result<Taken, Failure>> {
         let subject = &self.subjects[point.subject];
         let name = subject.engine.name();
@@ -224,29 +225,19 @@ impl Bench<'_> {
             settings.insert("relative_error".into(), own_accuracy(job).into());
         } else if self.options.coordinates == Coordinates::Raw {
             let key = engines::entry(&name).and_then(|entry| entry.fits_coordinates);
-            if let Some(key) = key {
-                settings.insert(key.into(), false.into());
-            }
+            settings.extend(key.map(|key| (key.into(), false.into())));
         }
-        self.take(subject, job, &settings, seed, variant)
+        self.trials.take(subject, job, &settings, self.effort(seed), (variant, 0))
     }
 
     /// The exact simulation of a changed job, finer than the simulator is asked for as an engine.
     fn witness(&self, job: &Job, variant: Option<Place>) -> Option<Result<Taken, Failure>> {
         let settings = Settings::from([("relative_error".to_owned(), (0.1 * own_accuracy(job)).into())]);
-        self.take(&simulator(), job, &settings, self.options.seed, variant)
+        self.trials.take(&simulator(), job, &settings, self.effort(self.options.seed), (variant, 0))
     }
 
-    fn take(
-        &self,
-        subject: &Instrument,
-        job: &Job,
-        settings: &Settings,
-        seed: u64,
-        variant: Option<Place>,
-    ) -> Option<Result<Taken, Failure>> {
-        let Options { budget, limit, .. } = *self.options;
-        self.trials.take(subject, job, settings, Effort { budget, seed, limit, threads: 1 }, (variant, 0))
+    fn effort(&self, seed: u64) -> Effort {
+        Effort { budget: self.options.budget, seed, limit: self.options.limit, threads: 1 }
     }
 }
 
@@ -256,7 +247,6 @@ fn own_accuracy(job: &Job) -> f64 {
     if points && job.scene.obstacles.is_empty() { 1e-4 } else { 5e-3 }
 }
 
-/// Whether a case holds anything to stress.
 pub fn concerns(case: &Case) -> bool {
     [ProcedureId::DirectIlluminance, ProcedureId::IndirectIlluminance].into_iter().any(|p| case.task(p).is_some())
 }

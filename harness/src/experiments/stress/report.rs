@@ -1,22 +1,22 @@
 //! Views of a stress report: the matrix of what breaks where, for a terminal and as Markdown.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::findings::{How, LawReport, StressReport};
-use crate::experiments::table;
+use super::findings::{How, LawReport, PointReport, StressReport};
+use crate::experiments::tables;
 use crate::record::EngineName;
 
 impl StressReport {
-    /// The matrix of what breaks where.
     pub fn terminal(&self) -> String {
         let (head, rows) = self.matrix();
-        let table = table::terminal(&head, &rows);
+        let table = tables::terminal(head, rows);
         format!("{}: breaks at\n\n{table}\n{LEGEND}\n{}", self.case, self.remarks("  "))
     }
 
     pub fn markdown(&self) -> String {
         let (head, rows) = self.matrix();
-        let table = table::markdown(&head, &rows);
+        let table = tables::markdown(head, rows);
         format!("## {}\n\n{table}\n{LEGEND}\n\n{}", self.case, self.remarks("- "))
     }
 
@@ -25,12 +25,8 @@ impl StressReport {
         let mut head = vec!["law".to_owned(), "magnitude".to_owned()];
         head.extend(engines.iter().map(|e| format!("{e} {}", self.engines[*e].split(' ').next().unwrap_or_default())));
         let mut rows: Vec<Vec<String>> = vec![];
-        let mut seen: Vec<&str> = vec![];
-        for law in &self.laws {
-            if seen.contains(&law.law.as_str()) {
-                continue;
-            }
-            seen.push(&law.law);
+        let mut seen = BTreeSet::new();
+        for law in self.laws.iter().filter(|l| seen.insert(&l.law)) {
             let of = |engine: &&EngineName| {
                 self.laws.iter().find(|l| l.law == law.law && l.engine == **engine).map_or(String::new(), cell)
             };
@@ -41,40 +37,21 @@ impl StressReport {
         (head, rows)
     }
 
-    /// What each broken law says, where it breaks and how.
     fn remarks(&self, bullet: &str) -> String {
         let mut text = String::new();
         for law in self.laws.iter().filter(|l| l.how.is_some()) {
-            let mut broken: Vec<(f64, Vec<String>)> = vec![];
-            for point in law.points.iter().filter(|p| p.found.how.is_some()) {
-                let what = match (point.found.deviation, point.found.how) {
-                    (Some(d), Some(How::SilentLoss)) => format!("{} lost", percent(d)),
-                    (Some(d), _) => percent(d),
-                    (None, how) => how.map_or("", How::name).to_owned(),
-                };
-                let what = format!("{what} ({})", point.procedure.name().split('_').next().unwrap_or_default());
-                match broken.last_mut() {
-                    Some((magnitude, all)) if *magnitude == point.magnitude => all.push(what),
-                    _ => broken.push((point.magnitude, vec![what])),
-                }
-            }
-            let list: Vec<String> = broken.iter().map(|(m, all)| format!("{m:e}: {}", all.join(", "))).collect();
-            let why = law.points.iter().find_map(|p| p.found.how.and(p.found.text.as_deref())).map(first_line);
-            let why = why.map(|w| format!(" ({w})")).unwrap_or_default();
-            let known = match law.known.join("; ") {
-                known if known.is_empty() => String::new(),
-                known => format!(" Known: {known}."),
+            let broken: Vec<&PointReport> = law.points.iter().filter(|p| p.finding.how.is_some()).collect();
+            let at = |alike: &[&PointReport]| {
+                let said: Vec<String> = alike.iter().map(|p| said(p)).collect();
+                format!("{:e}: {}", alike[0].magnitude, said.join(", "))
             };
-            writeln!(
-                text,
-                "{bullet}{} {}: {}. At {} {}{why}.{known}",
-                law.engine,
-                law.law,
-                law.what,
-                law.unit,
-                list.join("; ")
-            )
-            .ok();
+            let list: Vec<String> = broken.chunk_by(|a, b| a.magnitude == b.magnitude).map(at).collect();
+            let why = broken.iter().find_map(|p| p.finding.text.as_deref()).map(first_line);
+            let why = why.map(|w| format!(" ({w})")).unwrap_or_default();
+            let known = law.known.join("; ");
+            let known = if known.is_empty() { known } else { format!(" Known: {known}.") };
+            let (LawReport { engine, law, what, unit, .. }, list) = (law, list.join("; "));
+            writeln!(text, "{bullet}{engine} {law}: {what}. At {unit} {list}{why}.{known}").ok();
         }
         for law in self.laws.iter().filter(|l| !l.gone.is_empty()) {
             let gone = law.gone.join("; ");
@@ -82,6 +59,15 @@ impl StressReport {
         }
         text
     }
+}
+
+fn said(point: &PointReport) -> String {
+    let what = match (point.finding.deviation, point.finding.how) {
+        (Some(d), Some(How::SilentLoss)) => format!("{} lost", percent(d)),
+        (Some(d), _) => percent(d),
+        (None, how) => how.map_or(String::new(), |how| how.name().to_owned()),
+    };
+    format!("{what} ({})", point.procedure.name().split('_').next().unwrap_or_default())
 }
 
 const LEGEND: &str = "ok: no deviation of .1 % or more beyond the noise at any magnitude (noise of the worst reading in brackets: \
@@ -97,7 +83,7 @@ fn cell(law: &LawReport) -> String {
     match law.how {
         Some(How::Drift) => {}
         Some(how) => {
-            let first = law.points.iter().find(|p| p.found.how == Some(how)).map_or(0.0, |p| p.magnitude);
+            let first = law.points.iter().find(|p| p.finding.how == Some(how)).map_or(0.0, |p| p.magnitude);
             if parts.len() == 3 && law.breaks_at.values().all(|m| *m == first) {
                 parts.clear();
             }

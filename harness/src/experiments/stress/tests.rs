@@ -2,53 +2,38 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::*;
-use crate::engines::{Absent, Engine, EngineError, Measurement, SceneFile, Site, Support, Version, Workbench};
+use crate::engines::fixtures::{Fake, exact_direct_lx};
+use crate::engines::{EngineError, Measurement, Site, Support, Version};
 use crate::laws::Place;
 use crate::measure::Machine;
 use crate::measure::cache::Cache;
 use crate::record::{EngineName, Estimate};
 
 /// Reads the inverse-square law, and breaks where it is told to.
-struct Fragile;
+fn fragile(job: &Job) -> Result<Measurement, EngineError> {
+    let size_m = job.scene.room.map_or(0.0, |r| r.size_m.max_element());
+    let far_m = job.scene.luminaires[0].position_m.max_element();
+    let (engine, meter) = (EngineName::new("fragile"), job.stations[0].id.clone());
+    let factor = match (job.scene.room, size_m, far_m) {
+        // Off by half a percent from 2e3 m, a fifth from 2e5 m.
+        (Some(_), size, _) if size > 1e5 => 1.2,
+        (Some(_), size, _) if size > 1e3 => 1.005,
+        (Some(_), size, _) if size < 1e-3 => {
+            return Err(EngineError::Output { engine, what: "gave 3 readings for 4 meters".into() });
+        }
+        (None, _, far) if far > 1e6 => {
+            return Err(EngineError::NotFinite { engine, meter, value: f64::NAN, uncertainty: Uncertainty::Unstated });
+        }
+        (None, _, far) if far > 1e4 => 0.01,
+        _ => 1.0,
+    };
+    let estimate = |x: &f64| Estimate { value: factor * x, uncertainty: Uncertainty::Unstated };
+    Ok(Measurement { estimates: exact_direct_lx(job).iter().map(estimate).collect(), ..Measurement::default() })
+}
 
-impl Engine for Fragile {
-    fn name(&self) -> EngineName {
-        EngineName::new("fragile")
-    }
-
-    fn probe(&self, _site: &Site) -> Result<Version, Absent> {
-        Ok(Version("1".into()))
-    }
-
-    fn supports(&self, job: &Job) -> Support {
-        let mirrored = job.scene.luminaires.len() > 100;
-        if mirrored { Support::No("a hundred luminaires at most".into()) } else { Support::Yes }
-    }
-
-    fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
-        Ok(vec![])
-    }
-
-    fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
-        let size_m = job.scene.room.map_or(0.0, |r| r.size_m.max_element());
-        let far_m = job.scene.luminaires[0].position_m.max_element();
-        let crash = |what: &str| EngineError::Output { engine: self.name(), what: what.into() };
-        let (engine, meter) = (self.name(), job.stations[0].id.clone());
-        let not_a_number =
-            EngineError::NotFinite { engine, meter, value: f64::NAN, uncertainty: Uncertainty::Unstated };
-        let exact = crate::engines::fixtures::exact_direct_lx(job);
-        let factor = match (job.scene.room, size_m, far_m) {
-            // Off by half a percent from 2e3 m, a fifth from 2e5 m.
-            (Some(_), size, _) if size > 1e5 => 1.2,
-            (Some(_), size, _) if size > 1e3 => 1.005,
-            (Some(_), size, _) if size < 1e-3 => return Err(crash("gave 3 readings for 4 meters")),
-            (None, _, far) if far > 1e6 => return Err(not_a_number),
-            (None, _, far) if far > 1e4 => 0.01,
-            _ => 1.0,
-        };
-        let estimate = |x: &f64| Estimate { value: factor * x, uncertainty: Uncertainty::Unstated };
-        Ok(Measurement { estimates: exact.iter().map(estimate).collect(), ..Measurement::default() })
-    }
+fn at_most_a_hundred(job: &Job) -> Support {
+    let mirrored = job.scene.luminaires.len() > 100;
+    if mirrored { Support::No("a hundred luminaires at most".into()) } else { Support::Yes }
 }
 
 struct Silent;
@@ -82,7 +67,8 @@ fn stressed_knowing(folder: &std::path::Path, laws: &[&str], time: Duration, kno
         coordinates: Coordinates::Fitted,
         known,
     };
-    let subjects = [Instrument { engine: Arc::new(Fragile), version: Version("1".into()) }];
+    let engine = Arc::new(Fake { supports: at_most_a_hundred, ..Fake::new("fragile", fragile) });
+    let subjects = [Instrument { engine, version: Version("1".into()) }];
     stress(&axial(), &subjects, &options, &Silent)
 }
 
@@ -96,7 +82,7 @@ fn what_breaks_is_reported_at_its_magnitude_and_in_its_way() {
     let law = |id: &str| report.laws.iter().find(|l| l.law == id).unwrap();
     let direct = |id: &str| -> Vec<(f64, Option<How>)> {
         let points = law(id).points.iter().filter(|p| p.procedure == ProcedureId::DirectIlluminance);
-        points.map(|p| (p.magnitude, p.found.how)).collect()
+        points.map(|p| (p.magnitude, p.finding.how)).collect()
     };
     assert_eq!(law("scale_up").breaks_at["0.001"], 100.0);
     assert_eq!(law("scale_up").breaks_at["0.1"], 1e4);

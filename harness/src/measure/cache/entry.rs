@@ -8,10 +8,8 @@ use crate::measure::outcome::{Cost, Failure};
 use crate::record::ReadingKey;
 use crate::spec::hexadecimal;
 
-/// Version of the form of an entry.
 const FORM: u32 = 2;
 
-/// What an engine answered to a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// What it was first asked for; other cases may have the same job.

@@ -5,7 +5,6 @@ use sha2::{Digest, Sha256};
 use crate::engines::{Engine, EngineError, ExternalJob, Job, Version};
 use crate::spec::hexadecimal;
 
-/// Names an entry of the cache.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
     engine: String,
@@ -18,7 +17,6 @@ impl Key {
         Self { engine: engine.to_owned(), digits: digits.to_owned() }
     }
 
-    /// The folder of its entries.
     pub fn engine(&self) -> &str {
         &self.engine
     }
@@ -79,10 +77,8 @@ mod tests {
         for engine in all() {
             let of = |job: &Job| key(engine.as_ref(), &Version("1".into()), job).unwrap();
             let plain = of(&job);
-            assert_eq!(
-                plain,
-                of(&Job { case: "other".into(), procedure: ProcedureId::DirectIlluminance, ..job.clone() })
-            );
+            let renamed = Job { case: "other".into(), procedure: ProcedureId::DirectIlluminance, ..job.clone() };
+            assert_eq!(plain, of(&renamed));
             assert_ne!(plain, key(engine.as_ref(), &Version("2".into()), &job).unwrap());
             let mut others = vec![
                 Job { seed: 2, ..job.clone() },

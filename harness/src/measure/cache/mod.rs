@@ -24,7 +24,6 @@ pub struct Cache {
     root: PathBuf,
 }
 
-/// What a cache knows of a key.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lookup {
     Found(Box<Entry>),
@@ -65,7 +64,6 @@ impl Cache {
         }
     }
 
-    /// Keeps an entry. A reader, and a run that goes on after this one was killed, sees all of it or nothing.
     pub fn keep(&self, key: &Key, entry: &Entry) -> std::io::Result<()> {
         files::replace(&self.path(key), entry::text(entry, key.digits())?.as_bytes())
     }

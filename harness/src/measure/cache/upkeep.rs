@@ -15,7 +15,6 @@ const WRITERS_LIVE: Duration = Duration::from_secs(3600);
 pub struct Contents {
     /// Sound entries and their bytes, by engine.
     pub engines: BTreeMap<String, (usize, u64)>,
-    /// What is wrong with the others.
     pub damaged: Vec<String>,
     /// Files that a writer began; those of writers that were killed stay until they are pruned.
     pub unfinished: usize,
@@ -54,7 +53,6 @@ impl Cache {
         Ok(contents)
     }
 
-    /// Takes out what is damaged, what killed writers left, and entries that nobody used for so long.
     pub fn prune(&self, unused_for: Duration) -> io::Result<Pruned> {
         let now = SystemTime::now();
         let mut pruned = Pruned::default();

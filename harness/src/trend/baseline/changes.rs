@@ -5,6 +5,7 @@
 //! of a comparison together are wrong once in a hundred times where nothing changed (Šidák, JASA 62 (1967) 626). Standard errors
 //! from few blocks have Student's t with the degrees of freedom of Welch and Satterthwaite (GUM G.4.1).
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use schemars::JsonSchema;
@@ -19,7 +20,6 @@ const FAMILY: f64 = 0.01;
 /// Values without uncertainty may differ by the rounding of single precision, which renderers compute in.
 const ROUNDING: f64 = 1e-6;
 
-/// What two sets must share before their readings are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Comparability {
     /// A baseline: spec, version, luminaire model, light and settings.
@@ -30,15 +30,12 @@ pub enum Comparability {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Changes {
-    /// One a case, procedure and engine of either side.
     pub entries: Vec<EntryChange>,
-    /// How many were made.
     pub tests: usize,
     /// The level of each, so that all together keep theirs.
     pub level: f64,
 }
 
-/// What changed for one engine in one procedure of one case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EntryChange {
     #[serde(flatten)]
@@ -46,16 +43,13 @@ pub struct EntryChange {
     pub state: State,
     /// What differs besides the readings, or why they are not compared.
     pub notes: Vec<String>,
-    /// The mean shift of the sampled meters.
     pub mean: Option<MeanShift>,
-    /// Every meter of both sides.
     pub meters: Vec<MeterChange>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum State {
-    /// Nothing beyond noise.
     Unchanged,
     /// All meters together moved.
     Shifted,
@@ -63,7 +57,6 @@ pub enum State {
     Changed,
     /// The new side lacks it, or lacks meters of it.
     Vanished,
-    /// The old side lacks it.
     New,
     /// The two are not about the same thing.
     Refused,
@@ -73,9 +66,8 @@ pub enum State {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeanShift {
     pub relative: f64,
-    /// Standard uncertainty of it.
+    /// Standard.
     pub uncertainty: f64,
-    /// The probability of so large a shift where nothing changed.
     pub p_value: f64,
 }
 
@@ -91,9 +83,7 @@ pub struct MeterChange {
     /// Of that uncertainty, where it is estimated from few samples.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
-    /// The probability of so large a change where nothing changed.
     pub p_value: f64,
-    /// Beyond noise.
     pub significant: bool,
 }
 
@@ -112,16 +102,13 @@ impl Changes {
 }
 
 pub fn compare(old: &[Entry], new: &[Entry], comparability: Comparability) -> Changes {
-    let mut entries: Vec<EntryChange> = vec![];
-    for a in old {
-        entries.push(match new.iter().find(|b| b.key == a.key) {
-            None => bare(a, State::Vanished, vec!["there is no such run any more".to_owned()]),
-            Some(b) => pair(a, b, comparability),
-        });
-    }
-    for b in new.iter().filter(|b| !old.iter().any(|a| a.key == b.key)) {
-        entries.push(bare(b, State::New, vec!["there is nothing to hold it against".to_owned()]));
-    }
+    let of_old = old.iter().map(|a| match new.iter().find(|b| b.key == a.key) {
+        None => bare(a, State::Vanished, vec!["there is no such run any more".to_owned()]),
+        Some(b) => pair(a, b, comparability),
+    });
+    let added = new.iter().filter(|b| !old.iter().any(|a| a.key == b.key));
+    let added = added.map(|b| bare(b, State::New, vec!["there is nothing to hold it against".to_owned()]));
+    let mut entries: Vec<EntryChange> = of_old.chain(added).collect();
     let tests = entries.iter().map(|e| e.meters.len() + usize::from(e.mean.is_some())).sum::<usize>();
     // 1 - (1 - family)^(1 / tests), without loss of digits.
     let level = -f64::exp_m1(f64::ln_1p(-FAMILY) / tests.max(1) as f64);
@@ -156,18 +143,14 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
         differing("luminaire model", &a.model, &b.model),
         differing("light", &a.light.to_string(), &b.light.to_string()),
     ];
-    let mut of_instrument = vec![differing("version", &a.version, &b.version)];
-    let keys: std::collections::BTreeSet<&String> = a.method.keys().chain(b.method.keys()).collect();
-    for key in keys {
+    let mut notes: Vec<String> = of_subject.into_iter().flatten().collect();
+    let is_other_subject = !notes.is_empty();
+    notes.extend(differing("version", &a.version, &b.version));
+    for key in a.method.keys().chain(b.method.keys()).collect::<BTreeSet<_>>() {
         let of = |entry: &Entry| entry.method.get(key).cloned().unwrap_or_else(|| "not set".to_owned());
-        of_instrument.push(differing(&format!("setting {key}"), &of(a), &of(b)));
+        notes.extend(differing(&format!("setting {key}"), &of(a), &of(b)));
     }
-    let of_subject: Vec<String> = of_subject.into_iter().flatten().collect();
-    let of_instrument: Vec<String> = of_instrument.into_iter().flatten().collect();
-    let refused =
-        !of_subject.is_empty() || (comparability == Comparability::SameInstrument && !of_instrument.is_empty());
-    let notes: Vec<String> = of_subject.into_iter().chain(of_instrument).collect();
-    if refused {
+    if is_other_subject || (comparability == Comparability::SameInstrument && !notes.is_empty()) {
         return bare(a, State::Refused, notes);
     }
     let mut change = bare(a, State::Unchanged, notes);
@@ -183,7 +166,6 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
     change
 }
 
-/// Enough of a hash to tell two apart.
 fn short(hash: &str) -> String {
     hash.chars().take(12).collect()
 }
@@ -193,14 +175,11 @@ fn meter(before: &Reading, now: &Reading) -> MeterChange {
     let apart = Uncertainty::of_sum([(-1.0, before.uncertainty), (1.0, now.uncertainty)]);
     let combined = before.uncertainty.standard().hypot(now.uncertainty.standard());
     let rounding = ROUNDING * before.value.abs().max(now.value.abs());
-    let p_value = if !(change.is_finite() && combined.is_finite()) {
-        0.0
-    } else if change.abs() <= rounding {
-        1.0
-    } else if combined > 0.0 {
-        two_sided(change / combined, apart.degrees_of_freedom())
-    } else {
-        0.0
+    let p_value = match change.abs() {
+        size if !(size.is_finite() && combined.is_finite()) => 0.0,
+        size if size <= rounding => 1.0,
+        _ if combined > 0.0 => two_sided(change / combined, apart.degrees_of_freedom()),
+        _ => 0.0,
     };
     MeterChange {
         meter: before.meter.clone(),
@@ -237,9 +216,6 @@ fn mean(meters: &[MeterChange]) -> Option<MeanShift> {
 
 /// Probability of a standardised change at least this large, either way.
 fn two_sided(z: f64, freedom: Option<f64>) -> f64 {
-    let tail = match freedom.and_then(|f| StudentsT::new(0.0, 1.0, f).ok()) {
-        Some(t) => t.sf(z.abs()),
-        None => Normal::standard().sf(z.abs()),
-    };
-    2.0 * tail
+    let student = freedom.and_then(|f| StudentsT::new(0.0, 1.0, f).ok());
+    2.0 * student.map_or_else(|| Normal::standard().sf(z.abs()), |t| t.sf(z.abs()))
 }

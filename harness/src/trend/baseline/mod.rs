@@ -21,18 +21,15 @@ pub use review::{Decision, review};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Baseline {
-    /// Version of the format.
     pub luxproof_baseline: u32,
-    /// One a case, procedure and engine, sorted so.
+    /// Sorted by key.
     pub entries: Vec<Entry>,
 }
 
-/// What one engine read in one procedure of one case, and why that was accepted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     #[serde(flatten)]
     pub key: ReadingKey,
-    /// The engine's.
     pub version: String,
     pub model: String,
     pub light: Light,
@@ -48,7 +45,6 @@ pub struct Entry {
     pub accepted: String,
     /// Why it was accepted; empty in a candidate, which is refused as a baseline.
     pub reason: String,
-    /// One a meter.
     pub readings: Vec<Reading>,
 }
 
@@ -94,14 +90,12 @@ impl Entry {
 }
 
 impl Baseline {
-    /// The readings of a run as a candidate: accepted by nobody yet.
     pub fn candidate(report: &Report) -> Self {
         let mut entries: Vec<Entry> = report.recordings.iter().map(|r| Entry::of(report, r)).collect();
         entries.sort_by(|a, b| a.key.cmp(&b.key));
         Self { luxproof_baseline: 1, entries }
     }
 
-    /// Reads a baseline; a candidate that nobody accepted is refused.
     pub fn read(path: &Path) -> Result<Self, BaselineError> {
         let name = || path.display().to_string();
         let text = fs::read_to_string(path).map_err(|source| FileError { path: name(), source })?;
@@ -125,7 +119,6 @@ impl Baseline {
         Ok(baseline)
     }
 
-    /// Writes it, one reading a line.
     pub fn write(&self, path: &Path) -> Result<(), BaselineError> {
         let fail = |source| FileError { path: path.display().to_string(), source };
         let text = self.text().map_err(|e| fail(e.into()))?;
@@ -140,19 +133,15 @@ impl Baseline {
             for (key, value) in value.as_object().into_iter().flatten().filter(|(key, _)| *key != "readings") {
                 lines.push(format!("      {}: {value}", serde_json::Value::from(key.as_str())));
             }
-            let readings: Result<Vec<String>, _> =
-                entry.readings.iter().map(|r| serde_json::to_string(r).map(|r| format!("        {r}"))).collect();
-            lines.push(format!("      \"readings\": [\n{}\n      ]", readings?.join(",\n")));
+            let reading = |r| serde_json::to_string(r).map(|r| format!("        {r}"));
+            let readings: Vec<String> = entry.readings.iter().map(reading).collect::<Result<_, _>>()?;
+            lines.push(format!("      \"readings\": [\n{}\n      ]", readings.join(",\n")));
             entries.push(format!("    {{\n{}\n    }}", lines.join(",\n")));
         }
-        Ok(format!(
-            "{{\n  \"luxproof_baseline\": {},\n  \"entries\": [\n{}\n  ]\n}}\n",
-            self.luxproof_baseline,
-            entries.join(",\n")
-        ))
+        let (version, entries) = (self.luxproof_baseline, entries.join(",\n"));
+        Ok(format!("{{\n  \"luxproof_baseline\": {version},\n  \"entries\": [\n{entries}\n  ]\n}}\n"))
     }
 
-    /// Puts accepted entries in the place of those that they replace.
     pub fn accept(&mut self, accepted: Vec<Entry>) {
         for entry in accepted {
             self.entries.retain(|old| old.key != entry.key);

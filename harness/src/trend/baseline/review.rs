@@ -7,18 +7,14 @@ use crate::record::ReadingKey;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decision {
-    /// With reason and time.
     pub accepted: Vec<Entry>,
-    /// How many were declined.
     pub declined: usize,
 }
 
 /// Meters shown of one entry, those that changed most first.
 const SHOWN: usize = 12;
 
-/// Asks about every entry that is new or changed; `now` is written into what is accepted.
-///
-/// Ending the input declines the rest.
+/// Asks about every entry that is new or changed; ending the input declines the rest.
 pub fn review(
     changes: &Changes,
     candidates: &[Entry],
@@ -26,12 +22,9 @@ pub fn review(
     input: &mut dyn BufRead,
     output: &mut dyn Write,
 ) -> std::io::Result<Decision> {
-    let open: Vec<(&EntryChange, &Entry)> = changes
-        .entries
-        .iter()
-        .filter(|c| !matches!(c.state, State::Unchanged))
-        .filter_map(|c| candidates.iter().find(|e| e.key == c.key).map(|e| (c, e)))
-        .collect();
+    let changed = changes.entries.iter().filter(|c| c.state != State::Unchanged);
+    let open: Vec<(&EntryChange, &Entry)> =
+        changed.filter_map(|c| candidates.iter().find(|e| e.key == c.key).map(|e| (c, e))).collect();
     let mut decision = Decision { accepted: vec![], declined: 0 };
     for (k, (change, entry)) in open.iter().enumerate() {
         let ReadingKey { case, procedure, engine } = &entry.key;

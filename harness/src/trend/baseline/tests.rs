@@ -25,7 +25,6 @@ fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
     }
 }
 
-/// Values near 100 lx with normal noise.
 fn noisy(rng: &mut fastrand::Rng, meters: usize, std_error: f64, shift: f64) -> Vec<f64> {
     (0..meters).map(|k| (100.0 + k as f64) * (1.0 + shift) + std_error * normal(rng)).collect()
 }
@@ -124,10 +123,8 @@ fn a_baseline_of_another_spec_version_model_light_or_setting_is_refused() {
     }
     // Between two runs a new version is what one wants to know about; another spec is still another thing.
     let of_runs = |other: &Entry| compared(&[&a], &[other], Comparability::SameSpec).entries[0].state;
-    assert_eq!(
-        others.each_ref().map(of_runs),
-        [State::Refused, State::Unchanged, State::Refused, State::Refused, State::Unchanged]
-    );
+    let expected = [State::Refused, State::Unchanged, State::Refused, State::Refused, State::Unchanged];
+    assert_eq!(others.each_ref().map(of_runs), expected);
 }
 
 #[test]

@@ -15,6 +15,7 @@
 //! dated, among the nights since the sum last was zero or among the five, to the one that makes what followed most likely.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use super::innovation::{Innovation, MAX_SPREADS, MIN_ERROR, MIN_LEARNED, RunningMean, Spread, spread_of_all};
 use super::limits::{Limits, REFERENCE_VALUE, WINDOW};
@@ -23,22 +24,17 @@ use crate::record::{EngineName, MeterId, ProcedureId};
 
 /// Over all groups of a history together there is at most one false alarm in so many nights, in the mean.
 pub const NIGHTS_PER_FALSE_ALARM: f64 = 30.0;
-
 /// One night alone is no change: it takes a sum no further than this share of its limit.
 const MAX_OF_ONE_NIGHT: f64 = 0.9;
-
 /// Changes in the same direction of one engine and procedure dated so close together are one change seen several times ...
 const SAME_CHANGE: usize = 3;
-
 /// ... and what a single comparison shows so many nights after its group: it needs longer.
 const SAME_CHANGE_OF_ONE: usize = 21;
 
-/// How many series are judged together, with the share of the false alarms that each kind may have.
+/// How many series are judged together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// All cases of an engine in a procedure.
     EngineAndProcedure,
-    /// One case of these.
     Case,
     Comparison,
 }
@@ -46,6 +42,7 @@ pub enum Level {
 impl Level {
     const ALL: [Self; 3] = [Self::EngineAndProcedure, Self::Case, Self::Comparison];
 
+    /// Of the false alarms.
     const fn share(self) -> f64 {
         match self {
             Self::EngineAndProcedure => 0.25,
@@ -58,11 +55,9 @@ impl Level {
 /// A deviation that has changed and stayed; nights are counted from the first of the history.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// How many series changed together.
     pub level: Level,
     pub engine: EngineName,
     pub procedure: ProcedureId,
-    /// Where, below engine and procedure.
     pub part: Part,
     /// The first after the change, by estimate.
     pub night: usize,
@@ -75,12 +70,10 @@ pub struct Change {
     pub seen_in: Vec<Part>,
 }
 
-/// A case of an engine and procedure, or one comparison of it.
+/// A case of an engine and procedure or one comparison of it; none is all.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Part {
-    /// None for all.
     pub case: Option<String>,
-    /// None for all of the case.
     pub meter: Option<MeterId>,
 }
 
@@ -137,7 +130,6 @@ fn at_level(history: &History, level: Level) -> Vec<Change> {
     found
 }
 
-/// A case of an engine and procedure.
 type Case<'h> = (&'h EngineName, ProcedureId, &'h str);
 
 fn case_of(series: &Series) -> Case<'_> {
@@ -160,12 +152,6 @@ struct Alarm {
     shift: (f64, f64),
 }
 
-struct Noticed {
-    change: usize,
-    noticed: usize,
-}
-
-/// What a group is watched by.
 struct Watch<'a> {
     limits: Limits,
     /// The spread of the comparisons that are like it, before each night; none for a group that is judged by its own alone.
@@ -178,16 +164,15 @@ impl Watch<'_> {
     fn alarms(&self, members: &[&Series], nights: usize) -> Vec<Alarm> {
         let mut found: Vec<Alarm> = vec![];
         let mut start = 0;
-        while let Some(night) = self.first_alarm(members, start..nights) {
-            let Noticed { change, noticed } = night;
-            found.push(Alarm { night: change, noticed, shift: shift(members, start, change, noticed) });
+        while let Some((night, noticed)) = self.first_alarm(members, start..nights) {
+            found.push(Alarm { night, noticed, shift: shift(members, start, night, noticed) });
             start = noticed + 1;
         }
         found
     }
 
-    /// The first alarm of a segment without earlier changes.
-    fn first_alarm(&self, members: &[&Series], segment: std::ops::Range<usize>) -> Option<Noticed> {
+    /// The night of the first change of a segment, and that on which it is noticed.
+    fn first_alarm(&self, members: &[&Series], segment: Range<usize>) -> Option<(usize, usize)> {
         let most = REFERENCE_VALUE + MAX_OF_ONE_NIGHT * self.limits.sum;
         let mut means = vec![RunningMean::default(); members.len()];
         let mut spread = Spread::default();
@@ -209,12 +194,12 @@ impl Watch<'_> {
                 if sums[side] <= 0.0 {
                     (sums[side], zero[side]) = (0.0, deviates.len());
                 } else if sums[side] > self.limits.sum {
-                    return Some(Noticed { change: most_likely(&deviates[zero[side]..]), noticed: night });
+                    return Some((most_likely(&deviates[zero[side]..]), night));
                 }
             }
             let last = &deviates[deviates.len().saturating_sub(WINDOW)..];
             if self.limits.are_exceeded_by(last.iter().map(|(_, deviate)| deviate.clamp(-MAX_SPREADS, MAX_SPREADS))) {
-                return Some(Noticed { change: most_likely(last), noticed: night });
+                return Some((most_likely(last), night));
             }
         }
         None
@@ -238,7 +223,7 @@ fn most_likely(deviates: &[(usize, f64)]) -> usize {
 fn shift(members: &[&Series], start: usize, change: usize, noticed: usize) -> (f64, f64) {
     let (mut errors, mut relative, mut count) = (0.0, 0.0, 0.0);
     for series in members {
-        let mean = |values: &[f64], nights: std::ops::Range<usize>| {
+        let mean = |values: &[f64], nights: Range<usize>| {
             let there = nights.filter(|n| series.deviation[*n].is_finite()).map(|n| values[n]);
             let (sum, count) = there.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
             sum / count
@@ -262,7 +247,7 @@ mod tests {
     use crate::trend::history::synthetic::{Shift, Synthetic};
 
     /// Seeds of the simulations; each is a year of 2000 comparisons a night.
-    const SEEDS: std::ops::Range<u64> = 0..12;
+    const SEEDS: Range<u64> = 0..12;
 
     /// Of planted shifts of Mitsuba's indirect light, one a seed, seen at a level: how many are noticed within so many nights,
     /// and how many of these are dated to within two nights.
@@ -274,12 +259,10 @@ mod tests {
         let (mut noticed, mut dated) = (0, 0);
         for seed in SEEDS {
             let shift = Shift { night: 60 + 23 * seed as usize, ..shift };
-            let history =
-                Synthetic { seed, shift: Some(shift), nights: shift.night + within, ..base.clone() }.history();
-            let mine = |c: &&Change| {
-                is_of_shifted(c) && c.noticed >= shift.night && (c.part == part || c.seen_in.contains(&part))
-            };
-            if let Some(change) = changes(&history).iter().find(mine) {
+            let made = Synthetic { seed, shift: Some(shift), nights: shift.night + within, ..base.clone() };
+            let is_seen = |c: &Change| c.part == part || c.seen_in.contains(&part);
+            let mine = |c: &&Change| is_of_shifted(c) && c.noticed >= shift.night && is_seen(c);
+            if let Some(change) = changes(&made.history()).iter().find(mine) {
                 noticed += 1;
                 dated += usize::from(change.night.abs_diff(shift.night) <= 2);
             }
@@ -300,10 +283,8 @@ mod tests {
     #[test]
     fn a_year_without_change_has_at_most_one_false_alarm_a_month_over_all_series() {
         for common in [0.0, 1.0] {
-            let mut alarms = 0;
-            for seed in SEEDS {
-                alarms += changes(&Synthetic { seed, common, ..Synthetic::default() }.history()).len();
-            }
+            let made = |seed| Synthetic { seed, common, ..Synthetic::default() }.history();
+            let alarms: usize = SEEDS.map(|seed| changes(&made(seed)).len()).sum();
             let months = 12.0 * all() as f64;
             println!("{alarms} false alarms in {months} months");
             assert!(alarms as f64 <= months, "{alarms} in {months} months");
@@ -332,13 +313,12 @@ mod tests {
 
     /// Shifts of single readings, one in each of five cases, so that no group shows them: how many nights each took to be
     /// noticed, as far as it was within three weeks.
-    fn delays_of_single_readings(seeds: std::ops::Range<u64>) -> Vec<Option<usize>> {
+    fn delays_of_single_readings(seeds: Range<u64>) -> Vec<Option<usize>> {
         let mut delays = vec![];
         for seed in seeds {
             let shift = Shift { night: 60 + 23 * (seed as usize % 12), meters: 1, ..SEEN };
-            let history =
-                Synthetic { seed, shift: Some(shift), nights: shift.night + 21, ..Synthetic::default() }.history();
-            let found = at_level(&history, Level::Comparison);
+            let made = Synthetic { seed, shift: Some(shift), nights: shift.night + 21, ..Synthetic::default() };
+            let found = at_level(&made.history(), Level::Comparison);
             for case in 0..shift.cases {
                 let case = Some(format!("suite/case-{case}"));
                 let part = Part { case, meter: Some(MeterId::new("workplane", 0)) };
@@ -359,7 +339,6 @@ mod tests {
         assert!(20 * within(21) >= 19 * delays.len(), "{delays:?}");
     }
 
-    /// An engine that repeats exactly, with what the nights add.
     fn exact(nights: &[f64]) -> Vec<Change> {
         let mut history = Synthetic { nights: nights.len(), cases: 1, meters: 1, ..Synthetic::default() }.history();
         history.series.truncate(1);
@@ -382,11 +361,8 @@ mod tests {
         let dates: Vec<(usize, usize)> = found.iter().filter(of_all).map(|c| (c.night, c.noticed)).collect();
         assert_eq!(dates, [(20, 21)]);
         nights[12] = 0.0;
-        let found = exact(&nights);
-        assert!(
-            (found[0].relative - 1e-5).abs() < 1e-12 && (found[0].standard_errors - 10.0).abs() < 1e-6,
-            "{found:?}"
-        );
+        let found = &exact(&nights)[0];
+        assert!((found.relative - 1e-5).abs() < 1e-12 && (found.standard_errors - 10.0).abs() < 1e-6, "{found:?}");
     }
 
     #[test]

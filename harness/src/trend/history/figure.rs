@@ -25,8 +25,8 @@ pub(super) fn mean_deviation(members: &[&Series], nights: usize) -> Vec<f64> {
         let finite = |values: &[f64]| values.iter().filter(|v| v.is_finite()).map(|v| v * v).sum::<f64>();
         let reference = (finite(&series.reference) / count).sqrt();
         let error = ((finite(&series.std_error) / count).sqrt() / reference).max(1e-6);
-        for (sum, deviation) in sums.iter_mut().zip(&series.deviation).filter(|(_, d)| d.is_finite() && reference > 0.0)
-        {
+        let is_there = |d: &f64| d.is_finite() && reference > 0.0;
+        for (sum, deviation) in sums.iter_mut().zip(&series.deviation).filter(|(_, d)| is_there(d)) {
             *sum = (sum.0 + deviation / reference / error, sum.1 + 1.0 / error);
         }
     }
@@ -47,9 +47,7 @@ pub(super) fn figure(history: &History, engine: &EngineName, procedure: Procedur
             @if let Some(last) = last {
                 svg viewBox={ "0 0 " (WIDTH) " " (HEIGHT) } role="img" aria-labelledby={ (id) "-title " (id) "-caption" } {
                     (frame.axes(history))
-                    @for version in &versions {
-                        (frame.upright("version", version.night, &version.to))
-                    }
+                    @for version in &versions { (frame.upright("version", version.night, &version.to)) }
                     (frame.curve(&values))
                     @for change in &mine {
                         (frame.upright("change", change.night, ""))
@@ -84,7 +82,6 @@ pub(super) fn percent(relative: f64) -> String {
     }
 }
 
-/// Where nights and deviations lie in the picture.
 struct Frame {
     nights: usize,
     low: f64,
@@ -101,8 +98,7 @@ impl Frame {
     }
 
     fn x(&self, night: f64) -> f64 {
-        let last = (self.nights.max(2) - 1) as f64;
-        round(LEFT + (WIDTH - LEFT - 8.0) * night / last)
+        round(LEFT + (WIDTH - LEFT - 8.0) * night / (self.nights.max(2) - 1) as f64)
     }
 
     fn y(&self, value: f64) -> f64 {
@@ -125,15 +121,12 @@ impl Frame {
     }
 
     fn curve(&self, values: &[f64]) -> Markup {
-        let mut path = String::new();
-        let mut pen = 'M';
+        let (mut path, mut pen) = (String::new(), 'M');
         for (night, value) in values.iter().enumerate() {
             if value.is_finite() {
                 path += &format!("{pen}{} {}", self.x(night as f64), self.y(*value));
-                pen = 'L';
-            } else {
-                pen = 'M';
             }
+            pen = if value.is_finite() { 'L' } else { 'M' };
         }
         html! {
             path.curve d=(path) {}
@@ -151,9 +144,7 @@ impl Frame {
         let anchor = if x > 0.7 * WIDTH { "end" } else { "start" };
         html! {
             line class=(class) x1=(x) x2=(x) y1=(TOP - 6.0) y2=(HEIGHT - BOTTOM) {}
-            @if !label.is_empty() {
-                text x=(x) y=(TOP - 9.0) text-anchor=(anchor) { (label) }
-            }
+            @if !label.is_empty() { text x=(x) y=(TOP - 9.0) text-anchor=(anchor) { (label) } }
         }
     }
 

@@ -1,29 +1,13 @@
-//! The file of a history: how lines come into it, and why it may be refused.
+//! The file of a history: how lines come into it.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
 
-use super::line::Line;
+use super::line::{HistoryError, Line};
 use crate::system::files::{self, FileError};
 
-#[derive(Debug, thiserror::Error)]
-pub enum HistoryError {
-    #[error(transparent)]
-    File(#[from] FileError),
-    #[error("{path}:{line}: {what}; take the line out or restore the file")]
-    Line {
-        path: String,
-        /// From 1.
-        line: usize,
-        what: String,
-    },
-    #[error("`{night}` is no date; give the night as YYYY-MM-DD")]
-    Night { night: String },
-}
-
-/// What adding took out of a history.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Added {
     /// Lines of the same night and case.
@@ -35,14 +19,11 @@ pub struct Added {
 /// Where the whole lines of a text end, and the number of a last one that is cut short.
 pub(super) fn whole_lines(text: &[u8]) -> (&[u8], Option<usize>) {
     let (whole, rest) = text.split_at(text.iter().rposition(|b| *b == b'\n').map_or(0, |end| end + 1));
-    let cut_short = || whole.iter().filter(|b| **b == b'\n').count() + 1;
-    (whole, (!rest.is_empty()).then(cut_short))
+    (whole, (!rest.is_empty()).then(|| whole.iter().filter(|b| **b == b'\n').count() + 1))
 }
 
-/// Adds lines to a history, which is made if there is none.
-///
-/// A night that is run again takes the place of its earlier lines, case by case, so that repeating a night is harmless. The
-/// file is appended to, or replaced as a whole: never half written.
+/// A history is made if there is none, appended to, or replaced as a whole: never half written. A night that is run again
+/// takes the place of its earlier lines, case by case, so that repeating a night is harmless.
 pub fn add(path: &Path, lines: &[Line<'_>]) -> Result<Added, HistoryError> {
     let fail = |source| FileError { path: path.display().to_string(), source };
     let old = match fs::read(path) {
@@ -77,7 +58,6 @@ mod tests {
     use crate::record::{MeterId, ProcedureId, Quantity, ReadingKey};
     use crate::trend::history::{History, Numbers};
 
-    /// Adds a line of one meter to a history.
     fn add_one(path: &Path, night: &str, case: &str, deviation: f64) -> Added {
         let (key, meter) = (ReadingKey::new(case, ProcedureId::DirectIlluminance, "radiance"), MeterId::new("m", 0));
         let mut line = Line::new(night, &key, Quantity::Illuminance, Verdict::Pass);

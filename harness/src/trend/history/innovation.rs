@@ -4,19 +4,14 @@ use super::series::Series;
 
 /// So many innovations estimate the spread before any is judged by it.
 pub(super) const MIN_LEARNED: usize = 6;
-
 /// An innovation moves the estimates by no more than so many times the spread.
 pub(super) const MAX_SPREADS: f64 = 4.0;
-
 /// Of a standard error, relative to the reference: for engines that state none. A change far below any tolerance is one still.
 pub(super) const MIN_ERROR: f64 = 1e-6;
-
 /// Of a group's innovations, in standard errors: for what repeats exactly.
 const MIN_SPREAD: f64 = 0.1;
-
 /// The spread of all comparisons of a case counts for so many nights in that of each.
 const MAX_PEER_NIGHTS: usize = 50;
-
 /// A standard error so many times the usual is believed; one below may be chance, being estimated from few blocks.
 const UNUSUAL: f64 = 2.0;
 
@@ -112,10 +107,8 @@ pub(super) fn spread_of_all(members: &[&Series], nights: usize) -> Vec<Spread> {
     let mut before = vec![];
     for night in 0..nights {
         before.push(all);
-        for (mean, series) in means.iter_mut().zip(members) {
-            if let Some(innovation) = mean.update(series, night) {
-                all.update(innovation);
-            }
+        for innovation in members.iter().zip(&mut means).filter_map(|(series, mean)| mean.update(series, night)) {
+            all.update(innovation);
         }
     }
     before

@@ -4,14 +4,10 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 /// Half the shift that the sums are made for, in standard errors.
 pub(super) const REFERENCE_VALUE: f64 = 1.0;
-
-/// So many nights are looked at together.
 pub(super) const WINDOW: usize = 5;
-
 /// The part of the false alarms that the last nights together may give, the sums the rest.
 const SHARE_OF_WINDOW: f64 = 0.75;
 
-/// The limits of one group.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     /// Of either cumulative sum.
@@ -29,7 +25,6 @@ impl Limits {
         }
     }
 
-    /// Whether the normal deviates of the last nights are too far from zero together.
     pub(super) fn are_exceeded_by(self, last: impl ExactSizeIterator<Item = f64>) -> bool {
         last.len() == WINDOW && last.sum::<f64>().abs() > self.window * (WINDOW as f64).sqrt()
     }

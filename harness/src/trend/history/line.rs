@@ -9,10 +9,10 @@ use std::borrow::Cow;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::file::HistoryError;
 use crate::judge::{Basis, Comparison, Verdict};
 use crate::record::{MeterId, ProcedureId, Quantity, ReadingKey};
 use crate::report::Report;
+use crate::system::files::FileError;
 
 /// The format that is written; all up to it are read.
 const FORMAT: u32 = 2;
@@ -20,9 +20,8 @@ const FORMAT: u32 = 2;
 /// What an engine said in one procedure of one case on one night. Lists hold NaN, null in the file, where there is no number.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Line<'a> {
-    /// A date: YYYY-MM-DD.
     #[serde(borrow)]
-    night: Cow<'a, str>,
+    pub(super) night: Cow<'a, str>,
     #[serde(borrow)]
     case: Cow<'a, str>,
     #[serde(default = "first_format", deserialize_with = "known_format")]
@@ -30,7 +29,6 @@ pub struct Line<'a> {
     pub procedure: ProcedureId,
     #[serde(borrow)]
     pub engine: Cow<'a, str>,
-    /// The engine's.
     #[serde(borrow)]
     pub version: Cow<'a, str>,
     #[serde(borrow)]
@@ -43,7 +41,7 @@ pub struct Line<'a> {
     pub source: Cow<'a, str>,
     pub verdict: Verdict,
     #[serde(borrow, default)]
-    meters: Vec<Meters<'a>>,
+    pub(super) meters: Vec<Meters<'a>>,
     /// Of format 1.
     #[serde(borrow, default, skip_serializing)]
     meter: Option<Cow<'a, str>>,
@@ -57,7 +55,16 @@ pub struct Line<'a> {
     u: Vec<f64>,
 }
 
-/// Meters in the order of the numbers.
+#[derive(Debug, thiserror::Error)]
+pub enum HistoryError {
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error("{path}:{line}: {what}; take the line out or restore the file")]
+    Line { path: String, line: usize, what: String },
+    #[error("`{night}` is no date; give the night as YYYY-MM-DD")]
+    Night { night: String },
+}
+
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(untagged)]
 pub(super) enum Meters<'a> {
@@ -82,7 +89,6 @@ pub struct Numbers {
 pub(super) type Subject<'l> = (&'l str, ProcedureId, &'l str, &'l str, Option<Basis>, &'l str);
 
 impl<'a> Line<'a> {
-    /// A line without meters, version, model and reference.
     pub fn new(night: &'a str, key: &'a ReadingKey, quantity: Quantity, verdict: Verdict) -> Self {
         Self {
             night: night.into(),
@@ -122,7 +128,6 @@ impl<'a> Line<'a> {
         self.u.push(numbers.u);
     }
 
-    /// Reads a line of a file.
     pub(super) fn parse(text: &'a [u8]) -> Result<Self, String> {
         let mut line: Self = serde_json::from_slice(text).map_err(|e| e.to_string())?;
         line.meters.extend(line.meter.take().map(Meters::One));
@@ -135,10 +140,6 @@ impl<'a> Line<'a> {
         Ok(line)
     }
 
-    pub fn night(&self) -> &str {
-        &self.night
-    }
-
     /// How every line of this night and case begins, of whatever format.
     pub(super) fn head(&self) -> String {
         let text = |t: &str| serde_json::Value::from(t).to_string();
@@ -149,16 +150,10 @@ impl<'a> Line<'a> {
         (&self.case, self.procedure, &self.engine, &self.model, self.basis, &self.source)
     }
 
-    pub(super) fn meters(&self) -> &[Meters<'a>] {
-        &self.meters
-    }
-
-    /// How many comparisons it holds.
     pub fn count(&self) -> usize {
         self.deviation.len()
     }
 
-    /// The numbers of the `k`-th meter.
     pub(super) fn numbers(&self, k: usize) -> Numbers {
         let [reference, deviation, std_error, u] = [&self.reference, &self.deviation, &self.std_error, &self.u]
             .map(|numbers| numbers.get(k).copied().unwrap_or(f64::NAN));
@@ -236,7 +231,7 @@ fn rounded(value: Option<f64>, digits: usize) -> f64 {
     value.and_then(|v| format!("{v:.*e}", digits - 1).parse().ok()).unwrap_or(f64::NAN)
 }
 
-/// Whether a text is a date of the form that sorts by time.
+/// Of the form that sorts by time.
 fn is_date(text: &str) -> bool {
     let shape = text.len() == 10 && text.bytes().enumerate().all(|(k, b)| (b == b'-') == (k == 4 || k == 7));
     shape && humantime::parse_rfc3339_weak(&format!("{text} 00:00:00")).is_ok()

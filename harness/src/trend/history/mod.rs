@@ -15,7 +15,7 @@ mod site;
 mod synthetic;
 
 pub use change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part, changes};
-pub use file::{Added, HistoryError, add};
-pub use line::{Line, Numbers, lines};
+pub use file::{Added, add};
+pub use line::{HistoryError, Line, Numbers, lines};
 pub use series::{History, Key, Series, VersionChange};
 pub use site::site;

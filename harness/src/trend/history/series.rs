@@ -6,19 +6,17 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::file::{HistoryError, whole_lines};
-use super::line::{Line, Meters, Numbers, Subject};
+use super::file::whole_lines;
+use super::line::{HistoryError, Line, Meters, Numbers, Subject};
 use crate::judge::{Basis, Verdict};
 use crate::record::{EngineName, MeterId, ProcedureId, ReadingKey};
 use crate::system::files::FileError;
 
-/// What tells one comparison from another within a night.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key {
     pub reading: ReadingKey,
     pub model: String,
     pub meter: MeterId,
-    /// What the reference rests on.
     pub basis: Option<Basis>,
     /// Formula, solver or paper of the reference.
     pub source: String,
@@ -33,15 +31,12 @@ pub struct Series {
     /// Standard error of the reading, likewise; 0 where it has none.
     pub std_error: Vec<f64>,
     pub reference: Vec<f64>,
-    /// None on a night without the comparison.
     pub verdicts: Vec<Option<Verdict>>,
 }
 
-/// An engine's version differs from that of the night before.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct VersionChange {
     pub engine: EngineName,
-    /// The first night of the new version.
     pub night: usize,
     pub from: String,
     pub to: String,
@@ -49,9 +44,7 @@ pub struct VersionChange {
 
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    /// By date.
     pub nights: Vec<String>,
-    /// By key.
     pub series: Vec<Series>,
     pub version_changes: Vec<VersionChange>,
     /// The last line, from 1, where it was cut short and left out.
@@ -64,11 +57,9 @@ impl History {
         Self::parse(&bytes, path)
     }
 
-    /// Reads a history's text; `path` is for messages.
     pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Self, HistoryError> {
         let (whole, cut_short) = whole_lines(bytes);
-        let texts: Vec<(usize, &[u8])> =
-            (1..).zip(whole.split(|b| *b == b'\n')).filter(|(_, text)| !text.is_empty()).collect();
+        let texts: Vec<(usize, &[u8])> = (1..).zip(whole.split(|b| *b == b'\n')).filter(|t| !t.1.is_empty()).collect();
         let read = |&(line, text): &(usize, _)| Line::parse(text).map_err(|what| (line, what));
         // Of several lines that are wrong the first is told.
         let lines: Vec<Result<_, _>> = texts.par_iter().map(read).collect();
@@ -78,7 +69,7 @@ impl History {
     }
 
     fn of(lines: &[Line<'_>]) -> Self {
-        let dates: BTreeSet<&str> = lines.iter().map(Line::night).collect();
+        let dates: BTreeSet<&str> = lines.iter().map(|line| &*line.night).collect();
         let place_of: HashMap<&str, usize> = dates.iter().copied().zip(0..).collect();
         let mut series: Vec<Series> = vec![];
         let mut known: HashMap<Key, usize> = HashMap::new();
@@ -86,16 +77,15 @@ impl History {
         let mut repeated: HashMap<(Subject<'_>, &[Meters<'_>]), Vec<usize>> = HashMap::new();
         let mut versions: BTreeMap<(&str, usize), &str> = BTreeMap::new();
         for line in lines {
-            let night = place_of[line.night()];
+            let night = place_of[&*line.night];
             let mut place = |key: Key| {
                 *known.entry(key).or_insert_with_key(|key| {
                     series.push(Series::without_readings(key.clone(), dates.len()));
                     series.len() - 1
                 })
             };
-            let places =
-                repeated.entry((line.subject(), line.meters())).or_insert_with(|| keys(line).map(&mut place).collect());
-            for (k, place) in places.iter().enumerate() {
+            let same = repeated.entry((line.subject(), &line.meters[..]));
+            for (k, place) in same.or_insert_with(|| keys(line).map(&mut place).collect()).iter().enumerate() {
                 series[*place].set(night, line.numbers(k), line.verdict);
             }
             if !line.version.is_empty() {
@@ -111,7 +101,6 @@ impl History {
         self.series.iter().map(|s| (&s.key.reading.engine, s.key.reading.procedure)).collect()
     }
 
-    /// The series of an engine in a procedure.
     pub(super) fn of_engine(&self, engine: &EngineName, procedure: ProcedureId) -> Vec<&Series> {
         let is_of = |s: &&Series| s.key.reading.engine == *engine && s.key.reading.procedure == procedure;
         self.series.iter().filter(is_of).collect()
@@ -125,7 +114,7 @@ fn keys<'l>(line: &'l Line<'_>) -> impl Iterator<Item = Key> + 'l {
         let (model, source) = (model.to_owned(), source.to_owned());
         Key { reading: reading.clone(), model, meter, basis, source }
     };
-    line.meters().iter().flat_map(Meters::ids).map(key)
+    line.meters.iter().flat_map(Meters::ids).map(key)
 }
 
 impl Series {
@@ -147,13 +136,8 @@ fn version_changes(versions: &BTreeMap<(&str, usize), &str>) -> Vec<VersionChang
     let known: Vec<_> = versions.iter().collect();
     let change = |pair: &[(&(&str, usize), &&str)]| {
         let [((of, _), from), ((engine, night), to)] = *pair else { return None };
-        let changed = || VersionChange {
-            engine: (*engine).into(),
-            night: *night,
-            from: (*from).to_owned(),
-            to: (*to).to_owned(),
-        };
-        (of == engine && from != to).then(changed)
+        let (from, to) = ((*from).to_owned(), (*to).to_owned());
+        (of == engine && from != to).then(|| VersionChange { engine: (*engine).into(), night: *night, from, to })
     };
     known.windows(2).filter_map(change).collect()
 }
@@ -182,7 +166,6 @@ mod tests {
         assert!(read.series.is_sorted_by_key(|s| &s.key));
     }
 
-    /// One comparison of a night as format 1 has it.
     fn of_format_1(night: &str, meter: usize, deviation: &str) -> String {
         format!(
             r#"{{"night":"{night}","case":"suite/case-0","procedure":"direct_illuminance","engine":"iesna","version":"1.0","model":"point","meter":"workplane[{meter}]","quantity":"illuminance_lx","basis":"exact","source":"exact indirect light by radiosity, all bounces","value":1,"std_error":null,"reference":1,"deviation":{deviation},"u":1,"verdict":"pass"}}"#

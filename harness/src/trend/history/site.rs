@@ -28,8 +28,7 @@ pub fn site(history: &History, changes: &[Change], reports: &[(String, String)])
                         p {
                             "Reports of this night: "
                             @for (k, (name, link)) in reports.iter().enumerate() {
-                                @if k > 0 { ", " }
-                                a href=(link) { (name) }
+                                @if k > 0 { ", " } a href=(link) { (name) }
                             }
                         }
                     }
@@ -52,13 +51,12 @@ pub fn site(history: &History, changes: &[Change], reports: &[(String, String)])
     .into_string()
 }
 
-/// Verdicts of the last night, an engine and procedure a row.
 fn tonight(history: &History) -> Markup {
     let Some(night) = history.nights.len().checked_sub(1) else { return html! {} };
     let row = |engine: &EngineName, procedure: ProcedureId| {
         let members = history.of_engine(engine, procedure);
-        let count =
-            |of: &[Verdict]| members.iter().filter(|s| s.verdicts[night].is_some_and(|v| of.contains(&v))).count();
+        let verdicts: Vec<Verdict> = members.iter().filter_map(|s| s.verdicts[night]).collect();
+        let count = |of: &[Verdict]| verdicts.iter().filter(|v| of.contains(v)).count();
         let failed = count(&[Verdict::Fail, Verdict::UnexpectedPass, Verdict::Missing]);
         let (undecided, known) = (count(&[Verdict::Inconclusive]), count(&[Verdict::KnownDeviation]));
         let mean = mean_deviation(&members, history.nights.len())[night];
@@ -124,7 +122,6 @@ fn changed(history: &History, changes: &[Change]) -> Markup {
     }
 }
 
-/// Where a change is seen, in words.
 fn place(change: &Change) -> String {
     let name = |part: &Part| match (&part.case, &part.meter) {
         (Some(case), Some(meter)) => format!("{case} {meter}"),
@@ -143,7 +140,6 @@ fn place(change: &Change) -> String {
     text
 }
 
-/// The new version of the engine at about the night of a change, if there is one.
 fn version(history: &History, change: &Change) -> Option<String> {
     let near = |night: usize| night.abs_diff(change.night) <= 2;
     let found = history.version_changes.iter().find(|v| v.engine == change.engine && near(v.night))?;
@@ -169,15 +165,14 @@ mod tests {
         assert!(page.contains(&format!("<td class=\"date\">{date}</td>")), "no row for {date}");
         assert!(page.contains("1.1 (was 1.0)"));
         assert!(page.contains("href=\"suite/report.html\""));
-        let figure =
-            page.split("mitsuba-indirect_illuminance-title\">").nth(1).unwrap().split("</figure>").next().unwrap();
+        let figure_of = |engine: &str| {
+            let behind = page.split(&format!("{engine}-indirect_illuminance-title\">")).nth(1).unwrap();
+            behind.split("</figure>").next().unwrap()
+        };
+        let (figure, quiet) = (figure_of("mitsuba"), figure_of("radiance"));
         assert!(figure.contains("class=\"change\"") && figure.contains("class=\"mark\""), "{figure}");
-        assert!(
-            figure.contains("class=\"version\"") && figure.contains(&format!("Version 1.1 from {date}")),
-            "{figure}"
-        );
-        let quiet =
-            page.split("radiance-indirect_illuminance-title\">").nth(1).unwrap().split("</figure>").next().unwrap();
+        assert!(figure.contains("class=\"version\""), "{figure}");
+        assert!(figure.contains(&format!("Version 1.1 from {date}")), "{figure}");
         assert!(!quiet.contains("class=\"change\"") && !quiet.contains("class=\"version\""), "{quiet}");
         // Nothing is fetched from anywhere.
         assert!(!page.contains("http") && !page.contains("<script"));
@@ -195,9 +190,7 @@ mod tests {
     #[test]
     fn text_of_a_spec_cannot_become_markup() {
         let mut history = nights(None);
-        for series in &mut history.series {
-            series.key.reading.engine = "<b>\"x".into();
-        }
+        history.series.iter_mut().for_each(|series| series.key.reading.engine = "<b>\"x".into());
         let page = site(&history, &changes(&history), &[]);
         assert!(page.contains("&lt;b&gt;") && !page.contains("<b>"));
     }

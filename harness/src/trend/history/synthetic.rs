@@ -44,7 +44,6 @@ impl Default for Synthetic {
 }
 
 impl Synthetic {
-    /// The history itself.
     pub(super) fn history(&self) -> History {
         let mut random = Normal::new(self.seed);
         let mut series = vec![];
@@ -62,20 +61,17 @@ impl Synthetic {
         History { nights: (0..self.nights).map(date).collect(), series, ..History::default() }
     }
 
-    /// The text of its file.
     pub(super) fn text(&self) -> String {
         let history = self.history();
         let mut text = String::new();
         for (night, date) in history.nights.iter().enumerate() {
             for series in history.series.chunks(self.meters) {
-                text += &serde_json::to_string(&self.line(series, night, date)).unwrap();
-                text += "\n";
+                text += &(serde_json::to_string(&self.line(series, night, date)).unwrap() + "\n");
             }
         }
         text
     }
 
-    /// What a night says of the meters of one engine, procedure and case.
     fn line<'a>(&self, meters: &'a [Series], night: usize, date: &'a str) -> Line<'a> {
         let key = &meters[0].key;
         let is_new = key.reading.engine == "mitsuba" && self.new_version.is_some_and(|n| night >= n);
@@ -97,8 +93,7 @@ impl Synthetic {
             |s: &Shift| of.engine == "mitsuba" && of.procedure == PROCEDURES[1] && case < s.cases && meter < s.meters;
         let shift = self.shift.filter(shifted);
         let (own, shared) = ((1.0 - self.common).sqrt(), self.common.sqrt());
-        let mut deviation = vec![];
-        let mut std_error = vec![];
+        let (mut deviation, mut std_error) = (vec![], vec![]);
         for (night, common) in common.iter().enumerate().take(self.nights) {
             let moved = shift.filter(|s| night >= s.night).map_or(0.0, |s| s.standard_errors);
             deviation.push(bias + error * (own * random.draw() + shared * common + moved));
