@@ -59,7 +59,7 @@ pub fn from_luminaire(luminaire: &Luminaire, meter: &Meter) -> Lux {
 /// Mean cylindrical illuminance of a point by point luminaires that nothing hides (EN 12464-1: the mean over all vertical
 /// directions of the illuminance of a surface that faces them).
 ///
-/// A surface that faces the azimuth phi gets I cos(phi - phi_0) r / d^3 of a luminaire at the horizontal distance r, and nothing
+/// A surface that faces the azimuth phi gets `I cos(phi - phi_0) r / d^3` of a luminaire at the horizontal distance r, and nothing
 /// from behind; the mean of the positive part of a cosine is 1 / pi: E = sum of I r / (pi d^3).
 pub fn cylindrical_illuminance(scene: &Scene, point_m: DVec3) -> Lux {
     let of_one = |luminaire: &Luminaire| {

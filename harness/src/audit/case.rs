@@ -30,7 +30,7 @@ pub(super) struct Audit<'a> {
 pub(super) enum Stop {
     #[error("not run: the run was interrupted")]
     Interrupted,
-    #[error("not run: {case} failed, and the run was to stop there")]
+    #[error("not run: {case} failed, and --fail-fast was asked for")]
     Failed { case: String },
 }
 

@@ -99,8 +99,7 @@ pub fn refine(
 /// Adds a look to a reading, with weights that were fixed before.
 fn combine(reading: &mut Reading, before: f64, look: &Estimate, weight: f64) {
     let total = before + weight;
-    let mean = |a: f64, b: f64| (before * a + weight * b) / total;
-    reading.value = mean(reading.value, look.value);
+    reading.value = (before * reading.value + weight * look.value) / total;
     let parts = [(before / total, reading.uncertainty), (weight / total, look.uncertainty)];
     reading.uncertainty = Uncertainty::of_sum(parts);
 }

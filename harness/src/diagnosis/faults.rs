@@ -208,7 +208,9 @@ fn of_room(task: &Task) -> Vec<Fault> {
     }));
     // The exponent of display gamma, as an RGB colour would be decoded.
     let raised = |r: &mut Room, power: f64| {
-        Surface::ALL.into_iter().for_each(|s| *reflectance(r, s) = room.reflectance.of(s).powf(power));
+        for s in Surface::ALL {
+            *reflectance(r, s) = room.reflectance.of(s).powf(power);
+        }
     };
     faults
         .extend(with("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", &|r| raised(r, 2.2)));

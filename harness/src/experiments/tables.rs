@@ -9,7 +9,10 @@ pub(super) fn terminal(head: Vec<String>, rows: Vec<Vec<String>>) -> String {
     format!("{table}\n")
 }
 
+#[allow(clippy::needless_pass_by_value, reason = "called as the other form is")]
 pub(super) fn markdown(head: Vec<String>, rows: Vec<Vec<String>>) -> String {
     let rule = vec!["---".to_owned(); head.len()];
-    [head, rule].iter().chain(&rows).map(|cells| format!("| {} |\n", cells.join(" | "))).collect()
+    let line = |cells: &Vec<String>| format!("| {} |", cells.join(" | "));
+    let lines: Vec<String> = [head, rule].iter().chain(&rows).map(line).collect();
+    lines.join("\n") + "\n"
 }

@@ -180,7 +180,8 @@ fn opening(mut opening: LuminousOpening, scale: f64) -> LuminousOpening {
         | LuminousOpening::Ellipse { x_m: x, y_m: y, height_m: z }
         | LuminousOpening::Ellipsoid { x_m: x, y_m: y, z_m: z } => [x, y, z].into_iter().for_each(|m| *m *= scale),
         LuminousOpening::LyingCylinder { length_m, diameter_m, .. } => {
-            [length_m, diameter_m].into_iter().for_each(|m| *m *= scale);
+            *length_m *= scale;
+            *diameter_m *= scale;
         }
     }
     opening

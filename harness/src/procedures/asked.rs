@@ -49,7 +49,9 @@ impl<'de> Deserialize<'de> for Procedures {
                 let mut all = BTreeMap::new();
                 while let Some(name) = map.next_key::<String>()? {
                     let id: ProcedureId = name.parse().map_err(|_| A::Error::unknown_field(&name, &NAMES))?;
-                    if all.insert(id, id.row().form.read(&mut map)?).is_some() {
+                    // A case of a suite takes a procedure out by `null`.
+                    let Some(asked) = id.row().form.read(&mut map)? else { continue };
+                    if all.insert(id, asked).is_some() {
                         return Err(A::Error::duplicate_field(id.name()));
                     }
                 }

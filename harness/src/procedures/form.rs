@@ -106,21 +106,21 @@ impl Form {
         }
     }
 
-    pub(super) fn read<'de, A: MapAccess<'de>>(self, map: &mut A) -> Result<Asked, A::Error> {
+    /// What a spec asks in this form; nothing where it says `null`.
+    pub(super) fn read<'de, A: MapAccess<'de>>(self, map: &mut A) -> Result<Option<Asked>, A::Error> {
+        let at =
+            |meters, bounces: BouncesSpec, light| Asked::Meters(AtMeters { meters, bounces: bounces.into(), light });
         Ok(match self {
-            Self::Angles => Asked::Angles(map.next_value()?),
-            Self::Meters => {
-                let Meters { meters } = map.next_value()?;
-                Asked::Meters(AtMeters { meters, bounces: Bounces::Converged, light: AnyLight::Total })
-            }
-            Self::MetersAndBounces => {
-                let MetersAndBounces { meters, bounces } = map.next_value()?;
-                Asked::Meters(AtMeters { meters, bounces: bounces.into(), light: AnyLight::Total })
-            }
-            Self::MetersAndLight => {
-                let MetersAndLight { meters, bounces, light } = map.next_value()?;
-                Asked::Meters(AtMeters { meters, bounces: bounces.into(), light })
-            }
+            Self::Angles => map.next_value::<Option<AtAngles>>()?.map(Asked::Angles),
+            Self::Meters => map
+                .next_value::<Option<Meters>>()?
+                .map(|Meters { meters }| at(meters, BouncesSpec::default(), AnyLight::Total)),
+            Self::MetersAndBounces => map
+                .next_value::<Option<MetersAndBounces>>()?
+                .map(|MetersAndBounces { meters, bounces }| at(meters, bounces, AnyLight::Total)),
+            Self::MetersAndLight => map
+                .next_value::<Option<MetersAndLight>>()?
+                .map(|MetersAndLight { meters, bounces, light }| at(meters, bounces, light)),
         })
     }
 }

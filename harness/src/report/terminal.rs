@@ -66,9 +66,9 @@ pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&s
 
 /// Lines under a heading; nothing where there are none.
 fn section(text: &mut String, heading: &str, lines: impl Iterator<Item = String>) {
-    let lines: String = lines.map(|line| format!("  {line}\n")).collect();
+    let lines: Vec<String> = lines.map(|line| format!("  {line}\n")).collect();
     if !lines.is_empty() {
-        writeln!(text, "{heading}\n{lines}").ok();
+        writeln!(text, "{heading}\n{}", lines.concat()).ok();
     }
 }
 

@@ -10,6 +10,7 @@ use crate::record::{Estimate, Uncertainty};
 const BIAS: f64 = 1e-3;
 
 /// An engine of known law: error .02 / sqrt(seconds) of either sign by seed, above a bias of .1 %.
+#[allow(clippy::unnecessary_wraps, reason = "as an engine reads")]
 fn known_law(job: &Job) -> Result<Measurement, EngineError> {
     let gain = job.settings.get("gain").and_then(serde_json::Value::as_f64).unwrap_or(1.0);
     let noise = 0.02 / job.budget.seconds.max(1e-6).sqrt();

@@ -80,13 +80,13 @@ impl Finding {
         };
         let text = Some(failure.text.clone());
         let is_refused = matches!(failure.kind, FailureKind::Declined | FailureKind::Refused);
-        Self { how, text, is_refused, ..Self::default() }
+        Self { how, is_refused, text, ..Self::default() }
     }
 
     /// The changed job was read, what it is held against was not: nothing is known.
     pub(super) fn without_base(failure: &Failure) -> Self {
         let text = Some(format!("nothing to hold it against: {}", failure.text));
-        Self { text, is_refused: true, ..Self::default() }
+        Self { is_refused: true, text, ..Self::default() }
     }
 
     fn exceeds(&self, threshold: f64) -> bool {

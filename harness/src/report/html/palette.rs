@@ -16,7 +16,7 @@ const SPARE: [(&str, &str); 3] = [("#a8457f", "#e294c3"), ("#5b4bb5", "#a89cf0")
 
 /// Colours on paper and on black: those of our own engines first, for good, so that two reports read alike.
 fn colours() -> impl Iterator<Item = (&'static str, &'static str)> {
-    engines::ALL.into_iter().map(|entry| entry.colour).chain(SPARE)
+    engines::ALL.iter().map(|entry| entry.colour).chain(SPARE)
 }
 
 const OWN: usize = engines::ALL.len();

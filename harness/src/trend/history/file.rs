@@ -19,7 +19,7 @@ pub struct Added {
 /// Where the whole lines of a text end, and the number of a last one that is cut short.
 pub(super) fn whole_lines(text: &[u8]) -> (&[u8], Option<usize>) {
     let (whole, rest) = text.split_at(text.iter().rposition(|b| *b == b'\n').map_or(0, |end| end + 1));
-    (whole, (!rest.is_empty()).then(|| whole.iter().filter(|b| **b == b'\n').count() + 1))
+    (whole, (!rest.is_empty()).then(|| whole.split(|b| *b == b'\n').count()))
 }
 
 /// A history is made if there is none, appended to, or replaced as a whole: never half written. A night that is run again
