@@ -74,7 +74,7 @@ pub trait Engine: Send + Sync {
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError>;
 }
 
-/// What is known of an engine of our own before it is asked anything; [`super::catalogue`] lists them.
+/// What is known of an engine of our own before it is asked anything; `super::catalogue` lists them.
 pub struct Entry {
     pub name: EngineName,
     /// As its makers write it.

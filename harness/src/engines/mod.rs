@@ -1,7 +1,7 @@
 //! Engines: everything that yields readings, renderers and our own solvers alike, behind one seam.
 //!
 //! Adding one: write `engines/<name>.rs` with a type that implements [`Engine`] and its [`Entry`], and add its line to
-//! [`catalogue`]; or leave this program as it is and name a program of your own in a spec, see [`external`].
+//! `catalogue`; or leave this program as it is and name a program of your own in a spec, see `external`.
 //! `docs/adding-an-engine.md` walks through both.
 
 mod blocks;
