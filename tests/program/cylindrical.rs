@@ -1,4 +1,4 @@
-//! Mean cylindrical illuminance: direct light against its closed form and all light against the simulator, on every engine.
+//! Mean cylindrical illuminance: direct light against its closed form and all light against the simulator, on every engine but POV-Ray.
 
 use serde_json::Value;
 
@@ -18,7 +18,10 @@ fn direct_cylindrical_light_is_the_closed_form_within_its_quadrature() {
     let only = ["--procedures", "cylindrical_illuminance", "--engines"];
     let (report, code) = folder.run(&[&only[..], &[&ENGINES.join(","), "--format", "json"]].concat()).report();
     assert_eq!(code, Some(0), "{}", report["summary"]);
-    for engine in ENGINES {
+    // Its meters are discs, which hide one another at one point.
+    let skips = among(&report, "skips", &[("engine", "povray"), ("scope", "procedure")]);
+    assert!(skips[0]["reason"].as_str().unwrap().contains("hide one another"), "{}", skips[0]);
+    for engine in ENGINES.into_iter().filter(|e| *e != "povray") {
         let comparisons = faces(&report, engine);
         assert_eq!(comparisons.len(), 3, "{engine}");
         for c in comparisons {
