@@ -65,7 +65,7 @@ fn check(
     job: &Job,
 ) -> Result<(bool, String), Failure> {
     let (id, procedure) = (instrument.engine.name(), job.procedure);
-    let measurement = reader.read(&Question::new(instrument, job, procedure.name()))?.measurement;
+    let measurement = reader.try_read(&Question::new(instrument, job, procedure.name()))?.measurement;
     let expected = expected(job).map_err(|what| EngineError::Solver { engine: id.clone(), what })?;
     let estimate = measurement.estimates[0];
     let tolerance = tolerances.of(procedure, Basis::Exact, id.as_str(), Quantity::Illuminance, &BTreeMap::new());

@@ -1,7 +1,7 @@
 //! Runs a plan: one reading a job, readings kept on disk as each job finishes, one engine's failure stops no other.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -133,7 +133,8 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
         let seen = reader.read(&Question::new(&instrument, &job, &format!("{folder}-spot-check")))?;
         run.hold(&taken.measurement, &seen.measurement).map_err(failed)?;
         taken.cost.wall_s += seen.cost.wall_s;
-        // What was rendered stands.
+        // What was rendered stands; samples of another job do not tell how it varies with the rest.
+        taken.measurement.samples.clear();
         for (&station, estimate) in run.spot_check.iter().zip(seen.measurement.estimates) {
             taken.measurement.estimates[station] = estimate;
         }
@@ -158,8 +159,13 @@ impl Shelf {
         let mut all = self.recordings.lock().unwrap_or_else(PoisonError::into_inner);
         all.insert(place, recording.clone());
         let of_engine: Vec<&Recording> = all.values().filter(|r| r.key.engine == recording.key.engine).collect();
-        files::keep_json(&self.folder.join(format!("{}.json", recording.key.engine)), &of_engine)
+        keep(&self.folder, &recording.key.engine, &of_engine)
     }
+}
+
+/// The file of an engine's readings.
+pub(super) fn keep(folder: &Path, engine: &str, recordings: &[&Recording]) -> Result<(), FileError> {
+    files::keep_json(&folder.join(format!("{engine}.json")), &recordings)
 }
 
 /// What a case gives that is not run at all: a skip for every run of its plan, and engines of the given status.

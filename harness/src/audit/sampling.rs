@@ -1,10 +1,8 @@
 //! Sampling until comparisons are decided: which budget first looks get, and further looks through the run's reader.
 
-use std::path::Path;
-
 use clap::ValueEnum;
 
-use super::jobs::{Options, Outcome};
+use super::jobs::{self, Options, Outcome};
 use super::sequential::{self, Ask, Sampler};
 use crate::engines::Measurement;
 use crate::judge::Judge;
@@ -13,7 +11,7 @@ use crate::plan::{Plan, Planned, Run};
 use crate::procedures::Task;
 use crate::record::Recording;
 use crate::spec::Case;
-use crate::system::files::{self, FileError};
+use crate::system::files::FileError;
 
 /// When sampling stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -77,13 +75,9 @@ pub(super) fn sample_on(
         outcome.recordings[mine] = subject;
         let of_engine: Vec<&Recording> =
             outcome.recordings.iter().filter(|r| r.key.engine == engine.as_str()).collect();
-        keep(&options.out, engine.as_str(), &of_engine)?;
+        jobs::keep(&options.out.join("readings"), &engine, &of_engine)?;
     }
     Ok(())
-}
-
-fn keep(out: &Path, engine: &str, recordings: &[&Recording]) -> Result<(), FileError> {
-    files::keep_json(&out.join("readings").join(format!("{engine}.json")), &recordings)
 }
 
 /// Further looks of one engine at one task: jobs of the undecided stations alone, each with a seed of its own.

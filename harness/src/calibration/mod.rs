@@ -147,7 +147,7 @@ impl Calibration {
 
 fn part(instrument: &Instrument, scene: &KnownScene, reader: &Reader) -> Result<Part, CalibrationError> {
     let question = Question { limit: LIMIT, ..Question::new(instrument, &scene.job, scene.name) };
-    match reader.read(&question) {
+    match reader.try_read(&question) {
         Ok(taken) => {
             let declared = match instrument.engine.supports(&scene.job) {
                 Support::Approximate { size, .. } => size.unwrap_or(0.0),

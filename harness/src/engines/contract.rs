@@ -10,7 +10,7 @@ use super::Site;
 use super::blocks::Blocks;
 use super::workbench::{EngineError, SceneFile, Workbench};
 use crate::procedures::{Target, Task};
-use crate::record::{Effort, EngineName, Estimate, MeterId, Method, ProcedureId, Role, Uncertainty};
+use crate::record::{Effort, EngineName, Estimate, Light, MeterId, Method, ProcedureId, Role, Uncertainty};
 use crate::spec::{Budget, Case};
 use crate::system::slots::{Share, Slots};
 
@@ -169,10 +169,7 @@ impl Job {
 
     /// The limit on reflections, if reflected light is asked for.
     pub(super) const fn reflections(&self) -> Option<Bounces> {
-        match self.transport {
-            Transport::Direct => None,
-            Transport::Indirect(bounces) | Transport::Total(bounces) => Some(bounces),
-        }
+        Light(self.transport).bounces()
     }
 
     pub(super) fn largest_reflectance(&self) -> f64 {
@@ -246,6 +243,10 @@ impl Measurement {
     /// The weighted sum of stations' estimates, with the standard error that their joint sampling gives it; where the samples
     /// are not known, the errors of stations may be all one.
     pub fn weighted(&self, weights: &[(usize, f64)]) -> Estimate {
+        // One station's error is what its engine states.
+        if let [(station, weight)] = *weights {
+            return self.estimates[station].times(weight);
+        }
         let terms = || weights.iter().map(|&(k, weight)| (weight, self.estimates[k]));
         let apart = Uncertainty::of_dependent_sum(terms().map(|(weight, e)| (weight, e.uncertainty)));
         let sampled = !self.samples.is_empty() && self.samples.iter().all(|part| part.count() > 1);

@@ -128,9 +128,7 @@ fn sum(direct: &Measurement, mut indirect: Measurement) -> Measurement {
 fn support(job: &Job) -> Support {
     let unsupported = || job.scene.luminaires.iter().find_map(unsupported_luminaire);
     let objection = ENTRY.objection(job).or_else(unsupported);
-    if let Some(why) =
-        objection.or_else(|| filters_in_the_way(job)).or_else(|| too_near(job)).or_else(|| discs_at_one_point(job))
-    {
+    if let Some(why) = objection.or_else(|| filters_in_the_way(job)).or_else(|| too_near(job)) {
         return Support::No(why);
     }
     let Some(bounces) = job.reflections() else { return Support::Yes };
@@ -216,14 +214,6 @@ fn filters_in_the_way(job: &Job) -> Option<String> {
         }
     }
     None
-}
-
-/// Meters are discs that a camera sees from 2 mm away: those at one point hide one another.
-fn discs_at_one_point(job: &Job) -> Option<String> {
-    let at = |s: &super::Station| s.meter.position_m.to_array().map(f64::to_bits);
-    let mut seen = std::collections::BTreeMap::new();
-    let (a, b) = job.stations.iter().find_map(|s| seen.insert(at(s), &s.id).map(|other| (other, &s.id)))?;
-    Some(format!("{a} and {b} are at the same point, where POV-Ray's discs would hide one another"))
 }
 
 /// A meter so near an opening that it tells the opening's point lights apart.

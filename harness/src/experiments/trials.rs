@@ -50,7 +50,7 @@ impl<'a> Trials<'a> {
         let trial = Trial { case: self.case, variant, repetition, threads };
         let folder = job.procedure.name();
         let question = Question { limit, trial: Some(&trial), ..Question::new(instrument, &job, folder) };
-        match self.reader.read(&question) {
+        match self.reader.try_read(&question) {
             Err(Failure { kind: FailureKind::Interrupted | FailureKind::TimeUp, .. }) => None,
             taken => Some(taken),
         }

@@ -40,10 +40,15 @@ impl Reader {
         Self { site: site.clone(), out: None, cache: None, machine, isolation: Isolation::InProcess, until: None }
     }
 
-    pub fn read(&self, question: &Question<'_>) -> Result<Taken, Failure> {
-        if let Support::No(why) = question.instrument.engine.supports(question.job) {
-            return Err(Failure::new(FailureKind::Declined, why));
+    /// What no plan has asked the engine about: it may say beforehand that it cannot.
+    pub fn try_read(&self, question: &Question<'_>) -> Result<Taken, Failure> {
+        match question.instrument.engine.supports(question.job) {
+            Support::No(why) => Err(Failure::new(FailureKind::Declined, why)),
+            Support::Yes | Support::Approximate { .. } => self.read(question),
         }
+    }
+
+    pub fn read(&self, question: &Question<'_>) -> Result<Taken, Failure> {
         let key = question.key()?;
         // Whoever asks the same at the same time waits for this answer.
         let answered = self.machine.answered(&key);

@@ -146,7 +146,8 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
         writeln!(text, "#ifndef (Limit) #declare Limit = {}; #end", settings.recursion_limit(bounces)).ok();
     }
     writeln!(text, "#declare Brightness = #if (Indirect) {}; #else 1; #end", settings.brightness).ok();
-    text.push_str("global_settings {\n  assumed_gamma 1.0 max_trace_level 10 adc_bailout 1e-9\n");
+    // A ray to one of many discs at one point passes the transparent backs of half of the others.
+    text.push_str("global_settings {\n  assumed_gamma 1.0 max_trace_level 100 adc_bailout 1e-9\n");
     if let Some(bounces) = job.reflections() {
         writeln!(text, "  #if (Indirect) {} #end", settings.radiosity(bounces)).ok();
     }

@@ -184,17 +184,11 @@ impl Meters<'_> {
     }
 }
 
-#[derive(Debug, thiserror::Error)]
-#[error("`{night}` is no date; give the night as YYYY-MM-DD")]
-pub struct NotADate {
-    pub night: String,
-}
-
 /// The lines of a report, for the night of its start or for the one given.
-pub fn lines<'a>(report: &'a Report, night: Option<&'a str>) -> Result<Vec<Line<'a>>, NotADate> {
+pub fn lines<'a>(report: &'a Report, night: Option<&'a str>) -> Result<Vec<Line<'a>>, HistoryError> {
     let night = night.or_else(|| report.started.get(..10)).unwrap_or_default();
     if !is_date(night) {
-        return Err(NotADate { night: night.to_owned() });
+        return Err(HistoryError::Night { night: night.to_owned() });
     }
     let mut lines: Vec<Line<'a>> = vec![];
     for c in &report.comparisons {

@@ -16,6 +16,6 @@ mod synthetic;
 
 pub use change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part, changes};
 pub use file::{Added, add};
-pub use line::{HistoryError, Line, NotADate, Numbers, lines};
+pub use line::{HistoryError, Line, Numbers, lines};
 pub use series::{History, Key, Series, VersionChange};
 pub use site::site;
