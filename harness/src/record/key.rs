@@ -1,15 +1,15 @@
 //! Names of what is read: case, procedure, engine and meter, each written once.
 
 use std::borrow::{Borrow, Cow};
-use std::fmt;
-use std::ops::Deref;
-use std::str::FromStr;
 
+use derive_more::{Deref, Display};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use strum::{EnumString, IntoStaticStr, VariantNames};
 
 /// What a recording is of: one engine on one procedure of one case.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Display, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[display("{engine} {procedure} of {case}")]
 pub struct ReadingKey {
     pub case: String,
     pub procedure: ProcedureId,
@@ -27,15 +27,11 @@ impl ReadingKey {
     }
 }
 
-impl fmt::Display for ReadingKey {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {} of {}", self.engine, self.procedure, self.case)
-    }
-}
-
 /// A procedure; [`crate::procedures`] says what each measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(EnumString, IntoStaticStr, VariantNames, strum::Display)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case", const_into_str, parse_err_ty = UnknownProcedure, parse_err_fn = UnknownProcedure::of)]
 pub enum ProcedureId {
     /// Procedure 1: the luminous intensity distribution read back.
     LuminousIntensity,
@@ -60,31 +56,11 @@ impl ProcedureId {
     ];
 
     /// All names, in the same order.
-    pub const NAMES: [&str; Self::ALL.len()] = {
-        let mut names = [""; Self::ALL.len()];
-        let mut k = 0;
-        while k < names.len() {
-            names[k] = Self::ALL[k].name();
-            k += 1;
-        }
-        names
-    };
+    pub const NAMES: &[&str] = Self::VARIANTS;
 
     /// As specs, command lines and reports write it.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::LuminousIntensity => "luminous_intensity",
-            Self::DirectIlluminance => "direct_illuminance",
-            Self::IndirectIlluminance => "indirect_illuminance",
-            Self::TotalIlluminance => "total_illuminance",
-            Self::CylindricalIlluminance => "cylindrical_illuminance",
-        }
-    }
-}
-
-impl fmt::Display for ProcedureId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        self.into_str()
     }
 }
 
@@ -95,17 +71,16 @@ pub struct UnknownProcedure {
     pub name: String,
 }
 
-impl FromStr for ProcedureId {
-    type Err = UnknownProcedure;
-
-    fn from_str(name: &str) -> Result<Self, UnknownProcedure> {
-        Self::ALL.into_iter().find(|p| p.name() == name).ok_or_else(|| UnknownProcedure { name: name.to_owned() })
+impl UnknownProcedure {
+    fn of(name: &str) -> Self {
+        Self { name: name.to_owned() }
     }
 }
 
 /// The name of an engine in specs, on the command line and in reports.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Display, Deref, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
+#[deref(forward)]
 pub struct EngineName(Cow<'static, str>);
 
 impl EngineName {
@@ -136,14 +111,6 @@ impl From<String> for EngineName {
     }
 }
 
-impl Deref for EngineName {
-    type Target = str;
-
-    fn deref(&self) -> &str {
-        &self.0
-    }
-}
-
 impl Borrow<str> for EngineName {
     fn borrow(&self) -> &str {
         self
@@ -168,14 +135,8 @@ impl PartialEq<&str> for EngineName {
     }
 }
 
-impl fmt::Display for EngineName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self)
-    }
-}
-
 /// A meter of a case: `<set>[k]`, or `<luminaire>[k]` for readings of luminous intensity.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Display, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct MeterId(pub String);
 
@@ -183,12 +144,6 @@ impl MeterId {
     /// The `k`-th meter of a set.
     pub fn new(set: &str, k: usize) -> Self {
         Self(format!("{set}[{k}]"))
-    }
-}
-
-impl fmt::Display for MeterId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(&self.0)
     }
 }
 

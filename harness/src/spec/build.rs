@@ -383,7 +383,7 @@ impl<'a> Builder<'a> {
     ) -> Result<BTreeMap<ProcedureId, ToleranceOverride>, SpecError> {
         let one = |(name, tolerance): (&String, &ToleranceOverride)| {
             let procedure = name.parse::<ProcedureId>().map_err(|_| {
-                let help = suggestion(name, ProcedureId::NAMES.into_iter());
+                let help = suggestion(name, ProcedureId::NAMES.iter().copied());
                 self.source.error_at("tolerances", format!("`{name}` is no procedure"), help)
             })?;
             let values = [tolerance.relative, tolerance.absolute_lx, tolerance.absolute_cd];
