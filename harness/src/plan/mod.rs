@@ -13,7 +13,7 @@ use crate::engines::{Absent, Engine, Job, Site, Support, Version};
 use crate::measure::Instrument;
 use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
-use crate::spec::{Budget, Case, SpecError, suggestion};
+use crate::spec::{Budget, Case, SpecError};
 use luminaire::scene::Transport;
 
 use roster::Roster;
@@ -314,10 +314,4 @@ fn tasks(case: &Case, selection: &Selection) -> Result<Vec<Task>, SpecError> {
 
 fn job(case: &Case, engine: &EngineName, task: &Task, seed: u64) -> Job {
     Job { seed, settings: case.settings_of(engine.as_str()), ..Job::of_task(case, task) }
-}
-
-fn unknown<'a>(kind: &str, name: &str, known: impl Iterator<Item = &'a str> + Clone, option: &str) -> SpecError {
-    let help = suggestion(name, known);
-    let message = format!("there is no {kind} `{name}`");
-    SpecError { file: option.into(), line: None, column: None, message, help: Some(help) }
 }

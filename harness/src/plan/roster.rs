@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{Asked, Selection, unknown};
+use super::{Asked, Selection};
 use crate::engines::{self, Absent, Engine, Site, Version};
 use crate::record::EngineName;
-use crate::spec::{Case, SpecError};
+use crate::spec::{Case, SpecError, suggestion};
 use crate::system::slots::side_by_side;
 
 /// An engine and why it takes part.
@@ -31,11 +31,10 @@ impl Roster {
         let in_spec: Vec<&String> = case.engines.iter().flat_map(BTreeMap::keys).collect();
         for (name, settings) in case.engines.iter().flatten().filter(|(name, _)| !built_in.contains(*name)) {
             if !settings.0.contains_key("command") {
-                let mut error = unknown("engine", name, built_in.iter().map(String::as_str), "");
                 let place = case.source.error_at(&format!("engines.{name}"), "", "");
-                error = SpecError { file: place.file, line: place.line, column: place.column, ..error };
-                error.help = error.help.map(|h| format!("{h} A program of your own needs `command: [...]`"));
-                return Err(error);
+                let (message, known) = unknown(name, &built_in);
+                let help = Some(format!("{known} A program of your own needs `command: [...]`"));
+                return Err(SpecError { message, help, ..place });
             }
             let folder = case.path.parent().unwrap_or(Path::new(""));
             let engine = engines::external(name, &settings.0, folder).map_err(|error| {
@@ -45,10 +44,9 @@ impl Roster {
             all.push(Arc::from(engine));
         }
         let ids = names(&all);
-        for name in &selection.engines {
-            if !ids.contains(name) {
-                return Err(unknown("engine", name, ids.iter().map(String::as_str), "--engines"));
-            }
+        if let Some(name) = selection.engines.iter().find(|name| !ids.contains(*name)) {
+            let (message, known) = unknown(name, &ids);
+            return Err(SpecError::of("--engines", message, known));
         }
         let asked = |engine: &dyn Engine| {
             let id = engine.name();
@@ -77,6 +75,11 @@ impl Roster {
         self.probed.extend(ours);
         found
     }
+}
+
+/// What is wrong with a name that no engine has, and what to do.
+fn unknown(name: &str, known: &[String]) -> (String, String) {
+    (format!("there is no engine `{name}`"), suggestion(name, known.iter().map(String::as_str)))
 }
 
 fn names(engines: &[Arc<dyn Engine>]) -> Vec<String> {

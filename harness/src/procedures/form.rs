@@ -1,12 +1,11 @@
 //! The forms in which a spec asks for a procedure, unknown keys refused.
 
-use std::fmt;
-
 use luminaire::scene::Bounces;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
-use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{Deserializer, Error, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserializer, IgnoredAny, MapAccess};
+
+use super::shapes::{Found, Shapes};
 
 /// The keys that a spec gives a procedure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,30 +155,18 @@ pub struct AngleLists {
 
 impl<'de> Deserialize<'de> for Angles {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Either;
-        impl<'de> Visitor<'de> for Either {
-            type Value = Angles;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the word `photometry`, or {gamma_deg: [...], c_deg: [...]}")
-            }
-
-            fn visit_str<E: Error>(self, word: &str) -> Result<Angles, E> {
-                match word {
-                    "photometry" => Ok(Angles::Photometry),
-                    other => Err(E::custom(format!("`{other}` is no choice of angles; expected {EXPECTED_ANGLES}"))),
-                }
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Angles, A::Error> {
-                AngleLists::deserialize(MapAccessDeserializer::new(map)).map(Angles::Listed)
-            }
-        }
-        deserializer.deserialize_any(Either)
+        let expected = "the word `photometry`, or {gamma_deg: [...], c_deg: [...]}";
+        let read = |found: Found<'_, IgnoredAny, AngleLists>| match found {
+            Found::Word("photometry") => Some(Ok(Self::Photometry)),
+            Found::Word(other) => Some(Err(format!(
+                "`{other}` is no choice of angles; expected `photometry` or {{gamma_deg: [...], c_deg: [...]}}"
+            ))),
+            Found::Keys(lists) => Some(Ok(Self::Listed(lists))),
+            _ => None,
+        };
+        deserializer.deserialize_any(Shapes { expected, read })
     }
 }
-
-const EXPECTED_ANGLES: &str = "`photometry` or {gamma_deg: [...], c_deg: [...]}";
 
 /// One name or a list of names.
 #[derive(Clone, Debug, JsonSchema)]
@@ -203,23 +190,13 @@ impl Names {
 
 impl<'de> Deserialize<'de> for Names {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Either;
-        impl<'de> Visitor<'de> for Either {
-            type Value = Names;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the name of a meter set or a list of names")
-            }
-
-            fn visit_str<E: Error>(self, name: &str) -> Result<Names, E> {
-                Ok(Names::One(name.to_owned()))
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Names, A::Error> {
-                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(Names::Many)
-            }
-        }
-        deserializer.deserialize_any(Either)
+        let expected = "the name of a meter set or a list of names";
+        let read = |found: Found<'_, Vec<String>>| match found {
+            Found::Word(name) => Some(Ok(Self::One(name.to_owned()))),
+            Found::List(names) => Some(Ok(Self::Many(names))),
+            _ => None,
+        };
+        deserializer.deserialize_any(Shapes { expected, read })
     }
 }
 
@@ -253,30 +230,18 @@ impl From<BouncesSpec> for Bounces {
 
 impl<'de> Deserialize<'de> for BouncesSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Either;
-        impl Visitor<'_> for Either {
-            type Value = BouncesSpec;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the word `converged` or a number of diffuse reflections from 1")
+        let expected = "the word `converged` or a number of diffuse reflections from 1";
+        let read = |found: Found<'_>| match found {
+            Found::Word("converged") => Some(Ok(Self::Converged)),
+            Found::Word(other) => {
+                Some(Err(format!("`{other}` is no number of bounces; expected `converged` or 1, 2, ...")))
             }
-
-            fn visit_str<E: Error>(self, word: &str) -> Result<BouncesSpec, E> {
-                match word {
-                    "converged" => Ok(BouncesSpec::Converged),
-                    other => {
-                        Err(E::custom(format!("`{other}` is no number of bounces; expected `converged` or 1, 2, ...")))
-                    }
-                }
-            }
-
-            fn visit_u64<E: Error>(self, n: u64) -> Result<BouncesSpec, E> {
-                match u32::try_from(n) {
-                    Ok(n) if n >= 1 => Ok(BouncesSpec::AtMost(n)),
-                    _ => Err(E::custom(format!("bounces: {n} is out of range; give 1 or more, or `converged`"))),
-                }
-            }
-        }
-        deserializer.deserialize_any(Either)
+            Found::Count(n) => Some(match u32::try_from(n) {
+                Ok(n) if n >= 1 => Ok(Self::AtMost(n)),
+                _ => Err(format!("bounces: {n} is out of range; give 1 or more, or `converged`")),
+            }),
+            _ => None,
+        };
+        deserializer.deserialize_any(Shapes { expected, read })
     }
 }

@@ -4,6 +4,7 @@
 
 mod asked;
 mod form;
+pub(crate) mod shapes;
 pub mod table;
 mod task;
 

@@ -17,26 +17,13 @@ pub(super) fn locate(text: &str, path: &str) -> Option<(usize, usize)> {
 
 const MARK: &str = "luxproof-was-here";
 
-#[derive(Debug, PartialEq)]
-enum Step {
-    Key(String),
-    Index(usize),
-}
-
-fn steps(path: &str) -> Vec<Step> {
-    let mut steps = vec![];
-    for part in path.split('.').filter(|p| !p.is_empty()) {
-        let mut pieces = part.split('[');
-        if let Some(key) = pieces.next().filter(|k| !k.is_empty()) {
-            steps.push(Step::Key(key.to_owned()));
-        }
-        steps.extend(pieces.filter_map(|i| i.trim_end_matches(']').parse().ok().map(Step::Index)));
-    }
-    steps
+/// Keys and indices of a path, one after the other.
+fn steps(path: &str) -> Vec<&str> {
+    path.split(['.', '[']).map(|step| step.trim_end_matches(']')).filter(|step| !step.is_empty()).collect()
 }
 
 struct Walk<'a> {
-    steps: &'a [Step],
+    steps: &'a [&'a str],
 }
 
 impl<'de> DeserializeSeed<'de> for Walk<'_> {
@@ -55,9 +42,7 @@ impl<'de> Visitor<'de> for Walk<'_> {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
-        let Some((Step::Key(wanted), rest)) = self.steps.split_first() else {
-            return Err(A::Error::custom(MARK));
-        };
+        let Some((wanted, rest)) = self.steps.split_first() else { return Err(A::Error::custom(MARK)) };
         while let Some(key) = map.next_key::<String>()? {
             if key == *wanted {
                 return map.next_value_seed(Walk { steps: rest });
@@ -68,10 +53,11 @@ impl<'de> Visitor<'de> for Walk<'_> {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<(), A::Error> {
-        let Some((Step::Index(wanted), rest)) = self.steps.split_first() else {
+        let index = |(wanted, rest): (&&str, _)| Some((wanted.parse().ok()?, rest));
+        let Some((wanted, rest)) = self.steps.split_first().and_then(index) else {
             return Err(A::Error::custom(MARK));
         };
-        for _ in 0..*wanted {
+        for _ in 0usize..wanted {
             seq.next_element::<IgnoredAny>()?;
         }
         seq.next_element_seed(Walk { steps: rest }).map(|_| ())

@@ -29,6 +29,13 @@ pub struct SpecError {
     pub help: Option<String>,
 }
 
+impl SpecError {
+    /// One that concerns all of a file, or an option of the command line.
+    pub fn of(file: impl Into<PathBuf>, message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { file: file.into(), line: None, column: None, message: message.into(), help: Some(help.into()) }
+    }
+}
+
 fn place(file: &Path, line: Option<usize>, column: Option<usize>) -> String {
     let number = |n: Option<usize>| n.map(|n| format!("{n}:")).unwrap_or_default();
     format!("{}:{}{} ", file.display(), number(line), number(column))
@@ -46,13 +53,7 @@ pub struct Source {
 impl Source {
     /// Reads a spec file.
     pub fn read(path: &Path) -> Result<Self, SpecError> {
-        let fail = |message: String, help: &str| SpecError {
-            file: path.to_owned(),
-            line: None,
-            column: None,
-            message,
-            help: Some(help.to_owned()),
-        };
+        let fail = |message: String, help| SpecError::of(path, message, help);
         let bytes = std::fs::read(path).map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
         let text = String::from_utf8(bytes).map_err(|e| fail(format!("is not UTF-8: {e}"), "save it as UTF-8"))?;
         Ok(Self::new(path.to_owned(), text))
@@ -84,13 +85,8 @@ impl Source {
     /// An error at a place in the file, given as a path such as `meters.ceiling.points_m[2]`.
     pub fn error_at(&self, path: &str, message: impl Into<String>, help: impl Into<String>) -> SpecError {
         let place = self.overridden(path).or_else(|| locate::locate(&self.text, path));
-        SpecError {
-            file: self.path.clone(),
-            line: place.map(|p| p.0),
-            column: place.map(|p| p.1),
-            message: format!("{path}: {}", message.into()),
-            help: Some(help.into()),
-        }
+        let error = SpecError::of(&self.path, format!("{path}: {}", message.into()), help);
+        SpecError { line: place.map(|p| p.0), column: place.map(|p| p.1), ..error }
     }
 
     /// The place of a path in the override that sets it or something near it, if one does.

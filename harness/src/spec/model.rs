@@ -1,16 +1,15 @@
 //! The spec's shape: one type a part of the file, unknown keys refused.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::PathBuf;
 
 use luminaire::geometry::Reflectances;
 use schemars::JsonSchema;
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{Deserializer, Error, MapAccess, Visitor};
+use serde::de::{Deserializer, IgnoredAny};
 use serde::{Deserialize, Serialize};
 
 use crate::procedures::Procedures;
+use crate::procedures::shapes::{Found, Shapes};
 
 /// A luxproof spec: a room, luminaires, measuring points and the procedures to run on them.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -48,7 +47,7 @@ pub struct Spec {
     /// Overrides that make a suite of the spec, each a case of its own: a list, each with a `name`, or a matrix.
     #[serde(default)]
     #[schemars(with = "Option<CasesSchema>")]
-    pub cases: Option<serde::de::IgnoredAny>,
+    pub cases: Option<IgnoredAny>,
 }
 
 /// The shape of `cases`; they are read and checked where they are laid over the spec.
@@ -108,40 +107,15 @@ pub struct Fraction(#[schemars(range(min = 0, max = 1))] pub f64);
 
 impl<'de> Deserialize<'de> for Fraction {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Number).and_then(Self::checked)
+        let read = |found: Found<'_>| found.number().map(Self::checked);
+        deserializer.deserialize_any(Shapes { expected: "a number between 0 and 1", read })
     }
 }
 
 impl Fraction {
-    fn checked<E: Error>(value: f64) -> Result<Self, E> {
-        if (0.0..=1.0).contains(&value) {
-            Ok(Self(value))
-        } else {
-            Err(E::custom(format!("a reflectance lies between 0 and 1, not at {value}")))
-        }
-    }
-}
-
-/// The range check belongs inside the visitor: only there does the parser still know the place.
-struct Number;
-
-impl Visitor<'_> for Number {
-    type Value = f64;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number between 0 and 1")
-    }
-
-    fn visit_f64<E: Error>(self, value: f64) -> Result<f64, E> {
-        Fraction::checked(value).map(|f| f.0)
-    }
-
-    fn visit_u64<E: Error>(self, value: u64) -> Result<f64, E> {
-        self.visit_f64(value as f64)
-    }
-
-    fn visit_i64<E: Error>(self, value: i64) -> Result<f64, E> {
-        self.visit_f64(value as f64)
+    fn checked(value: f64) -> Result<Self, String> {
+        let sound = (0.0..=1.0).contains(&value);
+        sound.then_some(Self(value)).ok_or_else(|| format!("a reflectance lies between 0 and 1, not at {value}"))
     }
 }
 
@@ -175,31 +149,12 @@ pub struct FourWalls {
 
 impl<'de> Deserialize<'de> for Walls {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Either;
-        impl<'de> Visitor<'de> for Either {
-            type Value = Walls;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("one number for all walls, or {x-: , x+: , y-: , y+: }")
-            }
-
-            fn visit_f64<E: Error>(self, value: f64) -> Result<Walls, E> {
-                Fraction::checked(value).map(Walls::All)
-            }
-
-            fn visit_u64<E: Error>(self, value: u64) -> Result<Walls, E> {
-                self.visit_f64(value as f64)
-            }
-
-            fn visit_i64<E: Error>(self, value: i64) -> Result<Walls, E> {
-                self.visit_f64(value as f64)
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Walls, A::Error> {
-                FourWalls::deserialize(MapAccessDeserializer::new(map)).map(Walls::Each)
-            }
-        }
-        deserializer.deserialize_any(Either)
+        let expected = "one number for all walls, or {x-: , x+: , y-: , y+: }";
+        let read = |found: Found<'_, IgnoredAny, FourWalls>| match found {
+            Found::Keys(walls) => Some(Ok(Self::Each(walls))),
+            _ => found.number().map(|rho| Fraction::checked(rho).map(Self::All)),
+        };
+        deserializer.deserialize_any(Shapes { expected, read })
     }
 }
 
@@ -320,29 +275,17 @@ pub struct GridSpec {
 
 /// When an engine may stop: at whichever comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Budget {
     /// Standard error relative to the reading.
-    #[serde(default = "Budget::default_relative_error")]
     pub relative_error: f64,
     /// Wall-clock seconds an engine and procedure.
-    #[serde(default = "Budget::default_seconds")]
     pub seconds: f64,
-}
-
-impl Budget {
-    fn default_relative_error() -> f64 {
-        0.002
-    }
-
-    fn default_seconds() -> f64 {
-        60.0
-    }
 }
 
 impl Default for Budget {
     fn default() -> Self {
-        Self { relative_error: Self::default_relative_error(), seconds: Self::default_seconds() }
+        Self { relative_error: 0.002, seconds: 60.0 }
     }
 }
 
@@ -357,16 +300,13 @@ impl<'de> Deserialize<'de> for EngineSettings {
 }
 
 /// An override of a default tolerance.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct ToleranceOverride {
     /// Relative to the reference.
-    #[serde(default)]
     pub relative: f64,
     /// Absolute, in lux.
-    #[serde(default)]
     pub absolute_lx: f64,
     /// Absolute, in candela.
-    #[serde(default)]
     pub absolute_cd: f64,
 }

@@ -17,7 +17,7 @@ pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
     for case in &cases {
         if let Some(other) = names.insert(&case.name, &case.path) {
             let message = format!("holds a case `{}`, and so does {}", case.name, other.display());
-            return Err(plain(&case.path, message, "run them apart, or rename one: a report tells cases by name"));
+            return Err(SpecError::of(&case.path, message, "run them apart, or rename one: a report tells cases by name"));
         }
     }
     Ok(cases)
@@ -31,7 +31,7 @@ pub fn filtered(cases: Vec<Case>, patterns: &[String]) -> Result<Vec<Case>, Spec
     let mut globs = vec![];
     for pattern in patterns.iter().filter(|p| p.contains(['*', '?', '['])) {
         let refused =
-            |e| plain(option, format!("`{pattern}` is no pattern: {e}"), "use *, ? or [...], or a part of the name");
+            |e| SpecError::of(option, format!("`{pattern}` is no pattern: {e}"), "use *, ? or [...], or a part of the name");
         globs.push(glob::Pattern::new(pattern).map_err(refused)?);
     }
     let is_part = |name: &str| patterns.iter().any(|p| !p.contains(['*', '?', '[']) && name.contains(p.as_str()));
@@ -39,7 +39,7 @@ pub fn filtered(cases: Vec<Case>, patterns: &[String]) -> Result<Vec<Case>, Spec
     if !cases.iter().any(|case| chosen(&case.name)) {
         let names: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
         let message = format!("no case matches `{}`", patterns.join("`, `"));
-        return Err(plain(option, message, &format!("the cases are {}", names.join(", "))));
+        return Err(SpecError::of(option, message, format!("the cases are {}", names.join(", "))));
     }
     Ok(cases.into_iter().filter(|case| chosen(&case.name)).collect())
 }
@@ -52,18 +52,18 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, SpecError> {
     let Some(pattern) = path.to_str().filter(|p| !path.exists() && p.contains(['*', '?', '['])) else {
         return Ok(vec![path.to_owned()]);
     };
-    let matches = glob::glob(pattern).map_err(|e| plain(path, format!("is no pattern: {e}"), "give a file"))?;
+    let matches = glob::glob(pattern).map_err(|e| SpecError::of(path, format!("is no pattern: {e}"), "give a file"))?;
     let mut found: Vec<PathBuf> = matches.filter_map(Result::ok).collect();
     found.sort();
     if found.is_empty() {
-        return Err(plain(path, "matches no file".to_owned(), "check the pattern"));
+        return Err(SpecError::of(path, "matches no file", "check the pattern"));
     }
     Ok(found)
 }
 
 /// The YAML files of a folder that are specs, by name; tables and the like beside them are left alone.
 fn specs_of(folder: &Path) -> Result<Vec<PathBuf>, SpecError> {
-    let unreadable = |e: std::io::Error| plain(folder, format!("cannot be read: {e}"), "check the path");
+    let unreadable = |e: std::io::Error| SpecError::of(folder, format!("cannot be read: {e}"), "check the path");
     let mut specs = vec![];
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
@@ -77,13 +77,9 @@ fn specs_of(folder: &Path) -> Result<Vec<PathBuf>, SpecError> {
     specs.sort();
     if specs.is_empty() {
         let help = "a folder is run for its *.yaml files that begin a line with `luxproof:`";
-        return Err(plain(folder, "holds no spec".to_owned(), help));
+        return Err(SpecError::of(folder, "holds no spec", help));
     }
     Ok(specs)
-}
-
-fn plain(file: &Path, message: String, help: &str) -> SpecError {
-    SpecError { file: file.to_owned(), line: None, column: None, message, help: Some(help.to_owned()) }
 }
 
 #[cfg(test)]
