@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
 use luxproof::audit::Silent;
-use luxproof::audit::jobs::{Options, run};
+use luxproof::audit::jobs::Running;
+use luxproof::calibration::Calibrations;
 use luxproof::engines::Site;
 use luxproof::judge::{Comparison, Judge, KnownDeviations, Tolerances, Verdict};
 use luxproof::measure::{Machine, Reader};
@@ -27,9 +28,10 @@ fn recordings(case: &Case, engine: &str) -> Vec<Recording> {
     let site = Site::of_user().unwrap();
     let out = Folder::for_renderers(&[]);
     let plan = plan(case, &selection(engine), &site).unwrap();
-    let reader = Reader::bare(&site, Machine::new(2));
-    let options = Options { out: out.path(""), reader, calibrations: Arc::default() };
-    let outcome = run(case, &plan, &options, &Silent).unwrap();
+    let (folder, calibrations) = (out.path(""), &Calibrations::default());
+    let reader = Reader { out: Some(folder.clone()), ..Reader::bare(&site, Machine::new(2)) };
+    let running = Running { case, plan: &plan, folder: &folder, reader, calibrations, observer: &Silent };
+    let outcome = running.run().unwrap();
     let mine: Vec<Recording> = outcome.recordings.into_iter().filter(|r| r.key.engine == engine).collect();
     assert!(!mine.is_empty(), "{engine} did not run; run `luxproof engines install`");
     mine

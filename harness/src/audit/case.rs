@@ -1,10 +1,9 @@
 //! One case of an audit: its plan is run, undecided comparisons get further looks, and what was read is judged.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
-use super::jobs::{self, Outcome};
+use super::jobs::{self, Outcome, Running};
 use super::{AuditError, Options, sampling, sequential};
 use crate::calibration::Calibrations;
 use crate::diagnosis;
@@ -22,7 +21,7 @@ pub(super) struct Audit<'a> {
     pub(super) policy: &'a Policy,
     pub(super) options: &'a Options<'a>,
     pub(super) reader: Reader,
-    pub(super) calibrations: Arc<Calibrations>,
+    pub(super) calibrations: Calibrations,
 }
 
 /// Why the cases that are left are not run.
@@ -78,16 +77,12 @@ impl Audit<'_> {
     }
 
     fn readings(&self, case: &Case, plan: &Plan, judge: &Judge<'_>, folder: &Path) -> Result<Outcome, AuditError> {
-        let options = jobs::Options {
-            out: folder.to_owned(),
-            reader: self.reader.clone(),
-            calibrations: Arc::clone(&self.calibrations),
-        };
+        let reader = Reader { out: Some(folder.to_owned()), ..self.reader.clone() };
         let observer = self.options.observer;
-        let mut outcome = jobs::run(case, plan, &options, observer)?;
+        let running = Running { case, plan, folder, reader, calibrations: &self.calibrations, observer };
+        let mut outcome = running.run()?;
         if !process::is_interrupted() {
-            let told = |text: &str| observer.remarked(case, text);
-            sampling::sample_on(case, plan, judge, &options, &mut outcome, &told)?;
+            sampling::sample_on(&running, judge, &mut outcome)?;
         }
         if outcome.from_cache > 0 {
             let count = outcome.from_cache;

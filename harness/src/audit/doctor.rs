@@ -6,16 +6,16 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use luminaire::geometry::{Reflectances, Room};
-use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport};
+use luminaire::scene::{Bounces, Luminaire, Scene, Transport};
 use luminaire::simulator::{self, Accuracy};
 
-use crate::engines::{Budget, Engine, EngineError, Job, Station};
+use crate::calibration::scenes;
+use crate::engines::{Budget, Engine, EngineError, Job};
 use crate::judge::{Basis, Tolerances, Verdict, judge};
 use crate::measure::{Failure, FailureKind, Instrument, Question, Reader};
-use crate::record::{EngineName, MeterId, ProcedureId, Quantity};
+use crate::record::{EngineName, ProcedureId, Quantity};
 
 /// What the doctor found of one engine.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,29 +78,14 @@ fn check(
 }
 
 fn known_job(procedure: ProcedureId, transport: Transport) -> Job {
+    let isotropic = scenes::table(&[0.0], &[0.0, 90.0, 180.0], |_, _| 100.0);
+    let luminaire = Luminaire { id: "isotropic".into(), ..scenes::luminaire(isotropic, DVec3::splat(2.0)) };
     let reflectance = Reflectances::with_equal_walls(0.5, 0.5, 0.5);
-    let table = LuminousIntensityDistribution::axial(vec![0.0, 90.0, 180.0], vec![100.0; 3]);
-    let isotropic = table.unwrap_or_else(|e| unreachable!("a constant table is sound: {e}"));
-    let luminaire = Luminaire {
-        id: "isotropic".into(),
-        photometry: Arc::new(Photometry::of(isotropic)),
-        position_m: DVec3::splat(2.0),
-        orientation: DMat3::IDENTITY,
-        flux_scale: 1.0,
-        model: LuminaireModel::Point,
-    };
     let room = Some(Room { size_m: DVec3::splat(4.0), reflectance });
-    let meter = Meter { position_m: DVec3::new(1.0, 2.5, 0.5), normal: DVec3::Z };
-    Job {
-        case: "doctor".into(),
-        procedure,
-        scene: Scene { room, obstacles: vec![], luminaires: vec![luminaire] },
-        stations: vec![Station { id: MeterId::new("doctor", 0), meter, expected_lx: None }],
-        transport,
-        budget: Budget { relative_error: 0.003, seconds: 10.0 },
-        seed: 1,
-        settings: BTreeMap::new(),
-    }
+    let scene = Scene { room, obstacles: vec![], luminaires: vec![luminaire] };
+    let meters = [(DVec3::new(1.0, 2.5, 0.5), DVec3::Z)];
+    let budget = Budget { relative_error: 0.003, seconds: 10.0 };
+    Job { budget, ..scenes::job("doctor", procedure, scene, &meters, transport) }
 }
 
 fn expected(job: &Job) -> Result<f64, String> {

@@ -1,8 +1,8 @@
 //! Runs a plan: one reading a job, readings kept on disk as each job finishes, one engine's failure stops no other.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::observer::Observer;
@@ -10,28 +10,22 @@ use crate::calibration::{Calibrated, Calibrations, Origin};
 use crate::engines::{EngineError, Measurement};
 use crate::measure::{Cost, Failure, FailureKind, Question, Reader, Source, Taken};
 use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
-use crate::procedures::Task;
-use crate::record::{EngineStatus, Reading, ReadingKey, Recording, Status};
+use crate::record::{EngineName, EngineStatus, Reading, ReadingKey, Recording, Status};
 use crate::spec::Case;
 use crate::system::files::{self, FileError};
 use crate::system::slots::side_by_side;
 
-/// How to run.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// The folder of the run's files.
-    pub out: PathBuf,
+/// A case under way.
+pub struct Running<'a> {
+    pub case: &'a Case,
+    pub plan: &'a Plan,
+    /// The folder of the case's files, which is the reader's, too.
+    pub folder: &'a Path,
     /// Who takes readings; cases that run side by side share its machine.
     pub reader: Reader,
     /// What cases share of their instruments.
-    pub calibrations: Arc<Calibrations>,
-}
-
-impl Options {
-    /// Who takes the run's readings.
-    pub fn reader(&self) -> Reader {
-        Reader { out: Some(self.out.clone()), ..self.reader.clone() }
-    }
+    pub calibrations: &'a Calibrations,
+    pub observer: &'a dyn Observer,
 }
 
 /// What a run gave.
@@ -47,75 +41,129 @@ pub struct Outcome {
     pub from_cache: usize,
 }
 
-/// Runs every job of a plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
-pub fn run(case: &Case, plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Outcome, FileError> {
-    let threads = options.reader.machine.slots.threads();
-    let reader = options.reader();
-    let engines: Vec<usize> = (0..plan.engines.len()).collect();
-    let instruments = side_by_side(threads, &engines, |&e| instrument(case, plan, e, options, observer));
-    let shelf = Shelf { folder: options.out.join("readings"), recordings: Mutex::default() };
-    let runs: Vec<(usize, &Run)> = plan.runs.iter().enumerate().collect();
-    let one = |&(k, run): &(usize, &Run)| -> Result<Done, FileError> {
-        let done = measure(case, plan, run, &reader, &instruments[run.engine], observer);
-        if let Done::Recorded(recording, _) = &done {
-            shelf.keep(k, recording)?;
-        }
-        Ok(done)
-    };
-    let (mut recordings, mut skips, mut from_cache) = (vec![], vec![], 0);
-    for done in side_by_side(threads, &runs, one) {
-        match done? {
-            Done::Recorded(recording, source) => {
-                from_cache += usize::from(source == Some(Source::Cache));
-                recordings.push(*recording);
-            }
-            Done::Declined(skip) => skips.push(skip),
-        }
-    }
-    let engines = plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
-    Ok(Outcome { recordings, engines, skips, from_cache })
-}
-
 /// What became of one run of the plan.
 enum Done {
     Recorded(Box<Recording>, Option<Source>),
     Declined(Skip),
 }
 
-/// One run of the plan: the one place where a recording is made of what engines answer.
-fn measure(
-    case: &Case,
-    plan: &Plan,
-    run: &Run,
-    reader: &Reader,
-    instrument: &Result<Option<Calibrated>, String>,
-    observer: &dyn Observer,
-) -> Done {
-    let (planned, task) = (&plan.engines[run.engine], &plan.tasks[run.task]);
-    let engine = planned.engine.name();
-    observer.started(case, planned.engine.as_ref(), task.procedure.name());
-    let start = Instant::now();
-    let taken = match instrument {
-        Ok(_) => answer(planned, run, reader, task.procedure.name()),
-        // An instrument that reads known scenes wrong reads nothing.
-        Err(reason) => Err(EngineError::Solver { engine: engine.clone(), what: reason.clone() }.into()),
-    };
-    if let Err(Failure { kind: FailureKind::Declined, text: why }) = &taken {
-        observer.ended(case, planned.engine.as_ref(), task.procedure, start.elapsed(), None);
-        return Done::Declined(declined(case, planned, task, why));
+impl Running<'_> {
+    /// Runs every job of the plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
+    pub fn run(&self) -> Result<Outcome, FileError> {
+        let threads = self.reader.machine.slots.threads();
+        let engines: Vec<usize> = (0..self.plan.engines.len()).collect();
+        let instruments = side_by_side(threads, &engines, |&e| self.instrument(e));
+        // By place in the plan.
+        let kept: Mutex<BTreeMap<usize, Recording>> = Mutex::default();
+        let runs: Vec<(usize, &Run)> = self.plan.runs.iter().enumerate().collect();
+        let one = |&(k, run): &(usize, &Run)| -> Result<Done, FileError> {
+            let done = self.measure(run, &instruments[run.engine]);
+            if let Done::Recorded(recording, _) = &done {
+                let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+                kept.insert(k, (**recording).clone());
+                // Written as each job finishes, so that an interruption loses only what was under way.
+                keep(self.folder, &recording.key.engine, kept.values())?;
+            }
+            Ok(done)
+        };
+        let (mut recordings, mut skips, mut from_cache) = (vec![], vec![], 0);
+        for done in side_by_side(threads, &runs, one) {
+            match done? {
+                Done::Recorded(recording, source) => {
+                    from_cache += usize::from(source == Some(Source::Cache));
+                    recordings.push(*recording);
+                }
+                Done::Declined(skip) => skips.push(skip),
+            }
+        }
+        let engines = self.plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
+        Ok(Outcome { recordings, engines, skips, from_cache })
     }
-    let source = taken.as_ref().ok().map(|taken| taken.source);
-    let mut recording = record(case, planned, run, task, taken, start.elapsed());
-    recording.command = planned.engine.command_by_hand(&run.job, &reader.site);
-    if let Ok(Some(calibrated)) = instrument {
-        recording.instrument_uncertainty = calibrated.calibration.uncertainty(run.job.transport);
-        if let Ok(file) = &calibrated.kept {
-            recording.effort.insert("calibration".to_owned(), file.clone());
+
+    /// The calibration of an engine of the plan; `None` where it has nothing to do or is one of our own solvers, which are what
+    /// the others are calibrated by.
+    fn instrument(&self, e: usize) -> Result<Option<Calibrated>, String> {
+        let planned = &self.plan.engines[e];
+        let (Some(instrument), Some(run)) = (planned.instrument(), self.plan.runs.iter().find(|r| r.engine == e))
+        else {
+            return Ok(None);
+        };
+        if planned.engine.is_witness() {
+            return Ok(None);
+        }
+        self.observer.started(self.case, planned.engine.as_ref(), "calibration");
+        let made = |calibrated: &Calibrated| {
+            if calibrated.origin == Origin::Measured {
+                self.observer.calibrated(planned.engine.as_ref(), calibrated);
+            }
+        };
+        self.calibrations.of(&instrument, &run.job, &self.reader, made).map(Some)
+    }
+
+    /// One run of the plan: the one place where a recording is made of what engines answer.
+    fn measure(&self, run: &Run, instrument: &Result<Option<Calibrated>, String>) -> Done {
+        let (planned, task) = (&self.plan.engines[run.engine], &self.plan.tasks[run.task]);
+        let engine = planned.engine.as_ref();
+        self.observer.started(self.case, engine, task.procedure.name());
+        let start = Instant::now();
+        let taken = match instrument {
+            Ok(_) => answer(planned, run, &self.reader, task.procedure.name()),
+            // An instrument that reads known scenes wrong reads nothing.
+            Err(reason) => Err(EngineError::Solver { engine: engine.name(), what: reason.clone() }.into()),
+        };
+        if let Err(Failure { kind: FailureKind::Declined, text: why }) = &taken {
+            self.observer.ended(self.case, engine, task.procedure, start.elapsed(), None);
+            let reason = format!("it declines: {why}");
+            return Done::Declined(Skip::of(self.case, task, engine.name(), Scope::Procedure, reason));
+        }
+        let source = taken.as_ref().ok().map(|taken| taken.source);
+        let mut recording = self.record(run, taken, start.elapsed());
+        if let Ok(Some(calibrated)) = instrument {
+            recording.instrument_uncertainty = calibrated.calibration.uncertainty(run.job.transport);
+            if let Ok(file) = &calibrated.kept {
+                recording.effort.insert("calibration".to_owned(), file.clone());
+            }
+        }
+        let wall = Duration::from_secs_f64(recording.wall_s);
+        self.observer.ended(self.case, engine, task.procedure, wall, recording.failure.as_deref());
+        Done::Recorded(Box::new(recording), source)
+    }
+
+    fn record(&self, run: &Run, taken: Result<Taken, Failure>, wall: Duration) -> Recording {
+        let (planned, task) = (&self.plan.engines[run.engine], &self.plan.tasks[run.task]);
+        let engine = planned.engine.name();
+        let (measurement, wall_s, failure) = match taken {
+            Ok(taken) => (taken.measurement, taken.cost.wall_s, None),
+            Err(error) => {
+                tracing::error!(%engine, procedure = %task.procedure, "{error}");
+                (Measurement::default(), wall.as_secs_f64(), Some(error.to_string()))
+            }
+        };
+        let estimates = if failure.is_none() { measurement.readings(&task.targets) } else { vec![] };
+        let readings = estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
+            meter: target.id.clone(),
+            quantity: task.quantity,
+            value: estimate.value,
+            uncertainty: estimate.uncertainty,
+        });
+        Recording {
+            version: planned.version().unwrap_or_default(),
+            model: task.model(),
+            input_sha256: self.case.sha256.clone(),
+            seed: run.job.seed,
+            method: measurement.method,
+            effort: measurement.effort,
+            role: planned.engine.role(),
+            approximation: run.approximation.clone(),
+            notes: measurement.notes,
+            wall_s,
+            components: planned.engine.components(&run.job).into_iter().map(str::to_owned).collect(),
+            command: planned.engine.command_by_hand(&run.job, &self.reader.site),
+            failure,
+            readings: readings.collect(),
+            ..Recording::of(ReadingKey::new(&self.case.name, task.procedure, engine), task.light())
         }
     }
-    let wall = Duration::from_secs_f64(recording.wall_s);
-    observer.ended(case, planned.engine.as_ref(), task.procedure, wall, recording.failure.as_deref());
-    Done::Recorded(Box::new(recording), source)
 }
 
 /// What an engine answers to a run: it renders what the shortcut leaves, the rest follows, and the spot check must agree.
@@ -147,34 +195,21 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
     Ok(taken)
 }
 
-/// The readings' files, written as each job finishes, so that an interruption loses only what was under way.
-struct Shelf {
-    folder: PathBuf,
-    /// By place in the plan.
-    recordings: Mutex<BTreeMap<usize, Recording>>,
-}
-
-impl Shelf {
-    fn keep(&self, place: usize, recording: &Recording) -> Result<(), FileError> {
-        let mut all = self.recordings.lock().unwrap_or_else(PoisonError::into_inner);
-        all.insert(place, recording.clone());
-        let of_engine: Vec<&Recording> = all.values().filter(|r| r.key.engine == recording.key.engine).collect();
-        keep(&self.folder, &recording.key.engine, &of_engine)
-    }
-}
-
-/// The file of an engine's readings.
-pub(super) fn keep(folder: &Path, engine: &str, recordings: &[&Recording]) -> Result<(), FileError> {
-    files::keep_json(&folder.join(format!("{engine}.json")), &recordings)
+/// Writes the file of an engine's readings, those among all that are its own.
+pub(super) fn keep<'a>(
+    folder: &Path,
+    engine: &EngineName,
+    all: impl IntoIterator<Item = &'a Recording>,
+) -> Result<(), FileError> {
+    let mine: Vec<&Recording> = all.into_iter().filter(|r| r.key.engine == *engine).collect();
+    files::keep_json(&folder.join("readings").join(format!("{engine}.json")), &mine)
 }
 
 /// What a case gives that is not run at all: a skip for every run of its plan, and engines of the given status.
 pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcome {
-    let skip = |run: &Run| Skip {
-        key: ReadingKey::new(&case.name, plan.tasks[run.task].procedure, plan.engines[run.engine].engine.name()),
-        scope: Scope::Procedure,
-        reason: reason.to_owned(),
-        saved: Some("the whole run".to_owned()),
+    let skip = |run: &Run| {
+        let (task, engine) = (&plan.tasks[run.task], plan.engines[run.engine].engine.name());
+        Skip::of(case, task, engine, Scope::Procedure, reason).saving("the whole run")
     };
     let engine = |(e, planned): (usize, &Planned)| {
         let engine = self::status(planned, &[]);
@@ -186,81 +221,6 @@ pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcom
     };
     let engines = plan.engines.iter().enumerate().map(engine).collect();
     Outcome { recordings: vec![], engines, skips: plan.runs.iter().map(skip).collect(), from_cache: 0 }
-}
-
-/// The calibration of an engine of the plan; `None` where it has nothing to do or is one of our own solvers, which are what
-/// the others are calibrated by.
-fn instrument(
-    case: &Case,
-    plan: &Plan,
-    e: usize,
-    options: &Options,
-    observer: &dyn Observer,
-) -> Result<Option<Calibrated>, String> {
-    let planned = &plan.engines[e];
-    let (Some(instrument), Some(run)) = (planned.instrument(), plan.runs.iter().find(|r| r.engine == e)) else {
-        return Ok(None);
-    };
-    if planned.engine.is_witness() {
-        return Ok(None);
-    }
-    observer.started(case, planned.engine.as_ref(), "calibration");
-    let made = |calibrated: &Calibrated| {
-        if calibrated.origin == Origin::Measured {
-            observer.calibrated(planned.engine.as_ref(), calibrated);
-        }
-    };
-    options.calibrations.of(&instrument, &run.job, &options.reader, made).map(Some)
-}
-
-fn declined(case: &Case, planned: &Planned, task: &Task, why: &str) -> Skip {
-    Skip {
-        key: ReadingKey::new(&case.name, task.procedure, planned.engine.name()),
-        scope: Scope::Procedure,
-        reason: format!("it declines: {why}"),
-        saved: None,
-    }
-}
-
-fn record(
-    case: &Case,
-    planned: &Planned,
-    run: &Run,
-    task: &Task,
-    taken: Result<Taken, Failure>,
-    wall: Duration,
-) -> Recording {
-    let engine = planned.engine.name();
-    let (measurement, wall_s, failure) = match taken {
-        Ok(taken) => (taken.measurement, taken.cost.wall_s, None),
-        Err(error) => {
-            tracing::error!(%engine, procedure = %task.procedure, "{error}");
-            (Measurement::default(), wall.as_secs_f64(), Some(error.to_string()))
-        }
-    };
-    let estimates = if failure.is_none() { measurement.readings(&task.targets) } else { vec![] };
-    let readings = estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
-        meter: target.id.clone(),
-        quantity: task.quantity,
-        value: estimate.value,
-        uncertainty: estimate.uncertainty,
-    });
-    Recording {
-        version: planned.version().unwrap_or_default(),
-        model: task.model(),
-        input_sha256: case.sha256.clone(),
-        seed: run.job.seed,
-        method: measurement.method.clone(),
-        effort: measurement.effort.clone(),
-        role: planned.engine.role(),
-        approximation: run.approximation.clone(),
-        notes: measurement.notes.clone(),
-        wall_s,
-        components: planned.engine.components(&run.job).into_iter().map(str::to_owned).collect(),
-        failure,
-        readings: readings.collect(),
-        ..Recording::of(ReadingKey::new(&case.name, task.procedure, engine), task.light())
-    }
 }
 
 fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {

@@ -25,11 +25,12 @@ pub mod sampling;
 pub mod sequential;
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use sha2::{Digest, Sha256};
 
+use crate::calibration::Calibrations;
 use crate::engines::Site;
 use crate::judge::{Policy, Published, PublishedError};
 use crate::measure::cache::Cache;
@@ -128,7 +129,7 @@ pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<
         options.sampling.grant(&policy.judge(case, published.as_ref()), plan);
     }
     options.observer.planned(&cases, &plans);
-    let audit = Audit { policy, options, reader: options.reader(), calibrations: Arc::default() };
+    let audit = Audit { policy, options, reader: options.reader(), calibrations: Calibrations::default() };
     let stop: Mutex<Option<Stop>> = Mutex::new(None);
     let one = |&k: &usize| -> Result<Report, AuditError> {
         let (case, plan) = (&cases[k], &plans[k]);

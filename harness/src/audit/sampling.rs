@@ -2,15 +2,13 @@
 
 use clap::ValueEnum;
 
-use super::jobs::{self, Options, Outcome};
+use super::jobs::{self, Outcome, Running};
 use super::sequential::{self, Ask, Sampler};
 use crate::engines::Measurement;
 use crate::judge::Judge;
-use crate::measure::{Question, Reader, Source};
-use crate::plan::{Plan, Planned, Run};
-use crate::procedures::Task;
+use crate::measure::{Question, Source};
+use crate::plan::{Plan, Run};
 use crate::record::Recording;
-use crate::spec::Case;
 use crate::system::files::FileError;
 
 /// When sampling stops.
@@ -40,68 +38,57 @@ impl Sampling {
     }
 }
 
-/// Takes further looks wherever a comparison is undecided; `told` hears of each.
-pub(super) fn sample_on(
-    case: &Case,
-    plan: &Plan,
-    judge: &Judge<'_>,
-    options: &Options,
-    outcome: &mut Outcome,
-    told: &dyn Fn(&str),
-) -> Result<(), FileError> {
-    let reader = options.reader();
-    for run in &plan.runs {
-        let (planned, task) = (&plan.engines[run.engine], &plan.tasks[run.task]);
+/// Takes further looks wherever a comparison is undecided; the observer hears of each.
+pub(super) fn sample_on(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Outcome) -> Result<(), FileError> {
+    for run in &running.plan.runs {
+        let (planned, task) = (&running.plan.engines[run.engine], &running.plan.tasks[run.task]);
         let engine = planned.engine.name();
-        let is_mine = |r: &Recording| r.key.engine == engine.as_str() && r.key.procedure == task.procedure;
         if planned.engine.is_witness() {
             continue;
         }
+        let of_task = |r: &&Recording| r.key.procedure == task.procedure;
+        let is_mine = |r: &Recording| r.key.engine == engine && of_task(&r);
         let Some(mine) = outcome.recordings.iter().position(is_mine) else { continue };
         let mut subject = outcome.recordings[mine].clone();
-        let others =
-            outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure && r.key.engine != engine.as_str());
-        let others: Vec<&Recording> = others.collect();
-        let mut looks = Looks { planned, run, task, reader: &reader, told, from_cache: 0 };
-        let before_s = subject.wall_s;
-        sequential::refine(judge, task, &others, &mut subject, (run.job.budget, case.budget), &mut looks);
-        if run.job.budget != case.budget {
-            subject.notes.extend(sequential::saved(&subject, case.budget));
+        let others: Vec<&Recording> =
+            outcome.recordings.iter().filter(of_task).filter(|r| r.key.engine != engine).collect();
+        let mut looks = Looks { running, run, from_cache: 0 };
+        let (before_s, whole) = (subject.wall_s, running.case.budget);
+        sequential::refine(judge, task, &others, &mut subject, (run.job.budget, whole), &mut looks);
+        if run.job.budget != whole {
+            subject.notes.extend(sequential::saved(&subject, whole));
         }
         outcome.from_cache += looks.from_cache;
-        if let Some(status) = outcome.engines.iter_mut().find(|e| e.id == engine.as_str()) {
+        if let Some(status) = outcome.engines.iter_mut().find(|e| e.id == engine) {
             status.wall_s += subject.wall_s - before_s;
         }
         outcome.recordings[mine] = subject;
-        let of_engine: Vec<&Recording> =
-            outcome.recordings.iter().filter(|r| r.key.engine == engine.as_str()).collect();
-        jobs::keep(&options.out.join("readings"), &engine, &of_engine)?;
+        jobs::keep(running.folder, &engine, &outcome.recordings)?;
     }
     Ok(())
 }
 
 /// Further looks of one engine at one task: jobs of the undecided stations alone, each with a seed of its own.
 struct Looks<'a> {
-    planned: &'a Planned,
+    running: &'a Running<'a>,
     run: &'a Run,
-    task: &'a Task,
-    reader: &'a Reader,
-    told: &'a dyn Fn(&str),
     from_cache: usize,
 }
 
 impl Sampler for Looks<'_> {
     fn sample(&mut self, ask: &Ask) -> Result<(Measurement, f64), String> {
-        let (Run { job, .. }, task) = (self.run, self.task);
-        (self.told)(&format!(
+        let Running { case, plan, reader, observer, .. } = self.running;
+        let (job, planned, task) = (&self.run.job, &plan.engines[self.run.engine], &plan.tasks[self.run.task]);
+        let told = format!(
             "{}: {} of {} meters of {} are undecided: look {}, {:.0} s at most",
-            self.planned.engine.name(),
+            planned.engine.name(),
             ask.targets.len(),
             task.targets.len(),
             job.procedure,
             ask.look,
             ask.budget.seconds
-        ));
+        );
+        observer.remarked(case, &told);
         let further = crate::engines::Job {
             stations: ask.targets.iter().flat_map(|k| job.stations[task.stations_of(*k)].to_vec()).collect(),
             budget: ask.budget,
@@ -109,8 +96,8 @@ impl Sampler for Looks<'_> {
             ..job.clone()
         };
         let place = format!("{}/look-{}", job.procedure, ask.look);
-        let instrument = self.planned.instrument().ok_or("the engine is not there")?;
-        let taken = self.reader.read(&Question::new(&instrument, &further, &place)).map_err(|e| e.to_string())?;
+        let instrument = planned.instrument().ok_or("the engine is not there")?;
+        let taken = reader.read(&Question::new(&instrument, &further, &place)).map_err(|e| e.to_string())?;
         self.from_cache += usize::from(taken.source == Source::Cache);
         Ok((taken.measurement, taken.cost.wall_s))
     }

@@ -174,11 +174,8 @@ fn duration(seconds: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::*;
-    use crate::judge::tests::task;
-    use crate::judge::{KnownDeviations, Tolerances};
+    use crate::judge::tests::{built_in, task};
     use crate::system::random::normal;
 
     /// An engine that is off by so much at each meter, with normal noise that shrinks with the seconds granted.
@@ -226,10 +223,7 @@ mod tests {
         let targets: Vec<usize> = (0..deviations.len()).collect();
         let mut subject = recording("radiance", &engine.measurement(&targets, 1.0).estimates);
         let exact = recording("simulator", &vec![Estimate::exact(1.0); deviations.len()]);
-        let (tolerances, known) = (Tolerances::built_in().unwrap(), KnownDeviations::built_in().unwrap());
-        let overrides = BTreeMap::new();
-        let judge = Judge { tolerances: &tolerances, known: &known, overrides: &overrides, published: None };
-        let task = task(deviations.len());
+        let (judge, task) = (built_in(), task(deviations.len()));
         let whole = Budget { relative_error: 0.004, seconds };
         refine(&judge, &task, &[&exact], &mut subject, (first, whole), &mut engine);
         let mut compared = judge.compare(&task, &[&exact, &subject]);

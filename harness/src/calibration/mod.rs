@@ -10,7 +10,7 @@
 //! What an engine declares of its method ([`Support::Approximate`]) is not the instrument's and stays in its readings.
 
 mod calibrations;
-mod scenes;
+pub(crate) mod scenes;
 mod store;
 #[cfg(test)]
 mod tests;

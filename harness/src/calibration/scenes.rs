@@ -14,6 +14,9 @@ use crate::record::{MeterId, ProcedureId};
 /// A standard error that is far below the tolerances of reflected light, and a few seconds for engines that cannot meet it.
 pub(super) const BUDGET: Budget = Budget { relative_error: 2e-3, seconds: 5.0 };
 
+/// Of the scenes' jobs, meters and luminaires.
+const NAME: &str = "calibration";
+
 #[derive(Clone, Debug)]
 pub(super) struct KnownScene {
     pub(super) name: &'static str,
@@ -114,7 +117,7 @@ fn furnace() -> KnownScene {
     let transport = Transport::Indirect(Bounces::Converged);
     let scene = Scene { room: Some(room), obstacles: vec![], luminaires: vec![lamp] };
     let known = vec![Known { exact_lx, scale_lx: exact_lx }; meters.len()];
-    KnownScene { name: "furnace", job: job(ProcedureId::IndirectIlluminance, scene, &meters, transport), known }
+    KnownScene { name: "furnace", job: job(NAME, ProcedureId::IndirectIlluminance, scene, &meters, transport), known }
 }
 
 /// Direct light by the inverse-square law, obstacles not looked at.
@@ -127,17 +130,24 @@ fn direct(name: &'static str, scene: Scene, meters: &[(DVec3, DVec3)]) -> KnownS
         Known { exact_lx, scale_lx: exact_lx }
     };
     let known = meters.iter().map(known).collect();
-    KnownScene { name, job: job(ProcedureId::DirectIlluminance, scene, meters, Transport::Direct), known }
+    KnownScene { name, job: job(NAME, ProcedureId::DirectIlluminance, scene, meters, Transport::Direct), known }
 }
 
-fn job(procedure: ProcedureId, scene: Scene, meters: &[(DVec3, DVec3)], transport: Transport) -> Job {
+/// A job of a scene with meters by place and normal, to be done well enough to know an instrument by.
+pub(crate) fn job(
+    name: &str,
+    procedure: ProcedureId,
+    scene: Scene,
+    meters: &[(DVec3, DVec3)],
+    transport: Transport,
+) -> Job {
     let station = |(k, &(position_m, normal)): (usize, &(DVec3, DVec3))| Station {
-        id: MeterId::new("calibration", k),
+        id: MeterId::new(name, k),
         meter: Meter { position_m, normal },
         expected_lx: None,
     };
     Job {
-        case: "calibration".into(),
+        case: name.into(),
         procedure,
         scene,
         stations: meters.iter().enumerate().map(station).collect(),
@@ -148,9 +158,9 @@ fn job(procedure: ProcedureId, scene: Scene, meters: &[(DVec3, DVec3)], transpor
     }
 }
 
-fn luminaire(photometry: Photometry, position_m: DVec3) -> Luminaire {
+pub(crate) fn luminaire(photometry: Photometry, position_m: DVec3) -> Luminaire {
     Luminaire {
-        id: "calibration".into(),
+        id: NAME.into(),
         photometry: Arc::new(photometry),
         position_m,
         orientation: DMat3::IDENTITY,
@@ -159,7 +169,7 @@ fn luminaire(photometry: Photometry, position_m: DVec3) -> Luminaire {
     }
 }
 
-fn table(c_deg: &[f64], gamma_deg: &[f64], intensity: impl Fn(f64, f64) -> f64) -> Photometry {
+pub(crate) fn table(c_deg: &[f64], gamma_deg: &[f64], intensity: impl Fn(f64, f64) -> f64) -> Photometry {
     let intensity = &intensity;
     let candela = c_deg.iter().flat_map(|&c| gamma_deg.iter().map(move |&gamma| intensity(c, gamma))).collect();
     let table = LuminousIntensityDistribution::new(c_deg.to_vec(), gamma_deg.to_vec(), candela);

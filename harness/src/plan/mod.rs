@@ -45,7 +45,7 @@ pub struct Planned {
 impl Planned {
     /// The engine's version, where it is there.
     pub fn version(&self) -> Option<String> {
-        self.found.as_ref()?.as_ref().ok().map(|v| v.0.clone())
+        Some(self.instrument()?.version.0)
     }
 
     /// What readings are taken with, where it is there.
@@ -99,6 +99,19 @@ pub struct Skip {
     pub reason: String,
     /// What that saves, where it saves something.
     pub saved: Option<String>,
+}
+
+impl Skip {
+    /// Of an engine on a task of a case, where that saves nothing.
+    pub fn of(case: &Case, task: &Task, engine: EngineName, scope: Scope, reason: impl Into<String>) -> Self {
+        Self { key: ReadingKey::new(&case.name, task.procedure, engine), scope, reason: reason.into(), saved: None }
+    }
+
+    /// The same where it saves something.
+    #[must_use]
+    pub fn saving(self, saved: impl Into<String>) -> Self {
+        Self { saved: Some(saved.into()), ..self }
+    }
 }
 
 /// How much is skipped.
@@ -186,12 +199,10 @@ impl<'a> Planner<'a> {
         {
             let absence = found.as_ref().and_then(|f| f.as_ref().err()).map(ToString::to_string);
             for (task, offer) in plan.tasks.iter().zip(offers) {
-                let skip = |scope, reason, saved| skip(case, task, engine.as_ref(), (scope, reason, saved));
+                let skip = |scope, reason| Skip::of(case, task, engine.name(), scope, reason);
                 match (&absence, offer) {
-                    (Some(absent), _) => plan.skips.push(skip(Scope::Engine, absent.clone(), None)),
-                    (None, Offer::Skip(scope, reason)) => {
-                        plan.skips.push(skip(scope, reason, Some("the whole run".to_owned())));
-                    }
+                    (Some(absent), _) => plan.skips.push(skip(Scope::Engine, absent.clone())),
+                    (None, Offer::Skip(scope, reason)) => plan.skips.push(skip(scope, reason).saving("the whole run")),
                     (None, Offer::Run(run)) => plan.runs.push(Run { engine: e, ..*run }),
                 }
             }
@@ -237,13 +248,10 @@ impl<'a> Planner<'a> {
             self.repeated.shorten(&mut run.shortcut, planned.engine.as_ref());
             let all_s = cost_s(planned.engine.as_ref(), case.budget);
             for omission in &run.shortcut.omissions {
-                let saved = format!(
-                    "{:.0} % of the run, at most about {:.0} s",
-                    100.0 * omission.share,
-                    omission.share * all_s
-                );
-                let what = (omission.scope, omission.reason.clone(), Some(saved));
-                plan.skips.push(skip(case, &plan.tasks[run.task], planned.engine.as_ref(), what));
+                let (task, engine) = (&plan.tasks[run.task], planned.engine.name());
+                let (percent, seconds) = (100.0 * omission.share, omission.share * all_s);
+                let saved = format!("{percent:.0} % of the run, at most about {seconds:.0} s");
+                plan.skips.push(Skip::of(case, task, engine, omission.scope, &omission.reason).saving(saved));
             }
         }
         plan.skips.extend(facts(case, &plan.tasks));
@@ -255,12 +263,7 @@ impl<'a> Planner<'a> {
 
 /// What no engine does in a case, whatever its shortcuts.
 fn facts(case: &Case, tasks: &[Task]) -> Vec<Skip> {
-    let fact = |task: &Task, engine: EngineName, reason: &str| Skip {
-        key: ReadingKey::new(&case.name, task.procedure, engine),
-        scope: Scope::LightPath,
-        reason: reason.to_owned(),
-        saved: None,
-    };
+    let fact = |task: &Task, engine, reason: &str| Skip::of(case, task, engine, Scope::LightPath, reason);
     let direct = tasks.iter().filter(|t| t.transport == Transport::Direct && t.scene.room.is_some());
     let of = |task: &Task| {
         let mut found = vec![fact(task, EVERYONE, "direct light only: no reflection is followed")];
@@ -285,11 +288,6 @@ enum Offer {
 /// What a run of a whole job may cost, in seconds: the budget for renderers, next to nothing for our own solvers.
 pub fn cost_s(engine: &dyn Engine, budget: Budget) -> f64 {
     if engine.is_witness() { budget.seconds.min(1.0) } else { budget.seconds }
-}
-
-fn skip(case: &Case, task: &Task, engine: &dyn Engine, what: (Scope, String, Option<String>)) -> Skip {
-    let (scope, reason, saved) = what;
-    Skip { key: ReadingKey::new(&case.name, task.procedure, engine.name()), scope, reason, saved }
 }
 
 impl Selection {

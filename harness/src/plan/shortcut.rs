@@ -10,8 +10,6 @@ mod symmetry;
 #[cfg(test)]
 mod tests;
 
-use luminaire::scene::Transport;
-
 use crate::engines::{Job, Measurement};
 use crate::record::Estimate;
 
@@ -84,19 +82,15 @@ impl Shortcut {
 
     /// The readings of the job that was asked, from those of the job that was rendered.
     pub fn complete(&self, rendered: Measurement, asked: &Job) -> Measurement {
-        let of = |k: usize| rendered.estimates.get(k).map_or(Estimate::DARK, |e| e.times(self.factor));
-        let estimate = |fill: &Fill| match fill {
-            Fill::Rendered(k) | Fill::Mirrors { station: k, .. } => of(*k),
-            Fill::Dark => Estimate::DARK,
-        };
-        let estimates = self.fill.iter().map(estimate).collect();
-        let station = |fill: &Fill| match fill {
+        let source = |fill: &Fill| match fill {
             Fill::Rendered(k) | Fill::Mirrors { station: k, .. } if *k < rendered.estimates.len() => {
                 Some((*k, self.factor))
             }
             _ => None,
         };
-        let stations: Vec<_> = self.fill.iter().map(station).collect();
+        let stations: Vec<Option<(usize, f64)>> = self.fill.iter().map(source).collect();
+        let read = |(k, factor): (usize, f64)| rendered.estimates[k].times(factor);
+        let estimates = stations.iter().map(|source| source.map_or(Estimate::DARK, read)).collect();
         let samples = rendered.samples.iter().map(|part| part.rearranged(&stations)).collect();
         let mut method = rendered.method;
         method.extend(self.traces(asked));
@@ -105,28 +99,20 @@ impl Shortcut {
 
     /// Which meter's reading is which other's, for whoever repeats it.
     fn traces(&self, asked: &Job) -> Vec<(String, String)> {
-        let mut mirrored = vec![];
-        let mut dark = vec![];
-        for (fill, station) in self.fill.iter().zip(&asked.stations) {
-            match fill {
-                Fill::Rendered(_) => {}
-                Fill::Mirrors { station: k, by } => {
-                    mirrored.push(format!("{} is {} ({by})", station.id, self.job.stations[*k].id));
-                }
-                Fill::Dark => dark.push(station.id.to_string()),
-            }
-        }
-        let mut traces = vec![];
-        if !mirrored.is_empty() {
-            traces.push(("mirrored_meters".to_owned(), mirrored.join(", ")));
-        }
-        if !dark.is_empty() {
-            traces.push(("meters_without_light".to_owned(), dark.join(", ")));
-        }
-        if self.factor != 1.0 {
-            traces.push(("rescaled_by".to_owned(), self.factor.to_string()));
-        }
-        traces
+        let fills = || self.fill.iter().zip(&asked.stations);
+        let mirrored = fills().filter_map(|(fill, station)| match fill {
+            Fill::Mirrors { station: k, by } => Some(format!("{} is {} ({by})", station.id, self.job.stations[*k].id)),
+            Fill::Rendered(_) | Fill::Dark => None,
+        });
+        let dark = fills().filter(|(fill, _)| **fill == Fill::Dark).map(|(_, station)| station.id.to_string());
+        let rescaled = (self.factor != 1.0).then(|| self.factor.to_string());
+        let traces: [(&str, Vec<String>); 3] = [
+            ("mirrored_meters", mirrored.collect()),
+            ("meters_without_light", dark.collect()),
+            ("rescaled_by", rescaled.into_iter().collect()),
+        ];
+        let told = traces.into_iter().filter(|(_, words)| !words.is_empty());
+        told.map(|(name, words)| (name.to_owned(), words.join(", "))).collect()
     }
 
     /// Keeps of the rendered stations those that `wanted` says, and tells every fill where they are now.
@@ -158,9 +144,4 @@ impl Shortcut {
     fn omit(&mut self, scope: super::Scope, share: f64, reason: String) {
         self.omissions.push(Omission { scope, reason, share });
     }
-}
-
-/// Whether a transport holds light straight from the luminaires.
-const fn is_direct(transport: Transport) -> bool {
-    matches!(transport, Transport::Direct)
 }

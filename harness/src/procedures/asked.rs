@@ -47,7 +47,8 @@ impl<'de> Deserialize<'de> for Procedures {
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Procedures, A::Error> {
                 let mut all = BTreeMap::new();
                 while let Some(name) = map.next_key::<String>()? {
-                    let id: ProcedureId = name.parse().map_err(|_| A::Error::unknown_field(&name, ProcedureId::NAMES))?;
+                    let id: ProcedureId =
+                        name.parse().map_err(|_| A::Error::unknown_field(&name, ProcedureId::NAMES))?;
                     // A case of a suite takes a procedure out by `null`.
                     let Some(asked) = id.row().form.read(&mut map)? else { continue };
                     if all.insert(id, asked).is_some() {

@@ -29,8 +29,8 @@ impl ReadingKey {
 
 /// A procedure; [`crate::procedures`] says what each measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
-#[derive(EnumString, IntoStaticStr, VariantNames, strum::Display)]
 #[serde(rename_all = "snake_case")]
+#[derive(EnumString, IntoStaticStr, VariantNames, strum::Display)]
 #[strum(serialize_all = "snake_case", const_into_str, parse_err_ty = UnknownProcedure, parse_err_fn = UnknownProcedure::of)]
 pub enum ProcedureId {
     /// Procedure 1: the luminous intensity distribution read back.

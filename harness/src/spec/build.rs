@@ -113,10 +113,8 @@ impl<'a> Builder<'a> {
 
     fn build(mut self, spec: Spec) -> Result<Case, SpecError> {
         self.hash.update(&self.source.text);
-        if spec.luxproof != 1 {
-            let message = format!("format version {} is not known", spec.luxproof);
-            return Err(self.source.error_at("luxproof", message, "this program reads version 1"));
-        }
+        let message = format!("format version {} is not known", spec.luxproof);
+        self.require(spec.luxproof == 1, "luxproof", message, "this program reads version 1")?;
         let room = self.room(&spec)?;
         let obstacles = self.obstacles(&spec.obstacles, &room)?;
         let luminaires = self.luminaires(&spec.luminaires, &room)?;
@@ -153,14 +151,8 @@ impl<'a> Builder<'a> {
 
     fn room(&self, spec: &Spec) -> Result<Room, SpecError> {
         for (k, size) in spec.room.size_m.iter().enumerate() {
-            if !(size.is_finite() && *size > 0.0) {
-                let message = format!("{size} m is no extent");
-                return Err(self.source.error_at(
-                    &format!("room.size_m[{k}]"),
-                    message,
-                    "give a positive number of metres",
-                ));
-            }
+            let (at, message) = (format!("room.size_m[{k}]"), format!("{size} m is no extent"));
+            self.require(size.is_finite() && *size > 0.0, &at, message, "give a positive number of metres")?;
         }
         Ok(Room { size_m: DVec3::from(spec.room.size_m), reflectance: spec.room.reflectance.build() })
     }
@@ -172,10 +164,9 @@ impl<'a> Builder<'a> {
             let obstacle = match (&spec.cuboid, &spec.mesh) {
                 (Some(cuboid), None) => {
                     let (min_m, max_m) = (DVec3::from(cuboid.min_m), DVec3::from(cuboid.max_m));
-                    if !(min_m.is_finite() && max_m.is_finite() && min_m.cmplt(max_m).all()) {
-                        let message = format!("the box from {min_m} to {max_m} has no volume");
-                        return Err(self.source.error_at(&at, message, "give min_m below max_m on every axis"));
-                    }
+                    let sound = min_m.is_finite() && max_m.is_finite() && min_m.cmplt(max_m).all();
+                    let message = format!("the box from {min_m} to {max_m} has no volume");
+                    self.require(sound, &at, message, "give min_m below max_m on every axis")?;
                     Obstacle { shape: Shape::Box { min_m, max_m }, reflectance: cuboid.reflectance.0 }
                 }
                 (None, Some(mesh)) => {
@@ -195,43 +186,36 @@ impl<'a> Builder<'a> {
                 }
             };
             let (low, high) = extent(&obstacle.shape);
-            if low.min_element() < 0.0 || high.cmpgt(room.size_m).any() {
-                let message = format!("it reaches from {low} to {high}, outside the room");
-                return Err(self.source.error_at(&at, message, within(room)));
-            }
+            let outside = low.min_element() < 0.0 || high.cmpgt(room.size_m).any();
+            let message = format!("it reaches from {low} to {high}, outside the room");
+            self.require(!outside, &at, message, within(room))?;
             obstacles.push(obstacle);
         }
         Ok(obstacles)
     }
 
     fn luminaires(&mut self, specs: &[LuminaireSpec], room: &Room) -> Result<Vec<Luminaire>, SpecError> {
-        if specs.is_empty() {
-            return Err(self.source.error_at("luminaires", "there are none", "give at least one luminaire"));
-        }
+        self.require(!specs.is_empty(), "luminaires", "there are none", "give at least one luminaire")?;
         let mut ids = HashSet::new();
         let mut files: BTreeMap<PathBuf, Arc<Photometry>> = BTreeMap::new();
         let mut luminaires = vec![];
         for (k, spec) in specs.iter().enumerate() {
             let at = |field: &str| format!("luminaires[{k}].{field}");
-            if spec.id.is_empty() || !ids.insert(&spec.id) {
-                let message = format!("`{}` is no unique name", spec.id);
-                return Err(self.source.error_at(&at("id"), message, "give every luminaire an id of its own"));
-            }
+            let is_name = !spec.id.is_empty() && ids.insert(&spec.id);
+            let message = format!("`{}` is no unique name", spec.id);
+            self.require(is_name, &at("id"), message, "give every luminaire an id of its own")?;
             let position_m = DVec3::from(spec.at_m);
             // A luminous opening may be flush with a surface; light from a single point on one would be half lost.
             let margin = if spec.model == ModelSpec::Point { SURFACE_MARGIN * room.size_m.max_element() } else { 0.0 };
-            if !(position_m.is_finite() && room.contains(position_m, margin)) {
-                let message = format!("{position_m} lies outside the room or on its surface");
-                return Err(self.source.error_at(&at("at_m"), message, within(room)));
-            }
-            if !(spec.flux_scale.is_finite() && spec.flux_scale >= 0.0) {
-                let message = format!("{} is no factor", spec.flux_scale);
-                return Err(self.source.error_at(&at("flux_scale"), message, "give a number from 0"));
-            }
+            let inside = position_m.is_finite() && room.contains(position_m, margin);
+            let message = format!("{position_m} lies outside the room or on its surface");
+            self.require(inside, &at("at_m"), message, within(room))?;
+            let is_factor = spec.flux_scale.is_finite() && spec.flux_scale >= 0.0;
+            let message = format!("{} is no factor", spec.flux_scale);
+            self.require(is_factor, &at("flux_scale"), message, "give a number from 0")?;
             let turn = spec.rotate_deg;
-            if ![turn.azimuth, turn.tilt, turn.roll].iter().all(|a| a.is_finite()) {
-                return Err(self.source.error_at(&at("rotate_deg"), "angles must be finite", "give degrees"));
-            }
+            let finite = [turn.azimuth, turn.tilt, turn.roll].iter().all(|a| a.is_finite());
+            self.require(finite, &at("rotate_deg"), "angles must be finite", "give degrees")?;
             let path = self.beside(&spec.photometry);
             let photometry = match files.get(&path) {
                 Some(read) => Arc::clone(read),
@@ -281,9 +265,7 @@ impl<'a> Builder<'a> {
                 return Err(self.source.error_at(&at, message, "give exactly one of `points_m` and `grid`"));
             }
         };
-        if points.is_empty() {
-            return Err(self.source.error_at(&at, "the set holds no points", "give at least one"));
-        }
+        self.require(!points.is_empty(), &at, "the set holds no points", "give at least one")?;
         for (k, &point) in points.iter().enumerate() {
             if let Some((message, help)) = misplaced(point, scene) {
                 let path = if place == "grid" { format!("{at}.grid") } else { format!("{at}.points_m[{k}]") };
@@ -295,11 +277,9 @@ impl<'a> Builder<'a> {
 
     fn grid(&self, at: &str, grid: &GridSpec) -> Result<Vec<DVec3>, SpecError> {
         let [nu, nv] = grid.counts;
-        if nu.checked_mul(nv).is_none_or(|n| n == 0 || n > MAX_METERS) {
-            let message = format!("{nu} x {nv} points");
-            let help = format!("give counts whose product lies between 1 and {MAX_METERS}");
-            return Err(self.source.error_at(&format!("{at}.grid.counts"), message, help));
-        }
+        let sound = nu.checked_mul(nv).is_some_and(|n| (1..=MAX_METERS).contains(&n));
+        let help = format!("give counts whose product lies between 1 and {MAX_METERS}");
+        self.require(sound, &format!("{at}.grid.counts"), format!("{nu} x {nv} points"), help)?;
         let (origin, u, v) = (DVec3::from(grid.origin_m), DVec3::from(grid.u_m), DVec3::from(grid.v_m));
         Ok((0..nv).flat_map(|j| (0..nu).map(move |i| origin + u * i as f64 + v * j as f64)).collect())
     }
@@ -310,9 +290,7 @@ impl<'a> Builder<'a> {
         luminaires: &[LuminaireSpec],
         meters: &BTreeMap<String, Vec<Meter>>,
     ) -> Result<(), SpecError> {
-        if procedures.0.is_empty() {
-            return Err(self.source.error_at("procedures", "there are none", "give at least one procedure"));
-        }
+        self.require(!procedures.0.is_empty(), "procedures", "there are none", "give at least one procedure")?;
         for (procedure, asked) in &procedures.0 {
             match asked {
                 Asked::Meters(asked) => self.meter_sets(*procedure, &asked.meters, meters)?,
@@ -341,38 +319,25 @@ impl<'a> Builder<'a> {
         luminaires: &[LuminaireSpec],
     ) -> Result<(), SpecError> {
         let at = |field: &str| format!("procedures.{procedure}.{field}");
-        if !luminaires.iter().any(|l| l.id == intensity.luminaire) {
-            let message = format!("there is no luminaire `{}`", intensity.luminaire);
-            let help = suggestion(&intensity.luminaire, luminaires.iter().map(|l| l.id.as_str()));
-            return Err(self.source.error_at(&at("luminaire"), message, help));
-        }
-        if !(intensity.distance_m.is_finite() && intensity.distance_m > 0.0) {
-            let message = format!("{} m is no distance", intensity.distance_m);
-            return Err(self.source.error_at(&at("distance_m"), message, "give a positive number of metres"));
-        }
-        if let Angles::Listed(lists) = &intensity.angles {
-            let sound = |g: &f64| (0.0..=180.0).contains(g);
-            if lists.gamma_deg.is_empty() || !lists.gamma_deg.iter().all(sound) {
-                let help = "list gamma angles from 0 (nadir) to 180 (zenith)";
-                return Err(self.source.error_at(&at("angles.gamma_deg"), "not a list of gamma angles", help));
-            }
-            if lists.c_deg.is_empty() || !lists.c_deg.iter().all(|c| c.is_finite()) {
-                return Err(self.source.error_at(
-                    &at("angles.c_deg"),
-                    "not a list of C angles",
-                    "list C planes in degrees",
-                ));
-            }
-        }
-        Ok(())
+        let ids = || luminaires.iter().map(|l| l.id.as_str());
+        let message = format!("there is no luminaire `{}`", intensity.luminaire);
+        let help = suggestion(&intensity.luminaire, ids());
+        self.require(ids().any(|id| id == intensity.luminaire), &at("luminaire"), message, help)?;
+        let is_distance = intensity.distance_m.is_finite() && intensity.distance_m > 0.0;
+        let message = format!("{} m is no distance", intensity.distance_m);
+        self.require(is_distance, &at("distance_m"), message, "give a positive number of metres")?;
+        let Angles::Listed(lists) = &intensity.angles else { return Ok(()) };
+        let all = |list: &[f64], sound: fn(&f64) -> bool| !list.is_empty() && list.iter().all(sound);
+        let (gamma, c) = (all(&lists.gamma_deg, |g| (0.0..=180.0).contains(g)), all(&lists.c_deg, |c| c.is_finite()));
+        let help = "list gamma angles from 0 (nadir) to 180 (zenith)";
+        self.require(gamma, &at("angles.gamma_deg"), "not a list of gamma angles", help)?;
+        self.require(c, &at("angles.c_deg"), "not a list of C angles", "list C planes in degrees")
     }
 
     fn budget(&self, budget: Budget) -> Result<(), SpecError> {
         for (field, value) in [("relative_error", budget.relative_error), ("seconds", budget.seconds)] {
-            if !(value.is_finite() && value > 0.0) {
-                let at = format!("budget.{field}");
-                return Err(self.source.error_at(&at, format!("{value} is no budget"), "give a positive number"));
-            }
+            let (at, message) = (format!("budget.{field}"), format!("{value} is no budget"));
+            self.require(value.is_finite() && value > 0.0, &at, message, "give a positive number")?;
         }
         Ok(())
     }
@@ -387,13 +352,22 @@ impl<'a> Builder<'a> {
                 self.source.error_at("tolerances", format!("`{name}` is no procedure"), help)
             })?;
             let values = [tolerance.relative, tolerance.absolute_lx, tolerance.absolute_cd];
-            if values.iter().all(|v| v.is_finite() && *v >= 0.0) {
-                return Ok((procedure, *tolerance));
-            }
-            let at = format!("tolerances.{name}");
-            Err(self.source.error_at(&at, "a tolerance is a number from 0", "give positive numbers"))
+            let (at, sound) = (format!("tolerances.{name}"), values.iter().all(|v| v.is_finite() && *v >= 0.0));
+            self.require(sound, &at, "a tolerance is a number from 0", "give positive numbers")?;
+            Ok((procedure, *tolerance))
         };
         tolerances.iter().map(one).collect()
+    }
+
+    /// Refuses the spec at a place where something is not sound: what is wrong, and what to do.
+    fn require(
+        &self,
+        sound: bool,
+        at: &str,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Result<(), SpecError> {
+        if sound { Ok(()) } else { Err(self.source.error_at(at, message, help)) }
     }
 
     fn beside(&self, file: &Path) -> PathBuf {

@@ -17,7 +17,8 @@ pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
     for case in &cases {
         if let Some(other) = names.insert(&case.name, &case.path) {
             let message = format!("holds a case `{}`, and so does {}", case.name, other.display());
-            return Err(SpecError::of(&case.path, message, "run them apart, or rename one: a report tells cases by name"));
+            let help = "run them apart, or rename one: a report tells cases by name";
+            return Err(SpecError::of(&case.path, message, help));
         }
     }
     Ok(cases)
@@ -30,8 +31,8 @@ pub fn filtered(cases: Vec<Case>, patterns: &[String]) -> Result<Vec<Case>, Spec
     let option = Path::new("--filter");
     let mut globs = vec![];
     for pattern in patterns.iter().filter(|p| p.contains(['*', '?', '['])) {
-        let refused =
-            |e| SpecError::of(option, format!("`{pattern}` is no pattern: {e}"), "use *, ? or [...], or a part of the name");
+        let help = "use *, ? or [...], or a part of the name";
+        let refused = |e| SpecError::of(option, format!("`{pattern}` is no pattern: {e}"), help);
         globs.push(glob::Pattern::new(pattern).map_err(refused)?);
     }
     let is_part = |name: &str| patterns.iter().any(|p| !p.contains(['*', '?', '[']) && name.contains(p.as_str()));

@@ -3,7 +3,7 @@
 use luminaire::geometry::Surface;
 use luminaire::scene::{Bounces, Scene, Transport};
 
-use super::{Fill, Shortcut, is_direct};
+use super::{Fill, Shortcut};
 use crate::plan::Scope;
 
 /// How often light can be reflected in a scene, where that is told by looking at it.
@@ -18,9 +18,6 @@ enum Reflections {
 /// Leaves out reflections that there are none of.
 pub(super) fn shorten(shortcut: &mut Shortcut) {
     let transport = shortcut.job.transport;
-    if is_direct(transport) {
-        return;
-    }
     let (Transport::Indirect(asked) | Transport::Total(asked)) = transport else { return };
     let most = reflections(&shortcut.job.scene);
     let nothing = asked == Bounces::AtMost(0) || most == Reflections::None;

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 use luminaire::photometry::angles_deg;
-use luminaire::scene::{Luminaire, LuminaireModel, Meter};
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Transport};
 
-use super::{Fill, Shortcut, is_direct};
+use super::{Fill, Shortcut};
 use crate::engines::Job;
 use crate::plan::Scope;
 
@@ -13,7 +13,7 @@ const MARGIN_DEG: f64 = 1.0;
 
 /// Leaves out meters without direct light.
 pub(super) fn shorten(shortcut: &mut Shortcut, asked: &Job) {
-    if !is_direct(shortcut.job.transport) {
+    if shortcut.job.transport != Transport::Direct {
         return;
     }
     let lights: Vec<Lit> = asked.scene.luminaires.iter().map(Lit::of).collect();

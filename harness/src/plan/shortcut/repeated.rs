@@ -40,7 +40,7 @@ impl Repeated {
         } else {
             format!("the same job as that of {there} but for the flux: rescaled by {:.6}", shortcut.factor)
         };
-        shortcut.job = Job { stations: earlier.stations.clone(), ..earlier.clone() };
+        shortcut.job = earlier.clone();
         shortcut.omit(Scope::Meter, 1.0, reason);
     }
 }

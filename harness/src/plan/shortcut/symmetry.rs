@@ -1,6 +1,6 @@
 //! Symmetric scenes: of meters that a symmetry of room, bodies and luminaires takes to one another, one is rendered; pure.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DMat3, DVec3};
 use luminaire::geometry::{Room, Surface};
@@ -34,12 +34,10 @@ pub(super) fn shorten(shortcut: &mut Shortcut, asked: &Job) {
                 .any(|(k, s)| places.get(&place(&m.meter(&s.meter), size_m)).is_some_and(|j| *j != k))
     });
     motions.retain(|m| m.is_identity() || is_symmetric(&asked.scene, m));
-    let mut wanted = vec![];
     let mut images: Vec<Option<(usize, String)>> = vec![];
     let mut from: BTreeMap<[i64; 6], (usize, String)> = BTreeMap::new();
     for (k, station) in stations.iter().enumerate() {
         let known = from.get(&place(&station.meter, size_m)).cloned();
-        wanted.push(known.is_none());
         if known.is_none() {
             for motion in &motions {
                 let image = place(&motion.meter(&station.meter), size_m);
@@ -48,23 +46,16 @@ pub(super) fn shorten(shortcut: &mut Shortcut, asked: &Job) {
         }
         images.push(known);
     }
-    let left_out = wanted.iter().filter(|w| !**w).count();
+    let (left_out, all) = (images.iter().flatten().count(), images.len());
     if left_out == 0 {
         return;
     }
-    let mut names: Vec<String> = images.iter().flatten().map(|(_, by)| by.clone()).collect();
-    names.sort();
-    names.dedup();
-    let all = wanted.len();
-    let image = |k: usize| match &images[k] {
-        Some((station, by)) => Fill::Mirrors { station: *station, by: by.clone() },
-        None => Fill::Rendered(k),
-    };
+    let names: BTreeSet<&str> = images.iter().flatten().map(|(_, by)| by.as_str()).collect();
+    let names = Vec::from_iter(names).join(" or ");
+    let reason = format!("room and luminaires are the same after {names}: {left_out} of {all} meters mirror others");
+    let wanted: Vec<bool> = images.iter().map(Option::is_none).collect();
+    let image = |k: usize| images[k].clone().map_or(Fill::Rendered(k), |(station, by)| Fill::Mirrors { station, by });
     shortcut.render_only(&wanted, image);
-    let reason = format!(
-        "room and luminaires are the same after {}: {left_out} of {all} meters mirror others",
-        names.join(" or ")
-    );
     shortcut.omit(Scope::Meter, left_out as f64 / all as f64, reason);
 }
 

@@ -1,7 +1,7 @@
 //! Laws of shortcuts: what they leave out is what the exact simulation says it is, and what is not symmetric is left alone.
 
 use glam::DVec3;
-use luminaire::scene::{Bounces, LuminaireModel, Obstacle, Scene, Shape, orientation};
+use luminaire::scene::{Bounces, LuminaireModel, Obstacle, Scene, Shape, Transport, orientation};
 use luminaire::simulator::{Accuracy, illuminance};
 
 use super::*;
