@@ -5,18 +5,20 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::Instant;
 
-use luminaire::scene::{Bounces, Transport};
+use glam::DVec3;
+use luminaire::calculators::inverse_square::from_luminaire;
+use luminaire::scene::{Bounces, Luminaire, Meter, Transport};
 
 use crate::engines::blocks::{MIN_BLOCKS, Sampling};
 use crate::engines::image::read_rgb;
 use crate::engines::settings::Preset;
-use crate::engines::{EngineError, Job, Measurement, SceneFile, Site, Workbench};
+use crate::engines::{EngineError, Job, Measurement, SceneFile, Site, Station, Workbench};
 use crate::record::{Effort, Estimate, Method, Uncertainty};
 use crate::system::process::Invocation;
 
 use super::ID;
 use super::export::{self, Light};
-use super::frame::Frame;
+use super::frame::{self, Frame};
 use super::pixels::{self, Readout, Seen};
 use super::settings::{FIRST_REFLECTION_RAYS, LONG_POOL, POOL, Settings};
 
@@ -105,10 +107,15 @@ impl<'a> Bench<'a> {
             }
         }
         let mut estimates = vec![];
-        for (look, scale) in looks.iter().zip(&first) {
+        let frame = Frame::of(self.job, self.settings.coordinates);
+        let shifts = frame::seats(self.job, frame)
+            .into_iter()
+            .zip(&self.job.stations)
+            .map(|(p, s)| self.shift_lx(frame.metres(p), s));
+        for ((look, scale), shift_lx) in looks.iter().zip(&first).zip(shifts) {
             let Look::Done { lx, resolution_lx } = *look else { continue };
             // Bilinear maps in single precision are off by a share of the largest intensity, not of this one.
-            let bound = resolution_lx + DIRECT_RELATIVE * lx + self.table_error() * scale_of(*scale);
+            let bound = resolution_lx + DIRECT_RELATIVE * lx + self.table_error() * scale_of(*scale) + shift_lx;
             estimates.push(Estimate { value: lx, uncertainty: Uncertainty::Bound(bound) });
         }
         let effort = Effort::from([("looks", taken.to_string()), ("arguments", self.printed_arguments(run))]);
@@ -283,8 +290,16 @@ impl<'a> Bench<'a> {
         (mixed % 0x7fff_fffe) as u32 + 1
     }
 
+    /// What a disc that does not lie quite at its meter may read otherwise.
+    fn shift_lx(&self, seat_m: DVec3, station: &Station) -> f64 {
+        let seated = Meter { position_m: seat_m, ..station.meter };
+        let shift =
+            |l: &Luminaire| (from_luminaire(l, &seated).value() - from_luminaire(l, &station.meter).value()).abs();
+        self.job.scene.luminaires.iter().map(shift).sum()
+    }
+
     fn table_error(&self) -> f64 {
-        let axial = |l: &luminaire::scene::Luminaire| l.photometry.distribution.c_deg().len() == 1;
+        let axial = |l: &Luminaire| l.photometry.distribution.c_deg().len() == 1;
         if self.job.scene.luminaires.iter().all(axial) { AXIAL_TABLE } else { BILINEAR_TABLE }
     }
 

@@ -198,8 +198,8 @@ const AIM: &str = "
 #macro AimAt(P, N)
   #local U = vnormalize(vcross(N, #if (abs(N.x) < .7) x #else y #end));
   #local V = vcross(N, U);
-  #local C = P - (U + V)*1e-4;
-  triangle { C, C + V*3e-4, C + U*3e-4 }  // its normal, (P3 - P1) x (P2 - P1), is the meter's
+  #local C = P - (U + V)*.1;  // wide, as a mesh is kept in single precision
+  triangle { C, C + V*.3, C + U*.3 }  // its normal, (P3 - P1) x (P2 - P1), is the meter's
 #end
 #declare Aim = mesh {
   #for (K, 1, Blanks) AimAt(BlankSeat(K), z) #end

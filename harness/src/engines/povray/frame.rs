@@ -7,8 +7,8 @@ use glam::DVec3;
 use luminaire::geometry::Surface;
 use luminaire::scene::{Luminaire, Shape};
 
-use crate::engines::Job;
 use crate::engines::settings::Coordinates;
+use crate::engines::{Job, Station};
 
 /// From metres of the spec to units of the scene: (p - centre) scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +43,10 @@ impl Frame {
 
     pub(super) fn point(self, p_m: DVec3) -> DVec3 {
         (p_m - self.centre_m) * self.scale
+    }
+
+    pub(super) fn metres(self, point: DVec3) -> DVec3 {
+        point / self.scale + self.centre_m
     }
 }
 
@@ -80,25 +84,48 @@ fn extent_m(job: &Job) -> (DVec3, DVec3) {
 pub(super) fn seats(job: &Job, frame: Frame) -> Vec<DVec3> {
     let points: Vec<DVec3> = job.stations.iter().map(|s| frame.point(s.meter.position_m)).collect();
     let normal = |k: usize| job.stations[k].meter.normal;
-    let seat = |k: usize| {
-        if on_a_surface(job, frame, points[k]) {
-            return points[k] + CLEAR * normal(k);
-        }
-        // Each of two crossing discs lies a little behind its own meter: another's front comes after it, and another's
-        // back, which is transparent, before it, by more than POV-Ray's least distance between hits.
-        let crosses =
-            |j: usize| j != k && points[j].distance(points[k]) < REACH && normal(j).dot(normal(k)).abs() < 1.0 - 1e-9;
-        if (0..points.len()).any(crosses) { points[k] - BEHIND * normal(k) } else { points[k] }
+    let crossing = |k: usize| {
+        let near = (0..points.len()).filter(|&j| points[j].distance(points[k]) < REACH);
+        near.map(|j| normal(j).cross(normal(k)).length()).filter(|sine| *sine > PARALLEL).reduce(f64::min)
+    };
+    let sines: Vec<Option<f64>> = (0..points.len()).map(crossing).collect();
+    // Each of two crossing discs lies a little behind its own meter, all equally: another's front comes after it, and
+    // another's back, which is transparent, before it, by more than POV-Ray's least distance between hits.
+    let behind = sines.iter().flatten().map(|sine| 4.0 * AIM / sine).fold(BEHIND, f64::max);
+    let seat = |k: usize| match sines[k] {
+        _ if on_a_surface(job, frame, points[k]) => points[k] + CLEAR * normal(k),
+        Some(_) => points[k] - behind * normal(k),
+        None => points[k],
     };
     (0..points.len()).map(seat).collect()
 }
 
 /// How far a disc is lifted off a surface.
 const CLEAR: f64 = 2e-5;
-/// How far a disc lies behind its meter where discs cross.
+/// How far a disc lies behind its meter at least where discs cross.
 const BEHIND: f64 = 1e-4;
-/// Discs nearer than this to each other, twice their radius, may cross.
-const REACH: f64 = 2e-3;
+/// How far a ray may pass a disc's centre: the aim's triangles are kept in single precision, here up to 500 units from
+/// the origin. A front turned by t then seems nearer by t `AIM`, while it lies t^2/2 of the distance behind further off.
+const AIM: f64 = 3e-5;
+/// Sine of the angle below which two discs are one.
+const PARALLEL: f64 = 1e-9;
+/// Sine of the angle below which crossing discs would have to lie further behind their meters than they may.
+const NARROW: f64 = 0.05;
+/// Discs nearer than this to each other may cross.
+const REACH: f64 = 5e-3;
+
+/// Two meters at one point that look nearly the same way: one's disc would be seen for the other's.
+pub(super) fn narrow(job: &Job) -> Option<(&Station, &Station)> {
+    let frame = Frame::of(job, Coordinates::Fitted);
+    job.stations.iter().enumerate().find_map(|(k, a)| {
+        let hides = |b: &&Station| {
+            let sine = a.meter.normal.cross(b.meter.normal).length();
+            let apart = a.meter.position_m.distance(b.meter.position_m) * frame.scale;
+            apart < REACH && (PARALLEL..NARROW).contains(&sine) && a.meter.normal.dot(b.meter.normal) > 0.0
+        };
+        job.stations[k + 1..].iter().find(hides).map(|b| (a, b))
+    })
+}
 
 fn on_a_surface(job: &Job, frame: Frame, point: DVec3) -> bool {
     let near = |distance: f64| distance.abs() < CLEAR / 2.0;

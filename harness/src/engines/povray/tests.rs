@@ -158,6 +158,28 @@ fn several_luminaires_add_up_in_scenes_of_any_size() {
 }
 
 #[test]
+fn discs_that_face_every_way_at_one_point_are_told_apart_within_their_bounds() {
+    for size in [0.02, 1.0, 40.0] {
+        let room = room(DVec3::new(8.0, 6.0, 3.0) * size, 0.2, 0.5, 0.8);
+        let lamp = luminaire("a", DVec3::new(2.0, 2.5, 2.9) * size, lopsided());
+        let around = (0..48).map(|k| {
+            let (up, (sin, cos)) = (f64::from(k) / 24.0 - 1.0 + 1.0 / 48.0, (f64::from(k) * 2.4).sin_cos());
+            (DVec3::new(7.5, 5.5, 0.3) * size, DVec3::new(cos, sin, 0.0) * (1.0 - up * up).sqrt() + DVec3::Z * up)
+        });
+        let meters: Vec<_> = around.collect();
+        let job =
+            job(Scene { room: Some(room), obstacles: vec![], luminaires: vec![lamp] }, &meters, Transport::Direct);
+        let exact = exact_direct_lx(&job);
+        let most = exact.iter().copied().fold(0.0, f64::max);
+        for (estimate, exact) in read(&job).estimates.iter().zip(exact) {
+            let bound = estimate.uncertainty.bound();
+            let off = (estimate.value - exact).abs();
+            assert!(off <= bound && bound < 1e-4 * most, "{size}: {estimate:?}, {exact} lx");
+        }
+    }
+}
+
+#[test]
 fn a_meter_that_faces_away_reads_nothing() {
     let mut job = s1(Transport::Direct);
     job.stations[1].meter.normal = DVec3::Z;
@@ -368,6 +390,13 @@ fn what_povray_cannot_do_is_refused_with_a_reason() {
     assert!(refusal(between).contains("between"));
     let free = |j: &mut Job| (j.scene.room, j.transport) = (None, INDIRECT);
     assert!(refusal(free).contains("free field"));
+    let narrow = |j: &mut Job| {
+        let mut tilted = j.stations[0].clone();
+        let normal = tilted.meter.normal;
+        tilted.meter.normal = (normal + 0.02 * normal.any_orthonormal_vector()).normalize();
+        j.stations.push(tilted);
+    };
+    assert!(refusal(narrow).contains("hide one another"));
     assert_eq!(PovRay.supports(&s1(Transport::Direct)), Support::Yes);
 }
 
