@@ -9,7 +9,6 @@
 pub struct AddingAnEngine;
 
 pub mod audit;
-pub mod calibration;
 pub mod cli;
 pub mod diagnosis;
 pub mod engines;

@@ -5,7 +5,6 @@ use std::time::{Instant, SystemTime};
 
 use super::jobs::{self, Outcome, Running};
 use super::{AuditError, Options, sampling, sequential};
-use crate::calibration::Calibrations;
 use crate::diagnosis;
 use crate::judge::{Comparison, Consensus, Judge, Policy, Published, PublishedTable, Split};
 use crate::measure::Reader;
@@ -21,7 +20,6 @@ pub(super) struct Audit<'a> {
     pub(super) policy: &'a Policy,
     pub(super) options: &'a Options<'a>,
     pub(super) reader: Reader,
-    pub(super) calibrations: Calibrations,
 }
 
 /// Why the cases that are left are not run.
@@ -79,7 +77,7 @@ impl Audit<'_> {
     fn readings(&self, case: &Case, plan: &Plan, judge: &Judge<'_>, folder: &Path) -> Result<Outcome, AuditError> {
         let reader = Reader { out: Some(folder.to_owned()), ..self.reader.clone() };
         let observer = self.options.observer;
-        let running = Running { case, plan, folder, reader, calibrations: &self.calibrations, observer };
+        let running = Running { case, plan, folder, reader, observer };
         let mut outcome = running.run()?;
         if !process::is_interrupted() {
             sampling::sample_on(&running, judge, &mut outcome)?;

@@ -6,7 +6,6 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::observer::Observer;
-use crate::calibration::{Calibrated, Calibrations, Origin};
 use crate::engines::{EngineError, Measurement};
 use crate::measure::{Cost, Failure, FailureKind, Question, Reader, Source, Taken};
 use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
@@ -23,8 +22,6 @@ pub struct Running<'a> {
     pub folder: &'a Path,
     /// Who takes readings; cases that run side by side share its machine.
     pub reader: Reader,
-    /// What cases share of their instruments.
-    pub calibrations: &'a Calibrations,
     pub observer: &'a dyn Observer,
 }
 
@@ -51,13 +48,11 @@ impl Running<'_> {
     /// Runs every job of the plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
     pub fn run(&self) -> Result<Outcome, FileError> {
         let threads = self.reader.machine.slots.threads();
-        let engines: Vec<usize> = (0..self.plan.engines.len()).collect();
-        let instruments = side_by_side(threads, &engines, |&e| self.instrument(e));
         // By place in the plan.
         let kept: Mutex<BTreeMap<usize, Recording>> = Mutex::default();
         let runs: Vec<(usize, &Run)> = self.plan.runs.iter().enumerate().collect();
         let one = |&(k, run): &(usize, &Run)| -> Result<Done, FileError> {
-            let done = self.measure(run, &instruments[run.engine]);
+            let done = self.measure(run);
             if let Done::Recorded(recording, _) = &done {
                 let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
                 kept.insert(k, (**recording).clone());
@@ -80,50 +75,20 @@ impl Running<'_> {
         Ok(Outcome { recordings, engines, skips, from_cache })
     }
 
-    /// The calibration of an engine of the plan; `None` where it has nothing to do or is one of our own solvers, which are what
-    /// the others are calibrated by.
-    fn instrument(&self, e: usize) -> Result<Option<Calibrated>, String> {
-        let planned = &self.plan.engines[e];
-        let (Some(instrument), Some(run)) = (planned.instrument(), self.plan.runs.iter().find(|r| r.engine == e))
-        else {
-            return Ok(None);
-        };
-        if planned.engine.is_witness() {
-            return Ok(None);
-        }
-        self.observer.started(self.case, planned.engine.as_ref(), "calibration");
-        let made = |calibrated: &Calibrated| {
-            if calibrated.origin == Origin::Measured {
-                self.observer.calibrated(planned.engine.as_ref(), calibrated);
-            }
-        };
-        self.calibrations.of(&instrument, &run.job, &self.reader, made).map(Some)
-    }
-
     /// One run of the plan: the one place where a recording is made of what engines answer.
-    fn measure(&self, run: &Run, instrument: &Result<Option<Calibrated>, String>) -> Done {
+    fn measure(&self, run: &Run) -> Done {
         let (planned, task) = (&self.plan.engines[run.engine], &self.plan.tasks[run.task]);
         let engine = planned.engine.as_ref();
         self.observer.started(self.case, engine, task.procedure.name());
         let start = Instant::now();
-        let taken = match instrument {
-            Ok(_) => answer(planned, run, &self.reader, task.procedure.name()),
-            // An instrument that reads known scenes wrong reads nothing.
-            Err(reason) => Err(EngineError::Solver { engine: engine.name(), what: reason.clone() }.into()),
-        };
+        let taken = answer(planned, run, &self.reader, task.procedure.name());
         if let Err(Failure { kind: FailureKind::Declined, text: why }) = &taken {
             self.observer.ended(self.case, engine, task.procedure, start.elapsed(), None);
             let reason = format!("it declines: {why}");
             return Done::Declined(Skip::of(self.case, task, engine.name(), Scope::Procedure, reason));
         }
         let source = taken.as_ref().ok().map(|taken| taken.source);
-        let mut recording = self.record(run, taken, start.elapsed());
-        if let Ok(Some(calibrated)) = instrument {
-            recording.instrument_uncertainty = calibrated.calibration.uncertainty(run.job.transport);
-            if let Ok(file) = &calibrated.kept {
-                recording.effort.insert("calibration".to_owned(), file.clone());
-            }
-        }
+        let recording = self.record(run, taken, start.elapsed());
         let wall = Duration::from_secs_f64(recording.wall_s);
         self.observer.ended(self.case, engine, task.procedure, wall, recording.failure.as_deref());
         Done::Recorded(Box::new(recording), source)
@@ -157,6 +122,7 @@ impl Running<'_> {
             approximation: run.approximation.clone(),
             notes: measurement.notes,
             wall_s,
+            instrument_uncertainty: planned.engine.read_out().map_or(0.0, |read_out| read_out.relative),
             components: planned.engine.components(&run.job).into_iter().map(str::to_owned).collect(),
             command: planned.engine.command_by_hand(&run.job, &self.reader.site),
             failure,

@@ -18,7 +18,6 @@
 //! ```
 
 mod case;
-pub mod doctor;
 pub mod jobs;
 mod observer;
 pub mod sampling;
@@ -30,12 +29,12 @@ use std::time::Instant;
 
 use sha2::{Digest, Sha256};
 
-use crate::calibration::Calibrations;
 use crate::engines::Site;
 use crate::judge::{Policy, Published, PublishedError};
 use crate::measure::cache::Cache;
 use crate::measure::{Machine, Reader};
 use crate::plan::{Plan, Planner, Selection, Skipping};
+use crate::procedures::known;
 use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, SpecError, filtered, hexadecimal, suite};
 use crate::system::files::{self, FileError};
@@ -121,19 +120,27 @@ const MAX_CASES_AT_A_TIME: usize = 8;
 /// Runs every case of specs, folders and patterns and judges what engines read; files are written below [`Options::out`] alone.
 pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<Report, AuditError> {
     let clock = Instant::now();
-    let cases = chosen(specs, options)?;
+    let mut cases = chosen(specs, options)?;
     let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
     let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
+    let asked = cases.len();
+    for (case, plan) in planner.calibrations(&cases, &plans)? {
+        cases.push(case);
+        plans.push(plan);
+    }
     let published = published(&cases)?;
     for ((case, plan), published) in cases.iter().zip(&mut plans).zip(&published) {
         options.sampling.grant(&policy.judge(case, published.as_ref()), plan);
     }
     options.observer.planned(&cases, &plans);
-    let audit = Audit { policy, options, reader: options.reader(), calibrations: Calibrations::default() };
+    let audit = Audit { policy, options, reader: options.reader() };
     let stop: Mutex<Option<Stop>> = Mutex::new(None);
     let one = |&k: &usize| -> Result<Report, AuditError> {
         let (case, plan) = (&cases[k], &plans[k]);
-        let folder = if cases.len() == 1 { options.out.clone() } else { options.out.join(within(&options.out, case)) };
+        let folder = match asked {
+            1 if k < asked => options.out.clone(),
+            _ => options.out.join(within(&options.out, case)),
+        };
         let stopped = stop.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let report = audit.case(case, plan, published[k].as_ref(), stopped.as_ref(), &folder)?;
         let mut stop = stop.lock().unwrap_or_else(PoisonError::into_inner);
@@ -151,13 +158,21 @@ pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<
     let side = if options.after_failure == AfterFailure::Stop { 1 } else { options.jobs.clamp(1, MAX_CASES_AT_A_TIME) };
     let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
     let reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let mut report = Report::joined(record(specs, &cases), reports);
-    if cases.len() > 1 {
-        // Cases ran side by side: their seconds do not add up.
-        report.wall_s = clock.elapsed().as_secs_f64();
-        files::keep_json(&options.out.join("report.json"), &report)?;
-    }
+    let mut report = Report::joined(record(specs, &cases[..asked]), reports);
+    // Scenes of known answer are nobody's spec.
+    report.cases.truncate(asked);
+    // Cases ran side by side: their seconds do not add up.
+    report.wall_s = clock.elapsed().as_secs_f64();
+    files::keep_json(&options.out.join("report.json"), &report)?;
     Ok(report)
+}
+
+/// Lets engines, those of a spec too where one is given, read the scenes of known answer, and judges what they read.
+pub fn examine(spec: Option<&Path>, policy: &Policy, options: &Options<'_>) -> Result<Report, AuditError> {
+    let of = spec.map(Case::load).transpose()?.unwrap_or_default();
+    let mut planner = Planner::new(&options.selection, &options.site, Skipping::Nothing);
+    let (case, plan) = planner.known(&of, "", known::tasks(), &|_| true)?;
+    Audit { policy, options, reader: options.reader() }.case(&case, &plan, None, None, &options.out)
 }
 
 /// The cases that are asked for, read and checked before any engine starts.

@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use crate::calibration::Calibrated;
 use crate::engines::Engine;
 use crate::plan::Plan;
 use crate::record::ProcedureId;
@@ -14,8 +13,6 @@ pub trait Observer: Sync {
     fn planned(&self, _cases: &[Case], _plans: &[Plan]) {}
     /// A job starts.
     fn started(&self, _case: &Case, _engine: &dyn Engine, _what: &str) {}
-    /// An engine was calibrated just now: what that found and where it is kept.
-    fn calibrated(&self, _engine: &dyn Engine, _found: &Calibrated) {}
     /// A job ended, with its failure if it failed.
     fn ended(
         &self,

@@ -1,20 +1,17 @@
 //! `luxproof engines`: which there are, installing them, examining them.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
-use crate::audit::doctor;
-use crate::calibration::{self, Calibrated, Earlier};
-use crate::engines::{self, Engine, InstallState, Site};
-use crate::judge::Tolerances;
-use crate::measure::{Instrument, Machine, Reader};
+use super::run::not_audited;
+use crate::audit::{self, Options};
+use crate::engines::{self, InstallState, Site};
+use crate::judge::Policy;
 use crate::record::EngineName;
-use crate::report::Exit;
+use crate::report::{Detail, Exit, Style, terminal};
 use crate::spec::suggestion;
-use crate::system::process;
 
 #[derive(Clone, Debug, Subcommand)]
 pub(super) enum EnginesAction {
@@ -25,10 +22,13 @@ pub(super) enum EnginesAction {
         /// Engines by name [default: all]
         names: Vec<String>,
     },
-    /// Let every engine read a scene of known answer
+    /// Let engines read scenes of known answer and judge what they read
     Doctor {
         /// Engines by name [default: all]
         names: Vec<String>,
+        /// The spec whose engines, adapters among them, are examined, too
+        #[arg(long, value_name = "FILE")]
+        spec: Option<PathBuf>,
     },
 }
 
@@ -48,45 +48,17 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site) -> Resu
             known_engines(&names)?;
             Ok(report_installation(site, &names))
         }
-        EnginesAction::Doctor { names } => {
-            known_engines(&names)?;
-            examine(site, &names)
-        }
+        EnginesAction::Doctor { names, spec } => examine(site, &names, spec.as_deref()),
     }
 }
 
-fn examine(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
-    let tolerances = Tolerances::built_in().into_diagnostic()?;
-    let reader = Reader::bare(site, Machine::rendering_everything(process::cores()));
-    let mut exit = Exit::Passed;
-    for engine in engines::all() {
-        let engine: Arc<dyn Engine> = engine.into();
-        if names.is_empty() || names.iter().any(|n| engine.name() == *n) {
-            let finding = doctor::examine(&engine, &reader, &tolerances);
-            println!("{} {:<10} {}", if finding.healthy { "ok  " } else { "FAIL" }, finding.engine, finding.text);
-            exit = exit.worse(if finding.healthy { Exit::Passed } else { Exit::Engine });
-            exit = exit.worse(calibrate_anew(engine, &reader));
-        }
-    }
-    Ok(exit)
-}
-
-fn calibrate_anew(engine: Arc<dyn Engine>, reader: &Reader) -> Exit {
-    let version = match engine.probe(&reader.site) {
-        Ok(version) if !engine.is_witness() => version,
-        _ => return Exit::Passed,
-    };
-    let name = engine.name();
-    match calibration::calibrate(&Instrument { engine, version }, &BTreeMap::new(), reader, Earlier::Ignored) {
-        Ok(found) => {
-            println!("     {name:<10} {}", calibration_line(&found));
-            Exit::Passed
-        }
-        Err(error) => {
-            println!("FAIL {name:<10} {error}");
-            Exit::Engine
-        }
-    }
+fn examine(site: &Site, names: &[String], spec: Option<&Path>) -> Result<Exit, Diagnostic> {
+    let folder = tempfile::tempdir().into_diagnostic()?;
+    let mut options = Options::new(site.clone(), folder.path().to_owned());
+    options.selection.engines = names.to_vec();
+    let report = audit::examine(spec, &Policy::built_in().into_diagnostic()?, &options).map_err(not_audited)?;
+    print!("{}", terminal(&report, Style::Plain, Detail::Brief, None));
+    Ok(report.exit())
 }
 
 pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
@@ -106,12 +78,4 @@ pub(super) fn report_installation(site: &Site, names: &[String]) -> Exit {
     }
     let failed = outcomes.iter().any(|o| o.state == InstallState::Failed);
     if failed { Exit::Engine } else { Exit::Passed }
-}
-
-pub(super) fn calibration_line(found: &Calibrated) -> String {
-    let kept = match &found.kept {
-        Ok(file) => format!("kept in {file}"),
-        Err(why) => format!("not kept, so that it is measured again next time: {why}"),
-    };
-    format!("{}; {kept}", found.calibration.summary())
 }

@@ -6,9 +6,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::engines::calibration_line;
 use crate::audit::Observer;
-use crate::calibration::Calibrated;
 use crate::engines::Engine;
 use crate::plan::{Plan, Run};
 use crate::record::ProcedureId;
@@ -98,10 +96,6 @@ impl Observer for Progress {
     fn started(&self, case: &Case, engine: &dyn Engine, what: &str) {
         let left = self.work().left(self.start.elapsed());
         self.bar.set_message(format!("{}: {}: {what}, {left}", case.name, engine.name()));
-    }
-
-    fn calibrated(&self, engine: &dyn Engine, found: &Calibrated) {
-        self.line(&format!("{}: calibrated before its first use: {}", engine.name(), calibration_line(found)));
     }
 
     fn ended(&self, case: &Case, engine: &dyn Engine, procedure: ProcedureId, wall: Duration, failure: Option<&str>) {

@@ -37,10 +37,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
         report_installation(site, &args.selected.engines);
     }
     let report = audit::run(&args.selected.specs, &Policy::built_in().into_diagnostic()?, &options);
-    let mut report = report.map_err(|error| match error {
-        AuditError::Spec(error) => diagnose(error),
-        other => Diagnostic::from_err(other),
-    })?;
+    let mut report = report.map_err(not_audited)?;
     let root = options.out.clone();
     drop(progress);
     if let Some(path) = &args.baseline {
@@ -80,4 +77,11 @@ fn out_folder(args: &RunArgs) -> PathBuf {
     };
     let name = stem.map_or(Path::new("suite"), Path::new);
     args.out.clone().unwrap_or_else(|| Path::new("luxproof-out").join(name))
+}
+
+pub(super) fn not_audited(error: AuditError) -> Diagnostic {
+    match error {
+        AuditError::Spec(error) => diagnose(error),
+        other => Diagnostic::from_err(other),
+    }
 }

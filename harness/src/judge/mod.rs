@@ -280,7 +280,7 @@ fn reference_of_task(task: &Task, recordings: &[&Recording], k: usize, engine: &
     let (witness, basis, source) = match task.reference() {
         procedures::Reference::Witness { engine, basis, source } => (engine, basis, source),
         procedures::Reference::Formula { of, source } => {
-            return Some(Held::formula(of(&task.scene, task.targets[k].meter.position_m), source));
+            return Some(Held::formula(of(&task.scene, &task.targets[k]), source));
         }
     };
     if *engine == witness {

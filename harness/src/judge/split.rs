@@ -38,7 +38,7 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
     if task.reference().engine() != Some(&EngineName::SIMULATOR) {
         return vec![];
     }
-    // `instrument` is the relative standard uncertainty that calibration left.
+    // `instrument` is the relative standard uncertainty of the read-out.
     let uncertain = |reading: &Reading, instrument: f64| Uncertain {
         value: Lux(reading.value),
         half_width: Lux(coverage * reading.uncertainty.standard().hypot(instrument * reading.value)),

@@ -17,7 +17,7 @@ const NEGLIGIBLE: f64 = 1e-4;
 pub enum Source {
     /// Chance in the reading: the standard error of sampled light.
     MonteCarlo,
-    /// The engine as an instrument: what its calibration left.
+    /// Our own read-out of the engine.
     Instrument,
     /// The error bound of a deterministic reading: discretisation and read-out.
     Discretisation,

@@ -4,19 +4,22 @@ mod roster;
 mod shortcut;
 mod spot_check;
 
+use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use crate::engines::{Absent, Engine, Job, Site, Support, Version};
 use crate::measure::Instrument;
-use crate::procedures::Task;
+use crate::procedures::{Procedures, Task, known};
 use crate::record::{EngineName, ProcedureId, ReadingKey};
-use crate::spec::{Budget, Case, SpecError};
+use crate::spec::{Budget, Case, SpecError, hexadecimal};
 use luminaire::scene::Transport;
 
-use roster::Roster;
+use roster::{Chosen, Roster};
 use shortcut::Repeated;
 pub use shortcut::{Fill, Omission, Shortcut};
 
@@ -151,6 +154,9 @@ impl Plan {
     }
 }
 
+/// A standard error that is far below the tolerances of reflected light.
+const CALIBRATION: Budget = Budget { relative_error: 2e-3, seconds: 20.0 };
+
 /// Plans one case by itself, with all shortcuts.
 pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, SpecError> {
     Planner::new(selection, site, Skipping::Allowed).plan(case)
@@ -184,6 +190,68 @@ impl<'a> Planner<'a> {
     pub fn plan(&mut self, case: &Case) -> Result<Plan, SpecError> {
         let tasks = tasks(case, self.selection)?;
         let chosen = self.roster.chosen(case, self.selection)?;
+        let mut plan = self.whole(case, tasks, chosen);
+        if self.skipping == Skipping::Allowed {
+            self.shorten(case, &mut plan);
+        }
+        Ok(plan)
+    }
+
+    /// The scenes of known answer for every renderer that reads something in the cases, once for each of its settings, and for
+    /// the simulator; those of reflected light where it reads any. Nothing in them follows from other readings.
+    pub fn calibrations(&mut self, cases: &[Case], plans: &[Plan]) -> Result<Vec<(Case, Plan)>, SpecError> {
+        let (mut done, mut all) = (vec![], vec![]);
+        for (case, plan) in cases.iter().zip(plans) {
+            let mut fresh = vec![];
+            for run in plan.runs.iter().filter(|run| !plan.engines[run.engine].engine.is_witness()) {
+                let reflects = run.job.transport != Transport::Direct;
+                let what = (plan.engines[run.engine].engine.name(), run.job.settings.clone(), reflects);
+                // A program of the user's own lies beside the spec.
+                let place = what.1.contains_key("command").then(|| case.path.parent().map(Path::to_owned)).flatten();
+                if !done.contains(&(what.clone(), place.clone())) {
+                    fresh.push((what.0.clone(), reflects));
+                    done.push((what, place));
+                }
+            }
+            if fresh.is_empty() {
+                continue;
+            }
+            let mut scenes = known::tasks();
+            scenes.retain(|t| t.transport == Transport::Direct || fresh.iter().any(|(_, reflects)| *reflects));
+            let wanted = |engine: &EngineName| fresh.iter().any(|(name, _)| name == engine);
+            let of = if all.is_empty() { "" } else { case.name.as_str() };
+            all.push(self.known(case, of, scenes, &wanted)?);
+        }
+        Ok(all)
+    }
+
+    /// Scenes of known answer, for the simulator and the engines of a case that are wanted; `of` parts several of these in one run.
+    pub fn known(
+        &mut self,
+        case: &Case,
+        of: &str,
+        scenes: Vec<Task>,
+        wanted: &dyn Fn(&EngineName) -> bool,
+    ) -> Result<(Case, Plan), SpecError> {
+        let known = Case {
+            name: [known::CASE, of].join("/").trim_end_matches('/').to_owned(),
+            title: "Scenes of known answer".to_owned(),
+            sha256: hexadecimal(&Sha256::digest(format!("{scenes:?}"))),
+            budget: CALIBRATION,
+            procedures: Procedures::default(),
+            only_engines: None,
+            published: None,
+            tolerances: BTreeMap::new(),
+            ..case.clone()
+        };
+        let mut chosen = self.roster.chosen(&known, self.selection)?;
+        chosen.retain(|(e, _)| e.name() == EngineName::SIMULATOR || !e.is_witness() && wanted(&e.name()));
+        let plan = self.whole(&known, scenes, chosen);
+        Ok((known, plan))
+    }
+
+    /// Every task for every engine, as far as it can.
+    fn whole(&mut self, case: &Case, tasks: Vec<Task>, chosen: Vec<Chosen>) -> Plan {
         let offers: Vec<Vec<Offer>> =
             chosen.iter().map(|(engine, _)| self.offers(case, engine.as_ref(), &tasks)).collect();
         // Who has nothing to do is not even asked for a version.
@@ -208,10 +276,7 @@ impl<'a> Planner<'a> {
             }
             plan.engines.push(Planned { engine, found, asked });
         }
-        if self.skipping == Skipping::Allowed {
-            self.shorten(case, &mut plan);
-        }
-        Ok(plan)
+        plan
     }
 
     /// What an engine makes of each task, from the job alone.

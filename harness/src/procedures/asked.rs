@@ -26,7 +26,8 @@ impl JsonSchema for Procedures {
             schema.insert("description".to_owned(), procedure.meaning.into());
             (procedure.id.name().to_owned(), schema.to_value())
         };
-        let properties: serde_json::Map<_, _> = table::ALL.iter().map(property).collect();
+        let properties: serde_json::Map<_, _> =
+            ProcedureId::ALL.map(ProcedureId::row).into_iter().map(property).collect();
         json_schema!({
             "type": "object", "description": "What is measured; at least one.",
             "properties": properties, "additionalProperties": false,

@@ -18,6 +18,8 @@ pub enum Form {
     MetersAndBounces,
     /// `meters`, `bounces`, `light`.
     MetersAndLight,
+    /// None: a scene of the calibration, for which no spec can ask.
+    Known,
 }
 
 /// What a spec asks of one procedure.
@@ -102,6 +104,7 @@ impl Form {
             Self::Meters => generator.subschema_for::<Meters>(),
             Self::MetersAndBounces => generator.subschema_for::<MetersAndBounces>(),
             Self::MetersAndLight => generator.subschema_for::<MetersAndLight>(),
+            Self::Known => false.into(),
         }
     }
 
@@ -120,6 +123,7 @@ impl Form {
             Self::MetersAndLight => map
                 .next_value::<Option<MetersAndLight>>()?
                 .map(|MetersAndLight { meters, bounces, light }| at(meters, bounces, light)),
+            Self::Known => map.next_value::<()>().map(|()| None)?,
         })
     }
 }

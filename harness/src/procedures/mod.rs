@@ -4,6 +4,7 @@
 
 mod asked;
 mod form;
+pub mod known;
 pub(crate) mod shapes;
 pub mod table;
 mod task;

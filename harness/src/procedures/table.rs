@@ -8,7 +8,8 @@ use luminaire::calculators::inverse_square;
 use luminaire::scene::{LuminaireModel, Meter, Scene, Transport};
 
 use super::form::{AnyLight, Asked, AtMeters, Form};
-use super::task::{Aspect, Task, around, of_sets};
+use super::known;
+use super::task::{Aspect, Target, Task, around, of_sets};
 use crate::record::{Basis, EngineName, ProcedureId, Quantity};
 
 /// One procedure.
@@ -36,8 +37,8 @@ pub struct Procedure {
 pub enum Reference {
     /// The readings of one of our own engines.
     Witness { engine: EngineName, basis: Basis, source: &'static str },
-    /// A closed form of the scene at a place, to a rounding in `f64`.
-    Formula { of: fn(&Scene, DVec3) -> f64, source: &'static str },
+    /// A closed form of the scene at a target, to a rounding in `f64`.
+    Formula { of: fn(&Scene, &Target) -> f64, source: &'static str },
 }
 
 impl Reference {
@@ -58,8 +59,8 @@ impl Reference {
     }
 }
 
-/// Every procedure, in the order of reports. Tolerances stand under the same name in `reference/tolerances.yaml`.
-pub static ALL: [Procedure; 5] = [
+/// Every procedure, in the order of reports, and the scenes of the calibration. Tolerances stand under the same name in `reference/tolerances.yaml`.
+pub static ALL: [Procedure; 12] = [
     Procedure {
         id: ProcedureId::LuminousIntensity,
         title: "Luminous intensity",
@@ -119,13 +120,43 @@ pub static ALL: [Procedure; 5] = [
         aspects: all_around,
         reference: |task| match task.transport {
             Transport::Direct if is_inverse_square(&task.scene) => Reference::Formula {
-                of: |scene, point_m| inverse_square::cylindrical_illuminance(scene, point_m).value(),
+                of: |scene, target| inverse_square::cylindrical_illuminance(scene, target.meter.position_m).value(),
                 source: "inverse square, mean over vertical directions",
             },
             _ => EXACT,
         },
     },
+    known(ProcedureId::Point, "Point", "the inverse-square law from .5 to 10 m", |_| STRAIGHT),
+    known(ProcedureId::Asymmetric, "Asymmetric", "a table without symmetry, turned, all around", |_| STRAIGHT),
+    known(ProcedureId::Luminaires, "Luminaires", "three luminaires that differ", |_| STRAIGHT),
+    known(ProcedureId::Shadow, "Shadow", "light that a box hides, and light that passes it", |_| STRAIGHT),
+    known(ProcedureId::Furnace, "Furnace", "reflected light that is the same everywhere", |_| EVEN),
+    known(ProcedureId::Wall, "Wall", "the same light 5 mm from surfaces, edges and corners", |_| EVEN),
+    known(ProcedureId::Reflectances, "Reflectances", "floor, walls and ceiling that differ", |_| EXACT),
 ];
+
+/// A scene of the calibration.
+const fn known(
+    id: ProcedureId,
+    title: &'static str,
+    meaning: &'static str,
+    reference: fn(&Task) -> Reference,
+) -> Procedure {
+    Procedure {
+        id,
+        title,
+        short: title,
+        meaning,
+        quantity: Quantity::Illuminance,
+        form: Form::Known,
+        transport: |_| Transport::Direct,
+        aspects: as_it_looks,
+        reference,
+    }
+}
+
+const STRAIGHT: Reference = Reference::Formula { of: known::straight, source: "inverse square" };
+const EVEN: Reference = Reference::Formula { of: known::even, source: "rho / (1 - rho) x flux / area" };
 
 /// One illuminance, on the side that the meter looks to.
 fn as_it_looks(meter: Meter) -> (Vec<Aspect>, f64) {
@@ -204,9 +235,10 @@ mod tests {
 
     #[test]
     fn every_procedure_has_its_row_in_the_order_of_reports() {
-        assert_eq!(ALL.each_ref().map(|p| p.id), ProcedureId::ALL);
-        for procedure in ProcedureId::ALL {
-            assert_eq!(procedure.row().id, procedure);
+        assert!(ALL.iter().map(|p| p.id).take(ProcedureId::ALL.len()).eq(ProcedureId::ALL));
+        for (k, procedure) in ALL.iter().enumerate() {
+            assert_eq!(procedure.id as usize, k);
+            assert_eq!(procedure.form == Form::Known, k >= ProcedureId::ALL.len());
         }
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use luminaire::photometry::direction;
 use luminaire::scene::{Luminaire, Meter, Scene, Transport};
 
-use super::form::{Angles, AtAngles, Names};
+use super::form::{Angles, AtAngles, Form, Names};
 use crate::record::{Light, MeterId, ProcedureId, Quantity};
 
 /// What one procedure measures in one case.
@@ -59,6 +59,15 @@ impl Task {
         models.sort_unstable();
         models.dedup();
         if let [one] = models[..] { one.to_owned() } else { "mixed".to_owned() }
+    }
+
+    /// The procedure that an engine is asked for: of a scene of the calibration, the one of its light.
+    pub fn as_asked(&self) -> ProcedureId {
+        match (self.procedure.row().form, self.transport) {
+            (Form::Known, Transport::Direct) => ProcedureId::DirectIlluminance,
+            (Form::Known, _) => ProcedureId::IndirectIlluminance,
+            _ => self.procedure,
+        }
     }
 
     /// Which light counts.

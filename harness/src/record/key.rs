@@ -1,11 +1,12 @@
 //! Names of what is read: case, procedure, engine and meter, each written once.
 
 use std::borrow::{Borrow, Cow};
+use std::str::FromStr;
 
 use derive_more::{Deref, Display};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use strum::{EnumString, IntoStaticStr, VariantNames};
+use strum::{IntoStaticStr, VariantNames};
 
 /// What a recording is of: one engine on one procedure of one case.
 #[derive(Clone, Debug, Display, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
@@ -30,8 +31,8 @@ impl ReadingKey {
 /// A procedure; [`crate::procedures`] says what each measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[derive(EnumString, IntoStaticStr, VariantNames, strum::Display)]
-#[strum(serialize_all = "snake_case", const_into_str, parse_err_ty = UnknownProcedure, parse_err_fn = UnknownProcedure::of)]
+#[derive(IntoStaticStr, VariantNames, strum::Display)]
+#[strum(serialize_all = "snake_case", const_into_str)]
 pub enum ProcedureId {
     /// Procedure 1: the luminous intensity distribution read back.
     LuminousIntensity,
@@ -43,10 +44,24 @@ pub enum ProcedureId {
     TotalIlluminance,
     /// Mean over all vertical directions at a point (EN 12464-1).
     CylindricalIlluminance,
+    /// Calibration: the inverse-square law.
+    Point,
+    /// Calibration: a table without symmetry.
+    Asymmetric,
+    /// Calibration: several luminaires.
+    Luminaires,
+    /// Calibration: light that a box hides.
+    Shadow,
+    /// Calibration: reflected light that is even.
+    Furnace,
+    /// Calibration: even light near surfaces.
+    Wall,
+    /// Calibration: reflectances that differ.
+    Reflectances,
 }
 
 impl ProcedureId {
-    /// In the order of reports.
+    /// Those that a spec may ask for, in the order of reports.
     pub const ALL: [Self; 5] = [
         Self::LuminousIntensity,
         Self::DirectIlluminance,
@@ -55,8 +70,8 @@ impl ProcedureId {
         Self::CylindricalIlluminance,
     ];
 
-    /// All names, in the same order.
-    pub const NAMES: &[&str] = Self::VARIANTS;
+    /// Their names, in the same order.
+    pub const NAMES: &[&str] = Self::VARIANTS.split_at(Self::ALL.len()).0;
 
     /// As specs, command lines and reports write it.
     pub const fn name(self) -> &'static str {
@@ -71,9 +86,11 @@ pub struct UnknownProcedure {
     pub name: String,
 }
 
-impl UnknownProcedure {
-    fn of(name: &str) -> Self {
-        Self { name: name.to_owned() }
+impl FromStr for ProcedureId {
+    type Err = UnknownProcedure;
+
+    fn from_str(name: &str) -> Result<Self, UnknownProcedure> {
+        Self::ALL.into_iter().find(|p| p.name() == name).ok_or_else(|| UnknownProcedure { name: name.to_owned() })
     }
 }
 

@@ -132,7 +132,7 @@ pub struct Recording {
     pub notes: Vec<String>,
     /// Wall-clock seconds.
     pub wall_s: f64,
-    /// Relative standard uncertainty of the engine as an instrument, from its calibration; 0 for our own solvers.
+    /// Relative standard uncertainty of our own read-out, as the engine's driver declares it; a renderer's bias is none.
     #[serde(default)]
     pub instrument_uncertainty: f64,
     /// What it shares with other engines: witnesses that share a component count once.

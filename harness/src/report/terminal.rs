@@ -10,6 +10,7 @@ use super::notes::{Kind, Note, departures, notes, splits};
 use super::words::{mark, percent, plural, significant, unique, value};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
+use crate::procedures::Form;
 use crate::record::{EngineStatus, ProcedureId, Status};
 
 /// More meters than this are summarised instead of listed.
@@ -92,7 +93,8 @@ fn tables(report: &Report, style: Style, text: &mut String) {
     }
     // In a suite the readings of a procedure are those of many rooms: they stay in the files.
     let in_paper = |p: &ProcedureId| report.published.iter().any(|t| t.procedure == *p);
-    for procedure in report.procedures().into_iter().filter(|p| !report.is_suite() && !in_paper(p)) {
+    let is_known = |p: &ProcedureId| p.row().form == Form::Known;
+    for procedure in report.procedures().into_iter().filter(|p| !report.is_suite() && !in_paper(p) && !is_known(p)) {
         if let Some(table) = readings(report, procedure, style) {
             writeln!(text, "{table}\n").ok();
         }
@@ -143,7 +145,9 @@ fn verdicts(report: &Report, style: Style) -> String {
             Cell::Judged { verdict, .. } => TableCell::new(cell.text()).fg(colour(*verdict)),
             _ => TableCell::new(cell.text()),
         });
-        let heads = [TableCell::new(row.procedure), TableCell::new(row.basis)];
+        let of_calibration = !report.is_suite() && row.procedure.row().form == Form::Known;
+        let before = if of_calibration { "calibration: " } else { "" };
+        let heads = [TableCell::new(format!("{before}{}", row.procedure)), TableCell::new(row.basis)];
         let cells: Vec<TableCell> = name.into_iter().chain(heads).chain(cells).collect();
         case = row.case;
         cells

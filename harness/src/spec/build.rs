@@ -28,7 +28,7 @@ const SURFACE_MARGIN: f64 = 1e-9;
 const MAX_METERS: usize = 1_000_000;
 
 /// A spec, read, checked and built: all that the rest of the program needs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Case {
     /// The spec's file stem, and behind a slash the name of one of its cases.
     pub name: String,

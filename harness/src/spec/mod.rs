@@ -42,7 +42,7 @@ fn place(file: &Path, line: Option<usize>, column: Option<usize>) -> String {
 }
 
 /// A spec file as it was read: its text, kept for the places of errors.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Source {
     pub path: PathBuf,
     pub text: String,
