@@ -41,19 +41,13 @@ pub fn examine(engine: &Arc<dyn Engine>, reader: &Reader, tolerances: &Tolerance
         (ProcedureId::DirectIlluminance, Transport::Direct),
         (ProcedureId::IndirectIlluminance, Transport::Indirect(Bounces::Converged)),
     ] {
-        match check(&instrument, reader, tolerances, &known_job(procedure, transport)) {
-            Ok((well, text)) => {
-                healthy &= well;
-                texts.push(text);
-            }
-            Err(failure) if failure.kind == FailureKind::Declined => {
-                texts.push(format!("{procedure} not supported: {failure}"));
-            }
-            Err(failure) => {
-                healthy = false;
-                texts.push(format!("{procedure}: {failure}"));
-            }
-        }
+        let (well, text) = match check(&instrument, reader, tolerances, &known_job(procedure, transport)) {
+            Ok(found) => found,
+            Err(Failure { kind: FailureKind::Declined, text }) => (true, format!("{procedure} not supported: {text}")),
+            Err(failure) => (false, format!("{procedure}: {failure}")),
+        };
+        healthy &= well;
+        texts.push(text);
     }
     finding(healthy, texts.join("; "))
 }

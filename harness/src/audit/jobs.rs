@@ -84,13 +84,10 @@ impl Running<'_> {
     /// the others are calibrated by.
     fn instrument(&self, e: usize) -> Result<Option<Calibrated>, String> {
         let planned = &self.plan.engines[e];
-        let (Some(instrument), Some(run)) = (planned.instrument(), self.plan.runs.iter().find(|r| r.engine == e))
-        else {
+        let run = self.plan.runs.iter().find(|r| r.engine == e);
+        let (Some(instrument), Some(run), false) = (planned.instrument(), run, planned.engine.is_witness()) else {
             return Ok(None);
         };
-        if planned.engine.is_witness() {
-            return Ok(None);
-        }
         self.observer.started(self.case, planned.engine.as_ref(), "calibration");
         let made = |calibrated: &Calibrated| {
             if calibrated.origin == Origin::Measured {

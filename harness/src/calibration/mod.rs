@@ -26,6 +26,7 @@ use self::scenes::KnownScene;
 use crate::engines::Support;
 use crate::measure::{Failure, FailureKind, Instrument, Question, Reader};
 use crate::record::{EngineName, Estimate};
+use crate::system::files;
 use crate::system::slots::side_by_side;
 
 /// A deviation beyond this, noise and declared approximations apart, is no uncertainty but a broken instrument.
@@ -120,7 +121,8 @@ pub fn calibrate(
     let kept = if noise > scenes::BUDGET.relative_error {
         Err(format!("noise of {noise:.1e}, as on a machine with other work"))
     } else {
-        store::keep(&path, &calibration).map(|()| path.display().to_string())
+        let file = path.display().to_string();
+        files::replace_json(&path, &calibration).map_err(|e| format!("{file}: {e}")).map(|()| file)
     };
     Ok(Calibrated { calibration, origin: Origin::Measured, kept })
 }

@@ -5,8 +5,6 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use crate::system::files;
-
 use super::Calibration;
 use super::scenes::KnownScene;
 use crate::engines::{EngineError, Site, Support};
@@ -51,8 +49,4 @@ pub(super) fn read(path: &Path) -> Option<Calibration> {
     let calibration: Calibration = serde_json::from_str(&text).ok()?;
     let sound = |u: f64| u.is_finite() && u >= 0.0;
     calibration.parts.iter().all(|p| sound(p.uncertainty)).then_some(calibration)
-}
-
-pub(super) fn keep(path: &Path, calibration: &Calibration) -> Result<(), String> {
-    files::replace_json(path, calibration).map_err(|e| format!("{}: {e}", path.display()))
 }

@@ -4,7 +4,6 @@ mod basis;
 mod key;
 mod light;
 mod method;
-mod role;
 mod status;
 mod uncertainty;
 
@@ -15,8 +14,7 @@ pub use basis::Basis;
 pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
 pub use light::{Light, UnknownLight};
 pub use method::{Effort, Method};
-pub use role::Role;
-pub use status::{EngineStatus, Status};
+pub use status::{EngineStatus, Role, Status};
 pub use uncertainty::Uncertainty;
 
 /// The physical quantity of a reading and its unit.
