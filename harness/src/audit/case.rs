@@ -6,9 +6,10 @@ use std::time::{Instant, SystemTime};
 use super::jobs::{self, Outcome, Running};
 use super::{AuditError, Options, sampling, sequential};
 use crate::diagnosis;
-use crate::judge::{Comparison, Consensus, Judge, Policy, Published, PublishedTable, Split};
+use crate::judge::{Comparison, Judge, Policy, Published};
 use crate::measure::Reader;
-use crate::plan::{Plan, Scope, Skip};
+use crate::plan::{Plan, Skip};
+use crate::procedures::Task;
 use crate::record::{Recording, Status};
 use crate::report::{self, Report};
 use crate::spec::Case;
@@ -22,23 +23,11 @@ pub(super) struct Audit<'a> {
     pub(super) reader: Reader,
 }
 
-/// Why the cases that are left are not run.
-#[derive(Clone, Debug, thiserror::Error)]
-pub(super) enum Stop {
-    #[error("not run: the run was interrupted")]
-    Interrupted,
-    #[error("not run: {case} failed, and --fail-fast was asked for")]
-    Failed { case: String },
-}
-
-impl Stop {
-    /// How the engines of a case that is left have fared: an interruption must not look like success.
-    const fn status(&self) -> Status {
-        match self {
-            Self::Interrupted => Status::Failed,
-            Self::Failed { .. } => Status::Skipped,
-        }
-    }
+/// Why the cases that are left are not run, and how their engines have fared: an interruption must not look like success.
+#[derive(Clone, Debug)]
+pub(super) struct Stop {
+    pub(super) why: String,
+    pub(super) status: Status,
 }
 
 impl Audit<'_> {
@@ -54,20 +43,24 @@ impl Audit<'_> {
         let (started, clock) = (SystemTime::now(), Instant::now());
         let judge = self.policy.judge(case, published);
         let outcome = match stop {
-            Some(stop) => jobs::not_run(case, plan, stop.status(), &stop.to_string()),
+            Some(stop) => jobs::not_run(case, plan, stop.status, &stop.why),
             None => self.readings(case, plan, &judge, folder)?,
         };
-        let Judged { comparisons, splits, consensus, tables } = judged(case, plan, &outcome.recordings, &judge);
+        let of = |task: &Task| -> Vec<&Recording> {
+            outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure).collect()
+        };
+        let tasks = || plan.tasks.iter();
+        let comparisons = tasks().flat_map(|task| compared(task, &of(task), &judge)).collect();
         // What follows from other readings follows from nothing where the case was never begun.
-        let holds = |s: &&Skip| stop.is_none() || matches!(s.scope, Scope::Engine | Scope::Procedure);
+        let holds = |s: &&Skip| stop.is_none() || s.scope.leaves_no_reading();
         let skips = plan.skips.iter().filter(holds).cloned().chain(outcome.skips).collect();
         let report = Report {
-            wall_s: clock.elapsed().as_secs_f64(),
             engines: outcome.engines,
-            splits,
-            consensus,
-            published: tables,
-            curves: plan.tasks.iter().flat_map(|task| report::curves(&case.name, task)).collect(),
+            splits: tasks().flat_map(|task| judge.split(task, &of(task))).collect(),
+            consensus: tasks().flat_map(|task| judge.consensus(task, &of(task))).collect(),
+            published: tasks().filter_map(|task| judge.published?.table(task, &case.name)).collect(),
+            curves: tasks().flat_map(|task| report::curves(&case.name, task)).collect(),
+            wall_s: clock.elapsed().as_secs_f64(),
             ..Report::new(case, started, &outcome.recordings, comparisons, skips)
         };
         files::keep_json(&folder.join("report.json"), &report)?;
@@ -90,27 +83,10 @@ impl Audit<'_> {
     }
 }
 
-/// What follows from the recordings of a case.
-#[derive(Default)]
-struct Judged {
-    comparisons: Vec<Comparison>,
-    splits: Vec<Split>,
-    consensus: Vec<Consensus>,
-    tables: Vec<PublishedTable>,
-}
-
-/// Holds the recordings of a case against their references.
-fn judged(case: &Case, plan: &Plan, recordings: &[Recording], judge: &Judge<'_>) -> Judged {
-    let mut judged = Judged::default();
-    for task in &plan.tasks {
-        let mine: Vec<&Recording> = recordings.iter().filter(|r| r.key.procedure == task.procedure).collect();
-        let mut comparisons = judge.compare(task, &mine);
-        diagnosis::diagnose(task, &mut comparisons);
-        sequential::tell_the_price(&mut comparisons, &mine);
-        judged.comparisons.extend(comparisons);
-        judged.splits.extend(judge.split(task, &mine));
-        judged.consensus.extend(judge.consensus(task, &mine));
-        judged.tables.extend(judge.published.and_then(|p| p.table(task, &case.name)));
-    }
-    judged
+/// Holds readings of a task against their references and says of those that fail or are undecided why.
+fn compared(task: &Task, recordings: &[&Recording], judge: &Judge<'_>) -> Vec<Comparison> {
+    let mut comparisons = judge.compare(task, recordings);
+    diagnosis::diagnose(task, &mut comparisons);
+    sequential::tell_the_price(&mut comparisons, recordings);
+    comparisons
 }

@@ -122,7 +122,6 @@ impl Running<'_> {
             approximation: run.approximation.clone(),
             notes: measurement.notes,
             wall_s,
-            instrument_uncertainty: planned.engine.read_out().map_or(0.0, |read_out| read_out.relative),
             components: planned.engine.components(&run.job).into_iter().map(str::to_owned).collect(),
             command: planned.engine.command_by_hand(&run.job, &self.reader.site),
             failure,

@@ -35,6 +35,7 @@ use crate::measure::cache::Cache;
 use crate::measure::{Machine, Reader};
 use crate::plan::{Plan, Planner, Selection, Skipping};
 use crate::procedures::known;
+use crate::record::Status;
 use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, SpecError, filtered, hexadecimal, suite};
 use crate::system::files::{self, FileError};
@@ -145,12 +146,13 @@ pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<
         let report = audit.case(case, plan, published[k].as_ref(), stopped.as_ref(), &folder)?;
         let mut stop = stop.lock().unwrap_or_else(PoisonError::into_inner);
         if process::is_interrupted() {
-            *stop = Some(Stop::Interrupted);
+            *stop = Some(Stop { why: "not run: the run was interrupted".to_owned(), status: Status::Failed });
         } else if options.after_failure == AfterFailure::Stop
             && stop.is_none()
             && matches!(report.exit(), Exit::Failed | Exit::Engine)
         {
-            *stop = Some(Stop::Failed { case: case.name.clone() });
+            let why = format!("not run: {} failed, and --fail-fast was asked for", case.name);
+            *stop = Some(Stop { why, status: Status::Skipped });
         }
         Ok(report)
     };

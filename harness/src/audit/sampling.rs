@@ -3,10 +3,10 @@
 use clap::ValueEnum;
 
 use super::jobs::{self, Outcome, Running};
-use super::sequential::{self, Ask, Sampler};
-use crate::engines::Measurement;
+use super::sequential::{self, Ask};
+use crate::engines::Job;
 use crate::judge::Judge;
-use crate::measure::{Question, Source};
+use crate::measure::{Question, Source, Taken};
 use crate::plan::{Plan, Run};
 use crate::record::Recording;
 use crate::system::files::FileError;
@@ -52,13 +52,16 @@ pub(super) fn sample_on(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut 
         let mut subject = outcome.recordings[mine].clone();
         let others: Vec<&Recording> =
             outcome.recordings.iter().filter(of_task).filter(|r| r.key.engine != engine).collect();
-        let mut looks = Looks { running, run, from_cache: 0 };
+        let mut sample = |ask: &Ask| {
+            let taken = look(running, run, ask)?;
+            outcome.from_cache += usize::from(taken.source == Source::Cache);
+            Ok((taken.measurement, taken.cost.wall_s))
+        };
         let (before_s, whole) = (subject.wall_s, running.case.budget);
-        sequential::refine(judge, task, &others, &mut subject, (run.job.budget, whole), &mut looks);
+        sequential::refine(judge, task, &others, &mut subject, (run.job.budget, whole), &mut sample);
         if run.job.budget != whole {
             subject.notes.extend(sequential::saved(&subject, whole));
         }
-        outcome.from_cache += looks.from_cache;
         if let Some(status) = outcome.engines.iter_mut().find(|e| e.id == engine) {
             status.wall_s += subject.wall_s - before_s;
         }
@@ -68,39 +71,28 @@ pub(super) fn sample_on(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut 
     Ok(())
 }
 
-/// Further looks of one engine at one task: jobs of the undecided stations alone, each with a seed of its own.
-struct Looks<'a> {
-    running: &'a Running<'a>,
-    run: &'a Run,
-    from_cache: usize,
-}
-
-impl Sampler for Looks<'_> {
-    fn sample(&mut self, ask: &Ask) -> Result<(Measurement, f64), String> {
-        let Running { case, plan, reader, observer, .. } = self.running;
-        let (job, planned, task) = (&self.run.job, &plan.engines[self.run.engine], &plan.tasks[self.run.task]);
-        let told = format!(
-            "{}: {} of {} meters of {} are undecided: look {}, {:.0} s at most",
-            planned.engine.name(),
-            ask.targets.len(),
-            task.targets.len(),
-            job.procedure,
-            ask.look,
-            ask.budget.seconds
-        );
-        observer.remarked(case, &told);
-        let further = crate::engines::Job {
-            stations: ask.targets.iter().flat_map(|k| job.stations[task.stations_of(*k)].to_vec()).collect(),
-            budget: ask.budget,
-            seed: seed_of_look(job.seed, ask.look),
-            ..job.clone()
-        };
-        let place = format!("{}/look-{}", job.procedure, ask.look);
-        let instrument = planned.instrument().ok_or("the engine is not there")?;
-        let taken = reader.read(&Question::new(&instrument, &further, &place)).map_err(|e| e.to_string())?;
-        self.from_cache += usize::from(taken.source == Source::Cache);
-        Ok((taken.measurement, taken.cost.wall_s))
-    }
+/// A further look of one engine at one task: a job of the undecided stations alone, with a seed of its own.
+fn look(running: &Running<'_>, run: &Run, ask: &Ask) -> Result<Taken, String> {
+    let (planned, task) = (&running.plan.engines[run.engine], &running.plan.tasks[run.task]);
+    let procedure = task.procedure;
+    let told = format!(
+        "{}: {} of {} meters of {procedure} are undecided: look {}, {:.0} s at most",
+        planned.engine.name(),
+        ask.targets.len(),
+        task.targets.len(),
+        ask.look,
+        ask.budget.seconds
+    );
+    running.observer.remarked(running.case, &told);
+    let further = Job {
+        stations: ask.targets.iter().flat_map(|k| run.job.stations[task.stations_of(*k)].to_vec()).collect(),
+        budget: ask.budget,
+        seed: seed_of_look(run.job.seed, ask.look),
+        ..run.job.clone()
+    };
+    let instrument = planned.instrument().ok_or("the engine is not there")?;
+    let place = format!("{procedure}/look-{}", ask.look);
+    running.reader.read(&Question::new(&instrument, &further, &place)).map_err(|e| e.to_string())
 }
 
 /// Seeds of further looks lie far from those that people choose, and differ modulo any small number.

@@ -35,12 +35,6 @@ pub struct Ask {
     pub budget: Budget,
 }
 
-/// Someone who takes further looks.
-pub trait Sampler {
-    /// One estimate for each station of the targets asked for, and the seconds that it took; the error says why there is none.
-    fn sample(&mut self, ask: &Ask) -> Result<(Measurement, f64), String>;
-}
-
 /// The first look's budget where sampling stops as soon as comparisons are decided.
 pub fn first_look(budget: Budget, tolerance_relative: f64) -> Budget {
     Budget {
@@ -52,13 +46,15 @@ pub fn first_look(budget: Budget, tolerance_relative: f64) -> Budget {
 /// Takes further looks at a recording until its comparisons are decided or the budget is spent.
 ///
 /// `witnesses` are the other recordings of the task; `first` is the budget that the recording was taken with, `budget` the whole.
+/// `sample` takes a look: one estimate for each station of the targets asked for, and the seconds that it took; the error says why
+/// there is none.
 pub fn refine(
     judge: &Judge<'_>,
     task: &Task,
     witnesses: &[&Recording],
     subject: &mut Recording,
     (first, budget): (Budget, Budget),
-    sampler: &mut dyn Sampler,
+    sample: &mut dyn FnMut(&Ask) -> Result<(Measurement, f64), String>,
 ) {
     if subject.failure.is_some() || !subject.readings.iter().any(|r| r.uncertainty.is_sampled()) {
         return;
@@ -77,7 +73,7 @@ pub fn refine(
         }
         let relative_error = first.relative_error / weight.sqrt();
         let ask = Ask { look, targets, budget: Budget { relative_error, seconds: (weight * first_s).min(left_s) } };
-        let (measurement, wall_s) = match sampler.sample(&ask) {
+        let (measurement, wall_s) = match sample(&ask) {
             Ok(taken) => taken,
             Err(why) => {
                 subject.notes.push(format!("look {look} at {} meters gave nothing: {why}", ask.targets.len()));
@@ -181,32 +177,18 @@ mod tests {
     /// An engine that is off by so much at each meter, with normal noise that shrinks with the seconds granted.
     struct Synthetic {
         truth: Vec<f64>,
-        first: Budget,
         noise: f64,
         blocks: usize,
         random: fastrand::Rng,
-        asked: Vec<Ask>,
     }
 
     impl Synthetic {
-        fn estimate(&mut self, truth: f64, effort: f64) -> Estimate {
-            let sigma = self.noise / effort.sqrt() * (self.blocks as f64).sqrt();
-            let values: Vec<f64> = (0..self.blocks).map(|_| truth + sigma * normal(&mut self.random)).collect();
-            Estimate::of_samples(&values)
-        }
-
         fn measurement(&mut self, targets: &[usize], effort: f64) -> Measurement {
-            let truth = self.truth.clone();
-            let estimates = targets.iter().map(|k| self.estimate(truth[*k], effort)).collect();
+            let sigma = self.noise / effort.sqrt() * (self.blocks as f64).sqrt();
+            let mut block = |k: usize| self.truth[k] + sigma * normal(&mut self.random);
+            let mut samples = |k: &usize| (0..self.blocks).map(|_| block(*k)).collect::<Vec<f64>>();
+            let estimates = targets.iter().map(|k| Estimate::of_samples(&samples(k))).collect();
             Measurement { estimates, ..Measurement::default() }
-        }
-    }
-
-    impl Sampler for Synthetic {
-        fn sample(&mut self, ask: &Ask) -> Result<(Measurement, f64), String> {
-            self.asked.push(ask.clone());
-            let effort = (self.first.relative_error / ask.budget.relative_error).powi(2);
-            Ok((self.measurement(&ask.targets, effort), effort))
         }
     }
 
@@ -219,20 +201,26 @@ mod tests {
         let first = Budget { relative_error: 0.004, seconds: 1.0 };
         let truth = deviations.iter().map(|d| 1.0 + d).collect();
         let random = fastrand::Rng::with_seed(seed);
-        let mut engine = Synthetic { truth, first, noise: 0.004, blocks, random, asked: vec![] };
+        let mut engine = Synthetic { truth, noise: 0.004, blocks, random };
         let targets: Vec<usize> = (0..deviations.len()).collect();
         let mut subject = recording("radiance", &engine.measurement(&targets, 1.0).estimates);
         let exact = recording("simulator", &vec![Estimate::exact(1.0); deviations.len()]);
         let (judge, task) = (built_in(), task(deviations.len()));
         let whole = Budget { relative_error: 0.004, seconds };
-        refine(&judge, &task, &[&exact], &mut subject, (first, whole), &mut engine);
+        let mut asked = vec![];
+        let mut sample = |ask: &Ask| {
+            asked.push(ask.clone());
+            let effort = (first.relative_error / ask.budget.relative_error).powi(2);
+            Ok((engine.measurement(&ask.targets, effort), effort))
+        };
+        refine(&judge, &task, &[&exact], &mut subject, (first, whole), &mut sample);
         let mut compared = judge.compare(&task, &[&exact, &subject]);
         compared.retain(|c| c.key.engine == "radiance");
         tell_the_price(&mut compared, &[&subject]);
         for c in &compared {
             assert_eq!(c.verdict == Verdict::Inconclusive, c.diagnosis.is_some(), "{c:?}");
         }
-        (compared.iter().map(|c| c.verdict).collect(), engine.asked, subject)
+        (compared.iter().map(|c| c.verdict).collect(), asked, subject)
     }
 
     #[test]

@@ -22,12 +22,16 @@ fn found(task: &Task, right: &[f64], read: Vec<f64>) -> Vec<Cause> {
 }
 
 #[test]
-fn a_factor_of_pi_is_named_with_its_evidence() {
+fn a_factor_is_named_with_its_evidence_and_what_nothing_explains_is_left_unsaid() {
     let (task, right) = task(Transport::Direct);
-    let read = right.iter().map(|r| r * std::f64::consts::PI).collect();
-    let causes = found(&task, &right, read);
+    let found = |factors: [f64; 4]| found(&task, &right, right.iter().zip(factors).map(|(r, f)| r * f).collect());
+    let causes = found([std::f64::consts::PI; 4]);
     assert_eq!(causes[0].id, "factor-pi");
     assert!(causes[0].text.starts_with("all 4 readings are 3.1416 ± "), "{}", causes[0].text);
+    let unknown = found([1.37; 4]);
+    assert_eq!((unknown.len(), unknown[0].id), (1, "factor"));
+    assert_eq!(found([1.1, 0.8, 1.3, 0.95]), []);
+    assert_eq!(found([1.0; 4]), [], "right readings need no cause");
 }
 
 #[test]
@@ -37,25 +41,4 @@ fn light_that_stops_early_is_told_by_the_number_of_its_reflections() {
     let read = vec![0.91170, 1.12222, 1.12222, 1.38492];
     let causes = found(&task, &right, read);
     assert_eq!(causes[0].what, "light stops after 5 reflections");
-}
-
-#[test]
-fn what_nothing_explains_is_left_unsaid() {
-    let (task, right) = task(Transport::Direct);
-    let read: Vec<f64> = right.iter().zip([1.1, 0.8, 1.3, 0.95]).map(|(r, f)| r * f).collect();
-    assert_eq!(found(&task, &right, read), []);
-}
-
-#[test]
-fn right_readings_need_no_cause() {
-    let (task, right) = task(Transport::Direct);
-    assert_eq!(found(&task, &right, right.clone()), []);
-}
-
-#[test]
-fn an_unknown_factor_is_called_one() {
-    let (task, right) = task(Transport::Direct);
-    let read = right.iter().map(|r| 1.37 * r).collect();
-    let causes = found(&task, &right, read);
-    assert_eq!((causes.len(), causes[0].id), (1, "factor"));
 }

@@ -42,12 +42,6 @@ pub trait Engine: Send + Sync {
         vec![FILE_READER]
     }
 
-    /// What the way of its answers to us may put them off, relative, as its driver knows it; nothing where the bounds of its
-    /// readings tell.
-    fn read_out(&self) -> Option<ReadOut> {
-        None
-    }
-
     /// The job as native files, runnable by hand; pure. Our own solvers have none.
     fn export(&self, _job: &Job) -> Result<Vec<SceneFile>, EngineError> {
         Ok(vec![])
@@ -93,19 +87,6 @@ pub struct Entry {
     /// The setting that, `false`, leaves it the coordinates of the spec, where it would get handier ones.
     pub fits_coordinates: Option<&'static str>,
     pub make: fn() -> Box<dyn Engine>,
-}
-
-/// An uncertainty of our own read-out.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReadOut {
-    /// Standard uncertainty, relative.
-    pub relative: f64,
-    pub source: &'static str,
-}
-
-impl ReadOut {
-    /// Values that come as 32-bit floats: rounded to half a unit in the last place of 24 binary digits (GUM 4.3.7).
-    pub const SINGLE: Self = Self { relative: 3.5e-8, source: "32-bit floats: 2^-24 at most, rectangular" };
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

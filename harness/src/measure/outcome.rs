@@ -60,10 +60,6 @@ impl Failure {
     pub fn new(kind: FailureKind, text: impl Into<String>) -> Self {
         Self { kind, text: text.into() }
     }
-
-    pub(super) fn crash(text: impl Into<String>) -> Self {
-        Self::new(FailureKind::Crash, text)
-    }
 }
 
 impl From<EngineError> for Failure {

@@ -111,7 +111,7 @@ impl Reader {
             Lookup::Found(entry) => Some(*entry),
             Lookup::Unknown => None,
             Lookup::Damaged(what) => {
-                tracing::warn!("{}: the cache's {what}; the reading is taken anew", key.engine());
+                tracing::warn!("{}: the cache's {what}; the reading is taken anew", key.engine);
                 None
             }
         }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::outcome::{Failure, Taken};
+use super::outcome::{Failure, FailureKind, Taken};
 use super::question::{Question, Trial};
 use crate::engines::{EngineError, Workbench};
 use crate::laws::Place;
@@ -56,10 +56,10 @@ impl Request {
 }
 
 pub(super) fn read(program: &Path, request: &Request, bench: &Workbench) -> Result<Taken, Failure> {
-    let input = serde_json::to_vec(request).map_err(|e| Failure::crash(format!("the request is no JSON: {e}")))?;
+    let no_json = |what, e| Failure::new(FailureKind::Crash, format!("the {what} is no JSON: {e}"));
+    let input = serde_json::to_vec(request).map_err(|e| no_json("request", e))?;
     // The spec's path counts from where this process is.
     let run = Invocation::new(program, Path::new("."), bench.limit, &bench.log).args([READ_ONE]).stdin(input);
     let done = run.run().map_err(EngineError::from)?;
-    let no_json = |e| Failure::crash(format!("the reading apart is no JSON: {e}"));
-    serde_json::from_slice::<Result<Taken, Failure>>(&done.stdout).map_err(no_json)?
+    serde_json::from_slice::<Result<Taken, Failure>>(&done.stdout).map_err(|e| no_json("reading apart", e))?
 }

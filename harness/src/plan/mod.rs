@@ -255,13 +255,9 @@ impl<'a> Planner<'a> {
         let offers: Vec<Vec<Offer>> =
             chosen.iter().map(|(engine, _)| self.offers(case, engine.as_ref(), &tasks)).collect();
         // Who has nothing to do is not even asked for a version.
-        let busy = |e: &usize| offers[*e].iter().any(|o| matches!(o, Offer::Run(_)));
-        let busy: Vec<usize> = (0..chosen.len()).filter(busy).collect();
-        let engines: Vec<Arc<dyn Engine>> = busy.iter().map(|e| Arc::clone(&chosen[*e].0)).collect();
-        let mut found: Vec<Option<Result<Version, Absent>>> = vec![None; chosen.len()];
-        for (e, answer) in busy.into_iter().zip(self.roster.probe(&engines, self.site)) {
-            found[e] = Some(answer);
-        }
+        let is_busy = |e: usize| offers[e].iter().any(|o| matches!(o, Offer::Run(_)));
+        let busy: Vec<_> = (0..chosen.len()).map(|e| is_busy(e).then(|| Arc::clone(&chosen[e].0))).collect();
+        let found = self.roster.probe(&busy, self.site);
         let mut plan = Plan { tasks, engines: vec![], runs: vec![], skips: vec![] };
         for (e, ((engine, asked), (found, offers))) in chosen.into_iter().zip(found.into_iter().zip(offers)).enumerate()
         {

@@ -28,7 +28,6 @@ impl Roster {
     pub(super) fn chosen(&self, case: &Case, selection: &Selection) -> Result<Vec<Chosen>, SpecError> {
         let mut all = self.engines.clone();
         let built_in = names(&all);
-        let in_spec: Vec<&String> = case.engines.iter().flat_map(BTreeMap::keys).collect();
         for (name, settings) in case.engines.iter().flatten().filter(|(name, _)| !built_in.contains(*name)) {
             if !settings.0.contains_key("command") {
                 let place = case.source.error_at(&format!("engines.{name}"), "", "");
@@ -56,22 +55,27 @@ impl Roster {
                 Some(Asked::AsReference)
             } else if !selection.engines.is_empty() {
                 None
-            } else if case.engines.is_none() {
-                Some(Asked::ByDefault)
+            } else if let Some(in_spec) = &case.engines {
+                in_spec.contains_key(id.as_str()).then_some(Asked::ByName)
             } else {
-                in_spec.iter().any(|n| id == **n).then_some(Asked::ByName)
+                Some(Asked::ByDefault)
             }
         };
         Ok(all.into_iter().filter_map(|engine| asked(engine.as_ref()).map(|asked| (engine, asked))).collect())
     }
 
-    /// The versions of engines, side by side; those of our own list are remembered for the next case.
-    pub(super) fn probe(&mut self, engines: &[Arc<dyn Engine>], site: &Site) -> Vec<Result<Version, Absent>> {
+    /// The versions of those that are asked, side by side; those of our own list are remembered for the next case.
+    pub(super) fn probe(
+        &mut self,
+        asked: &[Option<Arc<dyn Engine>>],
+        site: &Site,
+    ) -> Vec<Option<Result<Version, Absent>>> {
         let is_ours = |e: &Arc<dyn Engine>| self.engines.iter().any(|ours| Arc::ptr_eq(ours, e));
         let known = |e: &Arc<dyn Engine>| self.probed.get(&e.name()).filter(|_| is_ours(e)).cloned();
-        let found = side_by_side(engines.len(), engines, |e| known(e).unwrap_or_else(|| e.probe(site)));
-        let ours = engines.iter().zip(&found).filter(|(e, _)| is_ours(e));
-        let ours: Vec<_> = ours.map(|(e, found)| (e.name(), found.clone())).collect();
+        let version = |e: &Arc<dyn Engine>| known(e).unwrap_or_else(|| e.probe(site));
+        let found = side_by_side(asked.len(), asked, |e| e.as_ref().map(version));
+        let answers = asked.iter().zip(&found).filter_map(|(e, found)| Some((e.as_ref()?, found.clone()?)));
+        let ours: Vec<_> = answers.filter(|(e, _)| is_ours(e)).map(|(e, found)| (e.name(), found)).collect();
         self.probed.extend(ours);
         found
     }

@@ -117,25 +117,19 @@ impl Shortcut {
 
     /// Keeps of the rendered stations those that `wanted` says, and tells every fill where they are now.
     fn render_only(&mut self, wanted: &[bool], instead: impl Fn(usize) -> Fill) {
-        let place: Vec<usize> = wanted
-            .iter()
-            .scan(0, |next, &w| {
-                let here = *next;
-                *next += usize::from(w);
-                Some(here)
-            })
-            .collect();
+        let mut place = vec![0];
+        place.extend(wanted.iter().scan(0, |kept, w| {
+            *kept += usize::from(*w);
+            Some(*kept)
+        }));
         for fill in &mut self.fill {
-            if let Fill::Rendered(k) = *fill {
-                *fill = if wanted[k] {
-                    Fill::Rendered(place[k])
-                } else {
-                    match instead(k) {
-                        Fill::Mirrors { station, by } => Fill::Mirrors { station: place[station], by },
-                        other => other,
-                    }
-                };
-            }
+            let Fill::Rendered(k) = *fill else { continue };
+            let source = if wanted[k] { Fill::Rendered(k) } else { instead(k) };
+            *fill = match source {
+                Fill::Rendered(k) => Fill::Rendered(place[k]),
+                Fill::Mirrors { station, by } => Fill::Mirrors { station: place[station], by },
+                Fill::Dark => Fill::Dark,
+            };
         }
         let mut keep = wanted.iter();
         self.job.stations.retain(|_| keep.next().copied().unwrap_or(true));

@@ -116,15 +116,9 @@ impl EngineName {
     }
 }
 
-impl From<&str> for EngineName {
-    fn from(name: &str) -> Self {
-        Self(Cow::Owned(name.to_owned()))
-    }
-}
-
-impl From<String> for EngineName {
-    fn from(name: String) -> Self {
-        Self(Cow::Owned(name))
+impl<T: Into<String>> From<T> for EngineName {
+    fn from(name: T) -> Self {
+        Self(Cow::Owned(name.into()))
     }
 }
 
@@ -134,21 +128,9 @@ impl Borrow<str> for EngineName {
     }
 }
 
-impl PartialEq<str> for EngineName {
-    fn eq(&self, other: &str) -> bool {
-        &**self == other
-    }
-}
-
-impl PartialEq<String> for EngineName {
-    fn eq(&self, other: &String) -> bool {
-        self.as_str() == other
-    }
-}
-
-impl PartialEq<&str> for EngineName {
-    fn eq(&self, other: &&str) -> bool {
-        &**self == *other
+impl<T: AsRef<str> + ?Sized> PartialEq<T> for EngineName {
+    fn eq(&self, other: &T) -> bool {
+        self.as_str() == other.as_ref()
     }
 }
 

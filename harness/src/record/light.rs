@@ -1,7 +1,6 @@
 //! Which light counted, as files write it: `direct`, `indirect, 7 bounces`, `total, all bounces`.
 
 use std::fmt;
-use std::str::FromStr;
 
 use luminaire::scene::{Bounces, Transport};
 use schemars::JsonSchema;
@@ -42,11 +41,11 @@ impl fmt::Display for Light {
 #[error("`{0}` is no light; expected `direct`, `indirect, all bounces` or `total, 7 bounces`, say")]
 pub struct UnknownLight(String);
 
-impl FromStr for Light {
-    type Err = UnknownLight;
+impl TryFrom<String> for Light {
+    type Error = UnknownLight;
 
-    fn from_str(text: &str) -> Result<Self, UnknownLight> {
-        let unknown = || UnknownLight(text.to_owned());
+    fn try_from(text: String) -> Result<Self, UnknownLight> {
+        let unknown = || UnknownLight(text.clone());
         if text == "direct" {
             return Ok(Self(Transport::Direct));
         }
@@ -69,14 +68,6 @@ impl From<Light> for String {
     }
 }
 
-impl TryFrom<String> for Light {
-    type Error = UnknownLight;
-
-    fn try_from(text: String) -> Result<Self, UnknownLight> {
-        text.parse()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,10 +80,10 @@ mod tests {
             Transport::Indirect(Bounces::AtMost(17)),
             Transport::Total(Bounces::Converged),
         ] {
-            assert_eq!(Light(transport).to_string().parse(), Ok(Light(transport)));
+            assert_eq!(Light::try_from(Light(transport).to_string()), Ok(Light(transport)));
         }
         for wrong in ["", "indirect", "indirect, many bounces", "light, 7 bounces"] {
-            assert!(wrong.parse::<Light>().is_err(), "{wrong}");
+            assert!(Light::try_from(wrong.to_owned()).is_err(), "{wrong}");
         }
     }
 }

@@ -4,7 +4,6 @@ mod basis;
 mod key;
 mod light;
 mod method;
-mod role;
 mod status;
 mod uncertainty;
 
@@ -15,8 +14,7 @@ pub use basis::Basis;
 pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
 pub use light::{Light, UnknownLight};
 pub use method::{Effort, Method};
-pub use role::Role;
-pub use status::{EngineStatus, Status};
+pub use status::{EngineStatus, Role, Status};
 pub use uncertainty::Uncertainty;
 
 /// The physical quantity of a reading and its unit.
@@ -132,9 +130,6 @@ pub struct Recording {
     pub notes: Vec<String>,
     /// Wall-clock seconds.
     pub wall_s: f64,
-    /// Relative standard uncertainty of our own read-out, as the engine's driver declares it; a renderer's bias is none.
-    #[serde(default)]
-    pub instrument_uncertainty: f64,
     /// What it shares with other engines: witnesses that share a component count once.
     #[serde(default)]
     pub components: Vec<String>,
@@ -167,7 +162,6 @@ impl Recording {
             approximation: None,
             notes: vec![],
             wall_s: 0.0,
-            instrument_uncertainty: 0.0,
             components: vec![],
             looks: vec![],
             command: None,

@@ -1,4 +1,4 @@
-//! How an engine fared in a run.
+//! What an engine takes part for, and how it fared in a run.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -54,4 +54,15 @@ pub enum Status {
     Failed,
     /// It can do nothing that was asked.
     Skipped,
+}
+
+/// What an engine takes part for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Others are judged by it: one of our own solvers. It always runs, and costs next to nothing.
+    Witness,
+    /// It is judged.
+    #[default]
+    Renderer,
 }

@@ -114,7 +114,7 @@ impl<'a> Builder<'a> {
     fn build(mut self, spec: Spec) -> Result<Case, SpecError> {
         self.hash.update(&self.source.text);
         let message = format!("format version {} is not known", spec.luxproof);
-        self.require(spec.luxproof == 1, "luxproof", message, "this program reads version 1")?;
+        self.source.require(spec.luxproof == 1, "luxproof", message, "this program reads version 1")?;
         let room = self.room(&spec)?;
         let obstacles = self.obstacles(&spec.obstacles, &room)?;
         let luminaires = self.luminaires(&spec.luminaires, &room)?;
@@ -128,8 +128,7 @@ impl<'a> Builder<'a> {
         let tolerances = self.tolerances(&spec.tolerances)?;
         let published = spec.published.map(|file| self.beside(&file));
         if let Some(file) = &published {
-            let bytes = self.read("published", file)?;
-            self.hash.update(bytes);
+            self.take_in("published", file)?;
         }
         let name = self.source.path.file_stem().map_or_else(|| "spec".into(), |s| s.to_string_lossy().into_owned());
         Ok(Case {
@@ -152,7 +151,7 @@ impl<'a> Builder<'a> {
     fn room(&self, spec: &Spec) -> Result<Room, SpecError> {
         for (k, size) in spec.room.size_m.iter().enumerate() {
             let (at, message) = (format!("room.size_m[{k}]"), format!("{size} m is no extent"));
-            self.require(size.is_finite() && *size > 0.0, &at, message, "give a positive number of metres")?;
+            self.source.require(size.is_finite() && *size > 0.0, &at, message, "give a positive number of metres")?;
         }
         Ok(Room { size_m: DVec3::from(spec.room.size_m), reflectance: spec.room.reflectance.build() })
     }
@@ -166,13 +165,12 @@ impl<'a> Builder<'a> {
                     let (min_m, max_m) = (DVec3::from(cuboid.min_m), DVec3::from(cuboid.max_m));
                     let sound = min_m.is_finite() && max_m.is_finite() && min_m.cmplt(max_m).all();
                     let message = format!("the box from {min_m} to {max_m} has no volume");
-                    self.require(sound, &at, message, "give min_m below max_m on every axis")?;
+                    self.source.require(sound, &at, message, "give min_m below max_m on every axis")?;
                     Obstacle { shape: Shape::Box { min_m, max_m }, reflectance: cuboid.reflectance.0 }
                 }
                 (None, Some(mesh)) => {
                     let path = self.beside(&mesh.file);
-                    let bytes = self.read(&format!("{at}.mesh.file"), &path)?;
-                    self.hash.update(bytes);
+                    self.take_in(&format!("{at}.mesh.file"), &path)?;
                     let read = Mesh::read_obj(&path).map_err(|error| {
                         let help = "give a Wavefront OBJ file of triangles or polygons, in metres, z up";
                         self.source.error_at(&format!("{at}.mesh.file"), error.to_string(), help)
@@ -188,14 +186,14 @@ impl<'a> Builder<'a> {
             let (low, high) = extent(&obstacle.shape);
             let outside = low.min_element() < 0.0 || high.cmpgt(room.size_m).any();
             let message = format!("it reaches from {low} to {high}, outside the room");
-            self.require(!outside, &at, message, within(room))?;
+            self.source.require(!outside, &at, message, within(room))?;
             obstacles.push(obstacle);
         }
         Ok(obstacles)
     }
 
     fn luminaires(&mut self, specs: &[LuminaireSpec], room: &Room) -> Result<Vec<Luminaire>, SpecError> {
-        self.require(!specs.is_empty(), "luminaires", "there are none", "give at least one luminaire")?;
+        self.source.require(!specs.is_empty(), "luminaires", "there are none", "give at least one luminaire")?;
         let mut ids = HashSet::new();
         let mut files: BTreeMap<PathBuf, Arc<Photometry>> = BTreeMap::new();
         let mut luminaires = vec![];
@@ -203,19 +201,19 @@ impl<'a> Builder<'a> {
             let at = |field: &str| format!("luminaires[{k}].{field}");
             let is_name = !spec.id.is_empty() && ids.insert(&spec.id);
             let message = format!("`{}` is no unique name", spec.id);
-            self.require(is_name, &at("id"), message, "give every luminaire an id of its own")?;
+            self.source.require(is_name, &at("id"), message, "give every luminaire an id of its own")?;
             let position_m = DVec3::from(spec.at_m);
             // A luminous opening may be flush with a surface; light from a single point on one would be half lost.
             let margin = if spec.model == ModelSpec::Point { SURFACE_MARGIN * room.size_m.max_element() } else { 0.0 };
             let inside = position_m.is_finite() && room.contains(position_m, margin);
             let message = format!("{position_m} lies outside the room or on its surface");
-            self.require(inside, &at("at_m"), message, within(room))?;
+            self.source.require(inside, &at("at_m"), message, within(room))?;
             let is_factor = spec.flux_scale.is_finite() && spec.flux_scale >= 0.0;
             let message = format!("{} is no factor", spec.flux_scale);
-            self.require(is_factor, &at("flux_scale"), message, "give a number from 0")?;
+            self.source.require(is_factor, &at("flux_scale"), message, "give a number from 0")?;
             let turn = spec.rotate_deg;
             let finite = [turn.azimuth, turn.tilt, turn.roll].iter().all(|a| a.is_finite());
-            self.require(finite, &at("rotate_deg"), "angles must be finite", "give degrees")?;
+            self.source.require(finite, &at("rotate_deg"), "angles must be finite", "give degrees")?;
             let path = self.beside(&spec.photometry);
             let photometry = match files.get(&path) {
                 Some(read) => Arc::clone(read),
@@ -238,8 +236,7 @@ impl<'a> Builder<'a> {
     }
 
     fn photometry(&mut self, at: &str, path: &Path) -> Result<Arc<Photometry>, SpecError> {
-        let bytes = self.read(at, path)?;
-        self.hash.update(bytes);
+        self.take_in(at, path)?;
         photometry::read_file(path).map(Arc::new).map_err(|error| SpecError {
             file: path.to_owned(),
             // The reader counts from 1; 0 is no place.
@@ -257,18 +254,18 @@ impl<'a> Builder<'a> {
             let message = "the normal has no direction";
             return Err(self.source.error_at(&format!("{at}.normal"), message, "give a vector other than zero"));
         };
-        let (points, place): (Vec<DVec3>, &str) = match (&set.points_m, &set.grid) {
-            (Some(points), None) => (points.iter().map(|p| DVec3::from(*p)).collect(), "points_m"),
-            (None, Some(grid)) => (self.grid(&at, grid)?, "grid"),
+        let points: Vec<DVec3> = match (&set.points_m, &set.grid) {
+            (Some(points), None) => points.iter().map(|p| DVec3::from(*p)).collect(),
+            (None, Some(grid)) => self.grid(&at, grid)?,
             _ => {
                 let message = "a meter set is either points or a grid";
                 return Err(self.source.error_at(&at, message, "give exactly one of `points_m` and `grid`"));
             }
         };
-        self.require(!points.is_empty(), &at, "the set holds no points", "give at least one")?;
+        self.source.require(!points.is_empty(), &at, "the set holds no points", "give at least one")?;
         for (k, &point) in points.iter().enumerate() {
             if let Some((message, help)) = misplaced(point, scene) {
-                let path = if place == "grid" { format!("{at}.grid") } else { format!("{at}.points_m[{k}]") };
+                let path = if set.grid.is_some() { format!("{at}.grid") } else { format!("{at}.points_m[{k}]") };
                 return Err(self.source.error_at(&path, format!("{name}[{k}] at {point} {message}"), help));
             }
         }
@@ -279,7 +276,7 @@ impl<'a> Builder<'a> {
         let [nu, nv] = grid.counts;
         let sound = nu.checked_mul(nv).is_some_and(|n| (1..=MAX_METERS).contains(&n));
         let help = format!("give counts whose product lies between 1 and {MAX_METERS}");
-        self.require(sound, &format!("{at}.grid.counts"), format!("{nu} x {nv} points"), help)?;
+        self.source.require(sound, &format!("{at}.grid.counts"), format!("{nu} x {nv} points"), help)?;
         let (origin, u, v) = (DVec3::from(grid.origin_m), DVec3::from(grid.u_m), DVec3::from(grid.v_m));
         Ok((0..nv).flat_map(|j| (0..nu).map(move |i| origin + u * i as f64 + v * j as f64)).collect())
     }
@@ -290,7 +287,7 @@ impl<'a> Builder<'a> {
         luminaires: &[LuminaireSpec],
         meters: &BTreeMap<String, Vec<Meter>>,
     ) -> Result<(), SpecError> {
-        self.require(!procedures.0.is_empty(), "procedures", "there are none", "give at least one procedure")?;
+        self.source.require(!procedures.0.is_empty(), "procedures", "there are none", "give at least one procedure")?;
         for (procedure, asked) in &procedures.0 {
             match asked {
                 Asked::Meters(asked) => self.meter_sets(*procedure, &asked.meters, meters)?,
@@ -322,22 +319,22 @@ impl<'a> Builder<'a> {
         let ids = || luminaires.iter().map(|l| l.id.as_str());
         let message = format!("there is no luminaire `{}`", intensity.luminaire);
         let help = suggestion(&intensity.luminaire, ids());
-        self.require(ids().any(|id| id == intensity.luminaire), &at("luminaire"), message, help)?;
+        self.source.require(ids().any(|id| id == intensity.luminaire), &at("luminaire"), message, help)?;
         let is_distance = intensity.distance_m.is_finite() && intensity.distance_m > 0.0;
         let message = format!("{} m is no distance", intensity.distance_m);
-        self.require(is_distance, &at("distance_m"), message, "give a positive number of metres")?;
+        self.source.require(is_distance, &at("distance_m"), message, "give a positive number of metres")?;
         let Angles::Listed(lists) = &intensity.angles else { return Ok(()) };
         let all = |list: &[f64], sound: fn(&f64) -> bool| !list.is_empty() && list.iter().all(sound);
         let (gamma, c) = (all(&lists.gamma_deg, |g| (0.0..=180.0).contains(g)), all(&lists.c_deg, |c| c.is_finite()));
         let help = "list gamma angles from 0 (nadir) to 180 (zenith)";
-        self.require(gamma, &at("angles.gamma_deg"), "not a list of gamma angles", help)?;
-        self.require(c, &at("angles.c_deg"), "not a list of C angles", "list C planes in degrees")
+        self.source.require(gamma, &at("angles.gamma_deg"), "not a list of gamma angles", help)?;
+        self.source.require(c, &at("angles.c_deg"), "not a list of C angles", "list C planes in degrees")
     }
 
     fn budget(&self, budget: Budget) -> Result<(), SpecError> {
         for (field, value) in [("relative_error", budget.relative_error), ("seconds", budget.seconds)] {
             let (at, message) = (format!("budget.{field}"), format!("{value} is no budget"));
-            self.require(value.is_finite() && value > 0.0, &at, message, "give a positive number")?;
+            self.source.require(value.is_finite() && value > 0.0, &at, message, "give a positive number")?;
         }
         Ok(())
     }
@@ -353,32 +350,24 @@ impl<'a> Builder<'a> {
             })?;
             let values = [tolerance.relative, tolerance.absolute_lx, tolerance.absolute_cd];
             let (at, sound) = (format!("tolerances.{name}"), values.iter().all(|v| v.is_finite() && *v >= 0.0));
-            self.require(sound, &at, "a tolerance is a number from 0", "give positive numbers")?;
+            self.source.require(sound, &at, "a tolerance is a number from 0", "give positive numbers")?;
             Ok((procedure, *tolerance))
         };
         tolerances.iter().map(one).collect()
-    }
-
-    /// Refuses the spec at a place where something is not sound: what is wrong, and what to do.
-    fn require(
-        &self,
-        sound: bool,
-        at: &str,
-        message: impl Into<String>,
-        help: impl Into<String>,
-    ) -> Result<(), SpecError> {
-        if sound { Ok(()) } else { Err(self.source.error_at(at, message, help)) }
     }
 
     fn beside(&self, file: &Path) -> PathBuf {
         self.folder.join(file)
     }
 
-    fn read(&self, at: &str, path: &Path) -> Result<Vec<u8>, SpecError> {
-        std::fs::read(path).map_err(|error| {
+    /// Adds a file to the case's hash.
+    fn take_in(&mut self, at: &str, path: &Path) -> Result<(), SpecError> {
+        let bytes = std::fs::read(path).map_err(|error| {
             let message = format!("{} cannot be read: {error}", path.display());
             self.source.error_at(at, message, "paths are relative to the spec's folder")
-        })
+        })?;
+        self.hash.update(bytes);
+        Ok(())
     }
 }
 

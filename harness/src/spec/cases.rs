@@ -13,7 +13,6 @@ use super::{Source, SpecError};
 pub(super) struct Variant {
     /// Its name; the parts of a matrix are joined by hyphens.
     pub(super) name: String,
-    /// The spec that results.
     pub(super) spec: Spec,
     /// The engines that its overrides name: the case is for these alone.
     pub(super) engines: Option<Vec<String>>,
@@ -39,16 +38,13 @@ pub(super) fn variants(source: &Source) -> Result<Vec<Variant>, SpecError> {
         Value::Mapping(axes) => matrix(source, axes)?,
         _ => return Err(source.error_at("cases", "neither a list nor a matrix", FORM)),
     };
-    if combinations.is_empty() {
-        return Err(source.error_at("cases", "there are none", "give at least one, or leave `cases` out"));
-    }
+    source.require(!combinations.is_empty(), "cases", "there are none", "give at least one, or leave `cases` out")?;
     let mut variants: Vec<Variant> = vec![];
     for overrides in combinations {
         let variant = combined(source, &base, &overrides)?;
-        if variants.iter().any(|v| v.name == variant.name) {
-            let message = format!("two cases are named `{}`", variant.name);
-            return Err(source.error_at(&overrides[0].place, message, "give every case a name of its own"));
-        }
+        let is_new = variants.iter().all(|v| v.name != variant.name);
+        let message = format!("two cases are named `{}`", variant.name);
+        source.require(is_new, &overrides[0].place, message, "give every case a name of its own")?;
         variants.push(variant);
     }
     Ok(variants)
@@ -101,12 +97,10 @@ fn matrix(source: &Source, axes: Mapping) -> Result<Vec<Vec<Override>>, SpecErro
 
 /// Names become folders.
 fn check_name(source: &Source, place: &str, name: &str) -> Result<(), SpecError> {
-    let sound = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    if !name.is_empty() && !name.starts_with('.') && name.chars().all(sound) {
-        return Ok(());
-    }
+    let known = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    let sound = !name.is_empty() && !name.starts_with('.') && name.chars().all(known);
     let help = "use letters, digits, hyphens, underscores and points; put a name of digits alone in quotes";
-    Err(source.error_at(place, format!("`{name}` is no name of a case"), help))
+    source.require(sound, place, format!("`{name}` is no name of a case"), help)
 }
 
 fn combined(source: &Source, base: &Mapping, overrides: &[Override]) -> Result<Variant, SpecError> {
@@ -115,9 +109,8 @@ fn combined(source: &Source, base: &Mapping, overrides: &[Override]) -> Result<V
     let mut text = Value::Mapping(base.clone());
     let mut engines: Option<Vec<String>> = None;
     for o in overrides {
-        if o.says.contains_key("cases") || o.says.contains_key("luxproof") {
-            return Err(source.error_at(&o.place, "a case has neither cases nor a format version of its own", FORM));
-        }
+        let sound = !o.says.contains_key("cases") && !o.says.contains_key("luxproof");
+        source.require(sound, &o.place, "a case has neither cases nor a format version of its own", FORM)?;
         lay(&mut text, &Value::Mapping(o.says.clone())).map_err(|missing| {
             let message = format!("there is no `{missing}` to override");
             source.error_at(&o.place, message, "name an item by its `id`")
@@ -166,23 +159,12 @@ mod tests {
     use super::*;
     use crate::record::ProcedureId;
     use crate::spec::model::ModelSpec;
-
-    const BASE: &str = "luxproof: 1
-room:
-  size_m: [4, 4, 3]
-  reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.8}
-luminaires:
-  - {id: a, photometry: a.ies, at_m: [2, 2, 2]}
-  - {id: b, photometry: a.ies, at_m: [2, 2, 2]}
-meters:
-  plane: {points_m: [[1, 1, 1]], normal: [0, 0, 1]}
-procedures:
-  indirect_illuminance: {meters: plane}
-  direct_illuminance: {meters: plane}
-";
+    use crate::spec::tests::MINIMAL;
 
     fn of(cases: &str) -> Result<Vec<Variant>, SpecError> {
-        variants(&Source::new("spec.yaml".into(), format!("{BASE}{cases}")))
+        let second = "  - {id: b, photometry: a.ies, at_m: [2, 2, 2]}\nmeters:\n";
+        let base = MINIMAL.replace("meters:\n", second) + "  indirect_illuminance: {meters: plane}\n";
+        variants(&Source::new("spec.yaml".into(), base + cases))
     }
 
     #[test]

@@ -9,7 +9,7 @@ pub(super) fn locate(text: &str, path: &str) -> Option<(usize, usize)> {
     let steps = steps(path);
     (0..=steps.len()).rev().find_map(|n| {
         let deserializer = serde_yaml::Deserializer::from_str(text);
-        let error = Walk { steps: &steps[..n] }.deserialize(deserializer).err()?;
+        let error = Walk(&steps[..n]).deserialize(deserializer).err()?;
         let location = error.location().filter(|_| error.to_string().contains(MARK))?;
         Some((location.line(), location.column()))
     })
@@ -22,9 +22,7 @@ fn steps(path: &str) -> Vec<&str> {
     path.split(['.', '[']).map(|step| step.trim_end_matches(']')).filter(|step| !step.is_empty()).collect()
 }
 
-struct Walk<'a> {
-    steps: &'a [&'a str],
-}
+struct Walk<'a>(&'a [&'a str]);
 
 impl<'de> DeserializeSeed<'de> for Walk<'_> {
     type Value = ();
@@ -42,10 +40,10 @@ impl<'de> Visitor<'de> for Walk<'_> {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
-        let Some((wanted, rest)) = self.steps.split_first() else { return Err(A::Error::custom(MARK)) };
+        let Some((wanted, rest)) = self.0.split_first() else { return Err(A::Error::custom(MARK)) };
         while let Some(key) = map.next_key::<String>()? {
             if key == *wanted {
-                return map.next_value_seed(Walk { steps: rest });
+                return map.next_value_seed(Walk(rest));
             }
             map.next_value::<IgnoredAny>()?;
         }
@@ -54,13 +52,13 @@ impl<'de> Visitor<'de> for Walk<'_> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<(), A::Error> {
         let index = |(wanted, rest): (&&str, _)| Some((wanted.parse().ok()?, rest));
-        let Some((wanted, rest)) = self.steps.split_first().and_then(index) else {
+        let Some((wanted, rest)) = self.0.split_first().and_then(index) else {
             return Err(A::Error::custom(MARK));
         };
         for _ in 0usize..wanted {
             seq.next_element::<IgnoredAny>()?;
         }
-        seq.next_element_seed(Walk { steps: rest }).map(|_| ())
+        seq.next_element_seed(Walk(rest)).map(|_| ())
     }
     // Scalars fall through to the default methods, which fail with "expected luxproof-was-here".
 }
@@ -70,16 +68,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_are_found_in_block_and_flow_style() {
+    fn places_are_found_in_block_and_flow_style_and_for_what_is_absent_that_of_its_nearest_parent() {
         let text = "room:\n  size_m: [1, 2]\nmeters:\n  a:\n    points_m: [[1, 2, 3], [4, 5, 6]]\n";
-        assert_eq!(locate(text, "room.size_m"), Some((2, 11)));
-        assert_eq!(locate(text, "meters.a.points_m[1]"), Some((5, 27)));
-        assert_eq!(locate(text, "meters.a.points_m[1][2]"), Some((5, 34)));
-        assert_eq!(locate(text, "room.size_m[1]"), Some((2, 15)));
-    }
-
-    #[test]
-    fn a_path_that_does_not_exist_is_placed_at_its_nearest_parent() {
-        assert_eq!(locate("room:\n  size_m: [1, 2]\n", "room.reflectance.floor"), Some((2, 3)));
+        for (path, place) in [
+            ("room.size_m", (2, 11)),
+            ("meters.a.points_m[1]", (5, 27)),
+            ("meters.a.points_m[1][2]", (5, 34)),
+            ("room.size_m[1]", (2, 15)),
+            ("room.reflectance.floor", (2, 3)),
+        ] {
+            assert_eq!(locate(text, path), Some(place), "{path}");
+        }
     }
 }

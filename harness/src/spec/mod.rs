@@ -89,6 +89,17 @@ impl Source {
         SpecError { line: place.map(|p| p.0), column: place.map(|p| p.1), ..error }
     }
 
+    /// Refuses what stands at a place unless it is sound.
+    fn require(
+        &self,
+        sound: bool,
+        path: &str,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Result<(), SpecError> {
+        if sound { Ok(()) } else { Err(self.error_at(path, message, help)) }
+    }
+
     /// The place of a path in the override that sets it or something near it, if one does.
     fn overridden(&self, path: &str) -> Option<(usize, usize)> {
         let first = path.split(['.', '[']).next().filter(|f| !f.is_empty())?;
@@ -140,7 +151,7 @@ mod tests {
         Source::new("spec.yaml".into(), text.into()).parse()
     }
 
-    const MINIMAL: &str = "luxproof: 1
+    pub(super) const MINIMAL: &str = "luxproof: 1
 room:
   size_m: [20, 20, 20]
   reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.8}
@@ -153,38 +164,27 @@ procedures:
 ";
 
     #[test]
-    fn a_minimal_spec_is_read() {
+    fn what_is_wrong_is_refused_at_its_place_and_an_unknown_key_answered_with_the_nearest() {
+        for (right, wrong, line, column, help) in [
+            ("size_m", "sise_m", 3, Some(3), Some("did you mean `size_m`?")),
+            ("0.5", "1.5", 4, Some(36), None),
+            ("1, 1, 1", "much", 8, None, None),
+        ] {
+            let error = parse(&MINIMAL.replace(right, wrong)).unwrap_err();
+            assert_eq!((error.line, error.help.as_deref()), (Some(line), help), "{error}");
+            assert!(error.message.contains(wrong) && column.is_none_or(|c| error.column == Some(c)), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_minimal_spec_is_read_and_walls_may_differ_and_meter_sets_be_listed() {
         let spec = parse(MINIMAL).unwrap();
         assert_eq!(spec.room.size_m, [20.0, 20.0, 20.0]);
         assert!(spec.procedures.0.contains_key(&ProcedureId::DirectIlluminance));
-    }
-
-    #[test]
-    fn unknown_keys_are_placed_and_answered_with_the_nearest_key() {
-        let error = parse(&MINIMAL.replace("size_m", "sise_m")).unwrap_err();
-        assert_eq!((error.line, error.column), (Some(3), Some(3)), "{error}");
-        assert_eq!(error.help.as_deref(), Some("did you mean `size_m`?"));
-    }
-
-    #[test]
-    fn a_reflectance_outside_zero_to_one_is_refused_at_its_place() {
-        let error = parse(&MINIMAL.replace("0.5", "1.5")).unwrap_err();
-        assert_eq!((error.line, error.column), (Some(4), Some(36)), "{error}");
-        assert!(error.message.contains("1.5"), "{error}");
-    }
-
-    #[test]
-    fn walls_may_differ_and_meter_sets_may_be_listed() {
         let text = MINIMAL
             .replace("walls: 0.5", "walls: {x-: 0.1, x+: 0.2, y-: 0.3, y+: 0.4}")
             .replace("meters: plane}", "meters: [plane]}");
         let reflectances = parse(&text).unwrap().room.reflectance.build();
         assert_eq!((reflectances.wall_x_max, reflectances.wall_y_min), (0.2, 0.3));
-    }
-
-    #[test]
-    fn text_is_no_number() {
-        let error = parse(&MINIMAL.replace("[1, 1, 1]", "[1, much, 1]")).unwrap_err();
-        assert_eq!(error.line, Some(8), "{error}");
     }
 }

@@ -7,25 +7,12 @@ use crate::spec::hexadecimal;
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
-    engine: String,
-    digits: String,
+    pub engine: String,
+    /// 64 hexadecimal digits.
+    pub digits: String,
 }
 
 impl Key {
-    #[cfg(test)]
-    pub(super) fn named(engine: &str, digits: &str) -> Self {
-        Self { engine: engine.to_owned(), digits: digits.to_owned() }
-    }
-
-    pub fn engine(&self) -> &str {
-        &self.engine
-    }
-
-    /// 64 hexadecimal digits.
-    pub fn digits(&self) -> &str {
-        &self.digits
-    }
-
     /// The key of the same where these conditions matter as well.
     #[must_use]
     pub fn under(&self, conditions: &str) -> Self {
@@ -80,21 +67,19 @@ mod tests {
             let renamed = Job { case: "other".into(), procedure: ProcedureId::DirectIlluminance, ..job.clone() };
             assert_eq!(plain, of(&renamed));
             assert_ne!(plain, key(engine.as_ref(), &Version("2".into()), &job).unwrap());
-            let mut others = vec![
-                Job { seed: 2, ..job.clone() },
-                Job { transport: Transport::Direct, ..job.clone() },
-                Job { stations: job.stations[1..].to_vec(), ..job.clone() },
-                Job { budget: crate::spec::Budget { seconds: 1.5, ..job.budget }, ..job.clone() },
-            ];
-            let mut dimmed = job.clone();
-            dimmed.scene.luminaires[0].flux_scale *= 1.0 + 1e-15;
-            others.push(dimmed);
-            let mut moved = job.clone();
-            moved.stations[0].meter.position_m.x += 1e-12;
-            others.push(moved);
             assert!(plain != plain.under("2 threads") && plain.under("1 thread") != plain.under("2 threads"));
-            for (k, other) in others.iter().enumerate() {
-                assert_ne!(plain, of(other), "{} {k}", engine.name());
+            let changes: [fn(&mut Job); 6] = [
+                |job| job.seed = 2,
+                |job| job.transport = Transport::Direct,
+                |job| drop(job.stations.remove(0)),
+                |job| job.budget.seconds = 1.5,
+                |job| job.scene.luminaires[0].flux_scale *= 1.0 + 1e-15,
+                |job| job.stations[0].meter.position_m.x += 1e-12,
+            ];
+            for (k, change) in changes.iter().enumerate() {
+                let mut other = job.clone();
+                change(&mut other);
+                assert_ne!(plain, of(&other), "{} {k}", engine.name());
             }
         }
     }

@@ -43,7 +43,7 @@ impl Cache {
     }
 
     pub fn path(&self, key: &Key) -> PathBuf {
-        self.root.join(key.engine()).join(key.digits()).with_extension("json")
+        self.root.join(&key.engine).join(&key.digits).with_extension("json")
     }
 
     /// Looks a key up; an entry that was found counts as used today.
@@ -54,7 +54,7 @@ impl Cache {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Lookup::Unknown,
             Err(error) => return Lookup::Damaged(format!("{} cannot be read: {error}", path.display())),
         };
-        match entry::parse(&text, key.digits()) {
+        match entry::parse(&text, &key.digits) {
             Ok(entry) => {
                 // Only pruning asks when an entry was used last: not to know is no reason to fail.
                 std::fs::File::open(&path).and_then(|f| f.set_modified(std::time::SystemTime::now())).ok();
@@ -65,6 +65,6 @@ impl Cache {
     }
 
     pub fn keep(&self, key: &Key, entry: &Entry) -> std::io::Result<()> {
-        files::replace(&self.path(key), entry::text(entry, key.digits())?.as_bytes())
+        files::replace(&self.path(key), entry::text(entry, &key.digits)?.as_bytes())
     }
 }

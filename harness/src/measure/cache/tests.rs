@@ -26,7 +26,7 @@ fn sample() -> Entry {
 }
 
 fn a_key(digit: char) -> Key {
-    Key::named("radiance", &digit.to_string().repeat(64))
+    Key { engine: "radiance".into(), digits: digit.to_string().repeat(64) }
 }
 
 #[test]
@@ -38,8 +38,8 @@ fn an_entry_comes_back_to_the_last_bit() {
     for _ in 0..2000 {
         let mut entry = sample();
         entry.answer.as_mut().unwrap().estimates[0].value = f64::from_bits(random.u64(0..0x7ff0_0000_0000_0000));
-        let text = entry::text(&entry, a_key('a').digits()).unwrap();
-        assert_eq!(entry::parse(&text, a_key('a').digits()).unwrap(), entry);
+        let text = entry::text(&entry, &a_key('a').digits).unwrap();
+        assert_eq!(entry::parse(&text, &a_key('a').digits).unwrap(), entry);
     }
     cache.keep(&a_key('a'), &sample()).unwrap();
     assert_eq!(cache.find(&a_key('a')), Lookup::Found(Box::new(sample())));
@@ -68,7 +68,7 @@ fn whatever_is_cut_flipped_or_foreign_is_found_out() {
             bytes[place] ^= 1 << bit;
             // White space may change, and digits beyond a double's precision: never what the entry says.
             if let Ok(entry) =
-                String::from_utf8(bytes).map_or(Err(String::new()), |t| entry::parse(&t, a_key('a').digits()))
+                String::from_utf8(bytes).map_or(Err(String::new()), |t| entry::parse(&t, &a_key('a').digits))
             {
                 assert_eq!(entry, sample(), "bit {bit} of byte {place}");
             }

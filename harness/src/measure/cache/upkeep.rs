@@ -42,7 +42,8 @@ impl Cache {
         for file in self.files()? {
             match kind(&file) {
                 Kind::Entry => {
-                    let (entries, bytes) = contents.engines.entry(folder_name(&file)).or_default();
+                    let engine = file.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy();
+                    let (entries, bytes) = contents.engines.entry(engine.into_owned()).or_default();
                     *entries += 1;
                     *bytes += file.metadata().map_or(0, |m| m.len());
                 }
@@ -95,11 +96,6 @@ fn list(folder: &Path) -> io::Result<Vec<PathBuf>> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(vec![]),
         Err(error) => Err(error),
     }
-}
-
-fn folder_name(file: &Path) -> String {
-    let folder = file.parent().and_then(Path::file_name);
-    folder.map_or_else(String::new, |f| f.to_string_lossy().into_owned())
 }
 
 fn kind(file: &Path) -> Kind {

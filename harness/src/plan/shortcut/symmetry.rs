@@ -22,26 +22,21 @@ const BESIDE_DEG: f64 = 1e-6;
 pub(super) fn shorten(shortcut: &mut Shortcut, asked: &Job) {
     let stations = &shortcut.job.stations;
     let size_m = asked.scene.room.map_or(DVec3::ONE, |r| r.size_m);
-    let mut motions: Vec<Motion> = Motion::all(size_m);
     // Motions that take no meter to another are not worth a look at the scene.
     let places: BTreeMap<[i64; 6], usize> =
         stations.iter().enumerate().rev().map(|(k, s)| (place(&s.meter, size_m), k)).collect();
-    motions.retain(|m| {
-        m.is_identity()
-            || stations
-                .iter()
-                .enumerate()
-                .any(|(k, s)| places.get(&place(&m.meter(&s.meter), size_m)).is_some_and(|j| *j != k))
-    });
-    motions.retain(|m| m.is_identity() || is_symmetric(&asked.scene, m));
+    let image = |m: &Motion, meter: &Meter| place(&m.meter(meter), size_m);
+    let moves =
+        |m: &Motion| stations.iter().enumerate().any(|(k, s)| places.get(&image(m, &s.meter)).is_some_and(|j| *j != k));
+    let mut motions = Motion::all(size_m);
+    motions.retain(|m| m.is_identity() || moves(m) && is_symmetric(&asked.scene, m));
     let mut images: Vec<Option<(usize, String)>> = vec![];
     let mut from: BTreeMap<[i64; 6], (usize, String)> = BTreeMap::new();
     for (k, station) in stations.iter().enumerate() {
         let known = from.get(&place(&station.meter, size_m)).cloned();
         if known.is_none() {
             for motion in &motions {
-                let image = place(&motion.meter(&station.meter), size_m);
-                from.entry(image).or_insert_with(|| (k, motion.name()));
+                from.entry(image(motion, &station.meter)).or_insert_with(|| (k, motion.name()));
             }
         }
         images.push(known);

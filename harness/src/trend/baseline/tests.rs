@@ -15,7 +15,7 @@ fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
         key: ReadingKey::new("room", ProcedureId::IndirectIlluminance, "radiance"),
         version: "6.0a".into(),
         model: "point".into(),
-        light: "indirect, 7 bounces".parse().unwrap(),
+        light: "indirect, 7 bounces".to_owned().try_into().unwrap(),
         input_sha256: "ab".repeat(32),
         method: [("preset", "audit")].into(),
         degrees_of_freedom: None,
@@ -113,7 +113,7 @@ fn a_baseline_of_another_spec_version_model_light_or_setting_is_refused() {
         Entry { input_sha256: "cd".repeat(32), ..a.clone() },
         Entry { version: "6.1".into(), ..a.clone() },
         Entry { model: "area".into(), ..a.clone() },
-        Entry { light: "indirect, all bounces".parse().unwrap(), ..a.clone() },
+        Entry { light: "indirect, all bounces".to_owned().try_into().unwrap(), ..a.clone() },
         Entry { method: Method::default(), ..a.clone() },
     ];
     for other in &others {
