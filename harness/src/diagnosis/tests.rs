@@ -40,6 +40,14 @@ fn light_that_stops_early_is_told_by_the_number_of_its_reflections() {
 }
 
 #[test]
+fn meters_that_face_the_other_way_are_named() {
+    let (task, right) = task(Transport::Indirect(Bounces::Converged));
+    let flipped = faults(&task, &right).into_iter().find(|f| f.id == "meter-flipped").unwrap();
+    let causes = found(&task, &right, flipped.readings(&right).unwrap());
+    assert_eq!(causes[0].id, "meter-flipped");
+}
+
+#[test]
 fn what_nothing_explains_is_left_unsaid() {
     let (task, right) = task(Transport::Direct);
     let read: Vec<f64> = right.iter().zip([1.1, 0.8, 1.3, 0.95]).map(|(r, f)| r * f).collect();
