@@ -243,7 +243,7 @@ fn of_transport(task: &Task) -> Vec<Fault> {
         light("indirect-added", "reflected light is counted too", Transport::Total(Bounces::Converged));
     }
     let mut flipped = task.clone();
-    flipped.targets.iter_mut().for_each(|t| t.meter.normal = -t.meter.normal);
+    flipped.targets.iter_mut().flat_map(|t| &mut t.aspects).for_each(|a| a.meter.normal = -a.meter.normal);
     faults.extend(scene("meter-flipped", "meters face the other way", &flipped));
     faults
 }

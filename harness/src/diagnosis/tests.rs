@@ -42,3 +42,11 @@ fn light_that_stops_early_is_told_by_the_number_of_its_reflections() {
     let causes = found(&task, &right, read);
     assert_eq!(causes[0].what, "light stops after 5 reflections");
 }
+
+#[test]
+fn meters_that_face_the_other_way_are_named() {
+    let (task, right) = task(Transport::Indirect(Bounces::Converged));
+    let flipped = faults(&task, &right).into_iter().find(|f| f.id == "meter-flipped").unwrap();
+    let causes = found(&task, &right, flipped.readings(&right).unwrap());
+    assert_eq!(causes[0].id, "meter-flipped");
+}

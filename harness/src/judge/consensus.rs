@@ -148,7 +148,7 @@ fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec
         };
         let read = |k: usize| {
             let reading = recording.readings.get(k).filter(|r| r.value.is_finite())?;
-            Some((reading.value, combined(&of_reading(recording, reading))))
+            Some((reading.value, combined(&of_reading(reading))))
         };
         let readings = (0..task.targets.len()).map(read).collect();
         Testimony::new(&recording.key.engine, recording.components.clone(), readings, allowed)

@@ -174,7 +174,7 @@ impl Judge<'_> {
         let difference = pair.map(|(a, b)| a.value - b.reference.value);
         let tail = uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor());
         let budget = pair.map(|(reading, held)| {
-            let components = of_reading(recording, reading).into_iter().chain(held.components.iter().copied());
+            let components = of_reading(reading).into_iter().chain(held.components.iter().copied());
             ErrorBudget::new(components.collect(), tail * share_of_reading(recording, k))
         });
         let missing = match (reading, &held) {
@@ -236,9 +236,9 @@ impl Held {
         self
     }
 
-    fn reading(recording: &Recording, reading: &Reading, basis: Basis, source: String) -> Self {
+    fn reading(reading: &Reading, basis: Basis, source: String) -> Self {
         let reference = Reference::of(reading.value, &reading.uncertainty, basis, source);
-        let components = of_reading(recording, reading).into_iter();
+        let components = of_reading(reading).into_iter();
         let components = components.map(|component| Component { source: Source::Reference, ..component });
         Self { reference, components: components.collect() }
     }
@@ -264,14 +264,12 @@ fn share_of_reading(recording: &Recording, k: usize) -> f64 {
 }
 
 /// What is uncertain of a reading.
-fn of_reading(recording: &Recording, reading: &Reading) -> Vec<Component> {
+fn of_reading(reading: &Reading) -> Vec<Component> {
     let uncertainty = &reading.uncertainty;
     let chance = uncertainty.standard_error().unwrap_or(0.0);
-    let instrument = recording.instrument_uncertainty * reading.value.abs();
     vec![
         Component::normal(Source::MonteCarlo, chance, uncertainty.degrees_of_freedom()),
         Component::within(Source::Discretisation, uncertainty.bound()),
-        Component::normal(Source::Instrument, instrument, None),
     ]
 }
 
@@ -292,5 +290,5 @@ fn reference_of_task(task: &Task, recordings: &[&Recording], k: usize, engine: &
         Some(solver) if basis == Basis::Exact => format!("{source}: {solver}"),
         _ => source.to_owned(),
     };
-    Some(Held::reading(recording, reading, basis, source))
+    Some(Held::reading(reading, basis, source))
 }

@@ -38,18 +38,16 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
     if task.reference().engine() != Some(&EngineName::SIMULATOR) {
         return vec![];
     }
-    // `instrument` is the relative standard uncertainty of the read-out.
-    let uncertain = |reading: &Reading, instrument: f64| Uncertain {
+    let uncertain = |reading: &Reading| Uncertain {
         value: Lux(reading.value),
-        half_width: Lux(coverage * reading.uncertainty.standard().hypot(instrument * reading.value)),
+        half_width: Lux(coverage * reading.uncertainty.standard()),
     };
     let mut splits = vec![];
     for renderer in recordings.iter().filter(|r| r.role == Role::Renderer) {
         for rendered in &renderer.readings {
             let at = |r: &Recording| r.readings.iter().find(|reading| reading.meter == rendered.meter).cloned();
             let (Some(method), Some(exact)) = (at(method), at(exact)) else { continue };
-            let value = uncertain(rendered, renderer.instrument_uncertainty);
-            let split = DeviationSplit::new(Lux(method.value), uncertain(&exact, 0.0), value);
+            let split = DeviationSplit::new(Lux(method.value), uncertain(&exact), uncertain(rendered));
             let Some(split) = split else { continue };
             let (method, name) = (name_of_method(task.transport), crate::engines::display_name(&renderer.key.engine));
             splits.push(Split {

@@ -110,13 +110,13 @@ fn a_budget_names_what_it_is_made_of() {
     let mut exact = recording("simulator", &[Estimate::exact(2.0)]);
     exact.readings[0].uncertainty = Uncertainty::Bound(0.0003);
     let mut subject = recording("radiance", &[sampled(2.01, 0.004, 8.0)]);
-    subject.instrument_uncertainty = 0.001;
+    subject.readings[0].uncertainty = subject.readings[0].uncertainty.within(0.002);
     let comparisons = built_in().compare(&task(1), &[&exact, &subject]);
     let budget = comparisons[0].budget.as_ref().unwrap();
     let of = |source| budget.components.iter().find(|c| c.source == source).unwrap();
     assert_eq!(of(Source::MonteCarlo).degrees_of_freedom, Some(8.0));
-    assert!((of(Source::Instrument).uncertainty - 0.00201).abs() < 1e-15);
+    assert!((of(Source::Discretisation).uncertainty - 0.002 / 3f64.sqrt()).abs() < 1e-15);
     assert!((of(Source::Reference).uncertainty - 0.0003 / 3f64.sqrt()).abs() < 1e-15);
     assert!(budget.components.iter().all(|c| !matches!(c.source, Source::Rounding | Source::Input)));
-    assert!((budget.combined - 0.004_f64.hypot(0.00201).hypot(0.0003 / 3f64.sqrt())).abs() < 1e-12);
+    assert!((budget.combined - 0.004_f64.hypot(0.002 / 3f64.sqrt()).hypot(0.0003 / 3f64.sqrt())).abs() < 1e-12);
 }

@@ -17,9 +17,8 @@ const NEGLIGIBLE: f64 = 1e-4;
 pub enum Source {
     /// Chance in the reading: the standard error of sampled light.
     MonteCarlo,
-    /// Our own read-out of the engine.
-    Instrument,
-    /// The error bound of a deterministic reading: discretisation and read-out.
+    /// The error bound of a deterministic reading: discretisation and read-out. Older reports tell an `instrument` apart.
+    #[serde(alias = "instrument")]
     Discretisation,
     /// The reference's own error.
     Reference,
@@ -31,13 +30,11 @@ pub enum Source {
 
 impl Source {
     /// Every source, in the order of reports.
-    pub const ALL: [Self; 6] =
-        [Self::MonteCarlo, Self::Instrument, Self::Discretisation, Self::Reference, Self::Rounding, Self::Input];
+    pub const ALL: [Self; 5] = [Self::MonteCarlo, Self::Discretisation, Self::Reference, Self::Rounding, Self::Input];
 
     pub const fn name(self) -> &'static str {
         match self {
             Self::MonteCarlo => "Monte Carlo",
-            Self::Instrument => "instrument",
             Self::Discretisation => "discretisation",
             Self::Reference => "reference",
             Self::Rounding => "rounding",

@@ -61,13 +61,12 @@ impl Interval {
 /// Draws an error with the components that a budget would state of it.
 type Draw = fn(&mut fastrand::Rng) -> (f64, Vec<Component>);
 
-const KINDS: [(&str, Draw); 8] = [
+const KINDS: [(&str, Draw); 7] = [
     ("Monte Carlo, many blocks", |random| {
         (0.003 * normal(random), vec![Component::normal(Source::MonteCarlo, 0.003, None)])
     }),
     ("Monte Carlo, 8 blocks", |random| few_blocks(random, FEW)),
     ("Monte Carlo, 3 blocks", |random| few_blocks(random, 3)),
-    ("instrument", |random| (0.001 * normal(random), vec![Component::normal(Source::Instrument, 0.001, None)])),
     ("discretisation", |random| (even(random, 0.002), vec![Component::within(Source::Discretisation, 0.002)])),
     ("reference, rounding", |random| rounded(random)),
     ("input: last digit of the table", |random| (even(random, 5e-4), vec![Component::within(Source::Input, 5e-4)])),
@@ -75,10 +74,9 @@ const KINDS: [(&str, Draw); 8] = [
         let (chance, mut components) = few_blocks(random, 2 * FEW);
         let (rounding, of_reference) = rounded(random);
         components.extend(of_reference);
-        components.push(Component::normal(Source::Instrument, 0.001, None));
         components.push(Component::within(Source::Input, 5e-4));
         components.push(Component::within(Source::Discretisation, 0.002));
-        (chance + rounding + 0.001 * normal(random) + even(random, 5e-4) + even(random, 0.002), components)
+        (chance + rounding + even(random, 5e-4) + even(random, 0.002), components)
     }),
 ];
 

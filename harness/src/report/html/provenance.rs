@@ -36,11 +36,11 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
 }
 
 fn settings(label: &str, recordings: &[&Recording]) -> Markup {
-    let heads = ["case", "procedure", "luminaire, light", "number seed", "number run time", "number instrument"];
+    let heads = ["case", "procedure", "luminaire, light", "number seed", "number run time"];
     let rows = html! {
         @for r in recordings {
             tr { th scope="row" { (r.key.case) } td { (r.key.procedure.row().title) } td { (r.model) ", " (r.light) } td.number { (r.seed) }
-                td.number { (duration(r.wall_s)) } td.number { (format!("{:.1e}", r.instrument_uncertainty)) }
+                td.number { (duration(r.wall_s)) }
                 td.wide { dl.settings {
                     @for (key, value) in r.method.iter().chain(r.effort.iter()) { div { dt { (key.replace('_', " ")) } dd { code { (value) } } } }
                     @if let Some(command) = &r.command { div { dt { "by hand" } dd { code { (command) } } } }

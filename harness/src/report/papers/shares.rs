@@ -38,7 +38,7 @@ fn split(
                 && (bounces.is_none() || r.light.bounces() == bounces)
         };
         let mut recordings = report.recordings.iter().filter(is_it);
-        recordings.find_map(|recording| Some(stage(reading(report, &recording.key, &row.meter)?, recording)))
+        recordings.find_map(|recording| reading(report, &recording.key, &row.meter).map(stage))
     };
     let (all, paper) = (Some(Bounces::Converged), &column.model);
     let stages = Stages {
@@ -64,11 +64,9 @@ fn split(
     })
 }
 
-/// A reading with all that is uncertain of it, the instrument included.
-fn stage(reading: &Reading, recording: &Recording) -> Estimate {
-    let instrument = recording.instrument_uncertainty * reading.value;
-    let uncertainty = Uncertainty::sampled(reading.uncertainty.standard().hypot(instrument), None);
-    Estimate { value: reading.value, uncertainty }
+/// A reading with all that is uncertain of it as one standard uncertainty.
+fn stage(reading: &Reading) -> Estimate {
+    Estimate { value: reading.value, uncertainty: Uncertainty::sampled(reading.uncertainty.standard(), None) }
 }
 
 /// The splits as a table; `None` of none.

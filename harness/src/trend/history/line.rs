@@ -82,7 +82,7 @@ pub struct Numbers {
     pub deviation: f64,
     /// Of the reading: what repeats differently from night to night.
     pub std_error: f64,
-    /// Combined standard uncertainty of the deviation: reading, instrument, reference.
+    /// Combined standard uncertainty of the deviation: reading and reference.
     pub u: f64,
 }
 
@@ -205,18 +205,17 @@ pub fn lines<'a>(report: &'a Report, night: Option<&'a str>) -> Result<Vec<Line<
         if place == lines.len() {
             lines.push(new);
         }
-        lines[place].push(&c.meter, Numbers::of(c, recording.map_or(0.0, |r| r.instrument_uncertainty)));
+        lines[place].push(&c.meter, Numbers::of(c));
     }
     Ok(lines)
 }
 
 impl Numbers {
     /// Rounded to what they are worth: a year of nights stays readable.
-    fn of(comparison: &Comparison, instrument: f64) -> Self {
+    fn of(comparison: &Comparison) -> Self {
         let std_error = comparison.uncertainty.standard_error();
-        let instrument = instrument * comparison.value.unwrap_or(0.0);
         let reference = comparison.reference.as_ref();
-        let u = reference.map(|r| std_error.unwrap_or(0.0).hypot(instrument).hypot(r.uncertainty));
+        let u = reference.map(|r| std_error.unwrap_or(0.0).hypot(r.uncertainty));
         Self {
             reference: rounded(reference.map(|r| r.value), 9),
             deviation: rounded(comparison.deviation, 6),
