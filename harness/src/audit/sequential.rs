@@ -35,6 +35,9 @@ pub struct Ask {
     pub budget: Budget,
 }
 
+/// One estimate for each station of the targets asked for, and the seconds that it took; the error says why there is none.
+pub type Look = Result<(Measurement, f64), String>;
+
 /// The first look's budget where sampling stops as soon as comparisons are decided.
 pub fn first_look(budget: Budget, tolerance_relative: f64) -> Budget {
     Budget {
@@ -46,15 +49,13 @@ pub fn first_look(budget: Budget, tolerance_relative: f64) -> Budget {
 /// Takes further looks at a recording until its comparisons are decided or the budget is spent.
 ///
 /// `witnesses` are the other recordings of the task; `first` is the budget that the recording was taken with, `budget` the whole.
-/// `sample` takes a look: one estimate for each station of the targets asked for, and the seconds that it took; the error says why
-/// there is none.
 pub fn refine(
     judge: &Judge<'_>,
     task: &Task,
     witnesses: &[&Recording],
     subject: &mut Recording,
     (first, budget): (Budget, Budget),
-    sample: &mut dyn FnMut(&Ask) -> Result<(Measurement, f64), String>,
+    sample: &mut dyn FnMut(&Ask) -> Look,
 ) {
     if subject.failure.is_some() || !subject.readings.iter().any(|r| r.uncertainty.is_sampled()) {
         return;

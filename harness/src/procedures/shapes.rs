@@ -28,12 +28,14 @@ impl<L, M> Found<'_, L, M> {
     }
 }
 
+/// `None` where a value has no such shape; the error says why it is none of that shape.
+pub(crate) type Read<T> = Option<Result<T, String>>;
+
 /// How a value is read by the shape of what is found.
 pub(crate) struct Shapes<T, L = IgnoredAny, M = IgnoredAny> {
     /// As the user is told what should have stood there.
     pub(crate) expected: &'static str,
-    /// `None` where the value has no such shape; the error says why it is none of that shape.
-    pub(crate) read: fn(Found<L, M>) -> Option<Result<T, String>>,
+    pub(crate) read: fn(Found<L, M>) -> Read<T>,
 }
 
 impl<T, L, M> Shapes<T, L, M> {
