@@ -95,7 +95,7 @@ fn known_job(procedure: ProcedureId, transport: Transport) -> Job {
         case: "doctor".into(),
         procedure,
         scene: Scene { room, obstacles: vec![], luminaires: vec![luminaire] },
-        stations: vec![Station { id: MeterId::new("doctor", 0), meter, expected_lx: None }],
+        stations: vec![Station { id: MeterId::new("doctor", 0), meter }],
         transport,
         budget: Budget { relative_error: 0.003, seconds: 10.0 },
         seed: 1,

@@ -134,7 +134,6 @@ fn job(procedure: ProcedureId, scene: Scene, meters: &[(DVec3, DVec3)], transpor
     let station = |(k, &(position_m, normal)): (usize, &(DVec3, DVec3))| Station {
         id: MeterId::new("calibration", k),
         meter: Meter { position_m, normal },
-        expected_lx: None,
     };
     Job {
         case: "calibration".into(),
