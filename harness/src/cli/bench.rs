@@ -10,7 +10,7 @@ use super::diagnostic::diagnose;
 use super::measuring::{Bar, MeasuringArgs};
 use super::{json, print};
 use crate::engines::Site;
-use crate::experiments::bench::{self, BenchReport, Knobs, Options, Progress};
+use crate::experiments::bench::{self, BenchReport, Knobs, Options};
 use crate::record::ProcedureId;
 use crate::report::Exit;
 use crate::spec::suite;
@@ -47,16 +47,6 @@ enum BenchFormat {
     Markdown,
     Csv,
     Svg,
-}
-
-impl Progress for Bar {
-    fn planned(&self, seconds: f64) {
-        self.0.inc_length((10.0 * seconds).ceil() as u64);
-    }
-
-    fn ended(&self, what: &str, seconds: f64) {
-        self.advance(what.to_owned(), (10.0 * seconds).ceil() as u64);
-    }
 }
 
 pub(super) fn run(args: &BenchArgs, site: &Site) -> Result<Exit, Diagnostic> {

@@ -10,6 +10,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::engines::known_engines;
 use crate::engines::{self, Site};
+use crate::experiments::Progress;
 use crate::measure::cache::Cache;
 use crate::measure::{self, Instrument, Isolation, Machine, Reader};
 use crate::report::Exit;
@@ -79,7 +80,7 @@ pub(super) fn read_one(site: &Site) -> Result<Exit, Diagnostic> {
 }
 
 /// A bar over things to do, with the time left by what they are expected to take.
-pub(super) struct Bar(pub(super) ProgressBar);
+pub(super) struct Bar(ProgressBar);
 
 impl Bar {
     pub(super) fn new() -> Self {
@@ -90,9 +91,15 @@ impl Bar {
         bar.enable_steady_tick(Duration::from_millis(500));
         Self(bar)
     }
+}
 
-    pub(super) fn advance(&self, what: String, things: u64) {
+impl Progress for Bar {
+    fn planned(&self, steps: u64) {
+        self.0.inc_length(steps);
+    }
+
+    fn ended(&self, what: String, steps: u64) {
         self.0.set_message(what);
-        self.0.inc(things);
+        self.0.inc(steps);
     }
 }

@@ -1,10 +1,10 @@
 //! How far a run is: one bar with the time left on a terminal, a line a job elsewhere.
 
 use std::io::IsTerminal;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use parking_lot::Mutex;
 
 use crate::audit::Observer;
 use crate::engines::Engine;
@@ -30,29 +30,14 @@ struct Work {
 
 impl Work {
     /// How long the rest takes: by the share of the budget that finished renderers used, at most the budget before that.
-    fn left(&self, elapsed: Duration) -> Left {
+    fn left(&self, elapsed: Duration) -> String {
         let rest_s = (self.budget_s - self.budget_done_s).max(0.0);
-        if self.budget_done_s > 0.0 {
-            Left::About(seconds(rest_s * elapsed.as_secs_f64() / self.budget_done_s))
+        let (word, s) = if self.budget_done_s > 0.0 {
+            ("about", rest_s * elapsed.as_secs_f64() / self.budget_done_s)
         } else {
-            Left::AtMost(seconds(rest_s))
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Left {
-    About(Duration),
-    AtMost(Duration),
-}
-
-impl std::fmt::Display for Left {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (word, time) = match self {
-            Self::About(time) => ("about", time),
-            Self::AtMost(time) => ("at most", time),
+            ("at most", rest_s)
         };
-        write!(f, "{word} {} left", indicatif::HumanDuration(*time))
+        format!("{word} {} left", indicatif::HumanDuration(seconds(s)))
     }
 }
 
@@ -75,15 +60,11 @@ impl Progress {
     fn line(&self, text: &str) {
         self.bar.suspend(|| eprintln!("{text}"));
     }
-
-    fn work(&self) -> MutexGuard<'_, Work> {
-        self.work.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl Observer for Progress {
     fn planned(&self, cases: &[Case], plans: &[Plan]) {
-        let mut work = self.work();
+        let mut work = self.work.lock();
         for (case, plan) in cases.iter().zip(plans) {
             let costs = |r: &&Run| !plan.engines[r.engine].engine.is_witness();
             work.jobs += plan.runs.len();
@@ -94,14 +75,14 @@ impl Observer for Progress {
     }
 
     fn started(&self, case: &Case, engine: &dyn Engine, what: &str) {
-        let left = self.work().left(self.start.elapsed());
+        let left = self.work.lock().left(self.start.elapsed());
         self.bar.set_message(format!("{}: {}: {what}, {left}", case.name, engine.name()));
     }
 
     fn ended(&self, case: &Case, engine: &dyn Engine, procedure: ProcedureId, wall: Duration, failure: Option<&str>) {
         let name = format!("{}: {}: {procedure}", case.name, engine.name());
         tracing::info!(wall_s = wall.as_secs_f64(), "{name} is done");
-        let mut work = self.work();
+        let mut work = self.work.lock();
         work.jobs_done += 1;
         work.budget_done_s += if engine.is_witness() { 0.0 } else { case.budget.seconds };
         self.bar.inc(1);
@@ -124,10 +105,11 @@ mod tests {
     #[test]
     fn the_time_left_is_the_budget_at_first_and_then_what_renderers_really_took_of_theirs() {
         let work = |done| Work { jobs: 9, jobs_done: 3, budget_s: 240.0, budget_done_s: done };
-        assert_eq!(work(0.0).left(seconds(5.0)), Left::AtMost(seconds(240.0)));
+        assert_eq!(work(0.0).left(seconds(5.0)), "at most 4 minutes left");
         // A quarter of the budget gone in 15 s: three more of these.
-        assert_eq!(work(60.0).left(seconds(15.0)), Left::About(seconds(45.0)));
-        assert_eq!(work(240.0).left(seconds(15.0)).to_string(), "about 0 seconds left");
-        assert_eq!(Work { budget_s: f64::INFINITY, ..Work::default() }.left(seconds(1.0)), Left::AtMost(seconds(1e9)));
+        assert_eq!(work(60.0).left(seconds(15.0)), "about 45 seconds left");
+        assert_eq!(work(240.0).left(seconds(15.0)), "about 0 seconds left");
+        let endless = Work { budget_s: f64::INFINITY, ..Work::default() };
+        assert_eq!(endless.left(seconds(1.0)), format!("at most {} left", indicatif::HumanDuration(seconds(1e9))));
     }
 }

@@ -8,8 +8,8 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 use super::diagnostic::diagnose;
 use super::measuring::{Bar, MeasuringArgs};
 use super::{json, print};
-use crate::engines::Site;
-use crate::experiments::stress::{self, Coordinates, Options, Progress, StressReport};
+use crate::engines::{Coordinates, Site};
+use crate::experiments::stress::{self, Options, StressReport};
 use crate::judge::KnownDeviations;
 use crate::laws;
 use crate::record::EngineName;
@@ -46,16 +46,6 @@ enum StressFormat {
     Terminal,
     Json,
     Markdown,
-}
-
-impl Progress for Bar {
-    fn planned(&self, points: usize) {
-        self.0.inc_length(points as u64);
-    }
-
-    fn ended(&self, engine: &str, law: &str, magnitude: f64) {
-        self.advance(format!("{engine}: {law} {magnitude:e}"), 1);
-    }
 }
 
 /// Stresses every case; the exit code tells whether our own exact solver broke a law.

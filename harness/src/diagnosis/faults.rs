@@ -136,7 +136,7 @@ fn arithmetic(task: &Task, right: &[f64]) -> Vec<Fault> {
     let towards: Vec<DVec3> = task.targets.iter().map(|t| luminaire.position_m - t.meter.position_m).collect();
     let cosines: Vec<f64> =
         towards.iter().zip(&task.targets).map(|(d, t)| (d.dot(t.meter.normal) / d.length()).max(0.0)).collect();
-    let intensities = towards.iter().map(|d| luminaire.intensity_towards(-*d).value()).collect();
+    let intensities: Vec<f64> = towards.iter().map(|d| luminaire.intensity_towards(-*d).value()).collect();
     let distances: Vec<f64> = towards.iter().map(|d| d.length()).collect();
     let inverse = cosines.iter().map(|c| if *c > 0.0 { 1.0 / c } else { 0.0 }).collect();
     let uneven = |values: &[f64]| values.iter().any(|v| (v - values[0]).abs() > INVISIBLE * values[0]);
@@ -148,7 +148,10 @@ fn arithmetic(task: &Task, right: &[f64]) -> Vec<Fault> {
     if uneven(&distances) {
         add("distance", "light falls with distance, not with its square", Effect::Shape(distances));
     }
-    add("candela-squared", "the candela are squared: the filter is applied to itself", Effect::Shape(intensities));
+    // What is the same everywhere is a factor like any other.
+    if uneven(&intensities) {
+        add("candela-squared", "the candela are squared: the filter is applied to itself", Effect::Shape(intensities));
+    }
     faults
 }
 

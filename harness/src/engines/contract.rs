@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
 use luminaire::geometry::Surface;
 use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
 use serde::{Deserialize, Serialize};
@@ -149,7 +150,7 @@ pub struct Job {
 impl Job {
     /// What an engine without settings is asked for a task of a case.
     pub fn of_task(case: &Case, task: &Task) -> Self {
-        let station = |(id, meter)| Station { id, meter, expected_lx: None };
+        let station = |(id, meter)| Station { id, meter };
         Self {
             case: case.name.clone(),
             procedure: task.as_asked(),
@@ -172,6 +173,17 @@ impl Job {
         Light(self.transport).bounces()
     }
 
+    /// How far all that a ray may meet is from a point: meters, the room's surfaces, boxes.
+    pub(super) fn distances_m(&self, at: DVec3) -> impl Iterator<Item = f64> {
+        let stations = self.stations.iter().map(move |s| s.meter.position_m.distance(at));
+        let room = self.scene.room.iter().flat_map(move |r| [at.to_array(), (r.size_m - at).to_array()].concat());
+        let boxes = self.scene.obstacles.iter().filter_map(move |o| match &o.shape {
+            Shape::Box { min_m, max_m } => Some(at.clamp(*min_m, *max_m).distance(at)),
+            Shape::Mesh { .. } => None,
+        });
+        stations.chain(room).chain(boxes)
+    }
+
     pub(super) fn largest_reflectance(&self) -> f64 {
         let room = self.scene.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
         room.chain(self.scene.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
@@ -182,8 +194,6 @@ impl Job {
 pub struct Station {
     pub id: MeterId,
     pub meter: Meter,
-    /// What it is expected to read at most, in lux, if known: lets engines choose a read-out scale. Never copied to a result.
-    pub expected_lx: Option<f64>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -303,7 +313,6 @@ pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Resu
 mod tests {
     use super::*;
     use crate::engines::fixtures;
-    use glam::DVec3;
 
     const ENGINE: EngineName = EngineName::new("test");
 

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use glam::DVec3;
 use luminaire::geometry::{Reflectances, Room};
-use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction};
+use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry, direction};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
 use luminaire::simulator::{self, Accuracy};
 
@@ -68,7 +68,7 @@ pub(crate) fn room(size_m: DVec3, floor: f64, walls: f64, ceiling: f64) -> Room 
 pub(crate) fn stations(points_m: &[[f64; 3]], normal: DVec3) -> Vec<Station> {
     let station = |(k, p): (usize, &[f64; 3])| {
         let meter = Meter { position_m: DVec3::from_array(*p), normal };
-        Station { id: MeterId::new("m", k), meter, expected_lx: None }
+        Station { id: MeterId::new("m", k), meter }
     };
     points_m.iter().enumerate().map(station).collect()
 }
@@ -133,12 +133,42 @@ pub(super) fn turned(distribution: LuminousIntensityDistribution) -> Luminaire {
     Luminaire { orientation: orientation(30.0, 20.0, 10.0), flux_scale: 0.7, ..lamp }
 }
 
+/// The same scene with all lengths and all light times so much.
+pub(super) fn scaled(mut job: Job, size: f64, flux: f64) -> Job {
+    if let Some(room) = &mut job.scene.room {
+        room.size_m *= size;
+    }
+    for lamp in &mut job.scene.luminaires {
+        lamp.flux_scale *= flux;
+        lamp.position_m *= size;
+    }
+    job.stations.iter_mut().for_each(|s| s.meter.position_m *= size);
+    job
+}
+
+pub(super) fn within(relative_error: f64, job: Job) -> Job {
+    Job { budget: Budget { relative_error, seconds: 60.0 }, ..job }
+}
+
+/// 1000 cd downwards, and the cosine elsewhere, straight between quarter degrees.
+pub(super) fn lambertian() -> LuminousIntensityDistribution {
+    let gamma: Vec<f64> = (0..=360).map(|k| 0.25 * f64::from(k)).collect();
+    let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
+    LuminousIntensityDistribution::axial(gamma, candela).unwrap()
+}
+
+/// A luminaire that sends out its light from an opening.
+pub(super) fn with_opening(lamp: Luminaire, opening: LuminousOpening) -> Luminaire {
+    let photometry = Arc::new(Photometry { opening, ..(*lamp.photometry).clone() });
+    Luminaire { photometry, model: LuminaireModel::Area, ..lamp }
+}
+
 /// Every (C, gamma) of a grid, read at `distance_m` in free field.
 pub(crate) fn goniometer(luminaire: &Luminaire, distance_m: f64, c_deg: &[f64], gamma_deg: &[f64]) -> Job {
     let towards = |c: f64, g: f64| luminaire.orientation * direction(c, g);
     let station = |(k, d): (usize, DVec3)| {
         let meter = Meter { position_m: luminaire.position_m + distance_m * d, normal: -d };
-        Station { id: MeterId::new("g", k), meter, expected_lx: None }
+        Station { id: MeterId::new("g", k), meter }
     };
     let directions = c_deg.iter().flat_map(|&c| gamma_deg.iter().map(move |&g| towards(c, g)));
     let stations = directions.enumerate().map(station).collect();
@@ -171,7 +201,7 @@ pub(crate) fn worst_relative(measurement: &Measurement, exact: &[f64]) -> f64 {
 }
 
 /// Our own solution of the same job.
-pub(super) fn simulated_lx(job: &Job, relative_error: f64) -> Vec<f64> {
+pub(crate) fn simulated_lx(job: &Job, relative_error: f64) -> Vec<f64> {
     let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();
     let accuracy = Accuracy { relative_error, seed: 1 };
     let solution = simulator::illuminance(&job.scene, &meters, job.transport, &accuracy).unwrap();

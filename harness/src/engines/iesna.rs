@@ -99,7 +99,7 @@ fn calculate(job: &Job, meter: &Meter) -> Result<Calculated, NotApplicable> {
     }
 }
 
-const fn method(transport: Transport) -> &'static str {
+pub(crate) const fn method(transport: Transport) -> &'static str {
     match transport {
         Transport::Direct => "inverse square",
         Transport::Indirect(_) => "IP-ED",

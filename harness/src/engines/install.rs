@@ -89,28 +89,26 @@ impl Component {
     }
 
     fn install(self, site: &Site, progress: &mut dyn FnMut(&str)) -> InstallOutcome {
-        let present = |detail: String| self.outcome(InstallState::Present, detail);
-        let done = |result: Result<String, InstallError>| match result {
-            Ok(detail) => self.outcome(InstallState::Installed, detail),
-            Err(error) => self.failed(&error),
+        let present = match self {
+            Self::PythonPackages => Some(site.venv()).filter(|_| venv::is_current(site)),
+            Self::PovRay => site.program("povray"),
+            Self::LibLlvm => site.llvm(),
         };
-        match self {
-            Self::PythonPackages if venv::is_current(site) => present(site.venv().display().to_string()),
-            Self::PythonPackages => done(venv::install(site, progress)),
-            Self::PovRay => match site.program("povray") {
-                Some(path) => present(path.display().to_string()),
-                None => done(debian::install_povray(site, progress)),
-            },
-            Self::LibLlvm => match site.llvm() {
-                Some(path) => present(path.display().to_string()),
-                None => match debian::install_llvm(site, progress) {
-                    Ok(detail) => self.outcome(InstallState::Installed, detail),
-                    Err(error) => {
-                        let detail = format!("Mitsuba will run its scalar_rgb variant, about 10x slower: {error}");
-                        self.outcome(InstallState::Optional, detail)
-                    }
-                },
-            },
+        if let Some(path) = present {
+            return self.outcome(InstallState::Present, path.display().to_string());
+        }
+        let installed = match self {
+            Self::PythonPackages => venv::install(site, progress),
+            Self::PovRay => debian::install_povray(site, progress),
+            Self::LibLlvm => debian::install_llvm(site, progress),
+        };
+        match installed {
+            Ok(detail) => self.outcome(InstallState::Installed, detail),
+            Err(error) if self == Self::LibLlvm => {
+                let detail = format!("Mitsuba will run its scalar_rgb variant, about 10x slower: {error}");
+                self.outcome(InstallState::Optional, detail)
+            }
+            Err(error) => self.failed(&error),
         }
     }
 

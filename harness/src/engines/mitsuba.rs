@@ -6,14 +6,14 @@ mod export;
 mod precision;
 mod settings;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
-use std::sync::Mutex;
 use std::time::Instant;
 
 use glam::DVec3;
 use luminaire::geometry::Surface;
 use luminaire::scene::{Luminaire, LuminaireModel, Shape, Transport};
+use parking_lot::Mutex;
 
 use self::backend::Backend;
 use self::driver::Driver;
@@ -112,7 +112,7 @@ impl Mitsuba {
     }
 
     fn backend(&self, site: &Site) -> Result<Backend, Absent> {
-        let mut known = self.backend.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut known = self.backend.lock();
         match known.as_ref().filter(|b| b.is_of(site)) {
             Some(backend) => Ok(backend.clone()),
             None => Ok(known.insert(Backend::find(site)?).clone()),

@@ -36,7 +36,9 @@ pub use contract::{
 };
 use contract::{OWN_LOOKUP, geometry_mib};
 pub use external::{ExternalJob, ExternalReadings};
+pub(crate) use iesna::method as method_of_iesna;
 pub use install::{InstallOutcome, InstallState, install};
+pub use settings::Coordinates;
 pub use site::{Site, SiteError};
 pub use workbench::{EngineError, SceneFile, Workbench};
 

@@ -15,7 +15,7 @@ mod pixels;
 mod settings;
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
@@ -224,13 +224,8 @@ fn narrow(job: &Job) -> Option<String> {
 
 /// A meter so near an opening that it tells the opening's point lights apart.
 fn too_near(job: &Job) -> Option<String> {
-    if matches!(job.transport, Transport::Indirect(_)) {
-        return None;
-    }
-    let opening::TooNear { station, luminaire, distance_m, spacing_m } = opening::too_near(job, export::points(job))?;
-    Some(format!(
-        "{station} is {distance_m:.2} m from the opening of {luminaire}, whose point lights are up to {spacing_m:.2} m apart"
-    ))
+    let is_read = !matches!(job.transport, Transport::Indirect(_));
+    is_read.then(|| opening::too_near(job, export::points(job))).flatten()
 }
 
 fn distance_to_segment(point: glam::DVec3, from: glam::DVec3, to: glam::DVec3) -> f64 {

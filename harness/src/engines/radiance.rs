@@ -11,7 +11,7 @@ mod route;
 mod sampling;
 mod settings;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 mod tools;
 
 use std::time::Instant;

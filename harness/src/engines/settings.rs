@@ -20,7 +20,7 @@ pub(super) enum Preset {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Coordinates {
+pub enum Coordinates {
     /// Moved and scaled where its absolute tolerances or its 32-bit floats need that.
     Fitted,
     /// Those of the spec, to see how the renderer itself bears them.

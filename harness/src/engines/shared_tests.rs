@@ -1,4 +1,4 @@
-//! What holds for every renderer that follows each reading's light by itself; each calls these from tests of its own.
+//! What holds for every renderer, or for those that follow each reading's light by itself; they run the real ones.
 
 use std::f64::consts::PI;
 
@@ -7,69 +7,115 @@ use luminaire::geometry::Reflectances;
 use luminaire::scene::{Bounces, Obstacle, Shape, Transport, orientation};
 
 use super::fixtures::*;
-use super::{Job, Measurement};
+use super::mitsuba::tests as mitsuba;
+use super::povray::tests as povray;
+use super::radiance::tests as radiance;
+use super::{Engine, EngineError, Job, Measurement, SceneFile, Site, Workbench};
+use crate::record::Estimate;
+use crate::system::process::ProcessError;
 
-/// Direct light of S1 within its bound, which is less than `relative`.
-pub(super) fn bounds_are_small_and_hold(found: &Measurement, relative: f64) {
-    for (estimate, exact) in found.estimates.iter().zip(S1_DIRECT_LX) {
-        let bound = estimate.uncertainty.bound();
-        assert!((estimate.value - exact).abs() <= bound && bound < relative * exact, "{estimate:?} for {exact}");
+/// A renderer, and how near the exact values it reads.
+#[derive(Clone, Copy)]
+struct Renderer {
+    read: fn(&Job) -> Measurement,
+    /// Direct light of S1: how far it may be off, and how wide its bound may be, relative.
+    direct: [f64; 2],
+    /// Direct light of turned luminaires: how far it may be off, relative to itself and to the brightest reading.
+    turned: [f64; 2],
+}
+
+const MITSUBA: Renderer = Renderer { read: mitsuba::read, direct: [1e-5, 1e-4], turned: [1e-4, 1e-5] };
+const RADIANCE: Renderer = Renderer { read: radiance::read, direct: [1e-6; 2], turned: [1e-4, 1e-5] };
+const POVRAY: Renderer = Renderer { read: povray::read, direct: [1e-6, 1e-4], turned: [0.0, 1e-6] };
+
+#[test]
+fn direct_light_follows_the_inverse_square_law_within_its_small_bound() {
+    for Renderer { read, direct: [off, bound], .. } in [MITSUBA, RADIANCE, POVRAY] {
+        let found = read(&s1(Transport::Direct));
+        assert!(worst_relative(&found, &S1_DIRECT_LX) < off, "{found:?}");
+        for (estimate, exact) in found.estimates.iter().zip(S1_DIRECT_LX) {
+            let stated = estimate.uncertainty.bound();
+            assert!((estimate.value - exact).abs() <= stated && stated < bound * exact, "{estimate:?} for {exact}");
+        }
     }
 }
 
-/// The difference to the converged value, .6 %, is seen as more than `z` standard errors.
-pub(super) fn n_bounces_are_n_reflections(read: impl Fn(&Job) -> Measurement, relative_error: f64, z: f64) {
-    let mut seven = s1(Transport::Indirect(Bounces::AtMost(7)));
-    seven.budget.relative_error = relative_error;
-    let found = read(&seven);
-    assert!(worst_z(&found, &S1_SEVEN_LX) < 4.0, "{found:?}");
-    assert!(worst_z(&found, &S1_INDIRECT_LX) > z, "{found:?}");
-    let none = read(&s1(Transport::Indirect(Bounces::AtMost(0))));
-    assert!(none.estimates.iter().all(|e| e.value == 0.0), "{none:?}");
+#[test]
+fn indirect_light_is_the_converged_value_within_its_standard_error() {
+    for (Renderer { read, .. }, relative_error, stated) in [(MITSUBA, 1e-3, 1.05e-3), (RADIANCE, 2e-3, 2.01e-3)] {
+        let found = read(&within(relative_error, s1(CONVERGED)));
+        let off = worst_relative(&found, &S1_INDIRECT_LX);
+        assert!(off < 4.0 * relative_error && worst_z(&found, &S1_INDIRECT_LX) < 4.0, "{found:?}");
+        let is_small = |e: &Estimate| e.uncertainty.standard_error().unwrap() < stated * e.value;
+        assert!(found.estimates.iter().all(is_small), "{found:?}");
+    }
 }
 
-pub(super) fn total_is_direct_plus_indirect(read: impl Fn(Job) -> Measurement) {
+/// The difference to the converged value, .6 %, is seen as many standard errors.
+#[test]
+fn n_bounces_are_n_diffuse_reflections() {
+    for (Renderer { read, .. }, relative_error, z) in [(MITSUBA, 5e-4, 8.0), (RADIANCE, 8e-4, 5.0)] {
+        let found = read(&within(relative_error, s1(Transport::Indirect(Bounces::AtMost(7)))));
+        assert!(worst_z(&found, &S1_SEVEN_LX) < 4.0, "{found:?}");
+        assert!(worst_z(&found, &S1_INDIRECT_LX) > z, "{found:?}");
+        let none = read(&s1(Transport::Indirect(Bounces::AtMost(0))));
+        assert!(none.estimates.iter().all(|e| e.value == 0.0), "{none:?}");
+    }
+}
+
+#[test]
+fn total_is_direct_plus_indirect() {
     let mut total = s1(Transport::Total(Bounces::Converged));
     for station in &mut total.stations {
         station.meter.normal = DVec3::NEG_Z;
         station.meter.position_m.z = 17.0;
     }
-    let direct = exact_direct_lx(&total);
-    let indirect = read(Job { transport: CONVERGED, ..total.clone() });
-    for ((total, indirect), direct) in read(total).estimates.iter().zip(&indirect.estimates).zip(direct) {
-        let sum = direct + indirect.value;
-        let error = total.uncertainty.standard_error().unwrap().hypot(indirect.uncertainty.standard_error().unwrap());
-        assert!((total.value - sum).abs() < 4.0 * error + 1e-5 * sum, "{total:?} {indirect:?} {direct}");
+    for (Renderer { read, .. }, relative_error) in [(MITSUBA, 1e-3), (RADIANCE, 2e-3)] {
+        let total = within(relative_error, total.clone());
+        let indirect = read(&Job { transport: CONVERGED, ..total.clone() });
+        let parts = indirect.estimates.iter().zip(exact_direct_lx(&total));
+        for (total, (indirect, direct)) in read(&total).estimates.iter().zip(parts) {
+            let sum = direct + indirect.value;
+            let [a, b] = [total, indirect].map(|e| e.uncertainty.standard_error().unwrap());
+            assert!((total.value - sum).abs() < 4.0 * a.hypot(b) + 1e-5 * sum, "{total:?} {indirect:?} {direct}");
+        }
     }
 }
 
-pub(super) fn turned_luminaires_read_their_own_table(read: impl Fn(&Job) -> Measurement) {
-    for distribution in [lopsided(), quadrant()] {
+#[test]
+fn asymmetric_and_turned_luminaires_read_their_own_table() {
+    for (Renderer { read, turned: off, .. }, distribution) in
+        [MITSUBA, RADIANCE, POVRAY].into_iter().flat_map(|r| [(r, lopsided()), (r, quadrant())])
+    {
         let every = |step: u32, end: u32| (0..=end / step).map(|k| f64::from(k * step)).collect::<Vec<_>>();
         let job = goniometer(&turned(distribution), 10.0, &every(15, 345), &every(5, 180));
         let (found, exact) = (read(&job), exact_direct_lx(&job));
         let scale = exact.iter().copied().fold(0.0, f64::max);
         for (estimate, exact) in found.estimates.iter().zip(exact) {
             let bound = estimate.uncertainty.bound();
-            assert!((estimate.value - exact).abs() < 1e-4 * exact + 1e-5 * scale, "{estimate:?} for {exact}");
+            assert!((estimate.value - exact).abs() <= off[0] * exact + off[1] * scale, "{estimate:?} for {exact}");
             assert!((estimate.value - exact).abs() <= bound, "{estimate:?} for {exact}");
         }
     }
 }
 
-pub(super) fn luminaires_add_up_and_obstacles_throw_shadows(read: impl Fn(&Job) -> Measurement) {
+#[test]
+fn several_luminaires_add_up_and_obstacles_throw_shadows() {
     let mut scene = s1(Transport::Direct).scene;
     scene.luminaires.push(luminaire("lopsided", DVec3::new(4.0, 5.0, 12.0), lopsided()));
     scene.luminaires.push(luminaire("second of its kind", DVec3::new(15.0, 5.0, 12.0), lopsided()));
     let points = [[3.0, 4.0, 5.0], [12.0, 12.0, 6.0], [18.0, 1.0, 1.0]];
     let free = job(scene, stations(&points, DVec3::Z), Transport::Direct);
-    assert!(worst_relative(&read(&free), &exact_direct_lx(&free)) < 1e-5);
 
     // A plate right above the first meter, once as a box and once as a mesh, hides every luminaire from it alone.
     let (min_m, max_m) = (DVec3::new(2.0, 3.0, 5.5), DVec3::new(4.0, 5.0, 5.6));
     let vertices_m = vec![min_m, max_m.with_y(min_m.y), max_m, min_m.with_y(max_m.y)];
     let mesh = Shape::Mesh { vertices_m, triangles: vec![[0, 1, 2], [0, 2, 3]] };
-    for shape in [Shape::Box { min_m, max_m }, mesh] {
+    let shapes = [Shape::Box { min_m, max_m }, mesh];
+    for (Renderer { read, .. }, shape) in
+        [MITSUBA, RADIANCE, POVRAY].into_iter().flat_map(|r| shapes.clone().map(|s| (r, s)))
+    {
+        assert!(worst_relative(&read(&free), &exact_direct_lx(&free)) < 1e-5);
         let mut shaded = free.clone();
         shaded.scene.obstacles = vec![Obstacle { shape, reflectance: 0.3 }];
         shaded.stations[0].meter.position_m = DVec3::new(3.0, 4.0, 5.4);
@@ -77,6 +123,24 @@ pub(super) fn luminaires_add_up_and_obstacles_throw_shadows(read: impl Fn(&Job) 
         assert_eq!(found.estimates[0].value, 0.0);
         assert!(worst(&relative_deviations(&found, &exact_direct_lx(&shaded))[1..]) < 1e-5, "{found:?}");
     }
+}
+
+/// What an engine reads of its own files once they were tampered with.
+pub(super) fn read_tampered(
+    engine: &dyn Engine,
+    job: &Job,
+    tamper: impl Fn(&str, String) -> String,
+    read: impl Fn(&[SceneFile], &Workbench) -> Result<Measurement, EngineError>,
+) -> Measurement {
+    let folder = tempfile::tempdir().unwrap();
+    let bench = workbench(Site::of_user().unwrap(), folder.path());
+    engine.probe(&bench.site).unwrap_or_else(|absent| panic!("{} is needed here: {absent}", engine.name()));
+    let edited = |f: SceneFile| match String::from_utf8(f.bytes.clone()) {
+        Ok(text) => SceneFile::text(&f.name, tamper(&f.name, text)),
+        Err(_) => f,
+    };
+    let files: Vec<_> = engine.export(job).unwrap().into_iter().map(edited).collect();
+    read(&files, &bench).unwrap()
 }
 
 /// Replaced texts of `file`: one by itself, then what makes a factor pi, drops the multiplier .7 and turns by 90 degrees.
@@ -103,6 +167,23 @@ pub(super) fn wrong_exports_are_seen(
     assert!(unchanged < right);
     assert!((factor_pi - (PI - 1.0)).abs() < 1e-4 && (multiplier_dropped - 1.0 / 0.7 + 1.0).abs() < 1e-4);
     assert!(turned_by_90 > 0.1, "{turned_by_90}");
+}
+
+/// Every way in which a program ends without readings, played by a script in its place, is an error that says so.
+pub(super) fn crashes_hangs_and_kills_are_told_apart(read: impl Fn(&str, f64) -> EngineError) {
+    for (script, says) in [
+        ("kill -SEGV $$", "signal 11"),
+        ("kill -ABRT $$", "signal 6"),
+        ("kill -KILL $$", "signal 9, out of memory"),
+        ("echo 'no such lamp' >&2; exit 3", "exit code 3"),
+        ("echo 'no such lamp' >&2; exit 1", "no such lamp"),
+    ] {
+        let error = read(script, 20.0);
+        assert!(matches!(error, EngineError::Process(ProcessError::Failed { .. })), "{script}: {error}");
+        assert!(error.to_string().contains(says), "{script}: {error}");
+    }
+    let hang = read("sleep 60", 0.4);
+    assert!(matches!(hang, EngineError::Process(ProcessError::TimedOut { .. })), "{hang}");
 }
 
 /// Six reflectances, a turned luminaire whose name would end a comment, a box and a mesh: everything that an export writes.

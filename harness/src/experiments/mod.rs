@@ -6,3 +6,17 @@ pub mod selftest;
 pub mod stress;
 mod tables;
 mod trials;
+
+/// Who is told how far an experiment is.
+pub trait Progress: Sync {
+    /// So many steps more are expected.
+    fn planned(&self, steps: u64);
+    /// Something ended that so many of them were expected for.
+    fn ended(&self, what: String, steps: u64);
+}
+
+#[cfg(test)]
+impl Progress for () {
+    fn planned(&self, _steps: u64) {}
+    fn ended(&self, _what: String, _steps: u64) {}
+}

@@ -287,28 +287,24 @@ fn log_likelihood(
 
 /// Log-likelihood of normal values about a common unknown mean, which has a flat prior; by Cholesky's factors.
 fn gaussian(matrix: &[Vec<f64>], values: &[f64]) -> Option<f64> {
-    let n = values.len();
-    let mut lower = vec![vec![0.0; n]; n];
-    for i in 0..n {
-        for j in 0..=i {
-            let left = matrix[i][j] - (0..j).map(|m| lower[i][m] * lower[j][m]).sum::<f64>();
-            lower[i][j] = if i == j { Some(left).filter(|l| *l > 0.0)?.sqrt() } else { left / lower[j][j] };
-        }
-    }
-    let solve = |b: &[f64]| {
-        let mut x = vec![0.0; n];
-        for i in 0..n {
-            x[i] = (b[i] - (0..i).map(|m| lower[i][m] * x[m]).sum::<f64>()) / lower[i][i];
-        }
-        x
-    };
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    let (ones, values) = (solve(&vec![1.0; n]), solve(values));
+    let (mut lower, mut ones, mut independent, mut log_determinant) = (Vec::<Vec<f64>>::new(), vec![], vec![], 0.0);
+    for (i, value) in values.iter().enumerate() {
+        let mut row = vec![];
+        for (j, above) in lower.iter().enumerate() {
+            row.push((matrix[i][j] - dot(&row, above)) / above[j]);
+        }
+        let diagonal = Some(matrix[i][i] - dot(&row, &row)).filter(|d| *d > 0.0)?.sqrt();
+        log_determinant += 2.0 * diagonal.ln();
+        ones.push((1.0 - dot(&row, &ones)) / diagonal);
+        independent.push((value - dot(&row, &independent)) / diagonal);
+        row.push(diagonal);
+        lower.push(row);
+    }
     let weight = dot(&ones, &ones);
-    let mean = dot(&ones, &values) / weight;
-    let residual: f64 = values.iter().zip(&ones).map(|(v, o)| (v - mean * o).powi(2)).sum();
-    let log_determinant: f64 = 2.0 * (0..n).map(|i| lower[i][i].ln()).sum::<f64>();
-    Some(-0.5 * (log_determinant + weight.ln() + residual + (n as f64 - 1.0) * std::f64::consts::TAU.ln()))
+    let mean = dot(&ones, &independent) / weight;
+    let residual: f64 = independent.iter().zip(&ones).map(|(v, o)| (v - mean * o).powi(2)).sum();
+    Some(-0.5 * (log_determinant + weight.ln() + residual + (values.len() as f64 - 1.0) * std::f64::consts::TAU.ln()))
 }
 
 /// A witness's deviation from the weighted mean of the others, averaged over the telling targets, relative.

@@ -1,11 +1,11 @@
 //! What of a deviation between an approximate method and a renderer is the method's, and what the renderer's.
 
 use luminaire::calculators::{DeviationSplit, Uncertain};
-use luminaire::scene::Transport;
 use luminaire::units::Lux;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::engines;
 use crate::procedures::Task;
 use crate::record::{EngineName, MeterId, ProcedureId, Reading, Recording, Role};
 
@@ -49,7 +49,8 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
             let (Some(method), Some(exact)) = (at(method), at(exact)) else { continue };
             let split = DeviationSplit::new(Lux(method.value), uncertain(&exact), uncertain(rendered));
             let Some(split) = split else { continue };
-            let (method, name) = (name_of_method(task.transport), crate::engines::display_name(&renderer.key.engine));
+            let (method, name) =
+                (engines::method_of_iesna(task.transport), engines::display_name(&renderer.key.engine));
             splits.push(Split {
                 case: renderer.key.case.clone(),
                 procedure: task.procedure,
@@ -68,20 +69,12 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
     splits
 }
 
-const fn name_of_method(transport: Transport) -> &'static str {
-    match transport {
-        Transport::Direct => "inverse square",
-        Transport::Indirect(_) => "IP-ED",
-        Transport::Total(_) => "inverse square + IP-ED",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::judge::tests;
     use crate::record::{Estimate, Uncertainty};
-    use luminaire::scene::Bounces;
+    use luminaire::scene::{Bounces, Transport};
 
     fn recording(engine: &str, value: f64, std_error: f64) -> Recording {
         tests::recording(engine, &[Estimate { value, uncertainty: Uncertainty::sampled(std_error, None) }])

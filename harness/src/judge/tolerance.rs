@@ -126,31 +126,20 @@ impl Tolerances {
 mod tests {
     use super::*;
 
-    fn of(procedure: ProcedureId, basis: Basis, engine: &str) -> Tolerance {
-        Tolerances::built_in().unwrap().of(procedure, basis, engine, Quantity::Illuminance, &BTreeMap::new())
-    }
+    const INDIRECT: ProcedureId = ProcedureId::IndirectIlluminance;
+    const DIRECT: ProcedureId = ProcedureId::DirectIlluminance;
+    const UNIT: Quantity = Quantity::Illuminance;
 
     #[test]
-    fn the_rule_that_names_most_applies() {
-        assert_eq!(of(ProcedureId::IndirectIlluminance, Basis::Exact, "iesna").relative, 0.10);
-        assert_eq!(of(ProcedureId::IndirectIlluminance, Basis::Exact, "radiance").relative, 0.02);
-        assert_eq!(of(ProcedureId::IndirectIlluminance, Basis::Published, "iesna").absolute, 0.03);
-    }
-
-    #[test]
-    fn what_is_not_loosened_is_zero() {
-        let none = Tolerances { rules: vec![], ..Tolerances::built_in().unwrap() };
-        let procedure = ProcedureId::DirectIlluminance;
-        let found = none.of(procedure, Basis::Exact, "radiance", Quantity::Illuminance, &BTreeMap::new());
-        assert_eq!(found, Tolerance::default());
-    }
-
-    #[test]
-    fn a_spec_overrides_the_table() {
+    fn the_rule_that_names_most_applies_a_spec_overrides_it_and_what_is_not_loosened_is_zero() {
+        let (table, none) = (Tolerances::built_in().unwrap(), BTreeMap::new());
+        assert_eq!(table.of(INDIRECT, Basis::Exact, "iesna", UNIT, &none).relative, 0.10);
+        assert_eq!(table.of(INDIRECT, Basis::Exact, "radiance", UNIT, &none).relative, 0.02);
+        assert_eq!(table.of(INDIRECT, Basis::Published, "iesna", UNIT, &none).absolute, 0.03);
         let strict = ToleranceOverride { relative: 1e-4, absolute_lx: 1e-3, absolute_cd: 0.0 };
-        let overrides = BTreeMap::from([(ProcedureId::DirectIlluminance, strict)]);
-        let (procedure, table) = (ProcedureId::DirectIlluminance, Tolerances::built_in().unwrap());
-        let found = table.of(procedure, Basis::ClosedForm, "povray", Quantity::Illuminance, &overrides);
+        let found = table.of(DIRECT, Basis::ClosedForm, "povray", UNIT, &BTreeMap::from([(DIRECT, strict)]));
         assert_eq!(found, Tolerance { relative: 1e-4, absolute: 1e-3 });
+        let bare = Tolerances { rules: vec![], ..table };
+        assert_eq!(bare.of(DIRECT, Basis::Exact, "radiance", UNIT, &none), Tolerance::default());
     }
 }

@@ -61,23 +61,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_interval_decides() {
-        assert_eq!(judge(0.5, 0.4, 1.0), Verdict::Pass);
-        assert_eq!(judge(-0.5, 0.6, 1.0), Verdict::Inconclusive);
-        assert_eq!(judge(1.5, 0.6, 1.0), Verdict::Inconclusive);
-        assert_eq!(judge(-1.5, 0.4, 1.0), Verdict::Fail);
-    }
-
-    #[test]
-    fn zero_tolerance_passes_only_equality() {
-        assert_eq!(judge(0.0, 0.0, 0.0), Verdict::Pass);
-        assert_eq!(judge(1e-300, 0.0, 0.0), Verdict::Fail);
-    }
-
-    #[test]
-    fn nothing_compares_as_equal_by_accident() {
-        for (d, u, a) in [(f64::NAN, 0.0, 1.0), (0.0, f64::NAN, 1.0), (0.0, 0.0, f64::NAN), (f64::INFINITY, 0.0, 1.0)] {
-            assert_eq!(judge(d, u, a), Verdict::Missing);
+    fn the_interval_decides_and_nothing_compares_as_equal_by_accident() {
+        const NAN: f64 = f64::NAN;
+        for (deviation, expanded, allowed, verdict) in [
+            (0.5, 0.4, 1.0, Verdict::Pass),
+            (-0.5, 0.6, 1.0, Verdict::Inconclusive),
+            (1.5, 0.6, 1.0, Verdict::Inconclusive),
+            (-1.5, 0.4, 1.0, Verdict::Fail),
+            // Zero tolerance passes only equality.
+            (0.0, 0.0, 0.0, Verdict::Pass),
+            (1e-300, 0.0, 0.0, Verdict::Fail),
+            (NAN, 0.0, 1.0, Verdict::Missing),
+            (0.0, NAN, 1.0, Verdict::Missing),
+            (0.0, 0.0, NAN, Verdict::Missing),
+            (f64::INFINITY, 0.0, 1.0, Verdict::Missing),
+        ] {
+            assert_eq!(judge(deviation, expanded, allowed), verdict, "{deviation} {expanded} {allowed}");
         }
     }
 }

@@ -220,6 +220,6 @@ fn beam(job: &Job, [from_deg, to_deg]: [f64; 2], towards_deg: f64) -> Option<Var
     let path = direction(20.0, towards_deg);
     let reach_m = 0.5 * one.position_m.min(room.size_m - one.position_m).min_element();
     let meter = Meter { position_m: one.position_m + reach_m * path, normal: -path };
-    job.stations = vec![Station { id: MeterId::new("beam", 0), meter, expected_lx: None }];
+    job.stations = vec![Station { id: MeterId::new("beam", 0), meter }];
     known_direct(job)
 }

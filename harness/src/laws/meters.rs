@@ -66,7 +66,7 @@ pub(super) const BESIDE_LUMINAIRE: Law = Law {
 };
 
 fn stations(meters: &[Meter]) -> Vec<Station> {
-    let station = |(k, meter): (usize, &Meter)| Station { id: MeterId::new("m", k), meter: *meter, expected_lx: None };
+    let station = |(k, meter): (usize, &Meter)| Station { id: MeterId::new("m", k), meter: *meter };
     meters.iter().enumerate().map(station).collect()
 }
 

@@ -129,7 +129,7 @@ pub(super) fn furnace(mut job: Job, rho: f64) -> Option<Variant> {
             for (y, wy) in GAUSS.map(crowded) {
                 let at = corners[0] + 0.5 * (1.0 + x) * u + 0.5 * (1.0 + y) * v;
                 let meter = Meter { position_m: at + OFF * size_m.min_element() * normal, normal };
-                stations.push(Station { id: MeterId::new(surface.name(), stations.len()), meter, expected_lx: None });
+                stations.push(Station { id: MeterId::new(surface.name(), stations.len()), meter });
                 weights.push(0.25 * wx * wy * room.area_m2(surface) / area_m2);
             }
         }

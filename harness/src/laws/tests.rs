@@ -1,15 +1,11 @@
 use luminaire::scene::Transport;
-use luminaire::simulator::{Accuracy, illuminance};
 
 use super::{ALL, Against, find};
 use crate::engines::Job;
-use crate::engines::fixtures::{CONVERGED, lopsided, luminaire, s1};
+use crate::engines::fixtures::{CONVERGED, lopsided, luminaire, s1, simulated_lx};
 
 fn exact(job: &Job) -> Vec<f64> {
-    let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();
-    let accuracy = Accuracy { relative_error: 1e-4, seed: 1 };
-    let solution = illuminance(&job.scene, &meters, job.transport, &accuracy).unwrap();
-    solution.estimates.iter().map(|e| e.illuminance.value()).collect()
+    simulated_lx(job, 1e-4)
 }
 
 /// A lopsided luminaire off the middle of a room of no symmetry.

@@ -12,7 +12,7 @@ mod matrix;
 mod notes;
 mod papers;
 mod terminal;
-mod words;
+pub(crate) mod words;
 
 use std::collections::BTreeSet;
 use std::time::SystemTime;
@@ -30,6 +30,7 @@ pub use budget::budgets;
 pub use csv::csv;
 pub use curve::{Curve, curves};
 pub use exit::{Exit, Summary};
+pub(crate) use html::table;
 pub use html::{Beside, BesideError, page};
 pub use junit::junit;
 pub use markdown::markdown;

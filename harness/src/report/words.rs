@@ -24,8 +24,19 @@ pub(super) fn significant(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
+/// Rounded to so many significant digits; `None` for what is no finite number.
+pub(crate) fn rounded(value: f64, digits: usize) -> Option<f64> {
+    format!("{value:.*e}", digits - 1).parse().ok().filter(|v: &f64| v.is_finite())
+}
+
+/// The next of 1, 2, 2.5, 5, 10 times a power of ten.
+pub(crate) fn round_step(raw: f64) -> f64 {
+    let decade = 10f64.powf(raw.log10().floor());
+    [1.0, 2.0, 2.5, 5.0, 10.0].map(|d| d * decade).into_iter().find(|s| *s >= raw * 0.999).unwrap_or(10.0 * decade)
+}
+
 /// So many decimals at most, none that is needless.
-pub(super) fn trimmed(value: f64, decimals: usize) -> String {
+pub(crate) fn trimmed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }

@@ -55,15 +55,9 @@ impl PeakMemory {
 /// Processor time of this process and of all its children that have ended.
 pub fn cpu_time() -> Duration {
     use nix::sys::resource::{UsageWho, getrusage};
-    let of = |who| {
-        getrusage(who).map_or(Duration::ZERO, |usage| {
-            let micros = |t: nix::sys::time::TimeVal| {
-                u64::try_from(t.tv_sec()).unwrap_or(0) * 1_000_000 + u64::try_from(t.tv_usec()).unwrap_or(0)
-            };
-            Duration::from_micros(micros(usage.user_time()) + micros(usage.system_time()))
-        })
-    };
-    of(UsageWho::RUSAGE_SELF) + of(UsageWho::RUSAGE_CHILDREN)
+    use nix::sys::time::TimeValLike;
+    let of = |who| getrusage(who).map_or(0, |usage| (usage.user_time() + usage.system_time()).num_microseconds());
+    Duration::from_micros((of(UsageWho::RUSAGE_SELF) + of(UsageWho::RUSAGE_CHILDREN)).unsigned_abs())
 }
 
 /// Asks a program about itself, its version say, in a folder of its own: in a shared one another user's log could not
@@ -162,12 +156,17 @@ impl Invocation {
         let start = Instant::now();
         tracing::debug!(command = %self.command_line(), cwd = %self.cwd.display(), "run");
         let mut child = self.spawn().map_err(|source| self.start_error(source))?;
-        let pipes = Pipes::attach(&mut child, self.stdin.clone());
+        if let Some(mut stdin) = child.stdin.take() {
+            let input = self.stdin.clone();
+            // A program that exits without reading its input closes the pipe: its own status tells why.
+            thread::spawn(move || stdin.write_all(&input).ok());
+        }
+        let (stdout, stderr) = (drain(child.stdout.take()), drain(child.stderr.take()));
         let ended = self.wait(&mut child, start);
         // Whatever the program started goes with it.
         kill_group(&child);
-        let (stdout, stderr) = pipes.join();
-        let stderr = self.conclude(ended, &stderr)?;
+        let stdout = stdout.join().unwrap_or_default();
+        let stderr = self.conclude(ended, &stderr.join().unwrap_or_default())?;
         Ok(Finished { stdout, stderr, wall: start.elapsed() })
     }
 
@@ -330,26 +329,7 @@ impl Drop for Conversation {
     }
 }
 
-/// Threads that feed and drain a child's pipes, so that neither side can block the other.
-struct Pipes {
-    stdout: thread::JoinHandle<Vec<u8>>,
-    stderr: thread::JoinHandle<Vec<u8>>,
-}
-
-impl Pipes {
-    fn attach(child: &mut Child, input: Vec<u8>) -> Self {
-        if let Some(mut stdin) = child.stdin.take() {
-            // A program that exits without reading its input closes the pipe: its own status tells why.
-            thread::spawn(move || stdin.write_all(&input).ok());
-        }
-        Self { stdout: drain(child.stdout.take()), stderr: drain(child.stderr.take()) }
-    }
-
-    fn join(self) -> (Vec<u8>, Vec<u8>) {
-        (self.stdout.join().unwrap_or_default(), self.stderr.join().unwrap_or_default())
-    }
-}
-
+/// A thread that empties a pipe, so that neither side can block the other.
 fn drain(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<u8>> {
     thread::spawn(move || {
         let mut bytes = vec![];

@@ -5,8 +5,9 @@
 //! needs every slot is not passed by small ones for ever.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
+
+use parking_lot::{Condvar, Mutex};
 
 /// The part of the free memory that jobs may have together.
 const SHARE_OF_MEMORY: f64 = 0.8;
@@ -68,22 +69,18 @@ impl Slots {
         let Share { threads, memory_mib } = share;
         let share =
             Share { threads: threads.clamp(1, self.all.threads), memory_mib: memory_mib.min(self.all.memory_mib) };
-        let mut state = self.state();
+        let mut state = self.state.lock();
         let ticket = state.next_ticket;
         state.next_ticket += 1;
         let fits = |s: &State| s.free.threads >= share.threads && s.free.memory_mib >= share.memory_mib;
         while !(state.served == ticket && fits(&state)) {
-            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            self.changed.wait(&mut state);
         }
         state.served += 1;
         state.free.threads -= share.threads;
         state.free.memory_mib -= share.memory_mib;
         self.changed.notify_all();
         Held { slots: self, share }
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -95,7 +92,7 @@ impl Held<'_> {
 
 impl Drop for Held<'_> {
     fn drop(&mut self) {
-        let mut state = self.slots.state();
+        let mut state = self.slots.state.lock();
         state.free.threads += self.share.threads;
         state.free.memory_mib += self.share.memory_mib;
         self.slots.changed.notify_all();
@@ -163,19 +160,19 @@ mod tests {
         let first = slots.take(Share { threads: 1, memory_mib: 1 });
         thread::scope(|scope| {
             for (k, threads) in [(0, 2), (1, 1)] {
-                let waiting = slots.state().next_ticket;
+                let waiting = slots.state.lock().next_ticket;
                 let (slots, order) = (&slots, &order);
                 scope.spawn(move || {
                     let _held = slots.take(Share { threads, memory_mib: 1 });
-                    order.lock().unwrap().push(k);
+                    order.lock().push(k);
                 });
-                while slots.state().next_ticket == waiting {
+                while slots.state.lock().next_ticket == waiting {
                     thread::yield_now();
                 }
             }
             drop(first);
         });
-        assert_eq!(order.into_inner().unwrap(), [0, 1]);
+        assert_eq!(order.into_inner(), [0, 1]);
     }
 
     #[test]

@@ -3,45 +3,51 @@
 //! As in EN 13032-2 and every catalogue: C 0 and C 90 to the right, C 180 and C 270 to the left; cd/klm for relative
 //! photometry, cd for absolute.
 
-use std::fmt::Write as _;
-
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
+use maud::{Markup, html};
+
+use crate::report::words::{round_step, trimmed};
 
 const RADIUS: f64 = 200.0;
 const MARGIN: f64 = 40.0;
 /// Heights of the title above and the legend below.
 const TITLE: f64 = 34.0;
 const LEGEND: f64 = 44.0;
+const MOST_RINGS: f64 = 6.0;
 /// C0-C180 and C90-C270: the colours and dashes of the two curves.
 const CURVES: [(f64, &str, &str, &str); 2] = [(0.0, "C0-C180", "#c0272d", ""), (90.0, "C90-C270", "#1f5fa8", "6 4")];
 
 pub(super) fn diagram(file: &str, photometry: &Photometry) -> String {
+    let distribution = &photometry.distribution;
     let scale = Scale::of(photometry);
     let upward = [0.0, 90.0, 180.0, 270.0]
         .iter()
-        .any(|c| (91..=180).any(|g| photometry.distribution.intensity(*c, f64::from(g)).value() > 0.0));
+        .any(|c| (91..=180).any(|g| distribution.intensity(*c, f64::from(g)).value() > 0.0));
     // A downlight is drawn to just above the horizon.
     let above = if upward { RADIUS } else { 0.0 };
     let (width, height) = (2.0 * (RADIUS + MARGIN), above + RADIUS + 2.0 * MARGIN + TITLE + LEGEND);
-    let (x, y) = (RADIUS + MARGIN, above + MARGIN + TITLE);
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"11\">\n\
-         <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n"
-    );
-    let flux = photometry.distribution.flux().value();
+    let (x, y, legend) = (RADIUS + MARGIN, above + MARGIN + TITLE, height - LEGEND + 16.0);
     let title = photometry.keyword("LUMINAIRE").and_then(|name| name.lines().next()).unwrap_or(file);
-    text(&mut svg, [width / 2.0, 20.0], "middle", &format!("{title}, {flux:.0} lm"));
-    writeln!(svg, "<g transform=\"translate({x} {y})\">").ok();
-    grid(&mut svg, &scale, upward);
-    for (c_deg, _, colour, dashes) in CURVES {
-        let points = curve(&photometry.distribution, &scale, c_deg);
-        let stroke = format!("stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dashes}\"");
-        writeln!(svg, "<path d=\"{points}\" fill=\"none\" {stroke}/>").ok();
-    }
-    svg.push_str("</g>\n");
-    legend(&mut svg, &scale, height - LEGEND);
-    svg.push_str("</svg>\n");
-    svg
+    let title: String = title.chars().filter(|c| !c.is_control()).collect();
+    let svg = html! {
+        svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (width) " " (height) } font-family="sans-serif" font-size="11" {
+            rect width=(width) height=(height) fill="#ffffff" {}
+            (text([width / 2.0, 20.0], "middle", &format!("{title}, {:.0} lm", distribution.flux().value())))
+            g transform={ "translate(" (x) " " (y) ")" } {
+                (grid(&scale, upward))
+                @for (c_deg, _, colour, dashes) in CURVES {
+                    path d=(curve(distribution, &scale, c_deg)) fill="none" stroke=(colour) stroke-width="2" stroke-dasharray=(dashes) {}
+                }
+            }
+            @for (k, (_, name, colour, dashes)) in CURVES.into_iter().enumerate() {
+                @let x = MARGIN + 120.0 * k as f64;
+                path d={ "M" (x) " " (legend) "h28" } stroke=(colour) stroke-width="2" stroke-dasharray=(dashes) {}
+                (text([x + 34.0, legend + 4.0], "start", name))
+            }
+            (text([2.0 * RADIUS + MARGIN, legend + 4.0], "end", scale.unit))
+        }
+    };
+    svg.into_string() + "\n"
 }
 
 struct Scale {
@@ -63,11 +69,8 @@ impl Scale {
         if largest <= 0.0 {
             return Self { unit, factor, step: 1.0, rings: 4 };
         }
-        // The roundest step that needs at most six rings.
-        let decade = 10f64.powf((largest / 6.0).log10().floor());
-        let round = [1.0, 2.0, 2.5, 5.0, 10.0].map(|digit| digit * decade);
-        let step = round.into_iter().find(|step| largest <= 6.0 * step).unwrap_or(round[4]);
-        Self { unit, factor, step, rings: (largest / step).ceil().clamp(1.0, 6.0) as u32 }
+        let step = round_step(largest / MOST_RINGS);
+        Self { unit, factor, step, rings: (largest / step).ceil().clamp(1.0, MOST_RINGS) as u32 }
     }
 
     fn radius(&self, candela: f64) -> f64 {
@@ -76,33 +79,30 @@ impl Scale {
 }
 
 /// Rings with their values, rays with their angles.
-fn grid(svg: &mut String, scale: &Scale, upward: bool) {
-    svg.push_str("<g fill=\"none\" stroke=\"#c8c8c8\" stroke-width=\"0.8\">\n");
+fn grid(scale: &Scale, upward: bool) -> Markup {
     let last = if upward { 180 } else { 90 };
-    for ring in 1..=scale.rings {
-        let r = RADIUS * f64::from(ring) / f64::from(scale.rings);
-        if upward {
-            writeln!(svg, "<circle r=\"{r:.2}\"/>").ok();
-        } else {
-            writeln!(svg, "<path d=\"M{:.2} 0A{r:.2} {r:.2} 0 0 0 {r:.2} 0\"/>", -r).ok();
+    let radius = |ring: u32| RADIUS * f64::from(ring) / f64::from(scale.rings);
+    html! {
+        g fill="none" stroke="#c8c8c8" stroke-width="0.8" {
+            @for r in (1..=scale.rings).map(radius) {
+                @if upward { circle r=(digits(r)) {} } @else { path d=(format!("M{:.2} 0A{r:.2} {r:.2} 0 0 0 {r:.2} 0", -r)) {} }
+            }
+            @for [x, y] in (0..=last).step_by(15).map(|gamma| place(f64::from(gamma), RADIUS)) {
+                path d=(format!("M{:.2} {y:.2}L0 0L{x:.2} {y:.2}", -x)) {}
+            }
+        }
+        g fill="#555555" {
+            @for gamma in (0..=last).step_by(30) {
+                @let [x, y] = place(f64::from(gamma), RADIUS + 14.0);
+                @for side in if gamma % 180 == 0 { &[1.0][..] } else { &[-1.0, 1.0] } {
+                    (text([side * x, y + 4.0], "middle", &format!("{gamma}°")))
+                }
+            }
+            @for ring in 1..=scale.rings {
+                (text([3.0, radius(ring) - 3.0], "start", &trimmed(scale.step * f64::from(ring), 3)))
+            }
         }
     }
-    for gamma in (0..=last).step_by(15) {
-        let [x, y] = place(f64::from(gamma), RADIUS);
-        writeln!(svg, "<path d=\"M{:.2} {y:.2}L0 0L{x:.2} {y:.2}\"/>", -x).ok();
-    }
-    svg.push_str("</g>\n<g fill=\"#555555\">\n");
-    for gamma in (0..=last).step_by(30) {
-        let [x, y] = place(f64::from(gamma), RADIUS + 14.0);
-        for side in if gamma % 180 == 0 { &[1.0][..] } else { &[-1.0, 1.0] } {
-            text(svg, [side * x, y + 4.0], "middle", &format!("{gamma}°"));
-        }
-    }
-    for ring in 1..=scale.rings {
-        let r = RADIUS * f64::from(ring) / f64::from(scale.rings);
-        text(svg, [3.0, r - 3.0], "start", &rounded(scale.step * f64::from(ring)));
-    }
-    svg.push_str("</g>\n");
 }
 
 /// The path of plane C and its opposite, from the zenith over the right to the nadir and up the left side.
@@ -121,31 +121,16 @@ fn curve(distribution: &LuminousIntensityDistribution, scale: &Scale, c_deg: f64
     format!("M{}Z", points.join("L"))
 }
 
-fn legend(svg: &mut String, scale: &Scale, top: f64) {
-    let y = top + 16.0;
-    for (k, (_, name, colour, dashes)) in CURVES.into_iter().enumerate() {
-        let x = MARGIN + 120.0 * k as f64;
-        writeln!(svg, "<path d=\"M{x} {y}h28\" stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dashes}\"/>")
-            .ok();
-        text(svg, [x + 34.0, y + 4.0], "start", name);
-    }
-    text(svg, [2.0 * RADIUS + MARGIN, y + 4.0], "end", scale.unit);
-}
-
 /// Where a gamma angle and a radius lie: nadir down, y of SVG down too.
 fn place(gamma_deg: f64, radius: f64) -> [f64; 2] {
     let (sin, cos) = gamma_deg.to_radians().sin_cos();
     [radius * sin, radius * cos]
 }
 
-fn text(svg: &mut String, [x, y]: [f64; 2], anchor: &str, words: &str) {
-    let words = words.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
-    let words: String = words.chars().filter(|c| !c.is_control()).collect();
-    writeln!(svg, "<text x=\"{x:.2}\" y=\"{y:.2}\" text-anchor=\"{anchor}\">{words}</text>").ok();
+fn text([x, y]: [f64; 2], anchor: &str, words: &str) -> Markup {
+    html! { text x=(digits(x)) y=(digits(y)) text-anchor=(anchor) { (words) } }
 }
 
-/// A ring's value without the noise of binary fractions.
-fn rounded(value: f64) -> String {
-    let text = format!("{value:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+fn digits(value: f64) -> String {
+    format!("{value:.2}")
 }

@@ -61,9 +61,9 @@ fn the_diagram_puts_each_intensity_at_its_angle_and_radius() {
     assert_eq!(svg.matches("<circle").count(), 4, "{svg}");
     assert!(svg.contains(">cd/klm<") && svg.contains(">150<") && svg.contains("Pendant &lt;1 &amp; 2&gt;"));
     let path = |colour: &str| {
-        let is_curve = |l: &&str| l.starts_with("<path d=\"M0") && l.contains(colour) && l.contains('Z');
-        let line = svg.lines().find(is_curve).unwrap();
-        let points = line.split('"').nth(1).unwrap().trim_start_matches('M').trim_end_matches('Z').to_owned();
+        let is_curve = |tag: &&str| tag.starts_with("path d=\"M0") && tag.contains(colour) && tag.contains('Z');
+        let tag = svg.split('<').find(is_curve).unwrap();
+        let points = tag.split('"').nth(1).unwrap().trim_start_matches('M').trim_end_matches('Z').to_owned();
         let point = |p: &str| p.split(' ').map(|n| n.parse::<f64>().unwrap()).collect::<Vec<f64>>();
         points.split('L').map(point).collect::<Vec<_>>()
     };

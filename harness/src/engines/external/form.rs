@@ -172,10 +172,14 @@ impl ReadingForm {
 
 impl ExternalJob {
     pub fn of(job: &Job) -> Self {
-        let (light, bounces) = match job.transport {
-            Transport::Direct => (Light::Direct, None),
-            Transport::Indirect(bounces) => (Light::Indirect, limit(bounces)),
-            Transport::Total(bounces) => (Light::Total, limit(bounces)),
+        let light = match job.transport {
+            Transport::Direct => Light::Direct,
+            Transport::Indirect(_) => Light::Indirect,
+            Transport::Total(_) => Light::Total,
+        };
+        let bounces = match job.reflections() {
+            Some(Bounces::AtMost(n)) => Some(n),
+            Some(Bounces::Converged) | None => None,
         };
         let ours = ["command", "procedures"];
         let settings = job.settings.iter().filter(|(k, _)| !ours.contains(&k.as_str()));
@@ -197,13 +201,6 @@ impl ExternalJob {
 
     pub fn to_json(&self) -> Result<Vec<u8>, serde_json::Error> {
         serde_json::to_vec_pretty(self)
-    }
-}
-
-const fn limit(bounces: Bounces) -> Option<u32> {
-    match bounces {
-        Bounces::Converged => None,
-        Bounces::AtMost(n) => Some(n),
     }
 }
 

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::*;
 use crate::engines::fixtures::{CONVERGED, cuboid, lopsided, luminaire, s1, workbench};
-use crate::system::process::ProcessError;
+use crate::engines::shared_tests;
 
 fn adapter(script: &str, folder: &Path) -> External {
     let settings = BTreeMap::from([("command".to_owned(), json!(["sh", "-c", script]))]);
@@ -60,12 +60,8 @@ fn rows_that_are_missing_swapped_negative_or_not_a_number_are_no_readings() {
 
 #[test]
 fn a_crash_a_hang_and_an_out_of_memory_kill_are_told_apart() {
-    let crash = read("echo 'no lamp' >&2; exit 3").unwrap_err().to_string();
-    assert!(crash.contains("exit code 3") && crash.contains("no lamp"), "{crash}");
-    let killed = read("kill -KILL $$").unwrap_err().to_string();
-    assert!(killed.contains("out of memory"), "{killed}");
-    let hung = read_within("sleep 60", Duration::from_millis(300)).unwrap_err();
-    assert!(matches!(hung, EngineError::Process(ProcessError::TimedOut { .. })), "{hung}");
+    let read = |script: &str, limit_s| read_within(script, Duration::from_secs_f64(limit_s)).unwrap_err();
+    shared_tests::crashes_hangs_and_kills_are_told_apart(read);
 }
 
 #[test]

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 use std::path::PathBuf;
-use std::thread;
 use std::time::Instant;
 
 use glam::DVec3;
@@ -15,6 +14,7 @@ use crate::engines::settings::Preset;
 use crate::engines::{EngineError, Job, Measurement, SceneFile, Site, Station, Workbench};
 use crate::record::{Effort, Estimate, Method, Uncertainty};
 use crate::system::process::Invocation;
+use crate::system::slots::side_by_side;
 
 use super::ID;
 use super::export::{self, Light};
@@ -198,20 +198,11 @@ impl<'a> Bench<'a> {
 
     /// Blocks, `jobs` of them side by side, each a process of one thread.
     fn wave(&self, run: Run, numbers: Range<usize>, jobs: usize, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
-        let mut blocks = vec![];
-        for first in numbers.clone().step_by(jobs) {
-            let results: Vec<_> = thread::scope(|scope| {
-                let block = |k: usize| {
-                    // The pilot is the first of the sequence of seeds.
-                    let run = Run { seed: self.seed(k + 1), ..run };
-                    scope.spawn(move || self.block(run, pilot))
-                };
-                let running: Vec<_> = (first..numbers.end.min(first + jobs)).map(block).collect();
-                running.into_iter().map(thread::ScopedJoinHandle::join).collect()
-            });
-            for result in results {
-                blocks.push(result.map_err(|_| EngineError::output(ID, "a block's thread panicked"))??);
-            }
+        // The pilot is the first of the sequence of seeds.
+        let block = |k: &usize| self.block(Run { seed: self.seed(k + 1), ..run }, pilot);
+        let (mut blocks, numbers) = (vec![], numbers.collect::<Vec<_>>());
+        for some in numbers.chunks(jobs) {
+            blocks.extend(side_by_side(jobs, some, block).into_iter().collect::<Result<Vec<_>, _>>()?);
         }
         Ok(blocks)
     }

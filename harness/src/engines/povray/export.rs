@@ -11,7 +11,7 @@ use luminaire::geometry::Surface;
 use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport};
 
-use crate::engines::{Job, SceneFile};
+use crate::engines::{Job, SceneFile, Station};
 
 use super::frame::{Frame, candela, seats};
 use super::opening::{self, Part};
@@ -47,14 +47,12 @@ pub(super) fn scene(job: &Job, settings: &Settings) -> SceneFile {
 
 /// The arguments of one run, without the program: `light`, `seed` and `blanks` choose what the scene shows.
 pub(super) fn arguments(job: &Job, light: Light, seed: u32, blanks: usize, image: &str) -> Vec<String> {
-    let mut arguments =
-        vec![format!("+I{SCENE}"), format!("+O{image}"), "+FP16".to_owned(), "File_Gamma=1.0".to_owned()];
-    arguments.extend([format!("+W{}", blanks + job.stations.len()), "+H1".to_owned()]);
-    arguments.extend(["-A", "-D", "+WT1", "-GD", "-GR", "-GS"].map(str::to_owned));
-    arguments.push(format!("Declare=Indirect={}", u8::from(light == Light::Indirect)));
-    arguments.push(format!("Declare=Seed={seed}"));
-    arguments.push(format!("Declare=Blanks={blanks}"));
-    arguments
+    let (width, indirect) = (blanks + job.stations.len(), u8::from(light == Light::Indirect));
+    let arguments = format!(
+        "+I{SCENE} +O{image} +FP16 File_Gamma=1.0 +W{width} +H1 -A -D +WT1 -GD -GR -GS Declare=Indirect={indirect} \
+         Declare=Seed={seed} Declare=Blanks={blanks}"
+    );
+    arguments.split(' ').map(str::to_owned).collect()
 }
 
 /// Blank pixels before the meters': they move the start of radiosity's sequence of directions, which has so many parts.
@@ -112,48 +110,38 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
             (Light::Direct, "direct light (Indirect=0) and reflected light (Indirect=1), to be added")
         }
     };
+    let (case, procedure) = (one_line(&job.case), job.procedure);
     let arguments = arguments(job, part, 0, 0, "scene.ppm").join(" ");
-    let mut text = format!(
-        "// {}, {}: illuminance at {count} meters, {what}.\n// Run: povray {arguments}\n\
+    let (unit_m, origin_m, indirect) = (1.0 / frame.scale, vector(frame.centre_m), u8::from(part == Light::Indirect));
+    let light = if (frame.light - 1.0).abs() > f64::EPSILON {
+        let light = frame.light;
+        format!("// All light, and the illuminances that pixels stand for, are {light:e} times those of the spec.\n")
+    } else {
+        String::new()
+    };
+    let (limit, radiosity) = job.reflections().map_or(Default::default(), |bounces| {
+        let limit = settings.recursion_limit(bounces);
+        let limit = format!("#ifndef (Limit) #declare Limit = {limit}; #end\n");
+        (limit, format!("  #if (Indirect) {} #end\n", settings.radiosity(bounces)))
+    });
+    let (rays, brightness) = (settings.count, settings.brightness);
+    // A ray to one of many discs at one point passes the transparent backs of half of the others.
+    format!(
+        "// {case}, {procedure}: illuminance at {count} meters, {what}.\n// Run: povray {arguments}\n\
          // One pixel a meter. With x = E / scale of the meter (below): red .25 + x/2, green 16 x, blue 256 x, linear.\n\
          // Seed > 0 turns the whole scene, and Blanks > 0 sets as many pixels (add them to +W) before the meters': either\n\
-         // gives radiosity other sample directions and changes nothing else.\n",
-        one_line(&job.case),
-        job.procedure
-    );
-    let (unit_m, origin_m) = (1.0 / frame.scale, vector(frame.centre_m));
-    writeln!(text, "// Scene units are {unit_m} m; the origin is at {origin_m} m of the spec.").ok();
-    if (frame.light - 1.0).abs() > f64::EPSILON {
-        let light = frame.light;
-        writeln!(
-            text,
-            "// All light, and the illuminances that pixels stand for, are {light:e} times those of the spec."
-        )
-        .ok();
-    }
-    text.push_str("#version 3.7;\n");
-    let indirect = u8::from(part == Light::Indirect);
-    writeln!(text, "#ifndef (Indirect) #declare Indirect = {indirect}; #end").ok();
-    text.push_str("#ifndef (Seed) #declare Seed = 0; #end\n#ifndef (Blanks) #declare Blanks = 0; #end\n");
-    text.push_str(
-        "\n// Reflectances divided and lights multiplied by Brightness carry the same light, and keep the weight of rays above\n\
-         // .25, below which POV-Ray would loosen error_bound by up to .25.\n",
-    );
-    text.push_str("// Rays a sample, the length of the pool that they come from, and reflections; Limit=1 reads the first reflection alone.\n");
-    writeln!(text, "#ifndef (Count) #declare Count = {}; #end", settings.count).ok();
-    writeln!(text, "#ifndef (Pool) #declare Pool = {POOL}; #end").ok();
-    if let Some(bounces) = job.reflections() {
-        writeln!(text, "#ifndef (Limit) #declare Limit = {}; #end", settings.recursion_limit(bounces)).ok();
-    }
-    writeln!(text, "#declare Brightness = #if (Indirect) {}; #else 1; #end", settings.brightness).ok();
-    // A ray to one of many discs at one point passes the transparent backs of half of the others.
-    text.push_str("global_settings {\n  assumed_gamma 1.0 max_trace_level 100 adc_bailout 1e-9\n");
-    if let Some(bounces) = job.reflections() {
-        writeln!(text, "  #if (Indirect) {} #end", settings.radiosity(bounces)).ok();
-    }
-    text.push_str("}\n\n");
-    text.push_str(TURN);
-    text
+         // gives radiosity other sample directions and changes nothing else.\n\
+         // Scene units are {unit_m} m; the origin is at {origin_m} m of the spec.\n\
+         {light}#version 3.7;\n\
+         #ifndef (Indirect) #declare Indirect = {indirect}; #end\n\
+         #ifndef (Seed) #declare Seed = 0; #end\n#ifndef (Blanks) #declare Blanks = 0; #end\n\n\
+         // Reflectances divided and lights multiplied by Brightness carry the same light, and keep the weight of rays above\n\
+         // .25, below which POV-Ray would loosen error_bound by up to .25.\n\
+         // Rays a sample, the length of the pool that they come from, and reflections; Limit=1 reads the first reflection alone.\n\
+         #ifndef (Count) #declare Count = {rays}; #end\n#ifndef (Pool) #declare Pool = {POOL}; #end\n\
+         {limit}#declare Brightness = #if (Indirect) {brightness}; #else 1; #end\n\
+         global_settings {{\n  assumed_gamma 1.0 max_trace_level 100 adc_bailout 1e-9\n{radiosity}}}\n\n{TURN}"
+    )
 }
 
 const TURN: &str = "#declare S = seed(Seed);
@@ -166,30 +154,23 @@ const TURN: &str = "#declare S = seed(Seed);
 
 fn meters(job: &Job, frame: Frame) -> String {
     let count = job.stations.len();
-    let mut text = format!("\n// Meters: position, normal.\n#declare Meters = array[{count}][2] {{\n");
-    let seats = seats(job, frame);
-    let rows: Vec<String> = job
-        .stations
-        .iter()
-        .zip(&seats)
-        .map(|(s, seat)| format!("  {{{}, {}}}", vector(*seat), vector(s.meter.normal)))
-        .collect();
-    text.push_str(&rows.join(",\n"));
-    text.push_str("\n};\n// Illuminance that the pixel's scale stands for, in lux.\n#ifdef (Readouts) #include \"readouts.inc\" #else\n");
+    let row = |(s, seat): (&Station, DVec3)| format!("  {{{}, {}}}", vector(seat), vector(s.meter.normal));
+    let rows: Vec<String> = job.stations.iter().zip(seats(job, frame)).map(row).collect();
     let first = |part| readouts(&first_readouts(job, part), frame.light);
-    if job.scene.room.is_some() && job.transport != Transport::Direct {
-        write!(text, "#if (Indirect)\n{}#else\n{}#end\n", first(Light::Indirect), first(Light::Direct)).ok();
+    let readouts = if job.scene.room.is_some() && job.transport != Transport::Direct {
+        format!("#if (Indirect)\n{}#else\n{}#end\n", first(Light::Indirect), first(Light::Direct))
     } else {
-        text.push_str(&first(Light::Direct));
-    }
-    text.push_str("#end\n");
+        first(Light::Direct)
+    };
+    let blanks = if job.transport == Transport::Direct { "" } else { BLANKS };
     let extent = job.scene.room.map_or(1.0, |r| r.size_m.max_element()) * frame.scale;
-    text.push_str(&AIM.replace("COUNT", &count.to_string()).replace("EXTENT", &extent.to_string()));
-    if job.transport != Transport::Direct {
-        text.push_str(&BLANKS.replace("EXTENT", &extent.to_string()));
-    }
-    text.push_str(METERS);
-    text
+    let discs = [AIM, blanks].concat().replace("COUNT", &count.to_string()).replace("EXTENT", &extent.to_string());
+    format!(
+        "\n// Meters: position, normal.\n#declare Meters = array[{count}][2] {{\n{}\n}};\n\
+         // Illuminance that the pixel's scale stands for, in lux.\n\
+         #ifdef (Readouts) #include \"readouts.inc\" #else\n{readouts}#end\n{discs}{METERS}",
+        rows.join(",\n")
+    )
 }
 
 /// A mesh camera takes one pixel from each triangle's centre (POV-Ray 3.7 reference, 2.4.1.3.10): a disc 2 mm below.
@@ -263,20 +244,17 @@ fn luminaires(job: &Job, frame: Frame) -> String {
 }
 
 fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame) -> String {
-    let mut text =
-        format!("// {}: {} cd at most, {}\n", one_line(&luminaire.id), candela(luminaire), luminaire.model.name());
-    let axes = luminaire.orientation;
-    let matrix: Vec<String> = [axes.x_axis, axes.y_axis, axes.z_axis].iter().map(|a| numbers(*a)).collect();
-    writeln!(text, "#macro Luminaire(P, Candela)").ok();
-    writeln!(
-        text,
-        "  light_source {{ P rgb Brightness*Candela/(2*F*F) fade_distance F fade_power 2 transform {{ Turn }} }}\n  \
+    let (axes, most) = (luminaire.orientation, candela(luminaire));
+    let matrix = [axes.x_axis, axes.y_axis, axes.z_axis].map(numbers).join(", ");
+    let mut text = format!(
+        "// {}: {most} cd at most, {}\n#macro Luminaire(P, Candela)\n  \
+         light_source {{ P rgb Brightness*Candela/(2*F*F) fade_distance F fade_power 2 transform {{ Turn }} }}\n  \
          sphere {{ 0, {FILTER_RADIUS} pigment {{ Distribution{number} }} finish {{ ambient 0 diffuse 0 }}\n    \
-         hollow no_image no_reflection no_radiosity\n    matrix <{}, 0, 0, 0> translate P transform {{ Turn }} }}\n#end",
-        matrix.join(", ")
-    )
-    .ok();
-    let candela = candela(luminaire) * frame.scale * frame.scale * frame.light;
+         hollow no_image no_reflection no_radiosity\n    matrix <{matrix}, 0, 0, 0> translate P transform {{ Turn }} }}\n#end\n",
+        one_line(&luminaire.id),
+        luminaire.model.name()
+    );
+    let candela = most * frame.scale * frame.scale * frame.light;
     let place = |part: &Part| vector(frame.point(luminaire.position_m + axes * part.offset_m));
     let instances = |points: usize| -> String {
         let line = |part: &Part| format!("Luminaire({}, {})\n", place(part), candela * part.share);
@@ -306,13 +284,11 @@ pub(super) fn parts(luminaire: &Luminaire, points: usize) -> Vec<Part> {
 }
 
 fn surroundings(job: &Job, frame: Frame) -> String {
-    let mut text = String::from(
-        "\n// The discs; those for reflected light stand in a group of their own that no light shines on.\n",
-    );
     let discs = format!("#for (K, 0, {} - 1) Disc(K) #end", job.stations.len());
-    writeln!(text, "#if (Indirect) light_group {{ {discs} global_lights off }} #else {discs} #end").ok();
-    text.push_str(
-        "\n#macro Diffuse(Rho) pigment { rgb Rho/Brightness } finish { ambient 0 diffuse 1 } transform { Turn } #end\n",
+    let mut text = format!(
+        "\n// The discs; those for reflected light stand in a group of their own that no light shines on.\n\
+         #if (Indirect) light_group {{ {discs} global_lights off }} #else {discs} #end\n\n\
+         #macro Diffuse(Rho) pigment {{ rgb Rho/Brightness }} finish {{ ambient 0 diffuse 1 }} transform {{ Turn }} #end\n"
     );
     if let Some(room) = job.scene.room {
         text.push_str("\n// The room: six slabs around it.\n");

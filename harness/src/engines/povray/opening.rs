@@ -46,20 +46,11 @@ pub(super) fn parts(opening: LuminousOpening, n: usize) -> Option<Vec<Part>> {
     }
 }
 
-/// A meter nearer to an opening than twice the widest gap between its point lights.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct TooNear {
-    pub(super) station: String,
-    pub(super) luminaire: String,
-    pub(super) distance_m: f64,
-    pub(super) spacing_m: f64,
-}
-
-/// The first meter that would tell the `n` by `n` point lights of an opening apart.
+/// Which meter, the first of all, would tell the `n` by `n` point lights of an opening apart.
 ///
 /// Measured in a cube of luminous panels of 2 m: 3 % at one gap's distance, below .5 % at two. Gauss-Legendre points are
 /// furthest apart in the middle, pi / 2 times the mean.
-pub(super) fn too_near(job: &Job, n: usize) -> Option<TooNear> {
+pub(super) fn too_near(job: &Job, n: usize) -> Option<String> {
     let of = |l: &Luminaire| {
         let [along_y, along_x, along_z] = l.photometry.opening.bounding_box_m();
         let half_m = 0.5 * DVec3::new(along_x, along_y, along_z);
@@ -69,8 +60,9 @@ pub(super) fn too_near(job: &Job, n: usize) -> Option<TooNear> {
             own.distance(own.clamp(-half_m, half_m))
         };
         let near = job.stations.iter().find(|s| distance_m(s.meter.position_m) < 2.0 * spacing_m)?;
-        let distance_m = distance_m(near.meter.position_m);
-        Some(TooNear { station: near.id.to_string(), luminaire: l.id.clone(), distance_m, spacing_m })
+        let (station, distance_m) = (&near.id, distance_m(near.meter.position_m));
+        let lights = format!("whose point lights are up to {spacing_m:.2} m apart");
+        Some(format!("{station} is {distance_m:.2} m from the opening of {}, {lights}", l.id))
     };
     job.scene.luminaires.iter().filter(|l| l.model == LuminaireModel::Area).find_map(of)
 }

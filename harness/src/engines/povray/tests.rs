@@ -4,13 +4,13 @@ use std::time::Duration;
 
 use glam::DVec3;
 use luminaire::geometry::{Reflectances, Room};
-use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening};
+use luminaire::photometry::LuminousOpening;
 use luminaire::scene::{LuminaireModel, Meter, Obstacle, Scene, Shape, orientation};
 
 use super::*;
 use crate::engines::Budget;
 use crate::engines::fixtures::{self, CONVERGED as INDIRECT, axial_uplight as uplight, *};
-use crate::system::process::ProcessError;
+use crate::engines::shared_tests;
 
 type Tamper = (&'static str, fn(&mut Job));
 
@@ -20,7 +20,7 @@ fn site() -> Site {
     site
 }
 
-fn read(job: &Job) -> Measurement {
+pub(in crate::engines) fn read(job: &Job) -> Measurement {
     let folder = tempfile::tempdir().unwrap();
     let measured = PovRay.read(job, &workbench(site(), folder.path()));
     measured
@@ -53,10 +53,9 @@ fn the_scene_of_s1_is_as_reviewed() {
 
 #[test]
 fn a_scene_with_turned_area_luminaires_and_obstacles_is_as_reviewed() {
-    let mut lamp = luminaire("panel", DVec3::new(2.0, 1.5, 2.9), lopsided());
+    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+    let mut lamp = with_opening(luminaire("panel", DVec3::new(2.0, 1.5, 2.9), lopsided()), opening);
     lamp.orientation = orientation(30.0, 20.0, 0.0);
-    lamp.model = LuminaireModel::Area;
-    std::sync::Arc::make_mut(&mut lamp.photometry).opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
     let room = room(DVec3::new(8.0, 6.0, 3.0), 0.2, 0.5, 0.8);
     let vertices_m = vec![DVec3::new(1.0, 1.0, 1.0), DVec3::new(2.0, 1.0, 1.0), DVec3::new(1.0, 2.0, 1.0)];
     let obstacles = vec![
@@ -73,30 +72,11 @@ fn a_scene_with_turned_area_luminaires_and_obstacles_is_as_reviewed() {
 }
 
 #[test]
-fn direct_light_of_s1_is_exact_to_1e_6_and_within_its_bound() {
-    let measured = read(&s1(Transport::Direct));
-    assert!(worst_relative(&measured, &S1_DIRECT_LX) < 1e-6, "{measured:?}");
-    for (estimate, exact) in measured.estimates.iter().zip(S1_DIRECT_LX) {
-        assert!((estimate.value - exact).abs() <= estimate.uncertainty.bound(), "{estimate:?} {exact}");
-    }
-}
-
-#[test]
 fn light_of_any_amount_in_rooms_of_any_size_is_read() {
     let (bright, dim) = (s1(Transport::Direct), in_eight_blocks(s1(INDIRECT), 20));
     let plain = read(&dim);
     for (flux, size, reflected) in [(1e10, 1.0, true), (1e-11, 1.0, false), (1.0, 1e6, true), (1.0, 1e-6, false)] {
-        let changed = |job: &Job| {
-            let mut job = job.clone();
-            let room = job.scene.room.as_mut().unwrap();
-            room.size_m *= size;
-            for lamp in &mut job.scene.luminaires {
-                lamp.flux_scale *= flux;
-                lamp.position_m *= size;
-            }
-            job.stations.iter_mut().for_each(|s| s.meter.position_m *= size);
-            job
-        };
+        let changed = |job: &Job| scaled(job.clone(), size, flux);
         let times = flux / (size * size);
         let exact = S1_DIRECT_LX.map(|lx| times * lx);
         let direct = read(&changed(&bright));
@@ -108,27 +88,6 @@ fn light_of_any_amount_in_rooms_of_any_size_is_read() {
         let indirect = read(&changed(&dim));
         let expected: Vec<f64> = plain.estimates.iter().map(|e| times * e.value).collect();
         assert!(worst_relative(&indirect, &expected) < 0.1, "{flux:e} {size:e}: {indirect:?} {expected:?}");
-    }
-}
-
-#[test]
-fn turned_asymmetric_luminaires_are_read_back_over_the_full_grid() {
-    let c_deg: Vec<f64> = (0..24).map(|k| 15.0 * f64::from(k)).collect();
-    let gamma_deg: Vec<f64> = (0..=36).map(|k| 5.0 * f64::from(k)).collect();
-    for distribution in [lopsided(), quadrant()] {
-        let mut lamp = luminaire("lamp", DVec3::new(3.0, -2.0, 5.0), distribution);
-        lamp.orientation = orientation(30.0, 20.0, 10.0);
-        lamp.flux_scale = 0.8;
-        let job = goniometer(&lamp, 10.0, &c_deg, &gamma_deg);
-        let exact = exact_direct_lx(&job);
-        let measured = read(&job);
-        let largest = exact.iter().copied().fold(0.0, f64::max);
-        for ((estimate, exact), station) in measured.estimates.iter().zip(&exact).zip(&job.stations) {
-            // At the edge of a table that ends with light, here gamma 90, it falls to zero within a thousandth of a degree.
-            let off = (estimate.value - exact).abs();
-            assert!(off <= 1e-6 * largest, "{}: {} lx, exact {exact}", station.id, estimate.value);
-            assert!(off <= estimate.uncertainty.bound(), "{}: off {off}, {estimate:?}", station.id);
-        }
     }
 }
 
@@ -189,40 +148,16 @@ fn a_meter_that_faces_away_reads_nothing() {
 }
 
 #[test]
-fn a_box_between_luminaire_and_meter_casts_a_shadow_and_a_mesh_the_same() {
-    let corner = |k: u32| {
-        let pick = |bit: u32, low: f64, high: f64| if k >> bit & 1 == 0 { low } else { high };
-        DVec3::new(pick(0, 9.0, 11.0), pick(1, 9.0, 11.0), pick(2, 13.0, 14.0))
-    };
-    let faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
-    let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
-    let mesh = Shape::Mesh { vertices_m: (0..8).map(corner).collect(), triangles };
-    let solid = Shape::Box { min_m: corner(0), max_m: corner(7) };
-    for shape in [solid, mesh] {
-        let mut job = s1(Transport::Direct);
-        job.scene.obstacles = vec![Obstacle { shape, reflectance: 0.5 }];
-        let measured = read(&job);
-        assert_eq!(measured.estimates[3].value, 0.0);
-        assert!((measured.estimates[0].value / S1_DIRECT_LX[0] - 1.0).abs() < 1e-6);
-    }
-}
-
-#[test]
 fn a_flat_opening_is_the_mean_of_its_points() {
     // A Lambertian square of 1 m, read at 2 m below its centre: configuration factor of four corner rectangles.
-    let gamma: Vec<f64> = (0..=180).map(|g| 0.5 * f64::from(g)).collect();
-    let candela = gamma.iter().map(|g: &f64| 1000.0 * g.to_radians().cos().max(0.0)).collect();
-    let lambertian = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
-    let mut lamp = luminaire("square", DVec3::new(0.0, 0.0, 2.0), lambertian);
-    let photometry = std::sync::Arc::make_mut(&mut lamp.photometry);
-    photometry.opening = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
-    lamp.model = LuminaireModel::Area;
+    let opening = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
+    let lamp = with_opening(luminaire("square", DVec3::new(0.0, 0.0, 2.0), lambertian()), opening);
     let scene = Scene { room: None, obstacles: vec![], luminaires: vec![lamp] };
     let measured = read(&job(scene, &[(DVec3::ZERO, DVec3::Z)], Transport::Direct));
     let (x, root) = (0.25_f64, 1.0625_f64.sqrt());
     let factor = 4.0 / std::f64::consts::TAU * 2.0 * (x / root) * (x / root).atan();
     let exact = std::f64::consts::PI * 1000.0 * factor;
-    // Half a degree of linear interpolation in gamma costs up to 1e-5.
+    // A quarter degree of linear interpolation in gamma costs up to 2.4e-6.
     assert!(worst_relative(&measured, &[exact]) < 2e-5, "{measured:?} {exact}");
 }
 
@@ -238,11 +173,6 @@ fn within_errors_and_named_bias(measured: &Measurement, exact: &[f64]) {
 }
 
 #[test]
-fn indirect_light_of_s1_is_exact_within_its_errors_and_the_named_bias() {
-    within_errors_and_named_bias(&read(&in_eight_blocks(s1(INDIRECT), 100)), &S1_INDIRECT_LX);
-}
-
-#[test]
 fn brighter_rooms_have_a_larger_named_bias() {
     let named = |rho: f64| match super::cache_error(rho, Bounces::AtMost(7), Preset::Audit) {
         Support::Approximate { size: Some(size), .. } => size,
@@ -254,12 +184,15 @@ fn brighter_rooms_have_a_larger_named_bias() {
 }
 
 #[test]
-fn reflections_are_cut_at_the_number_asked_for() {
-    let seven = in_eight_blocks(s1(Transport::Indirect(Bounces::AtMost(7))), 100);
-    within_errors_and_named_bias(&read(&seven), &S1_SEVEN_LX);
-    let first = read(&in_eight_blocks(s1(Transport::Indirect(Bounces::AtMost(1))), 200));
-    within_errors_and_named_bias(&first, &[0.4827964416, 0.6295558520, 0.6295558520, 0.8360829517]);
-    assert_eq!(read(&s1(Transport::Indirect(Bounces::AtMost(0)))).estimates[0].value, 0.0);
+fn indirect_light_of_s1_is_exact_within_its_errors_and_the_named_bias_and_cut_where_it_is_asked_for() {
+    let at_most = |n| Transport::Indirect(Bounces::AtMost(n));
+    let first = [0.4827964416, 0.6295558520, 0.6295558520, 0.8360829517];
+    for (light, count, exact) in
+        [(INDIRECT, 100, S1_INDIRECT_LX), (at_most(7), 100, S1_SEVEN_LX), (at_most(1), 200, first)]
+    {
+        within_errors_and_named_bias(&read(&in_eight_blocks(s1(light), count)), &exact);
+    }
+    assert_eq!(read(&s1(at_most(0))).estimates[0].value, 0.0);
 }
 
 /// Four different walls, two luminaires without symmetry, meters that luminaires shine on from every side.
@@ -313,12 +246,7 @@ fn read_with(script: &str, limit_s: f64) -> EngineError {
 
 #[test]
 fn crashes_hangs_and_kills_are_failures_with_their_cause() {
-    let crash = read_with("echo 'Parse Error: no such lamp' >&2; exit 1", 20.0);
-    assert!(crash.to_string().contains("no such lamp"), "{crash}");
-    let killed = read_with("kill -9 $$", 20.0);
-    assert!(killed.to_string().contains("signal 9"), "{killed}");
-    let hung = read_with("sleep 60", 0.3);
-    assert!(matches!(hung, EngineError::Process(ProcessError::TimedOut { .. })), "{hung}");
+    shared_tests::crashes_hangs_and_kills_are_told_apart(read_with);
 }
 
 #[test]

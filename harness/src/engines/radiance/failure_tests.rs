@@ -8,7 +8,7 @@ use luminaire::scene::{Bounces, Transport};
 
 use super::*;
 use crate::engines::fixtures::{s1, workbench, write_program};
-use crate::system::process::ProcessError;
+use crate::engines::shared_tests;
 
 /// A site whose rtrace is a shell script; the other programs do nothing.
 fn fake_site(root: &Path, rtrace: &str) -> Site {
@@ -38,44 +38,21 @@ const NAN: &str = r"\000\000\000\000\000\000\370\177";
 const MINUS_ONE: &str = r"\000\000\000\000\000\000\360\277";
 
 #[test]
-fn a_crash_is_an_error_with_its_signal() {
-    let error = failure("kill -SEGV $$", Transport::Direct, 20.0);
-    assert!(
-        matches!(&error, EngineError::Process(ProcessError::Failed { status, .. }) if status.contains("11")),
-        "{error}"
-    );
+fn a_crash_a_hang_and_an_out_of_memory_kill_are_told_apart() {
+    let read = |script: &str, limit_s| failure(script, Transport::Direct, limit_s);
+    shared_tests::crashes_hangs_and_kills_are_told_apart(read);
 }
 
 #[test]
-fn an_out_of_memory_kill_is_named() {
-    let error = failure("kill -KILL $$", Transport::Direct, 20.0).to_string();
-    assert!(error.contains("out of memory"), "{error}");
-}
-
-#[test]
-fn a_hang_is_killed_at_the_limit() {
-    let error = failure("sleep 60", Transport::Direct, 0.3);
-    assert!(matches!(error, EngineError::Process(ProcessError::TimedOut { .. })), "{error}");
-}
-
-#[test]
-fn an_error_of_the_user_keeps_what_rtrace_said() {
-    let error = failure("echo 'rtrace: fatal - cannot find function' >&2; exit 1", Transport::Direct, 20.0).to_string();
-    assert!(error.contains("cannot find function"), "{error}");
-}
-
-#[test]
-fn fewer_rows_than_meters_are_no_reading_though_rtrace_exits_well() {
-    let error = failure(&triples(3, ONE), Transport::Direct, 20.0);
-    assert!(matches!(error, EngineError::Output { .. }), "{error}");
-    let error = failure(&triples(4, ONE), Transport::Indirect(Bounces::Converged), 20.0);
-    assert!(matches!(error, EngineError::Output { .. }), "{error}");
-}
-
-#[test]
-fn nan_and_negative_light_are_no_readings() {
-    for nonsense in [NAN, MINUS_ONE] {
-        let error = failure(&triples(4, nonsense), Transport::Direct, 20.0);
+fn fewer_rows_than_meters_nan_and_negative_light_are_no_readings_though_rtrace_exits_well() {
+    let indirect = Transport::Indirect(Bounces::Converged);
+    for (rows, float, transport) in [
+        (3, ONE, Transport::Direct),
+        (4, ONE, indirect),
+        (4, NAN, Transport::Direct),
+        (4, MINUS_ONE, Transport::Direct),
+    ] {
+        let error = failure(&triples(rows, float), transport, 20.0);
         assert!(matches!(error, EngineError::Output { .. }), "{error}");
     }
 }

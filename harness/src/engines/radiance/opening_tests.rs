@@ -5,24 +5,17 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use luminaire::geometry::configuration_factor::element_to_polygon;
-use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry, read_file};
+use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, read_file};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
 use luminaire::simulator::{self, Accuracy, Uncertainty};
 
-use super::tests::{read, within};
+use super::tests::read;
 use super::*;
 use crate::engines::fixtures::{self, *};
 
-fn with_opening(lamp: Luminaire, opening: LuminousOpening) -> Luminaire {
-    let photometry = Arc::new(Photometry { opening, ..(*lamp.photometry).clone() });
-    Luminaire { photometry, model: LuminaireModel::Area, ..lamp }
-}
-
 /// A Lambertian downlight of 1000 cd on axis.
-fn lambertian(at_m: DVec3, opening: LuminousOpening) -> Luminaire {
-    let gamma: Vec<f64> = (0..=360).map(|k| 0.25 * f64::from(k)).collect();
-    let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
-    with_opening(luminaire("panel", at_m, LuminousIntensityDistribution::axial(gamma, candela).unwrap()), opening)
+fn panel(at_m: DVec3, opening: LuminousOpening) -> Luminaire {
+    with_opening(luminaire("panel", at_m, lambertian()), opening)
 }
 
 fn free_field(lamp: Luminaire, points_m: &[[f64; 3]], normal: DVec3) -> Job {
@@ -34,7 +27,7 @@ fn free_field(lamp: Luminaire, points_m: &[[f64; 3]], normal: DVec3) -> Job {
 fn a_lambertian_rectangle_follows_lamberts_polygon_formula() {
     let opening = LuminousOpening::Box { x_m: 1.0, y_m: 0.5, height_m: 0.0 };
     let job =
-        free_field(lambertian(DVec3::ZERO, opening), &[[0.0, 0.0, -1.0], [1.0, 0.5, -0.7], [0.2, 0.1, -3.0]], DVec3::Z);
+        free_field(panel(DVec3::ZERO, opening), &[[0.0, 0.0, -1.0], [1.0, 0.5, -0.7], [0.2, 0.1, -3.0]], DVec3::Z);
     let corners = [(-0.5, -0.25), (0.5, -0.25), (0.5, 0.25), (-0.5, 0.25)].map(|(x, y)| DVec3::new(x, y, 0.0));
     let exact: Vec<f64> = job
         .stations
@@ -49,7 +42,7 @@ fn a_lambertian_rectangle_follows_lamberts_polygon_formula() {
 #[test]
 fn a_lambertian_disc_and_a_sphere_follow_their_closed_forms() {
     let disc = LuminousOpening::Ellipse { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
-    let job = free_field(lambertian(DVec3::ZERO, disc), &[[0.0, 0.0, -1.0], [0.0, 0.0, -3.0]], DVec3::Z);
+    let job = free_field(panel(DVec3::ZERO, disc), &[[0.0, 0.0, -1.0], [0.0, 0.0, -3.0]], DVec3::Z);
     let found = read(&job);
     // On axis E = pi L sin^2: L = I / A, sin^2 = r^2 / (r^2 + d^2).
     let exact = [1.0, 3.0].map(|d: f64| 1000.0 / (0.25 + d * d));
@@ -92,7 +85,7 @@ fn a_turned_box_of_light_reads_as_the_path_tracer_has_it() {
 
 fn s2(transport: Transport) -> Job {
     let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
-    let panels = S2_PANELS_M.map(|[x, y]| lambertian(DVec3::new(x, y, 3.0), opening));
+    let panels = S2_PANELS_M.map(|[x, y]| panel(DVec3::new(x, y, 3.0), opening));
     within(5e-3, fixtures::s2(panels.to_vec(), transport))
 }
 

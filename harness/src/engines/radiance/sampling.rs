@@ -4,18 +4,18 @@
 //! clock, in seconds: processes that start together start from different places of one random sequence, reached by rows
 //! outside the scene.
 
-use std::thread;
 use std::time::Instant;
 
 use glam::DVec3;
 
+use super::export;
 use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options};
 use super::settings::Settings;
 use super::tools::Tools;
-use super::{ID, export};
 use crate::engines::blocks::{Blocks, MIN_BLOCKS, Sampling};
 use crate::engines::settings::Preset;
 use crate::engines::{Budget, EngineError, Job, Workbench};
+use crate::system::slots::side_by_side;
 
 /// Ambient divisions of the trial from which effort is planned.
 const TRIAL_DIVISIONS: u32 = 64;
@@ -123,13 +123,9 @@ impl Sampler<'_> {
     ) -> Result<Vec<Vec<f64>>, EngineError> {
         let mut read = vec![];
         for some in blocks.chunks(self.parallel()) {
-            let results: Vec<_> = thread::scope(|scope| {
-                let start = |(&count, place)| scope.spawn(move || self.process(options, place, count));
-                let running: Vec<_> = some.iter().zip(&mut *places).map(start).collect();
-                running.into_iter().map(thread::ScopedJoinHandle::join).collect()
-            });
-            for result in results {
-                read.extend(result.map_err(|_| EngineError::output(ID, "a thread that talked to rtrace panicked"))??);
+            let some: Vec<(usize, usize)> = some.iter().copied().zip(&mut *places).collect();
+            for read_by_one in side_by_side(some.len(), &some, |(count, place)| self.process(options, *place, *count)) {
+                read.extend(read_by_one?);
             }
         }
         Ok(read)

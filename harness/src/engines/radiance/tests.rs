@@ -1,65 +1,16 @@
 //! The real renderer against closed forms and the converged values of case S1, and what happens when it fails.
 
 use super::*;
-use crate::engines::Budget;
 use crate::engines::fixtures::*;
 use crate::engines::shared_tests;
 use std::f64::consts::PI;
 
-pub(super) fn read(job: &Job) -> Measurement {
+pub(in crate::engines) fn read(job: &Job) -> Measurement {
     read_tampered(job, |_, text| text)
 }
 
-pub(super) fn within(relative_error: f64, job: Job) -> Job {
-    Job { budget: Budget { relative_error, seconds: 60.0 }, ..job }
-}
-
 fn read_tampered(job: &Job, tamper: impl Fn(&str, String) -> String) -> Measurement {
-    let folder = tempfile::tempdir().unwrap();
-    let bench = workbench(Site::of_user().unwrap(), folder.path());
-    if let Err(absent) = Radiance.probe(&bench.site) {
-        panic!("Radiance is needed for this test: {absent}");
-    }
-    let edited = |f: SceneFile| SceneFile::text(&f.name, tamper(&f.name, String::from_utf8(f.bytes).unwrap()));
-    let files: Vec<_> = Radiance.export(job).unwrap().into_iter().map(edited).collect();
-    read_files(&files, job, &bench).unwrap()
-}
-
-#[test]
-fn direct_light_follows_the_inverse_square_law_in_single_precision() {
-    let job = s1(Transport::Direct);
-    let found = read(&job);
-    let deviations = relative_deviations(&found, &S1_DIRECT_LX);
-    assert!(worst(&deviations) < 1e-6, "{deviations:?}");
-    shared_tests::bounds_are_small_and_hold(&found, 1e-6);
-}
-
-#[test]
-fn indirect_light_is_the_converged_value_within_its_standard_error() {
-    let found = read(&within(2e-3, s1(CONVERGED)));
-    let deviations = relative_deviations(&found, &S1_INDIRECT_LX);
-    assert!(worst(&deviations) < 8e-3 && worst_z(&found, &S1_INDIRECT_LX) < 4.0, "{found:?}");
-    assert!(found.estimates.iter().all(|e| e.uncertainty.standard_error().unwrap() < 2.01e-3 * e.value), "{found:?}");
-}
-
-#[test]
-fn n_bounces_are_n_diffuse_reflections() {
-    shared_tests::n_bounces_are_n_reflections(read, 8e-4, 5.0);
-}
-
-#[test]
-fn total_is_direct_plus_indirect() {
-    shared_tests::total_is_direct_plus_indirect(|job| read(&within(2e-3, job)));
-}
-
-#[test]
-fn asymmetric_and_turned_luminaires_read_their_own_table() {
-    shared_tests::turned_luminaires_read_their_own_table(read);
-}
-
-#[test]
-fn several_luminaires_add_up_and_obstacles_throw_shadows() {
-    shared_tests::luminaires_add_up_and_obstacles_throw_shadows(read);
+    shared_tests::read_tampered(&Radiance, job, tamper, |files, bench| read_files(files, job, bench))
 }
 
 #[test]
@@ -87,14 +38,7 @@ fn exported_files_are_these() {
 #[test]
 fn tiny_and_huge_rooms_read_as_their_scale_has_it() {
     for size in [1e-3, 1e5] {
-        let mut job = s1(Transport::Direct);
-        job.scene.room.as_mut().unwrap().size_m *= size;
-        job.scene.luminaires[0].position_m *= size;
-        job.scene.luminaires[0].flux_scale *= size * size;
-        for station in &mut job.stations {
-            station.meter.position_m *= size;
-        }
-        let found = read(&job);
+        let found = read(&scaled(s1(Transport::Direct), size, size * size));
         assert!(worst(&relative_deviations(&found, &S1_DIRECT_LX)) < 1e-6, "{size}: {found:?}");
     }
 }

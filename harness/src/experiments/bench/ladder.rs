@@ -59,8 +59,9 @@ pub(super) fn ladder(engine: &dyn Engine, job: &Job, furnished: bool, own: &Sett
 }
 
 impl Rung {
-    pub(super) fn expected_s(&self) -> f64 {
-        if self.is_timed { self.budget.seconds.max(0.5) } else { 0.5 }
+    /// Tenths of the seconds that it is expected to take.
+    pub(super) fn expected_steps(&self) -> u64 {
+        (10.0 * if self.is_timed { self.budget.seconds.max(0.5) } else { 0.5 }).ceil() as u64
     }
 
     pub(super) fn settings(&self, own: &Settings) -> Settings {

@@ -20,8 +20,8 @@ use serde::Serialize;
 pub use self::curve::{BenchPoint, Curve, Pareto};
 pub use self::knobs::KnobEffect;
 use self::ladder::ladder;
-use super::deviation;
 use super::trials::{Effort, Settings, Trials, simulator};
+use super::{Progress, deviation};
 use crate::engines::Job;
 use crate::measure::{Failure, Instrument, Reader, Taken};
 use crate::record::{EngineName, Estimate, ProcedureId, ReadingKey};
@@ -47,13 +47,6 @@ pub struct Options<'a> {
 pub enum Knobs {
     Tried,
     Left,
-}
-
-pub trait Progress {
-    /// That many seconds more are expected.
-    fn planned(&self, seconds: f64);
-    /// A reading ended that was expected to take so long.
-    fn ended(&self, what: &str, seconds: f64);
 }
 
 #[derive(Clone, Debug, Default, Serialize)]
@@ -172,7 +165,7 @@ impl Bench<'_> {
         let own = case.settings_of(&name);
         let rungs = ladder(subject.engine.as_ref(), job, is_furnished(job), &own, self.options.seconds);
         let repetitions = self.options.repetitions.max(1);
-        self.progress.planned(rungs.iter().map(|r| r.expected_s() * repetitions as f64).sum());
+        self.progress.planned(rungs.iter().map(|r| r.expected_steps() * repetitions as u64).sum());
         let times_s = (self.start_up(subject, job, &own), self.set_up(subject, job, &own));
         let mut curves: Vec<((String, String), Vec<BenchPoint>)> = vec![];
         let (mut last_wall_s, mut last_preset, mut refusal) = (0.0, "", None);
@@ -190,7 +183,7 @@ impl Bench<'_> {
                     }
                 }
                 let what = format!("{name}: {} {} {:e}", job.procedure, rung.preset, rung.effort);
-                self.progress.ended(&what, rung.expected_s());
+                self.progress.ended(what, rung.expected_steps());
             }
             let Some(first) = taken.first() else { continue };
             (last_wall_s, last_preset) = (first.cost.wall_s, rung.preset.as_str());

@@ -24,13 +24,6 @@ fn known_law(job: &Job) -> Result<Measurement, EngineError> {
 
 const KNOBS: &[Knob] = &[Knob { key: "gain", values: &["1", "2"] }, Knob { key: "idle", values: &["true", "false"] }];
 
-struct Silent;
-
-impl Progress for Silent {
-    fn planned(&self, _seconds: f64) {}
-    fn ended(&self, _what: &str, _seconds: f64) {}
-}
-
 fn benched(knobs: Knobs) -> BenchReport {
     let folder = tempfile::tempdir().unwrap();
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/specs/axial.yaml");
@@ -46,7 +39,7 @@ fn benched(knobs: Knobs) -> BenchReport {
     let engine = Arc::new(Fake { knobs: KNOBS, ..Fake::new("known", known_law) });
     let subjects = [Instrument { engine, version: Version("1".into()) }];
     let mut report = BenchReport::default();
-    bench(&Case::load(&path).unwrap(), &subjects, &options, &Silent, &mut report);
+    bench(&Case::load(&path).unwrap(), &subjects, &options, &(), &mut report);
     report
 }
 

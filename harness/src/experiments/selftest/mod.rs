@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::tables;
 use crate::diagnosis::{self, Effect, Fault, Readings};
-use crate::judge::{Judge, KnownDeviations, Tolerances, Verdict};
+use crate::judge::{Judge, Policy, Verdict};
 use crate::procedures::{self, Task};
 use crate::record::{ProcedureId, Reading, ReadingKey, Recording, Uncertainty};
 use crate::spec::Case;
@@ -84,12 +84,11 @@ pub struct SelftestError(String);
 /// Runs the self-test: so many noisy runs a fault, and so many without one in each case.
 pub fn selftest(runs: usize, clean_runs: usize, seed: u64) -> Result<Scorecard, SelftestError> {
     let wrong = |e: &dyn fmt::Display| SelftestError(e.to_string());
-    let tolerances = Tolerances::built_in().map_err(|e| wrong(&e))?;
-    let known = KnownDeviations::built_in().map_err(|e| wrong(&e))?;
+    let policy = Policy::built_in().map_err(|e| wrong(&e))?;
     let folder = tempfile::tempdir().map_err(|e| wrong(&e))?;
     let mut card = Scorecard { faults: vec![], clean_runs: 0, false_alarms: 0 };
     for case in cases(folder.path())? {
-        let judge = Judge { tolerances: &tolerances, known: &known, overrides: &case.tolerances, published: None };
+        let judge = policy.judge(&case, None);
         let mut random = fastrand::Rng::with_seed(seed);
         let subjects: Vec<Subject> = case.tasks().filter_map(|task| Subject::of(&case, task)).collect();
         card.faults.extend(scores(&case, &subjects, &judge, runs, &mut random));

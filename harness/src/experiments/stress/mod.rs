@@ -5,17 +5,17 @@ mod report;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Mutex;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use luminaire::scene::LuminaireModel;
+use parking_lot::Mutex;
 
 use self::findings::{Finding, How};
 pub use self::findings::{LawReport, PointReport, StressReport};
-use super::deviation;
 use super::trials::{Effort, Settings, Trials, simulator};
-use crate::engines::{self, Job};
+use super::{Progress, deviation};
+use crate::engines::{self, Coordinates, Job};
 use crate::judge::KnownBreak;
 use crate::laws::{self, Against, Law, Place, Variant};
 use crate::measure::{Failure, Instrument, Reader, Taken};
@@ -33,23 +33,10 @@ pub struct Options<'a> {
     /// The laws by name; empty for all.
     pub laws: &'a [String],
     pub seed: u64,
+    /// Which coordinates renderers get.
     pub coordinates: Coordinates,
     /// What is on record of engines as luxproof drives them.
     pub known: &'a [KnownBreak],
-}
-
-/// Which coordinates renderers get.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Coordinates {
-    /// As luxproof exports them: moved and scaled where that helps.
-    Fitted,
-    /// Those of the scene, to see how a renderer itself bears them.
-    Raw,
-}
-
-pub trait Progress: Sync {
-    fn planned(&self, points: usize);
-    fn ended(&self, engine: &str, law: &str, magnitude: f64);
 }
 
 struct Point {
@@ -79,7 +66,7 @@ impl Point {
 
 pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progress: &dyn Progress) -> StressReport {
     let points = points(case, subjects, options);
-    progress.planned(points.len());
+    progress.planned(points.len() as u64);
     let bench = Bench { trials: Trials::new(case, &options.reader, options.time), subjects, options };
     let queue = Mutex::new(Queue {
         findings: vec![None; points.len()],
@@ -91,26 +78,22 @@ pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progr
             scope.spawn(|| {
                 loop {
                     // The lock is let go of at the end of the statement.
-                    let next = lock(&queue).next(&points);
+                    let next = queue.lock().next(&points);
                     let Some(k) = next else { break };
                     let clock = Instant::now();
                     let finding = bench.finding(&points[k]);
                     let engine = subjects[points[k].subject].engine.name();
-                    progress.ended(&engine, points[k].law.id, points[k].magnitude());
-                    let mut queue = lock(&queue);
+                    progress.ended(format!("{engine}: {} {:e}", points[k].law.id, points[k].magnitude()), 1);
+                    let mut queue = queue.lock();
                     queue.spent[points[k].subject] += clock.elapsed();
                     queue.findings[k] = finding;
                 }
             });
         }
     });
-    let findings = lock(&queue).findings.clone();
+    let findings = queue.into_inner().findings;
     let found = points.iter().zip(findings).map(|(point, finding)| (point.subject, point.law, point.report(finding)));
     StressReport::new(case, subjects, &found.collect::<Vec<_>>(), options.known)
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 fn points(case: &Case, subjects: &[Instrument], options: &Options<'_>) -> Vec<Point> {

@@ -36,13 +36,6 @@ fn at_most_a_hundred(job: &Job) -> Support {
     if mirrored { Support::No("a hundred luminaires at most".into()) } else { Support::Yes }
 }
 
-struct Silent;
-
-impl Progress for Silent {
-    fn planned(&self, _points: usize) {}
-    fn ended(&self, _engine: &str, _law: &str, _magnitude: f64) {}
-}
-
 fn axial() -> Case {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/specs/axial.yaml");
     Case::load(&path).unwrap()
@@ -69,7 +62,7 @@ fn stressed_knowing(folder: &std::path::Path, laws: &[&str], time: Duration, kno
     };
     let engine = Arc::new(Fake { supports: at_most_a_hundred, ..Fake::new("fragile", fragile) });
     let subjects = [Instrument { engine, version: Version("1".into()) }];
-    stress(&axial(), &subjects, &options, &Silent)
+    stress(&axial(), &subjects, &options, &())
 }
 
 const LONG: Duration = Duration::from_secs(100);

@@ -130,7 +130,7 @@ fn head(report: &Report) -> Markup {
 }
 
 /// A table that scrolls by itself where the page is too narrow; a heading may have a class, as in `number run time`.
-fn table(label: &str, heads: &[&str], rows: &Markup) -> Markup {
+pub(crate) fn table(label: &str, heads: &[&str], rows: &Markup) -> Markup {
     html! {
         div.scroll tabindex="0" role="region" aria-label=(label) {
             table {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::super::words::trimmed;
+use super::super::words::{rounded, trimmed};
 use super::palette::Palette;
 use crate::judge::Comparison;
 
@@ -65,7 +65,7 @@ impl Rows {
 
 /// Seven significant digits: what a page shows; all of them are in report.json.
 fn short(value: Option<f64>) -> Value {
-    json!(value.filter(|v| v.is_finite()).and_then(|v| format!("{v:.6e}").parse::<f64>().ok()))
+    json!(value.and_then(|v| rounded(v, 7)))
 }
 
 pub(super) fn place(c: &Comparison) -> String {

@@ -92,17 +92,14 @@ fn few_blocks_are_granted_the_wide_tails_of_student() {
 }
 
 #[test]
-fn exact_values_may_differ_by_single_precision_only() {
-    let a = entry(&[100.0, 50.0], None);
-    assert_eq!(state(&a, &entry(&[100.000_05, 50.0], None)), State::Unchanged);
-    assert_eq!(state(&a, &entry(&[100.001, 50.0], None)), State::Changed);
-}
-
-#[test]
-fn a_reading_that_is_no_number_is_a_change() {
-    let a = entry(&[100.0, 50.0], Some(1.0));
-    for bad in [f64::NAN, f64::INFINITY] {
-        assert_eq!(state(&a, &entry(&[bad, 50.0], Some(1.0))), State::Changed);
+fn exact_values_may_differ_by_single_precision_only_and_what_is_no_number_is_a_change() {
+    for (value, std_error, expected) in [
+        (100.000_05, None, State::Unchanged),
+        (100.001, None, State::Changed),
+        (f64::NAN, Some(1.0), State::Changed),
+        (f64::INFINITY, Some(1.0), State::Changed),
+    ] {
+        assert_eq!(state(&entry(&[100.0, 50.0], std_error), &entry(&[value, 50.0], std_error)), expected, "{value}");
     }
 }
 

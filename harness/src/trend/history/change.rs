@@ -292,15 +292,10 @@ mod tests {
     }
 
     #[test]
-    fn a_shift_of_all_readings_of_an_engine_is_noticed_within_five_nights() {
-        let seen = found(&Synthetic::default(), SEEN, Level::EngineAndProcedure, 5);
-        assert_eq!(seen, (all(), all()));
-    }
-
-    #[test]
-    fn a_shift_of_one_case_is_noticed_within_five_nights() {
-        let seen = found(&Synthetic::default(), Shift { cases: 1, ..SEEN }, Level::Case, 5);
-        assert_eq!(seen, (all(), all()));
+    fn a_shift_of_all_readings_of_an_engine_or_of_one_case_is_noticed_within_five_nights() {
+        for (cases, level) in [(SEEN.cases, Level::EngineAndProcedure), (1, Level::Case)] {
+            assert_eq!(found(&Synthetic::default(), Shift { cases, ..SEEN }, level, 5), (all(), all()), "{level:?}");
+        }
     }
 
     #[test]
@@ -311,27 +306,21 @@ mod tests {
         assert!(3 * seen.0 >= 2 * all(), "{seen:?}");
     }
 
-    /// Shifts of single readings, one in each of five cases, so that no group shows them: how many nights each took to be
-    /// noticed, as far as it was within three weeks.
-    fn delays_of_single_readings(seeds: Range<u64>) -> Vec<Option<usize>> {
-        let mut delays = vec![];
-        for seed in seeds {
-            let shift = Shift { night: 60 + 23 * (seed as usize % 12), meters: 1, ..SEEN };
+    #[test]
+    fn a_shift_of_one_reading_among_two_thousand_is_noticed_half_the_time_within_five_nights_and_soon_otherwise() {
+        // One reading in each of five cases, so that no group shows them; how many nights each took, if three weeks at most.
+        let mut delays: Vec<Option<usize>> = vec![];
+        for seed in SEEDS {
+            let shift = Shift { night: 60 + 23 * seed as usize, meters: 1, ..SEEN };
             let made = Synthetic { seed, shift: Some(shift), nights: shift.night + 21, ..Synthetic::default() };
             let found = at_level(&made.history(), Level::Comparison);
-            for case in 0..shift.cases {
+            delays.extend((0..shift.cases).map(|case| {
                 let case = Some(format!("suite/case-{case}"));
                 let part = Part { case, meter: Some(MeterId::new("workplane", 0)) };
                 let mine = |c: &&Change| is_of_shifted(c) && c.noticed >= shift.night && c.part == part;
-                delays.push(found.iter().find(mine).map(|change| change.noticed + 1 - shift.night));
-            }
+                found.iter().find(mine).map(|change| change.noticed + 1 - shift.night)
+            }));
         }
-        delays
-    }
-
-    #[test]
-    fn a_shift_of_one_reading_among_two_thousand_is_noticed_half_the_time_within_five_nights_and_soon_otherwise() {
-        let delays = delays_of_single_readings(SEEDS);
         let within = |nights: usize| delays.iter().flatten().filter(|d| **d <= nights).count();
         println!("within 5, 7, 10, 21 nights: {:?} of {}", [5, 7, 10, 21].map(within), delays.len());
         assert!(20 * within(5) >= 7 * delays.len(), "{delays:?}");

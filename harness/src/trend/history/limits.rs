@@ -71,11 +71,11 @@ mod tests {
     #[test]
     fn the_last_nights_alarm_as_often_as_white_noise_shows() {
         let limits = Limits::of(200.0);
-        let mut random = crate::trend::history::synthetic::Normal::new(1);
+        let mut random = fastrand::Rng::with_seed(1);
         let (mut alarms, nights) = (0, 400_000);
         let mut last = std::collections::VecDeque::new();
         for _ in 0..nights {
-            last.push_back(random.draw());
+            last.push_back(crate::system::random::normal(&mut random));
             last.drain(..last.len().saturating_sub(WINDOW));
             if limits.are_exceeded_by(last.iter().copied()) {
                 alarms += 1;

@@ -13,6 +13,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::judge::{Basis, Comparison, Verdict};
 use crate::record::{MeterId, ProcedureId, Quantity, ReadingKey};
 use crate::report::Report;
+use crate::report::words::rounded;
 use crate::system::files::FileError;
 
 /// The format that is written; all up to it are read.
@@ -215,20 +216,15 @@ impl Numbers {
     fn of(comparison: &Comparison) -> Self {
         let std_error = comparison.uncertainty.standard_error();
         let reference = comparison.reference.as_ref();
+        let number = |value: Option<f64>, digits| value.and_then(|v| rounded(v, digits)).unwrap_or(f64::NAN);
         let u = reference.map(|r| std_error.unwrap_or(0.0).hypot(r.uncertainty));
         Self {
-            reference: rounded(reference.map(|r| r.value), 9),
-            deviation: rounded(comparison.deviation, 6),
-            std_error: rounded(std_error, 4),
-            u: rounded(u, 4),
+            reference: number(reference.map(|r| r.value), 9),
+            deviation: number(comparison.deviation, 6),
+            std_error: number(std_error, 4),
+            u: number(u, 4),
         }
     }
-}
-
-/// Rounds to significant digits; what is no finite number is NaN.
-fn rounded(value: Option<f64>, digits: usize) -> f64 {
-    let value = value.filter(|v| v.is_finite());
-    value.and_then(|v| format!("{v:.*e}", digits - 1).parse().ok()).unwrap_or(f64::NAN)
 }
 
 /// Of the form that sorts by time.
@@ -357,9 +353,7 @@ mod tests {
         let good = ["2026-01-31", "2024-02-29"];
         let bad = ["", "2026-1-31", "2026-13-01", "20260131", "2026-01-31T", "tonight..."];
         assert!(good.iter().all(|n| is_date(n)) && !bad.iter().any(|n| is_date(n)));
-        assert_eq!(rounded(Some(1.732_05), 4), 1.732);
-        assert_eq!(rounded(Some(-1.23456789e-12), 3), -1.23e-12);
-        assert_eq!(rounded(Some(0.0), 3), 0.0);
-        assert!(rounded(Some(f64::NAN), 3).is_nan() && rounded(None, 3).is_nan());
+        let rounded = [(1.732_05, 4), (-1.23456789e-12, 3), (0.0, 3), (f64::NAN, 3)].map(|(v, n)| rounded(v, n));
+        assert_eq!(rounded, [Some(1.732), Some(-1.23e-12), Some(0.0), None]);
     }
 }

@@ -4,6 +4,7 @@ use super::line::{Line, Numbers};
 use super::series::{History, Key, Series};
 use crate::judge::{Basis, Verdict};
 use crate::record::{MeterId, ProcedureId, Quantity, ReadingKey};
+use crate::system::random::normal;
 
 const ENGINES: [&str; 5] = ["iesna", "mitsuba", "povray", "radiance", "simulator"];
 const PROCEDURES: [ProcedureId; 4] = [
@@ -45,11 +46,11 @@ impl Default for Synthetic {
 
 impl Synthetic {
     pub(super) fn history(&self) -> History {
-        let mut random = Normal::new(self.seed);
+        let mut random = fastrand::Rng::with_seed(self.seed);
         let mut series = vec![];
         for engine in ENGINES {
             for procedure in PROCEDURES {
-                let common: Vec<f64> = (0..self.nights).map(|_| random.draw()).collect();
+                let common: Vec<f64> = (0..self.nights).map(|_| normal(&mut random)).collect();
                 for case in 0..self.cases {
                     let reading = ReadingKey::new(format!("suite/case-{case}"), procedure, engine);
                     for meter in 0..self.meters {
@@ -86,9 +87,9 @@ impl Synthetic {
         line
     }
 
-    fn one(&self, of: &ReadingKey, case: usize, meter: usize, common: &[f64], random: &mut Normal) -> Series {
+    fn one(&self, of: &ReadingKey, case: usize, meter: usize, common: &[f64], random: &mut fastrand::Rng) -> Series {
         let (reference, error) = (100.0 + meter as f64, 0.05 * (1.0 + case as f64));
-        let bias = 0.3 * random.draw();
+        let bias = 0.3 * normal(random);
         let shifted =
             |s: &Shift| of.engine == "mitsuba" && of.procedure == PROCEDURES[1] && case < s.cases && meter < s.meters;
         let shift = self.shift.filter(shifted);
@@ -96,8 +97,8 @@ impl Synthetic {
         let (mut deviation, mut std_error) = (vec![], vec![]);
         for (night, common) in common.iter().enumerate().take(self.nights) {
             let moved = shift.filter(|s| night >= s.night).map_or(0.0, |s| s.standard_errors);
-            deviation.push(bias + error * (own * random.draw() + shared * common + moved));
-            let squares: f64 = (0..7).map(|_| random.draw().powi(2)).sum();
+            deviation.push(bias + error * (own * normal(random) + shared * common + moved));
+            let squares: f64 = (0..7).map(|_| normal(random).powi(2)).sum();
             std_error.push(error * (squares / 7.0).sqrt());
         }
         let key = Key {
@@ -115,26 +116,4 @@ impl Synthetic {
 fn date(night: usize) -> String {
     let day = std::time::SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(86_400 * (20_454 + night as u64));
     humantime::format_rfc3339_seconds(day).to_string()[..10].to_owned()
-}
-
-/// Standard normal numbers (Box and Muller 1958).
-pub(super) struct Normal {
-    random: fastrand::Rng,
-    spare: Option<f64>,
-}
-
-impl Normal {
-    pub(super) fn new(seed: u64) -> Self {
-        Self { random: fastrand::Rng::with_seed(seed), spare: None }
-    }
-
-    pub(super) fn draw(&mut self) -> f64 {
-        if let Some(spare) = self.spare.take() {
-            return spare;
-        }
-        let radius = (-2.0 * (1.0 - self.random.f64()).ln()).sqrt();
-        let (sine, cosine) = (std::f64::consts::TAU * self.random.f64()).sin_cos();
-        self.spare = Some(radius * sine);
-        radius * cosine
-    }
 }

@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Shape, Transport};
+use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 
 use super::frame::Frame;
 use super::surfaces::list;
@@ -53,7 +53,8 @@ pub(super) fn files(job: &Job, settings: &Settings, frame: &Frame, tables: &Tabl
     if obstacle_to_stock(job).is_some() {
         return vec![];
     }
-    let images = tables.distinct().enumerate().map(|(k, d)| SceneFile { name: image_name(k), bytes: opacity_pfm(d) });
+    let images =
+        tables.distinct.iter().enumerate().map(|(k, d)| SceneFile { name: image_name(k), bytes: opacity_pfm(d) });
     let mut files = vec![SceneFile::text("stock.xml", xml(job, settings, frame, tables))];
     files.extend(images);
     files
@@ -80,8 +81,8 @@ fn xml(job: &Job, settings: &Settings, frame: &Frame, tables: &Tables) -> String
     if has_surfaces(job) {
         xml += "    <include filename=\"room.xml\"/>\n";
     }
-    let luminaires = job.scene.luminaires.iter().zip(tables.indices());
-    xml.extend(luminaires.map(|(luminaire, table)| filtered_point(job, luminaire, table, frame)));
+    let luminaires = job.scene.luminaires.iter().zip(&tables.of_luminaire);
+    xml.extend(luminaires.map(|(luminaire, table)| filtered_point(job, luminaire, *table, frame)));
     xml + &meters(job, settings, frame) + "</scene>\n"
 }
 
@@ -224,14 +225,8 @@ fn disk_transform(at: DVec3, normal: DVec3, radius: f64) -> String {
 /// The filter sphere's radius: no meter, luminaire, box or surface may lie within it.
 fn radius_m(job: &Job, luminaire: &Luminaire) -> f64 {
     let at = luminaire.position_m;
-    let meters = job.stations.iter().map(|s| s.meter.position_m.distance(at));
     let others = job.scene.luminaires.iter().map(|l| l.position_m.distance(at)).filter(|d| *d > 0.0);
-    let walls = job.scene.room.iter().map(|r| at.min(r.size_m - at).min_element());
-    let boxes = job.scene.obstacles.iter().filter_map(|o| match &o.shape {
-        Shape::Box { min_m, max_m } => Some(at.clamp(*min_m, *max_m).distance(at)),
-        Shape::Mesh { .. } => None,
-    });
-    let nearest = meters.chain(others).chain(walls).chain(boxes).fold(f64::INFINITY, f64::min);
+    let nearest = job.distances_m(at).chain(others).fold(f64::INFINITY, f64::min);
     (RADIUS * size_m(job)).min(0.5 * nearest)
 }
 

@@ -45,42 +45,34 @@ fn rectangle(room: &Room, surface: Surface, frame: &Frame) -> String {
     let up = if surface.axis() == 2 { DVec3::Y } else { DVec3::Z };
     let half = 0.5 * frame.scale * room.size_m;
     let (half_x, half_y) = (half.dot(up.cross(normal).abs()), half.dot(up));
-    format!(
-        r#"
-    <!-- {name} -->
-    <shape type="rectangle">
-        <transform name="to_world">
-            <scale x="{half_x}" y="{half_y}"/>
-            <lookat origin="{origin}" target="{target}" up="{up}"/>
-        </transform>
-        {bsdf}
-    </shape>
-"#,
-        name = surface.name(),
-        origin = list(centre),
-        target = list(centre + normal),
-        up = list(up),
-        bsdf = diffuse(room.reflectance.of(surface)),
-    )
+    let [origin, target, up] = [centre, centre + normal, up].map(list);
+    let placed = [
+        format!(r#"<scale x="{half_x}" y="{half_y}"/>"#),
+        format!(r#"<lookat origin="{origin}" target="{target}" up="{up}"/>"#),
+    ];
+    shape(surface.name(), "rectangle", &placed, &diffuse(room.reflectance.of(surface)))
 }
 
 /// Mitsuba's cube reaches from -1 to 1 and faces outwards.
 fn cube(k: usize, min_m: DVec3, max_m: DVec3, bsdf: &str, frame: &Frame) -> String {
     let half = 0.5 * frame.scale * (max_m - min_m);
     let centre = frame.to_scene(0.5 * (min_m + max_m));
+    let placed = [format!(r#"<scale value="{}"/>"#, list(half)), format!(r#"<translate value="{}"/>"#, list(centre))];
+    shape(&format!("obstacle {k}"), "cube", &placed, bsdf)
+}
+
+fn shape(name: &str, kind: &str, [first, second]: &[String; 2], bsdf: &str) -> String {
     format!(
         r#"
-    <!-- obstacle {k} -->
-    <shape type="cube">
+    <!-- {name} -->
+    <shape type="{kind}">
         <transform name="to_world">
-            <scale value="{half}"/>
-            <translate value="{centre}"/>
+            {first}
+            {second}
         </transform>
         {bsdf}
     </shape>
-"#,
-        half = list(half),
-        centre = list(centre),
+"#
     )
 }
 

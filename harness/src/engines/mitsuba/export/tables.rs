@@ -8,8 +8,8 @@ use crate::engines::{EngineError, Job, SceneFile};
 
 /// Distributions without repetition, and which luminaire has which.
 pub(super) struct Tables<'a> {
-    distinct: Vec<&'a LuminousIntensityDistribution>,
-    of_luminaire: Vec<usize>,
+    pub(super) distinct: Vec<&'a LuminousIntensityDistribution>,
+    pub(super) of_luminaire: Vec<usize>,
 }
 
 #[derive(Serialize)]
@@ -31,15 +31,6 @@ impl<'a> Tables<'a> {
             }
         }
         tables
-    }
-
-    pub(super) fn distinct(&self) -> impl Iterator<Item = &'a LuminousIntensityDistribution> {
-        self.distinct.iter().copied()
-    }
-
-    /// Which of them each luminaire has, in the luminaires' order.
-    pub(super) fn indices(&self) -> impl Iterator<Item = usize> {
-        self.of_luminaire.iter().copied()
     }
 
     /// The file of each luminaire's table, in the luminaires' order.

@@ -1,7 +1,6 @@
 //! Every way in which a renderer fails, played by a false interpreter, ends in an error that says so.
 
 use super::*;
-use crate::system::process::ProcessError;
 
 /// Reads S1 through an interpreter that passes the probe and then runs `script`.
 fn read_with(script: &str, limit_s: f64) -> EngineError {
@@ -28,14 +27,7 @@ fn driver(stations: &[usize], answer: &str) -> String {
 
 #[test]
 fn a_crash_a_hang_and_an_out_of_memory_kill_are_told_apart() {
-    let crash = read_with("kill -ABRT $$", 30.0);
-    assert!(crash.to_string().contains("signal 6"), "{crash}");
-    let memory = read_with("kill -KILL $$", 30.0);
-    assert!(memory.to_string().contains("out of memory"), "{memory}");
-    let error = read_with("echo 'RuntimeError: no such plugin' >&2; exit 1", 30.0);
-    assert!(error.to_string().contains("no such plugin"), "{error}");
-    let hang = read_with("sleep 60", 0.5);
-    assert!(matches!(hang, EngineError::Process(ProcessError::TimedOut { .. })), "{hang}");
+    shared_tests::crashes_hangs_and_kills_are_told_apart(read_with);
 }
 
 #[test]
@@ -63,7 +55,7 @@ fn without_llvm_the_scalar_variant_runs_and_the_report_says_so() {
     let engine = Mitsuba::default();
     let folder = tempfile::tempdir().unwrap();
     let bench = workbench(Site::of_user().unwrap(), folder.path());
-    *engine.backend.lock().unwrap() = Some(Backend::find(&bench.site).unwrap().without_llvm());
+    *engine.backend.lock() = Some(Backend::find(&bench.site).unwrap().without_llvm());
     let job = s1(Transport::Direct);
     let found = engine.read(&job, &bench).unwrap();
     assert!(worst(&relative_deviations(&found, &S1_DIRECT_LX)) < 1e-5, "{found:?}");

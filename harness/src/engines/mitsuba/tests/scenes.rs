@@ -1,17 +1,9 @@
 //! Scenes beyond the empty cube: extended luminaires, obstacles, bright rooms, far and tiny coordinates.
 
-use std::sync::Arc;
-
-use luminaire::photometry::{HorizontalAxis, LuminousOpening, Photometry};
+use luminaire::photometry::{HorizontalAxis, LuminousOpening};
 
 use super::*;
 use crate::engines::fixtures;
-
-/// An opening that sends out `distribution`.
-fn area(at_m: DVec3, distribution: LuminousIntensityDistribution, opening: LuminousOpening) -> Luminaire {
-    let photometry = Arc::new(Photometry { opening, ..Photometry::of(distribution.clone()) });
-    Luminaire { model: LuminaireModel::Area, photometry, ..luminaire("area", at_m, distribution) }
-}
 
 #[test]
 fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
@@ -26,7 +18,7 @@ fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
         LuminousOpening::LyingCylinder { axis: HorizontalAxis::X, length_m, diameter_m },
         LuminousOpening::LyingCylinder { axis: HorizontalAxis::Y, length_m, diameter_m },
     ] {
-        let mut lamp = area(DVec3::new(1.0, 2.0, 3.0), lopsided(), opening);
+        let mut lamp = with_opening(luminaire("area", DVec3::new(1.0, 2.0, 3.0), lopsided()), opening);
         lamp.orientation = orientation(30.0, 20.0, 10.0);
         let angles = (&[10.0, 190.0], &[5.0, 85.0, 165.0]);
         let far = goniometer(&lamp, 300.0, angles.0, angles.1);
@@ -46,10 +38,8 @@ fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
 
 /// An opening has no body, so that plates of half a millimetre stand for the panels' black backs.
 fn s2(transport: Transport) -> Job {
-    let lambertian: Vec<f64> = (0..=90).map(|g| 1000.0 * f64::from(g).to_radians().cos().max(0.0)).collect();
-    let downlight = LuminousIntensityDistribution::axial((0..=90).map(f64::from).collect(), lambertian).unwrap();
     let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
-    let panel = |[x, y]: [f64; 2]| area(DVec3::new(x, y, 2.9994), downlight.clone(), opening);
+    let panel = |[x, y]: [f64; 2]| with_opening(luminaire("panel", DVec3::new(x, y, 2.9994), lambertian()), opening);
     let back = |[x, y]: [f64; 2]| cuboid([x - 0.3, y - 0.3, 2.9995], [x + 0.3, y + 0.3, 3.0], 0.0);
     let mut job = fixtures::s2(S2_PANELS_M.map(panel).to_vec(), transport);
     job.scene.obstacles.extend(S2_PANELS_M.map(back));
@@ -76,14 +66,8 @@ fn far_and_tiny_scenes_are_read_in_coordinates_of_their_own() {
     assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) > 1e-3, "raw 32-bit coordinates would do");
 
     // S1 a thousand times smaller: a million times the lux, direct and reflected.
-    let mut tiny = s1(CONVERGED);
-    tiny.scene.room = Some(room(DVec3::splat(0.02), 0.2, 0.5, 0.8));
-    tiny.scene.luminaires[0].position_m *= 1e-3;
-    for station in &mut tiny.stations {
-        station.meter.position_m *= 1e-3;
-    }
     let expected = S1_INDIRECT_LX.map(|lx| 1e6 * lx);
-    assert!(worst_z(&read(&tiny), &expected) < 4.5);
+    assert!(worst_z(&read(&scaled(s1(CONVERGED), 1e-3, 1.0)), &expected) < 4.5);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::fmt::Write;
 use glam::{DMat3, DVec3};
 use luminaire::geometry::Surface;
 use luminaire::photometry::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, lm63};
-use luminaire::scene::{Luminaire, Meter, Shape, Transport};
+use luminaire::scene::{Luminaire, Meter, Transport};
 
 use super::{EFFICACY, box_faces, polygon};
 use crate::engines::radiance::route::{Route, route};
@@ -332,16 +332,6 @@ fn joined(values: &[f64]) -> String {
 
 /// Small against the nearest surface, luminaire and meter, so that the sphere touches none of them.
 fn point_radius(job: &Job, luminaire: &Luminaire, scale: f64) -> f64 {
-    let at = luminaire.position_m;
-    let to_stations = job.stations.iter().map(|s| s.meter.position_m.distance(at));
-    let to_room = job.scene.room.iter().flat_map(|r| {
-        let far = r.size_m - at;
-        at.to_array().into_iter().chain(far.to_array())
-    });
-    let to_boxes = job.scene.obstacles.iter().filter_map(|o| match &o.shape {
-        Shape::Box { min_m, max_m } => Some(at.clamp(*min_m, *max_m).distance(at)),
-        Shape::Mesh { .. } => None,
-    });
-    let nearest = to_stations.chain(to_room).chain(to_boxes).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
+    let nearest = job.distances_m(luminaire.position_m).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
     POINT_RADIUS.min(0.01 * nearest * scale).max(MIN_RADIUS)
 }

@@ -1,6 +1,6 @@
 //! Axes: round ticks, and a scale for deviations that is straight near zero and logarithmic beyond.
 
-use crate::report::words::trimmed;
+use crate::report::words::{round_step, trimmed};
 
 /// Round values from `low` to `high`, about `count` of them.
 pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
@@ -10,12 +10,6 @@ pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
     }
     let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
     (first..=last).map(|k| k as f64 * step).collect()
-}
-
-/// The next of 1, 2, 2.5, 5, 10 times a power of ten.
-pub(super) fn round_step(raw: f64) -> f64 {
-    let decade = 10f64.powf(raw.log10().floor());
-    [1.0, 2.0, 2.5, 5.0, 10.0].map(|d| d * decade).into_iter().find(|s| *s >= raw * 0.999).unwrap_or(10.0 * decade)
 }
 
 pub(super) fn label(value: f64) -> String {

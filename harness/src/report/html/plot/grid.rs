@@ -6,12 +6,12 @@ use maud::{Markup, html};
 
 use super::super::palette::Palette;
 use super::super::percent;
-use super::axis::{label, round_step, ticks};
+use super::axis::{label, ticks};
 use super::contour::contour;
 use super::{Group, WIDTH, colours, figure, line, number, text};
 use crate::judge::Comparison;
 use crate::report::Report;
-use crate::report::words::{largest, significant as six_digits};
+use crate::report::words::{largest, round_step, rounded, significant as six_digits};
 
 const LEFT: f64 = 44.0;
 const RIGHT: f64 = 10.0;
@@ -120,23 +120,16 @@ fn isolux(title: &str, mine: &[&Comparison], lattice: &Lattice) -> Markup {
     let part = |v: f64| if high > low { (v - low) / (high - low) } else { 0.5 };
     let levels: Vec<f64> = ticks(low, high, 6).into_iter().filter(|l| *l > low && *l < high).collect();
     let unit = mine[0].quantity.unit();
+    // Three significant digits are enough for the end of a colour bar.
+    let end = |value: f64| label(rounded(value, 3).unwrap_or(value));
     let drawing = html! {
         (cells(mine, lattice, &frame, |k| colours::amount(part(values[k])), |k| format!("{} {unit}", six_digits(values[k]))))
         @for level in &levels { (isoline(&values, lattice, &frame, *level)) }
         (coordinates(lattice, &frame))
-        (colour_bar(&frame, colours::amount, &[(0.0, label(significant(low))), (1.0, label(significant(high)))], &format!("illuminance [{unit}]")))
+        (colour_bar(&frame, colours::amount, &[(0.0, end(low)), (1.0, end(high))], &format!("illuminance [{unit}]")))
     };
     let caption = html! { "Cells: the reference at each meter; lines: isolux, in " (unit) "." };
     figure(title, frame.size[1] + 46.0 + BAR, &drawing, &caption)
-}
-
-/// Three significant digits are enough for the end of a colour bar.
-fn significant(value: f64) -> f64 {
-    if value == 0.0 {
-        return 0.0;
-    }
-    let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
-    (value / unit).round() * unit
 }
 
 fn isoline(values: &[f64], lattice: &Lattice, frame: &Frame, level: f64) -> Markup {

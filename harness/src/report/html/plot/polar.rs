@@ -7,9 +7,10 @@ use std::collections::BTreeSet;
 use maud::{Markup, html};
 
 use super::super::palette::Palette;
-use super::axis::{label, round_step};
+use super::axis::label;
 use super::{Group, WIDTH, figure, legend, line, number, text};
 use crate::judge::Comparison;
+use crate::report::words::round_step;
 use crate::report::{Curve, Report};
 
 const RADIUS: f64 = 136.0;
@@ -98,10 +99,7 @@ fn rays(scale: &Scale, [up, down]: [bool; 2], step: f64, rings: u32) -> Markup {
     };
     let angles: Vec<f64> =
         (0..=12).map(|k| 15.0 * f64::from(k)).filter(|g| (*g >= 90.0 && up) || (*g <= 90.0 && down)).collect();
-    let edge = |gamma: f64, r: f64, side: f64| {
-        let (sin, cos) = gamma.to_radians().sin_cos();
-        [x + side * r * sin, y + r * cos]
-    };
+    let edge = |gamma: f64, r: f64, side: f64| scale.place(gamma, r / scale.per_candela, side);
     html! {
         @for k in 1..=rings { path.grid d=(ring(k)) {} }
         @for &gamma in &angles { @for side in [-1.0, 1.0] { (line("grid", scale.centre, edge(gamma, RADIUS, side))) } }
