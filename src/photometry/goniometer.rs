@@ -41,7 +41,7 @@ pub(super) struct Resampled {
 }
 
 /// The most values that a resampled table may have: 8 MB.
-const MOST_VALUES: usize = 1_000_000;
+const MAX_VALUES: usize = 1_000_000;
 /// Angles that differ by less are one, in degrees.
 const SAME_DEG: f64 = 1e-9;
 /// Over how many degrees a type C table falls to zero beyond the last plane of a type A table.
@@ -150,13 +150,13 @@ impl Native<'_> {
         if gamma_deg.len() < 2 {
             gamma_deg.push(180.0);
         }
-        if c_deg.len().saturating_mul(gamma_deg.len()) <= MOST_VALUES {
+        if c_deg.len().saturating_mul(gamma_deg.len()) <= MAX_VALUES {
             return (c_deg, gamma_deg);
         }
         let last_gamma = gamma_deg[gamma_deg.len() - 1];
         let finest = |angles: &[f64]| angles.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
         let step = 0.5 * finest(&self.table.horizontal_deg).min(finest(&self.table.vertical_deg));
-        let least_step = (last_c * last_gamma / (0.9 * MOST_VALUES as f64)).sqrt();
+        let least_step = (last_c * last_gamma / (0.9 * MAX_VALUES as f64)).sqrt();
         let even = |last: f64| {
             let count = (last / step.max(least_step)).ceil();
             (0..=count as usize).map(|k| last * k as f64 / count).collect::<Vec<f64>>()

@@ -87,6 +87,6 @@ impl Audit<'_> {
 fn compared(task: &Task, recordings: &[&Recording], judge: &Judge<'_>) -> Vec<Comparison> {
     let mut comparisons = judge.compare(task, recordings);
     diagnosis::diagnose(task, &mut comparisons);
-    sequential::tell_the_price(&mut comparisons, recordings);
+    sequential::estimate_remaining_cost(&mut comparisons, recordings);
     comparisons
 }

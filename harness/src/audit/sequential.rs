@@ -15,7 +15,7 @@ use crate::spec::Budget;
 /// The effort of each look against the first.
 const WEIGHTS: [f64; LOOKS as usize] = [1.0, 2.0, 6.0, 18.0];
 /// A look that could be granted less than this share of the first one's effort is not worth an engine's start.
-const LEAST_WEIGHT: f64 = 0.5;
+const MIN_WEIGHT: f64 = 0.5;
 /// A first look counts as this long at least, in seconds: one that was mirrored or read off another case took none.
 const SHORTEST_S: f64 = 1.0;
 /// Standard errors of the first look within a tolerance, where sampling stops as soon as it is decided: it then decides
@@ -69,7 +69,7 @@ pub fn refine(
         }
         let left_s = budget.seconds - subject.wall_s;
         let weight = WEIGHTS[look as usize - 1].min(left_s / first_s);
-        if weight < LEAST_WEIGHT {
+        if weight < MIN_WEIGHT {
             break;
         }
         let relative_error = first.relative_error / weight.sqrt();
@@ -131,7 +131,7 @@ fn effort(comparison: &Comparison) -> Option<f64> {
 }
 
 /// Tells of each undecided comparison what would decide it.
-pub fn tell_the_price(comparisons: &mut [Comparison], recordings: &[&Recording]) {
+pub fn estimate_remaining_cost(comparisons: &mut [Comparison], recordings: &[&Recording]) {
     for comparison in comparisons {
         let Some(times) = effort(comparison) else { continue };
         let Some(recording) = recordings.iter().find(|r| r.key.engine == comparison.key.engine) else { continue };
@@ -217,7 +217,7 @@ mod tests {
         refine(&judge, &task, &[&exact], &mut subject, (first, whole), &mut sample);
         let mut compared = judge.compare(&task, &[&exact, &subject]);
         compared.retain(|c| c.key.engine == "radiance");
-        tell_the_price(&mut compared, &[&subject]);
+        estimate_remaining_cost(&mut compared, &[&subject]);
         for c in &compared {
             assert_eq!(c.verdict == Verdict::Inconclusive, c.diagnosis.is_some(), "{c:?}");
         }

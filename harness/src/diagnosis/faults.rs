@@ -19,7 +19,7 @@ const ACCURACY: f64 = 1e-2;
 /// A fault that changes no reading by more than this share of the largest is not there in this task.
 const INVISIBLE: f64 = 1e-3;
 /// Reflections after which truncation is looked for no more: it hardly shows then.
-const MOST_BOUNCES: u32 = 8;
+const MAX_BOUNCES: u32 = 8;
 const HALF_MAX: f64 = 65504.0;
 
 pub struct Fault {
@@ -229,7 +229,7 @@ fn of_transport(task: &Task) -> Vec<Fault> {
     if let Transport::Indirect(bounces) | Transport::Total(bounces) = task.transport {
         let total = matches!(task.transport, Transport::Total(_));
         let of = |bounces| if total { Transport::Total(bounces) } else { Transport::Indirect(bounces) };
-        let most = if let Bounces::AtMost(n) = bounces { n.min(MOST_BOUNCES) } else { MOST_BOUNCES };
+        let most = if let Bounces::AtMost(n) = bounces { n.min(MAX_BOUNCES) } else { MAX_BOUNCES };
         for n in 0..most {
             let what = format!("light stops after {n} reflection{}", if n == 1 { "" } else { "s" });
             light("bounces-cut", &what, of(Bounces::AtMost(n)));

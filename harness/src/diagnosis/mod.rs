@@ -20,7 +20,7 @@ const SLACK: f64 = 5e-4;
 const FLOOR: f64 = 1e-6;
 /// Explanations that are this much worse than the best, in chi-squared, are no rivals of it.
 const RIVAL: f64 = 4.0;
-const MOST_RIVALS: usize = 3;
+const MAX_RIVALS: usize = 3;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cause {
@@ -117,7 +117,7 @@ pub fn causes(faults: &[Fault], readings: &Readings) -> Vec<Cause> {
     found.sort_by(|a, b| a.score.total_cmp(&b.score));
     let best = found.first().map_or(0.0, |c| c.score);
     found.retain(|c| c.score <= best + RIVAL);
-    found.truncate(MOST_RIVALS);
+    found.truncate(MAX_RIVALS);
     if found.is_empty() {
         found.extend(unnamed_factor(readings));
     }

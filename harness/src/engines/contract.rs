@@ -67,7 +67,7 @@ pub trait Engine: Send + Sync {
 
     /// The job without what makes no difference to this engine's readings: two jobs that are equal then are one to it. For
     /// most, the names of case and procedure are comments.
-    fn essence(&self, job: &Job) -> Job {
+    fn cache_identity(&self, job: &Job) -> Job {
         job.without_names()
     }
 

@@ -142,7 +142,7 @@ impl Engine for External {
     }
 
     /// A program of the user's is told the names of case and procedure, and may heed them.
-    fn essence(&self, job: &Job) -> Job {
+    fn cache_identity(&self, job: &Job) -> Job {
         job.clone()
     }
 

@@ -52,7 +52,7 @@ impl Engine for Simulator {
     }
 
     /// An impostor is a way to sample an opening: to an exact solution it is the opening itself.
-    fn essence(&self, job: &Job) -> Job {
+    fn cache_identity(&self, job: &Job) -> Job {
         let mut job = job.without_names();
         for luminaire in &mut job.scene.luminaires {
             if luminaire.model == LuminaireModel::Impostor {

@@ -67,7 +67,7 @@ pub struct Witness {
     pub probability: f64,
 }
 
-struct Testimony {
+struct WitnessReadings {
     name: String,
     shares: Vec<String>,
     /// Value and standard uncertainty at each target.
@@ -76,7 +76,7 @@ struct Testimony {
     allowed: Vec<f64>,
 }
 
-impl Testimony {
+impl WitnessReadings {
     fn new(name: &str, shares: Vec<String>, readings: Vec<Option<(f64, f64)>>, tolerance: Tolerance) -> Self {
         let around = |r: &Option<(f64, f64)>| r.map_or(0.0, |(value, _)| tolerance.around(value));
         Self { name: name.to_owned(), shares, allowed: readings.iter().map(around).collect(), readings }
@@ -84,7 +84,7 @@ impl Testimony {
 }
 
 /// Something that may be wrong, and which of the witnesses have it.
-struct Suspect {
+struct Hypothesis {
     name: String,
     holders: Vec<usize>,
 }
@@ -94,26 +94,26 @@ impl Judge<'_> {
     /// nobody read anything.
     pub fn consensus(&self, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
         let case = recordings.first()?.key.case.clone();
-        let testimonies = testimonies(self, task, recordings);
-        if testimonies.is_empty() {
+        let witnesses = witnesses(self, task, recordings);
+        if witnesses.is_empty() {
             return None;
         }
-        let suspects = suspects(&testimonies);
-        let independent = independent(&testimonies);
-        let telling: Vec<usize> = (0..task.targets.len()).filter(|k| differ(&testimonies, *k)).collect();
+        let hypotheses = hypotheses(&witnesses);
+        let independent = independent(&witnesses);
+        let telling: Vec<usize> = (0..task.targets.len()).filter(|k| differ(&witnesses, *k)).collect();
         let probabilities = if telling.is_empty() || independent < FEWEST {
-            vec![0.0; suspects.len()]
+            vec![0.0; hypotheses.len()]
         } else {
-            probabilities(&testimonies, &suspects, &telling)
+            probabilities(&witnesses, &hypotheses, &telling)
         };
         let reference = task.reference();
         let reference = reference.engine();
-        let witnesses = testimonies.iter().enumerate().map(|(i, t)| Witness {
+        let witnesses = witnesses.iter().enumerate().map(|(i, t)| Witness {
             name: t.name.clone(),
             is_reference: reference.is_some_and(|r| *r == t.name),
             shares: t.shares.clone(),
-            deviation: deviation(&testimonies, i, &telling),
-            probability: suspects.iter().zip(&probabilities).find(|(s, _)| s.name == t.name).map_or(0.0, |(_, p)| *p),
+            deviation: deviation(&witnesses, i, &telling),
+            probability: hypotheses.iter().zip(&probabilities).find(|(s, _)| s.name == t.name).map_or(0.0, |(_, p)| *p),
         });
         let mut found = Consensus {
             case,
@@ -125,14 +125,14 @@ impl Judge<'_> {
             component: None,
             odds: None,
             text: String::new(),
-            assumptions: assumptions(&testimonies),
+            assumptions: assumptions(&witnesses),
         };
-        found.text = told(&mut found, &suspects, &probabilities, &testimonies);
+        found.text = told(&mut found, &hypotheses, &probabilities, &witnesses);
         Some(found)
     }
 }
 
-fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<Testimony> {
+fn witnesses(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<WitnessReadings> {
     let reference = task.reference();
     let (reference, basis) = (reference.engine(), reference.basis());
     let tolerance = |engine: &str| judge.held_to(task, basis, engine);
@@ -151,15 +151,16 @@ fn testimonies(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec
             Some((reading.value, combined(&of_reading(reading))))
         };
         let readings = (0..task.targets.len()).map(read).collect();
-        Testimony::new(&recording.key.engine, recording.components.clone(), readings, allowed)
+        WitnessReadings::new(&recording.key.engine, recording.components.clone(), readings, allowed)
     };
-    let mut testimonies: Vec<Testimony> = recordings.iter().filter(|r| !r.readings.is_empty()).map(of_engine).collect();
-    testimonies.extend(derived(judge, task));
-    testimonies
+    let mut witnesses: Vec<WitnessReadings> =
+        recordings.iter().filter(|r| !r.readings.is_empty()).map(of_engine).collect();
+    witnesses.extend(derived(judge, task));
+    witnesses
 }
 
 /// Values derived from a formula, where the case has any: they rest on none of our code.
-fn derived(judge: &Judge<'_>, task: &Task) -> Option<Testimony> {
+fn derived(judge: &Judge<'_>, task: &Task) -> Option<WitnessReadings> {
     const NAME: &str = "derived values";
     let published = judge.published?;
     let read = |target| {
@@ -168,31 +169,31 @@ fn derived(judge: &Judge<'_>, task: &Task) -> Option<Testimony> {
     };
     let readings: Vec<_> = task.targets.iter().map(read).collect();
     let tolerance = judge.held_to(task, Basis::ClosedForm, NAME);
-    readings.iter().any(Option::is_some).then(|| Testimony::new(NAME, vec![], readings, tolerance))
+    readings.iter().any(Option::is_some).then(|| WitnessReadings::new(NAME, vec![], readings, tolerance))
 }
 
 /// Each witness's own code, and what some of them share but not all: what all share shifts nobody against another.
-fn suspects(testimonies: &[Testimony]) -> Vec<Suspect> {
-    let own = testimonies.iter().enumerate().map(|(i, t)| Suspect { name: t.name.clone(), holders: vec![i] });
-    let mut suspects: Vec<Suspect> = own.collect();
-    for name in testimonies.iter().flat_map(|t| &t.shares) {
-        let has = |i: &usize| testimonies[*i].shares.contains(name);
-        let holders: Vec<usize> = (0..testimonies.len()).filter(has).collect();
-        if suspects.iter().all(|s| s.name != *name) && holders.len() > 1 && holders.len() < testimonies.len() {
-            suspects.push(Suspect { name: name.clone(), holders });
+fn hypotheses(witnesses: &[WitnessReadings]) -> Vec<Hypothesis> {
+    let own = witnesses.iter().enumerate().map(|(i, t)| Hypothesis { name: t.name.clone(), holders: vec![i] });
+    let mut hypotheses: Vec<Hypothesis> = own.collect();
+    for name in witnesses.iter().flat_map(|t| &t.shares) {
+        let has = |i: &usize| witnesses[*i].shares.contains(name);
+        let holders: Vec<usize> = (0..witnesses.len()).filter(has).collect();
+        if hypotheses.iter().all(|s| s.name != *name) && holders.len() > 1 && holders.len() < witnesses.len() {
+            hypotheses.push(Hypothesis { name: name.clone(), holders });
         }
     }
-    suspects
+    hypotheses
 }
 
 /// How many groups are left when witnesses that share something go together. The reader of photometric files, which nearly
 /// all have, does not tie them: that it departs is a hypothesis of its own, or else a blind spot that is told.
-fn independent(testimonies: &[Testimony]) -> usize {
-    let mut group: Vec<usize> = (0..testimonies.len()).collect();
-    for i in 0..testimonies.len() {
+fn independent(witnesses: &[WitnessReadings]) -> usize {
+    let mut group: Vec<usize> = (0..witnesses.len()).collect();
+    for i in 0..witnesses.len() {
         for j in 0..i {
-            let tie = |s: &&String| *s != FILE_READER && testimonies[j].shares.contains(s);
-            if testimonies[i].shares.iter().any(|s| tie(&s)) {
+            let tie = |s: &&String| *s != FILE_READER && witnesses[j].shares.contains(s);
+            if witnesses[i].shares.iter().any(|s| tie(&s)) {
                 let (from, to) = (group[i], group[j]);
                 group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
             }
@@ -204,23 +205,23 @@ fn independent(testimonies: &[Testimony]) -> usize {
 }
 
 /// Whether any two witnesses are further apart at a target than the wider of their tolerances and twice their noise.
-fn differ(testimonies: &[Testimony], k: usize) -> bool {
-    let at = |t: &Testimony| t.readings[k].map(|(value, u)| (value, u, t.allowed[k]));
-    let all: Vec<(f64, f64, f64)> = testimonies.iter().filter_map(at).collect();
+fn differ(witnesses: &[WitnessReadings], k: usize) -> bool {
+    let at = |t: &WitnessReadings| t.readings[k].map(|(value, u)| (value, u, t.allowed[k]));
+    let all: Vec<(f64, f64, f64)> = witnesses.iter().filter_map(at).collect();
     all.iter().enumerate().any(|(i, a)| {
         all[..i].iter().any(|b| (a.0 - b.0).abs() > a.2.max(b.2) + 2.0 * a.1.hypot(b.1) + ROUNDING * a.0.abs())
     })
 }
 
-/// The probability of each suspect; what is missing to one is that nobody departs.
-fn probabilities(testimonies: &[Testimony], suspects: &[Suspect], telling: &[usize]) -> Vec<f64> {
-    let evidence = |suspect: Option<&Suspect>| -> f64 {
+/// The probability of each hypothesis; what is missing to one is that nobody departs.
+fn probabilities(witnesses: &[WitnessReadings], hypotheses: &[Hypothesis], telling: &[usize]) -> Vec<f64> {
+    let evidence = |hypothesis: Option<&Hypothesis>| -> f64 {
         let mean = |departure: Option<f64>| {
-            let at = |k: &usize| log_likelihood(testimonies, suspects, suspect, departure, *k);
+            let at = |k: &usize| log_likelihood(witnesses, hypotheses, hypothesis, departure, *k);
             telling.iter().map(at).sum::<f64>() / telling.len() as f64
         };
-        let Some(_) = suspect else { return mean(None) };
-        let smallest = telling.iter().map(|k| relative_allowance(testimonies, *k)).fold(f64::INFINITY, f64::min);
+        let Some(_) = hypothesis else { return mean(None) };
+        let smallest = telling.iter().map(|k| relative_allowance(witnesses, *k)).fold(f64::INFINITY, f64::min);
         let mut sizes = vec![smallest.clamp(1e-6, LARGEST_DEPARTURE)];
         while let Some(last) = sizes.last().copied().filter(|s| *s < LARGEST_DEPARTURE) {
             sizes.push(2.0 * last);
@@ -229,7 +230,7 @@ fn probabilities(testimonies: &[Testimony], suspects: &[Suspect], telling: &[usi
         log_of_sum(&logs) - (logs.len() as f64).ln()
     };
     let mut logs = vec![evidence(None)];
-    logs.extend(suspects.iter().map(|s| evidence(Some(s))));
+    logs.extend(hypotheses.iter().map(|s| evidence(Some(s))));
     let total = log_of_sum(&logs);
     logs[1..].iter().map(|l| (l - total).exp()).collect()
 }
@@ -240,14 +241,14 @@ fn log_of_sum(logs: &[f64]) -> f64 {
 }
 
 /// The smallest tolerance at a target, relative to the middle reading.
-fn relative_allowance(testimonies: &[Testimony], k: usize) -> f64 {
-    let allowed = testimonies.iter().filter(|t| t.readings[k].is_some()).map(|t| t.allowed[k]);
-    allowed.fold(f64::INFINITY, f64::min) / middle(testimonies, k)
+fn relative_allowance(witnesses: &[WitnessReadings], k: usize) -> f64 {
+    let allowed = witnesses.iter().filter(|t| t.readings[k].is_some()).map(|t| t.allowed[k]);
+    allowed.fold(f64::INFINITY, f64::min) / middle(witnesses, k)
 }
 
 /// The median of the readings at a target: a scale that one wrong witness does not move.
-fn middle(testimonies: &[Testimony], k: usize) -> f64 {
-    let mut values: Vec<f64> = testimonies.iter().filter_map(|t| t.readings[k]).map(|(value, _)| value.abs()).collect();
+fn middle(witnesses: &[WitnessReadings], k: usize) -> f64 {
+    let mut values: Vec<f64> = witnesses.iter().filter_map(|t| t.readings[k]).map(|(value, _)| value.abs()).collect();
     values.sort_by(f64::total_cmp);
     // Darkness has no scale of its own: the largest reading there is one.
     let largest = values.last().copied().unwrap_or(0.0);
@@ -256,24 +257,24 @@ fn middle(testimonies: &[Testimony], k: usize) -> f64 {
 
 /// Logarithm of the likelihood of the readings at one target, the truth integrated out.
 fn log_likelihood(
-    testimonies: &[Testimony],
-    suspects: &[Suspect],
-    departing: Option<&Suspect>,
+    witnesses: &[WitnessReadings],
+    hypotheses: &[Hypothesis],
+    departing: Option<&Hypothesis>,
     departure: Option<f64>,
     k: usize,
 ) -> f64 {
-    let scale = middle(testimonies, k);
-    let present: Vec<usize> = (0..testimonies.len()).filter(|i| testimonies[*i].readings[k].is_some()).collect();
+    let scale = middle(witnesses, k);
+    let present: Vec<usize> = (0..witnesses.len()).filter(|i| witnesses[*i].readings[k].is_some()).collect();
     let values: Vec<f64> =
-        present.iter().filter_map(|i| testimonies[*i].readings[k]).map(|(value, _)| value / scale - 1.0).collect();
+        present.iter().filter_map(|i| witnesses[*i].readings[k]).map(|(value, _)| value / scale - 1.0).collect();
     let covariance = |i: usize, j: usize| -> f64 {
-        let (a, b) = (&testimonies[i], &testimonies[j]);
-        let both = |s: &Suspect| s.holders.contains(&i) && s.holders.contains(&j);
+        let (a, b) = (&witnesses[i], &witnesses[j]);
+        let both = |s: &Hypothesis| s.holders.contains(&i) && s.holders.contains(&j);
         let mut sum = 0.0;
         if i == j {
             let noise = a.readings[k].map_or(0.0, |(_, u)| u);
             sum += (noise / scale).powi(2) + (ALLOWANCE * a.allowed[k] / scale).powi(2) + ROUNDING.powi(2);
-        } else if suspects.iter().any(both) {
+        } else if hypotheses.iter().any(both) {
             sum += SHARED * (ALLOWANCE * a.allowed[k].min(b.allowed[k]) / scale).powi(2);
         }
         if departing.is_some_and(both) {
@@ -308,15 +309,15 @@ fn gaussian(matrix: &[Vec<f64>], values: &[f64]) -> Option<f64> {
 }
 
 /// A witness's deviation from the weighted mean of the others, averaged over the telling targets, relative.
-fn deviation(testimonies: &[Testimony], i: usize, telling: &[usize]) -> Option<f64> {
-    let all: Vec<usize> = (0..testimonies[i].readings.len()).collect();
+fn deviation(witnesses: &[WitnessReadings], i: usize, telling: &[usize]) -> Option<f64> {
+    let all: Vec<usize> = (0..witnesses[i].readings.len()).collect();
     let targets = if telling.is_empty() { &all } else { telling };
     let at = |k: &usize| {
-        let (mine, _) = testimonies[i].readings[*k]?;
+        let (mine, _) = witnesses[i].readings[*k]?;
         let (mut sum, mut weights) = (0.0, 0.0);
-        for (j, other) in testimonies.iter().enumerate().filter(|(j, _)| *j != i) {
+        for (j, other) in witnesses.iter().enumerate().filter(|(j, _)| *j != i) {
             let Some((value, u)) = other.readings[*k] else { continue };
-            let variance = u.powi(2) + (ALLOWANCE * testimonies[j].allowed[*k]).powi(2) + (ROUNDING * value).powi(2);
+            let variance = u.powi(2) + (ALLOWANCE * witnesses[j].allowed[*k]).powi(2) + (ROUNDING * value).powi(2);
             let weight = variance.max(f64::MIN_POSITIVE).recip();
             (sum, weights) = (sum + weight * value, weights + weight);
         }
@@ -327,8 +328,13 @@ fn deviation(testimonies: &[Testimony], i: usize, telling: &[usize]) -> Option<f
 }
 
 /// Fills in who departs, and tells it.
-fn told(found: &mut Consensus, suspects: &[Suspect], probabilities: &[f64], testimonies: &[Testimony]) -> String {
-    let (count, telling) = (testimonies.len(), found.differing);
+fn told(
+    found: &mut Consensus,
+    hypotheses: &[Hypothesis],
+    probabilities: &[f64],
+    witnesses: &[WitnessReadings],
+) -> String {
+    let (count, telling) = (witnesses.len(), found.differing);
     if telling == 0 {
         return format!("{count} witnesses, {} of them independent, agree", found.independent);
     }
@@ -338,26 +344,26 @@ fn told(found: &mut Consensus, suspects: &[Suspect], probabilities: &[f64], test
             found.independent
         );
     }
-    let mut order: Vec<usize> = (0..suspects.len()).collect();
+    let mut order: Vec<usize> = (0..hypotheses.len()).collect();
     order.sort_by(|a, b| probabilities[*b].total_cmp(&probabilities[*a]));
     let best = order[0];
     let odds = (probabilities[best] / (1.0 - probabilities[best]).max(0.1 / HIGHEST_ODDS)).min(HIGHEST_ODDS);
     if odds < NAMED {
         let likely = order.iter().filter(|k| probabilities[**k] > 0.05);
         let likely: Vec<String> =
-            likely.map(|k| format!("{} ({:.0} %)", suspects[*k].name, 100.0 * probabilities[*k])).collect();
+            likely.map(|k| format!("{} ({:.0} %)", hypotheses[*k].name, 100.0 * probabilities[*k])).collect();
         let whom = if likely.is_empty() { "nobody in particular".to_owned() } else { likely.join(" or ") };
         return format!("witnesses differ at {telling} meters, and it is open who departs: {whom}");
     }
-    let suspect = &suspects[best];
-    let names: Vec<&str> = suspect.holders.iter().map(|i| testimonies[*i].name.as_str()).collect();
+    let hypothesis = &hypotheses[best];
+    let names: Vec<&str> = hypothesis.holders.iter().map(|i| witnesses[*i].name.as_str()).collect();
     found.departs = names.iter().map(|n| (*n).to_owned()).collect();
-    found.component = Some(suspect.name.clone());
+    found.component = Some(hypothesis.name.clone());
     found.odds = Some(odds);
     let is_reference = found.witnesses.iter().any(|w| w.is_reference && found.departs.contains(&w.name));
     let who = names.join(" and ");
-    let shared = if names.len() > 1 { format!(", by what they share: {}", suspect.name) } else { String::new() };
-    let by = suspect.holders.iter().filter_map(|i| found.witnesses[*i].deviation);
+    let shared = if names.len() > 1 { format!(", by what they share: {}", hypothesis.name) } else { String::new() };
+    let by = hypothesis.holders.iter().filter_map(|i| found.witnesses[*i].deviation);
     let by =
         by.max_by(|a, b| a.abs().total_cmp(&b.abs())).map_or(String::new(), |d| format!(" by {:+.1} %", 100.0 * d));
     let at = if odds >= HIGHEST_ODDS { "more than 10000".to_owned() } else { format!("{odds:.0}") };
@@ -368,9 +374,9 @@ fn told(found: &mut Consensus, suspects: &[Suspect], probabilities: &[f64], test
     )
 }
 
-fn assumptions(testimonies: &[Testimony]) -> String {
-    let of_all = |s: &&String| testimonies.len() > 1 && testimonies.iter().all(|t| t.shares.contains(s));
-    let blind: Vec<&str> = testimonies[0].shares.iter().filter(of_all).map(String::as_str).collect();
+fn assumptions(witnesses: &[WitnessReadings]) -> String {
+    let of_all = |s: &&String| witnesses.len() > 1 && witnesses.iter().all(|t| t.shares.contains(s));
+    let blind: Vec<&str> = witnesses[0].shares.iter().filter(of_all).map(String::as_str).collect();
     if blind.is_empty() {
         return ASSUMPTIONS.to_owned();
     }

@@ -129,8 +129,9 @@ impl Judge<'_> {
                 let reading = recording.readings.get(k);
                 let engine = &recording.key.engine;
                 let printed = self.published.iter().flat_map(|p| p.references(task, target, engine));
-                let printed = printed.map(|reference| Held::published(reference, input.as_ref(), target, reading));
-                let references: Vec<Held> =
+                let printed =
+                    printed.map(|reference| ScoredReference::published(reference, input.as_ref(), target, reading));
+                let references: Vec<ScoredReference> =
                     reference_of_task(task, recordings, k, engine).into_iter().chain(printed).collect();
                 if references.is_empty() && (reading.is_none() || recording.role == Role::Renderer) {
                     // Nothing to hold it against, or nothing to hold: that is said, never passed over.
@@ -166,7 +167,7 @@ impl Judge<'_> {
         }
     }
 
-    fn comparison(&self, task: &Task, recording: &Recording, k: usize, held: Option<Held>) -> Comparison {
+    fn comparison(&self, task: &Task, recording: &Recording, k: usize, held: Option<ScoredReference>) -> Comparison {
         let (target, reading) = (&task.targets[k], recording.readings.get(k));
         let basis = held.as_ref().map(|h| h.reference.basis);
         let tolerance = basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();
@@ -223,12 +224,12 @@ impl Judge<'_> {
 /// Rounding of a closed form in `f64`, relative: a few operations and two arctangents a luminaire.
 const ROUNDING: f64 = 1e-13;
 
-struct Held {
+struct ScoredReference {
     reference: Reference,
     components: Vec<Component>,
 }
 
-impl Held {
+impl ScoredReference {
     /// Tells the coverage factor of the reference alone, for an error beyond it with the probability `tail` on either side.
     fn covered(mut self, tail: f64) -> Self {
         let alone = ErrorBudget::new(self.components.clone(), tail);
@@ -274,11 +275,11 @@ fn of_reading(reading: &Reading) -> Vec<Component> {
 }
 
 /// What a task's own reference holds for a reading of an engine; the reference itself has none.
-fn reference_of_task(task: &Task, recordings: &[&Recording], k: usize, engine: &EngineName) -> Option<Held> {
+fn reference_of_task(task: &Task, recordings: &[&Recording], k: usize, engine: &EngineName) -> Option<ScoredReference> {
     let (witness, basis, source) = match task.reference() {
         procedures::Reference::Witness { engine, basis, source } => (engine, basis, source),
         procedures::Reference::Formula { of, source } => {
-            return Some(Held::formula(of(&task.scene, &task.targets[k]), source));
+            return Some(ScoredReference::formula(of(&task.scene, &task.targets[k]), source));
         }
     };
     if *engine == witness {
@@ -290,5 +291,5 @@ fn reference_of_task(task: &Task, recordings: &[&Recording], k: usize, engine: &
         Some(solver) if basis == Basis::Exact => format!("{source}: {solver}"),
         _ => source.to_owned(),
     };
-    Some(Held::reading(reading, basis, source))
+    Some(ScoredReference::reading(reading, basis, source))
 }

@@ -13,7 +13,7 @@ use parking_lot::{Condvar, Mutex};
 const SHARE_OF_MEMORY: f64 = 0.8;
 
 /// More threads than this a reading are no use: Radiance's and POV-Ray's fewest blocks are eight.
-const MOST_A_READING: usize = 8;
+const MAX_A_READING: usize = 8;
 
 #[derive(Debug)]
 pub struct Slots {
@@ -38,7 +38,7 @@ struct State {
 
 /// Slots in use; they are free again when this is dropped.
 #[derive(Debug)]
-pub struct Held<'a> {
+pub struct ScoredReference<'a> {
     slots: &'a Slots,
     share: Share,
 }
@@ -61,11 +61,11 @@ impl Slots {
 
     /// Threads for a reading of sampled, reflected light, which makes the most of its seconds with many.
     pub fn threads_a_reading(&self) -> usize {
-        self.all.threads.min(MOST_A_READING)
+        self.all.threads.min(MAX_A_READING)
     }
 
     /// Waits for a share. What asks for more than there is gets all that there is.
-    pub fn take(&self, share: Share) -> Held<'_> {
+    pub fn take(&self, share: Share) -> ScoredReference<'_> {
         let Share { threads, memory_mib } = share;
         let share =
             Share { threads: threads.clamp(1, self.all.threads), memory_mib: memory_mib.min(self.all.memory_mib) };
@@ -80,17 +80,17 @@ impl Slots {
         state.free.threads -= share.threads;
         state.free.memory_mib -= share.memory_mib;
         self.changed.notify_all();
-        Held { slots: self, share }
+        ScoredReference { slots: self, share }
     }
 }
 
-impl Held<'_> {
+impl ScoredReference<'_> {
     pub fn threads(&self) -> usize {
         self.share.threads
     }
 }
 
-impl Drop for Held<'_> {
+impl Drop for ScoredReference<'_> {
     fn drop(&mut self) {
         let mut state = self.slots.state.lock();
         state.free.threads += self.share.threads;

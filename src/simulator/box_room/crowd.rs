@@ -27,13 +27,13 @@ const KEPT: usize = 4;
 
 /// Many luminaires in a room.
 #[derive(Debug)]
-pub(super) struct Crowd {
+pub(super) struct ProjectedSources {
     room: Room,
     luminaires: Vec<Luminaire>,
     read: Mutex<Vec<(Vec<Receiver>, Vec<f64>)>>,
 }
 
-impl Crowd {
+impl ProjectedSources {
     pub(super) fn new(room: &Room, luminaires: &[Luminaire]) -> Self {
         Self { room: *room, luminaires: luminaires.to_vec(), read: Mutex::default() }
     }

@@ -30,7 +30,7 @@ const TOGETHER: usize = 32;
 /// Bytes of halved patches and of points that are kept for the next receivers; beyond that they are made anew.
 ///
 /// A dozen luminaires with fine tables would keep gigabytes otherwise.
-const MOST_KEPT: usize = 48 << 20;
+const MAX_KEPT: usize = 48 << 20;
 
 /// Everything that the luminaires light, as patches that halve themselves near a receiver.
 #[derive(Debug)]
@@ -234,7 +234,7 @@ impl FirstBounce {
         if let Some(value) = place.get() {
             return value;
         }
-        if own.is_none() && self.kept.fetch_add(bytes, Ordering::Relaxed) < MOST_KEPT {
+        if own.is_none() && self.kept.fetch_add(bytes, Ordering::Relaxed) < MAX_KEPT {
             return place.get_or_init(make);
         }
         own.get_or_insert_with(make)

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 use crate::geometry::Room;
 use crate::scene::{Bounces, Luminaire, Meter};
 use crate::simulator::{Bounded, gmres};
-use crowd::Crowd;
+use crowd::ProjectedSources;
 use error::Reading;
 use first_bounce::FirstBounce;
 use grid::Grid;
@@ -47,7 +47,7 @@ pub(super) struct Effort {
 }
 
 /// Entries of the operator at most: 128 MiB.
-const MOST_ENTRIES: usize = 1 << 24;
+const MAX_ENTRIES: usize = 1 << 24;
 /// Fewer meters than this are read sooner than another thread wakes.
 const FEW: usize = 8;
 /// Luminaires up to which each one's light is integrated for each node, where errors this small are asked for and where not.
@@ -128,7 +128,7 @@ pub(super) const EFFORTS: [Effort; 8] = [
 pub(super) struct EmptyRoom {
     symmetries: Option<Symmetries>,
     /// The luminaires, where they are many.
-    crowd: Option<Arc<Crowd>>,
+    crowd: Option<Arc<ProjectedSources>>,
     /// By place in [`EFFORTS`].
     fields: Vec<(usize, BoxField)>,
 }
@@ -166,7 +166,7 @@ impl EmptyRoom {
         let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires));
         let few = FEW_LUMINAIRES[usize::from(relative_error >= PROJECTION_REACHES)];
         if luminaires.len() > few && self.crowd.is_none() {
-            self.crowd = Some(Arc::new(Crowd::new(room, luminaires)));
+            self.crowd = Some(Arc::new(ProjectedSources::new(room, luminaires)));
         }
         let mut level = first_level(relative_error);
         let mut readings = vec![];
@@ -190,7 +190,7 @@ impl EmptyRoom {
                     format!("its bound of {worst:.0e} meets the {relative_error:.0e} asked for")
                 }
                 None => format!("the finest there is, its bound is {worst:.0e}"),
-                Some(next) if symmetry::matrix_entries(room.size_m, next) > MOST_ENTRIES => {
+                Some(next) if symmetry::matrix_entries(room.size_m, next) > MAX_ENTRIES => {
                     format!("a finer matrix would not fit, its bound is {worst:.0e}")
                 }
                 Some(_) => continue,
@@ -231,7 +231,7 @@ pub(super) struct BoxField {
 #[derive(Debug)]
 enum First {
     Few(FirstBounce),
-    Many(Arc<Crowd>),
+    Many(Arc<ProjectedSources>),
 }
 
 impl First {

@@ -24,9 +24,9 @@ use factor::factor;
 use patches::{Body, Fineness, Patch};
 
 /// Patches at most: the matrix of their nodes then takes 130 MB.
-const MOST_PATCHES: usize = 450;
+const MAX_PATCHES: usize = 450;
 /// Bodies at most: every one cuts what it comes close to, and patches multiply.
-const MOST_BODIES: usize = 40;
+const MAX_BODIES: usize = 40;
 /// Nodes of a patch.
 const NODES: usize = 9;
 /// Patches of an empty room whose sides are as long as the rule of thumb says.
@@ -83,7 +83,7 @@ impl Furnished {
         let occluders: Vec<Occluder> = bodies.iter().filter(stands).map(|b| b.shape).collect();
         let furnished = Self { room: scene.room, bodies, occluders, emitters, fields: vec![] };
         let fits = |room: &Room| furnished.fits(room, COARSE_MESHES[1]);
-        (furnished.bodies.len() <= MOST_BODIES && furnished.room.as_ref().is_none_or(fits)).then_some(furnished)
+        (furnished.bodies.len() <= MAX_BODIES && furnished.room.as_ref().is_none_or(fits)).then_some(furnished)
     }
 
     /// Direct illuminance at the meters.
@@ -121,7 +121,7 @@ impl Furnished {
         for level in levels.iter().copied() {
             if self.fields.iter().all(|(at, _)| *at != level) {
                 let patches = self.mesh(&room, level);
-                if patches.len() > MOST_PATCHES {
+                if patches.len() > MAX_PATCHES {
                     why = "finer meshes have too many patches";
                     break;
                 }
@@ -168,7 +168,7 @@ impl Furnished {
     }
 
     fn fits(&self, room: &Room, level: usize) -> bool {
-        self.mesh(room, level).len() <= MOST_PATCHES
+        self.mesh(room, level).len() <= MAX_PATCHES
     }
 
     /// The patches of a level, each finer than the one before.

@@ -15,7 +15,7 @@ const NEARBY: f64 = 0.1;
 /// Patches before a narrow gap are at most so many times as long as it is wide.
 const GAPS_LONG: f64 = 1.0;
 /// Parts of an edge at most, however narrow the gap before it: what a gap of no width would need ends nowhere.
-const MOST_PARTS: f64 = 24.0;
+const MAX_PARTS: f64 = 24.0;
 /// Where surfaces meet, the last patch is cut at this part of its side.
 const GRADE: f64 = 0.25;
 /// Patches shorter than this part of the mesh's side are not.
@@ -196,7 +196,7 @@ fn marks(panel: &Panel, along: usize, near: &[(f64, Occluder)], scale: f64) -> V
 ///
 /// Irradiance runs like x ln x where surfaces meet at a right angle.
 fn cuts(low: f64, high: f64, side_m: f64, corners: [bool; 2]) -> Vec<f64> {
-    let parts = ((high - low) / side_m).round().clamp(1.0, MOST_PARTS);
+    let parts = ((high - low) / side_m).round().clamp(1.0, MAX_PARTS);
     let part_m = (high - low) / parts;
     let graded = part_m > GRADED_FROM * side_m;
     let mut cuts = vec![low];

@@ -13,7 +13,7 @@ const MARGIN: f64 = 40.0;
 /// Heights of the title above and the legend below.
 const TITLE: f64 = 34.0;
 const LEGEND: f64 = 44.0;
-const MOST_RINGS: f64 = 6.0;
+const MAX_RINGS: f64 = 6.0;
 /// C0-C180 and C90-C270: the colours and dashes of the two curves.
 const CURVES: [(f64, &str, &str, &str); 2] = [(0.0, "C0-C180", "#c0272d", ""), (90.0, "C90-C270", "#1f5fa8", "6 4")];
 
@@ -69,8 +69,8 @@ impl Scale {
         if largest <= 0.0 {
             return Self { unit, factor, step: 1.0, rings: 4 };
         }
-        let step = round_step(largest / MOST_RINGS);
-        Self { unit, factor, step, rings: (largest / step).ceil().clamp(1.0, MOST_RINGS) as u32 }
+        let step = round_step(largest / MAX_RINGS);
+        Self { unit, factor, step, rings: (largest / step).ceil().clamp(1.0, MAX_RINGS) as u32 }
     }
 
     fn radius(&self, candela: f64) -> f64 {

@@ -13,7 +13,7 @@ use crate::record::{EngineName, ProcedureId, ReadingKey};
 /// Relative errors whose time is told.
 pub(super) const TARGETS: [f64; 4] = [0.1, 0.01, 1e-3, 1e-4];
 /// What is left of a time without the start-up at least, in parts of it.
-const LEAST_NET: f64 = 0.05;
+const MIN_NET: f64 = 0.05;
 
 #[derive(Clone, Debug, Serialize)]
 pub struct Curve {
@@ -114,7 +114,7 @@ impl Curve {
         points: Vec<BenchPoint>,
     ) -> Self {
         // A difference of two times that are nearly alike is not known better than that.
-        let net = |p: &BenchPoint| (p.wall_s - start_up_s).max(LEAST_NET * p.wall_s);
+        let net = |p: &BenchPoint| (p.wall_s - start_up_s).max(MIN_NET * p.wall_s);
         let timed = |time: &dyn Fn(&BenchPoint) -> f64| -> Vec<(f64, f64)> {
             points.iter().map(|p| (time(p), p.relative_error)).collect()
         };

@@ -16,7 +16,7 @@ const RUNS: usize = 500;
 const INTERVALS: usize = 10_000;
 /// Coverages that are looked at; the one of the verdicts is that of two standard deviations of a normal distribution.
 const NOMINAL: [f64; 5] = [0.5, 0.8, 0.9, 0.9545, 0.99];
-const LEAST_KS_P: f64 = 0.01;
+const MIN_KS_P: f64 = 0.01;
 /// How far coverage may lie from what it is said to be.
 const COVERAGE_WITHIN: f64 = 0.02;
 /// Independent blocks of an engine that has few.
@@ -54,7 +54,7 @@ impl Calibrations {
 impl Interval {
     pub fn is_good(&self) -> bool {
         let covers = |c: &Coverage| (c.found - c.nominal).abs() <= COVERAGE_WITHIN;
-        self.ks_p > LEAST_KS_P && self.coverage.iter().all(covers)
+        self.ks_p > MIN_KS_P && self.coverage.iter().all(covers)
     }
 }
 
@@ -196,7 +196,7 @@ mod tests {
         let budget = ErrorBudget::new(vec![Component::normal(Source::MonteCarlo, 0.8, None)], 0.02);
         let mut wrong: Vec<f64> = (0..RUNS).map(|_| budget.p_value(normal(&mut random), 0.0)).collect();
         wrong.sort_by(f64::total_cmp);
-        assert!(kolmogorov(distance_from_uniform(&wrong), RUNS) < LEAST_KS_P);
+        assert!(kolmogorov(distance_from_uniform(&wrong), RUNS) < MIN_KS_P);
     }
 
     #[test]

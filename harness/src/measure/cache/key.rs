@@ -24,11 +24,11 @@ impl Key {
 /// The key of what an engine reads of a job.
 ///
 /// In it go the files that the engine exports, drivers included; its version and settings; scene, stations, transport, budget and seed of
-/// the job; and this program's read-out. The names of case and procedure do not (see [`Engine::essence`]): equal jobs of
+/// the job; and this program's read-out. The names of case and procedure do not (see [`Engine::cache_identity`]): equal jobs of
 /// different cases share an entry. Nor does the number of threads: a reading is as good on any number.
 pub fn key(engine: &dyn Engine, version: &Version, job: &Job) -> Result<Key, EngineError> {
     let id = engine.name();
-    let job = engine.essence(job);
+    let job = engine.cache_identity(job);
     let unwritable = |e: serde_json::Error| EngineError::Solver { engine: id.clone(), what: format!("its job: {e}") };
     let mut hash = Sha256::new();
     let mut part = |bytes: &[u8]| {

@@ -47,7 +47,7 @@ impl Repeated {
 
 /// What names a job at unit flux; `None` where the engine may see more in it than its light.
 fn at_unit_flux(engine: &dyn Engine, job: &Job, flux: f64) -> Option<Vec<u8>> {
-    let mut job = engine.essence(job);
+    let mut job = engine.cache_identity(job);
     for luminaire in &mut job.scene.luminaires {
         luminaire.flux_scale = format!("{:.*e}", DIGITS - 1, luminaire.flux_scale / flux).parse().ok()?;
     }

@@ -19,7 +19,7 @@ use crate::record::ProcedureId;
 /// Width of every panel in user units; a telephone shows one at about its natural size.
 pub(super) const WIDTH: f64 = 350.0;
 /// More cases than this a procedure are left to the table.
-const MOST_CASES: usize = 9;
+const MAX_CASES: usize = 9;
 
 pub(super) struct Group<'a> {
     pub(super) case: &'a str,
@@ -38,10 +38,10 @@ pub(super) fn groups<'a>(report: &'a Report, procedure: ProcedureId) -> Vec<Grou
 
 pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -> Vec<Markup> {
     let mut shown: Vec<&Group<'_>> = groups.iter().collect();
-    if shown.len() > MOST_CASES {
+    if shown.len() > MAX_CASES {
         // Of many cases those are drawn that ask for attention most.
         shown.sort_by_key(|g| std::cmp::Reverse(g.comparisons.iter().map(|c| c.verdict).max()));
-        shown.truncate(MOST_CASES);
+        shown.truncate(MAX_CASES);
     }
     let mut panels: Vec<Markup> = vec![];
     // Panels of a kind side by side, so that cases compare along a row.

@@ -16,9 +16,9 @@ const LEFT: f64 = 52.0;
 const TOP: f64 = 8.0;
 const PLOT: f64 = 210.0;
 /// Errors below this share the lowest line: 1e-6 %.
-const LEAST_ERROR: f64 = 1e-8;
+const MIN_ERROR: f64 = 1e-8;
 /// Run times below this share the left edge.
-const LEAST_TIME_S: f64 = 0.01;
+const MIN_TIME_S: f64 = 0.01;
 
 /// One run: how long it took and the largest deviation from its firmest reference.
 struct Point {
@@ -75,7 +75,7 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     if all.is_empty() {
         return None;
     }
-    let (time, error) = (span(|p| p.0, LEAST_TIME_S), span(|p| p.1, LEAST_ERROR));
+    let (time, error) = (span(|p| p.0, MIN_TIME_S), span(|p| p.1, MIN_ERROR));
     let width = WIDTH - LEFT - 12.0;
     let place = |wall_s: f64, e: f64| [LEFT + width * time.part(wall_s), TOP + PLOT * (1.0 - error.part(e))];
     let of_curves = curves.iter().map(|c| c.engine.as_str());
@@ -96,7 +96,7 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
         @for (engine, [x, y]) in &labels { (text("direct halo", if *x > LEFT + 0.7 * width { "end" } else { "start" }, [if *x > LEFT + 0.7 * width { x - 8.0 } else { x + 8.0 }, y + 4.0], engine)) }
         @for point in &points { g.ring { title { (point.words) } (palette.mark(&point.engine, place(point.wall_s, point.error), 4.4)) } }
     };
-    let floor = points.iter().any(|p| p.error < LEAST_ERROR);
+    let floor = points.iter().any(|p| p.error < MIN_ERROR);
     let caption = html! {
         (legend(&engines, palette)) @if floor { " At the lower edge: 10⁻⁶ % or less." } @if !curves.is_empty() { " Lines: the ladder of luxproof bench." }
     };
