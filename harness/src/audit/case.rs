@@ -57,7 +57,10 @@ impl Audit<'_> {
         let report = Report {
             engines: outcome.engines,
             splits: tasks().flat_map(|task| judge.split(task, &of(task))).collect(),
-            consensus: tasks().filter_map(|task| judge.consensus(task, &of(task))).collect(),
+            consensus: tasks()
+                .filter(|task| !task.is_known())
+                .filter_map(|task| judge.consensus(task, &of(task)))
+                .collect(),
             published: tasks().filter_map(|task| judge.published?.table(task, &case.name)).collect(),
             curves: tasks().flat_map(|task| report::curves(&case.name, task)).collect(),
             wall_s: clock.elapsed().as_secs_f64(),

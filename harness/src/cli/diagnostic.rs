@@ -2,6 +2,7 @@
 
 use miette::{LabeledSpan, NamedSource, Report, Severity, SourceSpan};
 
+use crate::audit::AuditError;
 use crate::spec::SpecError;
 
 pub(crate) fn diagnose(error: SpecError) -> Report {
@@ -32,4 +33,11 @@ fn span(text: &str, line: usize, column: usize) -> Option<SourceSpan> {
     let (offset, _) = rest.char_indices().nth(column.checked_sub(1)?).unwrap_or((rest.len(), ' '));
     let word = rest[offset..].find([' ', ',', ']', '}', ':']).unwrap_or(rest.len() - offset).max(1);
     Some((start_of_line + offset, word.min((rest.len() - offset).max(1))).into())
+}
+
+pub(super) fn not_audited(error: AuditError) -> Report {
+    match error {
+        AuditError::Spec(error) => diagnose(error),
+        other => Report::from_err(other),
+    }
 }

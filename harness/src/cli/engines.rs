@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Subcommand;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
-use super::run::not_audited;
+use super::diagnostic::not_audited;
 use crate::audit::{self, Options};
 use crate::engines::{self, InstallState, Site};
 use crate::judge::Policy;

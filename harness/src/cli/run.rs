@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::RunArgs;
-use super::diagnostic::diagnose;
+use super::diagnostic::{diagnose, not_audited};
 use super::engines::report_installation;
 use super::progress::Progress;
 use super::views::print_report;
-use crate::audit::{self, AfterFailure, AuditError, Options};
+use crate::audit::{self, AfterFailure, Options};
 use crate::engines::Site;
 use crate::judge::Policy;
 use crate::measure::cache::Cache;
@@ -77,11 +77,4 @@ fn out_folder(args: &RunArgs) -> PathBuf {
     };
     let name = stem.map_or(Path::new("suite"), Path::new);
     args.out.clone().unwrap_or_else(|| Path::new("luxproof-out").join(name))
-}
-
-pub(super) fn not_audited(error: AuditError) -> Diagnostic {
-    match error {
-        AuditError::Spec(error) => diagnose(error),
-        other => Diagnostic::from_err(other),
-    }
 }

@@ -108,7 +108,7 @@ impl Judge<'_> {
         };
         let reference = task.reference();
         let reference = reference.engine();
-        let witnesses = witnesses.iter().enumerate().map(|(i, t)| Witness {
+        let shown = witnesses.iter().enumerate().map(|(i, t)| Witness {
             name: t.name.clone(),
             is_reference: reference.is_some_and(|r| *r == t.name),
             shares: t.shares.clone(),
@@ -118,7 +118,7 @@ impl Judge<'_> {
         let mut found = Consensus {
             case,
             procedure: task.procedure,
-            witnesses: witnesses.collect(),
+            witnesses: shown.collect(),
             independent,
             differing: telling.len(),
             departs: vec![],

@@ -61,6 +61,11 @@ impl Task {
         if let [one] = models[..] { one.to_owned() } else { "mixed".to_owned() }
     }
 
+    /// Whether it is a scene of the calibration, whose answer needs no witnesses.
+    pub fn is_known(&self) -> bool {
+        self.procedure.row().form == Form::Known
+    }
+
     /// The procedure that an engine is asked for: of a scene of the calibration, the one of its light.
     pub fn as_asked(&self) -> ProcedureId {
         match (self.procedure.row().form, self.transport) {
