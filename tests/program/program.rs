@@ -5,6 +5,7 @@
 mod baselines;
 mod by_hand;
 mod cache;
+mod calibration;
 mod command_line;
 mod cylindrical;
 mod external_adapter;

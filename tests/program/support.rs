@@ -34,7 +34,7 @@ pub(crate) struct Folder {
 }
 
 impl Folder {
-    /// For our own solvers and adapters: no renderer is installed, what was calibrated stays here, other tests run at the same time.
+    /// For our own solvers and adapters: no renderer is installed, other tests run at the same time.
     pub(crate) fn new(files: &[(&str, &str)]) -> Self {
         assert!(!HAS_FOLDER.get(), "a second folder would wait for the first");
         let part = MACHINE.read().unwrap_or_else(PoisonError::into_inner);
@@ -105,9 +105,9 @@ impl Folder {
         Answer::of(&mut self.command(args))
     }
 
-    /// Audits `spec.yaml` into `out`.
+    /// Audits `spec.yaml` into `out`; `calibration.rs` looks at scenes of known answer.
     pub(crate) fn run(&self, more: &[&str]) -> Answer {
-        self.luxproof(&[&["run", "spec.yaml", "--out", "out"][..], more].concat())
+        self.luxproof(&[&["run", "spec.yaml", "--out", "out", "--no-calibration"][..], more].concat())
     }
 }
 
@@ -176,7 +176,9 @@ impl From<std::process::Output> for Answer {
 pub(crate) fn run_reference(args: &[&str]) -> (Value, Option<i32>) {
     let folder = Folder::for_renderers(&[]);
     let out = folder.path("out");
-    let args = [&["run"][..], args, &["--no-cache", "--format", "json", "--out", out.to_str().unwrap()]].concat();
+    let args =
+        [&["run"][..], args, &["--no-cache", "--no-calibration", "--format", "json", "--out", out.to_str().unwrap()]]
+            .concat();
     let (printed, code) = Answer::of(folder.command(&args).current_dir(root())).report();
     assert_eq!(printed, folder.report());
     (printed, code)

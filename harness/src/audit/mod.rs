@@ -33,7 +33,7 @@ use crate::engines::Site;
 use crate::judge::{Policy, Published, PublishedError};
 use crate::measure::cache::Cache;
 use crate::measure::{Machine, Reader};
-use crate::plan::{Plan, Planner, Selection, Skipping};
+use crate::plan::{Plan, Planner, Selection, Skip, Skipping};
 use crate::procedures::known;
 use crate::record::Status;
 use crate::report::{Exit, Report, SpecRecord};
@@ -66,8 +66,19 @@ pub struct Options<'a> {
     pub sampling: Sampling,
     /// What a failed case means to those after it.
     pub after_failure: AfterFailure,
+    /// Whether engines read scenes of known answer besides.
+    pub calibration: Calibration,
     /// Told of what happens.
     pub observer: &'a dyn Observer,
+}
+
+/// Whether engines read scenes of known answer besides those of the specs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Calibration {
+    /// They do, and are judged by them like by any other case.
+    Judged,
+    /// They do not, and the report says so.
+    LeftOut,
 }
 
 /// What a failed case means to those after it.
@@ -91,6 +102,7 @@ impl Options<'_> {
             skipping: Skipping::Allowed,
             sampling: Sampling::Accurate,
             after_failure: AfterFailure::GoOn,
+            calibration: Calibration::Judged,
             observer: &Silent,
         }
     }
@@ -125,7 +137,11 @@ pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<
     let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
     let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
     let asked = cases.len();
-    for (case, plan) in planner.calibrations(&cases, &plans)? {
+    let calibrations = match options.calibration {
+        Calibration::Judged => planner.calibrations(&cases, &plans)?,
+        Calibration::LeftOut => vec![],
+    };
+    for (case, plan) in calibrations {
         cases.push(case);
         plans.push(plan);
     }
@@ -163,6 +179,10 @@ pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<
     let mut report = Report::joined(record(specs, &cases[..asked]), reports);
     // Scenes of known answer are nobody's spec.
     report.cases.truncate(asked);
+    if options.calibration == Calibration::LeftOut {
+        report.skips.push(Skip::uncalibrated(&plans[0]));
+        report.summary.skipped += 1;
+    }
     // Cases ran side by side: their seconds do not add up.
     report.wall_s = clock.elapsed().as_secs_f64();
     files::keep_json(&options.out.join("report.json"), &report)?;

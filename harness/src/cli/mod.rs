@@ -153,6 +153,9 @@ struct RunArgs {
     /// Take every reading anew, and keep none
     #[arg(long)]
     no_cache: bool,
+    /// Leave out the scenes of known answer, which tell a wrong engine from a difficult room
+    #[arg(long)]
+    no_calibration: bool,
     /// When sampling stops
     #[arg(long, value_enum, value_name = "WHEN", default_value_t)]
     sampling: Sampling,

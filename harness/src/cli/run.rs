@@ -9,7 +9,7 @@ use super::diagnostic::{diagnose, not_audited};
 use super::engines::report_installation;
 use super::progress::Progress;
 use super::views::print_report;
-use crate::audit::{self, AfterFailure, Options};
+use crate::audit::{self, AfterFailure, Calibration, Options};
 use crate::engines::Site;
 use crate::judge::Policy;
 use crate::measure::cache::Cache;
@@ -28,6 +28,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
         skipping: args.selected.skipping(),
         sampling: args.sampling,
         after_failure: if args.fail_fast { AfterFailure::Stop } else { AfterFailure::GoOn },
+        calibration: if args.no_calibration { Calibration::LeftOut } else { Calibration::Judged },
         observer: &progress,
         ..Options::new(site.clone(), out_folder(args))
     };

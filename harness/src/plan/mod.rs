@@ -110,6 +110,13 @@ impl Skip {
         Self { key: ReadingKey::new(&case.name, task.procedure, engine), scope, reason: reason.into(), saved: None }
     }
 
+    /// Of the scenes of known answer, which somebody did not want.
+    pub(crate) fn uncalibrated(plan: &Plan) -> Self {
+        let key = ReadingKey::new(known::CASE, plan.tasks[0].procedure, EVERYONE);
+        let reason = "no engine reads the scenes of known answer: --no-calibration".to_owned();
+        Self { key, scope: Scope::Procedure, reason, saved: None }
+    }
+
     /// The same where it saves something.
     #[must_use]
     pub fn saving(self, saved: impl Into<String>) -> Self {
@@ -154,8 +161,8 @@ impl Plan {
     }
 }
 
-/// A standard error that is far below the tolerances of reflected light.
-const CALIBRATION: Budget = Budget { relative_error: 2e-3, seconds: 20.0 };
+/// A standard error that is far below the tolerances of reflected light, and a few seconds for engines that cannot meet it.
+const CALIBRATION: Budget = Budget { relative_error: 2e-3, seconds: 5.0 };
 
 /// Plans one case by itself, with all shortcuts.
 pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, SpecError> {

@@ -60,7 +60,7 @@ impl Reference {
 }
 
 /// Every procedure, in the order of reports, and the scenes of the calibration. Tolerances stand under the same name in `reference/tolerances.yaml`.
-pub static ALL: [Procedure; 12] = [
+pub static ALL: [Procedure; 11] = [
     Procedure {
         id: ProcedureId::LuminousIntensity,
         title: "Luminous intensity",
@@ -130,8 +130,7 @@ pub static ALL: [Procedure; 12] = [
     known(ProcedureId::Asymmetric, "Asymmetric", "a table without symmetry, turned, all around", |_| STRAIGHT),
     known(ProcedureId::Luminaires, "Luminaires", "three luminaires that differ", |_| STRAIGHT),
     known(ProcedureId::Shadow, "Shadow", "light that a box hides, and light that passes it", |_| STRAIGHT),
-    known(ProcedureId::Furnace, "Furnace", "reflected light that is the same everywhere", |_| EVEN),
-    known(ProcedureId::Wall, "Wall", "the same light 5 mm from surfaces, edges and corners", |_| EVEN),
+    known(ProcedureId::Furnace, "Furnace", "reflected light that is the same everywhere, near surfaces too", |_| EVEN),
     known(ProcedureId::Reflectances, "Reflectances", "floor, walls and ceiling that differ", |_| EXACT),
 ];
 

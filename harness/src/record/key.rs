@@ -54,8 +54,6 @@ pub enum ProcedureId {
     Shadow,
     /// Calibration: reflected light that is even.
     Furnace,
-    /// Calibration: even light near surfaces.
-    Wall,
     /// Calibration: reflectances that differ.
     Reflectances,
 }

@@ -1,0 +1,97 @@
+//! Calibration is evidence: scenes of known answer are judged like any other, excuse nothing and stop nothing.
+
+use serde_json::Value;
+
+use crate::support::{Answer, Folder, MINE, SKEW_LAMP, SKEW_ROOM, adapter, among};
+
+const PROCEDURES: [&str; 5] = ["luminous_intensity", "direct_illuminance", "point", "asymmetric", "luminaires"];
+
+/// The example adapter with a part of it replaced.
+fn folder(from: &str, to: &str) -> Folder {
+    let adapter = adapter();
+    assert!(adapter.contains(from));
+    let spec = [SKEW_ROOM, MINE].concat();
+    Folder::new(&[("spec.yaml", &spec), ("lamp.ies", SKEW_LAMP), ("adapter.py", &adapter.replace(from, to))])
+}
+
+fn run(folder: &Folder) -> Answer {
+    folder.luxproof(&["run", "spec.yaml", "--out", "out"])
+}
+
+fn verdicts<'a>(report: &'a Value, procedure: &str) -> Vec<&'a str> {
+    let mine = among(report, "comparisons", &[("engine", "mine"), ("procedure", procedure)]);
+    mine.into_iter().map(|c| c["verdict"].as_str().unwrap()).collect()
+}
+
+const LUX: &str = "lux = illuminance_lx(";
+
+#[test]
+fn a_right_engine_passes_scenes_of_known_answer_and_says_which_it_declines() {
+    let folder = folder(LUX, LUX);
+    run(&folder).exits(0).prints("calibration: asymmetric");
+    let report = folder.report();
+    for procedure in PROCEDURES {
+        let verdicts = verdicts(&report, procedure);
+        assert!(!verdicts.is_empty() && verdicts.iter().all(|v| *v == "pass"), "{procedure}: {verdicts:?}");
+    }
+    let declined = among(&report, "skips", &[("case", "calibration"), ("engine", "mine"), ("procedure", "shadow")]);
+    assert_eq!(declined.len(), 1, "{}", report["skips"]);
+    // The simulator is held to the same closed forms.
+    assert_eq!(
+        among(&report, "comparisons", &[("case", "calibration"), ("engine", "simulator"), ("verdict", "pass")]).len(),
+        68
+    );
+}
+
+#[test]
+fn a_factor_of_two_percent_fails_everywhere_and_is_said_to_be_none_that_is_known() {
+    let folder = folder(LUX, "lux = 1.02 * illuminance_lx(");
+    run(&folder).exits(1).prints("1.0200");
+    let report = folder.report();
+    for procedure in PROCEDURES {
+        let verdicts = verdicts(&report, procedure);
+        assert!(verdicts.iter().all(|v| *v == "fail"), "{procedure}: {verdicts:?}");
+    }
+    for c in among(&report, "comparisons", &[("engine", "mine"), ("verdict", "fail")]) {
+        assert!(c["value"].is_number(), "a reading was lost: {c}");
+        assert!(c["diagnosis"].as_str().unwrap().ends_with("a factor that is none of those known"), "{c}");
+    }
+}
+
+#[test]
+fn faults_that_calibration_shows_too_are_named_on_the_terminal() {
+    for (from, to, name) in [
+        (LUX, "lux = math.pi * illuminance_lx(", "factor pi"),
+        (LUX, "lux = 2 * illuminance_lx(", "factor 2"),
+        ("* intensity_cd(lamp, ray) /", "* intensity_cd(lamp, ray) ** 2 /", "the candela are squared"),
+        ("max(cosine, 0.0) *", "(cosine > 0.0) *", "the cosine at the meter is left out"),
+        ("math.atan2(y, x)", "math.atan2(-y, x)", "C runs the other way round"),
+    ] {
+        let folder = folder(from, to);
+        run(&folder).exits(1).prints(name);
+        let report = folder.report();
+        let lost = among(&report, "comparisons", &[("engine", "mine"), ("verdict", "missing")]);
+        assert!(lost.is_empty(), "{name}: {lost:?}");
+        let all = among(&report, "comparisons", &[("engine", "mine"), ("verdict", "inconclusive")]);
+        assert!(all.is_empty(), "{name}: {all:?}");
+    }
+}
+
+#[test]
+fn what_is_left_out_is_said() {
+    let folder = folder(LUX, LUX);
+    let report = folder.run(&["--format", "json"]).exits(0).json();
+    assert!(among(&report, "comparisons", &[("case", "calibration")]).is_empty());
+    let skips = among(&report, "skips", &[("case", "calibration")]);
+    assert!(skips[0]["reason"].as_str().unwrap().contains("--no-calibration"), "{skips:?}");
+}
+
+#[test]
+fn the_doctor_examines_adapters_too() {
+    let folder = folder(LUX, "lux = 1.02 * illuminance_lx(");
+    folder.luxproof(&["engines", "doctor", "mine", "--spec", "spec.yaml"]).exits(1).prints("FAIL 54 +2.0 %");
+    folder
+        .luxproof(&["engines", "doctor", "yours", "--spec", "spec.yaml"])
+        .exits(2)
+        .complains("there is no engine `yours`");
+}
