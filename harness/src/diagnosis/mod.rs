@@ -169,7 +169,7 @@ fn explanation(fault: &Fault, readings: &Readings) -> Option<Cause> {
         id: fault.id,
         what: fault.what.clone(),
         text: match found {
-            Some(found) => format!("{found}: {}", fault.what),
+            Some(found) => format!("{}: {found}", fault.what),
             None => format!(
                 "{}: that explains all {n} readings to {:.2} %, which are up to {:.1} % off otherwise",
                 fault.what,
@@ -186,12 +186,11 @@ fn unnamed_factor(readings: &Readings) -> Option<Cause> {
     let (factor, error) = readings.factor(&readings.right)?;
     let predicted: Vec<f64> = readings.right.iter().map(|r| factor * r).collect();
     let chi_squared = readings.chi_squared(&predicted);
+    let what = format!("factor {factor:.4}, none of those known");
     (n >= 3 && is_chance(chi_squared, n - 1)).then(|| Cause {
         id: "factor",
-        what: "a factor that is none of those known".to_owned(),
-        text: format!(
-            "all {n} readings are {factor:.4} ± {error:.4} times the reference: a factor that is none of those known"
-        ),
+        text: format!("{what}: all {n} readings are {factor:.4} ± {error:.4} times the reference"),
+        what,
         score: chi_squared,
     })
 }
