@@ -84,3 +84,21 @@ fn the_forms_have_schemas() {
         assert!(schema.to_string().contains(key), "{schema}");
     }
 }
+
+#[test]
+fn zero_hits_are_not_seen_and_never_an_error_of_zero() {
+    let sampled =
+        adapter().replace("\"error_bound_lx\": 1e-12 * lux", "\"std_error_lx\": 1e-3 * lux, \"degrees_of_freedom\": 7");
+    let unlucky = sampled.replace(
+        "    for meter in job[\"meters\"]:\n        lux =",
+        "    for meter in job[\"meters\"]:\n        lux = 0.0 if meter[\"id\"] == \"plane[1]\" else",
+    );
+    assert!(unlucky != sampled && sampled != adapter());
+    let (report, code) = run(&folder(&unlucky));
+    assert_eq!(code, Some(4));
+    let of = |meter: &str| among(&report, "comparisons", &[("engine", "mine"), ("meter", meter)])[0];
+    assert_eq!(of("plane[0]")["verdict"], "pass");
+    let unseen = of("plane[1]");
+    assert_eq!((&unseen["verdict"], &unseen["uncertainty"]["kind"]), (&"inconclusive".into(), &"not_seen".into()));
+    assert!(unseen["diagnosis"].as_str().unwrap().starts_with("not seen"), "{unseen}");
+}

@@ -165,7 +165,7 @@ pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<
             *stop = Some(Stop { why: "not run: the run was interrupted".to_owned(), status: Status::Failed });
         } else if options.after_failure == AfterFailure::Stop
             && stop.is_none()
-            && matches!(report.exit(), Exit::Failed | Exit::Engine)
+            && matches!(report.worst(), Exit::Failed | Exit::Engine)
         {
             let why = format!("not run: {} failed, and --fail-fast was asked for", case.name);
             *stop = Some(Stop { why, status: Status::Skipped });

@@ -97,8 +97,12 @@ pub fn refine(
 fn combine(reading: &mut Reading, before: f64, look: &Estimate, weight: f64) {
     let total = before + weight;
     reading.value = (before * reading.value + weight * look.value) / total;
-    let parts = [(before / total, reading.uncertainty), (weight / total, look.uncertainty)];
-    reading.uncertainty = Uncertainty::of_sum(parts);
+    reading.uncertainty = match (reading.uncertainty, look.uncertainty) {
+        // What an empty look would scatter is what the other does, by its effort.
+        (Uncertainty::NotSeen, other) if other != Uncertainty::NotSeen => other.times((weight / total).sqrt()),
+        (seen, Uncertainty::NotSeen) if seen != Uncertainty::NotSeen => seen.times((before / total).sqrt()),
+        (seen, other) => Uncertainty::of_sum([(before / total, seen), (weight / total, other)]),
+    };
 }
 
 /// The targets at which more samples would decide something.
@@ -122,6 +126,9 @@ fn effort(comparison: &Comparison) -> Option<f64> {
         chosen.map(|c| c.uncertainty.powi(2)).sum()
     };
     let (sampled, fixed) = (square(true), square(false));
+    if comparison.uncertainty == Uncertainty::NotSeen {
+        return Some(1.0);
+    }
     if sampled == 0.0 {
         return None;
     }

@@ -33,7 +33,10 @@ impl Blocks {
 
     /// The mean at each station, with as many degrees of freedom as there are blocks less one.
     pub fn estimates(&self) -> Vec<Estimate> {
-        (0..self.0.first().map_or(0, Vec::len)).map(|k| self.weighted(&[(k, 1.0)])).collect()
+        let stations = 0..self.0.first().map_or(0, Vec::len);
+        let mut all: Vec<Estimate> = stations.map(|k| self.weighted(&[(k, 1.0)])).collect();
+        Estimate::mark_unseen(&mut all);
+        all
     }
 
     /// The weighted sum over stations, with the error that their joint sampling gives it.
@@ -220,6 +223,15 @@ mod tests {
         let ratio = blocks.worst_error(&[50.0, 50.0]) / blocks.worst_error(&[]);
         assert!((ratio - 2.0).abs() < 0.1, "{ratio}");
         assert_eq!(Blocks::new(vec![vec![0.0]; 8]).worst_error(&[]), 0.0);
+    }
+
+    #[test]
+    fn what_no_sample_met_is_not_seen_unless_nothing_was() {
+        let of = |second: f64| Blocks::new(vec![vec![1.0, 0.0], vec![2.0, second]]).estimates()[1].uncertainty;
+        assert_eq!(of(0.0), Uncertainty::NotSeen);
+        assert!(of(0.1).standard_error().unwrap() > 0.0);
+        // A dark room is dark, and says so.
+        assert_eq!(Blocks::new(vec![vec![0.0]; 8]).estimates()[0].uncertainty.standard_error(), Some(0.0));
     }
 
     #[test]

@@ -214,7 +214,10 @@ impl Judge<'_> {
         let deviation = if sound { value - reference.value } else { f64::NAN };
         let allowed = tolerance.around(reference.value);
         comparison.verdict = judge(deviation, budget.expanded, allowed);
-        if comparison.verdict != Verdict::Missing {
+        if comparison.uncertainty == Uncertainty::NotSeen && comparison.verdict == Verdict::Fail {
+            comparison.verdict = Verdict::Inconclusive;
+            comparison.diagnosis = Some("not seen: no sample met here what samples met elsewhere".to_owned());
+        } else if comparison.verdict != Verdict::Missing {
             comparison.p_value = Some(budget.p_value(deviation, allowed));
         }
         comparison

@@ -62,6 +62,17 @@ impl Estimate {
         Self { value, uncertainty: Uncertainty::sampled(std_error, Some(n - 1.0)) }
     }
 
+    /// Tells those that no sample met, where samples met others: zero hits are no standard error of zero.
+    pub fn mark_unseen(all: &mut [Self]) {
+        let is_sampled = |e: &Self| e.uncertainty.standard_error().is_some();
+        if all.iter().any(|e| is_sampled(e) && e.value > 0.0) {
+            let dark = |e: &&mut Self| {
+                e.value == 0.0 && e.uncertainty == Uncertainty::sampled(0.0, e.uncertainty.degrees_of_freedom())
+            };
+            all.iter_mut().filter(dark).for_each(|e| e.uncertainty = Uncertainty::NotSeen);
+        }
+    }
+
     /// A value without error.
     pub const fn exact(value: f64) -> Self {
         Self { value, uncertainty: Uncertainty::Exact }

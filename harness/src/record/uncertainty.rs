@@ -12,6 +12,8 @@ pub enum Uncertainty {
     Unstated,
     /// The value is claimed to be what the method gives, to the last digit.
     Exact,
+    /// It was sampled, and no sample met what others did: how much there is of it, no number of none can tell.
+    NotSeen,
     /// The value of the method lies within this distance.
     Bound(f64),
     /// The value is a mean of independent samples.
@@ -51,13 +53,13 @@ impl Uncertainty {
     pub const fn bound(&self) -> f64 {
         match self {
             Self::Bound(bound) | Self::StandardError { bound, .. } => *bound,
-            Self::Unstated | Self::Exact => 0.0,
+            Self::Unstated | Self::Exact | Self::NotSeen => 0.0,
         }
     }
 
     /// Whether further samples would make it smaller.
     pub fn is_sampled(&self) -> bool {
-        self.standard_error().is_some_and(|e| e > 0.0)
+        *self == Self::NotSeen || self.standard_error().is_some_and(|e| e > 0.0)
     }
 
     /// Standard uncertainty; a bound counts as a rectangular distribution (JCGM 100:2008, 4.3.7).
@@ -99,9 +101,10 @@ impl Uncertainty {
     /// the fewest degrees of freedom of any.
     pub fn of_dependent_sum(terms: impl IntoIterator<Item = (f64, Self)>) -> Self {
         let (mut value, mut bound, mut degrees_of_freedom) = (0.0, 0.0, None::<f64>);
-        let (mut is_sampled, mut is_bounded, mut is_exact) = (false, false, false);
+        let (mut is_sampled, mut is_bounded, mut is_exact, mut is_unseen) = (false, false, false, false);
         for (weight, term) in terms {
             is_exact |= term == Self::Exact;
+            is_unseen |= term == Self::NotSeen && weight != 0.0;
             is_bounded |= matches!(term, Self::Bound(_));
             is_sampled |= matches!(term, Self::StandardError { .. });
             value += weight.abs() * term.standard_error().unwrap_or(0.0);
@@ -109,6 +112,7 @@ impl Uncertainty {
             degrees_of_freedom = [degrees_of_freedom, term.degrees_of_freedom()].into_iter().flatten().reduce(f64::min);
         }
         match (is_sampled, is_bounded, is_exact) {
+            _ if is_unseen => Self::NotSeen,
             (true, ..) => Self::StandardError { value, degrees_of_freedom, bound },
             (_, true, _) => Self::Bound(bound),
             (_, _, true) => Self::Exact,
@@ -167,6 +171,7 @@ enum Kind {
     Bound,
     StandardError,
     Exact,
+    NotSeen,
 }
 
 impl From<Uncertainty> for Written {
@@ -176,6 +181,7 @@ impl From<Uncertainty> for Written {
         let stated = match uncertainty {
             Uncertainty::Unstated => None,
             Uncertainty::Exact => stated(Kind::Exact, 0.0, None),
+            Uncertainty::NotSeen => stated(Kind::NotSeen, 0.0, None),
             Uncertainty::Bound(bound) => stated(Kind::Bound, bound, None),
             Uncertainty::StandardError { value, degrees_of_freedom, .. } => {
                 stated(Kind::StandardError, value, degrees_of_freedom)
@@ -198,6 +204,7 @@ impl TryFrom<Written> for Uncertainty {
         let bound = written.error_bound.unwrap_or(0.0);
         let read = match (written.uncertainty, written.std_error, written.error_bound) {
             (Some(Stated { kind: Kind::Exact, .. }), ..) => Self::Exact,
+            (Some(Stated { kind: Kind::NotSeen, .. }), ..) => Self::NotSeen,
             (Some(Stated { kind: Kind::Bound, value, .. }), ..) => Self::Bound(value),
             (Some(Stated { kind: Kind::StandardError, value, degrees_of_freedom }), ..) => {
                 Self::StandardError { value, degrees_of_freedom, bound }
@@ -230,7 +237,8 @@ mod tests {
     #[test]
     fn files_keep_what_is_stated_and_old_ones_are_read() {
         let both = Uncertainty::StandardError { value: 3.0, degrees_of_freedom: Some(7.0), bound: 0.5 };
-        for stated in [Uncertainty::Unstated, Uncertainty::Exact, Uncertainty::Bound(0.1), SAMPLED, both] {
+        let bare = [Uncertainty::Unstated, Uncertainty::Exact, Uncertainty::NotSeen];
+        for stated in bare.into_iter().chain([Uncertainty::Bound(0.1), SAMPLED, both]) {
             let text = serde_json::to_string(&stated).unwrap();
             assert_eq!(serde_json::from_str::<Uncertainty>(&text).unwrap(), stated, "{text}");
         }
@@ -260,5 +268,6 @@ mod tests {
         assert_eq!(sum.bound(), 0.1);
         assert_eq!(Uncertainty::Exact.times(3.0), Uncertainty::Exact);
         assert_eq!(SAMPLED.times(2.0), Uncertainty::sampled(6.0, Some(7.0)));
+        assert_eq!(Uncertainty::of_sum([(1.0, SAMPLED), (1.0, Uncertainty::NotSeen)]), Uncertainty::NotSeen);
     }
 }

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::judge::{Comparison, Consensus, PaperSplit, PublishedTable, Split};
 use crate::plan::Skip;
-use crate::record::{EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Status};
+use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Status};
 use crate::spec::Case;
 
 pub use accepted::{BaselineCheck, BaselineLine};
@@ -175,7 +175,13 @@ impl Report {
         if self.is_suite() { format!("{case}{after}") } else { String::new() }
     }
 
+    /// The exit code of a run.
     pub fn exit(&self) -> Exit {
+        if self.has_audited() { self.worst() } else { Exit::Engine.worse(self.worst()) }
+    }
+
+    /// The worst that happened to anything.
+    pub(crate) fn worst(&self) -> Exit {
         let engine = |e: &EngineStatus| match e.status {
             Status::Failed => Exit::Engine,
             Status::Absent if e.is_required => Exit::Engine,
@@ -185,6 +191,13 @@ impl Report {
         let readings = self.comparisons.iter().map(|c| Exit::of(c.verdict));
         let all = self.engines.iter().map(engine).chain(readings).chain(self.baseline.iter().map(baseline));
         all.fold(Exit::Passed, Exit::worse)
+    }
+
+    /// Whether any renderer gave a reading, where any was wanted: a run that audits nothing must not look like success.
+    fn has_audited(&self) -> bool {
+        let is_renderer = |name: &EngineName| ![EngineName::SIMULATOR, EngineName::IESNA].contains(name);
+        let wanted = self.engines.iter().any(|e| is_renderer(&e.id));
+        !wanted || self.readings.iter().any(|r| is_renderer(&r.key.engine))
     }
 
     fn procedures(&self) -> BTreeSet<ProcedureId> {
