@@ -25,7 +25,8 @@ fn files(path: &Path) -> std::io::Result<Vec<PathBuf>> {
         return Ok(vec![path.to_owned()]);
     }
     let mut entries: Vec<PathBuf> = path.read_dir()?.map(|e| Ok(e?.path())).collect::<std::io::Result<_>>()?;
-    entries.retain(|e| !e.to_string_lossy().contains("test") && !e.ends_with("snapshots"));
+    let is_of_tests = |stem: &str| stem == "tests" || stem.ends_with("_tests") || stem == "snapshots";
+    entries.retain(|e| !e.file_stem().and_then(|s| s.to_str()).is_some_and(is_of_tests));
     entries.sort();
     let mut found = vec![];
     for entry in entries {
