@@ -5,7 +5,7 @@
 //! - **Luminaires**: three that differ in table, rotation and flux; shows one that is lost, or takes another's table.
 //! - **Shadow**: a box between luminaire and meters in a black room; shows light that leaks or meters that are missed.
 //! - **Furnace**: a cube that its luminaire lights evenly, so that reflected light is the same everywhere in every direction,
-//!   E = rho / (1 - rho) x flux / area, to 5e-4; in its middle it shows what a method of reflected light loses or gains, 5 mm
+//!   E = rho / (1 - rho) x flux / area, to 7e-4; in its middle it shows what a method of reflected light loses or gains, 5 mm
 //!   from a wall, an edge and a corner what caches and offsets blur.
 //! - **Reflectances**: floor, walls and ceiling that differ, against the simulator; shows surfaces that are exchanged or lost.
 
@@ -205,8 +205,8 @@ mod tests {
                 &Accuracy { relative_error: 1e-4, seed: 1 },
             )
             .unwrap();
-            // The furnace's table is linear between nodes 3 degrees apart, so that its light is even to a few parts in 1e4 only.
-            let limit = if task.transport == Transport::Direct { 1e-12 } else { 6e-4 };
+            // The furnace's table is linear between nodes 3 degrees apart, so that its light is even to 7e-4 only.
+            let limit = if task.transport == Transport::Direct { 1e-12 } else { 7e-4 };
             for (target, estimate) in task.targets.iter().zip(found.estimates) {
                 let (found, right) = (estimate.illuminance.value(), of(&task.scene, target));
                 assert!(
