@@ -122,7 +122,7 @@ impl Running<'_> {
             approximation: run.approximation.clone(),
             notes: measurement.notes,
             wall_s,
-            components: planned.engine.components(&run.job).into_iter().map(str::to_owned).collect(),
+            components: planned.engine.components(&run.job),
             command: planned.engine.command_by_hand(&run.job, &self.reader.site),
             failure,
             readings: readings.collect(),
@@ -201,5 +201,6 @@ fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
     };
     let wall_s = mine.iter().map(|r| r.wall_s).sum();
     let is_required = planned.asked == Asked::ByName;
-    EngineStatus { id, version: planned.version(), status, is_required, reason, wall_s }
+    let fingerprint = planned.instrument().map(|i| i.version.fingerprint);
+    EngineStatus { id, version: planned.version(), fingerprint, status, is_required, reason, wall_s }
 }

@@ -37,7 +37,7 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site) -> Resu
         EnginesAction::List => {
             for engine in engines::all() {
                 match engine.probe(site) {
-                    Ok(version) => println!("{:<10} {}", engine.name(), version.0),
+                    Ok(version) => println!("{:<10} {}", engine.name(), version.text),
                     Err(absent) => println!("{:<10} absent: {absent}", engine.name()),
                 }
             }

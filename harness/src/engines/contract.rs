@@ -1,15 +1,16 @@
 //! The contract between the program and an engine: what an engine is asked, what it gives, and what is known of it.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use glam::DVec3;
 use luminaire::geometry::Surface;
 use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
 use serde::{Deserialize, Serialize};
 
-use super::Site;
 use super::blocks::Blocks;
 use super::workbench::{EngineError, SceneFile, Workbench};
+use super::{Site, fingerprint};
 use crate::procedures::{Target, Task};
 use crate::record::{Effort, EngineName, Estimate, Light, MeterId, Method, ProcedureId, Role, Uncertainty};
 use crate::spec::{Budget, Case};
@@ -39,8 +40,8 @@ pub trait Engine: Send + Sync {
 
     /// What it shares with other engines, by name: what one error would put off for all who have it. Witnesses that share a
     /// component count once; their own code need not be named.
-    fn components(&self, _job: &Job) -> Vec<&'static str> {
-        vec![FILE_READER]
+    fn components(&self, _job: &Job) -> Vec<String> {
+        vec![FILE_READER.to_owned()]
     }
 
     /// The job as native files, runnable by hand; pure. Our own solvers have none.
@@ -196,9 +197,30 @@ pub struct Station {
     pub meter: Meter,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-#[serde(transparent)]
-pub struct Version(pub String);
+/// What an engine is: what it says of itself, and what really runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Version {
+    pub text: String,
+    /// Hash of its files: programs, libraries, packages.
+    pub fingerprint: String,
+}
+
+impl Version {
+    /// An engine that tells `text`, of these files and folders.
+    pub(super) fn of(text: impl Into<String>, site: &Site, files: impl IntoIterator<Item = PathBuf>) -> Self {
+        Self { text: text.into(), fingerprint: fingerprint::of(site, files) }
+    }
+
+    /// One of our own solvers, which this program's sources make.
+    pub(crate) fn own() -> Self {
+        Self { text: env!("CARGO_PKG_VERSION").to_owned(), fingerprint: env!("LUXPROOF_READ_OUT").to_owned() }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn told(text: &str) -> Self {
+        Self { text: text.to_owned(), fingerprint: String::new() }
+    }
+}
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{reason}; {remedy}")]

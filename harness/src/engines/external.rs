@@ -8,14 +8,16 @@ mod form;
 mod tests;
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
 pub use self::form::{ExternalJob, ExternalReadings};
-use super::{Absent, Engine, EngineError, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked};
+use super::{
+    Absent, Engine, EngineError, FILE_READER, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
+};
 use crate::record::{EngineName, ProcedureId, UnknownProcedure};
+use crate::spec::hexadecimal;
 use crate::system::process::Invocation;
 
 /// The environment variable that names an empty folder for the adapter's own files, kept with the run.
@@ -29,8 +31,18 @@ pub(super) struct External {
     command: Vec<String>,
     /// The procedures that it takes part in; `None` for all.
     procedures: Option<Vec<ProcedureId>>,
+    /// What it has in common with other engines, by name: `shares`.
+    shares: Vec<String>,
+    /// Files and folders besides those of its command that make its readings: `depends_on`.
+    depends_on: Vec<PathBuf>,
     /// The spec's folder, in which it runs.
     folder: PathBuf,
+}
+
+/// Whether a folder beside a source holds sources of its kind.
+fn is_package(folder: &Path, source: &Path) -> bool {
+    let mut entries = folder.read_dir().into_iter().flatten().flatten();
+    entries.any(|e| e.path().extension() == source.extension())
 }
 
 impl External {
@@ -63,7 +75,12 @@ impl External {
         // The folder of a spec that is named without one is the working directory.
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let folder = std::path::absolute(folder).map_err(|e| EngineError::io(folder, e))?;
-        Ok(Self { id, command, procedures, folder })
+        let list = |key: &str| match words(key) {
+            None => Ok(vec![]),
+            Some(list) => list.map_err(|_| error(key, "must be a list of names")),
+        };
+        let depends_on = list("depends_on")?.into_iter().map(|file| folder.join(file)).collect();
+        Ok(Self { shares: list("shares")?, id: id.clone(), command, procedures, depends_on, folder })
     }
 
     /// The program: a path is relative to the spec's folder, a bare name is looked up there and then on PATH.
@@ -81,6 +98,22 @@ impl External {
         Ok(run.args(&self.command[1..]).env(FOLDER_VARIABLE, &workbench.scene_dir).stdin(input))
     }
 
+    /// The files that its command names.
+    fn named(&self) -> impl Iterator<Item = PathBuf> {
+        self.command[1..].iter().map(|w| self.folder.join(w)).filter(|p| p.is_file())
+    }
+
+    /// Its command by content, whatever its files are called.
+    fn contents(&self) -> String {
+        let mut hash = Sha256::new();
+        for word in &self.command {
+            let bytes = std::fs::read(self.folder.join(word)).unwrap_or_else(|_| word.clone().into_bytes());
+            hash.update((bytes.len() as u64).to_le_bytes());
+            hash.update(bytes);
+        }
+        format!("sha256:{}", &hexadecimal(&hash.finalize())[..12])
+    }
+
     fn absence(&self) -> String {
         format!("`{}` is neither beside the spec nor on PATH", self.command[0])
     }
@@ -95,29 +128,36 @@ impl Engine for External {
         self.id.clone()
     }
 
-    /// The version of an adapter is the SHA-256 of its command and of the files that the command names.
+    /// The version of an adapter is the hash of what its command says; what runs are the files that it names, the sources beside
+    /// these, which they may import, and those that it depends on by `depends_on`.
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
-        let program = self
-            .program(site)
-            .ok_or_else(|| Absent { reason: self.absence(), remedy: format!("correct engines.{}.command", self.id) })?;
-        let mut hash = Sha256::new();
-        for word in &self.command {
-            hash.update(word);
-            hash.update([0]);
+        let remedy = format!("correct engines.{}", self.id);
+        let absent = |reason| Absent { reason, remedy: remedy.clone() };
+        let program = self.program(site).ok_or_else(|| absent(self.absence()))?;
+        let mut files = vec![program];
+        for named in self.named() {
+            let beside =
+                named.parent().map(Path::to_owned).unwrap_or_default().read_dir().into_iter().flatten().flatten();
+            files.extend(
+                beside
+                    .map(|e| e.path())
+                    .filter(|p| p.extension() == named.extension() || p.is_dir() && is_package(p, &named)),
+            );
         }
-        let named = self.command[1..].iter().map(|w| self.folder.join(w)).filter(|p| p.is_file());
-        for path in std::iter::once(program).chain(named) {
-            let absent = |e: std::io::Error| Absent {
-                reason: format!("{} cannot be read: {e}", path.display()),
-                remedy: "check its permissions".to_owned(),
-            };
-            hash.update(std::fs::read(&path).map_err(absent)?);
+        for file in &self.depends_on {
+            if !file.exists() {
+                return Err(absent(format!("{}, which it depends on, is not there", file.display())));
+            }
+            files.push(file.clone());
         }
-        let digits = hash.finalize().iter().take(6).fold(String::new(), |mut text, byte| {
-            write!(text, "{byte:02x}").ok();
-            text
-        });
-        Ok(Version(format!("sha256:{digits}")))
+        files.sort();
+        Ok(Version::of(self.contents(), site, files))
+    }
+
+    /// A program that two engines run counts once, and so does what it says that it shares.
+    fn components(&self, _job: &Job) -> Vec<String> {
+        let program = format!("the program {}", self.contents());
+        [FILE_READER.to_owned(), program].into_iter().chain(self.shares.clone()).collect()
     }
 
     fn supports(&self, job: &Job) -> Support {

@@ -54,9 +54,7 @@ fn seen(path: &Path, earlier: Option<&Known>) -> io::Result<Known> {
     if let Some(known) = earlier.filter(|k| k.size == size && k.changed_ns == changed_ns) {
         return Ok(known.clone());
     }
-    let mut hash = Sha256::new();
-    io::copy(&mut std::fs::File::open(path)?, &mut hash)?;
-    Ok(Known { size, changed_ns, sha256: hexadecimal(&hash.finalize()) })
+    Ok(Known { size, changed_ns, sha256: hexadecimal(&Sha256::digest(std::fs::read(path)?)) })
 }
 
 /// The files at or below a path, sorted; what compilers leave beside sources is none.

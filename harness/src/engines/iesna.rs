@@ -33,7 +33,7 @@ impl Engine for Iesna {
     }
 
     fn probe(&self, _site: &Site) -> Result<Version, Absent> {
-        Ok(Version(env!("CARGO_PKG_VERSION").to_owned()))
+        Ok(Version::own())
     }
 
     fn supports(&self, job: &Job) -> Support {
@@ -53,8 +53,8 @@ impl Engine for Iesna {
         Support::Approximate { why: objections.join("; "), size: None }
     }
 
-    fn components(&self, _job: &Job) -> Vec<&'static str> {
-        vec![super::FILE_READER, super::OWN_LOOKUP]
+    fn components(&self, _job: &Job) -> Vec<String> {
+        [super::FILE_READER, super::OWN_LOOKUP].map(str::to_owned).to_vec()
     }
 
     fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {

@@ -51,7 +51,7 @@ impl Engine for Mitsuba {
     }
 
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
-        self.backend(site).map(|backend| backend.version())
+        self.backend(site).map(|backend| backend.version(site))
     }
 
     fn supports(&self, job: &Job) -> Support {

@@ -8,6 +8,7 @@ mod blocks;
 mod catalogue;
 mod contract;
 mod external;
+mod fingerprint;
 #[cfg(test)]
 pub(crate) mod fixtures;
 mod iesna;

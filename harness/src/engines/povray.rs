@@ -57,12 +57,13 @@ impl Engine for PovRay {
             return Err(absent("OpenImageIO, which reads its images, is not there".to_owned()));
         }
         let program = bench::program(site).map_err(|e| absent(e.to_string()))?;
-        let done = process::ask(program, "--version", |asked| bench::hermetic(asked, site));
+        let done = process::ask(program.clone(), "--version", |asked| bench::hermetic(asked, site));
         let done = done.map_err(|e| absent(e.to_string()))?;
         let said = format!("{}\n{}", String::from_utf8_lossy(&done.stdout), done.stderr);
         let version = said.lines().find_map(|l| l.trim().strip_prefix("POV-Ray "));
         let version = version.and_then(|v| v.split_whitespace().next());
-        version.map(|v| Version(v.to_owned())).ok_or_else(|| absent("povray does not tell its version".to_owned()))
+        let version = version.ok_or_else(|| absent("povray does not tell its version".to_owned()))?;
+        Ok(Version::of(version, site, [program, site.debian()]))
     }
 
     fn supports(&self, job: &Job) -> Support {

@@ -55,7 +55,7 @@ impl Engine for Radiance {
     }
 
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
-        Tools::find(site)?.version()
+        Tools::find(site)?.version(site)
     }
 
     fn supports(&self, job: &Job) -> Support {
@@ -80,11 +80,11 @@ impl Engine for Radiance {
         Support::Approximate { why: why.join("; "), size: Some(size) }
     }
 
-    fn components(&self, job: &Job) -> Vec<&'static str> {
+    fn components(&self, job: &Job) -> Vec<String> {
         match Settings::of(job).map(|s| s.photometrist) {
             // It reads the file as our reader and writer pass it on, expanded to the whole sphere.
-            Ok(Photometrist::Ies2rad) => vec![super::FILE_READER, "ies2rad"],
-            _ => vec![super::FILE_READER],
+            Ok(Photometrist::Ies2rad) => vec![super::FILE_READER.to_owned(), "ies2rad".to_owned()],
+            _ => vec![super::FILE_READER.to_owned()],
         }
     }
 

@@ -36,15 +36,15 @@ impl Engine for Simulator {
     }
 
     fn probe(&self, _site: &Site) -> Result<Version, Absent> {
-        Ok(Version(env!("CARGO_PKG_VERSION").to_owned()))
+        Ok(Version::own())
     }
 
     fn supports(&self, _job: &Job) -> Support {
         Support::Yes
     }
 
-    fn components(&self, _job: &Job) -> Vec<&'static str> {
-        vec![super::FILE_READER, super::OWN_LOOKUP]
+    fn components(&self, _job: &Job) -> Vec<String> {
+        [super::FILE_READER, super::OWN_LOOKUP].map(str::to_owned).to_vec()
     }
 
     fn knobs(&self) -> &'static [Knob] {

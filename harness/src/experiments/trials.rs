@@ -59,5 +59,5 @@ impl<'a> Trials<'a> {
 
 /// The exact simulation, which others are held against.
 pub(super) fn simulator() -> Instrument {
-    Instrument { engine: Arc::new(Simulator), version: Version(env!("CARGO_PKG_VERSION").to_owned()) }
+    Instrument { engine: Arc::new(Simulator), version: Version::own() }
 }

@@ -103,7 +103,7 @@ impl Reader {
             Err(failure) => (Err(failure), Cost { wall_s: clock.elapsed().as_secs_f64(), ..Cost::default() }),
         };
         let key = ReadingKey::new(&job.case, job.procedure, name);
-        Ok(Entry { key, version: instrument.version.0.clone(), cost, answer })
+        Ok(Entry { key, version: instrument.version.text.clone(), cost, answer })
     }
 
     fn find(&self, key: &Key) -> Option<Entry> {

@@ -48,7 +48,7 @@ pub struct Planned {
 impl Planned {
     /// The engine's version, where it is there.
     pub fn version(&self) -> Option<String> {
-        Some(self.instrument()?.version.0)
+        Some(self.instrument()?.version.text)
     }
 
     /// What readings are taken with, where it is there.

@@ -12,6 +12,9 @@ pub struct EngineStatus {
     pub id: EngineName,
     /// Its version, where it is there.
     pub version: Option<String>,
+    /// Hash of what really runs: programs, libraries, packages, sources.
+    #[serde(default)]
+    pub fingerprint: Option<String>,
     /// How it fared.
     pub status: Status,
     /// Whether it was named, so that its absence is an error.

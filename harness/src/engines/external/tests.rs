@@ -77,7 +77,7 @@ fn the_version_changes_with_the_command_and_with_the_files_that_it_names() {
     std::fs::write(folder.path().join("mine.sh"), "one").unwrap();
     let version = |words: serde_json::Value| {
         let settings = BTreeMap::from([("command".to_owned(), words)]);
-        External::new("mine", &settings, folder.path()).unwrap().probe(&site).unwrap().0
+        External::new("mine", &settings, folder.path()).unwrap().probe(&site).unwrap().text
     };
     let before = version(json!(["sh", "mine.sh"]));
     assert_eq!(before, version(json!(["sh", "mine.sh"])));
@@ -87,6 +87,30 @@ fn the_version_changes_with_the_command_and_with_the_files_that_it_names() {
     let absent = BTreeMap::from([("command".to_owned(), json!(["./gone"]))]);
     let absent = External::new("mine", &absent, folder.path()).unwrap().probe(&site).unwrap_err();
     assert!(absent.to_string().contains("./gone"), "{absent}");
+}
+
+#[test]
+fn the_fingerprint_changes_with_sources_beside_the_adapter_and_with_what_it_depends_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    std::fs::create_dir(folder.path().join("package")).unwrap();
+    for name in ["mine.py", "module.py", "package/part.py", "table.txt", "notes.txt"] {
+        write(name, "one");
+    }
+    let settings = json!({"command": ["sh", "mine.py"], "depends_on": ["table.txt"]});
+    let settings: BTreeMap<_, _> = serde_json::from_value(settings).unwrap();
+    let site = Site::at(folder.path().join("engines"));
+    let now = || External::new("mine", &settings, folder.path()).unwrap().probe(&site).unwrap().fingerprint;
+    let mut before = now();
+    for name in ["module.py", "package/part.py", "table.txt"] {
+        write(name, "another");
+        assert_ne!(before, now(), "{name}");
+        before = now();
+    }
+    write("notes.txt", "another");
+    assert_eq!(before, now());
+    std::fs::remove_file(folder.path().join("table.txt")).unwrap();
+    assert!(External::new("mine", &settings, folder.path()).unwrap().probe(&site).is_err());
 }
 
 #[test]

@@ -58,10 +58,12 @@ impl Backend {
         Self { llvm: None, ..self }
     }
 
-    pub(super) fn version(&self) -> Version {
+    pub(super) fn version(&self, site: &Site) -> Version {
         let Versions { mitsuba, drjit, llvm } = &self.versions;
         let llvm = llvm.as_ref().map_or("no usable LLVM".to_owned(), |v| format!("LLVM {v}"));
-        Version(format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"))
+        let packages = ["mitsuba", "drjit"].iter().filter_map(|name| site.python_package(name));
+        let files = packages.chain(self.llvm.clone()).chain(self.python.canonicalize());
+        Version::of(format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"), site, files)
     }
 
     pub(super) fn command_by_hand(&self) -> String {

@@ -31,13 +31,13 @@ impl Tools {
     }
 
     /// The version that rtrace names: `RADIANCE 6.0a ...`, its first two words.
-    pub(super) fn version(&self) -> Result<Version, Absent> {
+    pub(super) fn version(&self, site: &Site) -> Result<Version, Absent> {
         let absent = |reason: String| Absent { reason, remedy: "run `luxproof engines install` again".into() };
         let done = process::ask(self.program("rtrace"), "-version", |asked| self.prepared(asked));
         let done = done.map_err(|error| absent(error.to_string()))?;
         let text = String::from_utf8_lossy(&done.stdout).into_owned();
         let version = text.split_whitespace().nth(1).ok_or_else(|| absent(format!("rtrace -version says `{text}`")))?;
-        Ok(Version(version.to_owned()))
+        Ok(Version::of(version, site, [self.package.clone()]))
     }
 
     pub(super) fn compile(&self, workbench: &Workbench) -> Result<(), EngineError> {

@@ -81,7 +81,7 @@ pub fn bench(
     let bench = Bench { trials: Trials::new(case, &options.reader, options.time), options, progress };
     report.machine = machine();
     for subject in subjects {
-        report.engines.insert(subject.engine.name(), subject.version.0.clone());
+        report.engines.insert(subject.engine.name(), subject.version.text.clone());
     }
     let asked = |procedure: ProcedureId| match options.procedures {
         [] => procedure != ProcedureId::LuminousIntensity,

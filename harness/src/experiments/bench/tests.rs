@@ -37,7 +37,7 @@ fn benched(knobs: Knobs) -> BenchReport {
         knobs,
     };
     let engine = Arc::new(Fake { knobs: KNOBS, ..Fake::new("known", known_law) });
-    let subjects = [Instrument { engine, version: Version("1".into()) }];
+    let subjects = [Instrument { engine, version: Version::told("1") }];
     let mut report = BenchReport::default();
     bench(&Case::load(&path).unwrap(), &subjects, &options, &(), &mut report);
     report

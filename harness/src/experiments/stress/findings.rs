@@ -146,7 +146,7 @@ impl StressReport {
             LawReport::new(engine.clone(), law, points, &known.collect::<Vec<_>>())
         };
         let alike = |a: &Found, b: &Found| (a.0, a.1.id) == (b.0, b.1.id);
-        let engines = subjects.iter().map(|s| (s.engine.name(), s.version.0.clone())).collect();
+        let engines = subjects.iter().map(|s| (s.engine.name(), s.version.text.clone())).collect();
         Self { case: case.name.clone(), engines, laws: found.chunk_by(alike).map(report).collect() }
     }
 

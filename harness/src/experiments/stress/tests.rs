@@ -61,7 +61,7 @@ fn stressed_knowing(folder: &std::path::Path, laws: &[&str], time: Duration, kno
         known,
     };
     let engine = Arc::new(Fake { supports: at_most_a_hundred, ..Fake::new("fragile", fragile) });
-    let subjects = [Instrument { engine, version: Version("1".into()) }];
+    let subjects = [Instrument { engine, version: Version::told("1") }];
     stress(&axial(), &subjects, &options, &())
 }
 

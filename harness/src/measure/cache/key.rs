@@ -38,7 +38,8 @@ pub fn key(engine: &dyn Engine, version: &Version, job: &Job) -> Result<Key, Eng
     part(env!("LUXPROOF_READ_OUT").as_bytes());
     part(env!("CARGO_PKG_VERSION").as_bytes());
     part(id.as_str().as_bytes());
-    part(version.0.as_bytes());
+    part(version.text.as_bytes());
+    part(version.fingerprint.as_bytes());
     part(&ExternalJob::of(&job).to_json().map_err(unwritable)?);
     part(&serde_json::to_vec(&job.settings).map_err(unwritable)?);
     for _ in &job.stations {
@@ -63,11 +64,11 @@ mod tests {
     fn whatever_may_change_a_reading_changes_the_key_and_names_do_not() {
         let job = fixtures::s1(Transport::Total(luminaire::scene::Bounces::Converged));
         for engine in all() {
-            let of = |job: &Job| key(engine.as_ref(), &Version("1".into()), job).unwrap();
+            let of = |job: &Job| key(engine.as_ref(), &Version::told("1"), job).unwrap();
             let plain = of(&job);
             let renamed = Job { case: "other".into(), procedure: ProcedureId::DirectIlluminance, ..job.clone() };
             assert_eq!(plain, of(&renamed));
-            assert_ne!(plain, key(engine.as_ref(), &Version("2".into()), &job).unwrap());
+            assert_ne!(plain, key(engine.as_ref(), &Version::told("2"), &job).unwrap());
             assert!(plain != plain.under("2 threads") && plain.under("1 thread") != plain.under("2 threads"));
             let changes: [fn(&mut Job); 6] = [
                 |job| job.seed = 2,
@@ -92,7 +93,7 @@ mod tests {
         let mut impostor = area.clone();
         impostor.scene.luminaires[0].model = LuminaireModel::Impostor;
         for engine in all().iter().filter(|e| ["simulator", "radiance"].contains(&e.name().as_str())) {
-            let of = |job: &Job| key(engine.as_ref(), &Version("1".into()), job).unwrap();
+            let of = |job: &Job| key(engine.as_ref(), &Version::told("1"), job).unwrap();
             assert_eq!(of(&area) == of(&impostor), engine.name() == "simulator");
         }
     }
