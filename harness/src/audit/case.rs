@@ -50,7 +50,9 @@ impl Audit<'_> {
             outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure).collect()
         };
         let tasks = || plan.tasks.iter();
-        let comparisons = tasks().flat_map(|task| compared(task, &of(task), &judge)).collect();
+        let mut comparisons: Vec<Comparison> = tasks().flat_map(|task| judge.compare(task, &of(task))).collect();
+        diagnosis::diagnose(&plan.tasks, &mut comparisons);
+        sequential::estimate_remaining_cost(&mut comparisons, &outcome.recordings);
         // What follows from other readings follows from nothing where the case was never begun.
         let holds = |s: &&Skip| stop.is_none() || s.scope.leaves_no_reading();
         let skips = plan.skips.iter().filter(holds).cloned().chain(outcome.skips).collect();
@@ -84,12 +86,4 @@ impl Audit<'_> {
         }
         Ok(outcome)
     }
-}
-
-/// Holds readings of a task against their references and says of those that fail or are undecided why.
-fn compared(task: &Task, recordings: &[&Recording], judge: &Judge<'_>) -> Vec<Comparison> {
-    let mut comparisons = judge.compare(task, recordings);
-    diagnosis::diagnose(task, &mut comparisons);
-    sequential::estimate_remaining_cost(&mut comparisons, recordings);
-    comparisons
 }

@@ -138,10 +138,10 @@ fn effort(comparison: &Comparison) -> Option<f64> {
 }
 
 /// Tells of each undecided comparison what would decide it.
-pub fn estimate_remaining_cost(comparisons: &mut [Comparison], recordings: &[&Recording]) {
+pub fn estimate_remaining_cost(comparisons: &mut [Comparison], recordings: &[Recording]) {
     for comparison in comparisons {
         let Some(times) = effort(comparison) else { continue };
-        let Some(recording) = recordings.iter().find(|r| r.key.engine == comparison.key.engine) else { continue };
+        let Some(recording) = recordings.iter().find(|r| r.key == comparison.key) else { continue };
         let text = if times.is_infinite() {
             let others = "its other uncertainties alone straddle the tolerance".to_owned();
             format!("undecided, and more samples of {} would not help: {others}", comparison.key.engine)
@@ -224,7 +224,7 @@ mod tests {
         refine(&judge, &task, &[&exact], &mut subject, (first, whole), &mut sample);
         let mut compared = judge.compare(&task, &[&exact, &subject]);
         compared.retain(|c| c.key.engine == "radiance");
-        estimate_remaining_cost(&mut compared, &[&subject]);
+        estimate_remaining_cost(&mut compared, std::slice::from_ref(&subject));
         for c in &compared {
             assert_eq!(c.verdict == Verdict::Inconclusive, c.diagnosis.is_some(), "{c:?}");
         }

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 use crate::judge::{Basis, Comparison, Verdict};
 use crate::procedures::Task;
-use crate::record::EngineName;
+use crate::record::{EngineName, ProcedureId};
 
 pub use faults::{Effect, Fault, faults, truth};
 
@@ -29,30 +29,70 @@ pub struct Cause {
     pub text: String,
     /// What went wrong, without the evidence.
     pub what: String,
+    /// The factor that was fitted, with its standard error, where one was.
+    fitted: Option<(f64, f64)>,
     /// Chi-squared of what it leaves, and what its free parameter costs.
     score: f64,
 }
 
-pub fn diagnose(task: &Task, comparisons: &mut [Comparison]) {
-    let key = |c: &Comparison| Some((c.key.engine.clone(), c.reference.as_ref()?.basis));
+/// What explains the failed readings of one engine in one task.
+struct Found {
+    engine: EngineName,
+    basis: Basis,
+    procedure: ProcedureId,
+    /// The faults that its readings could show.
+    offered: BTreeSet<&'static str>,
+    causes: Vec<Cause>,
+}
+
+/// Says of the failures of a case why, task by task; what is fitted to one task must hold in every other that fails, too.
+pub fn diagnose(tasks: &[Task], comparisons: &mut [Comparison]) {
+    let group = |c: &Comparison| Some((c.key.procedure, c.key.engine.clone(), c.reference.as_ref()?.basis));
     let failed = comparisons.iter().filter(|c| c.verdict == Verdict::Fail);
-    let groups: BTreeSet<(EngineName, Basis)> = failed.filter_map(key).collect();
-    for group in groups {
+    let groups: BTreeSet<_> = failed.filter_map(group).collect();
+    let mut all = vec![];
+    for (procedure, engine, basis) in groups {
         // Printed values and calculators are off by more than a renderer's fault.
-        if !matches!(group.1, Basis::ClosedForm | Basis::Exact) || group.0 == "iesna" {
+        if !matches!(basis, Basis::ClosedForm | Basis::Exact) || engine == "iesna" {
             continue;
         }
-        let mine = |c: &&mut Comparison| key(c).as_ref() == Some(&group);
-        let members: Vec<&mut Comparison> = comparisons.iter_mut().filter(mine).collect();
-        let Some(readings) = Readings::of(&members) else { continue };
+        let mine = |c: &&Comparison| group(c).is_some_and(|g| g == (procedure, engine.clone(), basis));
+        let members: Vec<&Comparison> = comparisons.iter().filter(mine).collect();
+        let task = tasks.iter().find(|task| task.procedure == procedure);
+        let Some((task, readings)) = task.zip(Readings::of(&members)) else { continue };
         let faults = faults(task, &readings.right);
-        let found: Vec<String> = causes(&faults, &readings).into_iter().map(|c| c.text).collect();
-        let text = (!found.is_empty()).then(|| found.join("; or "));
-        for comparison in members.into_iter().filter(|c| c.verdict == Verdict::Fail && c.diagnosis.is_none()) {
-            comparison.diagnosis.clone_from(&text);
-        }
+        let (offered, causes) = (faults.iter().map(|f| f.id).collect(), causes(&faults, &readings));
+        all.push(Found { engine, basis, procedure, offered, causes });
+    }
+    for found in &all {
+        let rest = || all.iter().filter(|other| other.engine == found.engine);
+        let held = found.causes.iter().filter(|cause| rest().all(|other| cause.holds_in(other)));
+        let text: Vec<&str> = held.map(|cause| cause.text.as_str()).collect();
+        let mine = comparisons.iter_mut().filter(|c| {
+            c.verdict == Verdict::Fail
+                && c.diagnosis.is_none()
+                && c.key.procedure == found.procedure
+                && c.key.engine == found.engine
+                && c.basis() == Some(found.basis)
+        });
+        mine.for_each(|c| c.diagnosis = (!text.is_empty()).then(|| text.join("; or ")));
     }
 }
+
+impl Cause {
+    /// Whether what was fitted explains what else failed, as far as that could show it.
+    fn holds_in(&self, other: &Found) -> bool {
+        let Some((value, error)) = self.fitted else { return true };
+        let agrees = |c: &Cause| {
+            let (same, its_error) = c.fitted.unwrap_or((value, 0.0));
+            c.id == self.id && (value - same).abs() <= 3.0 * error.hypot(its_error) + 2.0 * SLACK * value
+        };
+        (self.id != FACTOR && !other.offered.contains(self.id)) || other.causes.iter().any(agrees)
+    }
+}
+
+/// The id of a factor that is no fault's.
+const FACTOR: &str = "factor";
 
 #[derive(Clone, Debug)]
 pub struct Readings {
@@ -64,7 +104,7 @@ pub struct Readings {
 
 impl Readings {
     /// `None` where one of them is missing: what is not there cannot be explained.
-    fn of(members: &[&mut Comparison]) -> Option<Self> {
+    fn of(members: &[&Comparison]) -> Option<Self> {
         let mut readings = Self { read: vec![], right: vec![], uncertainty: vec![] };
         for comparison in members {
             let reference = comparison.reference.as_ref()?;
@@ -131,7 +171,7 @@ fn is_chance(chi_squared: f64, freedom: usize) -> bool {
 }
 
 fn explanation(fault: &Fault, readings: &Readings) -> Option<Cause> {
-    let n = readings.len();
+    let (n, mut fitted) = (readings.len(), None);
     let (predicted, parameters, found) = match &fault.effect {
         Effect::Factor(_) => {
             let (factor, error) = readings.factor(&readings.right)?;
@@ -141,7 +181,8 @@ fn explanation(fault: &Fault, readings: &Readings) -> Option<Cause> {
         Effect::Values(values) => (values.clone(), 0, None),
         Effect::Shape(_) => {
             let shape = fault.readings(&readings.right)?;
-            let (factor, _) = readings.factor(&shape)?;
+            let (factor, error) = readings.factor(&shape)?;
+            fitted = Some((factor, error));
             (shape.iter().map(|s| factor * s).collect(), 1, None)
         }
         Effect::Clamp => {
@@ -167,6 +208,7 @@ fn explanation(fault: &Fault, readings: &Readings) -> Option<Cause> {
     let chi_squared = readings.chi_squared(&predicted);
     is_chance(chi_squared, n - parameters).then(|| Cause {
         id: fault.id,
+        fitted,
         what: fault.what.clone(),
         text: match found {
             Some(found) => format!("{}: {found}", fault.what),
@@ -188,7 +230,8 @@ fn unnamed_factor(readings: &Readings) -> Option<Cause> {
     let chi_squared = readings.chi_squared(&predicted);
     let what = format!("factor {factor:.4}, none of those known");
     (n >= 3 && is_chance(chi_squared, n - 1)).then(|| Cause {
-        id: "factor",
+        id: FACTOR,
+        fitted: Some((factor, error)),
         text: format!("{what}: all {n} readings are {factor:.4} ± {error:.4} times the reference"),
         what,
         score: chi_squared,
