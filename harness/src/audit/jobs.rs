@@ -14,7 +14,6 @@ use crate::spec::Case;
 use crate::system::files::{self, FileError};
 use crate::system::slots::side_by_side;
 
-/// A case under way.
 pub struct Running<'a> {
     pub case: &'a Case,
     pub plan: &'a Plan,
@@ -38,7 +37,6 @@ pub struct Outcome {
     pub from_cache: usize,
 }
 
-/// What became of one run of the plan.
 enum Done {
     Recorded(Box<Recording>, Option<Source>),
     Declined(Skip),

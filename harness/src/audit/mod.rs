@@ -46,9 +46,7 @@ use case::{Audit, Stop};
 pub use observer::{Observer, Silent};
 pub use sampling::Sampling;
 
-/// How to audit.
 pub struct Options<'a> {
-    /// Where engines are installed.
     pub site: Site,
     /// The folder of the run's files: the report, readings, scenes and logs.
     pub out: PathBuf,
@@ -68,7 +66,6 @@ pub struct Options<'a> {
     pub after_failure: AfterFailure,
     /// Whether engines read scenes of known answer besides.
     pub calibration: Calibration,
-    /// Told of what happens.
     pub observer: &'a dyn Observer,
 }
 

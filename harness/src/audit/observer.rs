@@ -11,7 +11,6 @@ use crate::spec::Case;
 pub trait Observer: Sync {
     /// All cases are planned; their plans lie beside them.
     fn planned(&self, _cases: &[Case], _plans: &[Plan]) {}
-    /// A job starts.
     fn started(&self, _case: &Case, _engine: &dyn Engine, _what: &str) {}
     /// A job ended, with its failure if it failed.
     fn ended(

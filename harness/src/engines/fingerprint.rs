@@ -16,9 +16,7 @@ use crate::system::files;
 const MAX_FILES: usize = 20_000;
 
 /// Hashes of files that have not changed since, by path: size and time of change tell.
-#[derive(Default, Serialize, Deserialize)]
-#[serde(transparent)]
-struct Memo(BTreeMap<PathBuf, Known>);
+type Memo = BTreeMap<PathBuf, Known>;
 
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 struct Known {
@@ -36,11 +34,11 @@ pub(super) fn of(site: &Site, paths: impl IntoIterator<Item = PathBuf>) -> Strin
     let memo: Memo = std::fs::read(&place).ok().and_then(|b| serde_json::from_slice(&b).ok()).unwrap_or_default();
     let (mut now, mut hash) = (Memo::default(), Sha256::new());
     for path in paths.iter().flat_map(|path| below(path)) {
-        let known = seen(&path, memo.0.get(&path));
+        let known = seen(&path, memo.get(&path));
         hash.update(known.as_ref().map_or_else(ToString::to_string, |k| k.sha256.clone()));
-        now.0.extend(known.map(|known| (path, known)));
+        now.extend(known.map(|known| (path, known)));
     }
-    if now.0 != memo.0 {
+    if now != memo {
         // Where it cannot be kept, files are read again next time.
         files::keep_json(&place, &now).ok();
     }
@@ -72,27 +70,4 @@ fn below(path: &Path) -> Vec<PathBuf> {
     }
     found.sort();
     found
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn another_content_is_another_engine_and_the_same_is_not_read_twice() {
-        let folder = tempfile::tempdir().unwrap();
-        let site = Site::at(folder.path().join("engines"));
-        let (program, module) = (folder.path().join("rtrace"), folder.path().join("lib/module.py"));
-        std::fs::create_dir(folder.path().join("lib")).unwrap();
-        std::fs::write(&program, "one").unwrap();
-        std::fs::write(&module, "one").unwrap();
-        let now = || of(&site, [program.clone(), folder.path().join("lib")]);
-        let first = now();
-        assert_eq!(first, now());
-        std::fs::write(&module, "two").unwrap();
-        let second = now();
-        assert_ne!(first, second);
-        std::fs::remove_file(&program).unwrap();
-        assert_ne!(second, now());
-    }
 }

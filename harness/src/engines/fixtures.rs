@@ -200,7 +200,6 @@ pub(crate) fn worst_relative(measurement: &Measurement, exact: &[f64]) -> f64 {
     worst(&relative_deviations(measurement, exact))
 }
 
-/// Our own solution of the same job.
 pub(crate) fn simulated_lx(job: &Job, relative_error: f64) -> Vec<f64> {
     let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();
     let accuracy = Accuracy { relative_error, seed: 1 };

@@ -129,7 +129,9 @@ fn sum(direct: &Measurement, mut indirect: Measurement) -> Measurement {
 fn support(job: &Job) -> Support {
     let unsupported = || job.scene.luminaires.iter().find_map(unsupported_luminaire);
     let objection = ENTRY.objection(job).or_else(unsupported);
-    if let Some(why) = objection.or_else(|| filters_in_the_way(job)).or_else(|| too_near(job)).or_else(|| narrow(job)) {
+    if let Some(why) =
+        objection.or_else(|| filters_in_the_way(job)).or_else(|| too_near(job)).or_else(|| frame::narrow(job))
+    {
         return Support::No(why);
     }
     let Some(bounces) = job.reflections() else { return Support::Yes };
@@ -215,12 +217,6 @@ fn filters_in_the_way(job: &Job) -> Option<String> {
         }
     }
     None
-}
-
-fn narrow(job: &Job) -> Option<String> {
-    let (a, b) = frame::narrow(job)?;
-    let (a, b) = (&a.id, &b.id);
-    Some(format!("{a} and {b} are at one point and nearly parallel, where POV-Ray's discs would hide one another"))
 }
 
 /// A meter so near an opening that it tells the opening's point lights apart.

@@ -29,13 +29,11 @@ pub struct Plan {
     pub tasks: Vec<Task>,
     /// The engines that take part, in order.
     pub engines: Vec<Planned>,
-    /// What will run.
     pub runs: Vec<Run>,
     /// What will not, and why.
     pub skips: Vec<Skip>,
 }
 
-/// An engine of the plan.
 pub struct Planned {
     /// The engine; one that knows itself by now is shared by all cases.
     pub engine: Arc<dyn Engine>,
@@ -74,13 +72,11 @@ pub enum Asked {
     AsReference,
 }
 
-/// One engine on one procedure.
 pub struct Run {
     /// Index into [`Plan::engines`].
     pub engine: usize,
     /// Index into [`Plan::tasks`].
     pub task: usize,
-    /// What the engine is asked.
     pub job: Job,
     /// Where the engine only approximates what is asked.
     pub approximation: Option<String>,
@@ -172,7 +168,6 @@ pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, Spe
 /// Whether readings may be left out that follow from others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Skipping {
-    /// They may.
     Allowed,
     /// Everything is rendered.
     Nothing,
@@ -188,12 +183,10 @@ pub struct Planner<'a> {
 }
 
 impl<'a> Planner<'a> {
-    /// A planner that has seen no case yet.
     pub fn new(selection: &'a Selection, site: &'a Site, skipping: Skipping) -> Self {
         Self { selection, site, skipping, roster: Roster::new(), repeated: Repeated::default() }
     }
 
-    /// Plans the next case.
     pub fn plan(&mut self, case: &Case) -> Result<Plan, SpecError> {
         let tasks = tasks(case, self.selection)?;
         let chosen = self.roster.chosen(case, self.selection)?;
@@ -209,25 +202,22 @@ impl<'a> Planner<'a> {
     pub fn calibrations(&mut self, cases: &[Case], plans: &[Plan]) -> Result<Vec<(Case, Plan)>, SpecError> {
         let (mut done, mut all) = (vec![], vec![]);
         for (case, plan) in cases.iter().zip(plans) {
-            let mut fresh = vec![];
-            for run in plan.runs.iter().filter(|run| !plan.engines[run.engine].engine.is_witness()) {
-                let reflects = run.job.transport != Transport::Direct;
-                let what = (plan.engines[run.engine].engine.name(), run.job.settings.clone(), reflects);
-                // A program of the user's own lies beside the spec.
-                let place = what.1.contains_key("command").then(|| case.path.parent().map(Path::to_owned)).flatten();
-                if !done.contains(&(what.clone(), place.clone())) {
-                    fresh.push((what.0.clone(), reflects));
-                    done.push((what, place));
-                }
-            }
+            // A program of the user's own lies beside the spec.
+            let what = |run: &Run| {
+                let is_direct = run.job.transport == Transport::Direct;
+                let engine = plan.engines[run.engine].engine.name();
+                (engine, run.job.settings.clone(), is_direct, case.path.parent().map(Path::to_owned))
+            };
+            let renderers = plan.runs.iter().filter(|run| !plan.engines[run.engine].engine.is_witness());
+            let fresh: Vec<_> = renderers.map(what).filter(|what| !done.contains(what)).collect();
             if fresh.is_empty() {
                 continue;
             }
-            let mut scenes = known::tasks();
-            scenes.retain(|t| t.transport == Transport::Direct || fresh.iter().any(|(_, reflects)| *reflects));
-            let wanted = |engine: &EngineName| fresh.iter().any(|(name, _)| name == engine);
+            let is_asked = |t: &Task| t.transport == Transport::Direct || fresh.iter().any(|what| !what.2);
+            let scenes = known::tasks().into_iter().filter(is_asked).collect();
             let of = if all.is_empty() { "" } else { case.name.as_str() };
-            all.push(self.known(case, of, scenes, &wanted)?);
+            all.push(self.known(case, of, scenes, &|engine| fresh.iter().any(|what| what.0 == *engine))?);
+            done.extend(fresh);
         }
         Ok(all)
     }

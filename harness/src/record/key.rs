@@ -77,7 +77,6 @@ impl ProcedureId {
     }
 }
 
-/// There is no such procedure.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("there is no procedure `{name}`; there are {}", ProcedureId::NAMES.join(", "))]
 pub struct UnknownProcedure {

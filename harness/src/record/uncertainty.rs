@@ -28,7 +28,6 @@ pub enum Uncertainty {
 }
 
 impl Uncertainty {
-    /// A standard error alone.
     pub const fn sampled(value: f64, degrees_of_freedom: Option<f64>) -> Self {
         Self::StandardError { value, degrees_of_freedom, bound: 0.0 }
     }

@@ -42,13 +42,11 @@ pub struct Case {
     pub scene: Scene,
     /// Meters by set.
     pub meters: BTreeMap<String, Vec<Meter>>,
-    /// What is measured.
     pub procedures: Procedures,
     /// The engines that the spec names, with settings; `None` where it names none.
     pub engines: Option<BTreeMap<String, EngineSettings>>,
     /// The engines that a case of a suite is for, where its overrides name some; others are skipped.
     pub only_engines: Option<Vec<String>>,
-    /// When an engine may stop.
     pub budget: Budget,
     /// The published tables, absolute or relative to the working directory.
     pub published: Option<PathBuf>,
@@ -360,7 +358,6 @@ impl<'a> Builder<'a> {
         self.folder.join(file)
     }
 
-    /// Adds a file to the case's hash.
     fn take_in(&mut self, at: &str, path: &Path) -> Result<(), SpecError> {
         let bytes = std::fs::read(path).map_err(|error| {
             let message = format!("{} cannot be read: {error}", path.display());
@@ -404,7 +401,6 @@ fn extent(shape: &Shape) -> (DVec3, DVec3) {
     }
 }
 
-/// Bytes as hexadecimal digits.
 pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().fold(String::new(), |mut text, byte| {
         write!(text, "{byte:02x}").ok();

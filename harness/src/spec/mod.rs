@@ -51,7 +51,6 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads a spec file.
     pub fn read(path: &Path) -> Result<Self, SpecError> {
         let fail = |message: String, help| SpecError::of(path, message, help);
         let bytes = std::fs::read(path).map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
@@ -59,7 +58,6 @@ impl Source {
         Ok(Self::new(path.to_owned(), text))
     }
 
-    /// The text of a spec file.
     pub fn new(path: PathBuf, text: String) -> Self {
         Self { path, text, overrides: vec![] }
     }

@@ -115,7 +115,7 @@ const NARROW: f64 = 0.05;
 const REACH: f64 = 5e-3;
 
 /// Two meters at one point that look nearly the same way: one's disc would be seen for the other's.
-pub(super) fn narrow(job: &Job) -> Option<(&Station, &Station)> {
+pub(super) fn narrow(job: &Job) -> Option<String> {
     let frame = Frame::of(job, Coordinates::Fitted);
     job.stations.iter().enumerate().find_map(|(k, a)| {
         let hides = |b: &&Station| {
@@ -123,7 +123,9 @@ pub(super) fn narrow(job: &Job) -> Option<(&Station, &Station)> {
             let apart = a.meter.position_m.distance(b.meter.position_m) * frame.scale;
             apart < REACH && (PARALLEL..NARROW).contains(&sine) && a.meter.normal.dot(b.meter.normal) > 0.0
         };
-        job.stations[k + 1..].iter().find(hides).map(|b| (a, b))
+        let b = job.stations[k + 1..].iter().find(hides)?;
+        let why = "are at one point and nearly parallel, where POV-Ray's discs would hide one another";
+        Some(format!("{} and {} {why}", a.id, b.id))
     })
 }
 
