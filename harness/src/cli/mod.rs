@@ -130,6 +130,7 @@ impl Selected {
 }
 
 #[derive(Debug, Args)]
+#[allow(clippy::struct_excessive_bools, reason = "switches of a command line")]
 struct RunArgs {
     #[command(flatten)]
     selected: Selected,

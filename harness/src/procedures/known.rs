@@ -5,8 +5,8 @@
 //! - **Luminaires**: three that differ in table, rotation and flux; shows one that is lost, or takes another's table.
 //! - **Shadow**: a box between luminaire and meters in a black room; shows light that leaks or meters that are missed.
 //! - **Furnace**: a cube that its luminaire lights evenly, so that reflected light is the same everywhere in every direction,
-//!   E = rho / (1 - rho) x flux / area, to 7e-4; in its middle it shows what a method of reflected light loses or gains, 5 mm
-//!   from a wall, an edge and a corner what caches and offsets blur.
+//!   E = rho / (1 - rho) x flux / area, to 7e-4 but in corners, where the table is straight across a bend; in its middle it shows
+//!   what a method of reflected light loses or gains, 5 mm from surfaces and an edge what caches and offsets blur.
 //! - **Reflectances**: floor, walls and ceiling that differ, against the simulator; shows surfaces that are exchanged or lost.
 
 use std::sync::Arc;
@@ -132,8 +132,8 @@ fn furnace() -> Task {
         ([0.3, 1.5, 1.2], DVec3::X),
         ([1.6, 1.3, 0.4], DVec3::new(0.36, -0.48, 0.8)),
         ([0.005, 0.6, 0.7], DVec3::X),
+        ([1.2, 1.0, 1.995], DVec3::NEG_Z),
         ([0.005, 0.005, 1.2], DVec3::new(0.6, 0.8, 0.0)),
-        ([1.995, 1.995, 0.005], DVec3::Z),
     ]
     .map(|(p, n)| (DVec3::from(p), n));
     task(ProcedureId::Furnace, evenly_lit(), &meters, REFLECTED)
