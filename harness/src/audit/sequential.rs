@@ -98,6 +98,8 @@ fn combine(reading: &mut Reading, before: f64, look: &Estimate, weight: f64) {
     let total = before + weight;
     reading.value = (before * reading.value + weight * look.value) / total;
     reading.uncertainty = match (reading.uncertainty, look.uncertainty) {
+        // Nothing met again, by a look that was asked for this meter alone.
+        (Uncertainty::NotSeen, other) if other.standard_error() == Some(0.0) => Uncertainty::NotSeen,
         // What an empty look would scatter is what the other does, by its effort.
         (Uncertainty::NotSeen, other) if other != Uncertainty::NotSeen => other.times((weight / total).sqrt()),
         (seen, Uncertainty::NotSeen) if seen != Uncertainty::NotSeen => seen.times((before / total).sqrt()),
