@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::Report;
-use super::words::{largest, mark, percent, unique};
+use super::words::{largest, mark, percent};
 use crate::judge::{Basis, Comparison, Verdict};
 use crate::record::{EngineName, ProcedureId, ReadingKey, Recording, Role};
 
@@ -50,10 +50,7 @@ impl Cell {
 pub(super) fn matrix(report: &Report) -> Vec<Row> {
     let of_case = |case| report.procedures().into_iter().map(move |procedure| (case, procedure));
     let mut rows = vec![];
-    // Scenes of known answer are no case of a spec.
-    let named = report.cases.iter().map(|c| c.name.as_str());
-    let cases = unique(named.chain(report.comparisons.iter().map(|c| c.key.case.as_str())));
-    for (case, procedure) in cases.into_iter().flat_map(of_case) {
+    for (case, procedure) in report.case_names().into_iter().flat_map(of_case) {
         let comparisons: Vec<&Comparison> =
             report.comparisons.iter().filter(|c| c.key.is_of(case, procedure)).collect();
         for basis in comparisons.iter().map(|c| c.basis()).collect::<BTreeSet<Option<Basis>>>() {

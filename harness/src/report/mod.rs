@@ -166,6 +166,12 @@ impl Report {
         Self { paper_splits: papers::splits(&joined), ..joined }
     }
 
+    /// The cases of specs, and behind them those of known answer.
+    fn case_names(&self) -> Vec<&str> {
+        let read = self.recordings.iter().map(|r| &r.key).chain(self.skips.iter().map(|s| &s.key));
+        words::unique(self.cases.iter().map(|c| &c.name).chain(read.map(|key| &key.case)).map(String::as_str))
+    }
+
     fn is_suite(&self) -> bool {
         self.cases.len() > 1
     }
