@@ -95,16 +95,8 @@ pub fn refine(
 
 /// Adds a look to a reading, with weights that were fixed before.
 fn combine(reading: &mut Reading, before: f64, look: &Estimate, weight: f64) {
-    let total = before + weight;
-    reading.value = (before * reading.value + weight * look.value) / total;
-    reading.uncertainty = match (reading.uncertainty, look.uncertainty) {
-        // Nothing met again, by a look that was asked for this meter alone.
-        (Uncertainty::NotSeen, other) if other.standard_error() == Some(0.0) => Uncertainty::NotSeen,
-        // What an empty look would scatter is what the other does, by its effort.
-        (Uncertainty::NotSeen, other) if other != Uncertainty::NotSeen => other.times((weight / total).sqrt()),
-        (seen, Uncertainty::NotSeen) if seen != Uncertainty::NotSeen => seen.times((before / total).sqrt()),
-        (seen, other) => Uncertainty::of_sum([(before / total, seen), (weight / total, other)]),
-    };
+    reading.value = (before * reading.value + weight * look.value) / (before + weight);
+    reading.uncertainty = Uncertainty::of_looks([(before, reading.uncertainty), (weight, look.uncertainty)]);
 }
 
 /// The targets at which more samples would decide something.
@@ -122,15 +114,15 @@ fn effort(comparison: &Comparison) -> Option<f64> {
     if comparison.verdict != Verdict::Inconclusive {
         return None;
     }
+    if comparison.uncertainty == Uncertainty::NotSeen {
+        return Some(1.0);
+    }
     let (budget, deviation) = (comparison.budget.as_ref()?, comparison.deviation?);
     let square = |sampled: bool| -> f64 {
         let chosen = budget.components.iter().filter(|c| (c.source == Source::MonteCarlo) == sampled);
         chosen.map(|c| c.uncertainty.powi(2)).sum()
     };
     let (sampled, fixed) = (square(true), square(false));
-    if comparison.uncertainty == Uncertainty::NotSeen {
-        return Some(1.0);
-    }
     if sampled == 0.0 {
         return None;
     }

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 use crate::judge::{Basis, Comparison, Verdict};
 use crate::procedures::Task;
-use crate::record::{EngineName, ProcedureId};
+use crate::record::{EngineName, ProcedureId, Uncertainty};
 
 pub use faults::{Effect, Fault, faults, truth};
 
@@ -110,7 +110,11 @@ impl Readings {
             let reference = comparison.reference.as_ref()?;
             readings.read.push(comparison.value.filter(|v| v.is_finite())?);
             readings.right.push(reference.value);
-            let error = comparison.uncertainty.standard_error().unwrap_or(0.0);
+            let error = match comparison.uncertainty {
+                // It bears out anything.
+                Uncertainty::NotSeen => f64::INFINITY,
+                other => other.standard_error().unwrap_or(0.0),
+            };
             readings.uncertainty.push(error.hypot(reference.uncertainty));
         }
         Some(readings)
@@ -143,7 +147,8 @@ impl Readings {
     /// The largest relative distance from a prediction, in percent.
     fn worst_percent(&self, predicted: &[f64]) -> f64 {
         let largest = predicted.iter().copied().fold(0.0, f64::max);
-        let off = self.read.iter().zip(predicted).map(|(y, p)| (y - p).abs() / p.max(FLOOR * largest));
+        let told = (0..self.len()).filter(|k| self.uncertainty[*k].is_finite());
+        let off = told.map(|k| (self.read[k] - predicted[k]).abs() / predicted[k].max(FLOOR * largest));
         100.0 * off.filter(|x| x.is_finite()).fold(0.0, f64::max)
     }
 }

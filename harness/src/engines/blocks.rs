@@ -33,10 +33,13 @@ impl Blocks {
 
     /// The mean at each station, with as many degrees of freedom as there are blocks less one.
     pub fn estimates(&self) -> Vec<Estimate> {
-        let stations = 0..self.0.first().map_or(0, Vec::len);
-        let mut all: Vec<Estimate> = stations.map(|k| self.weighted(&[(k, 1.0)])).collect();
+        let mut all: Vec<Estimate> = self.stations().map(|k| self.weighted(&[(k, 1.0)])).collect();
         Estimate::mark_unseen(&mut all);
         all
+    }
+
+    fn stations(&self) -> Range<usize> {
+        0..self.0.first().map_or(0, Vec::len)
     }
 
     /// The weighted sum over stations, with the error that their joint sampling gives it.
@@ -54,12 +57,13 @@ impl Blocks {
 
     /// The largest standard error relative to its reading, which is the mean less `known_lx`, light that is not sampled.
     pub fn worst_error(&self, known_lx: &[f64]) -> f64 {
-        let relative = |(k, mean): (usize, Estimate)| {
+        let relative = |k: usize| {
+            let mean = self.weighted(&[(k, 1.0)]);
             let error = mean.uncertainty.standard_error().unwrap_or(f64::INFINITY);
             let reading = mean.value - known_lx.get(k).unwrap_or(&0.0);
             if error == 0.0 { 0.0 } else { error / reading.max(f64::MIN_POSITIVE) }
         };
-        self.estimates().into_iter().enumerate().map(relative).fold(0.0, f64::max)
+        self.stations().map(relative).fold(0.0, f64::max)
     }
 }
 
@@ -229,6 +233,8 @@ mod tests {
     fn what_no_sample_met_is_not_seen_unless_nothing_was() {
         let of = |second: f64| Blocks::new(vec![vec![1.0, 0.0], vec![2.0, second]]).estimates()[1].uncertainty;
         assert_eq!(of(0.0), Uncertainty::NotSeen);
+        // A meter that faces away is dark however long it is sampled.
+        assert_eq!(Blocks::new(vec![vec![1.0, 0.0]; 2]).worst_error(&[]), 0.0);
         assert!(of(0.1).standard_error().unwrap() > 0.0);
         // A dark room is dark, and says so.
         assert_eq!(Blocks::new(vec![vec![0.0]; 8]).estimates()[0].uncertainty.standard_error(), Some(0.0));

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{Component, Judge, Tolerance, of_reading};
 use crate::engines::FILE_READER;
 use crate::procedures::Task;
-use crate::record::{Basis, ProcedureId, Recording};
+use crate::record::{Basis, ProcedureId, Reading, Recording, Uncertainty};
 
 /// Independent witnesses that a statement takes.
 const FEWEST: usize = 3;
@@ -147,7 +147,8 @@ fn witnesses(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<W
             tolerance(&recording.key.engine)
         };
         let read = |k: usize| {
-            let reading = recording.readings.get(k).filter(|r| r.value.is_finite())?;
+            let is_told = |r: &&Reading| r.value.is_finite() && r.uncertainty != Uncertainty::NotSeen;
+            let reading = recording.readings.get(k).filter(is_told)?;
             Some((reading.value, combined(&of_reading(reading))))
         };
         let readings = (0..task.targets.len()).map(read).collect();

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::engines;
 use crate::procedures::Task;
-use crate::record::{EngineName, MeterId, ProcedureId, Reading, Recording, Role};
+use crate::record::{EngineName, MeterId, ProcedureId, Reading, Recording, Role, Uncertainty};
 
 /// One method against one renderer at one meter; every share is relative to the renderer's value, and they add up.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -44,7 +44,7 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
     };
     let mut splits = vec![];
     for renderer in recordings.iter().filter(|r| r.role == Role::Renderer) {
-        for rendered in &renderer.readings {
+        for rendered in renderer.readings.iter().filter(|r| r.uncertainty != Uncertainty::NotSeen) {
             let at = |r: &Recording| r.readings.iter().find(|reading| reading.meter == rendered.meter).cloned();
             let (Some(method), Some(exact)) = (at(method), at(exact)) else { continue };
             let split = DeviationSplit::new(Lux(method.value), uncertain(&exact), uncertain(rendered));

@@ -38,6 +38,10 @@ impl Run {
         let brightest = said.estimates.iter().chain(&seen.estimates).map(|e| e.value).fold(0.0, f64::max);
         for (&station, seen) in self.spot_check.iter().zip(&seen.estimates) {
             let said = &said.estimates[station];
+            // Of what one of them did not see nothing follows.
+            if [said, seen].iter().any(|e| e.uncertainty == Uncertainty::NotSeen) {
+                continue;
+            }
             let apart_by_chance = Uncertainty::of_sum([(1.0, said.uncertainty), (-1.0, seen.uncertainty)]);
             let noise = COVERAGE * apart_by_chance.standard_error().unwrap_or(0.0) + apart_by_chance.bound();
             let allowed = noise + self.declared * said.value.max(seen.value) + ROUNDING * brightest;

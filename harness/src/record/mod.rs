@@ -66,9 +66,7 @@ impl Estimate {
     pub fn mark_unseen(all: &mut [Self]) {
         let is_sampled = |e: &Self| e.uncertainty.standard_error().is_some();
         if all.iter().any(|e| is_sampled(e) && e.value > 0.0) {
-            let dark = |e: &&mut Self| {
-                e.value == 0.0 && e.uncertainty == Uncertainty::sampled(0.0, e.uncertainty.degrees_of_freedom())
-            };
+            let dark = |e: &&mut Self| e.value == 0.0 && e.uncertainty.standard_error() == Some(0.0);
             all.iter_mut().filter(dark).for_each(|e| e.uncertainty = Uncertainty::NotSeen);
         }
     }

@@ -111,11 +111,28 @@ impl Uncertainty {
             degrees_of_freedom = [degrees_of_freedom, term.degrees_of_freedom()].into_iter().flatten().reduce(f64::min);
         }
         match (is_sampled, is_bounded, is_exact) {
-            _ if is_unseen => Self::NotSeen,
             (true, ..) => Self::StandardError { value, degrees_of_freedom, bound },
+            // What samples met elsewhere in the sum tells how much they scatter; beside what is known nothing does.
+            _ if is_unseen => Self::NotSeen,
             (_, true, _) => Self::Bound(bound),
             (_, _, true) => Self::Exact,
             _ => Self::Unstated,
+        }
+    }
+
+    /// That of the mean of two looks at one value, each weighted by its effort: one that met nothing scatters as the other
+    /// does, by its effort.
+    pub fn of_looks(looks: [(f64, Self); 2]) -> Self {
+        let total = looks[0].0 + looks[1].0;
+        match looks {
+            // Asked for this value alone, a look that meets nothing tells an error of 0.
+            [(_, Self::NotSeen), (_, other)] | [(_, other), (_, Self::NotSeen)] if !(other.standard() > 0.0) => {
+                Self::NotSeen
+            }
+            [(_, Self::NotSeen), (effort, other)] | [(effort, other), (_, Self::NotSeen)] => {
+                other.times((effort / total).sqrt())
+            }
+            looks => Self::of_sum(looks.map(|(effort, look)| (effort / total, look))),
         }
     }
 
@@ -267,6 +284,17 @@ mod tests {
         assert_eq!(sum.bound(), 0.1);
         assert_eq!(Uncertainty::Exact.times(3.0), Uncertainty::Exact);
         assert_eq!(SAMPLED.times(2.0), Uncertainty::sampled(6.0, Some(7.0)));
-        assert_eq!(Uncertainty::of_sum([(1.0, SAMPLED), (1.0, Uncertainty::NotSeen)]), Uncertainty::NotSeen);
+    }
+
+    #[test]
+    fn what_was_not_seen_has_no_error_of_its_own_and_that_of_other_samples_beside_them() {
+        let unseen = Uncertainty::NotSeen;
+        assert_eq!(Uncertainty::of_sum([(1.0, Uncertainty::Bound(0.1)), (1.0, unseen)]), unseen);
+        assert_eq!(Uncertainty::of_sum([(1.0, SAMPLED), (1.0, unseen)]), SAMPLED);
+        assert_eq!(Uncertainty::of_looks([(1.0, unseen), (3.0, unseen)]), unseen);
+        assert_eq!(Uncertainty::of_looks([(1.0, unseen), (3.0, Uncertainty::sampled(0.0, None))]), unseen);
+        // As good as four units of effort, where three had an error of 3.
+        let both = Uncertainty::of_looks([(1.0, unseen), (3.0, SAMPLED)]);
+        assert!((both.standard() - 3.0 * 0.75_f64.sqrt()).abs() < 1e-15, "{both:?}");
     }
 }

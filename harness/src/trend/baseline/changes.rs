@@ -176,6 +176,7 @@ fn meter(before: &Reading, now: &Reading) -> MeterChange {
     let combined = before.uncertainty.standard().hypot(now.uncertainty.standard());
     let rounding = ROUNDING * before.value.abs().max(now.value.abs());
     let p_value = match change.abs() {
+        _ if [before, now].iter().any(|r| r.uncertainty == Uncertainty::NotSeen) => 1.0,
         size if !(size.is_finite() && combined.is_finite()) => 0.0,
         size if size <= rounding => 1.0,
         _ if combined > 0.0 => two_sided(change / combined, apart.degrees_of_freedom()),
