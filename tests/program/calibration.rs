@@ -136,3 +136,101 @@ fn an_edited_module_of_an_adapter_is_noticed_at_the_next_run() {
     let of = |report: &Value| among(report, "engines", &[("id", "mine")])[0]["fingerprint"].clone();
     assert!(of(&first).is_string() && of(&first) != of(&second), "{} {}", of(&first), of(&second));
 }
+
+/// The example adapter that knows shadows of boxes, and the reflected light of a furnace from its table's flux.
+fn knowing() -> String {
+    let declines = "    if job[\"light\"] != \"direct\":\n        return {\"declined\": \"the inverse-square law knows direct light only\"}\n    if job[\"obstacles\"]:\n        return {\"declined\": \"the inverse-square law knows no shadows\"}\n";
+    let reads = "lux = illuminance_lx(job[\"luminaires\"], meter)";
+    let adapter = adapter();
+    assert!(adapter.contains(declines) && adapter.contains(reads));
+    let furnace = "    if job[\"light\"] != \"direct\":
+        rho = set(job[\"room\"][\"reflectance\"].values())
+        if len(rho) > 1:
+            return {\"declined\": \"one reflectance only\"}
+        rho, (x, y, z) = rho.pop(), job[\"room\"][\"size_m\"]
+        steps = [(math.radians(3 * k + 1.5), math.radians(6 * j + 3)) for k in range(60) for j in range(60)]
+        flux = sum(intensity_cd(job[\"luminaires\"][0], (math.sin(g) * math.cos(c), math.sin(g) * math.sin(c), -math.cos(g))) * math.sin(g) for g, c in steps) * math.radians(3) * math.radians(6)
+        lux = LOSS * rho / (1 - rho) * flux / (2 * (x * y + y * z + z * x))
+        return {\"readings\": [{\"meter\": m[\"id\"], \"illuminance_lx\": lux, \"error_bound_lx\": 1e-3 * lux} for m in job[\"meters\"]]}
+";
+    let hidden = "LOSS = 1.0
+def hidden(lamp, meter, job):
+    for box in job[\"obstacles\"]:
+        low, high = 0.0, 1.0
+        for p, q, a, b in zip(lamp[\"position_m\"], meter[\"position_m\"], box[\"min_m\"], box[\"max_m\"]):
+            ends = sorted([(a - p) / (q - p), (b - p) / (q - p)]) if p != q else [0.0, 1.0] if a <= p <= b else [1.0, 0.0]
+            low, high = max(low, ends[0]), min(high, ends[1])
+        if low < high:
+            return True
+    return False
+
+
+def answer(";
+    let lit = "lux = illuminance_lx([l for l in job[\"luminaires\"] if not hidden(l, meter, job)], meter)";
+    adapter.replace(declines, furnace).replace(reads, lit).replace("def answer(", hidden)
+}
+
+#[test]
+fn a_leak_fails_the_shadow_and_lost_reflections_the_furnace_and_nothing_else() {
+    let spec = [SKEW_ROOM, "  indirect_illuminance: {meters: plane}\n", MINE].concat();
+    for (from, to, fails) in
+        [("LOSS", "LOSS", ""), ("if low < high:", "if False:", "shadow"), ("LOSS = 1.0", "LOSS = 0.75", "furnace")]
+    {
+        let adapter = knowing();
+        assert!(adapter.contains(from));
+        let folder =
+            Folder::new(&[("spec.yaml", &spec), ("lamp.ies", SKEW_LAMP), ("adapter.py", &adapter.replace(from, to))]);
+        run(&folder).exits(i32::from(!fails.is_empty()));
+        let report = folder.report();
+        for procedure in ["direct_illuminance", "point", "asymmetric", "luminaires", "shadow", "furnace"] {
+            let verdicts = verdicts(&report, procedure);
+            let failed = verdicts.contains(&"fail");
+            assert!(!verdicts.is_empty() && failed == (procedure == fails), "{fails}, {procedure}: {verdicts:?}");
+            assert!(!verdicts.contains(&"missing"), "{fails}, {procedure}: {verdicts:?}");
+        }
+    }
+}
+
+#[test]
+fn scenes_of_known_answer_are_read_once_for_each_setting_of_an_engine_whatever_the_specs() {
+    let spec = [SKEW_ROOM, MINE].concat();
+    let settings = spec.replace("adapter.py]", "adapter.py], quality: high");
+    let adapter = adapter();
+    let folder = Folder::new(&[
+        ("a.yaml", &spec),
+        ("b.yaml", &spec),
+        ("c.yaml", &settings),
+        ("lamp.ies", SKEW_LAMP),
+        ("adapter.py", &adapter),
+        ("calibration.yaml", &spec),
+    ]);
+    let known = |specs: &[&str]| {
+        let report =
+            folder.luxproof(&[&["run"][..], specs, &["--out", "out", "--format", "json"]].concat()).exits(0).json();
+        let all = report["comparisons"].as_array().unwrap().iter();
+        let mine = all.filter(|c| c["engine"] == "mine" && c["case"].as_str().unwrap().starts_with("calibration"));
+        let cases: Vec<String> = report["cases"].as_array().unwrap().iter().map(|c| c["name"].to_string()).collect();
+        (mine.count(), cases.len())
+    };
+    assert_eq!(known(&["a.yaml"]), (64, 2));
+    assert_eq!(known(&["a.yaml", "b.yaml"]), (64, 3));
+    assert_eq!(known(&["a.yaml", "b.yaml", "c.yaml"]), (128, 5));
+    folder.luxproof(&["run", "calibration.yaml"]).exits(2).complains("give the spec another name");
+}
+
+#[test]
+fn every_view_shows_scenes_of_known_answer_and_a_baseline_needs_none_of_them() {
+    let folder = folder(LUX, LUX);
+    run(&folder).exits(0);
+    for (view, says) in [
+        ("markdown", "| calibration: point | closed form |"),
+        ("junit", "<testsuite name=\"calibration\""),
+        ("html", "Calibration: point"),
+        ("csv", "calibration,point"),
+    ] {
+        folder.luxproof(&["report", "out/report.json", "--format", view]).exits(0).prints(says);
+    }
+    folder.luxproof(&["accept", "out", "--all", "--reason", "first look"]).exits(0);
+    assert!(!folder.read("baselines/spec.json").contains("calibration"));
+    folder.luxproof(&["run", "spec.yaml", "--out", "out", "--baseline", "baselines"]).exits(0);
+}

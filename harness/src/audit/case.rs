@@ -13,7 +13,6 @@ use crate::procedures::Task;
 use crate::record::{Recording, Status};
 use crate::report::{self, Report};
 use crate::spec::Case;
-use crate::system::files;
 use crate::system::process;
 
 /// What all cases of an audit share.
@@ -31,7 +30,7 @@ pub(super) struct Stop {
 }
 
 impl Audit<'_> {
-    /// Runs and judges one case, unless the audit has stopped before it; its report is kept in the folder.
+    /// Runs and judges one case, unless the audit has stopped before it.
     pub(super) fn case(
         &self,
         case: &Case,
@@ -56,20 +55,18 @@ impl Audit<'_> {
         // What follows from other readings follows from nothing where the case was never begun.
         let holds = |s: &&Skip| stop.is_none() || s.scope.leaves_no_reading();
         let skips = plan.skips.iter().filter(holds).cloned().chain(outcome.skips).collect();
-        let report = Report {
+        Ok(Report {
             engines: outcome.engines,
             splits: tasks().flat_map(|task| judge.split(task, &of(task))).collect(),
             consensus: tasks()
-                .filter(|task| !task.is_known())
+                .filter(|task| !task.procedure.is_known())
                 .filter_map(|task| judge.consensus(task, &of(task)))
                 .collect(),
             published: tasks().filter_map(|task| judge.published?.table(task, &case.name)).collect(),
             curves: tasks().flat_map(|task| report::curves(&case.name, task)).collect(),
             wall_s: clock.elapsed().as_secs_f64(),
             ..Report::new(case, started, &outcome.recordings, comparisons, skips)
-        };
-        files::keep_json(&folder.join("report.json"), &report)?;
-        Ok(report)
+        })
     }
 
     fn readings(&self, case: &Case, plan: &Plan, judge: &Judge<'_>, folder: &Path) -> Result<Outcome, AuditError> {

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+
 use std::time::{Duration, Instant};
 
 use super::observer::Observer;
+use parking_lot::Mutex;
+
 use crate::engines::{EngineError, Measurement};
 use crate::measure::{Cost, Failure, FailureKind, Question, Reader, Source, Taken};
 use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
@@ -52,7 +54,7 @@ impl Running<'_> {
         let one = |&(k, run): &(usize, &Run)| -> Result<Done, FileError> {
             let done = self.measure(run);
             if let Done::Recorded(recording, _) = &done {
-                let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut kept = kept.lock();
                 kept.insert(k, (**recording).clone());
                 // Written as each job finishes, so that an interruption loses only what was under way.
                 keep(self.folder, &recording.key.engine, kept.values())?;
@@ -200,5 +202,6 @@ fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
     let wall_s = mine.iter().map(|r| r.wall_s).sum();
     let is_required = planned.asked == Asked::ByName;
     let fingerprint = planned.instrument().map(|i| i.version.fingerprint);
-    EngineStatus { id, version: planned.version(), fingerprint, status, is_required, reason, wall_s }
+    let role = planned.engine.role();
+    EngineStatus { id, version: planned.version(), role, fingerprint, status, is_required, reason, wall_s }
 }

@@ -24,17 +24,17 @@ pub mod sampling;
 pub mod sequential;
 
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use sha2::{Digest, Sha256};
+
+use parking_lot::Mutex;
 
 use crate::engines::Site;
 use crate::judge::{Policy, Published, PublishedError};
 use crate::measure::cache::Cache;
 use crate::measure::{Machine, Reader};
-use crate::plan::{Plan, Planner, Selection, Skip, Skipping};
-use crate::procedures::known;
+use crate::plan::{EVERYONE, Plan, Planner, Scope, Selection, Skip, Skipping};
 use crate::record::Status;
 use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, SpecError, filtered, hexadecimal, suite};
@@ -129,35 +129,64 @@ const MAX_CASES_AT_A_TIME: usize = 8;
 
 /// Runs every case of specs, folders and patterns and judges what engines read; files are written below [`Options::out`] alone.
 pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<Report, AuditError> {
-    let clock = Instant::now();
     let mut cases = chosen(specs, options)?;
     let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
     let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
-    let asked = cases.len();
-    let calibrations = match options.calibration {
-        Calibration::Judged => planner.calibrations(&cases, &plans)?,
-        Calibration::LeftOut => vec![],
-    };
-    for (case, plan) in calibrations {
-        cases.push(case);
-        plans.push(plan);
+    let spec = record(specs, &cases);
+    let known = planner.calibrations(&cases, &plans)?;
+    match options.calibration {
+        Calibration::Judged => known.into_iter().for_each(|(case, plan)| {
+            cases.push(case);
+            plans.push(plan);
+        }),
+        Calibration::LeftOut => {
+            let why = "no engine reads this scene of known answer: --no-calibration";
+            let skip = |(case, task)| Skip::of(case, task, EVERYONE, Scope::Procedure, why);
+            let scenes = known.iter().flat_map(|(case, plan)| plan.tasks.iter().map(move |task| (case, task)));
+            plans[0].skips.extend(scenes.map(skip));
+        }
     }
-    let published = published(&cases)?;
+    audited(spec, &cases, plans, policy, options)
+}
+
+/// Lets engines, those of a spec too where one is given, read the scenes of known answer, and judges what they read.
+pub fn examine(spec: Option<&Path>, policy: &Policy, options: &Options<'_>) -> Result<Report, AuditError> {
+    let of = spec.map(|path| suite(&[path.to_owned()])).transpose()?.unwrap_or_else(|| vec![Case::default()]);
+    let known = Planner::new(&options.selection, &options.site, options.skipping).examinations(&of)?;
+    let (cases, plans): (Vec<_>, Vec<_>) = known.into_iter().unzip();
+    audited(cases.first().map(SpecRecord::of).unwrap_or_default(), &cases, plans, policy, options)
+}
+
+/// One report of what is planned for cases.
+fn audited(
+    spec: SpecRecord,
+    cases: &[Case],
+    mut plans: Vec<Plan>,
+    policy: &Policy,
+    options: &Options<'_>,
+) -> Result<Report, AuditError> {
+    let clock = Instant::now();
+    let published = published(cases)?;
     for ((case, plan), published) in cases.iter().zip(&mut plans).zip(&published) {
         options.sampling.grant(&policy.judge(case, published.as_ref()), plan);
     }
-    options.observer.planned(&cases, &plans);
+    options.observer.planned(cases, &plans);
     let audit = Audit { policy, options, reader: options.reader() };
+    let is_alone = cases.iter().filter(|case| !case.is_known()).count() == 1;
     let stop: Mutex<Option<Stop>> = Mutex::new(None);
     let one = |&k: &usize| -> Result<Report, AuditError> {
         let (case, plan) = (&cases[k], &plans[k]);
-        let folder = match asked {
-            1 if k < asked => options.out.clone(),
-            _ => options.out.join(within(&options.out, case)),
+        let folder = match case.is_known() {
+            true => options.out.join(&case.name),
+            false if is_alone => options.out.clone(),
+            false => options.out.join(within(&options.out, case)),
         };
-        let stopped = stop.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let stopped = stop.lock().clone();
         let report = audit.case(case, plan, published[k].as_ref(), stopped.as_ref(), &folder)?;
-        let mut stop = stop.lock().unwrap_or_else(PoisonError::into_inner);
+        if folder != options.out {
+            files::keep_json(&folder.join("report.json"), &report)?;
+        }
+        let mut stop = stop.lock();
         if process::is_interrupted() {
             *stop = Some(Stop { why: "not run: the run was interrupted".to_owned(), status: Status::Failed });
         } else if options.after_failure == AfterFailure::Stop
@@ -172,26 +201,11 @@ pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<
     // What comes after a failure must not have begun before it.
     let side = if options.after_failure == AfterFailure::Stop { 1 } else { options.jobs.clamp(1, MAX_CASES_AT_A_TIME) };
     let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
-    let reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let mut report = Report::joined(record(specs, &cases[..asked]), reports);
-    // Scenes of known answer are nobody's spec.
-    report.cases.truncate(asked);
-    if options.calibration == Calibration::LeftOut {
-        report.skips.push(Skip::uncalibrated(&plans[0]));
-        report.summary.skipped += 1;
-    }
+    let mut report = Report::joined(spec, done.into_iter().collect::<Result<Vec<_>, _>>()?);
     // Cases ran side by side: their seconds do not add up.
     report.wall_s = clock.elapsed().as_secs_f64();
     files::keep_json(&options.out.join("report.json"), &report)?;
     Ok(report)
-}
-
-/// Lets engines, those of a spec too where one is given, read the scenes of known answer, and judges what they read.
-pub fn examine(spec: Option<&Path>, policy: &Policy, options: &Options<'_>) -> Result<Report, AuditError> {
-    let of = spec.map(Case::load).transpose()?.unwrap_or_default();
-    let mut planner = Planner::new(&options.selection, &options.site, Skipping::Nothing);
-    let (case, plan) = planner.known(&of, "", known::tasks(), &|_| true)?;
-    Audit { policy, options, reader: options.reader() }.case(&case, &plan, None, None, &options.out)
 }
 
 /// The cases that are asked for, read and checked before any engine starts.

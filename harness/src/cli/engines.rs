@@ -9,7 +9,8 @@ use super::diagnostic::not_audited;
 use crate::audit::{self, Options};
 use crate::engines::{self, InstallState, Site};
 use crate::judge::Policy;
-use crate::record::EngineName;
+use crate::plan::Skipping;
+use crate::record::{EngineName, EngineStatus, Status};
 use crate::report::{Detail, Exit, Style, terminal};
 use crate::spec::suggestion;
 
@@ -54,11 +55,12 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site) -> Resu
 
 fn examine(site: &Site, names: &[String], spec: Option<&Path>) -> Result<Exit, Diagnostic> {
     let folder = tempfile::tempdir().into_diagnostic()?;
-    let mut options = Options::new(site.clone(), folder.path().to_owned());
+    let mut options = Options { skipping: Skipping::Nothing, ..Options::new(site.clone(), folder.path().to_owned()) };
     options.selection.engines = names.to_vec();
     let report = audit::examine(spec, &Policy::built_in().into_diagnostic()?, &options).map_err(not_audited)?;
     print!("{}", terminal(&report, Style::Plain, Detail::Brief, None));
-    Ok(report.exit())
+    let is_absent = |e: &EngineStatus| e.status == Status::Absent;
+    Ok(report.exit().worse(if report.engines.iter().any(is_absent) { Exit::Engine } else { Exit::Passed }))
 }
 
 pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {

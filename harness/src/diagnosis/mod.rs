@@ -6,7 +6,7 @@
 
 mod faults;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::judge::{Basis, Comparison, Verdict};
 use crate::procedures::Task;
@@ -35,47 +35,50 @@ pub struct Cause {
     score: f64,
 }
 
+/// Whose failures are explained together.
+type Group = (ProcedureId, Basis, EngineName);
+
 /// What explains the failed readings of one engine in one task.
 struct Found {
-    engine: EngineName,
-    basis: Basis,
-    procedure: ProcedureId,
+    group: Group,
     /// The faults that its readings could show.
     offered: BTreeSet<&'static str>,
     causes: Vec<Cause>,
 }
 
-/// Says of the failures of a case why, task by task; what is fitted to one task must hold in every other that fails, too.
+/// Says of the failures of a case why, task by task; a factor that is fitted to one task must hold in every other of the case
+/// that fails, too.
 pub fn diagnose(tasks: &[Task], comparisons: &mut [Comparison]) {
-    let group = |c: &Comparison| Some((c.key.procedure, c.key.engine.clone(), c.reference.as_ref()?.basis));
+    let group = |c: &Comparison| -> Option<Group> {
+        Some((c.key.procedure, c.reference.as_ref()?.basis, c.key.engine.clone()))
+    };
     let failed = comparisons.iter().filter(|c| c.verdict == Verdict::Fail);
-    let groups: BTreeSet<_> = failed.filter_map(group).collect();
+    let groups: BTreeSet<Group> = failed.filter_map(group).collect();
+    // The same for every engine of a task.
+    let mut predicted: BTreeMap<(ProcedureId, Basis), Vec<Fault>> = BTreeMap::new();
     let mut all = vec![];
-    for (procedure, engine, basis) in groups {
+    for group_of_one in groups {
+        let (procedure, basis, engine) = &group_of_one;
         // Printed values and calculators are off by more than a renderer's fault.
-        if !matches!(basis, Basis::ClosedForm | Basis::Exact) || engine == "iesna" {
+        if !matches!(basis, Basis::ClosedForm | Basis::Exact) || *engine == EngineName::IESNA {
             continue;
         }
-        let mine = |c: &&Comparison| group(c).is_some_and(|g| g == (procedure, engine.clone(), basis));
+        let mine = |c: &&Comparison| group(c).as_ref() == Some(&group_of_one);
         let members: Vec<&Comparison> = comparisons.iter().filter(mine).collect();
-        let task = tasks.iter().find(|task| task.procedure == procedure);
+        let task = tasks.iter().find(|task| task.procedure == *procedure);
         let Some((task, readings)) = task.zip(Readings::of(&members)) else { continue };
-        let faults = faults(task, &readings.right);
-        let (offered, causes) = (faults.iter().map(|f| f.id).collect(), causes(&faults, &readings));
-        all.push(Found { engine, basis, procedure, offered, causes });
+        let faults = predicted.entry((*procedure, *basis)).or_insert_with(|| faults(task, &readings.right));
+        let offered = faults.iter().map(|f| f.id).chain([FACTOR]).collect();
+        all.push(Found { offered, causes: causes(faults, &readings), group: group_of_one });
     }
     for found in &all {
-        let rest = || all.iter().filter(|other| other.engine == found.engine);
+        let rest = || all.iter().filter(|other| other.group.2 == found.group.2);
         let held = found.causes.iter().filter(|cause| rest().all(|other| cause.holds_in(other)));
         let text: Vec<&str> = held.map(|cause| cause.text.as_str()).collect();
-        let mine = comparisons.iter_mut().filter(|c| {
-            c.verdict == Verdict::Fail
-                && c.diagnosis.is_none()
-                && c.key.procedure == found.procedure
-                && c.key.engine == found.engine
-                && c.basis() == Some(found.basis)
-        });
-        mine.for_each(|c| c.diagnosis = (!text.is_empty()).then(|| text.join("; or ")));
+        let is_mine = |c: &Comparison| c.verdict == Verdict::Fail && group(c).as_ref() == Some(&found.group);
+        for comparison in comparisons.iter_mut().filter(|c| c.diagnosis.is_none() && is_mine(c)) {
+            comparison.diagnosis = (!text.is_empty()).then(|| text.join("; or "));
+        }
     }
 }
 
@@ -87,7 +90,7 @@ impl Cause {
             let (same, its_error) = c.fitted.unwrap_or((value, 0.0));
             c.id == self.id && (value - same).abs() <= 3.0 * error.hypot(its_error) + 2.0 * SLACK * value
         };
-        (self.id != FACTOR && !other.offered.contains(self.id)) || other.causes.iter().any(agrees)
+        !other.offered.contains(self.id) || other.causes.iter().any(agrees)
     }
 }
 

@@ -1,9 +1,11 @@
 //! What all cases of a run share: the machine's slots, and what engines have answered so far.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use super::cache::{Entry, Key};
+use parking_lot::Mutex;
+
 use crate::system::slots::Slots;
 
 #[derive(Debug)]
@@ -28,7 +30,7 @@ impl Machine {
 
     /// Where the answer to an equal job of this run is, or will be.
     pub(super) fn answered(&self, key: &Key) -> Option<Arc<Answered>> {
-        let mut all = self.answers.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = self.answers.as_ref()?.lock();
         Some(Arc::clone(all.entry(key.clone()).or_default()))
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::cache::{Cache, Entry, Key, Lookup};
@@ -52,7 +52,7 @@ impl Reader {
         let key = question.key()?;
         // Whoever asks the same at the same time waits for this answer.
         let answered = self.machine.answered(&key);
-        let mut answered = answered.as_ref().map(|a| a.lock().unwrap_or_else(PoisonError::into_inner));
+        let mut answered = answered.as_ref().map(|a| a.lock());
         let known = answered.as_ref().and_then(|a| (**a).clone());
         let (entry, source) = match known.or_else(|| self.find(&key)) {
             Some(entry) => {

@@ -1,22 +1,20 @@
 //! The plan: which engine runs which procedure of a case, what is skipped, and why.
 
+mod calibration;
 mod roster;
 mod shortcut;
 mod spot_check;
 
-use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use crate::engines::{Absent, Engine, Job, Site, Support, Version};
 use crate::measure::Instrument;
-use crate::procedures::{Procedures, Task, known};
+use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
-use crate::spec::{Budget, Case, SpecError, hexadecimal};
+use crate::spec::{Budget, Case, SpecError};
 use luminaire::scene::Transport;
 
 use roster::{Chosen, Roster};
@@ -106,13 +104,6 @@ impl Skip {
         Self { key: ReadingKey::new(&case.name, task.procedure, engine), scope, reason: reason.into(), saved: None }
     }
 
-    /// Of the scenes of known answer, which somebody did not want.
-    pub(crate) fn uncalibrated(plan: &Plan) -> Self {
-        let key = ReadingKey::new(known::CASE, plan.tasks[0].procedure, EVERYONE);
-        let reason = "no engine reads the scenes of known answer: --no-calibration".to_owned();
-        Self { key, scope: Scope::Procedure, reason, saved: None }
-    }
-
     /// The same where it saves something.
     #[must_use]
     pub fn saving(self, saved: impl Into<String>) -> Self {
@@ -157,9 +148,6 @@ impl Plan {
     }
 }
 
-/// A standard error that is far below the tolerances of reflected light, and a few seconds for engines that cannot meet it.
-const CALIBRATION: Budget = Budget { relative_error: 2e-3, seconds: 5.0 };
-
 /// Plans one case by itself, with all shortcuts.
 pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, SpecError> {
     Planner::new(selection, site, Skipping::Allowed).plan(case)
@@ -195,56 +183,6 @@ impl<'a> Planner<'a> {
             self.shorten(case, &mut plan);
         }
         Ok(plan)
-    }
-
-    /// The scenes of known answer for every renderer that reads something in the cases, once for each of its settings, and for
-    /// the simulator; those of reflected light where it reads any. Nothing in them follows from other readings.
-    pub fn calibrations(&mut self, cases: &[Case], plans: &[Plan]) -> Result<Vec<(Case, Plan)>, SpecError> {
-        let (mut done, mut all) = (vec![], vec![]);
-        for (case, plan) in cases.iter().zip(plans) {
-            // A program of the user's own lies beside the spec.
-            let what = |run: &Run| {
-                let is_direct = run.job.transport == Transport::Direct;
-                let engine = plan.engines[run.engine].engine.name();
-                (engine, run.job.settings.clone(), is_direct, case.path.parent().map(Path::to_owned))
-            };
-            let renderers = plan.runs.iter().filter(|run| !plan.engines[run.engine].engine.is_witness());
-            let fresh: Vec<_> = renderers.map(what).filter(|what| !done.contains(what)).collect();
-            if fresh.is_empty() {
-                continue;
-            }
-            let is_asked = |t: &Task| t.transport == Transport::Direct || fresh.iter().any(|what| !what.2);
-            let scenes = known::tasks().into_iter().filter(is_asked).collect();
-            let of = if all.is_empty() { "" } else { case.name.as_str() };
-            all.push(self.known(case, of, scenes, &|engine| fresh.iter().any(|what| what.0 == *engine))?);
-            done.extend(fresh);
-        }
-        Ok(all)
-    }
-
-    /// Scenes of known answer, for the simulator and the engines of a case that are wanted; `of` parts several of these in one run.
-    pub fn known(
-        &mut self,
-        case: &Case,
-        of: &str,
-        scenes: Vec<Task>,
-        wanted: &dyn Fn(&EngineName) -> bool,
-    ) -> Result<(Case, Plan), SpecError> {
-        let known = Case {
-            name: [known::CASE, of].join("/").trim_end_matches('/').to_owned(),
-            title: "Scenes of known answer".to_owned(),
-            sha256: hexadecimal(&Sha256::digest(format!("{scenes:?}"))),
-            budget: CALIBRATION,
-            procedures: Procedures::default(),
-            only_engines: None,
-            published: None,
-            tolerances: BTreeMap::new(),
-            ..case.clone()
-        };
-        let mut chosen = self.roster.chosen(&known, self.selection)?;
-        chosen.retain(|(e, _)| e.name() == EngineName::SIMULATOR || !e.is_witness() && wanted(&e.name()));
-        let plan = self.whole(&known, scenes, chosen);
-        Ok((known, plan))
     }
 
     /// Every task for every engine, as far as it can.

@@ -22,12 +22,11 @@ impl JsonSchema for Procedures {
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let property = |procedure: &table::Procedure| {
-            let mut schema = procedure.form.schema(generator);
+            let mut schema = procedure.form?.schema(generator);
             schema.insert("description".to_owned(), procedure.meaning.into());
-            (procedure.id.name().to_owned(), schema.to_value())
+            Some((procedure.id.name().to_owned(), schema.to_value()))
         };
-        let properties: serde_json::Map<_, _> =
-            ProcedureId::ALL.map(ProcedureId::row).into_iter().map(property).collect();
+        let properties: serde_json::Map<_, _> = table::ALL.iter().filter_map(property).collect();
         json_schema!({
             "type": "object", "description": "What is measured; at least one.",
             "properties": properties, "additionalProperties": false,
@@ -48,10 +47,11 @@ impl<'de> Deserialize<'de> for Procedures {
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Procedures, A::Error> {
                 let mut all = BTreeMap::new();
                 while let Some(name) = map.next_key::<String>()? {
-                    let id: ProcedureId =
-                        name.parse().map_err(|_| A::Error::unknown_field(&name, ProcedureId::NAMES))?;
+                    let unknown = || A::Error::unknown_field(&name, ProcedureId::NAMES);
+                    let id: ProcedureId = name.parse().map_err(|_| unknown())?;
+                    let form = id.row().form.ok_or_else(unknown)?;
                     // A case of a suite takes a procedure out by `null`.
-                    let Some(asked) = id.row().form.read(&mut map)? else { continue };
+                    let Some(asked) = form.read(&mut map)? else { continue };
                     if all.insert(id, asked).is_some() {
                         return Err(A::Error::duplicate_field(id.name()));
                     }

@@ -18,8 +18,6 @@ pub enum Form {
     MetersAndBounces,
     /// `meters`, `bounces`, `light`.
     MetersAndLight,
-    /// None: a scene of the calibration, for which no spec can ask.
-    Known,
 }
 
 /// What a spec asks of one procedure.
@@ -104,7 +102,6 @@ impl Form {
             Self::Meters => generator.subschema_for::<Meters>(),
             Self::MetersAndBounces => generator.subschema_for::<MetersAndBounces>(),
             Self::MetersAndLight => generator.subschema_for::<MetersAndLight>(),
-            Self::Known => false.into(),
         }
     }
 
@@ -123,7 +120,6 @@ impl Form {
             Self::MetersAndLight => map
                 .next_value::<Option<MetersAndLight>>()?
                 .map(|MetersAndLight { meters, bounces, light }| at(meters, bounces, light)),
-            Self::Known => map.next_value::<()>().map(|()| None)?,
         })
     }
 }

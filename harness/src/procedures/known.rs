@@ -12,8 +12,8 @@
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
-use luminaire::calculators::inverse_square::from_luminaire;
-use luminaire::geometry::{Reflectances, Room};
+use luminaire::calculators::inverse_square::direct_illuminance;
+use luminaire::geometry::{Reflectances, Room, Surface};
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
 
@@ -30,25 +30,15 @@ pub fn tasks() -> Vec<Task> {
 
 /// The inverse-square law, straight light that a box may hide.
 pub(super) fn straight(scene: &Scene, target: &Target) -> f64 {
-    let is_hidden =
-        |l: &Luminaire| scene.obstacles.iter().any(|o| crosses(&o.shape, l.position_m, target.meter.position_m));
-    let lit = scene.luminaires.iter().filter(|l| !is_hidden(l));
-    lit.map(|l| from_luminaire(l, &target.meter).value()).sum()
+    direct_illuminance(scene, &target.meter).map_or(f64::NAN, |found| found.illuminance.value())
 }
 
 /// The reflected light of a room of one reflectance that is lit evenly.
 pub(super) fn even(scene: &Scene, _: &Target) -> f64 {
     let Some(room) = scene.room else { return 0.0 };
     let flux: f64 = scene.luminaires.iter().map(|l| l.photometry.distribution.flux().value() * l.flux_scale).sum();
-    let [x, y, z] = room.size_m.to_array();
-    room.reflectance.floor / (1.0 - room.reflectance.floor) * flux / (2.0 * (x * y + y * z + z * x))
-}
-
-/// Whether a segment passes through a box (Kay and Kajiya, SIGGRAPH 1986: slabs); known scenes hold no meshes.
-fn crosses(shape: &Shape, from: DVec3, to: DVec3) -> bool {
-    let Shape::Box { min_m, max_m } = shape else { return false };
-    let (a, b) = ((min_m - from) / (to - from), (max_m - from) / (to - from));
-    a.min(b).max_element().max(0.0) < a.max(b).min_element().min(1.0)
+    let (rho, area_m2) = (room.reflectance.floor, Surface::ALL.iter().map(|s| room.area_m2(*s)).sum::<f64>());
+    rho / (1.0 - rho) * flux / area_m2
 }
 
 fn point() -> Task {

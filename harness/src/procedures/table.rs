@@ -22,8 +22,8 @@ pub struct Procedure {
     /// What it reads, in a sentence for users.
     pub meaning: &'static str,
     pub quantity: Quantity,
-    /// The keys that a spec gives it.
-    pub form: Form,
+    /// The keys that a spec gives it; none where it is a scene of the calibration.
+    pub form: Option<Form>,
     /// Which light counts.
     pub transport: fn(&AtMeters) -> Transport,
     /// What is added up at a meter of the spec, and how far off that sum may be, relative.
@@ -67,7 +67,7 @@ pub static ALL: [Procedure; 11] = [
         short: "Intensity",
         meaning: "The luminous intensity distribution read back from illuminance at a distance in free field, I = E d², over the curve of the photometric file.",
         quantity: Quantity::LuminousIntensity,
-        form: Form::Angles,
+        form: Some(Form::Angles),
         transport: |_| Transport::Direct,
         aspects: as_it_looks,
         reference: |task| closed_form(task, "photometric file, bilinear in (C, gamma)"),
@@ -78,7 +78,7 @@ pub static ALL: [Procedure; 11] = [
         short: "Direct",
         meaning: "Illuminance straight from the luminaires, without any reflected light.",
         quantity: Quantity::Illuminance,
-        form: Form::Meters,
+        form: Some(Form::Meters),
         transport: |_| Transport::Direct,
         aspects: as_it_looks,
         reference: |task| closed_form(task, "inverse square"),
@@ -89,7 +89,7 @@ pub static ALL: [Procedure; 11] = [
         short: "Indirect",
         meaning: "Illuminance by light that was reflected at least once.",
         quantity: Quantity::Illuminance,
-        form: Form::MetersAndBounces,
+        form: Some(Form::MetersAndBounces),
         transport: |asked| Transport::Indirect(asked.bounces),
         aspects: as_it_looks,
         reference: |_| EXACT,
@@ -100,7 +100,7 @@ pub static ALL: [Procedure; 11] = [
         short: "Total",
         meaning: "Direct and reflected light together.",
         quantity: Quantity::Illuminance,
-        form: Form::MetersAndBounces,
+        form: Some(Form::MetersAndBounces),
         transport: |asked| Transport::Total(asked.bounces),
         aspects: as_it_looks,
         reference: |_| EXACT,
@@ -111,7 +111,7 @@ pub static ALL: [Procedure; 11] = [
         short: "Cylindrical",
         meaning: "Mean over all vertical directions of the illuminance at a point (EN 12464-1), wherever its meter looks: of all light, or of the part that the spec names.",
         quantity: Quantity::Illuminance,
-        form: Form::MetersAndLight,
+        form: Some(Form::MetersAndLight),
         transport: |asked| match asked.light {
             AnyLight::Total => Transport::Total(asked.bounces),
             AnyLight::Direct => Transport::Direct,
@@ -126,12 +126,19 @@ pub static ALL: [Procedure; 11] = [
             _ => EXACT,
         },
     },
-    known(ProcedureId::Point, "Point", "the inverse-square law from .5 to 10 m", |_| STRAIGHT),
-    known(ProcedureId::Asymmetric, "Asymmetric", "a table without symmetry, turned, all around", |_| STRAIGHT),
-    known(ProcedureId::Luminaires, "Luminaires", "three luminaires that differ", |_| STRAIGHT),
-    known(ProcedureId::Shadow, "Shadow", "light that a box hides, and light that passes it", |_| STRAIGHT),
-    known(ProcedureId::Furnace, "Furnace", "reflected light that is the same everywhere, near surfaces too", |_| EVEN),
-    known(ProcedureId::Reflectances, "Reflectances", "floor, walls and ceiling that differ", |_| EXACT),
+    known(ProcedureId::Point, "Calibration: point", "the inverse-square law from .5 to 10 m", |_| STRAIGHT),
+    known(ProcedureId::Asymmetric, "Calibration: asymmetric", "a table without symmetry, turned, all around", |_| {
+        STRAIGHT
+    }),
+    known(ProcedureId::Luminaires, "Calibration: luminaires", "three luminaires that differ", |_| STRAIGHT),
+    known(ProcedureId::Shadow, "Calibration: shadow", "light that a box hides, and light that passes it", |_| STRAIGHT),
+    known(
+        ProcedureId::Furnace,
+        "Calibration: furnace",
+        "reflected light that is the same everywhere, near surfaces too",
+        |_| EVEN,
+    ),
+    known(ProcedureId::Reflectances, "Calibration: reflectances", "floor, walls and ceiling that differ", |_| EXACT),
 ];
 
 /// A scene of the calibration.
@@ -147,7 +154,7 @@ const fn known(
         short: title,
         meaning,
         quantity: Quantity::Illuminance,
-        form: Form::Known,
+        form: None,
         transport: |_| Transport::Direct,
         aspects: as_it_looks,
         reference,
@@ -226,6 +233,11 @@ impl ProcedureId {
     pub fn row(self) -> &'static Procedure {
         &ALL[self as usize]
     }
+
+    /// Whether it is a scene of known answer, which no spec asks for.
+    pub fn is_known(self) -> bool {
+        self.row().form.is_none()
+    }
 }
 
 #[cfg(test)]
@@ -237,7 +249,7 @@ mod tests {
         assert!(ALL.iter().map(|p| p.id).take(ProcedureId::ALL.len()).eq(ProcedureId::ALL));
         for (k, procedure) in ALL.iter().enumerate() {
             assert_eq!(procedure.id as usize, k);
-            assert_eq!(procedure.form == Form::Known, k >= ProcedureId::ALL.len());
+            assert_eq!(procedure.id.is_known(), k >= ProcedureId::ALL.len());
         }
     }
 

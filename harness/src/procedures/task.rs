@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use luminaire::photometry::direction;
 use luminaire::scene::{Luminaire, Meter, Scene, Transport};
 
-use super::form::{Angles, AtAngles, Form, Names};
+use super::form::{Angles, AtAngles, Names};
 use crate::record::{Light, MeterId, ProcedureId, Quantity};
 
 /// What one procedure measures in one case.
@@ -61,17 +61,12 @@ impl Task {
         if let [one] = models[..] { one.to_owned() } else { "mixed".to_owned() }
     }
 
-    /// Whether it is a scene of the calibration, whose answer needs no witnesses.
-    pub fn is_known(&self) -> bool {
-        self.procedure.row().form == Form::Known
-    }
-
     /// The procedure that an engine is asked for: of a scene of the calibration, the one of its light.
     pub fn as_asked(&self) -> ProcedureId {
-        match (self.procedure.row().form, self.transport) {
-            (Form::Known, Transport::Direct) => ProcedureId::DirectIlluminance,
-            (Form::Known, _) => ProcedureId::IndirectIlluminance,
-            _ => self.procedure,
+        match (self.procedure.is_known(), self.transport) {
+            (false, _) => self.procedure,
+            (true, Transport::Direct) => ProcedureId::DirectIlluminance,
+            (true, _) => ProcedureId::IndirectIlluminance,
         }
     }
 

@@ -12,6 +12,9 @@ pub struct EngineStatus {
     pub id: EngineName,
     /// Its version, where it is there.
     pub version: Option<String>,
+    /// What it takes part for.
+    #[serde(default)]
+    pub role: Role,
     /// Hash of what really runs: programs, libraries, packages, sources.
     #[serde(default)]
     pub fingerprint: Option<String>,

@@ -9,8 +9,8 @@ use crate::record::ReadingKey;
 
 pub fn junit(report: &Report) -> String {
     let mut junit = JUnit::new("luxproof");
-    for case in report.case_names() {
-        junit.add_test_suite(suite(report, case));
+    for case in &report.cases {
+        junit.add_test_suite(suite(report, &case.name));
     }
     if let Some(check) = &report.baseline {
         junit.add_test_suite(accepted(check));

@@ -22,7 +22,7 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
     for row in matrix(report) {
         let cells: Vec<String> = row.cells.iter().map(Cell::text).collect();
         let case = report.of_suite(&row.case, " | ");
-        line(format!("| {case}{} | {} | {} |", row.procedure, row.basis, cells.join(" | ")));
+        line(format!("| {case}{} | {} | {} |", row.label, row.basis, cells.join(" | ")));
     }
     for grid in papers::grids(report) {
         line(format!(

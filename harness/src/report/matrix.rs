@@ -11,6 +11,8 @@ use crate::record::{EngineName, ProcedureId, ReadingKey, Recording, Role};
 pub(super) struct Row {
     pub(super) case: String,
     pub(super) procedure: ProcedureId,
+    /// Its name, and where no column of cases says so, that it is of the calibration.
+    pub(super) label: String,
     pub(super) basis: &'static str,
     /// One an engine, in the report's order.
     pub(super) cells: Vec<Cell>,
@@ -50,7 +52,7 @@ impl Cell {
 pub(super) fn matrix(report: &Report) -> Vec<Row> {
     let of_case = |case| report.procedures().into_iter().map(move |procedure| (case, procedure));
     let mut rows = vec![];
-    for (case, procedure) in report.case_names().into_iter().flat_map(of_case) {
+    for (case, procedure) in report.cases.iter().map(|c| c.name.as_str()).flat_map(of_case) {
         let comparisons: Vec<&Comparison> =
             report.comparisons.iter().filter(|c| c.key.is_of(case, procedure)).collect();
         for basis in comparisons.iter().map(|c| c.basis()).collect::<BTreeSet<Option<Basis>>>() {
@@ -59,6 +61,11 @@ pub(super) fn matrix(report: &Report) -> Vec<Row> {
             rows.push(Row {
                 case: case.to_owned(),
                 procedure,
+                label: if procedure.is_known() && !report.is_suite() {
+                    format!("{case}: {procedure}")
+                } else {
+                    procedure.to_string()
+                },
                 basis: of_row[0].basis_name(),
                 cells: report.engines.iter().map(|e| cell(report, &key(&e.id), &of_row)).collect(),
             });

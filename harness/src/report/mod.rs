@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::judge::{Comparison, Consensus, PaperSplit, PublishedTable, Split};
 use crate::plan::Skip;
-use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Status};
+use crate::record::{EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Role, Status};
 use crate::spec::Case;
 
 pub use accepted::{BaselineCheck, BaselineLine};
@@ -81,6 +81,9 @@ pub struct Report {
 pub struct CaseRecord {
     pub name: String,
     pub spec: SpecRecord,
+    /// Whether it holds scenes of known answer, for which no spec asks.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_known: bool,
 }
 
 /// What was run.
@@ -122,7 +125,7 @@ impl Report {
             luxproof: 1,
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
             started: humantime::format_rfc3339_seconds(started).to_string(),
-            cases: vec![CaseRecord { name: case.name.clone(), spec: spec.clone() }],
+            cases: vec![CaseRecord { name: case.name.clone(), spec: spec.clone(), is_known: case.is_known() }],
             spec,
             readings: recordings.iter().flat_map(readings).collect(),
             recordings: recordings.iter().map(|r| Recording { readings: vec![], ..r.clone() }).collect(),
@@ -166,14 +169,13 @@ impl Report {
         Self { paper_splits: papers::splits(&joined), ..joined }
     }
 
-    /// The cases of specs, and behind them those of known answer.
-    fn case_names(&self) -> Vec<&str> {
-        let read = self.recordings.iter().map(|r| &r.key).chain(self.skips.iter().map(|s| &s.key));
-        words::unique(self.cases.iter().map(|c| &c.name).chain(read.map(|key| &key.case)).map(String::as_str))
+    /// How many cases specs ask for.
+    fn asked(&self) -> usize {
+        self.cases.iter().filter(|c| !c.is_known).count()
     }
 
     fn is_suite(&self) -> bool {
-        self.cases.len() > 1
+        self.asked() > 1
     }
 
     /// The case and what parts it from what follows; nothing where there is but one case.
@@ -201,9 +203,8 @@ impl Report {
 
     /// Whether any renderer gave a reading, where any was wanted: a run that audits nothing must not look like success.
     fn has_audited(&self) -> bool {
-        let is_renderer = |name: &EngineName| ![EngineName::SIMULATOR, EngineName::IESNA].contains(name);
-        let wanted = self.engines.iter().any(|e| is_renderer(&e.id));
-        !wanted || self.readings.iter().any(|r| is_renderer(&r.key.engine))
+        let wanted = self.engines.iter().any(|e| e.role == Role::Renderer);
+        !wanted || self.recordings.iter().any(|r| r.role == Role::Renderer && r.failure.is_none())
     }
 
     fn procedures(&self) -> BTreeSet<ProcedureId> {

@@ -10,7 +10,6 @@ use super::notes::{Kind, Note, departures, notes, splits};
 use super::words::{mark, percent, plural, significant, unique, value};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
-use crate::procedures::Form;
 use crate::record::{EngineStatus, ProcedureId, Status};
 
 /// More meters than this are summarised instead of listed.
@@ -93,8 +92,7 @@ fn tables(report: &Report, style: Style, text: &mut String) {
     }
     // In a suite the readings of a procedure are those of many rooms: they stay in the files.
     let in_paper = |p: &ProcedureId| report.published.iter().any(|t| t.procedure == *p);
-    let is_known = |p: &ProcedureId| p.row().form == Form::Known;
-    for procedure in report.procedures().into_iter().filter(|p| !report.is_suite() && !in_paper(p) && !is_known(p)) {
+    for procedure in report.procedures().into_iter().filter(|p| !report.is_suite() && !in_paper(p) && !p.is_known()) {
         if let Some(table) = readings(report, procedure, style) {
             writeln!(text, "{table}\n").ok();
         }
@@ -145,9 +143,7 @@ fn verdicts(report: &Report, style: Style) -> String {
             Cell::Judged { verdict, .. } => TableCell::new(cell.text()).fg(colour(*verdict)),
             _ => TableCell::new(cell.text()),
         });
-        let of_calibration = !report.is_suite() && row.procedure.row().form == Form::Known;
-        let before = if of_calibration { "calibration: " } else { "" };
-        let heads = [TableCell::new(format!("{before}{}", row.procedure)), TableCell::new(row.basis)];
+        let heads = [TableCell::new(row.label), TableCell::new(row.basis)];
         let cells: Vec<TableCell> = name.into_iter().chain(heads).chain(cells).collect();
         case = row.case;
         cells

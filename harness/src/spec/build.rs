@@ -63,6 +63,11 @@ impl Case {
         of_engine.map(|EngineSettings(settings)| settings.clone()).unwrap_or_default()
     }
 
+    /// Whether it holds scenes of known answer, for which no spec asks.
+    pub fn is_known(&self) -> bool {
+        self.procedures.0.is_empty()
+    }
+
     /// What a procedure measures in it; `None` where the spec does not ask for it.
     pub fn task(&self, procedure: ProcedureId) -> Option<Task> {
         procedure.row().task(self.procedures.0.get(&procedure)?, &self.scene, &self.meters)

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::{Case, SpecError};
+use crate::procedures::known;
 
 /// The cases of several specs, folders or patterns, in the order given; the files of a folder are sorted by name.
 pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
@@ -20,6 +21,10 @@ pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
             let help = "run them apart, or rename one: a report tells cases by name";
             return Err(SpecError::of(&case.path, message, help));
         }
+    }
+    if let Some(case) = cases.iter().find(|c| Path::new(&c.name).starts_with(known::CASE)) {
+        let message = format!("`{}` is the name of the scenes of known answer, which every engine reads", known::CASE);
+        return Err(SpecError::of(&case.path, message, "give the spec another name"));
     }
     Ok(cases)
 }

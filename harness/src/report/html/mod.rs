@@ -108,7 +108,7 @@ fn head(report: &Report) -> Markup {
         header id="top" {
             p.overline {
                 "luxproof " (report.tool_version) " · " (report.started.replace('T', " ").replace('Z', " UTC")) " · "
-                (plural(report.cases.len(), "case")) " · " (plural(report.engines.len(), "engine")) " · " (duration(report.wall_s))
+                (plural(report.asked(), "case")) " · " (plural(report.engines.len(), "engine")) " · " (duration(report.wall_s))
             }
             h1 { (report.spec.title) }
             p.spec { code { (report.spec.path) } }
