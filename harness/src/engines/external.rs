@@ -151,7 +151,7 @@ impl Engine for External {
             files.push(file.clone());
         }
         files.sort();
-        Ok(Version::of(self.contents(), site, files))
+        Ok(Version::of(&self.id, self.contents(), site, files))
     }
 
     /// A program that two engines run counts once, and so does what it says that it shares.

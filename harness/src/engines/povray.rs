@@ -63,7 +63,7 @@ impl Engine for PovRay {
         let version = said.lines().find_map(|l| l.trim().strip_prefix("POV-Ray "));
         let version = version.and_then(|v| v.split_whitespace().next());
         let version = version.ok_or_else(|| absent("povray does not tell its version".to_owned()))?;
-        Ok(Version::of(version, site, [program, site.debian()]))
+        Ok(Version::of(&ID, version, site, [program, site.debian()]))
     }
 
     fn supports(&self, job: &Job) -> Support {
