@@ -62,7 +62,7 @@ impl Backend {
     pub(super) fn version(&self, site: &Site) -> Version {
         let Versions { mitsuba, drjit, llvm } = &self.versions;
         let llvm = llvm.as_ref().map_or("no usable LLVM".to_owned(), |v| format!("LLVM {v}"));
-        let packages = ["mitsuba", "drjit"].iter().filter_map(|name| site.python_package(name));
+        let packages = ["mitsuba", "drjit", "numpy"].iter().filter_map(|name| site.python_package(name));
         let files = packages.chain(self.llvm.clone()).chain(self.python.canonicalize());
         Version::of(&ID, format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"), site, files)
     }
