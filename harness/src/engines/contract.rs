@@ -207,8 +207,13 @@ pub struct Version {
 
 impl Version {
     /// An engine that tells `text`, of these files and folders.
-    pub(super) fn of(text: impl Into<String>, site: &Site, files: impl IntoIterator<Item = PathBuf>) -> Self {
-        Self { text: text.into(), fingerprint: fingerprint::of(site, files) }
+    pub(super) fn of(
+        engine: &EngineName,
+        text: impl Into<String>,
+        site: &Site,
+        files: impl IntoIterator<Item = PathBuf>,
+    ) -> Self {
+        Self { text: text.into(), fingerprint: fingerprint::of(engine, site, files) }
     }
 
     /// One of our own solvers, which this program's sources make.

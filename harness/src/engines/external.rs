@@ -37,13 +37,12 @@ pub(super) struct External {
     depends_on: Vec<PathBuf>,
     /// The spec's folder, in which it runs.
     folder: PathBuf,
+    /// Its command by content, whatever its files are called.
+    contents: String,
 }
 
-/// Whether a folder beside a source holds sources of its kind.
-fn is_package(folder: &Path, source: &Path) -> bool {
-    let mut entries = folder.read_dir().into_iter().flatten().flatten();
-    entries.any(|e| e.path().extension() == source.extension())
-}
+/// Suffixes of what runs as it stands and may fetch what lies beside it.
+const SOURCES: [&str; 12] = ["jl", "js", "lua", "m", "mjs", "pl", "py", "r", "R", "rb", "sh", "ts"];
 
 impl External {
     pub(super) fn new(
@@ -80,14 +79,14 @@ impl External {
             Some(list) => list.map_err(|_| error(key, "must be a list of names")),
         };
         let depends_on = list("depends_on")?.into_iter().map(|file| folder.join(file)).collect();
-        Ok(Self { shares: list("shares")?, id: id.clone(), command, procedures, depends_on, folder })
+        let contents = contents(&command, &folder);
+        Ok(Self { shares: list("shares")?, id: id.clone(), command, procedures, depends_on, folder, contents })
     }
 
-    /// The program: a path is relative to the spec's folder, a bare name is looked up there and then on PATH.
+    /// The program: a path is relative to the spec's folder, a bare name is looked up on PATH.
     fn program(&self, site: &Site) -> Option<PathBuf> {
-        let beside = self.folder.join(&self.command[0]);
         let is_path = self.command[0].contains('/');
-        if is_path { Some(beside).filter(|p| p.is_file()) } else { site.program(&self.command[0]) }
+        if is_path { file(&self.folder, (0, &self.command[0])) } else { site.program(&self.command[0]) }
     }
 
     fn invocation(&self, job: &Job, workbench: &Workbench) -> Result<Invocation, EngineError> {
@@ -96,22 +95,6 @@ impl External {
         let run = Invocation::new(program, &self.folder, workbench.limit, &workbench.log);
         let run = Invocation { peak: workbench.peak.clone(), ..run };
         Ok(run.args(&self.command[1..]).env(FOLDER_VARIABLE, &workbench.scene_dir).stdin(input))
-    }
-
-    /// The files that its command names.
-    fn named(&self) -> impl Iterator<Item = PathBuf> {
-        self.command[1..].iter().map(|w| self.folder.join(w)).filter(|p| p.is_file())
-    }
-
-    /// Its command by content, whatever its files are called.
-    fn contents(&self) -> String {
-        let mut hash = Sha256::new();
-        for word in &self.command {
-            let bytes = std::fs::read(self.folder.join(word)).unwrap_or_else(|_| word.clone().into_bytes());
-            hash.update((bytes.len() as u64).to_le_bytes());
-            hash.update(bytes);
-        }
-        format!("sha256:{}", &hexadecimal(&hash.finalize())[..12])
     }
 
     fn absence(&self) -> String {
@@ -123,40 +106,57 @@ impl External {
     }
 }
 
+/// The file that a word of a command names. A program without a folder is none: it is looked up on PATH.
+fn file(folder: &Path, (k, word): (usize, &String)) -> Option<PathBuf> {
+    Some(folder.join(word)).filter(|path| (k > 0 || word.contains('/')) && path.is_file())
+}
+
+fn contents(command: &[String], folder: &Path) -> String {
+    let mut hash = Sha256::new();
+    for (k, word) in command.iter().enumerate() {
+        let read = file(folder, (k, word)).and_then(|path| std::fs::read(path).ok());
+        let bytes = read.unwrap_or_else(|| word.clone().into_bytes());
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    }
+    format!("sha256:{}", &hexadecimal(&hash.finalize())[..12])
+}
+
+fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    folder.read_dir().into_iter().flatten().flatten().map(|entry| entry.path())
+}
+
 impl Engine for External {
     fn name(&self) -> EngineName {
         self.id.clone()
     }
 
     /// The version of an adapter is the hash of what its command says; what runs are the files that it names, the sources beside
-    /// these, which they may import, and those that it depends on by `depends_on`.
+    /// the first of these that is one, which that may import, and those that it depends on by `depends_on`.
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         let remedy = format!("correct engines.{}", self.id);
         let absent = |reason| Absent { reason, remedy: remedy.clone() };
         let program = self.program(site).ok_or_else(|| absent(self.absence()))?;
+        let named: Vec<PathBuf> = self.command.iter().enumerate().filter_map(|word| file(&self.folder, word)).collect();
         let mut files = vec![program];
-        for named in self.named() {
-            let beside =
-                named.parent().map(Path::to_owned).unwrap_or_default().read_dir().into_iter().flatten().flatten();
-            files.extend(
-                beside
-                    .map(|e| e.path())
-                    .filter(|p| p.extension() == named.extension() || p.is_dir() && is_package(p, &named)),
-            );
+        if let Some(source) = named.iter().find(|f| f.extension().is_some_and(|e| SOURCES.iter().any(|s| e == *s))) {
+            let is_kin = |p: PathBuf| p.extension() == source.extension() && p.is_file();
+            let beside = source.parent().into_iter().flat_map(entries);
+            files.extend(beside.filter(|p| is_kin(p.clone()) || entries(p).any(is_kin)));
         }
+        files.extend(named);
         for file in &self.depends_on {
             if !file.exists() {
                 return Err(absent(format!("{}, which it depends on, is not there", file.display())));
             }
             files.push(file.clone());
         }
-        files.sort();
-        Ok(Version::of(self.contents(), site, files))
+        Ok(Version::of(&self.id, &self.contents, site, files))
     }
 
     /// A program that two engines run counts once, and so does what it says that it shares.
     fn components(&self, _job: &Job) -> Vec<String> {
-        let program = format!("the program {}", self.contents());
+        let program = format!("the program {}", self.contents);
         [FILE_READER.to_owned(), program].into_iter().chain(self.shares.clone()).collect()
     }
 

@@ -1,18 +1,20 @@
 //! What really runs: a hash of the files of an engine, whatever version it tells.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use walkdir::WalkDir;
 
 use super::Site;
+use crate::record::EngineName;
 use crate::spec::hexadecimal;
 use crate::system::files;
 
-/// More files than this are no engine's.
+/// Of more files than this only the number counts.
 const MAX_FILES: usize = 20_000;
 
 /// Hashes of files that have not changed since, by path: size and time of change tell.
@@ -25,17 +27,19 @@ struct Known {
     sha256: String,
 }
 
-/// SHA-256 of the contents of files and folders, 16 hexadecimal digits of it; what cannot be read is part of it as just that.
-pub(super) fn of(site: &Site, paths: impl IntoIterator<Item = PathBuf>) -> String {
+/// SHA-256 of the names and contents of an engine's files and folders, 16 hexadecimal digits of it; what cannot be read is
+/// part of it as just that.
+pub(super) fn of(engine: &EngineName, site: &Site, roots: impl IntoIterator<Item = PathBuf>) -> String {
     // An engine each, so that probes side by side do not overwrite one another's.
-    let paths: Vec<PathBuf> = paths.into_iter().collect();
-    let name = hexadecimal(&Sha256::digest(format!("{paths:?}")));
-    let place = site.root().join("fingerprints").join(format!("{}.json", &name[..16]));
+    let place = site.root().join("fingerprints").join(format!("{engine}.json"));
     let memo: Memo = std::fs::read(&place).ok().and_then(|b| serde_json::from_slice(&b).ok()).unwrap_or_default();
-    let (mut now, mut hash) = (Memo::default(), Sha256::new());
-    for path in paths.iter().flat_map(|path| below(path)) {
+    let roots: BTreeSet<PathBuf> = roots.into_iter().collect();
+    let files: Vec<_> = roots.iter().flat_map(|root| below(root)).collect();
+    let (mut now, mut hash) = (Memo::default(), Sha256::new_with_prefix(files.len().to_le_bytes()));
+    for (name, path) in files.into_iter().take(MAX_FILES) {
         let known = seen(&path, memo.get(&path));
-        hash.update(known.as_ref().map_or_else(ToString::to_string, |k| k.sha256.clone()));
+        let content = known.as_ref().map_or_else(ToString::to_string, |k| k.sha256.clone());
+        hash.update(format!("{}\0{content}\n", name.display()));
         now.extend(known.map(|known| (path, known)));
     }
     if now != memo {
@@ -55,19 +59,43 @@ fn seen(path: &Path, earlier: Option<&Known>) -> io::Result<Known> {
     Ok(Known { size, changed_ns, sha256: hexadecimal(&Sha256::digest(std::fs::read(path)?)) })
 }
 
-/// The files at or below a path, sorted; what compilers leave beside sources is none.
-fn below(path: &Path) -> Vec<PathBuf> {
-    let (mut found, mut open) = (vec![], vec![path.to_owned()]);
-    while let Some(path) = open.pop() {
-        match path.read_dir() {
-            Ok(entries) if found.len() < MAX_FILES => {
-                let paths = entries.flatten().map(|e| e.path());
-                open.extend(paths.filter(|p| !p.ends_with("__pycache__")));
-            }
-            Ok(_) => (),
-            Err(_) => found.push(path),
-        }
+/// The files at or below a path, in order, each with its name from there; what compilers leave beside sources is none.
+fn below(root: &Path) -> impl Iterator<Item = (PathBuf, PathBuf)> {
+    let walk = WalkDir::new(root).sort_by_file_name().into_iter().filter_entry(|e| e.file_name() != "__pycache__");
+    let file = |entry: walkdir::Result<walkdir::DirEntry>| match entry {
+        Ok(entry) => Some(entry.into_path()).filter(|path| path.is_file()),
+        Err(error) => error.path().map(Path::to_owned),
+    };
+    // With the root's own name, which tells files that are named each by itself.
+    let above = root.parent().unwrap_or(root);
+    walk.filter_map(file).map(move |path| (path.strip_prefix(above).unwrap_or(&path).to_owned(), path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contents_names_and_numbers_of_files_count_and_folders_that_are_linked_do_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let (root, site) = (folder.path().join("engine"), Site::at(folder.path().join("site")));
+        std::fs::create_dir_all(root.join("part")).unwrap();
+        std::fs::write(root.join("part/a"), "one").unwrap();
+        std::os::unix::fs::symlink(&root, root.join("part/circle")).unwrap();
+        let now = || of(&EngineName::new("mine"), &site, [root.clone(), root.clone()]);
+        let mut seen = vec![now()];
+        assert_eq!(now(), seen[0]);
+        std::fs::rename(root.join("part/a"), root.join("part/b")).unwrap();
+        seen.push(now());
+        std::fs::rename(root.join("part/b"), root.join("b")).unwrap();
+        seen.push(now());
+        std::fs::write(root.join("b"), "other").unwrap();
+        seen.push(now());
+        std::fs::write(root.join("c"), "").unwrap();
+        seen.push(now());
+        assert_eq!(seen.iter().collect::<BTreeSet<_>>().len(), 5, "{seen:?}");
+        let kept: Vec<_> =
+            site.root().join("fingerprints").read_dir().unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(kept, ["mine.json"]);
     }
-    found.sort();
-    found
 }

@@ -51,7 +51,7 @@ const LIMIT: Duration = Duration::from_secs(3600);
 /// `progress` is told of each step before it starts. Another installation into the same site is waited for.
 pub fn install(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str)) -> Vec<InstallOutcome> {
     let components = components(engines);
-    // ScoredReference to the end, so that two installations never write the same folder.
+    // Held to the end, so that two installations never write the same folder.
     let lock = match lock(site) {
         Ok(lock) => lock,
         Err(error) => return components.iter().map(|c| c.failed(&error)).collect(),

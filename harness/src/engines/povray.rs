@@ -17,6 +17,8 @@ mod settings;
 #[cfg(test)]
 pub(super) mod tests;
 
+use std::path::PathBuf;
+
 use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 
@@ -53,9 +55,8 @@ impl Engine for PovRay {
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         let remedy = || "run `luxproof engines install`, or install the Debian package povray".to_owned();
         let absent = |reason| Absent { reason, remedy: remedy() };
-        if site.python_package("OpenImageIO").is_none() {
-            return Err(absent("OpenImageIO, which reads its images, is not there".to_owned()));
-        }
+        let reader = site.python_package("OpenImageIO");
+        let reader = reader.ok_or_else(|| absent("OpenImageIO, which reads its images, is not there".to_owned()))?;
         let program = bench::program(site).map_err(|e| absent(e.to_string()))?;
         let done = process::ask(program.clone(), "--version", |asked| bench::hermetic(asked, site));
         let done = done.map_err(|e| absent(e.to_string()))?;
@@ -63,7 +64,11 @@ impl Engine for PovRay {
         let version = said.lines().find_map(|l| l.trim().strip_prefix("POV-Ray "));
         let version = version.and_then(|v| v.split_whitespace().next());
         let version = version.ok_or_else(|| absent("povray does not tell its version".to_owned()))?;
-        Ok(Version::of(version, site, [program, site.debian()]))
+        // Unpacked with it; the system's own libraries are not asked, nor Mitsuba's.
+        let (unpacked, llvm) = (site.debian(), site.libraries("libLLVM"));
+        let is_its = |l: &PathBuf| program.starts_with(&unpacked) && l.starts_with(&unpacked) && !llvm.contains(l);
+        let libraries = site.libraries("lib").into_iter().filter(is_its);
+        Ok(Version::of(&ID, version, site, libraries.chain([program.clone(), reader])))
     }
 
     fn supports(&self, job: &Job) -> Support {

@@ -1,32 +1,35 @@
 //! Who takes part: the engines that a command line and a spec choose, each asked for its version once and only if it has work.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{Asked, Selection};
-use crate::engines::{self, Absent, Engine, Site, Version};
-use crate::record::EngineName;
-use crate::spec::{Case, SpecError, suggestion};
+use crate::engines::{self, Absent, Engine, EngineError, Site, Version};
+use crate::spec::{Case, EngineSettings, SpecError, suggestion};
 use crate::system::slots::side_by_side;
 
 /// An engine and why it takes part.
 pub(super) type Chosen = (Arc<dyn Engine>, Asked);
 
-/// Our own engines, shared by all cases, and what they say of their version.
+/// Engines, each shared by all cases that it takes part in, and what they say of their version.
 pub(super) struct Roster {
-    engines: Vec<Arc<dyn Engine>>,
-    probed: BTreeMap<EngineName, Result<Version, Absent>>,
+    ours: Vec<Arc<dyn Engine>>,
+    externals: Vec<(Named, Arc<dyn Engine>)>,
+    probed: Vec<(Arc<dyn Engine>, Result<Version, Absent>)>,
 }
+
+/// A program of a user's: name, settings and the folder that its paths count from.
+type Named = (String, EngineSettings, PathBuf);
 
 impl Roster {
     pub(super) fn new() -> Self {
-        Self { engines: engines::all().into_iter().map(Arc::from).collect(), probed: BTreeMap::new() }
+        let ours = engines::all().into_iter().map(Arc::from).collect();
+        Self { ours, externals: vec![], probed: vec![] }
     }
 
     /// The engines of a case, in the order of reports.
-    pub(super) fn chosen(&self, case: &Case, selection: &Selection) -> Result<Vec<Chosen>, SpecError> {
-        let mut all = self.engines.clone();
+    pub(super) fn chosen(&mut self, case: &Case, selection: &Selection) -> Result<Vec<Chosen>, SpecError> {
+        let mut all = self.ours.clone();
         let built_in = names(&all);
         for (name, settings) in case.engines.iter().flatten().filter(|(name, _)| !built_in.contains(*name)) {
             if !settings.0.contains_key("command") {
@@ -36,11 +39,10 @@ impl Roster {
                 return Err(SpecError { message, help, ..place });
             }
             let folder = case.path.parent().unwrap_or(Path::new(""));
-            let engine = engines::external(name, &settings.0, folder).map_err(|error| {
+            all.push(self.external(name, settings, folder).map_err(|error| {
                 let help = "give `command: [program, arguments...]`, paths relative to the spec";
                 case.source.error_at(&format!("engines.{name}"), error.to_string(), help)
-            })?;
-            all.push(Arc::from(engine));
+            })?);
         }
         let ids = names(&all);
         if let Some(name) = selection.engines.iter().find(|name| !ids.contains(*name)) {
@@ -64,19 +66,33 @@ impl Roster {
         Ok(all.into_iter().filter_map(|engine| asked(engine.as_ref()).map(|asked| (engine, asked))).collect())
     }
 
-    /// The versions of those that are asked, side by side; those of our own list are remembered for the next case.
+    fn external(
+        &mut self,
+        name: &str,
+        settings: &EngineSettings,
+        folder: &Path,
+    ) -> Result<Arc<dyn Engine>, EngineError> {
+        let named = (name.to_owned(), settings.clone(), folder.to_owned());
+        if let Some((_, engine)) = self.externals.iter().find(|(known, _)| *known == named) {
+            return Ok(Arc::clone(engine));
+        }
+        let engine: Arc<dyn Engine> = Arc::from(engines::external(name, &settings.0, folder)?);
+        self.externals.push((named, Arc::clone(&engine)));
+        Ok(engine)
+    }
+
+    /// The versions of those that are asked, side by side, remembered for the next case.
     pub(super) fn probe(
         &mut self,
         asked: &[Option<Arc<dyn Engine>>],
         site: &Site,
     ) -> Vec<Option<Result<Version, Absent>>> {
-        let is_ours = |e: &Arc<dyn Engine>| self.engines.iter().any(|ours| Arc::ptr_eq(ours, e));
-        let known = |e: &Arc<dyn Engine>| self.probed.get(&e.name()).filter(|_| is_ours(e)).cloned();
-        let version = |e: &Arc<dyn Engine>| known(e).unwrap_or_else(|| e.probe(site));
+        let known = |e: &Arc<dyn Engine>| self.probed.iter().find(|(probed, _)| Arc::ptr_eq(probed, e));
+        let version = |e: &Arc<dyn Engine>| known(e).map_or_else(|| e.probe(site), |(_, found)| found.clone());
         let found = side_by_side(asked.len(), asked, |e| e.as_ref().map(version));
-        let answers = asked.iter().zip(&found).filter_map(|(e, found)| Some((e.as_ref()?, found.clone()?)));
-        let ours: Vec<_> = answers.filter(|(e, _)| is_ours(e)).map(|(e, found)| (e.name(), found)).collect();
-        self.probed.extend(ours);
+        let answers = asked.iter().flatten().zip(found.iter().flatten());
+        let fresh: Vec<_> = answers.filter(|(e, _)| known(e).is_none()).map(|(e, f)| (e.clone(), f.clone())).collect();
+        self.probed.extend(fresh);
         found
     }
 }

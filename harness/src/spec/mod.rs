@@ -163,14 +163,14 @@ procedures:
 
     #[test]
     fn what_is_wrong_is_refused_at_its_place_and_an_unknown_key_answered_with_the_nearest() {
-        for (right, wrong, line, column, help) in [
-            ("size_m", "sise_m", 3, Some(3), Some("did you mean `size_m`?")),
-            ("0.5", "1.5", 4, Some(36), None),
-            ("1, 1, 1", "much", 8, None, None),
+        for (right, wrong, word, line, column, help) in [
+            ("size_m", "sise_m", "sise_m", 3, Some(3), Some("did you mean `size_m`?")),
+            ("0.5", "1.5", "1.5", 4, Some(36), None),
+            ("[1, 1, 1]", "[1, much, 1]", "much", 8, None, None),
         ] {
             let error = parse(&MINIMAL.replace(right, wrong)).unwrap_err();
             assert_eq!((error.line, error.help.as_deref()), (Some(line), help), "{error}");
-            assert!(error.message.contains(wrong) && column.is_none_or(|c| error.column == Some(c)), "{error}");
+            assert!(error.message.contains(word) && column.is_none_or(|c| error.column == Some(c)), "{error}");
         }
     }
 

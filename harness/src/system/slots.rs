@@ -38,7 +38,7 @@ struct State {
 
 /// Slots in use; they are free again when this is dropped.
 #[derive(Debug)]
-pub struct ScoredReference<'a> {
+pub struct Held<'a> {
     slots: &'a Slots,
     share: Share,
 }
@@ -65,7 +65,7 @@ impl Slots {
     }
 
     /// Waits for a share. What asks for more than there is gets all that there is.
-    pub fn take(&self, share: Share) -> ScoredReference<'_> {
+    pub fn take(&self, share: Share) -> Held<'_> {
         let Share { threads, memory_mib } = share;
         let share =
             Share { threads: threads.clamp(1, self.all.threads), memory_mib: memory_mib.min(self.all.memory_mib) };
@@ -80,17 +80,17 @@ impl Slots {
         state.free.threads -= share.threads;
         state.free.memory_mib -= share.memory_mib;
         self.changed.notify_all();
-        ScoredReference { slots: self, share }
+        Held { slots: self, share }
     }
 }
 
-impl ScoredReference<'_> {
+impl Held<'_> {
     pub fn threads(&self) -> usize {
         self.share.threads
     }
 }
 
-impl Drop for ScoredReference<'_> {
+impl Drop for Held<'_> {
     fn drop(&mut self) {
         let mut state = self.slots.state.lock();
         state.free.threads += self.share.threads;

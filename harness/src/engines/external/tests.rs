@@ -94,21 +94,24 @@ fn the_fingerprint_changes_with_sources_beside_the_adapter_and_with_what_it_depe
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     std::fs::create_dir(folder.path().join("package")).unwrap();
-    for name in ["mine.py", "module.py", "package/part.py", "table.txt", "notes.txt"] {
+    for name in ["mine.py", "module.py", "package/part.py", "table.txt", "notes.txt", "a.json", "b.json", "sh", "tool"]
+    {
         write(name, "one");
     }
-    let settings = json!({"command": ["sh", "mine.py"], "depends_on": ["table.txt"]});
+    let settings = json!({"command": ["sh", "mine.py", "a.json"], "depends_on": ["table.txt"]});
     let settings: BTreeMap<_, _> = serde_json::from_value(settings).unwrap();
     let site = Site::at(folder.path().join("engines"));
     let now = || External::new("mine", &settings, folder.path()).unwrap().probe(&site).unwrap().fingerprint;
     let mut before = now();
-    for name in ["module.py", "package/part.py", "table.txt"] {
+    for name in ["mine.py", "module.py", "package/part.py", "table.txt", "a.json"] {
         write(name, "another");
         assert_ne!(before, now(), "{name}");
         before = now();
     }
-    write("notes.txt", "another");
-    assert_eq!(before, now());
+    for name in ["notes.txt", "b.json", "sh", "tool"] {
+        write(name, "another");
+        assert_eq!(before, now(), "{name}");
+    }
     std::fs::remove_file(folder.path().join("table.txt")).unwrap();
     assert!(External::new("mine", &settings, folder.path()).unwrap().probe(&site).is_err());
 }

@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::{InstallError, step};
 use crate::engines::Site;
+use crate::spec::hexadecimal;
 
 const LOCK: &str = include_str!("../../../engines.lock");
 
@@ -85,8 +86,7 @@ fn remove(path: &Path) -> Result<(), InstallError> {
 }
 
 fn folder_name() -> String {
-    let digest = Sha256::digest(LOCK.as_bytes());
-    digest.iter().take(8).fold("venv-".to_owned(), |name, byte| name + &format!("{byte:02x}"))
+    format!("venv-{}", &hexadecimal(&Sha256::digest(LOCK))[..16])
 }
 
 #[cfg(test)]

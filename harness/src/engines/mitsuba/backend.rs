@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::Deserialize;
 
+use super::ID;
 use super::settings::Settings;
 use crate::engines::workbench::by_hand;
 use crate::engines::{Absent, Site, Version, Workbench};
@@ -61,9 +62,9 @@ impl Backend {
     pub(super) fn version(&self, site: &Site) -> Version {
         let Versions { mitsuba, drjit, llvm } = &self.versions;
         let llvm = llvm.as_ref().map_or("no usable LLVM".to_owned(), |v| format!("LLVM {v}"));
-        let packages = ["mitsuba", "drjit"].iter().filter_map(|name| site.python_package(name));
+        let packages = ["mitsuba", "drjit", "numpy"].iter().filter_map(|name| site.python_package(name));
         let files = packages.chain(self.llvm.clone()).chain(self.python.canonicalize());
-        Version::of(format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"), site, files)
+        Version::of(&ID, format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"), site, files)
     }
 
     pub(super) fn command_by_hand(&self) -> String {

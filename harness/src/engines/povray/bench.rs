@@ -200,11 +200,7 @@ impl<'a> Bench<'a> {
     fn wave(&self, run: Run, numbers: Range<usize>, jobs: usize, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
         // The pilot is the first of the sequence of seeds.
         let block = |k: &usize| self.block(Run { seed: self.seed(k + 1), ..run }, pilot);
-        let (mut blocks, numbers) = (vec![], numbers.collect::<Vec<_>>());
-        for some in numbers.chunks(jobs) {
-            blocks.extend(side_by_side(jobs, some, block).into_iter().collect::<Result<Vec<_>, _>>()?);
-        }
-        Ok(blocks)
+        side_by_side(jobs, &numbers.collect::<Vec<_>>(), block).into_iter().collect()
     }
 
     /// The first reflection, most of the noise, is read once more with many rays and no cache, and exchanged for the

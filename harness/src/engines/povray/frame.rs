@@ -3,12 +3,15 @@
 //! POV-Ray ignores what is nearer than 1e-4 to a ray's start and takes 1e-3 for nothing near a shadow ray's
 //! (`MIN_ISECT_DEPTH`, `SHADOW_TOLERANCE`); its radiosity measures distances from the camera.
 
-use glam::DVec3;
+use std::collections::HashMap;
+
+use glam::{DVec3, I64Vec3};
 use luminaire::geometry::Surface;
 use luminaire::scene::{Luminaire, Shape};
 
+use super::settings::Settings;
+use crate::engines::Job;
 use crate::engines::settings::Coordinates;
-use crate::engines::{Job, Station};
 
 /// From metres of the spec to units of the scene: (p - centre) scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,26 +87,23 @@ fn extent_m(job: &Job) -> (DVec3, DVec3) {
 pub(super) fn seats(job: &Job, frame: Frame) -> Vec<DVec3> {
     let points: Vec<DVec3> = job.stations.iter().map(|s| frame.point(s.meter.position_m)).collect();
     let normal = |k: usize| job.stations[k].meter.normal;
-    let crossing = |k: usize| {
-        let near = (0..points.len()).filter(|&j| points[j].distance(points[k]) < REACH);
-        near.map(|j| normal(j).cross(normal(k)).length()).filter(|sine| *sine > PARALLEL).reduce(f64::min)
-    };
-    let sines: Vec<Option<f64>> = (0..points.len()).map(crossing).collect();
+    let (mut crosses, mut behind) = (vec![false; points.len()], 0.0_f64);
     // Each of two crossing discs lies a little behind its own meter, all equally: another's front comes after it, and
     // another's back, which is transparent, before it, by more than POV-Ray's least distance between hits.
-    let behind = sines.iter().flatten().map(|sine| 4.0 * AIM / sine).fold(BEHIND, f64::max);
-    let seat = |k: usize| match sines[k] {
+    for (j, k, sine) in crossings(job, frame) {
+        (crosses[j], crosses[k]) = (true, true);
+        behind = behind.max(4.0 * AIM / sine);
+    }
+    let seat = |k: usize| match crosses[k] {
         _ if on_a_surface(job, frame, points[k]) => points[k] + CLEAR * normal(k),
-        Some(_) => points[k] - behind * normal(k),
-        None => points[k],
+        true => points[k] - behind * normal(k),
+        false => points[k],
     };
     (0..points.len()).map(seat).collect()
 }
 
 /// How far a disc is lifted off a surface.
 const CLEAR: f64 = 2e-5;
-/// How far a disc lies behind its meter at least where discs cross.
-const BEHIND: f64 = 1e-4;
 /// How far a ray may pass a disc's centre: the aim's triangles are kept in single precision, here up to 500 units from
 /// the origin. A front turned by t then seems nearer by t `AIM`, while it lies t^2/2 of the distance behind further off.
 const AIM: f64 = 3e-5;
@@ -114,19 +114,32 @@ const NARROW: f64 = 0.05;
 /// Discs nearer than this to each other may cross.
 const REACH: f64 = 5e-3;
 
+/// The pairs of meters whose discs may hide one another, and the sine of the angle between them: 1 where they face away from
+/// each other, as a back hides nothing, but stands off from a front like any other.
+fn crossings(job: &Job, frame: Frame) -> impl Iterator<Item = (usize, usize, f64)> {
+    let mut cells: HashMap<I64Vec3, Vec<usize>> = HashMap::new();
+    (0..job.stations.len()).flat_map(move |k| {
+        let seat = |k: usize| (frame.point(job.stations[k].meter.position_m), job.stations[k].meter.normal);
+        let (point, normal) = seat(k);
+        let crossing = |&j: &usize| {
+            let (other, facing) = seat(j);
+            let sine = if facing.dot(normal) < 0.0 { 1.0 } else { facing.cross(normal).length() };
+            (sine > PARALLEL && other.distance(point) < REACH).then_some((j, k, sine))
+        };
+        let cell = (point / REACH).floor().as_i64vec3();
+        let around = (0..27).map(|n| cell.saturating_add(I64Vec3::new(n % 3, n / 3 % 3, n / 9) - 1));
+        let found: Vec<_> = around.flat_map(|c| cells.get(&c).into_iter().flatten()).filter_map(crossing).collect();
+        cells.entry(cell).or_default().push(k);
+        found
+    })
+}
+
 /// Two meters at one point that look nearly the same way: one's disc would be seen for the other's.
 pub(super) fn narrow(job: &Job) -> Option<String> {
-    let frame = Frame::of(job, Coordinates::Fitted);
-    job.stations.iter().enumerate().find_map(|(k, a)| {
-        let hides = |b: &&Station| {
-            let sine = a.meter.normal.cross(b.meter.normal).length();
-            let apart = a.meter.position_m.distance(b.meter.position_m) * frame.scale;
-            apart < REACH && (PARALLEL..NARROW).contains(&sine) && a.meter.normal.dot(b.meter.normal) > 0.0
-        };
-        let b = job.stations[k + 1..].iter().find(hides)?;
-        let why = "are at one point and nearly parallel, where POV-Ray's discs would hide one another";
-        Some(format!("{} and {} {why}", a.id, b.id))
-    })
+    let coordinates = Settings::of(job).map_or(Coordinates::Fitted, |s| s.coordinates);
+    let (j, k, _) = crossings(job, Frame::of(job, coordinates)).find(|(.., sine)| *sine < NARROW)?;
+    let why = "are at one point and nearly parallel, where POV-Ray's discs would hide one another";
+    Some(format!("{} and {} {why}", job.stations[j].id, job.stations[k].id))
 }
 
 fn on_a_surface(job: &Job, frame: Frame, point: DVec3) -> bool {

@@ -37,7 +37,7 @@ impl Tools {
         let done = done.map_err(|error| absent(error.to_string()))?;
         let text = String::from_utf8_lossy(&done.stdout).into_owned();
         let version = text.split_whitespace().nth(1).ok_or_else(|| absent(format!("rtrace -version says `{text}`")))?;
-        Ok(Version::of(version, site, [self.package.clone()]))
+        Ok(Version::of(&ID, version, site, [self.package.clone()]))
     }
 
     pub(super) fn compile(&self, workbench: &Workbench) -> Result<(), EngineError> {
