@@ -45,7 +45,8 @@ fn year() -> &'static tempfile::NamedTempFile {
 /// Of five engines in four procedures of five cases.
 fn readings() -> Vec<ReadingKey> {
     let engines = ["iesna", "mitsuba", "povray", "radiance", "simulator"];
-    let procedures = || engines.iter().flat_map(|engine| ProcedureId::ALL.map(|procedure| (*engine, procedure)));
+    let procedures =
+        || engines.iter().flat_map(|engine| ProcedureId::ALL.iter().map(|procedure| (*engine, *procedure)));
     let case = |k| procedures().map(move |(e, p)| ReadingKey::new(format!("cachet/case-{k}"), p, e));
     (0..5).flat_map(case).collect()
 }

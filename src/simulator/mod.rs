@@ -9,7 +9,7 @@ mod emission;
 mod gmres;
 mod path_tracing;
 mod prepared;
-mod quadrature;
+pub mod quadrature;
 mod radiosity;
 mod sampler;
 mod validate;

@@ -5,18 +5,18 @@
 
 /// A Gauss-Legendre rule on 0..1 with the weights of Lagrange's polynomials through its nodes.
 #[derive(Clone, Debug)]
-pub(crate) struct Gauss {
+pub struct Gauss {
     /// Nodes, rising.
-    pub(crate) nodes: Vec<f64>,
+    pub nodes: Vec<f64>,
     /// Weights, summing to 1.
-    pub(crate) weights: Vec<f64>,
+    pub weights: Vec<f64>,
     /// Reciprocals of what the product of distances to all other nodes is at each.
     barycentric: Vec<f64>,
 }
 
 impl Gauss {
     /// The rule with `count` nodes, exact for polynomials up to degree `2 count - 1`.
-    pub(crate) fn new(count: usize) -> Self {
+    pub fn new(count: usize) -> Self {
         let (mut nodes, mut weights) = (vec![0.0; count], vec![0.0; count]);
         for i in 0..count {
             let mut z = (std::f64::consts::PI * (i as f64 + 0.75) / (count as f64 + 0.5)).cos();
@@ -37,6 +37,11 @@ impl Gauss {
         let weight = |i: usize| 1.0 / (0..count).filter(|j| *j != i).map(|j| nodes[i] - nodes[j]).product::<f64>();
         let barycentric = (0..count).map(weight).collect();
         Self { nodes, weights, barycentric }
+    }
+
+    /// The nodes, rising, each with its weight.
+    pub fn points(&self) -> impl Iterator<Item = (f64, f64)> + Clone {
+        self.nodes.iter().copied().zip(self.weights.iter().copied())
     }
 
     /// The values at `t` of the Lagrange polynomials through the nodes, as products: no division, no node to step around.

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::Subcommand;
 use etcetera::BaseStrategy;
+use indicatif::HumanBytes;
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use crate::measure::cache::Cache;
@@ -47,7 +48,7 @@ fn info(cache: &Cache) -> Result<String, Diagnostic> {
     let contents = cache.contents().into_diagnostic()?;
     let mut lines = vec![format!("readings are kept in {}", cache.root().display())];
     for (engine, (entries, bytes)) in &contents.engines {
-        lines.push(format!("{engine:<10} {entries} entries, {:.1} KiB", kibibytes(*bytes)));
+        lines.push(format!("{engine:<10} {entries} entries, {}", HumanBytes(*bytes)));
     }
     if contents.engines.is_empty() {
         lines.push("it is empty".to_owned());
@@ -61,13 +62,7 @@ fn info(cache: &Cache) -> Result<String, Diagnostic> {
 
 fn prune(cache: &Cache, days: u32) -> Result<String, Diagnostic> {
     let pruned = cache.prune(Duration::from_secs(86_400 * u64::from(days))).into_diagnostic()?;
-    let (unused, damaged, kib) = (pruned.unused, pruned.damaged, kibibytes(pruned.bytes));
+    let (unused, damaged, size) = (pruned.unused, pruned.damaged, HumanBytes(pruned.bytes));
     let unfinished = pruned.unfinished;
-    Ok(format!(
-        "took out {unused} unused for {days} days, {damaged} damaged, {unfinished} half written: {kib:.1} KiB\n"
-    ))
-}
-
-fn kibibytes(bytes: u64) -> f64 {
-    bytes as f64 / 1024.0
+    Ok(format!("took out {unused} unused for {days} days, {damaged} damaged, {unfinished} half written: {size}\n"))
 }

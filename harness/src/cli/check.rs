@@ -36,7 +36,7 @@ pub(super) fn check(selected: &Selected, site: &Site) -> Result<Exit, Diagnostic
             }
         }
         let absent = plan.engines.iter().any(|p| p.asked == Asked::ByName && p.is_absent());
-        exit = exit.worse(if absent { Exit::Engine } else { Exit::Passed });
+        exit = exit.max(if absent { Exit::Engine } else { Exit::Passed });
     }
     Ok(exit)
 }

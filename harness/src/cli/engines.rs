@@ -60,7 +60,7 @@ fn examine(site: &Site, names: &[String], spec: Option<&Path>) -> Result<Exit, D
     let report = audit::examine(spec, &Policy::built_in().into_diagnostic()?, &options).map_err(not_audited)?;
     print!("{}", terminal(&report, Style::Plain, Detail::Brief, None));
     let is_absent = |e: &EngineStatus| e.status == Status::Absent;
-    Ok(report.exit().worse(if report.engines.iter().any(is_absent) { Exit::Engine } else { Exit::Passed }))
+    Ok(report.exit().max(if report.engines.iter().any(is_absent) { Exit::Engine } else { Exit::Passed }))
 }
 
 pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {

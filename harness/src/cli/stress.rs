@@ -52,7 +52,7 @@ enum StressFormat {
 pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
     for law in &args.laws {
         if laws::find(law).is_none() {
-            let help = suggestion(law, laws::ALL.iter().map(|l| l.id));
+            let help = suggestion(law, laws::all().map(|l| l.id));
             return Err(miette::miette!(help = help, "there is no law `{law}`"));
         }
     }

@@ -8,6 +8,8 @@ mod faults;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use itertools::Itertools;
+
 use crate::judge::{Basis, Comparison, Verdict};
 use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId, Uncertainty};
@@ -161,8 +163,8 @@ pub fn causes(faults: &[Fault], readings: &Readings) -> Vec<Cause> {
     if readings.len() < 2 || is_chance(readings.chi_squared(&readings.right), readings.len()) {
         return vec![];
     }
-    let mut found: Vec<Cause> = faults.iter().filter_map(|fault| explanation(fault, readings)).collect();
-    found.sort_by(|a, b| a.score.total_cmp(&b.score));
+    let found = faults.iter().filter_map(|fault| explanation(fault, readings));
+    let mut found: Vec<Cause> = found.sorted_by(|a, b| a.score.total_cmp(&b.score)).collect();
     let best = found.first().map_or(0.0, |c| c.score);
     found.retain(|c| c.score <= best + RIVAL);
     found.truncate(MAX_RIVALS);

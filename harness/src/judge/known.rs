@@ -1,6 +1,6 @@
 //! Known deviations: where an engine is known to differ, by how much and why, read from `reference/known_deviations.yaml`.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::verdict::Verdict;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
@@ -42,8 +42,7 @@ pub struct KnownBreak {
     /// The case that it was measured with.
     pub case: String,
     pub law: String,
-    /// How it breaks: drift, `silent_loss`, nan, crash or hang.
-    pub how: String,
+    pub how: How,
     /// The mildest magnitude at which it does.
     pub from: f64,
     /// The largest deviation measured, relative; none where nothing is read.
@@ -51,6 +50,19 @@ pub struct KnownBreak {
     pub relative: Option<f64>,
     pub cause: String,
     pub source: String,
+}
+
+/// How a law is broken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, strum::Display)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum How {
+    Drift,
+    /// More than half of the light is gone, or readings are, without an error.
+    SilentLoss,
+    Nan,
+    Crash,
+    Hang,
 }
 
 #[derive(Debug, thiserror::Error)]

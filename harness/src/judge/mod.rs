@@ -27,7 +27,7 @@ use papers::Input;
 
 pub use crate::record::Basis;
 pub use consensus::{Consensus, Witness};
-pub use known::{KnownBreak, KnownDeviationError, KnownDeviations, Subject};
+pub use known::{How, KnownBreak, KnownDeviationError, KnownDeviations, Subject};
 pub use papers::{PaperSplit, Share, Stages, shares};
 pub use papers::{Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use policy::{Policy, PolicyError};

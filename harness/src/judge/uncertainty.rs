@@ -12,10 +12,14 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal, StudentsT};
 /// Components below this share of the widest one change no quantile that anybody reads.
 const NEGLIGIBLE: f64 = 1e-4;
 
+/// What an error comes from, in the order of reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
+#[derive(strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "snake_case", const_into_str)]
 pub enum Source {
     /// Chance in the reading: the standard error of sampled light.
+    #[strum(to_string = "Monte Carlo")]
     MonteCarlo,
     /// The error bound of a deterministic reading: discretisation and read-out. Older reports tell an `instrument` apart.
     #[serde(alias = "instrument")]
@@ -26,21 +30,6 @@ pub enum Source {
     Rounding,
     /// The last digit of the photometric file's candela table, where the reference does not rest on that file.
     Input,
-}
-
-impl Source {
-    /// Every source, in the order of reports.
-    pub const ALL: [Self; 5] = [Self::MonteCarlo, Self::Discretisation, Self::Reference, Self::Rounding, Self::Input];
-
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::MonteCarlo => "Monte Carlo",
-            Self::Discretisation => "discretisation",
-            Self::Reference => "reference",
-            Self::Rounding => "rounding",
-            Self::Input => "input",
-        }
-    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

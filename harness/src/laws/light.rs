@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
+use itertools::Itertools;
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction};
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Transport};
 
@@ -11,7 +12,7 @@ use super::{Against, Law, Light, Variant};
 use crate::engines::{Job, Station};
 use crate::record::MeterId;
 
-pub(super) const FLUX_UP: Law = Law {
+const FLUX_UP: Law = Law {
     id: "flux_up",
     what: "tables scaled to a largest intensity: illuminance in proportion",
     unit: "cd",
@@ -20,89 +21,85 @@ pub(super) const FLUX_UP: Law = Law {
     variant: brightened,
 };
 
-pub(super) const FLUX_DOWN: Law = Law { id: "flux_down", magnitudes: &[1.0, 1e-3, 1e-6, 1e-9], ..FLUX_UP };
-
-pub(super) const DIM_SCALE: Law = Law {
-    id: "dimming",
-    what: "the factor on a luminaire's flux: illuminance in proportion",
-    unit: "factor",
-    magnitudes: &[1e-3, 1e-6, 1e-9],
-    light: Light::Either,
-    variant: |job, factor| {
-        let mut job = job.clone();
-        job.scene.luminaires.iter_mut().for_each(|l| l.flux_scale *= factor);
-        Some(Variant { job, against: Against::Base(factor) })
+/// In the order of reports.
+pub(super) const LAWS: &[Law] = &[
+    FLUX_UP,
+    Law { id: "flux_down", magnitudes: &[1.0, 1e-3, 1e-6, 1e-9], ..FLUX_UP },
+    Law {
+        id: "dimming",
+        what: "the factor on a luminaire's flux: illuminance in proportion",
+        unit: "factor",
+        magnitudes: &[1e-3, 1e-6, 1e-9],
+        light: Light::Either,
+        variant: |job, factor| {
+            let mut job = job.clone();
+            job.scene.luminaires.iter_mut().for_each(|l| l.flux_scale *= factor);
+            Some(Variant { job, against: Against::Base(factor) })
+        },
     },
-};
-
-pub(super) const SUPERPOSITION: Law = Law {
-    id: "superposition",
-    what: "several luminaires: the sum of what each gives alone",
-    unit: "luminaires",
-    magnitudes: &[2.0, 4.0],
-    light: Light::Either,
-    variant: superposed,
-};
-
-pub(super) const MANY_LUMINAIRES: Law = Law {
-    id: "many_luminaires",
-    what: "the flux spread over many luminaires: inverse squares add up, and reflected light in a furnace is what the flux makes it",
-    unit: "luminaires",
-    magnitudes: &[1.0, 10.0, 100.0, 1000.0],
-    light: Light::Either,
-    variant: many,
-};
-
-pub(super) const FINE_TABLE: Law = Law {
-    id: "fine_table",
-    what: "the same table with more angles: the same light",
-    unit: "deg",
-    magnitudes: &[1.0, 0.1, 0.01],
-    light: Light::Either,
-    variant: refined,
-};
-
-pub(super) const NEEDLE_BEAM: Law = Law {
-    id: "needle_beam",
-    what: "all flux in a narrow beam: inverse square on its axis, and reflected light in a furnace is what the flux makes it",
-    unit: "deg",
-    magnitudes: &[10.0, 1.0, 0.1, 0.01],
-    light: Light::Either,
-    variant: |job, width_deg| beam(job, [0.0, width_deg], 0.0),
-};
-
-pub(super) const ONE_GAMMA: Law = Law {
-    id: "one_gamma",
-    what: "all flux at one angle from the nadir: inverse square there, and reflected light in a furnace is what the flux makes it",
-    unit: "deg",
-    magnitudes: &[10.0, 1.0, 0.1, 1e-3],
-    light: Light::Either,
-    variant: |job, width_deg| beam(job, [37.0, 37.0 + width_deg], 37.0 + 0.5 * width_deg),
-};
-
-pub(super) const DARK: Law = Law {
-    id: "dark",
-    what: "luminaires of 0 lm: 0 lx",
-    unit: "lm",
-    magnitudes: &[0.0],
-    light: Light::Either,
-    variant: |job, _| {
-        let mut job = job.clone();
-        retable(&mut job, |table| Some(table.scaled(0.0)))?;
-        let against = Against::Known(vec![0.0; job.stations.len()]);
-        Some(Variant { job, against })
+    Law {
+        id: "superposition",
+        what: "several luminaires: the sum of what each gives alone",
+        unit: "luminaires",
+        magnitudes: &[2.0, 4.0],
+        light: Light::Either,
+        variant: superposed,
     },
-};
-
-pub(super) const SEEDS: Law = Law {
-    id: "seeds",
-    what: "another seed: the same light within the standard errors stated",
-    unit: "seed",
-    magnitudes: &[2.0, 3.0, 4.0, 5.0],
-    light: Light::Reflected,
-    // The seed of a magnitude is set where it is read.
-    variant: |job, _| Some(Variant { job: job.clone(), against: Against::Base(1.0) }),
-};
+    Law {
+        id: "many_luminaires",
+        what: "the flux spread over many luminaires: inverse squares add up, and reflected light in a furnace is what the flux makes it",
+        unit: "luminaires",
+        magnitudes: &[1.0, 10.0, 100.0, 1000.0],
+        light: Light::Either,
+        variant: many,
+    },
+    Law {
+        id: "fine_table",
+        what: "the same table with more angles: the same light",
+        unit: "deg",
+        magnitudes: &[1.0, 0.1, 0.01],
+        light: Light::Either,
+        variant: refined,
+    },
+    Law {
+        id: "needle_beam",
+        what: "all flux in a narrow beam: inverse square on its axis, and reflected light in a furnace is what the flux makes it",
+        unit: "deg",
+        magnitudes: &[10.0, 1.0, 0.1, 0.01],
+        light: Light::Either,
+        variant: |job, width_deg| beam(job, [0.0, width_deg], 0.0),
+    },
+    Law {
+        id: "one_gamma",
+        what: "all flux at one angle from the nadir: inverse square there, and reflected light in a furnace is what the flux makes it",
+        unit: "deg",
+        magnitudes: &[10.0, 1.0, 0.1, 1e-3],
+        light: Light::Either,
+        variant: |job, width_deg| beam(job, [37.0, 37.0 + width_deg], 37.0 + 0.5 * width_deg),
+    },
+    Law {
+        id: "dark",
+        what: "luminaires of 0 lm: 0 lx",
+        unit: "lm",
+        magnitudes: &[0.0],
+        light: Light::Either,
+        variant: |job, _| {
+            let mut job = job.clone();
+            retable(&mut job, |table| Some(table.scaled(0.0)))?;
+            let against = Against::Known(vec![0.0; job.stations.len()]);
+            Some(Variant { job, against })
+        },
+    },
+    Law {
+        id: "seeds",
+        what: "another seed: the same light within the standard errors stated",
+        unit: "seed",
+        magnitudes: &[2.0, 3.0, 4.0, 5.0],
+        light: Light::Reflected,
+        // The seed of a magnitude is set where it is read.
+        variant: |job, _| Some(Variant { job: job.clone(), against: Against::Base(1.0) }),
+    },
+];
 
 fn retable(
     job: &mut Job,
@@ -181,12 +178,10 @@ fn refined(job: &Job, step_deg: f64) -> Option<Variant> {
     retable(&mut job, |table| {
         let (first, last) = (table.gamma_deg()[0], *table.gamma_deg().last()?);
         let steps = ((last - first) / step_deg).round() as usize;
-        let mut gamma_deg: Vec<f64> = (0..steps).map(|k| first + k as f64 * step_deg).collect();
-        gamma_deg.extend(table.gamma_deg());
-        gamma_deg.sort_by(f64::total_cmp);
+        let even = (0..steps).map(|k| first + k as f64 * step_deg);
         // Nodes that differ by rounding alone are one.
         let mut nodes: Vec<f64> = vec![];
-        for gamma in gamma_deg {
+        for gamma in even.chain(table.gamma_deg().iter().copied()).sorted_by(f64::total_cmp) {
             let known = table.gamma_deg().contains(&gamma);
             match nodes.last_mut() {
                 Some(near) if gamma - *near < 1e-6 * step_deg => *near = if known { gamma } else { *near },

@@ -8,7 +8,7 @@ use super::{Against, Law, Light, Variant};
 use crate::engines::{Job, Station};
 use crate::record::MeterId;
 
-pub(super) const NEAR_SURFACE: Law = Law {
+const NEAR_SURFACE: Law = Law {
     id: "meter_near_surface",
     what: "meters ever closer to floor, ceiling and a wall: what the exact values are there",
     unit: "m",
@@ -26,44 +26,46 @@ pub(super) const NEAR_SURFACE: Law = Law {
     },
 };
 
-pub(super) const NEAR_EDGE: Law = Law {
-    id: "meter_near_edge",
-    what: "meters ever closer to edges of the room: what the exact values are there",
-    variant: |job, off_m| {
-        let size_m = job.scene.room?.size_m;
-        let low = DVec3::new(off_m, 0.42 * size_m.y, off_m);
-        let high = DVec3::new(off_m, 0.42 * size_m.y, size_m.z - off_m);
-        at(job, &[(low, DVec3::Z), (low, DVec3::X), (high, DVec3::NEG_Z)])
+/// In the order of reports.
+pub(super) const LAWS: &[Law] = &[
+    NEAR_SURFACE,
+    Law {
+        id: "meter_near_edge",
+        what: "meters ever closer to edges of the room: what the exact values are there",
+        variant: |job, off_m| {
+            let size_m = job.scene.room?.size_m;
+            let low = DVec3::new(off_m, 0.42 * size_m.y, off_m);
+            let high = DVec3::new(off_m, 0.42 * size_m.y, size_m.z - off_m);
+            at(job, &[(low, DVec3::Z), (low, DVec3::X), (high, DVec3::NEG_Z)])
+        },
+        ..NEAR_SURFACE
     },
-    ..NEAR_SURFACE
-};
-
-pub(super) const NEAR_CORNER: Law = Law {
-    id: "meter_near_corner",
-    what: "meters ever closer to corners of the room: what the exact values are there",
-    variant: |job, off_m| {
-        let size_m = job.scene.room?.size_m;
-        let (low, high) = (DVec3::splat(off_m), size_m - off_m);
-        at(job, &[(low, DVec3::Z), (low, DVec3::ONE.normalize()), (high, DVec3::NEG_Z)])
+    Law {
+        id: "meter_near_corner",
+        what: "meters ever closer to corners of the room: what the exact values are there",
+        variant: |job, off_m| {
+            let size_m = job.scene.room?.size_m;
+            let (low, high) = (DVec3::splat(off_m), size_m - off_m);
+            at(job, &[(low, DVec3::Z), (low, DVec3::ONE.normalize()), (high, DVec3::NEG_Z)])
+        },
+        ..NEAR_SURFACE
     },
-    ..NEAR_SURFACE
-};
-
-pub(super) const BESIDE_LUMINAIRE: Law = Law {
-    id: "meter_near_luminaire",
-    what: "meters ever closer to a point luminaire: the inverse-square law",
-    unit: "m",
-    magnitudes: &[1.0, 0.1, 1e-2, 1e-3, 1e-4],
-    light: Light::Direct,
-    variant: |job, distance_m| {
-        let mut job = job.clone();
-        let from = job.scene.luminaires.iter().find(|l| l.model == LuminaireModel::Point)?.position_m;
-        let paths = [DVec3::Z, DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.48, 0.64, -0.6)];
-        let meter = |path: DVec3| Meter { position_m: from + distance_m * path, normal: -path };
-        job.stations = stations(&paths.map(meter));
-        known_direct(job)
+    Law {
+        id: "meter_near_luminaire",
+        what: "meters ever closer to a point luminaire: the inverse-square law",
+        unit: "m",
+        magnitudes: &[1.0, 0.1, 1e-2, 1e-3, 1e-4],
+        light: Light::Direct,
+        variant: |job, distance_m| {
+            let mut job = job.clone();
+            let from = job.scene.luminaires.iter().find(|l| l.model == LuminaireModel::Point)?.position_m;
+            let paths = [DVec3::Z, DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.48, 0.64, -0.6)];
+            let meter = |path: DVec3| Meter { position_m: from + distance_m * path, normal: -path };
+            job.stations = stations(&paths.map(meter));
+            known_direct(job)
+        },
     },
-};
+];
 
 fn stations(meters: &[Meter]) -> Vec<Station> {
     let station = |(k, meter): (usize, &Meter)| Station { id: MeterId::new("m", k), meter: *meter };

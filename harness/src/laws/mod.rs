@@ -15,35 +15,9 @@ use serde::{Deserialize, Serialize};
 use crate::engines::Job;
 
 /// Every law, in the order of reports.
-pub const ALL: [&Law; 27] = [
-    &similarity::SCALE_UP,
-    &similarity::SCALE_DOWN,
-    &similarity::TRANSLATION,
-    &similarity::TRANSLATED_ROOM,
-    &similarity::TURNED_ROOM,
-    &similarity::ROOM_ON_ITS_SIDE,
-    &similarity::TURNED_LUMINAIRE,
-    &similarity::MIRROR,
-    &light::FLUX_UP,
-    &light::FLUX_DOWN,
-    &light::SUPERPOSITION,
-    &light::MANY_LUMINAIRES,
-    &surfaces::WALL_PATCHES,
-    &surfaces::THIN_PANEL,
-    &surfaces::SLIVER,
-    &surfaces::REFLECTANCE,
-    &surfaces::NEAR_CEILING,
-    &meters::NEAR_SURFACE,
-    &meters::NEAR_EDGE,
-    &meters::NEAR_CORNER,
-    &meters::BESIDE_LUMINAIRE,
-    &light::FINE_TABLE,
-    &light::NEEDLE_BEAM,
-    &light::ONE_GAMMA,
-    &light::DARK,
-    &light::DIM_SCALE,
-    &light::SEEDS,
-];
+pub fn all() -> impl Iterator<Item = &'static Law> + Clone {
+    [similarity::LAWS, light::LAWS, surfaces::LAWS, meters::LAWS].into_iter().flatten()
+}
 
 pub struct Law {
     pub id: &'static str,
@@ -111,7 +85,7 @@ pub struct Place {
 }
 
 pub fn find(id: &str) -> Option<&'static Law> {
-    ALL.into_iter().find(|law| law.id == id)
+    all().find(|law| law.id == id)
 }
 
 pub fn job(base: &Job, place: &Place) -> Option<Job> {

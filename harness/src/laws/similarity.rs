@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
+use itertools::Itertools;
 use luminaire::geometry::{Reflectances, Room, Surface};
 use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry};
 use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport};
@@ -10,7 +11,7 @@ use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transp
 use super::{Against, Law, Light, Variant};
 use crate::engines::{Job, Station};
 
-pub(super) const SCALE_UP: Law = Law {
+const SCALE_UP: Law = Law {
     id: "scale_up",
     what: "all lengths times s: illuminance divided by the square of s",
     unit: "s",
@@ -19,73 +20,70 @@ pub(super) const SCALE_UP: Law = Law {
     variant: scaled,
 };
 
-pub(super) const SCALE_DOWN: Law =
-    Law { id: "scale_down", magnitudes: &[0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6], ..SCALE_UP };
-
-pub(super) const TRANSLATION: Law = Law {
-    id: "translation",
-    what: "everything moved along each axis, in free field: the same direct light",
-    unit: "m",
-    magnitudes: &[10.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7],
-    light: Light::Direct,
-    variant: translated,
-};
-
-/// A spec's room has a corner at the origin, so that it is moved as a room of plates in a black room as much larger.
-pub(super) const TRANSLATED_ROOM: Law = Law {
-    id: "translated_room",
-    what: "the room built of plates, far off in a large black room: the same reflected light",
-    unit: "m",
-    magnitudes: &[1.0, 10.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7],
-    light: Light::Reflected,
-    variant: translated_room,
-};
-
-pub(super) const TURNED_ROOM: Law = Law {
-    id: "turned_room",
-    what: "everything turned about the vertical: the same light",
-    unit: "quarter turns",
-    magnitudes: &[1.0, 2.0, 3.0],
-    light: Light::Either,
-    variant: |job, quarters| {
-        let quarter = DMat3::from_cols(DVec3::Y, DVec3::NEG_X, DVec3::Z);
-        Some(same(mapped(job, (1..quarters as u32).fold(quarter, |turn, _| quarter * turn), 1.0)?))
+/// In the order of reports.
+pub(super) const LAWS: &[Law] = &[
+    SCALE_UP,
+    Law { id: "scale_down", magnitudes: &[0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6], ..SCALE_UP },
+    Law {
+        id: "translation",
+        what: "everything moved along each axis, in free field: the same direct light",
+        unit: "m",
+        magnitudes: &[10.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7],
+        light: Light::Direct,
+        variant: translated,
     },
-};
-
-pub(super) const ROOM_ON_ITS_SIDE: Law = Law {
-    id: "room_on_its_side",
-    what: "everything turned about the room's diagonal, so that a wall becomes the floor: the same light",
-    unit: "third turns",
-    magnitudes: &[1.0, 2.0],
-    light: Light::Either,
-    variant: |job, thirds| {
-        let third = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X);
-        Some(same(mapped(job, if thirds < 2.0 { third } else { third * third }, 1.0)?))
+    // A spec's room has a corner at the origin, so that it is moved as a room of plates in a black room as much larger.
+    Law {
+        id: "translated_room",
+        what: "the room built of plates, far off in a large black room: the same reflected light",
+        unit: "m",
+        magnitudes: &[1.0, 10.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7],
+        light: Light::Reflected,
+        variant: translated_room,
     },
-};
-
-pub(super) const TURNED_LUMINAIRE: Law = Law {
-    id: "turned_luminaire",
-    what: "luminaires turned about their axes and their tables turned back: the same light",
-    unit: "deg",
-    magnitudes: &[7.0, 45.0, 123.4],
-    light: Light::Either,
-    variant: turned_luminaire,
-};
-
-pub(super) const MIRROR: Law = Law {
-    id: "mirror",
-    what: "everything mirrored, tables too: the same light",
-    unit: "axis, x = 1",
-    magnitudes: &[1.0, 2.0, 3.0],
-    light: Light::Either,
-    variant: |job, axis| {
-        let mut flip = DVec3::ONE;
-        flip[axis as usize - 1] = -1.0;
-        Some(same(mapped(job, DMat3::from_diagonal(flip), 1.0)?))
+    Law {
+        id: "turned_room",
+        what: "everything turned about the vertical: the same light",
+        unit: "quarter turns",
+        magnitudes: &[1.0, 2.0, 3.0],
+        light: Light::Either,
+        variant: |job, quarters| {
+            let quarter = DMat3::from_cols(DVec3::Y, DVec3::NEG_X, DVec3::Z);
+            Some(same(mapped(job, (1..quarters as u32).fold(quarter, |turn, _| quarter * turn), 1.0)?))
+        },
     },
-};
+    Law {
+        id: "room_on_its_side",
+        what: "everything turned about the room's diagonal, so that a wall becomes the floor: the same light",
+        unit: "third turns",
+        magnitudes: &[1.0, 2.0],
+        light: Light::Either,
+        variant: |job, thirds| {
+            let third = DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X);
+            Some(same(mapped(job, if thirds < 2.0 { third } else { third * third }, 1.0)?))
+        },
+    },
+    Law {
+        id: "turned_luminaire",
+        what: "luminaires turned about their axes and their tables turned back: the same light",
+        unit: "deg",
+        magnitudes: &[7.0, 45.0, 123.4],
+        light: Light::Either,
+        variant: turned_luminaire,
+    },
+    Law {
+        id: "mirror",
+        what: "everything mirrored, tables too: the same light",
+        unit: "axis, x = 1",
+        magnitudes: &[1.0, 2.0, 3.0],
+        light: Light::Either,
+        variant: |job, axis| {
+            let mut flip = DVec3::ONE;
+            flip[axis as usize - 1] = -1.0;
+            Some(same(mapped(job, DMat3::from_diagonal(flip), 1.0)?))
+        },
+    },
+];
 
 fn same(job: Job) -> Variant {
     Variant { job, against: Against::Base(1.0) }
@@ -160,10 +158,8 @@ fn luminaire(luminaire: &Luminaire, position_m: DVec3, linear: DMat3, scale: f64
 /// The table with C 0 and C 180 exchanged.
 fn mirrored(table: &LuminousIntensityDistribution) -> LuminousIntensityDistribution {
     let full = table.full_circle();
-    let mut c_deg: Vec<f64> = full.c_deg().iter().map(|c| (180.0 - c).rem_euclid(360.0)).collect();
-    c_deg.extend([0.0, 360.0]);
-    c_deg.sort_by(f64::total_cmp);
-    c_deg.dedup();
+    let images = full.c_deg().iter().map(|c| (180.0 - c).rem_euclid(360.0)).chain([0.0, 360.0]);
+    let c_deg: Vec<f64> = images.sorted_by(f64::total_cmp).dedup().collect();
     let rows = c_deg.iter().flat_map(|&c| {
         let plane = 180.0 - c % 360.0;
         full.gamma_deg().iter().map(move |g| (plane, *g))

@@ -4,60 +4,60 @@ use glam::DVec3;
 use luminaire::calculators::inverse_square;
 use luminaire::geometry::{Reflectances, Room, Surface};
 use luminaire::scene::{LuminaireModel, Meter, Obstacle, Shape, Transport};
+use luminaire::simulator::quadrature::Gauss;
 
 use super::{Against, Law, Light, Variant};
 use crate::engines::{Job, Station};
 use crate::record::MeterId;
 
-pub(super) const WALL_PATCHES: Law = Law {
-    id: "wall_patches",
-    what: "a wall covered with thin plates of its own reflectance: the same reflected light",
-    unit: "plates",
-    magnitudes: &[1.0, 4.0, 16.0, 64.0],
-    light: Light::Reflected,
-    variant: |job, plates| covered(job, plates.sqrt() as usize, 1.0, 1e-5),
-};
-
-pub(super) const THIN_PANEL: Law = Law {
-    id: "thin_panel",
-    what: "a plate of the wall's own reflectance on it, ever thinner: the same reflected light",
-    unit: "thickness / room",
-    magnitudes: &[1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9],
-    light: Light::Reflected,
-    variant: |job, thickness| covered(job, 1, 0.5, thickness),
-};
-
-pub(super) const SLIVER: Law = Law {
-    id: "sliver",
-    what: "a strip of the wall's own reflectance on it, ever narrower: the same reflected light",
-    unit: "aspect",
-    magnitudes: &[10.0, 1e2, 1e4, 1e6],
-    light: Light::Reflected,
-    variant: |job, aspect| covered(job, 1, 1.0 / aspect, 1e-5_f64.min(0.1 / aspect)),
-};
-
-pub(super) const REFLECTANCE: Law = Law {
-    id: "reflectance",
-    what: "a closed room of one reflectance: the mean of reflected light is flux x rho / (area x (1 - rho))",
-    unit: "rho",
-    magnitudes: &[0.0, 0.5, 0.9, 0.99, 0.999, 1.0 - 1e-6, 1.0 - 1e-9],
-    light: Light::Reflected,
-    variant: |job, rho| furnace(emptied(job), rho),
-};
-
-pub(super) const NEAR_CEILING: Law = Law {
-    id: "near_ceiling",
-    what: "luminaires ever closer below the ceiling of a closed room of one reflectance: the same mean of reflected light",
-    unit: "m",
-    magnitudes: &[1.0, 0.1, 1e-2, 1e-3, 1e-6, 0.0],
-    light: Light::Reflected,
-    variant: |job, below_m| {
-        let mut job = emptied(job);
-        let height_m = job.scene.room?.size_m.z;
-        job.scene.luminaires.iter_mut().for_each(|l| l.position_m.z = height_m - below_m);
-        if below_m < height_m { furnace(job, 0.5) } else { None }
+/// In the order of reports.
+pub(super) const LAWS: &[Law] = &[
+    Law {
+        id: "wall_patches",
+        what: "a wall covered with thin plates of its own reflectance: the same reflected light",
+        unit: "plates",
+        magnitudes: &[1.0, 4.0, 16.0, 64.0],
+        light: Light::Reflected,
+        variant: |job, plates| covered(job, plates.sqrt() as usize, 1.0, 1e-5),
     },
-};
+    Law {
+        id: "thin_panel",
+        what: "a plate of the wall's own reflectance on it, ever thinner: the same reflected light",
+        unit: "thickness / room",
+        magnitudes: &[1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9],
+        light: Light::Reflected,
+        variant: |job, thickness| covered(job, 1, 0.5, thickness),
+    },
+    Law {
+        id: "sliver",
+        what: "a strip of the wall's own reflectance on it, ever narrower: the same reflected light",
+        unit: "aspect",
+        magnitudes: &[10.0, 1e2, 1e4, 1e6],
+        light: Light::Reflected,
+        variant: |job, aspect| covered(job, 1, 1.0 / aspect, 1e-5_f64.min(0.1 / aspect)),
+    },
+    Law {
+        id: "reflectance",
+        what: "a closed room of one reflectance: the mean of reflected light is flux x rho / (area x (1 - rho))",
+        unit: "rho",
+        magnitudes: &[0.0, 0.5, 0.9, 0.99, 0.999, 1.0 - 1e-6, 1.0 - 1e-9],
+        light: Light::Reflected,
+        variant: |job, rho| furnace(emptied(job), rho),
+    },
+    Law {
+        id: "near_ceiling",
+        what: "luminaires ever closer below the ceiling of a closed room of one reflectance: the same mean of reflected light",
+        unit: "m",
+        magnitudes: &[1.0, 0.1, 1e-2, 1e-3, 1e-6, 0.0],
+        light: Light::Reflected,
+        variant: |job, below_m| {
+            let mut job = emptied(job);
+            let height_m = job.scene.room?.size_m.z;
+            job.scene.luminaires.iter_mut().for_each(|l| l.position_m.z = height_m - below_m);
+            if below_m < height_m { furnace(job, 0.5) } else { None }
+        },
+    },
+];
 
 /// The job's room without bodies, its luminaires as points.
 fn emptied(job: &Job) -> Job {
@@ -95,15 +95,6 @@ fn covered(job: &Job, n: usize, part: f64, thickness: f64) -> Option<Variant> {
     matches!(job.transport, Transport::Indirect(_)).then_some(Variant { job, against: Against::Base(1.0) })
 }
 
-/// Gauss-Legendre nodes and weights on -1..1 (Abramowitz & Stegun 25.4.29, n = 6).
-const GAUSS: [(f64, f64); 6] = [
-    (-0.932_469_514_203_152, 0.171_324_492_379_170),
-    (-0.661_209_386_466_265, 0.360_761_573_048_139),
-    (-0.238_619_186_083_197, 0.467_913_934_572_691),
-    (0.238_619_186_083_197, 0.467_913_934_572_691),
-    (0.661_209_386_466_265, 0.360_761_573_048_139),
-    (0.932_469_514_203_152, 0.171_324_492_379_170),
-];
 /// How far off the surfaces a furnace is read, in parts of the room.
 const OFF: f64 = 1e-4;
 /// How far off the mean over those nodes may be, relative, in parts of 1 - rho: reflected light is the more even the brighter
@@ -121,16 +112,16 @@ pub(super) fn furnace(mut job: Job, rho: f64) -> Option<Variant> {
         return None;
     }
     let area_m2: f64 = Surface::ALL.iter().map(|s| room.area_m2(*s)).sum();
-    let (mut stations, mut weights) = (vec![], vec![]);
+    let (rule, mut stations, mut weights) = (Gauss::new(6), vec![], vec![]);
     for surface in Surface::ALL {
         let (corners, normal) = (room.corners(surface), surface.inward_normal());
         let (u, v) = (corners[1] - corners[0], corners[3] - corners[0]);
-        for (x, wx) in GAUSS.map(crowded) {
-            for (y, wy) in GAUSS.map(crowded) {
-                let at = corners[0] + 0.5 * (1.0 + x) * u + 0.5 * (1.0 + y) * v;
+        for (x, wx) in rule.points().map(crowded) {
+            for (y, wy) in rule.points().map(crowded) {
+                let at = corners[0] + x * u + y * v;
                 let meter = Meter { position_m: at + OFF * size_m.min_element() * normal, normal };
                 stations.push(Station { id: MeterId::new(surface.name(), stations.len()), meter });
-                weights.push(0.25 * wx * wy * room.area_m2(surface) / area_m2);
+                weights.push(wx * wy * room.area_m2(surface) / area_m2);
             }
         }
     }
@@ -141,9 +132,9 @@ pub(super) fn furnace(mut job: Job, rho: f64) -> Option<Variant> {
     Some(Variant { job, against: Against::Mean { weights, value_lx, quadrature: QUADRATURE * (1.0 - rho) } })
 }
 
-/// A node moved towards the nearer edge, where reflected light is least smooth: x becomes (3 x - x^3) / 2.
+/// A node moved towards the nearer edge, where reflected light is least smooth: x becomes 3 x^2 - 2 x^3.
 fn crowded((x, weight): (f64, f64)) -> (f64, f64) {
-    (0.5 * (3.0 * x - x.powi(3)), 1.5 * (1.0 - x * x) * weight)
+    (x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) * weight)
 }
 
 /// Direct light of point luminaires in an empty room: the inverse-square law.

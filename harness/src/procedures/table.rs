@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn every_procedure_has_its_row_in_the_order_of_reports() {
-        assert!(ALL.iter().map(|p| p.id).take(ProcedureId::ALL.len()).eq(ProcedureId::ALL));
+        assert!(ALL.iter().map(|p| p.id).take(ProcedureId::ALL.len()).eq(ProcedureId::ALL.iter().copied()));
         for (k, procedure) in ALL.iter().enumerate() {
             assert_eq!(procedure.id as usize, k);
             assert_eq!(procedure.id.is_known(), k >= ProcedureId::ALL.len());

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use derive_more::{Deref, Display};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use strum::{IntoStaticStr, VariantNames};
+use strum::{IntoStaticStr, VariantArray, VariantNames};
 
 /// What a recording is of: one engine on one procedure of one case.
 #[derive(Clone, Debug, Display, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
@@ -31,7 +31,7 @@ impl ReadingKey {
 /// A procedure; [`crate::procedures`] says what each measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[derive(IntoStaticStr, VariantNames, strum::Display)]
+#[derive(IntoStaticStr, VariantArray, VariantNames, strum::Display)]
 #[strum(serialize_all = "snake_case", const_into_str)]
 pub enum ProcedureId {
     /// Procedure 1: the luminous intensity distribution read back.
@@ -60,16 +60,10 @@ pub enum ProcedureId {
 
 impl ProcedureId {
     /// Those that a spec may ask for, in the order of reports.
-    pub const ALL: [Self; 5] = [
-        Self::LuminousIntensity,
-        Self::DirectIlluminance,
-        Self::IndirectIlluminance,
-        Self::TotalIlluminance,
-        Self::CylindricalIlluminance,
-    ];
+    pub const ALL: &[Self] = <Self as VariantArray>::VARIANTS.split_at(5).0;
 
     /// Their names, in the same order.
-    pub const NAMES: &[&str] = Self::VARIANTS.split_at(Self::ALL.len()).0;
+    pub const NAMES: &[&str] = <Self as VariantNames>::VARIANTS.split_at(Self::ALL.len()).0;
 
     /// As specs, command lines and reports write it.
     pub const fn name(self) -> &'static str {
@@ -87,7 +81,7 @@ impl FromStr for ProcedureId {
     type Err = UnknownProcedure;
 
     fn from_str(name: &str) -> Result<Self, UnknownProcedure> {
-        Self::ALL.into_iter().find(|p| p.name() == name).ok_or_else(|| UnknownProcedure { name: name.to_owned() })
+        Self::ALL.iter().copied().find(|p| p.name() == name).ok_or_else(|| UnknownProcedure { name: name.to_owned() })
     }
 }
 
@@ -149,7 +143,7 @@ mod tests {
 
     #[test]
     fn every_procedure_is_found_by_the_name_that_files_carry() {
-        for procedure in ProcedureId::ALL {
+        for &procedure in ProcedureId::ALL {
             assert_eq!(procedure.name().parse(), Ok(procedure));
             assert_eq!(serde_json::to_value(procedure).unwrap(), procedure.name());
         }

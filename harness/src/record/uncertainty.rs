@@ -126,7 +126,7 @@ impl Uncertainty {
         let total = looks[0].0 + looks[1].0;
         match looks {
             // Asked for this value alone, a look that meets nothing tells an error of 0.
-            [(_, Self::NotSeen), (_, other)] | [(_, other), (_, Self::NotSeen)] if !(other.standard() > 0.0) => {
+            [(_, Self::NotSeen), (_, other)] | [(_, other), (_, Self::NotSeen)] if other.standard() <= 0.0 => {
                 Self::NotSeen
             }
             [(_, Self::NotSeen), (effort, other)] | [(effort, other), (_, Self::NotSeen)] => {

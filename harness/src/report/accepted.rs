@@ -1,9 +1,9 @@
 //! What holding a run against its baseline said, as every view tells it.
 
+use itertools::Itertools;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::words::unique;
 use crate::record::ReadingKey;
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -38,8 +38,8 @@ impl BaselineCheck {
     /// How many entries are in which state: `4 unchanged, 1 REFUSED`.
     pub(super) fn counts(&self) -> String {
         let of = |state: &String| self.entries.iter().filter(|e| e.state == *state).count();
-        let states = unique(self.entries.iter().map(|e| &e.state));
-        let counts: Vec<String> = states.iter().map(|state| format!("{} {state}", of(state))).collect();
-        if counts.is_empty() { "nothing to compare".to_owned() } else { counts.join(", ") }
+        let states = self.entries.iter().map(|e| &e.state).unique();
+        let counts = states.map(|state| format!("{} {state}", of(state))).join(", ");
+        if counts.is_empty() { "nothing to compare".to_owned() } else { counts }
     }
 }

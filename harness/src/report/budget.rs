@@ -2,9 +2,11 @@
 
 use std::fmt::Write;
 
+use itertools::Itertools;
+use strum::VariantArray;
+
 use super::Report;
 use super::terminal::{Style, drawn};
-use super::words::unique;
 use crate::judge::{Comparison, ErrorBudget, Source};
 
 /// More comparisons of a kind than this are not all listed: those with the widest interval for their tolerance are.
@@ -15,7 +17,7 @@ pub fn budgets(report: &Report) -> String {
     let mut text =
         "Error budgets: standard uncertainties in percent of the reference (GUM); interval = k u\n".to_owned();
     let kind = |c: &Comparison| (c.key.case.clone(), c.key.procedure, c.key.engine.clone(), c.basis_name());
-    for found in unique(report.comparisons.iter().filter(|c| c.budget.is_some()).map(kind)) {
+    for found in report.comparisons.iter().filter(|c| c.budget.is_some()).map(kind).unique() {
         let of_kind = report.comparisons.iter().filter(|c| kind(c) == found);
         let mut mine: Vec<(&Comparison, &ErrorBudget)> =
             of_kind.filter_map(|c| c.budget.as_ref().map(|b| (c, b))).collect();
@@ -33,8 +35,8 @@ pub fn budgets(report: &Report) -> String {
 
 fn table(rows: &[(&Comparison, &ErrorBudget)]) -> String {
     let is_there = |source: &Source| rows.iter().any(|(_, b)| b.components.iter().any(|c| c.source == *source));
-    let sources: Vec<Source> = Source::ALL.into_iter().filter(is_there).collect();
-    let head = ["  meter", "deviation", "tolerance"].into_iter().chain(sources.iter().map(|s| s.name()));
+    let sources: Vec<Source> = Source::VARIANTS.iter().copied().filter(is_there).collect();
+    let head = ["  meter", "deviation", "tolerance"].into_iter().chain(sources.iter().map(Source::into_str));
     let head = head.chain(["u", "freedom", "k", "interval", "p", "verdict"]);
     let rows = rows.iter().map(|(comparison, budget)| {
         let scale = comparison.reference.as_ref().map_or(1.0, |r| r.value.abs());

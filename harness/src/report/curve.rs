@@ -1,5 +1,6 @@
 //! Luminous intensity curves of the photometric files, kept in the report so that a view can draw readings over them.
 
+use itertools::Itertools;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,10 +22,7 @@ pub struct Curve {
 /// The half planes that a task reads back, and those across the axis, which complete a polar diagram.
 pub fn curves(case: &str, task: &Task) -> Vec<Curve> {
     let directions = task.targets.iter().filter_map(|t| t.direction);
-    let mut planes: Vec<f64> =
-        directions.flat_map(|d| [d.c_deg, d.c_deg + 180.0]).map(|c| c.rem_euclid(360.0)).collect();
-    planes.sort_by(f64::total_cmp);
-    planes.dedup();
+    let planes = directions.flat_map(|d| [d.c_deg, d.c_deg + 180.0]).map(|c| c.rem_euclid(360.0));
     let [luminaire] = &task.scene.luminaires[..] else { return vec![] };
     let distribution = &luminaire.photometry.distribution;
     let gamma_deg = distribution.gamma_deg();
@@ -37,5 +35,5 @@ pub fn curves(case: &str, task: &Task) -> Vec<Curve> {
         gamma_deg: gamma_deg.to_vec(),
         intensity_cd: gamma_deg.iter().map(|&gamma| intensity_cd(c_deg, gamma)).collect(),
     };
-    planes.into_iter().map(of_plane).collect()
+    planes.sorted_by(f64::total_cmp).dedup().map(of_plane).collect()
 }

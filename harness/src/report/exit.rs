@@ -75,11 +75,6 @@ impl Exit {
         }
     }
 
-    #[must_use]
-    pub fn worse(self, other: Self) -> Self {
-        self.max(other)
-    }
-
     pub(super) const fn of(verdict: Verdict) -> Self {
         match verdict {
             Verdict::Pass | Verdict::KnownDeviation => Self::Passed,
@@ -95,9 +90,9 @@ mod tests {
 
     #[test]
     fn the_worst_exit_wins() {
-        assert_eq!(Exit::Failed.worse(Exit::Undecided), Exit::Failed);
-        assert_eq!(Exit::Failed.worse(Exit::Engine), Exit::Engine);
-        assert_eq!(Exit::Usage.worse(Exit::Engine).code(), 2);
+        assert_eq!(Exit::Failed.max(Exit::Undecided), Exit::Failed);
+        assert_eq!(Exit::Failed.max(Exit::Engine), Exit::Engine);
+        assert_eq!(Exit::Usage.max(Exit::Engine).code(), 2);
         assert_eq!(
             [Exit::Passed, Exit::Failed, Exit::Usage, Exit::Engine, Exit::Undecided].map(Exit::code),
             [0, 1, 2, 3, 4]

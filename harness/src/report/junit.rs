@@ -66,7 +66,7 @@ fn test_case(key: &ReadingKey, what: &str, status: TestCaseStatus) -> TestCase {
 }
 
 fn told(skip: &Skip) -> String {
-    format!("{}: {}", notes::kind(skip).name(), notes::reason(skip))
+    format!("{}: {}", notes::kind(skip), notes::reason(skip))
 }
 
 fn status(comparisons: &[&Comparison]) -> TestCaseStatus {

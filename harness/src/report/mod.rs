@@ -11,6 +11,7 @@ mod markdown;
 mod matrix;
 mod notes;
 mod papers;
+pub(crate) mod svg;
 mod terminal;
 pub(crate) mod words;
 
@@ -185,7 +186,7 @@ impl Report {
 
     /// The exit code of a run.
     pub fn exit(&self) -> Exit {
-        if self.has_audited() { self.worst() } else { Exit::Engine.worse(self.worst()) }
+        if self.has_audited() { self.worst() } else { Exit::Engine.max(self.worst()) }
     }
 
     /// The worst that happened to anything.
@@ -198,7 +199,7 @@ impl Report {
         let baseline = |b: &BaselineCheck| if b.is_as_accepted() { Exit::Passed } else { Exit::Failed };
         let readings = self.comparisons.iter().map(|c| Exit::of(c.verdict));
         let all = self.engines.iter().map(engine).chain(readings).chain(self.baseline.iter().map(baseline));
-        all.fold(Exit::Passed, Exit::worse)
+        all.fold(Exit::Passed, Ord::max)
     }
 
     /// Whether any renderer gave a reading, where any was wanted: a run that audits nothing must not look like success.

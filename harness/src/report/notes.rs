@@ -8,7 +8,8 @@ use crate::judge::Split;
 use crate::plan::{EVERYONE, Skip};
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, strum::Display)]
+#[strum(serialize_all = "snake_case")]
 pub(super) enum Kind {
     Failed,
     /// Not run: there is no reading.
@@ -16,19 +17,7 @@ pub(super) enum Kind {
     /// Read with less work: meters that follow from others, light paths that carry nothing.
     Shortcut,
     Approximate,
-    Noted,
-}
-
-impl Kind {
-    pub(super) const fn name(self) -> &'static str {
-        match self {
-            Self::Failed => "failed",
-            Self::Skipped => "skipped",
-            Self::Shortcut => "shortcut",
-            Self::Approximate => "approximate",
-            Self::Noted => "note",
-        }
-    }
+    Note,
 }
 
 /// What holds of one engine in some jobs.
@@ -56,7 +45,7 @@ fn recorded(report: &Report) -> impl Iterator<Item = (Kind, &ReadingKey, String)
         // What the approximation says already need not be said again.
         let said = |note: &&String| r.approximation.as_ref().is_some_and(|a| a.contains(note.as_str()));
         let approximate = r.approximation.iter().map(|a| (Kind::Approximate, a));
-        let noted = r.notes.iter().filter(move |n| !said(n)).map(|n| (Kind::Noted, n));
+        let noted = r.notes.iter().filter(move |n| !said(n)).map(|n| (Kind::Note, n));
         let failed = r.failure.iter().map(|f| (Kind::Failed, f));
         failed.chain(approximate).chain(noted).map(|(kind, text)| (kind, &r.key, text.clone()))
     })
@@ -76,7 +65,7 @@ impl Note<'_> {
     pub(super) fn line(&self, report: &Report) -> String {
         let who = if *self.engine == EVERYONE { String::new() } else { format!("{} ", self.engine) };
         let text = self.text.lines().next().unwrap_or_default();
-        format!("{}: {who}{}: {text}", self.kind.name(), self.place(report))
+        format!("{}: {who}{}: {text}", self.kind, self.place(report))
     }
 
     fn place(&self, report: &Report) -> String {

@@ -4,10 +4,11 @@ use std::fmt::Write;
 use std::ops::Range;
 
 use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArrangement, Row, Table, presets};
+use itertools::Itertools;
 
 use super::matrix::{Cell, matrix, worst};
 use super::notes::{Kind, Note, departures, notes, splits};
-use super::words::{mark, percent, plural, significant, unique, value};
+use super::words::{mark, percent, plural, significant, value};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
 use crate::record::{EngineStatus, ProcedureId, Status};
@@ -155,7 +156,7 @@ fn verdicts(report: &Report, style: Style) -> String {
 fn readings(report: &Report, procedure: ProcedureId, style: Style) -> Option<String> {
     let records: Vec<&ReadingRecord> = report.readings.iter().filter(|r| r.key.procedure == procedure).collect();
     let unit = records.first()?.reading.quantity.unit();
-    let meters = unique(records.iter().map(|r| &r.reading.meter));
+    let meters = records.iter().map(|r| &r.reading.meter).unique().collect_vec();
     if meters.len() > LISTED_METERS {
         return None;
     }
@@ -218,9 +219,9 @@ fn told(report: &Report, detail: Detail, text: &mut String) {
     let mut left: Vec<String> = [Kind::Failed, Kind::Skipped, Kind::Shortcut]
         .into_iter()
         .filter(|kind| of(*kind) > 0)
-        .map(|kind| format!("{} more {}", of(kind), kind.name()))
+        .map(|kind| format!("{} more {}", of(kind), kind))
         .collect();
-    left.extend(Some(of(Kind::Approximate) + of(Kind::Noted)).filter(|n| *n > 0).map(|n| plural(n, "note")));
+    left.extend(Some(of(Kind::Approximate) + of(Kind::Note)).filter(|n| *n > 0).map(|n| plural(n, "note")));
     let papers = if detail == Detail::Brief && report.is_suite() { report.published.len() } else { 0 };
     left.extend(Some(papers).filter(|n| *n > 0).map(|n| plural(n, "published table")));
     if !left.is_empty() {

@@ -62,17 +62,6 @@ pub(super) fn mark(verdict: Verdict) -> String {
     if verdict.is_bad() { verdict.name().to_uppercase() } else { verdict.name().to_owned() }
 }
 
-/// Each once, in the order of their first.
-pub(super) fn unique<T: PartialEq>(all: impl IntoIterator<Item = T>) -> Vec<T> {
-    let mut seen = vec![];
-    for one in all {
-        if !seen.contains(&one) {
-            seen.push(one);
-        }
-    }
-    seen
-}
-
 /// The deviation of the largest magnitude.
 pub(super) fn largest(deviations: impl Iterator<Item = f64>) -> Option<f64> {
     deviations.max_by(|a, b| a.abs().total_cmp(&b.abs()))

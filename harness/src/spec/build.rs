@@ -75,7 +75,7 @@ impl Case {
 
     /// What all procedures measure in it, in the order of reports.
     pub fn tasks(&self) -> impl Iterator<Item = Task> {
-        ProcedureId::ALL.into_iter().filter_map(|procedure| self.task(procedure))
+        ProcedureId::ALL.iter().copied().filter_map(|procedure| self.task(procedure))
     }
 
     /// Reads, checks and builds the case of a spec file, without the overrides of its `cases`.

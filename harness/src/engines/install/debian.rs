@@ -5,6 +5,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use itertools::Itertools;
+
 use super::{InstallError, step};
 use crate::engines::Site;
 
@@ -92,8 +94,7 @@ impl<'a> Apt<'a> {
     fn unpack(&self) -> Result<(), InstallError> {
         let archives = self.state().join("cache/archives");
         let entries = fs::read_dir(&archives).map_err(|e| InstallError::io(&archives, e))?;
-        let mut packages: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| is_package(p)).collect();
-        packages.sort();
+        let packages: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| is_package(p)).sorted().collect();
         if packages.is_empty() {
             // Without lists apt-get ends well, having fetched nothing of a package that is installed elsewhere.
             return Err(not_there("any package to unpack", "see install.log in the folder of the engines"));

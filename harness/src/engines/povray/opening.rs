@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use luminaire::photometry::LuminousOpening;
 use luminaire::scene::{Luminaire, LuminaireModel};
+use luminaire::simulator::quadrature::Gauss;
 
 use crate::engines::Job;
 
@@ -22,25 +23,25 @@ pub(super) struct Part {
 
 /// The parts of an opening, `n` by `n`; `None` where the opening is not flat.
 pub(super) fn parts(opening: LuminousOpening, n: usize) -> Option<Vec<Part>> {
-    let nodes = gauss_legendre(n);
+    let rule = Gauss::new(n);
     match opening {
         LuminousOpening::Point => Some(vec![Part { offset_m: DVec3::ZERO, share: 1.0 }]),
         LuminousOpening::Box { x_m, y_m, height_m: 0.0 } => {
             let part = |(u, wu): (f64, f64), (v, wv): (f64, f64)| Part {
-                offset_m: DVec3::new(u * x_m, v * y_m, 0.0) / 2.0,
-                share: wu * wv / 4.0,
+                offset_m: DVec3::new((u - 0.5) * x_m, (v - 0.5) * y_m, 0.0),
+                share: wu * wv,
             };
-            Some(nodes.iter().flat_map(|&a| nodes.iter().map(move |&b| part(a, b))).collect())
+            Some(rule.points().flat_map(|a| rule.points().map(move |b| part(a, b))).collect())
         }
         LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 } => {
             let turns = 2 * n;
             let part = |(u, w): (f64, f64), k: usize| {
                 // Uniform in the square of the radius, evenly spaced in angle.
-                let radius = f64::midpoint(1.0, u).sqrt() / 2.0;
+                let radius = u.sqrt() / 2.0;
                 let (sin, cos) = (2.0 * PI * (k as f64 + 0.5) / turns as f64).sin_cos();
-                Part { offset_m: DVec3::new(x_m * cos, y_m * sin, 0.0) * radius, share: w / 2.0 / turns as f64 }
+                Part { offset_m: DVec3::new(x_m * cos, y_m * sin, 0.0) * radius, share: w / turns as f64 }
             };
-            Some(nodes.iter().flat_map(|&a| (0..turns).map(move |k| part(a, k))).collect())
+            Some(rule.points().flat_map(|a| (0..turns).map(move |k| part(a, k))).collect())
         }
         _ => None,
     }
@@ -65,30 +66,6 @@ pub(super) fn too_near(job: &Job, n: usize) -> Option<String> {
         Some(format!("{station} is {distance_m:.2} m from the opening of {}, {lights}", l.id))
     };
     job.scene.luminaires.iter().filter(|l| l.model == LuminaireModel::Area).find_map(of)
-}
-
-/// Nodes and weights on -1..1 by Newton's method on the Legendre polynomial.
-fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
-    let node = |k: usize| {
-        let mut x = (PI * (k as f64 + 0.75) / (n as f64 + 0.5)).cos();
-        let mut slope = 1.0;
-        for _ in 0..30 {
-            let (value, derivative) = legendre(n, x);
-            slope = derivative;
-            x -= value / derivative;
-        }
-        (x, 2.0 / ((1.0 - x * x) * slope * slope))
-    };
-    (0..n).map(node).collect()
-}
-
-fn legendre(n: usize, x: f64) -> (f64, f64) {
-    let (mut before, mut here) = (1.0, x);
-    for k in 2..=n {
-        let k = k as f64;
-        (before, here) = (here, ((2.0 * k - 1.0) * x * here - (k - 1.0) * before) / k);
-    }
-    (here, n as f64 * (x * here - before) / (x * x - 1.0))
 }
 
 #[cfg(test)]

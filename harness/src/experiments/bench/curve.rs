@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use itertools::Itertools;
 use serde::Serialize;
 
 use super::Truth;
@@ -100,8 +101,7 @@ impl BenchPoint {
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut all: Vec<f64> = values.collect();
-    all.sort_by(f64::total_cmp);
+    let all = values.sorted_by(f64::total_cmp).collect_vec();
     if all.is_empty() { 0.0 } else { 0.5 * (all[(all.len() - 1) / 2] + all[all.len() / 2]) }
 }
 
@@ -156,11 +156,9 @@ pub struct Pareto {
 impl Pareto {
     pub(super) fn of(case: &str, procedure: ProcedureId, curves: &[Curve], floor: f64) -> Self {
         let mine = curves.iter().filter(|c| c.key.case == case && c.key.procedure == procedure);
-        let mut all: Vec<(String, f64, f64)> =
-            mine.flat_map(|c| c.points.iter().map(|p| (c.name(), p.wall_s, p.relative_error.max(floor)))).collect();
-        all.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
+        let all = mine.flat_map(|c| c.points.iter().map(|p| (c.name(), p.wall_s, p.relative_error.max(floor))));
         let mut front: Vec<(String, f64, f64)> = vec![];
-        for point in all {
+        for point in all.sorted_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2))) {
             if front.last().is_none_or(|best| point.2 < best.2) {
                 front.push(point);
             }

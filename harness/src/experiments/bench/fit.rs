@@ -1,5 +1,6 @@
 //! Slope and floor of error over time, time to an error, and the interval of a root mean square; pure.
 
+use itertools::Itertools;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// A power law above a floor: error squared = (a t^slope)^2 + floor^2.
@@ -61,8 +62,7 @@ fn line(points: &[(f64, f64)], floor: f64) -> Option<(f64, f64)> {
 
 /// Time at which the error first comes down to a target, log-log between the points; never beyond them.
 pub(super) fn time_to(points: &[(f64, f64)], target: f64) -> Option<f64> {
-    let mut points = points.to_vec();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let points = points.iter().copied().sorted_by(|a, b| a.0.total_cmp(&b.0)).collect_vec();
     let k = points.iter().position(|(_, e)| *e <= target)?;
     let (t1, e1) = points[k];
     if k == 0 || e1 <= 0.0 {

@@ -6,6 +6,7 @@
 
 use std::fmt;
 
+use itertools::Itertools;
 use serde::{Deserialize, Serialize};
 
 use crate::judge::{Component, ErrorBudget, Source};
@@ -102,13 +103,11 @@ fn even(random: &mut fastrand::Rng, bound: f64) -> f64 {
 pub fn calibrations(seed: u64) -> Calibrations {
     let of_kind = |(k, (kind, draw)): (usize, &(&str, Draw))| {
         let mut random = fastrand::Rng::with_seed(seed.wrapping_add(k as u64));
-        let mut p_values: Vec<f64> = (0..RUNS)
-            .map(|_| {
-                let (error, components) = draw(&mut random);
-                ErrorBudget::new(components, 0.02).p_value(error, 0.0)
-            })
-            .collect();
-        p_values.sort_by(f64::total_cmp);
+        let mut p_value = || {
+            let (error, components) = draw(&mut random);
+            ErrorBudget::new(components, 0.02).p_value(error, 0.0)
+        };
+        let p_values: Vec<f64> = (0..RUNS).map(|_| p_value()).sorted_by(f64::total_cmp).collect();
         let ks_statistic = distance_from_uniform(&p_values);
         Interval {
             kind: (*kind).to_owned(),
@@ -194,8 +193,7 @@ mod tests {
         // Standard errors that are a fifth too small.
         let mut random = fastrand::Rng::with_seed(1);
         let budget = ErrorBudget::new(vec![Component::normal(Source::MonteCarlo, 0.8, None)], 0.02);
-        let mut wrong: Vec<f64> = (0..RUNS).map(|_| budget.p_value(normal(&mut random), 0.0)).collect();
-        wrong.sort_by(f64::total_cmp);
+        let wrong = (0..RUNS).map(|_| budget.p_value(normal(&mut random), 0.0)).sorted_by(f64::total_cmp).collect_vec();
         assert!(kolmogorov(distance_from_uniform(&wrong), RUNS) < MIN_KS_P);
     }
 

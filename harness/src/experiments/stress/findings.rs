@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::experiments::deviation::Compared;
-use crate::judge::KnownBreak;
+use crate::judge::{How, KnownBreak};
 use crate::laws::Law;
 use crate::measure::{Failure, FailureKind, Instrument};
 use crate::record::{EngineName, ProcedureId};
@@ -16,29 +16,6 @@ pub(super) const THRESHOLDS: [f64; 3] = [1e-3, 1e-2, 0.1];
 
 /// How much larger than on record a deviation may be and still be the known one.
 const MARGIN: f64 = 1.25;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum How {
-    Drift,
-    /// More than half of the light is gone, or readings are, without an error.
-    SilentLoss,
-    Nan,
-    Crash,
-    Hang,
-}
-
-impl How {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Drift => "drift",
-            Self::SilentLoss => "silent_loss",
-            Self::Nan => "nan",
-            Self::Crash => "crash",
-            Self::Hang => "hang",
-        }
-    }
-}
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(super) struct Finding {
@@ -166,7 +143,7 @@ impl LawReport {
             Some((threshold.to_string(), at.magnitude))
         };
         let explains = |k: &KnownBreak, p: &PointReport| {
-            p.finding.how.is_some_and(|how| how.name() == k.how)
+            p.finding.how == Some(k.how)
                 && step(p.magnitude) >= step(k.from)
                 && p.finding.deviation.is_none_or(|d| k.relative.is_some_and(|most| d <= MARGIN * most))
         };

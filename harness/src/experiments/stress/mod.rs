@@ -11,12 +11,12 @@ use std::time::{Duration, Instant};
 use luminaire::scene::LuminaireModel;
 use parking_lot::Mutex;
 
-use self::findings::{Finding, How};
+use self::findings::Finding;
 pub use self::findings::{LawReport, PointReport, StressReport};
 use super::trials::{Effort, Settings, Trials, simulator};
 use super::{Progress, deviation};
 use crate::engines::{self, Coordinates, Job};
-use crate::judge::KnownBreak;
+use crate::judge::{How, KnownBreak};
 use crate::laws::{self, Against, Law, Place, Variant};
 use crate::measure::{Failure, Instrument, Reader, Taken};
 use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
@@ -98,9 +98,9 @@ pub fn stress(case: &Case, subjects: &[Instrument], options: &Options<'_>, progr
 
 fn points(case: &Case, subjects: &[Instrument], options: &Options<'_>) -> Vec<Point> {
     let mut points = vec![];
-    let chosen = |law: &&&'static Law| options.laws.is_empty() || options.laws.iter().any(|l| l == law.id);
+    let chosen = |law: &&'static Law| options.laws.is_empty() || options.laws.iter().any(|l| l == law.id);
     for subject in 0..subjects.len() {
-        for law in laws::ALL.iter().filter(chosen) {
+        for law in laws::all().filter(chosen) {
             // Intensities are direct light in free field, whose laws direct illuminance keeps as well.
             let tasks = case.tasks().filter(|task| task.procedure != ProcedureId::LuminousIntensity);
             for task in tasks.filter(|t| law.light.concerns(t.transport)) {

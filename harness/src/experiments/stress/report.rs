@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::findings::{How, LawReport, PointReport, StressReport};
+use super::findings::{LawReport, PointReport, StressReport};
 use crate::experiments::tables;
+use crate::judge::How;
 use crate::record::EngineName;
 
 impl StressReport {
@@ -65,7 +66,7 @@ fn said(point: &PointReport) -> String {
     let what = match (point.finding.deviation, point.finding.how) {
         (Some(d), Some(How::SilentLoss)) => format!("{} lost", percent(d)),
         (Some(d), _) => percent(d),
-        (None, how) => how.map_or(String::new(), |how| how.name().to_owned()),
+        (None, how) => how.map_or(String::new(), |how| how.to_string()),
     };
     format!("{what} ({})", point.procedure.name().split('_').next().unwrap_or_default())
 }
@@ -87,7 +88,7 @@ fn cell(law: &LawReport) -> String {
             if parts.len() == 3 && law.breaks_at.values().all(|m| *m == first) {
                 parts.clear();
             }
-            parts.push(format!("{} @ {first:e}", how.name()));
+            parts.push(format!("{how} @ {first:e}"));
         }
         None if law.worst_deviation.is_some() => {
             parts.push(format!("ok ({})", law.resolution.map_or("?".to_owned(), percent)));

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use itertools::Itertools;
 use maud::{Markup, html};
 use serde::Deserialize;
 
-use super::super::words::unique;
 use super::palette::Palette;
+use crate::judge::How;
 use crate::record::{EngineName, ProcedureId};
 
 #[derive(Clone, Debug)]
@@ -48,7 +49,7 @@ pub struct StressLaw {
     /// Magnitude at which the deviation first passes the fraction.
     #[serde(default)]
     pub breaks_at: BTreeMap<String, Option<f64>>,
-    pub how: Option<String>,
+    pub how: Option<How>,
     pub refused_at: Option<f64>,
     /// The causes on record, where all that breaks is known.
     #[serde(default)]
@@ -77,9 +78,8 @@ pub(super) fn stress_section(beside: &[Beside], palette: &Palette) -> Option<Mar
     if laws.is_empty() {
         return None;
     }
-    let names = unique(laws.iter().map(|l| l.law.as_str()));
-    let mut engines = unique(laws.iter().map(|l| l.engine.as_str()));
-    engines.sort_by_key(|e| palette.order(e));
+    let names: Vec<_> = laws.iter().map(|l| l.law.as_str()).unique().collect();
+    let engines = laws.iter().map(|l| l.engine.as_str()).unique().sorted_by_key(|e| palette.order(e)).collect_vec();
     let known: Vec<&StressLaw> = laws.iter().copied().filter(|l| !l.known.is_empty()).collect();
     Some(html! {
         h2 id="stress-title" { "Numerical stability" }
@@ -107,17 +107,17 @@ fn stress_cell(law: Option<&&StressLaw>) -> Markup {
     let Some(law) = law else { return html! { td.quiet { "–" } } };
     let at = |(key, name): (&str, &'static str)| Some((name, law.breaks_at.get(key).copied().flatten()?));
     let first_break = [("0.001", "0.1 %"), ("0.01", "1 %"), ("0.1", "10 %")].into_iter().find_map(at);
-    let class = match (law.worst_deviation, law.how.as_deref()) {
+    let class = match (law.worst_deviation, law.how) {
         (_, Some(_)) if !law.known.is_empty() => "v-known",
         (None, None) => "quiet",
-        (_, Some("nan" | "crash" | "hang" | "silent_loss")) | (None, _) => "v-fail",
+        (_, Some(How::Nan | How::Crash | How::Hang | How::SilentLoss)) | (None, _) => "v-fail",
         (Some(d), _) if d.abs() >= 0.1 => "v-fail",
         (Some(d), _) if d.abs() >= 0.001 => "v-undecided",
         _ => "v-pass",
     };
     html! {
         td class=(class) {
-            div { (worst(law)) @if let Some(how) = &law.how { " " (how.replace('_', " ")) } }
+            div { (worst(law)) @if let Some(how) = &law.how { " " (how.to_string().replace('_', " ")) } }
             @if let Some((name, at)) = first_break { div.most { (name) " at " (format!("{at:e}")) } }
             @if let (Some(at), Some(_)) = (law.refused_at, law.worst_deviation) { div.most { "refuses at " (format!("{at:e}")) } }
             @if !law.known.is_empty() { div.most { "known deviation" } }
@@ -127,8 +127,8 @@ fn stress_cell(law: Option<&&StressLaw>) -> Markup {
 
 /// The largest deviation, or why there is none; where nothing came of a reading, what others deviate by says little.
 fn worst(law: &StressLaw) -> String {
-    match (law.worst_deviation, law.how.as_deref()) {
-        (_, Some("nan" | "crash" | "hang")) => String::new(),
+    match (law.worst_deviation, law.how) {
+        (_, Some(How::Nan | How::Crash | How::Hang)) => String::new(),
         (Some(deviation), _) => super::percent(deviation).trim_start_matches('+').to_owned(),
         (None, _) if law.refused_at.is_some() => "refuses".to_owned(),
         (None, _) => "not tried".to_owned(),

@@ -1,5 +1,6 @@
 //! The verdict matrix: case, procedure and basis by engine; each cell opens the readings that it stands for.
 
+use itertools::Itertools;
 use maud::{Markup, html};
 
 use super::super::Report;
@@ -11,8 +12,7 @@ use crate::record::ProcedureId;
 
 pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
     let rows = matrix(report);
-    let mut cases: Vec<&str> = rows.iter().map(|r| r.case.as_str()).collect();
-    cases.dedup();
+    let cases: Vec<&str> = rows.iter().map(|r| r.case.as_str()).dedup().collect();
     html! {
         h2 id="matrix-title" { "Verdicts" }
         p.lead {

@@ -37,7 +37,7 @@ fn row(note: &Note<'_>) -> Markup {
     let procedures: BTreeSet<&str> = note.jobs.iter().map(|(_, procedure)| procedure.row().title).collect();
     let class = if note.kind == Kind::Failed { "v-fail" } else { "" };
     html! {
-        tr { td class=(class) { (note.kind.name()) } th scope="row" { (note.engine) }
+        tr { td class=(class) { (note.kind) } th scope="row" { (note.engine) }
             td { (Vec::from_iter(procedures).join(", ")) }
             td { @if cases.len() > 3 { (plural(cases.len(), "case")) } @else { (Vec::from_iter(cases).join(", ")) } }
             td.wide { (note.text) } }

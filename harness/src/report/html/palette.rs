@@ -3,8 +3,7 @@
 //! Colours after Okabe and Ito, "Color Universal Design" (2008), darkened on paper and lightened on black until text in them
 //! keeps a contrast of 4.5 to 1.
 
-use std::collections::BTreeSet;
-
+use itertools::Itertools;
 use maud::{Markup, html};
 
 use super::super::Report;
@@ -53,9 +52,7 @@ impl Palette {
 
     /// Each once, in the report's order; those that are not in it come last, by name.
     pub(super) fn sorted<'a>(&self, engines: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
-        let mut engines = Vec::from_iter(engines.collect::<BTreeSet<_>>());
-        engines.sort_by_key(|e| self.order(e));
-        engines
+        engines.sorted().dedup().sorted_by_key(|e| self.order(e)).collect()
     }
 
     pub(super) fn order(&self, engine: &str) -> usize {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use itertools::Itertools;
 use maud::{Markup, html};
 
 use super::super::matrix::sort_worst_first;
@@ -96,9 +97,8 @@ fn bar(c: &Comparison) -> Markup {
 }
 
 fn filters(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palette: &Palette) -> Markup {
-    let mut cases: Vec<&str> = mine.iter().map(|c| c.key.case.as_str()).collect();
-    cases.sort_by_key(|case| report.cases.iter().position(|c| c.name == *case));
-    cases.dedup();
+    let place = |case: &&str| report.cases.iter().position(|c| c.name == *case);
+    let cases: Vec<&str> = mine.iter().map(|c| c.key.case.as_str()).sorted_by_key(place).dedup().collect();
     let bases: BTreeSet<&str> = mine.iter().map(|c| c.basis_name()).collect();
     let verdicts: BTreeSet<Verdict> = mine.iter().map(|c| c.verdict).collect();
     let count = |v: Verdict| mine.iter().filter(|c| c.verdict == v).count();

@@ -20,7 +20,7 @@ impl Rows {
     pub(super) fn add(&mut self, c: &Comparison, palette: &Palette) -> usize {
         let components = c.budget.iter().flat_map(|b| &b.components);
         let components: Vec<Value> =
-            components.map(|part| json!([self.word(part.source.name()), short(Some(part.uncertainty))])).collect();
+            components.map(|part| json!([self.word(part.source.into_str()), short(Some(part.uncertainty))])).collect();
         let source = c.reference.as_ref().map_or("", |r| r.source.as_str());
         let diagnosis = c.diagnosis.as_deref().unwrap_or_default();
         let words = [&*c.key.case, &*c.key.engine, c.basis_name(), source, diagnosis, c.verdict.name()];

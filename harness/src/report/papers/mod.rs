@@ -4,6 +4,8 @@ mod shares;
 
 use std::collections::BTreeMap;
 
+use itertools::Itertools;
+
 use super::Report;
 use super::words::{largest, percent, published_column, value};
 use crate::judge::{Basis, PublishedTable};
@@ -21,8 +23,7 @@ pub(super) struct Grid {
 
 /// One grid a published table, in the order of the procedures, then the shares.
 pub(super) fn grids(report: &Report) -> Vec<Grid> {
-    let mut tables: Vec<&PublishedTable> = report.published.iter().collect();
-    tables.sort_by_key(|t| t.procedure);
+    let tables: Vec<&PublishedTable> = report.published.iter().sorted_by_key(|t| t.procedure).collect();
     tables.into_iter().map(|table| grid(report, table)).chain(shares::grid(report)).collect()
 }
 
@@ -38,8 +39,8 @@ pub(super) fn grid(report: &Report, table: &PublishedTable) -> Grid {
         rows.push(std::iter::once(format!("paper {}", column.name)).chain(cells).chain([note.to_owned()]).collect());
     }
     let mine = |r: &&Recording| r.key.procedure == table.procedure && table.cases.contains(&r.key.case);
-    let mut recordings: Vec<&Recording> = report.recordings.iter().filter(mine).collect();
-    recordings.sort_by_key(|r| report.engines.iter().position(|e| e.id == r.key.engine));
+    let place = |r: &&Recording| report.engines.iter().position(|e| e.id == r.key.engine);
+    let recordings: Vec<&Recording> = report.recordings.iter().filter(mine).sorted_by_key(place).collect();
     let mut seen: Vec<(String, Vec<String>)> = vec![];
     for recording in recordings {
         let cell = |meter| reading(report, &recording.key, meter).map_or_else(|| "-".to_owned(), value);

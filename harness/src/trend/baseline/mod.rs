@@ -9,6 +9,7 @@ mod review;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use itertools::Itertools;
 use serde::{Deserialize, Serialize};
 
 use crate::record::{Light, Method, Reading, ReadingKey, Recording};
@@ -93,8 +94,7 @@ impl Baseline {
     pub fn candidate(report: &Report) -> Self {
         // Scenes of known answer need nobody's acceptance.
         let asked = report.recordings.iter().filter(|r| !r.key.procedure.is_known());
-        let mut entries: Vec<Entry> = asked.map(|r| Entry::of(report, r)).collect();
-        entries.sort_by(|a, b| a.key.cmp(&b.key));
+        let entries = asked.map(|r| Entry::of(report, r)).sorted_by(|a, b| a.key.cmp(&b.key)).collect();
         Self { luxproof_baseline: 1, entries }
     }
 

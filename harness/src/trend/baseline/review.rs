@@ -2,6 +2,8 @@
 
 use std::io::{BufRead, Write};
 
+use itertools::Itertools;
+
 use super::{Changes, Entry, EntryChange, MeterChange, State};
 use crate::record::ReadingKey;
 
@@ -89,8 +91,7 @@ fn describe(change: &EntryChange, entry: &Entry, output: &mut dyn Write) -> std:
         }
         return more(entry.readings.len(), output);
     }
-    let mut meters: Vec<_> = change.meters.iter().collect();
-    meters.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    let meters: Vec<_> = change.meters.iter().sorted_by(|a, b| a.p_value.total_cmp(&b.p_value)).collect();
     for m in meters.iter().take(SHOWN) {
         let change = m.new - m.old;
         let in_u = if m.uncertainty > 0.0 { format!("{:+.1} u", change / m.uncertainty) } else { "exact".to_owned() };

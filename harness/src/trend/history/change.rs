@@ -17,6 +17,8 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use strum::VariantArray;
+
 use super::innovation::{Innovation, MAX_SPREADS, MIN_ERROR, MIN_LEARNED, RunningMean, Spread, spread_of_all};
 use super::limits::{Limits, REFERENCE_VALUE, WINDOW};
 use super::series::{History, Series};
@@ -32,7 +34,7 @@ const SAME_CHANGE: usize = 3;
 const SAME_CHANGE_OF_ONE: usize = 21;
 
 /// How many series are judged together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, VariantArray)]
 pub enum Level {
     EngineAndProcedure,
     Case,
@@ -40,8 +42,6 @@ pub enum Level {
 }
 
 impl Level {
-    const ALL: [Self; 3] = [Self::EngineAndProcedure, Self::Case, Self::Comparison];
-
     /// Of the false alarms.
     const fn share(self) -> f64 {
         match self {
@@ -80,7 +80,7 @@ pub struct Part {
 /// The changes of a history, by night and level. What several levels see of one engine and procedure at once is one change.
 pub fn changes(history: &History) -> Vec<Change> {
     let mut found: Vec<Change> = vec![];
-    for change in Level::ALL.into_iter().flat_map(|level| at_level(history, level)) {
+    for change in Level::VARIANTS.iter().copied().flat_map(|level| at_level(history, level)) {
         let same = |c: &&mut Change| {
             let is_one_of_it = change.level == Level::Comparison && c.level < Level::Comparison;
             let after = if is_one_of_it { SAME_CHANGE_OF_ONE } else { SAME_CHANGE };

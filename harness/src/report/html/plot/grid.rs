@@ -2,15 +2,17 @@
 
 use std::collections::BTreeSet;
 
+use itertools::Itertools;
 use maud::{Markup, html};
 
 use super::super::palette::Palette;
 use super::super::percent;
-use super::axis::{label, ticks};
+use super::axis::ticks;
 use super::contour::contour;
-use super::{Group, WIDTH, colours, figure, line, number, text};
+use super::{Group, WIDTH, colours, figure};
 use crate::judge::Comparison;
 use crate::report::Report;
+use crate::report::svg::{label, line, number, text};
 use crate::report::words::{largest, round_step, rounded, significant as six_digits};
 
 const LEFT: f64 = 44.0;
@@ -27,10 +29,8 @@ pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette) -> V
     let mut panels = vec![];
     for name in firm.iter().map(|c| set(c)).collect::<BTreeSet<&str>>() {
         let of_set = |engine: &str| {
-            let mut mine: Vec<&Comparison> =
-                firm.iter().copied().filter(|c| set(c) == name && c.key.engine == engine).collect();
-            mine.sort_by_key(|c| index(c));
-            mine
+            let mine = firm.iter().copied().filter(|c| set(c) == name && c.key.engine == engine);
+            mine.sorted_by_key(|c| index(c)).collect_vec()
         };
         let engines = group.engines(palette);
         let Some((first, lattice)) = engines.iter().find_map(|e| Some((of_set(e), Lattice::of(&of_set(e))?))) else {

@@ -11,7 +11,7 @@ pub(super) mod times;
 use maud::{Markup, html};
 
 use super::super::Report;
-use super::super::words::trimmed;
+use super::super::svg::number;
 use super::palette::Palette;
 use crate::judge::{Basis, Comparison};
 use crate::record::ProcedureId;
@@ -78,18 +78,6 @@ fn figure(title: &str, height: f64, drawing: &Markup, caption: &Markup) -> Marku
             div.caption { (caption) }
         }
     }
-}
-
-fn text(class: &str, anchor: &str, [x, y]: [f64; 2], words: &str) -> Markup {
-    html! { text class=(class) text-anchor=(anchor) x=(number(x)) y=(number(y)) { (words) } }
-}
-
-fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Markup {
-    html! { path class=(class) d={ "M" (number(x1)) " " (number(y1)) "L" (number(x2)) " " (number(y2)) } {} }
-}
-
-fn number(value: f64) -> String {
-    trimmed(value, 1)
 }
 
 fn legend(engines: &[&str], palette: &Palette) -> Markup {

@@ -5,10 +5,11 @@ use std::collections::BTreeSet;
 use maud::{Markup, html};
 
 use super::super::palette::Palette;
-use super::axis::{Deviations, label};
-use super::{Group, WIDTH, figure, line, number, text};
+use super::axis::Deviations;
+use super::{Group, WIDTH, figure};
 use crate::judge::{Basis, Comparison};
 use crate::report::Report;
+use crate::report::svg::{label, line, number, text};
 
 const LEFT: f64 = 82.0;
 const ROW: f64 = 24.0;

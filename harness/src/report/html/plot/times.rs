@@ -1,15 +1,16 @@
 //! Run time against error: what each engine's agreement costs, one panel a procedure.
 
+use itertools::Itertools;
 use maud::{Markup, html};
 
 use super::super::beside::{BenchCurve, Beside};
 use super::super::palette::Palette;
 use super::super::{duration, percent};
-use super::axis::label;
-use super::{WIDTH, figure, groups, legend, line, number, text};
+use super::{WIDTH, figure, groups, legend};
 use crate::judge::Comparison;
 use crate::record::ProcedureId;
 use crate::report::Report;
+use crate::report::svg::{label, line, number, text};
 use crate::report::words::largest;
 
 const LEFT: f64 = 52.0;
@@ -110,8 +111,8 @@ fn labels<'a>(
     place: &impl Fn(f64, f64) -> [f64; 2],
 ) -> Vec<(&'a str, [f64; 2])> {
     let middle = |engine: &&'a str| {
-        let mut mine: Vec<&Point> = points.iter().filter(|p| p.engine == *engine).collect();
-        mine.sort_by(|a, b| a.error.total_cmp(&b.error));
+        let mine = points.iter().filter(|p| p.engine == *engine);
+        let mine = mine.sorted_by(|a, b| a.error.total_cmp(&b.error)).collect_vec();
         mine.get(mine.len() / 2).map(|p| (*engine, place(p.wall_s, p.error)))
     };
     let mut labels: Vec<(&str, [f64; 2])> = engines.iter().filter_map(middle).collect();
@@ -133,8 +134,8 @@ fn labels<'a>(
 }
 
 fn drawn(curve: &BenchCurve, palette: &Palette, place: &impl Fn(f64, f64) -> [f64; 2]) -> Markup {
-    let mut rungs: Vec<_> = curve.points.iter().filter_map(|p| Some((p, p.relative_error?))).collect();
-    rungs.sort_by(|a, b| a.0.wall_s.total_cmp(&b.0.wall_s));
+    let rungs = curve.points.iter().filter_map(|p| Some((p, p.relative_error?)));
+    let rungs = rungs.sorted_by(|a, b| a.0.wall_s.total_cmp(&b.0.wall_s)).collect_vec();
     let path: Vec<String> =
         rungs.iter().map(|(p, e)| place(p.wall_s, *e)).map(|[x, y]| format!("{} {}", number(x), number(y))).collect();
     let class = format!("line e{}", palette.index(&curve.engine));
