@@ -207,7 +207,7 @@ pub struct Version {
 
 impl Version {
     /// An engine that tells `text`, of these files and folders.
-    pub(super) fn of(
+    pub fn of(
         engine: &EngineName,
         text: impl Into<String>,
         site: &Site,
