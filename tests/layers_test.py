@@ -144,6 +144,46 @@ class Layers(unittest.TestCase):
         self.add("src/scene.rs", "use crate::calculators::Ratio;\n")
         self.complains("simulator and calculators must not know of each other")
 
+    def test_an_import_fails_in_whatever_shape_it_stands(self):
+        clean = (self.root / "harness/src/record.rs").read_text()
+        for shape in [
+            "fn f() { for _ in 0..crate::report::count() {} }",
+            "fn f(x: &[u8]) { &x[..=crate::report::COUNT]; }",
+            "fn f() -> Reading { Reading { ..crate::report::reading() } }",
+            "enum Kind { One }\nmy! { crate::report::draw() }",
+            "enum Kind { One }\nstd::thread_local!(static N: u8 = 0, crate::report::draw());",
+            '#[serde(with = "crate::report")]\nstruct Kept;',
+            "struct Kept { #[cfg(test)] calls: fn(), other: crate::report::Other }",
+            "fn f(#[cfg(test)] a: impl Fn(), b: crate::report::Other) {}",
+        ]:
+            with self.subTest(shape):
+                self.plant({"harness/src/record.rs": f"{clean}{shape}\n"})
+                self.complains("record imports report, which lies above it")
+
+    def test_qualified_functions_and_statics_of_the_parent_have_their_own_names(self):
+        clean = (self.root / "harness/src/judge/mod.rs").read_text()
+        self.add("harness/src/judge/verdict.rs", "fn again() { super::again; }\n")
+        for shape in ["pub const unsafe fn again() { rule::go() }", "pub static mut again: fn() = rule::go;"]:
+            with self.subTest(shape):
+                self.plant({"harness/src/judge/mod.rs": f"{clean}{shape}\n"})
+                self.complains("mod.rs's again -> rule")
+
+    def test_what_hides_code_from_this_script_fails(self):
+        clean = (self.root / "harness/src/record.rs").read_text()
+        self.plant({"harness/src/other.rs": "", "harness/src/record/part.rs": ""})
+        for shape, says in [
+            ('#[path = "other.rs"]\nmod part;', "`path` hides what is imported"),
+            ('include!("part.in");', "`include` hides what is imported"),
+            ("mod nowhere;", "`mod nowhere` has no file of its name"),
+            ("use std::process::*;", "std::process::Command is for"),
+            ("fn f() { ::std::process::Command::new(); }", "std::process::Command is for"),
+            ("extern crate serde_yaml as y;", "serde_yaml is for"),
+            ("fn f() { 0..serde_yaml::x(); }", "serde_yaml is for"),
+        ]:
+            with self.subTest(shape):
+                self.plant({"harness/src/record.rs": f"{clean}{shape}\n"})
+                self.complains(says)
+
     def test_a_glob_of_the_crate_fails(self):
         self.add("harness/src/report.rs", "use crate::judge::*;\n")
         self.complains("harness/src/report.rs:3: `use crate::judge::*` hides what is imported")
