@@ -2,8 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use sha2::{Digest, Sha256};
+
 use super::verdict::Verdict;
+use crate::engines::{ExternalJob, Job};
+use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
+use crate::spec::{Case, hexadecimal};
 
 const ON_RECORD: &str = include_str!("../../../reference/known_deviations.yaml");
 
@@ -21,9 +26,9 @@ struct KnownDeviation {
     engine: EngineName,
     procedure: ProcedureId,
     basis: super::Basis,
-    /// Only in this case, where one is named; the name of a spec stands for all its cases.
+    /// Only in the tasks of these contents, where any are named, whatever their spec is called.
     #[serde(default)]
-    case: Option<String>,
+    contents: Vec<String>,
     /// Only with this luminaire model, where one is named.
     #[serde(default)]
     model: Option<String>,
@@ -91,7 +96,7 @@ impl KnownDeviations {
             k.engine == of.key.engine
                 && k.procedure == of.key.procedure
                 && k.basis == of.basis
-                && k.case.as_deref().is_none_or(|c| of.is_of(c))
+                && (k.contents.is_empty() || k.contents.iter().any(|c| c == of.content))
                 && k.model.as_deref().is_none_or(|m| m == of.model)
         };
         let Some(known) = self.known_deviations.iter().find(applies) else { return (verdict, None) };
@@ -109,16 +114,18 @@ impl KnownDeviations {
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
     pub key: &'a ReadingKey,
+    /// What is measured: see [`content`].
+    pub content: &'a str,
     pub model: &'a str,
     pub basis: super::Basis,
     /// Deviation over reference, where that is defined.
     pub relative_deviation: Option<f64>,
 }
 
-impl Subject<'_> {
-    fn is_of(&self, name: &str) -> bool {
-        self.key.case.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
-    }
+/// What a task is: a hash over what an adapter would be asked, less the names of spec and case, budget and seed.
+pub(super) fn content(task: &Task) -> String {
+    let asked = ExternalJob::of(&Job::of_task(&Case::default(), task)).to_json().unwrap_or_default();
+    hexadecimal(&Sha256::digest(asked))[..16].to_owned()
 }
 
 #[cfg(test)]
@@ -139,33 +146,42 @@ mod tests {
     fn subject(relative_deviation: f64) -> Subject<'static> {
         static KEY: LazyLock<ReadingKey> =
             LazyLock::new(|| ReadingKey::new("c", ProcedureId::IndirectIlluminance, "iesna"));
-        Subject { key: &KEY, model: "point", basis: Basis::Exact, relative_deviation: Some(relative_deviation) }
+        Subject {
+            key: &KEY,
+            content: "a room",
+            model: "point",
+            basis: Basis::Exact,
+            relative_deviation: Some(relative_deviation),
+        }
     }
 
     #[test]
-    fn a_failure_within_the_recorded_range_is_known_and_one_outside_is_not() {
-        let record = record("always: false");
-        assert_eq!(record.revise(Verdict::Fail, &subject(-0.15)).0, Verdict::KnownDeviation);
-        assert_eq!(record.revise(Verdict::Fail, &subject(-0.25)).0, Verdict::Fail);
-        assert_eq!(record.revise(Verdict::Pass, &subject(-0.01)).0, Verdict::Pass);
-        assert_eq!(record.revise(Verdict::Missing, &subject(-0.15)).0, Verdict::Missing);
+    fn a_record_excuses_what_it_is_about_within_its_range_and_tells_what_is_gone() {
+        use Verdict::{Fail, KnownDeviation, Missing, Pass, UnexpectedPass};
+        for (about, verdict, deviation, revised) in [
+            ("always: false", Fail, -0.15, KnownDeviation),
+            ("always: false", Fail, -0.25, Fail),
+            ("always: false", Pass, -0.01, Pass),
+            ("always: false", Missing, -0.15, Missing),
+            ("always: true", Pass, 0.0, UnexpectedPass),
+            ("always: false, model: point", Fail, -0.15, KnownDeviation),
+            ("always: false, model: impostor", Fail, -0.15, Fail),
+            ("always: false, contents: [a room]", Fail, -0.15, KnownDeviation),
+            ("always: false, contents: [a hall]", Fail, -0.15, Fail),
+        ] {
+            assert_eq!(record(about).revise(verdict, &subject(deviation)).0, revised, "{about}");
+        }
     }
 
     #[test]
-    fn a_record_for_one_model_excuses_no_other() {
-        let record = record("always: false, model: impostor");
-        assert_eq!(record.revise(Verdict::Fail, &subject(-0.15)).0, Verdict::Fail);
-        let impostor = Subject { model: "impostor", ..subject(-0.15) };
-        assert_eq!(record.revise(Verdict::Fail, &impostor).0, Verdict::KnownDeviation);
-    }
-
-    #[test]
-    fn a_deviation_that_is_gone_is_reported() {
-        assert_eq!(record("always: true").revise(Verdict::Pass, &subject(0.0)).0, Verdict::UnexpectedPass);
-    }
-
-    #[test]
-    fn the_record_of_the_program_is_sound() {
-        KnownDeviations::built_in().unwrap();
+    fn the_record_of_the_program_is_about_tasks_of_the_reference() {
+        let reference = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference");
+        let cases = crate::spec::suite(&["specs", "analytic"].map(|folder| reference.join(folder))).unwrap();
+        let tasks = |case| Case::tasks(case).map(|t| (t.procedure, content(&t), &case.name));
+        let known: Vec<_> = cases.iter().flat_map(tasks).collect();
+        for entry in KnownDeviations::built_in().unwrap().known_deviations {
+            let is_there = |of: &String| known.iter().any(|(procedure, c, _)| *procedure == entry.procedure && c == of);
+            assert!(entry.contents.iter().all(is_there), "{}: {known:#?}", entry.cause);
+        }
     }
 }

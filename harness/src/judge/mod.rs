@@ -121,7 +121,7 @@ impl Judge<'_> {
     /// `recordings` are those of this task, one an engine. An engine that failed is `missing` at every meter. What fails, fails
     /// at the family-wise level of all comparisons of its engine here.
     pub fn compare(&self, task: &Task, recordings: &[&Recording]) -> Vec<Comparison> {
-        let input = self.published.map(|_| Input::of(task));
+        let (input, content) = (self.published.map(|_| Input::of(task)), known::content(task));
         let mut comparisons = vec![];
         for recording in recordings {
             let (mut family, mut shares) = (vec![], vec![]);
@@ -140,14 +140,14 @@ impl Judge<'_> {
                 family.extend(references.into_iter().map(|held| self.comparison(task, recording, k, Some(held))));
                 shares.resize(family.len(), share_of_reading(recording, k));
             }
-            self.decide(&mut family, &shares);
+            self.decide(&mut family, &shares, &content);
             comparisons.extend(family);
         }
         comparisons
     }
 
     /// Verdicts of all comparisons of one engine in one procedure of one case; of its error each may spend its share.
-    fn decide(&self, family: &mut [Comparison], shares: &[f64]) {
+    fn decide(&self, family: &mut [Comparison], shares: &[f64], content: &str) {
         let tested: Vec<usize> = (0..family.len()).filter(|k| family[*k].p_value.is_some()).collect();
         let p_values: Vec<f64> = tested.iter().filter_map(|k| Some(family[*k].p_value? / shares[*k])).collect();
         let rejected = family::rejected(&p_values, self.tolerances.family_wise_error());
@@ -160,7 +160,7 @@ impl Judge<'_> {
         for comparison in family {
             let Some(basis) = comparison.reference.as_ref().map(|r| r.basis) else { continue };
             let Comparison { key, model, relative_deviation, .. } = &*comparison;
-            let subject = Subject { key, model, basis, relative_deviation: *relative_deviation };
+            let subject = Subject { key, content, model, basis, relative_deviation: *relative_deviation };
             let (verdict, cause) = self.known.revise(comparison.verdict, &subject);
             comparison.verdict = verdict;
             comparison.diagnosis = cause.or(comparison.diagnosis.take());

@@ -164,8 +164,7 @@ impl Spread {
     }
 
     fn standard(&self) -> Standard {
-        let few = self.degrees_of_freedom.filter(|freedom| *freedom < MANY);
-        let student = few.and_then(|freedom| StudentsT::new(0.0, 1.0, freedom).ok());
+        let student = self.degrees_of_freedom.filter(|f| *f < MANY).and_then(|f| StudentsT::new(0.0, 1.0, f).ok());
         student.map_or(Standard::Normal(Normal::standard()), Standard::Student)
     }
 }

@@ -19,16 +19,15 @@ pub fn budgets(report: &Report) -> String {
     let kind = |c: &Comparison| (c.key.case.clone(), c.key.procedure, c.key.engine.clone(), c.basis_name());
     for found in report.comparisons.iter().filter(|c| c.budget.is_some()).map(kind).unique() {
         let of_kind = report.comparisons.iter().filter(|c| kind(c) == found);
-        let mut mine: Vec<(&Comparison, &ErrorBudget)> =
-            of_kind.filter_map(|c| c.budget.as_ref().map(|b| (c, b))).collect();
-        let all = mine.len();
         let of_tolerance =
             |(c, budget): &(&Comparison, &ErrorBudget)| budget.expanded / c.allowed().max(f64::MIN_POSITIVE);
-        mine.sort_by(|a, b| of_tolerance(b).total_cmp(&of_tolerance(a)));
-        mine.truncate(LISTED);
+        let mine = of_kind.filter_map(|c| Some((c, c.budget.as_ref()?)));
+        let mine = mine.sorted_by(|a, b| of_tolerance(b).total_cmp(&of_tolerance(a))).collect_vec();
+        let all = mine.len();
         let (case, procedure, engine, basis) = found;
         let more = if all > LISTED { format!(", the {LISTED} widest of {all}") } else { String::new() };
-        writeln!(text, "\n{case}: {procedure}, {engine} against {basis}{more}\n{}", table(&mine)).ok();
+        writeln!(text, "\n{case}: {procedure}, {engine} against {basis}{more}\n{}", table(&mine[..all.min(LISTED)]))
+            .ok();
     }
     text
 }

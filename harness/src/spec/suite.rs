@@ -59,8 +59,7 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, SpecError> {
         return Ok(vec![path.to_owned()]);
     };
     let matches = glob::glob(pattern).map_err(|e| SpecError::of(path, format!("is no pattern: {e}"), "give a file"))?;
-    let mut found: Vec<PathBuf> = matches.filter_map(Result::ok).collect();
-    found.sort();
+    let found: Vec<PathBuf> = matches.filter_map(Result::ok).collect(); // in alphabetical order
     if found.is_empty() {
         return Err(SpecError::of(path, "matches no file", "check the pattern"));
     }

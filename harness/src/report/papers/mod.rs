@@ -23,8 +23,8 @@ pub(super) struct Grid {
 
 /// One grid a published table, in the order of the procedures, then the shares.
 pub(super) fn grids(report: &Report) -> Vec<Grid> {
-    let tables: Vec<&PublishedTable> = report.published.iter().sorted_by_key(|t| t.procedure).collect();
-    tables.into_iter().map(|table| grid(report, table)).chain(shares::grid(report)).collect()
+    let tables = report.published.iter().sorted_by_key(|t| t.procedure);
+    tables.map(|table| grid(report, table)).chain(shares::grid(report)).collect()
 }
 
 pub(super) fn grid(report: &Report, table: &PublishedTable) -> Grid {
@@ -40,9 +40,8 @@ pub(super) fn grid(report: &Report, table: &PublishedTable) -> Grid {
     }
     let mine = |r: &&Recording| r.key.procedure == table.procedure && table.cases.contains(&r.key.case);
     let place = |r: &&Recording| report.engines.iter().position(|e| e.id == r.key.engine);
-    let recordings: Vec<&Recording> = report.recordings.iter().filter(mine).sorted_by_key(place).collect();
     let mut seen: Vec<(String, Vec<String>)> = vec![];
-    for recording in recordings {
+    for recording in report.recordings.iter().filter(mine).sorted_by_key(place) {
         let cell = |meter| reading(report, &recording.key, meter).map_or_else(|| "-".to_owned(), value);
         let cells: Vec<String> = table.rows.iter().map(|r| cell(&r.meter)).collect();
         let label = label(recording);

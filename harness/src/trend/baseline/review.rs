@@ -91,15 +91,14 @@ fn describe(change: &EntryChange, entry: &Entry, output: &mut dyn Write) -> std:
         }
         return more(entry.readings.len(), output);
     }
-    let meters: Vec<_> = change.meters.iter().sorted_by(|a, b| a.p_value.total_cmp(&b.p_value)).collect();
-    for m in meters.iter().take(SHOWN) {
+    for m in change.meters.iter().sorted_by(|a, b| a.p_value.total_cmp(&b.p_value)).take(SHOWN) {
         let change = m.new - m.old;
         let in_u = if m.uncertainty > 0.0 { format!("{:+.1} u", change / m.uncertainty) } else { "exact".to_owned() };
         let mark = if m.significant { "  <- changed" } else { "" };
         let (MeterChange { meter, old, new, .. }, unit) = (m, m.quantity.unit());
         writeln!(output, "  {meter:<16} old {old:.6} new {new:.6} {unit}, change {change:+.6}: {in_u}{mark}")?;
     }
-    more(meters.len(), output)
+    more(change.meters.len(), output)
 }
 
 fn more(meters: usize, output: &mut dyn Write) -> std::io::Result<()> {

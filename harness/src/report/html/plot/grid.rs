@@ -135,14 +135,11 @@ fn isolux(title: &str, mine: &[&Comparison], lattice: &Lattice) -> Markup {
 fn isoline(values: &[f64], lattice: &Lattice, frame: &Frame, level: f64) -> Markup {
     let segments = contour(values, lattice.counts, level);
     let place = |p: [f64; 2]| frame.at(p[0], p[1]);
-    let path: String = segments
-        .iter()
-        .map(|[a, b]| {
-            let (a, b) = (place(*a), place(*b));
-            format!("M{} {}L{} {}", number(a[0]), number(a[1]), number(b[0]), number(b[1]))
-        })
-        .collect::<Vec<String>>()
-        .concat();
+    let stretch = |[a, b]: &[[f64; 2]; 2]| {
+        let (a, b) = (place(*a), place(*b));
+        format!("M{} {}L{} {}", number(a[0]), number(a[1]), number(b[0]), number(b[1]))
+    };
+    let path = segments.iter().map(stretch).join("");
     // Its label: where the line comes nearest to the middle of the right half.
     let wanted = [LEFT + 0.72 * frame.size[0], 6.0 + 0.5 * frame.size[1]];
     let middle = |[a, b]: &[[f64; 2]; 2]| place([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]);

@@ -115,8 +115,7 @@ fn labels<'a>(
         let mine = mine.sorted_by(|a, b| a.error.total_cmp(&b.error)).collect_vec();
         mine.get(mine.len() / 2).map(|p| (*engine, place(p.wall_s, p.error)))
     };
-    let mut labels: Vec<(&str, [f64; 2])> = engines.iter().filter_map(middle).collect();
-    labels.sort_by(|a, b| a.1[1].total_cmp(&b.1[1]));
+    let mut labels = engines.iter().filter_map(middle).sorted_by(|a, b| a.1[1].total_cmp(&b.1[1])).collect_vec();
     for k in 1..labels.len() {
         let clear = |other: &(&str, [f64; 2])| (other.1[0] - labels[k].1[0]).abs() < 70.0;
         let above = labels[..k].iter().filter(|o| clear(o)).map(|o| o.1[1] + 12.0).fold(f64::NEG_INFINITY, f64::max);
