@@ -114,7 +114,7 @@ impl KnownDeviations {
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
     pub key: &'a ReadingKey,
-    /// What is measured: see [`content`].
+    /// What is measured, as a hash.
     pub content: &'a str,
     pub model: &'a str,
     pub basis: super::Basis,
