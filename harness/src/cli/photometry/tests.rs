@@ -57,24 +57,23 @@ fn the_summary_reads_well() {
 #[test]
 fn the_diagram_puts_each_intensity_at_its_angle_and_radius() {
     let svg = polar::diagram("pendant.ies", &pendant());
-    // 200 cd/klm at the nadir: four rings of 50, the outermost at 200 units.
-    assert_eq!(svg.matches("<circle").count(), 4, "{svg}");
+    // 200 cd/klm at the nadir: four rings of 50, each in two halves, the outermost at 200 units.
+    assert_eq!(svg.matches(" 0 0 1 ").count(), 4, "{svg}");
     assert!(svg.contains(">cd/klm<") && svg.contains(">150<") && svg.contains("Pendant &lt;1 &amp; 2&gt;"));
-    let path = |colour: &str| {
-        let is_curve = |tag: &&str| tag.starts_with("path d=\"M0") && tag.contains(colour) && tag.contains('Z');
-        let tag = svg.split('<').find(is_curve).unwrap();
-        let points = tag.split('"').nth(1).unwrap().trim_start_matches('M').trim_end_matches('Z').to_owned();
+    let path = |class: &str| {
+        let start = format!("path class=\"{class}\" d=\"M");
+        let tag = svg.split('<').find_map(|tag| tag.strip_prefix(&start)).unwrap();
         let point = |p: &str| p.split(' ').map(|n| n.parse::<f64>().unwrap()).collect::<Vec<f64>>();
-        points.split('L').map(point).collect::<Vec<_>>()
+        tag.split('"').next().unwrap().split('L').map(point).collect::<Vec<_>>()
     };
-    for (colour, wide) in [("#c0272d", 1.0), ("#1f5fa8", 1.2)] {
-        let points = path(colour);
+    for (class, wide) in [("curve", 1.0), ("curve dashed", 1.2)] {
+        let points = path(class);
         assert_eq!(points.len(), 2 * 181);
         let expected = 200.0 * (60.0f64 / wide).to_radians().cos();
-        let (right, left) = (&points[120], &points[181 + 60]);
-        for (point, side) in [(right, 1.0), (left, -1.0)] {
-            assert!((point[0] - side * expected * 60f64.to_radians().sin()).abs() < 0.01, "{point:?}");
-            assert!((point[1] - expected * 60f64.to_radians().cos()).abs() < 0.01, "{point:?}");
+        // From the zenith down the left side to the nadir and up the right one; rounded to a tenth.
+        for (point, side) in [(&points[181 + 60], 1.0), (&points[180 - 60], -1.0)] {
+            assert!((point[0] - 240.0 - side * expected * 60f64.to_radians().sin()).abs() < 0.051, "{point:?}");
+            assert!((point[1] - 274.0 - expected * 60f64.to_radians().cos()).abs() < 0.051, "{point:?}");
         }
     }
 }
@@ -83,7 +82,7 @@ fn the_diagram_puts_each_intensity_at_its_angle_and_radius() {
 fn a_downlight_has_half_rings() {
     let table = LuminousIntensityDistribution::axial(vec![0.0, 90.0], vec![730.0, 0.0]).unwrap();
     let svg = polar::diagram("spot.ies", &Photometry::of(table));
-    assert_eq!(svg.matches("<circle").count(), 0);
+    assert_eq!((svg.matches(" 0 0 1 ").count(), svg.matches(" 0 0 0 ").count()), (0, 4), "{svg}");
     assert!(svg.contains(">cd<") && svg.contains(">800<") && svg.contains("spot.ies, "));
 }
 
