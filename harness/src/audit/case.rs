@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Instant, SystemTime};
 
 use super::jobs::{self, Outcome, Running};
-use super::{AuditError, Options, sampling, sequential};
+use super::{AuditError, Options, repetition, sampling, sequential};
 use crate::diagnosis;
 use crate::judge::{Comparison, Judge, Policy, Published};
 use crate::measure::Reader;
@@ -75,7 +75,8 @@ impl Audit<'_> {
         let running = Running { case, plan, folder, reader, observer };
         let mut outcome = running.run()?;
         if !process::is_interrupted() {
-            sampling::sample_on(&running, judge, &mut outcome)?;
+            let stated = repetition::examine(&running, &mut outcome);
+            sampling::sample_on(&running, judge, &stated, &mut outcome)?;
         }
         if outcome.from_cache > 0 {
             let count = outcome.from_cache;

@@ -116,6 +116,7 @@ impl Running<'_> {
             model: task.model(),
             input_sha256: self.case.sha256.clone(),
             seed: run.job.seed,
+            skewness: measurement.skewness(),
             method: measurement.method,
             effort: measurement.effort,
             role: planned.engine.role(),

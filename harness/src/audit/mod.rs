@@ -20,6 +20,7 @@
 mod case;
 pub mod jobs;
 mod observer;
+mod repetition;
 pub mod sampling;
 pub mod sequential;
 

@@ -3,11 +3,13 @@
 use clap::ValueEnum;
 
 use super::jobs::{self, Outcome, Running};
+use super::repetition;
 use super::sequential::{self, Ask};
-use crate::engines::Job;
+use crate::engines::{Job, Station};
 use crate::judge::Judge;
 use crate::measure::{Question, Source, Taken};
 use crate::plan::{Plan, Run};
+use crate::procedures::Task;
 use crate::record::Recording;
 use crate::system::files::FileError;
 
@@ -39,7 +41,12 @@ impl Sampling {
 }
 
 /// Takes further looks wherever a comparison is undecided; the observer hears of each.
-pub(super) fn sample_on(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Outcome) -> Result<(), FileError> {
+pub(super) fn sample_on(
+    running: &Running<'_>,
+    judge: &Judge<'_>,
+    stated: &repetition::Found,
+    outcome: &mut Outcome,
+) -> Result<(), FileError> {
     for run in &running.plan.runs {
         let (planned, task) = (&running.plan.engines[run.engine], &running.plan.tasks[run.task]);
         let engine = planned.engine.name();
@@ -53,7 +60,10 @@ pub(super) fn sample_on(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut 
         let others: Vec<&Recording> =
             outcome.recordings.iter().filter(of_task).filter(|r| r.key.engine != engine).collect();
         let mut sample = |ask: &Ask| {
-            let taken = look(running, run, ask)?;
+            let mut taken = look(running, run, ask)?;
+            for estimate in &mut taken.measurement.estimates {
+                *estimate = repetition::corrected(stated.get(&engine).map_or(&[], Vec::as_slice), *estimate);
+            }
             outcome.from_cache += usize::from(taken.source == Source::Cache);
             Ok((taken.measurement, taken.cost.wall_s))
         };
@@ -85,7 +95,7 @@ fn look(running: &Running<'_>, run: &Run, ask: &Ask) -> Result<Taken, String> {
     );
     running.observer.remarked(running.case, &told);
     let further = Job {
-        stations: ask.targets.iter().flat_map(|k| run.job.stations[task.stations_of(*k)].to_vec()).collect(),
+        stations: stations_of(run, task, &ask.targets),
         budget: ask.budget,
         seed: seed_of_look(run.job.seed, ask.look),
         ..run.job.clone()
@@ -95,8 +105,13 @@ fn look(running: &Running<'_>, run: &Run, ask: &Ask) -> Result<Taken, String> {
     running.reader.read(&Question::new(&instrument, &further, &place)).map_err(|e| e.to_string())
 }
 
+/// The stations of some targets of a run's task.
+pub(super) fn stations_of(run: &Run, task: &Task, targets: &[usize]) -> Vec<Station> {
+    targets.iter().flat_map(|k| run.job.stations[task.stations_of(*k)].to_vec()).collect()
+}
+
 /// Seeds of further looks lie far from those that people choose, and differ modulo any small number.
-fn seed_of_look(seed: u64, look: u32) -> u64 {
+pub(super) fn seed_of_look(seed: u64, look: u32) -> u64 {
     const APART: u64 = 0x1_0000_0001;
     seed.wrapping_add(APART.wrapping_mul(u64::from(look - 1)))
 }

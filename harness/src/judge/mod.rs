@@ -20,7 +20,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::procedures::{self, Target, Task};
-use crate::record::{EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, Uncertainty};
+use crate::record::{
+    Doubt, EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, Uncertainty,
+};
 use crate::spec::ToleranceOverride;
 
 use papers::Input;
@@ -124,7 +126,7 @@ impl Judge<'_> {
         let input = self.published.map(|_| Input::of(task));
         let mut comparisons = vec![];
         for recording in recordings {
-            let (mut family, mut shares) = (vec![], vec![]);
+            let mut family = vec![];
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.readings.get(k);
                 let engine = &recording.key.engine;
@@ -138,18 +140,17 @@ impl Judge<'_> {
                     family.push(self.comparison(task, recording, k, None));
                 }
                 family.extend(references.into_iter().map(|held| self.comparison(task, recording, k, Some(held))));
-                shares.resize(family.len(), share_of_reading(recording, k));
             }
-            self.decide(&mut family, &shares);
+            self.decide(&mut family);
             comparisons.extend(family);
         }
         comparisons
     }
 
-    /// Verdicts of all comparisons of one engine in one procedure of one case; of its error each may spend its share.
-    fn decide(&self, family: &mut [Comparison], shares: &[f64]) {
+    /// Verdicts of all comparisons of one engine in one procedure of one case.
+    fn decide(&self, family: &mut [Comparison]) {
         let tested: Vec<usize> = (0..family.len()).filter(|k| family[*k].p_value.is_some()).collect();
-        let p_values: Vec<f64> = tested.iter().filter_map(|k| Some(family[*k].p_value? / shares[*k])).collect();
+        let p_values: Vec<f64> = tested.iter().filter_map(|k| family[*k].p_value).collect();
         let rejected = family::rejected(&p_values, self.tolerances.family_wise_error());
         for (k, rejected) in tested.into_iter().zip(rejected) {
             let of_one = &mut family[k].verdict;
@@ -176,7 +177,7 @@ impl Judge<'_> {
         let tail = uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor());
         let budget = pair.map(|(reading, held)| {
             let components = of_reading(reading).into_iter().chain(held.components.iter().copied());
-            ErrorBudget::new(components.collect(), tail * share_of_reading(recording, k))
+            ErrorBudget::spending(components.collect(), tail, share_of_reading(recording, k))
         });
         let missing = match (reading, &held) {
             (None, _) => recording.failure.clone().or_else(|| Some("no reading".to_owned())),
@@ -214,13 +215,41 @@ impl Judge<'_> {
         let deviation = if sound { value - reference.value } else { f64::NAN };
         let allowed = tolerance.around(reference.value);
         comparison.verdict = judge(deviation, budget.expanded, allowed);
-        if comparison.uncertainty == Uncertainty::NotSeen && comparison.verdict == Verdict::Fail {
+        let waits = unbelievable(comparison.uncertainty, value, is_heavy_tailed(recording));
+        if let Some(why) = waits.filter(|_| comparison.verdict == Verdict::Fail) {
             comparison.verdict = Verdict::Inconclusive;
-            comparison.diagnosis = Some("not seen: no sample met here what samples met elsewhere".to_owned());
+            comparison.diagnosis = Some(why.to_owned());
         } else if comparison.verdict != Verdict::Missing {
             comparison.p_value = Some(budget.p_value(deviation, allowed));
         }
         comparison
+    }
+}
+
+/// The largest relative standard error of a mean that is about normal: light is not negative, and what scatters more is skewed, so
+/// that most means of few samples lie far below what they estimate.
+const MAX_RELATIVE_ERROR: f64 = 0.25;
+
+/// Normal deviates of the skewness of blocks beyond which their mean is not normal either: one in a hundred of normal blocks.
+const MAX_SKEWNESS: f64 = 2.33;
+
+/// Whether its blocks tell so, or what it states with one seed and the other.
+fn is_heavy_tailed(recording: &Recording) -> bool {
+    recording.skewness.is_some_and(|s| s > MAX_SKEWNESS)
+        || recording.stated_errors.iter().any(|s| s.doubt == Some(Doubt::HeavyTail))
+}
+
+/// Why a sampled value fails nothing, whatever its distance: its interval is not one.
+fn unbelievable(uncertainty: Uncertainty, value: f64, is_heavy_tailed: bool) -> Option<&'static str> {
+    match uncertainty {
+        Uncertainty::StandardError { value: error, .. } if error > 0.0 && is_heavy_tailed => Some(
+            "a heavy tail: a few of its samples hold much of the light, others are still to come; it fails nothing yet",
+        ),
+        Uncertainty::NotSeen => Some("not seen: no sample met here what samples met elsewhere"),
+        Uncertainty::StandardError { value: error, .. } if error > MAX_RELATIVE_ERROR * value => {
+            Some("too few samples: they scatter so much that their mean is not normal, and fails nothing yet")
+        }
+        _ => None,
     }
 }
 

@@ -12,6 +12,8 @@ use crate::record::{EngineName, ProcedureId, ReadingKey};
 #[strum(serialize_all = "snake_case")]
 pub(super) enum Kind {
     Failed,
+    /// What is wrong with how an engine states its errors.
+    Finding,
     /// Not run: there is no reading.
     Skipped,
     /// Read with less work: meters that follow from others, light paths that carry nothing.
@@ -47,7 +49,9 @@ fn recorded(report: &Report) -> impl Iterator<Item = (Kind, &ReadingKey, String)
         let approximate = r.approximation.iter().map(|a| (Kind::Approximate, a));
         let noted = r.notes.iter().filter(move |n| !said(n)).map(|n| (Kind::Note, n));
         let failed = r.failure.iter().map(|f| (Kind::Failed, f));
-        failed.chain(approximate).chain(noted).map(|(kind, text)| (kind, &r.key, text.clone()))
+        let doubts =
+            r.stated_errors.iter().filter(|s| s.doubt.is_some()).map(|s| (Kind::Finding, &r.key, s.to_string()));
+        failed.chain(approximate).chain(noted).map(|(kind, text)| (kind, &r.key, text.clone())).chain(doubts)
     })
 }
 

@@ -216,7 +216,7 @@ fn told(report: &Report, detail: Detail, text: &mut String) {
         writeln!(text, "  {}", shortened(&note.line(report), detail)).ok();
     }
     let of = |kind: Kind| notes[shown..].iter().filter(|n| n.kind == kind).count();
-    let mut left: Vec<String> = [Kind::Failed, Kind::Skipped, Kind::Shortcut]
+    let mut left: Vec<String> = [Kind::Failed, Kind::Finding, Kind::Skipped, Kind::Shortcut]
         .into_iter()
         .filter(|kind| of(*kind) > 0)
         .map(|kind| format!("{} more {}", of(kind), kind))
