@@ -30,8 +30,8 @@ use papers::Input;
 pub use crate::record::Basis;
 pub use consensus::{Consensus, Witness};
 pub use known::{How, KnownBreak, KnownDeviationError, KnownDeviations, Subject};
+pub use papers::{Misfit, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use papers::{PaperSplit, Share, Stages, shares};
-pub use papers::{Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use policy::{Policy, PolicyError};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
@@ -53,12 +53,15 @@ pub struct Reference {
     pub basis: Basis,
     /// Formula, solver or paper.
     pub source: String,
+    /// Why it is not to be believed, of a printed cell: then no engine answers for what departs from it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub doubt: Option<String>,
 }
 
 impl Reference {
     fn of(value: f64, stated: &Uncertainty, basis: Basis, source: String) -> Self {
         let (uncertainty, degrees_of_freedom) = (stated.standard(), stated.degrees_of_freedom());
-        Self { value, uncertainty, degrees_of_freedom, coverage_factor: None, basis, source }
+        Self { value, uncertainty, degrees_of_freedom, coverage_factor: None, basis, source, doubt: None }
     }
 }
 
@@ -165,6 +168,11 @@ impl Judge<'_> {
             let (verdict, cause) = self.known.revise(comparison.verdict, &subject);
             comparison.verdict = verdict;
             comparison.diagnosis = cause.or(comparison.diagnosis.take());
+            let doubt = comparison.reference.as_ref().and_then(|r| r.doubt.clone());
+            if let (Some(doubt), Verdict::Fail | Verdict::Inconclusive) = (doubt, comparison.verdict) {
+                comparison.verdict = Verdict::KnownDeviation;
+                comparison.diagnosis = Some(doubt);
+            }
         }
     }
 

@@ -2,8 +2,10 @@
 //!
 //! Per engine and procedure the weighted mean of the relative changes is tested (weights 1/u²; the uncertainty widened by the
 //! Birge ratio where meters scatter more than they say: Birge, Phys. Rev. 40 (1932) 207), then every meter. All tests
-//! of a comparison together are wrong once in a hundred times where nothing changed (Šidák, JASA 62 (1967) 626). Standard errors
-//! from few blocks have Student's t with the degrees of freedom of Welch and Satterthwaite (GUM G.4.1).
+//! of a comparison together are wrong once in a hundred times where nothing changed (Šidák, JASA 62 (1967) 626); half of that is
+//! for the means, which are few. Standard errors from few blocks have Student's t with the degrees of freedom of Welch and
+//! Satterthwaite (GUM G.4.1); a mean has those of all its meters together, and a variance that is larger by what its weights are
+//! uncertain by (Meier, Variance of a weighted mean, Biometrics 9 (1953) 59).
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -17,6 +19,10 @@ use crate::record::{MeterId, Quantity, Reading, ReadingKey, Uncertainty};
 
 /// Probability that anything at all is called changed where nothing is.
 const FAMILY: f64 = 0.01;
+/// The part of it that the means have among them.
+const SHARE_OF_MEANS: f64 = 0.5;
+/// Meier's term is the first of a series in 1 / degrees of freedom: simulated up to 192 meters, it is too small for fewer than these.
+const FEWEST_FOR_WEIGHTS: f64 = 7.0;
 /// Values without uncertainty may differ by the rounding of single precision, which renderers compute in.
 const ROUNDING: f64 = 1e-6;
 
@@ -31,9 +37,12 @@ pub enum Comparability {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Changes {
     pub entries: Vec<EntryChange>,
+    /// Of single meters.
     pub tests: usize,
     /// The level of each, so that all together keep theirs.
     pub level: f64,
+    /// That of each mean.
+    pub level_of_means: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -109,22 +118,25 @@ pub fn compare(old: &[Entry], new: &[Entry], comparability: Comparability) -> Ch
     let added = new.iter().filter(|b| !old.iter().any(|a| a.key == b.key));
     let added = added.map(|b| bare(b, State::New, vec!["there is nothing to hold it against".to_owned()]));
     let mut entries: Vec<EntryChange> = of_old.chain(added).collect();
-    let tests = entries.iter().map(|e| e.meters.len() + usize::from(e.mean.is_some())).sum::<usize>();
+    let tests = entries.iter().map(|e| e.meters.len()).sum();
+    let means = entries.iter().filter(|e| e.mean.is_some()).count();
     // 1 - (1 - family)^(1 / tests), without loss of digits.
-    let level = -f64::exp_m1(f64::ln_1p(-FAMILY) / tests.max(1) as f64);
+    let each = |family: f64, tests: usize| -f64::exp_m1(f64::ln_1p(-family) / tests.max(1) as f64);
+    let of_means = if means == 0 { 0.0 } else { SHARE_OF_MEANS * FAMILY };
+    let (level, level_of_means) = (each(FAMILY - of_means, tests), each(of_means, means));
     for entry in &mut entries {
-        decide(entry, level);
+        decide(entry, level, level_of_means);
     }
-    Changes { entries, tests, level }
+    Changes { entries, tests, level, level_of_means }
 }
 
-fn decide(entry: &mut EntryChange, level: f64) {
+fn decide(entry: &mut EntryChange, level: f64, level_of_means: f64) {
     for meter in &mut entry.meters {
         // A probability that is no number never counts as agreement.
         meter.significant = meter.p_value < level || meter.p_value.is_nan();
     }
     if entry.state == State::Unchanged {
-        if entry.mean.is_some_and(|m| m.p_value < level || m.p_value.is_nan()) {
+        if entry.mean.is_some_and(|m| m.p_value < level_of_means || m.p_value.is_nan()) {
             entry.state = State::Shifted;
         } else if entry.meters.iter().any(|m| m.significant) {
             entry.state = State::Changed;
@@ -147,7 +159,7 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
     let is_other_subject = !notes.is_empty();
     notes.extend(differing("version", &a.version, &b.version));
     for key in a.method.keys().chain(b.method.keys()).collect::<BTreeSet<_>>() {
-        let of = |entry: &Entry| entry.method.get(key).cloned().unwrap_or_else(|| "not set".to_owned());
+        let of = |entry: &Entry| entry.said(key).unwrap_or("not set").to_owned();
         notes.extend(differing(&format!("setting {key}"), &of(a), &of(b)));
     }
     if is_other_subject || (comparability == Comparability::SameInstrument && !notes.is_empty()) {
@@ -196,21 +208,25 @@ fn meter(before: &Reading, now: &Reading) -> MeterChange {
 
 /// The weighted mean shift of the meters that are sampled; `None` where fewer than two are.
 fn mean(meters: &[MeterChange]) -> Option<MeanShift> {
-    let sampled: Vec<(f64, f64)> = meters
+    let sampled: Vec<(f64, f64, Option<f64>)> = meters
         .iter()
         .filter(|m| m.uncertainty > 0.0 && m.old > 0.0 && m.uncertainty.is_finite() && m.new.is_finite())
-        .map(|m| ((m.new - m.old) / m.old, m.uncertainty / m.old))
+        .map(|m| ((m.new - m.old) / m.old, (m.uncertainty / m.old).powi(-2), m.degrees_of_freedom))
         .collect();
     if sampled.len() < 2 {
         return None;
     }
-    let weights: f64 = sampled.iter().map(|(_, u)| u.powi(-2)).sum();
-    let relative = sampled.iter().map(|(d, u)| d * u.powi(-2)).sum::<f64>() / weights;
-    let scatter = sampled.iter().map(|(d, u)| ((d - relative) / u).powi(2)).sum::<f64>();
-    let birge = (scatter / (sampled.len() - 1) as f64).sqrt().max(1.0);
-    let uncertainty = birge / weights.sqrt();
-    // Meters of one run may share their blocks: the mean is granted no more degrees of freedom than one of them.
-    let freedom = meters.iter().filter_map(|m| m.degrees_of_freedom).reduce(f64::min);
+    let weights: f64 = sampled.iter().map(|(_, weight, _)| weight).sum();
+    let relative = sampled.iter().map(|(change, weight, _)| change * weight).sum::<f64>() / weights;
+    let scatter = sampled.iter().map(|(change, weight, _)| weight * (change - relative).powi(2)).sum::<f64>();
+    let birge = scatter / (sampled.len() - 1) as f64;
+    // Shares of the mean with the degrees of freedom that each is known by.
+    let shares = || sampled.iter().filter_map(|(_, weight, freedom)| Some((weight / weights, (*freedom)?)));
+    let fewest = shares().map(|(_, freedom)| freedom).reduce(f64::min);
+    let meier = 1.0 + 4.0 * shares().map(|(share, freedom)| share * (1.0 - share) / freedom).sum::<f64>();
+    let all = shares().map(|(share, freedom)| share * share / freedom).sum::<f64>().recip();
+    let freedom = fewest.map(|fewest| if fewest < FEWEST_FOR_WEIGHTS { fewest } else { all });
+    let uncertainty = (birge.max(meier) / weights).sqrt();
     let p_value = if relative.abs() <= ROUNDING { 1.0 } else { two_sided(relative / uncertainty, freedom) };
     Some(MeanShift { relative, uncertainty, p_value })
 }
