@@ -10,15 +10,13 @@ use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::Entry;
+use crate::judge::{SINGLE_PRECISION, WeightedMean, two_sided};
 use crate::record::{MeterId, Quantity, Reading, ReadingKey, Uncertainty};
 
 /// Probability that anything at all is called changed where nothing is.
 const FAMILY: f64 = 0.01;
-/// Values without uncertainty may differ by the rounding of single precision, which renderers compute in.
-const ROUNDING: f64 = 1e-6;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Comparability {
@@ -174,7 +172,7 @@ fn meter(before: &Reading, now: &Reading) -> MeterChange {
     let change = now.value - before.value;
     let apart = Uncertainty::of_sum([(-1.0, before.uncertainty), (1.0, now.uncertainty)]);
     let combined = before.uncertainty.standard().hypot(now.uncertainty.standard());
-    let rounding = ROUNDING * before.value.abs().max(now.value.abs());
+    let rounding = SINGLE_PRECISION * before.value.abs().max(now.value.abs());
     let p_value = match change.abs() {
         _ if [before, now].iter().any(|r| r.uncertainty == Uncertainty::NotSeen) => 1.0,
         size if !(size.is_finite() && combined.is_finite()) => 0.0,
@@ -201,22 +199,8 @@ fn mean(meters: &[MeterChange]) -> Option<MeanShift> {
         .filter(|m| m.uncertainty > 0.0 && m.old > 0.0 && m.uncertainty.is_finite() && m.new.is_finite())
         .map(|m| ((m.new - m.old) / m.old, m.uncertainty / m.old))
         .collect();
-    if sampled.len() < 2 {
-        return None;
-    }
-    let weights: f64 = sampled.iter().map(|(_, u)| u.powi(-2)).sum();
-    let relative = sampled.iter().map(|(d, u)| d * u.powi(-2)).sum::<f64>() / weights;
-    let scatter = sampled.iter().map(|(d, u)| ((d - relative) / u).powi(2)).sum::<f64>();
-    let birge = (scatter / (sampled.len() - 1) as f64).sqrt().max(1.0);
-    let uncertainty = birge / weights.sqrt();
+    let mean = WeightedMean::of(&sampled)?;
     // Meters of one run may share their blocks: the mean is granted no more degrees of freedom than one of them.
     let freedom = meters.iter().filter_map(|m| m.degrees_of_freedom).reduce(f64::min);
-    let p_value = if relative.abs() <= ROUNDING { 1.0 } else { two_sided(relative / uncertainty, freedom) };
-    Some(MeanShift { relative, uncertainty, p_value })
-}
-
-/// Probability of a standardised change at least this large, either way.
-fn two_sided(z: f64, freedom: Option<f64>) -> f64 {
-    let student = freedom.and_then(|f| StudentsT::new(0.0, 1.0, f).ok());
-    2.0 * student.map_or_else(|| Normal::standard().sf(z.abs()), |t| t.sf(z.abs()))
+    Some(MeanShift { relative: mean.value, uncertainty: mean.uncertainty, p_value: mean.p_value(freedom) })
 }
