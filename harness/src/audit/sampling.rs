@@ -1,41 +1,27 @@
 //! Sampling until comparisons are decided: which budget first looks get, and further looks through the run's reader.
 
-use clap::ValueEnum;
-
 use super::jobs::{self, Outcome, Running};
 use super::repetition;
 use super::sequential::{self, Ask};
 use crate::engines::{Job, Station};
-use crate::judge::Judge;
+use crate::judge::{Judge, Sampling};
 use crate::measure::{Question, Source, Taken};
 use crate::plan::{Plan, Run};
 use crate::procedures::Task;
 use crate::record::Recording;
 use crate::system::files::FileError;
 
-/// When sampling stops.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Sampling {
-    /// At the relative error of the spec's budget; beyond it only what is undecided
-    #[default]
-    Accurate,
-    /// As soon as every comparison is decided, which is much earlier where readings agree
-    Decided,
-}
-
-impl Sampling {
-    /// Gives the jobs of a plan the budget of their first look.
-    pub(super) fn grant(self, judge: &Judge<'_>, plan: &mut Plan) {
-        if self == Self::Accurate {
-            return;
-        }
-        for run in &mut plan.runs {
-            let engine = plan.engines[run.engine].engine.name();
-            if !plan.engines[run.engine].engine.is_witness() {
-                let tolerance = judge.tolerance(&plan.tasks[run.task], engine.as_str());
-                run.job.budget = sequential::first_look(run.job.budget, tolerance.relative);
-                run.shortcut.job.budget = run.job.budget;
-            }
+/// Gives the jobs of a plan the budget of their first look.
+pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
+    if sampling == Sampling::Accurate {
+        return;
+    }
+    for run in &mut plan.runs {
+        let engine = plan.engines[run.engine].engine.name();
+        if !plan.engines[run.engine].engine.is_witness() {
+            let tolerance = judge.tolerance(&plan.tasks[run.task], engine.as_str());
+            run.job.budget = sequential::first_look(run.job.budget, tolerance.relative);
+            run.shortcut.job.budget = run.job.budget;
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The diffing layer: readings against references that carry their own uncertainty; it sees nothing but readings.
 
+mod bias;
 mod comparison;
 mod consensus;
 mod family;
@@ -28,14 +29,15 @@ use crate::spec::ToleranceOverride;
 use papers::Input;
 
 pub use crate::record::Basis;
+pub use bias::{Bias, SINGLE_PRECISION, WeightedMean, two_sided};
 pub use consensus::{Consensus, Witness};
-pub use known::{How, KnownBreak, KnownDeviationError, KnownDeviations, Subject};
+pub use known::{Glob, How, KnownBreak, KnownDeviation, KnownDeviations, OnRecord, State};
 pub use papers::{Misfit, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use papers::{PaperSplit, Share, Stages, shares};
-pub use policy::{Policy, PolicyError};
+pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicyRecord, Profile, ProjectPolicy, Sampling};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
-pub use tolerance::{Tolerance, ToleranceError, Tolerances};
+pub use tolerance::{Rule, Tolerance, Tolerances};
 pub use uncertainty::{Component, ErrorBudget, Shape, Source};
 pub use verdict::{Verdict, judge};
 
@@ -88,6 +90,9 @@ pub struct Comparison {
     /// Deviation over reference.
     pub relative_deviation: Option<f64>,
     pub tolerance: Tolerance,
+    /// File and source of the tolerance, where it is a project's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance_source: Option<String>,
     pub verdict: Verdict,
     pub diagnosis: Option<String>,
     /// What the deviation may owe to chance and ignorance; null where there is no deviation.
@@ -114,10 +119,19 @@ impl Judge<'_> {
 
     /// What an engine is held to in a task, by what others are judged by there.
     pub fn tolerance(&self, task: &Task, engine: &str) -> Tolerance {
-        self.held_to(task, task.reference().basis(), engine)
+        self.held_to(task, task.reference().basis(), engine).0
     }
 
-    fn held_to(&self, task: &Task, basis: Basis, engine: &str) -> Tolerance {
+    /// What every entry on record came to that is about comparisons of a task; `recordings` as for [`Self::compare`].
+    pub fn on_record(&self, comparisons: &[Comparison], recordings: &[&Recording]) -> Vec<OnRecord> {
+        let one = |recording: &&Recording| {
+            let mine: Vec<Comparison> = comparisons.iter().filter(|c| c.key == recording.key).cloned().collect();
+            self.known.on_record(&mine, &recording.content_sha256)
+        };
+        recordings.iter().flat_map(one).collect()
+    }
+
+    fn held_to(&self, task: &Task, basis: Basis, engine: &str) -> (Tolerance, Option<String>) {
         self.tolerances.of(task.procedure, basis, engine, task.quantity, self.overrides)
     }
 
@@ -144,14 +158,14 @@ impl Judge<'_> {
                 }
                 family.extend(references.into_iter().map(|held| self.comparison(task, recording, k, Some(held))));
             }
-            self.decide(&mut family);
+            self.decide(&mut family, &recording.content_sha256);
             comparisons.extend(family);
         }
         comparisons
     }
 
-    /// Verdicts of all comparisons of one engine in one procedure of one case.
-    fn decide(&self, family: &mut [Comparison]) {
+    /// Verdicts of all comparisons of one engine in one procedure of one case, which is known by its content.
+    fn decide(&self, family: &mut [Comparison], content: &str) {
         let tested: Vec<usize> = (0..family.len()).filter(|k| family[*k].p_value.is_some()).collect();
         let p_values: Vec<f64> = tested.iter().filter_map(|k| family[*k].p_value).collect();
         let rejected = family::rejected(&p_values, self.tolerances.family_wise_error());
@@ -162,16 +176,18 @@ impl Judge<'_> {
             }
         }
         for comparison in family {
-            let Some(basis) = comparison.reference.as_ref().map(|r| r.basis) else { continue };
-            let Comparison { key, model, relative_deviation, .. } = &*comparison;
-            let subject = Subject { key, model, basis, relative_deviation: *relative_deviation };
-            let (verdict, cause) = self.known.revise(comparison.verdict, &subject);
-            comparison.verdict = verdict;
-            comparison.diagnosis = cause.or(comparison.diagnosis.take());
-            let doubt = comparison.reference.as_ref().and_then(|r| r.doubt.clone());
-            if let (Some(doubt), Verdict::Fail | Verdict::Inconclusive) = (doubt, comparison.verdict) {
-                comparison.verdict = Verdict::KnownDeviation;
+            self.known.revise(comparison, content, self.tolerances.coverage_factor());
+            let Some(basis) = comparison.basis() else { continue };
+            let ReadingKey { procedure, engine, .. } = &comparison.key;
+            if !matches!(comparison.verdict, Verdict::Fail | Verdict::Inconclusive) {
+                continue;
+            }
+            if let Some(doubt) = comparison.reference.as_ref().and_then(|r| r.doubt.clone()) {
                 comparison.diagnosis = Some(doubt);
+                comparison.verdict = Verdict::KnownDeviation;
+            } else if let Some(why) = self.tolerances.not_claimed(*procedure, basis, engine) {
+                comparison.diagnosis = Some(why.to_owned());
+                comparison.verdict = Verdict::NotJudged;
             }
         }
     }
@@ -179,7 +195,8 @@ impl Judge<'_> {
     fn comparison(&self, task: &Task, recording: &Recording, k: usize, held: Option<ScoredReference>) -> Comparison {
         let (target, reading) = (&task.targets[k], recording.readings.get(k));
         let basis = held.as_ref().map(|h| h.reference.basis);
-        let tolerance = basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();
+        let (tolerance, tolerance_source) =
+            basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();
         let pair = reading.zip(held.as_ref());
         let difference = pair.map(|(a, b)| a.value - b.reference.value);
         let tail = uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor());
@@ -208,6 +225,7 @@ impl Judge<'_> {
             deviation: difference.filter(|d| d.is_finite()),
             relative_deviation: None,
             tolerance,
+            tolerance_source,
             verdict: Verdict::Missing,
             diagnosis: missing,
             budget,

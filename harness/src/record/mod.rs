@@ -127,6 +127,9 @@ pub struct Recording {
     pub light: Light,
     /// SHA-256 of the spec and of every file that it names.
     pub input_sha256: String,
+    /// SHA-256 of what was measured, whatever its files are called: known deviations of one case are on record under it.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub content_sha256: String,
     /// Seed of every random choice.
     pub seed: u64,
     /// What the engine did. Files of before effort was told apart have both under `settings`.
@@ -174,6 +177,7 @@ impl Recording {
             model: String::new(),
             light,
             input_sha256: String::new(),
+            content_sha256: String::new(),
             seed: 1,
             method: Method::default(),
             effort: Effort::default(),

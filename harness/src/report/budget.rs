@@ -29,6 +29,9 @@ pub fn budgets(report: &Report) -> String {
         let (case, procedure, engine, basis) = found;
         let more = if all > LISTED { format!(", the {LISTED} widest of {all}") } else { String::new() };
         writeln!(text, "\n{case}: {procedure}, {engine} against {basis}{more}\n{}", table(&mine)).ok();
+        if let Some(source) = mine.first().and_then(|(c, _)| c.tolerance_source.as_ref()) {
+            writeln!(text, "  tolerance by {source}").ok();
+        }
     }
     text
 }

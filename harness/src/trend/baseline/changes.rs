@@ -12,19 +12,15 @@ use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::Entry;
+use crate::judge::{SINGLE_PRECISION, WeightedMean, two_sided};
 use crate::record::{MeterId, Quantity, Reading, ReadingKey, Uncertainty};
 
 /// Probability that anything at all is called changed where nothing is.
 const FAMILY: f64 = 0.01;
 /// The part of it that the means have among them.
 const SHARE_OF_MEANS: f64 = 0.5;
-/// Meier's term is the first of a series in 1 / degrees of freedom: simulated up to 192 meters, it is too small for fewer than these.
-const FEWEST_FOR_WEIGHTS: f64 = 7.0;
-/// Values without uncertainty may differ by the rounding of single precision, which renderers compute in.
-const ROUNDING: f64 = 1e-6;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Comparability {
@@ -186,7 +182,7 @@ fn meter(before: &Reading, now: &Reading) -> MeterChange {
     let change = now.value - before.value;
     let apart = Uncertainty::of_sum([(-1.0, before.uncertainty), (1.0, now.uncertainty)]);
     let combined = before.uncertainty.standard().hypot(now.uncertainty.standard());
-    let rounding = ROUNDING * before.value.abs().max(now.value.abs());
+    let rounding = SINGLE_PRECISION * before.value.abs().max(now.value.abs());
     let p_value = match change.abs() {
         _ if [before, now].iter().any(|r| r.uncertainty == Uncertainty::NotSeen) => 1.0,
         size if !(size.is_finite() && combined.is_finite()) => 0.0,
@@ -208,31 +204,11 @@ fn meter(before: &Reading, now: &Reading) -> MeterChange {
 
 /// The weighted mean shift of the meters that are sampled; `None` where fewer than two are.
 fn mean(meters: &[MeterChange]) -> Option<MeanShift> {
-    let sampled: Vec<(f64, f64, Option<f64>)> = meters
+    let sampled: Vec<_> = meters
         .iter()
         .filter(|m| m.uncertainty > 0.0 && m.old > 0.0 && m.uncertainty.is_finite() && m.new.is_finite())
-        .map(|m| ((m.new - m.old) / m.old, (m.uncertainty / m.old).powi(-2), m.degrees_of_freedom))
+        .map(|m| ((m.new - m.old) / m.old, m.uncertainty / m.old, m.degrees_of_freedom))
         .collect();
-    if sampled.len() < 2 {
-        return None;
-    }
-    let weights: f64 = sampled.iter().map(|(_, weight, _)| weight).sum();
-    let relative = sampled.iter().map(|(change, weight, _)| change * weight).sum::<f64>() / weights;
-    let scatter = sampled.iter().map(|(change, weight, _)| weight * (change - relative).powi(2)).sum::<f64>();
-    let birge = scatter / (sampled.len() - 1) as f64;
-    // Shares of the mean with the degrees of freedom that each is known by.
-    let shares = || sampled.iter().filter_map(|(_, weight, freedom)| Some((weight / weights, (*freedom)?)));
-    let fewest = shares().map(|(_, freedom)| freedom).reduce(f64::min);
-    let meier = 1.0 + 4.0 * shares().map(|(share, freedom)| share * (1.0 - share) / freedom).sum::<f64>();
-    let all = shares().map(|(share, freedom)| share * share / freedom).sum::<f64>().recip();
-    let freedom = fewest.map(|fewest| if fewest < FEWEST_FOR_WEIGHTS { fewest } else { all });
-    let uncertainty = (birge.max(meier) / weights).sqrt();
-    let p_value = if relative.abs() <= ROUNDING { 1.0 } else { two_sided(relative / uncertainty, freedom) };
-    Some(MeanShift { relative, uncertainty, p_value })
-}
-
-/// Probability of a standardised change at least this large, either way.
-fn two_sided(z: f64, freedom: Option<f64>) -> f64 {
-    let student = freedom.and_then(|f| StudentsT::new(0.0, 1.0, f).ok());
-    2.0 * student.map_or_else(|| Normal::standard().sf(z.abs()), |t| t.sf(z.abs()))
+    let mean = WeightedMean::of(&sampled)?;
+    Some(MeanShift { relative: mean.value, uncertainty: mean.uncertainty, p_value: mean.p_value() })
 }
