@@ -23,12 +23,10 @@ const PART: f64 = 0.05;
 /// Two values of one determined reading differ by the rounding of single precision at most, relative.
 const ROUNDING: f64 = 1e-6;
 
-/// How the errors of each engine are, as far as they were looked at: of what it sampled, and of what it claims.
-pub(super) type Found = BTreeMap<EngineName, Vec<StatedErrors>>;
-
-/// Reads again, tells in the recordings what is found, and gives readings the errors that they have.
-pub(super) fn examine(running: &Running<'_>, outcome: &mut Outcome) -> Found {
-    let mut found = Found::new();
+/// Reads again, tells in the recordings what is found, and gives readings the errors that they have: by engine, of what it sampled
+/// and of what it claims.
+pub(super) fn examine(running: &Running<'_>, outcome: &mut Outcome) -> BTreeMap<EngineName, Vec<StatedErrors>> {
+    let mut found = BTreeMap::new();
     for (e, planned) in running.plan.engines.iter().enumerate().filter(|(_, p)| !p.engine.is_vouched_for()) {
         let name = planned.engine.name();
         let (mut sampled, mut claims) = (vec![], vec![]);
@@ -49,15 +47,10 @@ pub(super) fn examine(running: &Running<'_>, outcome: &mut Outcome) -> Found {
         let Some(of_engine) = found.get(&recording.key.engine) else { continue };
         recording.stated_errors.clone_from(of_engine);
         for reading in &mut recording.readings {
-            reading.uncertainty = corrected(of_engine, estimate(reading)).uncertainty;
+            reading.uncertainty = StatedErrors::corrected(of_engine, estimate(reading)).uncertainty;
         }
     }
     found
-}
-
-/// A reading with the error that it has.
-pub(super) fn corrected(of_engine: &[StatedErrors], estimate: Estimate) -> Estimate {
-    of_engine.iter().fold(estimate, |estimate, stated| stated.correct(estimate))
 }
 
 fn estimate(reading: &Reading) -> Estimate {

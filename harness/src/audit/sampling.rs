@@ -1,14 +1,15 @@
 //! Sampling until comparisons are decided: which budget first looks get, and further looks through the run's reader.
 
+use std::collections::BTreeMap;
+
 use super::jobs::{self, Outcome, Running};
-use super::repetition;
 use super::sequential::{self, Ask};
 use crate::engines::{Job, Station};
 use crate::judge::{Judge, Sampling};
 use crate::measure::{Question, Source, Taken};
 use crate::plan::{Plan, Run};
 use crate::procedures::Task;
-use crate::record::Recording;
+use crate::record::{EngineName, Recording, StatedErrors};
 use crate::system::files::FileError;
 
 /// Gives the jobs of a plan the budget of their first look.
@@ -30,7 +31,7 @@ pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
 pub(super) fn sample_on(
     running: &Running<'_>,
     judge: &Judge<'_>,
-    stated: &repetition::Found,
+    stated: &BTreeMap<EngineName, Vec<StatedErrors>>,
     outcome: &mut Outcome,
 ) -> Result<(), FileError> {
     for run in &running.plan.runs {
@@ -48,7 +49,7 @@ pub(super) fn sample_on(
         let mut sample = |ask: &Ask| {
             let mut taken = look(running, run, ask)?;
             for estimate in &mut taken.measurement.estimates {
-                *estimate = repetition::corrected(stated.get(&engine).map_or(&[], Vec::as_slice), *estimate);
+                *estimate = StatedErrors::corrected(stated.get(&engine).map_or(&[], Vec::as_slice), *estimate);
             }
             outcome.from_cache += usize::from(taken.source == Source::Cache);
             Ok((taken.measurement, taken.cost.wall_s))

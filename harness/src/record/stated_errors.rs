@@ -96,12 +96,18 @@ impl StatedErrors {
         (relative > 0.0).then_some(doubted)
     }
 
+    /// A reading with the error that it has by all that was found of its engine.
+    #[must_use]
+    pub fn corrected(found: &[Self], estimate: Estimate) -> Estimate {
+        found.iter().fold(estimate, |estimate, stated| stated.correct(estimate))
+    }
+
     /// What a reading's error is, by how such readings scatter.
     ///
     /// A standard error says how readings scatter, and nothing else: one that is far too large is as wrong as one that is too
     /// small. What may be off in every reading alike is a bound.
     #[must_use]
-    pub fn correct(&self, estimate: Estimate) -> Estimate {
+    fn correct(&self, estimate: Estimate) -> Estimate {
         let freedom = self.degrees_of_freedom;
         let uncertainty = match (estimate.uncertainty, self.ratio, self.of_claims) {
             (Uncertainty::StandardError { value, degrees_of_freedom, bound }, Some(ratio), _)
