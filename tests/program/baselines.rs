@@ -113,6 +113,43 @@ fn accepting_everything_needs_a_reason_and_a_review_needs_a_terminal() {
 }
 
 #[test]
+fn what_is_accepted_anew_every_night_is_a_drift_in_the_history_still_and_fails_where_it_is_denied() {
+    let room = room();
+    run(&room, &[]).exits(0);
+    let first = room.report();
+    for night in 1..=18 {
+        // Ten nights alike, then a ten-thousandth more every night.
+        let factor = 1.0 + 1e-4 * f64::from(night - 10).max(0.0);
+        let mut report = first.clone();
+        for list in ["readings", "comparisons"] {
+            for one in report[list].as_array_mut().unwrap().iter_mut().filter(|c| c["engine"] == "iesna") {
+                let value = one["value"].as_f64().unwrap();
+                one["value"] = (value * factor).into();
+                if let Some(deviation) = one["deviation"].as_f64() {
+                    one["deviation"] = (deviation + value * (factor - 1.0)).into();
+                }
+            }
+        }
+        room.write("out/report.json", &report.to_string());
+        room.luxproof(&["accept", "out", "--all", "--reason", "as it is today"]).exits(0);
+        let date = format!("2026-01-{night:02}");
+        room.luxproof(&["history", "add", "out/report.json", "--history", "nights.jsonl", "--night", &date]).exits(0);
+    }
+    let latest = room.luxproof(&["accept", "out", "--all", "--reason", "as it is today"]).exits(0);
+    assert!(latest.stdout.starts_with("0 accepted"), "{}", latest.stdout);
+    let site = ["history", "site", "--history", "nights.jsonl", "--out", "site"];
+    let drawn = |more: &[&str]| room.luxproof(&[&site[..], more].concat());
+    drawn(&[]).exits(0);
+    drawn(&["--deny", "drift", "--since", "8"]).exits(1).prints("drifts by +0.01").prints("since 2026-01-11, noticed");
+    drawn(&["--deny", "any", "--since", "8"]).exits(1);
+    drawn(&["--deny", "change", "--since", "8"]).exits(0);
+    // Nothing new was noticed on the last night.
+    drawn(&["--deny", "any"]).exits(0);
+    drawn(&["--since", "8"]).exits(2);
+    assert!(room.read("site/index.html").contains("since 2026-01-11"));
+}
+
+#[test]
 fn every_view_of_a_run_is_printed_and_the_page_is_kept() {
     let room = room();
     let page = run(&room, &["--format", "html"]).exits(0).stdout;

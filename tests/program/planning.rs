@@ -95,7 +95,7 @@ fn what_follows_is_not_rendered_and_reads_and_is_judged_the_same() {
     says("spec/above", "mine", "no luminaire sends light straight to 24 of 24 meters");
     let skips = whole["skips"].as_array().unwrap();
     assert!(skips.iter().all(|s| s["case"] == "calibration" && s["engine"] == "all"), "{skips:?}");
-    let mirrored = &among(&planned, "recordings", &[("engine", "mine")])[0]["method"]["mirrored_meters"];
+    let mirrored = &among(&planned, "recordings", &[("engine", "mine")])[0]["effort"]["mirrored_meters"];
     assert!(mirrored.as_str().unwrap().contains("plane[23] is plane[0] (x -> -x, y -> -y)"), "{mirrored}");
     lab.0.luxproof(&["check", "spec.yaml"]).prints("18 of 24 meters mirror others");
 }

@@ -16,6 +16,8 @@ mod measuring;
 mod mesh_files;
 mod negative_controls;
 mod planning;
+mod policy;
+mod stated_errors;
 mod stops;
 mod suite;
 mod support;

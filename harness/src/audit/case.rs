@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Instant, SystemTime};
 
 use super::jobs::{self, Outcome, Running};
-use super::{AuditError, Options, sampling, sequential};
+use super::{AuditError, Options, repetition, sampling, sequential};
 use crate::diagnosis;
 use crate::judge::{Comparison, Judge, Policy, Published};
 use crate::measure::Reader;
@@ -17,7 +17,6 @@ use crate::system::process;
 
 /// What all cases of an audit share.
 pub(super) struct Audit<'a> {
-    pub(super) policy: &'a Policy,
     pub(super) options: &'a Options<'a>,
     pub(super) reader: Reader,
 }
@@ -35,12 +34,13 @@ impl Audit<'_> {
         &self,
         case: &Case,
         plan: &Plan,
+        policy: &Policy,
         published: Option<&Published>,
         stop: Option<&Stop>,
         folder: &Path,
     ) -> Result<Report, AuditError> {
         let (started, clock) = (SystemTime::now(), Instant::now());
-        let judge = self.policy.judge(case, published);
+        let judge = policy.judge(case, published);
         let outcome = match stop {
             Some(stop) => jobs::not_run(case, plan, stop.status, &stop.why),
             None => self.readings(case, plan, &judge, folder)?,
@@ -50,6 +50,7 @@ impl Audit<'_> {
         };
         let tasks = || plan.tasks.iter();
         let mut comparisons: Vec<Comparison> = tasks().flat_map(|task| judge.compare(task, &of(task))).collect();
+        let known = tasks().flat_map(|task| judge.on_record(&comparisons, &of(task))).collect();
         diagnosis::diagnose(&plan.tasks, &mut comparisons);
         sequential::estimate_remaining_cost(&mut comparisons, &outcome.recordings);
         // What follows from other readings follows from nothing where the case was never begun.
@@ -57,6 +58,8 @@ impl Audit<'_> {
         let skips = plan.skips.iter().filter(holds).cloned().chain(outcome.skips).collect();
         Ok(Report {
             engines: outcome.engines,
+            known_deviations: known,
+            bias: judge.bias(&comparisons),
             splits: tasks().flat_map(|task| judge.split(task, &of(task))).collect(),
             consensus: tasks()
                 .filter(|task| !task.procedure.is_known())
@@ -65,7 +68,7 @@ impl Audit<'_> {
             published: tasks().filter_map(|task| judge.published?.table(task, &case.name)).collect(),
             curves: tasks().flat_map(|task| report::curves(&case.name, task)).collect(),
             wall_s: clock.elapsed().as_secs_f64(),
-            ..Report::new(case, started, &outcome.recordings, comparisons, skips)
+            ..Report::new(case, policy.record.as_ref(), started, &outcome.recordings, comparisons, skips)
         })
     }
 
@@ -75,7 +78,8 @@ impl Audit<'_> {
         let running = Running { case, plan, folder, reader, observer };
         let mut outcome = running.run()?;
         if !process::is_interrupted() {
-            sampling::sample_on(&running, judge, &mut outcome)?;
+            let stated = repetition::examine(&running, &mut outcome);
+            sampling::sample_on(&running, judge, &stated, &mut outcome)?;
         }
         if outcome.from_cache > 0 {
             let count = outcome.from_cache;

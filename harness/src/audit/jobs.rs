@@ -12,7 +12,7 @@ use crate::engines::{EngineError, Measurement};
 use crate::measure::{Cost, Failure, FailureKind, Question, Reader, Source, Taken};
 use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
 use crate::record::{EngineName, EngineStatus, Reading, ReadingKey, Recording, Status};
-use crate::spec::Case;
+use crate::spec::{Case, content};
 use crate::system::files::{self, FileError};
 use crate::system::slots::side_by_side;
 
@@ -115,7 +115,9 @@ impl Running<'_> {
             version: planned.version().unwrap_or_default(),
             model: task.model(),
             input_sha256: self.case.sha256.clone(),
+            content_sha256: content(task),
             seed: run.job.seed,
+            skewness: measurement.skewness(),
             method: measurement.method,
             effort: measurement.effort,
             role: planned.engine.role(),

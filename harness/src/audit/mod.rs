@@ -5,11 +5,10 @@
 //!
 //! use luxproof::audit::{self, Options};
 //! use luxproof::engines::Site;
-//! use luxproof::judge::Policy;
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
 //!     let options = Options::new(Site::of_user()?, PathBuf::from("out"));
-//!     let report = audit::run(&[PathBuf::from("office.yaml")], &Policy::built_in()?, &options)?;
+//!     let report = audit::run(&[PathBuf::from("office.yaml")], &options)?;
 //!     for c in report.comparisons.iter().filter(|c| c.verdict.is_bad()) {
 //!         println!("{} at {}: {:?}", c.key, c.meter, c.relative_deviation);
 //!     }
@@ -20,10 +19,12 @@
 mod case;
 pub mod jobs;
 mod observer;
-pub mod sampling;
+mod repetition;
+mod sampling;
 pub mod sequential;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use sha2::{Digest, Sha256};
@@ -31,7 +32,7 @@ use sha2::{Digest, Sha256};
 use parking_lot::Mutex;
 
 use crate::engines::Site;
-use crate::judge::{Policy, Published, PublishedError};
+use crate::judge::{Policy, PolicyChoice, Published, PublishedError};
 use crate::measure::cache::Cache;
 use crate::measure::{Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Scope, Selection, Skip, Skipping};
@@ -42,9 +43,9 @@ use crate::system::files::{self, FileError};
 use crate::system::process;
 use crate::system::slots::side_by_side;
 
+pub use crate::judge::Sampling;
 use case::{Audit, Stop};
 pub use observer::{Observer, Silent};
-pub use sampling::Sampling;
 
 pub struct Options<'a> {
     pub site: Site,
@@ -60,8 +61,10 @@ pub struct Options<'a> {
     pub filter: Vec<String>,
     /// Whether readings may be left out that follow from others.
     pub skipping: Skipping,
-    /// When sampling stops.
-    pub sampling: Sampling,
+    /// Which project policies judge, and by which of their profiles.
+    pub policy: PolicyChoice,
+    /// When sampling stops; `None`: as the profile says.
+    pub sampling: Option<Sampling>,
     /// What a failed case means to those after it.
     pub after_failure: AfterFailure,
     /// Whether engines read scenes of known answer besides.
@@ -97,7 +100,8 @@ impl Options<'_> {
             selection: Selection { seed: 1, ..Selection::default() },
             filter: vec![],
             skipping: Skipping::Allowed,
-            sampling: Sampling::Accurate,
+            policy: PolicyChoice::default(),
+            sampling: None,
             after_failure: AfterFailure::GoOn,
             calibration: Calibration::Judged,
             observer: &Silent,
@@ -128,17 +132,21 @@ pub enum AuditError {
 const MAX_CASES_AT_A_TIME: usize = 8;
 
 /// Runs every case of specs, folders and patterns and judges what engines read; files are written below [`Options::out`] alone.
-pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<Report, AuditError> {
-    let mut cases = chosen(specs, options)?;
+pub fn run(specs: &[PathBuf], options: &Options<'_>) -> Result<Report, AuditError> {
+    let (mut cases, mut policies) = chosen(specs, options)?;
     let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
     let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
     let spec = record(specs, &cases);
     let known = planner.calibrations(&cases, &plans)?;
     match options.calibration {
-        Calibration::Judged => known.into_iter().for_each(|(case, plan)| {
-            cases.push(case);
-            plans.push(plan);
-        }),
+        Calibration::Judged => {
+            let policy = common(&policies)?;
+            for (case, plan) in known {
+                cases.push(case);
+                plans.push(plan);
+                policies.push(Arc::clone(&policy));
+            }
+        }
         Calibration::LeftOut => {
             let why = "no engine reads this scene of known answer: --no-calibration";
             let skip = |(case, task)| Skip::of(case, task, EVERYONE, Scope::Procedure, why);
@@ -146,15 +154,30 @@ pub fn run(specs: &[PathBuf], policy: &Policy, options: &Options<'_>) -> Result<
             plans[0].skips.extend(scenes.map(skip));
         }
     }
-    audited(spec, &cases, plans, policy, options)
+    audited(spec, &cases, plans, &policies, options)
 }
 
 /// Lets engines, those of a spec too where one is given, read the scenes of known answer, and judges what they read.
-pub fn examine(spec: Option<&Path>, policy: &Policy, options: &Options<'_>) -> Result<Report, AuditError> {
-    let of = spec.map(|path| suite(&[path.to_owned()])).transpose()?.unwrap_or_else(|| vec![Case::default()]);
+pub fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<Report, AuditError> {
+    let (of, policy) = match spec {
+        Some(path) => {
+            let (cases, policies) = chosen(&[path.to_owned()], options)?;
+            (cases, common(&policies)?)
+        }
+        None => (vec![Case::default()], Arc::new(options.policy.read(options.policy.file.as_deref())?)),
+    };
     let known = Planner::new(&options.selection, &options.site, options.skipping).examinations(&of)?;
     let (cases, plans): (Vec<_>, Vec<_>) = known.into_iter().unzip();
-    audited(cases.first().map(SpecRecord::of).unwrap_or_default(), &cases, plans, policy, options)
+    let policies = vec![policy; cases.len()];
+    audited(cases.first().map(SpecRecord::of).unwrap_or_default(), &cases, plans, &policies, options)
+}
+
+/// The policy of the scenes of known answer: that of the specs where they have one in common, else ours alone.
+fn common(policies: &[Arc<Policy>]) -> Result<Arc<Policy>, SpecError> {
+    match policies {
+        [first, rest @ ..] if rest.iter().all(|other| Arc::ptr_eq(first, other)) => Ok(Arc::clone(first)),
+        _ => Policy::built_in().map(Arc::new),
+    }
 }
 
 /// One report of what is planned for cases.
@@ -162,16 +185,17 @@ fn audited(
     spec: SpecRecord,
     cases: &[Case],
     mut plans: Vec<Plan>,
-    policy: &Policy,
+    policies: &[Arc<Policy>],
     options: &Options<'_>,
 ) -> Result<Report, AuditError> {
     let clock = Instant::now();
     let published = published(cases)?;
-    for ((case, plan), published) in cases.iter().zip(&mut plans).zip(&published) {
-        options.sampling.grant(&policy.judge(case, published.as_ref()), plan);
+    for (((case, plan), published), policy) in cases.iter().zip(&mut plans).zip(&published).zip(policies) {
+        let sampling = options.sampling.or(policy.profile.sampling).unwrap_or_default();
+        sampling::grant(sampling, &policy.judge(case, published.as_ref()), plan);
     }
     options.observer.planned(cases, &plans);
-    let audit = Audit { policy, options, reader: options.reader() };
+    let audit = Audit { options, reader: options.reader() };
     let is_alone = cases.iter().filter(|case| !case.is_known()).count() == 1;
     let stop: Mutex<Option<Stop>> = Mutex::new(None);
     let one = |&k: &usize| -> Result<Report, AuditError> {
@@ -182,7 +206,7 @@ fn audited(
             false => options.out.join(within(&options.out, case)),
         };
         let stopped = stop.lock().clone();
-        let report = audit.case(case, plan, published[k].as_ref(), stopped.as_ref(), &folder)?;
+        let report = audit.case(case, plan, &policies[k], published[k].as_ref(), stopped.as_ref(), &folder)?;
         if folder != options.out {
             files::keep_json(&folder.join("report.json"), &report)?;
         }
@@ -208,14 +232,18 @@ fn audited(
     Ok(report)
 }
 
-/// The cases that are asked for, read and checked before any engine starts.
-pub fn chosen(specs: &[PathBuf], options: &Options<'_>) -> Result<Vec<Case>, SpecError> {
+/// The cases that are asked for, under the profile chosen, each with its policy; all read and checked before any engine starts.
+pub fn chosen(specs: &[PathBuf], options: &Options<'_>) -> Result<(Vec<Case>, Vec<Arc<Policy>>), SpecError> {
     let mut cases = suite(specs).and_then(|all| filtered(all, &options.filter))?;
     // Of a suite, the cases that the chosen procedures concern; a choice that concerns none is refused by the planner.
     if cases.iter().any(|case| options.selection.concerns(case)) {
         cases.retain(|case| options.selection.concerns(case));
     }
-    Ok(cases)
+    let policies = options.policy.of_cases(&cases)?;
+    for (case, policy) in cases.iter_mut().zip(&policies) {
+        case.budget = policy.profile.budget.over(case.budget);
+    }
+    Ok((cases, policies))
 }
 
 /// The published tables of each case.

@@ -1,45 +1,39 @@
 //! Sampling until comparisons are decided: which budget first looks get, and further looks through the run's reader.
 
-use clap::ValueEnum;
+use std::collections::BTreeMap;
 
 use super::jobs::{self, Outcome, Running};
 use super::sequential::{self, Ask};
-use crate::engines::Job;
-use crate::judge::Judge;
+use crate::engines::{Job, Station};
+use crate::judge::{Judge, Sampling};
 use crate::measure::{Question, Source, Taken};
 use crate::plan::{Plan, Run};
-use crate::record::Recording;
+use crate::procedures::Task;
+use crate::record::{EngineName, Recording, StatedErrors};
 use crate::system::files::FileError;
 
-/// When sampling stops.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Sampling {
-    /// At the relative error of the spec's budget; beyond it only what is undecided
-    #[default]
-    Accurate,
-    /// As soon as every comparison is decided, which is much earlier where readings agree
-    Decided,
-}
-
-impl Sampling {
-    /// Gives the jobs of a plan the budget of their first look.
-    pub(super) fn grant(self, judge: &Judge<'_>, plan: &mut Plan) {
-        if self == Self::Accurate {
-            return;
-        }
-        for run in &mut plan.runs {
-            let engine = plan.engines[run.engine].engine.name();
-            if !plan.engines[run.engine].engine.is_witness() {
-                let tolerance = judge.tolerance(&plan.tasks[run.task], engine.as_str());
-                run.job.budget = sequential::first_look(run.job.budget, tolerance.relative);
-                run.shortcut.job.budget = run.job.budget;
-            }
+/// Gives the jobs of a plan the budget of their first look.
+pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
+    if sampling == Sampling::Accurate {
+        return;
+    }
+    for run in &mut plan.runs {
+        let engine = plan.engines[run.engine].engine.name();
+        if !plan.engines[run.engine].engine.is_witness() {
+            let tolerance = judge.tolerance(&plan.tasks[run.task], engine.as_str());
+            run.job.budget = sequential::first_look(run.job.budget, tolerance.relative);
+            run.shortcut.job.budget = run.job.budget;
         }
     }
 }
 
 /// Takes further looks wherever a comparison is undecided; the observer hears of each.
-pub(super) fn sample_on(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Outcome) -> Result<(), FileError> {
+pub(super) fn sample_on(
+    running: &Running<'_>,
+    judge: &Judge<'_>,
+    stated: &BTreeMap<EngineName, Vec<StatedErrors>>,
+    outcome: &mut Outcome,
+) -> Result<(), FileError> {
     for run in &running.plan.runs {
         let (planned, task) = (&running.plan.engines[run.engine], &running.plan.tasks[run.task]);
         let engine = planned.engine.name();
@@ -53,7 +47,10 @@ pub(super) fn sample_on(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut 
         let others: Vec<&Recording> =
             outcome.recordings.iter().filter(of_task).filter(|r| r.key.engine != engine).collect();
         let mut sample = |ask: &Ask| {
-            let taken = look(running, run, ask)?;
+            let mut taken = look(running, run, ask)?;
+            for estimate in &mut taken.measurement.estimates {
+                *estimate = StatedErrors::corrected(stated.get(&engine).map_or(&[], Vec::as_slice), *estimate);
+            }
             outcome.from_cache += usize::from(taken.source == Source::Cache);
             Ok((taken.measurement, taken.cost.wall_s))
         };
@@ -85,7 +82,7 @@ fn look(running: &Running<'_>, run: &Run, ask: &Ask) -> Result<Taken, String> {
     );
     running.observer.remarked(running.case, &told);
     let further = Job {
-        stations: ask.targets.iter().flat_map(|k| run.job.stations[task.stations_of(*k)].to_vec()).collect(),
+        stations: stations_of(run, task, &ask.targets),
         budget: ask.budget,
         seed: seed_of_look(run.job.seed, ask.look),
         ..run.job.clone()
@@ -95,8 +92,13 @@ fn look(running: &Running<'_>, run: &Run, ask: &Ask) -> Result<Taken, String> {
     running.reader.read(&Question::new(&instrument, &further, &place)).map_err(|e| e.to_string())
 }
 
+/// The stations of some targets of a run's task.
+pub(super) fn stations_of(run: &Run, task: &Task, targets: &[usize]) -> Vec<Station> {
+    targets.iter().flat_map(|k| run.job.stations[task.stations_of(*k)].to_vec()).collect()
+}
+
 /// Seeds of further looks lie far from those that people choose, and differ modulo any small number.
-fn seed_of_look(seed: u64, look: u32) -> u64 {
+pub(super) fn seed_of_look(seed: u64, look: u32) -> u64 {
     const APART: u64 = 0x1_0000_0001;
     seed.wrapping_add(APART.wrapping_mul(u64::from(look - 1)))
 }

@@ -83,6 +83,7 @@ pub fn refine(
         };
         subject.notes.push(format!("look {look}: {} undecided meters were asked for more", ask.targets.len()));
         subject.wall_s += wall_s;
+        subject.skewness = measurement.skewness().or(subject.skewness);
         subject.effort.extend(measurement.effort.iter().map(|(k, v)| (format!("look{look}_{k}"), v.clone())));
         let estimates = measurement.readings(ask.targets.iter().map(|k| &task.targets[*k]));
         for (&k, estimate) in ask.targets.iter().zip(&estimates) {

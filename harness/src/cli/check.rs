@@ -1,5 +1,6 @@
 //! `luxproof check`: the plan of specs, nothing started.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 
 use miette::{IntoDiagnostic, Report as Diagnostic};
@@ -8,18 +9,23 @@ use super::Selected;
 use super::diagnostic::diagnose;
 use crate::audit;
 use crate::engines::Site;
+use crate::judge::PolicyRecord;
 use crate::plan::{Asked, Planner, cost_s};
+use crate::record::EngineName;
 use crate::report::Exit;
 use crate::spec::{filtered, suite};
 
 pub(super) fn check(selected: &Selected, site: &Site) -> Result<Exit, Diagnostic> {
-    let cases = suite(&selected.specs).and_then(|all| filtered(all, &selected.filter)).map_err(diagnose)?;
+    let mut cases = suite(&selected.specs).and_then(|all| filtered(all, &selected.filter)).map_err(diagnose)?;
+    let policies = selected.policy.of_cases(&cases).map_err(diagnose)?;
     audit::published(&cases).into_diagnostic()?;
     let mut out = std::io::stdout().lock();
     let mut exit = Exit::Passed;
     let selection = selected.selection();
+    let mut planned: BTreeMap<&PolicyRecord, BTreeSet<EngineName>> = BTreeMap::new();
     let mut planner = Planner::new(&selection, site, selected.skipping());
-    for case in &cases {
+    for (case, policy) in cases.iter_mut().zip(&policies) {
+        case.budget = policy.profile.budget.over(case.budget);
         let plan = planner.plan(case).map_err(diagnose)?;
         writeln!(out, "{} ({}): {}", case.name, case.path.display(), case.title).into_diagnostic()?;
         for task in &plan.tasks {
@@ -35,8 +41,19 @@ pub(super) fn check(selected: &Selected, site: &Site) -> Result<Exit, Diagnostic
                 writeln!(out, "    skip {:<10} {}{saved}", skip.key.engine, skip.reason).into_diagnostic()?;
             }
         }
+        if let Some(record) = &policy.record {
+            let engines = plan.runs.iter().map(|run| plan.engines[run.engine].engine.name());
+            planned.entry(record).or_default().extend(engines);
+        }
         let absent = plan.engines.iter().any(|p| p.asked == Asked::ByName && p.is_absent());
         exit = exit.max(if absent { Exit::Engine } else { Exit::Passed });
+    }
+    for (policy, engines) in planned {
+        writeln!(out, "policy {}", policy.file).into_diagnostic()?;
+        for engine in policy.required_engines.iter().filter(|engine| !engines.contains(*engine)) {
+            writeln!(out, "REQUIRED by {} and not to run: {engine}", policy.file).into_diagnostic()?;
+            exit = Exit::Engine;
+        }
     }
     Ok(exit)
 }

@@ -44,7 +44,11 @@ pub(super) fn text(changes: &Changes) -> String {
     let count = |state| changes.entries.iter().filter(|e| e.state == state).count();
     let counts = [State::Unchanged, State::Shifted, State::Changed, State::Vanished, State::New, State::Refused]
         .map(|state| format!("{} {}", count(state), name(state).to_lowercase()));
-    text + &format!("{}; {} tests, each at {:.1e}\n", counts.join(", "), changes.tests, changes.level)
+    let Changes { tests, level, level_of_means, .. } = changes;
+    text + &format!(
+        "{}; {tests} meters, each tested at {level:.1e}, means at {level_of_means:.1e}\n",
+        counts.join(", ")
+    )
 }
 
 /// Changes as a report keeps them. Nothing that nobody accepted counts as accepted, be it new.

@@ -8,7 +8,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 use super::diagnostic::not_audited;
 use crate::audit::{self, Options};
 use crate::engines::{self, InstallState, Site};
-use crate::judge::Policy;
+use crate::judge::PolicyChoice;
 use crate::plan::Skipping;
 use crate::record::{EngineName, EngineStatus, Status};
 use crate::report::{Detail, Exit, Style, terminal};
@@ -30,6 +30,8 @@ pub(super) enum EnginesAction {
         /// The spec whose engines, adapters among them, are examined, too
         #[arg(long, value_name = "FILE")]
         spec: Option<PathBuf>,
+        #[command(flatten)]
+        policy: PolicyChoice,
     },
 }
 
@@ -49,15 +51,16 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site) -> Resu
             known_engines(&names)?;
             Ok(report_installation(site, &names))
         }
-        EnginesAction::Doctor { names, spec } => examine(site, &names, spec.as_deref()),
+        EnginesAction::Doctor { names, spec, policy } => examine(site, &names, spec.as_deref(), policy),
     }
 }
 
-fn examine(site: &Site, names: &[String], spec: Option<&Path>) -> Result<Exit, Diagnostic> {
+fn examine(site: &Site, names: &[String], spec: Option<&Path>, policy: PolicyChoice) -> Result<Exit, Diagnostic> {
     let folder = tempfile::tempdir().into_diagnostic()?;
-    let mut options = Options { skipping: Skipping::Nothing, ..Options::new(site.clone(), folder.path().to_owned()) };
+    let options = Options::new(site.clone(), folder.path().to_owned());
+    let mut options = Options { skipping: Skipping::Nothing, policy, ..options };
     options.selection.engines = names.to_vec();
-    let report = audit::examine(spec, &Policy::built_in().into_diagnostic()?, &options).map_err(not_audited)?;
+    let report = audit::examine(spec, &options).map_err(not_audited)?;
     print!("{}", terminal(&report, Style::Plain, Detail::Brief, None));
     let is_absent = |e: &EngineStatus| e.status == Status::Absent;
     Ok(report.exit().max(if report.engines.iter().any(is_absent) { Exit::Engine } else { Exit::Passed }))

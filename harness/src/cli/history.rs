@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Subcommand;
+use clap::{Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::views::read_report;
 use crate::report::Exit;
-use crate::trend::history::{History, Line, add, changes, lines, site};
+use crate::trend::history::{Change, Course, History, Line, add, changes, in_words, lines, site};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Action {
@@ -34,7 +34,30 @@ pub(super) enum Action {
         /// A report to link to, relative to the site: NAME=PATH; may be given several times
         #[arg(long, value_name = "NAME=PATH", value_parser = link)]
         report: Vec<(String, String)>,
+        /// Exit with 1 where one was noticed on the last night: a change of level, a drift, or either
+        #[arg(long, value_enum, value_name = "WHAT")]
+        deny: Option<Deny>,
+        /// So many of the last nights count for --deny
+        #[arg(long, value_name = "NIGHTS", requires = "deny", default_value_t = 1)]
+        since: usize,
     },
+}
+
+/// What the last nights may not bring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Deny {
+    Change,
+    Drift,
+    Any,
+}
+
+impl Deny {
+    const fn holds(self, course: Course) -> bool {
+        match course {
+            Course::Step { .. } => !matches!(self, Self::Drift),
+            Course::Drift { .. } => !matches!(self, Self::Change),
+        }
+    }
 }
 
 fn link(text: &str) -> Result<(String, String), String> {
@@ -47,7 +70,18 @@ pub(super) fn history(action: &Action) -> Result<Exit, Diagnostic> {
         Action::Add { reports, history, night } => {
             reports.iter().try_for_each(|path| add_report(path, history, night.as_deref()))?;
         }
-        Action::Site { history, out, report } => draw(history, out, report)?,
+        Action::Site { history, out, report, deny, since } => {
+            let (history, changes) = draw(history, out, report)?;
+            let first = history.nights.len().saturating_sub(*since);
+            let is_denied = |c: &&Change| c.noticed >= first && deny.is_some_and(|deny| deny.holds(c.course));
+            let denied: Vec<&Change> = changes.iter().filter(is_denied).collect();
+            for change in &denied {
+                println!("{}", in_words(&history, change));
+            }
+            if !denied.is_empty() {
+                return Ok(Exit::Failed);
+            }
+        }
     }
     Ok(Exit::Passed)
 }
@@ -69,7 +103,7 @@ fn tell_of_cut(history: &Path, line: Option<usize>) {
     }
 }
 
-fn draw(path: &Path, out: &Path, reports: &[(String, String)]) -> Result<(), Diagnostic> {
+fn draw(path: &Path, out: &Path, reports: &[(String, String)]) -> Result<(History, Vec<Change>), Diagnostic> {
     let history = History::read(path).into_diagnostic()?;
     tell_of_cut(path, history.cut_short);
     std::fs::create_dir_all(out).into_diagnostic().wrap_err_with(|| out.display().to_string())?;
@@ -80,5 +114,5 @@ fn draw(path: &Path, out: &Path, reports: &[(String, String)]) -> Result<(), Dia
         .wrap_err_with(|| page.display().to_string())?;
     let (nights, series) = (history.nights.len(), history.series.len());
     println!("{}: {nights} nights, {series} series, {} changes", page.display(), changes.len());
-    Ok(())
+    Ok((history, changes))
 }

@@ -27,6 +27,7 @@ use serde::Serialize;
 use self::photometry::PhotometryArgs;
 use crate::audit::Sampling;
 use crate::engines::{ExternalJob, ExternalReadings, Site};
+use crate::judge::{PolicyChoice, ProjectPolicy};
 use crate::plan::{Selection, Skipping};
 use crate::record::ProcedureId;
 use crate::report::{Exit, Report};
@@ -89,7 +90,7 @@ enum Command {
     /// Take one reading for another process of this program
     #[command(name = crate::measure::READ_ONE, hide = true)]
     ReadOne,
-    /// Print the JSON Schema of the spec, the report, or what external adapters read and print
+    /// Print the JSON Schema of the spec, the project policy, the report, or what external adapters read and print
     Schema {
         /// Which schema
         #[arg(value_enum, default_value_t = SchemaOf::Spec)]
@@ -117,6 +118,8 @@ struct Selected {
     /// Render everything, also what follows from other readings
     #[arg(long)]
     no_skips: bool,
+    #[command(flatten)]
+    policy: PolicyChoice,
 }
 
 impl Selected {
@@ -157,9 +160,9 @@ struct RunArgs {
     /// Leave out the scenes of known answer, which tell a wrong engine from a difficult room
     #[arg(long)]
     no_calibration: bool,
-    /// When sampling stops
-    #[arg(long, value_enum, value_name = "WHEN", default_value_t)]
-    sampling: Sampling,
+    /// When sampling stops [default: as the policy's profile says, else accurate]
+    #[arg(long, value_enum, value_name = "WHEN")]
+    sampling: Option<Sampling>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -171,6 +174,8 @@ enum TextOrJson {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum SchemaOf {
     Spec,
+    /// `luxproof.yaml`
+    Policy,
     Report,
     /// What an external adapter reads on its standard input
     Job,
@@ -230,6 +235,7 @@ fn json(value: &(impl Serialize + ?Sized)) -> Result<String, Diagnostic> {
 fn schema(of: SchemaOf) -> Result<Exit, Diagnostic> {
     let schema = match of {
         SchemaOf::Spec => schemars::schema_for!(Spec),
+        SchemaOf::Policy => schemars::schema_for!(ProjectPolicy),
         SchemaOf::Report => schemars::schema_for!(Report),
         SchemaOf::Job => schemars::schema_for!(ExternalJob),
         SchemaOf::Readings => schemars::schema_for!(ExternalReadings),

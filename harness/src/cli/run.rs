@@ -11,7 +11,6 @@ use super::progress::Progress;
 use super::views::print_report;
 use crate::audit::{self, AfterFailure, Calibration, Options};
 use crate::engines::Site;
-use crate::judge::Policy;
 use crate::measure::cache::Cache;
 use crate::report::{BaselineCheck, Exit, Report};
 use crate::system::files;
@@ -26,6 +25,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
         selection: args.selected.selection(),
         filter: args.selected.filter.clone(),
         skipping: args.selected.skipping(),
+        policy: args.selected.policy.clone(),
         sampling: args.sampling,
         after_failure: if args.fail_fast { AfterFailure::Stop } else { AfterFailure::GoOn },
         calibration: if args.no_calibration { Calibration::LeftOut } else { Calibration::Judged },
@@ -37,8 +37,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
         audit::chosen(&args.selected.specs, &options).map_err(diagnose)?;
         report_installation(site, &args.selected.engines);
     }
-    let report = audit::run(&args.selected.specs, &Policy::built_in().into_diagnostic()?, &options);
-    let mut report = report.map_err(not_audited)?;
+    let mut report = audit::run(&args.selected.specs, &options).map_err(not_audited)?;
     let root = options.out.clone();
     drop(progress);
     if let Some(path) = &args.baseline {

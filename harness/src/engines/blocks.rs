@@ -48,6 +48,27 @@ impl Blocks {
         Estimate::of_samples(&self.0.iter().map(sum).collect::<Vec<f64>>())
     }
 
+    /// How skewed the blocks are: the normal deviate of their skewness (D'Agostino, Biometrika 57 (1970) 679), in the mean over stations,
+    /// so that stations that vary together count as one. `None` for fewer blocks than that holds for, or where nothing varies.
+    pub fn skewness(&self) -> Option<f64> {
+        let n = self.count() as f64;
+        if self.count() < MIN_BLOCKS {
+            return None;
+        }
+        let of = |k: usize| {
+            let mean = self.0.iter().map(|b| b[k]).sum::<f64>() / n;
+            let moment = |power| self.0.iter().map(|b| (b[k] - mean).powi(power)).sum::<f64>() / n;
+            Some(moment(3) / moment(2).powf(1.5)).filter(|g| g.is_finite())
+        };
+        let y = ((n + 1.0) * (n + 3.0) / (6.0 * (n - 2.0))).sqrt();
+        let kurtosis =
+            3.0 * (n * n + 27.0 * n - 70.0) * (n + 1.0) * (n + 3.0) / ((n - 2.0) * (n + 5.0) * (n + 7.0) * (n + 9.0));
+        let w = ((2.0 * (kurtosis - 1.0)).sqrt() - 1.0).sqrt();
+        let deviate = |g: f64| (y * g / (2.0 / (w * w - 1.0)).sqrt()).asinh() / w.ln().sqrt();
+        let all: Vec<f64> = self.stations().filter_map(of).map(deviate).collect();
+        (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
+    }
+
     /// Blocks of other stations, each a factor times one of these, or dark.
     #[must_use]
     pub fn rearranged(&self, stations: &[Option<(usize, f64)>]) -> Self {
@@ -227,6 +248,24 @@ mod tests {
         let ratio = blocks.worst_error(&[50.0, 50.0]) / blocks.worst_error(&[]);
         assert!((ratio - 2.0).abs() < 0.1, "{ratio}");
         assert_eq!(Blocks::new(vec![vec![0.0]; 8]).worst_error(&[]), 0.0);
+    }
+
+    #[test]
+    fn the_skewness_of_normal_blocks_is_a_normal_deviate_and_a_heavy_tail_is_far_from_it() {
+        let mut random = fastrand::Rng::with_seed(1);
+        for blocks in [8, 16, 64] {
+            let mut drawn = |of: fn(f64) -> f64| {
+                let mut block = || (0..6).map(|_| of(crate::system::random::normal(&mut random))).collect();
+                Blocks::new((0..blocks).map(|_| block()).collect()).skewness().unwrap()
+            };
+            let normal: Vec<f64> = (0..2000).map(|_| drawn(|z| 10.0 + z)).collect();
+            let variance = normal.iter().map(|z| z * z).sum::<f64>() / 2000.0;
+            assert!((6.0 * variance - 1.0).abs() < 0.12, "{blocks}: {variance}");
+            let heavy = (0..200).filter(|_| drawn(|z| (2.0 * z).exp()) > 2.0).count();
+            assert!(heavy > 170, "{blocks}: {heavy}");
+        }
+        assert_eq!(Blocks::new(vec![vec![1.0]; 8]).skewness(), None);
+        assert_eq!(Blocks::new(vec![vec![1.0], vec![2.0]]).skewness(), None);
     }
 
     #[test]

@@ -33,6 +33,11 @@ pub trait Engine: Send + Sync {
         self.role() == Role::Witness
     }
 
+    /// Whether its driver is ours, which has seen how its blocks scatter: what others state of their errors is looked into.
+    fn is_vouched_for(&self) -> bool {
+        true
+    }
+
     fn probe(&self, site: &Site) -> Result<Version, Absent>;
 
     /// Whether it can do this job, exactly or nearly; decided from the job alone, before anything starts.
@@ -275,6 +280,11 @@ impl Measurement {
             }
         };
         targets.into_iter().map(reading).collect()
+    }
+
+    /// Of the part of the light whose blocks are the most skewed, see [`Blocks::skewness`].
+    pub fn skewness(&self) -> Option<f64> {
+        self.samples.iter().filter_map(Blocks::skewness).reduce(f64::max)
     }
 
     /// The weighted sum of stations' estimates, with the standard error that their joint sampling gives it; where the samples

@@ -131,6 +131,10 @@ impl Engine for External {
         self.id.clone()
     }
 
+    fn is_vouched_for(&self) -> bool {
+        false
+    }
+
     /// The version of an adapter is the hash of what its command says; what runs are the files that it names, the sources beside
     /// the first of these that is one, which that may import, and those that it depends on by `depends_on`.
     fn probe(&self, site: &Site) -> Result<Version, Absent> {

@@ -135,7 +135,7 @@ impl Judge<'_> {
 fn witnesses(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<WitnessReadings> {
     let reference = task.reference();
     let (reference, basis) = (reference.engine(), reference.basis());
-    let tolerance = |engine: &str| judge.held_to(task, basis, engine);
+    let tolerance = |engine: &str| judge.held_to(task, basis, engine).0;
     // The reference is as good as what the best of the others is held to.
     let strictest =
         recordings.iter().map(|r| tolerance(&r.key.engine)).min_by(|a, b| a.relative.total_cmp(&b.relative));
@@ -169,7 +169,7 @@ fn derived(judge: &Judge<'_>, task: &Task) -> Option<WitnessReadings> {
         references.find(|r| r.basis != Basis::Published).map(|r| (r.value, r.uncertainty))
     };
     let readings: Vec<_> = task.targets.iter().map(read).collect();
-    let tolerance = judge.held_to(task, Basis::ClosedForm, NAME);
+    let tolerance = judge.held_to(task, Basis::ClosedForm, NAME).0;
     readings.iter().any(Option::is_some).then(|| WitnessReadings::new(NAME, vec![], readings, tolerance))
 }
 

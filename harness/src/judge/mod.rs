@@ -1,5 +1,6 @@
 //! The diffing layer: readings against references that carry their own uncertainty; it sees nothing but readings.
 
+mod bias;
 mod comparison;
 mod consensus;
 mod family;
@@ -20,20 +21,23 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::procedures::{self, Target, Task};
-use crate::record::{EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, Uncertainty};
+use crate::record::{
+    Doubt, EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, Uncertainty,
+};
 use crate::spec::ToleranceOverride;
 
 use papers::Input;
 
 pub use crate::record::Basis;
+pub use bias::{Bias, SINGLE_PRECISION, WeightedMean, two_sided};
 pub use consensus::{Consensus, Witness};
-pub use known::{How, KnownBreak, KnownDeviationError, KnownDeviations, Subject};
+pub use known::{Glob, How, KnownBreak, KnownDeviation, KnownDeviations, OnRecord, State};
+pub use papers::{Misfit, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use papers::{PaperSplit, Share, Stages, shares};
-pub use papers::{Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
-pub use policy::{Policy, PolicyError};
+pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicyRecord, Profile, ProjectPolicy, Sampling};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
-pub use tolerance::{Tolerance, ToleranceError, Tolerances};
+pub use tolerance::{Rule, Tolerance, Tolerances};
 pub use uncertainty::{Component, ErrorBudget, Shape, Source};
 pub use verdict::{Verdict, judge};
 
@@ -51,12 +55,15 @@ pub struct Reference {
     pub basis: Basis,
     /// Formula, solver or paper.
     pub source: String,
+    /// Why it is not to be believed, of a printed cell: then no engine answers for what departs from it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub doubt: Option<String>,
 }
 
 impl Reference {
     fn of(value: f64, stated: &Uncertainty, basis: Basis, source: String) -> Self {
         let (uncertainty, degrees_of_freedom) = (stated.standard(), stated.degrees_of_freedom());
-        Self { value, uncertainty, degrees_of_freedom, coverage_factor: None, basis, source }
+        Self { value, uncertainty, degrees_of_freedom, coverage_factor: None, basis, source, doubt: None }
     }
 }
 
@@ -83,6 +90,9 @@ pub struct Comparison {
     /// Deviation over reference.
     pub relative_deviation: Option<f64>,
     pub tolerance: Tolerance,
+    /// File and source of the tolerance, where it is a project's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance_source: Option<String>,
     pub verdict: Verdict,
     pub diagnosis: Option<String>,
     /// What the deviation may owe to chance and ignorance; null where there is no deviation.
@@ -109,10 +119,19 @@ impl Judge<'_> {
 
     /// What an engine is held to in a task, by what others are judged by there.
     pub fn tolerance(&self, task: &Task, engine: &str) -> Tolerance {
-        self.held_to(task, task.reference().basis(), engine)
+        self.held_to(task, task.reference().basis(), engine).0
     }
 
-    fn held_to(&self, task: &Task, basis: Basis, engine: &str) -> Tolerance {
+    /// What every entry on record came to that is about comparisons of a task; `recordings` as for [`Self::compare`].
+    pub fn on_record(&self, comparisons: &[Comparison], recordings: &[&Recording]) -> Vec<OnRecord> {
+        let one = |recording: &&Recording| {
+            let mine: Vec<Comparison> = comparisons.iter().filter(|c| c.key == recording.key).cloned().collect();
+            self.known.on_record(&mine, &recording.content_sha256)
+        };
+        recordings.iter().flat_map(one).collect()
+    }
+
+    fn held_to(&self, task: &Task, basis: Basis, engine: &str) -> (Tolerance, Option<String>) {
         self.tolerances.of(task.procedure, basis, engine, task.quantity, self.overrides)
     }
 
@@ -121,10 +140,10 @@ impl Judge<'_> {
     /// `recordings` are those of this task, one an engine. An engine that failed is `missing` at every meter. What fails, fails
     /// at the family-wise level of all comparisons of its engine here.
     pub fn compare(&self, task: &Task, recordings: &[&Recording]) -> Vec<Comparison> {
-        let (input, content) = (self.published.map(|_| Input::of(task)), known::content(task));
+        let input = self.published.map(|_| Input::of(task));
         let mut comparisons = vec![];
         for recording in recordings {
-            let (mut family, mut shares) = (vec![], vec![]);
+            let mut family = vec![];
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.readings.get(k);
                 let engine = &recording.key.engine;
@@ -138,18 +157,17 @@ impl Judge<'_> {
                     family.push(self.comparison(task, recording, k, None));
                 }
                 family.extend(references.into_iter().map(|held| self.comparison(task, recording, k, Some(held))));
-                shares.resize(family.len(), share_of_reading(recording, k));
             }
-            self.decide(&mut family, &shares, &content);
+            self.decide(&mut family, &recording.content_sha256);
             comparisons.extend(family);
         }
         comparisons
     }
 
-    /// Verdicts of all comparisons of one engine in one procedure of one case; of its error each may spend its share.
-    fn decide(&self, family: &mut [Comparison], shares: &[f64], content: &str) {
+    /// Verdicts of all comparisons of one engine in one procedure of one case, which is known by its content.
+    fn decide(&self, family: &mut [Comparison], content: &str) {
         let tested: Vec<usize> = (0..family.len()).filter(|k| family[*k].p_value.is_some()).collect();
-        let p_values: Vec<f64> = tested.iter().filter_map(|k| Some(family[*k].p_value? / shares[*k])).collect();
+        let p_values: Vec<f64> = tested.iter().filter_map(|k| family[*k].p_value).collect();
         let rejected = family::rejected(&p_values, self.tolerances.family_wise_error());
         for (k, rejected) in tested.into_iter().zip(rejected) {
             let of_one = &mut family[k].verdict;
@@ -158,25 +176,33 @@ impl Judge<'_> {
             }
         }
         for comparison in family {
-            let Some(basis) = comparison.reference.as_ref().map(|r| r.basis) else { continue };
-            let Comparison { key, model, relative_deviation, .. } = &*comparison;
-            let subject = Subject { key, content, model, basis, relative_deviation: *relative_deviation };
-            let (verdict, cause) = self.known.revise(comparison.verdict, &subject);
-            comparison.verdict = verdict;
-            comparison.diagnosis = cause.or(comparison.diagnosis.take());
+            self.known.revise(comparison, content, self.tolerances.coverage_factor());
+            let Some(basis) = comparison.basis() else { continue };
+            let ReadingKey { procedure, engine, .. } = &comparison.key;
+            if !matches!(comparison.verdict, Verdict::Fail | Verdict::Inconclusive) {
+                continue;
+            }
+            if let Some(doubt) = comparison.reference.as_ref().and_then(|r| r.doubt.clone()) {
+                comparison.diagnosis = Some(doubt);
+                comparison.verdict = Verdict::KnownDeviation;
+            } else if let Some(why) = self.tolerances.not_claimed(*procedure, basis, engine) {
+                comparison.diagnosis = Some(why.to_owned());
+                comparison.verdict = Verdict::NotJudged;
+            }
         }
     }
 
     fn comparison(&self, task: &Task, recording: &Recording, k: usize, held: Option<ScoredReference>) -> Comparison {
         let (target, reading) = (&task.targets[k], recording.readings.get(k));
         let basis = held.as_ref().map(|h| h.reference.basis);
-        let tolerance = basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();
+        let (tolerance, tolerance_source) =
+            basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();
         let pair = reading.zip(held.as_ref());
         let difference = pair.map(|(a, b)| a.value - b.reference.value);
         let tail = uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor());
         let budget = pair.map(|(reading, held)| {
             let components = of_reading(reading).into_iter().chain(held.components.iter().copied());
-            ErrorBudget::new(components.collect(), tail * share_of_reading(recording, k))
+            ErrorBudget::spending(components.collect(), tail, share_of_reading(recording, k))
         });
         let missing = match (reading, &held) {
             (None, _) => recording.failure.clone().or_else(|| Some("no reading".to_owned())),
@@ -199,6 +225,7 @@ impl Judge<'_> {
             deviation: difference.filter(|d| d.is_finite()),
             relative_deviation: None,
             tolerance,
+            tolerance_source,
             verdict: Verdict::Missing,
             diagnosis: missing,
             budget,
@@ -214,13 +241,41 @@ impl Judge<'_> {
         let deviation = if sound { value - reference.value } else { f64::NAN };
         let allowed = tolerance.around(reference.value);
         comparison.verdict = judge(deviation, budget.expanded, allowed);
-        if comparison.uncertainty == Uncertainty::NotSeen && comparison.verdict == Verdict::Fail {
+        let waits = unbelievable(comparison.uncertainty, value, is_heavy_tailed(recording));
+        if let Some(why) = waits.filter(|_| comparison.verdict == Verdict::Fail) {
             comparison.verdict = Verdict::Inconclusive;
-            comparison.diagnosis = Some("not seen: no sample met here what samples met elsewhere".to_owned());
+            comparison.diagnosis = Some(why.to_owned());
         } else if comparison.verdict != Verdict::Missing {
             comparison.p_value = Some(budget.p_value(deviation, allowed));
         }
         comparison
+    }
+}
+
+/// The largest relative standard error of a mean that is about normal: light is not negative, and what scatters more is skewed, so
+/// that most means of few samples lie far below what they estimate.
+const MAX_RELATIVE_ERROR: f64 = 0.25;
+
+/// Normal deviates of the skewness of blocks beyond which their mean is not normal either: one in a hundred of normal blocks.
+const MAX_SKEWNESS: f64 = 2.33;
+
+/// Whether its blocks tell so, or what it states with one seed and the other.
+fn is_heavy_tailed(recording: &Recording) -> bool {
+    recording.skewness.is_some_and(|s| s > MAX_SKEWNESS)
+        || recording.stated_errors.iter().any(|s| s.doubt == Some(Doubt::HeavyTail))
+}
+
+/// Why a sampled value fails nothing, whatever its distance: its interval is not one.
+fn unbelievable(uncertainty: Uncertainty, value: f64, is_heavy_tailed: bool) -> Option<&'static str> {
+    match uncertainty {
+        Uncertainty::StandardError { value: error, .. } if error > 0.0 && is_heavy_tailed => Some(
+            "a heavy tail: a few of its samples hold much of the light, others are still to come; it fails nothing yet",
+        ),
+        Uncertainty::NotSeen => Some("not seen: no sample met here what samples met elsewhere"),
+        Uncertainty::StandardError { value: error, .. } if error > MAX_RELATIVE_ERROR * value => {
+            Some("too few samples: they scatter so much that their mean is not normal, and fails nothing yet")
+        }
+        _ => None,
     }
 }
 

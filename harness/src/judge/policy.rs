@@ -1,29 +1,253 @@
-//! What readings are held to: tolerances, and deviations that are on record.
+//! What readings are held to: our tolerances and known deviations, and a project's besides, in a file beside its specs.
+//!
+//! A policy decides verdicts and what a run must hold; no key of a kept reading knows of it.
 
-use super::{Judge, KnownDeviationError, KnownDeviations, Published, ToleranceError, Tolerances};
-use crate::spec::Case;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use clap::{Args, ValueEnum};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::tolerance::Rule;
+use super::{Judge, KnownDeviation, KnownDeviations, Published, Tolerances, known, tolerance};
+use crate::record::EngineName;
+use crate::spec::{Budget, Case, Source, SpecError, hexadecimal, suggestion};
+
+/// The name of a project's policy, beside a spec or in a folder above it.
+pub const POLICY_FILE: &str = "luxproof.yaml";
+
+/// What a project holds its specs to, besides what luxproof does.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ProjectPolicy {
+    /// Engines without whose readings a run is no audit: exit 3.
+    pub required_engines: Vec<EngineName>,
+    /// Tolerances that go before ours; the rule that names most applies.
+    pub tolerances: Vec<Rule>,
+    /// Where engines are known to differ, by how much and why.
+    pub known_deviations: Vec<KnownDeviation>,
+    /// How runs differ by occasion; one is chosen by `--profile`.
+    pub profiles: BTreeMap<String, Profile>,
+}
+
+/// How runs of one occasion differ from what specs say.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Profile {
+    /// In place of the specs' own.
+    pub budget: ProfileBudget,
+    /// When sampling stops.
+    pub sampling: Option<Sampling>,
+}
+
+/// When an engine may stop; what is left out stays as a spec says.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ProfileBudget {
+    /// Standard error relative to the reading.
+    pub relative_error: Option<f64>,
+    /// Wall-clock seconds an engine and procedure.
+    pub seconds: Option<f64>,
+}
+
+impl ProfileBudget {
+    /// The budget of a spec under this profile.
+    pub fn over(self, spec: Budget) -> Budget {
+        Budget {
+            relative_error: self.relative_error.unwrap_or(spec.relative_error),
+            seconds: self.seconds.unwrap_or(spec.seconds),
+        }
+    }
+}
+
+/// When sampling stops.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// At the relative error of the spec's budget; beyond it only what is undecided
+    #[default]
+    Accurate,
+    /// As soon as every comparison is decided, which is much earlier where readings agree
+    Decided,
+}
+
+/// Which project policy judges specs.
+#[derive(Clone, Debug, Default, Args)]
+pub struct PolicyChoice {
+    /// The project's policy [default: the nearest luxproof.yaml, beside each spec or in a folder above it]
+    #[arg(long = "policy", value_name = "FILE")]
+    pub file: Option<PathBuf>,
+    /// A profile of the policy
+    #[arg(long, value_name = "NAME")]
+    pub profile: Option<String>,
+}
+
+impl PolicyChoice {
+    /// The policy of each case; cases of one file share one.
+    pub fn of_cases(&self, cases: &[Case]) -> Result<Vec<Arc<Policy>>, SpecError> {
+        let mut read: BTreeMap<Option<PathBuf>, Arc<Policy>> = BTreeMap::new();
+        let policy = |case: &Case| {
+            let file = self.file.clone().or_else(|| nearest(&case.path));
+            if let Some(policy) = read.get(&file) {
+                return Ok(Arc::clone(policy));
+            }
+            let policy = Arc::new(self.read(file.as_deref())?);
+            read.insert(file, Arc::clone(&policy));
+            Ok(policy)
+        };
+        cases.iter().map(policy).collect()
+    }
+
+    /// Ours, with that of a file where there is one.
+    pub fn read(&self, file: Option<&Path>) -> Result<Policy, SpecError> {
+        let Some(file) = file else {
+            let help = format!("write a {POLICY_FILE} beside the spec, or name one with --policy");
+            return match &self.profile {
+                Some(name) => Err(SpecError::of("--profile", format!("no policy has a profile `{name}`"), help)),
+                None => Policy::built_in(),
+            };
+        };
+        let source = Source::read(file)?;
+        let project: ProjectPolicy = source.parse()?;
+        tolerance::check(&source, &project.tolerances)?;
+        known::check(&source, &project.known_deviations)?;
+        for (name, ProfileBudget { relative_error, seconds }) in project.profiles.iter().map(|(n, p)| (n, p.budget)) {
+            for (field, value) in [("relative_error", relative_error), ("seconds", seconds)] {
+                let (at, sound) =
+                    (format!("profiles.{name}.budget.{field}"), value.is_none_or(|v| v.is_finite() && v > 0.0));
+                source.require(sound, &at, "this is no budget", "give a positive number")?;
+            }
+        }
+        let profile = match &self.profile {
+            None => Profile::default(),
+            Some(name) => *project.profiles.get(name).ok_or_else(|| {
+                let help = suggestion(name, project.profiles.keys().map(String::as_str));
+                source.error_at("profiles", format!("there is no profile `{name}`"), help)
+            })?,
+        };
+        let here = std::env::current_dir().unwrap_or_default();
+        let shown = file.strip_prefix(here).unwrap_or(file).display().to_string();
+        Ok(Policy {
+            tolerances: Tolerances::built_in()?.with(&project.tolerances, &shown),
+            known: KnownDeviations::built_in()?.with(&project.known_deviations),
+            profile,
+            record: Some(PolicyRecord {
+                file: shown,
+                sha256: hexadecimal(&Sha256::digest(&source.text)),
+                profile: self.profile.clone(),
+                required_engines: project.required_engines,
+            }),
+        })
+    }
+}
+
+/// The policy beside a spec or in the nearest folder above it, up to the root of the file system.
+fn nearest(spec: &Path) -> Option<PathBuf> {
+    let spec = std::path::absolute(spec).ok()?;
+    spec.ancestors().skip(1).map(|folder| folder.join(POLICY_FILE)).find(|file| file.is_file())
+}
+
+/// Which project policy judged, as reports tell it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub struct PolicyRecord {
+    pub file: String,
+    pub sha256: String,
+    /// The profile that was chosen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<String>,
+    /// Without a reading of each of them the run is no audit.
+    pub required_engines: Vec<EngineName>,
+}
+
+/// What the readings of a case are held to.
 #[derive(Clone, Debug)]
 pub struct Policy {
     pub tolerances: Tolerances,
     pub known: KnownDeviations,
-}
-
-#[derive(Debug, thiserror::Error)]
-pub enum PolicyError {
-    #[error(transparent)]
-    Tolerance(#[from] ToleranceError),
-    #[error(transparent)]
-    KnownDeviation(#[from] KnownDeviationError),
+    pub profile: Profile,
+    /// The project's part of it; `None` where there is none.
+    pub record: Option<PolicyRecord>,
 }
 
 impl Policy {
-    pub fn built_in() -> Result<Self, PolicyError> {
-        Ok(Self { tolerances: Tolerances::built_in()?, known: KnownDeviations::built_in()? })
+    /// Ours alone.
+    pub fn built_in() -> Result<Self, SpecError> {
+        let (tolerances, known) = (Tolerances::built_in()?, KnownDeviations::built_in()?);
+        Ok(Self { tolerances, known, profile: Profile::default(), record: None })
     }
 
     /// Who judges by it the readings of a case, which may loosen or tighten tolerances.
     pub fn judge<'a>(&'a self, case: &'a Case, published: Option<&'a Published>) -> Judge<'a> {
         Judge { tolerances: &self.tolerances, known: &self.known, overrides: &case.tolerances, published }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::judge::Basis;
+    use crate::record::{ProcedureId, Quantity};
+
+    const FILE: &str = "required_engines: [radiance, mitsuba]
+tolerances: [{procedure: direct_illuminance, engine: povray, relative: 0.005, source: \"decided in May\"}]
+known_deviations:
+  - {engine: radiance, case: \"office/*\", procedure: direct_illuminance, meter: \"desk[3]\", expected: -0.012, uncertainty: 0.002,
+     cause: \"a cache\", source: \"measured\", owner: lighting-team, issue: \"RAD-41\", expires: 2027-06-30}
+profiles: {ci: {budget: {relative_error: 0.005}, sampling: decided}, audit: {}}
+";
+
+    /// A policy in a folder, below which a spec lies.
+    fn read(text: &str, profile: Option<&str>) -> Result<Policy, SpecError> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("specs")).unwrap();
+        std::fs::write(folder.path().join(POLICY_FILE), text).unwrap();
+        let case = Case { path: folder.path().join("specs/office.yaml"), ..Case::default() };
+        let choice = PolicyChoice { file: None, profile: profile.map(str::to_owned) };
+        choice.of_cases(&[case]).map(|found| (*found[0]).clone())
+    }
+
+    #[test]
+    fn a_policy_is_found_above_a_spec_and_goes_before_ours_where_it_names_as_much() {
+        let policy = read(FILE, Some("ci")).unwrap();
+        let record = policy.record.as_ref().unwrap();
+        assert!(record.file.ends_with(POLICY_FILE) && record.required_engines.len() == 2, "{record:?}");
+        assert_eq!(record.sha256, hexadecimal(&Sha256::digest(FILE)));
+        let spec = Budget { relative_error: 0.002, seconds: 7.0 };
+        assert_eq!(policy.profile.budget.over(spec), Budget { relative_error: 0.005, seconds: 7.0 });
+        assert_eq!(policy.profile.sampling, Some(Sampling::Decided));
+        let of = |engine| {
+            let (procedure, none) = (ProcedureId::DirectIlluminance, BTreeMap::new());
+            policy.tolerances.of(procedure, Basis::Published, engine, Quantity::Illuminance, &none)
+        };
+        let (tolerance, source) = of("povray");
+        assert!(source.unwrap().ends_with("luxproof.yaml: decided in May"));
+        assert_eq!((tolerance.relative, of("radiance").0.relative, of("radiance").1), (0.005, 0.01, None));
+    }
+
+    #[test]
+    fn what_is_wrong_is_refused_at_its_place() {
+        for (right, wrong, line, says) in [
+            ("required_engines", "requierd_engines", 1, "did you mean `required_engines`?"),
+            ("0.005, source", "-0.005, source", 2, "a tolerance is a number from 0"),
+            ("\"decided in May\"", "\" \"", 2, "has no source"),
+            ("direct_illuminance, engine", "direct, engine", 2, "unknown variant"),
+            ("\"office/*\"", "[office]", 4, "a name"),
+            ("\"desk[3]\"", "\"desk***\"", 4, "is no pattern"),
+            ("uncertainty: 0.002", "uncertainty: 0.006", 4, "no uncertainty of a known deviation"),
+            ("expected: -0.012", "expected: 0", 4, "this is no deviation"),
+            ("2027-06-30", "2027-06-31", 5, "day"),
+            ("relative_error: 0.005", "relative_error: 0", 6, "this is no budget"),
+            ("sampling: decided", "sampling: quick", 6, "unknown variant"),
+        ] {
+            assert!(FILE.contains(right), "{right}");
+            let error = read(&FILE.replacen(right, wrong, 1), None).unwrap_err();
+            assert!(error.line == Some(line) && error.to_string().contains(says), "{wrong}: {error}");
+        }
+        let error = read(FILE, Some("audi")).unwrap_err();
+        assert!(error.to_string().contains("did you mean `audit`?"), "{error}");
+        assert!(read("profiles: {}\n", None).is_ok());
     }
 }

@@ -1,13 +1,14 @@
 //! Tolerances: read from `reference/tolerances.yaml`, overridden by a spec; zero where nothing is said.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Basis;
-use crate::record::{ProcedureId, Quantity};
-use crate::spec::ToleranceOverride;
+use crate::record::{EngineName, ProcedureId, Quantity};
+use crate::spec::{Source, SpecError, ToleranceOverride};
 
 const DEFAULTS: &str = include_str!("../../../reference/tolerances.yaml");
 
@@ -34,6 +35,7 @@ pub struct Tolerances {
     family_wise_error: Sourced,
     #[serde(rename = "tolerances")]
     rules: Vec<Rule>,
+    not_claimed: Vec<NotClaimed>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -43,45 +45,88 @@ struct Sourced {
     source: String,
 }
 
-#[derive(Clone, Debug, Deserialize)]
+/// How far readings may lie from their references, and how that is known.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Rule {
+#[schemars(rename = "ToleranceRule")]
+pub struct Rule {
     procedure: ProcedureId,
+    /// From which references; from all where none is named.
     #[serde(default)]
     basis: Option<Basis>,
+    /// Whose readings; anybody's where nobody is named.
     #[serde(default)]
-    engine: Option<String>,
+    engine: Option<EngineName>,
+    /// Relative to the reference.
     #[serde(default)]
     relative: f64,
+    /// In lux.
     #[serde(default)]
     absolute_lx: f64,
+    /// In candela.
     #[serde(default)]
     absolute_cd: f64,
+    /// A standard, a paper, a decision of the project.
+    source: String,
+    /// Whose rule it is, where not ours.
+    #[serde(skip)]
+    file: Option<String>,
+}
+
+/// Where a method claims nothing: beyond its tolerance a reading is told and not judged.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NotClaimed {
+    engine: EngineName,
+    procedure: ProcedureId,
+    basis: Basis,
+    why: String,
     source: String,
 }
 
-#[derive(Debug, thiserror::Error)]
-#[error("reference/tolerances.yaml: {0}")]
-pub struct ToleranceError(String);
+/// Refuses rules that are no numbers or have no source.
+pub(super) fn check(source: &Source, rules: &[Rule]) -> Result<(), SpecError> {
+    for (k, rule) in rules.iter().enumerate() {
+        let at = |field: &str| format!("tolerances[{k}].{field}");
+        for (field, value) in
+            [("relative", rule.relative), ("absolute_lx", rule.absolute_lx), ("absolute_cd", rule.absolute_cd)]
+        {
+            let sound = value.is_finite() && value >= 0.0;
+            source.require(sound, &at(field), "a tolerance is a number from 0", "give a positive number")?;
+        }
+        let help = "say which standard, paper or decision it is from";
+        source.require(!rule.source.trim().is_empty(), &at("source"), "the tolerance has no source", help)?;
+    }
+    Ok(())
+}
 
 impl Tolerances {
-    pub fn built_in() -> Result<Self, ToleranceError> {
-        crate::spec::from_yaml::<Self>(DEFAULTS).map_err(ToleranceError)?.checked()
+    pub fn built_in() -> Result<Self, SpecError> {
+        let source = Source::new(PathBuf::from("reference/tolerances.yaml"), DEFAULTS.to_owned());
+        let all: Self = source.parse()?;
+        check(&source, &all.rules)?;
+        let factor = &all.coverage_factor;
+        let sound = factor.value.is_finite() && factor.value > 0.0 && !factor.source.trim().is_empty();
+        source.require(sound, "coverage_factor", "no factor", "give a positive value and a source")?;
+        let level = &all.family_wise_error;
+        let sound = level.value > 0.0 && level.value < 0.5 && !level.source.trim().is_empty();
+        source.require(sound, "family_wise_error", "no level", "give a value between 0 and .5 and a source")?;
+        let is_told = |n: &NotClaimed| !(n.why.trim().is_empty() || n.source.trim().is_empty());
+        source.require(all.not_claimed.iter().all(is_told), "not_claimed", "one lacks why or source", "give both")?;
+        Ok(all)
     }
 
-    fn checked(self) -> Result<Self, ToleranceError> {
-        if let Some(rule) = self.rules.iter().find(|r| r.source.trim().is_empty()) {
-            return Err(ToleranceError(format!("a tolerance of {} has no source", rule.procedure)));
-        }
-        let sound = self.coverage_factor.value.is_finite() && self.coverage_factor.value > 0.0;
-        if !sound || self.coverage_factor.source.trim().is_empty() {
-            return Err(ToleranceError("the coverage factor needs a positive value and a source".into()));
-        }
-        let level = &self.family_wise_error;
-        if !(level.value > 0.0 && level.value < 0.5) || level.source.trim().is_empty() {
-            return Err(ToleranceError("the family-wise error needs a value between 0 and .5 and a source".into()));
-        }
-        Ok(self)
+    /// The same with the rules of a project's file besides, which go before ours of the same kind.
+    #[must_use]
+    pub(super) fn with(mut self, rules: &[Rule], file: &str) -> Self {
+        self.rules.extend(rules.iter().map(|rule| Rule { file: Some(file.to_owned()), ..rule.clone() }));
+        self
+    }
+
+    /// Why a reading beyond its tolerance is not judged; `None` where it is.
+    pub(super) fn not_claimed(&self, procedure: ProcedureId, basis: Basis, engine: &str) -> Option<&str> {
+        let applies = |n: &&NotClaimed| n.procedure == procedure && n.basis == basis && n.engine == *engine;
+        self.not_claimed.iter().find(applies).map(|n| n.why.as_str())
     }
 
     /// How many standard deviations of a normal distribution the interval of a verdict covers.
@@ -94,7 +139,8 @@ impl Tolerances {
         self.family_wise_error.value
     }
 
-    /// The tolerance of a comparison: the spec's override, else the rule that names most, else zero.
+    /// The tolerance of a comparison: the spec's override, else the rule that names most, else zero; and whose it is, with its
+    /// source, where it is a project's.
     pub fn of(
         &self,
         procedure: ProcedureId,
@@ -102,23 +148,23 @@ impl Tolerances {
         engine: &str,
         quantity: Quantity,
         overrides: &BTreeMap<ProcedureId, ToleranceOverride>,
-    ) -> Tolerance {
+    ) -> (Tolerance, Option<String>) {
         let absolute = |lx: f64, cd: f64| match quantity {
             Quantity::Illuminance => lx,
             Quantity::LuminousIntensity => cd,
         };
         if let Some(o) = overrides.get(&procedure) {
-            return Tolerance { relative: o.relative, absolute: absolute(o.absolute_lx, o.absolute_cd) };
+            return (Tolerance { relative: o.relative, absolute: absolute(o.absolute_lx, o.absolute_cd) }, None);
         }
         let applies = |rule: &&Rule| {
             rule.procedure == procedure
                 && rule.basis.is_none_or(|b| b == basis)
-                && rule.engine.as_deref().is_none_or(|e| e == engine)
+                && rule.engine.as_ref().is_none_or(|e| e == engine)
         };
         let names = |rule: &&Rule| usize::from(rule.basis.is_some()) + 2 * usize::from(rule.engine.is_some());
-        let rule = self.rules.iter().filter(applies).max_by_key(names);
-        rule.map(|r| Tolerance { relative: r.relative, absolute: absolute(r.absolute_lx, r.absolute_cd) })
-            .unwrap_or_default()
+        let Some(rule) = self.rules.iter().filter(applies).max_by_key(names) else { return Default::default() };
+        let tolerance = Tolerance { relative: rule.relative, absolute: absolute(rule.absolute_lx, rule.absolute_cd) };
+        (tolerance, rule.file.as_ref().map(|file| format!("{file}: {}", rule.source)))
     }
 }
 
@@ -133,13 +179,13 @@ mod tests {
     #[test]
     fn the_rule_that_names_most_applies_a_spec_overrides_it_and_what_is_not_loosened_is_zero() {
         let (table, none) = (Tolerances::built_in().unwrap(), BTreeMap::new());
-        assert_eq!(table.of(INDIRECT, Basis::Exact, "iesna", UNIT, &none).relative, 0.10);
-        assert_eq!(table.of(INDIRECT, Basis::Exact, "radiance", UNIT, &none).relative, 0.02);
-        assert_eq!(table.of(INDIRECT, Basis::Published, "iesna", UNIT, &none).absolute, 0.03);
+        assert_eq!(table.of(INDIRECT, Basis::Exact, "iesna", UNIT, &none).0.relative, 0.10);
+        assert_eq!(table.of(INDIRECT, Basis::Exact, "radiance", UNIT, &none).0.relative, 0.02);
+        assert_eq!(table.of(INDIRECT, Basis::Published, "iesna", UNIT, &none).0.absolute, 0.03);
         let strict = ToleranceOverride { relative: 1e-4, absolute_lx: 1e-3, absolute_cd: 0.0 };
         let found = table.of(DIRECT, Basis::ClosedForm, "povray", UNIT, &BTreeMap::from([(DIRECT, strict)]));
-        assert_eq!(found, Tolerance { relative: 1e-4, absolute: 1e-3 });
+        assert_eq!(found, (Tolerance { relative: 1e-4, absolute: 1e-3 }, None));
         let bare = Tolerances { rules: vec![], ..table };
-        assert_eq!(bare.of(DIRECT, Basis::Exact, "radiance", UNIT, &none), Tolerance::default());
+        assert_eq!(bare.of(DIRECT, Basis::Exact, "radiance", UNIT, &none), Default::default());
     }
 }

@@ -80,28 +80,44 @@ pub struct ErrorBudget {
     pub coverage_factor: f64,
     /// Half width of the interval of the deviation that a verdict is about.
     pub expanded: f64,
+    /// The components with chance as wide as it counts here; as above where all of its error may be spent.
+    #[serde(skip)]
+    counted: Vec<Component>,
 }
 
 impl ErrorBudget {
     /// Adds components up; an error beyond the interval has the probability `tail` on either side.
-    pub fn new(mut components: Vec<Component>, tail: f64) -> Self {
+    pub fn new(components: Vec<Component>, tail: f64) -> Self {
+        Self::spending(components, tail, 1.0)
+    }
+
+    /// The same where chance may spend only a `share` of its error, since it may be looked at again: it counts for as much more as
+    /// that takes. What no look makes smaller spends all of its own.
+    pub fn spending(mut components: Vec<Component>, tail: f64, share: f64) -> Self {
         components.retain(|c| c.uncertainty != 0.0);
         let combined = components.iter().map(|c| c.uncertainty.powi(2)).sum::<f64>().sqrt();
-        let spread = Spread::of(&components);
-        let expanded = spread.quantile(tail);
+        let mut counted = components.clone();
+        for chance in counted.iter_mut().filter(|c| c.source == Source::MonteCarlo && share < 1.0) {
+            let alone = Spread::of(&[*chance]);
+            chance.uncertainty *= alone.quantile(tail * share) / alone.quantile(tail);
+        }
+        let expanded = Spread::of(&counted).quantile(tail);
         Self {
             combined,
-            degrees_of_freedom: spread.degrees_of_freedom,
+            degrees_of_freedom: Spread::of(&components).degrees_of_freedom,
             coverage_factor: if combined > 0.0 { expanded / combined } else { 0.0 },
             expanded,
             components,
+            counted,
         }
     }
 
     /// The probability of a deviation at least this far from nothing, were the truth just `allowed` away: the largest over all
     /// truths within the tolerance.
     pub fn p_value(&self, deviation: f64, allowed: f64) -> f64 {
-        let (spread, distance) = (Spread::of(&self.components), deviation.abs());
+        // A budget that was read from a file counts as it stands.
+        let counted = if self.counted.is_empty() { &self.components } else { &self.counted };
+        let (spread, distance) = (Spread::of(counted), deviation.abs());
         if self.combined == 0.0 {
             return if distance > allowed { 0.0 } else { 1.0 };
         }
@@ -264,6 +280,23 @@ mod tests {
                 assert!((share - spread.tail(x)).abs() < 0.015, "{freedom:?} {x}: {share} {}", spread.tail(x));
             }
             assert!((spread.tail(spread.quantile(0.01)) - 0.01).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn what_no_look_makes_smaller_spends_all_of_its_error_at_any_look() {
+        let tail = upper_tail_of_normal(2.0);
+        let chance = |u| Component::normal(Source::MonteCarlo, u, Some(7.0));
+        let rounding = Component::within(Source::Rounding, 1.0);
+        for share in [0.5, 0.125] {
+            // Chance alone spends its share, and bounds alone nothing.
+            let alone = ErrorBudget::spending(vec![chance(1.0)], tail, share);
+            assert!((alone.expanded - ErrorBudget::new(vec![chance(1.0)], tail * share).expanded).abs() < 1e-9);
+            assert_eq!(ErrorBudget::spending(vec![rounding], tail, share).expanded, budget(&[rounding]).expanded);
+            // What is left of chance makes hardly a difference.
+            let both = ErrorBudget::spending(vec![chance(0.01), rounding], tail, share);
+            assert!((both.expanded / budget(&[chance(0.01), rounding]).expanded - 1.0).abs() < 2e-3, "{both:?}");
+            assert_eq!(both.components, [chance(0.01), rounding]);
         }
     }
 

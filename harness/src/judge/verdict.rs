@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 pub enum Verdict {
     /// The whole interval of the deviation lies within the tolerance.
     Pass,
+    /// It lies outside, where the method claims nothing: that is told, not judged.
+    NotJudged,
     /// It lies outside, as is known and explained.
     KnownDeviation,
     /// It straddles the tolerance: more samples would decide.
@@ -30,6 +32,7 @@ impl Verdict {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Pass => "pass",
+            Self::NotJudged => "not judged",
             Self::KnownDeviation => "known deviation",
             Self::Inconclusive => "undecided",
             Self::Fail => "fail",

@@ -92,9 +92,9 @@ impl Shortcut {
         let read = |(k, factor): (usize, f64)| rendered.estimates[k].times(factor);
         let estimates = stations.iter().map(|source| source.map_or(Estimate::DARK, read)).collect();
         let samples = rendered.samples.iter().map(|part| part.rearranged(&stations)).collect();
-        let mut method = rendered.method;
-        method.extend(self.traces(asked));
-        Measurement { estimates, method, effort: rendered.effort, notes: rendered.notes, samples }
+        let mut effort = rendered.effort;
+        effort.extend(self.traces(asked));
+        Measurement { estimates, method: rendered.method, effort, notes: rendered.notes, samples }
     }
 
     /// Which meter's reading is which other's, for whoever repeats it.

@@ -4,6 +4,7 @@ mod basis;
 mod key;
 mod light;
 mod method;
+mod stated_errors;
 mod status;
 mod uncertainty;
 
@@ -14,6 +15,7 @@ pub use basis::Basis;
 pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
 pub use light::{Light, UnknownLight};
 pub use method::{Effort, Method};
+pub use stated_errors::{Doubt, StatedErrors};
 pub use status::{EngineStatus, Role, Status};
 pub use uncertainty::Uncertainty;
 
@@ -125,6 +127,9 @@ pub struct Recording {
     pub light: Light,
     /// SHA-256 of the spec and of every file that it names.
     pub input_sha256: String,
+    /// SHA-256 of what was measured, whatever its files are called: known deviations of one case are on record under it.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub content_sha256: String,
     /// Seed of every random choice.
     pub seed: u64,
     /// What the engine did. Files of before effort was told apart have both under `settings`.
@@ -145,6 +150,13 @@ pub struct Recording {
     /// At which of several planned looks each reading was last sampled, counted from 1; empty where one look was planned.
     #[serde(default)]
     pub looks: Vec<u32>,
+    /// How skewed the blocks of its samples are, in standard deviations of what normal blocks would be: a heavy tail.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skewness: Option<f64>,
+    /// How its stated errors agree with how readings of other seeds scatter, where that was looked at: of what was sampled, and of
+    /// what is claimed to be determined.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stated_errors: Vec<StatedErrors>,
     /// The command that repeats it by hand in the folder that `luxproof export` makes, where there is one.
     #[serde(default)]
     pub command: Option<String>,
@@ -165,6 +177,7 @@ impl Recording {
             model: String::new(),
             light,
             input_sha256: String::new(),
+            content_sha256: String::new(),
             seed: 1,
             method: Method::default(),
             effort: Effort::default(),
@@ -173,6 +186,8 @@ impl Recording {
             wall_s: 0.0,
             components: vec![],
             looks: vec![],
+            skewness: None,
+            stated_errors: vec![],
             command: None,
             failure: None,
             readings: vec![],

@@ -14,6 +14,9 @@ pub struct Summary {
     pub fail: usize,
     /// Undecided within the budget.
     pub inconclusive: usize,
+    /// Beyond the tolerance, where a method claims nothing.
+    #[serde(default)]
+    pub not_judged: usize,
     /// Deviations on record.
     pub known_deviation: usize,
     /// Deviations on record that are gone.
@@ -30,6 +33,7 @@ impl Summary {
             pass: count(Verdict::Pass),
             fail: count(Verdict::Fail),
             inconclusive: count(Verdict::Inconclusive),
+            not_judged: count(Verdict::NotJudged),
             known_deviation: count(Verdict::KnownDeviation),
             unexpected_pass: count(Verdict::UnexpectedPass),
             missing: count(Verdict::Missing),
@@ -40,11 +44,11 @@ impl Summary {
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { pass, fail, inconclusive, known_deviation, unexpected_pass, missing, skipped } = self;
+        let Self { pass, fail, inconclusive, not_judged, known_deviation, unexpected_pass, missing, skipped } = self;
         write!(
             f,
             "{pass} passed, {fail} failed, {inconclusive} undecided, {known_deviation} known deviations, \
-             {unexpected_pass} unexpected passes, {missing} missing, {skipped} skipped"
+             {unexpected_pass} unexpected passes, {missing} missing, {not_judged} not judged, {skipped} skipped"
         )
     }
 }
@@ -77,7 +81,7 @@ impl Exit {
 
     pub(super) const fn of(verdict: Verdict) -> Self {
         match verdict {
-            Verdict::Pass | Verdict::KnownDeviation => Self::Passed,
+            Verdict::Pass | Verdict::NotJudged | Verdict::KnownDeviation => Self::Passed,
             Verdict::Inconclusive => Self::Undecided,
             Verdict::Fail | Verdict::UnexpectedPass | Verdict::Missing => Self::Failed,
         }

@@ -3,7 +3,7 @@
 use quick_junit::{NonSuccessKind, Report as JUnit, TestCase, TestCaseStatus, TestSuite};
 
 use super::{BaselineCheck, Report, notes};
-use crate::judge::{Comparison, Verdict};
+use crate::judge::{Comparison, PolicyRecord, Verdict};
 use crate::plan::Skip;
 use crate::record::ReadingKey;
 
@@ -14,6 +14,9 @@ pub fn junit(report: &Report) -> String {
     }
     if let Some(check) = &report.baseline {
         junit.add_test_suite(accepted(check));
+    }
+    for policy in report.policies() {
+        junit.add_test_suite(required(report, policy));
     }
     // Writing to a string fails on no condition that a report can meet; an empty document would be noticed at once.
     let text = junit.to_string().unwrap_or_default();
@@ -33,6 +36,20 @@ fn accepted(check: &BaselineCheck) -> TestSuite {
             failure(entry.state.clone(), entry.details.join("\n"))
         };
         suite.add_test_case(test_case(&entry.key, " baseline", status));
+    }
+    suite
+}
+
+/// The engines that a project requires.
+fn required(report: &Report, policy: &PolicyRecord) -> TestSuite {
+    let mut suite = TestSuite::new(format!("policy {}", policy.file));
+    for engine in &policy.required_engines {
+        let status = if report.lacking().contains(&(policy, engine)) {
+            failure("no reading".to_owned(), format!("{engine} is required by {}", policy.file))
+        } else {
+            TestCaseStatus::success()
+        };
+        suite.add_test_case(TestCase::new(format!("required engine {engine}"), status));
     }
     suite
 }

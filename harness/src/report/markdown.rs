@@ -3,9 +3,10 @@
 use std::fmt::Write;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{Kind, departures, notes, splits};
+use super::notes::{Kind, biases, departures, notes, policies, splits};
 use super::words::{mark, percent, significant};
 use super::{Report, papers};
+use crate::record::ProcedureId;
 
 /// `link` leads to the whole report, where it is published.
 pub fn markdown(report: &Report, link: Option<&str>) -> String {
@@ -16,6 +17,9 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
     };
     line(format!("## luxproof: {}", report.spec.title));
     line(format!("\n{} in {:.1} s\n", report.summary, report.wall_s));
+    for policy in policies(report) {
+        line(format!("{policy}\n"));
+    }
     let engines: Vec<&str> = report.engines.iter().map(|e| e.id.as_str()).collect();
     line(format!("| {}procedure | against | {} |", report.of_suite("case", " | "), engines.join(" | ")));
     line(format!("|---|---|{}", "---|".repeat(engines.len() + usize::from(report.is_suite()))));
@@ -35,6 +39,12 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
             line(format!("| {} |", row.iter().map(|c| cell(c)).collect::<Vec<_>>().join(" | ")));
         }
         line("\n</details>".to_owned());
+    }
+    let bias = |p: ProcedureId| biases(report, p).into_iter().map(move |line| format!("- {p}, {line}"));
+    let biases: Vec<String> = report.procedures().into_iter().flat_map(bias).collect();
+    if !biases.is_empty() {
+        let summary = "Bias: mean deviation, its interval, p of none";
+        line(format!("\n<details><summary>{summary}</summary>\n\n{}\n\n</details>", biases.join("\n")));
     }
     let splits = splits(report);
     if !splits.is_empty() {

@@ -21,9 +21,9 @@ use std::time::SystemTime;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::judge::{Comparison, Consensus, PaperSplit, PublishedTable, Split};
+use crate::judge::{Bias, Comparison, Consensus, OnRecord, PaperSplit, PolicyRecord, PublishedTable, Split};
 use crate::plan::Skip;
-use crate::record::{EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Role, Status};
+use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Role, Status};
 use crate::spec::Case;
 
 pub use accepted::{BaselineCheck, BaselineLine};
@@ -61,6 +61,12 @@ pub struct Report {
     /// What of the distance between a paper's calculation and its renderings is whose.
     #[serde(default)]
     pub paper_splits: Vec<PaperSplit>,
+    /// Whether readings lie off together, below any tolerance: one a case, procedure, engine and kind of reference.
+    #[serde(default)]
+    pub bias: Vec<Bias>,
+    /// What each known deviation on record came to, where it is about something that was read.
+    #[serde(default)]
+    pub known_deviations: Vec<OnRecord>,
     /// What the witnesses of each case and procedure say of each other: who departs.
     #[serde(default)]
     pub consensus: Vec<Consensus>,
@@ -82,6 +88,9 @@ pub struct Report {
 pub struct CaseRecord {
     pub name: String,
     pub spec: SpecRecord,
+    /// The project's policy that it is judged by, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub policy: Option<PolicyRecord>,
     /// Whether it holds scenes of known answer, for which no spec asks.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_known: bool,
@@ -116,6 +125,7 @@ impl Report {
     /// What readings and skips of a case say by themselves; what else is known of the run the caller adds.
     pub fn new(
         case: &Case,
+        policy: Option<&PolicyRecord>,
         started: SystemTime,
         recordings: &[Recording],
         comparisons: Vec<Comparison>,
@@ -126,7 +136,12 @@ impl Report {
             luxproof: 1,
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
             started: humantime::format_rfc3339_seconds(started).to_string(),
-            cases: vec![CaseRecord { name: case.name.clone(), spec: spec.clone(), is_known: case.is_known() }],
+            cases: vec![CaseRecord {
+                name: case.name.clone(),
+                spec: spec.clone(),
+                policy: policy.cloned(),
+                is_known: case.is_known(),
+            }],
             spec,
             readings: recordings.iter().flat_map(readings).collect(),
             recordings: recordings.iter().map(|r| Recording { readings: vec![], ..r.clone() }).collect(),
@@ -146,6 +161,8 @@ impl Report {
             all.recordings.extend(one.recordings);
             all.skips.extend(one.skips);
             all.splits.extend(one.splits);
+            all.bias.extend(one.bias);
+            all.known_deviations.extend(one.known_deviations);
             all.consensus.extend(one.consensus);
             all.curves.extend(one.curves);
             all.cases.extend(one.cases);
@@ -186,7 +203,28 @@ impl Report {
 
     /// The exit code of a run.
     pub fn exit(&self) -> Exit {
-        if self.has_audited() { self.worst() } else { Exit::Engine.max(self.worst()) }
+        let is_whole = self.has_audited() && self.lacking().is_empty();
+        if is_whole { self.worst() } else { Exit::Engine.max(self.worst()) }
+    }
+
+    /// The project policies of the run, each once.
+    pub(crate) fn policies(&self) -> BTreeSet<&PolicyRecord> {
+        self.cases.iter().filter_map(|c| c.policy.as_ref()).collect()
+    }
+
+    /// The engines that a policy requires and that gave no reading in any of its cases.
+    pub(crate) fn lacking(&self) -> Vec<(&PolicyRecord, &EngineName)> {
+        let is_of = |case: &str, policy| {
+            self.cases.iter().any(|c| c.name == case && c.policy.as_ref() == Some(policy) && !c.is_known)
+        };
+        let has_read = |policy, engine: &EngineName| {
+            let mut read = self.recordings.iter().filter(|r| r.key.engine == *engine && r.failure.is_none());
+            read.any(|r| is_of(&r.key.case, policy))
+        };
+        // An examination by scenes of known answer alone is no audit.
+        let policies = self.policies().into_iter().filter(|_| self.asked() > 0);
+        let required = policies.flat_map(|policy| policy.required_engines.iter().map(move |engine| (policy, engine)));
+        required.filter(|(policy, engine)| !has_read(policy, engine)).collect()
     }
 
     /// The worst that happened to anything.

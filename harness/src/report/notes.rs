@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Report;
-use crate::judge::Split;
+use crate::judge::{Bias, OnRecord, PolicyRecord, Split, State};
 use crate::plan::{EVERYONE, Skip};
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 
@@ -12,6 +12,10 @@ use crate::record::{EngineName, ProcedureId, ReadingKey};
 #[strum(serialize_all = "snake_case")]
 pub(super) enum Kind {
     Failed,
+    /// What is wrong with how an engine states its errors.
+    Finding,
+    /// A known deviation that is on record and excuses nothing here.
+    Record,
     /// Not run: there is no reading.
     Skipped,
     /// Read with less work: meters that follow from others, light paths that carry nothing.
@@ -34,7 +38,9 @@ type Job<'a> = (&'a str, ProcedureId);
 /// Each once, whatever number of jobs it holds of; by kind, then by engine.
 pub(super) fn notes(report: &Report) -> Vec<Note<'_>> {
     let mut notes: BTreeMap<_, BTreeSet<Job<'_>>> = BTreeMap::new();
-    for (kind, key, text) in recorded(report).chain(report.skips.iter().map(|s| (kind(s), &s.key, reason(s)))) {
+    let on_record = report.known_deviations.iter().filter_map(|k| Some((Kind::Record, &k.key, idle(k)?)));
+    let skipped = report.skips.iter().map(|s| (kind(s), &s.key, reason(s)));
+    for (kind, key, text) in recorded(report).chain(on_record).chain(skipped) {
         notes.entry((kind, &key.engine, text)).or_default().insert((&key.case, key.procedure));
     }
     notes.into_iter().map(|((kind, engine, text), jobs)| Note { kind, engine, text, jobs }).collect()
@@ -47,7 +53,9 @@ fn recorded(report: &Report) -> impl Iterator<Item = (Kind, &ReadingKey, String)
         let approximate = r.approximation.iter().map(|a| (Kind::Approximate, a));
         let noted = r.notes.iter().filter(move |n| !said(n)).map(|n| (Kind::Note, n));
         let failed = r.failure.iter().map(|f| (Kind::Failed, f));
-        failed.chain(approximate).chain(noted).map(|(kind, text)| (kind, &r.key, text.clone()))
+        let doubts =
+            r.stated_errors.iter().filter(|s| s.doubt.is_some()).map(|s| (Kind::Finding, &r.key, s.to_string()));
+        failed.chain(approximate).chain(noted).map(|(kind, text)| (kind, &r.key, text.clone())).chain(doubts)
     })
 }
 
@@ -58,6 +66,37 @@ pub(super) const fn kind(skip: &Skip) -> Kind {
 pub(super) fn reason(skip: &Skip) -> String {
     let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
     format!("{}{saved}", skip.reason)
+}
+
+/// What is to be said of a known deviation that excuses nothing; nothing where it does.
+fn idle(known: &OnRecord) -> Option<String> {
+    let (entry, percent) = (&known.entry, 100.0 * known.entry.expected);
+    let at = entry.meter.clone().map(|glob| format!(" at {}", String::from(glob))).unwrap_or_default();
+    let what = match known.state {
+        State::Seen => return None,
+        State::NotSeen => "is not seen".to_owned(),
+        State::Expired => entry.expires.map(|last| format!("has expired on {last}"))?,
+    };
+    Some(format!("the known deviation of {percent:+.2} %{at} {what}: {}", entry.told()))
+}
+
+/// The mean deviation of each engine in a procedure, told even where everything passes.
+pub(super) fn biases(report: &Report, procedure: ProcedureId) -> Vec<String> {
+    let line =
+        |b: &Bias| format!("{}{} against {}: {b}", report.of_suite(&b.key.case, ": "), b.key.engine, b.basis.name());
+    report.bias.iter().filter(|b| b.key.procedure == procedure).map(line).collect()
+}
+
+/// Which policy judged, and what it requires in vain; nothing where there is none.
+pub(super) fn policies(report: &Report) -> Vec<String> {
+    let line = |p: &PolicyRecord| {
+        let profile = p.profile.as_ref().map(|name| format!(", profile {name}")).unwrap_or_default();
+        let digits: String = p.sha256.chars().take(12).collect();
+        format!("policy {}{profile} (SHA-256 {digits}…)", p.file)
+    };
+    let lacking = report.lacking().into_iter();
+    let lacking = lacking.map(|(p, engine)| format!("REQUIRED by {} and without any reading: {engine}", p.file));
+    report.policies().into_iter().map(line).chain(lacking).collect()
 }
 
 impl Note<'_> {

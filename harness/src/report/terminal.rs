@@ -7,7 +7,7 @@ use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArr
 use itertools::Itertools;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{Kind, Note, departures, notes, splits};
+use super::notes::{Kind, Note, biases, departures, notes, policies, splits};
 use super::words::{mark, percent, plural, significant, value};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
@@ -36,7 +36,7 @@ pub enum Detail {
 const fn colour(verdict: Verdict) -> Color {
     match verdict {
         Verdict::Pass => Color::Green,
-        Verdict::KnownDeviation => Color::Cyan,
+        Verdict::KnownDeviation | Verdict::NotJudged => Color::Cyan,
         Verdict::Inconclusive => Color::Yellow,
         Verdict::Fail | Verdict::UnexpectedPass | Verdict::Missing => Color::Red,
     }
@@ -45,10 +45,18 @@ const fn colour(verdict: Verdict) -> Color {
 pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&str>) -> String {
     let mut text = String::new();
     writeln!(text, "\nluxproof {}: {}", report.tool_version, report.spec.title).ok();
-    writeln!(text, "{}\n", engines_line(report)).ok();
+    writeln!(text, "{}", engines_line(report)).ok();
+    for line in policies(report) {
+        writeln!(text, "{line}").ok();
+    }
+    writeln!(text).ok();
     writeln!(text, "{}\n", verdicts(report, style)).ok();
     if detail == Detail::All || !report.is_suite() {
         tables(report, style, &mut text);
+    }
+    for procedure in report.procedures().into_iter().filter(|_| detail == Detail::All) {
+        let heading = format!("Bias of {procedure}: mean deviation, its interval, p of none");
+        section(&mut text, &heading, biases(report, procedure).into_iter());
     }
     let most = if detail == Detail::All { usize::MAX } else { BRIEF };
     let departures = departures(report).into_iter().take(most).map(|line| shortened(&line, detail));
@@ -216,7 +224,7 @@ fn told(report: &Report, detail: Detail, text: &mut String) {
         writeln!(text, "  {}", shortened(&note.line(report), detail)).ok();
     }
     let of = |kind: Kind| notes[shown..].iter().filter(|n| n.kind == kind).count();
-    let mut left: Vec<String> = [Kind::Failed, Kind::Skipped, Kind::Shortcut]
+    let mut left: Vec<String> = [Kind::Failed, Kind::Finding, Kind::Record, Kind::Skipped, Kind::Shortcut]
         .into_iter()
         .filter(|kind| of(*kind) > 0)
         .map(|kind| format!("{} more {}", of(kind), kind))

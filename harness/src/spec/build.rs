@@ -81,14 +81,14 @@ impl Case {
     /// Reads, checks and builds the case of a spec file, without the overrides of its `cases`.
     pub fn load(path: &Path) -> Result<Self, SpecError> {
         let source = Source::read(path)?;
-        let spec = source.parse()?;
+        let spec: Spec = source.parse()?;
         Builder::new(&source).build(spec)
     }
 
     /// All cases of a spec file: those of its `cases`, or the one that it is.
     pub fn load_all(path: &Path) -> Result<Vec<Self>, SpecError> {
         let source = Source::read(path)?;
-        let spec = source.parse()?;
+        let spec: Spec = source.parse()?;
         let variants = super::cases::variants(&source)?;
         if variants.is_empty() {
             return Ok(vec![Builder::new(&source).build(spec)?]);

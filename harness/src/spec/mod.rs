@@ -4,6 +4,7 @@
 
 mod build;
 mod cases;
+mod content;
 mod locate;
 mod model;
 mod suite;
@@ -12,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 pub use build::Case;
 pub(crate) use build::hexadecimal;
+pub use content::content;
 pub use model::{Budget, EngineSettings, Spec, ToleranceOverride};
 pub use suite::{filtered, suite};
 
@@ -41,7 +43,7 @@ fn place(file: &Path, line: Option<usize>, column: Option<usize>) -> String {
     format!("{}:{}{} ", file.display(), number(line), number(column))
 }
 
-/// A spec file as it was read: its text, kept for the places of errors.
+/// A spec or policy file as it was read: its text, kept for the places of errors.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
     pub path: PathBuf,
@@ -62,8 +64,8 @@ impl Source {
         Self { path, text, overrides: vec![] }
     }
 
-    /// Parses the text; unknown keys are errors with the nearest known key.
-    pub fn parse(&self) -> Result<Spec, SpecError> {
+    /// Parses the text as a spec or a policy; unknown keys are errors with the nearest known key.
+    pub fn parse<T: serde::de::DeserializeOwned>(&self) -> Result<T, SpecError> {
         serde_yaml::from_str(&self.text).map_err(|error| {
             let message = error.to_string();
             // serde_yaml ends its message with the place, which the error carries already.
@@ -88,7 +90,7 @@ impl Source {
     }
 
     /// Refuses what stands at a place unless it is sound.
-    fn require(
+    pub(crate) fn require(
         &self,
         sound: bool,
         path: &str,

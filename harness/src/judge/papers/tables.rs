@@ -6,13 +6,18 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
-use luminaire::scene::{Bounces, Transport};
+use itertools::Itertools;
+use luminaire::scene::{Bounces, Luminaire, Transport};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::fit::{Misfit, Printed, misfits};
 use crate::judge::{Basis, Reference};
 use crate::procedures::{Target, Task};
 use crate::record::{Estimate, MeterId, ProcedureId, Quantity, Uncertainty};
+
+/// Places within so many metres, and directions within so many degrees, are the same, as the format says.
+const SAME: f64 = 1e-6;
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -23,7 +28,7 @@ pub struct Published {
     rounding: Rounding,
     /// What is known of the luminaire's flux beyond our file.
     flux: Option<PublishedFlux>,
-    tables: BTreeMap<ProcedureId, Table>,
+    pub(super) tables: BTreeMap<ProcedureId, Table>,
 }
 
 /// The flux of a paper's luminaire, as far as its tables tell.
@@ -55,12 +60,12 @@ struct Rounding {
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Table {
+pub(super) struct Table {
     name: String,
     quantity: Quantity,
     bounces: Option<u32>,
     columns: BTreeMap<String, Column>,
-    rows: Vec<Row>,
+    pub(super) rows: Vec<Row>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -80,12 +85,12 @@ struct Column {
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Row {
+pub(super) struct Row {
     gamma_deg: Option<f64>,
     c_deg: Option<f64>,
     at_m: Option<[f64; 3]>,
     normal: Option<[f64; 3]>,
-    cells: BTreeMap<String, String>,
+    pub(super) cells: BTreeMap<String, String>,
 }
 
 /// A published table as it is printed, with the meters that its rows belong to.
@@ -106,6 +111,9 @@ pub struct PublishedTable {
     pub columns: Vec<PublishedColumn>,
     /// Its rows, in the order of the meters.
     pub rows: Vec<PublishedRow>,
+    /// Cells that do not fit the rest of it.
+    #[serde(default)]
+    pub misfits: Vec<Misfit>,
 }
 
 impl PublishedTable {
@@ -138,6 +146,9 @@ pub struct PublishedRow {
     pub meter: MeterId,
     /// The place: gamma in degrees, or the position in metres.
     pub place: String,
+    /// Which of the paper's rows it is, counted from 0.
+    #[serde(default)]
+    pub row: usize,
     pub cells: BTreeMap<String, String>,
 }
 
@@ -171,8 +182,8 @@ impl Published {
         let Some(table) = self.tables.get(&task.procedure).filter(|t| t.quantity == task.quantity) else {
             return vec![];
         };
-        let Some(row) = table.rows.iter().find(|r| r.is_at(target)) else { return vec![] };
-        let model = task.model();
+        let Some((k, row)) = table.rows.iter().find_position(|r| r.is_at(target)) else { return vec![] };
+        let (model, misfits) = (task.model(), self.misfits(task));
         // Derived values judge every engine, whatever they are of; a paper's those of the same luminaire model.
         let derived = self.citation.basis != Basis::Published;
         let closed_form = matches!(task.transport, Transport::Direct);
@@ -187,7 +198,9 @@ impl Published {
         let reference = |(name, column): (&String, &Column)| {
             let cell = self.cell(row.cells.get(name)?, table.decimals(name))?;
             let source = format!("{}, {}, {name}: {}", self.citation.title, table.name, column.meaning);
-            Some(Reference::of(cell.value, &cell.uncertainty, self.citation.basis, source))
+            let doubt =
+                misfits.iter().find(|m| m.row == k && m.column == *name).map(|m| format!("{}: {m}", table.name));
+            Some(Reference { doubt, ..Reference::of(cell.value, &cell.uncertainty, self.citation.basis, source) })
         };
         table.columns.iter().filter(|(_, column)| compared(column)).filter_map(reference).collect()
     }
@@ -200,12 +213,12 @@ impl Published {
         }
         let table = self.tables.get(&task.procedure).filter(|t| t.quantity == task.quantity)?;
         let row = |target: &Target| {
-            let row = table.rows.iter().find(|r| r.is_at(target))?;
+            let (k, row) = table.rows.iter().find_position(|r| r.is_at(target))?;
             let place = match target.direction {
                 Some(d) => format!("{}", d.gamma_deg),
                 None => format!("({})", target.meter.position_m.to_array().map(|x| x.to_string()).join(", ")),
             };
-            Some(PublishedRow { meter: target.id.clone(), place, cells: row.cells.clone() })
+            Some(PublishedRow { meter: target.id.clone(), place, row: k, cells: row.cells.clone() })
         };
         let rows: Vec<PublishedRow> = task.targets.iter().filter_map(row).collect();
         let column = |(name, column): (&String, &Column)| PublishedColumn {
@@ -225,8 +238,57 @@ impl Published {
             units_in_last_digit: self.rounding.units_in_last_digit,
             flux: self.flux.clone(),
             columns: table.columns.iter().map(column).collect(),
+            misfits: self.misfits(task),
             rows,
         })
+    }
+
+    /// Cells of a task's table that do not fit; derived values rest on formulas, and not on one another.
+    pub(super) fn misfits(&self, task: &Task) -> Vec<Misfit> {
+        let Some(table) = self.tables.get(&task.procedure).filter(|_| self.citation.basis == Basis::Published) else {
+            return vec![];
+        };
+        let columns: Vec<Printed<'_>> = table
+            .columns
+            .keys()
+            .map(|column| {
+                let rows = table.rows.iter();
+                let cells = rows.map(|row| Some((row.cells.get(column)?.as_str(), self.printed(table, row, column)?)));
+                (column.as_str(), cells.collect())
+            })
+            .collect();
+        let lawful = match &task.scene.luminaires[..] {
+            [luminaire] if task.procedure == ProcedureId::DirectIlluminance => self.by_the_law(table, luminaire),
+            _ => vec![],
+        };
+        misfits(&columns, &lawful)
+    }
+
+    /// What the reference column of direct light must print by the intensity in the same direction, where that is printed.
+    fn by_the_law<'t>(&'t self, table: &'t Table, luminaire: &Luminaire) -> Vec<(usize, &'t str, Estimate)> {
+        let Some(intensities) = self.tables.get(&ProcedureId::LuminousIntensity) else { return vec![] };
+        let reference =
+            |table: &'t Table| table.columns.iter().find(|(_, c)| c.reference).map(|(name, _)| name.as_str());
+        let Some((column, of_intensity)) = reference(table).zip(reference(intensities)) else { return vec![] };
+        let expected = |(k, row): (usize, &Row)| {
+            let from = DVec3::from(row.at_m?) - luminaire.position_m;
+            let local = luminaire.orientation.transpose() * from;
+            let gamma_deg = local.angle_between(DVec3::NEG_Z).to_degrees();
+            let c_deg = local.y.atan2(local.x).to_degrees().rem_euclid(360.0);
+            // Every plane of the table meets at the poles.
+            let is_pole = local.x.hypot(local.y) <= SAME;
+            let same = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() <= SAME);
+            let is_there = |row: &&Row| same(row.gamma_deg, gamma_deg) && (is_pole || same(row.c_deg, c_deg));
+            let intensity = self.printed(intensities, intensities.rows.iter().find(is_there)?, of_intensity)?;
+            let cosine = -DVec3::from(row.normal?).normalize().dot(from.normalize());
+            Some((k, column, intensity.times(luminaire.flux_scale * cosine / from.length_squared())))
+        };
+        table.rows.iter().enumerate().filter_map(expected).collect()
+    }
+
+    /// A cell of a table with the interval that its rounding leaves.
+    fn printed(&self, table: &Table, row: &Row, column: &str) -> Option<Estimate> {
+        self.cell(row.cells.get(column)?, table.decimals(column))
     }
 
     fn cell(&self, printed: &str, decimals: usize) -> Option<Estimate> {
@@ -254,9 +316,7 @@ impl Table {
 }
 
 impl Row {
-    /// Within 1e-6 m or 1e-6 degrees, as the format says.
     fn is_at(&self, target: &Target) -> bool {
-        const SAME: f64 = 1e-6;
         match (target.direction, self.gamma_deg.zip(self.c_deg), self.at_m.zip(self.normal)) {
             (Some(d), Some((gamma, c)), _) => (gamma - d.gamma_deg).abs() <= SAME && (c - d.c_deg).abs() <= SAME,
             (None, _, Some((at, normal))) => {

@@ -60,7 +60,7 @@ fn of_an_oblong_room_a_quarter_is_rendered_and_of_a_square_one_with_an_axial_lam
     square.scene.luminaires[0].photometry = fixtures::photometry(table.unwrap());
     let shortcut = holds(&square);
     assert_eq!(shortcut.job.stations.len(), 3);
-    let settings = shortcut.complete(exact(&shortcut.job), &square).method;
+    let settings = shortcut.complete(exact(&shortcut.job), &square).effort;
     // Every meter that is filled in is traced to the one that was rendered.
     assert_eq!(settings["mirrored_meters"].matches(" is ").count(), 13, "{settings:?}");
     assert!(shortcut.omissions.iter().all(|o| !o.reason.is_empty() && o.share > 0.0 && o.share <= 1.0));

@@ -44,7 +44,7 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
             }
         }
         ul.legend {
-            @for verdict in [Verdict::Pass, Verdict::KnownDeviation, Verdict::Inconclusive, Verdict::Fail, Verdict::UnexpectedPass, Verdict::Missing] {
+            @for verdict in [Verdict::Pass, Verdict::NotJudged, Verdict::KnownDeviation, Verdict::Inconclusive, Verdict::Fail, Verdict::UnexpectedPass, Verdict::Missing] {
                 li class={ "v-" (class(verdict)) } { span.glyph aria-hidden="true" { (glyph(verdict)) } " " (verdict.name()) }
             }
         }

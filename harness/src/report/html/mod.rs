@@ -98,6 +98,7 @@ fn head(report: &Report) -> Markup {
     let s = &report.summary;
     let counts = [
         (Verdict::Pass, s.pass),
+        (Verdict::NotJudged, s.not_judged),
         (Verdict::KnownDeviation, s.known_deviation),
         (Verdict::Inconclusive, s.inconclusive),
         (Verdict::Fail, s.fail),
@@ -112,6 +113,7 @@ fn head(report: &Report) -> Markup {
             }
             h1 { (report.spec.title) }
             p.spec { code { (report.spec.path) } }
+            @for line in super::notes::policies(report) { p.spec { (line) } }
             @if !report.comparisons.is_empty() {
                 div.share aria-hidden="true" {
                     @for (verdict, count) in counts { @if count > 0 {
@@ -147,7 +149,7 @@ pub(crate) fn table(label: &str, heads: &[&str], rows: &Markup) -> Markup {
 fn class(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Pass => "pass",
-        Verdict::KnownDeviation => "known",
+        Verdict::KnownDeviation | Verdict::NotJudged => "known",
         Verdict::Inconclusive => "undecided",
         Verdict::Fail | Verdict::UnexpectedPass | Verdict::Missing => "fail",
     }
@@ -157,6 +159,7 @@ fn class(verdict: Verdict) -> &'static str {
 fn glyph(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Pass => "✓",
+        Verdict::NotJudged => "–",
         Verdict::KnownDeviation => "≈",
         Verdict::Inconclusive => "?",
         Verdict::Fail => "✕",

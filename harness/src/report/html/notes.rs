@@ -35,7 +35,7 @@ pub(super) fn section(report: &Report) -> Markup {
 fn row(note: &Note<'_>) -> Markup {
     let cases: BTreeSet<&str> = note.jobs.iter().map(|(case, _)| *case).collect();
     let procedures: BTreeSet<&str> = note.jobs.iter().map(|(_, procedure)| procedure.row().title).collect();
-    let class = if note.kind == Kind::Failed { "v-fail" } else { "" };
+    let class = if note.kind <= Kind::Finding { "v-fail" } else { "" };
     html! {
         tr { td class=(class) { (note.kind) } th scope="row" { (note.engine) }
             td { (Vec::from_iter(procedures).join(", ")) }

@@ -24,7 +24,7 @@
   name();
 
   // Tables of readings.
-  const severity = ["missing", "unexpected pass", "fail", "undecided", "known deviation", "pass"];
+  const severity = ["missing", "unexpected pass", "fail", "undecided", "known deviation", "not judged", "pass"];
   const keys = {
     e: (r) => word(r, ENGINE), c: (r) => word(r, CASE), m: (r) => r[METER], v: (r) => r[VALUE], r: (r) => r[REFERENCE],
     b: (r) => word(r, BASIS), d: (r) => r[RELATIVE], s: (r) => r[NORMALIZED], x: (r) => severity.indexOf(word(r, VERDICT)),

@@ -6,6 +6,7 @@ use itertools::Itertools;
 use maud::{Markup, html};
 
 use super::super::matrix::sort_worst_first;
+use super::super::notes::biases;
 use super::super::words::significant;
 use super::super::{Report, papers};
 use super::palette::Palette;
@@ -31,6 +32,12 @@ pub(super) fn section(report: &Report, procedure: ProcedureId, palette: &Palette
         p.lead { (procedure.row().meaning) }
         @if !plots.is_empty() { div.panels { @for panel in plots { (panel) } } }
         @for table in report.published.iter().filter(|t| t.procedure == procedure) { (printed(&papers::grid(report, table))) }
+        @let biases = biases(report, procedure);
+        @if !biases.is_empty() {
+            details { summary { "Bias: mean deviation, its interval, p of none" }
+                ul.notes { @for line in &biases { li { (minus(line)) } } }
+            }
+        }
         @if all == 0 {
             p { "Nothing was compared." }
         } @else {

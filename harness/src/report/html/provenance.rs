@@ -23,6 +23,10 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
         (table("Inputs", &["case", "spec", "SHA-256 of the spec and all it names"], &html! {
             @for c in &report.cases { tr { th scope="row" { (c.name) } td { code { (c.spec.path) } } td { code.hash { (c.spec.sha256) } } } }
         }))
+        @for policy in report.policies() {
+            p { "Judged by the policy " code { (policy.file) } @if let Some(name) = &policy.profile { ", profile " code { (name) } }
+                ", SHA-256 " code.hash { (policy.sha256) } }
+        }
         h3 { "Settings" }
         @for engine in &report.engines {
             @let mine: Vec<&Recording> = report.recordings.iter().filter(|r| r.key.engine == engine.id).collect();

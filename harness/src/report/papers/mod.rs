@@ -8,7 +8,7 @@ use itertools::Itertools;
 
 use super::Report;
 use super::words::{largest, percent, published_column, value};
-use crate::judge::{Basis, PublishedTable};
+use crate::judge::{Basis, Misfit, PublishedTable};
 use crate::record::{EngineName, MeterId, Quantity, Reading, ReadingKey, Recording};
 
 pub(super) use shares::splits;
@@ -35,8 +35,11 @@ pub(super) fn grid(report: &Report, table: &PublishedTable) -> Grid {
     let mut rows: Vec<Vec<String>> = vec![];
     for column in &table.columns {
         let cells = table.rows.iter().map(|r| r.cells.get(&column.name).cloned().unwrap_or_else(|| "-".to_owned()));
-        let note = if column.reference { "its reference" } else { "" };
-        rows.push(std::iter::once(format!("paper {}", column.name)).chain(cells).chain([note.to_owned()]).collect());
+        let note = column.reference.then(|| "its reference".to_owned());
+        let misfits =
+            table.misfits.iter().filter(|m| m.column == column.name && table.rows.iter().any(|r| r.row == m.row));
+        let note = note.into_iter().chain(misfits.map(Misfit::to_string)).join("; ");
+        rows.push(std::iter::once(format!("paper {}", column.name)).chain(cells).chain([note]).collect());
     }
     let mine = |r: &&Recording| r.key.procedure == table.procedure && table.cases.contains(&r.key.case);
     let place = |r: &&Recording| report.engines.iter().position(|e| e.id == r.key.engine);

@@ -2,23 +2,25 @@
 //!
 //! Per engine and procedure the weighted mean of the relative changes is tested (weights 1/u²; the uncertainty widened by the
 //! Birge ratio where meters scatter more than they say: Birge, Phys. Rev. 40 (1932) 207), then every meter. All tests
-//! of a comparison together are wrong once in a hundred times where nothing changed (Šidák, JASA 62 (1967) 626). Standard errors
-//! from few blocks have Student's t with the degrees of freedom of Welch and Satterthwaite (GUM G.4.1).
+//! of a comparison together are wrong once in a hundred times where nothing changed (Šidák, JASA 62 (1967) 626); half of that is
+//! for the means, which are few. Standard errors from few blocks have Student's t with the degrees of freedom of Welch and
+//! Satterthwaite (GUM G.4.1); a mean has those of all its meters together, and a variance that is larger by what its weights are
+//! uncertain by (Meier, Variance of a weighted mean, Biometrics 9 (1953) 59).
 
 use std::collections::BTreeSet;
 use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 use super::Entry;
+use crate::judge::{SINGLE_PRECISION, WeightedMean, two_sided};
 use crate::record::{MeterId, Quantity, Reading, ReadingKey, Uncertainty};
 
 /// Probability that anything at all is called changed where nothing is.
 const FAMILY: f64 = 0.01;
-/// Values without uncertainty may differ by the rounding of single precision, which renderers compute in.
-const ROUNDING: f64 = 1e-6;
+/// The part of it that the means have among them.
+const SHARE_OF_MEANS: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Comparability {
@@ -31,9 +33,12 @@ pub enum Comparability {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Changes {
     pub entries: Vec<EntryChange>,
+    /// Of single meters.
     pub tests: usize,
     /// The level of each, so that all together keep theirs.
     pub level: f64,
+    /// That of each mean.
+    pub level_of_means: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -109,22 +114,25 @@ pub fn compare(old: &[Entry], new: &[Entry], comparability: Comparability) -> Ch
     let added = new.iter().filter(|b| !old.iter().any(|a| a.key == b.key));
     let added = added.map(|b| bare(b, State::New, vec!["there is nothing to hold it against".to_owned()]));
     let mut entries: Vec<EntryChange> = of_old.chain(added).collect();
-    let tests = entries.iter().map(|e| e.meters.len() + usize::from(e.mean.is_some())).sum::<usize>();
+    let tests = entries.iter().map(|e| e.meters.len()).sum();
+    let means = entries.iter().filter(|e| e.mean.is_some()).count();
     // 1 - (1 - family)^(1 / tests), without loss of digits.
-    let level = -f64::exp_m1(f64::ln_1p(-FAMILY) / tests.max(1) as f64);
+    let each = |family: f64, tests: usize| -f64::exp_m1(f64::ln_1p(-family) / tests.max(1) as f64);
+    let of_means = if means == 0 { 0.0 } else { SHARE_OF_MEANS * FAMILY };
+    let (level, level_of_means) = (each(FAMILY - of_means, tests), each(of_means, means));
     for entry in &mut entries {
-        decide(entry, level);
+        decide(entry, level, level_of_means);
     }
-    Changes { entries, tests, level }
+    Changes { entries, tests, level, level_of_means }
 }
 
-fn decide(entry: &mut EntryChange, level: f64) {
+fn decide(entry: &mut EntryChange, level: f64, level_of_means: f64) {
     for meter in &mut entry.meters {
         // A probability that is no number never counts as agreement.
         meter.significant = meter.p_value < level || meter.p_value.is_nan();
     }
     if entry.state == State::Unchanged {
-        if entry.mean.is_some_and(|m| m.p_value < level || m.p_value.is_nan()) {
+        if entry.mean.is_some_and(|m| m.p_value < level_of_means || m.p_value.is_nan()) {
             entry.state = State::Shifted;
         } else if entry.meters.iter().any(|m| m.significant) {
             entry.state = State::Changed;
@@ -147,7 +155,7 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
     let is_other_subject = !notes.is_empty();
     notes.extend(differing("version", &a.version, &b.version));
     for key in a.method.keys().chain(b.method.keys()).collect::<BTreeSet<_>>() {
-        let of = |entry: &Entry| entry.method.get(key).cloned().unwrap_or_else(|| "not set".to_owned());
+        let of = |entry: &Entry| entry.said(key).unwrap_or("not set").to_owned();
         notes.extend(differing(&format!("setting {key}"), &of(a), &of(b)));
     }
     if is_other_subject || (comparability == Comparability::SameInstrument && !notes.is_empty()) {
@@ -174,7 +182,7 @@ fn meter(before: &Reading, now: &Reading) -> MeterChange {
     let change = now.value - before.value;
     let apart = Uncertainty::of_sum([(-1.0, before.uncertainty), (1.0, now.uncertainty)]);
     let combined = before.uncertainty.standard().hypot(now.uncertainty.standard());
-    let rounding = ROUNDING * before.value.abs().max(now.value.abs());
+    let rounding = SINGLE_PRECISION * before.value.abs().max(now.value.abs());
     let p_value = match change.abs() {
         _ if [before, now].iter().any(|r| r.uncertainty == Uncertainty::NotSeen) => 1.0,
         size if !(size.is_finite() && combined.is_finite()) => 0.0,
@@ -196,27 +204,11 @@ fn meter(before: &Reading, now: &Reading) -> MeterChange {
 
 /// The weighted mean shift of the meters that are sampled; `None` where fewer than two are.
 fn mean(meters: &[MeterChange]) -> Option<MeanShift> {
-    let sampled: Vec<(f64, f64)> = meters
+    let sampled: Vec<_> = meters
         .iter()
         .filter(|m| m.uncertainty > 0.0 && m.old > 0.0 && m.uncertainty.is_finite() && m.new.is_finite())
-        .map(|m| ((m.new - m.old) / m.old, m.uncertainty / m.old))
+        .map(|m| ((m.new - m.old) / m.old, m.uncertainty / m.old, m.degrees_of_freedom))
         .collect();
-    if sampled.len() < 2 {
-        return None;
-    }
-    let weights: f64 = sampled.iter().map(|(_, u)| u.powi(-2)).sum();
-    let relative = sampled.iter().map(|(d, u)| d * u.powi(-2)).sum::<f64>() / weights;
-    let scatter = sampled.iter().map(|(d, u)| ((d - relative) / u).powi(2)).sum::<f64>();
-    let birge = (scatter / (sampled.len() - 1) as f64).sqrt().max(1.0);
-    let uncertainty = birge / weights.sqrt();
-    // Meters of one run may share their blocks: the mean is granted no more degrees of freedom than one of them.
-    let freedom = meters.iter().filter_map(|m| m.degrees_of_freedom).reduce(f64::min);
-    let p_value = if relative.abs() <= ROUNDING { 1.0 } else { two_sided(relative / uncertainty, freedom) };
-    Some(MeanShift { relative, uncertainty, p_value })
-}
-
-/// Probability of a standardised change at least this large, either way.
-fn two_sided(z: f64, freedom: Option<f64>) -> f64 {
-    let student = freedom.and_then(|f| StudentsT::new(0.0, 1.0, f).ok());
-    2.0 * student.map_or_else(|| Normal::standard().sf(z.abs()), |t| t.sf(z.abs()))
+    let mean = WeightedMean::of(&sampled)?;
+    Some(MeanShift { relative: mean.value, uncertainty: mean.uncertainty, p_value: mean.p_value() })
 }

@@ -37,8 +37,11 @@ pub struct Entry {
     /// SHA-256 of the spec and of every file that it names.
     pub input_sha256: String,
     /// What the engine did: another run of the same instrument does the same.
-    #[serde(alias = "settings")]
+    #[serde(default)]
     pub method: Method,
+    /// Method and effort in one, of files that are older than the difference.
+    #[serde(default, skip_serializing)]
+    settings: Method,
     /// Of all standard errors, where the file is older than the readings' own.
     #[serde(default, skip_serializing)]
     degrees_of_freedom: Option<f64>,
@@ -73,11 +76,17 @@ impl Entry {
             light: recording.light,
             input_sha256: recording.input_sha256.clone(),
             method: recording.method.clone(),
+            settings: Method::default(),
             degrees_of_freedom: None,
             accepted: String::new(),
             reason: String::new(),
             readings: mine.map(|r| r.reading.clone()).collect(),
         }
+    }
+
+    /// What it says of a setting that makes readings comparable.
+    fn said(&self, key: &str) -> Option<&str> {
+        self.method.get(key).or_else(|| self.settings.get(key)).map(String::as_str)
     }
 
     fn has_sound_values(&self) -> bool {

@@ -1,7 +1,10 @@
 //! The laws of baselines: refused unless they match, noise told apart from shifts, nothing accepted without a reason.
 
+use serde_json::json;
+
 use super::*;
-use crate::record::{MeterId, Method, ProcedureId, Quantity, Uncertainty};
+use crate::record::{Estimate, MeterId, Method, ProcedureId, Quantity, Uncertainty};
+use crate::report::Summary;
 use crate::system::random::normal;
 
 fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
@@ -18,6 +21,7 @@ fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
         light: "indirect, 7 bounces".to_owned().try_into().unwrap(),
         input_sha256: "ab".repeat(32),
         method: [("preset", "audit")].into(),
+        settings: Method::default(),
         degrees_of_freedom: None,
         accepted: "2026-01-01T00:00:00Z".into(),
         reason: "first look".into(),
@@ -64,6 +68,90 @@ fn a_shift_far_below_the_noise_of_one_meter_is_found_in_the_mean() {
         .count();
     // .3 % of some 195 lx is .6 lx, 0.8 of the noise of one difference, but 11 of that of their mean.
     assert!(found == 100, "{found}");
+}
+
+/// Two runs of so many entries, as blocks would state their standard errors, the second one's means shifted by so many of theirs.
+fn of_blocks(rng: &mut fastrand::Rng, entries: usize, meters: usize, blocks: usize, shift: f64) -> [Vec<Entry>; 2] {
+    let sigma = |k: usize| 0.1 * (1.0 + k as f64 % 5.0);
+    let weights: f64 = (0..meters).map(|k| ((100.0 + k as f64) / sigma(k)).powi(2) / 2.0).sum();
+    let mut side = |relative: f64| -> Vec<Entry> {
+        let mut one = |n: usize| {
+            let truth: Vec<f64> = (0..meters).map(|k| (100.0 + k as f64) * (1.0 + relative)).collect();
+            let mut entry = Entry { version: n.to_string(), ..entry(&truth, None) };
+            entry.key.case = format!("room {n}");
+            for (k, reading) in entry.readings.iter_mut().enumerate() {
+                let spread = sigma(k) * (blocks as f64).sqrt();
+                let samples: Vec<f64> = (0..blocks).map(|_| reading.value + spread * normal(rng)).collect();
+                let estimate = Estimate::of_samples(&samples);
+                (reading.value, reading.uncertainty) = (estimate.value, estimate.uncertainty);
+            }
+            entry
+        };
+        (0..entries).map(&mut one).collect()
+    };
+    [side(0.0), side(shift / weights.sqrt())]
+}
+
+#[test]
+fn nothing_at_all_changes_in_99_of_100_comparisons_of_runs_with_few_blocks() {
+    let mut rng = fastrand::Rng::with_seed(21);
+    for (entries, meters, blocks, runs) in [(4, 14, 8, 1500), (1, 100, 8, 800), (3, 4, 16, 1500), (4, 14, 4, 1500)] {
+        let mut alarms = 0;
+        for _ in 0..runs {
+            let [a, b] = of_blocks(&mut rng, entries, meters, blocks, 0.0);
+            alarms += usize::from(!compare(&a, &b, Comparability::SameInstrument).is_clean());
+        }
+        println!("{alarms} of {runs} with {entries} entries of {meters} meters and {blocks} blocks");
+        // One in a hundred, and three standard deviations of the count.
+        let expected = 0.01 * f64::from(runs);
+        assert!(alarms as f64 <= expected + 3.0 * expected.sqrt(), "{alarms} of {runs}");
+    }
+}
+
+#[test]
+fn a_shift_of_5_3_standard_errors_of_the_mean_is_called_shifted() {
+    let mut rng = fastrand::Rng::with_seed(22);
+    for (entries, meters, blocks) in [(4, 14, 8), (4, 14, 16), (1, 100, 8)] {
+        let mut shifted = 0;
+        for _ in 0..200 {
+            let [a, b] = of_blocks(&mut rng, entries, meters, blocks, 5.3);
+            shifted += usize::from(compare(&a, &b, Comparability::SameInstrument).entries[0].state == State::Shifted);
+        }
+        println!("{shifted} of 200 with {entries} entries of {meters} meters and {blocks} blocks");
+        assert!(shifted >= 180, "{shifted} of 200 with {entries} entries of {meters} meters and {blocks} blocks");
+    }
+}
+
+#[test]
+fn more_looks_at_the_same_instrument_are_no_other_instrument() {
+    let run = |effort: serde_json::Value, looks: [u32; 1]| {
+        let key = json!({"case": "room", "procedure": "indirect_illuminance", "engine": "mitsuba"});
+        let with = |more: serde_json::Value| {
+            let both = [&key, &more].map(|part| part.as_object().unwrap().clone());
+            both.into_iter().flatten().collect::<serde_json::Map<_, _>>()
+        };
+        let recording = with(
+            json!({"version": "1", "light": "direct", "input_sha256": "ab", "seed": 1, "method": {"preset": "audit"},
+            "effort": effort, "looks": looks, "approximation": null, "notes": [], "failure": null, "wall_s": 1}),
+        );
+        let reading = with(
+            json!({"model": "point", "meter": "plane[0]", "quantity": "illuminance_lx", "value": 100, "std_error": 1}),
+        );
+        let report: Report = serde_json::from_value(json!({"luxproof": 1, "tool_version": "1", "started": "", "wall_s": 1,
+            "spec": {"path": "", "sha256": "", "title": ""}, "engines": [], "comparisons": [], "skips": [], "summary": Summary::default(),
+            "recordings": [recording], "readings": [reading]}))
+        .unwrap();
+        Baseline::candidate(&report).entries
+    };
+    let once = run(json!({"seed": "1", "mirrored_meters": "plane[1] is plane[0]"}), [1]);
+    let twice = run(json!({"seed": "2", "look2_command": "again", "blocks": "32"}), [2]);
+    let change = &compare(&once, &twice, Comparability::SameInstrument).entries[0];
+    assert!(change.state == State::Unchanged && change.meters.len() == 1, "{change:?}");
+    // A file of before effort was told apart holds both as settings: what the method says of itself counts.
+    let old = |method: Method| Entry { settings: method, method: Method::default(), ..entry(&[100.0], Some(1.0)) };
+    let now = entry(&[100.0], Some(1.0));
+    assert_eq!(state(&old([("preset", "audit"), ("look2_command", "again")].into()), &now), State::Unchanged);
+    assert_eq!(state(&old([("preset", "fast")].into()), &now), State::Refused);
 }
 
 #[test]

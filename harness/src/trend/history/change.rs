@@ -14,24 +14,28 @@
 //! for a shift of two standard errors, and the sum of the last five nights, likeliest to see one within five. A change is
 //! dated, among the nights since the sum last was zero or among the five, to the one that makes what followed most likely.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use strum::VariantArray;
 
-use super::innovation::{Innovation, MAX_SPREADS, MIN_ERROR, MIN_LEARNED, RunningMean, Spread, spread_of_all};
+use super::drift::{Line, Trend};
+use super::innovation::{Innovation, MAX_SPREADS, MIN_LEARNED, RunningMean, Spread, spread_of_all};
 use super::limits::{Limits, REFERENCE_VALUE, WINDOW};
-use super::series::{History, Series};
+use super::series::{History, Key, Series};
 use crate::record::{EngineName, MeterId, ProcedureId};
 
 /// Over all groups of a history together there is at most one false alarm in so many nights, in the mean.
-pub const NIGHTS_PER_FALSE_ALARM: f64 = 30.0;
+pub const NIGHTS_PER_FALSE_ALARM: f64 = 40.0;
 /// One night alone is no change: it takes a sum no further than this share of its limit.
 const MAX_OF_ONE_NIGHT: f64 = 0.9;
 /// Changes in the same direction of one engine and procedure dated so close together are one change seen several times ...
 const SAME_CHANGE: usize = 3;
 /// ... and what a single comparison shows so many nights after its group: it needs longer.
 const SAME_CHANGE_OF_ONE: usize = 21;
+/// So many nights after it is noticed a step may still turn out to be the beginning of a drift.
+const SETTLED: usize = 14;
 
 /// How many series are judged together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, VariantArray)]
@@ -52,7 +56,7 @@ impl Level {
     }
 }
 
-/// A deviation that has changed and stayed; nights are counted from the first of the history.
+/// A deviation that has changed; nights are counted from the first of the history.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
     pub level: Level,
@@ -61,13 +65,28 @@ pub struct Change {
     pub part: Part,
     /// The first after the change, by estimate.
     pub night: usize,
+    /// That on which it was first told as what it is told as.
     pub noticed: usize,
-    /// How far the deviation moved, in standard errors of a reading, in the mean over the group.
-    pub standard_errors: f64,
-    /// Likewise relative to the reference.
-    pub relative: f64,
+    pub course: Course,
     /// The cases and comparisons that show the same change by themselves.
     pub seen_in: Vec<Part>,
+}
+
+/// How a deviation changed, in the mean over the group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Course {
+    /// From one level to another, where it stayed: in standard errors of a reading, and relative to the reference.
+    Step { standard_errors: f64, relative: f64 },
+    /// Night after night by as much again, relative to the reference, plus or minus `half_width`; up to a night, or still.
+    Drift { a_night: f64, half_width: f64, until: Option<usize> },
+}
+
+impl Course {
+    const fn is_upwards(self) -> bool {
+        match self {
+            Self::Step { relative: by, .. } | Self::Drift { a_night: by, .. } => by > 0.0,
+        }
+    }
 }
 
 /// A case of an engine and procedure or one comparison of it; none is all.
@@ -77,24 +96,50 @@ pub struct Part {
     pub meter: Option<MeterId>,
 }
 
-/// The changes of a history, by night and level. What several levels see of one engine and procedure at once is one change.
+/// The changes of a history, by night and level. What several levels see of one engine and procedure at once is one change;
+/// what narrower ones see of a drift is taken out of them.
 pub fn changes(history: &History) -> Vec<Change> {
-    let mut found: Vec<Change> = vec![];
-    for change in Level::VARIANTS.iter().copied().flat_map(|level| at_level(history, level)) {
-        let same = |c: &&mut Change| {
-            let is_one_of_it = change.level == Level::Comparison && c.level < Level::Comparison;
-            let after = if is_one_of_it { SAME_CHANGE_OF_ONE } else { SAME_CHANGE };
-            (&c.engine, c.procedure) == (&change.engine, change.procedure)
-                && (c.night..=c.night + SAME_CHANGE + after).contains(&(change.night + SAME_CHANGE))
-                && (c.standard_errors > 0.0) == (change.standard_errors > 0.0)
-        };
-        match found.iter_mut().find(same) {
-            Some(wider) => wider.seen_in.push(change.part),
-            None => found.push(change),
+    let (mut found, mut history): (Vec<Change>, _) = (vec![], Cow::Borrowed(history));
+    for level in Level::VARIANTS.iter().copied() {
+        let here = at_level(&history, level);
+        for change in &here {
+            if let Course::Drift { until, .. } = change.course {
+                let ramp = change.night..until.unwrap_or(history.nights.len());
+                let is_in_it = |s: &&mut Series| change.holds(&s.key);
+                history.to_mut().series.iter_mut().filter(is_in_it).for_each(|s| level_out(s, &ramp));
+            }
+        }
+        for change in here {
+            let same = |c: &&mut Change| {
+                let is_one_of_it = change.level == Level::Comparison && c.level < Level::Comparison;
+                let after = if is_one_of_it { SAME_CHANGE_OF_ONE } else { SAME_CHANGE };
+                let is_then = match change.course {
+                    Course::Step { .. } => {
+                        (c.night..=c.night + SAME_CHANGE + after).contains(&(change.night + SAME_CHANGE))
+                    }
+                    // A few uncertain readings may take a step for a drift, whose line then runs across it.
+                    Course::Drift { .. } => (change.night..=change.noticed + after).contains(&(c.night + after)),
+                };
+                (&c.engine, c.procedure) == (&change.engine, change.procedure)
+                    && is_then
+                    && c.course.is_upwards() == change.course.is_upwards()
+            };
+            match found.iter_mut().find(same) {
+                Some(wider) => wider.seen_in.push(change.part),
+                None => found.push(change),
+            }
         }
     }
     found.sort_by_key(|a| (a.night, a.level));
     found
+}
+
+impl Change {
+    fn holds(&self, key: &Key) -> bool {
+        (&self.engine, self.procedure) == (&key.reading.engine, key.reading.procedure)
+            && self.part.case.as_ref().is_none_or(|case| *case == key.reading.case)
+            && self.part.meter.as_ref().is_none_or(|meter| *meter == key.meter)
+    }
 }
 
 fn at_level(history: &History, level: Level) -> Vec<Change> {
@@ -120,9 +165,8 @@ fn at_level(history: &History, level: Level) -> Vec<Change> {
             part: part.clone(),
             night: alarm.night,
             noticed: alarm.noticed,
-            standard_errors: alarm.shift.0,
-            relative: alarm.shift.1,
-            seen_in: vec![],
+            course: alarm.course,
+            seen_in: alarm.seen_in,
         };
         let watch = Watch { limits, peers: cases.get(&of).map_or(&[], Vec::as_slice) };
         found.extend(watch.alarms(&members, history.nights.len()).into_iter().map(named));
@@ -149,7 +193,9 @@ fn spreads_of_cases(history: &History) -> BTreeMap<Case<'_>, Vec<Spread>> {
 struct Alarm {
     night: usize,
     noticed: usize,
-    shift: (f64, f64),
+    course: Course,
+    /// Of a drift, the cases that show it by themselves.
+    seen_in: Vec<Part>,
 }
 
 struct Watch<'a> {
@@ -163,31 +209,64 @@ impl Watch<'_> {
     /// change were picked for being unusual, and would predict the next ones wrong.
     fn alarms(&self, members: &[&Series], nights: usize) -> Vec<Alarm> {
         let mut found: Vec<Alarm> = vec![];
-        let mut start = 0;
-        while let Some((night, noticed)) = self.first_alarm(members, start..nights) {
-            found.push(Alarm { night, noticed, shift: shift(members, start, night, noticed) });
-            start = noticed + 1;
+        let (mut start, mut first_step) = (0, None);
+        while let Some((night, noticed)) = self.first_alarm(self.off_the_level(members, start..nights)) {
+            let trend = Trend::of(members, start, night, nights);
+            // With the step before it, this one may be part of a drift that is too slow for one alone to tell.
+            let longer = first_step.map(|(start, night)| Trend::of(members, start, night, nights));
+            let told = (noticed..nights.min(noticed + SETTLED)).find_map(|night| {
+                let of_two = || longer.as_ref().and_then(|trend| Some((trend, night, trend.drift(night + 1, 2)?)));
+                trend.drift(night + 1, 1).map(|drift| (&trend, night, drift)).or_else(of_two)
+            });
+            if let Some((trend, noticed, drift)) = told {
+                found.truncate(found.len() - usize::from(trend.start < start));
+                let end = self.first_alarm(trend.off_the_line(&drift, noticed + 1));
+                (start, first_step) = (end.map_or(nights, |(_, noticed)| noticed + 1), None);
+                let until = end.map(|(night, _)| night);
+                let line = trend.line(until.unwrap_or(nights)).unwrap_or(drift);
+                let [a_night, half_width] = [line.slope, line.half_width].map(|v| v * trend.relative);
+                let night = line.night + 1;
+                let shows_it = |members: &[&Series]| {
+                    let drift = Trend::of(members, trend.start, night, nights).drift(until.unwrap_or(nights), 1);
+                    drift.is_some_and(|own| own.slope * line.slope > 0.0)
+                };
+                let cases = members.chunk_by(|a, b| a.key.reading.case == b.key.reading.case);
+                let cases = cases.filter(|case| case.len() < members.len() && shows_it(case));
+                let part = |case: &[&Series]| Part { case: Some(case[0].key.reading.case.clone()), meter: None };
+                let (seen_in, course) = (cases.map(part).collect(), Course::Drift { a_night, half_width, until });
+                found.push(Alarm { night, noticed, course, seen_in });
+            } else {
+                (start, first_step) = (noticed + 1, Some((start, night)));
+                let moved = trend.step(night..noticed + 1);
+                let (standard_errors, relative) = (moved * trend.standard_errors, moved * trend.relative);
+                let course = Course::Step { standard_errors, relative };
+                found.push(Alarm { night, noticed, course, seen_in: vec![] });
+            }
         }
         found
     }
 
-    /// The night of the first change of a segment, and that on which it is noticed.
-    fn first_alarm(&self, members: &[&Series], segment: Range<usize>) -> Option<(usize, usize)> {
-        let most = REFERENCE_VALUE + MAX_OF_ONE_NIGHT * self.limits.sum;
+    /// What each night of a segment brings that the mean of the nights before it did not predict, as normal deviates.
+    fn off_the_level(&self, members: &[&Series], segment: Range<usize>) -> impl Iterator<Item = (usize, f64)> {
         let mut means = vec![RunningMean::default(); members.len()];
         let mut spread = Spread::default();
-        let mut deviates = vec![];
-        let (mut sums, mut zero) = ([0.0_f64; 2], [0; 2]);
-        for night in segment {
+        segment.filter_map(move |night| {
             let updates = members.iter().zip(&mut means).filter_map(|(series, mean)| mean.update(series, night));
-            let Some(innovation) = Innovation::of_group(updates) else { continue };
+            let innovation = Innovation::of_group(updates)?;
             let known = self.peers.get(night).map_or(spread, |peers| spread.moderated_by(*peers));
-            let deviate = known.deviate(innovation).clamp(-most, most);
             let is_learning = spread.count < MIN_LEARNED;
             spread.update(innovation);
-            if is_learning {
-                continue;
-            }
+            (!is_learning).then(|| (night, known.deviate(innovation)))
+        })
+    }
+
+    /// The night of the first change of a segment, and that on which it is noticed.
+    fn first_alarm(&self, nights: impl Iterator<Item = (usize, f64)>) -> Option<(usize, usize)> {
+        let most = REFERENCE_VALUE + MAX_OF_ONE_NIGHT * self.limits.sum;
+        let mut deviates = vec![];
+        let (mut sums, mut zero) = ([0.0_f64; 2], [0; 2]);
+        for (night, deviate) in nights {
+            let deviate = deviate.clamp(-most, most);
             deviates.push((night, deviate));
             for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
                 sums[side] += sign * deviate - REFERENCE_VALUE;
@@ -219,32 +298,20 @@ fn most_likely(deviates: &[(usize, f64)]) -> usize {
     best.1
 }
 
-/// How far a group's deviations moved at a change: in standard errors and relative to the reference.
-fn shift(members: &[&Series], start: usize, change: usize, noticed: usize) -> (f64, f64) {
-    let (mut errors, mut relative, mut count) = (0.0, 0.0, 0.0);
-    for series in members {
-        let mean = |values: &[f64], nights: Range<usize>| {
-            let there = nights.filter(|n| series.deviation[*n].is_finite()).map(|n| values[n]);
-            let (sum, count) = there.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
-            sum / count
-        };
-        let moved = mean(&series.deviation, change..noticed + 1) - mean(&series.deviation, start..change);
-        let reference = mean(&series.reference, start..noticed + 1).abs();
-        let squares: Vec<f64> = series.std_error.iter().map(|e| e * e).collect();
-        let error = mean(&squares, start..noticed + 1).sqrt().max(MIN_ERROR * reference).max(f64::MIN_POSITIVE);
-        if moved.is_finite() {
-            errors += moved / error;
-            relative += if reference > 0.0 { moved / reference } else { 0.0 };
-            count += 1.0;
-        }
+/// Takes out of a series the line that it shows itself over the nights of a drift, so that what is left is its own.
+fn level_out(series: &mut Series, ramp: &Range<usize>) {
+    let along = |night: usize| (night + 1).clamp(ramp.start, ramp.end).saturating_sub(ramp.start) as f64;
+    let before = ramp.start.saturating_sub(ramp.len())..ramp.end;
+    let points: Vec<_> = before.map(|n| (along(n), series.deviation[n])).filter(|(_, d)| d.is_finite()).collect();
+    if let Some(line) = Line::through(&points) {
+        series.deviation.iter_mut().enumerate().for_each(|(night, d)| *d -= line.slope * along(night));
     }
-    (errors / count, relative / count)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trend::history::synthetic::{Shift, Synthetic};
+    use crate::trend::history::synthetic::{Drift, Shift, Synthetic};
 
     /// Seeds of the simulations; each is a year of 2000 comparisons a night.
     const SEEDS: Range<u64> = 0..12;
@@ -281,14 +348,71 @@ mod tests {
     }
 
     #[test]
-    fn a_year_without_change_has_at_most_one_false_alarm_a_month_over_all_series() {
-        for common in [0.0, 1.0] {
-            let made = |seed| Synthetic { seed, common, ..Synthetic::default() }.history();
-            let alarms: usize = SEEDS.map(|seed| changes(&made(seed)).len()).sum();
-            let months = 12.0 * all() as f64;
-            println!("{alarms} false alarms in {months} months");
-            assert!(alarms as f64 <= months, "{alarms} in {months} months");
+    fn three_hundred_nights_without_change_have_at_most_ten_alarms_over_all_series() {
+        // Other seeds than the limits and the evidence of drifts were chosen with.
+        for (common, seeds) in [(0.0, 1000..1016), (1.0, 2000..2008)] {
+            let made = |seed| Synthetic { seed, common, nights: 300, ..Synthetic::default() }.history();
+            let alarms: Vec<usize> = seeds.map(|seed| changes(&made(seed)).len()).collect();
+            println!("{alarms:?} false alarms");
+            assert!(alarms.iter().all(|count| *count <= 10), "{alarms:?}");
+            // In the mean as many as promised.
+            let nights = 300.0 * alarms.len() as f64;
+            assert!(alarms.iter().sum::<usize>() as f64 <= nights / NIGHTS_PER_FALSE_ALARM * 1.3, "{alarms:?}");
         }
+    }
+
+    /// Of Mitsuba's indirect light, since a night: the changes that are told so many nights after a planted one.
+    fn told(base: &Synthetic, since: usize) -> Vec<Change> {
+        let is_mine = |c: &Change| is_of_shifted(c) && c.noticed >= since;
+        changes(&base.history()).into_iter().filter(is_mine).collect()
+    }
+
+    #[test]
+    fn a_drift_of_a_twentieth_of_a_percent_a_night_is_told_as_one_within_ten_nights_with_its_slope() {
+        const A_NIGHT: f64 = 5e-4;
+        let (mut as_drift, mut as_it_is, mut further) = (0, 0, 0);
+        for seed in 100..112 {
+            let first = 60 + 7 * (seed as usize % 20);
+            let drift = Some(Drift { nights: (first, usize::MAX), a_night: A_NIGHT, cases: 5 });
+            let found = told(&Synthetic { seed, nights: first + 10, drift, ..Synthetic::default() }, first);
+            let is_it = |c: &Change| match c.course {
+                Course::Drift { a_night, half_width, until: None } => Some((a_night - A_NIGHT).abs() <= half_width),
+                Course::Drift { .. } | Course::Step { .. } => None,
+            };
+            let [one] = &found[..] else {
+                further += 1;
+                continue;
+            };
+            as_drift += usize::from(is_it(one).is_some() && one.level == Level::EngineAndProcedure);
+            as_it_is +=
+                usize::from(is_it(one) == Some(true) && one.night.abs_diff(first) <= 2 && one.seen_in.len() == 5);
+        }
+        println!(
+            "{as_drift} told as a drift and nothing else, {as_it_is} with slope, date and cases, {further} as more"
+        );
+        assert!(as_drift >= 11 && as_it_is >= 10, "{as_drift} {as_it_is} {further}");
+    }
+
+    #[test]
+    fn a_drift_that_ends_is_one_drift_with_both_dates_and_a_step_is_none() {
+        let (mut ended, mut steps) = (0, 0);
+        for seed in SEEDS {
+            let nights = (80, 110);
+            let drift = Some(Drift { nights, a_night: 5e-4, cases: 5 });
+            let found = told(&Synthetic { seed, nights: 160, drift, ..Synthetic::default() }, nights.0);
+            let is_it = |c: &Change| {
+                let Course::Drift { until: Some(end), .. } = c.course else { return false };
+                c.night.abs_diff(nights.0) <= 2 && end.abs_diff(nights.1) <= 2
+            };
+            ended += usize::from(found.iter().any(is_it));
+            let shift = Some(Shift { night: 80, ..SEEN });
+            let found = told(&Synthetic { seed, nights: 110, shift, ..Synthetic::default() }, 80);
+            let is_step = |c: &Change| matches!(c.course, Course::Step { .. }) && c.night.abs_diff(80) <= 2;
+            let is_drift = |c: &Change| matches!(c.course, Course::Drift { .. });
+            steps += usize::from(found.iter().any(is_step) && !found.iter().any(is_drift));
+        }
+        println!("{ended} drifts with both dates, {steps} steps told as steps alone, of {}", all());
+        assert!(ended + 1 >= all() && steps + 1 >= all(), "{ended} {steps}");
     }
 
     #[test]
@@ -351,7 +475,11 @@ mod tests {
         assert_eq!(dates, [(20, 21)]);
         nights[12] = 0.0;
         let found = &exact(&nights)[0];
-        assert!((found.relative - 1e-5).abs() < 1e-12 && (found.standard_errors - 10.0).abs() < 1e-6, "{found:?}");
+        assert!(
+            matches!(found.course, Course::Step { standard_errors, relative }
+            if (relative - 1e-5).abs() < 1e-12 && (standard_errors - 10.0).abs() < 1e-6),
+            "{found:?}"
+        );
     }
 
     #[test]

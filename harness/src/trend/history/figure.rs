@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::change::Change;
+use super::change::{Change, Course};
 use super::series::{History, Series, VersionChange};
 use crate::record::{EngineName, ProcedureId};
 
@@ -57,9 +57,7 @@ pub(super) fn figure(history: &History, engine: &EngineName, procedure: Procedur
                 figcaption id={ (id) "-caption" } {
                     "Mean deviation of " (members.len()) " comparisons, last " (percent(*last)) ". "
                     @if mine.is_empty() { "No change. " }
-                    @for change in &mine {
-                        "Change on " (history.nights[change.night]) " by " (percent(change.relative)) ". "
-                    }
+                    @for change in &mine { "It " (course(history, change)) ". " }
                     @for version in &versions {
                         "Version " (version.to) " from " (history.nights[version.night]) ". "
                     }
@@ -67,6 +65,27 @@ pub(super) fn figure(history: &History, engine: &EngineName, procedure: Procedur
             } @else {
                 p.soft id={ (id) "-caption" } { "No readings." }
             }
+        }
+    }
+}
+
+/// What a deviation did, and when: `drifts by +0.0500 % ± 0.0060 % a night since 2026-03-01`.
+pub(super) fn course(history: &History, change: &Change) -> String {
+    let (date, by) = (|night: usize| history.nights.get(night).map_or("", String::as_str), by(change.course));
+    match change.course {
+        Course::Step { .. } => format!("changed by {by} on {}", date(change.night)),
+        Course::Drift { until: None, .. } => format!("drifts by {by} since {}", date(change.night)),
+        Course::Drift { until: Some(end), .. } => {
+            format!("drifted by {by} from {} to {}", date(change.night), date(end.saturating_sub(1)))
+        }
+    }
+}
+
+pub(super) fn by(course: Course) -> String {
+    match course {
+        Course::Step { relative, .. } => percent(relative),
+        Course::Drift { a_night, half_width, .. } => {
+            format!("{} ± {} a night", percent(a_night), percent(half_width).trim_start_matches('+'))
         }
     }
 }

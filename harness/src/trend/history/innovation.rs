@@ -9,7 +9,7 @@ pub(super) const MAX_SPREADS: f64 = 4.0;
 /// Of a standard error, relative to the reference: for engines that state none. A change far below any tolerance is one still.
 pub(super) const MIN_ERROR: f64 = 1e-6;
 /// Of a group's innovations, in standard errors: for what repeats exactly.
-const MIN_SPREAD: f64 = 0.1;
+pub(super) const MIN_SPREAD: f64 = 0.1;
 /// The spread of all comparisons of a case counts for so many nights in that of each.
 const MAX_PEER_NIGHTS: usize = 50;
 /// A standard error so many times the usual is believed; one below may be chance, being estimated from few blocks.
@@ -17,7 +17,7 @@ const UNUSUAL: f64 = 2.0;
 
 /// A night's deviation less the one predicted, in standard errors of their difference.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Innovation(f64);
+pub(super) struct Innovation(pub(super) f64);
 
 impl Innovation {
     /// That of a group: the sum over the square root of their number; `None` without any.
@@ -35,6 +35,11 @@ pub(super) struct Spread {
 }
 
 impl Spread {
+    /// One that so many innovations told before, by the sum of their squares.
+    pub(super) const fn known(squares: f64, count: usize) -> Self {
+        Self { squares, count }
+    }
+
     fn value(&self) -> f64 {
         (self.squares / self.count.max(1) as f64).sqrt().max(MIN_SPREAD)
     }

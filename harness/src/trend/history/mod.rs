@@ -4,6 +4,7 @@
 //! follows from it (series, change points, the site) is computed anew from the lines each time; nothing is stored twice.
 
 mod change;
+mod drift;
 mod figure;
 mod file;
 mod innovation;
@@ -14,8 +15,8 @@ mod site;
 #[cfg(test)]
 mod synthetic;
 
-pub use change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part, changes};
+pub use change::{Change, Course, Level, NIGHTS_PER_FALSE_ALARM, Part, changes};
 pub use file::{Added, add};
 pub use line::{HistoryError, Line, Numbers, lines};
 pub use series::{History, Key, Series, VersionChange};
-pub use site::site;
+pub use site::{in_words, site};

@@ -2,8 +2,8 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::change::{Change, Level, NIGHTS_PER_FALSE_ALARM, Part};
-use super::figure::{figure, mean_deviation, percent};
+use super::change::{Change, Course, Level, NIGHTS_PER_FALSE_ALARM, Part};
+use super::figure::{by, course, figure, mean_deviation, percent};
 use super::series::History;
 use crate::judge::Verdict;
 use crate::record::{EngineName, ProcedureId};
@@ -37,7 +37,7 @@ pub fn site(history: &History, changes: &[Change], reports: &[(String, String)])
                     (changed(history, changes))
                     h2 { "Trends" }
                     p.soft {
-                        "A red line with a triangle is a change of the deviation, a dashed line a new version of the engine. "
+                        "A red line with a triangle is a change of the deviation or the beginning of a drift, a dashed line a new version of the engine. "
                         "The mean counts a reading by the inverse of its standard error."
                     }
                     div.trends {
@@ -85,7 +85,7 @@ fn tonight(history: &History) -> Markup {
 /// What changed, the latest first.
 fn changed(history: &History, changes: &[Change]) -> Markup {
     const HEADS: [&str; 8] =
-        ["since", "noticed", "engine", "procedure", "where", "number by", "number standard errors", "new version"];
+        ["since", "noticed", "engine", "procedure", "where", "by", "number standard errors", "new version"];
     html! {
         h2 { "Changes" }
         @if changes.is_empty() {
@@ -96,8 +96,15 @@ fn changed(history: &History, changes: &[Change]) -> Markup {
                     tr {
                         td.date { (history.nights[change.night]) } td.date { (history.nights[change.noticed]) }
                         td { (change.engine) } td { (change.procedure) } td { (place(change)) }
-                        td.number { (percent(change.relative)) }
-                        td.number { (format!("{:+.1}", change.standard_errors)) }
+                        td {
+                            @match change.course {
+                                Course::Step { .. } => (by(change.course)),
+                                Course::Drift { .. } => (course(history, change)),
+                            }
+                        }
+                        td.number {
+                            @if let Course::Step { standard_errors, .. } = change.course { (format!("{standard_errors:+.1}")) }
+                        }
                         td { (version(history, change).unwrap_or_default()) }
                     }
                 }
@@ -106,9 +113,16 @@ fn changed(history: &History, changes: &[Change]) -> Markup {
         p.soft {
             "Found by sums over nights; at most one false alarm in "
             (format!("{NIGHTS_PER_FALSE_ALARM:.0}")) " nights is to be expected over all series together. "
-            "One bad night is no change."
+            "One bad night is no change. What goes further night after night is a drift: a line fits it better than steps do."
         }
     }
+}
+
+/// A change in one line of text.
+pub fn in_words(history: &History, change: &Change) -> String {
+    let Change { engine, procedure, noticed, .. } = change;
+    let noticed = history.nights.get(*noticed).map_or("", String::as_str);
+    format!("{engine} {procedure}, {}: {}, noticed on {noticed}", place(change), course(history, change))
 }
 
 fn place(change: &Change) -> String {
@@ -139,7 +153,7 @@ fn version(history: &History, change: &Change) -> Option<String> {
 mod tests {
     use super::*;
     use crate::trend::history::changes;
-    use crate::trend::history::synthetic::{Shift, Synthetic};
+    use crate::trend::history::synthetic::{Drift, Shift, Synthetic};
 
     const PROCEDURE: ProcedureId = ProcedureId::IndirectIlluminance;
 
@@ -171,6 +185,22 @@ mod tests {
         assert!(!quiet.contains("class=\"change\"") && !quiet.contains("class=\"version\""), "{quiet}");
         // Nothing is fetched from anywhere.
         assert!(!page.contains("http") && !page.contains("<script"));
+    }
+
+    #[test]
+    fn a_drift_is_told_with_its_slope_its_interval_and_its_first_night() {
+        let drift = Some(Drift { nights: (30, 100), a_night: 5e-4, cases: 2 });
+        let made = Synthetic { nights: 45, cases: 2, meters: 20, drift, ..Synthetic::default() };
+        let history = made.history();
+        let changes = changes(&history);
+        let is_it = |c: &&Change| c.engine == "mitsuba" && matches!(c.course, Course::Drift { .. });
+        let words = in_words(&history, changes.iter().find(is_it).unwrap());
+        let (slope, rest) = words.split_once("drifts by +0.0").unwrap().1.split_once(" % ± 0.00").unwrap();
+        assert!(slope.starts_with("49") || slope.starts_with("50"), "{words}");
+        assert!(rest.contains(&format!(" % a night since {}, noticed", history.nights[30])), "{words}");
+        let page = site(&history, &changes, &[]);
+        // In the table, and below the trend.
+        assert_eq!(page.matches("drifts by +0.0").count(), 2, "{words}");
     }
 
     #[test]

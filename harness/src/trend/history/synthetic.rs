@@ -26,6 +26,18 @@ pub(super) struct Synthetic {
     /// The first night of a new version of Mitsuba.
     pub(super) new_version: Option<usize>,
     pub(super) shift: Option<Shift>,
+    pub(super) drift: Option<Drift>,
+}
+
+/// A planted drift of Mitsuba's indirect light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drift {
+    /// The first on which it shows, and the first on which it goes no further.
+    pub(super) nights: (usize, usize),
+    /// Relative to the reference, a night.
+    pub(super) a_night: f64,
+    /// How many cases it concerns, the first ones.
+    pub(super) cases: usize,
 }
 
 /// A planted change of Mitsuba's indirect light.
@@ -40,7 +52,7 @@ pub(super) struct Shift {
 
 impl Default for Synthetic {
     fn default() -> Self {
-        Self { nights: 365, cases: 5, meters: 20, seed: 1, common: 0.0, new_version: None, shift: None }
+        Self { nights: 365, cases: 5, meters: 20, seed: 1, common: 0.0, new_version: None, shift: None, drift: None }
     }
 }
 
@@ -90,14 +102,17 @@ impl Synthetic {
     fn one(&self, of: &ReadingKey, case: usize, meter: usize, common: &[f64], random: &mut fastrand::Rng) -> Series {
         let (reference, error) = (100.0 + meter as f64, 0.05 * (1.0 + case as f64));
         let bias = 0.3 * normal(random);
-        let shifted =
-            |s: &Shift| of.engine == "mitsuba" && of.procedure == PROCEDURES[1] && case < s.cases && meter < s.meters;
-        let shift = self.shift.filter(shifted);
+        let is_subject = of.engine == "mitsuba" && of.procedure == PROCEDURES[1];
+        let shift = self.shift.filter(|s| is_subject && case < s.cases && meter < s.meters);
+        let drift = self.drift.filter(|d| is_subject && case < d.cases);
         let (own, shared) = ((1.0 - self.common).sqrt(), self.common.sqrt());
         let (mut deviation, mut std_error) = (vec![], vec![]);
         for (night, common) in common.iter().enumerate().take(self.nights) {
             let moved = shift.filter(|s| night >= s.night).map_or(0.0, |s| s.standard_errors);
-            deviation.push(bias + error * (own * normal(random) + shared * common + moved));
+            let along = drift.map_or(0.0, |Drift { nights: (first, end), a_night, .. }| {
+                a_night * reference * (night + 1).clamp(first, end).saturating_sub(first) as f64
+            });
+            deviation.push(bias + error * (own * normal(random) + shared * common + moved) + along);
             let squares: f64 = (0..7).map(|_| normal(random).powi(2)).sum();
             std_error.push(error * (squares / 7.0).sqrt());
         }

@@ -1,0 +1,107 @@
+//! Readings again with other seeds, of engines whose errors nobody else vouches for: do they scatter as is stated of them?
+//!
+//! Our own drivers state how their blocks scatter, which they have seen. A user's program says whatever it says. What it sampled is
+//! read three times more at a quarter of the effort; of what it claims without any chance a random twentieth is read again, and
+//! all of it where that is another value.
+
+use std::collections::BTreeMap;
+
+use super::jobs::{Outcome, Running};
+use super::sampling::{seed_of_look, stations_of};
+use crate::engines::Job;
+use crate::judge::LOOKS;
+use crate::measure::Question;
+use crate::plan::Run;
+use crate::record::{EngineName, Estimate, Reading, StatedErrors, Uncertainty};
+use crate::spec::Budget;
+
+const REPETITIONS: u32 = 3;
+/// Effort of each against that of the first look.
+const EFFORT: f64 = 0.25;
+/// The part of what is claimed that is read again, one reading of a task at least.
+const PART: f64 = 0.05;
+/// Two values of one determined reading differ by the rounding of single precision at most, relative.
+const ROUNDING: f64 = 1e-6;
+
+/// Reads again, tells in the recordings what is found, and gives readings the errors that they have: by engine, of what it sampled
+/// and of what it claims.
+pub(super) fn examine(running: &Running<'_>, outcome: &mut Outcome) -> BTreeMap<EngineName, Vec<StatedErrors>> {
+    let mut found = BTreeMap::new();
+    for (e, planned) in running.plan.engines.iter().enumerate().filter(|(_, p)| !p.engine.is_vouched_for()) {
+        let name = planned.engine.name();
+        let (mut sampled, mut claims) = (vec![], vec![]);
+        for run in running.plan.runs.iter().filter(|run| run.engine == e) {
+            let procedure = running.plan.tasks[run.task].procedure;
+            let mine = outcome.recordings.iter().find(|r| r.key.engine == name && r.key.procedure == procedure);
+            let readings = mine.map_or(&[][..], |r| &r.readings);
+            let of = |is_sampled: bool| -> Vec<usize> {
+                (0..readings.len()).filter(|k| readings[*k].uncertainty.is_sampled() == is_sampled).collect()
+            };
+            sampled.extend(repeated(running, run, readings, &of(true), EFFORT));
+            claims.extend(contradicted(running, run, readings, &of(false)));
+        }
+        let doubts = [StatedErrors::of_sampled(&sampled), StatedErrors::of_claims(&claims)];
+        found.insert(name, doubts.into_iter().flatten().collect());
+    }
+    for recording in &mut outcome.recordings {
+        let Some(of_engine) = found.get(&recording.key.engine) else { continue };
+        recording.stated_errors.clone_from(of_engine);
+        for reading in &mut recording.readings {
+            reading.uncertainty = StatedErrors::corrected(of_engine, estimate(reading)).uncertainty;
+        }
+    }
+    found
+}
+
+fn estimate(reading: &Reading) -> Estimate {
+    Estimate { value: reading.value, uncertainty: reading.uncertainty }
+}
+
+/// What is claimed to be determined, where another seed reads otherwise: every such reading, several times.
+fn contradicted(running: &Running<'_>, run: &Run, readings: &[Reading], claimed: &[usize]) -> Vec<Vec<Estimate>> {
+    let mut drawn = claimed.to_vec();
+    fastrand::Rng::with_seed(run.job.seed).shuffle(&mut drawn);
+    drawn.truncate((PART * claimed.len() as f64).ceil() as usize);
+    let Some(again) = read(running, run, &drawn, 1, 1.0) else { return vec![] };
+    let differs = |(k, now): (&usize, &Estimate)| {
+        let bound = readings[*k].uncertainty.bound() + now.uncertainty.bound();
+        (now.value - readings[*k].value).abs() > bound + ROUNDING * now.value.max(readings[*k].value)
+    };
+    if drawn.iter().zip(&again).any(differs) { repeated(running, run, readings, claimed, 1.0) } else { vec![] }
+}
+
+/// The readings of targets with those of other seeds; none where the engine does not answer again.
+fn repeated(
+    running: &Running<'_>,
+    run: &Run,
+    readings: &[Reading],
+    targets: &[usize],
+    effort: f64,
+) -> Vec<Vec<Estimate>> {
+    let again: Vec<Vec<Estimate>> =
+        (1..=REPETITIONS).filter_map(|number| read(running, run, targets, number, effort)).collect();
+    let of = |(k, target): (usize, &usize)| {
+        let seen = again.iter().map(|estimates| estimates[k]);
+        seen.chain([estimate(&readings[*target])]).filter(|e| e.uncertainty != Uncertainty::NotSeen).collect()
+    };
+    targets.iter().enumerate().map(of).collect()
+}
+
+fn read(running: &Running<'_>, run: &Run, targets: &[usize], number: u32, effort: f64) -> Option<Vec<Estimate>> {
+    if targets.is_empty() {
+        return None;
+    }
+    let (planned, task) = (&running.plan.engines[run.engine], &running.plan.tasks[run.task]);
+    let Budget { relative_error, seconds } = run.job.budget;
+    let job = Job {
+        stations: stations_of(run, task, targets),
+        budget: Budget { relative_error: relative_error / effort.sqrt(), seconds: effort * seconds },
+        // Beyond those of all looks.
+        seed: seed_of_look(run.job.seed, LOOKS + number),
+        ..run.job.clone()
+    };
+    let folder = format!("{}/repetition-{number}", task.procedure);
+    let taken = running.reader.read(&Question::new(&planned.instrument()?, &job, &folder));
+    let taken = taken.inspect_err(|error| tracing::warn!("{}: not read again: {error}", planned.engine.name())).ok()?;
+    Some(taken.measurement.readings(targets.iter().map(|k| &task.targets[*k])))
+}

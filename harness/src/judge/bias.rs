@@ -1,0 +1,182 @@
+//! Bias: whether an engine's readings lie off their references together, below any tolerance.
+//!
+//! The weighted mean of the relative deviations (weights 1/u²), its uncertainty widened by the Birge ratio where they scatter more than
+//! they say (Birge, Phys. Rev. 40 (1932) 207) and for weights that are themselves estimated (Meier, Biometrics 9 (1953) 59), and the
+//! probability of a mean so far off, were there no bias.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+use super::uncertainty::{Component, ErrorBudget, Source, upper_tail_of_normal};
+use super::{Basis, Comparison, Judge};
+use crate::record::{ReadingKey, Uncertainty};
+
+/// Values without uncertainty may differ by the rounding of single precision, which renderers compute in.
+pub const SINGLE_PRECISION: f64 = 1e-6;
+
+/// The mean deviation of an engine's readings from one kind of reference, relative.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Bias {
+    #[serde(flatten)]
+    pub key: ReadingKey,
+    pub basis: Basis,
+    /// How many readings it is the mean of.
+    pub readings: usize,
+    /// Weighted by 1/u²; plain where no reading has an uncertainty.
+    pub mean: f64,
+    /// The interval of the mean at the coverage of verdicts; without uncertainties the range of the deviations.
+    pub low: f64,
+    pub high: f64,
+    /// How probable a mean this far off is where there is no bias; null without uncertainties.
+    pub p_value: Option<f64>,
+}
+
+impl fmt::Display for Bias {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [mean, low, high] = [self.mean, self.low, self.high].map(|x| 100.0 * x);
+        write!(f, "{mean:+.3} % [{low:+.3}, {high:+.3}]")?;
+        match self.p_value {
+            Some(p) => write!(f, ", p = {p:.2}"),
+            None => write!(f, ", range of {}", self.readings),
+        }
+    }
+}
+
+/// The weighted mean of values that state uncertainties, widened where they scatter more than they say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WeightedMean {
+    pub value: f64,
+    /// Standard.
+    pub uncertainty: f64,
+    pub degrees_of_freedom: Option<f64>,
+}
+
+/// Meier's term is the first of a series in 1 / degrees of freedom: simulated up to 192 meters, it is too small for fewer than these.
+const FEWEST_FOR_WEIGHTS: f64 = 7.0;
+
+impl WeightedMean {
+    /// Of values with their standard uncertainties, all positive, and the degrees of freedom of these; `None` of fewer than two.
+    pub fn of(values: &[(f64, f64, Option<f64>)]) -> Option<Self> {
+        if values.len() < 2 {
+            return None;
+        }
+        let weights: f64 = values.iter().map(|(_, u, _)| u.powi(-2)).sum();
+        let value = values.iter().map(|(d, u, _)| d * u.powi(-2)).sum::<f64>() / weights;
+        let scatter = values.iter().map(|(d, u, _)| ((d - value) / u).powi(2)).sum::<f64>();
+        let birge = scatter / (values.len() - 1) as f64;
+        // Shares of the mean with the degrees of freedom that each is known by.
+        let shares = || values.iter().filter_map(|(_, u, freedom)| Some((u.powi(-2) / weights, (*freedom)?)));
+        let fewest = shares().map(|(_, freedom)| freedom).reduce(f64::min);
+        let meier = 1.0 + 4.0 * shares().map(|(share, freedom)| share * (1.0 - share) / freedom).sum::<f64>();
+        let all = shares().map(|(share, freedom)| share * share / freedom).sum::<f64>().recip();
+        let degrees_of_freedom = fewest.map(|fewest| if fewest < FEWEST_FOR_WEIGHTS { fewest } else { all });
+        Some(Self { value, uncertainty: (birge.max(meier) / weights).sqrt(), degrees_of_freedom })
+    }
+
+    /// The probability of a mean at least this far from nothing, were there nothing.
+    pub fn p_value(&self) -> f64 {
+        if self.value.abs() <= SINGLE_PRECISION {
+            1.0
+        } else {
+            two_sided(self.value / self.uncertainty, self.degrees_of_freedom)
+        }
+    }
+}
+
+/// Probability of a standardised deviation at least this large, either way.
+pub fn two_sided(z: f64, degrees_of_freedom: Option<f64>) -> f64 {
+    let student = degrees_of_freedom.and_then(|f| StudentsT::new(0.0, 1.0, f).ok());
+    2.0 * student.map_or_else(|| Normal::standard().sf(z.abs()), |t| t.sf(z.abs()))
+}
+
+impl Judge<'_> {
+    /// The bias of every engine of a task, against each kind of reference; comparisons without a relative deviation tell nothing.
+    pub fn bias(&self, comparisons: &[Comparison]) -> Vec<Bias> {
+        let mut groups: BTreeMap<(&ReadingKey, Basis), Vec<Deviation>> = BTreeMap::new();
+        for c in comparisons.iter().filter(|c| c.uncertainty != Uncertainty::NotSeen) {
+            let (Some(reference), Some(budget)) = (&c.reference, &c.budget) else { continue };
+            let Some(relative) = c.relative_deviation else { continue };
+            let uncertainty = budget.combined / reference.value.abs();
+            let deviation = Deviation { relative, uncertainty, degrees_of_freedom: budget.degrees_of_freedom };
+            groups.entry((&c.key, reference.basis)).or_default().push(deviation);
+        }
+        let tail = upper_tail_of_normal(self.tolerances.coverage_factor());
+        groups.into_iter().map(|((key, basis), all)| of_group(key, basis, &all, tail)).collect()
+    }
+}
+
+/// How far a reading lies off its reference, relative to it.
+struct Deviation {
+    relative: f64,
+    /// Standard.
+    uncertainty: f64,
+    degrees_of_freedom: Option<f64>,
+}
+
+fn of_group(key: &ReadingKey, basis: Basis, all: &[Deviation], tail: f64) -> Bias {
+    // What states no uncertainty would outweigh everything.
+    let stated = all.iter().filter(|d| d.uncertainty > SINGLE_PRECISION);
+    let stated: Vec<_> = stated.map(|d| (d.relative, d.uncertainty, d.degrees_of_freedom)).collect();
+    let (mean, low, high, p_value) = match WeightedMean::of(&stated) {
+        Some(mean) if stated.len() == all.len() => {
+            let spread = Component::normal(Source::MonteCarlo, mean.uncertainty, mean.degrees_of_freedom);
+            let expanded = ErrorBudget::new(vec![spread], tail).expanded;
+            (mean.value, mean.value - expanded, mean.value + expanded, Some(mean.p_value()))
+        }
+        _ => {
+            let deviations = || all.iter().map(|d| d.relative);
+            let mean = deviations().sum::<f64>() / all.len() as f64;
+            (mean, deviations().fold(f64::INFINITY, f64::min), deviations().fold(f64::NEG_INFINITY, f64::max), None)
+        }
+    };
+    Bias { key: key.clone(), basis, readings: all.len(), mean, low, high, p_value }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::judge::tests::{built_in, recording, task};
+    use crate::record::Estimate;
+    use crate::system::random::normal;
+
+    fn bias(readings: &[Estimate]) -> Bias {
+        let exact = recording("simulator", &vec![Estimate::exact(1.0); readings.len()]);
+        let (judge, task) = (built_in(), task(readings.len()));
+        let comparisons = judge.compare(&task, &[&exact, &recording("radiance", readings)]);
+        judge.bias(&comparisons).into_iter().find(|b| b.key.engine == "radiance").unwrap()
+    }
+
+    fn noisy(deviation: f64, stated: f64, seed: u64) -> Vec<Estimate> {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let uncertainty = Uncertainty::sampled(stated, None);
+        (0..50).map(|_| Estimate { value: 1.0 + deviation + 0.004 * normal(&mut random), uncertainty }).collect()
+    }
+
+    #[test]
+    fn a_bias_below_the_tolerance_is_found_and_none_is_not() {
+        let found = bias(&noisy(0.003, 0.004, 1));
+        assert!(found.low > 0.0 && found.low < 0.003 && found.high > 0.003, "{found}");
+        assert!(found.p_value.unwrap() < 1e-4 && found.readings == 50, "{found}");
+        let p_values: Vec<f64> = (0..200).map(|seed| bias(&noisy(0.0, 0.004, seed)).p_value.unwrap()).collect();
+        let small = p_values.iter().filter(|p| **p < 0.05).count();
+        assert!((2..=20).contains(&small), "{small} of 200 below .05, of which 10 are expected");
+    }
+
+    #[test]
+    fn scatter_beyond_what_is_stated_widens_the_interval() {
+        let (honest, bold) = (bias(&noisy(0.003, 0.004, 1)), bias(&noisy(0.003, 0.0004, 1)));
+        let width = |b: &Bias| b.high - b.low;
+        assert!((width(&bold) / width(&honest) - 1.0).abs() < 0.3, "{honest} {bold}");
+    }
+
+    #[test]
+    fn readings_without_uncertainty_have_mean_and_range_and_no_probability() {
+        let found = bias(&[Estimate::exact(1.01), Estimate::exact(0.99), Estimate::exact(1.03)]);
+        assert!((found.mean - 0.01).abs() < 1e-12 && (found.low + 0.01).abs() < 1e-12, "{found}");
+        assert_eq!((found.p_value, found.to_string()), (None, "+1.000 % [-1.000, +3.000], range of 3".to_owned()));
+    }
+}

@@ -1,0 +1,105 @@
+//! What a program states of its errors is looked into: readings of other seeds tell whether they scatter as it says.
+
+use serde_json::Value;
+
+use crate::support::{Folder, MINE, SKEW_LAMP, SKEW_ROOM, adapter, among};
+
+/// The example adapter, its illuminance times `factor` of a generator of each meter and seed, with these statements about it.
+fn run(factor: &str, stated: &str, seed: u64) -> Value {
+    let noisy = adapter()
+        .replace("\"error_bound_lx\": 1e-12 * lux", stated)
+        .replace("import ", "import random\nimport ")
+        .replace("        readings.append", &format!("        {factor}\n        readings.append"));
+    assert!(noisy.contains(stated) && noisy.contains(factor));
+    let spec = [SKEW_ROOM, MINE].concat();
+    let folder = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", SKEW_LAMP), ("adapter.py", &noisy)]);
+    folder.run(&["--no-calibration", "--no-cache", "--seed", &seed.to_string(), "--format", "json"]).report().0
+}
+
+const SAMPLED: &str = "\"std_error_lx\": stated, \"degrees_of_freedom\": 7";
+/// Normal noise of the given size, the bias, and the standard error stated, all relative.
+fn noise(bias: f64, size: f64, stated: f64) -> String {
+    format!("{RANDOM}stated = {stated} * lux; lux *= 1 + {bias} + {size} * chance.gauss(0, 1)")
+}
+
+const RANDOM: &str = "chance = random.Random(f\"{job['seed']} {job['procedure']} {meter['id']}\"); ";
+
+/// The verdicts of the program, how many of each, and what is found of its statements.
+fn verdicts(report: &Value) -> (usize, usize, Vec<&Value>) {
+    let mine = among(report, "comparisons", &[("engine", "mine")]);
+    let count = |verdict: &str| mine.iter().filter(|c| c["verdict"] == verdict).count();
+    let found = among(report, "recordings", &[("engine", "mine")])[0]["stated_errors"].as_array();
+    let doubts = found.into_iter().flatten().map(|s| &s["doubt"]).filter(|d| !d.is_null()).collect();
+    (count("pass"), count("fail"), doubts)
+}
+
+const SEEDS: std::ops::Range<u64> = 100..110;
+
+#[test]
+fn errors_three_times_too_small_are_told_and_fail_nothing_that_is_right() {
+    let (mut told, mut failed) = (0, 0);
+    for seed in SEEDS {
+        let report = run(&noise(0.009, 0.003, 0.001), SAMPLED, seed);
+        let (_, fails, doubts) = verdicts(&report);
+        told += usize::from(doubts == ["too_small"]);
+        failed += usize::from(fails > 0);
+    }
+    assert!(told >= 9 && failed <= 1, "{told} told, {failed} failed");
+}
+
+#[test]
+fn right_errors_are_believed() {
+    let (mut told, mut failed) = (0, 0);
+    for seed in SEEDS {
+        let report = run(&noise(0.015, 0.001, 0.001), SAMPLED, seed);
+        let (_, fails, doubts) = verdicts(&report);
+        told += doubts.len();
+        failed += usize::from(fails > 20);
+        let report = run(&noise(0.0, 0.001, 0.001), SAMPLED, seed);
+        assert_eq!(verdicts(&report).1, 0, "{report}");
+    }
+    assert!(told <= 1 && failed >= 9, "{told} told, {failed} failed");
+}
+
+#[test]
+fn a_heavy_tail_fails_nothing_and_names_nothing() {
+    let lognormal = format!(
+        "{RANDOM}blocks = [lux * math.exp(2 * chance.gauss(0, 1) - 2) for _ in range(8)]; lux = sum(blocks) / 8; \
+         stated = math.sqrt(sum((b - lux) ** 2 for b in blocks) / 56)"
+    );
+    for seed in SEEDS {
+        let report = run(&lognormal, SAMPLED, seed);
+        let mine = among(&report, "comparisons", &[("engine", "mine")]);
+        for comparison in mine {
+            assert_eq!(comparison["verdict"], "inconclusive", "{comparison}");
+            let said = comparison["diagnosis"].as_str().unwrap();
+            assert!(said.starts_with("too few samples") || said.starts_with("undecided"), "{said}");
+        }
+    }
+}
+
+#[test]
+fn what_is_claimed_to_be_determined_is_read_again_and_its_scatter_counts() {
+    let mut failed = 0;
+    for seed in SEEDS {
+        for claim in ["\"exact\": True", "\"std_error_lx\": 0.0", "\"error_bound_lx\": 1e-9"] {
+            let report = run(&noise(0.006, 0.004, 0.0), claim, seed);
+            let (_, fails, doubts) = verdicts(&report);
+            assert_eq!(doubts, ["scatters"], "{claim}");
+            failed += usize::from(fails > 0);
+        }
+    }
+    assert!(failed <= 3, "{failed}");
+    let report = run("pass", "\"exact\": True", 1);
+    assert_eq!(verdicts(&report), (23, 0, vec![]));
+}
+
+#[test]
+fn nothing_hides_behind_a_stated_error_of_its_own_size() {
+    let report = run(&noise(0.3, 0.001, 0.3), SAMPLED, 1);
+    let (_, fails, doubts) = verdicts(&report);
+    assert_eq!((fails, doubts), (23, vec![&Value::from("too_large")]));
+    // One that reads the same with every seed cannot be checked, which is told.
+    let report = run("stated = 0.3 * lux; lux *= 1.3", SAMPLED, 1);
+    assert_eq!(verdicts(&report).2, ["same_for_every_seed"]);
+}
