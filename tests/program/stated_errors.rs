@@ -13,7 +13,7 @@ fn run(factor: &str, stated: &str, seed: u64) -> Value {
     assert!(noisy.contains(stated) && noisy.contains(factor));
     let spec = [SKEW_ROOM, MINE].concat();
     let folder = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", SKEW_LAMP), ("adapter.py", &noisy)]);
-    folder.run(&["--no-calibration", "--no-cache", "--seed", &seed.to_string(), "--format", "json"]).report().0
+    folder.run(&["--no-cache", "--seed", &seed.to_string(), "--format", "json"]).report().0
 }
 
 const SAMPLED: &str = "\"std_error_lx\": stated, \"degrees_of_freedom\": 7";

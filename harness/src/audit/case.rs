@@ -52,7 +52,7 @@ impl Audit<'_> {
         let mut comparisons: Vec<Comparison> = tasks().flat_map(|task| judge.compare(task, &of(task))).collect();
         let known = tasks().flat_map(|task| judge.on_record(&comparisons, &of(task))).collect();
         diagnosis::diagnose(&plan.tasks, &mut comparisons);
-        sequential::estimate_remaining_cost(&mut comparisons, &outcome.recordings);
+        sequential::estimate_remaining_cost(&mut comparisons);
         // What follows from other readings follows from nothing where the case was never begun.
         let holds = |s: &&Skip| stop.is_none() || s.scope.leaves_no_reading();
         let skips = plan.skips.iter().filter(holds).cloned().chain(outcome.skips).collect();
@@ -68,7 +68,7 @@ impl Audit<'_> {
             published: tasks().filter_map(|task| judge.published?.table(task, &case.name)).collect(),
             curves: tasks().flat_map(|task| report::curves(&case.name, task)).collect(),
             wall_s: clock.elapsed().as_secs_f64(),
-            ..Report::new(case, policy.record.as_ref(), started, &outcome.recordings, comparisons, skips)
+            ..Report::new(case, policy, started, &outcome.recordings, comparisons, skips)
         })
     }
 

@@ -118,6 +118,7 @@ impl Running<'_> {
             content_sha256: content(task),
             seed: run.job.seed,
             skewness: measurement.skewness(),
+            work_s: measurement.work_s,
             method: measurement.method,
             effort: measurement.effort,
             role: planned.engine.role(),

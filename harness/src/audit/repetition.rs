@@ -38,7 +38,7 @@ pub(super) fn examine(running: &Running<'_>, outcome: &mut Outcome) -> BTreeMap<
                 (0..readings.len()).filter(|k| readings[*k].uncertainty.is_sampled() == is_sampled).collect()
             };
             sampled.extend(repeated(running, run, readings, &of(true), EFFORT));
-            claims.extend(contradicted(running, run, readings, &of(false)));
+            claims.extend(contradicted(running, run, readings, &rendered(running, run, of(false))));
         }
         let doubts = [StatedErrors::of_sampled(&sampled), StatedErrors::of_claims(&claims)];
         found.insert(name, doubts.into_iter().flatten().collect());
@@ -55,6 +55,12 @@ pub(super) fn examine(running: &Running<'_>, outcome: &mut Outcome) -> BTreeMap<
 
 fn estimate(reading: &Reading) -> Estimate {
     Estimate { value: reading.value, uncertainty: reading.uncertainty }
+}
+
+/// The targets among these that were rendered: what follows from others is the spot check's to look at.
+fn rendered(running: &Running<'_>, run: &Run, targets: Vec<usize>) -> Vec<usize> {
+    let (task, unseen) = (&running.plan.tasks[run.task], run.shortcut.unseen(&run.job));
+    targets.into_iter().filter(|k| !unseen.iter().any(|s| task.stations_of(*k).contains(s))).collect()
 }
 
 /// What is claimed to be determined, where another seed reads otherwise: every such reading, several times.

@@ -52,7 +52,7 @@ pub(super) fn sample_on(
                 *estimate = StatedErrors::corrected(stated.get(&engine).map_or(&[], Vec::as_slice), *estimate);
             }
             outcome.from_cache += usize::from(taken.source == Source::Cache);
-            Ok((taken.measurement, taken.cost.wall_s))
+            Ok((taken.measurement, taken.cost))
         };
         let (before_s, whole) = (subject.wall_s, running.case.budget);
         sequential::refine(judge, task, &others, &mut subject, (run.job.budget, whole), &mut sample);

@@ -88,50 +88,50 @@ impl Blocks {
     }
 }
 
-/// When to stop, and how many blocks come at a time.
+/// When to stop, and how many blocks come at a time: by their error, and by seconds that are counted at a fixed rate. No clock
+/// says how much is sampled, so that one seed makes the same blocks on any machine under any load.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sampling<'a> {
     /// The largest standard error relative to a reading that is small enough.
     pub(super) relative_error: f64,
     /// What the mean holds that is no part of the reading, at each station; empty where there is nothing.
     pub(super) known_lx: &'a [f64],
-    /// Blocks that would probably end later are not begun.
-    pub(super) until: Instant,
-    /// Blocks that are made whatever the time.
+    /// Seconds that all blocks may take, and that one takes, as its engine counts them.
+    pub(super) seconds: f64,
+    pub(super) block_s: f64,
+    /// Blocks that are made whatever they take.
     pub(super) min_blocks: usize,
     /// Before there are so many, an error that is small enough is not believed.
     pub(super) enough_blocks: usize,
     pub(super) max_blocks: usize,
-    /// The last wave is asked for all that is missing.
-    pub(super) max_waves: usize,
-    /// So many take as long as one.
-    pub(super) side_by_side: usize,
-    /// How long one takes, if a trial told; if none did, the first wave is the fewest blocks.
-    pub(super) block_s: Option<f64>,
+    /// The one thing that a clock decides: past this none is begun, on a machine that is slower by far than is counted on.
+    pub(super) until: Instant,
 }
 
+/// Seconds by the clock for each second of a budget, before sampling is cut short.
+const PATIENCE: f64 = 5.0;
+
 impl Sampling<'static> {
-    /// As many blocks as a budget asks for.
-    pub(super) fn within(budget: Budget, started: Instant) -> Self {
+    /// As many blocks as a budget asks for, of so many seconds each.
+    pub(super) fn within(budget: Budget, block_s: f64) -> Self {
         // A budget of more than a century has no end.
-        let seconds = Duration::from_secs_f64(budget.seconds.clamp(0.0, 3e9));
+        let patience = Duration::from_secs_f64((PATIENCE * budget.seconds).clamp(0.0, 3e9));
         Self {
             relative_error: budget.relative_error,
             known_lx: &[],
-            until: started + seconds,
+            seconds: budget.seconds,
+            block_s,
             min_blocks: MIN_BLOCKS,
             enough_blocks: MIN_BLOCKS,
             max_blocks: usize::MAX,
-            max_waves: usize::MAX,
-            side_by_side: 1,
-            block_s: None,
+            until: Instant::now() + patience,
         }
     }
 
     /// A fixed number of blocks, whatever their error.
-    pub(super) fn fixed(blocks: usize, budget: Budget, started: Instant) -> Self {
+    pub(super) fn fixed(blocks: usize, budget: Budget, block_s: f64) -> Self {
         let (relative_error, min_blocks) = (f64::INFINITY, MIN_BLOCKS.min(blocks));
-        let within = Self::within(budget, started);
+        let within = Self::within(budget, block_s);
         Self { relative_error, min_blocks, enough_blocks: blocks, max_blocks: blocks, ..within }
     }
 }
@@ -141,44 +141,52 @@ impl Sampling<'_> {
     pub(super) fn run(
         &self,
         mut wave: impl FnMut(Range<usize>) -> Result<Vec<Vec<f64>>, EngineError>,
-    ) -> Result<Blocks, EngineError> {
+    ) -> Result<Sampled, EngineError> {
         let mut blocks = Blocks::default();
-        let mut turn_s = self.block_s;
-        for waves_left in (0..self.max_waves).rev() {
-            let have = blocks.count();
-            let count = self.next(&blocks, turn_s, waves_left);
-            if count == 0 {
-                break;
+        loop {
+            let (have, count) = (blocks.count(), self.next(&blocks));
+            let is_late = count > 0 && have >= self.min_blocks && Instant::now() >= self.until;
+            if count == 0 || is_late {
+                let remark = self.remark(&blocks, is_late);
+                return Ok(Sampled { work_s: have as f64 * self.block_s, blocks, remark });
             }
-            let started = Instant::now();
             blocks.0.extend(wave(have..have + count)?);
-            let took_s = started.elapsed().as_secs_f64() / count.div_ceil(self.side_by_side) as f64;
-            // The slowest so far is what the next may take.
-            turn_s = turn_s.filter(|_| have > 0).map(|s| s.max(took_s)).or(Some(took_s));
         }
-        Ok(blocks)
     }
 
-    pub(super) fn shortfall(&self, blocks: &Blocks) -> Option<String> {
+    fn remark(&self, blocks: &Blocks, is_late: bool) -> Option<String> {
         let worst = blocks.worst_error(self.known_lx);
+        if is_late {
+            return Some(format!(
+                "cut short by the clock at a relative standard error of {worst:.1e}: the machine is {PATIENCE} times slower than is \
+                 counted on, and another run may read otherwise"
+            ));
+        }
         (worst > self.relative_error).then(|| format!("out of time at a relative standard error of {worst:.1e}"))
     }
 
     /// How many blocks come next; 0 for no more.
-    fn next(&self, blocks: &Blocks, turn_s: Option<f64>, waves_left: usize) -> usize {
+    fn next(&self, blocks: &Blocks) -> usize {
         let have = blocks.count();
         let missing = if have < self.enough_blocks {
             self.enough_blocks - have
         } else {
             let excess = blocks.worst_error(self.known_lx) / self.relative_error;
-            let missing = (have as f64 * (excess * excess - 1.0)).ceil() as usize;
-            if waves_left == 0 { missing } else { missing.min(MAX_GROWTH * have) }
+            ((have as f64 * (excess * excess - 1.0)).ceil() as usize).min(MAX_GROWTH * have)
         };
-        let left_s = self.until.saturating_duration_since(Instant::now()).as_secs_f64();
-        let turns = turn_s.map_or(0, |turn_s| (left_s / turn_s) as usize);
-        let count = missing.min(turns.saturating_mul(self.side_by_side)).max(self.min_blocks.saturating_sub(have));
-        count.next_multiple_of(self.side_by_side).min(self.max_blocks - have)
+        let affordable = ((self.seconds / self.block_s) as usize).min(self.max_blocks).max(self.min_blocks);
+        missing.min(affordable.saturating_sub(have))
     }
+}
+
+/// The blocks of one part of the light.
+#[derive(Clone, Debug)]
+pub(super) struct Sampled {
+    pub(super) blocks: Blocks,
+    /// Seconds that they take, as their engine counts them.
+    pub(super) work_s: f64,
+    /// Why there are no more of them, where their error is larger than was asked for.
+    pub(super) remark: Option<String>,
 }
 
 #[cfg(test)]
@@ -194,14 +202,14 @@ mod tests {
         (0..2).map(|_| 100.0 * (1.0 + spread * uniform(&mut random))).collect()
     }
 
-    fn sampled(rule: &Sampling<'_>, spread: f64) -> (Blocks, Vec<Range<usize>>) {
+    fn sampled(rule: &Sampling<'_>, spread: f64) -> (Sampled, Vec<Range<usize>>) {
         let mut waves = vec![];
         let wave = |numbers: Range<usize>| {
             waves.push(numbers.clone());
             Ok(numbers.map(|k| block(k, spread)).collect())
         };
-        let blocks = rule.run(wave).unwrap();
-        (blocks, waves)
+        let found = rule.run(wave).unwrap();
+        (found, waves)
     }
 
     fn budget(relative_error: f64, seconds: f64) -> Budget {
@@ -210,36 +218,39 @@ mod tests {
 
     #[test]
     fn blocks_are_made_until_the_error_asked_for_and_not_many_more() {
-        let rule = Sampling { side_by_side: 3, ..Sampling::within(budget(1e-3, 60.0), Instant::now()) };
-        let (blocks, waves) = sampled(&rule, 0.02);
-        assert!(blocks.worst_error(&[]) <= 1e-3 && rule.shortfall(&blocks).is_none());
+        let (found, waves) = sampled(&Sampling::within(budget(1e-3, 60.0), 0.01), 0.02);
+        assert!(found.blocks.worst_error(&[]) <= 1e-3 && found.remark.is_none());
         // (20 / 1)^2 = 400 blocks, as far as 8 blocks can tell.
-        assert!((300..700).contains(&blocks.count()), "{waves:?}");
-        assert!(waves.iter().all(|w| w.len() % 3 == 0 && w.len() <= MAX_GROWTH * w.start.max(3)), "{waves:?}");
+        assert!((300..700).contains(&found.blocks.count()), "{waves:?}");
+        assert!(waves.iter().all(|w| w.len() <= MAX_GROWTH * w.start.max(3)), "{waves:?}");
         // Every block once and in order, so that its number can seed it.
         assert!(waves.windows(2).all(|w| w[0].end == w[1].start) && waves[0].start == 0);
+        assert!((found.work_s - 0.01 * found.blocks.count() as f64).abs() < 1e-12);
     }
 
     #[test]
     fn without_time_there_are_the_fewest_blocks_and_a_remark() {
-        let rule = Sampling { enough_blocks: 32, ..Sampling::within(budget(1e-6, 0.0), Instant::now()) };
-        let (blocks, _) = sampled(&rule, 0.02);
-        assert_eq!(blocks.count(), MIN_BLOCKS);
-        assert!(rule.shortfall(&blocks).unwrap().starts_with("out of time"));
-        assert_eq!(
-            sampled(&Sampling { block_s: Some(1e-9), until: Instant::now() + Duration::from_secs(9), ..rule }, 0.0)
-                .0
-                .count(),
-            32
-        );
+        let rule = Sampling { enough_blocks: 32, ..Sampling::within(budget(1e-6, 0.0), 1.0) };
+        let found = sampled(&rule, 0.02).0;
+        assert_eq!(found.blocks.count(), MIN_BLOCKS);
+        assert!(found.remark.unwrap().starts_with("out of time"));
+        for (seconds, blocks) in [(20.5, 20), (9e9, 32)] {
+            assert_eq!(sampled(&Sampling { seconds, ..rule }, 0.0).0.blocks.count(), blocks);
+        }
+    }
+
+    #[test]
+    fn a_clock_that_ran_out_is_told_and_changes_nothing_else() {
+        let rule = Sampling::within(budget(1e-3, 60.0), 0.01);
+        let (late, _) = sampled(&Sampling { until: Instant::now(), ..rule }, 0.02);
+        let (whole, _) = sampled(&rule, 0.02);
+        assert!(late.remark.unwrap().starts_with("cut short by the clock"));
+        assert_eq!(late.blocks.0, whole.blocks.0[..MIN_BLOCKS]);
     }
 
     #[test]
     fn a_fixed_number_of_blocks_is_just_that() {
-        let rule = Sampling::fixed(8, budget(1e-6, 60.0), Instant::now());
-        for side_by_side in [1, 3] {
-            assert_eq!(sampled(&Sampling { side_by_side, ..rule }, 0.5).0.count(), 8);
-        }
+        assert_eq!(sampled(&Sampling::fixed(8, budget(1e-6, 60.0), 0.1), 0.5).0.blocks.count(), 8);
     }
 
     #[test]

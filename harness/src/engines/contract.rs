@@ -8,7 +8,7 @@ use luminaire::geometry::Surface;
 use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
 use serde::{Deserialize, Serialize};
 
-use super::blocks::Blocks;
+use super::blocks::{Blocks, Sampled};
 use super::workbench::{EngineError, SceneFile, Workbench};
 use super::{Site, fingerprint};
 use crate::procedures::{Target, Task};
@@ -102,6 +102,8 @@ pub enum Component {
     PythonPackages,
     PovRay,
     LibLlvm,
+    /// It gives rtrace's random numbers a seed.
+    LibFaketime,
 }
 
 impl Entry {
@@ -264,6 +266,9 @@ pub struct Measurement {
     /// standard error. Empty where nothing was sampled or nobody says.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub samples: Vec<Blocks>,
+    /// Seconds that its sampling takes at the rate that the engine counts with; `None` for one that keeps to the clock.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub work_s: Option<f64>,
 }
 
 impl Measurement {
@@ -280,6 +285,15 @@ impl Measurement {
             }
         };
         targets.into_iter().map(reading).collect()
+    }
+
+    /// Takes the blocks of a part of the light, and gives its estimates.
+    pub(super) fn take(&mut self, part: Sampled) -> Vec<Estimate> {
+        let estimates = part.blocks.estimates();
+        *self.work_s.get_or_insert(0.0) += part.work_s;
+        self.notes.extend(part.remark);
+        self.samples.push(part.blocks);
+        estimates
     }
 
     /// Of the part of the light whose blocks are the most skewed, see [`Blocks::skewness`].

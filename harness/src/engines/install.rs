@@ -1,4 +1,4 @@
-//! Installs the engines into the site: pinned Python packages, POV-Ray and a libLLVM; does nothing where all is there.
+//! Installs the engines into the site: pinned Python packages, POV-Ray, a libLLVM and libfaketime; does nothing where all is there.
 //!
 //! As root, Debian packages are installed system-wide; otherwise they are downloaded and unpacked into the site.
 
@@ -62,7 +62,7 @@ pub fn install(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&st
 }
 
 fn components(engines: &[EngineName]) -> Vec<Component> {
-    let all = [Component::PythonPackages, Component::PovRay, Component::LibLlvm];
+    let all = [Component::PythonPackages, Component::PovRay, Component::LibLlvm, Component::LibFaketime];
     let named = || ALL.iter().filter(|entry| engines.is_empty() || engines.contains(&entry.name));
     all.into_iter().filter(|c| named().any(|entry| entry.installs.contains(c))).collect()
 }
@@ -85,6 +85,7 @@ impl Component {
             Self::PythonPackages => "Python packages",
             Self::PovRay => "POV-Ray",
             Self::LibLlvm => "libLLVM",
+            Self::LibFaketime => "libfaketime",
         }
     }
 
@@ -93,6 +94,7 @@ impl Component {
             Self::PythonPackages => Some(site.venv()).filter(|_| venv::is_current(site)),
             Self::PovRay => site.program("povray"),
             Self::LibLlvm => site.llvm(),
+            Self::LibFaketime => site.libfaketime(),
         };
         if let Some(path) = present {
             return self.outcome(InstallState::Present, path.display().to_string());
@@ -101,6 +103,7 @@ impl Component {
             Self::PythonPackages => venv::install(site, progress),
             Self::PovRay => debian::install_povray(site, progress),
             Self::LibLlvm => debian::install_llvm(site, progress),
+            Self::LibFaketime => debian::install_libfaketime(site, progress),
         };
         match installed {
             Ok(detail) => self.outcome(InstallState::Installed, detail),
@@ -133,10 +136,11 @@ mod tests {
 
     #[test]
     fn every_engine_gets_what_it_needs_and_no_more() {
-        use Component::{LibLlvm, PovRay, PythonPackages};
-        assert_eq!(components(&[]), [PythonPackages, PovRay, LibLlvm]);
-        assert_eq!(components(&[EngineName::new("radiance")]), [PythonPackages]);
-        assert_eq!(components(&[EngineName::new("povray"), EngineName::new("radiance")]), [PythonPackages, PovRay]);
+        use Component::{LibFaketime, LibLlvm, PovRay, PythonPackages};
+        assert_eq!(components(&[]), [PythonPackages, PovRay, LibLlvm, LibFaketime]);
+        assert_eq!(components(&[EngineName::new("radiance")]), [PythonPackages, LibFaketime]);
+        let two = [EngineName::new("povray"), EngineName::new("radiance")];
+        assert_eq!(components(&two), [PythonPackages, PovRay, LibFaketime]);
         assert_eq!(components(&[EngineName::new("mitsuba")]), [PythonPackages, LibLlvm]);
         assert_eq!(components(&[EngineName::new("simulator"), EngineName::new("iesna")]), []);
     }
@@ -147,7 +151,7 @@ mod tests {
         let file = folder.path().join("file");
         std::fs::write(&file, "").unwrap();
         let outcomes = install(&Site::at(file.join("site")), &[EngineName::new("radiance")], |_| {});
-        assert_eq!(outcomes.len(), 1);
+        assert_eq!(outcomes.len(), 2);
         assert_eq!(outcomes[0].state, InstallState::Failed);
         assert!(outcomes[0].detail.contains("site"), "{}", outcomes[0].detail);
     }

@@ -8,8 +8,6 @@ mod settings;
 #[cfg(test)]
 pub(super) mod tests;
 
-use std::time::Instant;
-
 use glam::DVec3;
 use luminaire::geometry::Surface;
 use luminaire::scene::{Luminaire, LuminaireModel, Shape, Transport};
@@ -101,11 +99,10 @@ impl Mitsuba {
         settings: &Settings,
         workbench: &Workbench,
     ) -> Result<Measurement, EngineError> {
-        let started = Instant::now();
         workbench.write(files)?;
         let backend = self.backend(&workbench.site).map_err(|absent| EngineError::output(ID, absent.to_string()))?;
         let (run, fallback) = backend.invocation(workbench, settings);
-        let mut measurement = Driver { job, settings, conversation: run.converse()?, started }.measurement()?;
+        let mut measurement = Driver { job, settings, conversation: run.converse()? }.measurement()?;
         measurement.notes.extend(fallback);
         measurement.effort.insert("command".into(), run.command_line());
         super::checked(&ID, job, measurement)

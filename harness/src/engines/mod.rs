@@ -7,6 +7,7 @@
 mod blocks;
 mod catalogue;
 mod contract;
+mod effort;
 mod external;
 mod fingerprint;
 #[cfg(test)]

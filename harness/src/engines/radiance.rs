@@ -14,12 +14,10 @@ mod settings;
 pub(super) mod tests;
 mod tools;
 
-use std::time::Instant;
-
 use luminaire::scene::{LuminaireModel, Transport};
 
 use self::options::{Options, Sources};
-use self::sampling::{Sampled, Sampler};
+use self::sampling::Sampler;
 use self::settings::{Photometrist, Settings};
 use self::tools::Tools;
 use super::settings::Preset;
@@ -28,6 +26,7 @@ use super::{
     Workbench, checked,
 };
 use crate::record::{EngineName, Estimate, Uncertainty};
+use crate::system::random::seed;
 
 const ID: EngineName = EngineName::new("radiance");
 
@@ -35,7 +34,7 @@ pub(super) static ENTRY: Entry = Entry {
     name: ID,
     display_name: "Radiance",
     colour: ("#b84a00", "#f08a4b"),
-    installs: &[Component::PythonPackages],
+    installs: &[Component::PythonPackages, Component::LibFaketime],
     models: &[LuminaireModel::Point, LuminaireModel::Area, LuminaireModel::Impostor],
     fits_coordinates: Some("rescale"),
     make: || Box::new(Radiance),
@@ -43,9 +42,6 @@ pub(super) static ENTRY: Entry = Entry {
 
 /// Radiance keeps colours and candela tables in 32-bit floats; measured against the inverse-square law.
 const FLOAT_READ_OUT: f64 = 5e-7;
-
-const NOT_REPEATABLE: &str = "rtrace seeds its random numbers from the clock, so reflected light repeats within its \
-                              standard error only; its fixed sequence (-u-) is biased by .3 %";
 
 pub(super) struct Radiance;
 
@@ -93,8 +89,10 @@ impl Engine for Radiance {
         Ok(export::files(job, &settings, &printed_options(job, &settings)))
     }
 
-    fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
-        Some(Tools::find(site).map_or_else(|_| "sh run.sh".to_owned(), |tools| tools.command_by_hand()))
+    fn command_by_hand(&self, job: &Job, site: &Site) -> Option<String> {
+        Some(
+            Tools::find(site).map_or_else(|_| "sh run.sh".to_owned(), |tools| tools.command_by_hand(seed(&[job.seed]))),
+        )
     }
 
     fn knobs(&self) -> &'static [Knob] {
@@ -121,7 +119,6 @@ fn printed_options(job: &Job, settings: &Settings) -> Options {
 }
 
 fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
-    let started = Instant::now();
     let settings = Settings::of(job)?;
     let tools = Tools::find(&workbench.site).map_err(|absent| EngineError::output(ID, absent.to_string()))?;
     workbench.write(files)?;
@@ -130,7 +127,7 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
     }
     tools.compile(workbench)?;
     let rows = export::rows(job, export::scale(job, settings.coordinates));
-    let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows, started };
+    let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows };
     let options = printed_options(job, &settings);
     let mut measurement = Measurement::default();
     measurement.effort.insert("seed".into(), job.seed.to_string());
@@ -144,21 +141,20 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
         measurement.estimates = direct;
         return checked(&ID, job, measurement);
     }
-    let part_lx = tools.rtrace(workbench, &options.part_of_total, &sampler.rows)?;
+    let part_lx = sampler.determined(&options.part_of_total)?;
     let is_total = matches!(job.transport, Transport::Total(_));
-    let Sampled { blocks, divisions, options, shortfall } = sampler.total(if is_total { &[] } else { &part_lx })?;
-    let (count, divisions) = (blocks.count().to_string(), divisions.to_string());
+    let (total, divisions) = sampler.total(if is_total { &[] } else { &part_lx })?;
+    let options = sampler.options(divisions);
+    let (count, divisions) = (total.blocks.count().to_string(), divisions.to_string());
     let settings = [("rtrace", options.join(" ")), ("blocks", count), ("ambient_divisions", divisions)];
     measurement.effort.extend(settings.map(|(key, value)| (key.to_owned(), value)));
-    measurement.notes.push(NOT_REPEATABLE.into());
-    measurement.notes.extend(shortfall);
-    let reflected = blocks.estimates().into_iter().zip(part_lx).map(|(total, part_lx)| reflected(total, part_lx));
+    let total = measurement.take(total);
+    let reflected = total.into_iter().zip(part_lx).map(|(total, part_lx)| reflected(total, part_lx));
     measurement.estimates = if is_total {
         reflected.zip(&direct).map(|(reflected, direct)| reflected.plus(direct)).collect()
     } else {
         reflected.collect()
     };
-    measurement.samples.push(blocks);
     checked(&ID, job, measurement)
 }
 
@@ -170,12 +166,9 @@ fn direct(
 ) -> Result<Vec<Estimate>, EngineError> {
     let Sampler { job, settings, .. } = *sampler;
     if Sources::of(job, settings) == Sources::Openings && settings.preset != Preset::Default {
-        let blocks = sampler.direct(options)?;
-        let estimates = blocks.estimates().into_iter().map(sampled).collect();
-        measurement.samples.push(blocks);
-        return Ok(estimates);
+        return Ok(measurement.take(sampler.direct(options)?).into_iter().map(sampled).collect());
     }
-    let direct_lx = sampler.tools.rtrace(sampler.workbench, &options.direct, &sampler.rows)?;
+    let direct_lx = sampler.determined(&options.direct)?;
     let pairs = direct_lx.into_iter().zip(&job.stations);
     Ok(pairs.map(|(value_lx, station)| determined(job, value_lx, station)).collect())
 }

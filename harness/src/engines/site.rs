@@ -58,12 +58,20 @@ impl Site {
 
     /// Shared libraries whose file name starts with `prefix`, ours first, then the system's.
     pub fn libraries(&self, prefix: &str) -> Vec<PathBuf> {
+        let files = self.library_folders().filter_map(|f| std::fs::read_dir(f).ok()).flat_map(Iterator::flatten);
+        files.map(|f| f.path()).filter(|p| file_name_starts_with(p, prefix)).collect()
+    }
+
+    /// The library that can hold a program's clock, which Debian keeps in a folder of its own.
+    pub fn libfaketime(&self) -> Option<PathBuf> {
+        self.library_folders().map(|f| f.join("faketime/libfaketime.so.1")).find(|p| p.is_file())
+    }
+
+    fn library_folders(&self) -> impl Iterator<Item = PathBuf> {
         let triple = format!("{}-linux-gnu", env::consts::ARCH);
         let ours = ["usr/lib", "lib"].map(|l| self.debian().join(l));
         let roots = ours.into_iter().chain(["/usr/lib", "/usr/lib64", "/usr/local/lib"].map(PathBuf::from));
-        let folders = roots.flat_map(|r| [r.join(&triple), r]);
-        let files = folders.filter_map(|f| std::fs::read_dir(f).ok()).flat_map(Iterator::flatten);
-        files.map(|f| f.path()).filter(|p| file_name_starts_with(p, prefix)).collect()
+        roots.flat_map(move |r| [r.join(&triple), r])
     }
 
     /// What `LD_LIBRARY_PATH` must hold for programs of our unpacked packages; `None` if there are none.

@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::tolerance::Rule;
+use super::tolerance::{Rule, ToleranceClass};
 use super::{Judge, KnownDeviation, KnownDeviations, Published, Tolerances, known, tolerance};
 use crate::record::EngineName;
 use crate::spec::{Budget, Case, Source, SpecError, hexadecimal, suggestion};
@@ -25,6 +25,8 @@ pub const POLICY_FILE: &str = "luxproof.yaml";
 pub struct ProjectPolicy {
     /// Engines without whose readings a run is no audit: exit 3.
     pub required_engines: Vec<EngineName>,
+    /// What verdicts are for: the class of our tolerances.
+    pub tolerance_class: Option<ToleranceClass>,
     /// Tolerances that go before ours; the rule that names most applies.
     pub tolerances: Vec<Rule>,
     /// Where engines are known to differ, by how much and why.
@@ -41,6 +43,8 @@ pub struct Profile {
     pub budget: ProfileBudget,
     /// When sampling stops.
     pub sampling: Option<Sampling>,
+    /// What verdicts are for, in place of the policy's own.
+    pub tolerance_class: Option<ToleranceClass>,
 }
 
 /// When an engine may stop; what is left out stays as a spec says.
@@ -83,6 +87,9 @@ pub struct PolicyChoice {
     /// A profile of the policy
     #[arg(long, value_name = "NAME")]
     pub profile: Option<String>,
+    /// What verdicts are for, which says how far readings may lie from their references [default: verification]
+    #[arg(long, value_name = "CLASS")]
+    pub tolerance_class: Option<ToleranceClass>,
 }
 
 impl PolicyChoice {
@@ -107,7 +114,11 @@ impl PolicyChoice {
             let help = format!("write a {POLICY_FILE} beside the spec, or name one with --policy");
             return match &self.profile {
                 Some(name) => Err(SpecError::of("--profile", format!("no policy has a profile `{name}`"), help)),
-                None => Policy::built_in(),
+                None => {
+                    let policy = Policy::built_in()?;
+                    let class = self.tolerance_class.unwrap_or_default();
+                    Ok(Policy { tolerances: policy.tolerances.of_class(class), ..policy })
+                }
             };
         };
         let source = Source::read(file)?;
@@ -130,8 +141,9 @@ impl PolicyChoice {
         };
         let here = std::env::current_dir().unwrap_or_default();
         let shown = file.strip_prefix(here).unwrap_or(file).display().to_string();
+        let class = self.tolerance_class.or(profile.tolerance_class).or(project.tolerance_class).unwrap_or_default();
         Ok(Policy {
-            tolerances: Tolerances::built_in()?.with(&project.tolerances, &shown),
+            tolerances: Tolerances::built_in()?.of_class(class).with(&project.tolerances, &shown),
             known: KnownDeviations::built_in()?.with(&project.known_deviations),
             profile,
             record: Some(PolicyRecord {
@@ -205,7 +217,7 @@ profiles: {ci: {budget: {relative_error: 0.005}, sampling: decided}, audit: {}}
         std::fs::create_dir(folder.path().join("specs")).unwrap();
         std::fs::write(folder.path().join(POLICY_FILE), text).unwrap();
         let case = Case { path: folder.path().join("specs/office.yaml"), ..Case::default() };
-        let choice = PolicyChoice { file: None, profile: profile.map(str::to_owned) };
+        let choice = PolicyChoice { profile: profile.map(str::to_owned), ..PolicyChoice::default() };
         choice.of_cases(&[case]).map(|found| (*found[0]).clone())
     }
 

@@ -3,10 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use clap::ValueEnum;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Basis;
+use super::uncertainty::upper_tail_of_normal;
 use crate::record::{EngineName, ProcedureId, Quantity};
 use crate::spec::{Source, SpecError, ToleranceOverride};
 
@@ -28,11 +30,54 @@ impl Tolerance {
     }
 }
 
+/// What verdicts are for, which says how far readings may lie from their references.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    ValueEnum,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    strum::Display,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum ToleranceClass {
+    /// Values that others are held to
+    Reference,
+    /// Renderers that are audited or compared
+    #[default]
+    Verification,
+    /// Lighting design
+    Design,
+    /// Estimates
+    Survey,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Class {
+    /// Relative tolerances of ours are so many times as wide.
+    factor: f64,
+    #[serde(rename = "use")]
+    purpose: String,
+    source: String,
+}
+
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tolerances {
     coverage_factor: Sourced,
     family_wise_error: Sourced,
+    classes: BTreeMap<ToleranceClass, Class>,
+    #[serde(skip)]
+    class: ToleranceClass,
     #[serde(rename = "tolerances")]
     rules: Vec<Rule>,
     not_claimed: Vec<NotClaimed>,
@@ -111,6 +156,11 @@ impl Tolerances {
         let level = &all.family_wise_error;
         let sound = level.value > 0.0 && level.value < 0.5 && !level.source.trim().is_empty();
         source.require(sound, "family_wise_error", "no level", "give a value between 0 and .5 and a source")?;
+        let is_sound = |class: &Class| {
+            class.factor.is_finite() && class.factor > 0.0 && !(class.purpose.is_empty() || class.source.is_empty())
+        };
+        let all_there = ToleranceClass::value_variants().iter().all(|c| all.classes.get(c).is_some_and(is_sound));
+        source.require(all_there, "classes", "one lacks factor, use or source", "give all of them")?;
         let is_told = |n: &NotClaimed| !(n.why.trim().is_empty() || n.source.trim().is_empty());
         source.require(all.not_claimed.iter().all(is_told), "not_claimed", "one lacks why or source", "give both")?;
         Ok(all)
@@ -121,6 +171,26 @@ impl Tolerances {
     pub(super) fn with(mut self, rules: &[Rule], file: &str) -> Self {
         self.rules.extend(rules.iter().map(|rule| Rule { file: Some(file.to_owned()), ..rule.clone() }));
         self
+    }
+
+    /// The same for another use; tolerances of specs and projects stay as they are.
+    #[must_use]
+    pub fn of_class(mut self, class: ToleranceClass) -> Self {
+        self.class = class;
+        self
+    }
+
+    /// What verdicts are for and how often they are wrong, in a line.
+    pub fn decision_rule(&self) -> String {
+        let class = self.classes.get(&self.class);
+        let purpose = class.map(|c| format!(" ({}; {})", c.purpose, c.source)).unwrap_or_default();
+        let wrong_pass = 100.0 * upper_tail_of_normal(self.coverage_factor());
+        let wrong_fail = 100.0 * self.family_wise_error();
+        format!(
+            "tolerances of class {}{purpose}: a pass is wrong in {wrong_pass:.1} % of comparisons at most, any fail of an engine in \
+             a procedure in {wrong_fail:.0} % (JCGM 106:2012, guarded acceptance; Holm 1979)",
+            self.class
+        )
     }
 
     /// Why a reading beyond its tolerance is not judged; `None` where it is.
@@ -140,7 +210,7 @@ impl Tolerances {
     }
 
     /// The tolerance of a comparison: the spec's override, else the rule that names most, else zero; and whose it is, with its
-    /// source, where it is a project's.
+    /// source, where it is a project's or of another class than usual.
     pub fn of(
         &self,
         procedure: ProcedureId,
@@ -163,8 +233,12 @@ impl Tolerances {
         };
         let names = |rule: &&Rule| usize::from(rule.basis.is_some()) + 2 * usize::from(rule.engine.is_some());
         let Some(rule) = self.rules.iter().filter(applies).max_by_key(names) else { return Default::default() };
-        let tolerance = Tolerance { relative: rule.relative, absolute: absolute(rule.absolute_lx, rule.absolute_cd) };
-        (tolerance, rule.file.as_ref().map(|file| format!("{file}: {}", rule.source)))
+        let class = self.classes.get(&self.class).filter(|_| rule.file.is_none());
+        let relative = rule.relative * class.map_or(1.0, |c| c.factor);
+        let tolerance = Tolerance { relative, absolute: absolute(rule.absolute_lx, rule.absolute_cd) };
+        let of_class = class.filter(|_| self.class != ToleranceClass::default());
+        let of_class = of_class.map(|c| format!("class {}, {}", self.class, c.purpose));
+        (tolerance, rule.file.as_ref().map(|file| format!("{file}: {}", rule.source)).or(of_class))
     }
 }
 
@@ -185,6 +259,18 @@ mod tests {
         let strict = ToleranceOverride { relative: 1e-4, absolute_lx: 1e-3, absolute_cd: 0.0 };
         let found = table.of(DIRECT, Basis::ClosedForm, "povray", UNIT, &BTreeMap::from([(DIRECT, strict)]));
         assert_eq!(found, (Tolerance { relative: 1e-4, absolute: 1e-3 }, None));
+        let design = table.clone().of_class(ToleranceClass::Design);
+        let (found, whose) = design.of(INDIRECT, Basis::Exact, "radiance", UNIT, &none);
+        assert_eq!((found, whose.is_some()), (Tolerance { relative: 0.1, absolute: 1e-3 }, true));
+        assert_eq!(
+            design.of(DIRECT, Basis::ClosedForm, "povray", UNIT, &BTreeMap::from([(DIRECT, strict)])).0.relative,
+            1e-4
+        );
+        let rule = design.decision_rule();
+        assert!(
+            rule.contains("class design") && rule.contains("in 2.3 % of") && rule.contains("in 5 % (JCGM"),
+            "{rule}"
+        );
         let bare = Tolerances { rules: vec![], ..table };
         assert_eq!(bare.of(DIRECT, Basis::Exact, "radiance", UNIT, &none), Default::default());
     }

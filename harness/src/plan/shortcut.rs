@@ -94,7 +94,7 @@ impl Shortcut {
         let samples = rendered.samples.iter().map(|part| part.rearranged(&stations)).collect();
         let mut effort = rendered.effort;
         effort.extend(self.traces(asked));
-        Measurement { estimates, method: rendered.method, effort, notes: rendered.notes, samples }
+        Measurement { estimates, effort, samples, ..rendered }
     }
 
     /// Which meter's reading is which other's, for whoever repeats it.

@@ -144,6 +144,9 @@ pub struct Recording {
     pub notes: Vec<String>,
     /// Wall-clock seconds.
     pub wall_s: f64,
+    /// Seconds that its sampling takes at the rate that the engine counts with, on any machine; none for one that keeps to the clock.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub work_s: Option<f64>,
     /// What it shares with other engines: witnesses that share a component count once.
     #[serde(default)]
     pub components: Vec<String>,
@@ -184,6 +187,7 @@ impl Recording {
             approximation: None,
             notes: vec![],
             wall_s: 0.0,
+            work_s: None,
             components: vec![],
             looks: vec![],
             skewness: None,
@@ -192,6 +196,11 @@ impl Recording {
             failure: None,
             readings: vec![],
         }
+    }
+
+    /// What sampling has taken of a budget, in seconds: counted where the engine counts, by the clock where not.
+    pub fn work_s(&self) -> f64 {
+        self.work_s.unwrap_or(self.wall_s)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{Kind, biases, departures, notes, policies, splits};
+use super::notes::{Kind, biases, decision_rules, departures, notes, policies, splits};
 use super::words::{mark, percent, significant};
 use super::{Report, papers};
 use crate::record::ProcedureId;
@@ -17,6 +17,9 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
     };
     line(format!("## luxproof: {}", report.spec.title));
     line(format!("\n{} in {:.1} s\n", report.summary, report.wall_s));
+    for rule in decision_rules(report) {
+        line(format!("{rule}\n"));
+    }
     for policy in policies(report) {
         line(format!("{policy}\n"));
     }

@@ -21,7 +21,7 @@ use std::time::SystemTime;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::judge::{Bias, Comparison, Consensus, OnRecord, PaperSplit, PolicyRecord, PublishedTable, Split};
+use crate::judge::{Bias, Comparison, Consensus, OnRecord, PaperSplit, Policy, PolicyRecord, PublishedTable, Split};
 use crate::plan::Skip;
 use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Role, Status};
 use crate::spec::Case;
@@ -91,6 +91,9 @@ pub struct CaseRecord {
     /// The project's policy that it is judged by, where there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub policy: Option<PolicyRecord>,
+    /// What its verdicts are for and how often they are wrong.
+    #[serde(default)]
+    pub decision_rule: String,
     /// Whether it holds scenes of known answer, for which no spec asks.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_known: bool,
@@ -125,7 +128,7 @@ impl Report {
     /// What readings and skips of a case say by themselves; what else is known of the run the caller adds.
     pub fn new(
         case: &Case,
-        policy: Option<&PolicyRecord>,
+        policy: &Policy,
         started: SystemTime,
         recordings: &[Recording],
         comparisons: Vec<Comparison>,
@@ -139,7 +142,8 @@ impl Report {
             cases: vec![CaseRecord {
                 name: case.name.clone(),
                 spec: spec.clone(),
-                policy: policy.cloned(),
+                policy: policy.record.clone(),
+                decision_rule: policy.tolerances.decision_rule(),
                 is_known: case.is_known(),
             }],
             spec,

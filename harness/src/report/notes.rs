@@ -87,6 +87,11 @@ pub(super) fn biases(report: &Report, procedure: ProcedureId) -> Vec<String> {
     report.bias.iter().filter(|b| b.key.procedure == procedure).map(line).collect()
 }
 
+/// What verdicts are for and how often they are wrong.
+pub(super) fn decision_rules(report: &Report) -> BTreeSet<&str> {
+    report.cases.iter().map(|c| c.decision_rule.as_str()).filter(|rule| !rule.is_empty()).collect()
+}
+
 /// Which policy judged, and what it requires in vain; nothing where there is none.
 pub(super) fn policies(report: &Report) -> Vec<String> {
     let line = |p: &PolicyRecord| {

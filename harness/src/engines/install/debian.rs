@@ -1,4 +1,4 @@
-//! POV-Ray and libLLVM from Debian or Ubuntu: installed as root, otherwise downloaded by apt and unpacked into the site.
+//! POV-Ray, libLLVM and libfaketime from Debian or Ubuntu: installed as root, otherwise downloaded by apt and unpacked into the site.
 //!
 //! Without root, apt works on lists and caches of our own below the site; what the system already has is not fetched.
 
@@ -31,6 +31,13 @@ pub(super) fn install_llvm(site: &Site, progress: &mut dyn FnMut(&str)) -> Resul
     let remedy = "install LLVM 17 or later (macOS: `brew install llvm`)";
     Apt::find(site, "libLLVM", remedy)?.install(&LLVM_PACKAGES, progress)?;
     let found = site.llvm().ok_or_else(|| not_there("libLLVM", remedy))?;
+    Ok(found.display().to_string())
+}
+
+pub(super) fn install_libfaketime(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
+    let remedy = "install libfaketime, with which rtrace's random numbers can be repeated";
+    Apt::find(site, "libfaketime", remedy)?.install(&["libfaketime"], progress)?;
+    let found = site.libfaketime().ok_or_else(|| not_there("libfaketime", remedy))?;
     Ok(found.display().to_string())
 }
 

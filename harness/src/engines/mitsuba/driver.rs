@@ -1,7 +1,6 @@
 //! Talks with the driver in Mitsuba's interpreter: how large a block is, which blocks, and what their readings are.
 
 use std::collections::BTreeMap;
-use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +9,7 @@ use super::precision::float_error_lx;
 use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
 use crate::engines::blocks::{Blocks, Sampling};
 use crate::engines::contract::same_meters;
+use crate::engines::effort;
 use crate::engines::settings::Preset;
 use crate::engines::{EngineError, Job, Measurement};
 use crate::record::{Estimate, Uncertainty};
@@ -25,6 +25,10 @@ const SCALAR_TRIAL_SIDE: usize = 2;
 /// The spread of two blocks is a rough guess of the error of one.
 const PLAN_MARGIN: f64 = 2.0;
 
+/// Seconds that are counted for a ray: on two cores of a usual server, half as much again as was measured there.
+const RAY_S: f64 = 2e-7;
+const SCALAR_RAY_S: f64 = 1e-4;
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Greeting {
@@ -34,6 +38,13 @@ struct Greeting {
     lanes: usize,
     stations: Vec<String>,
     parts: Vec<Part>,
+}
+
+impl Greeting {
+    /// Whether no kernels are compiled, and a path costs much.
+    fn is_scalar(&self) -> bool {
+        self.variant.starts_with("scalar")
+    }
 }
 
 #[derive(Deserialize)]
@@ -63,8 +74,6 @@ pub(super) struct Driver<'a> {
     pub(super) job: &'a Job,
     pub(super) settings: &'a Settings,
     pub(super) conversation: Conversation,
-    /// When the seconds of the budget began.
-    pub(super) started: Instant,
 }
 
 impl Driver<'_> {
@@ -102,39 +111,39 @@ impl Driver<'_> {
         let (side, rule) = match self.settings.preset {
             Preset::Audit => self.plan(part, greeting)?,
             Preset::Fast | Preset::Default => {
-                (FIXED_SIDE, Sampling::fixed(FIXED_BLOCKS, self.job.budget, self.started))
+                let block_s = self.sample_s(part, greeting) * (FIXED_SIDE * FIXED_SIDE) as f64;
+                (FIXED_SIDE, Sampling::fixed(FIXED_BLOCKS, self.job.budget, block_s))
             }
         };
-        let blocks = rule.run(|numbers| self.blocks(part, side, stream, numbers))?;
+        let mut read = rule.run(|numbers| self.blocks(part, side, stream, numbers))?;
+        read.remark = read.remark.map(|why| format!("{}: {why}", part.name));
         let samples = side * side * part.rays / self.job.stations.len().max(1);
-        let of_part = [("blocks", blocks.count()), ("samples_a_meter_and_block", samples)];
+        let of_part = [("blocks", read.blocks.count()), ("samples_a_meter_and_block", samples)];
         found.effort.extend(of_part.map(|(key, value)| (format!("{}_{key}", part.name), value.to_string())));
-        found.notes.extend(rule.shortfall(&blocks).map(|why| format!("{}: {why}", part.name)));
-        let estimates = blocks.estimates();
-        found.samples.push(blocks);
-        Ok(estimates)
+        Ok(found.take(read))
     }
 
     /// Samples along a side of a block so that a block fills the rays in flight at most, and enough blocks about reach the
     /// error and fit in the time.
     fn plan(&mut self, part: &Part, greeting: &Greeting) -> Result<(usize, Sampling<'static>), EngineError> {
         let full = (greeting.lanes / part.rays.max(1)).isqrt().clamp(2, MAX_SIDE);
-        let trial_side = if greeting.variant.starts_with("scalar") { SCALAR_TRIAL_SIDE } else { full };
-        // The first one compiles kernels.
-        let mut trials = self.blocks(part, trial_side, Stream::Trial, 0..1)?;
-        let second = Instant::now();
-        trials.extend(self.blocks(part, trial_side, Stream::Trial, 1..2)?);
-        let sample_s = second.elapsed().as_secs_f64() / (trial_side * trial_side) as f64;
-        let budget = self.job.budget;
-        let left_s = (budget.seconds - self.started.elapsed().as_secs_f64()).max(0.0);
-        let affordable = ((left_s / ENOUGH_BLOCKS as f64 / sample_s) as usize).isqrt();
+        let trial_side = if greeting.is_scalar() { SCALAR_TRIAL_SIDE } else { full };
+        let trials = self.blocks(part, trial_side, Stream::Trial, 0..2)?;
+        let (sample_s, budget) = (self.sample_s(part, greeting), self.job.budget);
+        let affordable = ((budget.seconds / ENOUGH_BLOCKS as f64 / sample_s) as usize).isqrt();
         // The error is that of the mean of two; m x m samples are at least as good as m x m independent ones.
         let excess = Blocks::new(trials).worst_error(&[]) / budget.relative_error;
         let needed = trial_side as f64 * PLAN_MARGIN * excess * (2.0 / ENOUGH_BLOCKS as f64).sqrt();
         let side = (needed.ceil() as usize).max(MIN_SIDE).min(full).min(affordable).max(2);
-        let block_s = Some(sample_s * (side * side) as f64);
-        let within = Sampling::within(budget, self.started);
-        Ok((side, Sampling { enough_blocks: ENOUGH_BLOCKS, block_s, ..within }))
+        let within = Sampling::within(budget, sample_s * (side * side) as f64);
+        Ok((side, Sampling { enough_blocks: ENOUGH_BLOCKS, ..within }))
+    }
+
+    /// Seconds that are counted for one sample of a part at every meter.
+    fn sample_s(&self, part: &Part, greeting: &Greeting) -> f64 {
+        let rays = if part.name == "direct" { 1.0 } else { 2.0 * effort::path_length(self.job).max(1.0) };
+        let ray_s = if greeting.is_scalar() { SCALAR_RAY_S } else { RAY_S };
+        ray_s * part.rays as f64 * rays * effort::a_ray(self.job)
     }
 
     fn blocks(

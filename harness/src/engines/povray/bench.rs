@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 use std::path::PathBuf;
-use std::time::Instant;
 
 use glam::DVec3;
 use luminaire::calculators::inverse_square::from_luminaire;
@@ -24,6 +23,13 @@ use super::settings::{FIRST_REFLECTION_RAYS, LONG_POOL, POOL, Settings};
 
 /// Rays a sample at least, where the budget is short.
 const MIN_RAYS: f64 = 25.0;
+/// Seconds that are counted for the test of a ray against a shape: on two cores of a usual server, half as much again as was
+/// measured there.
+const TEST_S: f64 = 1.1e-7;
+/// What a block takes with its runs of the first reflection, against one without.
+const FIRST_REFLECTION: f64 = 1.35;
+/// The part of the time that the fewest blocks may take.
+const FIRST_BLOCKS: f64 = 0.9;
 /// Looks at direct light at most: each narrows a reading by 1e3 at least.
 const MAX_LOOKS: usize = 10;
 /// Below this share of its upper bound a reading is darkness.
@@ -123,48 +129,47 @@ impl<'a> Bench<'a> {
     }
 
     pub(super) fn indirect(&self) -> Result<Measurement, EngineError> {
-        let started = Instant::now();
-        let budget = self.job.budget;
         let count = self.settings.count;
         let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, reflections: Reflections::All };
         let pilot = self.pilot(run)?;
-        let jobs = self.workbench.jobs.max(1);
-        let mut notes = vec![];
-        let left_s = budget.seconds - started.elapsed().as_secs_f64();
-        let waves = MIN_BLOCKS.div_ceil(jobs) as f64;
-        // Time grows a little faster than rays; the runs of the first reflection add about a third.
-        let share = (0.65 * left_s / (waves * pilot.wall_s)).max(1e-3).powf(0.8);
+        let (budget, mut block_s) = (self.job.budget, FIRST_REFLECTION * pilot.work_s);
+        // Time grows a little faster than rays.
+        let share = (FIRST_BLOCKS * budget.seconds / (MIN_BLOCKS as f64 * block_s)).max(1e-3).powf(0.8);
+        let mut measurement = Measurement { method: self.method(), ..Measurement::default() };
         if share < 1.0 && self.settings.preset == Preset::Audit {
             run.count = (f64::from(run.count) * share).max(MIN_RAYS) as u32;
-            notes.push(format!("{} rays a sample instead of {}: the budget is short", run.count, self.settings.count));
+            block_s *= f64::from(run.count) / f64::from(self.settings.count);
+            let few = format!("{} rays a sample instead of {}: the budget is short", run.count, self.settings.count);
+            measurement.notes.push(few);
         }
         self.keep_readouts(&pilot.readouts)?;
-        let rule = Sampling { side_by_side: jobs, ..Sampling::within(budget, started) };
-        let blocks = rule.run(|numbers| self.wave(run, numbers, jobs, &pilot))?;
-        notes.extend(rule.shortfall(&blocks));
+        let jobs = self.workbench.jobs.max(1);
+        let blocks = Sampling::within(budget, block_s).run(|numbers| self.wave(run, numbers, jobs, &pilot))?;
+        let made = blocks.blocks.count();
+        measurement.estimates = measurement.take(blocks);
         let mut effort = Effort::from([
             ("arguments", self.printed_arguments(run)),
-            ("blocks", blocks.count().to_string()),
-            ("seeds", format!("{}..={}", self.seed(1), self.seed(blocks.count()))),
+            ("blocks", made.to_string()),
+            ("seeds", format!("{}..={}", self.seed(1), self.seed(made))),
             ("count", run.count.to_string()),
         ]);
         if self.settings.preset != Preset::Default {
             effort.insert("count_first_reflection".into(), (FIRST_REFLECTION_RAYS * run.count).to_string());
         }
-        let mut method = self.method();
+        measurement.effort = effort;
+        let method = &mut measurement.method;
         method.insert("error_bound".into(), self.settings.error_bound.to_string());
         method.insert("recursion_limit".into(), self.settings.recursion_limit.to_string());
-        Ok(Measurement { estimates: blocks.estimates(), method, effort, notes, samples: vec![blocks] })
+        Ok(measurement)
     }
 
-    /// A first block, which finds each meter's scale and how long a block takes.
+    /// A first block, which finds each meter's scale and how much work a block is.
     fn pilot(&self, run: Run) -> Result<Pilot, EngineError> {
         let mut readouts = export::first_readouts(self.job, Light::Indirect);
         let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();
         for _ in 0..MAX_LOOKS {
-            let start = Instant::now();
-            let seen = self.look(run, &readouts)?;
-            let wall_s = start.elapsed().as_secs_f64();
+            self.keep_readouts(&readouts)?;
+            let Rendered { seen, work_s } = self.render(run, &readouts)?;
             let (mut settled, mut brightest_lx) = (true, 0.0_f64);
             for (k, seen) in seen.into_iter().enumerate() {
                 let scale = match seen {
@@ -190,7 +195,7 @@ impl<'a> Bench<'a> {
                 // A meter that one block sees in near darkness may be brighter by far in the next.
                 let least = 0.4 * brightest_lx;
                 let readouts = readouts.iter().map(|r| Readout::Coarse(scale_of(*r).max(least))).collect();
-                return Ok(Pilot { readouts, wall_s });
+                return Ok(Pilot { readouts, work_s });
             }
         }
         Err(output(format!("reflected light was not read after {MAX_LOOKS} looks")))
@@ -223,7 +228,7 @@ impl<'a> Bench<'a> {
     }
 
     fn values(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
-        let seen = self.render(run, &pilot.readouts)?;
+        let seen = self.render(run, &pilot.readouts)?.seen;
         let value = |(k, seen): (usize, Seen)| match seen {
             Seen::Value { lx, .. } => Ok(lx),
             // None of a block's few rays met what little light there is; the spread of the blocks tells.
@@ -239,7 +244,7 @@ impl<'a> Bench<'a> {
 
     fn look(&self, run: Run, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
         self.keep_readouts(readouts)?;
-        self.render(run, readouts)
+        Ok(self.render(run, readouts)?.seen)
     }
 
     fn keep_readouts(&self, readouts: &[Readout]) -> Result<(), EngineError> {
@@ -247,11 +252,11 @@ impl<'a> Bench<'a> {
         self.workbench.write(&[SceneFile::text("readouts.inc", export::readouts(readouts, light))])
     }
 
-    fn render(&self, run: Run, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
+    fn render(&self, run: Run, readouts: &[Readout]) -> Result<Rendered, EngineError> {
         let image = format!("seed{}.ppm", run.seed);
         let path = self.workbench.scene_dir.join(&image);
         let invocation = self.workbench.invoke(&self.program).args(self.arguments(run, &image));
-        hermetic(invocation, &self.workbench.site).run()?;
+        let finished = hermetic(invocation, &self.workbench.site).run()?;
         let pixels = read_rgb(&ID, self.workbench, &path)?;
         std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
         let blanks = run.blanks();
@@ -259,7 +264,8 @@ impl<'a> Bench<'a> {
             let (found, wanted) = (pixels.len(), readouts.len());
             return Err(output(format!("gave {found} pixels for {wanted} meters and {blanks} blanks")));
         }
-        Ok(readouts.iter().zip(pixels.into_iter().skip(blanks)).map(|(r, p)| pixels::decode(*r, p)).collect())
+        let seen = readouts.iter().zip(pixels.into_iter().skip(blanks)).map(|(r, p)| pixels::decode(*r, p)).collect();
+        Ok(Rendered { seen, work_s: TEST_S * intersection_tests(&finished.stderr) })
     }
 
     fn arguments(&self, run: Run, image: &str) -> Vec<String> {
@@ -310,13 +316,29 @@ const DIRECT_RELATIVE: f64 = 5e-7;
 const AXIAL_TABLE: f64 = 2e-7;
 const BILINEAR_TABLE: f64 = 1e-6;
 
+/// What POV-Ray's statistics count: tests of rays against shapes and the boxes around them, in rows that end in a share of successes.
+fn intersection_tests(said: &str) -> f64 {
+    let tests = |line: &str| -> Option<f64> {
+        let mut words = line.split_whitespace().rev();
+        let [share, succeeded, tests] = [(); 3].map(|()| words.next().and_then(|w| w.parse::<f64>().ok()));
+        (share? <= 100.0 && succeeded? <= tests?).then_some(tests?)
+    };
+    said.lines().filter_map(tests).sum()
+}
+
 fn output(what: String) -> EngineError {
     EngineError::output(ID, what)
 }
 
 struct Pilot {
     readouts: Vec<Readout>,
-    wall_s: f64,
+    work_s: f64,
+}
+
+struct Rendered {
+    seen: Vec<Seen>,
+    /// Seconds that are counted for it.
+    work_s: f64,
 }
 
 #[derive(Clone, Copy)]

@@ -49,7 +49,7 @@ pub(super) fn scene(job: &Job, settings: &Settings) -> SceneFile {
 pub(super) fn arguments(job: &Job, light: Light, seed: u32, blanks: usize, image: &str) -> Vec<String> {
     let (width, indirect) = (blanks + job.stations.len(), u8::from(light == Light::Indirect));
     let arguments = format!(
-        "+I{SCENE} +O{image} +FP16 File_Gamma=1.0 +W{width} +H1 -A -D +WT1 -GD -GR -GS Declare=Indirect={indirect} \
+        "+I{SCENE} +O{image} +FP16 File_Gamma=1.0 +W{width} +H1 -A -D +WT1 -GD -GR Declare=Indirect={indirect} \
          Declare=Seed={seed} Declare=Blanks={blanks}"
     );
     arguments.split(' ').map(str::to_owned).collect()

@@ -13,6 +13,8 @@ use crate::system::process::{self, Invocation};
 #[derive(Clone, Debug)]
 pub(super) struct Tools {
     package: PathBuf,
+    /// What makes the time stand still for rtrace, which takes it for the seed of its random numbers.
+    clock: PathBuf,
 }
 
 const OCTREE: &str = "scene.oct";
@@ -27,7 +29,10 @@ impl Tools {
                 return Err(absent(format!("{} has no {file}", package.display())));
             }
         }
-        Ok(Self { package })
+        let absent = |reason: String| Absent { reason, ..absent(String::new()) };
+        let clock = site.libfaketime();
+        let clock = clock.ok_or_else(|| absent("libfaketime, which lets rtrace have a seed, is not there".into()))?;
+        Ok(Self { package, clock })
     }
 
     /// The version that rtrace names: `RADIANCE 6.0a ...`, its first two words.
@@ -37,7 +42,7 @@ impl Tools {
         let done = done.map_err(|error| absent(error.to_string()))?;
         let text = String::from_utf8_lossy(&done.stdout).into_owned();
         let version = text.split_whitespace().nth(1).ok_or_else(|| absent(format!("rtrace -version says `{text}`")))?;
-        Ok(Version::of(&ID, version, site, [self.package.clone()]))
+        Ok(Version::of(&ID, version, site, [self.package.clone(), self.clock.clone()]))
     }
 
     pub(super) fn compile(&self, workbench: &Workbench) -> Result<(), EngineError> {
@@ -69,25 +74,34 @@ impl Tools {
         workbench.write(&[SceneFile::text(&format!("luminaire-{k}.rad"), text.replace("' light '", kind))])
     }
 
-    /// Illuminance in lux of each row.
+    /// Illuminance in lux of each row, with the random numbers of a seed.
     pub(super) fn rtrace(
         &self,
         workbench: &Workbench,
         options: &[String],
+        seed: u32,
         rows: &[[f64; 6]],
     ) -> Result<Vec<f64>, EngineError> {
         let stdin = rows.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
-        let run = self.prepared(workbench.invoke(self.program("rtrace")));
+        let run = self.seeded(workbench.invoke(self.program("rtrace")), seed);
         let finished = run.args(["-h", "-fdd"]).args(options).args([OCTREE]).stdin(stdin).run()?;
         parse(&finished.stdout, rows.len())
     }
 
-    pub(super) fn command_by_hand(&self) -> String {
-        self.prepared(by_hand("sh")).args(["run.sh"]).command_line_with_env()
+    pub(super) fn command_by_hand(&self, seed: u32) -> String {
+        self.seeded(by_hand("sh"), seed).args(["run.sh"]).command_line_with_env()
     }
 
     fn program(&self, name: &str) -> PathBuf {
         self.package.join("bin").join(name)
+    }
+
+    /// rtrace calls `srandom(time(0))`: the seconds since 1970 stand still at the seed.
+    fn seeded(&self, run: Invocation, seed: u32) -> Invocation {
+        let held =
+            [("FAKETIME", seed.to_string()), ("FAKETIME_FMT", "%s".into()), ("FAKETIME_DISABLE_SHM", "1".into())];
+        let run = held.into_iter().fold(self.prepared(run), |run, (key, value)| run.env(key, value));
+        run.env("LD_PRELOAD", &self.clock)
     }
 
     /// With the search paths that the programs need: for their library and for one another.

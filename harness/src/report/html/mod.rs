@@ -113,6 +113,7 @@ fn head(report: &Report) -> Markup {
             }
             h1 { (report.spec.title) }
             p.spec { code { (report.spec.path) } }
+            @for line in super::notes::decision_rules(report) { p.spec { (line) } }
             @for line in super::notes::policies(report) { p.spec { (line) } }
             @if !report.comparisons.is_empty() {
                 div.share aria-hidden="true" {

@@ -1,0 +1,41 @@
+//! What sampling costs, by rule: no clock, and so no load of the machine, says how much is sampled.
+//!
+//! Engines count seconds at a fixed rate each, measured with two cores of a usual server. A budget's seconds are meant so; by the
+//! clock a job takes what the machine makes of them.
+
+use luminaire::scene::{Bounces, LuminaireModel, Shape};
+
+use super::Job;
+
+/// Of the last of the light's reflections little is left after so many, whatever the reflectance.
+const LONGEST: f64 = 100.0;
+/// Shadow rays towards an opening, as far as its parts are told apart.
+const PARTS: f64 = 10.0;
+/// Triangles of an empty room.
+const ROOM: f64 = 12.0;
+
+/// Reflections that a path is followed for, in the mean and at most.
+pub(super) fn path_length(job: &Job) -> f64 {
+    let all = (1.0 - job.largest_reflectance()).recip().min(LONGEST);
+    match job.reflections() {
+        None => 0.0,
+        Some(Bounces::AtMost(n)) => all.min(f64::from(n)),
+        Some(Bounces::Converged) => all,
+    }
+}
+
+/// What a ray takes against one in an empty room: as many more steps as the tree of triangles is deeper.
+pub(super) fn a_ray(job: &Job) -> f64 {
+    let triangles = |shape: &Shape| match shape {
+        Shape::Box { .. } => ROOM,
+        Shape::Mesh { triangles, .. } => triangles.len() as f64,
+    };
+    let all: f64 = job.scene.obstacles.iter().map(|o| triangles(&o.shape)).sum();
+    (ROOM + all).log2() / ROOM.log2()
+}
+
+/// Shadow rays to all luminaires.
+pub(super) fn shadow_rays(job: &Job) -> f64 {
+    let of_one = |model| if model == LuminaireModel::Point { 1.0 } else { PARTS };
+    job.scene.luminaires.iter().map(|l| of_one(l.model)).sum()
+}
