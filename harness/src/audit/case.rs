@@ -5,7 +5,6 @@ use std::time::{Instant, SystemTime};
 
 use super::jobs::{self, Outcome, Running};
 use super::{AuditError, Options, repetition, sampling, sequential};
-use crate::diagnosis;
 use crate::judge::{Comparison, Judge, Policy, Published};
 use crate::measure::Reader;
 use crate::plan::{Plan, Skip};
@@ -51,7 +50,6 @@ impl Audit<'_> {
         let tasks = || plan.tasks.iter();
         let mut comparisons: Vec<Comparison> = tasks().flat_map(|task| judge.compare(task, &of(task))).collect();
         let known = tasks().flat_map(|task| judge.on_record(&comparisons, &of(task))).collect();
-        diagnosis::diagnose(&plan.tasks, &mut comparisons);
         sequential::estimate_remaining_cost(&mut comparisons);
         // What follows from other readings follows from nothing where the case was never begun.
         let holds = |s: &&Skip| stop.is_none() || s.scope.leaves_no_reading();

@@ -31,11 +31,12 @@ use sha2::{Digest, Sha256};
 
 use parking_lot::Mutex;
 
+use crate::diagnosis::{self, Examined};
 use crate::engines::Site;
 use crate::judge::{Policy, PolicyChoice, Published, PublishedError};
 use crate::measure::cache::Cache;
 use crate::measure::{Machine, Reader};
-use crate::plan::{EVERYONE, Plan, Planner, Scope, Selection, Skip, Skipping};
+use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
 use crate::record::Status;
 use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, SpecError, filtered, hexadecimal, suite};
@@ -198,13 +199,14 @@ fn audited(
     let audit = Audit { options, reader: options.reader() };
     let is_alone = cases.iter().filter(|case| !case.is_known()).count() == 1;
     let stop: Mutex<Option<Stop>> = Mutex::new(None);
+    let folder_of = |case: &Case| match case.is_known() {
+        true => options.out.join(&case.name),
+        false if is_alone => options.out.clone(),
+        false => options.out.join(within(&options.out, case)),
+    };
     let one = |&k: &usize| -> Result<Report, AuditError> {
         let (case, plan) = (&cases[k], &plans[k]);
-        let folder = match case.is_known() {
-            true => options.out.join(&case.name),
-            false if is_alone => options.out.clone(),
-            false => options.out.join(within(&options.out, case)),
-        };
+        let folder = folder_of(case);
         let stopped = stop.lock().clone();
         let report = audit.case(case, plan, &policies[k], published[k].as_ref(), stopped.as_ref(), &folder)?;
         if folder != options.out {
@@ -225,11 +227,36 @@ fn audited(
     // What comes after a failure must not have begun before it.
     let side = if options.after_failure == AfterFailure::Stop { 1 } else { options.jobs.clamp(1, MAX_CASES_AT_A_TIME) };
     let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
-    let mut report = Report::joined(spec, done.into_iter().collect::<Result<Vec<_>, _>>()?);
+    let mut reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
+    diagnose(&plans, &mut reports);
+    for (case, report) in cases.iter().zip(&reports) {
+        let folder = folder_of(case);
+        if folder != options.out && report.comparisons.iter().any(|c| c.diagnosis.is_some()) {
+            files::keep_json(&folder.join("report.json"), report)?;
+        }
+    }
+    let mut report = Report::joined(spec, reports);
     // Cases ran side by side: their seconds do not add up.
     report.wall_s = clock.elapsed().as_secs_f64();
     files::keep_json(&options.out.join("report.json"), &report)?;
     Ok(report)
+}
+
+/// Says why what fails does, by all that an engine read in the run.
+fn diagnose(plans: &[Plan], reports: &mut [Report]) {
+    if process::is_interrupted() {
+        return;
+    }
+    let settings = |plan: &Plan| {
+        let of_run = |run: &Run| (plan.engines[run.engine].engine.name(), format!("{:?}", run.job.settings));
+        plan.runs.iter().map(of_run).collect()
+    };
+    let mut cases = vec![];
+    for (plan, report) in plans.iter().zip(reports) {
+        let comparisons = &mut report.comparisons;
+        cases.push(Examined { tasks: &plan.tasks, settings: settings(plan), comparisons });
+    }
+    diagnosis::diagnose(&mut cases);
 }
 
 /// The cases that are asked for, under the profile chosen, each with its policy; all read and checked before any engine starts.

@@ -4,7 +4,7 @@ use clap::Args;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::{TextOrJson, json, print};
-use crate::experiments::selftest::{calibrations, selftest};
+use crate::experiments::selftest::{calibrations, naming, selftest};
 use crate::report::Exit;
 
 #[derive(Debug, Args)]
@@ -21,6 +21,9 @@ pub(super) struct SelftestArgs {
     /// Show how good the verdicts' intervals and p-values are, and nothing else
     #[arg(long)]
     calibration: bool,
+    /// Draw so many faults of each kind at random, in rooms at random: how often are they named rightly, wrongly, not at all?
+    #[arg(long, value_name = "N", conflicts_with = "calibration")]
+    naming: Option<usize>,
     /// View of the scorecard to print
     #[arg(long, value_enum, value_name = "FORMAT", default_value_t = TextOrJson::Terminal)]
     format: TextOrJson,
@@ -34,6 +37,14 @@ pub(super) fn run_selftest(args: &SelftestArgs) -> Result<Exit, Diagnostic> {
             TextOrJson::Json => serde_json::to_string(&found).into_diagnostic()? + "\n",
         })?;
         return Ok(if found.is_good() { Exit::Passed } else { Exit::Failed });
+    }
+    if let Some(faults) = args.naming {
+        let found = naming(faults, args.seed).into_diagnostic()?;
+        print(&match args.format {
+            TextOrJson::Terminal => found.to_string(),
+            TextOrJson::Json => json(&found)?,
+        })?;
+        return Ok(Exit::Passed);
     }
     let card = selftest(args.runs.max(1), args.clean_runs, args.seed).into_diagnostic()?;
     print(&match args.format {

@@ -1,91 +1,40 @@
-//! Faults that renderers and exporters are known to have, each as what a task's readings would be with it.
-//!
-//! The diagnosis looks for them in readings that failed, the self-test puts them in.
+//! Faults that renderers and exporters are known to have. The diagnosis looks for them in readings that failed, the
+//! self-test puts them in.
 
-use std::sync::Arc;
-
-use glam::{DMat3, DVec3};
+use glam::DMat3;
+use itertools::Itertools;
 use luminaire::geometry::{Room, Surface};
-use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
-use luminaire::simulator::{self, Accuracy};
+use luminaire::scene::{Bounces, LuminaireModel, Transport};
 
-use crate::engines::Measurement;
+use super::fault::{Fault, Parameter};
+use super::tables::{averaged, extrapolated, is_axial, isotropic, remap, replace};
+use super::wrong::{Law, Order, Readout, Wrong};
 use crate::procedures::Task;
-use crate::record::Estimate;
 
-/// Readings are predicted to this relative error at least; they turn out a hundred times better.
-const ACCURACY: f64 = 1e-2;
-/// A fault that changes no reading by more than this share of the largest is not there in this task.
-const INVISIBLE: f64 = 1e-3;
 /// Reflections after which truncation is looked for no more: it hardly shows then.
 const MAX_BOUNCES: u32 = 8;
 const HALF_MAX: f64 = 65504.0;
+/// Luminaires of a scene that are looked at one by one.
+pub(super) const LUMINAIRES: usize = 8;
 
-pub struct Fault {
-    /// A short name, the same in every task.
-    pub id: &'static str,
-    pub what: String,
-    pub effect: Effect,
-}
-
-pub enum Effect {
-    Factor(f64),
-    /// Multiplies each by a number of its own, and all by one that is not known beforehand.
-    Shape(Vec<f64>),
-    Values(Vec<f64>),
-    Clamp,
-    Offset,
-}
-
-/// The light of a task, by the simulator; `None` where that cannot be had in a moment.
-pub fn truth(task: &Task) -> Option<Vec<f64>> {
-    let meters: Vec<_> = task.stations().map(|(_, meter)| meter).collect();
-    let bare =
-        task.scene.obstacles.is_empty() && task.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
-    if !bare && task.transport != Transport::Direct {
-        return None;
+/// Every fault on the list that cases may show; what is of one case alone names what is in it.
+pub fn faults(cases: &[&[Task]]) -> Vec<Fault> {
+    let mut all = factors();
+    all.extend(readouts());
+    all.extend(laws());
+    all.extend(of_luminaires());
+    all.extend(of_rooms());
+    all.extend(of_light());
+    // Scenes of known answer are no case: each is a room of its own.
+    let of_a_spec = |(_, tasks): &(usize, &&[Task])| !tasks.iter().all(|t| t.procedure.is_known());
+    for (case, tasks) in cases.iter().enumerate().filter(of_a_spec) {
+        all.extend(of_case(case, tasks));
     }
-    let accuracy = Accuracy { relative_error: ACCURACY, seed: 1 };
-    let solution = simulator::illuminance(&task.scene, &meters, task.transport, &accuracy).ok()?;
-    let estimates = solution.estimates.iter().map(|e| Estimate::exact(e.illuminance.value())).collect();
-    let measurement = Measurement { estimates, ..Measurement::default() };
-    Some(measurement.readings(&task.targets).iter().map(|reading| reading.value).collect())
-}
-
-pub fn faults(task: &Task, right: &[f64]) -> Vec<Fault> {
-    let mut all = factors(task);
-    all.extend(arithmetic(task, right));
-    all.extend(of_luminaires(task));
-    all.extend(of_room(task));
-    all.extend(of_transport(task));
-    all.retain(|fault| fault.shows(right));
     all
 }
 
-impl Fault {
-    fn new(id: &'static str, what: impl Into<String>, effect: Effect) -> Self {
-        Self { id, what: what.into(), effect }
-    }
-
-    /// What is read with the fault instead of `right`, where the fault alone says so.
-    pub fn readings(&self, right: &[f64]) -> Option<Vec<f64>> {
-        match &self.effect {
-            Effect::Factor(factor) => Some(right.iter().map(|r| r * factor).collect()),
-            Effect::Shape(shape) => Some(right.iter().zip(shape).map(|(r, s)| r * s).collect()),
-            Effect::Values(values) => Some(values.clone()),
-            Effect::Clamp | Effect::Offset => None,
-        }
-    }
-
-    fn shows(&self, right: &[f64]) -> bool {
-        let largest = right.iter().copied().fold(0.0, f64::max);
-        let differs = |wrong: Vec<f64>| wrong.iter().zip(right).any(|(w, r)| (w - r).abs() > INVISIBLE * largest);
-        self.readings(right).is_none_or(differs)
-    }
-}
-
-fn factors(task: &Task) -> Vec<Fault> {
+/// Without parameters.
+fn factors() -> Vec<Fault> {
     use std::f64::consts::PI;
     let constant = [
         ("factor-pi", "factor pi: exitance taken for luminance", PI),
@@ -105,210 +54,250 @@ fn factors(task: &Task) -> Vec<Fault> {
         ("kilo", "factor 1000: candela a kilolumen taken for candela, or lux for kilolux", 1000.0),
         ("milli", "factor 1/1000: candela taken for candela a kilolumen", 1e-3),
     ];
-    let mut faults: Vec<Fault> =
-        constant.into_iter().map(|(id, what, factor)| Fault::new(id, what, Effect::Factor(factor))).collect();
-    if let [luminaire] = &task.scene.luminaires[..] {
-        if luminaire.flux_scale > 0.0 {
-            let what = "the spec's flux_scale is left out".to_owned();
-            faults.push(Fault::new("flux-scale", what, Effect::Factor(1.0 / luminaire.flux_scale)));
-        }
-        if let Some(lumens) = luminaire.photometry.lamp_lumens.filter(|lumens| *lumens > 0.0) {
-            let per = format!("factor 1000/lamp lumens: scaled to a kilolumen of its {lumens} lm");
-            faults.push(Fault::new("per-kilolumen", per, Effect::Factor(1000.0 / lumens)));
-            let twice = format!("factor lamp lumens/1000: its {lumens} lm applied once too often");
-            faults.push(Fault::new("lumens-twice", twice, Effect::Factor(lumens / 1000.0)));
-        }
-    }
-    faults
-}
-
-fn arithmetic(task: &Task, right: &[f64]) -> Vec<Fault> {
-    let half: Vec<f64> = right.iter().map(|r| r.min(HALF_MAX)).collect();
-    let mut faults = vec![
-        Fault::new("clamp", "highlights are cut off", Effect::Clamp),
-        Fault::new("half-float", "half-precision numbers: what is above 65504 is lost", Effect::Values(half)),
-        Fault::new("offset", "the same is added to every reading", Effect::Offset),
-    ];
-    let [luminaire] = &task.scene.luminaires[..] else { return faults };
-    if task.transport != Transport::Direct || luminaire.model != LuminaireModel::Point {
-        return faults;
-    }
-    let towards: Vec<DVec3> = task.targets.iter().map(|t| luminaire.position_m - t.meter.position_m).collect();
-    let cosines: Vec<f64> =
-        towards.iter().zip(&task.targets).map(|(d, t)| (d.dot(t.meter.normal) / d.length()).max(0.0)).collect();
-    let intensities: Vec<f64> = towards.iter().map(|d| luminaire.intensity_towards(-*d).value()).collect();
-    let distances: Vec<f64> = towards.iter().map(|d| d.length()).collect();
-    let inverse = cosines.iter().map(|c| if *c > 0.0 { 1.0 / c } else { 0.0 }).collect();
-    let uneven = |values: &[f64]| values.iter().any(|v| (v - values[0]).abs() > INVISIBLE * values[0]);
-    let mut add = |id, what: &str, effect| faults.push(Fault::new(id, what, effect));
-    if uneven(&cosines) {
-        add("cosine-missing", "the cosine at the meter is left out", Effect::Values(times(right, inverse)));
-        add("cosine-doubled", "the cosine at the meter is applied twice", Effect::Values(times(right, cosines)));
-    }
-    if uneven(&distances) {
-        add("distance", "light falls with distance, not with its square", Effect::Shape(distances));
-    }
-    // What is the same everywhere is a factor like any other.
-    if uneven(&intensities) {
-        add("candela-squared", "the candela are squared: the filter is applied to itself", Effect::Shape(intensities));
-    }
-    faults
-}
-
-fn times(right: &[f64], factors: Vec<f64>) -> Vec<f64> {
-    right.iter().zip(factors).map(|(r, f)| r * f).collect()
-}
-
-fn of_luminaires(task: &Task) -> Vec<Fault> {
-    let mut faults = vec![];
-    let mut of_each = |id, what: &str, change: &dyn Fn(&mut Luminaire)| {
-        let mut wrong = task.clone();
-        wrong.scene.luminaires.iter_mut().for_each(change);
-        faults.extend(scene(id, what, &wrong));
+    let factor = |(id, what, factor): (&'static str, &str, f64)| {
+        let times = move |wrong: &mut Wrong, _: &[f64]| {
+            wrong.factor *= factor;
+            true
+        };
+        Fault::new(id, what, times).about(FACTOR)
     };
-    for (id, turn) in [("c-turned-90", 90.0), ("c-turned-180", 180.0), ("c-turned-270", 270.0)] {
-        let what = format!("the distribution is turned by {turn} degrees in C");
-        of_each(id, &what, &|l| replace(l, Some(l.photometry.distribution.turned(turn))));
-    }
-    of_each("c-mirrored", "C runs the other way round: 90 and 270 degrees are exchanged", &|l| {
-        remap(l, |c, g| (-c, g));
-    });
-    of_each("c-mirrored-90", "C 0 and C 180 are exchanged", &|l| remap(l, |c, g| (180.0 - c, g)));
-    of_each("gamma-flipped", "gamma is counted from the zenith: up and down are exchanged", &|l| {
-        remap(l, |c, g| (c, 180.0 - g));
-    });
-    of_each("isotropic", "the distribution is replaced by the same intensity everywhere", &isotropic);
-    of_each("averaged", "the distribution is averaged over C", &averaged);
-    of_each("extrapolated", "the table goes on beyond its last angle", &extrapolated);
-    of_each("unrotated", "the luminaire's rotation is left out", &|l| l.orientation = DMat3::IDENTITY);
-    of_each("rotated-back", "the luminaire's rotation is applied the wrong way round", &|l| {
-        l.orientation = l.orientation.transpose();
-    });
-    of_each("area-as-point", "the luminous opening is shrunk to a point", &|l| l.model = LuminaireModel::Point);
-    for k in 0..task.scene.luminaires.len().min(if task.scene.luminaires.len() > 1 { 8 } else { 0 }) {
-        let mut wrong = task.clone();
-        let lost = wrong.scene.luminaires.remove(k);
-        faults.extend(scene("luminaire-lost", &format!("{} gives no light", lost.id), &wrong));
-    }
-    faults
-}
-
-fn of_room(task: &Task) -> Vec<Fault> {
-    let Some(room) = task.scene.room else { return vec![] };
-    let with = |id, what: &str, change: &dyn Fn(&mut Room)| {
-        let (mut wrong, mut changed) = (task.clone(), room);
-        change(&mut changed);
-        wrong.scene.room = Some(changed);
-        scene(id, what, &wrong)
-    };
-    let mut faults = vec![];
-    for surface in Surface::ALL {
-        let what = format!("{} reflects nothing: dropped, or its normal points outwards", name(surface));
-        faults.extend(with("surface-lost", &what, &|r| *reflectance(r, surface) = 0.0));
-    }
-    faults.extend(with("upside-down", "ceiling and floor are exchanged", &|r| {
-        std::mem::swap(&mut r.reflectance.floor, &mut r.reflectance.ceiling);
+    let mut faults: Vec<Fault> = constant.into_iter().map(factor).collect();
+    let unnamed = "factor {0:}, none of those known";
+    faults.push(Fault::new(FACTOR, unnamed, |_, _| true).as_bright_as_you_like());
+    let scaled = "the spec's flux_scale is left out";
+    faults.push(Fault::new("flux-scale", scaled, |wrong, _| {
+        wrong.dimmed(|l| (l.flux_scale > 0.0 && l.flux_scale != 1.0).then(|| 1.0 / l.flux_scale))
     }));
+    let lumens = |l: &luminaire::scene::Luminaire| l.photometry.lamp_lumens.filter(|lumens| *lumens > 0.0);
+    let per = "factor 1000/lamp lumens: scaled to a kilolumen";
+    faults.push(Fault::new("per-kilolumen", per, move |wrong, _| wrong.dimmed(|l| Some(1000.0 / lumens(l)?))));
+    let twice = "factor lamp lumens/1000: the lamp's lumens applied once too often";
+    faults.push(Fault::new("lumens-twice", twice, move |wrong, _| wrong.dimmed(|l| Some(lumens(l)? / 1000.0))));
+    faults
+}
+
+/// The id of a factor that is no fault's.
+pub(super) const FACTOR: &str = "factor";
+
+fn readouts() -> Vec<Fault> {
+    let readout = |id, what, readout: fn(&[f64]) -> Readout| {
+        Fault::new(id, what, move |wrong, p| {
+            wrong.readouts.push(readout(p));
+            true
+        })
+    };
+    let level = Parameter { unit: " lx", starts: vec![], step: 1e-3, range: (0.0, f64::MAX) };
+    let more = Parameter { unit: " lx", starts: vec![0.0], step: 1e-3, range: (0.0, f64::MAX) };
+    vec![
+        readout("clamp", "highlights are cut off at {0}", |p| Readout::AtMost(p[0])).with([level]),
+        readout("offset", "{0} are added to every reading", |p| Readout::Plus(p[0])).with([more]),
+        readout("half-float", "half-precision numbers: what is above 65504 is lost", |_| Readout::AtMost(HALF_MAX)),
+        readout("dark", "no light at all: every reading is zero", |_| Readout::AtMost(0.0)),
+        readout("reversed", "the meters of a set are read in the reverse order", |_| Readout::Order(Order::Reversed)),
+        readout("next", "every meter reads what the next of its set should", |_| Readout::Order(Order::Next)),
+        readout("previous", "every meter reads what the one before it should", |_| Readout::Order(Order::Previous)),
+        readout("exchanged", "rows and columns of grids of meters are exchanged", |_| Readout::Order(Order::Exchanged)),
+    ]
+}
+
+fn laws() -> Vec<Fault> {
+    let law = |id, what, law: Law| {
+        Fault::new(id, what, move |wrong, _| {
+            // Where the light is even, the wrong law is a factor like any other.
+            wrong.law = law;
+            wrong.task().scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point)
+        })
+    };
+    let wrong = |change: fn(&mut Law)| {
+        let mut law = Law::RIGHT;
+        change(&mut law);
+        law
+    };
+    vec![
+        law("cosine-missing", "the cosine at the meter is left out", wrong(|l| l.cosine = 0)),
+        law("cosine-doubled", "the cosine at the meter is applied twice", wrong(|l| l.cosine = 2)),
+        law("distance", "light falls with distance, not with its square", wrong(|l| l.distance = 1))
+            .as_bright_as_you_like(),
+        law("candela-squared", "the candela are squared: the filter is applied to itself", wrong(|l| l.intensity = 2))
+            .as_bright_as_you_like(),
+    ]
+}
+
+fn of_luminaires() -> Vec<Fault> {
+    let of_each = |id, what: &str, change: fn(&mut luminaire::scene::Luminaire) -> bool| {
+        Fault::new(id, what, move |wrong, _| wrong.luminaires(change))
+    };
+    let turned = |(id, deg): (&'static str, f64)| {
+        let what = format!("the distribution is turned by {deg} degrees in C");
+        let turn = move |l: &mut luminaire::scene::Luminaire| {
+            !is_axial(l) && replace(l, Some(l.photometry.distribution.turned(deg)))
+        };
+        Fault::new(id, what, move |wrong, _| wrong.luminaires(turn)).about(TURN)
+    };
+    let mut faults = [("c-turned-90", 90.0), ("c-turned-180", 180.0), ("c-turned-270", 270.0)].map(turned).to_vec();
+    faults.extend([
+        of_each("c-mirrored", "C runs the other way round: 90 and 270 degrees are exchanged", |l| {
+            !is_axial(l) && remap(l, |c, g| (-c, g))
+        }),
+        of_each("c-mirrored-90", "C 0 and C 180 are exchanged", |l| !is_axial(l) && remap(l, |c, g| (180.0 - c, g))),
+        of_each("gamma-flipped", "gamma is counted from the zenith: up and down are exchanged", |l| {
+            remap(l, |c, g| (c, 180.0 - g))
+        }),
+        of_each("isotropic", "the distribution is replaced by the same intensity everywhere", isotropic),
+        of_each("averaged", "the distribution is averaged over C", |l| !is_axial(l) && averaged(l)),
+        of_each("extrapolated", "the table goes on beyond its last angle", extrapolated),
+        of_each("unrotated", "the luminaire's rotation is left out", |l| {
+            let before = std::mem::replace(&mut l.orientation, DMat3::IDENTITY);
+            before != DMat3::IDENTITY
+        }),
+        of_each("rotated-back", "the luminaire's rotation is applied the wrong way round", |l| {
+            let back = l.orientation.transpose();
+            let before = std::mem::replace(&mut l.orientation, back);
+            before != l.orientation
+        }),
+        of_each("area-as-point", "the luminous opening is shrunk to a point", |l| {
+            let before = std::mem::replace(&mut l.model, LuminaireModel::Point);
+            before != LuminaireModel::Point
+        }),
+    ]);
+    faults
+}
+
+/// What rotations in C are about.
+pub(super) const TURN: &str = "turn";
+/// What powers of reflectances are about.
+pub(super) const POWER: &str = "power of reflectances";
+
+fn of_rooms() -> Vec<Fault> {
+    let mut faults = vec![Fault::new("upside-down", "ceiling and floor are exchanged", |wrong, _| {
+        in_room(wrong, |r| std::mem::swap(&mut r.reflectance.floor, &mut r.reflectance.ceiling))
+    })];
     // The exponent of display gamma, as an RGB colour would be decoded.
-    let raised = |r: &mut Room, power: f64| {
-        for s in Surface::ALL {
-            *reflectance(r, s) = room.reflectance.of(s).powf(power);
-        }
-    };
-    faults
-        .extend(with("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", &|r| raised(r, 2.2)));
-    faults.extend(with("gamma-encoded", "reflectances are encoded as colours, to the power of 1/2.2", &|r| {
-        raised(r, 1.0 / 2.2);
-    }));
+    for (id, what, power) in [
+        ("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", 2.2),
+        ("gamma-encoded", "reflectances are encoded as colours, to the power of 1/2.2", 1.0 / 2.2),
+    ] {
+        faults.push(Fault::new(id, what, move |wrong, _| raised(wrong, power)).about(POWER));
+    }
     faults
 }
 
-fn of_transport(task: &Task) -> Vec<Fault> {
+fn of_light() -> Vec<Fault> {
+    let mut faults: Vec<Fault> = (0..MAX_BOUNCES).map(bounces_cut).collect();
+    faults.extend([
+        Fault::new("bounces-uncut", "light is followed beyond the reflections asked for", |wrong, _| {
+            let asked = wrong.task().transport;
+            bounces(asked).is_some_and(|b| b != Bounces::Converged) && {
+                wrong.transport(with_bounces(asked, Bounces::Converged));
+                true
+            }
+        }),
+        Fault::new("direct-lost", "direct light is missing", |wrong, _| {
+            let Transport::Total(bounces) = wrong.task().transport else { return false };
+            wrong.transport(Transport::Indirect(bounces));
+            true
+        }),
+        Fault::new("direct-added", "direct light is counted too", |wrong, _| {
+            let Transport::Indirect(bounces) = wrong.task().transport else { return false };
+            wrong.transport(Transport::Total(bounces));
+            true
+        }),
+        Fault::new("indirect-added", "reflected light is counted too", |wrong, _| {
+            let is_there = wrong.task().transport == Transport::Direct && wrong.task().scene.room.is_some();
+            if is_there {
+                wrong.transport(Transport::Total(Bounces::Converged));
+            }
+            is_there
+        }),
+        Fault::new("meter-flipped", "meters face the other way", |wrong, _| {
+            wrong.meters(|m| m.normal = -m.normal);
+            true
+        }),
+    ]);
+    faults
+}
+
+fn bounces_cut(n: u32) -> Fault {
+    let what = format!("light stops after {n} reflection{}", if n == 1 { "" } else { "s" });
+    Fault::new("bounces-cut", what, move |wrong, _| {
+        let asked = wrong.task().transport;
+        let cuts = bounces(asked).is_some_and(|b| if let Bounces::AtMost(most) = b { n < most } else { true });
+        if cuts {
+            wrong.transport(with_bounces(asked, Bounces::AtMost(n)));
+        }
+        cuts
+    })
+}
+
+const fn bounces(transport: Transport) -> Option<Bounces> {
+    match transport {
+        Transport::Direct => None,
+        Transport::Indirect(bounces) | Transport::Total(bounces) => Some(bounces),
+    }
+}
+
+const fn with_bounces(transport: Transport, bounces: Bounces) -> Transport {
+    match transport {
+        Transport::Direct => Transport::Direct,
+        Transport::Indirect(_) => Transport::Indirect(bounces),
+        Transport::Total(_) => Transport::Total(bounces),
+    }
+}
+
+fn of_case(case: usize, tasks: &[Task]) -> Vec<Fault> {
     let mut faults = vec![];
-    let mut light = |id, what: &str, transport| faults.extend(scene(id, what, &Task { transport, ..task.clone() }));
-    if let Transport::Indirect(bounces) | Transport::Total(bounces) = task.transport {
-        let total = matches!(task.transport, Transport::Total(_));
-        let of = |bounces| if total { Transport::Total(bounces) } else { Transport::Indirect(bounces) };
-        let most = if let Bounces::AtMost(n) = bounces { n.min(MAX_BOUNCES) } else { MAX_BOUNCES };
-        for n in 0..most {
-            let what = format!("light stops after {n} reflection{}", if n == 1 { "" } else { "s" });
-            light("bounces-cut", &what, of(Bounces::AtMost(n)));
-        }
-        if total {
-            light("direct-lost", "direct light is missing", Transport::Indirect(bounces));
-        } else {
-            light("direct-added", "direct light is counted too", Transport::Total(bounces));
-        }
-        if bounces != Bounces::Converged {
-            light("bounces-uncut", "light is followed beyond the reflections asked for", of(Bounces::Converged));
-        }
-    } else if task.scene.room.is_some() {
-        light("indirect-added", "reflected light is counted too", Transport::Total(Bounces::Converged));
+    if tasks.iter().any(|t| t.scene.room.is_some() && t.transport != Transport::Direct) {
+        faults.extend(Surface::ALL.map(|surface| {
+            let what = format!("{} reflects nothing: dropped, or its normal points outwards", name(surface));
+            let fault = Fault::new("surface-lost", what, move |wrong, _| reflects(wrong, surface, 0.0));
+            fault.about(name(surface)).within(case)
+        }));
     }
-    let mut flipped = task.clone();
-    flipped.targets.iter_mut().flat_map(|t| &mut t.aspects).for_each(|a| a.meter.normal = -a.meter.normal);
-    faults.extend(scene("meter-flipped", "meters face the other way", &flipped));
+    let ids = names(tasks);
+    for id in ids.iter().filter(|_| ids.len() > 1).take(LUMINAIRES) {
+        let lost = id.clone();
+        let fault = Fault::new("luminaire-lost", format!("{id} gives no light"), move |wrong, _| {
+            let before = wrong.task().scene.luminaires.len();
+            // A scene that loses its only one is dark.
+            if before == 1 && wrong.task().scene.luminaires[0].id == lost {
+                wrong.factor = 0.0;
+                return true;
+            }
+            wrong.scene().luminaires.retain(|l| l.id != lost);
+            wrong.task().scene.luminaires.len() < before
+        });
+        faults.push(fault.about(format!("flux of {id}")).within(case));
+    }
     faults
 }
 
-fn scene(id: &'static str, what: &str, wrong: &Task) -> Option<Fault> {
-    truth(wrong).map(|values| Fault::new(id, what, Effect::Values(values)))
+/// The luminaires of a case.
+pub(super) fn names(tasks: &[Task]) -> Vec<String> {
+    tasks.iter().flat_map(|t| &t.scene.luminaires).map(|l| l.id.clone()).unique().collect()
 }
 
-/// Leaves the luminaire as it is where a table's angles allow no other.
-fn replace(luminaire: &mut Luminaire, distribution: Option<LuminousIntensityDistribution>) {
-    if let Some(distribution) = distribution {
-        luminaire.photometry = Arc::new(Photometry { distribution, ..(*luminaire.photometry).clone() });
+pub(super) fn in_room(wrong: &mut Wrong, change: impl Fn(&mut Room)) -> bool {
+    if wrong.task().transport == Transport::Direct || wrong.task().scene.room.is_none() {
+        return false;
     }
+    wrong.scene().room.as_mut().map(change).is_some()
 }
 
-/// Reads the table at other angles: at its own nodes and their images, so that nothing is lost between them.
-fn remap(luminaire: &mut Luminaire, source: impl Fn(f64, f64) -> (f64, f64)) {
-    let table = luminaire.photometry.distribution.full_circle();
-    // Every map is its own inverse: nodes of C go to their mirror images about C 0 or C 90.
-    let images = |c: &f64| [*c, (-c).rem_euclid(360.0), (180.0 - c).rem_euclid(360.0)];
-    let mut c_deg: Vec<f64> = table.c_deg().iter().flat_map(images).chain([0.0, 360.0]).collect();
-    let mut gamma_deg: Vec<f64> = table.gamma_deg().iter().flat_map(|g| [*g, source(0.0, *g).1]).collect();
-    for angles in [&mut c_deg, &mut gamma_deg] {
-        angles.sort_by(f64::total_cmp);
-        angles.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
-    }
-    let at = |c: f64| gamma_deg.iter().map(move |g| (c, *g));
-    let value = |(c, g): (f64, f64)| {
-        let (c, g) = source(c, g);
-        table.intensity(c, g).value()
-    };
-    let candela = c_deg.iter().flat_map(|c| at(*c)).map(value).collect();
-    replace(luminaire, LuminousIntensityDistribution::new(c_deg, gamma_deg, candela).ok());
+pub(super) fn reflects(wrong: &mut Wrong, surface: Surface, value: f64) -> bool {
+    in_room(wrong, |room| *reflectance(room, surface) = value)
 }
 
-fn isotropic(luminaire: &mut Luminaire) {
-    let mean = luminaire.photometry.distribution.flux().value() / (4.0 * std::f64::consts::PI);
-    replace(luminaire, LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![mean; 2]).ok());
+/// Every reflectance to a power.
+pub(super) fn raised(wrong: &mut Wrong, power: f64) -> bool {
+    in_room(wrong, |room| {
+        for surface in Surface::ALL {
+            let r = reflectance(room, surface);
+            *r = r.powf(power);
+        }
+    })
 }
 
-fn averaged(luminaire: &mut Luminaire) {
-    let table = &luminaire.photometry.distribution;
-    let axial = LuminousIntensityDistribution::axial(table.gamma_deg().to_vec(), table.azimuth_average());
-    replace(luminaire, axial.ok());
-}
-
-fn extrapolated(luminaire: &mut Luminaire) {
-    let table = &luminaire.photometry.distribution;
-    let gamma = table.gamma_deg();
-    let (first, last) = (gamma[0], gamma[gamma.len() - 1]);
-    let mut gamma_deg = gamma.to_vec();
-    gamma_deg.splice(0..0, (first > 0.0).then_some(0.0));
-    gamma_deg.extend((last < 180.0).then_some(180.0));
-    let row = |c: &f64| {
-        let held = |g: &f64| table.intensity(*c, g.clamp(first, last)).value();
-        gamma_deg.iter().map(held).collect::<Vec<_>>()
-    };
-    let candela = table.c_deg().iter().flat_map(row).collect();
-    replace(luminaire, LuminousIntensityDistribution::new(table.c_deg().to_vec(), gamma_deg, candela).ok());
-}
-
-fn reflectance(room: &mut Room, surface: Surface) -> &mut f64 {
+pub(super) fn reflectance(room: &mut Room, surface: Surface) -> &mut f64 {
     let r = &mut room.reflectance;
     match surface {
         Surface::Floor => &mut r.floor,
@@ -320,7 +309,7 @@ fn reflectance(room: &mut Room, surface: Surface) -> &mut f64 {
     }
 }
 
-const fn name(surface: Surface) -> &'static str {
+pub(super) const fn name(surface: Surface) -> &'static str {
     match surface {
         Surface::Floor => "the floor",
         Surface::Ceiling => "the ceiling",

@@ -4,7 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Report;
-use crate::judge::{Bias, OnRecord, PolicyRecord, Split, State};
+use super::words::plural;
+use crate::judge::{Bias, OnRecord, PolicyRecord, Split, State, Verdict};
 use crate::plan::{EVERYONE, Skip};
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 
@@ -128,6 +129,19 @@ impl Note<'_> {
 pub(super) fn departures(report: &Report) -> Vec<String> {
     let differing = report.consensus.iter().filter(|c| c.differing > 0);
     differing.map(|c| format!("{}{}: {}", report.of_suite(&c.case, " "), c.procedure, c.text)).collect()
+}
+
+/// What explains failures, each cause once: who, how many procedures of how many cases, and why.
+pub(super) fn diagnoses(report: &Report) -> Vec<String> {
+    let mut causes: BTreeMap<(&EngineName, &str), BTreeSet<Job<'_>>> = BTreeMap::new();
+    for c in report.comparisons.iter().filter(|c| c.verdict == Verdict::Fail) {
+        let Some(why) = &c.diagnosis else { continue };
+        causes.entry((&c.key.engine, why)).or_default().insert((&c.key.case, c.key.procedure));
+    }
+    let line = |((engine, why), jobs): (&(&EngineName, &str), &BTreeSet<Job<'_>>)| {
+        format!("{engine} in {}: {why}", plural(jobs.len(), "procedure"))
+    };
+    causes.iter().map(line).collect()
 }
 
 /// The widest split of each case, procedure and engine, in their order: where it was read, and what it says.

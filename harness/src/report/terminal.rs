@@ -7,7 +7,7 @@ use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArr
 use itertools::Itertools;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{Kind, Note, biases, departures, notes, policies, splits};
+use super::notes::{Kind, Note, biases, departures, diagnoses, notes, policies, splits};
 use super::words::{mark, percent, plural, significant, value};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
@@ -61,6 +61,8 @@ pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&s
     let most = if detail == Detail::All { usize::MAX } else { BRIEF };
     let departures = departures(report).into_iter().take(most).map(|line| shortened(&line, detail));
     section(&mut text, "Who departs from the other witnesses, the reference included", departures);
+    let diagnoses = diagnoses(report).into_iter().take(most).map(|line| shortened(&line, detail));
+    section(&mut text, "What explains failures", diagnoses);
     let line = |c: &Comparison| format!("{}{}", report.of_suite(&c.key.case, ": "), deviation_line(c));
     let worst = worst(report, 5).into_iter().map(|c| shortened(&line(c), detail));
     section(&mut text, "Worst deviations (by verdict, then deviation over tolerance)", worst);

@@ -1,6 +1,7 @@
 //! The self-test: every known fault is put into a witness's readings, and the harness must catch it and name it.
 
 mod calibration;
+mod naming;
 
 use std::fmt;
 use std::path::Path;
@@ -8,14 +9,15 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::tables;
-use crate::diagnosis::{self, Effect, Fault, Readings};
-use crate::judge::{Judge, Policy, Verdict};
-use crate::procedures::{self, Task};
+use crate::diagnosis::{self, Bench, Cause, Fault, Model, Sheet};
+use crate::judge::{Comparison, Judge, Policy, Verdict};
+use crate::procedures::{Target, Task};
 use crate::record::{ProcedureId, Reading, ReadingKey, Recording, Uncertainty};
 use crate::spec::Case;
 use crate::system::random::normal;
 
 pub use calibration::{Calibrations, calibrations};
+pub use naming::{Named, Naming, naming};
 
 /// The specs and their luminaires, laid out as in the repository.
 const FILES: [(&str, &str); 5] = [
@@ -90,12 +92,11 @@ pub fn selftest(runs: usize, clean_runs: usize, seed: u64) -> Result<Scorecard, 
     for case in cases(folder.path())? {
         let judge = policy.judge(&case, None);
         let mut random = fastrand::Rng::with_seed(seed);
-        let subjects: Vec<Subject> = case.tasks().filter_map(|task| Subject::of(&case, task)).collect();
-        card.faults.extend(scores(&case, &subjects, &judge, runs, &mut random));
+        let subjects = Subjects::of(&case);
+        card.faults.extend(subjects.scores(&judge, runs, &mut random));
         for _ in 0..clean_runs {
-            let failed = |s: &Subject, random: &mut _| s.run(&judge, &s.right, random).is_some();
             card.clean_runs += 1;
-            card.false_alarms += usize::from(subjects.iter().any(|s| failed(s, &mut random)));
+            card.false_alarms += usize::from(subjects.read(&judge, None, &mut random).iter().any(|sheet| sheet.fails));
         }
     }
     Ok(card)
@@ -113,86 +114,127 @@ fn cases(folder: &Path) -> Result<Vec<Case>, SelftestError> {
     specs.map(|(name, _)| Case::load(&folder.join(name)).map_err(|e| SelftestError(e.to_string()))).collect()
 }
 
-struct Subject {
+/// What a case asks for, and all that may be wrong with it.
+struct Subjects {
     case: String,
-    task: Task,
-    right: Vec<f64>,
-    faults: Vec<Fault>,
+    bench: Bench,
 }
 
-impl Subject {
-    fn of(case: &Case, task: Task) -> Option<Self> {
-        let right = diagnosis::truth(&task)?;
-        let faults = diagnosis::faults(&task, &right);
-        Some(Self { case: case.name.clone(), task, right, faults })
+impl Subjects {
+    fn of(case: &Case) -> Self {
+        let tasks: Vec<Task> = case.tasks().collect();
+        let model = |task: &Task| Some(Model::new(0, task, diagnosis::truth(task)?));
+        let models = tasks.iter().filter_map(model).collect();
+        Self { case: case.name.clone(), bench: Bench::new(&[&tasks], models) }
     }
 
-    /// Judges noisy readings: `None` where nothing fails, else what is named.
-    fn run(&self, judge: &Judge<'_>, read: &[f64], random: &mut fastrand::Rng) -> Option<Vec<diagnosis::Cause>> {
-        let errors: Vec<f64> = read.iter().map(|r| self.noise() * r).collect();
-        let noisy: Vec<f64> = read.iter().zip(&errors).map(|(r, e)| (r + e * normal(random)).max(0.0)).collect();
-        self.fails(judge, &noisy, &errors).then(|| {
-            let readings = Readings { read: noisy, right: self.right.clone(), uncertainty: errors };
-            diagnosis::causes(&self.faults, &readings)
-        })
+    fn models(&self) -> &[Model] {
+        &self.bench.models
     }
 
-    fn fails(&self, judge: &Judge<'_>, read: &[f64], errors: &[f64]) -> bool {
+    /// Noisy readings of every procedure, right or with what a fault makes of it, as the diagnosis gets them.
+    fn read(&self, judge: &Judge<'_>, wrong: Option<&[Option<Vec<f64>>]>, random: &mut fastrand::Rng) -> Vec<Sheet> {
+        let sheet = |(k, model): (usize, &Model)| {
+            let read = wrong.and_then(|wrong| wrong[k].as_ref()).unwrap_or(&model.right);
+            let errors: Vec<f64> = read.iter().map(|r| noise(model) * r).collect();
+            let noisy = read.iter().zip(&errors).map(|(r, e)| (r + e * normal(random)).max(0.0)).collect::<Vec<f64>>();
+            let comparisons = self.judged(judge, model, &noisy, &errors);
+            Sheet::of(k, model, &comparisons.iter().collect::<Vec<_>>())
+        };
+        self.models().iter().enumerate().filter_map(sheet).collect()
+    }
+
+    fn judged(&self, judge: &Judge<'_>, model: &Model, read: &[f64], errors: &[f64]) -> Vec<Comparison> {
         let (zero, exact) = (vec![0.0; read.len()], ["iesna", "simulator"]);
-        let subject = self.recording(SUBJECT, read, errors);
-        let witnesses = exact.map(|engine| self.recording(engine, &self.right, &zero));
+        let subject = self.recording(model, SUBJECT, read, errors);
+        let witnesses = exact.map(|engine| self.recording(model, engine, &model.right, &zero));
         let all: Vec<&Recording> = witnesses.iter().chain([&subject]).collect();
-        judge.compare(&self.task, &all).iter().any(|c| c.key.engine == SUBJECT && c.verdict == Verdict::Fail)
+        let mut comparisons = judge.compare(&model.task, &all);
+        comparisons.retain(|c| c.key.engine == SUBJECT);
+        comparisons
     }
 
-    fn noise(&self) -> f64 {
-        if self.task.transport == luminaire::scene::Transport::Direct { DIRECT_NOISE } else { INDIRECT_NOISE }
-    }
-
-    fn recording(&self, engine: &str, values: &[f64], errors: &[f64]) -> Recording {
-        let reading = |((target, value), error): ((&procedures::Target, &f64), &f64)| Reading {
+    fn recording(&self, model: &Model, engine: &str, values: &[f64], errors: &[f64]) -> Recording {
+        let task = &model.task;
+        let reading = |((target, value), error): ((&Target, &f64), &f64)| Reading {
             meter: target.id.clone(),
-            quantity: self.task.quantity,
+            quantity: task.quantity,
             value: *value,
             uncertainty: Uncertainty::sampled(*error, None),
         };
         Recording {
-            model: self.task.model(),
-            light: self.task.light(),
-            readings: self.task.targets.iter().zip(values).zip(errors).map(reading).collect(),
-            ..Recording::of(ReadingKey::new(&self.case, self.task.procedure, engine), self.task.light())
+            model: task.model(),
+            light: task.light(),
+            readings: task.targets.iter().zip(values).zip(errors).map(reading).collect(),
+            ..Recording::of(ReadingKey::new(&self.case, task.procedure, engine), task.light())
         }
     }
 
-    /// What this procedure reads with a fault; `None` where the fault does not show in it.
-    fn wrong(&self, id: &str, what: &str) -> Option<Vec<f64>> {
-        let fault = self.faults.iter().find(|f| f.id == id && f.what == what)?;
-        let largest = self.right.iter().copied().fold(0.0, f64::max);
-        Some(match &fault.effect {
-            Effect::Clamp => self.right.iter().map(|r| r.min(CLAMP * largest)).collect(),
-            Effect::Offset => self.right.iter().map(|r| r + OFFSET * largest).collect(),
+    fn scores(&self, judge: &Judge<'_>, runs: usize, random: &mut fastrand::Rng) -> Vec<Score> {
+        let is_named = |f: &&Fault| f.id != "factor" && f.id != "dark";
+        self.bench.listed.iter().filter(is_named).filter_map(|fault| self.score(fault, judge, runs, random)).collect()
+    }
+
+    /// `None` where a fault does not show in this case.
+    fn score(&self, fault: &Fault, judge: &Judge<'_>, runs: usize, random: &mut fastrand::Rng) -> Option<Score> {
+        let parameters = self.parameters(fault);
+        let wrong = self.wrong(fault, &parameters);
+        if wrong.iter().all(Option::is_none) {
+            return None;
+        }
+        let pairs = || self.models().iter().zip(&wrong).filter_map(|(m, w)| Some((m, w.as_ref()?)));
+        let what = fault.said(&parameters.iter().map(|p| (*p, 0.0)).collect::<Vec<_>>());
+        let mut score = Score { id: fault.id.to_owned(), what, case: self.case.clone(), ..Score::default() };
+        score.size = pairs().map(|(model, wrong)| size(model, wrong)).fold(0.0, f64::max);
+        let (mut failed, mut named) = (vec![0; self.models().len()], 0);
+        for _ in 0..runs {
+            let sheets = self.read(judge, Some(&wrong), random);
+            sheets.iter().filter(|sheet| sheet.fails).for_each(|sheet| failed[sheet.model] += 1);
+            named += usize::from(sheets.iter().any(|s| s.fails) && names(fault, &self.bench.causes(&sheets)));
+        }
+        let mostly = |count: usize| count as f64 >= MOSTLY * runs as f64;
+        score.named_in = named as f64 / runs as f64;
+        score.diagnosed = mostly(named);
+        for (k, model) in self.models().iter().enumerate().filter(|(k, _)| mostly(failed[*k])) {
+            score.caught_by.push(model.task.procedure);
+            let smallest = wrong[k].as_ref().and_then(|wrong| self.smallest(judge, model, wrong));
+            score.smallest_detectable = [score.smallest_detectable, smallest].into_iter().flatten().reduce(f64::min);
+        }
+        Some(score)
+    }
+
+    /// What a parameter of a fault is when it is put in: a share of the brightest illuminance.
+    fn parameters(&self, fault: &Fault) -> Vec<f64> {
+        let lux =
+            |m: &Model| m.right.iter().zip(&m.task.targets).map(|(r, t)| r / t.aspects[0].weight).fold(0.0, f64::max);
+        let brightest = self.models().iter().map(lux).fold(0.0, f64::max);
+        let share = if fault.id == "clamp" { CLAMP } else { OFFSET };
+        fault.parameters.iter().map(|_| share * brightest).collect()
+    }
+
+    /// What each procedure reads with a fault; `None` where it does not show there.
+    fn wrong(&self, fault: &Fault, parameters: &[f64]) -> Vec<Option<Vec<f64>>> {
+        let read = |m: &Model| fault.readings(m, parameters);
+        let mut all: Vec<Option<Vec<f64>>> = self.models().iter().map(read).collect();
+        if fault.has_factor {
             // As bright as before on the whole.
-            Effect::Shape(shape) => {
-                let total: f64 = self.right.iter().zip(shape).map(|(r, s)| r * s).sum();
-                let factor = self.right.iter().sum::<f64>() / total;
-                self.right.iter().zip(shape).map(|(r, s)| factor * r * s).collect()
-            }
-            Effect::Factor(_) | Effect::Values(_) => fault.readings(&self.right)?,
-        })
+            let pairs = || self.models().iter().zip(&all).filter_map(|(m, w)| Some((m, w.as_ref()?)));
+            let right: f64 = pairs().flat_map(|(m, _)| &m.right).sum();
+            let factor = right / pairs().flat_map(|(_, w)| w).sum::<f64>();
+            all.iter_mut().flatten().flatten().for_each(|r| *r *= factor);
+        }
+        for (model, wrong) in self.models().iter().zip(&mut all) {
+            wrong.take_if(|wrong| !diagnosis::shows(wrong, &model.right));
+        }
+        all
     }
 
-    fn size(&self, wrong: &[f64]) -> f64 {
-        let largest = self.right.iter().copied().fold(0.0, f64::max);
-        let relative = |(w, r): (&f64, &f64)| (w - r).abs() / r.max(0.01 * largest);
-        wrong.iter().zip(&self.right).map(relative).fold(0.0, f64::max)
-    }
-
-    fn smallest(&self, judge: &Judge<'_>, wrong: &[f64]) -> Option<f64> {
-        let mix = |part: f64| -> Vec<f64> { self.right.iter().zip(wrong).map(|(r, w)| r + part * (w - r)).collect() };
+    fn smallest(&self, judge: &Judge<'_>, model: &Model, wrong: &[f64]) -> Option<f64> {
+        let mix = |part: f64| -> Vec<f64> { model.right.iter().zip(wrong).map(|(r, w)| r + part * (w - r)).collect() };
         let fails = |part: f64| {
             let read = mix(part);
-            let errors: Vec<f64> = read.iter().map(|r| self.noise() * r).collect();
-            self.fails(judge, &read, &errors)
+            let errors: Vec<f64> = read.iter().map(|r| noise(model) * r).collect();
+            self.judged(judge, model, &read, &errors).iter().any(|c| c.verdict == Verdict::Fail)
         };
         if !fails(1.0) {
             return None;
@@ -202,40 +244,25 @@ impl Subject {
             let middle = 0.5 * (passes + caught);
             if fails(middle) { caught = middle } else { passes = middle }
         }
-        Some(self.size(&mix(caught)))
+        Some(size(model, &mix(caught)))
     }
 }
 
-fn scores(case: &Case, subjects: &[Subject], judge: &Judge<'_>, runs: usize, random: &mut fastrand::Rng) -> Vec<Score> {
-    let mut names: Vec<(&str, &str)> = vec![];
-    for fault in subjects.iter().flat_map(|s| &s.faults) {
-        if !names.contains(&(fault.id, fault.what.as_str())) {
-            names.push((fault.id, &fault.what));
-        }
-    }
-    let mut one = |(id, what): (&str, &str)| {
-        let case = case.name.clone();
-        let mut score = Score { id: id.to_owned(), what: what.to_owned(), case, ..Score::default() };
-        for subject in subjects {
-            let Some(wrong) = subject.wrong(id, what) else { continue };
-            score.size = score.size.max(subject.size(&wrong));
-            let found: Vec<_> = (0..runs).filter_map(|_| subject.run(judge, &wrong, random)).collect();
-            let of_runs = |n: usize| n as f64 / runs as f64;
-            if of_runs(found.len()) < MOSTLY {
-                continue;
-            }
-            if score.caught_by.is_empty() {
-                let named = |causes: &&Vec<diagnosis::Cause>| causes.iter().any(|c| c.id == id && c.what == what);
-                score.named_in = of_runs(found.iter().filter(named).count());
-                score.diagnosed = score.named_in >= MOSTLY;
-            }
-            score.caught_by.push(subject.task.procedure);
-            let smallest = subject.smallest(judge, &wrong);
-            score.smallest_detectable = [score.smallest_detectable, smallest].into_iter().flatten().reduce(f64::min);
-        }
-        score
-    };
-    names.into_iter().map(&mut one).collect()
+fn noise(model: &Model) -> f64 {
+    if model.task.transport == luminaire::scene::Transport::Direct { DIRECT_NOISE } else { INDIRECT_NOISE }
+}
+
+/// Whether a fault is among the causes of all that is explained, and something is.
+fn names(fault: &Fault, causes: &[Vec<Cause>]) -> bool {
+    let is_meant = |c: &Cause| c.id == fault.id && (!c.parameters.is_empty() || c.what == fault.what);
+    let mut explained = causes.iter().filter(|causes| !causes.is_empty()).peekable();
+    explained.peek().is_some() && explained.all(|causes| causes.iter().any(is_meant))
+}
+
+fn size(model: &Model, wrong: &[f64]) -> f64 {
+    let largest = model.right.iter().copied().fold(0.0, f64::max);
+    let relative = |(w, r): (&f64, &f64)| (w - r).abs() / r.max(0.01 * largest);
+    wrong.iter().zip(&model.right).map(relative).fold(0.0, f64::max)
 }
 
 impl fmt::Display for Scorecard {

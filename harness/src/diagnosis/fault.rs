@@ -1,0 +1,134 @@
+//! What a fault is: a change of what is asked of an engine, or of what it reads, with or without free parameters.
+
+use std::sync::Arc;
+
+use super::wrong::{Fidelity, Model, Wrong};
+
+/// A fault that changes no reading by more than this share of the largest is not there in this task.
+const INVISIBLE: f64 = 1e-3;
+
+/// Makes a task wrong, with parameters; says whether there is anything to be wrong in it.
+type Change = Arc<dyn Fn(&mut Wrong, &[f64]) -> bool + Send + Sync>;
+
+#[derive(Clone)]
+pub struct Fault {
+    /// A short name, the same in every task.
+    pub id: &'static str,
+    /// In words; `{0}` stands for the first parameter.
+    pub what: String,
+    /// What it is a value of. A fault without parameters and one with are the same thing where they are about the same.
+    pub about: String,
+    /// The one case that it is in; otherwise it is the engine's, wherever it shows.
+    pub case: Option<usize>,
+    pub parameters: Vec<Parameter>,
+    /// Whether everything is besides as bright as it may be: a parameter, too, the last.
+    pub has_factor: bool,
+    pub change: Change,
+}
+
+/// A number that is fitted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Behind the number.
+    pub unit: &'static str,
+    /// Where fits start from; none where that is the brightest reading, in lux.
+    pub starts: Vec<f64>,
+    /// What changes readings by percents.
+    pub step: f64,
+    pub range: (f64, f64),
+}
+
+impl Fault {
+    pub fn new(
+        id: &'static str,
+        what: impl Into<String>,
+        change: impl Fn(&mut Wrong, &[f64]) -> bool + Send + Sync + 'static,
+    ) -> Self {
+        let parameters = vec![];
+        let about = id.to_owned();
+        Self { id, what: what.into(), about, case: None, parameters, has_factor: false, change: Arc::new(change) }
+    }
+
+    #[must_use]
+    pub fn about(self, about: impl Into<String>) -> Self {
+        Self { about: about.into(), ..self }
+    }
+
+    #[must_use]
+    pub fn within(self, case: usize) -> Self {
+        Self { case: Some(case), ..self }
+    }
+
+    #[must_use]
+    pub fn with(self, parameters: impl Into<Vec<Parameter>>) -> Self {
+        Self { parameters: parameters.into(), ..self }
+    }
+
+    #[must_use]
+    pub fn as_bright_as_you_like(self) -> Self {
+        Self { has_factor: true, ..self }
+    }
+
+    /// This one and then another.
+    #[must_use]
+    pub fn and(&self, then: &Self) -> Self {
+        let (one, other) = (Arc::clone(&self.change), Arc::clone(&then.change));
+        // Both must have something to change in one task or the other, but not in every one.
+        let both = move |wrong: &mut Wrong, _: &[f64]| {
+            let first = one(wrong, &[]);
+            other(wrong, &[]) || first
+        };
+        let case = self.case.or(then.case);
+        Self {
+            id: "two",
+            what: format!("two faults: {}, and {}", self.what, then.what),
+            about: format!("{} and {}", self.about, then.about),
+            case,
+            parameters: vec![],
+            has_factor: self.has_factor || then.has_factor,
+            change: Arc::new(both),
+        }
+    }
+
+    pub fn count_of_parameters(&self) -> usize {
+        self.parameters.len() + usize::from(self.has_factor)
+    }
+
+    /// What a task reads with it, the free factor left out; nothing where it is not in this task, or nobody can say.
+    pub fn readings(&self, model: &Model, parameters: &[f64]) -> Option<Vec<f64>> {
+        self.predicted(model, parameters, Fidelity::Fine)
+    }
+
+    pub fn predicted(&self, model: &Model, parameters: &[f64], fidelity: Fidelity) -> Option<Vec<f64>> {
+        if self.case.is_some_and(|case| case != model.case) {
+            return None;
+        }
+        let mut wrong = Wrong::new(&model.task);
+        let is_there = (self.change)(&mut wrong, parameters);
+        let readings = model.readings(&wrong, fidelity).filter(|_| is_there)?;
+        readings.iter().all(|r| r.is_finite()).then_some(readings)
+    }
+
+    /// Its words, with numbers and their standard errors.
+    pub fn said(&self, fitted: &[(f64, f64)]) -> String {
+        let mut text = self.what.clone();
+        for (k, (value, error)) in fitted.iter().enumerate() {
+            let unit = self.parameters.get(k).map_or("", |p| p.unit);
+            text = text.replace(&format!("{{{k}}}"), &format!("{value:.4} ± {error:.4}{unit}"));
+            text = text.replace(&format!("{{{k}:}}"), &format!("{value:.4}"));
+        }
+        text
+    }
+}
+
+/// Whether readings differ so that it can be seen.
+pub fn shows(wrong: &[f64], right: &[f64]) -> bool {
+    let largest = right.iter().copied().fold(0.0, f64::max);
+    wrong.iter().zip(right).any(|(w, r)| (w - r).abs() > INVISIBLE * largest)
+}
+
+impl Parameter {
+    pub fn new(unit: &'static str, start: f64, step: f64, range: (f64, f64)) -> Self {
+        Self { unit, starts: vec![start], step, range }
+    }
+}

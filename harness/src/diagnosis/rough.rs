@@ -1,0 +1,111 @@
+//! Reflected light in a moment: radiosity of a few patches a surface. It is good to percents, and far better as the
+//! ratio of one scene to one that is like it; what it lets through is solved for by the simulator.
+
+use glam::DVec3;
+use luminaire::geometry::configuration_factor::element_to_polygon;
+use luminaire::geometry::{Room, Surface};
+use luminaire::scene::{Bounces, Luminaire, Meter};
+
+/// Patches of a surface, each way.
+const PATCHES: usize = 5;
+/// Points of a patch, each way, at which its light is looked at.
+const POINTS: usize = 2;
+/// Reflections that stand for all.
+const ENDLESS: u32 = 60;
+/// Light that is left when no more is followed, as a share.
+const NEGLIGIBLE: f64 = 1e-4;
+
+struct Patch {
+    surface: Surface,
+    corners_m: [DVec3; 4],
+}
+
+/// The patches of an empty room, and what each sees of every other.
+pub(super) struct Rough {
+    patches: Vec<Patch>,
+    /// Configuration factors of one patch after the other.
+    seen: Vec<Vec<f64>>,
+}
+
+impl Rough {
+    pub(super) fn new(room: &Room) -> Self {
+        let patches: Vec<Patch> = Surface::ALL.into_iter().flat_map(|s| patches_of(room, s)).collect();
+        let of_one = |patch: &Patch| {
+            let (centre, normal) = (patch.at(0.5, 0.5), patch.surface.inward_normal());
+            let sees = |other: &Patch| {
+                let faces = other.surface != patch.surface;
+                if faces { element_to_polygon(centre, normal, &other.corners_m) } else { 0.0 }
+            };
+            let seen: Vec<f64> = patches.iter().map(sees).collect();
+            let all: f64 = seen.iter().sum();
+            seen.into_iter().map(|s| s / all).collect()
+        };
+        let seen = patches.iter().map(of_one).collect();
+        Self { patches, seen }
+    }
+
+    /// Reflected illuminance in lux at meters.
+    pub(super) fn lux(&self, room: &Room, luminaires: &[Luminaire], meters: &[Meter], bounces: Bounces) -> Vec<f64> {
+        let most = if let Bounces::AtMost(most) = bounces { most.min(ENDLESS) } else { ENDLESS };
+        let reflectances: Vec<f64> = self.patches.iter().map(|p| room.reflectance.of(p.surface)).collect();
+        let first: Vec<f64> = self.patches.iter().map(|p| p.straight(luminaires)).collect();
+        let (mut lit, mut exitance) = (first.clone(), vec![0.0; first.len()]);
+        let brightest = first.iter().copied().fold(0.0, f64::max);
+        for _ in 0..most {
+            let leaving: Vec<f64> = lit.iter().zip(&reflectances).map(|(e, r)| e * r).collect();
+            exitance.iter_mut().zip(&leaving).for_each(|(all, one)| *all += one);
+            lit = self.seen.iter().map(|seen| seen.iter().zip(&leaving).map(|(f, m)| f * m).sum()).collect();
+            if lit.iter().all(|e| *e <= NEGLIGIBLE * brightest) {
+                break;
+            }
+        }
+        let at = |meter: &Meter| {
+            let from = |(patch, exitance): (&Patch, &f64)| {
+                exitance * element_to_polygon(meter.position_m, meter.normal, &patch.corners_m)
+            };
+            self.patches.iter().zip(&exitance).map(from).sum()
+        };
+        meters.iter().map(at).collect()
+    }
+}
+
+impl Patch {
+    fn at(&self, u: f64, v: f64) -> DVec3 {
+        let [origin, along, _, across] = self.corners_m;
+        origin + u * (along - origin) + v * (across - origin)
+    }
+
+    /// The mean of what comes straight from luminaires.
+    fn straight(&self, luminaires: &[Luminaire]) -> f64 {
+        let normal = self.surface.inward_normal();
+        let place = |k: usize| (k as f64 + 0.5) / POINTS as f64;
+        let points = (0..POINTS * POINTS).map(|k| self.at(place(k % POINTS), place(k / POINTS)));
+        let lux = |point: DVec3| luminaires.iter().map(|l| illuminance(l, point, normal)).sum::<f64>();
+        points.map(lux).sum::<f64>() / (POINTS * POINTS) as f64
+    }
+}
+
+fn illuminance(luminaire: &Luminaire, point: DVec3, normal: DVec3) -> f64 {
+    let towards = luminaire.position_m - point;
+    let square = towards.length_squared();
+    let cosine = towards.dot(normal) / square.sqrt();
+    if cosine <= 0.0 { 0.0 } else { luminaire.intensity_towards(-towards).value() * cosine / square }
+}
+
+fn patches_of(room: &Room, surface: Surface) -> Vec<Patch> {
+    let normal = surface.axis();
+    let (first, second) = ((normal + 1) % 3, (normal + 2) % 3);
+    let depth = if surface.is_far() { room.size_m[normal] } else { 0.0 };
+    let corner = |i: usize, j: usize| {
+        let mut at = DVec3::ZERO;
+        at[normal] = depth;
+        at[first] = room.size_m[first] * i as f64 / PATCHES as f64;
+        at[second] = room.size_m[second] * j as f64 / PATCHES as f64;
+        at
+    };
+    let patch = |k: usize| {
+        let (i, j) = (k % PATCHES, k / PATCHES);
+        Patch { surface, corners_m: [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)] }
+    };
+    (0..PATCHES * PATCHES).map(patch).collect()
+}

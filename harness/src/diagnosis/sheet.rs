@@ -1,0 +1,172 @@
+//! The readings of one engine in one procedure of one case, and how well a prediction stands up to them.
+
+use super::wrong::Model;
+use crate::judge::{Comparison, Verdict};
+use crate::record::Uncertainty;
+
+/// Error of a prediction that no uncertainty of a reading covers, relative: engines' own small biases.
+const SLACK: f64 = 5e-4;
+/// The same where predictions rest on thinned tables.
+const THINNED: f64 = 2e-3;
+/// The same of rough predictions, and as a share of the change that they predict.
+const ROUGH: (f64, f64) = (5e-3, 0.1);
+/// Likewise, as a share of the largest reading.
+const FLOOR: f64 = 1e-6;
+/// Standard deviations that count as a reading's own scatter.
+const SCATTER: f64 = 3.0;
+
+#[derive(Clone, Debug)]
+pub struct Sheet {
+    pub model: usize,
+    pub case: usize,
+    pub is_cheap: bool,
+    pub read: Vec<f64>,
+    pub right: Vec<f64>,
+    /// Combined standard uncertainty of each pair; infinite where a reading says nothing.
+    pub uncertainty: Vec<f64>,
+    /// How far readings may be off, in their unit.
+    pub allowed: Vec<f64>,
+    /// Whether any of it fails.
+    pub fails: bool,
+    slack: f64,
+    is_rough: bool,
+}
+
+/// How a prediction stands up to readings, with the chi-squared that it leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stand {
+    /// What is left is chance.
+    Explained(f64),
+    /// What is left is no more than an engine may be off.
+    Borne(f64),
+    Contradicted(f64),
+}
+
+impl Sheet {
+    /// `None` where a reading is missing: what is not there cannot be explained.
+    pub fn of(model: usize, of: &Model, members: &[&Comparison]) -> Option<Self> {
+        let mut sheet = Self {
+            model,
+            case: of.case,
+            is_cheap: of.is_cheap(),
+            read: vec![],
+            right: vec![],
+            uncertainty: vec![],
+            allowed: vec![],
+            fails: members.iter().any(|c| c.verdict == Verdict::Fail),
+            slack: if of.is_thinned() { THINNED } else { SLACK },
+            is_rough: false,
+        };
+        for comparison in members {
+            let reference = comparison.reference.as_ref()?;
+            sheet.read.push(comparison.value.filter(|v| v.is_finite())?);
+            sheet.right.push(reference.value);
+            sheet.allowed.push(comparison.allowed());
+            let told = match (comparison.uncertainty, comparison.verdict) {
+                // They bear out anything.
+                (Uncertainty::NotSeen, _) | (_, Verdict::KnownDeviation | Verdict::NotJudged) => f64::INFINITY,
+                (other, _) => other.standard(),
+            };
+            sheet.uncertainty.push(told.hypot(reference.uncertainty));
+        }
+        Some(sheet)
+    }
+
+    /// The readings that say something.
+    fn told(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.read.len()).filter(|k| self.uncertainty[*k].is_finite())
+    }
+
+    pub fn count(&self) -> usize {
+        self.told().count()
+    }
+
+    /// The same readings where predictions are rough.
+    #[must_use]
+    pub fn roughly(&self) -> Self {
+        Self { slack: if self.is_cheap { self.slack } else { ROUGH.0 }, is_rough: !self.is_cheap, ..self.clone() }
+    }
+
+    /// Standard deviation of a reading from a prediction that is right.
+    pub fn sigma(&self, k: usize, predicted: f64) -> f64 {
+        let change = if self.is_rough { ROUGH.1 * (predicted - self.right[k]) } else { 0.0 };
+        let largest = self.right.iter().chain(&self.read).copied().fold(0.0, f64::max);
+        self.uncertainty[k].hypot(self.slack * predicted).hypot(FLOOR * largest).hypot(change).max(f64::MIN_POSITIVE)
+    }
+
+    /// What a right reading may be off where this is predicted.
+    fn allowed(&self, k: usize, predicted: f64) -> f64 {
+        if self.right[k] > 0.0 { self.allowed[k] * predicted / self.right[k] } else { self.allowed[k] }
+    }
+
+    pub fn chi_squared(&self, predicted: &[f64]) -> f64 {
+        self.told().map(|k| ((self.read[k] - predicted[k]) / self.sigma(k, predicted[k])).powi(2)).sum()
+    }
+
+    pub fn stand(&self, predicted: &[f64]) -> Stand {
+        let chi_squared = self.chi_squared(predicted);
+        if is_chance(chi_squared, self.count()) {
+            return Stand::Explained(chi_squared);
+        }
+        let beyond = |k: usize| {
+            let (off, sigma) = ((self.read[k] - predicted[k]).abs(), self.sigma(k, predicted[k]));
+            off > self.allowed(k, predicted[k]) + SCATTER * sigma
+        };
+        if self.told().any(beyond) {
+            return Stand::Contradicted(chi_squared);
+        }
+        let loose = |k: usize| {
+            let wide = self.sigma(k, predicted[k]).hypot(self.allowed(k, predicted[k]));
+            ((self.read[k] - predicted[k]) / wide).powi(2)
+        };
+        Stand::Borne(limit(self.count()) + self.told().map(loose).sum::<f64>())
+    }
+
+    /// Residuals in standard deviations, those of readings that pass by what they may be off.
+    pub fn residuals<'a>(&'a self, predicted: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+        self.told().map(|k| (self.read[k] - predicted[k]) / self.width(k))
+    }
+
+    /// What a fit weighs a reading by, whatever is predicted.
+    pub fn width(&self, k: usize) -> f64 {
+        let sigma = self.sigma(k, self.read[k]);
+        if self.fails { sigma } else { sigma.hypot(self.allowed[k]) }
+    }
+
+    /// Sums of products for the factor that makes a prediction fit best: with itself and with what was read.
+    pub fn products(&self, predicted: &[f64]) -> (f64, f64) {
+        let term = |k: usize| (predicted[k] / self.width(k), self.read[k] / self.width(k));
+        self.told().map(term).fold((0.0, 0.0), |(square, product), (p, r)| (square + p * p, product + p * r))
+    }
+
+    /// How many readings would tell a prediction from what is right.
+    pub fn telling(&self, predicted: &[f64]) -> usize {
+        let tells = |k: &usize| (predicted[*k] - self.right[*k]).abs() > SCATTER * self.sigma(*k, predicted[*k]);
+        self.told().filter(tells).count()
+    }
+
+    /// The largest relative distance from a prediction, in percent.
+    pub fn worst_percent(&self, predicted: &[f64]) -> f64 {
+        let largest = predicted.iter().copied().fold(0.0, f64::max);
+        let off = self.told().map(|k| (self.read[k] - predicted[k]).abs() / predicted[k].max(FLOOR * largest));
+        100.0 * off.filter(|x| x.is_finite()).fold(0.0, f64::max)
+    }
+}
+
+impl Stand {
+    pub const fn chi_squared(self) -> f64 {
+        match self {
+            Self::Explained(x) | Self::Borne(x) | Self::Contradicted(x) => x,
+        }
+    }
+}
+
+/// Whether chi-squared is no larger than chance makes it, but for one time in a thousand or so.
+pub(super) fn is_chance(chi_squared: f64, freedom: usize) -> bool {
+    chi_squared <= limit(freedom)
+}
+
+fn limit(freedom: usize) -> f64 {
+    let freedom = freedom as f64;
+    freedom + 3.1 * (2.0 * freedom).sqrt() + 6.0
+}
