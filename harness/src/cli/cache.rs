@@ -1,6 +1,5 @@
 //! `luxproof cache`: what the cache of readings holds, and taking out what is damaged or long unused.
 
-use std::io::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -40,7 +39,7 @@ pub(super) fn manage(action: Option<Action>, cache: &Cache) -> Result<Exit, Diag
         Action::Info => info(cache)?,
         Action::Prune { unused } => prune(cache, unused)?,
     };
-    std::io::stdout().lock().write_all(text.as_bytes()).into_diagnostic()?;
+    super::print(&text)?;
     Ok(Exit::Passed)
 }
 

@@ -17,7 +17,7 @@ use super::{
     Absent, Engine, EngineError, FILE_READER, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
 };
 use crate::record::{EngineName, ProcedureId, UnknownProcedure};
-use crate::spec::hexadecimal;
+use crate::system::digest::hexadecimal;
 use crate::system::process::Invocation;
 
 /// The environment variable that names an empty folder for the adapter's own files, kept with the run.

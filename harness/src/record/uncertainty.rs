@@ -136,13 +136,6 @@ impl Uncertainty {
         }
     }
 
-    /// Tells the degrees of freedom of a standard error that says none itself.
-    pub fn grant(&mut self, degrees: Option<f64>) {
-        if let Self::StandardError { degrees_of_freedom, .. } = self {
-            *degrees_of_freedom = degrees_of_freedom.or(degrees);
-        }
-    }
-
     /// Whether what is stated are numbers.
     pub fn is_finite(&self) -> bool {
         self.standard_error().is_none_or(f64::is_finite) && self.bound().is_finite()

@@ -1,7 +1,6 @@
 //! Spec -> Case: reads the files that a spec names, checks what the shape alone cannot, and builds the scene.
 
 use std::collections::{BTreeMap, HashSet};
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -18,6 +17,7 @@ use super::model::{
 use super::{Source, SpecError, suggestion};
 use crate::procedures::{Angles, Asked, AtAngles, Names, Procedures, Task};
 use crate::record::ProcedureId;
+use crate::system::digest::hexadecimal;
 
 /// Nearest a meter or a luminaire may come to a surface, relative to the room's largest extent.
 ///
@@ -404,13 +404,6 @@ fn extent(shape: &Shape) -> (DVec3, DVec3) {
             vertices_m.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
         }
     }
-}
-
-pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        write!(text, "{byte:02x}").ok();
-        text
-    })
 }
 
 fn within(room: &Room) -> String {
