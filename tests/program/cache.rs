@@ -92,7 +92,7 @@ fn damaged_entries_are_named_and_read_anew() {
         match k % 3 {
             0 => fs::write(path, &text[..text.len() / 2]).unwrap(),
             // A wrong reading that is sound JSON.
-            1 => fs::write(path, text.replacen("\"wall_s\": ", "\"wall_s\": 1", 1)).unwrap(),
+            1 => fs::write(path, text.replacen("\"wall_s\":", "\"wall_s\":1", 1)).unwrap(),
             _ => fs::copy(entries.keys().next().unwrap(), path).map(drop).unwrap(),
         }
     }
@@ -151,7 +151,7 @@ fn two_hundred_kills_at_random_instants_lose_and_falsify_nothing() {
     // All that is kept of the adapter says the same readings, whatever the seed.
     let mut by_procedure: BTreeMap<String, Value> = BTreeMap::new();
     for text in lab.entries().values() {
-        let entry = serde_json::from_str::<Value>(text).unwrap()["entry"].clone();
+        let entry = serde_json::from_str::<Value>(text).unwrap()["body"].clone();
         if entry["engine"] == "mine" {
             let procedure = entry["procedure"].as_str().unwrap().to_owned();
             assert_eq!(*by_procedure.entry(procedure).or_insert(entry["answer"].clone()), entry["answer"]);

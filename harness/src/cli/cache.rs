@@ -43,6 +43,9 @@ pub(super) fn manage(action: Option<Action>, cache: &Cache) -> Result<Exit, Diag
     Ok(Exit::Passed)
 }
 
+/// Damaged files that are named; an earlier luxproof may have left hundreds of another form.
+const SHOWN: usize = 5;
+
 fn info(cache: &Cache) -> Result<String, Diagnostic> {
     let contents = cache.contents().into_diagnostic()?;
     let mut lines = vec![format!("readings are kept in {}", cache.root().display())];
@@ -52,7 +55,11 @@ fn info(cache: &Cache) -> Result<String, Diagnostic> {
     if contents.engines.is_empty() {
         lines.push("it is empty".to_owned());
     }
-    lines.extend(contents.damaged.iter().map(|d| format!("damaged, read anew when it is asked for: {d}")));
+    let shown = contents.damaged.iter().take(SHOWN);
+    lines.extend(shown.map(|d| format!("damaged, read anew when it is asked for: {d}")));
+    if let Some(more) = contents.damaged.len().checked_sub(SHOWN).filter(|more| *more > 0) {
+        lines.push(format!("and {more} more; `luxproof cache prune` takes them out"));
+    }
     if contents.unfinished > 0 {
         lines.push(format!("{} files that a run is writing, or was when it was killed", contents.unfinished));
     }

@@ -173,6 +173,11 @@ impl Engine for External {
         }
     }
 
+    /// Its own are checked where it is made; all others are the program's.
+    fn check_settings(&self, _job: &Job) -> Result<(), EngineError> {
+        Ok(())
+    }
+
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
         let bytes = ExternalJob::of(job).to_json().map_err(|e| self.output(format!("the job is no JSON: {e}")))?;
         Ok(vec![SceneFile { name: JOB_FILE.to_owned(), bytes }])

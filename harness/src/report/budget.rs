@@ -26,7 +26,8 @@ pub fn budgets(report: &Report) -> String {
         let all = mine.len();
         let (case, procedure, engine, basis) = found;
         let more = if all > LISTED { format!(", the {LISTED} widest of {all}") } else { String::new() };
-        writeln!(text, "\n{case}: {procedure}, {engine} against {basis}{more}\n{}", table(&mine[..all.min(LISTED)])).ok();
+        writeln!(text, "\n{case}: {procedure}, {engine} against {basis}{more}\n{}", table(&mine[..all.min(LISTED)]))
+            .ok();
         if let Some(source) = mine.first().and_then(|(c, _)| c.tolerance_source.as_ref()) {
             writeln!(text, "  tolerance by {source}").ok();
         }

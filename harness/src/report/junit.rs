@@ -126,3 +126,15 @@ fn line(c: &Comparison) -> String {
         c.verdict.name()
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_beyond_every_clock_and_none_at_all_are_durations() {
+        assert_eq!([1e300, f64::INFINITY].map(duration), [Duration::MAX; 2]);
+        assert_eq!([-1.0, f64::NAN].map(duration), [Duration::ZERO; 2]);
+        assert_eq!(duration(1.5), Duration::from_millis(1500));
+    }
+}

@@ -51,7 +51,7 @@ impl Polar {
 
     /// Where an intensity at gamma lies; `side` is 1 to the right, -1 to the left.
     pub(super) fn place(&self, gamma_deg: f64, intensity: f64, side: f64) -> [f64; 2] {
-        self.at(gamma_deg, intensity * self.radius / (self.step * f64::from(self.rings)), side)
+        self.at(gamma_deg, intensity / (self.step * f64::from(self.rings)) * self.radius, side)
     }
 
     fn at(&self, gamma_deg: f64, r: f64, side: f64) -> [f64; 2] {
