@@ -93,7 +93,7 @@ impl Folder {
             is_string ^= c == '"';
             bare.extend(Some(c).filter(|c| is_string || !c.is_ascii_whitespace()));
         }
-        let checksum: String = Sha256::digest(bare).iter().map(|byte| format!("{byte:02x}")).collect();
+        let checksum = Sha256::digest(bare).iter().fold(String::new(), |hash, byte| hash + &format!("{byte:02x}"));
         let old = head.split("\"checksum\":\"").nth(1).and_then(|rest| rest.split('"').next()).unwrap();
         self.write(name, &text.replace(old, &checksum));
     }

@@ -72,11 +72,12 @@ impl Roster {
             let settings = case.settings_of(name.as_str());
             let is_program = settings.contains_key("command");
             let keys: Vec<&str> = engine.knobs().iter().map(|k| k.key).collect();
-            let help = || match is_program {
-                true => format!("`{name}` is an engine of luxproof's: give a program of your own another name"),
-                false => {
-                    format!("settings of {name}: {}", if keys.is_empty() { "none".into() } else { keys.join(", ") })
+            let known = if keys.is_empty() { "none".to_owned() } else { keys.join(", ") };
+            let help = || {
+                if is_program {
+                    return format!("`{name}` is an engine of luxproof's: give a program of your own another name");
                 }
+                format!("settings of {name}: {known}")
             };
             let job = Job { settings, ..Job::of_task(case, task) };
             engine.check_settings(&job).map_err(|error| misset(case, name.as_str(), error, help))?;

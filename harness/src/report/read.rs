@@ -41,9 +41,8 @@ impl Report {
     pub fn from_json(text: &str) -> Result<ReadReport, ReportError> {
         let Head { luxproof: found, tool_version: by } = serde_json::from_str(text).map_err(ReportError::Foreign)?;
         let is_known = found == VERSION;
-        let report = serde_json::from_str(text).map_err(|source| match is_known {
-            true => ReportError::Damaged(source),
-            false => ReportError::Version { found, by, source },
+        let report = serde_json::from_str(text).map_err(|source| {
+            if is_known { ReportError::Damaged(source) } else { ReportError::Version { found, by, source } }
         })?;
         let doubt = format!(
             "is a report of version {found} where this luxproof reads version {VERSION}: what it does not know it passes over"

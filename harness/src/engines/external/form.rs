@@ -173,7 +173,7 @@ impl ReadingForm {
 
     /// What is wrong with its degrees of freedom, if anything is.
     fn senseless_freedom(&self) -> Option<String> {
-        let freedom = self.degrees_of_freedom.filter(|f| !(*f >= 1.0))?;
+        let freedom = self.degrees_of_freedom.filter(|f| *f < 1.0)?;
         let meter = &self.meter;
         Some(format!("gave `degrees_of_freedom: {freedom}` at {meter}: two samples have one, fewer tell no error"))
     }
