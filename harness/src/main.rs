@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use luxproof::cli::Cli;
+use luxproof::cli::{Cli, complain};
 use luxproof::report::Exit;
 use tracing_subscriber::EnvFilter;
 
@@ -12,12 +12,17 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let level = ["warn", "info", "debug", "trace"][usize::from(cli.verbosity()).min(3)];
     let filter = EnvFilter::new(format!("luxproof={level}"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .log_internal_errors(false)
+        .without_time()
+        .init();
     if let Err(error) = ctrlc::set_handler(luxproof::system::process::interrupt) {
         tracing::warn!(%error, "Ctrl-C will not stop renderers in order");
     }
     let exit = cli.run().unwrap_or_else(|error| {
-        eprintln!("{error:?}");
+        complain(&format!("{error:?}"));
         Exit::Usage
     });
     ExitCode::from(exit.code())

@@ -21,6 +21,8 @@ mod round_trip_tests;
 
 use std::path::Path;
 
+use glam::DVec3;
+
 pub use details::Details;
 pub use distribution::{DistributionError, LuminousIntensityDistribution, Symmetry, angles_deg, direction};
 pub use error::{Problem, ReadError};
@@ -206,6 +208,43 @@ impl LuminousOpening {
             Self::Ellipsoid { x_m, y_m, z_m } => [y_m, x_m, z_m],
             Self::LyingCylinder { axis: HorizontalAxis::X, length_m, diameter_m } => [diameter_m, length_m, diameter_m],
             Self::LyingCylinder { axis: HorizontalAxis::Y, length_m, diameter_m } => [length_m, diameter_m, diameter_m],
+        }
+    }
+
+    /// How far it reaches from the photometric centre along a unit vector of its own frame, in metres: its support function.
+    pub fn reach_m(&self, along: DVec3) -> f64 {
+        let [width, length, height] = self.bounding_box_m();
+        let parts = 0.5 * DVec3::new(length, width, height) * along.abs();
+        match self {
+            Self::Point | Self::Box { .. } => parts.element_sum(),
+            Self::Ellipse { .. } => parts.x.hypot(parts.y) + parts.z,
+            Self::Ellipsoid { .. } => parts.length(),
+            Self::LyingCylinder { axis: HorizontalAxis::X, .. } => parts.x + parts.y.hypot(parts.z),
+            Self::LyingCylinder { axis: HorizontalAxis::Y, .. } => parts.y + parts.x.hypot(parts.z),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_opening_reaches_as_far_as_its_outermost_point() {
+        let (x, y, slanted) = (DVec3::X, DVec3::Y, DVec3::new(0.6, 0.0, 0.8));
+        let lying = |axis| LuminousOpening::LyingCylinder { axis, length_m: 4.0, diameter_m: 2.0 };
+        for (opening, reaches) in [
+            (LuminousOpening::Point, [0.0; 3]),
+            (LuminousOpening::Box { x_m: 4.0, y_m: 2.0, height_m: 1.0 }, [2.0, 1.0, 0.6 * 2.0 + 0.8 * 0.5]),
+            (LuminousOpening::Ellipse { x_m: 4.0, y_m: 2.0, height_m: 1.0 }, [2.0, 1.0, 0.6 * 2.0 + 0.8 * 0.5]),
+            (LuminousOpening::Ellipsoid { x_m: 4.0, y_m: 2.0, z_m: 4.0 }, [2.0, 1.0, 2.0]),
+            (lying(HorizontalAxis::X), [2.0, 1.0, 0.6 * 2.0 + 0.8]),
+            (lying(HorizontalAxis::Y), [1.0, 2.0, 1.0]),
+        ] {
+            for (along, reach_m) in [x, y, slanted].into_iter().zip(reaches) {
+                assert!((opening.reach_m(along) - reach_m).abs() < 1e-15, "{opening:?} {along}");
+                assert_eq!(opening.reach_m(along), opening.reach_m(-along));
+            }
         }
     }
 }

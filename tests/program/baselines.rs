@@ -53,7 +53,7 @@ fn an_accepted_run_repeats_and_keeps_its_reason() {
 #[test]
 fn every_view_tells_what_departs_from_the_baseline() {
     let room = accepted();
-    room.edit("baselines/spec.json", VERSION, OTHER_VERSION);
+    room.forge("baselines/spec.json", VERSION, OTHER_VERSION);
     run(&room, &["--baseline", "baselines"]).exits(1);
     for (view, says) in [
         ("terminal", "Baseline baselines/spec.json: 4 REFUSED"),
@@ -77,12 +77,73 @@ fn others_may_read_a_baseline_as_they_may_any_new_file() {
 #[test]
 fn a_baseline_of_another_spec_or_version_is_refused() {
     let room = accepted();
-    room.edit("baselines/spec.json", VERSION, OTHER_VERSION);
+    room.forge("baselines/spec.json", VERSION, OTHER_VERSION);
     run(&room, &["--baseline", "baselines"]).exits(1).prints("REFUSED").prints("version: 0.0.1 before");
 
-    room.edit("baselines/spec.json", OTHER_VERSION, VERSION);
+    room.forge("baselines/spec.json", OTHER_VERSION, VERSION);
     room.edit("lamp.ies", "100 80 0", "110 80 0");
     run(&room, &["--baseline", "baselines"]).exits(1).prints("REFUSED").prints("spec: ");
+}
+
+#[test]
+fn a_baseline_that_was_edited_torn_or_moved_is_refused_before_anything_is_measured_and_accepted_anew() {
+    let room = accepted();
+    let sound = room.read("baselines/spec.json");
+    let refused = |says: &str| {
+        fs::remove_dir_all(room.path("out")).unwrap();
+        run(&room, &["--baseline", "baselines"]).exits(2).complains("baselines/spec.json").complains(says);
+        assert!(!room.path("out").exists(), "it was measured");
+        room.write("baselines/spec.json", &sound);
+        run(&room, &["--baseline", "baselines"]).exits(0);
+    };
+    room.edit("baselines/spec.json", "\"value\":", "\"value\":1");
+    refused("was edited");
+    room.write("baselines/spec.json", &sound[..sound.len() / 2]);
+    refused("cut short");
+    room.edit("baselines/spec.json", "baseline 2", "baseline 3");
+    refused("`luxproof baseline 3`");
+    room.edit("baselines/spec.json", "\"key\":\"spec\"", "\"key\":\"other\"");
+    refused("`other`");
+    // That of another spec under this one's name.
+    fs::write(room.path("hall.yaml"), room.read("spec.yaml")).unwrap();
+    room.write("baselines/hall.json", &sound);
+    let hall = room.luxproof(&["run", "hall.yaml", "--engines", OWN, "--out", "hall", "--baseline", "baselines"]);
+    hall.exits(2).complains("is about spec, and").complains("hall");
+    // What is refused is reviewed anew, and kept aside.
+    room.edit("baselines/spec.json", "first look", "second look");
+    let accept = ["accept", "out", "--all", "--reason", "third look"];
+    room.luxproof(&accept).exits(0).complains("reviewed as new").prints("4 accepted");
+    assert!(room.read("baselines/spec.json.refused").contains("second look"));
+    run(&room, &["--baseline", "baselines"]).exits(0).prints("4 unchanged");
+}
+
+#[test]
+fn a_baseline_that_lacks_meters_accepts_nothing_of_them() {
+    let room = accepted();
+    let baseline = room.read("baselines/spec.json");
+    // The first entry's readings but the last.
+    let last = baseline.split("\n        {").nth(2).and_then(|rest| rest.split('\n').next()).unwrap().to_owned();
+    room.forge("baselines/spec.json", &format!(",\n        {{{last}\n      ]"), "\n      ]");
+    run(&room, &["--baseline", "baselines"]).exits(1).prints("there is nothing to hold plane[1] against");
+}
+
+#[test]
+fn a_report_of_another_version_is_told_and_one_that_does_not_fit_refused() {
+    let room = room();
+    run(&room, &[]).exits(0);
+    room.edit("out/report.json", "\"luxproof\": 1", "\"luxproof\": 2");
+    let told = "is a report of version 2 where this luxproof reads version 1";
+    for command in [
+        &["report", "out/report.json"][..],
+        &["diff", "out", "out"],
+        &["accept", "out", "--all", "--reason", "it is right"],
+        &["history", "add", "out/report.json", "--history", "nights.jsonl"],
+    ] {
+        room.luxproof(command).exits(0).complains(told);
+    }
+    room.edit("out/report.json", "\"readings\"", "\"values\"");
+    room.luxproof(&["diff", "out", "out"]).exits(2).complains("version 2").complains("missing field `readings`");
+    room.luxproof(&["report", "spec.yaml"]).exits(2).complains("is no report of luxproof");
 }
 
 #[test]

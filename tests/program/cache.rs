@@ -95,7 +95,7 @@ fn damaged_entries_are_named_and_read_anew() {
         match k % 3 {
             0 => fs::write(path, &text[..text.len() / 2]).unwrap(),
             // A wrong reading that is sound JSON.
-            1 => fs::write(path, text.replacen("\"wall_s\": ", "\"wall_s\": 1", 1)).unwrap(),
+            1 => fs::write(path, text.replacen("\"wall_s\":", "\"wall_s\":1", 1)).unwrap(),
             _ => fs::copy(entries.keys().next().unwrap(), path).map(drop).unwrap(),
         }
     }
@@ -154,7 +154,7 @@ fn two_hundred_kills_at_random_instants_lose_and_falsify_nothing() {
     // All that is kept of the adapter says the same readings, whatever the seed: of both meters, and of one that was read again.
     let mut by_procedure: BTreeMap<(String, usize), Vec<Value>> = BTreeMap::new();
     for text in lab.entries().values() {
-        let entry = serde_json::from_str::<Value>(text).unwrap()["entry"].clone();
+        let entry = serde_json::from_str::<Value>(text).unwrap()["body"].clone();
         if entry["engine"] == "mine" {
             let estimates = entry["answer"]["Ok"]["estimates"].as_array().unwrap().clone();
             by_procedure.entry((entry["procedure"].to_string(), estimates.len())).or_default().push(estimates.into());

@@ -84,6 +84,64 @@ fn a_luminaire_outside_the_room_is_refused() {
 }
 
 #[test]
+fn an_opening_that_sticks_out_of_the_room_is_refused_and_one_flush_with_the_ceiling_is_not() {
+    // 1.2 m x 0.6 m x 0.1 m, tilted by 90 degrees as high as it is wide.
+    let panel = LAMP.replace("1 1 2 0 0 0", "1 1 2 0.6 1.2 0.1");
+    let at = |place: &str| spec().replace("at_m: [3, 2, 2.5]", &format!("model: area, {place}"));
+    for (place, says) in [
+        ("at_m: [3, 2, 2.97]", "sticks out of the room by 0.02 m through the ceiling"),
+        ("at_m: [0.5, 2, 2]", "by 0.1 m through the wall x-"),
+        ("at_m: [3, 2, 0.4], rotate_deg: {tilt: 90}", "by 0.2 m through the floor"),
+    ] {
+        refused_files(&at(place), &panel, "spec.yaml:7:", says);
+    }
+    for place in ["at_m: [0.6, 2, 2.95]", "at_m: [3, 2, 0.6], rotate_deg: {tilt: 90}"] {
+        let room = Folder::new(&[("spec.yaml", &at(place)), ("lamp.ies", &panel)]);
+        room.luxproof(&["check", "spec.yaml"]).exits(0);
+    }
+}
+
+#[test]
+fn a_luminaire_brighter_than_all_is_refused() {
+    refused("at_m: [3, 2, 2.5]", "at_m: [3, 2, 2.5], flux_scale: 1e300", "spec.yaml:7:", "nothing is so bright");
+}
+
+#[test]
+fn settings_that_an_engine_of_ours_does_not_know_are_refused_before_anything_starts() {
+    for (engine, says) in [
+        ("iesna: {command: [x]}", "give a program of your own another name"),
+        ("iesna: {speed: 2}", "settings of iesna: none"),
+        ("povray: {cuont: 3}", "settings of povray: preset, count, error_bound"),
+        ("povray: {count: many}", "a whole number from 5"),
+        ("radiance: {preset: best}", "audit, fast or default"),
+        ("simulator: {relative_error: 2}", "must be a number from"),
+    ] {
+        // Also where the engine takes no part.
+        refused_files(&format!("{}engines:\n  {engine}\n", spec()), LAMP, "spec.yaml:15:", says);
+    }
+}
+
+#[test]
+fn who_reads_no_further_is_no_error() {
+    let room = room();
+    own_run(&room).exits(0);
+    for args in [
+        &["engines", "list"][..],
+        &["schema", "report"],
+        &["photometry", "lamp.ies"],
+        &["check", "spec.yaml"],
+        &["cache", "info"],
+        &["report", "out/report.json", "--format", "html"],
+    ] {
+        let (unread, end) = std::io::pipe().unwrap();
+        drop(unread);
+        let mut program = room.command(args);
+        program.stdout(end.try_clone().unwrap()).stderr(end);
+        assert!(program.status().unwrap().success(), "{args:?}");
+    }
+}
+
+#[test]
 fn a_missing_photometric_file_is_named() {
     refused("photometry: lamp.ies", "photometry: lmap.ies", "spec.yaml:7:28", "lmap.ies cannot be read");
 }

@@ -102,3 +102,31 @@ fn zero_hits_are_not_seen_and_never_an_error_of_zero() {
     assert_eq!((&unseen["verdict"], &unseen["uncertainty"]["kind"]), (&"inconclusive".into(), &"not_seen".into()));
     assert!(unseen["diagnosis"].as_str().unwrap().starts_with("not seen"), "{unseen}");
 }
+
+#[test]
+fn whatever_numbers_an_adapter_says_its_report_is_read_back_in_every_view() {
+    let folder = folder(&adapter());
+    for (lux, error) in [
+        ("1e308", "\"exact\": True"),
+        ("1e29", "\"std_error_lx\": 1e29, \"degrees_of_freedom\": 1"),
+        ("1e-300", "\"std_error_lx\": 5e-324, \"degrees_of_freedom\": 1e300"),
+        ("5e-324", "\"error_bound_lx\": 1e30"),
+        ("0.0 if meter[\"id\"] == \"plane[1]\" else 1e29", "\"std_error_lx\": 1e-200, \"degrees_of_freedom\": 7"),
+    ] {
+        let absurd = adapter().replace("\"error_bound_lx\": 1e-12 * lux", error);
+        let absurd = absurd.replace(
+            "    for meter in job[\"meters\"]:\n        lux =",
+            &format!("    for meter in job[\"meters\"]:\n        lux = {lux}\n        other ="),
+        );
+        assert!(absurd.contains("other =") && absurd.contains(error));
+        folder.write("adapter.py", &absurd);
+        let (report, _) = run(&folder);
+        let status = &of_adapter(&report, "engines", "id")[0]["status"];
+        assert_eq!(status, if lux == "1e308" { "failed" } else { "ran" }, "{lux}");
+        for format in ["terminal", "markdown", "junit", "csv", "html"] {
+            let view = folder.luxproof(&["report", "out/report.json", "--format", format]);
+            assert!(view.code != Some(2) && !view.stdout.is_empty(), "{lux} {format}: {}", view.stderr);
+        }
+        folder.luxproof(&["diff", "out", "out"]).exits(0);
+    }
+}

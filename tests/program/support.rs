@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use serde_json::Value;
+use sha2::{Digest, Sha256};
 
 /// Our own solvers.
 pub(crate) const OWN: &str = "simulator,iesna";
@@ -80,6 +81,21 @@ impl Folder {
         let text = self.read(name);
         assert!(text.contains(from), "no `{from}` in {text}");
         self.write(name, &text.replace(from, to));
+    }
+
+    /// Replaces a part of a file in an envelope, and makes its checksum right again as nobody does by accident.
+    pub(crate) fn forge(&self, name: &str, from: &str, to: &str) {
+        self.edit(name, from, to);
+        let text = self.read(name);
+        let (head, body) = text.split_once("\"body\":").unwrap();
+        let (mut is_string, mut bare) = (false, String::new());
+        for c in body.trim_end().strip_suffix('}').unwrap().chars() {
+            is_string ^= c == '"';
+            bare.extend(Some(c).filter(|c| is_string || !c.is_ascii_whitespace()));
+        }
+        let checksum = Sha256::digest(bare).iter().fold(String::new(), |hash, byte| hash + &format!("{byte:02x}"));
+        let old = head.split("\"checksum\":\"").nth(1).and_then(|rest| rest.split('"').next()).unwrap();
+        self.write(name, &text.replace(old, &checksum));
     }
 
     pub(crate) fn json(&self, name: &str) -> Value {

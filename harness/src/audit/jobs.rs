@@ -89,7 +89,7 @@ impl Running<'_> {
         }
         let source = taken.as_ref().ok().map(|taken| taken.source);
         let recording = self.record(run, taken, start.elapsed());
-        let wall = Duration::from_secs_f64(recording.wall_s);
+        let wall = Duration::try_from_secs_f64(recording.wall_s).unwrap_or_default();
         self.observer.ended(self.case, engine, task.procedure, wall, recording.failure.as_deref());
         Done::Recorded(Box::new(recording), source)
     }

@@ -39,7 +39,8 @@ use crate::measure::{Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
 use crate::record::Status;
 use crate::report::{Exit, Report, SpecRecord};
-use crate::spec::{Case, SpecError, filtered, hexadecimal, suite};
+use crate::spec::{Case, SpecError, filtered, suite};
+use crate::system::digest::hexadecimal;
 use crate::system::files::{self, FileError};
 use crate::system::process;
 use crate::system::slots::side_by_side;
@@ -137,7 +138,7 @@ pub fn run(specs: &[PathBuf], options: &Options<'_>) -> Result<Report, AuditErro
     let (mut cases, mut policies) = chosen(specs, options)?;
     let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
     let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
-    let spec = record(specs, &cases);
+    let spec = subject(specs, &cases);
     let known = planner.calibrations(&cases, &plans)?;
     match options.calibration {
         Calibration::Judged => {
@@ -285,8 +286,8 @@ fn within(root: &Path, case: &Case) -> PathBuf {
     PathBuf::from(own.unwrap_or(&case.name))
 }
 
-/// What was run, all cases together.
-fn record(specs: &[PathBuf], cases: &[Case]) -> SpecRecord {
+/// What is run, all cases together.
+pub fn subject(specs: &[PathBuf], cases: &[Case]) -> SpecRecord {
     if let [case] = cases {
         return SpecRecord::of(case);
     }

@@ -4,11 +4,12 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use miette::{IntoDiagnostic, Report as Diagnostic};
+use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::views::read_report;
+use super::{complain, print};
 use crate::report::{Exit, Report};
-use crate::trend::baseline::{Baseline, Comparability, Decision, Entry, State, compare, review};
+use crate::trend::baseline::{Baseline, BaselineError, Comparability, Decision, Entry, State, compare, review};
 
 #[derive(Debug, Args)]
 pub(super) struct AcceptArgs {
@@ -31,12 +32,8 @@ pub(super) fn read_run(run: &Path) -> Result<Report, Diagnostic> {
 
 pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
     let report = read_run(&args.run)?;
-    let path = Baseline::place(args.baseline.as_deref().unwrap_or(Path::new("baselines")), &report);
-    let mut baseline = if path.exists() {
-        Baseline::read(&path).into_diagnostic()?
-    } else {
-        Baseline { luxproof_baseline: 1, entries: vec![] }
-    };
+    let path = Baseline::place(args.baseline.as_deref().unwrap_or(Path::new("baselines")), &report.spec);
+    let Kept { mut baseline, is_refused } = kept(&path, &report)?;
     let mut candidates = Baseline::candidate(&report).entries;
     candidates.retain(may_be_accepted);
     let changes = compare(&baseline.entries, &candidates, Comparability::SameInstrument);
@@ -63,15 +60,42 @@ pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
     let unchanged = changes.entries.iter().filter(|c| c.state == State::Unchanged).count();
     if accepted > 0 {
         baseline.accept(decision.accepted);
+        if is_refused {
+            let aside = path.with_extension("json.refused");
+            std::fs::rename(&path, &aside).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+            complain(&format!("what was refused now lies in {}", aside.display()));
+        }
         baseline.write(&path).into_diagnostic()?;
     }
-    println!("{accepted} accepted, {declined} declined, {unchanged} unchanged: {}", path.display());
+    print(&format!("{accepted} accepted, {declined} declined, {unchanged} unchanged: {}\n", path.display()))?;
     Ok(Exit::Passed)
+}
+
+/// What was accepted before, and whether there is a file that cannot be trusted to say so.
+struct Kept {
+    baseline: Baseline,
+    is_refused: bool,
+}
+
+/// A file that is no sound baseline counts as none, which is told: everything is reviewed anew.
+fn kept(path: &Path, report: &Report) -> Result<Kept, Diagnostic> {
+    if !path.exists() {
+        return Ok(Kept { baseline: Baseline::default(), is_refused: false });
+    }
+    match Baseline::of_run(path, report.cases.iter().map(|c| c.name.as_str())) {
+        Ok(baseline) => Ok(Kept { baseline, is_refused: false }),
+        // To put aside the sound baseline of another spec is nothing that anybody would want.
+        Err(error @ (BaselineError::File(_) | BaselineError::Elsewhere { .. })) => Err(error).into_diagnostic(),
+        Err(error) => {
+            complain(&format!("{error}: all of this run is reviewed as new"));
+            Ok(Kept { baseline: Baseline::default(), is_refused: true })
+        }
+    }
 }
 
 fn may_be_accepted(entry: &Entry) -> bool {
     if !entry.is_sound() {
-        eprintln!("{}: without sound readings, never accepted", entry.key);
+        complain(&format!("{}: without sound readings, never accepted", entry.key));
     }
     entry.is_sound()
 }

@@ -1,6 +1,5 @@
 //! `luxproof cache`: what the cache of readings holds, and taking out what is damaged or long unused.
 
-use std::io::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -40,9 +39,12 @@ pub(super) fn manage(action: Option<Action>, cache: &Cache) -> Result<Exit, Diag
         Action::Info => info(cache)?,
         Action::Prune { unused } => prune(cache, unused)?,
     };
-    std::io::stdout().lock().write_all(text.as_bytes()).into_diagnostic()?;
+    super::print(&text)?;
     Ok(Exit::Passed)
 }
+
+/// Damaged files that are named; an earlier luxproof may have left hundreds of another form.
+const SHOWN: usize = 5;
 
 fn info(cache: &Cache) -> Result<String, Diagnostic> {
     let contents = cache.contents().into_diagnostic()?;
@@ -53,7 +55,11 @@ fn info(cache: &Cache) -> Result<String, Diagnostic> {
     if contents.engines.is_empty() {
         lines.push("it is empty".to_owned());
     }
-    lines.extend(contents.damaged.iter().map(|d| format!("damaged, read anew when it is asked for: {d}")));
+    let shown = contents.damaged.iter().take(SHOWN);
+    lines.extend(shown.map(|d| format!("damaged, read anew when it is asked for: {d}")));
+    if let Some(more) = contents.damaged.len().checked_sub(SHOWN).filter(|more| *more > 0) {
+        lines.push(format!("and {more} more; `luxproof cache prune` takes them out"));
+    }
     if contents.unfinished > 0 {
         lines.push(format!("{} files that a run is writing, or was when it was killed", contents.unfinished));
     }

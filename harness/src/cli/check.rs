@@ -1,12 +1,13 @@
 //! `luxproof check`: the plan of specs, nothing started.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Write;
+use std::fmt::Write;
 
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::Selected;
 use super::diagnostic::diagnose;
+use super::print;
 use crate::audit;
 use crate::engines::Site;
 use crate::judge::PolicyRecord;
@@ -19,7 +20,7 @@ pub(super) fn check(selected: &Selected, site: &Site) -> Result<Exit, Diagnostic
     let mut cases = suite(&selected.specs).and_then(|all| filtered(all, &selected.filter)).map_err(diagnose)?;
     let policies = selected.policy.of_cases(&cases).map_err(diagnose)?;
     audit::published(&cases).into_diagnostic()?;
-    let mut out = std::io::stdout().lock();
+    let mut out = String::new();
     let mut exit = Exit::Passed;
     let selection = selected.selection();
     let mut planned: BTreeMap<&PolicyRecord, BTreeSet<EngineName>> = BTreeMap::new();
@@ -47,6 +48,7 @@ pub(super) fn check(selected: &Selected, site: &Site) -> Result<Exit, Diagnostic
         }
         let absent = plan.engines.iter().any(|p| p.asked == Asked::ByName && p.is_absent());
         exit = exit.max(if absent { Exit::Engine } else { Exit::Passed });
+        print(&std::mem::take(&mut out))?;
     }
     for (policy, engines) in planned {
         writeln!(out, "policy {}", policy.file).into_diagnostic()?;
@@ -55,6 +57,7 @@ pub(super) fn check(selected: &Selected, site: &Site) -> Result<Exit, Diagnostic
             exit = Exit::Engine;
         }
     }
+    print(&out)?;
     Ok(exit)
 }
 

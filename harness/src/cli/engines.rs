@@ -6,6 +6,7 @@ use clap::Subcommand;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::not_audited;
+use super::{complain, print};
 use crate::audit::{self, Options};
 use crate::engines::{self, InstallState, Site};
 use crate::judge::PolicyChoice;
@@ -39,12 +40,12 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site) -> Resu
     match action.unwrap_or(EnginesAction::List) {
         EnginesAction::List => {
             for engine in engines::all() {
-                match engine.probe(site) {
-                    Ok(version) => println!("{:<10} {}", engine.name(), version.text),
-                    Err(absent) => println!("{:<10} absent: {absent}", engine.name()),
-                }
+                print(&match engine.probe(site) {
+                    Ok(version) => format!("{:<10} {}\n", engine.name(), version.text),
+                    Err(absent) => format!("{:<10} absent: {absent}\n", engine.name()),
+                })?;
             }
-            println!("engines are kept in {}", site.root().display());
+            print(&format!("engines are kept in {}\n", site.root().display()))?;
             Ok(Exit::Passed)
         }
         EnginesAction::Install { names } => {
@@ -61,7 +62,7 @@ fn examine(site: &Site, names: &[String], spec: Option<&Path>, policy: PolicyCho
     let mut options = Options { skipping: Skipping::Nothing, policy, ..options };
     options.selection.engines = names.to_vec();
     let report = audit::examine(spec, &options).map_err(not_audited)?;
-    print!("{}", terminal(&report, Style::Plain, Detail::Brief, None));
+    print(&terminal(&report, Style::Plain, Detail::Brief, None))?;
     let is_absent = |e: &EngineStatus| e.status == Status::Absent;
     Ok(report.exit().max(if report.engines.iter().any(is_absent) { Exit::Engine } else { Exit::Passed }))
 }
@@ -77,9 +78,9 @@ pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
 pub(super) fn report_installation(site: &Site, names: &[String]) -> Exit {
     let wanted = engines::all().into_iter().map(|e| e.name());
     let wanted: Vec<_> = wanted.filter(|e| names.is_empty() || names.iter().any(|n| e == n)).collect();
-    let outcomes = engines::install(site, &wanted, |step| eprintln!("{step}"));
+    let outcomes = engines::install(site, &wanted, complain);
     for outcome in &outcomes {
-        eprintln!("{}: {}", outcome.component, outcome.detail);
+        complain(&format!("{}: {}", outcome.component, outcome.detail));
     }
     let failed = outcomes.iter().any(|o| o.state == InstallState::Failed);
     if failed { Exit::Engine } else { Exit::Passed }

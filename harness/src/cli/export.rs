@@ -6,6 +6,7 @@ use clap::Args;
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::diagnostic::diagnose;
+use super::{complain, print};
 use crate::engines::{self, Site};
 use crate::plan::{Selection, plan};
 use crate::record::ProcedureId;
@@ -36,7 +37,7 @@ pub(super) fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic>
         exported += export_case(case, args, site, &folder)?;
     }
     if exported == 0 {
-        eprintln!("{} writes no scenes", args.engine);
+        complain(&format!("{} writes no scenes", args.engine));
     }
     Ok(Exit::Passed)
 }
@@ -53,7 +54,7 @@ fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Resul
         for task in &plan.tasks {
             let job = plan.job(case, e, task, selection.seed);
             if let engines::Support::No(reason) = planned.engine.supports(&job) {
-                eprintln!("{}: {reason}", task.procedure);
+                complain(&format!("{}: {reason}", task.procedure));
                 continue;
             }
             let files = planned.engine.export(&job).into_diagnostic()?;
@@ -62,10 +63,10 @@ fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Resul
             for file in &files {
                 let path = folder.join(&file.name);
                 std::fs::write(&path, &file.bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
-                println!("{}", path.display());
+                print(&format!("{}\n", path.display()))?;
             }
             if let Some(command) = planned.engine.command_by_hand(&job, site) {
-                println!("  cd {} && {command}", folder.display());
+                print(&format!("  cd {} && {command}\n", folder.display()))?;
             }
             exported += files.len();
         }

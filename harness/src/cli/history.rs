@@ -6,6 +6,7 @@ use clap::{Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::views::read_report;
+use super::{complain, print};
 use crate::report::Exit;
 use crate::trend::history::{Change, Course, History, Line, add, changes, in_words, lines, site};
 
@@ -76,7 +77,7 @@ pub(super) fn history(action: &Action) -> Result<Exit, Diagnostic> {
             let is_denied = |c: &&Change| c.noticed >= first && deny.is_some_and(|deny| deny.holds(c.course));
             let denied: Vec<&Change> = changes.iter().filter(is_denied).collect();
             for change in &denied {
-                println!("{}", in_words(&history, change));
+                print(&format!("{}\n", in_words(&history, change)))?;
             }
             if !denied.is_empty() {
                 return Ok(Exit::Failed);
@@ -93,13 +94,12 @@ fn add_report(path: &Path, history: &Path, night: Option<&str>) -> Result<(), Di
     tell_of_cut(history, added.cut_short);
     let count: usize = lines.iter().map(Line::count).sum();
     let instead = if added.replaced > 0 { format!(" in place of {} lines", added.replaced) } else { String::new() };
-    println!("{}: {count} comparisons added{instead}", history.display());
-    Ok(())
+    print(&format!("{}: {count} comparisons added{instead}\n", history.display()))
 }
 
 fn tell_of_cut(history: &Path, line: Option<usize>) {
     if let Some(line) = line {
-        eprintln!("{}:{line}: the last line is cut short and left out", history.display());
+        complain(&format!("{}:{line}: the last line is cut short and left out", history.display()));
     }
 }
 
@@ -113,6 +113,6 @@ fn draw(path: &Path, out: &Path, reports: &[(String, String)]) -> Result<(Histor
         .into_diagnostic()
         .wrap_err_with(|| page.display().to_string())?;
     let (nights, series) = (history.nights.len(), history.series.len());
-    println!("{}: {nights} nights, {series} series, {} changes", page.display(), changes.len());
+    print(&format!("{}: {nights} nights, {series} series, {} changes\n", page.display(), changes.len()))?;
     Ok((history, changes))
 }

@@ -49,7 +49,7 @@ impl MeasuringArgs {
             match engine.probe(site) {
                 Ok(version) => present.push(Instrument { engine: engine.into(), version }),
                 Err(absent) if is_named => return Err(miette::miette!("{}: {absent}", engine.name())),
-                Err(absent) => eprintln!("{}: {absent}", engine.name()),
+                Err(absent) => super::complain(&format!("{}: {absent}", engine.name())),
             }
         }
         Ok(present)

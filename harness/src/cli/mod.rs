@@ -228,6 +228,11 @@ fn print(text: &str) -> Result<(), Diagnostic> {
     }
 }
 
+/// Tells something on standard error; that nobody reads it is no reason to stop.
+pub fn complain(text: &str) {
+    writeln!(std::io::stderr().lock(), "{text}").ok();
+}
+
 fn json(value: &(impl Serialize + ?Sized)) -> Result<String, Diagnostic> {
     Ok(serde_json::to_string_pretty(value).into_diagnostic()? + "\n")
 }
@@ -240,6 +245,6 @@ fn schema(of: SchemaOf) -> Result<Exit, Diagnostic> {
         SchemaOf::Job => schemars::schema_for!(ExternalJob),
         SchemaOf::Readings => schemars::schema_for!(ExternalReadings),
     };
-    print!("{}", json(&schema)?);
+    print(&json(&schema)?)?;
     Ok(Exit::Passed)
 }

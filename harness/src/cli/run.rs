@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::RunArgs;
+use super::complain;
 use super::diagnostic::{diagnose, not_audited};
 use super::engines::report_installation;
 use super::progress::Progress;
@@ -37,36 +38,54 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
         audit::chosen(&args.selected.specs, &options).map_err(diagnose)?;
         report_installation(site, &args.selected.engines);
     }
+    let held = args.baseline.as_deref().map(|path| Held::read(path, &args.selected.specs, &options)).transpose()?;
     let mut report = audit::run(&args.selected.specs, &options).map_err(not_audited)?;
     let root = options.out.clone();
     drop(progress);
-    if let Some(path) = &args.baseline {
-        report.baseline = Some(hold_against_baseline(&report, path, &root)?);
+    if let Some(held) = &held {
+        report.baseline = Some(held.hold(&report, &root)?);
         files::keep_json(&root.join("report.json"), &report).into_diagnostic()?;
     }
     print_report(&report, &root, &args.views)?;
     Ok(report.exit())
 }
 
-/// Holds a run against its baseline; what does not match it fails and is left as a candidate in the run's folder.
-fn hold_against_baseline(report: &Report, path: &Path, root: &Path) -> Result<BaselineCheck, Diagnostic> {
-    let place = Baseline::place(path, report);
-    let kept = if place.exists() { Baseline::read(&place).into_diagnostic()?.entries } else { vec![] };
-    let candidate = Baseline::candidate(report);
-    // What was not asked of this run is not missed in it.
-    let skipped = report.skips.iter().map(|s| &s.key);
-    let asked: Vec<_> = candidate.entries.iter().map(|e| &e.key).chain(skipped).collect();
-    let kept: Vec<Entry> = kept.into_iter().filter(|e| asked.contains(&&e.key)).collect();
-    let changes = baseline::compare(&kept, &candidate.entries, Comparability::SameInstrument);
-    files::keep_json(&root.join("baseline-changes.json"), &changes).into_diagnostic()?;
-    let check = super::diff::check(&changes, &place);
-    if !check.is_as_accepted() {
-        let file = root.join("baseline-candidate.json");
-        candidate.write(&file).into_diagnostic()?;
-        let accept = format!("luxproof accept {} --baseline {}", root.display(), path.display());
-        eprintln!("baseline: left as a candidate: {}; to review it: {accept}", file.display());
+/// The baseline that a run is held against.
+struct Held {
+    /// As it was named.
+    named: PathBuf,
+    place: PathBuf,
+    kept: Vec<Entry>,
+}
+
+impl Held {
+    /// Reads and checks it before anything is measured; one that is not there yet holds nothing.
+    fn read(path: &Path, specs: &[PathBuf], options: &Options<'_>) -> Result<Self, Diagnostic> {
+        let (cases, _) = audit::chosen(specs, options).map_err(diagnose)?;
+        let place = Baseline::place(path, &audit::subject(specs, &cases));
+        let names = cases.iter().map(|case| case.name.as_str());
+        let kept = if place.exists() { Baseline::of_run(&place, names).into_diagnostic()?.entries } else { vec![] };
+        Ok(Self { named: path.to_owned(), place, kept })
     }
-    Ok(check)
+
+    /// Holds a run against it; what does not match it fails and is left as a candidate in the run's folder.
+    fn hold(&self, report: &Report, root: &Path) -> Result<BaselineCheck, Diagnostic> {
+        let candidate = Baseline::candidate(report);
+        // What was not asked of this run is not missed in it.
+        let skipped = report.skips.iter().map(|s| &s.key);
+        let asked: Vec<_> = candidate.entries.iter().map(|e| &e.key).chain(skipped).collect();
+        let kept: Vec<Entry> = self.kept.iter().filter(|e| asked.contains(&&e.key)).cloned().collect();
+        let changes = baseline::compare(&kept, &candidate.entries, Comparability::SameInstrument);
+        files::keep_json(&root.join("baseline-changes.json"), &changes).into_diagnostic()?;
+        let check = super::diff::check(&changes, &self.place);
+        if !check.is_as_accepted() {
+            let file = root.join("baseline-candidate.json");
+            candidate.write(&file).into_diagnostic()?;
+            let accept = format!("luxproof accept {} --baseline {}", root.display(), self.named.display());
+            complain(&format!("baseline: left as a candidate: {}; to review it: {accept}", file.display()));
+        }
+        Ok(check)
+    }
 }
 
 /// The folder of the run: by default that of the one spec or folder, or one for all where there are several.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
-use super::{json, print};
+use super::{complain, json, print};
 use crate::report::{self, Beside, Detail, Exit, Report, Style};
 
 /// Which views of a report are printed, and how.
@@ -49,7 +49,11 @@ pub(super) struct ReportArgs {
 }
 
 pub(super) fn print_report(report: &Report, folder: &Path, views: &Views) -> Result<(), Diagnostic> {
-    let beside = |path: &PathBuf| read(path, |text| Beside::from_json(text).into_diagnostic());
+    let beside = |path: &PathBuf| {
+        let text = std::fs::read_to_string(path).into_diagnostic();
+        let read = text.and_then(|text| Beside::from_json(&text).into_diagnostic());
+        read.wrap_err_with(|| path.display().to_string())
+    };
     let beside = views.beside.iter().map(beside).collect::<Result<Vec<_>, _>>()?;
     let detail = if views.all { Detail::All } else { Detail::Brief };
     let style = if std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) {
@@ -93,10 +97,10 @@ pub(super) fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
 }
 
 pub(super) fn read_report(file: &Path) -> Result<Report, Diagnostic> {
-    read(file, |text| serde_json::from_str(text).into_diagnostic())
-}
-
-fn read<T>(file: &Path, parse: impl Fn(&str) -> Result<T, Diagnostic>) -> Result<T, Diagnostic> {
-    let text = std::fs::read_to_string(file).into_diagnostic();
-    text.and_then(|text| parse(&text)).wrap_err_with(|| file.display().to_string())
+    let text = std::fs::read_to_string(file).into_diagnostic().wrap_err_with(|| file.display().to_string())?;
+    let read = Report::from_json(&text).map_err(|why| miette::miette!("{} {why}", file.display()))?;
+    if let Some(doubt) = read.doubt {
+        complain(&format!("{} {doubt}", file.display()));
+    }
+    Ok(read.report)
 }

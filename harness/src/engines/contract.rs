@@ -65,6 +65,11 @@ pub trait Engine: Send + Sync {
         &[]
     }
 
+    /// What is wrong with its settings, from the job alone, before anything starts.
+    fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
+        only_known(&self.name(), job, self.knobs())
+    }
+
     /// Memory that a job takes on so many threads or processes, in MiB; an estimate on the safe side, of which as much runs side
     /// by side as there is room for. Twice what case S2 took and more, a process each.
     fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
@@ -322,6 +327,23 @@ impl Measurement {
     }
 }
 
+/// Refuses a setting that an engine does not know, naming those that it does.
+pub(super) fn only_known(engine: &EngineName, job: &Job, knobs: &[Knob]) -> Result<(), EngineError> {
+    let Some(key) = job.settings.keys().find(|key| knobs.iter().all(|k| k.key != *key)) else { return Ok(()) };
+    let known = if knobs.is_empty() { "none at all".to_owned() } else { list(knobs.iter().map(|k| k.key), "and") };
+    let what = format!("no such setting; there are {known}");
+    Err(EngineError::Setting { engine: engine.clone(), key: key.clone(), what })
+}
+
+/// `a, b or c`.
+pub(super) fn list<'a>(words: impl Iterator<Item = &'a str>, last: &str) -> String {
+    let words: Vec<&str> = words.collect();
+    match words.split_last() {
+        Some((end, start)) if !start.is_empty() => format!("{} {last} {end}", start.join(", ")),
+        _ => words.concat(),
+    }
+}
+
 /// Checks that what was read is named as the meters, in their order.
 pub(super) fn same_meters<'a>(
     engine: &EngineName,
@@ -343,7 +365,10 @@ fn count_readings(engine: &EngineName, job: &Job, found: usize) -> Result<(), En
     (found == wanted).then_some(()).ok_or_else(wrong)
 }
 
-/// Checks what every engine must hold: one finite, non-negative value a station.
+/// No light is so bright: the sun's surface gives 1e10 lx. What is made of readings, fourth powers among it, stays a number below this.
+const BRIGHTEST_LX: f64 = 1e30;
+
+/// Checks what every engine must hold: one finite, non-negative value a station that can be light.
 pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
     count_readings(engine, job, measurement.estimates.len())?;
     for (estimate, station) in measurement.estimates.iter().zip(&job.stations) {
@@ -354,6 +379,11 @@ pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Resu
         }
         if value < 0.0 || !uncertainty.is_sound() {
             let what = format!("read {value} lx ({uncertainty:?}) at {meter}");
+            return Err(EngineError::Output { engine, what });
+        }
+        if [value, uncertainty.standard_error().unwrap_or(0.0), uncertainty.bound()].iter().any(|v| *v > BRIGHTEST_LX) {
+            let what =
+                format!("read {value:e} lx ({uncertainty:?}) at {meter}: beyond {BRIGHTEST_LX:e} lx nothing is light");
             return Err(EngineError::Output { engine, what });
         }
     }
@@ -379,7 +409,8 @@ mod tests {
     #[test]
     fn missing_rows_nan_infinity_and_negative_readings_are_errors() {
         assert!(checked(&ENGINE, &job(2), measurement(&[1.0, 0.0])).is_ok());
-        for bad in [&[1.0][..], &[1.0, f64::NAN], &[1.0, f64::INFINITY], &[-1e-9, 1.0], &[1.0, 1.0, 1.0]] {
+        for bad in [&[1.0][..], &[1.0, 1e308], &[1.0, f64::NAN], &[1.0, f64::INFINITY], &[-1e-9, 1.0], &[1.0, 1.0, 1.0]]
+        {
             assert!(checked(&ENGINE, &job(2), measurement(bad)).is_err(), "{bad:?}");
         }
         let mut odd = measurement(&[1.0]);

@@ -17,7 +17,7 @@ use super::{
     Absent, Engine, EngineError, FILE_READER, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
 };
 use crate::record::{EngineName, ProcedureId, UnknownProcedure};
-use crate::spec::hexadecimal;
+use crate::system::digest::hexadecimal;
 use crate::system::process::Invocation;
 
 /// The environment variable that names an empty folder for the adapter's own files, kept with the run.
@@ -171,6 +171,11 @@ impl Engine for External {
             }
             _ => Support::Yes,
         }
+    }
+
+    /// Its own are checked where it is made; all others are the program's.
+    fn check_settings(&self, _job: &Job) -> Result<(), EngineError> {
+        Ok(())
     }
 
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {

@@ -11,7 +11,8 @@ use walkdir::WalkDir;
 
 use super::Site;
 use crate::record::EngineName;
-use crate::spec::hexadecimal;
+use crate::system::digest::hexadecimal;
+use crate::system::envelope::{self, Schema};
 use crate::system::files;
 
 /// Of more files than this only the number counts.
@@ -19,6 +20,8 @@ const MAX_FILES: usize = 20_000;
 
 /// Hashes of files that have not changed since, by path: size and time of change tell.
 type Memo = BTreeMap<PathBuf, Known>;
+
+const SCHEMA: Schema = Schema { of: "hashes of engine files", version: 1 };
 
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 struct Known {
@@ -32,7 +35,7 @@ struct Known {
 pub(super) fn of(engine: &EngineName, site: &Site, roots: impl IntoIterator<Item = PathBuf>) -> String {
     // An engine each, so that probes side by side do not overwrite one another's.
     let place = site.root().join("fingerprints").join(format!("{engine}.json"));
-    let memo: Memo = std::fs::read(&place).ok().and_then(|b| serde_json::from_slice(&b).ok()).unwrap_or_default();
+    let memo = kept(&place, engine);
     let roots: BTreeSet<PathBuf> = roots.into_iter().collect();
     let files: Vec<_> = roots.iter().flat_map(|root| below(root)).collect();
     let (mut now, mut hash) = (Memo::default(), Sha256::new_with_prefix(files.len().to_le_bytes()));
@@ -44,9 +47,19 @@ pub(super) fn of(engine: &EngineName, site: &Site, roots: impl IntoIterator<Item
     }
     if now != memo {
         // Where it cannot be kept, files are read again next time.
-        files::keep_json(&place, &now).ok();
+        let text = envelope::seal(SCHEMA, engine.as_str(), &now).map_err(io::Error::from);
+        text.and_then(|text| files::replace(&place, text.as_bytes())).ok();
     }
     hexadecimal(&hash.finalize())[..16].to_owned()
+}
+
+/// What an earlier run saw; a file that is not sound is told and replaced.
+fn kept(place: &Path, engine: &EngineName) -> Memo {
+    let Ok(text) = std::fs::read(place) else { return Memo::default() };
+    envelope::open(SCHEMA, &text).and_then(|sealed| sealed.about(engine.as_str())).unwrap_or_else(|why| {
+        tracing::warn!("{engine}: {} {why}; its files are hashed anew", place.display());
+        Memo::default()
+    })
 }
 
 fn seen(path: &Path, earlier: Option<&Known>) -> io::Result<Known> {
@@ -97,5 +110,33 @@ mod tests {
         let kept: Vec<_> =
             site.root().join("fingerprints").read_dir().unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!(kept, ["mine.json"]);
+    }
+
+    #[test]
+    fn hashes_that_were_edited_cut_or_moved_are_never_believed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (root, site) = (folder.path().join("engine"), Site::at(folder.path().join("site")));
+        std::fs::create_dir_all(&root).unwrap();
+        std::fs::write(root.join("a"), "one").unwrap();
+        let (engine, other) = (EngineName::new("mine"), EngineName::new("other"));
+        let right = of(&engine, &site, [root.clone()]);
+        let place = |name: &str| site.root().join("fingerprints").join(name);
+        let sound = std::fs::read_to_string(place("mine.json")).unwrap();
+        let at = sound.find("sha256\":\"").unwrap() + 9;
+        let digit = if sound[at..].starts_with('0') { "1" } else { "0" };
+        let edited = format!("{}{digit}{}", &sound[..at], &sound[at + 1..]);
+        for (name, text) in [
+            ("mine.json", edited.as_str()),
+            ("mine.json", &sound[..sound.len() / 2]),
+            ("mine.json", &sound.replace("files 1", "files 0")),
+            ("mine.json", ""),
+            ("other.json", &sound),
+        ] {
+            std::fs::write(place(name), text).unwrap();
+            let asked = if name == "mine.json" { &engine } else { &other };
+            assert!(kept(&place(name), asked).is_empty(), "{text}");
+            assert_eq!(of(asked, &site, [root.clone()]), right);
+            assert!(!kept(&place(name), asked).is_empty(), "it was not replaced");
+        }
     }
 }

@@ -80,6 +80,10 @@ impl Engine for Mitsuba {
         settings::KNOBS
     }
 
+    fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
+        Settings::of(job).map(drop)
+    }
+
     /// One process, whatever its threads: Python, LLVM, and a wavefront of paths.
     fn memory_mib(&self, job: &Job, _threads: usize) -> u64 {
         1024 + super::geometry_mib(job)

@@ -102,6 +102,10 @@ impl Engine for PovRay {
         settings::KNOBS
     }
 
+    fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
+        Settings::of(job).map(drop)
+    }
+
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
         let settings = Settings::of(job)?;
         workbench.write(&self.export(job)?)?;

@@ -99,6 +99,10 @@ impl Engine for Radiance {
         settings::KNOBS
     }
 
+    fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
+        Settings::of(job).map(drop)
+    }
+
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
         read_files(&self.export(job)?, job, workbench)
     }

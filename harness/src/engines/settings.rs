@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use serde_json::Value;
 
-use super::contract::{Job, Knob};
+use super::contract::{Job, Knob, list, only_known};
 use super::workbench::EngineError;
 use crate::record::EngineName;
 
@@ -43,14 +43,8 @@ pub(super) struct Given<'a> {
 
 impl<'a> Given<'a> {
     pub(super) fn of(job: &'a Job, engine: EngineName, knobs: &[Knob]) -> Result<Self, EngineError> {
-        let given = Self { engine, job };
-        match job.settings.keys().find(|key| knobs.iter().all(|k| k.key != *key)) {
-            None => Ok(given),
-            Some(key) => {
-                let known = list(knobs.iter().map(|k| k.key), "and");
-                Err(given.error(key, format!("no such setting; there are {known}")))
-            }
-        }
+        only_known(&engine, job, knobs)?;
+        Ok(Self { engine, job })
     }
 
     pub(super) fn preset(&self) -> Result<Preset, EngineError> {
@@ -93,15 +87,6 @@ impl<'a> Given<'a> {
 
     fn error(&self, key: &str, what: String) -> EngineError {
         EngineError::Setting { engine: self.engine.clone(), key: key.to_owned(), what }
-    }
-}
-
-/// `a, b or c`.
-fn list<'a>(words: impl Iterator<Item = &'a str>, last: &str) -> String {
-    let words: Vec<&str> = words.collect();
-    match words.split_last() {
-        Some((end, start)) if !start.is_empty() => format!("{} {last} {end}", start.join(", ")),
-        _ => words.concat(),
     }
 }
 

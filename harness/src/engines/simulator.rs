@@ -26,6 +26,11 @@ const KNOBS: &[Knob] = &[Knob { key: "relative_error", values: &["0.001", "0.1",
 /// How much finer than the budget's error the simulator works: a witness whose own error counts for nothing.
 const MARGIN: f64 = 0.1;
 
+fn relative_error(job: &Job) -> Result<f64, EngineError> {
+    let asked = Given::of(job, ID, KNOBS)?.number("relative_error", 1e-12..=1.0)?;
+    Ok(asked.unwrap_or(MARGIN * job.budget.relative_error))
+}
+
 impl Engine for Simulator {
     fn name(&self) -> EngineName {
         ID
@@ -51,6 +56,10 @@ impl Engine for Simulator {
         KNOBS
     }
 
+    fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
+        relative_error(job).map(drop)
+    }
+
     /// An impostor is a way to sample an opening: to an exact solution it is the opening itself.
     fn cache_identity(&self, job: &Job) -> Job {
         let mut job = job.without_names();
@@ -63,8 +72,7 @@ impl Engine for Simulator {
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
-        let asked = Given::of(job, ID, KNOBS)?.number("relative_error", 1e-12..=1.0)?;
-        let relative_error = asked.unwrap_or(MARGIN * job.budget.relative_error);
+        let relative_error = relative_error(job)?;
         let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();
         let accuracy = Accuracy { relative_error, seed: job.seed };
         let failed = |what: String| EngineError::Solver { engine: ID, what };

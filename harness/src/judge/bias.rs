@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-use super::uncertainty::{Component, ErrorBudget, Source, upper_tail_of_normal};
+use super::uncertainty::{Component, ErrorBudget, MANY, Source, upper_tail_of_normal};
 use super::{Basis, Comparison, Judge};
 use crate::record::{ReadingKey, Uncertainty};
 
@@ -59,7 +59,8 @@ pub struct WeightedMean {
 const FEWEST_FOR_WEIGHTS: f64 = 7.0;
 
 impl WeightedMean {
-    /// Of values with their standard uncertainties, all positive, and the degrees of freedom of these; `None` of fewer than two.
+    /// Of values with their standard uncertainties, all positive, and the degrees of freedom of these; `None` of fewer than two, and
+    /// where weights or scatter are beyond all numbers.
     pub fn of(values: &[(f64, f64, Option<f64>)]) -> Option<Self> {
         if values.len() < 2 {
             return None;
@@ -74,7 +75,9 @@ impl WeightedMean {
         let meier = 1.0 + 4.0 * shares().map(|(share, freedom)| share * (1.0 - share) / freedom).sum::<f64>();
         let all = shares().map(|(share, freedom)| share * share / freedom).sum::<f64>().recip();
         let degrees_of_freedom = fewest.map(|fewest| if fewest < FEWEST_FOR_WEIGHTS { fewest } else { all });
-        Some(Self { value, uncertainty: (birge.max(meier) / weights).sqrt(), degrees_of_freedom })
+        let mean = Self { value, uncertainty: (birge.max(meier) / weights).sqrt(), degrees_of_freedom };
+        let is_number = value.is_finite() && mean.uncertainty.is_finite() && mean.uncertainty > 0.0;
+        is_number.then_some(mean)
     }
 
     /// The probability of a mean at least this far from nothing, were there nothing.
@@ -87,8 +90,12 @@ impl WeightedMean {
     }
 }
 
-/// Probability of a standardised deviation at least this large, either way.
+/// Probability of a standardised deviation at least this large, either way; what is no number agrees with nothing.
 pub fn two_sided(z: f64, degrees_of_freedom: Option<f64>) -> f64 {
+    if !z.is_finite() {
+        return 0.0;
+    }
+    let degrees_of_freedom = degrees_of_freedom.filter(|f| *f < MANY);
     let student = degrees_of_freedom.and_then(|f| StudentsT::new(0.0, 1.0, f).ok());
     2.0 * student.map_or_else(|| Normal::standard().sf(z.abs()), |t| t.sf(z.abs()))
 }
@@ -105,7 +112,7 @@ impl Judge<'_> {
             groups.entry((&c.key, reference.basis)).or_default().push(deviation);
         }
         let tail = upper_tail_of_normal(self.tolerances.coverage_factor());
-        groups.into_iter().map(|((key, basis), all)| of_group(key, basis, &all, tail)).collect()
+        groups.into_iter().filter_map(|((key, basis), all)| of_group(key, basis, &all, tail)).collect()
     }
 }
 
@@ -117,7 +124,8 @@ struct Deviation {
     degrees_of_freedom: Option<f64>,
 }
 
-fn of_group(key: &ReadingKey, basis: Basis, all: &[Deviation], tail: f64) -> Bias {
+/// `None` where the deviations are so absurd that their mean is no number.
+fn of_group(key: &ReadingKey, basis: Basis, all: &[Deviation], tail: f64) -> Option<Bias> {
     // What states no uncertainty would outweigh everything.
     let stated = all.iter().filter(|d| d.uncertainty > SINGLE_PRECISION);
     let stated: Vec<_> = stated.map(|d| (d.relative, d.uncertainty, d.degrees_of_freedom)).collect();
@@ -133,7 +141,8 @@ fn of_group(key: &ReadingKey, basis: Basis, all: &[Deviation], tail: f64) -> Bia
             (mean, deviations().fold(f64::INFINITY, f64::min), deviations().fold(f64::NEG_INFINITY, f64::max), None)
         }
     };
-    Bias { key: key.clone(), basis, readings: all.len(), mean, low, high, p_value }
+    let are_numbers = [mean, low, high].iter().all(|v| v.is_finite());
+    are_numbers.then(|| Bias { key: key.clone(), basis, readings: all.len(), mean, low, high, p_value })
 }
 
 #[cfg(test)]

@@ -233,7 +233,8 @@ fn probabilities(witnesses: &[WitnessReadings], hypotheses: &[Hypothesis], telli
     let mut logs = vec![evidence(None)];
     logs.extend(hypotheses.iter().map(|s| evidence(Some(s))));
     let total = log_of_sum(&logs);
-    logs[1..].iter().map(|l| (l - total).exp()).collect()
+    // Readings so far apart that their evidence is no number speak for nobody.
+    logs[1..].iter().map(|l| (l - total).exp()).map(|p| if p.is_finite() { p } else { 0.0 }).collect()
 }
 
 fn log_of_sum(logs: &[f64]) -> f64 {

@@ -14,7 +14,8 @@ use sha2::{Digest, Sha256};
 use super::tolerance::{Rule, ToleranceClass};
 use super::{Judge, KnownDeviation, KnownDeviations, Published, Tolerances, known, tolerance};
 use crate::record::EngineName;
-use crate::spec::{Budget, Case, Source, SpecError, hexadecimal, suggestion};
+use crate::spec::{Budget, Case, Source, SpecError, suggestion};
+use crate::system::digest::hexadecimal;
 
 /// The name of a project's policy, beside a spec or in a folder above it.
 pub const POLICY_FILE: &str = "luxproof.yaml";

@@ -48,7 +48,10 @@ pub(super) fn splits(task: &Task, recordings: &[&Recording], coverage: f64) -> V
             let at = |r: &Recording| r.readings.iter().find(|reading| reading.meter == rendered.meter).cloned();
             let (Some(method), Some(exact)) = (at(method), at(exact)) else { continue };
             let split = DeviationSplit::new(Lux(method.value), uncertain(&exact), uncertain(rendered));
-            let Some(split) = split else { continue };
+            // Light next to nothing may have shares that are no numbers.
+            let is_number =
+                |s: &DeviationSplit| [s.whole, s.method, s.renderer, s.uncertainty].iter().all(|v| v.is_finite());
+            let Some(split) = split.filter(is_number) else { continue };
             let (method, name) =
                 (engines::method_of_iesna(task.transport), engines::display_name(&renderer.key.engine));
             splits.push(Split {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{Continuous, ContinuousCDF, Normal, StudentsT};
 
 /// Degrees of freedom from which on Student's t is the normal distribution to six digits, and no longer computed well.
-const MANY: f64 = 1e6;
+pub(super) const MANY: f64 = 1e6;
 /// Components below this share of the widest one change no quantile that anybody reads.
 const NEGLIGIBLE: f64 = 1e-4;
 

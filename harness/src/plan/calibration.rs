@@ -12,7 +12,8 @@ use super::{Asked, Plan, Planner, Selection};
 use crate::engines::{ExternalJob, Job};
 use crate::procedures::{Task, known};
 use crate::record::EngineName;
-use crate::spec::{Budget, Case, EngineSettings, SpecError, hexadecimal};
+use crate::spec::{Budget, Case, EngineSettings, SpecError};
+use crate::system::digest::hexadecimal;
 
 /// A standard error that decides at the tolerances of reflected light, and the time that slow engines need for it.
 const BUDGET: Budget = Budget { relative_error: 4e-3, seconds: 60.0 };

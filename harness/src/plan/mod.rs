@@ -177,6 +177,7 @@ impl<'a> Planner<'a> {
 
     pub fn plan(&mut self, case: &Case) -> Result<Plan, SpecError> {
         let tasks = tasks(case, self.selection)?;
+        self.roster.check_settings(case, &tasks[0])?;
         let chosen = self.roster.chosen(case, self.selection)?;
         let mut plan = self.whole(case, tasks, chosen);
         if self.skipping == Skipping::Allowed {

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{Asked, Selection};
-use crate::engines::{self, Absent, Engine, EngineError, Site, Version};
+use crate::engines::{self, Absent, Engine, EngineError, Job, Site, Version};
+use crate::procedures::Task;
 use crate::spec::{Case, EngineSettings, SpecError, suggestion};
 use crate::system::slots::side_by_side;
 
@@ -39,10 +40,8 @@ impl Roster {
                 return Err(SpecError { message, help, ..place });
             }
             let folder = case.path.parent().unwrap_or(Path::new(""));
-            all.push(self.external(name, settings, folder).map_err(|error| {
-                let help = "give `command: [program, arguments...]`, paths relative to the spec";
-                case.source.error_at(&format!("engines.{name}"), error.to_string(), help)
-            })?);
+            let help = || "give `command: [program, arguments...]`, paths relative to the spec".to_owned();
+            all.push(self.external(name, settings, folder).map_err(|error| misset(case, name, error, help))?);
         }
         let ids = names(&all);
         if let Some(name) = selection.engines.iter().find(|name| !ids.contains(*name)) {
@@ -64,6 +63,26 @@ impl Roster {
             }
         };
         Ok(all.into_iter().filter_map(|engine| asked(engine.as_ref()).map(|asked| (engine, asked))).collect())
+    }
+
+    /// Refuses settings of our own engines that they do not know, whichever of them take part.
+    pub(super) fn check_settings(&self, case: &Case, task: &Task) -> Result<(), SpecError> {
+        for engine in &self.ours {
+            let name = engine.name();
+            let settings = case.settings_of(name.as_str());
+            let is_program = settings.contains_key("command");
+            let keys: Vec<&str> = engine.knobs().iter().map(|k| k.key).collect();
+            let known = if keys.is_empty() { "none".to_owned() } else { keys.join(", ") };
+            let help = || {
+                if is_program {
+                    return format!("`{name}` is an engine of luxproof's: give a program of your own another name");
+                }
+                format!("settings of {name}: {known}")
+            };
+            let job = Job { settings, ..Job::of_task(case, task) };
+            engine.check_settings(&job).map_err(|error| misset(case, name.as_str(), error, help))?;
+        }
+        Ok(())
     }
 
     fn external(
@@ -94,6 +113,14 @@ impl Roster {
         let fresh: Vec<_> = answers.filter(|(e, _)| known(e).is_none()).map(|(e, f)| (e.clone(), f.clone())).collect();
         self.probed.extend(fresh);
         found
+    }
+}
+
+/// An error in the settings of an engine, at its place in the spec.
+fn misset(case: &Case, name: &str, error: EngineError, help: impl Fn() -> String) -> SpecError {
+    match error {
+        EngineError::Setting { key, what, .. } => case.source.error_at(&format!("engines.{name}.{key}"), what, help()),
+        other => case.source.error_at(&format!("engines.{name}"), other.to_string(), help()),
     }
 }
 

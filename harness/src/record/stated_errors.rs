@@ -61,6 +61,9 @@ impl StatedErrors {
             sum += stated.iter().map(|(x, w)| w * (x - mean).powi(2)).sum::<f64>();
             degrees_of_freedom += stated.len().saturating_sub(1) as f64;
         }
+        if !sum.is_finite() {
+            return None;
+        }
         let chance = ChiSquared::new(degrees_of_freedom).ok()?;
         let (below, above) = (chance.cdf(sum), chance.sf(sum));
         let ratio = (sum / degrees_of_freedom).sqrt();
@@ -93,7 +96,7 @@ impl StatedErrors {
             of_claims: Some(relative),
             doubt: Some(Doubt::Scatters),
         };
-        (relative > 0.0).then_some(doubted)
+        (relative > 0.0 && relative.is_finite()).then_some(doubted)
     }
 
     /// A reading with the error that it has by all that was found of its engine.

@@ -89,8 +89,10 @@ impl Uncertainty {
         }));
         match all {
             Self::StandardError { bound, degrees_of_freedom, .. } => {
-                let effective = if fourth > 0.0 { Some(variance * variance / fourth) } else { degrees_of_freedom };
-                Self::StandardError { value: variance.sqrt(), degrees_of_freedom: effective, bound }
+                // Fourth powers may be no numbers where their roots are: then those with the fewest count.
+                let effective = Some(variance * variance / fourth).filter(|f| f.is_normal() && fourth > 0.0);
+                let degrees_of_freedom = effective.or(degrees_of_freedom);
+                Self::StandardError { value: variance.sqrt(), degrees_of_freedom, bound }
             }
             other => other,
         }
@@ -133,13 +135,6 @@ impl Uncertainty {
                 other.times((effort / total).sqrt())
             }
             looks => Self::of_sum(looks.map(|(effort, look)| (effort / total, look))),
-        }
-    }
-
-    /// Tells the degrees of freedom of a standard error that says none itself.
-    pub fn grant(&mut self, degrees: Option<f64>) {
-        if let Self::StandardError { degrees_of_freedom, .. } = self {
-            *degrees_of_freedom = degrees_of_freedom.or(degrees);
         }
     }
 

@@ -1,5 +1,7 @@
 //! JUnit XML: a test case is case x procedure x engine, for continuous integration.
 
+use std::time::Duration;
+
 use quick_junit::{NonSuccessKind, Report as JUnit, TestCase, TestCaseStatus, TestSuite};
 
 use super::{BaselineCheck, Report, notes};
@@ -59,7 +61,7 @@ fn suite(report: &Report, name: &str) -> TestSuite {
     for recording in report.recordings.iter().filter(|r| r.key.case == name) {
         let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.key == recording.key).collect();
         let mut case = test_case(&recording.key, "", status(&comparisons));
-        case.set_time(std::time::Duration::from_secs_f64(recording.wall_s.max(0.0)));
+        case.set_time(duration(recording.wall_s));
         // What was left out of a job that ran is told with it: a job is one test case.
         let left_out: Vec<String> = report.skips.iter().filter(|s| s.key == recording.key).map(told).collect();
         if !left_out.is_empty() {
@@ -74,6 +76,11 @@ fn suite(report: &Report, name: &str) -> TestSuite {
         suite.add_test_case(test_case(&skip.key, "", status));
     }
     suite
+}
+
+/// Of a report that somebody wrote, too: seconds below nothing are none, and beyond every clock the most that there are.
+fn duration(wall_s: f64) -> Duration {
+    Duration::try_from_secs_f64(wall_s.max(0.0)).unwrap_or(Duration::MAX)
 }
 
 fn test_case(key: &ReadingKey, what: &str, status: TestCaseStatus) -> TestCase {
@@ -118,4 +125,16 @@ fn line(c: &Comparison) -> String {
         c.reference.as_ref().map_or("none", |r| r.source.as_str()),
         c.verdict.name()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_beyond_every_clock_and_none_at_all_are_durations() {
+        assert_eq!([1e300, f64::INFINITY].map(duration), [Duration::MAX; 2]);
+        assert_eq!([-1.0, f64::NAN].map(duration), [Duration::ZERO; 2]);
+        assert_eq!(duration(1.5), Duration::from_millis(1500));
+    }
 }

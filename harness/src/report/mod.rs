@@ -11,6 +11,7 @@ mod markdown;
 mod matrix;
 mod notes;
 mod papers;
+mod read;
 pub(crate) mod svg;
 mod terminal;
 pub(crate) mod words;
@@ -35,6 +36,7 @@ pub(crate) use html::table;
 pub use html::{Beside, BesideError, page};
 pub use junit::junit;
 pub use markdown::markdown;
+pub use read::{ReadReport, ReportError};
 pub use terminal::{Detail, Style, terminal};
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -136,7 +138,7 @@ impl Report {
     ) -> Self {
         let spec = SpecRecord::of(case);
         Self {
-            luxproof: 1,
+            luxproof: read::VERSION,
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
             started: humantime::format_rfc3339_seconds(started).to_string(),
             cases: vec![CaseRecord {

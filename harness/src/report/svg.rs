@@ -24,6 +24,9 @@ pub(super) fn label(value: f64) -> String {
     trimmed(value, decimals).replace('-', "−")
 }
 
+/// More than any round step near a fifth of the scale gives.
+const MOST_RINGS: f64 = 10.0;
+
 /// The paper of a polar diagram: rings of equal intensity, rays of equal gamma.
 pub(crate) struct Polar {
     centre: [f64; 2],
@@ -41,13 +44,14 @@ type Curve<'a> = (&'a [f64], &'a [f64]);
 impl Polar {
     /// For intensities up to `most`.
     pub(crate) fn new(centre: [f64; 2], radius: f64, most: f64, halves: [bool; 2]) -> Self {
-        let step = if most > 0.0 { round_step(most / 5.0) } else { 1.0 };
-        Self { centre, radius, step, rings: (most / step).ceil().max(1.0) as u32, halves }
+        // Darkness has no rings, and neither has what is next to it: a fifth of the smallest number is none.
+        let step = Some(most / 5.0).filter(|fifth| fifth.is_normal()).map_or(1.0, round_step);
+        Self { centre, radius, step, rings: (most / step).ceil().clamp(1.0, MOST_RINGS) as u32, halves }
     }
 
     /// Where an intensity at gamma lies; `side` is 1 to the right, -1 to the left.
     pub(super) fn place(&self, gamma_deg: f64, intensity: f64, side: f64) -> [f64; 2] {
-        self.at(gamma_deg, intensity * self.radius / (self.step * f64::from(self.rings)), side)
+        self.at(gamma_deg, intensity / (self.step * f64::from(self.rings)) * self.radius, side)
     }
 
     fn at(&self, gamma_deg: f64, r: f64, side: f64) -> [f64; 2] {

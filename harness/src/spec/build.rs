@@ -1,12 +1,11 @@
 //! Spec -> Case: reads the files that a spec names, checks what the shape alone cannot, and builds the scene.
 
 use std::collections::{BTreeMap, HashSet};
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
-use luminaire::geometry::{Mesh, Room};
+use luminaire::geometry::{Mesh, Room, Surface};
 use luminaire::photometry::{self, Photometry};
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, orientation};
 use sha2::{Digest, Sha256};
@@ -18,11 +17,15 @@ use super::model::{
 use super::{Source, SpecError, suggestion};
 use crate::procedures::{Angles, Asked, AtAngles, Names, Procedures, Task};
 use crate::record::ProcedureId;
+use crate::system::digest::hexadecimal;
 
 /// Nearest a meter or a luminaire may come to a surface, relative to the room's largest extent.
 ///
 /// On the surface itself a renderer's answer depends on rounding, and so would ours.
 const SURFACE_MARGIN: f64 = 1e-9;
+
+/// No luminaire is so bright: the sun itself has some 3e27 cd. What is made of it stays a number below this.
+const BRIGHTEST_CD: f64 = 1e30;
 
 /// More meters than this are a slip of the pen.
 const MAX_METERS: usize = 1_000_000;
@@ -222,7 +225,7 @@ impl<'a> Builder<'a> {
                 Some(read) => Arc::clone(read),
                 None => Arc::clone(files.entry(path.clone()).or_insert(self.photometry(&at("photometry"), &path)?)),
             };
-            luminaires.push(Luminaire {
+            let luminaire = Luminaire {
                 id: spec.id.clone(),
                 photometry,
                 position_m,
@@ -233,7 +236,16 @@ impl<'a> Builder<'a> {
                     ModelSpec::Area => LuminaireModel::Area,
                     ModelSpec::Impostor => LuminaireModel::Impostor,
                 },
-            });
+            };
+            let brightest_cd = luminaire.photometry.distribution.max_intensity().value() * luminaire.flux_scale;
+            let message = format!("it gives the luminaire {brightest_cd:e} cd, and nothing is so bright");
+            let help = "correct the factor, or the candela of the photometric file";
+            self.source.require(brightest_cd <= BRIGHTEST_CD, &at("flux_scale"), message, help)?;
+            if let Some(message) = sticks_out(&luminaire, room) {
+                let help = "move or turn it, or read it as `model: point`; an opening may be flush with a surface";
+                return Err(self.source.error_at(&at("at_m"), message, help));
+            }
+            luminaires.push(luminaire);
         }
         Ok(luminaires)
     }
@@ -397,6 +409,28 @@ fn misplaced(point: DVec3, scene: &Scene) -> Option<(&'static str, String)> {
     None
 }
 
+/// Nearer to a surface than this, in metres, an opening is flush with it.
+const FLUSH_M: f64 = 1e-9;
+
+/// How far the luminous opening sticks out of the room, where it does: light from behind a surface is the simulator's alone.
+fn sticks_out(luminaire: &Luminaire, room: &Room) -> Option<String> {
+    if luminaire.model == LuminaireModel::Point {
+        return None;
+    }
+    let to_own = luminaire.orientation.transpose();
+    let beyond_m = |surface: Surface| {
+        let outward = -surface.inward_normal();
+        let plane_m = if surface.is_far() { room.size_m[surface.axis()] } else { 0.0 };
+        let reach_m = luminaire.photometry.opening.reach_m(to_own * outward);
+        luminaire.position_m.dot(outward) + reach_m - plane_m
+    };
+    let by = Surface::ALL.into_iter().map(|s| (beyond_m(s), s)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let (beyond_m, surface) = by.filter(|(m, _)| *m > FLUSH_M)?;
+    // Whole nanometres: further digits are rounding.
+    let beyond_m = (beyond_m * 1e9).round() / 1e9;
+    Some(format!("its luminous opening sticks out of the room by {beyond_m} m through the {}", surface.name()))
+}
+
 fn extent(shape: &Shape) -> (DVec3, DVec3) {
     match shape {
         Shape::Box { min_m, max_m } => (*min_m, *max_m),
@@ -404,13 +438,6 @@ fn extent(shape: &Shape) -> (DVec3, DVec3) {
             vertices_m.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
         }
     }
-}
-
-pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        write!(text, "{byte:02x}").ok();
-        text
-    })
 }
 
 fn within(room: &Room) -> String {

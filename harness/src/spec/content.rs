@@ -4,8 +4,8 @@ use glam::{DMat3, DVec3};
 use luminaire::scene::Shape;
 use sha2::{Digest, Sha256};
 
-use super::hexadecimal;
 use crate::procedures::Task;
+use crate::system::digest::hexadecimal;
 
 /// Figures count to nine decimals: angles go through sines, whose last digit is the machine's.
 const PER_UNIT: f64 = 1e9;

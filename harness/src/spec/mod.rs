@@ -12,7 +12,6 @@ mod suite;
 use std::path::{Path, PathBuf};
 
 pub use build::Case;
-pub(crate) use build::hexadecimal;
 pub use content::content;
 pub use model::{Budget, EngineSettings, Spec, ToleranceOverride};
 pub use suite::{filtered, suite};

@@ -1,5 +1,7 @@
-//! What the rest needs of the machine: files seen whole, processes with a limit, slots, random numbers.
+//! What the rest needs of the machine: files seen whole, envelopes for what is kept, processes with a limit, slots, random numbers.
 
+pub(crate) mod digest;
+pub mod envelope;
 pub mod files;
 pub mod process;
 pub(crate) mod random;

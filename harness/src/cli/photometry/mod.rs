@@ -78,7 +78,7 @@ pub(crate) fn run(args: &PhotometryArgs) -> Result<Exit, Diagnostic> {
         Format::Terminal if args.utilization => utilization(&readings)?,
         Format::Terminal => summaries(&readings),
     };
-    print!("{text}");
+    super::print(&text)?;
     for reading in &readings {
         if let Ok(photometry) = &reading.read {
             write_files(args, &reading.file, photometry)?;
@@ -88,7 +88,7 @@ pub(crate) fn run(args: &PhotometryArgs) -> Result<Exit, Diagnostic> {
     for reading in readings {
         if let Err(error) = reading.read {
             exit = Exit::Usage;
-            eprintln!("{:?}", diagnose(spec_error(&error)));
+            super::complain(&format!("{:?}", diagnose(spec_error(&error))));
         }
     }
     Ok(exit)
@@ -158,7 +158,7 @@ fn write_files(args: &PhotometryArgs, file: &Path, photometry: &Photometry) -> R
         let written = convert(out, photometry)?;
         save(out, &written.text)?;
         for loss in &written.losses {
-            eprintln!("{}: {loss}", out.display());
+            super::complain(&format!("{}: {loss}", out.display()));
         }
     }
     Ok(())

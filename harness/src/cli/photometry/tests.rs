@@ -150,3 +150,13 @@ fn utilization_is_of_the_lamps_flux_and_falls_with_the_cavity_ratio() {
     let (down, up) = (distribution.flux_between(0.0, 90.0).value(), distribution.flux_between(90.0, 180.0).value());
     assert_eq!(f64::from(first_column[0]), (100.0 * (down + 0.8 * up) / 1000.0 / (1.0 - 0.16)).round());
 }
+
+#[test]
+fn a_diagram_of_next_to_nothing_or_of_more_than_all_has_few_rings_and_finite_places() {
+    for candela in [5e-324, 1e-310, 1e308] {
+        let table = LuminousIntensityDistribution::new(vec![0.0], vec![0.0, 90.0], vec![candela, 0.0]).unwrap();
+        let svg = polar::diagram("dark.ies", &Photometry::of(table));
+        let curve = svg.split("class=\"curve\"").nth(1).unwrap().split('>').next().unwrap();
+        assert!(svg.len() < 20_000 && !curve.contains("inf") && !curve.contains("NaN"), "{candela:e}: {svg}");
+    }
+}

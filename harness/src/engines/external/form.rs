@@ -158,16 +158,30 @@ struct ReadingForm {
 
 impl ReadingForm {
     fn uncertainty(&self) -> Uncertainty {
-        let bound = self.error_bound_lx.unwrap_or(0.0);
-        match (self.exact, self.std_error_lx, self.error_bound_lx) {
+        let [error, bound] = [self.std_error_lx, self.error_bound_lx].map(|e| e.map(no_smaller_than_counts));
+        match (self.exact, error, bound) {
             (true, ..) => Uncertainty::Exact,
-            (_, Some(value), _) => {
-                Uncertainty::StandardError { value, degrees_of_freedom: self.degrees_of_freedom, bound }
-            }
+            (_, Some(value), bound) => Uncertainty::StandardError {
+                value,
+                degrees_of_freedom: self.degrees_of_freedom,
+                bound: bound.unwrap_or(0.0),
+            },
             (_, None, Some(bound)) => Uncertainty::Bound(bound),
             (_, None, None) => Uncertainty::Unstated,
         }
     }
+
+    /// What is wrong with its degrees of freedom, if anything is.
+    fn senseless_freedom(&self) -> Option<String> {
+        let freedom = self.degrees_of_freedom.filter(|f| *f < 1.0)?;
+        let meter = &self.meter;
+        Some(format!("gave `degrees_of_freedom: {freedom}` at {meter}: two samples have one, fewer tell no error"))
+    }
+}
+
+/// An error that is smaller is as good as this one, of which weights and fourth powers are numbers still.
+fn no_smaller_than_counts(error_lx: f64) -> f64 {
+    if error_lx > 0.0 { error_lx.max(1e-30) } else { error_lx }
 }
 
 impl ExternalJob {
@@ -271,8 +285,19 @@ fn meter(station: &Station) -> MeterForm {
 pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Result<Measurement, EngineError> {
     let answer: ExternalReadings = serde_json::from_slice(stdout)
         .map_err(|e| EngineError::no_readings(engine.clone(), &String::from_utf8_lossy(stdout), &e))?;
-    if let Some(why) = answer.declined {
-        return Err(EngineError::Declined { engine: engine.clone(), why });
+    let output = |what: &str| EngineError::output(engine.clone(), what);
+    match answer.declined {
+        Some(why) if why.trim().is_empty() => {
+            return Err(output("declined for no reason: `declined` says what it cannot do"));
+        }
+        Some(_) if !answer.readings.is_empty() => {
+            return Err(output("declined and gave readings: give either `declined` or `readings`"));
+        }
+        Some(why) => return Err(EngineError::Declined { engine: engine.clone(), why }),
+        None => {}
+    }
+    if let Some(what) = answer.readings.iter().find_map(ReadingForm::senseless_freedom) {
+        return Err(output(&what));
     }
     same_meters(engine, job, answer.readings.iter().map(|reading| reading.meter.as_str()))?;
     let estimate = |r: &ReadingForm| Estimate { value: r.illuminance_lx, uncertainty: r.uncertainty() };

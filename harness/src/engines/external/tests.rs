@@ -46,6 +46,7 @@ fn rows_that_are_missing_swapped_negative_or_not_a_number_are_no_readings() {
         (None, "3 readings for 4 meters"),
         (Some(("m[2]", "1")), "gave `m[2]` where `m[3]`"),
         (Some(("m[3]", "-1")), "read -1 lx"),
+        (Some(("m[3]", "1e308")), "read 1e308 lx (Unstated) at m[3]: beyond 1e30 lx nothing is light"),
         (Some(("m[3]", "NaN")), "no JSON of readings"),
         (Some(("m[3]", "1e999")), "no JSON of readings"),
         (Some(("m[3]", "null")), "no JSON of readings"),
@@ -53,6 +54,13 @@ fn rows_that_are_missing_swapped_negative_or_not_a_number_are_no_readings() {
         let rows: Vec<_> = three.into_iter().chain(fourth).collect();
         let error = read(&prints(&rows)).unwrap_err();
         assert!(matches!(error, EngineError::Output { .. }) && error.to_string().contains(says), "{says}: {error}");
+    }
+    for (last, says) in [
+        (r#""std_error_lx": 1e300"#, "nothing is light"),
+        (r#""std_error_lx": 1, "degrees_of_freedom": 0.5"#, "`degrees_of_freedom: 0.5` at m[3]: two samples have one"),
+    ] {
+        let error = read(&prints(&[&three[..], &[("m[3]", &format!("1, {last}"))]].concat())).unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
     }
     let error = read("cat > /dev/null; echo Segmentation fault").unwrap_err().to_string();
     assert!(error.contains("Segmentation fault"), "{error}");
@@ -167,4 +175,21 @@ fn the_job_of_a_furnished_room_is_as_reviewed() {
     let value: serde_json::Value = serde_json::from_str(&text).unwrap();
     let lines: Vec<String> = value.as_object().unwrap().iter().map(|(k, v)| format!("{k}: {v}")).collect();
     insta::assert_snapshot!(lines.join("\n"));
+}
+
+#[test]
+fn who_declines_says_why_and_reads_nothing() {
+    let answer = |json: &str| read(&format!("cat > /dev/null; echo '{json}'")).unwrap_err();
+    assert!(matches!(answer(r#"{"declined": "no shadows"}"#), EngineError::Declined { .. }));
+    for (json, says) in [
+        (r#"{"declined": ""}"#, "declined for no reason"),
+        (r#"{"declined": " "}"#, "declined for no reason"),
+        (
+            r#"{"declined": "no", "readings": [{"meter": "m[0]", "illuminance_lx": 1}]}"#,
+            "either `declined` or `readings`",
+        ),
+    ] {
+        let error = answer(json);
+        assert!(matches!(error, EngineError::Output { .. }) && error.to_string().contains(says), "{error}");
+    }
 }

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::{InstallError, step};
 use crate::engines::Site;
-use crate::spec::hexadecimal;
+use crate::system::digest::hexadecimal;
 
 const LOCK: &str = include_str!("../../../engines.lock");
 

@@ -3,7 +3,7 @@
 use sha2::{Digest, Sha256};
 
 use crate::engines::{Engine, EngineError, ExternalJob, Job, Version};
-use crate::spec::hexadecimal;
+use crate::system::digest::hexadecimal;
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {

@@ -1,8 +1,7 @@
 //! The cache: readings under the hash of everything that they depend on, so that nothing is rendered twice.
 //!
 //! An entry is one file whose name is its key. It is written beside its place and renamed into it, so that a reader sees all
-//! of it or nothing whenever the writer is killed, and it carries its key and a checksum, so that what was damaged since is found out and
-//! read anew. Any number of runs may share a cache: whoever comes last replaces an entry by an equally good one.
+//! of it or nothing whenever the writer is killed, and lies in an envelope, so that what was damaged since is found out and read anew. Any number of runs may share a cache: whoever comes last replaces an entry by an equally good one.
 
 mod entry;
 mod key;
@@ -49,7 +48,7 @@ impl Cache {
     /// Looks a key up; an entry that was found counts as used today.
     pub fn find(&self, key: &Key) -> Lookup {
         let path = self.path(key);
-        let text = match std::fs::read_to_string(&path) {
+        let text = match std::fs::read(&path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Lookup::Unknown,
             Err(error) => return Lookup::Damaged(format!("{} cannot be read: {error}", path.display())),

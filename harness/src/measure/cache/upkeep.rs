@@ -104,8 +104,8 @@ fn kind(file: &Path) -> Kind {
         return Kind::Unfinished;
     }
     let key = name.trim_end_matches(".json");
-    let checked = std::fs::read_to_string(file).map_err(|e| format!("cannot be read: {e}"));
-    match checked.and_then(|text| entry::parse(&text, key)) {
+    let checked = std::fs::read(file).map_err(|e| format!("cannot be read: {e}"));
+    match checked.and_then(|text| entry::parse(&text, key).map_err(|why| why.to_string())) {
         Ok(_) => Kind::Entry,
         Err(why) => Kind::Damaged(why),
     }

@@ -62,6 +62,7 @@ pub enum State {
     Changed,
     /// The new side lacks it, or lacks meters of it.
     Vanished,
+    /// There is nothing to hold it against, or nothing for some of its meters.
     New,
     /// The two are not about the same thing.
     Refused,
@@ -131,7 +132,7 @@ fn decide(entry: &mut EntryChange, level: f64, level_of_means: f64) {
         // A probability that is no number never counts as agreement.
         meter.significant = meter.p_value < level || meter.p_value.is_nan();
     }
-    if entry.state == State::Unchanged {
+    if matches!(entry.state, State::Unchanged | State::New) {
         if entry.mean.is_some_and(|m| m.p_value < level_of_means || m.p_value.is_nan()) {
             entry.state = State::Shifted;
         } else if entry.meters.iter().any(|m| m.significant) {
@@ -169,6 +170,13 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
             change.state = State::Vanished;
             change.notes.push(format!("{} is not read any more", before.meter));
         }
+    }
+    let is_held = |now: &&Reading| a.readings.iter().any(|r| r.meter == now.meter && r.quantity == now.quantity);
+    for now in b.readings.iter().filter(|now| !is_held(now)) {
+        if change.state == State::Unchanged {
+            change.state = State::New;
+        }
+        change.notes.push(format!("there is nothing to hold {} against", now.meter));
     }
     change.mean = mean(&change.meters);
     change

@@ -1,28 +1,31 @@
 //! Baselines: readings that somebody accepted for a reason, kept in a file that reads well in a review of changes.
 //!
 //! A baseline holds for one spec, engine, version, luminaire model, light and method; anything else is refused, never
-//! silently reused. Reading tests after Mitsuba 3's `test_renders.py`: a missing reference fails and leaves a candidate.
+//! silently reused. It lies in an envelope: what was edited by hand is nothing that anybody accepted. Reading tests after Mitsuba 3's `test_renders.py`: a missing reference fails and leaves a candidate.
 
 mod changes;
 mod review;
 
+use std::collections::{BTreeSet, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use itertools::Itertools;
 use serde::{Deserialize, Serialize};
 
-use crate::record::{Light, Method, Reading, ReadingKey, Recording};
-use crate::report::Report;
+use crate::record::{Light, MeterId, Method, Reading, ReadingKey, Recording};
+use crate::report::{Report, SpecRecord};
+use crate::system::envelope::{self, Refusal, Schema};
 use crate::system::files::{self, FileError};
 
 pub use changes::{Changes, Comparability, EntryChange, MeanShift, MeterChange, State, compare};
 pub use review::{Decision, review};
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+const SCHEMA: Schema = Schema { of: "baseline", version: 2 };
+
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Baseline {
-    pub luxproof_baseline: u32,
     /// Sorted by key.
     pub entries: Vec<Entry>,
 }
@@ -37,14 +40,7 @@ pub struct Entry {
     /// SHA-256 of the spec and of every file that it names.
     pub input_sha256: String,
     /// What the engine did: another run of the same instrument does the same.
-    #[serde(default)]
     pub method: Method,
-    /// Method and effort in one, of files that are older than the difference.
-    #[serde(default, skip_serializing)]
-    settings: Method,
-    /// Of all standard errors, where the file is older than the readings' own.
-    #[serde(default, skip_serializing)]
-    degrees_of_freedom: Option<f64>,
     /// When it was accepted (RFC 3339, UTC); empty in a candidate.
     pub accepted: String,
     /// Why it was accepted; empty in a candidate, which is refused as a baseline.
@@ -56,15 +52,20 @@ pub struct Entry {
 pub enum BaselineError {
     #[error(transparent)]
     File(#[from] FileError),
-    #[error("{path}: {source}; a baseline is written by `luxproof accept`")]
-    Format { path: String, source: serde_json::Error },
-    #[error("{path}: format {found} of a baseline; this luxproof reads format 1")]
-    Version { path: String, found: u32 },
-    #[error("{path}: {key}: a negative or infinite reading is no baseline")]
+    #[error("{path} {why}; {ANEW}")]
+    Refused { path: String, why: Refusal },
+    #[error("{path}: {key}: a negative or infinite reading, or none at all, is no baseline; {ANEW}")]
     Unsound { path: String, key: ReadingKey },
+    #[error("{path}: {key}{} stands there twice; {ANEW}", meter.as_ref().map(|m| format!(" at {m}")).unwrap_or_default())]
+    Twice { path: String, key: ReadingKey, meter: Option<MeterId> },
     #[error("{path}: {key} was accepted for no reason; review it with `luxproof accept`")]
     NotAccepted { path: String, key: ReadingKey },
+    #[error("{path} is about {found}, and this run about {wanted}; name the baseline of this spec")]
+    Elsewhere { path: String, found: String, wanted: String },
 }
+
+/// What to do about a file that is none.
+const ANEW: &str = "restore it, or review a run anew with `luxproof accept`, which replaces it";
 
 impl Entry {
     fn of(report: &Report, recording: &Recording) -> Self {
@@ -76,8 +77,6 @@ impl Entry {
             light: recording.light,
             input_sha256: recording.input_sha256.clone(),
             method: recording.method.clone(),
-            settings: Method::default(),
-            degrees_of_freedom: None,
             accepted: String::new(),
             reason: String::new(),
             readings: mine.map(|r| r.reading.clone()).collect(),
@@ -86,16 +85,12 @@ impl Entry {
 
     /// What it says of a setting that makes readings comparable.
     fn said(&self, key: &str) -> Option<&str> {
-        self.method.get(key).or_else(|| self.settings.get(key)).map(String::as_str)
-    }
-
-    fn has_sound_values(&self) -> bool {
-        self.readings.iter().all(|r| r.value.is_finite() && r.value >= 0.0)
+        self.method.get(key).map(String::as_str)
     }
 
     /// Whether it may become a baseline: there are readings, and all of them are measurements.
     pub fn is_sound(&self) -> bool {
-        !self.readings.is_empty() && self.has_sound_values()
+        !self.readings.is_empty() && self.readings.iter().all(|r| r.value.is_finite() && r.value >= 0.0)
     }
 }
 
@@ -104,30 +99,57 @@ impl Baseline {
         // Scenes of known answer need nobody's acceptance.
         let asked = report.recordings.iter().filter(|r| !r.key.procedure.is_known());
         let entries = asked.map(|r| Entry::of(report, r)).sorted_by(|a, b| a.key.cmp(&b.key)).collect();
-        Self { luxproof_baseline: 1, entries }
+        Self { entries }
     }
 
     pub fn read(path: &Path) -> Result<Self, BaselineError> {
         let name = || path.display().to_string();
-        let text = fs::read_to_string(path).map_err(|source| FileError { path: name(), source })?;
-        let mut baseline: Self =
-            serde_json::from_str(&text).map_err(|source| BaselineError::Format { path: name(), source })?;
-        if baseline.luxproof_baseline != 1 {
-            return Err(BaselineError::Version { path: name(), found: baseline.luxproof_baseline });
-        }
-        for entry in &mut baseline.entries {
-            for reading in &mut entry.readings {
-                reading.uncertainty.grant(entry.degrees_of_freedom);
-            }
-            let key = entry.key.clone();
-            if entry.reason.trim().is_empty() {
-                return Err(BaselineError::NotAccepted { path: name(), key });
-            }
-            if !entry.has_sound_values() {
-                return Err(BaselineError::Unsound { path: name(), key });
-            }
-        }
+        let text = fs::read(path).map_err(|source| FileError { path: name(), source })?;
+        let opened = envelope::open(SCHEMA, &text).and_then(|sealed| sealed.about_what(Self::subject));
+        let baseline: Self = opened.map_err(|why| BaselineError::Refused { path: name(), why })?;
+        baseline.check(&name())?;
         Ok(baseline)
+    }
+
+    fn check(&self, path: &str) -> Result<(), BaselineError> {
+        let mut keys = HashSet::new();
+        for entry in &self.entries {
+            let (path, key) = (path.to_owned(), entry.key.clone());
+            if entry.reason.trim().is_empty() {
+                return Err(BaselineError::NotAccepted { path, key });
+            }
+            if !entry.is_sound() {
+                return Err(BaselineError::Unsound { path, key });
+            }
+            if !keys.insert(&entry.key) {
+                return Err(BaselineError::Twice { path, key, meter: None });
+            }
+            let mut read = HashSet::new();
+            if let Some(again) = entry.readings.iter().find(|r| !read.insert((&r.meter, r.quantity))) {
+                return Err(BaselineError::Twice { path, key, meter: Some(again.meter.clone()) });
+            }
+        }
+        Ok(())
+    }
+
+    /// The baseline of a run of these cases: one about none of their specs is another's.
+    pub fn of_run<'a>(path: &Path, cases: impl IntoIterator<Item = &'a str>) -> Result<Self, BaselineError> {
+        let baseline = Self::read(path)?;
+        let wanted: BTreeSet<&str> = cases.into_iter().map(spec).collect();
+        if baseline.entries.is_empty() || baseline.specs().any(|spec| wanted.contains(spec)) {
+            return Ok(baseline);
+        }
+        let (found, wanted) = (baseline.subject(), wanted.into_iter().join(", "));
+        Err(BaselineError::Elsewhere { path: path.display().to_string(), found, wanted })
+    }
+
+    fn specs(&self) -> impl Iterator<Item = &str> {
+        self.entries.iter().map(|entry| spec(&entry.key.case)).sorted_unstable().dedup()
+    }
+
+    /// What it is about: its specs.
+    fn subject(&self) -> String {
+        self.specs().join(", ")
     }
 
     pub fn write(&self, path: &Path) -> Result<(), BaselineError> {
@@ -149,8 +171,8 @@ impl Baseline {
             lines.push(format!("      \"readings\": [\n{}\n      ]", readings.join(",\n")));
             entries.push(format!("    {{\n{}\n    }}", lines.join(",\n")));
         }
-        let (version, entries) = (self.luxproof_baseline, entries.join(",\n"));
-        Ok(format!("{{\n  \"luxproof_baseline\": {version},\n  \"entries\": [\n{entries}\n  ]\n}}\n"))
+        let body = format!("{{\n  \"entries\": [\n{}\n  ]\n}}", entries.join(",\n"));
+        Ok(envelope::seal_text(SCHEMA, &self.subject(), body)? + "\n")
     }
 
     pub fn accept(&mut self, accepted: Vec<Entry>) {
@@ -161,15 +183,20 @@ impl Baseline {
         self.entries.sort_by(|a, b| a.key.cmp(&b.key));
     }
 
-    /// The file that a path names: itself, or in a folder the one of this run's spec.
-    pub fn place(path: &Path, report: &Report) -> PathBuf {
+    /// The file that a path names: itself, or in a folder the one of what was run.
+    pub fn place(path: &Path, run: &SpecRecord) -> PathBuf {
         if path.extension().is_some_and(|e| e == "json") && !path.is_dir() {
             return path.to_owned();
         }
-        let spec = report.spec.path.split_whitespace().next().map(Path::new);
+        let spec = run.path.split_whitespace().next().map(Path::new);
         let stem = spec.and_then(Path::file_stem).and_then(|s| s.to_str()).unwrap_or("suite");
         path.join(format!("{stem}.json"))
     }
+}
+
+/// The spec that a case is of.
+fn spec(case: &str) -> &str {
+    case.split('/').next().unwrap_or(case)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use serde_json::json;
 use super::*;
 use crate::record::{Estimate, MeterId, Method, ProcedureId, Quantity, Uncertainty};
 use crate::report::Summary;
+use crate::system::envelope::tests::planted;
 use crate::system::random::normal;
 
 fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
@@ -21,8 +22,6 @@ fn entry(values: &[f64], std_error: Option<f64>) -> Entry {
         light: "indirect, 7 bounces".to_owned().try_into().unwrap(),
         input_sha256: "ab".repeat(32),
         method: [("preset", "audit")].into(),
-        settings: Method::default(),
-        degrees_of_freedom: None,
         accepted: "2026-01-01T00:00:00Z".into(),
         reason: "first look".into(),
         readings: values.iter().enumerate().map(reading).collect(),
@@ -147,11 +146,6 @@ fn more_looks_at_the_same_instrument_are_no_other_instrument() {
     let twice = run(json!({"seed": "2", "look2_command": "again", "blocks": "32"}), [2]);
     let change = &compare(&once, &twice, Comparability::SameInstrument).entries[0];
     assert!(change.state == State::Unchanged && change.meters.len() == 1, "{change:?}");
-    // A file of before effort was told apart holds both as settings: what the method says of itself counts.
-    let old = |method: Method| Entry { settings: method, method: Method::default(), ..entry(&[100.0], Some(1.0)) };
-    let now = entry(&[100.0], Some(1.0));
-    assert_eq!(state(&old([("preset", "audit"), ("look2_command", "again")].into()), &now), State::Unchanged);
-    assert_eq!(state(&old([("preset", "fast")].into()), &now), State::Refused);
 }
 
 #[test]
@@ -170,12 +164,10 @@ fn one_meter_that_moved_is_named_and_the_mean_is_not_blamed() {
 fn few_blocks_are_granted_the_wide_tails_of_student() {
     let (a, b) = (entry(&[100.0, 100.0], Some(1.0)), entry(&[107.0, 100.0], Some(1.0)));
     assert_eq!(state(&a, &b), State::Changed, "4.9 u of a normal distribution");
-    // A file may grant them once for all of its readings.
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("old.json");
-    let text = Baseline { luxproof_baseline: 1, entries: vec![a, b] }.text().unwrap();
-    fs::write(&path, text.replace("\"reason\"", "\"degrees_of_freedom\": 2.0, \"reason\"")).unwrap();
-    let few = Baseline::read(&path).unwrap().entries;
+    let few = [a, b].map(|mut entry| {
+        entry.readings[0].uncertainty = Uncertainty::sampled(1.0, Some(2.0));
+        entry
+    });
     assert_eq!(state(&few[0], &few[1]), State::Unchanged, "4.9 u with four degrees of freedom");
 }
 
@@ -227,22 +219,77 @@ fn what_vanished_fails_and_what_is_new_is_said() {
 fn a_file_comes_back_as_it_was_with_one_reading_a_line() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("kept/room.json");
-    let baseline = Baseline { luxproof_baseline: 1, entries: vec![entry(&[0.1, 1.0 / 3.0, 1e-300], Some(0.1))] };
+    let baseline = Baseline { entries: vec![entry(&[0.1, 1.0 / 3.0, 1e-300], Some(0.1))] };
     baseline.write(&path).unwrap();
     assert_eq!(Baseline::read(&path).unwrap(), baseline);
     let text = fs::read_to_string(&path).unwrap();
     assert_eq!(text.lines().filter(|l| l.contains("\"meter\"")).count(), 3, "{text}");
 }
 
-#[test]
-fn a_candidate_and_a_reading_below_zero_are_refused_as_baselines() {
+/// What is wrong with a file of these entries.
+fn refused(entries: Vec<Entry>) -> BaselineError {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("room.json");
-    let write = |e: Entry| Baseline { luxproof_baseline: 1, entries: vec![e] }.write(&path).unwrap();
-    write(Entry { reason: " ".into(), ..entry(&[1.0], None) });
-    assert!(matches!(Baseline::read(&path), Err(BaselineError::NotAccepted { .. })));
-    write(entry(&[-1.0], None));
-    assert!(matches!(Baseline::read(&path), Err(BaselineError::Unsound { .. })));
+    Baseline { entries }.write(&path).unwrap();
+    Baseline::read(&path).unwrap_err()
+}
+
+#[test]
+fn a_candidate_and_what_is_no_single_sound_reading_are_refused_as_baselines() {
+    let sound = entry(&[1.0, 2.0], Some(0.1));
+    let not_accepted = refused(vec![Entry { reason: " ".into(), ..sound.clone() }]);
+    assert!(matches!(not_accepted, BaselineError::NotAccepted { .. }), "{not_accepted}");
+    for bad in [entry(&[-1.0], None), entry(&[], None)] {
+        assert!(matches!(refused(vec![bad]), BaselineError::Unsound { .. }));
+    }
+    let mut twice = sound.clone();
+    twice.readings.push(sound.readings[0].clone());
+    assert!(refused(vec![twice]).to_string().contains(" at plane[0] stands there twice"));
+    assert!(matches!(refused(vec![sound.clone(), sound.clone()]), BaselineError::Twice { meter: None, .. }));
+    for freedom in [0.0, -1.0] {
+        let mut senseless = sound.clone();
+        senseless.readings[1].uncertainty = Uncertainty::sampled(0.1, Some(freedom));
+        assert!(refused(vec![senseless]).to_string().contains("positive degrees of freedom"), "{freedom}");
+    }
+}
+
+#[test]
+fn meters_that_nobody_accepted_are_no_baseline_for_any() {
+    let (few, all) = (entry(&[100.0], Some(1.0)), entry(&[100.0, 50.0, 20.0], Some(1.0)));
+    let change = &compared(&[&few], &[&all], Comparability::SameInstrument).entries[0];
+    assert_eq!((change.state, change.notes.len()), (State::New, 2), "{change:?}");
+    assert!(change.notes[0].contains("plane[1]"), "{change:?}");
+    // What moved is told before what is missing.
+    assert_eq!(state(&few, &entry(&[200.0, 50.0], Some(1.0))), State::Changed);
+}
+
+#[test]
+fn absurd_numbers_are_changes_and_no_panic() {
+    for (old, new, error) in [(1e-300, 1e308, 1e-200), (1e308, 1e-300, 1e300), (5e-324, 1.0, 5e-324)] {
+        let sides = [old, new].map(|value| entry(&[value, value], Some(error)));
+        assert_ne!(state(&sides[0], &sides[1]), State::Unchanged, "{old} {new} {error}");
+    }
+}
+
+#[test]
+fn an_edited_torn_moved_or_older_file_is_no_baseline_and_the_error_says_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.json");
+    Baseline { entries: vec![entry(&[0.5], None)] }.write(&path).unwrap();
+    let sound = fs::read(&path).unwrap();
+    for bytes in planted(sound.trim_ascii_end()) {
+        fs::write(&path, &bytes).unwrap();
+        // White space between the parts may be another.
+        let read = Baseline::read(&path).map(|b| b.entries);
+        assert!(read.is_err() || read.unwrap() == [entry(&[0.5], None)], "{}", String::from_utf8_lossy(&bytes));
+    }
+    fs::write(&path, r#"{"luxproof_baseline": 1, "entries": []}"#).unwrap();
+    let error = Baseline::read(&path).unwrap_err().to_string();
+    assert!(error.contains("room.json is cut short") && error.contains("luxproof accept"), "{error}");
+    fs::write(&path, &sound).unwrap();
+    assert!(Baseline::of_run(&path, ["hall", "room/dark"]).is_ok());
+    let error = Baseline::of_run(&path, ["office/dark", "office/light"]).unwrap_err().to_string();
+    assert!(error.contains("is about room, and this run about office"), "{error}");
 }
 
 fn reviewed(old: &[Entry], new: &[Entry], says: &str) -> (Decision, String) {

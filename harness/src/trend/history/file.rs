@@ -32,11 +32,11 @@ pub fn add(path: &Path, lines: &[Line<'_>]) -> Result<Added, HistoryError> {
     };
     let mut new = vec![];
     for line in lines {
-        serde_json::to_writer(&mut new, line).map_err(|e| fail(e.into()))?;
+        new.extend(line.text().map_err(|e| fail(e.into()))?.into_bytes());
         new.push(b'\n');
     }
     let (whole, cut_short) = whole_lines(&old);
-    let heads: BTreeSet<String> = lines.iter().map(Line::head).collect();
+    let heads: BTreeSet<String> = lines.iter().flat_map(Line::heads).collect();
     let stays = |line: &&[u8]| !heads.iter().any(|h| line.starts_with(h.as_bytes()));
     let before = || whole.split_inclusive(|b| *b == b'\n');
     let replaced = before().filter(|line| !stays(line)).count();
@@ -98,5 +98,25 @@ mod tests {
         let text = fs::read_to_string(&path).unwrap();
         assert_eq!(text.lines().count(), 2);
         assert!(text.starts_with(&whole));
+    }
+
+    #[test]
+    fn a_line_that_was_edited_or_put_under_another_night_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("history.jsonl");
+        add_one(&path, "2026-01-01", "one", 2.0);
+        add_one(&path, "2026-01-02", "one", 2.0);
+        let sound = fs::read_to_string(&path).unwrap();
+        for (from, to, says) in [
+            ("\"deviation\":[2.0]", "\"deviation\":[1.0]", "was edited"),
+            ("\"key\":\"2026-01-02", "\"key\":\"2026-01-03", "is about `2026-01-03 one` where `2026-01-02 one`"),
+            ("history line 3", "history line 4", "is a `luxproof history line 4`"),
+        ] {
+            let at = sound.rfind(from).unwrap();
+            fs::write(&path, format!("{}{to}{}", &sound[..at], &sound[at + from.len()..])).unwrap();
+            let error = History::read(&path).unwrap_err().to_string();
+            assert!(error.contains("history.jsonl:2: the line") && error.contains(says), "{error}");
+            assert!(error.contains("take the line out or restore the file"), "{error}");
+        }
     }
 }

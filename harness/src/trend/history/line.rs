@@ -1,23 +1,27 @@
 //! One line of the history: what an engine said in one procedure of one case on one night, the numbers of its meters as lists.
 //!
 //! A line stands by itself, so that lines can be taken out, reordered, or merged from two histories. All that it says in words
-//! holds for all of its meters; comparisons with another verdict or reference have a line of their own. A line of format 1,
-//! written until November 2026, is one of a single meter with numbers in place of lists.
+//! holds for all of its meters; comparisons with another verdict or reference have a line of their own. A line lies in an envelope,
+//! so that one that was edited is found out. Lines of formats 1 and 2, written until November 2026, have none; one of format 1 is
+//! of a single meter with numbers in place of lists.
 
 use std::borrow::Cow;
 use std::fmt;
 
-use serde::de::{Error as _, SeqAccess, Visitor};
+use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::judge::{Basis, Comparison, Verdict};
 use crate::record::{MeterId, ProcedureId, Quantity, ReadingKey};
 use crate::report::Report;
 use crate::report::words::rounded;
+use crate::system::envelope::{self, Schema};
 use crate::system::files::FileError;
 
-/// The format that is written; all up to it are read.
-const FORMAT: u32 = 2;
+const SCHEMA: Schema = Schema { of: "history line", version: 3 };
+
+/// The last format of lines without an envelope.
+const LAST_BARE: u32 = 2;
 
 /// What an engine said in one procedure of one case on one night. Lists hold NaN, null in the file, where there is no number.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -26,7 +30,8 @@ pub struct Line<'a> {
     pub(super) night: Cow<'a, str>,
     #[serde(borrow)]
     case: Cow<'a, str>,
-    #[serde(default = "first_format", deserialize_with = "known_format")]
+    /// Of a line without an envelope.
+    #[serde(default = "last_bare", skip_serializing)]
     format: u32,
     pub procedure: ProcedureId,
     #[serde(borrow)]
@@ -95,7 +100,7 @@ impl<'a> Line<'a> {
         Self {
             night: night.into(),
             case: key.case.as_str().into(),
-            format: FORMAT,
+            format: LAST_BARE,
             procedure: key.procedure,
             engine: key.engine.as_str().into(),
             version: "".into(),
@@ -130,8 +135,21 @@ impl<'a> Line<'a> {
         self.u.push(numbers.u);
     }
 
+    /// As it stands in a history, without its end.
+    pub fn text(&self) -> serde_json::Result<String> {
+        envelope::seal(SCHEMA, &self.about(), self)
+    }
+
     pub(super) fn parse(text: &'a [u8]) -> Result<Self, String> {
-        let mut line: Self = serde_json::from_slice(text).map_err(|e| e.to_string())?;
+        let mut line: Self = if text.starts_with(br#"{"night":"#) {
+            serde_json::from_slice(text).map_err(|e| e.to_string())?
+        } else {
+            let opened = envelope::open(SCHEMA, text).and_then(|sealed| sealed.about_what(Self::about));
+            opened.map_err(|why| format!("the line {why}"))?
+        };
+        if !(1..=LAST_BARE).contains(&line.format) {
+            return Err(format!("format {}; this luxproof reads formats 1 to {LAST_BARE}", line.format));
+        }
         line.meters.extend(line.meter.take().map(Meters::One));
         let count = line.meters.iter().try_fold(0_usize, |count, meters| count.checked_add(meters.count()?));
         let lists = [&line.reference, &line.std_error, &line.u];
@@ -142,10 +160,15 @@ impl<'a> Line<'a> {
         Ok(line)
     }
 
-    /// How every line of this night and case begins, of whatever format.
-    pub(super) fn head(&self) -> String {
+    fn about(&self) -> String {
+        format!("{} {}", self.night, self.case)
+    }
+
+    /// How every line of this night and case begins, in an envelope or without.
+    pub(super) fn heads(&self) -> [String; 2] {
         let text = |t: &str| serde_json::Value::from(t).to_string();
-        format!("{{\"night\":{},\"case\":{},", text(&self.night), text(&self.case))
+        let bare = format!("{{\"night\":{},\"case\":{},", text(&self.night), text(&self.case));
+        [envelope::head(SCHEMA, &self.about()), bare]
     }
 
     pub(super) fn subject(&self) -> Subject<'_> {
@@ -233,14 +256,8 @@ fn is_date(text: &str) -> bool {
     shape && humantime::parse_rfc3339_weak(&format!("{text} 00:00:00")).is_ok()
 }
 
-const fn first_format() -> u32 {
-    1
-}
-
-fn known_format<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
-    let format = u32::deserialize(from)?;
-    let later = || D::Error::custom(format!("format {format}; this luxproof reads formats 1 to {FORMAT}"));
-    if (1..=FORMAT).contains(&format) { Ok(format) } else { Err(later()) }
+const fn last_bare() -> u32 {
+    LAST_BARE
 }
 
 fn is_void(numbers: &[f64]) -> bool {
@@ -290,6 +307,7 @@ impl<'de> Visitor<'de> for List {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::system::envelope::tests::planted;
 
     const FORMAT_1: &str = r#"{"night":"2026-01-02","case":"a\"b","procedure":"direct_illuminance","engine":"e","version":"1","model":"point","meter":"m[0-3]","quantity":"illuminance_lx","basis":"exact","source":"","value":1.5,"std_error":null,"reference":1,"deviation":0.5,"u":1e-3,"verdict":"pass"}"#;
 
@@ -307,12 +325,16 @@ mod tests {
             let value = if k == 2 { f64::NAN } else { k as f64 / 3.0 };
             line.push(id, Numbers { reference: 1.0, deviation: value, std_error: f64::NAN, u: 1e-7 });
         }
-        let text = serde_json::to_string(&line).unwrap();
-        assert!(text.starts_with(&line.head()), "{text}");
+        let text = line.text().unwrap();
+        assert!(text.starts_with(&line.heads()[0]), "{text}");
+        assert!(serde_json::to_string(&line).unwrap().starts_with(&line.heads()[1]));
         let meters = r#""meters":[["m",0,1],["m",3,3],["n",4,4],"n[04]","odd[5-6]","n[]",["n",7,8]]"#;
         assert!(text.contains(meters) && !text.contains("std_error"), "{text}");
         let read = Line::parse(text.as_bytes()).unwrap();
-        assert_eq!(serde_json::to_string(&read).unwrap(), text);
+        assert_eq!(read.text().unwrap(), text);
+        for bytes in planted(text.as_bytes()) {
+            assert!(Line::parse(&bytes).is_err(), "{}", String::from_utf8_lossy(&bytes));
+        }
         assert_eq!(read.meters.iter().flat_map(Meters::ids).collect::<Vec<_>>(), ids);
         assert!(read.numbers(2).deviation.is_nan() && read.numbers(1).std_error.is_nan());
         assert_eq!((read.numbers(1).deviation, read.numbers(8).u), (1.0 / 3.0, 1e-7));

@@ -79,7 +79,7 @@ impl Synthetic {
         let mut text = String::new();
         for (night, date) in history.nights.iter().enumerate() {
             for series in history.series.chunks(self.meters) {
-                text += &(serde_json::to_string(&self.line(series, night, date)).unwrap() + "\n");
+                text += &(self.line(series, night, date).text().unwrap() + "\n");
             }
         }
         text
