@@ -113,14 +113,12 @@ impl PolicyChoice {
     pub fn read(&self, file: Option<&Path>) -> Result<Policy, SpecError> {
         let Some(file) = file else {
             let help = format!("write a {POLICY_FILE} beside the spec, or name one with --policy");
-            return match &self.profile {
-                Some(name) => Err(SpecError::of("--profile", format!("no policy has a profile `{name}`"), help)),
-                None => {
-                    let policy = Policy::built_in()?;
-                    let class = self.tolerance_class.unwrap_or_default();
-                    Ok(Policy { tolerances: policy.tolerances.of_class(class), ..policy })
-                }
-            };
+            if let Some(name) = &self.profile {
+                return Err(SpecError::of("--profile", format!("no policy has a profile `{name}`"), help));
+            }
+            let policy = Policy::built_in()?;
+            let class = self.tolerance_class.unwrap_or_default();
+            return Ok(Policy { tolerances: policy.tolerances.of_class(class), ..policy });
         };
         let source = Source::read(file)?;
         let project: ProjectPolicy = source.parse()?;
