@@ -1,10 +1,8 @@
 //! What the tests of the whole program share: folders to run luxproof in, its answers, a room, lamps and an adapter.
 
-use std::cell::Cell;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -19,45 +17,22 @@ pub(crate) const ENGINES: [&str; 5] = ["simulator", "iesna", "mitsuba", "povray"
 pub(crate) const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
 pub(crate) const S1_INDIRECT_LX: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
 
-/// Renderers keep their budgets by the clock, so that what runs beside them costs them samples.
-static MACHINE: RwLock<()> = RwLock::new(());
-
-thread_local! {
-    static HAS_FOLDER: Cell<bool> = const { Cell::new(false) };
-}
-
-/// A temporary folder that luxproof is run in, with a cache of its own. A test has one at a time: it is also its share of the machine.
+/// A temporary folder that luxproof is run in, with a cache of its own.
 pub(crate) struct Folder {
     kept: tempfile::TempDir,
     engines: Option<PathBuf>,
-    _part: Option<RwLockReadGuard<'static, ()>>,
-    _whole: Option<RwLockWriteGuard<'static, ()>>,
 }
 
 impl Folder {
-    /// For our own solvers and adapters: no renderer is installed, other tests run at the same time.
+    /// For our own solvers and adapters: no renderer is installed.
     pub(crate) fn new(files: &[(&str, &str)]) -> Self {
-        assert!(!HAS_FOLDER.get(), "a second folder would wait for the first");
-        let part = MACHINE.read().unwrap_or_else(PoisonError::into_inner);
-        Self::with(files, Some(part), None)
+        let folder = Self::for_renderers(files);
+        Self { engines: Some(folder.path("engines")), ..folder }
     }
 
-    /// For the renderers that the user has installed; nothing else runs meanwhile.
+    /// For the renderers that the user has installed.
     pub(crate) fn for_renderers(files: &[(&str, &str)]) -> Self {
-        assert!(!HAS_FOLDER.get(), "a second folder would wait for the first");
-        let whole = MACHINE.write().unwrap_or_else(PoisonError::into_inner);
-        Self::with(files, None, Some(whole))
-    }
-
-    fn with(
-        files: &[(&str, &str)],
-        part: Option<RwLockReadGuard<'static, ()>>,
-        whole: Option<RwLockWriteGuard<'static, ()>>,
-    ) -> Self {
-        HAS_FOLDER.set(true);
-        let kept = tempfile::tempdir().unwrap();
-        let engines = part.is_some().then(|| kept.path().join("engines"));
-        let folder = Self { kept, engines, _part: part, _whole: whole };
+        let folder = Self { kept: tempfile::tempdir().unwrap(), engines: None };
         for (name, text) in files {
             folder.write(name, text);
         }
@@ -124,12 +99,6 @@ impl Folder {
     /// Audits `spec.yaml` into `out`; `calibration.rs` looks at scenes of known answer.
     pub(crate) fn run(&self, more: &[&str]) -> Answer {
         self.luxproof(&[&["run", "spec.yaml", "--out", "out", "--no-calibration"][..], more].concat())
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        HAS_FOLDER.set(false);
     }
 }
 
