@@ -23,7 +23,8 @@ budget: {relative_error: 0.01, seconds: 10}
 
 /// The report of a run without the times that it has of its own.
 fn said(folder: &Folder, more: &[&str]) -> Value {
-    let fixed = ["run", "spec.yaml", "--no-cache", "--no-calibration", "--engines", "radiance,mitsuba,povray,simulator"];
+    let fixed =
+        ["run", "spec.yaml", "--no-cache", "--no-calibration", "--engines", "radiance,mitsuba,povray,simulator"];
     folder.luxproof(&[&fixed[..], &["--out", "out", "--seed", "1"], more].concat()).exits(0);
     let mut report = folder.report();
     timeless(&mut report);
@@ -46,7 +47,11 @@ fn under_load<T>(run: impl FnOnce() -> T) -> T {
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
         for _ in 0..2 * std::thread::available_parallelism().unwrap().get() {
-            scope.spawn(|| while !done.load(Ordering::Relaxed) {});
+            scope.spawn(|| {
+                while !done.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            });
         }
         let result = run();
         done.store(true, Ordering::Relaxed);
@@ -59,7 +64,11 @@ fn one_seed_says_the_same_to_the_byte_on_a_busy_machine_and_with_other_numbers_o
     let folder = Folder::for_renderers(&[("spec.yaml", SPEC), ("lamp.ies", SKEW_LAMP)]);
     let idle = said(&folder, &[]);
     for engine in ["radiance", "mitsuba", "povray"] {
-        let sampled = idle["recordings"].as_array().unwrap().iter().any(|r| r["engine"] == engine && r["work_s"].as_f64() > Some(0.0));
+        let sampled = idle["recordings"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|r| r["engine"] == engine && r["work_s"].as_f64() > Some(0.0));
         assert!(sampled, "{engine} sampled nothing: {idle}");
     }
     let busy = under_load(|| said(&folder, &[]));

@@ -94,8 +94,7 @@ impl Search<'_> {
         let failing = |k: &usize| self.sheets[*k].fails;
         let mut open: Vec<usize> = (0..self.sheets.len()).filter(failing).collect();
         let mut causes = vec![vec![]; self.sheets.len()];
-        let is_dark = |k: &usize| self.sheets[*k].read.iter().all(|r| *r == 0.0);
-        if open.iter().all(is_dark) {
+        if self.sheets.iter().all(|sheet| sheet.read.iter().all(|r| *r == 0.0)) {
             let dark = (0..self.bench.listed.len()).filter(|f| self.bench.listed[*f].id == "dark");
             Self::settle(&dark.filter_map(|f| self.of_listed(f)).collect::<Vec<_>>(), &mut open, &mut causes);
             return causes;
@@ -417,7 +416,9 @@ impl Search<'_> {
             }
         }
         let all: usize = explained.iter().map(|k| self.sheets[*k].count()).sum();
-        if telling < 2 + count_of_parameters || !is_chance(left, all - count_of_parameters) {
+        // Of a fault on the list one reading less need tell, where others tell that they are as they should be.
+        let needed = if fault.id == "clamp" { 2 } else { 2 + count_of_parameters };
+        if telling < needed || all < 2 + count_of_parameters || !is_chance(left, all - count_of_parameters) {
             return None;
         }
         let told: usize = self.sheets.iter().map(Sheet::count).sum();

@@ -9,7 +9,7 @@ const SLACK: f64 = 5e-4;
 /// The same where predictions rest on thinned tables.
 const THINNED: f64 = 2e-3;
 /// The same of rough predictions, and as a share of the change that they predict.
-const ROUGH: (f64, f64) = (5e-3, 0.1);
+const ROUGH: (f64, f64) = (1e-2, 0.25);
 /// Likewise, as a share of the largest reading.
 const FLOOR: f64 = 1e-6;
 /// Standard deviations that count as a reading's own scatter.

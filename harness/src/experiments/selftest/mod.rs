@@ -187,10 +187,14 @@ impl Subjects {
         let mut score = Score { id: fault.id.to_owned(), what, case: self.case.clone(), ..Score::default() };
         score.size = pairs().map(|(model, wrong)| size(model, wrong)).fold(0.0, f64::max);
         let (mut failed, mut named) = (vec![0; self.models().len()], 0);
+        // Where nothing but zero is read, nobody can say more than that.
+        let dark = self.bench.listed.iter().find(|f| f.id == "dark");
         for _ in 0..runs {
             let sheets = self.read(judge, Some(&wrong), random);
             sheets.iter().filter(|sheet| sheet.fails).for_each(|sheet| failed[sheet.model] += 1);
-            named += usize::from(sheets.iter().any(|s| s.fails) && names(fault, &self.bench.causes(&sheets)));
+            let is_dark = sheets.iter().flat_map(|sheet| &sheet.read).all(|read| *read == 0.0);
+            let meant = if is_dark { dark.unwrap_or(fault) } else { fault };
+            named += usize::from(sheets.iter().any(|s| s.fails) && names(meant, &self.bench.causes(&sheets)));
         }
         let mostly = |count: usize| count as f64 >= MOSTLY * runs as f64;
         score.named_in = named as f64 / runs as f64;
