@@ -8,7 +8,7 @@ use crate::support::{Folder, MINE, SKEW_LAMP, SKEW_ROOM, adapter, among};
 fn run(factor: &str, stated: &str, seed: u64) -> Value {
     let noisy = adapter()
         .replace("\"error_bound_lx\": 1e-12 * lux", stated)
-        .replace("import ", "import random\nimport ")
+        .replacen("\nimport ", "\nimport random\nimport ", 1)
         .replace("        readings.append", &format!("        {factor}\n        readings.append"));
     assert!(noisy.contains(stated) && noisy.contains(factor));
     let spec = [SKEW_ROOM, MINE].concat();

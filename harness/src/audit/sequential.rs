@@ -13,8 +13,10 @@ use crate::procedures::Task;
 use crate::record::{Estimate, Reading, Recording, Uncertainty};
 use crate::spec::Budget;
 
-/// The effort of each look against the first.
-const WEIGHTS: [f64; LOOKS as usize] = [1.0, 2.0, 6.0, 18.0];
+/// All looks together take so many times the effort of the first, where that is as accurate as the spec asks; where it is coarser, so many
+/// times what the spec asks.
+const BEYOND_FIRST: f64 = 27.0;
+const BEYOND_SPEC: f64 = 2.0;
 /// A look that could be granted less than this share of the first one's effort is not worth an engine's start.
 const MIN_WEIGHT: f64 = 0.5;
 /// A first look counts as this long at least, in seconds: one that was mirrored or read off another case took none.
@@ -62,15 +64,19 @@ pub fn refine(
         return;
     }
     subject.looks = vec![1; subject.readings.len()];
-    let (first_s, mut total_weight) = (subject.work_s().max(SHORTEST_S), WEIGHTS[0]);
+    let (first_s, mut total_weight) = (subject.work_s().max(SHORTEST_S), 1.0);
     for look in 2..=LOOKS {
         let targets = undecided(judge, task, witnesses, subject);
         if targets.is_empty() {
             break;
         }
         let left_s = budget.seconds - subject.work_s();
-        // In powers of two, so that a clock, where there is no other count, hardly ever has a say.
-        let weight = WEIGHTS[look as usize - 1].min((left_s / first_s).log2().floor().exp2());
+        let mut affordable = left_s / first_s;
+        if subject.work_s.is_none() {
+            // In powers of two, so that a clock, where there is no other count, hardly ever has a say.
+            affordable = affordable.log2().floor().exp2();
+        }
+        let weight = weight(look, first.relative_error / budget.relative_error).min(affordable);
         if weight < MIN_WEIGHT {
             break;
         }
@@ -95,6 +101,13 @@ pub fn refine(
         }
         total_weight += weight;
     }
+}
+
+/// The effort of a look against the first, whose error is so many times what is asked for: each makes the total the same factor larger.
+fn weight(look: u32, coarser: f64) -> f64 {
+    let all = (BEYOND_SPEC * coarser * coarser).max(BEYOND_FIRST);
+    let total = |look: u32| all.powf(f64::from(look - 1) / f64::from(LOOKS - 1));
+    total(look) - total(look - 1)
 }
 
 /// Adds a look to a reading, with weights that were fixed before.
@@ -209,14 +222,15 @@ mod tests {
         let targets: Vec<usize> = (0..deviations.len()).collect();
         let first_s = effort(first.relative_error);
         let mut subject = recording("radiance", &engine.measurement(&targets, first_s).estimates);
-        subject.wall_s = first_s;
+        subject.work_s = Some(first_s);
         let exact = recording("simulator", &vec![Estimate::exact(1.0); deviations.len()]);
         let (judge, task) = (built_in(), task(deviations.len()));
         let mut asked = vec![];
         let mut sample = |ask: &Ask| {
             asked.push(ask.clone());
-            let wall_s = effort(ask.budget.relative_error);
-            Ok((engine.measurement(&ask.targets, wall_s), Cost { wall_s, ..Cost::default() }))
+            let work_s = effort(ask.budget.relative_error);
+            let measurement = engine.measurement(&ask.targets, work_s);
+            Ok((Measurement { work_s: Some(work_s), ..measurement }, Cost::default()))
         };
         refine(&judge, &task, &[&exact], &mut subject, (first, whole), &mut sample);
         let mut compared = judge.compare(&task, &[&exact, &subject]);
@@ -243,7 +257,7 @@ mod tests {
             let deviations: Vec<f64> = (0..6).map(|_| 0.015 * normal(&mut random)).collect();
             let pair = [whole, decided].map(|first| run_within(&deviations, (first, whole), 16, 7000 + seed));
             for (total, one) in cost.iter_mut().zip(&pair) {
-                *total += one.2.wall_s;
+                *total += one.2.work_s();
             }
             let open = |verdict| verdict == Verdict::Inconclusive;
             for (accurate, decided) in pair[0].0.iter().zip(&pair[1].0) {
@@ -261,10 +275,9 @@ mod tests {
         let told = format!(
             "{both} decided by both, {contrary} contrary, {only_accurate} and {only_decided} by one; {cost:?} s"
         );
-        eprintln!("{told}");
+        // Each is wrong now and then at the very edge; what only accurate sampling decides is there, too, where its one look may spend more.
         assert!(contrary <= 6, "{told}");
-        assert!(only_accurate <= 60, "{told}");
-        assert!(cost[1] < 0.5 * cost[0], "{told}");
+        assert!(only_accurate < both / 25 && cost[1] < 0.6 * cost[0], "{told}");
     }
 
     #[test]
@@ -296,7 +309,7 @@ mod tests {
         let wrong = (0..2000).filter(|seed| {
             let mut random = fastrand::Rng::with_seed(*seed);
             let (mut sum, mut weight) = (0.0, 0.0);
-            WEIGHTS.iter().any(|w| {
+            [1.0, 2.0, 6.0, 18.0].iter().any(|w: &f64| {
                 sum += w.sqrt() * normal(&mut random);
                 weight += w;
                 // One-sided at 5 %: z = 1.645.

@@ -3,6 +3,7 @@
 //! Engines count seconds at a fixed rate each, measured with two cores of a usual server. A budget's seconds are meant so; by the
 //! clock a job takes what the machine makes of them.
 
+use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, LuminaireModel, Shape};
 
 use super::Job;
@@ -22,6 +23,12 @@ pub(super) fn path_length(job: &Job) -> f64 {
         Some(Bounces::AtMost(n)) => all.min(f64::from(n)),
         Some(Bounces::Converged) => all,
     }
+}
+
+/// Of all surfaces of a room, by their areas.
+pub(super) fn mean_reflectance(room: &Room) -> f64 {
+    let over = |f: &dyn Fn(Surface) -> f64| Surface::ALL.iter().map(|&s| f(s)).sum::<f64>();
+    over(&|s| room.area_m2(s) * room.reflectance.of(s)) / over(&|s| room.area_m2(s))
 }
 
 /// What a ray takes against one in an empty room: as many more steps as the tree of triangles is deeper.

@@ -19,9 +19,9 @@ pub(super) mod tests;
 
 use std::path::PathBuf;
 
-use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 
+use super::effort;
 use super::settings::{Coordinates, Preset};
 use super::workbench::by_hand;
 use super::{
@@ -148,7 +148,7 @@ fn support(job: &Job) -> Support {
         return Support::No("in free field nothing reflects: there is no room to gather light from".to_owned());
     };
     let preset = Settings::of(job).map_or(Preset::Audit, |s| s.preset);
-    cache_error(mean_reflectance(&room), bounces, preset)
+    cache_error(effort::mean_reflectance(&room), bounces, preset)
 }
 
 /// The bias of radiosity's cache, as measured against exact values, and what twenty reflections leave out.
@@ -238,9 +238,4 @@ fn distance_to_segment(point: glam::DVec3, from: glam::DVec3, to: glam::DVec3) -
     let along = to - from;
     let t = ((point - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     point.distance(from + t * along)
-}
-
-fn mean_reflectance(room: &Room) -> f64 {
-    let over = |f: &dyn Fn(Surface) -> f64| Surface::ALL.iter().map(|&s| f(s)).sum::<f64>();
-    over(&|s| room.area_m2(s) * room.reflectance.of(s)) / over(&|s| room.area_m2(s))
 }

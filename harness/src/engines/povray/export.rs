@@ -11,6 +11,7 @@ use luminaire::geometry::Surface;
 use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport};
 
+use crate::engines::effort;
 use crate::engines::{Job, SceneFile, Station};
 
 use super::frame::{Frame, candela, seats};
@@ -88,7 +89,7 @@ pub(super) fn readouts(readouts: &[Readout], light: f64) -> String {
 fn upper_bound_lx(job: &Job, at_m: DVec3, part: Light) -> f64 {
     let bound: f64 = if let (Light::Indirect, Some(room)) = (part, job.scene.room) {
         let area: f64 = Surface::ALL.iter().map(|&s| room.area_m2(s)).sum();
-        let mean = super::mean_reflectance(&room);
+        let mean = effort::mean_reflectance(&room);
         let flux = |l: &Luminaire| l.photometry.distribution.flux().value() * l.flux_scale;
         8.0 * job.scene.luminaires.iter().map(flux).sum::<f64>() / area * mean / (1.0 - mean).max(0.01)
     } else {

@@ -29,7 +29,7 @@ const DEFAULT_BOUNCES: u32 = 2;
 
 /// Weight below which rays are at risk, in units of the weight of one division's ray. The error at a given time is
 /// least near .1 to .2 (case S1: 8e-6 s against 11e-6 at .5 and 2e-5 at .01); at .8 rtrace would cut the divisions.
-const ROULETTE: f64 = 0.15;
+pub(super) const ROULETTE: f64 = 0.15;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sources {

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options};
+use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options, ROULETTE, bounces};
 use super::settings::Settings;
 use super::tools::Tools;
 use crate::engines::blocks::{Blocks, MIN_BLOCKS, Sampled, Sampling};
@@ -25,7 +25,7 @@ const MAX_PARALLEL: usize = 8;
 
 /// Seconds that are counted for a ray and its shadow rays, and for a row where rtrace keeps its cache: on two cores of a
 /// usual server, half as much again as was measured there.
-const RAY_S: f64 = 2.5e-6;
+const RAY_S: f64 = 3e-6;
 const CACHED_ROW_S: f64 = 5.0;
 
 /// Samples of an opening where direct light alone is read, for each of those within reflected light.
@@ -101,8 +101,15 @@ impl Sampler<'_> {
     }
 
     fn block_s(&self, divisions: u32) -> f64 {
-        let rays = f64::from(divisions) * self.rows.len() as f64 * effort::path_length(self.job);
+        let rays = f64::from(divisions) * self.rows.len() as f64 * self.path_length();
         RAY_S * rays * (1.0 + effort::shadow_rays(self.job)) * effort::a_ray(self.job)
+    }
+
+    /// Reflections that a path is followed for in the mean: until its weight falls below the roulette's, and on by chance.
+    fn path_length(&self) -> f64 {
+        let mean = self.job.scene.room.map_or(0.0, |room| effort::mean_reflectance(&room)).clamp(0.01, 0.99);
+        let length = ROULETTE.ln() / mean.ln() + (1.0 - mean).recip();
+        length.min(f64::from(bounces(self.job)))
     }
 
     /// A process a block: of the one, or where rtrace keeps its cache, the blocks would be alike.

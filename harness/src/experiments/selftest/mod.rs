@@ -32,7 +32,7 @@ const DIRECT_NOISE: f64 = 1e-5;
 /// Relative standard error of a reading that random paths were traced for.
 const INDIRECT_NOISE: f64 = 1e-3;
 /// Where highlights are cut, as a share of the brightest reading.
-const CLAMP: f64 = 0.6;
+const CLAMP: f64 = 0.1;
 /// What is added everywhere, as a share of the brightest reading.
 const OFFSET: f64 = 0.05;
 /// Faults below this size are listed and not counted.
