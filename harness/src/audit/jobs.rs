@@ -1,6 +1,7 @@
 //! Runs a plan: one reading a job, readings kept on disk as each job finishes, one engine's failure stops no other.
 
 use std::collections::BTreeMap;
+use std::ops::Add;
 use std::path::Path;
 
 use std::time::{Duration, Instant};
@@ -149,6 +150,8 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
         let seen = reader.read(&Question::new(&instrument, &job, &format!("{folder}-spot-check")))?;
         run.hold(&taken.measurement, &seen.measurement).map_err(failed)?;
         taken.cost.wall_s += seen.cost.wall_s;
+        let work_s = [taken.measurement.work_s, seen.measurement.work_s];
+        taken.measurement.work_s = work_s.into_iter().flatten().reduce(f64::add);
         // What was rendered stands; samples of another job do not tell how it varies with the rest.
         taken.measurement.samples.clear();
         for (&station, estimate) in run.spot_check.iter().zip(seen.measurement.estimates) {

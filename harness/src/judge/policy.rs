@@ -54,7 +54,7 @@ pub struct Profile {
 pub struct ProfileBudget {
     /// Standard error relative to the reading.
     pub relative_error: Option<f64>,
-    /// Wall-clock seconds an engine and procedure.
+    /// Seconds an engine and procedure, as the engine counts them.
     pub seconds: Option<f64>,
 }
 

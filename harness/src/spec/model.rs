@@ -279,7 +279,7 @@ pub struct GridSpec {
 pub struct Budget {
     /// Standard error relative to the reading.
     pub relative_error: f64,
-    /// Wall-clock seconds an engine and procedure.
+    /// Seconds an engine and procedure, as the engine counts them; a program of the user's keeps to its clock.
     pub seconds: f64,
 }
 

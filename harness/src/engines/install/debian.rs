@@ -15,30 +15,36 @@ const LLVM_PACKAGES: [&str; 5] = ["libllvm19", "libllvm20", "libllvm18", "libllv
 
 pub(super) fn install_povray(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install POV-Ray 3.7 so that `povray` is on PATH (macOS: `brew install povray`)";
-    let apt = Apt::find(site, "POV-Ray", remedy)?;
-    apt.install(&["povray"], progress)?;
-    let found = site.program("povray").ok_or_else(|| not_there("povray", remedy))?;
+    let found = fetched(site, ("POV-Ray", &["povray"]), |site| site.program("povray"), remedy, progress)?;
     // Seen to start, with the libraries that were unpacked beside it.
     let mut check = step(site, &found).args(["--version"]);
     if let Some(path) = site.library_path() {
         check = check.env("LD_LIBRARY_PATH", path);
     }
     check.run()?;
-    Ok(found.display().to_string())
+    Ok(found)
 }
 
 pub(super) fn install_llvm(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install LLVM 17 or later (macOS: `brew install llvm`)";
-    Apt::find(site, "libLLVM", remedy)?.install(&LLVM_PACKAGES, progress)?;
-    let found = site.llvm().ok_or_else(|| not_there("libLLVM", remedy))?;
-    Ok(found.display().to_string())
+    fetched(site, ("libLLVM", &LLVM_PACKAGES), Site::llvm, remedy, progress)
 }
 
 pub(super) fn install_libfaketime(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install libfaketime, with which rtrace's random numbers can be repeated";
-    Apt::find(site, "libfaketime", remedy)?.install(&["libfaketime"], progress)?;
-    let found = site.libfaketime().ok_or_else(|| not_there("libfaketime", remedy))?;
-    Ok(found.display().to_string())
+    fetched(site, ("libfaketime", &["libfaketime"]), Site::libfaketime, remedy, progress)
+}
+
+/// Where the file is that the first of these packages brings.
+fn fetched(
+    site: &Site,
+    (what, packages): (&str, &[&str]),
+    find: impl Fn(&Site) -> Option<PathBuf>,
+    remedy: &str,
+    progress: &mut dyn FnMut(&str),
+) -> Result<String, InstallError> {
+    Apt::find(site, what, remedy)?.install(packages, progress)?;
+    Ok(find(site).ok_or_else(|| not_there(what, remedy))?.display().to_string())
 }
 
 fn not_there(what: &str, remedy: &str) -> InstallError {
