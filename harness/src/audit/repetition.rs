@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use super::jobs::{Outcome, Running};
 use super::sampling::{seed_of_look, stations_of};
 use crate::engines::Job;
-use crate::judge::LOOKS;
+use crate::judge::{LOOKS, SINGLE_PRECISION};
 use crate::measure::Question;
 use crate::plan::Run;
 use crate::record::{EngineName, Estimate, Reading, StatedErrors, Uncertainty};
@@ -20,8 +20,6 @@ const REPETITIONS: u32 = 3;
 const EFFORT: f64 = 0.25;
 /// The part of what is claimed that is read again, one reading of a task at least.
 const PART: f64 = 0.05;
-/// Two values of one determined reading differ by the rounding of single precision at most, relative.
-const ROUNDING: f64 = 1e-6;
 
 /// Reads again, tells in the recordings what is found, and gives readings the errors that they have: by engine, of what it sampled
 /// and of what it claims.
@@ -71,7 +69,7 @@ fn contradicted(running: &Running<'_>, run: &Run, readings: &[Reading], claimed:
     let Some(again) = read(running, run, &drawn, 1, 1.0) else { return vec![] };
     let differs = |(k, now): (&usize, &Estimate)| {
         let bound = readings[*k].uncertainty.bound() + now.uncertainty.bound();
-        (now.value - readings[*k].value).abs() > bound + ROUNDING * now.value.max(readings[*k].value)
+        (now.value - readings[*k].value).abs() > bound + SINGLE_PRECISION * now.value.max(readings[*k].value)
     };
     if drawn.iter().zip(&again).any(differs) { repeated(running, run, readings, claimed, 1.0) } else { vec![] }
 }

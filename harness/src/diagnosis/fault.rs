@@ -90,6 +90,11 @@ impl Fault {
         }
     }
 
+    /// Whether it says all by itself.
+    pub fn is_plain(&self) -> bool {
+        self.count_of_parameters() == 0 && self.id != "dark"
+    }
+
     pub fn count_of_parameters(&self) -> usize {
         self.parameters.len() + usize::from(self.has_factor)
     }

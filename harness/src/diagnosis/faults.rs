@@ -25,12 +25,14 @@ pub fn faults(cases: &[&[Task]]) -> Vec<Fault> {
     all.extend(of_luminaires());
     all.extend(of_rooms());
     all.extend(of_light());
-    // Scenes of known answer are no case: each is a room of its own.
-    let of_a_spec = |(_, tasks): &(usize, &&[Task])| !tasks.iter().all(|t| t.procedure.is_known());
-    for (case, tasks) in cases.iter().enumerate().filter(of_a_spec) {
-        all.extend(of_case(case, tasks));
-    }
+    all.extend(of_specs(cases).flat_map(|(case, tasks)| of_case(case, tasks)));
     all
+}
+
+/// Scenes of known answer are no case: each is a room of its own.
+pub(super) fn of_specs<'a>(cases: &[&'a [Task]]) -> impl Iterator<Item = (usize, &'a [Task])> {
+    let is_a_spec = |tasks: &[Task]| !tasks.iter().all(|t| t.procedure.is_known());
+    cases.iter().copied().enumerate().filter(move |(_, tasks)| is_a_spec(tasks))
 }
 
 /// Without parameters.

@@ -58,7 +58,7 @@ pub(super) fn fit(
     Some(Fitted { chi_squared: sum_of_squares(&left), parameters: at.into_iter().zip(errors).collect() })
 }
 
-fn sum_of_squares(values: &[f64]) -> f64 {
+pub(super) fn sum_of_squares(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum()
 }
 

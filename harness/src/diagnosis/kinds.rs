@@ -6,7 +6,8 @@ use luminaire::geometry::Surface;
 use luminaire::scene::{Luminaire, Transport};
 
 use super::fault::{Fault, Parameter};
-use super::faults::{FACTOR, LUMINAIRES, POWER, TURN, in_room, name, names, raised, reflectance, reflects};
+use super::faults::{LUMINAIRES, POWER, TURN, in_room, name, names, of_specs, raised, reflectance, reflects};
+use super::tables::is_axial;
 use super::wrong::Wrong;
 use crate::procedures::Task;
 
@@ -16,11 +17,7 @@ const AWAY_M: (f64, f64) = (-3.0, 3.0);
 /// Every kind that cases may show.
 pub fn kinds(cases: &[&[Task]]) -> Vec<Fault> {
     let mut all = of_engine();
-    // Scenes of known answer are no case: each is a room of its own.
-    let of_a_spec = |(_, tasks): &(usize, &&[Task])| !tasks.iter().all(|t| t.procedure.is_known());
-    for (case, tasks) in cases.iter().enumerate().filter(of_a_spec) {
-        all.extend(of_case(case, tasks));
-    }
+    all.extend(of_specs(cases).flat_map(|(case, tasks)| of_case(case, tasks)));
     all
 }
 
@@ -40,7 +37,7 @@ fn of_engine() -> Vec<Fault> {
             let turn = DMat3::from_rotation_z(p[0].to_radians());
             wrong.luminaires(|l| {
                 l.orientation *= turn;
-                l.photometry.distribution.c_deg().len() > 1
+                !is_axial(l)
             })
         })
         .about(TURN)
@@ -78,8 +75,6 @@ fn of_case(case: usize, tasks: &[Task]) -> Vec<Fault> {
         all.extend(of_luminaire(None, "all"));
         all.extend(ids.iter().take(LUMINAIRES).map(|id| flux(id)));
     }
-    let alone = "factor {0:} in this case alone, none of those known";
-    all.push(Fault::new("factor-here", alone, |_, _| true).about(FACTOR).as_bright_as_you_like());
     let moved = Fault::new("shifted-here", "meters are off by {0} in x, {1} in y, {2} in z, in this case alone", shift);
     all.push(moved.about("shifted").with([metres(), metres(), metres()]));
     all.into_iter().map(|fault| fault.within(case)).collect()
@@ -87,15 +82,15 @@ fn of_case(case: usize, tasks: &[Task]) -> Vec<Fault> {
 
 fn of_surfaces(tasks: &[Task]) -> Vec<Fault> {
     let lit = tasks.iter().find(|t| t.transport != Transport::Direct).and_then(|t| t.scene.room);
-    let Some(mut room) = lit else { return vec![] };
+    let Some(room) = lit else { return vec![] };
     let mut all = vec![];
     for surface in Surface::ALL {
-        let right = *reflectance(&mut room, surface);
+        let right = room.reflectance.of(surface);
         let what = format!("{} reflects {{0}} instead of {right}", name(surface));
         let fault = Fault::new("reflectance", what, move |wrong, p| reflects(wrong, surface, p[0]));
         all.push(fault.about(name(surface)).with([Parameter::new("", right, 0.02, (0.0, 0.995))]));
     }
-    let most = Surface::ALL.map(|s| *reflectance(&mut room, s)).into_iter().fold(0.01, f64::max);
+    let most = Surface::ALL.map(|s| room.reflectance.of(s)).into_iter().fold(0.01, f64::max);
     let scaled = Fault::new("reflectances", "every surface reflects {0} times what it should", |wrong, p| {
         let by = p[0];
         in_room(wrong, |room| Surface::ALL.into_iter().for_each(|s| *reflectance(room, s) *= by))
@@ -104,67 +99,51 @@ fn of_surfaces(tasks: &[Task]) -> Vec<Fault> {
     all
 }
 
+/// A change of one luminaire, or of all at once.
+fn each(
+    id: Option<&str>,
+    change: impl Fn(&mut Luminaire, &[f64]) + Send + Sync + 'static,
+) -> impl Fn(&mut Wrong, &[f64]) -> bool + Send + Sync + 'static {
+    let id = id.map(str::to_owned);
+    move |wrong, p| {
+        wrong.luminaires(|l| {
+            let is_it = id.as_ref().is_none_or(|id| *id == l.id);
+            if is_it {
+                change(l, p);
+            }
+            is_it
+        })
+    }
+}
+
 /// Its place and its rotation: of one luminaire, or of all at once.
-fn of_luminaire(id: Option<&String>, who: &str) -> Vec<Fault> {
-    let only = |id: Option<&String>| {
-        let id = id.cloned();
-        move |l: &Luminaire| id.as_ref().is_none_or(|id| *id == l.id)
-    };
+fn of_luminaire(id: Option<&str>, who: &str) -> Vec<Fault> {
     let subject = match id {
         None => "all luminaires are".to_owned(),
         Some(_) if who == "its" => "the luminaire is".to_owned(),
         Some(id) => format!("{id} is"),
     };
-    let (is_moved, is_turned, is_tilted) = (only(id), only(id), only(id));
     let moved = format!("{subject} off by {{0}} in x, {{1}} in y, {{2}} in z");
-    let place = Fault::new("place", moved, move |wrong, p| {
-        let by = DVec3::new(p[0], p[1], p[2]);
-        wrong.luminaires(|l| {
-            is_moved(l) && {
-                l.position_m += by;
-                true
-            }
-        })
-    });
+    let place = each(id, |l, p| l.position_m += DVec3::new(p[0], p[1], p[2]));
     let turned = format!("{subject} turned by {{0}} about the vertical");
-    let turn = Fault::new("turn", turned, move |wrong, p| {
-        let turn = DMat3::from_rotation_z(p[0].to_radians());
-        wrong.luminaires(|l| {
-            is_turned(l) && {
-                l.orientation = turn * l.orientation;
-                true
-            }
-        })
-    });
+    let turn = each(id, |l, p| l.orientation = DMat3::from_rotation_z(p[0].to_radians()) * l.orientation);
     let tilted = format!("{subject} tilted by {{0}} about x and {{1}} about y");
-    let tilt = Fault::new("tilt", tilted, move |wrong, p| {
+    let tilt = each(id, |l, p| {
         let by = DVec3::new(p[0].to_radians(), p[1].to_radians(), 0.0);
-        let tilt =
-            if by == DVec3::ZERO { DMat3::IDENTITY } else { DMat3::from_axis_angle(by.normalize(), by.length()) };
-        wrong.luminaires(|l| {
-            is_tilted(l) && {
-                l.orientation = tilt * l.orientation;
-                true
-            }
-        })
+        if by != DVec3::ZERO {
+            l.orientation = DMat3::from_axis_angle(by.normalize(), by.length()) * l.orientation;
+        }
     });
+    let about_turn = if who == "its" { TURN.to_owned() } else { format!("turn of {who}") };
     vec![
-        place.about(format!("place of {who}")).with([metres(), metres(), metres()]),
-        turn.about(if who == "its" { TURN.to_owned() } else { format!("turn of {who}") }).with([degrees(true)]),
-        tilt.about(format!("tilt of {who}")).with([degrees(false), degrees(false)]),
+        Fault::new("place", moved, place).about(format!("place of {who}")).with([metres(), metres(), metres()]),
+        Fault::new("turn", turned, turn).about(about_turn).with([degrees(true)]),
+        Fault::new("tilt", tilted, tilt).about(format!("tilt of {who}")).with([degrees(false), degrees(false)]),
     ]
 }
 
 fn flux(id: &str) -> Fault {
-    let name = id.to_owned();
-    let what = format!("{id} gives {{0}} times its light");
-    let fault = Fault::new("flux", what, move |wrong, p| {
-        wrong.luminaires(|l| {
-            l.id == name && {
-                l.flux_scale *= p[0];
-                true
-            }
-        })
-    });
+    let fault =
+        Fault::new("flux", format!("{id} gives {{0}} times its light"), each(Some(id), |l, p| l.flux_scale *= p[0]));
     fault.about(format!("flux of {id}")).with([Parameter::new("", 1.0, 0.05, (0.0, 1e4))])
 }

@@ -2,6 +2,7 @@
 //! ratio of one scene to one that is like it; what it lets through is solved for by the simulator.
 
 use glam::DVec3;
+use luminaire::calculators::inverse_square::from_luminaire;
 use luminaire::geometry::configuration_factor::element_to_polygon;
 use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, Luminaire, Meter};
@@ -80,29 +81,14 @@ impl Patch {
         let normal = self.surface.inward_normal();
         let place = |k: usize| (k as f64 + 0.5) / POINTS as f64;
         let points = (0..POINTS * POINTS).map(|k| self.at(place(k % POINTS), place(k / POINTS)));
-        let lux = |point: DVec3| luminaires.iter().map(|l| illuminance(l, point, normal)).sum::<f64>();
-        points.map(lux).sum::<f64>() / (POINTS * POINTS) as f64
+        let lux = |meter: Meter| luminaires.iter().map(|l| from_luminaire(l, &meter).value()).sum::<f64>();
+        points.map(|position_m| lux(Meter { position_m, normal })).sum::<f64>() / (POINTS * POINTS) as f64
     }
 }
 
-fn illuminance(luminaire: &Luminaire, point: DVec3, normal: DVec3) -> f64 {
-    let towards = luminaire.position_m - point;
-    let square = towards.length_squared();
-    let cosine = towards.dot(normal) / square.sqrt();
-    if cosine <= 0.0 { 0.0 } else { luminaire.intensity_towards(-towards).value() * cosine / square }
-}
-
 fn patches_of(room: &Room, surface: Surface) -> Vec<Patch> {
-    let normal = surface.axis();
-    let (first, second) = ((normal + 1) % 3, (normal + 2) % 3);
-    let depth = if surface.is_far() { room.size_m[normal] } else { 0.0 };
-    let corner = |i: usize, j: usize| {
-        let mut at = DVec3::ZERO;
-        at[normal] = depth;
-        at[first] = room.size_m[first] * i as f64 / PATCHES as f64;
-        at[second] = room.size_m[second] * j as f64 / PATCHES as f64;
-        at
-    };
+    let whole = Patch { surface, corners_m: room.corners(surface) };
+    let corner = |i: usize, j: usize| whole.at(i as f64 / PATCHES as f64, j as f64 / PATCHES as f64);
     let patch = |k: usize| {
         let (i, j) = (k % PATCHES, k / PATCHES);
         Patch { surface, corners_m: [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)] }

@@ -6,7 +6,6 @@
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, HashMap};
-use std::sync::Arc;
 
 use itertools::Itertools;
 use parking_lot::Mutex;
@@ -14,7 +13,7 @@ use parking_lot::Mutex;
 use super::cause::{Cause, Evidence};
 use super::fault::{Fault, Parameter, shows};
 use super::faults::{FACTOR, faults};
-use super::fit::{Fitted, fit};
+use super::fit::{Fitted, fit, sum_of_squares};
 use super::kinds::kinds;
 use super::sheet::{Sheet, Stand, is_chance};
 use super::wrong::{Fidelity, Model};
@@ -45,7 +44,7 @@ pub struct Bench {
     predicted: Mutex<HashMap<(usize, usize, bool), Predicted>>,
 }
 
-type Predicted = Option<Arc<Vec<f64>>>;
+type Predicted = Option<Vec<f64>>;
 
 impl Bench {
     pub fn new(cases: &[&[Task]], models: Vec<Model>) -> Self {
@@ -58,7 +57,7 @@ impl Bench {
         if let Some(known) = self.predicted.lock().get(&key) {
             return known.clone();
         }
-        let found = self.listed[fault].predicted(&self.models[model], &[], fidelity).map(Arc::new);
+        let found = self.listed[fault].predicted(&self.models[model], &[], fidelity);
         self.predicted.lock().insert(key, found.clone());
         found
     }
@@ -127,9 +126,7 @@ impl Search<'_> {
         if !fault.parameters.is_empty() {
             return self.of_kind(fault);
         }
-        let predict = |sheet: usize, fidelity| {
-            self.bench.of_listed(index, self.sheets[sheet].model, fidelity).map(Arc::unwrap_or_clone)
-        };
+        let predict = |sheet: usize, fidelity| self.bench.of_listed(index, self.sheets[sheet].model, fidelity);
         self.weighed(fault, &predict)
     }
 
@@ -140,17 +137,13 @@ impl Search<'_> {
 
     /// A known fault that is as bright as it may be besides.
     fn with_factors(&self, _open: &[usize]) -> Vec<Held> {
-        let is_shape = |f: &usize| {
-            let fault = &self.bench.listed[*f];
-            fault.about != FACTOR && fault.id != "dark" && fault.parameters.is_empty() && !fault.has_factor
-        };
+        let is_shape = |f: &usize| self.bench.listed[*f].about != FACTOR && self.bench.listed[*f].is_plain();
         let scaled = |f: usize| {
             let fault = self.bench.listed[f].clone().as_bright_as_you_like();
             let predict = |sheet: usize, fidelity| {
                 // A factor shows where the fault does not.
                 let model = self.sheets[sheet].model;
-                let with = self.bench.of_listed(f, model, fidelity).map(Arc::unwrap_or_clone);
-                with.or_else(|| Some(self.bench.models[model].right.clone()))
+                self.bench.of_listed(f, model, fidelity).or_else(|| Some(self.bench.models[model].right.clone()))
             };
             let mut held = self.weighed(&fault, &predict)?;
             let (factor, error) = *held.cause.parameters.last()?;
@@ -177,7 +170,7 @@ impl Search<'_> {
     }
 
     fn pairs(&self, _open: &[usize]) -> Vec<Held> {
-        let is_alone = |f: &&Fault| f.about != FACTOR && f.id != "dark" && f.parameters.is_empty() && !f.has_factor;
+        let is_alone = |f: &&Fault| f.about != FACTOR && f.is_plain();
         let alone: Vec<&Fault> = self.bench.listed.iter().filter(is_alone).collect();
         let two = |[one, other]: [&&Fault; 2]| {
             let differ = one.id != other.id && one.about != other.about;
@@ -311,7 +304,7 @@ impl Search<'_> {
         let mut residuals = |parameters: &[f64]| self.residuals(fault, parameters, sheets, corrections);
         let mut tried: Vec<(f64, &Vec<f64>)> = match starts {
             [one] => vec![(0.0, one)],
-            _ => starts.iter().filter_map(|s| Some((residuals(s)?.iter().map(|r| r * r).sum(), s))).collect(),
+            _ => starts.iter().filter_map(|s| Some((sum_of_squares(&residuals(s)?), s))).collect(),
         };
         tried.sort_by(|a, b| a.0.total_cmp(&b.0));
         let fits = tried.iter().take(FOLLOWED).filter_map(|(_, start)| fit(&fault.parameters, start, &mut residuals));
@@ -359,16 +352,14 @@ impl Search<'_> {
             }
             if fault.has_factor {
                 let failing = predicted.iter().filter(|(k, _)| self.sheets[**k].fails);
-                let products = failing.map(|(k, p)| sheets[*k].products(p));
-                let (square, product) = products.fold((0.0, 0.0), |(s, q), (a, b)| (s + a, q + b));
-                factor = (product / square, square.sqrt().recip());
+                factor = likeliest_factor(failing.map(|(k, p)| sheets[*k].products(p)));
             }
             let refuted = |(k, p): (&usize, &Vec<f64>)| {
                 let p: Vec<f64> = p.iter().map(|x| factor.0 * x).collect();
                 Self::refutes(&sheets[*k], &p)
             };
             // Without a failing sheet no factor is known yet.
-            if self.is_spent() || (factor.0.is_finite() && predicted.iter().any(refuted)) {
+            if self.is_spent() || (fault.has_factor && factor.0.is_finite() && predicted.iter().any(refuted)) {
                 return None;
             }
             let fails = |(k, p): (&usize, &Vec<f64>)| self.sheets[*k].fails && shows(p, &self.sheets[*k].right);
@@ -439,10 +430,14 @@ impl Search<'_> {
 
     /// What readings are times the reference.
     fn factor(&self, explained: &[usize]) -> (f64, f64) {
-        let products = explained.iter().map(|k| self.sheets[*k].products(&self.sheets[*k].right));
-        let (square, product) = products.fold((0.0, 0.0), |(s, q), (a, b)| (s + a, q + b));
-        (product / square, square.sqrt().recip())
+        likeliest_factor(explained.iter().map(|k| self.sheets[*k].products(&self.sheets[*k].right)))
     }
+}
+
+/// By least squares, with its standard error, from sums of products.
+fn likeliest_factor(products: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+    let (square, product) = products.fold((0.0, 0.0), |(s, q), (a, b)| (s + a, q + b));
+    (product / square, square.sqrt().recip())
 }
 
 /// Those that explain a sheet about as well as the best; of the same thing the best alone, of too many none.

@@ -29,6 +29,8 @@ pub struct Sheet {
     /// Whether any of it fails.
     pub fails: bool,
     slack: f64,
+    /// Part of every standard deviation, in the readings' unit.
+    floor: f64,
     is_rough: bool,
 }
 
@@ -55,6 +57,7 @@ impl Sheet {
             allowed: vec![],
             fails: members.iter().any(|c| c.verdict == Verdict::Fail),
             slack: if of.is_thinned() { THINNED } else { SLACK },
+            floor: 0.0,
             is_rough: false,
         };
         for comparison in members {
@@ -69,6 +72,7 @@ impl Sheet {
             };
             sheet.uncertainty.push(told.hypot(reference.uncertainty));
         }
+        sheet.floor = FLOOR * sheet.right.iter().chain(&sheet.read).copied().fold(0.0, f64::max);
         Some(sheet)
     }
 
@@ -90,8 +94,7 @@ impl Sheet {
     /// Standard deviation of a reading from a prediction that is right.
     pub fn sigma(&self, k: usize, predicted: f64) -> f64 {
         let change = if self.is_rough { ROUGH.1 * (predicted - self.right[k]) } else { 0.0 };
-        let largest = self.right.iter().chain(&self.read).copied().fold(0.0, f64::max);
-        self.uncertainty[k].hypot(self.slack * predicted).hypot(FLOOR * largest).hypot(change).max(f64::MIN_POSITIVE)
+        self.uncertainty[k].hypot(self.slack * predicted).hypot(self.floor).hypot(change).max(f64::MIN_POSITIVE)
     }
 
     /// What a right reading may be off where this is predicted.

@@ -4,7 +4,7 @@
 use std::sync::OnceLock;
 
 use glam::DVec3;
-use luminaire::scene::{Luminaire, LuminaireModel, Meter, Scene, Transport};
+use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport};
 use luminaire::simulator::{self, Accuracy};
 
 use super::rough::Rough;
@@ -244,16 +244,14 @@ pub fn truth(task: &Task) -> Option<Vec<f64>> {
 }
 
 fn light(task: &Task, law: Law, rough: Option<&Rough>) -> Option<Light> {
-    let meters: Vec<Meter> = task.stations().map(|(_, meter)| meter).collect();
+    let meters: Vec<Meter> = task.targets.iter().flat_map(|t| &t.aspects).map(|a| a.meter).collect();
+    let reflected = |bounces| reflected(&task.scene, bounces, &meters, law, rough);
     let none = vec![0.0; meters.len()];
     let direct = || straight(&task.scene, &meters, law);
     Some(match task.transport {
         Transport::Direct => Light { direct: direct()?, reflected: none },
-        Transport::Indirect(_) => Light { direct: none, reflected: reflected(task, &meters, law, rough)? },
-        Transport::Total(bounces) => {
-            let indirect = Task { transport: Transport::Indirect(bounces), ..task.clone() };
-            Light { direct: direct()?, reflected: reflected(&indirect, &meters, law, rough)? }
-        }
+        Transport::Indirect(bounces) => Light { direct: none, reflected: reflected(bounces)? },
+        Transport::Total(bounces) => Light { direct: direct()?, reflected: reflected(bounces)? },
     })
 }
 
@@ -273,12 +271,12 @@ fn straight(scene: &Scene, meters: &[Meter], law: Law) -> Option<Vec<f64>> {
     Some(meters.iter().zip(right?).map(of_meter).collect())
 }
 
-fn reflected(task: &Task, meters: &[Meter], law: Law, rough: Option<&Rough>) -> Option<Vec<f64>> {
+fn reflected(scene: &Scene, bounces: Bounces, meters: &[Meter], law: Law, rough: Option<&Rough>) -> Option<Vec<f64>> {
     let is_bare = |l: &Luminaire| l.model == LuminaireModel::Point;
-    if !task.scene.obstacles.is_empty() || !task.scene.luminaires.iter().all(is_bare) {
+    if !scene.obstacles.is_empty() || !scene.luminaires.iter().all(is_bare) {
         return None;
     }
-    let mut scene = task.scene.clone();
+    let mut scene = scene.clone();
     for luminaire in &mut scene.luminaires {
         if rough.is_none() {
             tables::thinned(luminaire);
@@ -290,15 +288,15 @@ fn reflected(task: &Task, meters: &[Meter], law: Law, rough: Option<&Rough>) -> 
             return None;
         }
     }
-    match (task.transport, rough, scene.room) {
-        (Transport::Indirect(bounces), Some(rough), Some(room)) => {
+    match (rough, scene.room) {
+        (Some(rough), Some(room)) => {
             // The simulator refuses what lies outside; so must this.
             let is_inside = |p: DVec3| p.cmpgt(DVec3::ZERO).all() && p.cmplt(room.size_m).all();
             let places = meters.iter().map(|m| m.position_m).chain(scene.luminaires.iter().map(|l| l.position_m));
             let lux = || rough.lux(&room, &scene.luminaires, meters, bounces);
             places.into_iter().all(is_inside).then(lux)
         }
-        _ => solved(&scene, meters, task.transport),
+        _ => solved(&scene, meters, Transport::Indirect(bounces)),
     }
 }
 

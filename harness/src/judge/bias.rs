@@ -9,9 +9,8 @@ use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-use super::uncertainty::{Component, ErrorBudget, MANY, Source, upper_tail_of_normal};
+use super::uncertainty::{Component, ErrorBudget, Source, Standard, upper_tail_of_normal};
 use super::{Basis, Comparison, Judge};
 use crate::record::{ReadingKey, Uncertainty};
 
@@ -95,9 +94,7 @@ pub fn two_sided(z: f64, degrees_of_freedom: Option<f64>) -> f64 {
     if !z.is_finite() {
         return 0.0;
     }
-    let degrees_of_freedom = degrees_of_freedom.filter(|f| *f < MANY);
-    let student = degrees_of_freedom.and_then(|f| StudentsT::new(0.0, 1.0, f).ok());
-    2.0 * student.map_or_else(|| Normal::standard().sf(z.abs()), |t| t.sf(z.abs()))
+    2.0 * Standard::of(degrees_of_freedom).tail(z.abs())
 }
 
 impl Judge<'_> {

@@ -165,7 +165,7 @@ fn derived(judge: &Judge<'_>, task: &Task) -> Option<WitnessReadings> {
     const NAME: &str = "derived values";
     let published = judge.published?;
     let read = |target| {
-        let mut references = published.references(task, target, NAME).into_iter();
+        let mut references = published.references(task, target, NAME, &[]).into_iter();
         references.find(|r| r.basis != Basis::Published).map(|r| (r.value, r.uncertainty))
     };
     let readings: Vec<_> = task.targets.iter().map(read).collect();

@@ -141,13 +141,14 @@ impl Judge<'_> {
     /// at the family-wise level of all comparisons of its engine here.
     pub fn compare(&self, task: &Task, recordings: &[&Recording]) -> Vec<Comparison> {
         let input = self.published.map(|_| Input::of(task));
+        let misfits = self.published.map_or_else(Vec::new, |p| p.misfits(task));
         let mut comparisons = vec![];
         for recording in recordings {
             let mut family = vec![];
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.readings.get(k);
                 let engine = &recording.key.engine;
-                let printed = self.published.iter().flat_map(|p| p.references(task, target, engine));
+                let printed = self.published.iter().flat_map(|p| p.references(task, target, engine, &misfits));
                 let printed =
                     printed.map(|reference| ScoredReference::published(reference, input.as_ref(), target, reading));
                 let references: Vec<ScoredReference> =

@@ -180,19 +180,23 @@ impl Spread {
     }
 
     fn standard(&self) -> Standard {
-        let student = self.degrees_of_freedom.filter(|f| *f < MANY).and_then(|f| StudentsT::new(0.0, 1.0, f).ok());
-        student.map_or(Standard::Normal(Normal::standard()), Standard::Student)
+        Standard::of(self.degrees_of_freedom)
     }
 }
 
 /// The distribution of an error over its standard uncertainty.
-enum Standard {
+pub(super) enum Standard {
     Normal(Normal),
     Student(StudentsT),
 }
 
 impl Standard {
-    fn tail(&self, z: f64) -> f64 {
+    pub(super) fn of(degrees_of_freedom: Option<f64>) -> Self {
+        let student = degrees_of_freedom.filter(|f| *f < MANY).and_then(|f| StudentsT::new(0.0, 1.0, f).ok());
+        student.map_or(Self::Normal(Normal::standard()), Self::Student)
+    }
+
+    pub(super) fn tail(&self, z: f64) -> f64 {
         match self {
             Self::Normal(n) => n.sf(z),
             Self::Student(t) => t.sf(z),

@@ -44,9 +44,9 @@ fn accepted(check: &BaselineCheck) -> TestSuite {
 
 /// The engines that a project requires.
 fn required(report: &Report, policy: &PolicyRecord) -> TestSuite {
-    let mut suite = TestSuite::new(format!("policy {}", policy.file));
+    let (mut suite, lacking) = (TestSuite::new(format!("policy {}", policy.file)), report.lacking());
     for engine in &policy.required_engines {
-        let status = if report.lacking().contains(&(policy, engine)) {
+        let status = if lacking.contains(&(policy, engine)) {
             failure("no reading".to_owned(), format!("{engine} is required by {}", policy.file))
         } else {
             TestCaseStatus::success()

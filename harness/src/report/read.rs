@@ -39,15 +39,20 @@ struct Head {
 
 impl Report {
     pub fn from_json(text: &str) -> Result<ReadReport, ReportError> {
-        let Head { luxproof: found, tool_version: by } = serde_json::from_str(text).map_err(ReportError::Foreign)?;
-        let is_known = found == VERSION;
-        let report = serde_json::from_str(text).map_err(|source| {
-            if is_known { ReportError::Damaged(source) } else { ReportError::Version { found, by, source } }
-        })?;
+        let report: Self = serde_json::from_str(text).map_err(|source| Self::refusal(text, source))?;
+        let found = report.luxproof;
         let doubt = format!(
             "is a report of version {found} where this luxproof reads version {VERSION}: what it does not know it passes over"
         );
-        Ok(ReadReport { report, doubt: (!is_known).then_some(doubt) })
+        Ok(ReadReport { report, doubt: (found != VERSION).then_some(doubt) })
+    }
+
+    fn refusal(text: &str, source: serde_json::Error) -> ReportError {
+        match serde_json::from_str(text) {
+            Err(foreign) => ReportError::Foreign(foreign),
+            Ok(Head { luxproof: VERSION, .. }) => ReportError::Damaged(source),
+            Ok(Head { luxproof: found, tool_version: by }) => ReportError::Version { found, by, source },
+        }
     }
 }
 

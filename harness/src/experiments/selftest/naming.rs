@@ -66,9 +66,7 @@ struct Put {
 type Draw = fn(&[Task], &mut fastrand::Rng) -> Option<Put>;
 
 const KINDS: [(&str, bool, Draw); 16] = [
-    ("listed", true, |tasks, random| {
-        one_of(diagnosis::faults(&[tasks]), |f| f.parameters.is_empty() && !f.has_factor, random)
-    }),
+    ("listed", true, |tasks, random| one_of(diagnosis::faults(&[tasks]), diagnosis::Fault::is_plain, random)),
     ("bounces", true, |tasks, random| one_of(diagnosis::faults(&[tasks]), |f| f.id == "bounces-cut", random)),
     ("order of meters", true, |tasks, random| {
         let orders = ["reversed", "next", "previous", "exchanged"];
@@ -141,16 +139,14 @@ fn of_kind(tasks: &[Task], id: &str, random: &mut fastrand::Rng) -> Option<Put> 
 }
 
 fn two(tasks: &[Task], random: &mut fastrand::Rng) -> Option<Put> {
-    let is_meant = |f: &Fault| f.parameters.is_empty() && !f.has_factor && f.id != "dark";
-    let mut listed: Vec<Fault> = diagnosis::faults(&[tasks]).into_iter().filter(is_meant).collect();
+    let mut listed: Vec<Fault> = diagnosis::faults(&[tasks]).into_iter().filter(Fault::is_plain).collect();
     let one = listed.swap_remove(random.usize(..listed.len()));
     let other = listed.swap_remove(random.usize(..listed.len()));
     if one.about == other.about || one.id == other.id {
         return None;
     }
-    let both = one.and(&other);
-    let reads = move |m: &Model| both.readings(m, &[]).unwrap_or_else(|| m.right.clone());
-    Some(Put { parts: vec![(one, vec![]), (other, vec![])], reads: Box::new(reads) })
+    let both = put(one.and(&other), vec![]);
+    Some(Put { parts: vec![(one, vec![]), (other, vec![])], ..both })
 }
 
 fn scaled_power(right: &[f64], power: f64) -> Vec<f64> {

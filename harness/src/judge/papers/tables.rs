@@ -178,12 +178,19 @@ impl Published {
     ///
     /// The paper's own reference columns of a closed form judge every engine; every other column stands beside the
     /// readings of the engine that it names; both of the same luminaire model. A column at a fixed number of bounces is compared with readings at that number.
-    pub fn references(&self, task: &Task, target: &Target, engine: &str) -> Vec<Reference> {
+    /// What misfits cells of the task's table have is [`Self::misfits`].
+    pub(in crate::judge) fn references(
+        &self,
+        task: &Task,
+        target: &Target,
+        engine: &str,
+        misfits: &[Misfit],
+    ) -> Vec<Reference> {
         let Some(table) = self.tables.get(&task.procedure).filter(|t| t.quantity == task.quantity) else {
             return vec![];
         };
         let Some((k, row)) = table.rows.iter().find_position(|r| r.is_at(target)) else { return vec![] };
-        let (model, misfits) = (task.model(), self.misfits(task));
+        let model = task.model();
         // Derived values judge every engine, whatever they are of; a paper's those of the same luminaire model.
         let derived = self.citation.basis != Basis::Published;
         let closed_form = matches!(task.transport, Transport::Direct);
@@ -244,7 +251,7 @@ impl Published {
     }
 
     /// Cells of a task's table that do not fit; derived values rest on formulas, and not on one another.
-    pub(super) fn misfits(&self, task: &Task) -> Vec<Misfit> {
+    pub(in crate::judge) fn misfits(&self, task: &Task) -> Vec<Misfit> {
         let Some(table) = self.tables.get(&task.procedure).filter(|_| self.citation.basis == Basis::Published) else {
             return vec![];
         };

@@ -99,11 +99,12 @@ impl Trend {
     /// The drift that the nights before `end` show by more than so many steps.
     pub(super) fn drift(&self, end: usize, steps: usize) -> Option<Kink> {
         let points = self.tame(end);
-        let (kink, count) = (kink(&points, self.start)?, points.len() as f64);
+        let kink = kink(&points, self.start).filter(|kink| kink.slope.abs() > kink.half_width)?;
+        let count = points.len() as f64;
         let least = count * MIN_SPREAD.powi(2);
         let likelier = count * (residual_of_steps(&points, steps).max(least) / kink.residual.max(least)).ln();
         let more_parameters = 2.0 * (steps - 1) as f64;
-        (likelier + more_parameters * count.ln() > EVIDENCE && kink.slope.abs() > kink.half_width).then_some(kink)
+        (likelier + more_parameters * count.ln() > EVIDENCE).then_some(kink)
     }
 
     /// The line of a drift that is known to be one, by the nights before `end`.
