@@ -10,8 +10,6 @@ use super::Job;
 
 /// Of the last of the light's reflections little is left after so many, whatever the reflectance.
 const LONGEST: f64 = 100.0;
-/// Shadow rays towards an opening, as far as its parts are told apart.
-const PARTS: f64 = 10.0;
 /// Triangles of an empty room.
 const ROOM: f64 = 12.0;
 
@@ -27,8 +25,17 @@ pub(super) fn path_length(job: &Job) -> f64 {
 
 /// Of all surfaces of a room, by their areas.
 pub(super) fn mean_reflectance(room: &Room) -> f64 {
-    let over = |f: &dyn Fn(Surface) -> f64| Surface::ALL.iter().map(|&s| f(s)).sum::<f64>();
-    over(&|s| room.area_m2(s) * room.reflectance.of(s)) / over(&|s| room.area_m2(s))
+    by_area(room, |s| room.reflectance.of(s))
+}
+
+/// How much of a room's surfaces is not black, by area.
+pub(super) fn reflecting_share(room: &Room) -> f64 {
+    by_area(room, |s| if room.reflectance.of(s) > 0.0 { 1.0 } else { 0.0 })
+}
+
+fn by_area(room: &Room, of: impl Fn(Surface) -> f64) -> f64 {
+    let over = |f: &dyn Fn(Surface) -> f64| Surface::ALL.iter().map(|&s| room.area_m2(s) * f(s)).sum::<f64>();
+    over(&of) / over(&|_| 1.0)
 }
 
 /// What a ray takes against one in an empty room: as many more steps as the tree of triangles is deeper.
@@ -41,8 +48,8 @@ pub(super) fn a_ray(job: &Job) -> f64 {
     (ROOM + all).log2() / ROOM.log2()
 }
 
-/// Shadow rays to all luminaires.
-pub(super) fn shadow_rays(job: &Job) -> f64 {
-    let of_one = |model| if model == LuminaireModel::Point { 1.0 } else { PARTS };
+/// Shadow rays to all luminaires, so many of them to an opening.
+pub(super) fn shadow_rays(job: &Job, to_an_opening: f64) -> f64 {
+    let of_one = |model| if model == LuminaireModel::Point { 1.0 } else { to_an_opening };
     job.scene.luminaires.iter().map(|l| of_one(l.model)).sum()
 }

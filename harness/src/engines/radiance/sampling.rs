@@ -23,13 +23,18 @@ const PLAN_MARGIN: f64 = 1.5;
 const PLANNED_BLOCKS: usize = 2 * MIN_BLOCKS;
 const MAX_PARALLEL: usize = 8;
 
-/// Seconds that are counted for a ray and its shadow rays, and for a row where rtrace keeps its cache: on two cores of a
-/// usual server, half as much again as was measured there.
-const RAY_S: f64 = 3e-6;
+/// Seconds that are counted for a ray to a surface or a luminaire, and for a row where rtrace keeps its cache: on two cores of a
+/// usual server, half as much again as was measured there (2.6e-6 s of one core a ray, from 1.9 to 3.6 over the cases of reference/).
+const RAY_S: f64 = 2e-6;
 const CACHED_ROW_S: f64 = 5.0;
 
-/// Samples of an opening where direct light alone is read, for each of those within reflected light.
-const DIRECT_SAMPLES: f64 = 25.0;
+/// Seconds for a shadow ray where direct light alone is read, whose rays are much alike.
+const SHADOW_RAY_S: f64 = 1.5e-6;
+/// Parts of an opening that are told apart: within reflected light, and at most, as where direct light alone is read.
+const PARTS: f64 = 4.0;
+const MAX_PARTS: f64 = 64.0;
+/// Of the weight that a surface reflects, what rtrace parts.
+const KEPT_WEIGHT: f64 = 0.8;
 
 /// Which of a job's random numbers.
 #[derive(Clone, Copy)]
@@ -47,18 +52,19 @@ pub(super) struct Sampler<'a> {
     pub(super) rows: Vec<[f64; 6]>,
 }
 
-/// Direct light that is subtracted or is all that is asked for should add little to the error.
+/// Direct light that is subtracted should add little to the error.
 const DIRECT_ERROR: f64 = 0.3;
-/// Share of the time after which direct light is no longer sampled, whether or not its error is small enough.
+/// Share of the time after which it is no longer sampled, whether or not its error is small enough.
 const DIRECT_SHARE: f64 = 0.3;
 
 impl Sampler<'_> {
     /// Direct light of openings, whose samples are jittered; in one process a wave.
     pub(super) fn direct(&self, options: &Options) -> Result<Sampled, EngineError> {
         let Budget { relative_error, seconds } = self.job.budget;
-        let budget = Budget { relative_error: DIRECT_ERROR * relative_error, seconds: DIRECT_SHARE * seconds };
-        let samples = DIRECT_SAMPLES * self.rows.len() as f64 * effort::shadow_rays(self.job);
-        let rule = Sampling::within(budget, RAY_S * samples * effort::a_ray(self.job));
+        let (error, share) = if self.job.reflections().is_none() { (1.0, 1.0) } else { (DIRECT_ERROR, DIRECT_SHARE) };
+        let budget = Budget { relative_error: error * relative_error, seconds: share * seconds };
+        let rays = self.rows.len() as f64 * effort::shadow_rays(self.job, MAX_PARTS);
+        let rule = Sampling::within(budget, SHADOW_RAY_S * rays * effort::a_ray(self.job));
         rule.run(|numbers| self.process(&options.direct, Stream::Direct, &numbers))
     }
 
@@ -101,15 +107,26 @@ impl Sampler<'_> {
     }
 
     fn block_s(&self, divisions: u32) -> f64 {
-        let rays = f64::from(divisions) * self.rows.len() as f64 * self.path_length();
-        RAY_S * rays * (1.0 + effort::shadow_rays(self.job)) * effort::a_ray(self.job)
+        let (hits, reflecting) = self.hits();
+        let rays = hits + reflecting * effort::shadow_rays(self.job, PARTS);
+        RAY_S * f64::from(divisions) * self.rows.len() as f64 * rays * effort::a_ray(self.job)
     }
 
-    /// Reflections that a path is followed for in the mean: until its weight falls below the roulette's, and on by chance.
-    fn path_length(&self) -> f64 {
-        let mean = self.job.scene.room.map_or(0.0, |room| effort::mean_reflectance(&room)).clamp(0.01, 0.99);
-        let length = ROULETTE.ln() / mean.ln() + (1.0 - mean).recip();
-        length.min(f64::from(bounces(self.job)))
+    /// Surfaces that rays meet for each division in the mean, and those among them that are not black, which cast shadow rays: at
+    /// each, rtrace parts a ray of so much weight that its parts pass the roulette in as many (`doambient` in its ambient.c).
+    fn hits(&self) -> (f64, f64) {
+        let Some(room) = self.job.scene.room else { return (1.0, 0.0) };
+        let share = effort::reflecting_share(&room);
+        let reflectance = effort::mean_reflectance(&room) / share.max(f64::MIN_POSITIVE);
+        let (mut hits, mut rays, mut weight) = (0.0, 1.0, 1.0);
+        for _ in 0..bounces(self.job) {
+            hits += rays;
+            let parts = (KEPT_WEIGHT * reflectance * weight / ROULETTE).sqrt().round().max(1.0).powi(2);
+            let of_each = reflectance * weight / parts;
+            rays *= share * parts * (of_each / ROULETTE).min(1.0);
+            weight = of_each.max(ROULETTE);
+        }
+        (hits, share * hits)
     }
 
     /// A process a block: of the one, or where rtrace keeps its cache, the blocks would be alike.
