@@ -11,6 +11,7 @@ use crate::judge::{Comparison, Judge, LOOKS, Source, Verdict};
 use crate::measure::Cost;
 use crate::procedures::Task;
 use crate::record::{Estimate, Reading, Recording, Uncertainty};
+use crate::report::words::rounded;
 use crate::spec::Budget;
 
 /// All looks together take so many times the effort of the first, where that is as accurate as the spec asks; where it is coarser, so many
@@ -157,7 +158,8 @@ pub fn estimate_remaining_cost(comparisons: &mut [Comparison]) {
             let others = "its other uncertainties alone straddle the tolerance";
             format!("undecided, and more samples of {engine} would not help: {others}")
         } else {
-            format!("undecided: needs about {:.1} times the samples of {engine}", times.max(1.1))
+            let times = rounded(times.max(1.1), 2).unwrap_or(times);
+            format!("undecided: needs about {times} times the samples of {engine}")
         };
         comparison.diagnosis.get_or_insert(text);
     }

@@ -9,6 +9,7 @@ use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, Gamma};
 
 use super::uncertainty::{Component, ErrorBudget, Source, Standard, upper_tail_of_normal};
 use super::{Basis, Comparison, Judge};
@@ -32,6 +33,35 @@ pub struct Bias {
     pub high: f64,
     /// How probable a mean this far off is where there is no bias; null without uncertainties.
     pub p_value: Option<f64>,
+    /// How the deviations scatter over the meters; null without uncertainties.
+    pub scatter: Option<Scatter>,
+}
+
+/// Scatter of deviations about their mean, against the uncertainties that are stated of them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Scatter {
+    /// Root of the mean square of deviations in units of their uncertainties, the Birge ratio.
+    pub ratio: f64,
+    /// How probable so large a ratio is where the uncertainties are right and the deviation is one for all meters; null where
+    /// uncertainties are known by four degrees of freedom or fewer.
+    pub p_value: Option<f64>,
+}
+
+impl Scatter {
+    /// Of a sum of squares that are so many freely, each of a deviation over its uncertainty. Where uncertainties are known by few
+    /// degrees of freedom the squares are those of Student's t, whose sum has about a gamma distribution of the same mean and variance.
+    fn of(squares: f64, free: f64, degrees_of_freedom: impl Iterator<Item = Option<f64>>) -> Self {
+        let (mut mean, mut variance, mut count) = (0.0, 0.0, 0.0);
+        for freedom in degrees_of_freedom {
+            let n = freedom.unwrap_or(f64::INFINITY).min(MANY);
+            mean += n / (n - 2.0);
+            variance += if n > 4.0 { 2.0 * n * n * (n - 1.0) / ((n - 2.0).powi(2) * (n - 4.0)) } else { f64::NAN };
+            count += 1.0;
+        }
+        let (mean, variance) = (mean * free / count, variance * free / count);
+        let gamma = Gamma::new(mean * mean / variance, mean / variance);
+        Self { ratio: (squares / free).sqrt(), p_value: gamma.ok().map(|g| g.sf(squares)).filter(|p| p.is_finite()) }
+    }
 }
 
 impl fmt::Display for Bias {
@@ -39,8 +69,12 @@ impl fmt::Display for Bias {
         let [mean, low, high] = [self.mean, self.low, self.high].map(|x| 100.0 * x);
         write!(f, "{mean:+.3} % [{low:+.3}, {high:+.3}]")?;
         match self.p_value {
-            Some(p) => write!(f, ", p = {p:.2}"),
-            None => write!(f, ", range of {}", self.readings),
+            Some(p) => write!(f, ", p = {p:.2}")?,
+            None => write!(f, ", range of {}", self.readings)?,
+        }
+        match self.scatter {
+            Some(Scatter { ratio, p_value: Some(p) }) => write!(f, "; scatter {ratio:.2} of what is stated, p = {p:.2}"),
+            _ => Ok(()),
         }
     }
 }
@@ -52,8 +86,11 @@ pub struct WeightedMean {
     /// Standard.
     pub uncertainty: f64,
     pub degrees_of_freedom: Option<f64>,
+    pub scatter: Scatter,
 }
 
+/// From so many degrees of freedom on, Student's t is the normal distribution.
+const MANY: f64 = 1e6;
 /// Meier's term is the first of a series in 1 / degrees of freedom: simulated up to 192 meters, it is too small for fewer than these.
 const FEWEST_FOR_WEIGHTS: f64 = 7.0;
 
@@ -66,15 +103,15 @@ impl WeightedMean {
         }
         let weights: f64 = values.iter().map(|(_, u, _)| u.powi(-2)).sum();
         let value = values.iter().map(|(d, u, _)| d * u.powi(-2)).sum::<f64>() / weights;
-        let scatter = values.iter().map(|(d, u, _)| ((d - value) / u).powi(2)).sum::<f64>();
-        let birge = scatter / (values.len() - 1) as f64;
+        let squares = values.iter().map(|(d, u, _)| ((d - value) / u).powi(2)).sum::<f64>();
+        let scatter = Scatter::of(squares, (values.len() - 1) as f64, values.iter().map(|(_, _, freedom)| *freedom));
         // Shares of the mean with the degrees of freedom that each is known by.
         let shares = || values.iter().filter_map(|(_, u, freedom)| Some((u.powi(-2) / weights, (*freedom)?)));
         let fewest = shares().map(|(_, freedom)| freedom).reduce(f64::min);
         let meier = 1.0 + 4.0 * shares().map(|(share, freedom)| share * (1.0 - share) / freedom).sum::<f64>();
         let all = shares().map(|(share, freedom)| share * share / freedom).sum::<f64>().recip();
         let degrees_of_freedom = fewest.map(|fewest| if fewest < FEWEST_FOR_WEIGHTS { fewest } else { all });
-        let mean = Self { value, uncertainty: (birge.max(meier) / weights).sqrt(), degrees_of_freedom };
+        let mean = Self { value, uncertainty: (scatter.ratio.powi(2).max(meier) / weights).sqrt(), degrees_of_freedom, scatter };
         let is_number = value.is_finite() && mean.uncertainty.is_finite() && mean.uncertainty > 0.0;
         is_number.then_some(mean)
     }
@@ -126,11 +163,11 @@ fn of_group(key: &ReadingKey, basis: Basis, all: &[Deviation], tail: f64) -> Opt
     // What states no uncertainty would outweigh everything.
     let stated = all.iter().filter(|d| d.uncertainty > SINGLE_PRECISION);
     let stated: Vec<_> = stated.map(|d| (d.relative, d.uncertainty, d.degrees_of_freedom)).collect();
-    let (mean, low, high, p_value) = match WeightedMean::of(&stated) {
+    let (mean, low, high, of_stated) = match WeightedMean::of(&stated) {
         Some(mean) if stated.len() == all.len() => {
             let spread = Component::normal(Source::MonteCarlo, mean.uncertainty, mean.degrees_of_freedom);
             let expanded = ErrorBudget::new(vec![spread], tail).expanded;
-            (mean.value, mean.value - expanded, mean.value + expanded, Some(mean.p_value()))
+            (mean.value, mean.value - expanded, mean.value + expanded, Some((mean.p_value(), mean.scatter)))
         }
         _ => {
             let deviations = || all.iter().map(|d| d.relative);
@@ -139,7 +176,8 @@ fn of_group(key: &ReadingKey, basis: Basis, all: &[Deviation], tail: f64) -> Opt
         }
     };
     let are_numbers = [mean, low, high].iter().all(|v| v.is_finite());
-    are_numbers.then(|| Bias { key: key.clone(), basis, readings: all.len(), mean, low, high, p_value })
+    let (p_value, scatter) = of_stated.unzip();
+    are_numbers.then(|| Bias { key: key.clone(), basis, readings: all.len(), mean, low, high, p_value, scatter })
 }
 
 #[cfg(test)]
@@ -177,6 +215,34 @@ mod tests {
         let (honest, bold) = (bias(&noisy(0.003, 0.004, 1)), bias(&noisy(0.003, 0.0004, 1)));
         let width = |b: &Bias| b.high - b.low;
         assert!((width(&bold) / width(&honest) - 1.0).abs() < 0.3, "{honest} {bold}");
+    }
+
+    /// How often, of 2,000 times, the scatter of so many right readings is called this improbable.
+    fn alarms(readings: usize, blocks: usize, below: f64) -> usize {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut improbable = || {
+            let mut block = || 1.0 + 0.02 * normal(&mut random);
+            let mut reading = || Estimate::of_samples(&(0..blocks).map(|_| block()).collect::<Vec<f64>>());
+            let values: Vec<_> = (0..readings)
+                .map(|_| reading())
+                .filter_map(|e| Some((e.value, e.uncertainty.standard_error()?, e.uncertainty.degrees_of_freedom())))
+                .collect();
+            WeightedMean::of(&values).and_then(|m| m.scatter.p_value).is_some_and(|p| p < below)
+        };
+        (0..2000).filter(|_| improbable()).count()
+    }
+
+    #[test]
+    fn scatter_over_meters_is_improbable_as_rarely_as_it_says_and_too_small_errors_show() {
+        for (readings, blocks) in [(4, 8), (14, 8), (77, 8), (4, 16), (14, 16), (77, 16), (14, 200)] {
+            let found = [0.05, 0.01, 0.001].map(|below| alarms(readings, blocks, below));
+            eprintln!("{readings} {blocks} {found:?}");
+            assert!(found[0] <= 150 && found[1] <= 40, "{readings} readings of {blocks} blocks: {found:?}");
+        }
+        let scatter = |stated| bias(&noisy(0.003, stated, 1)).scatter.unwrap();
+        let (honest, bold) = (scatter(0.004), scatter(0.004 / 3.0));
+        assert!((honest.ratio - 1.0).abs() < 0.2 && honest.p_value.unwrap() > 0.01, "{honest:?}");
+        assert!((bold.ratio - 3.0).abs() < 0.6 && bold.p_value.unwrap() < 1e-6, "{bold:?}");
     }
 
     #[test]
