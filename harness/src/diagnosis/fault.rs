@@ -23,6 +23,8 @@ pub struct Fault {
     pub parameters: Vec<Parameter>,
     /// Whether everything is besides as bright as it may be: a parameter, too, the last.
     pub has_factor: bool,
+    /// Whether it reflects light in a task of direct light, which is then no cheaper than others.
+    pub reflects: bool,
     pub change: Change,
 }
 
@@ -45,8 +47,8 @@ impl Fault {
         change: impl Fn(&mut Wrong, &[f64]) -> bool + Send + Sync + 'static,
     ) -> Self {
         let parameters = vec![];
-        let about = id.to_owned();
-        Self { id, what: what.into(), about, case: None, parameters, has_factor: false, change: Arc::new(change) }
+        let (about, what, change) = (id.to_owned(), what.into(), Arc::new(change));
+        Self { id, what, about, case: None, parameters, has_factor: false, reflects: false, change }
     }
 
     #[must_use]
@@ -69,6 +71,11 @@ impl Fault {
         Self { has_factor: true, ..self }
     }
 
+    #[must_use]
+    pub fn that_reflects(self) -> Self {
+        Self { reflects: true, ..self }
+    }
+
     /// This one and then another.
     #[must_use]
     pub fn and(&self, then: &Self) -> Self {
@@ -86,6 +93,7 @@ impl Fault {
             case,
             parameters: vec![],
             has_factor: self.has_factor || then.has_factor,
+            reflects: self.reflects || then.reflects,
             change: Arc::new(both),
         }
     }
@@ -101,17 +109,16 @@ impl Fault {
 
     /// What a task reads with it, the free factor left out; nothing where it is not in this task, or nobody can say.
     pub fn readings(&self, model: &Model, parameters: &[f64]) -> Option<Vec<f64>> {
-        self.predicted(model, parameters, Fidelity::Fine)
+        model.readings(&self.wrong(model, parameters)?, Fidelity::Fine)
     }
 
-    pub fn predicted(&self, model: &Model, parameters: &[f64], fidelity: Fidelity) -> Option<Vec<f64>> {
+    /// What an engine with it takes a task for; nothing where it is not in this task.
+    pub fn wrong(&self, model: &Model, parameters: &[f64]) -> Option<Wrong> {
         if self.case.is_some_and(|case| case != model.case) {
             return None;
         }
         let mut wrong = Wrong::new(&model.task);
-        let is_there = (self.change)(&mut wrong, parameters);
-        let readings = model.readings(&wrong, fidelity).filter(|_| is_there)?;
-        readings.iter().all(|r| r.is_finite()).then_some(readings)
+        (self.change)(&mut wrong, parameters).then_some(wrong)
     }
 
     /// Its words, with numbers and their standard errors.

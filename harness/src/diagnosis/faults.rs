@@ -210,7 +210,8 @@ fn of_light() -> Vec<Fault> {
                 wrong.transport(Transport::Total(Bounces::Converged));
             }
             is_there
-        }),
+        })
+        .that_reflects(),
         Fault::new("meter-flipped", "meters face the other way", |wrong, _| {
             wrong.meters(|m| m.normal = -m.normal);
             true

@@ -4,7 +4,8 @@
 //! A fault explains readings where chi-squared of what is left is as small as chance makes it; a free parameter costs
 //! what Schwarz's criterion (Ann. Statist. 6, 1978) asks for it. It must hold in every procedure and case of the
 //! engine in which it would show, calibration included, whether that fails or passes. Where up to three explain them
-//! equally well all are named, and where none does or more do, nothing is said.
+//! equally well all are named, and where none does or more do, nothing is said; nor where the work that a search may
+//! be runs out before all of a kind are tried.
 
 mod cause;
 mod fault;
@@ -22,6 +23,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::judge::{Basis, Comparison, Verdict};
 use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId};
+use crate::system::process;
 
 pub use cause::Cause;
 pub use fault::{Fault, Parameter, shows};
@@ -78,7 +80,7 @@ pub fn explain(cases: &mut [Examined<'_>]) -> Vec<Vec<Cause>> {
             (0..cases.len()).partition(|k| failing[*k].contains(subject));
         beside.retain(|k| cases[*k].comparisons.iter().any(|c| cases[*k].subject(c) == *subject));
         beside.sort_by_key(|k| !cases[*k].tasks.iter().all(|t| t.procedure.is_known()));
-        for together in mine.chunks(CASES_TOGETHER) {
+        for together in mine.chunks(CASES_TOGETHER).take_while(|_| !process::is_interrupted()) {
             let chosen: Vec<usize> = together.iter().chain(beside.iter().take(CASES_BESIDE)).copied().collect();
             all.extend(explain_subject(cases, &chosen, subject));
         }

@@ -3,9 +3,12 @@
 //!
 //! An explanation is held against everything that its engine read. It is admissible where it leaves no more than
 //! chance in one failing sheet at least, and in every other sheet that it changes no more than an engine may be off.
+//!
+//! What may be spent on a search is limited, in work that is counted. What is left untried might explain readings as
+//! well as what was found: where the limit is reached, the stage that reached it says nothing, nor do those after it.
 
-use std::cell::Cell;
-use std::collections::{BTreeMap, HashMap};
+use std::cell::{Cell, RefCell};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use itertools::Itertools;
 use parking_lot::Mutex;
@@ -16,7 +19,7 @@ use super::faults::{FACTOR, faults};
 use super::fit::{Fitted, fit, sum_of_squares};
 use super::kinds::kinds;
 use super::sheet::{Sheet, Stand, is_chance};
-use super::wrong::{Fidelity, Model};
+use super::wrong::{Fidelity, Model, Work, Wrong};
 use crate::procedures::Task;
 use crate::system::process;
 
@@ -28,8 +31,10 @@ const MAX_RIVALS: usize = 3;
 const SEEN: f64 = 3.0;
 /// What two faults cost besides their parameters: twice the logarithm of how many pairs there are, about.
 const PAIR: f64 = 12.0;
-/// Solutions of reflected light that fits and pairs may take for one engine: rough and fine.
-const SOLUTIONS: [usize; 2] = [3000, 60];
+/// What explaining one engine may cost: ten seconds of a core or so.
+const LIMIT: u64 = 60_000_000;
+/// Readings of a sheet that kinds are fitted to at first: more tell hardly more of a few parameters.
+const FEW: usize = 40;
 /// Fits that are made with what the simulator has at the last one's parameters.
 const REFINED: usize = 2;
 /// Starts of a fit that are followed up, the best first.
@@ -40,42 +45,82 @@ pub struct Bench {
     pub models: Vec<Model>,
     pub listed: Vec<Fault>,
     kinds: Vec<Fault>,
-    /// By listed fault and model.
-    predicted: Mutex<HashMap<(usize, usize, bool), Predicted>>,
+    /// By listed fault and model, with what it cost.
+    predicted: Mutex<HashMap<OfListed, (Work, Predicted)>>,
 }
 
 type Predicted = Option<Vec<f64>>;
+/// A listed fault, a model, and whether its reflected light is the simulator's.
+type OfListed = (usize, usize, bool);
+/// A place in a search, whether all its readings count, whether reflected light is the simulator's, and parameters.
+type OfKind = (usize, bool, bool, Vec<u64>);
 
 impl Bench {
     pub fn new(cases: &[&[Task]], models: Vec<Model>) -> Self {
         Self { models, listed: faults(cases), kinds: kinds(cases), predicted: Mutex::default() }
     }
 
-    /// Without parameters, or with a free factor that is left out.
-    fn of_listed(&self, fault: usize, model: usize, fidelity: Fidelity) -> Predicted {
-        let key = (fault, model, fidelity == Fidelity::Fine && !self.models[model].is_cheap());
-        if let Some(known) = self.predicted.lock().get(&key) {
-            return known.clone();
-        }
-        let found = self.listed[fault].predicted(&self.models[model], &[], fidelity);
-        self.predicted.lock().insert(key, found.clone());
-        found
-    }
-
     /// What explains the failing sheets of one engine, the best first, sheet by sheet.
     pub fn causes(&self, sheets: &[Sheet]) -> Vec<Vec<Cause>> {
-        let rough: Vec<Sheet> = sheets.iter().map(Sheet::roughly).collect();
-        Search { bench: self, sheets, rough: &rough, left: SOLUTIONS.map(Cell::new) }.causes()
+        let (models, few) = self.at_few(sheets);
+        let rough = |sheets: &[Sheet]| sheets.iter().map(Sheet::roughly).collect();
+        let all = Desk { models: &self.models, sheets, rough: rough(sheets), is_all: true };
+        let few = Desk { models: &models, sheets: &few, rough: rough(&few), is_all: false };
+        let few = if few.sheets.is_empty() { &all } else { &few };
+        let (solved, asked, known) = Default::default();
+        Search {
+            bench: self,
+            sheets,
+            all: &all,
+            few,
+            left: Cell::new(LIMIT),
+            is_out: Cell::new(false),
+            solved,
+            asked,
+            known,
+        }
+        .causes()
     }
+
+    /// Sheets of few readings each, from end to end of what there are, with their models; none where that leaves none out.
+    fn at_few(&self, sheets: &[Sheet]) -> (Vec<Model>, Vec<Sheet>) {
+        if sheets.iter().all(|sheet| sheet.read.len() <= FEW) {
+            return Default::default();
+        }
+        let some = |(k, sheet): (usize, &Sheet)| {
+            let (count, kept) = (sheet.read.len(), sheet.read.len().min(FEW));
+            let places: Vec<usize> = (0..kept).map(|place| place * count / kept).collect();
+            (self.models[sheet.model].at(&places), sheet.at(&places, k))
+        };
+        sheets.iter().enumerate().map(some).unzip()
+    }
+}
+
+/// Sheets with their models.
+struct Desk<'a> {
+    models: &'a [Model],
+    sheets: &'a [Sheet],
+    /// The same for rough predictions.
+    rough: Vec<Sheet>,
+    /// Whether all readings are on it.
+    is_all: bool,
 }
 
 struct Search<'a> {
     bench: &'a Bench,
     sheets: &'a [Sheet],
-    /// The same for rough predictions.
-    rough: &'a [Sheet],
-    /// Solutions of reflected light that are left: rough and fine.
-    left: [Cell<usize>; 2],
+    all: &'a Desk<'a>,
+    /// What fits are made with first.
+    few: &'a Desk<'a>,
+    /// Work that is left.
+    left: Cell<u64>,
+    is_out: Cell<bool>,
+    /// What is right and solved for already, by model, whether all its readings count, and fidelity.
+    solved: RefCell<HashSet<(usize, bool, bool)>>,
+    /// Predictions that are paid for, whoever had them made before: the same search always ends at the same place.
+    asked: RefCell<HashSet<OfListed>>,
+    /// What the fault predicts that is being fitted.
+    known: RefCell<HashMap<OfKind, Predicted>>,
 }
 
 /// What a sheet's task reads with a fault, where it shows.
@@ -103,6 +148,9 @@ impl Search<'_> {
                 break;
             }
             let found = stage(self, &open);
+            if self.is_spent() {
+                break;
+            }
             Self::settle(&found, &mut open, &mut causes);
         }
         causes
@@ -124,15 +172,16 @@ impl Search<'_> {
     fn of_listed(&self, index: usize) -> Option<Held> {
         let fault = &self.bench.listed[index];
         if !fault.parameters.is_empty() {
-            return self.of_kind(fault);
+            // Of the readings that are cut off none may be among a few.
+            return self.of_kind(fault, self.all);
         }
-        let predict = |sheet: usize, fidelity| self.bench.of_listed(index, self.sheets[sheet].model, fidelity);
+        let predict = |sheet: usize, fidelity| self.listed_at(index, sheet, fidelity);
         self.weighed(fault, &predict)
     }
 
     fn fitted(&self, open: &[usize]) -> Vec<Held> {
         let concerns = |fault: &&Fault| fault.case.is_none_or(|case| open.iter().any(|k| self.sheets[*k].case == case));
-        self.bench.kinds.iter().filter(concerns).filter_map(|fault| self.of_kind(fault)).collect()
+        self.bench.kinds.iter().filter(concerns).filter_map(|fault| self.of_kind(fault, self.few)).collect()
     }
 
     /// A known fault that is as bright as it may be besides.
@@ -142,8 +191,8 @@ impl Search<'_> {
             let fault = self.bench.listed[f].clone().as_bright_as_you_like();
             let predict = |sheet: usize, fidelity| {
                 // A factor shows where the fault does not.
-                let model = self.sheets[sheet].model;
-                self.bench.of_listed(f, model, fidelity).or_else(|| Some(self.bench.models[model].right.clone()))
+                let right = || Some(self.bench.models[self.sheets[sheet].model].right.clone());
+                self.listed_at(f, sheet, fidelity).or_else(right)
             };
             let mut held = self.weighed(&fault, &predict)?;
             let (factor, error) = *held.cause.parameters.last()?;
@@ -161,7 +210,7 @@ impl Search<'_> {
             if f.about != FACTOR || f.has_factor {
                 return None;
             }
-            let mut wrong = super::wrong::Wrong::new(&self.bench.models.first()?.task);
+            let mut wrong = Wrong::new(&self.bench.models.first()?.task);
             (f.change)(&mut wrong, &[]);
             let near = (wrong.factor - factor).abs() <= SEEN * error + 1e-3 * factor;
             near.then(|| f.what.clone())
@@ -170,66 +219,124 @@ impl Search<'_> {
     }
 
     fn pairs(&self, _open: &[usize]) -> Vec<Held> {
-        let is_alone = |f: &&Fault| f.about != FACTOR && f.is_plain();
+        let is_alone = |f: &&Fault| f.about != FACTOR && f.is_plain() && !f.reflects;
         let alone: Vec<&Fault> = self.bench.listed.iter().filter(is_alone).collect();
         let two = |[one, other]: [&&Fault; 2]| {
             let differ = one.id != other.id && one.about != other.about;
             let meet = one.case.is_none_or(|c| other.case.is_none_or(|d| c == d));
             let both = (differ && meet).then(|| one.and(other))?;
-            let mut held = self.weighed(&both, &|sheet, fidelity| self.anew(&both, &[], sheet, fidelity))?;
+            let mut held = self.weighed(&both, &|sheet, fidelity| self.anew(self.all, &both, &[], sheet, fidelity))?;
             held.cause.score += PAIR;
             Some(held)
         };
         alone.iter().array_combinations().filter_map(two).collect()
     }
 
-    /// What a sheet's task reads with a fault, as long as there are solutions left.
-    fn anew(&self, fault: &Fault, parameters: &[f64], sheet: usize, fidelity: Fidelity) -> Option<Vec<f64>> {
-        let sheet = &self.sheets[sheet];
-        if !sheet.is_cheap && fault.case.is_none_or(|case| case == sheet.case) {
-            let left = &self.left[usize::from(fidelity == Fidelity::Fine)];
-            left.set(left.get().saturating_sub(1));
-            if left.get() == 0 {
-                return None;
-            }
+    /// What a sheet's task reads with a listed fault: without parameters, or with a free factor that is left out.
+    fn listed_at(&self, fault: usize, sheet: usize, fidelity: Fidelity) -> Predicted {
+        let (bench, model) = (self.bench, self.sheets[sheet].model);
+        let is_fine = fidelity == Fidelity::Fine && !self.is_cheap(&bench.listed[fault], sheet);
+        let key = (fault, model, is_fine);
+        let is_new = self.asked.borrow_mut().insert(key);
+        let known = bench.predicted.lock().get(&key).cloned();
+        if let Some((work, found)) = known {
+            return if is_new && !self.takes(self.all, model, is_fine, work) { None } else { found };
         }
-        fault.predicted(&self.bench.models[sheet.model], parameters, fidelity)
+        let wrong = bench.listed[fault].wrong(&bench.models[model], &[]);
+        let work = wrong.as_ref().map_or_else(Work::default, |w| bench.models[model].work(w, fidelity));
+        if !self.takes(self.all, model, is_fine, work) {
+            return None;
+        }
+        let found = wrong.and_then(|w| bench.models[model].readings(&w, fidelity));
+        bench.predicted.lock().insert(key, (work, found.clone()));
+        found
+    }
+
+    /// What a sheet's task reads with a fault.
+    fn anew(&self, desk: &Desk<'_>, fault: &Fault, parameters: &[f64], sheet: usize, fidelity: Fidelity) -> Predicted {
+        let place = desk.sheets[sheet].model;
+        let model = &desk.models[place];
+        let wrong = fault.wrong(model, parameters)?;
+        let is_fine = fidelity == Fidelity::Fine && !self.is_cheap(fault, sheet);
+        let may = self.takes(desk, place, is_fine, model.work(&wrong, fidelity));
+        if may { model.readings(&wrong, fidelity) } else { None }
+    }
+
+    /// The same of the fault that is being fitted, which is asked for again and again.
+    fn fitting(
+        &self,
+        desk: &Desk<'_>,
+        fault: &Fault,
+        parameters: &[f64],
+        sheet: usize,
+        fidelity: Fidelity,
+    ) -> Predicted {
+        let is_fine = fidelity == Fidelity::Fine && !self.is_cheap(fault, sheet);
+        let key = (sheet, desk.is_all, is_fine, parameters.iter().map(|p| p.to_bits()).collect());
+        if let Some(found) = self.known.borrow().get(&key) {
+            return found.clone();
+        }
+        let found = self.anew(desk, fault, parameters, sheet, fidelity);
+        self.known.borrow_mut().insert(key, found.clone());
+        found
+    }
+
+    /// Whether a prediction takes no time worth speaking of.
+    fn is_cheap(&self, fault: &Fault, sheet: usize) -> bool {
+        self.sheets[sheet].is_cheap && !fault.reflects
+    }
+
+    /// Pays for a prediction; says whether it can be paid for.
+    fn takes(&self, desk: &Desk<'_>, model: usize, is_fine: bool, work: Work) -> bool {
+        let is_new = work.right > 0 && self.solved.borrow_mut().insert((model, desk.is_all, is_fine));
+        let cost = work.wrong + if is_new { work.right } else { 0 };
+        if self.is_spent() || cost > self.left.get() {
+            self.is_out.set(true);
+            return false;
+        }
+        self.left.set(self.left.get() - cost);
+        true
     }
 
     fn is_spent(&self) -> bool {
-        process::is_interrupted() || self.left.iter().any(|left| left.get() == 0)
+        self.is_out.get() || process::is_interrupted()
     }
 
     /// Fits the parameters of a fault, roughly first, and to what the simulator has where that does not rule it out.
-    fn of_kind(&self, fault: &Fault) -> Option<Held> {
+    fn of_kind(&self, fault: &Fault, first: &Desk<'_>) -> Option<Held> {
+        self.known.borrow_mut().clear();
         let concerned = |k: &usize| fault.case.is_none_or(|case| self.sheets[*k].case == case);
         let order: Vec<usize> = self.order().into_iter().filter(concerned).collect();
         let mut starts = self.starts(fault);
         let cheap: Vec<usize> = order.iter().copied().filter(|k| self.sheets[*k].is_cheap).collect();
+        let mut fitted_to = None;
         for among in [&cheap, &order] {
-            let touched = self.touched(fault, &starts[0], among);
-            if !touched.iter().any(|k| self.sheets[*k].fails) {
+            let touched = self.touched(first, fault, &starts[0], among);
+            if !touched.iter().any(|k| self.sheets[*k].fails) || fitted_to.as_ref() == Some(&touched) {
                 continue;
             }
-            let fitted = self.best(fault, &starts, &touched, None)?;
-            let values = fitted.values();
+            let values = self.best(first, fault, &starts, &touched, None)?.values();
             let refuted = |k: &usize| {
-                let predicted = self.anew(fault, &values, *k, Fidelity::Rough);
-                predicted.is_none_or(|p| matches!(self.rough[*k].stand(&p), Stand::Contradicted(_)))
+                let predicted = self.fitting(first, fault, &values, *k, Fidelity::Rough);
+                let sheets = if self.sheets[*k].is_cheap { first.sheets } else { &first.rough };
+                predicted.is_none_or(|p| matches!(sheets[*k].stand(&p), Stand::Contradicted(_)))
             };
             if touched.iter().any(refuted) {
                 return None;
             }
             starts = vec![values];
+            fitted_to = Some(touched);
         }
-        let touched = self.touched(fault, &starts[0], &order);
-        let mut fitted = self.best(fault, &starts, &touched, None)?;
+        // What changes nothing that fails explains nothing.
+        fitted_to?;
+        let touched = self.touched(self.all, fault, &starts[0], &order);
+        let mut fitted = self.best(self.all, fault, &starts, &touched, None)?;
         if touched.iter().any(|k| !self.sheets[*k].is_cheap) {
             for _ in 0..REFINED {
                 let from = fitted.values();
                 let corrections =
                     touched.iter().map(|k| self.correction(fault, &from, *k)).collect::<Option<Vec<_>>>()?;
-                fitted = self.best(fault, &[from], &touched, Some(&corrections))?;
+                fitted = self.best(self.all, fault, &[from], &touched, Some(&corrections))?;
             }
         }
         let is_off = |((value, error), parameter): (&(f64, f64), &Parameter)| {
@@ -240,14 +347,15 @@ impl Search<'_> {
             return None;
         }
         let values = fitted.values();
-        let held = self.weighed(fault, &|sheet, fidelity| self.anew(fault, &values, sheet, fidelity))?;
+        let predict = |sheet: usize, fidelity| self.fitting(self.all, fault, &values, sheet, fidelity);
+        let held = self.weighed(fault, &predict)?;
         Some(Self::with_parameters(held, fault, fitted.parameters))
     }
 
     /// What the simulator has over the rough prediction, reading by reading.
     fn correction(&self, fault: &Fault, at: &[f64], sheet: usize) -> Option<Vec<f64>> {
-        let fine = self.anew(fault, at, sheet, Fidelity::Fine)?;
-        let rough = self.anew(fault, at, sheet, Fidelity::Rough)?;
+        let fine = self.fitting(self.all, fault, at, sheet, Fidelity::Fine)?;
+        let rough = self.fitting(self.all, fault, at, sheet, Fidelity::Rough)?;
         Some(fine.iter().zip(&rough).map(|(f, r)| if *r > 0.0 { f / r } else { 1.0 }).collect())
     }
 
@@ -276,7 +384,7 @@ impl Search<'_> {
     }
 
     /// The sheets that parameters beside `at` change.
-    fn touched(&self, fault: &Fault, at: &[f64], among: &[usize]) -> Vec<usize> {
+    fn touched(&self, desk: &Desk<'_>, fault: &Fault, at: &[f64], among: &[usize]) -> Vec<usize> {
         let beside: Vec<f64> = at
             .iter()
             .zip(&fault.parameters)
@@ -286,9 +394,8 @@ impl Search<'_> {
             })
             .collect();
         let changes = |k: &usize| {
-            let sheet = &self.sheets[*k];
-            let wrong = self.anew(fault, &beside, *k, Fidelity::Rough);
-            wrong.is_some_and(|w| w.iter().zip(&sheet.right).any(|(w, r)| (w - r).abs() > 1e-5 * r))
+            let wrong = self.fitting(desk, fault, &beside, *k, Fidelity::Rough);
+            wrong.is_some_and(|w| w.iter().zip(&desk.sheets[*k].right).any(|(w, r)| (w - r).abs() > 1e-5 * r))
         };
         among.iter().copied().filter(changes).collect()
     }
@@ -296,12 +403,13 @@ impl Search<'_> {
     /// The best fit from any start.
     fn best(
         &self,
+        desk: &Desk<'_>,
         fault: &Fault,
         starts: &[Vec<f64>],
         sheets: &[usize],
         corrections: Option<&[Vec<f64>]>,
     ) -> Option<Fitted> {
-        let mut residuals = |parameters: &[f64]| self.residuals(fault, parameters, sheets, corrections);
+        let mut residuals = |parameters: &[f64]| self.residuals(desk, fault, parameters, sheets, corrections);
         let mut tried: Vec<(f64, &Vec<f64>)> = match starts {
             [one] => vec![(0.0, one)],
             _ => starts.iter().filter_map(|s| Some((sum_of_squares(&residuals(s)?), s))).collect(),
@@ -313,6 +421,7 @@ impl Search<'_> {
 
     fn residuals(
         &self,
+        desk: &Desk<'_>,
         fault: &Fault,
         parameters: &[f64],
         sheets: &[usize],
@@ -320,11 +429,11 @@ impl Search<'_> {
     ) -> Option<Vec<f64>> {
         let mut residuals = vec![];
         for (place, &k) in sheets.iter().enumerate() {
-            let mut predicted = self.anew(fault, parameters, k, Fidelity::Rough)?;
+            let mut predicted = self.fitting(desk, fault, parameters, k, Fidelity::Rough)?;
             if let Some(corrections) = corrections {
                 predicted.iter_mut().zip(&corrections[place]).for_each(|(p, c)| *p *= c);
             }
-            residuals.extend(self.sheets[k].residuals(&predicted));
+            residuals.extend(desk.sheets[k].residuals(&predicted));
         }
         Some(residuals)
     }
@@ -341,10 +450,15 @@ impl Search<'_> {
         let mut predicted: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
         let mut factor = (1.0, 0.0);
         for (is_cheap, fidelity) in [(true, Fidelity::Fine), (false, Fidelity::Rough), (false, Fidelity::Fine)] {
-            let sheets = if fidelity == Fidelity::Fine { self.sheets } else { self.rough };
-            for k in order.iter().copied().filter(|k| self.sheets[*k].is_cheap == is_cheap) {
+            let sheets = if fidelity == Fidelity::Fine { self.sheets } else { &self.all.rough };
+            for k in order.iter().copied().filter(|k| self.is_cheap(fault, *k) == is_cheap) {
                 predicted.remove(&k);
-                let Some(found) = predict(k, fidelity) else { continue };
+                let found = predict(k, fidelity);
+                // What cannot be paid for is not what does not show.
+                if self.is_spent() {
+                    return None;
+                }
+                let Some(found) = found else { continue };
                 if !fault.has_factor && Self::refutes(&sheets[k], &found) {
                     return None;
                 }
@@ -359,7 +473,7 @@ impl Search<'_> {
                 Self::refutes(&sheets[*k], &p)
             };
             // Without a failing sheet no factor is known yet.
-            if self.is_spent() || (fault.has_factor && factor.0.is_finite() && predicted.iter().any(refuted)) {
+            if fault.has_factor && factor.0.is_finite() && predicted.iter().any(refuted) {
                 return None;
             }
             let fails = |(k, p): (&usize, &Vec<f64>)| self.sheets[*k].fails && shows(p, &self.sheets[*k].right);

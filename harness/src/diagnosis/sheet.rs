@@ -88,7 +88,15 @@ impl Sheet {
     /// The same readings where predictions are rough.
     #[must_use]
     pub fn roughly(&self) -> Self {
-        Self { slack: if self.is_cheap { self.slack } else { ROUGH.0 }, is_rough: !self.is_cheap, ..self.clone() }
+        Self { slack: ROUGH.0, is_rough: true, ..self.clone() }
+    }
+
+    /// Some of the readings, of another model.
+    #[must_use]
+    pub fn at(&self, places: &[usize], model: usize) -> Self {
+        let of = |values: &[f64]| places.iter().map(|k| values[*k]).collect();
+        let (read, right) = (of(&self.read), of(&self.right));
+        Self { model, read, right, uncertainty: of(&self.uncertainty), allowed: of(&self.allowed), ..self.clone() }
     }
 
     /// Standard deviation of a reading from a prediction that is right.

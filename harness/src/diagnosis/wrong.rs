@@ -1,7 +1,7 @@
 //! What a wrong engine would read: the scene, light and meters that it takes for those asked for, and what it then
 //! does to the readings. Changes compose, so that two faults at once are one after the other.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport};
@@ -9,12 +9,18 @@ use luminaire::simulator::{self, Accuracy};
 
 use super::rough::Rough;
 use super::tables;
-use crate::procedures::Task;
+use crate::procedures::{Target, Task};
 
 /// Light is predicted to this relative error at least; it turns out a hundred times better.
 const ACCURACY: f64 = 1e-2;
 /// Half width of what a prediction's own error is corrected by: the reference knows the unchanged scene better.
 const CORRECTED: f64 = 0.25;
+/// What a luminaire seen from a meter costs where a box may hide it; where nothing does, that is the unit of work.
+const BEHIND_BOXES: u64 = 20;
+/// The same of a luminous opening, which is integrated over for milliseconds.
+const OPENING: u64 = 20_000;
+/// What the simulator's reflected light costs a luminaire, and more for every meter: many ask for finer solutions.
+const FINE: [u64; 2] = [1_000_000, 10_000];
 
 /// A task as a wrong engine takes it.
 #[derive(Clone)]
@@ -22,6 +28,8 @@ pub struct Wrong {
     task: Task,
     /// Whether scene, meters or light are other than asked, so that they must be solved for.
     is_relit: bool,
+    /// Whether that is so of the meters.
+    are_moved: bool,
     pub law: Law,
     /// On every reading.
     pub factor: f64,
@@ -65,7 +73,8 @@ impl Law {
 impl Wrong {
     /// Nothing is wrong yet.
     pub fn new(task: &Task) -> Self {
-        Self { task: task.clone(), is_relit: false, law: Law::RIGHT, factor: 1.0, readouts: vec![] }
+        let (is_relit, are_moved) = (false, false);
+        Self { task: task.clone(), is_relit, are_moved, law: Law::RIGHT, factor: 1.0, readouts: vec![] }
     }
 
     pub const fn task(&self) -> &Task {
@@ -104,7 +113,7 @@ impl Wrong {
     }
 
     pub fn meters(&mut self, change: impl Fn(&mut Meter)) {
-        self.is_relit = true;
+        (self.is_relit, self.are_moved) = (true, true);
         self.task.targets.iter_mut().flat_map(|t| &mut t.aspects).for_each(|a| change(&mut a.meter));
     }
 }
@@ -127,6 +136,15 @@ struct Light {
 
 /// Right light, and what its reference has over it, by target.
 type Base = (Light, Vec<f64>);
+
+/// What a prediction costs, counted and never timed, so that the same seed says the same on a busy machine. One is a
+/// luminaire seen from a meter: a tenth of a microsecond or two.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// What is right of the task, where that is needed; it is solved for once.
+    pub right: u64,
+    pub wrong: u64,
+}
 
 /// A task with what is right of it.
 pub struct Model {
@@ -157,7 +175,9 @@ impl Model {
 
     fn solved(&self, task: &Task, law: Law, fidelity: Fidelity) -> Option<Light> {
         let rough = match fidelity {
-            Fidelity::Rough => self.rough.get_or_init(|| task.scene.room.as_ref().map(Rough::new)).as_ref(),
+            Fidelity::Rough => {
+                self.rough.get_or_init(|| Some(Rough::new(task.scene.room.as_ref()?, &meters(&self.task)))).as_ref()
+            }
             Fidelity::Fine => None,
         };
         light(task, law, rough)
@@ -173,12 +193,47 @@ impl Model {
         !self.is_cheap() && self.task.scene.luminaires.iter().any(|l| tables::thinned(&mut l.clone()))
     }
 
+    /// The same task at some of its targets.
+    #[must_use]
+    pub fn at(&self, places: &[usize]) -> Self {
+        let task =
+            Task { targets: places.iter().map(|k| self.task.targets[*k].clone()).collect(), ..self.task.clone() };
+        Self::new(self.case, &task, places.iter().map(|k| self.right[*k]).collect())
+    }
+
+    /// Whether light is solved for and not known.
+    fn is_other_light(wrong: &Wrong) -> bool {
+        wrong.is_relit || wrong.law != Law::RIGHT
+    }
+
+    fn is_one_each(&self) -> bool {
+        self.task.targets.iter().all(|t| t.aspects.len() == 1)
+    }
+
+    /// What it costs to say what is read.
+    pub fn work(&self, wrong: &Wrong, fidelity: Fidelity) -> Work {
+        let stations = self.task.targets.iter().map(|t| t.aspects.len() as u64).sum();
+        let is_other = Self::is_other_light(wrong);
+        let right = if is_other || !self.is_one_each() { work(&self.task, stations, fidelity, true) } else { 0 };
+        if !is_other {
+            return Work { right, wrong: stations };
+        }
+        let pairs = wrong.task.scene.luminaires.iter().zip(&self.task.scene.luminaires);
+        let others = pairs.filter(|(other, l)| !Arc::ptr_eq(&other.photometry, &l.photometry));
+        let nodes = |l: &Luminaire| {
+            let table = &l.photometry.distribution;
+            (table.c_deg().len() * table.gamma_deg().len()) as u64
+        };
+        let tables: u64 = others.map(|(other, _)| nodes(other)).sum();
+        Work { right, wrong: stations + tables + work(&wrong.task, stations, fidelity, wrong.are_moved) }
+    }
+
     /// What is read, by target; nothing where that cannot be said.
     pub fn readings(&self, wrong: &Wrong, fidelity: Fidelity) -> Option<Vec<f64>> {
-        let lux = if wrong.is_relit || wrong.law != Law::RIGHT {
+        let lux = if Self::is_other_light(wrong) {
             let (_, corrections) = self.light(fidelity)?;
             self.corrected(&self.solved(&wrong.task, wrong.law, fidelity)?, corrections)
-        } else if self.task.targets.iter().all(|t| t.aspects.len() == 1) {
+        } else if self.is_one_each() {
             self.evenly()
         } else {
             self.light(fidelity)
@@ -192,22 +247,21 @@ impl Model {
                 readings = order.of_all(&self.task, &readings)?;
             }
         }
-        Some(readings)
+        readings.iter().all(|r| r.is_finite()).then_some(readings)
     }
 
     fn corrected(&self, light: &Light, corrections: &[f64]) -> Vec<f64> {
         let is_direct = self.task.transport == Transport::Direct;
-        let of_target = |t: usize| self.task.stations_of(t).map(move |s| (t, s));
-        let lux = |(t, s): (usize, usize)| {
-            let (all, some) = if is_direct { (light.direct[s], 0.0) } else { (light.reflected[s], light.direct[s]) };
-            all * corrections[t] + some
-        };
-        (0..self.task.targets.len()).flat_map(of_target).map(lux).collect()
+        // Reflected light that nobody asked for is as it is solved for.
+        let (all, some) = if is_direct { (&light.direct, &light.reflected) } else { (&light.reflected, &light.direct) };
+        let of_target = |(target, by): (&Target, &f64)| std::iter::repeat_n(*by, target.aspects.len());
+        let by = self.task.targets.iter().zip(corrections).flat_map(of_target);
+        all.iter().zip(some).zip(by).map(|((all, some), by)| all * by + some).collect()
     }
 
     /// What every station of a target would read were they alike.
     fn evenly(&self) -> Vec<f64> {
-        let of_target = |(target, right): (&crate::procedures::Target, &f64)| {
+        let of_target = |(target, right): (&Target, &f64)| {
             let weight: f64 = target.aspects.iter().map(|a| a.weight).sum();
             vec![right / weight; target.aspects.len()]
         };
@@ -216,11 +270,34 @@ impl Model {
 }
 
 fn summed(task: &Task, lux: &[f64]) -> Vec<f64> {
-    let of_target = |t: usize| {
-        let stations = task.stations_of(t).zip(&task.targets[t].aspects);
-        stations.map(|(s, aspect)| aspect.weight * lux[s]).sum()
+    let mut lux = lux.iter();
+    let of_target = |t: &Target| t.aspects.iter().zip(lux.by_ref()).map(|(aspect, lux)| aspect.weight * lux).sum();
+    task.targets.iter().map(of_target).collect()
+}
+
+fn meters(task: &Task) -> Vec<Meter> {
+    task.targets.iter().flat_map(|t| &t.aspects).map(|a| a.meter).collect()
+}
+
+/// What the light of a task costs.
+fn work(task: &Task, stations: u64, fidelity: Fidelity, are_moved: bool) -> u64 {
+    let scene = &task.scene;
+    let of_one = |l: &Luminaire| match l.model {
+        LuminaireModel::Point if scene.obstacles.is_empty() => 1,
+        LuminaireModel::Point => BEHIND_BOXES,
+        LuminaireModel::Area | LuminaireModel::Impostor => OPENING,
     };
-    (0..task.targets.len()).map(of_target).collect()
+    let straight = stations * scene.luminaires.iter().map(of_one).sum::<u64>();
+    let reflected = match fidelity {
+        _ if !is_bare(scene) => 0,
+        Fidelity::Rough => Rough::work(scene.luminaires.len() as u64, if are_moved { stations } else { 0 }),
+        Fidelity::Fine => (FINE[0] + FINE[1] * stations) * scene.luminaires.len() as u64,
+    };
+    match task.transport {
+        Transport::Direct => straight,
+        Transport::Indirect(_) => reflected,
+        Transport::Total(_) => straight + reflected,
+    }
 }
 
 fn corrections(task: &Task, light: &Light, right: &[f64], fidelity: Fidelity) -> Vec<f64> {
@@ -244,24 +321,29 @@ pub fn truth(task: &Task) -> Option<Vec<f64>> {
 }
 
 fn light(task: &Task, law: Law, rough: Option<&Rough>) -> Option<Light> {
-    let meters: Vec<Meter> = task.targets.iter().flat_map(|t| &t.aspects).map(|a| a.meter).collect();
+    let meters = meters(task);
     let reflected = |bounces| reflected(&task.scene, bounces, &meters, law, rough);
     let none = vec![0.0; meters.len()];
     let direct = || straight(&task.scene, &meters, law);
     Some(match task.transport {
         Transport::Direct => Light { direct: direct()?, reflected: none },
         Transport::Indirect(bounces) => Light { direct: none, reflected: reflected(bounces)? },
-        Transport::Total(bounces) => Light { direct: direct()?, reflected: reflected(bounces)? },
+        // What cannot be said is soon known of reflected light.
+        Transport::Total(bounces) => Light { reflected: reflected(bounces)?, direct: direct()? },
     })
 }
 
 fn straight(scene: &Scene, meters: &[Meter], law: Law) -> Option<Vec<f64>> {
+    // The simulator bounds its error by a table's peak, which it looks for at every meter.
+    if is_bare(scene) {
+        let lux = |meter: &Meter| scene.luminaires.iter().map(|l| law.illuminance(l, meter)).sum();
+        return is_sound(scene, meters).then(|| meters.iter().map(lux).collect());
+    }
     let right = solved(scene, meters, Transport::Direct);
     if law == Law::RIGHT {
         return right;
     }
-    let points_only = scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
-    if !points_only || (!scene.obstacles.is_empty() && scene.luminaires.len() > 1) {
+    if scene.luminaires.len() > 1 || scene.luminaires.iter().any(|l| l.model != LuminaireModel::Point) {
         return None;
     }
     let of_meter = |(meter, right): (&Meter, f64)| {
@@ -271,9 +353,21 @@ fn straight(scene: &Scene, meters: &[Meter], law: Law) -> Option<Vec<f64>> {
     Some(meters.iter().zip(right?).map(of_meter).collect())
 }
 
+/// Whether nothing hides its luminaires, which are points.
+fn is_bare(scene: &Scene) -> bool {
+    scene.obstacles.is_empty() && scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point)
+}
+
+/// Whether all lies where the simulator takes it.
+fn is_sound(scene: &Scene, meters: &[Meter]) -> bool {
+    let is_inside = |p: DVec3| scene.room.is_none_or(|room| p.cmpgt(DVec3::ZERO).all() && p.cmplt(room.size_m).all());
+    let is_apart = |m: &Meter| scene.luminaires.iter().all(|l| l.position_m != m.position_m);
+    scene.luminaires.iter().all(|l| is_inside(l.position_m) && l.flux_scale >= 0.0)
+        && meters.iter().all(|m| is_inside(m.position_m) && is_apart(m))
+}
+
 fn reflected(scene: &Scene, bounces: Bounces, meters: &[Meter], law: Law, rough: Option<&Rough>) -> Option<Vec<f64>> {
-    let is_bare = |l: &Luminaire| l.model == LuminaireModel::Point;
-    if !scene.obstacles.is_empty() || !scene.luminaires.iter().all(is_bare) {
+    if !is_bare(scene) {
         return None;
     }
     let mut scene = scene.clone();
@@ -291,10 +385,7 @@ fn reflected(scene: &Scene, bounces: Bounces, meters: &[Meter], law: Law, rough:
     match (rough, scene.room) {
         (Some(rough), Some(room)) => {
             // The simulator refuses what lies outside; so must this.
-            let is_inside = |p: DVec3| p.cmpgt(DVec3::ZERO).all() && p.cmplt(room.size_m).all();
-            let places = meters.iter().map(|m| m.position_m).chain(scene.luminaires.iter().map(|l| l.position_m));
-            let lux = || rough.lux(&room, &scene.luminaires, meters, bounces);
-            places.into_iter().all(is_inside).then(lux)
+            is_sound(&scene, meters).then(|| rough.lux(&room, &scene.luminaires, meters, bounces))
         }
         _ => solved(&scene, meters, Transport::Indirect(bounces)),
     }
