@@ -3,27 +3,30 @@
 //! A spec names it: `engines: {mine: {command: [python3, mine.py]}}`. It runs in the spec's folder, with the time limit, log
 //! and checks of every other engine.
 
+mod code;
+mod command;
 mod form;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-
-use sha2::{Digest, Sha256};
 
 pub use self::form::{ExternalJob, ExternalReadings};
 use super::{
     Absent, Engine, EngineError, FILE_READER, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
+    fingerprint,
 };
 use crate::record::{EngineName, ProcedureId, UnknownProcedure};
-use crate::system::digest::hexadecimal;
 use crate::system::process::Invocation;
 
 /// The environment variable that names an empty folder for the adapter's own files, kept with the run.
 const FOLDER_VARIABLE: &str = "LUXPROOF_SCENE_DIR";
 
 const JOB_FILE: &str = "job.json";
+
+/// Folders of programs that have nothing to do with each other.
+const INSTALLED: [&str; 6] = ["/bin", "/sbin", "/usr/bin", "/usr/sbin", "/usr/local/bin", "/usr/local/sbin"];
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct External {
@@ -39,10 +42,9 @@ pub(super) struct External {
     folder: PathBuf,
     /// Its command by content, whatever its files are called.
     contents: String,
+    /// What makes its readings, by content: who has one of these in common is no other program.
+    parts: BTreeSet<String>,
 }
-
-/// Suffixes of what runs as it stands and may fetch what lies beside it.
-const SOURCES: [&str; 12] = ["jl", "js", "lua", "m", "mjs", "pl", "py", "r", "R", "rb", "sh", "ts"];
 
 impl External {
     pub(super) fn new(
@@ -79,14 +81,14 @@ impl External {
             Some(list) => list.map_err(|_| error(key, "must be a list of names")),
         };
         let depends_on = list("depends_on")?.into_iter().map(|file| folder.join(file)).collect();
-        let contents = contents(&command, &folder);
-        Ok(Self { shares: list("shares")?, id: id.clone(), command, procedures, depends_on, folder, contents })
+        let (contents, parts) = (command::contents_of(&command, &folder), command::parts(&command, &folder));
+        Ok(Self { shares: list("shares")?, id: id.clone(), command, procedures, depends_on, folder, contents, parts })
     }
 
     /// The program: a path is relative to the spec's folder, a bare name is looked up on PATH.
     fn program(&self, site: &Site) -> Option<PathBuf> {
         let is_path = self.command[0].contains('/');
-        if is_path { file(&self.folder, (0, &self.command[0])) } else { site.program(&self.command[0]) }
+        if is_path { command::file(&self.folder, 0, &self.command[0]) } else { site.program(&self.command[0]) }
     }
 
     fn invocation(&self, job: &Job, workbench: &Workbench) -> Result<Invocation, EngineError> {
@@ -95,6 +97,18 @@ impl External {
         let run = Invocation::new(program, &self.folder, workbench.limit, &workbench.log);
         let run = Invocation { peak: workbench.peak.clone(), ..run };
         Ok(run.args(&self.command[1..]).env(FOLDER_VARIABLE, &workbench.scene_dir).stdin(input))
+    }
+
+    /// Where the code of it may lie that no word names: where it runs, and about each of its files, wherever links put them.
+    fn folders(&self, files: &[PathBuf]) -> Vec<PathBuf> {
+        let mut folders = vec![self.folder.clone()];
+        let real = files.iter().filter_map(|file| file.canonicalize().ok());
+        for folder in files.iter().cloned().chain(real).filter_map(|file| file.parent().map(Path::to_owned)) {
+            if !folders.contains(&folder) && !INSTALLED.iter().any(|other| folder == Path::new(other)) {
+                folders.push(folder);
+            }
+        }
+        folders
     }
 
     fn absence(&self) -> String {
@@ -106,26 +120,6 @@ impl External {
     }
 }
 
-/// The file that a word of a command names. A program without a folder is none: it is looked up on PATH.
-fn file(folder: &Path, (k, word): (usize, &String)) -> Option<PathBuf> {
-    Some(folder.join(word)).filter(|path| (k > 0 || word.contains('/')) && path.is_file())
-}
-
-fn contents(command: &[String], folder: &Path) -> String {
-    let mut hash = Sha256::new();
-    for (k, word) in command.iter().enumerate() {
-        let read = file(folder, (k, word)).and_then(|path| std::fs::read(path).ok());
-        let bytes = read.unwrap_or_else(|| word.clone().into_bytes());
-        hash.update((bytes.len() as u64).to_le_bytes());
-        hash.update(bytes);
-    }
-    format!("sha256:{}", &hexadecimal(&hash.finalize())[..12])
-}
-
-fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
-    folder.read_dir().into_iter().flatten().flatten().map(|entry| entry.path())
-}
-
 impl Engine for External {
     fn name(&self) -> EngineName {
         self.id.clone()
@@ -135,33 +129,36 @@ impl Engine for External {
         false
     }
 
-    /// The version of an adapter is the hash of what its command says; what runs are the files that it names, the sources beside
-    /// the first of these that is one, which that may import, and those that it depends on by `depends_on`.
+    /// The version of an adapter is the hash of what its command says. What runs is more: the files that it names, all code below the
+    /// folders of these and below that in which it runs, which it may load or start, and what it depends on by `depends_on`.
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         let remedy = format!("correct engines.{}", self.id);
         let absent = |reason| Absent { reason, remedy: remedy.clone() };
         let program = self.program(site).ok_or_else(|| absent(self.absence()))?;
-        let named: Vec<PathBuf> = self.command.iter().enumerate().filter_map(|word| file(&self.folder, word)).collect();
-        let mut files = vec![program];
-        if let Some(source) = named.iter().find(|f| f.extension().is_some_and(|e| SOURCES.iter().any(|s| e == *s))) {
-            let is_kin = |p: PathBuf| p.extension() == source.extension() && p.is_file();
-            let beside = source.parent().into_iter().flat_map(entries);
-            files.extend(beside.filter(|p| is_kin(p.clone()) || entries(p).any(is_kin)));
+        if let Some(gone) = self.depends_on.iter().find(|file| !file.exists()) {
+            return Err(absent(format!("{}, which it depends on, is not there", gone.display())));
         }
-        files.extend(named);
-        for file in &self.depends_on {
-            if !file.exists() {
-                return Err(absent(format!("{}, which it depends on, is not there", file.display())));
-            }
-            files.push(file.clone());
+        let own = command::own_files(&self.command, &self.folder);
+        let code = code::below(&self.folders(&own), site.root());
+        let mut text = self.contents.clone();
+        if !code.is_all {
+            tracing::warn!("{}: more code lies about it than is looked at: it needs a folder of its own", self.id);
+            text += " (not all of its code)";
         }
-        Ok(Version::of(&self.id, &self.contents, site, files))
+        if self.depends_on.is_empty() && command::is_unknown(&self.command, &self.folder) {
+            tracing::warn!("{}: no word of its command names a file of its own: name them in `depends_on`", self.id);
+            text += " (its files are not known)";
+        }
+        let named = fingerprint::listed(std::iter::once(program).chain(own));
+        let others = fingerprint::listed(self.depends_on.iter().cloned());
+        let files = named.into_iter().chain(code.files).chain(others).collect();
+        Ok(Version { text, fingerprint: fingerprint::of_files(&self.id, site, files) })
     }
 
-    /// A program that two engines run counts once, and so does what it says that it shares.
+    /// A file that two engines' commands name counts once, whatever the other words, and so does what it says that it shares.
     fn components(&self, _job: &Job) -> Vec<String> {
-        let program = format!("the program {}", self.contents);
-        [FILE_READER.to_owned(), program].into_iter().chain(self.shares.clone()).collect()
+        let parts = self.parts.iter().chain(&self.shares);
+        std::iter::once(FILE_READER.to_owned()).chain(parts.cloned()).collect()
     }
 
     fn supports(&self, job: &Job) -> Support {

@@ -1,7 +1,8 @@
 //! What really runs: a hash of the files of an engine, whatever version it tells.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
@@ -33,11 +34,20 @@ struct Known {
 /// SHA-256 of the names and contents of an engine's files and folders, 16 hexadecimal digits of it; what cannot be read is
 /// part of it as just that.
 pub(super) fn of(engine: &EngineName, site: &Site, roots: impl IntoIterator<Item = PathBuf>) -> String {
+    of_files(engine, site, listed(roots))
+}
+
+/// The files at or below some files and folders, each with its name from there.
+pub(super) fn listed(roots: impl IntoIterator<Item = PathBuf>) -> Vec<(PathBuf, PathBuf)> {
+    let roots: BTreeSet<PathBuf> = roots.into_iter().collect();
+    roots.iter().flat_map(|root| below(root)).collect()
+}
+
+/// The same of files with their names, in this order.
+pub(super) fn of_files(engine: &EngineName, site: &Site, files: Vec<(PathBuf, PathBuf)>) -> String {
     // An engine each, so that probes side by side do not overwrite one another's.
     let place = site.root().join("fingerprints").join(format!("{engine}.json"));
     let memo = kept(&place, engine);
-    let roots: BTreeSet<PathBuf> = roots.into_iter().collect();
-    let files: Vec<_> = roots.iter().flat_map(|root| below(root)).collect();
     let (mut now, mut hash) = (Memo::default(), Sha256::new_with_prefix(files.len().to_le_bytes()));
     for (name, path) in files.into_iter().take(MAX_FILES) {
         let known = seen(&path, memo.get(&path));
@@ -69,7 +79,21 @@ fn seen(path: &Path, earlier: Option<&Known>) -> io::Result<Known> {
     if let Some(known) = earlier.filter(|k| k.size == size && k.changed_ns == changed_ns) {
         return Ok(known.clone());
     }
-    Ok(Known { size, changed_ns, sha256: hexadecimal(&Sha256::digest(std::fs::read(path)?)) })
+    Ok(Known { size, changed_ns, sha256: sha256(path)? })
+}
+
+/// By pieces: libraries may be larger than what memory is left.
+fn sha256(path: &Path) -> io::Result<String> {
+    let (mut file, mut hash) = (BufReader::with_capacity(1 << 16, File::open(path)?), Sha256::new());
+    loop {
+        let piece = file.fill_buf()?;
+        let read = piece.len();
+        if read == 0 {
+            return Ok(hexadecimal(&hash.finalize()));
+        }
+        hash.update(piece);
+        file.consume(read);
+    }
 }
 
 /// The files at or below a path, in order, each with its name from there; what compilers leave beside sources is none.

@@ -180,7 +180,11 @@ fn hypotheses(witnesses: &[WitnessReadings]) -> Vec<Hypothesis> {
     for name in witnesses.iter().flat_map(|t| &t.shares) {
         let has = |i: &usize| witnesses[*i].shares.contains(name);
         let holders: Vec<usize> = (0..witnesses.len()).filter(has).collect();
-        if hypotheses.iter().all(|s| s.name != *name) && holders.len() > 1 && holders.len() < witnesses.len() {
+        // What the same witnesses share besides is the same hypothesis: two of them would take each other's odds.
+        if hypotheses.iter().all(|s| s.name != *name && s.holders != holders)
+            && holders.len() > 1
+            && holders.len() < witnesses.len()
+        {
             hypotheses.push(Hypothesis { name: name.clone(), holders });
         }
     }
@@ -447,6 +451,27 @@ mod tests {
         // Without sharing it would be two against two.
         let split = statement(&[("simulator", &[], 1.1), ("a", &[], 1.1), ("b", &[], 1.0), ("c", &[], 1.0)], 3);
         assert!(split.departs.is_empty(), "{}", split.text);
+    }
+
+    #[test]
+    fn whoever_shares_two_components_is_named_as_whoever_shares_one() {
+        const TABLES: &str = "tables";
+        let twins = |shared: &[&str]| {
+            statement(&[("a", shared, 1.1), ("b", shared, 1.1), ("simulator", &[], 1.0), ("c", &[], 1.0)], 3)
+        };
+        let (one, two) = (twins(&[LOOKUP]), twins(&[LOOKUP, TABLES]));
+        assert_eq!((&two.departs[..], two.odds), (&["a".to_owned(), "b".to_owned()][..], one.odds), "{}", two.text);
+        assert_eq!(two.independent, 3);
+    }
+
+    #[test]
+    fn three_starts_of_one_script_count_once() {
+        let script = "the program sha256:0123456789ab";
+        let found = statement(
+            &[("a", &[script], 1.1), ("b", &[script], 1.1), ("c", &[script, "tables"], 1.1), ("simulator", &[], 1.0)],
+            3,
+        );
+        assert_eq!((found.independent, found.departs.len()), (2, 0), "{}", found.text);
     }
 
     #[test]

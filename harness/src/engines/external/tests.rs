@@ -125,6 +125,71 @@ fn the_fingerprint_changes_with_sources_beside_the_adapter_and_with_what_it_depe
 }
 
 #[test]
+fn the_fingerprint_changes_with_what_a_command_starts_or_loads_without_naming_it() {
+    for (command, edited) in [
+        (json!(["./run.sh"]), "adapter.py"),
+        (json!(["python3", "-m", "adapter"]), "adapter.py"),
+        (json!(["python3", "-m", "adapter"]), "package/deep/module.py"),
+        (json!(["sh", "adapter.py"]), "package/deep/module.py"),
+        (json!(["sh", "adapter.py"]), "package/deep/libfast.so"),
+        (json!(["../other/tool.py"]), "../other/lib/helper.js"),
+        (json!(["bin/link.py"]), "../other/lib/helper.js"),
+    ] {
+        let kept = tempfile::tempdir().unwrap();
+        let folder = kept.path().join("spec");
+        for inner in ["spec/package/deep", "spec/bin", "other/lib"] {
+            std::fs::create_dir_all(kept.path().join(inner)).unwrap();
+        }
+        let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+        for name in ["run.sh", "adapter.py", "package/deep/module.py", "package/deep/libfast.so", "../other/tool.py"] {
+            write(name, "one");
+        }
+        write("../other/lib/helper.js", "one");
+        std::os::unix::fs::symlink("../../other/tool.py", folder.join("bin/link.py")).unwrap();
+        let site = Site::at(kept.path().join("engines"));
+        let settings = BTreeMap::from([("command".to_owned(), command.clone())]);
+        let now = || {
+            write("out", "of a run");
+            External::new("mine", &settings, &folder).unwrap().probe(&site).unwrap()
+        };
+        let before = now();
+        assert_eq!(before, now());
+        write(edited, "another");
+        assert_ne!(before.fingerprint, now().fingerprint, "{command}: {edited}");
+    }
+}
+
+#[test]
+fn a_program_of_which_nothing_is_known_says_so_in_its_version() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("table.txt"), "one").unwrap();
+    let version = |settings: serde_json::Value| {
+        let settings: BTreeMap<_, _> = serde_json::from_value(settings).unwrap();
+        let site = Site::at(folder.path().join("engines"));
+        External::new("mine", &settings, folder.path()).unwrap().probe(&site).unwrap().text
+    };
+    let unknown = version(json!({"command": ["sh", "-s", "elsewhere"]}));
+    assert!(unknown.starts_with("sha256:") && unknown.ends_with("(its files are not known)"), "{unknown}");
+    let named = version(json!({"command": ["sh", "-s", "elsewhere"], "depends_on": ["table.txt"]}));
+    assert!(unknown.starts_with(&named) && named.len() < unknown.len(), "{named}");
+}
+
+#[test]
+fn one_script_is_one_component_however_it_is_started() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.py"), "one").unwrap();
+    std::fs::write(folder.path().join("b.py"), "two").unwrap();
+    let of = |words: serde_json::Value| {
+        let settings = BTreeMap::from([("command".to_owned(), words)]);
+        External::new("mine", &settings, folder.path()).unwrap().components(&s1(Transport::Direct))
+    };
+    let plain = of(json!(["python3", "a.py"]));
+    assert_eq!(plain, of(json!(["python3", "-u", "a.py"])));
+    assert_eq!(plain, of(json!(["python3", "-B", "a.py", "--quick"])));
+    assert_ne!(plain, of(json!(["python3", "b.py"])));
+}
+
+#[test]
 fn settings_that_make_no_sense_are_named() {
     for (settings, key) in [
         (json!({"command": "mine.py"}), "engines.mine.command"),

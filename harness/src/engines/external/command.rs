@@ -1,0 +1,177 @@
+//! What the words of a command name: the files of the program's own, and what only runs them.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::system::digest::hexadecimal;
+
+/// Programs that run what somebody else wrote, without the numbers of their versions.
+const RUNNERS: &[&str] = &[
+    "awk", "bash", "bun", "cargo", "conda", "dash", "deno", "docker", "dotnet", "env", "fish", "java", "julia", "ksh",
+    "lua", "luajit", "make", "mono", "nice", "node", "npx", "octave", "perl", "php", "podman", "poetry", "pypy",
+    "python", "r", "rscript", "ruby", "sh", "ssh", "stdbuf", "time", "timeout", "uv",
+];
+
+/// After these a word is a program itself.
+const INLINE: &[&str] = &["-c", "-e", "-E", "-lc", "--eval"];
+
+/// The file that a word of a command names. A program without a folder is none: it is looked up on PATH.
+pub(super) fn file(folder: &Path, k: usize, word: &str) -> Option<PathBuf> {
+    Some(folder.join(word)).filter(|path| (k > 0 || word.contains('/')) && path.is_file())
+}
+
+/// The files of its own that a command names: in its words, in commands within words, as values of options, and as Python's modules.
+pub(super) fn own_files(command: &[String], folder: &Path) -> Vec<PathBuf> {
+    let mut found = vec![];
+    for (k, word) in command.iter().enumerate() {
+        let parts = word.split(|c: char| c.is_whitespace() || "'\"=;&|()<>".contains(c));
+        let words = std::iter::once(word.as_str()).chain(parts.filter(|part| !part.is_empty()));
+        let after_m = k > 0 && command[k - 1] == "-m";
+        let named = words.filter_map(|word| file(folder, k, word));
+        let named = named.chain(after_m.then(|| module(folder, word)).flatten());
+        for path in named.filter(|path| !is_runner_file(path)) {
+            if !found.contains(&path) {
+                found.push(path);
+            }
+        }
+    }
+    found
+}
+
+/// The file of a module that Python is told to run.
+fn module(folder: &Path, name: &str) -> Option<PathBuf> {
+    let place = name.replace('.', "/");
+    let files = [format!("{place}.py"), format!("{place}/__main__.py")];
+    files.into_iter().map(|file| folder.join(file)).find(|path| path.is_file())
+}
+
+/// The word that is the program itself: what something that runs programs is told to.
+fn inline(command: &[String]) -> Option<&String> {
+    let told = command.windows(2).find(|pair| INLINE.contains(&pair[0].as_str()))?;
+    is_runner(&command[0]).then_some(&told[1])
+}
+
+/// Whether nothing tells what a command runs: it names something that runs other programs, and none of these.
+pub(super) fn is_unknown(command: &[String], folder: &Path) -> bool {
+    is_runner(&command[0]) && own_files(command, folder).is_empty() && inline(command).is_none()
+}
+
+/// What makes its readings, by content, whatever it is called and however it is started: one name a file, program or text.
+pub(super) fn parts(command: &[String], folder: &Path) -> BTreeSet<String> {
+    let contents = own_files(command, folder).into_iter().filter_map(|path| std::fs::read(path).ok());
+    // Two empty files have nothing in common.
+    let mut parts: BTreeSet<String> = contents.filter(|bytes| !bytes.is_empty()).map(|bytes| hash(&bytes)).collect();
+    if !command[0].contains('/') && !is_runner(&command[0]) {
+        parts.insert(command[0].clone());
+    }
+    if parts.is_empty() {
+        parts.insert(inline(command).map_or_else(|| contents_of(command, folder), |text| hash(text.as_bytes())));
+    }
+    parts.into_iter().map(|part| format!("the program {part}")).collect()
+}
+
+/// Hash of a command, its files by what is in them.
+pub(super) fn contents_of(command: &[String], folder: &Path) -> String {
+    let mut all = vec![];
+    for (k, word) in command.iter().enumerate() {
+        let read = file(folder, k, word).and_then(|path| std::fs::read(path).ok());
+        let bytes = read.unwrap_or_else(|| word.clone().into_bytes());
+        all.extend((bytes.len() as u64).to_le_bytes());
+        all.extend(bytes);
+    }
+    hash(&all)
+}
+
+fn hash(bytes: &[u8]) -> String {
+    format!("sha256:{}", &hexadecimal(&Sha256::digest(bytes))[..12])
+}
+
+/// One that lies where programs are installed; a file of that name beside a spec is the user's own.
+fn is_runner_file(path: &Path) -> bool {
+    let is_installed = path.parent().is_some_and(|folder| folder.ends_with("bin") || folder.ends_with("sbin"));
+    is_installed && is_runner(&path.to_string_lossy())
+}
+
+fn is_runner(program: &str) -> bool {
+    let name = Path::new(program).file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    RUNNERS.contains(&name.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.' || c == '-'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(command: &[&str]) -> Vec<String> {
+        command.iter().map(|word| (*word).to_owned()).collect()
+    }
+
+    /// Two scripts, a copy of the first, a package, an environment and a program.
+    fn folder() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(folder.path().join("package")).unwrap();
+        std::fs::create_dir_all(folder.path().join("venv/bin")).unwrap();
+        for (name, text) in [
+            ("a.py", "one"),
+            ("copy.py", "one"),
+            ("b.py", "two"),
+            ("package/__main__.py", "three"),
+            ("venv/bin/python3", "python"),
+            ("tool", "tool"),
+            ("x.json", ""),
+        ] {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        folder
+    }
+
+    #[test]
+    fn whatever_starts_a_script_it_is_one_program() {
+        let folder = folder();
+        let of = |command: &[&str]| parts(&words(command), folder.path());
+        let one = of(&["python3", "a.py"]);
+        assert_eq!(one.len(), 1);
+        for command in [
+            &["python3", "-u", "a.py"][..],
+            &["python3.12", "-B", "copy.py", "x.json"],
+            &["./venv/bin/python3", "a.py"],
+            &["/usr/bin/env", "python3", "a.py"],
+            &["env", "PYTHONHASHSEED=0", "nice", "venv/bin/python3", "a.py"],
+            &["python3", "-u", "-m", "a"],
+            &["sh", "-c", "exec python3 -u ./a.py"],
+            &["env", "--script=a.py"],
+        ] {
+            assert!(!of(command).is_disjoint(&one), "{command:?}: {:?}", of(command));
+        }
+        for command in [
+            &["python3", "b.py"][..],
+            &["./venv/bin/python3", "b.py"],
+            &["python3", "-m", "package"],
+            &["sh", "-c", "cat"],
+            &["./tool", "-u"],
+            &["mycalc"],
+        ] {
+            assert!(of(command).is_disjoint(&one), "{command:?}");
+        }
+        assert!(!of(&["./tool", "-u"]).is_disjoint(&of(&["./tool"])));
+        assert!(!of(&["mycalc", "--fast"]).is_disjoint(&of(&["mycalc"])));
+        assert!(of(&["sh", "-c", "cat"]).is_disjoint(&of(&["sh", "-c", "tac"])));
+    }
+
+    #[test]
+    fn what_runs_programs_and_names_none_is_not_known() {
+        let folder = folder();
+        let is_unknown = |command: &[&str]| is_unknown(&words(command), folder.path());
+        for command in
+            [&["python3", "-m", "elsewhere"][..], &["ssh", "host", "calc"], &["./venv/bin/python3", "-m", "x"]]
+        {
+            assert!(is_unknown(command), "{command:?}");
+        }
+        for command in
+            [&["python3", "a.py"][..], &["python3", "-m", "package"], &["./tool"], &["mycalc"], &["sh", "-c", "cat"]]
+        {
+            assert!(!is_unknown(command), "{command:?}");
+        }
+    }
+}
