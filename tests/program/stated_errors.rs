@@ -73,7 +73,7 @@ fn a_heavy_tail_fails_nothing_and_names_nothing() {
         for comparison in mine {
             assert_eq!(comparison["verdict"], "inconclusive", "{comparison}");
             let said = comparison["diagnosis"].as_str().unwrap();
-            assert!(said.starts_with("a heavy tail") || said.starts_with("undecided"), "{said}");
+            assert!(["a heavy tail", "too few samples", "undecided"].iter().any(|s| said.starts_with(s)), "{said}");
         }
     }
 }

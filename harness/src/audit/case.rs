@@ -57,7 +57,7 @@ impl Audit<'_> {
         Ok(Report {
             engines: outcome.engines,
             known_deviations: known,
-            bias: judge.bias(&comparisons),
+            bias: judge.bias(&comparisons, &outcome.recordings),
             splits: tasks().flat_map(|task| judge.split(task, &of(task))).collect(),
             consensus: tasks()
                 .filter(|task| !task.procedure.is_known())
@@ -76,7 +76,7 @@ impl Audit<'_> {
         let running = Running { case, plan, folder, reader, observer };
         let mut outcome = running.run()?;
         if !process::is_interrupted() {
-            let stated = repetition::examine(&running, &mut outcome);
+            let stated = repetition::examine(&running, judge, &mut outcome);
             sampling::sample_on(&running, judge, &stated, &mut outcome)?;
         }
         if outcome.from_cache > 0 {

@@ -12,7 +12,7 @@ use parking_lot::Mutex;
 use crate::engines::{EngineError, Measurement};
 use crate::measure::{Cost, Failure, FailureKind, Question, Reader, Source, Taken};
 use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
-use crate::record::{EngineName, EngineStatus, Reading, ReadingKey, Recording, Status};
+use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, StatedErrors, Status};
 use crate::spec::{Case, content};
 use crate::system::files::{self, FileError};
 use crate::system::slots::side_by_side;
@@ -26,6 +26,9 @@ pub struct Running<'a> {
     pub reader: Reader,
     pub observer: &'a dyn Observer,
 }
+
+/// What is found of what an engine states of its errors in a procedure.
+pub(super) type Found = BTreeMap<(EngineName, ProcedureId), Vec<StatedErrors>>;
 
 /// What a run gave.
 #[derive(Clone, Debug)]
@@ -119,6 +122,7 @@ impl Running<'_> {
             content_sha256: content(task),
             seed: run.job.seed,
             skewness: measurement.skewness(),
+            design_effect: measurement.design_effect(),
             work_s: measurement.work_s,
             method: measurement.method,
             effort: measurement.effort,
@@ -135,7 +139,8 @@ impl Running<'_> {
     }
 }
 
-/// What an engine answers to a run: it renders what the shortcut leaves, the rest follows, and the spot check must agree.
+/// What an engine answers to a run: it renders what the shortcut leaves, and the rest follows. Where its spot check contradicts that, it
+/// renders everything.
 fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result<Taken, Failure> {
     let failed = |what: String| Failure::from(EngineError::Solver { engine: planned.engine.name(), what });
     let instrument = planned.instrument().ok_or_else(|| failed("it is not there".to_owned()))?;
@@ -148,7 +153,14 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
     let mut taken = Taken { measurement: shortcut.complete(rendered.measurement, &run.job), ..rendered };
     if let Some(job) = run.spot_check_job() {
         let seen = reader.read(&Question::new(&instrument, &job, &format!("{folder}-spot-check")))?;
-        run.hold(&taken.measurement, &seen.measurement).map_err(failed)?;
+        if let Err(contradiction) = run.hold(&taken.measurement, &seen.measurement) {
+            let name = planned.engine.name();
+            tracing::warn!("{name}: {contradiction}");
+            let mut whole = reader.read(&Question::new(&instrument, &run.job, folder))?;
+            whole.cost.wall_s += taken.cost.wall_s + seen.cost.wall_s;
+            whole.measurement.notes.push(contradiction);
+            return Ok(whole);
+        }
         taken.cost.wall_s += seen.cost.wall_s;
         let work_s = [taken.measurement.work_s, seen.measurement.work_s];
         taken.measurement.work_s = work_s.into_iter().flatten().reduce(f64::add);
@@ -210,4 +222,61 @@ fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
     let fingerprint = planned.instrument().map(|i| i.version.fingerprint);
     let role = planned.engine.role();
     EngineStatus { id, version: planned.version(), role, fingerprint, status, is_required, reason, wall_s }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use luminaire::scene::Transport;
+
+    use super::*;
+    use crate::engines::fixtures::{Fake, s1};
+    use crate::engines::{Job, Site, Version};
+    use crate::measure::Machine;
+    use crate::plan::{Fill, Shortcut};
+    use crate::record::{Estimate, Uncertainty};
+
+    /// An engine that reads `slope` lx more a metre along x, asked by a shortcut that says that all meters read the same.
+    fn answered(slope: f64) -> Measurement {
+        let estimate = move |at_m: f64| Estimate { value: 1.0 + slope * at_m, uncertainty: Uncertainty::Bound(1e-9) };
+        let read = move |job: &Job| {
+            let estimates = job.stations.iter().map(|s| estimate(s.meter.position_m.x)).collect();
+            Ok(Measurement { estimates, work_s: Some(job.stations.len() as f64), ..Measurement::default() })
+        };
+        let job = s1(Transport::Direct);
+        let mut shortcut = Shortcut::none(&job);
+        shortcut.job.stations.truncate(1);
+        for fill in &mut shortcut.fill[1..] {
+            *fill = Fill::Mirrors { station: 0, by: "a false claim".into() };
+        }
+        let run = Run { engine: 0, task: 0, job, approximation: None, declared: 0.0, shortcut, spot_check: vec![2] };
+        let found = Some(Ok(Version::told("1")));
+        let planned = Planned { engine: Arc::new(Fake::new("fake", read)), found, asked: Asked::ByName };
+        let folder = tempfile::tempdir().unwrap();
+        let reader = Reader::bare(&Site::at(folder.path()), Machine::new(1));
+        answer(&planned, &run, &reader, "direct_illuminance").unwrap().measurement
+    }
+
+    fn values(measurement: &Measurement) -> Vec<f64> {
+        measurement.estimates.iter().map(|e| e.value).collect()
+    }
+
+    #[test]
+    fn what_a_spot_check_contradicts_is_rendered_whole_and_says_so() {
+        let right = answered(0.0);
+        assert_eq!((values(&right), right.notes.len()), (vec![1.0; 4], 0));
+        assert_eq!(right.effort["spot_checked"], "m[2]");
+        // Of the one that is rendered and the one that is looked at.
+        assert_eq!(right.work_s, Some(2.0));
+        let lopsided = answered(0.5);
+        assert_eq!(values(&lopsided), [2.0, 2.0, 6.0, 6.0]);
+        let [note] = &lopsided.notes[..] else { panic!("{:?}", lopsided.notes) };
+        assert!(
+            note.contains("m[2] reads 6 lx where 2 lx follow") && note.contains("everything was rendered"),
+            "{note}"
+        );
+        assert!(!lopsided.effort.contains_key("mirrored_meters"), "{:?}", lopsided.effort);
+        assert_eq!(lopsided.work_s, Some(4.0));
+    }
 }

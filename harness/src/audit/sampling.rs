@@ -1,15 +1,13 @@
 //! Sampling until comparisons are decided: which budget first looks get, and further looks through the run's reader.
 
-use std::collections::BTreeMap;
-
-use super::jobs::{self, Outcome, Running};
+use super::jobs::{self, Found, Outcome, Running};
 use super::sequential::{self, Ask};
 use crate::engines::{Job, Station};
 use crate::judge::{Judge, Sampling};
 use crate::measure::{Question, Source, Taken};
 use crate::plan::{Plan, Run};
 use crate::procedures::Task;
-use crate::record::{EngineName, Recording, StatedErrors};
+use crate::record::{Recording, StatedErrors};
 use crate::system::files::FileError;
 
 /// Gives the jobs of a plan the budget of their first look.
@@ -31,7 +29,7 @@ pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
 pub(super) fn sample_on(
     running: &Running<'_>,
     judge: &Judge<'_>,
-    stated: &BTreeMap<EngineName, Vec<StatedErrors>>,
+    stated: &Found,
     outcome: &mut Outcome,
 ) -> Result<(), FileError> {
     for run in &running.plan.runs {
@@ -46,10 +44,11 @@ pub(super) fn sample_on(
         let mut subject = outcome.recordings[mine].clone();
         let others: Vec<&Recording> =
             outcome.recordings.iter().filter(of_task).filter(|r| r.key.engine != engine).collect();
+        let found = stated.get(&(engine.clone(), task.procedure)).map_or(&[][..], Vec::as_slice);
         let mut sample = |ask: &Ask| {
             let mut taken = look(running, run, ask)?;
             for estimate in &mut taken.measurement.estimates {
-                *estimate = StatedErrors::corrected(stated.get(&engine).map_or(&[], Vec::as_slice), *estimate);
+                *estimate = StatedErrors::corrected(found, *estimate);
             }
             outcome.from_cache += usize::from(taken.source == Source::Cache);
             Ok((taken.measurement, taken.cost))

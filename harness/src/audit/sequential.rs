@@ -72,6 +72,9 @@ pub fn refine(
             break;
         }
         let left_s = budget.seconds - subject.work_s();
+        if left_s <= 0.0 {
+            break;
+        }
         let mut affordable = left_s / first_s;
         if subject.work_s.is_none() {
             // In powers of two, so that a clock, where there is no other count, hardly ever has a say.
@@ -320,6 +323,16 @@ mod tests {
         });
         let share = wrong.count() as f64 / 2000.0;
         assert!(share > 0.08, "{share}");
+    }
+
+    #[test]
+    fn a_program_that_took_longer_than_it_was_given_is_asked_for_no_more() {
+        let exact = recording("simulator", &[Estimate::exact(1.0)]);
+        let edge = Estimate { value: 1.02, uncertainty: Uncertainty::sampled(0.004, None) };
+        let (mut subject, whole) = (recording("mine", &[edge]), Budget { relative_error: 0.004, seconds: 0.5 });
+        assert!(subject.work_s.is_none() && subject.wall_s > whole.seconds);
+        let mut sample = |ask: &Ask| panic!("{ask:?}");
+        refine(&built_in(), &task(1), &[&exact], &mut subject, (whole, whole), &mut sample);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::EngineError;
-use crate::record::Estimate;
+use crate::record::{Estimate, design_effect};
 use crate::spec::Budget;
 
 /// Fewer blocks make no honest standard error.
@@ -67,6 +67,20 @@ impl Blocks {
         let deviate = |g: f64| (y * g / (2.0 / (w * w - 1.0)).sqrt()).asinh() / w.ln().sqrt();
         let all: Vec<f64> = self.stations().filter_map(of).map(deviate).collect();
         (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
+    }
+
+    /// How much of their noise stations share; `None` for fewer blocks than tell.
+    pub fn design_effect(&self) -> Option<f64> {
+        let n = self.count() as f64;
+        let of = |k: usize| {
+            let mean = self.0.iter().map(|b| b[k]).sum::<f64>() / n;
+            let deviation = (self.0.iter().map(|b| (b[k] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+            (deviation > 0.0).then_some((k, mean, deviation))
+        };
+        let sampled: Vec<(usize, f64, f64)> = self.stations().filter_map(of).collect();
+        let deviates = |b: &Vec<f64>| sampled.iter().map(|(k, mean, deviation)| (b[*k] - mean) / deviation).collect();
+        let all: Vec<Vec<f64>> = self.0.iter().map(deviates).collect();
+        (self.count() >= MIN_BLOCKS && !sampled.is_empty()).then(|| design_effect(&all))
     }
 
     /// Blocks of other stations, each a factor times one of these, or dark.

@@ -306,6 +306,11 @@ impl Measurement {
         self.samples.iter().filter_map(Blocks::skewness).reduce(f64::max)
     }
 
+    /// Of the part of the light whose meters share the most of their noise.
+    pub fn design_effect(&self) -> Option<f64> {
+        self.samples.iter().filter_map(Blocks::design_effect).reduce(f64::max)
+    }
+
     /// The weighted sum of stations' estimates, with the standard error that their joint sampling gives it; where the samples
     /// are not known, the errors of stations may be all one.
     pub fn weighted(&self, weights: &[(usize, f64)]) -> Estimate {

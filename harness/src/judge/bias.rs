@@ -13,7 +13,7 @@ use statrs::distribution::{ContinuousCDF, Gamma};
 
 use super::uncertainty::{Component, ErrorBudget, Source, Standard, upper_tail_of_normal};
 use super::{Basis, Comparison, Judge};
-use crate::record::{ReadingKey, Uncertainty};
+use crate::record::{ReadingKey, Recording, Uncertainty};
 
 /// Values without uncertainty may differ by the rounding of single precision, which renderers compute in.
 pub const SINGLE_PRECISION: f64 = 1e-6;
@@ -73,7 +73,9 @@ impl fmt::Display for Bias {
             None => write!(f, ", range of {}", self.readings)?,
         }
         match self.scatter {
-            Some(Scatter { ratio, p_value: Some(p) }) => write!(f, "; scatter {ratio:.2} of what is stated, p = {p:.2}"),
+            Some(Scatter { ratio, p_value: Some(p) }) => {
+                write!(f, "; scatter {ratio:.2} of what is stated, p = {p:.2}")
+            }
             _ => Ok(()),
         }
     }
@@ -111,9 +113,19 @@ impl WeightedMean {
         let meier = 1.0 + 4.0 * shares().map(|(share, freedom)| share * (1.0 - share) / freedom).sum::<f64>();
         let all = shares().map(|(share, freedom)| share * share / freedom).sum::<f64>().recip();
         let degrees_of_freedom = fewest.map(|fewest| if fewest < FEWEST_FOR_WEIGHTS { fewest } else { all });
-        let mean = Self { value, uncertainty: (scatter.ratio.powi(2).max(meier) / weights).sqrt(), degrees_of_freedom, scatter };
+        let mean = Self {
+            value,
+            uncertainty: (scatter.ratio.powi(2).max(meier) / weights).sqrt(),
+            degrees_of_freedom,
+            scatter,
+        };
         let is_number = value.is_finite() && mean.uncertainty.is_finite() && mean.uncertainty > 0.0;
         is_number.then_some(mean)
+    }
+
+    /// Where meters share noise: their mean is as uncertain as that of so many times fewer.
+    fn sharing(self, design_effect: f64) -> Self {
+        Self { uncertainty: design_effect.sqrt() * self.uncertainty, ..self }
     }
 
     /// The probability of a mean at least this far from nothing, were there nothing.
@@ -136,7 +148,8 @@ pub fn two_sided(z: f64, degrees_of_freedom: Option<f64>) -> f64 {
 
 impl Judge<'_> {
     /// The bias of every engine of a task, against each kind of reference; comparisons without a relative deviation tell nothing.
-    pub fn bias(&self, comparisons: &[Comparison]) -> Vec<Bias> {
+    pub fn bias(&self, comparisons: &[Comparison], recordings: &[Recording]) -> Vec<Bias> {
+        let shared = |key: &ReadingKey| recordings.iter().find(|r| r.key == *key).and_then(|r| r.design_effect);
         let mut groups: BTreeMap<(&ReadingKey, Basis), Vec<Deviation>> = BTreeMap::new();
         for c in comparisons.iter().filter(|c| c.uncertainty != Uncertainty::NotSeen) {
             let (Some(reference), Some(budget)) = (&c.reference, &c.budget) else { continue };
@@ -146,7 +159,10 @@ impl Judge<'_> {
             groups.entry((&c.key, reference.basis)).or_default().push(deviation);
         }
         let tail = upper_tail_of_normal(self.tolerances.coverage_factor());
-        groups.into_iter().filter_map(|((key, basis), all)| of_group(key, basis, &all, tail)).collect()
+        let of = |((key, basis), all): ((&ReadingKey, Basis), Vec<Deviation>)| {
+            of_group(key, basis, &all, shared(key).unwrap_or(1.0), tail)
+        };
+        groups.into_iter().filter_map(of).collect()
     }
 }
 
@@ -159,11 +175,11 @@ struct Deviation {
 }
 
 /// `None` where the deviations are so absurd that their mean is no number.
-fn of_group(key: &ReadingKey, basis: Basis, all: &[Deviation], tail: f64) -> Option<Bias> {
+fn of_group(key: &ReadingKey, basis: Basis, all: &[Deviation], design_effect: f64, tail: f64) -> Option<Bias> {
     // What states no uncertainty would outweigh everything.
     let stated = all.iter().filter(|d| d.uncertainty > SINGLE_PRECISION);
     let stated: Vec<_> = stated.map(|d| (d.relative, d.uncertainty, d.degrees_of_freedom)).collect();
-    let (mean, low, high, of_stated) = match WeightedMean::of(&stated) {
+    let (mean, low, high, of_stated) = match WeightedMean::of(&stated).map(|mean| mean.sharing(design_effect)) {
         Some(mean) if stated.len() == all.len() => {
             let spread = Component::normal(Source::MonteCarlo, mean.uncertainty, mean.degrees_of_freedom);
             let expanded = ErrorBudget::new(vec![spread], tail).expanded;
@@ -191,7 +207,7 @@ mod tests {
         let exact = recording("simulator", &vec![Estimate::exact(1.0); readings.len()]);
         let (judge, task) = (built_in(), task(readings.len()));
         let comparisons = judge.compare(&task, &[&exact, &recording("radiance", readings)]);
-        judge.bias(&comparisons).into_iter().find(|b| b.key.engine == "radiance").unwrap()
+        judge.bias(&comparisons, &[]).into_iter().find(|b| b.key.engine == "radiance").unwrap()
     }
 
     fn noisy(deviation: f64, stated: f64, seed: u64) -> Vec<Estimate> {
@@ -243,6 +259,22 @@ mod tests {
         let (honest, bold) = (scatter(0.004), scatter(0.004 / 3.0));
         assert!((honest.ratio - 1.0).abs() < 0.2 && honest.p_value.unwrap() > 0.01, "{honest:?}");
         assert!((bold.ratio - 3.0).abs() < 0.6 && bold.p_value.unwrap() < 1e-6, "{bold:?}");
+    }
+
+    #[test]
+    fn noise_that_meters_share_is_no_bias() {
+        let p_value = |seed: u64, design_effect: Option<f64>| {
+            let common = 0.004 * normal(&mut fastrand::Rng::with_seed(seed));
+            let one = Estimate { value: 1.0 + common, uncertainty: Uncertainty::sampled(0.004, None) };
+            let exact = recording("simulator", &[Estimate::exact(1.0); 24]);
+            let (judge, subject) = (built_in(), Recording { design_effect, ..recording("radiance", &[one; 24]) });
+            let comparisons = judge.compare(&task(24), &[&exact, &subject]);
+            let found = judge.bias(&comparisons, &[subject]);
+            found.into_iter().find(|b| b.key.engine == "radiance").and_then(|b| b.p_value).unwrap()
+        };
+        let small = |design_effect| (0..200).filter(|seed| p_value(*seed, design_effect) < 0.05).count();
+        assert!((2..=20).contains(&small(Some(24.0))), "{}", small(Some(24.0)));
+        assert!(small(None) > 100, "the negative control: {}", small(None));
     }
 
     #[test]

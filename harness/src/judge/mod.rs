@@ -194,7 +194,9 @@ impl Judge<'_> {
     }
 
     fn comparison(&self, task: &Task, recording: &Recording, k: usize, held: Option<ScoredReference>) -> Comparison {
-        let (target, reading) = (&task.targets[k], recording.readings.get(k));
+        let target = &task.targets[k];
+        let reading = recording.readings.get(k).map(|r| believed(r, recording, held.as_ref()));
+        let reading = reading.as_ref();
         let basis = held.as_ref().map(|h| h.reference.basis);
         let (tolerance, tolerance_source) =
             basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();
@@ -242,7 +244,8 @@ impl Judge<'_> {
         let deviation = if sound { value - reference.value } else { f64::NAN };
         let allowed = tolerance.around(reference.value);
         comparison.verdict = judge(deviation, budget.expanded, allowed);
-        let waits = unbelievable(comparison.uncertainty, value, is_heavy_tailed(recording));
+        let waits =
+            unbelievable(comparison.uncertainty, value, is_heavy_tailed(recording, comparison.uncertainty, deviation));
         if let Some(why) = waits.filter(|_| comparison.verdict == Verdict::Fail) {
             comparison.verdict = Verdict::Inconclusive;
             comparison.diagnosis = Some(why.to_owned());
@@ -260,10 +263,15 @@ const MAX_RELATIVE_ERROR: f64 = 0.25;
 /// Normal deviates of the skewness of blocks beyond which their mean is not normal either: one in a hundred of normal blocks.
 const MAX_SKEWNESS: f64 = 2.33;
 
+/// Standard errors that a mean of few samples of a heavy tail may lie off: eight of a lognormal distribution of sigma 2 lie 28 below
+/// once in some hundred times. An engine that only says that its errors vary hides nothing farther off.
+const FAR: f64 = 100.0;
+
 /// Whether its blocks tell so, or what it states with one seed and the other.
-fn is_heavy_tailed(recording: &Recording) -> bool {
-    recording.skewness.is_some_and(|s| s > MAX_SKEWNESS)
-        || recording.stated_errors.iter().any(|s| s.doubt == Some(Doubt::HeavyTail))
+fn is_heavy_tailed(recording: &Recording, uncertainty: Uncertainty, deviation: f64) -> bool {
+    let is_near = || uncertainty.standard_error().is_some_and(|error| deviation.abs() < FAR * error);
+    let is_stated = || recording.stated_errors.iter().any(|s| s.doubt == Some(Doubt::HeavyTail));
+    recording.skewness.is_some_and(|s| s > MAX_SKEWNESS) || (is_stated() && is_near())
 }
 
 /// Why a sampled value fails nothing, whatever its distance: its interval is not one.
@@ -273,11 +281,31 @@ fn unbelievable(uncertainty: Uncertainty, value: f64, is_heavy_tailed: bool) -> 
             "a heavy tail: a few of its samples hold much of the light, others are still to come; it fails nothing yet",
         ),
         Uncertainty::NotSeen => Some("not seen: no sample met here what samples met elsewhere"),
-        Uncertainty::StandardError { value: error, .. } if error > MAX_RELATIVE_ERROR * value => {
+        Uncertainty::StandardError { value: error, .. } if value > 0.0 && error > MAX_RELATIVE_ERROR * value => {
             Some("too few samples: they scatter so much that their mean is not normal, and fails nothing yet")
         }
         _ => None,
     }
+}
+
+/// Where a sample is met that rarely, it may carry so many times the light of those elsewhere.
+const BRIGHTER: f64 = 1e4;
+
+/// A reading with the error that it has where no sample met anything: were the reference right, and light to come here in portions
+/// many times as large as anywhere else (a portion is the variance of a reading over its value), zero would be so far off by chance.
+/// Where that is not far below the reference, it stays not seen.
+fn believed(reading: &Reading, recording: &Recording, held: Option<&ScoredReference>) -> Reading {
+    let portion = |r: &Reading| Some(r.uncertainty.standard_error()?.powi(2) / r.value).filter(|p| p.is_finite());
+    let largest = recording.readings.iter().filter_map(portion).reduce(f64::max).filter(|p| *p > 0.0);
+    let uncertainty = match (reading.uncertainty, held, largest) {
+        (Uncertainty::NotSeen, Some(held), Some(largest)) => {
+            let error = (BRIGHTER * largest * held.reference.value).sqrt();
+            let is_small = error < MAX_RELATIVE_ERROR * held.reference.value;
+            if is_small { Uncertainty::sampled(error, None) } else { Uncertainty::NotSeen }
+        }
+        (stated, ..) => stated,
+    };
+    Reading { uncertainty, ..reading.clone() }
 }
 
 /// Rounding of a closed form in `f64`, relative: a few operations and two arctangents a luminaire.

@@ -106,6 +106,19 @@ fn a_real_failure_at_one_meter_of_192_still_fails() {
 }
 
 #[test]
+fn what_is_never_seen_fails_where_samples_are_many_and_waits_where_they_are_few() {
+    let exact = recording("simulator", &[Estimate::exact(1.0); 4]);
+    let verdict = |error: f64| {
+        let mut readings = vec![sampled(1.0, error, 15.0); 4];
+        readings[2] = Estimate { value: 0.0, uncertainty: Uncertainty::NotSeen };
+        let comparisons = built_in().compare(&task(4), &[&exact, &recording("radiance", &readings)]);
+        comparisons.iter().find(|c| c.meter == MeterId::new("grid", 2) && c.key.engine == "radiance").unwrap().verdict
+    };
+    assert_eq!(verdict(1e-4), Verdict::Fail);
+    assert_eq!(verdict(0.01), Verdict::Inconclusive);
+}
+
+#[test]
 fn a_budget_names_what_it_is_made_of() {
     let mut exact = recording("simulator", &[Estimate::exact(2.0)]);
     exact.readings[0].uncertainty = Uncertainty::Bound(0.0003);

@@ -1,7 +1,8 @@
 //! Shortcuts: the least that has to be rendered for a run, and how the other readings follow from it; pure.
 //!
-//! Our own witnesses take none: they read every meter as it was asked, so that a claim that is wrong shows in every comparison, besides in the spot
-//! checks, which render a random twentieth of what was not rendered.
+//! Our own witnesses take none of symmetry, darkness or flat rooms: they read every meter as it was asked, so that a claim that is
+//! wrong shows in every comparison, besides in the spot checks, which render a random twentieth of what a run leaves out. A user's
+//! program takes none at all: what a shortcut fills in is what light does, and not what the program says of it.
 
 mod bounces;
 mod dark;

@@ -1,28 +1,26 @@
-//! Spot checks: a random part of what is not rendered is rendered all the same, and must be what the shortcut says.
+//! Spot checks: a random part of what is not rendered is rendered all the same. Where it is not what the shortcut says, everything is.
 
 use super::Run;
 use crate::engines::{Job, Measurement};
 use crate::record::Uncertainty;
 
-/// The part of what is not rendered that is looked at, one reading at least.
+/// The part of what a run does not render that is looked at, one reading at least.
 const PART: f64 = 0.05;
 /// Standard errors that two readings of one quantity may be apart.
 const COVERAGE: f64 = 5.0;
 /// What renderers' single-precision coordinates make of two meters that mirror each other, relative to the brightest reading.
 const ROUNDING: f64 = 2e-5;
 
-/// Draws the stations to be looked at, over all runs of a case but those of witnesses, which read every meter anyway.
+/// Draws the stations to be looked at, for every run of a case by itself: what one engine reads says nothing of another. Witnesses
+/// read every meter anyway.
 pub(super) fn draw(runs: &mut [Run], is_witness: impl Fn(&Run) -> bool, seed: u64) {
-    let unseen = |(r, run): (usize, &Run)| run.shortcut.unseen(&run.job).into_iter().map(move |s| (r, s));
-    let subjects = runs.iter().enumerate().filter(|(_, run)| !is_witness(run));
-    let mut unseen: Vec<(usize, usize)> = subjects.flat_map(unseen).collect();
-    fastrand::Rng::with_seed(seed).shuffle(&mut unseen);
-    let wanted = (PART * unseen.len() as f64).ceil() as usize;
-    for (r, station) in unseen.into_iter().take(wanted) {
-        runs[r].spot_check.push(station);
-    }
-    for run in runs {
-        run.spot_check.sort_unstable();
+    let mut random = fastrand::Rng::with_seed(seed);
+    for run in runs.iter_mut().filter(|run| !is_witness(run)) {
+        let mut drawn = run.shortcut.unseen(&run.job);
+        random.shuffle(&mut drawn);
+        drawn.truncate((PART * drawn.len() as f64).ceil() as usize);
+        drawn.sort_unstable();
+        run.spot_check = drawn;
     }
 }
 
@@ -48,7 +46,7 @@ impl Run {
             let apart = (said.value - seen.value).abs();
             if apart.is_nan() || allowed.is_nan() || apart > allowed {
                 return Err(format!(
-                    "spot check: {} reads {} lx where {} lx follow from a shortcut ({}); --no-skips renders everything",
+                    "a spot check contradicts a shortcut: {} reads {} lx where {} lx follow ({}); everything was rendered instead",
                     self.job.stations[station].id,
                     seen.value,
                     said.value,
@@ -88,13 +86,18 @@ mod tests {
     }
 
     #[test]
-    fn a_twentieth_is_drawn_one_at_least_by_the_seed() {
+    fn a_twentieth_of_every_run_is_drawn_one_at_least_by_the_seed() {
         for (points, wanted) in [(1, 0), (2, 1), (21, 1), (22, 2), (401, 20)] {
             let mut runs = [run(points)];
             draw(&mut runs, |_| false, 1);
             assert_eq!(runs[0].spot_check.len(), wanted, "{points}");
             assert!(runs[0].spot_check.iter().all(|s| (1..points).contains(s)));
         }
+        // A run with much to look at takes nothing from one with little, and a witness is left alone.
+        let mut runs = [run(2), run(401), run(1), run(41), run(41)];
+        runs[4].engine = 1;
+        draw(&mut runs, |run| run.engine == 1, 1);
+        assert_eq!(runs.map(|r| r.spot_check.len()), [1, 20, 0, 2, 0]);
         let drawn = |seed| {
             let mut runs = [run(401), run(401)];
             draw(&mut runs, |_| false, seed);

@@ -1,6 +1,7 @@
 //! Readings: what one engine says at one meter, with its uncertainty.
 
 mod basis;
+mod design_effect;
 mod key;
 mod light;
 mod method;
@@ -12,6 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use basis::Basis;
+pub use design_effect::design_effect;
 pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
 pub use light::{Light, UnknownLight};
 pub use method::{Effort, Method};
@@ -156,6 +158,9 @@ pub struct Recording {
     /// How skewed the blocks of its samples are, in standard deviations of what normal blocks would be: a heavy tail.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skewness: Option<f64>,
+    /// How much of their noise its meters share: the variance of their mean over that of independent meters; null where it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub design_effect: Option<f64>,
     /// How its stated errors agree with how readings of other seeds scatter, where that was looked at: of what was sampled, and of
     /// what is claimed to be determined.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -191,6 +196,7 @@ impl Recording {
             components: vec![],
             looks: vec![],
             skewness: None,
+            design_effect: None,
             stated_errors: vec![],
             command: None,
             failure: None,

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{Estimate, Uncertainty};
+use super::{Estimate, Uncertainty, design_effect};
 
 /// Stated errors that vary as they do with a smaller probability are a heavy tail: the chi-squared distribution is only nearly theirs.
 const UNHEARD_OF: f64 = 1e-4;
@@ -16,6 +16,11 @@ const TOLD: f64 = 0.005;
 const COUNTED: f64 = 0.05;
 /// Degrees of freedom of a standard error that tells none: more than that would make little of how it may vary.
 const FEW: f64 = 3.0;
+/// Standard errors that vary as those of fewer degrees of freedom are not of samples that are about normal: blocks of exponential
+/// noise, eight of them, vary as those of four.
+const NORMAL: f64 = 3.0;
+/// The fewest degrees of freedom that a standard error is taken to have.
+const FEWEST: f64 = 1.0;
 /// What readings that are the same differ by, in what is stated of them: rounding.
 const SAME: f64 = 1e-6;
 /// How many times too large a stated error is before that is told: some care is nobody's fault.
@@ -26,8 +31,13 @@ const MIN_EXCESS: f64 = 3.0;
 pub struct StatedErrors {
     /// Scatter over stated standard error, root of the mean square; null where no error was stated.
     pub ratio: Option<f64>,
-    /// Of the scatter: repeated readings less the meters that they were taken at.
+    /// Of the scatter: repeated readings less the meters that they were taken at, fewer where meters share their noise.
     pub degrees_of_freedom: f64,
+    /// How much of their noise the meters share: the variance of their mean over that of independent meters.
+    pub design_effect: f64,
+    /// Degrees of freedom by which standard errors vary from seed to seed, where they vary more than those that are stated have it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub degrees_of_freedom_seen: Option<f64>,
     /// The probability of a ratio as far from 1, were the stated errors right.
     pub p_value: Option<f64>,
     /// Relative scatter of readings that are claimed to have none, root of the mean square.
@@ -41,62 +51,93 @@ pub struct StatedErrors {
 pub enum Doubt {
     TooSmall,
     TooLarge,
-    /// They vary from seed to seed by more than their degrees of freedom have it: a few samples hold much of the light.
+    /// They vary from seed to seed by more than those of normal samples: a few samples hold much of the light.
     HeavyTail,
+    /// They vary as those of fewer samples than are stated.
+    FewerSamples,
     /// What is claimed to be determined scatters.
     Scatters,
     /// Every seed reads the same, although errors of sampling are stated.
     SameForEverySeed,
+    /// The engine did not read again.
+    NotReadAgain,
+    /// What is stated is beyond the tolerance at most meters, and nothing shows that it is meant: nothing could ever fail.
+    BeyondTolerance,
 }
 
 impl StatedErrors {
+    /// Nothing found but a doubt.
+    pub const fn doubted(doubt: Doubt) -> Self {
+        Self {
+            ratio: None,
+            degrees_of_freedom: 0.0,
+            design_effect: 1.0,
+            degrees_of_freedom_seen: None,
+            p_value: None,
+            of_claims: None,
+            doubt: Some(doubt),
+        }
+    }
+
     /// Of readings whose errors are stated, one list a meter; meters whose error is not of sampling say nothing.
     pub fn of_sampled(meters: &[Vec<Estimate>]) -> Option<Self> {
-        let (mut sum, mut degrees_of_freedom) = (0.0, 0.0);
+        let draws = meters.iter().map(Vec::len).max()?;
+        let (mut sum, mut freedom, mut deviates) = (0.0, 0.0, vec![vec![]; draws]);
         for readings in meters {
             let error = |e: &Estimate| e.uncertainty.standard_error().filter(|e| *e > 0.0);
             let stated: Vec<(f64, f64)> = readings.iter().filter_map(|e| Some((e.value, error(e)?.powi(-2)))).collect();
             let weights: f64 = stated.iter().map(|(_, w)| w).sum();
             let mean = stated.iter().map(|(x, w)| x * w).sum::<f64>() / weights;
-            sum += stated.iter().map(|(x, w)| w * (x - mean).powi(2)).sum::<f64>();
-            degrees_of_freedom += stated.len().saturating_sub(1) as f64;
+            let of_each: Vec<f64> = stated.iter().map(|(x, w)| w.sqrt() * (x - mean)).collect();
+            sum += of_each.iter().map(|z| z * z).sum::<f64>();
+            freedom += stated.len().saturating_sub(1) as f64;
+            if of_each.len() == draws {
+                deviates.iter_mut().zip(of_each).for_each(|(draw, z)| draw.push(z));
+            }
         }
         if !sum.is_finite() {
             return None;
         }
+        let design_effect = design_effect(&deviates);
+        let ratio = (sum / freedom).sqrt();
+        let degrees_of_freedom = freedom / design_effect;
         let chance = ChiSquared::new(degrees_of_freedom).ok()?;
-        let (below, above) = (chance.cdf(sum), chance.sf(sum));
-        let ratio = (sum / degrees_of_freedom).sqrt();
+        let (below, above) = (chance.cdf(sum / design_effect), chance.sf(sum / design_effect));
+        let seen = varying(meters);
         let doubt = match ratio {
             r if r < SAME => Some(Doubt::SameForEverySeed),
-            _ if heavy_tailed(meters) => Some(Doubt::HeavyTail),
+            _ if seen.is_some_and(|seen| seen < NORMAL) => Some(Doubt::HeavyTail),
             _ if above < TOLD => Some(Doubt::TooSmall),
             r if below < TOLD && r < 1.0 / MIN_EXCESS => Some(Doubt::TooLarge),
-            _ => None,
+            _ => seen.map(|_| Doubt::FewerSamples),
         };
-        let p_value = Some(2.0 * below.min(above));
-        Some(Self { ratio: Some(ratio), degrees_of_freedom, p_value, of_claims: None, doubt })
+        Some(Self {
+            ratio: Some(ratio),
+            degrees_of_freedom,
+            design_effect,
+            degrees_of_freedom_seen: seen,
+            p_value: Some(2.0 * below.min(above)),
+            of_claims: None,
+            doubt,
+        })
     }
 
-    /// Of readings that are claimed to be determined and are not.
+    /// Of readings that are claimed to be determined and are not. What is next to nothing beside the brightest meter scatters by
+    /// rounding.
     pub fn of_claims(meters: &[Vec<Estimate>]) -> Option<Self> {
+        let mean = |readings: &[Estimate]| readings.iter().map(|e| e.value).sum::<f64>() / readings.len() as f64;
+        let brightest = meters.iter().map(|readings| mean(readings)).fold(0.0, f64::max);
         let (mut sum, mut degrees_of_freedom) = (0.0, 0.0);
         for readings in meters {
-            let mean = readings.iter().map(|e| e.value).sum::<f64>() / readings.len() as f64;
-            if mean > 0.0 {
+            let mean = mean(readings);
+            if mean > SAME * brightest {
                 sum += readings.iter().map(|e| (e.value / mean - 1.0).powi(2)).sum::<f64>();
                 degrees_of_freedom += readings.len().saturating_sub(1) as f64;
             }
         }
         let relative = (sum / degrees_of_freedom).sqrt();
-        let doubted = Self {
-            ratio: None,
-            degrees_of_freedom,
-            p_value: None,
-            of_claims: Some(relative),
-            doubt: Some(Doubt::Scatters),
-        };
-        (relative > 0.0 && relative.is_finite()).then_some(doubted)
+        let found = Self { degrees_of_freedom, of_claims: Some(relative), ..Self::doubted(Doubt::Scatters) };
+        (relative > 0.0 && relative.is_finite()).then_some(found)
     }
 
     /// A reading with the error that it has by all that was found of its engine.
@@ -113,14 +154,20 @@ impl StatedErrors {
     fn correct(&self, estimate: Estimate) -> Estimate {
         let freedom = self.degrees_of_freedom;
         let uncertainty = match (estimate.uncertainty, self.ratio, self.of_claims) {
-            (Uncertainty::StandardError { value, degrees_of_freedom, bound }, Some(ratio), _)
-                if value > 0.0 && self.counts(ratio) =>
-            {
-                let degrees_of_freedom = degrees_of_freedom.map_or(freedom, |of_stated| {
+            (Uncertainty::StandardError { value, degrees_of_freedom, bound }, Some(ratio), _) if value > 0.0 => {
+                let seen = self.degrees_of_freedom_seen;
+                let stated = match seen {
+                    Some(seen) => Some(degrees_of_freedom.map_or(seen, |stated| stated.min(seen)).max(FEWEST)),
+                    None => degrees_of_freedom,
+                };
+                if self.counts(ratio) {
                     // Relative variances of the two standard errors add up.
-                    (of_stated.recip() + freedom.recip()).recip()
-                });
-                Uncertainty::StandardError { value: ratio * value, degrees_of_freedom: Some(degrees_of_freedom), bound }
+                    let of_both = stated.map_or(freedom, |stated| (stated.recip() + freedom.recip()).recip());
+                    let degrees_of_freedom = Some(of_both.max(FEWEST.min(freedom)));
+                    Uncertainty::StandardError { value: ratio * value, degrees_of_freedom, bound }
+                } else {
+                    Uncertainty::StandardError { value, degrees_of_freedom: stated, bound }
+                }
             }
             (stated, None, Some(relative)) => Uncertainty::StandardError {
                 value: relative * estimate.value,
@@ -135,26 +182,40 @@ impl StatedErrors {
     fn counts(&self, ratio: f64) -> bool {
         match self.doubt {
             Some(Doubt::TooSmall | Doubt::TooLarge | Doubt::Scatters) => true,
-            Some(Doubt::SameForEverySeed) => false,
-            Some(Doubt::HeavyTail) | None => ratio > 1.0 && self.p_value.is_some_and(|p| p < 2.0 * COUNTED),
+            Some(Doubt::SameForEverySeed | Doubt::NotReadAgain | Doubt::BeyondTolerance) => false,
+            Some(Doubt::HeavyTail | Doubt::FewerSamples) | None => {
+                ratio > 1.0 && self.p_value.is_some_and(|p| p < 2.0 * COUNTED)
+            }
         }
     }
 }
 
-/// Whether standard errors stated for readings of one effort, all but the last of each meter, vary more than those of normal samples:
-/// the logarithm of a variance with n degrees of freedom has the variance psi'(n / 2) (Bartlett and Kendall, Suppl. J. Roy. Statist.
-/// Soc. 8 (1946)).
-fn heavy_tailed(meters: &[Vec<Estimate>]) -> bool {
-    let (mut sum, mut freedom) = (0.0, 0.0);
+/// The degrees of freedom by which standard errors stated for readings of one effort, all but the last of each meter, vary, where that
+/// is more than those of normal samples with the degrees of freedom stated: the logarithm of a variance with n degrees of freedom
+/// has the variance psi'(n / 2) (Bartlett and Kendall, Suppl. J. Roy. Statist. Soc. 8 (1946)).
+fn varying(meters: &[Vec<Estimate>]) -> Option<f64> {
+    let (mut sum, mut squares, mut freedom) = (0.0, 0.0, 0.0);
     for readings in meters {
         let repeated = readings.iter().take(readings.len().saturating_sub(1)).map(|e| e.uncertainty);
         let stated = repeated.filter_map(|u| Some((u.standard_error()?, u.degrees_of_freedom().unwrap_or(FEW))));
         let logs: Vec<(f64, f64)> = stated.filter(|(e, _)| *e > 0.0).map(|(e, n)| (2.0 * e.ln(), n)).collect();
         let mean = logs.iter().map(|(log, _)| log).sum::<f64>() / logs.len() as f64;
         sum += logs.iter().map(|(log, n)| (log - mean).powi(2) / trigamma(n / 2.0)).sum::<f64>();
+        squares += logs.iter().map(|(log, _)| (log - mean).powi(2)).sum::<f64>();
         freedom += logs.len().saturating_sub(1) as f64;
     }
-    ChiSquared::new(freedom).is_ok_and(|chance| chance.sf(sum) < UNHEARD_OF)
+    let is_unheard_of = ChiSquared::new(freedom).is_ok_and(|chance| chance.sf(sum) < UNHEARD_OF);
+    is_unheard_of.then(|| 2.0 * of_trigamma(squares / freedom))
+}
+
+/// The number of which this is the trigamma: it falls.
+fn of_trigamma(value: f64) -> f64 {
+    let (mut low, mut high) = (1e-6_f64, 1e6_f64);
+    for _ in 0..100 {
+        let middle = (low * high).sqrt();
+        if trigamma(middle) > value { low = middle } else { high = middle }
+    }
+    high
 }
 
 /// The second derivative of the logarithm of the gamma function (Abramowitz and Stegun 6.4.6 and 6.4.12).
@@ -171,32 +232,46 @@ impl fmt::Display for StatedErrors {
         match self.doubt {
             Some(Doubt::TooSmall) => write!(
                 f,
-                "its standard errors are {ratio:.1} times too small: that is how its readings of other seeds scatter ({freedom} \
+                "its standard errors are {ratio:.1} times too small: that is how its readings of other seeds scatter ({freedom:.0} \
                  degrees of freedom); verdicts go by the scatter"
             ),
             Some(Doubt::TooLarge) => write!(
                 f,
-                "its standard errors are {:.1} times too large: its readings of other seeds scatter by as much less ({freedom} \
+                "its standard errors are {:.1} times too large: its readings of other seeds scatter by as much less ({freedom:.0} \
                  degrees of freedom); verdicts go by the scatter",
                 ratio.recip()
             ),
             Some(Doubt::HeavyTail) => write!(
                 f,
                 "a heavy tail: its standard errors vary from seed to seed by much more than they should, so that a few of its samples \
-                 hold much of the light and others are still to come; it fails nothing yet"
+                 hold much of the light and others are still to come; verdicts go by the {:.1} degrees of freedom that this tells",
+                self.degrees_of_freedom_seen.unwrap_or(FEWEST).max(FEWEST)
+            ),
+            Some(Doubt::FewerSamples) => write!(
+                f,
+                "its standard errors vary from seed to seed as those of {:.1} degrees of freedom do, fewer than it states; verdicts go \
+                 by these",
+                self.degrees_of_freedom_seen.unwrap_or(FEWEST)
             ),
             Some(Doubt::Scatters) => write!(
                 f,
-                "it claims readings without any scatter, and those of other seeds scatter by {:.2e} ({freedom} degrees of \
+                "it claims readings without any scatter, and those of other seeds scatter by {:.2e} ({freedom:.0} degrees of \
                  freedom); verdicts go by the scatter",
                 self.of_claims.unwrap_or(0.0)
             ),
             Some(Doubt::SameForEverySeed) => {
                 write!(f, "it states errors of sampling and reads the same with every seed: they cannot be checked")
             }
+            Some(Doubt::NotReadAgain) => {
+                write!(f, "it did not read again with another seed: what it states of its errors could not be checked")
+            }
+            Some(Doubt::BeyondTolerance) => write!(
+                f,
+                "what it states of its errors is beyond the tolerance at most meters: nothing that it reads could ever fail"
+            ),
             None => write!(
                 f,
-                "readings of other seeds scatter by {ratio:.2} of what it states ({freedom} degrees of freedom)"
+                "readings of other seeds scatter by {ratio:.2} of what it states ({freedom:.0} degrees of freedom)"
             ),
         }
     }
@@ -250,6 +325,43 @@ mod tests {
         assert!(count(2.0, 6) > 990, "{}", count(2.0, 6));
         assert!(count(0.0, 6) <= 2 && count(0.0, 40) <= 2, "{} {}", count(0.0, 6), count(0.0, 40));
         assert!((trigamma(1.0) - std::f64::consts::PI.powi(2) / 6.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn more_samples_than_there_are_change_no_verdict() {
+        // Eight blocks each, stated as 4096 samples.
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut reading = || {
+            let of_blocks = Estimate::of_samples(&(0..8).map(|_| 100.0 + normal(&mut random)).collect::<Vec<f64>>());
+            let error = of_blocks.uncertainty.standard_error().unwrap();
+            Estimate { uncertainty: Uncertainty::sampled(error, Some(4095.0)), ..of_blocks }
+        };
+        let all: Vec<Vec<Estimate>> = (0..24).map(|_| (0..4).map(|_| reading()).collect()).collect();
+        let found = StatedErrors::of_sampled(&all).unwrap();
+        assert_eq!(found.doubt, Some(Doubt::FewerSamples), "{found}");
+        let freedom = found.correct(all[0][0]).uncertainty.degrees_of_freedom().unwrap();
+        assert!((4.5..11.0).contains(&freedom), "{freedom}");
+    }
+
+    #[test]
+    fn noise_that_meters_share_says_little_of_stated_errors() {
+        let told = |seed: &u64| {
+            let mut random = fastrand::Rng::with_seed(*seed);
+            let drawn: Vec<f64> = (0..4).map(|_| 100.0 + normal(&mut random)).collect();
+            let one = |value: &f64| Estimate { value: *value, uncertainty: Uncertainty::sampled(1.0, Some(7.0)) };
+            let found = StatedErrors::of_sampled(&vec![drawn.iter().map(one).collect(); 24]).unwrap();
+            found.doubt.is_some()
+        };
+        let count = (0..1000).filter(told).count();
+        // .5 % either way.
+        assert!(count <= 20, "{count} of 1000");
+    }
+
+    #[test]
+    fn rounding_in_the_dark_is_no_scatter() {
+        let readings = |values: [f64; 4]| values.map(Estimate::exact).to_vec();
+        let dark = readings([1e-12, 3e-12, 2e-12, 1e-13]);
+        assert_eq!(StatedErrors::of_claims(&[readings([100.0; 4]), dark]), None);
     }
 
     #[test]

@@ -8,11 +8,15 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command as StdCommand, ExitStatus, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
+
+use parking_lot::Mutex;
+
+/// How long a pipe may stay open after the program behind it has ended.
+const LEFT_BEHIND: Duration = Duration::from_secs(3);
 
 /// Set when the user asked to stop (Ctrl-C); every running process group is then killed.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
@@ -165,8 +169,8 @@ impl Invocation {
         let ended = self.wait(&mut child, start);
         // Whatever the program started goes with it.
         kill_group(&child);
-        let stdout = stdout.join().unwrap_or_default();
-        let stderr = self.conclude(ended, &stderr.join().unwrap_or_default())?;
+        let stdout = stdout.said();
+        let stderr = self.conclude(ended, &stderr.said())?;
         Ok(Finished { stdout, stderr, wall: start.elapsed() })
     }
 
@@ -272,7 +276,7 @@ pub struct Conversation {
     stdin: Option<ChildStdin>,
     lines: mpsc::Receiver<String>,
     /// Joined once its messages are in the log.
-    stderr: Option<thread::JoinHandle<Vec<u8>>>,
+    stderr: Option<Drained>,
 }
 
 const LISTEN: Duration = Duration::from_millis(10);
@@ -314,7 +318,7 @@ impl Conversation {
     fn close(&mut self, ended: Result<ExitStatus, ProcessError>) -> Result<(), ProcessError> {
         kill_group(&self.child);
         let Some(stderr) = self.stderr.take() else { return Ok(()) };
-        self.invocation.conclude(ended, &stderr.join().unwrap_or_default()).map(|_| ())
+        self.invocation.conclude(ended, &stderr.said()).map(|_| ())
     }
 }
 
@@ -330,16 +334,42 @@ impl Drop for Conversation {
 }
 
 /// A thread that empties a pipe, so that neither side can block the other.
-fn drain(pipe: Option<impl Read + Send + 'static>) -> thread::JoinHandle<Vec<u8>> {
-    thread::spawn(move || {
-        let mut bytes = vec![];
-        if let Some(mut pipe) = pipe
-            && let Err(error) = pipe.read_to_end(&mut bytes)
-        {
-            tracing::warn!(%error, "output of a program cut short");
+/// What a program writes, read as it comes.
+#[derive(Debug)]
+struct Drained {
+    bytes: Arc<Mutex<Vec<u8>>>,
+    closed: mpsc::Receiver<()>,
+}
+
+impl Drained {
+    /// All of it, once the program has ended: something that it left behind may hold its pipe open for ever.
+    fn said(self) -> Vec<u8> {
+        if self.closed.recv_timeout(LEFT_BEHIND) == Err(mpsc::RecvTimeoutError::Timeout) {
+            tracing::warn!("a program left something behind that holds its output open: what it said so far counts");
         }
-        bytes
-    })
+        std::mem::take(&mut self.bytes.lock())
+    }
+}
+
+fn drain(pipe: Option<impl Read + Send + 'static>) -> Drained {
+    let bytes = Arc::new(Mutex::new(vec![]));
+    let (closes, closed) = mpsc::channel::<()>();
+    let kept = Arc::clone(&bytes);
+    thread::spawn(move || {
+        // Goes with the thread, and so tells that the pipe is closed.
+        let _closes = closes;
+        let Some(mut pipe) = pipe else { return };
+        let mut chunk = vec![0; 1 << 16];
+        loop {
+            match pipe.read(&mut chunk) {
+                Ok(0) => return,
+                Ok(count) => kept.lock().extend(&chunk[..count]),
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => (),
+                Err(error) => return tracing::warn!(%error, "output of a program cut short"),
+            }
+        }
+    });
+    Drained { bytes, closed }
 }
 
 fn kill_group(child: &Child) {
@@ -399,6 +429,16 @@ mod tests {
         assert!(matches!(error, ProcessError::TimedOut { .. }), "{error}");
         thread::sleep(Duration::from_millis(1300));
         assert!(!folder.path().join("survivor").exists());
+    }
+
+    #[test]
+    fn what_a_program_leaves_behind_does_not_hold_its_answer() {
+        let folder = tempfile::tempdir().unwrap();
+        let start = Instant::now();
+        // A session of its own is out of the group's reach.
+        let done = shell("setsid sleep 60 & echo answer", 30.0, folder.path()).unwrap();
+        assert_eq!(done.stdout, b"answer\n");
+        assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
     }
 
     fn conversation(script: &str, limit_s: f64, folder: &Path) -> Conversation {
