@@ -165,7 +165,7 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
         let work_s = [taken.measurement.work_s, seen.measurement.work_s];
         taken.measurement.work_s = work_s.into_iter().flatten().reduce(f64::add);
         // What was rendered stands; samples of another job do not tell how it varies with the rest.
-        taken.measurement.samples.clear();
+        taken.measurement.forget_samples();
         for (&station, estimate) in run.spot_check.iter().zip(seen.measurement.estimates) {
             taken.measurement.estimates[station] = estimate;
         }

@@ -294,6 +294,16 @@ mod tests {
     }
 
     #[test]
+    fn meters_that_mirror_each_other_share_their_noise_and_that_outlives_the_samples() {
+        let one = Blocks::new((0..16).map(|k| block(k, 0.02)[..1].to_vec()).collect());
+        let twelve = one.rearranged(&[Some((0, 1.0)); 12]);
+        let mut found = Measurement { samples: vec![twelve], ..Measurement::default() };
+        assert!((found.design_effect().unwrap() - 12.0).abs() < 1e-9);
+        found.forget_samples();
+        assert!(found.samples.is_empty() && (found.design_effect().unwrap() - 12.0).abs() < 1e-9);
+    }
+
+    #[test]
     fn what_no_sample_met_is_not_seen_unless_nothing_was() {
         let of = |second: f64| Blocks::new(vec![vec![1.0, 0.0], vec![2.0, second]]).estimates()[1].uncertainty;
         assert_eq!(of(0.0), Uncertainty::NotSeen);

@@ -271,6 +271,9 @@ pub struct Measurement {
     /// standard error. Empty where nothing was sampled or nobody says.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub samples: Vec<Blocks>,
+    /// The design effect of samples that are forgotten.
+    #[serde(skip)]
+    pub shared: Option<f64>,
     /// Seconds that its sampling takes at the rate that the engine counts with; `None` for one that keeps to the clock.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub work_s: Option<f64>,
@@ -306,9 +309,15 @@ impl Measurement {
         self.samples.iter().filter_map(Blocks::skewness).reduce(f64::max)
     }
 
+    /// Forgets the samples, but not how much of their noise meters share.
+    pub fn forget_samples(&mut self) {
+        self.shared = self.design_effect();
+        self.samples.clear();
+    }
+
     /// Of the part of the light whose meters share the most of their noise.
     pub fn design_effect(&self) -> Option<f64> {
-        self.samples.iter().filter_map(Blocks::design_effect).reduce(f64::max)
+        self.shared.or_else(|| self.samples.iter().filter_map(Blocks::design_effect).reduce(f64::max))
     }
 
     /// The weighted sum of stations' estimates, with the standard error that their joint sampling gives it; where the samples

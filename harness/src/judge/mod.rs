@@ -145,6 +145,7 @@ impl Judge<'_> {
         let mut comparisons = vec![];
         for recording in recordings {
             let mut family = vec![];
+            let largest = largest_portion(recording);
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.readings.get(k);
                 let engine = &recording.key.engine;
@@ -155,9 +156,10 @@ impl Judge<'_> {
                     reference_of_task(task, recordings, k, engine).into_iter().chain(printed).collect();
                 if references.is_empty() && (reading.is_none() || recording.role == Role::Renderer) {
                     // Nothing to hold it against, or nothing to hold: that is said, never passed over.
-                    family.push(self.comparison(task, recording, k, None));
+                    family.push(self.comparison(task, (recording, k), largest, None));
                 }
-                family.extend(references.into_iter().map(|held| self.comparison(task, recording, k, Some(held))));
+                let compared = |held| self.comparison(task, (recording, k), largest, Some(held));
+                family.extend(references.into_iter().map(compared));
             }
             self.decide(&mut family, &recording.content_sha256);
             comparisons.extend(family);
@@ -193,18 +195,25 @@ impl Judge<'_> {
         }
     }
 
-    fn comparison(&self, task: &Task, recording: &Recording, k: usize, held: Option<ScoredReference>) -> Comparison {
-        let target = &task.targets[k];
-        let reading = recording.readings.get(k).map(|r| believed(r, recording, held.as_ref()));
-        let reading = reading.as_ref();
+    /// One reading against one reference; `largest_portion` is that of its recording.
+    fn comparison(
+        &self,
+        task: &Task,
+        (recording, k): (&Recording, usize),
+        largest_portion: Option<f64>,
+        held: Option<ScoredReference>,
+    ) -> Comparison {
+        let (target, reading) = (&task.targets[k], recording.readings.get(k));
+        let believed = |r: &Reading| believed(r.uncertainty, largest_portion, held.as_ref().map(|h| h.reference.value));
+        let uncertainty = reading.map_or(Uncertainty::Unstated, believed);
         let basis = held.as_ref().map(|h| h.reference.basis);
         let (tolerance, tolerance_source) =
             basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();
         let pair = reading.zip(held.as_ref());
         let difference = pair.map(|(a, b)| a.value - b.reference.value);
         let tail = uncertainty::upper_tail_of_normal(self.tolerances.coverage_factor());
-        let budget = pair.map(|(reading, held)| {
-            let components = of_reading(reading).into_iter().chain(held.components.iter().copied());
+        let budget = pair.map(|(_, held)| {
+            let components = of_reading(&uncertainty).into_iter().chain(held.components.iter().copied());
             ErrorBudget::spending(components.collect(), tail, share_of_reading(recording, k))
         });
         let missing = match (reading, &held) {
@@ -223,7 +232,7 @@ impl Judge<'_> {
             c_deg: target.direction.map(|d| d.c_deg),
             quantity: task.quantity,
             value: reading.map(|r| r.value),
-            uncertainty: reading.map_or(Uncertainty::Unstated, |r| r.uncertainty),
+            uncertainty,
             reference: held.map(|h| h.reference),
             deviation: difference.filter(|d| d.is_finite()),
             relative_deviation: None,
@@ -263,8 +272,8 @@ const MAX_RELATIVE_ERROR: f64 = 0.25;
 /// Normal deviates of the skewness of blocks beyond which their mean is not normal either: one in a hundred of normal blocks.
 const MAX_SKEWNESS: f64 = 2.33;
 
-/// Standard errors that a mean of few samples of a heavy tail may lie off: eight of a lognormal distribution of sigma 2 lie 28 below
-/// once in some hundred times. An engine that only says that its errors vary hides nothing farther off.
+/// Standard errors that a mean of few samples of a heavy tail may lie off: eight of a lognormal distribution of sigma 2 lie 28 off in 25
+/// of 1,000 draws, and 100 off in one of 2,000 (200,000 drawn). An engine that only says that its errors vary hides nothing farther off.
 const FAR: f64 = 100.0;
 
 /// Whether its blocks tell so, or what it states with one seed and the other.
@@ -291,21 +300,22 @@ fn unbelievable(uncertainty: Uncertainty, value: f64, is_heavy_tailed: bool) -> 
 /// Where a sample is met that rarely, it may carry so many times the light of those elsewhere.
 const BRIGHTER: f64 = 1e4;
 
-/// A reading with the error that it has where no sample met anything: were the reference right, and light to come here in portions
-/// many times as large as anywhere else (a portion is the variance of a reading over its value), zero would be so far off by chance.
-/// Where that is not far below the reference, it stays not seen.
-fn believed(reading: &Reading, recording: &Recording, held: Option<&ScoredReference>) -> Reading {
+/// The largest portion that light comes in to an engine's meters: the variance of a reading over its value.
+fn largest_portion(recording: &Recording) -> Option<f64> {
     let portion = |r: &Reading| Some(r.uncertainty.standard_error()?.powi(2) / r.value).filter(|p| p.is_finite());
-    let largest = recording.readings.iter().filter_map(portion).reduce(f64::max).filter(|p| *p > 0.0);
-    let uncertainty = match (reading.uncertainty, held, largest) {
-        (Uncertainty::NotSeen, Some(held), Some(largest)) => {
-            let error = (BRIGHTER * largest * held.reference.value).sqrt();
-            let is_small = error < MAX_RELATIVE_ERROR * held.reference.value;
-            if is_small { Uncertainty::sampled(error, None) } else { Uncertainty::NotSeen }
+    recording.readings.iter().filter_map(portion).reduce(f64::max).filter(|p| *p > 0.0)
+}
+
+/// The error that a reading has where no sample met anything: were the reference right, and light to come here in portions many times as
+/// large as anywhere else, zero would be so far off by chance. Where that is not far below the reference, it stays not seen.
+fn believed(stated: Uncertainty, largest_portion: Option<f64>, reference: Option<f64>) -> Uncertainty {
+    match (stated, largest_portion, reference) {
+        (Uncertainty::NotSeen, Some(portion), Some(reference)) => {
+            let error = (BRIGHTER * portion * reference).sqrt();
+            if error < MAX_RELATIVE_ERROR * reference { Uncertainty::sampled(error, None) } else { stated }
         }
-        (stated, ..) => stated,
-    };
-    Reading { uncertainty, ..reading.clone() }
+        _ => stated,
+    }
 }
 
 /// Rounding of a closed form in `f64`, relative: a few operations and two arctangents a luminaire.
@@ -326,7 +336,7 @@ impl ScoredReference {
 
     fn reading(reading: &Reading, basis: Basis, source: String) -> Self {
         let reference = Reference::of(reading.value, &reading.uncertainty, basis, source);
-        let components = of_reading(reading).into_iter();
+        let components = of_reading(&reading.uncertainty).into_iter();
         let components = components.map(|component| Component { source: Source::Reference, ..component });
         Self { reference, components: components.collect() }
     }
@@ -352,8 +362,7 @@ fn share_of_reading(recording: &Recording, k: usize) -> f64 {
 }
 
 /// What is uncertain of a reading.
-fn of_reading(reading: &Reading) -> Vec<Component> {
-    let uncertainty = &reading.uncertainty;
+fn of_reading(uncertainty: &Uncertainty) -> Vec<Component> {
     let chance = uncertainty.standard_error().unwrap_or(0.0);
     vec![
         Component::normal(Source::MonteCarlo, chance, uncertainty.degrees_of_freedom()),

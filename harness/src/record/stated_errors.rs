@@ -155,19 +155,16 @@ impl StatedErrors {
         let freedom = self.degrees_of_freedom;
         let uncertainty = match (estimate.uncertainty, self.ratio, self.of_claims) {
             (Uncertainty::StandardError { value, degrees_of_freedom, bound }, Some(ratio), _) if value > 0.0 => {
-                let seen = self.degrees_of_freedom_seen;
-                let stated = match seen {
-                    Some(seen) => Some(degrees_of_freedom.map_or(seen, |stated| stated.min(seen)).max(FEWEST)),
-                    None => degrees_of_freedom,
-                };
-                if self.counts(ratio) {
+                let seen = self.degrees_of_freedom_seen.map(|seen| seen.max(FEWEST));
+                let stated = [degrees_of_freedom, seen].into_iter().flatten().reduce(f64::min);
+                let (by, degrees_of_freedom) = if self.counts(ratio) {
                     // Relative variances of the two standard errors add up.
                     let of_both = stated.map_or(freedom, |stated| (stated.recip() + freedom.recip()).recip());
-                    let degrees_of_freedom = Some(of_both.max(FEWEST.min(freedom)));
-                    Uncertainty::StandardError { value: ratio * value, degrees_of_freedom, bound }
+                    (ratio, Some(of_both.max(FEWEST)))
                 } else {
-                    Uncertainty::StandardError { value, degrees_of_freedom: stated, bound }
-                }
+                    (1.0, stated)
+                };
+                Uncertainty::StandardError { value: by * value, degrees_of_freedom, bound }
             }
             (stated, None, Some(relative)) => Uncertainty::StandardError {
                 value: relative * estimate.value,
@@ -244,8 +241,7 @@ impl fmt::Display for StatedErrors {
             Some(Doubt::HeavyTail) => write!(
                 f,
                 "a heavy tail: its standard errors vary from seed to seed by much more than they should, so that a few of its samples \
-                 hold much of the light and others are still to come; verdicts go by the {:.1} degrees of freedom that this tells",
-                self.degrees_of_freedom_seen.unwrap_or(FEWEST).max(FEWEST)
+                 hold much of the light and others are still to come; what lies not far beyond them fails nothing yet"
             ),
             Some(Doubt::FewerSamples) => write!(
                 f,

@@ -13,8 +13,6 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use parking_lot::Mutex;
-
 /// How long a pipe may stay open after the program behind it has ended.
 const LEFT_BEHIND: Duration = Duration::from_secs(3);
 
@@ -275,7 +273,7 @@ pub struct Conversation {
     child: Child,
     stdin: Option<ChildStdin>,
     lines: mpsc::Receiver<String>,
-    /// Joined once its messages are in the log.
+    /// Taken once its messages are in the log.
     stderr: Option<Drained>,
 }
 
@@ -333,43 +331,47 @@ impl Drop for Conversation {
     }
 }
 
-/// A thread that empties a pipe, so that neither side can block the other.
-/// What a program writes, read as it comes.
+/// What a program writes, as a thread reads it, so that neither side can block the other.
 #[derive(Debug)]
-struct Drained {
-    bytes: Arc<Mutex<Vec<u8>>>,
-    closed: mpsc::Receiver<()>,
-}
+struct Drained(mpsc::Receiver<Vec<u8>>);
 
 impl Drained {
     /// All of it, once the program has ended: something that it left behind may hold its pipe open for ever.
     fn said(self) -> Vec<u8> {
-        if self.closed.recv_timeout(LEFT_BEHIND) == Err(mpsc::RecvTimeoutError::Timeout) {
-            tracing::warn!("a program left something behind that holds its output open: what it said so far counts");
+        let (until, mut said) = (Instant::now() + LEFT_BEHIND, vec![]);
+        loop {
+            match self.0.recv_timeout(until.saturating_duration_since(Instant::now())) {
+                Ok(piece) => said.extend(piece),
+                Err(mpsc::RecvTimeoutError::Disconnected) => return said,
+                Err(mpsc::RecvTimeoutError::Timeout) => {
+                    tracing::warn!(
+                        "a program left something behind that holds its output open: what it said so far counts"
+                    );
+                    return said;
+                }
+            }
         }
-        std::mem::take(&mut self.bytes.lock())
     }
 }
 
 fn drain(pipe: Option<impl Read + Send + 'static>) -> Drained {
-    let bytes = Arc::new(Mutex::new(vec![]));
-    let (closes, closed) = mpsc::channel::<()>();
-    let kept = Arc::clone(&bytes);
+    let (sender, pieces) = mpsc::channel();
     thread::spawn(move || {
-        // Goes with the thread, and so tells that the pipe is closed.
-        let _closes = closes;
         let Some(mut pipe) = pipe else { return };
-        let mut chunk = vec![0; 1 << 16];
+        let mut buffer = vec![0; 1 << 16];
         loop {
-            match pipe.read(&mut chunk) {
+            match pipe.read(&mut buffer) {
+                // Ends with the pipe, or when nobody listens any more.
                 Ok(0) => return,
-                Ok(count) => kept.lock().extend(&chunk[..count]),
-                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => (),
-                Err(error) => return tracing::warn!(%error, "output of a program cut short"),
+                Ok(count) if sender.send(buffer[..count].to_vec()).is_err() => return,
+                Err(error) if error.kind() != std::io::ErrorKind::Interrupted => {
+                    return tracing::warn!(%error, "output of a program cut short");
+                }
+                _ => (),
             }
         }
     });
-    Drained { bytes, closed }
+    Drained(pieces)
 }
 
 fn kill_group(child: &Child) {

@@ -18,6 +18,7 @@ fn sample() -> Entry {
         notes: vec!["a note with \"quotes\" and µ".to_owned()],
         samples: vec![Blocks::new(vec![vec![1.0 / 3.0; 5], vec![0.1 + 0.2; 5]])],
         work_s: Some(1.1),
+        shared: None,
     };
     Entry {
         key: ReadingKey::new("case", ProcedureId::DirectIlluminance, "radiance"),
