@@ -11,7 +11,9 @@ use crate::judge::{Comparison, Judge, LOOKS, SINGLE_PRECISION};
 use crate::measure::Question;
 use crate::plan::Run;
 use crate::procedures::Task;
-use crate::record::{Doubt, EngineName, Estimate, Reading, ReadingKey, Recording, StatedErrors, Uncertainty};
+use crate::record::{
+    Doubt, EngineName, Estimate, Reading, ReadingKey, Recording, StatedErrors, Uncertainty, Variation,
+};
 use crate::spec::Budget;
 use crate::system::process;
 
@@ -21,25 +23,27 @@ const EFFORT: f64 = 0.25;
 /// The part of what is claimed that is read again, one reading of a task at least.
 const PART: f64 = 0.05;
 
+/// What a run read again.
+struct Again<'a> {
+    task: &'a Task,
+    was_asked: bool,
+    /// Target by target, what was sampled and what was claimed to be determined and is not; `None` where it did not answer.
+    sampled: Option<Vec<Vec<Estimate>>>,
+    claims: Option<Vec<Vec<Estimate>>>,
+}
+
 /// Reads again, tells in the recordings what is found, and gives readings the errors that they have: by engine and procedure, of what
 /// it sampled and of what it claims.
 pub(super) fn examine(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Outcome) -> Found {
     let mut found = Found::new();
     for (e, planned) in running.plan.engines.iter().enumerate().filter(|(_, p)| !p.engine.is_vouched_for()) {
         let name = planned.engine.name();
-        for run in running.plan.runs.iter().filter(|run| run.engine == e) {
-            let task = &running.plan.tasks[run.task];
-            let mine = outcome.recordings.iter().find(|r| r.key.engine == name && r.key.procedure == task.procedure);
-            let readings = mine.map_or(&[][..], |r| &r.readings);
-            let of = |is_sampled: bool| -> Vec<usize> {
-                (0..readings.len()).filter(|k| readings[*k].uncertainty.is_sampled() == is_sampled).collect()
-            };
-            let (of_samples, of_claims) = (of(true), rendered(running, run, of(false)));
-            let sampled = repeated(running, run, readings, &of_samples, EFFORT);
-            let claims = contradicted(running, run, readings, &of_claims);
-            let was_asked = !(process::is_interrupted() || of_samples.is_empty() && of_claims.is_empty());
+        let runs = running.plan.runs.iter().filter(|run| run.engine == e);
+        let all: Vec<Again<'_>> = runs.map(|run| again(running, run, &name, outcome)).collect();
+        let of_engine: Variation = all.iter().filter_map(|a| a.sampled.as_deref()).map(Variation::of).sum();
+        for Again { task, was_asked, sampled, claims } in all {
             let doubts = [
-                sampled.as_deref().and_then(StatedErrors::of_sampled),
+                sampled.as_deref().and_then(|meters| StatedErrors::of_sampled(meters, &of_engine)),
                 claims.as_deref().and_then(StatedErrors::of_claims),
                 (was_asked && (sampled.is_none() || claims.is_none()))
                     .then_some(StatedErrors::doubted(Doubt::NotReadAgain)),
@@ -60,6 +64,20 @@ pub(super) fn examine(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Ou
         }
     }
     found
+}
+
+fn again<'a>(running: &'a Running<'_>, run: &Run, engine: &EngineName, outcome: &Outcome) -> Again<'a> {
+    let task = &running.plan.tasks[run.task];
+    let mine = outcome.recordings.iter().find(|r| r.key.engine == *engine && r.key.procedure == task.procedure);
+    let readings = mine.map_or(&[][..], |r| &r.readings);
+    let of = |is_sampled: bool| -> Vec<usize> {
+        (0..readings.len()).filter(|k| readings[*k].uncertainty.is_sampled() == is_sampled).collect()
+    };
+    let (of_samples, of_claims) = (of(true), rendered(running, run, of(false)));
+    let sampled = repeated(running, run, readings, &of_samples, EFFORT);
+    let claims = contradicted(running, run, readings, &of_claims);
+    let was_asked = !(process::is_interrupted() || of_samples.is_empty() && of_claims.is_empty());
+    Again { task, was_asked, sampled, claims }
 }
 
 /// Whether the bounds that an engine states leave room for any reading within the tolerance and beyond, at most meters.

@@ -38,6 +38,8 @@ pub struct Parameter {
     /// What changes readings by percents.
     pub step: f64,
     pub range: (f64, f64),
+    /// What it comes back to itself by: a whole turn.
+    pub period: Option<f64>,
 }
 
 impl Fault {
@@ -141,6 +143,11 @@ pub fn shows(wrong: &[f64], right: &[f64]) -> bool {
 
 impl Parameter {
     pub fn new(unit: &'static str, start: f64, step: f64, range: (f64, f64)) -> Self {
-        Self { unit, starts: vec![start], step, range }
+        Self { unit, starts: vec![start], step, range, period: None }
+    }
+
+    /// The same value, as close to zero as its period allows.
+    pub(super) fn least(&self, value: f64) -> f64 {
+        self.period.map_or(value, |period| value - period * (value / period).round())
     }
 }

@@ -88,8 +88,8 @@ fn readouts() -> Vec<Fault> {
             true
         })
     };
-    let level = Parameter { unit: " lx", starts: vec![], step: 1e-3, range: (0.0, f64::MAX) };
-    let more = Parameter { unit: " lx", starts: vec![0.0], step: 1e-3, range: (0.0, f64::MAX) };
+    let level = Parameter { unit: " lx", starts: vec![], step: 1e-3, range: (0.0, f64::MAX), period: None };
+    let more = Parameter { unit: " lx", starts: vec![0.0], step: 1e-3, range: (0.0, f64::MAX), period: None };
     vec![
         readout("clamp", "highlights are cut off at {0}", |p| Readout::AtMost(p[0])).with([level]),
         readout("offset", "{0} are added to every reading", |p| Readout::Plus(p[0])).with([more]),

@@ -28,7 +28,7 @@ fn metres() -> Parameter {
 /// A rotation, from every side where it may be any.
 fn degrees(anywhere: bool) -> Parameter {
     let starts = if anywhere { (-5..=6).map(|k| 30.0 * f64::from(k)).collect() } else { vec![0.0] };
-    Parameter { unit: " degrees", starts, step: 1.0, range: (-200.0, 200.0) }
+    Parameter { unit: " degrees", starts, step: 1.0, range: (-200.0, 200.0), period: anywhere.then_some(360.0) }
 }
 
 fn of_engine() -> Vec<Fault> {

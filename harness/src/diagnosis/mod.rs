@@ -43,6 +43,8 @@ pub struct Examined<'a> {
     pub tasks: &'a [Task],
     /// How each engine was set, so that it is the same engine in another case.
     pub settings: BTreeMap<EngineName, String>,
+    /// Engines of which nothing is explained: noise with a heavy tail looks like any fault.
+    pub silent: BTreeSet<EngineName>,
     pub comparisons: &'a mut [Comparison],
 }
 
@@ -73,7 +75,10 @@ pub fn diagnose(cases: &mut [Examined<'_>]) {
 pub fn explain(cases: &mut [Examined<'_>]) -> Vec<Vec<Cause>> {
     let mut all = vec![];
     let fails = |c: &&Comparison| c.verdict == Verdict::Fail && Examined::is_about(c);
-    let of_case = |case: &Examined<'_>| case.comparisons.iter().filter(fails).map(|c| case.subject(c)).collect();
+    let of_case = |case: &Examined<'_>| {
+        let told = |c: &&Comparison| fails(c) && !case.silent.contains(&c.key.engine);
+        case.comparisons.iter().filter(told).map(|c| case.subject(c)).collect()
+    };
     let failing: Vec<BTreeSet<Subject>> = cases.iter().map(of_case).collect();
     for subject in failing.iter().flatten().collect::<BTreeSet<_>>() {
         let (mine, mut beside): (Vec<usize>, Vec<usize>) =

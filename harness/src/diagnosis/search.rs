@@ -360,6 +360,9 @@ impl Search<'_> {
     }
 
     fn with_parameters(mut held: Held, fault: &Fault, mut parameters: Vec<(f64, f64)>) -> Held {
+        for (found, parameter) in parameters.iter_mut().zip(&fault.parameters) {
+            found.0 = parameter.least(found.0);
+        }
         parameters.extend(held.cause.parameters);
         held.cause.parameters = parameters;
         held.cause = Cause { what: fault.said(&held.cause.parameters), ..held.cause };

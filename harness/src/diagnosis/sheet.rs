@@ -68,7 +68,12 @@ impl Sheet {
             let told = match (comparison.uncertainty, comparison.verdict) {
                 // They bear out anything.
                 (Uncertainty::NotSeen, _) | (_, Verdict::KnownDeviation | Verdict::NotJudged) => f64::INFINITY,
-                (other, _) => other.standard(),
+                // The variance of Student's t; there is none for two degrees of freedom.
+                (other, _) => match other.degrees_of_freedom() {
+                    Some(few) if few <= 2.0 => f64::INFINITY,
+                    Some(few) => other.standard() * (few / (few - 2.0)).sqrt(),
+                    None => other.standard(),
+                },
             };
             sheet.uncertainty.push(told.hypot(reference.uncertainty));
         }

@@ -1,6 +1,6 @@
 //! What is named, and what is better left unsaid.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use luminaire::scene::{Bounces, Transport};
 
@@ -71,7 +71,12 @@ fn judged(tasks: &[Task], read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<Comparison> 
 
 fn found(tasks: &[Task], read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<Vec<Cause>> {
     let mut comparisons = judged(tasks, read);
-    explain(&mut [Examined { tasks, settings: BTreeMap::new(), comparisons: &mut comparisons }])
+    explain(&mut [Examined {
+        tasks,
+        settings: BTreeMap::new(),
+        silent: BTreeSet::new(),
+        comparisons: &mut comparisons,
+    }])
 }
 
 /// What is said of all that is explained, in one list.

@@ -271,12 +271,19 @@ pub struct Measurement {
     /// standard error. Empty where nothing was sampled or nobody says.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub samples: Vec<Blocks>,
-    /// The design effect of samples that are forgotten.
+    /// What samples told that are forgotten.
     #[serde(skip)]
-    pub shared: Option<f64>,
+    pub forgotten: Forgotten,
     /// Seconds that its sampling takes at the rate that the engine counts with; `None` for one that keeps to the clock.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub work_s: Option<f64>,
+}
+
+/// What is known of the noise of samples that are not kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Forgotten {
+    design_effect: Option<f64>,
+    skewness: Option<f64>,
 }
 
 impl Measurement {
@@ -306,18 +313,18 @@ impl Measurement {
 
     /// Of the part of the light whose blocks are the most skewed, see [`Blocks::skewness`].
     pub fn skewness(&self) -> Option<f64> {
-        self.samples.iter().filter_map(Blocks::skewness).reduce(f64::max)
+        self.forgotten.skewness.or_else(|| self.samples.iter().filter_map(Blocks::skewness).reduce(f64::max))
     }
 
-    /// Forgets the samples, but not how much of their noise meters share.
+    /// Forgets the samples, but not what they told of the noise.
     pub fn forget_samples(&mut self) {
-        self.shared = self.design_effect();
+        self.forgotten = Forgotten { design_effect: self.design_effect(), skewness: self.skewness() };
         self.samples.clear();
     }
 
     /// Of the part of the light whose meters share the most of their noise.
     pub fn design_effect(&self) -> Option<f64> {
-        self.shared.or_else(|| self.samples.iter().filter_map(Blocks::design_effect).reduce(f64::max))
+        self.forgotten.design_effect.or_else(|| self.samples.iter().filter_map(Blocks::design_effect).reduce(f64::max))
     }
 
     /// The weighted sum of stations' estimates, with the standard error that their joint sampling gives it; where the samples

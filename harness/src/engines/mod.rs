@@ -34,7 +34,8 @@ pub use crate::spec::Budget;
 pub use blocks::Blocks;
 pub use catalogue::{ALL, all, display_name, entry};
 pub use contract::{
-    Absent, Component, Engine, Entry, FILE_READER, Job, Knob, Measurement, Station, Support, Version, checked, share,
+    Absent, Component, Engine, Entry, FILE_READER, Forgotten, Job, Knob, Measurement, Station, Support, Version,
+    checked, share,
 };
 use contract::{OWN_LOOKUP, geometry_mib};
 pub use external::{ExternalJob, ExternalReadings};

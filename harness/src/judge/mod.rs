@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::procedures::{self, Target, Task};
 use crate::record::{
-    Doubt, EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, Uncertainty,
+    Doubt, EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, StatedErrors, Uncertainty,
 };
 use crate::spec::ToleranceOverride;
 
@@ -204,7 +204,10 @@ impl Judge<'_> {
         held: Option<ScoredReference>,
     ) -> Comparison {
         let (target, reading) = (&task.targets[k], recording.readings.get(k));
-        let believed = |r: &Reading| believed(r.uncertainty, largest_portion, held.as_ref().map(|h| h.reference.value));
+        let believed = |r: &Reading| {
+            let stated = StatedErrors::of_looks(&recording.stated_errors, r.uncertainty);
+            believed(stated, largest_portion, held.as_ref().map(|h| h.reference.value))
+        };
         let uncertainty = reading.map_or(Uncertainty::Unstated, believed);
         let basis = held.as_ref().map(|h| h.reference.basis);
         let (tolerance, tolerance_source) =
@@ -253,13 +256,14 @@ impl Judge<'_> {
         let deviation = if sound { value - reference.value } else { f64::NAN };
         let allowed = tolerance.around(reference.value);
         comparison.verdict = judge(deviation, budget.expanded, allowed);
-        let waits =
-            unbelievable(comparison.uncertainty, value, is_heavy_tailed(recording, comparison.uncertainty, deviation));
+        let p_value = budget.p_value(deviation, allowed);
+        let is_heavy_tailed = is_heavy_tailed(recording, comparison.uncertainty, deviation, p_value);
+        let waits = unbelievable(comparison.uncertainty, value, is_heavy_tailed);
         if let Some(why) = waits.filter(|_| comparison.verdict == Verdict::Fail) {
             comparison.verdict = Verdict::Inconclusive;
             comparison.diagnosis = Some(why.to_owned());
         } else if comparison.verdict != Verdict::Missing {
-            comparison.p_value = Some(budget.p_value(deviation, allowed));
+            comparison.p_value = Some(p_value);
         }
         comparison
     }
@@ -272,15 +276,19 @@ const MAX_RELATIVE_ERROR: f64 = 0.25;
 /// Normal deviates of the skewness of blocks beyond which their mean is not normal either: one in a hundred of normal blocks.
 const MAX_SKEWNESS: f64 = 2.33;
 
-/// Standard errors that a mean of few samples of a heavy tail may lie off: eight of a lognormal distribution of sigma 2 lie 28 off in 25
-/// of 1,000 draws, and 100 off in one of 2,000 (200,000 drawn). An engine that only says that its errors vary hides nothing farther off.
+/// Standard errors that a mean of few samples of a heavy tail may lie off: eight of a lognormal distribution of sigma 2 lie 89 off in one
+/// of 1,000 draws, 32 of them 24. Blocks that only say that they are skewed hide nothing farther off.
 const FAR: f64 = 100.0;
 
-/// Whether its blocks tell so, or what it states with one seed and the other.
-fn is_heavy_tailed(recording: &Recording, uncertainty: Uncertainty, deviation: f64) -> bool {
+/// A heavy tail fails what is less probable than this by Student's t with the degrees of freedom that its errors vary by: that is wider
+/// there than any of the heavy tails tried, and not always so for more probable deviations.
+const WELL_COVERED: f64 = 1e-3;
+
+/// Whether its blocks tell so, or how its errors vary from seed to seed, and it is near enough for a heavy tail to have done it.
+fn is_heavy_tailed(recording: &Recording, uncertainty: Uncertainty, deviation: f64, p_value: f64) -> bool {
     let is_near = || uncertainty.standard_error().is_some_and(|error| deviation.abs() < FAR * error);
-    let is_stated = || recording.stated_errors.iter().any(|s| s.doubt == Some(Doubt::HeavyTail));
-    recording.skewness.is_some_and(|s| s > MAX_SKEWNESS) || (is_stated() && is_near())
+    let is_told = || recording.stated_errors.iter().any(|s| s.doubt == Some(Doubt::HeavyTail));
+    recording.skewness.is_some_and(|s| s > MAX_SKEWNESS) && is_near() || is_told() && p_value > WELL_COVERED
 }
 
 /// Why a sampled value fails nothing, whatever its distance: its interval is not one.

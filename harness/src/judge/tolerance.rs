@@ -268,7 +268,7 @@ mod tests {
         );
         let rule = design.decision_rule();
         assert!(
-            rule.contains("class design") && rule.contains("in 2.3 % of") && rule.contains("in 5 % (JCGM"),
+            rule.contains("class design") && rule.contains("in 2.3 % of") && rule.contains("in 1 % (JCGM"),
             "{rule}"
         );
         let bare = Tolerances { rules: vec![], ..table };

@@ -17,7 +17,7 @@ pub use design_effect::design_effect;
 pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
 pub use light::{Light, UnknownLight};
 pub use method::{Effort, Method};
-pub use stated_errors::{Doubt, StatedErrors};
+pub use stated_errors::{Doubt, StatedErrors, Variation};
 pub use status::{EngineStatus, Role, Status};
 pub use uncertainty::Uncertainty;
 

@@ -1,6 +1,7 @@
 //! What is stated of errors, held against how readings of other seeds scatter.
 
 use std::fmt;
+use std::iter::Sum;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,11 +17,14 @@ const TOLD: f64 = 0.005;
 const COUNTED: f64 = 0.05;
 /// Degrees of freedom of a standard error that tells none: more than that would make little of how it may vary.
 const FEW: f64 = 3.0;
+const MANY: f64 = 1e6;
 /// Standard errors that vary as those of fewer degrees of freedom are not of samples that are about normal: blocks of exponential
-/// noise, eight of them, vary as those of four.
+/// noise, eight of them, vary as those of three.
 const NORMAL: f64 = 3.0;
 /// The fewest degrees of freedom that a standard error is taken to have.
-const FEWEST: f64 = 1.0;
+const FEWEST: f64 = 0.5;
+/// A procedure's standard errors vary less than the engine's others where it is less probable than this that they vary alike.
+const STEADIER: f64 = 0.003;
 /// What readings that are the same differ by, in what is stated of them: rounding.
 const SAME: f64 = 1e-6;
 /// How many times too large a stated error is before that is told: some care is nobody's fault.
@@ -79,8 +83,9 @@ impl StatedErrors {
         }
     }
 
-    /// Of readings whose errors are stated, one list a meter; meters whose error is not of sampling say nothing.
-    pub fn of_sampled(meters: &[Vec<Estimate>]) -> Option<Self> {
+    /// Of readings whose errors are stated, one list a meter; meters whose error is not of sampling say nothing. `of_engine` is how the
+    /// errors of all that the engine read vary.
+    pub fn of_sampled(meters: &[Vec<Estimate>], of_engine: &Variation) -> Option<Self> {
         let draws = meters.iter().map(Vec::len).max()?;
         let (mut sum, mut freedom, mut deviates) = (0.0, 0.0, vec![vec![]; draws]);
         for readings in meters {
@@ -103,19 +108,19 @@ impl StatedErrors {
         let degrees_of_freedom = freedom / design_effect;
         let chance = ChiSquared::new(degrees_of_freedom).ok()?;
         let (below, above) = (chance.cdf(sum / design_effect), chance.sf(sum / design_effect));
-        let seen = varying(meters);
+        let (varies, varies_beyond) = Variation::of(meters).with(of_engine);
         let doubt = match ratio {
             r if r < SAME => Some(Doubt::SameForEverySeed),
-            _ if seen.is_some_and(|seen| seen < NORMAL) => Some(Doubt::HeavyTail),
+            _ if varies_beyond && varies.is_some_and(|seen| seen < NORMAL) => Some(Doubt::HeavyTail),
             _ if above < TOLD => Some(Doubt::TooSmall),
             r if below < TOLD && r < 1.0 / MIN_EXCESS => Some(Doubt::TooLarge),
-            _ => seen.map(|_| Doubt::FewerSamples),
+            _ => varies_beyond.then_some(Doubt::FewerSamples),
         };
         Some(Self {
             ratio: Some(ratio),
             degrees_of_freedom,
             design_effect,
-            degrees_of_freedom_seen: seen,
+            degrees_of_freedom_seen: varies,
             p_value: Some(2.0 * below.min(above)),
             of_claims: None,
             doubt,
@@ -176,6 +181,21 @@ impl StatedErrors {
         Estimate { uncertainty, ..estimate }
     }
 
+    /// What several looks together are uncertain by: as little as one of them where their tail is heavy, since the mean of more such samples
+    /// is hardly more normal.
+    #[must_use]
+    pub fn of_looks(found: &[Self], together: Uncertainty) -> Uncertainty {
+        let heavy =
+            found.iter().filter(|f| f.doubt == Some(Doubt::HeavyTail)).filter_map(|f| f.degrees_of_freedom_seen);
+        match (together, heavy.reduce(f64::min)) {
+            (Uncertainty::StandardError { value, degrees_of_freedom, bound }, Some(seen)) => {
+                let few = degrees_of_freedom.map_or(seen, |all| all.min(seen)).max(FEWEST);
+                Uncertainty::StandardError { value, degrees_of_freedom: Some(few), bound }
+            }
+            _ => together,
+        }
+    }
+
     fn counts(&self, ratio: f64) -> bool {
         match self.doubt {
             Some(Doubt::TooSmall | Doubt::TooLarge | Doubt::Scatters) => true,
@@ -187,22 +207,73 @@ impl StatedErrors {
     }
 }
 
-/// The degrees of freedom by which standard errors stated for readings of one effort, all but the last of each meter, vary, where that
-/// is more than those of normal samples with the degrees of freedom stated: the logarithm of a variance with n degrees of freedom
-/// has the variance psi'(n / 2) (Bartlett and Kendall, Suppl. J. Roy. Statist. Soc. 8 (1946)).
-fn varying(meters: &[Vec<Estimate>]) -> Option<f64> {
-    let (mut sum, mut squares, mut freedom) = (0.0, 0.0, 0.0);
-    for readings in meters {
-        let repeated = readings.iter().take(readings.len().saturating_sub(1)).map(|e| e.uncertainty);
-        let stated = repeated.filter_map(|u| Some((u.standard_error()?, u.degrees_of_freedom().unwrap_or(FEW))));
-        let logs: Vec<(f64, f64)> = stated.filter(|(e, _)| *e > 0.0).map(|(e, n)| (2.0 * e.ln(), n)).collect();
-        let mean = logs.iter().map(|(log, _)| log).sum::<f64>() / logs.len() as f64;
-        sum += logs.iter().map(|(log, n)| (log - mean).powi(2) / trigamma(n / 2.0)).sum::<f64>();
-        squares += logs.iter().map(|(log, _)| (log - mean).powi(2)).sum::<f64>();
-        freedom += logs.len().saturating_sub(1) as f64;
+/// How standard errors of one effort vary from seed to seed: the logarithm of a variance with n degrees of freedom has the variance
+/// psi'(n / 2) (Bartlett and Kendall, Suppl. J. Roy. Statist. Soc. 8 (1946)).
+///
+/// Student's t with the n that is seen covers means of skewed samples, too: its two-sided quantiles of .01 and .001 are at least .85 of
+/// those of 2 million means of 8 and of 32 samples, exponential, Pareto (1.5 to 3) or lognormal (sigma .5 to 2), and most are far wider.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Variation {
+    squares: f64,
+    freedom: f64,
+    /// The squares over those of as many degrees of freedom as are stated; where none are, of as few as may be, and of many.
+    over_few: f64,
+    over_many: f64,
+}
+
+impl Variation {
+    /// Of readings of one effort, all but the last of each meter.
+    pub fn of(meters: &[Vec<Estimate>]) -> Self {
+        let mut all = Self::default();
+        for readings in meters {
+            let repeated = readings.iter().take(readings.len().saturating_sub(1)).map(|e| e.uncertainty);
+            let stated = repeated.filter_map(|u| Some((u.standard_error()?, u.degrees_of_freedom())));
+            let logs: Vec<(f64, Option<f64>)> =
+                stated.filter(|(e, _)| *e > 0.0).map(|(e, n)| (2.0 * e.ln(), n)).collect();
+            let mean = logs.iter().map(|(log, _)| log).sum::<f64>() / logs.len() as f64;
+            for (log, stated) in &logs {
+                let square = (log - mean).powi(2);
+                all.squares += square;
+                all.over_few += square / trigamma(stated.unwrap_or(FEW) / 2.0);
+                all.over_many += square / trigamma(stated.unwrap_or(MANY) / 2.0);
+            }
+            all.freedom += logs.len().saturating_sub(1) as f64;
+        }
+        all
     }
-    let is_unheard_of = ChiSquared::new(freedom).is_ok_and(|chance| chance.sf(sum) < UNHEARD_OF);
-    is_unheard_of.then(|| 2.0 * of_trigamma(squares / freedom))
+
+    fn degrees_of_freedom(&self) -> f64 {
+        2.0 * of_trigamma(self.squares / self.freedom)
+    }
+
+    fn is_less_probable_than(&self, probability: f64, over: f64) -> bool {
+        ChiSquared::new(self.freedom).is_ok_and(|chance| chance.sf(over) < probability)
+    }
+
+    /// The degrees of freedom of a procedure's standard errors, where these vary more than those that are stated have it, by itself or by
+    /// all that its engine read; and whether that is unheard of. What is plainly steadier than its engine's other errors stands alone.
+    fn with(&self, of_engine: &Self) -> (Option<f64>, bool) {
+        let variance = of_engine.squares / of_engine.freedom;
+        let is_steadier = ChiSquared::new(self.freedom).is_ok_and(|c| c.cdf(self.squares / variance) < STEADIER);
+        let heard = [Some(self), Some(of_engine).filter(|_| !is_steadier)];
+        let heard = || heard.into_iter().flatten();
+        let varying = heard().filter(|v| v.is_less_probable_than(COUNTED, v.over_many));
+        (
+            varying.map(Self::degrees_of_freedom).reduce(f64::min),
+            heard().any(|v| v.is_less_probable_than(UNHEARD_OF, v.over_few)),
+        )
+    }
+}
+
+impl Sum for Variation {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |a, b| Self {
+            squares: a.squares + b.squares,
+            freedom: a.freedom + b.freedom,
+            over_few: a.over_few + b.over_few,
+            over_many: a.over_many + b.over_many,
+        })
+    }
 }
 
 /// The number of which this is the trigamma: it falls.
@@ -240,8 +311,9 @@ impl fmt::Display for StatedErrors {
             ),
             Some(Doubt::HeavyTail) => write!(
                 f,
-                "a heavy tail: its standard errors vary from seed to seed by much more than they should, so that a few of its samples \
-                 hold much of the light and others are still to come; what lies not far beyond them fails nothing yet"
+                "a heavy tail: its standard errors vary from seed to seed as those of {:.1} degrees of freedom do, so that a few of its \
+                 samples hold much of the light and others are still to come; verdicts wait for what lies beyond that",
+                self.degrees_of_freedom_seen.unwrap_or(FEWEST)
             ),
             Some(Doubt::FewerSamples) => write!(
                 f,
@@ -290,9 +362,13 @@ mod tests {
         (0..METERS).map(|_| (0..4).map(|_| one()).collect()).collect()
     }
 
+    fn of(meters: &[Vec<Estimate>]) -> StatedErrors {
+        StatedErrors::of_sampled(meters, &Variation::of(meters)).unwrap()
+    }
+
     fn told(scatter: f64, stated: f64, doubt: Doubt) -> usize {
         let is_told = |seed: &u64| {
-            let found = StatedErrors::of_sampled(&readings(*seed, scatter, stated)).unwrap();
+            let found = of(&readings(*seed, scatter, stated));
             found.doubt == Some(doubt)
         };
         (0..1000).filter(is_told).count()
@@ -315,7 +391,7 @@ mod tests {
                 || if heaviness > 0.0 { (heaviness * normal(&mut random)).exp() } else { 9.0 + normal(&mut random) };
             let mut reading = || Estimate::of_samples(&(0..8).map(|_| sample()).collect::<Vec<f64>>());
             let all: Vec<Vec<Estimate>> = (0..meters).map(|_| (0..4).map(|_| reading()).collect()).collect();
-            StatedErrors::of_sampled(&all).unwrap().doubt == Some(Doubt::HeavyTail)
+            of(&all).doubt == Some(Doubt::HeavyTail)
         };
         let count = |heaviness, meters| (0..1000).filter(|seed| told(*seed, heaviness, meters)).count();
         assert!(count(2.0, 6) > 990, "{}", count(2.0, 6));
@@ -333,7 +409,7 @@ mod tests {
             Estimate { uncertainty: Uncertainty::sampled(error, Some(4095.0)), ..of_blocks }
         };
         let all: Vec<Vec<Estimate>> = (0..24).map(|_| (0..4).map(|_| reading()).collect()).collect();
-        let found = StatedErrors::of_sampled(&all).unwrap();
+        let found = of(&all);
         assert_eq!(found.doubt, Some(Doubt::FewerSamples), "{found}");
         let freedom = found.correct(all[0][0]).uncertainty.degrees_of_freedom().unwrap();
         assert!((4.5..11.0).contains(&freedom), "{freedom}");
@@ -345,7 +421,7 @@ mod tests {
             let mut random = fastrand::Rng::with_seed(*seed);
             let drawn: Vec<f64> = (0..4).map(|_| 100.0 + normal(&mut random)).collect();
             let one = |value: &f64| Estimate { value: *value, uncertainty: Uncertainty::sampled(1.0, Some(7.0)) };
-            let found = StatedErrors::of_sampled(&vec![drawn.iter().map(one).collect(); 24]).unwrap();
+            let found = of(&vec![drawn.iter().map(one).collect(); 24]);
             found.doubt.is_some()
         };
         let count = (0..1000).filter(told).count();
@@ -362,7 +438,7 @@ mod tests {
 
     #[test]
     fn what_is_corrected_has_the_error_that_is_there() {
-        let found = StatedErrors::of_sampled(&readings(1, 3.0, 1.0)).unwrap();
+        let found = of(&readings(1, 3.0, 1.0));
         let corrected = found.correct(readings(1, 3.0, 1.0)[0][0]).uncertainty;
         assert!((2.0..4.5).contains(&corrected.standard_error().unwrap()), "{corrected:?}");
         // 7 and 12.

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::Report;
+use super::{Report, Summary};
 
 /// The version of the format that this program writes.
 pub(super) const VERSION: u32 = 1;
@@ -11,7 +11,8 @@ pub(super) const VERSION: u32 = 1;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadReport {
     pub report: Report,
-    /// What the user should know of it: another version, of which only what both have is seen.
+    /// What the user should know of it: another version, of which only what both have is seen, or counts that are not those of its
+    /// verdicts, which are counted anew.
     pub doubt: Option<String>,
 }
 
@@ -39,12 +40,19 @@ struct Head {
 
 impl Report {
     pub fn from_json(text: &str) -> Result<ReadReport, ReportError> {
-        let report: Self = serde_json::from_str(text).map_err(|source| Self::refusal(text, source))?;
-        let found = report.luxproof;
-        let doubt = format!(
-            "is a report of version {found} where this luxproof reads version {VERSION}: what it does not know it passes over"
-        );
-        Ok(ReadReport { report, doubt: (found != VERSION).then_some(doubt) })
+        let mut report: Self = serde_json::from_str(text).map_err(|source| Self::refusal(text, source))?;
+        let (found, told) = (report.luxproof, report.summary);
+        report.summary = Summary::of(&report.comparisons, &report.skips);
+        let doubt = if found != VERSION {
+            Some(format!(
+                "is a report of version {found} where this luxproof reads version {VERSION}: what it does not know it passes over"
+            ))
+        } else if told != report.summary {
+            Some("was edited: its summary is not that of its verdicts, which are counted anew".to_owned())
+        } else {
+            None
+        };
+        Ok(ReadReport { report, doubt })
     }
 
     fn refusal(text: &str, source: serde_json::Error) -> ReportError {
@@ -70,6 +78,15 @@ mod tests {
         assert_eq!((read.report.luxproof, read.doubt), (VERSION, None));
         let doubt = Report::from_json(&text(2)).unwrap().doubt.unwrap();
         assert!(doubt.starts_with("is a report of version 2 where this luxproof reads version 1"), "{doubt}");
+    }
+
+    #[test]
+    fn verdicts_are_counted_anew() {
+        let edited =
+            Report { summary: Summary { fail: 3, ..Summary::default() }, luxproof: VERSION, ..Report::default() };
+        let read = Report::from_json(&serde_json::to_string(&edited).unwrap()).unwrap();
+        assert_eq!(read.report.summary, Summary::default());
+        assert!(read.doubt.unwrap().starts_with("was edited"));
     }
 
     #[test]

@@ -4,7 +4,8 @@
 //! each place the difference is held against those at all others (leave one out): their median, give or take Student's t times
 //! their median deviation, never less than what rounding spreads, and the last digits of both. Where neither differences nor
 //! ratios fit, one of the two cells is wrong; the one that more columns contradict, or both where as many do. Direct light of a
-//! paper's reference column is also held against its intensity in the same direction.
+//! paper's reference column is also held against its intensity in the same direction. What the control totals of a table tell is put
+//! right before.
 
 use std::collections::BTreeMap;
 
@@ -218,12 +219,12 @@ mod tests {
         })
     }
 
-    #[test]
-    fn every_edit_of_a_digit_by_three_is_made_and_those_beyond_the_tables_own_scatter_are_told() {
+    /// Every edit of a digit by three and more, by procedure, column and power of ten of the digit.
+    fn every_edit(original: &Published) -> BTreeMap<(ProcedureId, String, i32), Edits> {
         let mut told: BTreeMap<(ProcedureId, String, i32), Edits> = BTreeMap::new();
         for procedure in TABLES {
-            let before = named(&published(), procedure);
-            let mut published = published();
+            let before = named(original, procedure);
+            let mut published = original.clone();
             for row in 0..published.tables[&procedure].rows.len() {
                 for (column, printed) in published.tables[&procedure].rows[row].cells.clone() {
                     for (power, new) in edited(&printed) {
@@ -245,6 +246,36 @@ mod tests {
                 }
             }
         }
+        told
+    }
+
+    #[test]
+    fn every_edit_of_a_digit_by_three_is_told_and_nothing_else_with_it() {
+        for (place, count) in every_edit(&published()) {
+            assert_eq!((count.told, count.others_too), (count.made, 0), "{place:?}");
+        }
+    }
+
+    #[test]
+    fn several_edits_of_one_row_are_told_each() {
+        let mut published = published();
+        let cells = &mut published.tables.get_mut(&TABLES[2]).unwrap().rows[2].cells;
+        cells.insert("lum1".to_owned(), "2.75".to_owned());
+        cells.insert("lum2".to_owned(), "2.06".to_owned());
+        let found = published.misfits(&task(TABLES[2]));
+        let told: Vec<(usize, &str, String)> =
+            found.iter().map(|m| (m.row, m.column.as_str(), format!("{:.2}", m.expected))).collect();
+        assert_eq!(told, [(2, "lum1", "2.45".to_owned()), (2, "lum2", "2.46".to_owned())]);
+    }
+
+    #[test]
+    fn without_control_totals_those_beyond_the_tables_own_scatter_are_told() {
+        let mut bare = published();
+        for table in bare.tables.values_mut() {
+            table.totals.clear();
+            table.rows.iter_mut().for_each(|row| row.total = None);
+        }
+        let told = every_edit(&bare);
         for ((procedure, column, power), count) in &told {
             println!("{procedure} {column} 10^{power}: {count:?}");
             // Table 1 spreads by some candela between its columns and by rounding to .1 cd; Tables 2 and 3 by some hundredths of a lux.
@@ -277,8 +308,8 @@ mod tests {
             let [one] = &compared[..] else { panic!("{compared:?}") };
             assert_eq!(one.verdict, verdict, "{one:?}");
             let is_charged = one.diagnosis.as_ref().is_some_and(|d| {
-                d.starts_with("Table 2: the printed 18.55 does not fit its own table: by")
-                    && d.contains("inverse-square law")
+                d.starts_with("Table 2: the printed 18.55 does not fit its own table: by the control totals of")
+                    && d.contains("13.55")
             });
             assert_eq!(is_charged, verdict == Verdict::KnownDeviation, "{one:?}");
         }

@@ -18,6 +18,8 @@ use crate::record::{Estimate, MeterId, ProcedureId, Quantity, Uncertainty};
 
 /// Places within so many metres, and directions within so many degrees, are the same, as the format says.
 const SAME: f64 = 1e-6;
+/// Sums of printed decimals differ by less than this, relative to their total or 1.
+const ROUNDING_OF_SUMS: f64 = 1e-9;
 
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -65,6 +67,9 @@ pub(super) struct Table {
     quantity: Quantity,
     bounces: Option<u32>,
     columns: BTreeMap<String, Column>,
+    /// Control totals of its columns.
+    #[serde(default)]
+    pub(super) totals: BTreeMap<String, String>,
     pub(super) rows: Vec<Row>,
 }
 
@@ -91,6 +96,8 @@ pub(super) struct Row {
     at_m: Option<[f64; 3]>,
     normal: Option<[f64; 3]>,
     pub(super) cells: BTreeMap<String, String>,
+    /// Control total of its cells.
+    pub(super) total: Option<String>,
 }
 
 /// A published table as it is printed, with the meters that its rows belong to.
@@ -167,8 +174,9 @@ impl Published {
         if published.version != 1 {
             return Err(fail(format!("format version {} is not known; this program reads 1", published.version)));
         }
-        let cells = published.tables.values().flat_map(|t| t.rows.iter().flat_map(|r| r.cells.values()));
-        if let Some(bad) = cells.into_iter().find(|c| published.cell(c, 0).is_none()) {
+        let of_row = |r: &'_ Row| r.cells.values().chain(&r.total).cloned().collect::<Vec<String>>();
+        let of_table = |t: &'_ Table| t.rows.iter().flat_map(of_row).chain(t.totals.values().cloned()).collect_vec();
+        if let Some(bad) = published.tables.values().flat_map(of_table).find(|c| published.cell(c, 0).is_none()) {
             return Err(fail(format!("the cell \"{bad}\" is no number")));
         }
         Ok(published)
@@ -259,8 +267,9 @@ impl Published {
             .columns
             .keys()
             .map(|column| {
-                let rows = table.rows.iter();
-                let cells = rows.map(|row| Some((row.cells.get(column)?.as_str(), self.printed(table, row, column)?)));
+                let rows = table.rows.iter().enumerate();
+                let cells =
+                    rows.map(|(k, row)| Some((row.cells.get(column)?.as_str(), self.copied(table, k, column)?)));
                 (column.as_str(), cells.collect())
             })
             .collect();
@@ -268,7 +277,15 @@ impl Published {
             [luminaire] if task.procedure == ProcedureId::DirectIlluminance => self.by_the_law(table, luminaire),
             _ => vec![],
         };
-        misfits(&columns, &lawful)
+        let changed = table.changed().into_iter().map(|(row, column, expected)| Misfit {
+            row,
+            column: column.to_owned(),
+            printed: table.rows[row].cells[column].clone(),
+            expected,
+            half_width: 0.0,
+            by: vec!["the control totals of its row and its column".to_owned()],
+        });
+        changed.chain(misfits(&columns, &lawful)).unique_by(|m| (m.row, m.column.clone())).collect()
     }
 
     /// What the reference column of direct light must print by the intensity in the same direction, where that is printed.
@@ -286,16 +303,19 @@ impl Published {
             let is_pole = local.x.hypot(local.y) <= SAME;
             let same = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() <= SAME);
             let is_there = |row: &&Row| same(row.gamma_deg, gamma_deg) && (is_pole || same(row.c_deg, c_deg));
-            let intensity = self.printed(intensities, intensities.rows.iter().find(is_there)?, of_intensity)?;
+            let intensity =
+                self.copied(intensities, intensities.rows.iter().position(|r| is_there(&r))?, of_intensity)?;
             let cosine = -DVec3::from(row.normal?).normalize().dot(from.normalize());
             Some((k, column, intensity.times(luminaire.flux_scale * cosine / from.length_squared())))
         };
         table.rows.iter().enumerate().filter_map(expected).collect()
     }
 
-    /// A cell of a table with the interval that its rounding leaves.
-    fn printed(&self, table: &Table, row: &Row, column: &str) -> Option<Estimate> {
-        self.cell(row.cells.get(column)?, table.decimals(column))
+    /// A cell of a table, with the interval that its rounding leaves, as it was when it was copied.
+    fn copied(&self, table: &Table, row: usize, column: &str) -> Option<Estimate> {
+        let now = self.cell(table.rows[row].cells.get(column)?, table.decimals(column))?;
+        let was = table.changed().into_iter().find(|changed| (changed.0, changed.1) == (row, column));
+        Some(was.map_or(now, |(_, _, value)| Estimate { value, ..now }))
     }
 
     fn cell(&self, printed: &str, decimals: usize) -> Option<Estimate> {
@@ -319,6 +339,39 @@ impl Table {
     /// The decimals of a column: those of its longest cell, since a bare 0 among them is as exact as they are.
     fn decimals(&self, column: &str) -> usize {
         self.rows.iter().filter_map(|r| r.cells.get(column)).map(|c| decimals_of(c)).max().unwrap_or(0)
+    }
+}
+
+/// What a total says beyond the sum of the cells that it is of; `None` where they agree.
+fn missing<'a>(total: Option<&String>, cells: impl Iterator<Item = &'a String>) -> Option<f64> {
+    let number = |cell: &String| cell.trim().parse::<f64>().ok();
+    let total = number(total?)?;
+    let missing = total - cells.filter_map(number).sum::<f64>();
+    (missing.abs() > ROUNDING_OF_SUMS * total.abs().max(1.0)).then_some(missing)
+}
+
+impl Table {
+    /// The cells that are not what they were when its control totals were added up, and what they were: where a row and a column lack as
+    /// much, or all that lacks is in one of either.
+    fn changed(&self) -> Vec<(usize, &str, f64)> {
+        let of_row = |(k, row): (usize, &Row)| Some((k, missing(row.total.as_ref(), row.cells.values())?));
+        let rows: Vec<(usize, f64)> = self.rows.iter().enumerate().filter_map(of_row).collect();
+        let of_column = |(name, total): (&'_ String, &String)| {
+            let cells = self.rows.iter().filter_map(|row| row.cells.get(name));
+            Some((name.clone(), missing(Some(total), cells)?))
+        };
+        let columns: Vec<(String, f64)> = self.totals.iter().filter_map(of_column).collect();
+        let place = |(&(row, of_row), (column, of_column)): (&(usize, f64), &(String, f64))| {
+            let (column, cell) = self.rows[row].cells.get_key_value(column)?;
+            let is_one = (of_row - of_column).abs() <= ROUNDING_OF_SUMS * of_row.abs().max(1.0);
+            let lacks = match (rows.len(), columns.len()) {
+                (1, _) => *of_column,
+                _ if is_one || columns.len() == 1 => of_row,
+                _ => return None,
+            };
+            Some((row, column.as_str(), cell.trim().parse::<f64>().ok()? + lacks))
+        };
+        rows.iter().cartesian_product(&columns).filter_map(place).collect()
     }
 }
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::*;
-use crate::engines::{Blocks, Measurement};
+use crate::engines::{Blocks, Forgotten, Measurement};
 use crate::measure::{Cost, Failure, FailureKind};
 use crate::record::{Estimate, ProcedureId, ReadingKey, Uncertainty};
 use crate::system::envelope::tests::planted;
@@ -18,7 +18,7 @@ fn sample() -> Entry {
         notes: vec!["a note with \"quotes\" and µ".to_owned()],
         samples: vec![Blocks::new(vec![vec![1.0 / 3.0; 5], vec![0.1 + 0.2; 5]])],
         work_s: Some(1.1),
-        shared: None,
+        forgotten: Forgotten::default(),
     };
     Entry {
         key: ReadingKey::new("case", ProcedureId::DirectIlluminance, "radiance"),
