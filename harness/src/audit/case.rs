@@ -51,8 +51,9 @@ impl Audit<'_> {
         let mut comparisons: Vec<Comparison> = tasks().flat_map(|task| judge.compare(task, &of(task))).collect();
         let known = tasks().flat_map(|task| judge.on_record(&comparisons, &of(task))).collect();
         sequential::estimate_remaining_cost(&mut comparisons);
-        // What follows from other readings follows from nothing where the case was never begun.
-        let holds = |s: &&Skip| stop.is_none() || s.scope.leaves_no_reading();
+        // What follows from other readings follows from nothing where the case was never begun, or where it does not.
+        let is_contradicted = |s: &Skip| outcome.contradicted.contains(&(s.key.engine.clone(), s.key.procedure));
+        let holds = |s: &&Skip| s.scope.leaves_no_reading() || stop.is_none() && !is_contradicted(s);
         let skips = plan.skips.iter().filter(holds).cloned().chain(outcome.skips).collect();
         Ok(Report {
             engines: outcome.engines,

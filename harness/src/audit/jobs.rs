@@ -1,6 +1,6 @@
 //! Runs a plan: one reading a job, readings kept on disk as each job finishes, one engine's failure stops no other.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Add;
 use std::path::Path;
 
@@ -39,12 +39,14 @@ pub struct Outcome {
     pub engines: Vec<EngineStatus>,
     /// What an engine declined once it had seen the job.
     pub skips: Vec<Skip>,
+    /// Where a spot check contradicted what was to follow from other readings, so that nothing of the run was left out.
+    pub contradicted: BTreeSet<(EngineName, ProcedureId)>,
     /// How many answers of engines came out of the cache.
     pub from_cache: usize,
 }
 
 enum Done {
-    Recorded(Box<Recording>, Option<Source>),
+    Recorded { recording: Box<Recording>, source: Option<Source>, was_contradicted: bool },
     Declined(Skip),
 }
 
@@ -57,7 +59,7 @@ impl Running<'_> {
         let runs: Vec<(usize, &Run)> = self.plan.runs.iter().enumerate().collect();
         let one = |&(k, run): &(usize, &Run)| -> Result<Done, FileError> {
             let done = self.measure(run);
-            if let Done::Recorded(recording, _) = &done {
+            if let Done::Recorded { recording, .. } = &done {
                 let mut kept = kept.lock();
                 kept.insert(k, (**recording).clone());
                 // Written as each job finishes, so that an interruption loses only what was under way.
@@ -65,18 +67,20 @@ impl Running<'_> {
             }
             Ok(done)
         };
-        let (mut recordings, mut skips, mut from_cache) = (vec![], vec![], 0);
+        let (mut recordings, mut skips, mut from_cache, mut contradicted) = (vec![], vec![], 0, BTreeSet::new());
         for done in side_by_side(threads, &runs, one) {
             match done? {
-                Done::Recorded(recording, source) => {
+                Done::Recorded { recording, source, was_contradicted } => {
                     from_cache += usize::from(source == Some(Source::Cache));
+                    let ReadingKey { engine, procedure, .. } = &recording.key;
+                    contradicted.extend(was_contradicted.then(|| (engine.clone(), *procedure)));
                     recordings.push(*recording);
                 }
                 Done::Declined(skip) => skips.push(skip),
             }
         }
         let engines = self.plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
-        Ok(Outcome { recordings, engines, skips, from_cache })
+        Ok(Outcome { recordings, engines, skips, contradicted, from_cache })
     }
 
     /// One run of the plan: the one place where a recording is made of what engines answer.
@@ -85,7 +89,10 @@ impl Running<'_> {
         let engine = planned.engine.as_ref();
         self.observer.started(self.case, engine, task.procedure.name());
         let start = Instant::now();
-        let taken = answer(planned, run, &self.reader, task.procedure.name());
+        let (taken, was_contradicted) = match answer(planned, run, &self.reader, task.procedure.name()) {
+            Ok(Answer { taken, was_contradicted }) => (Ok(taken), was_contradicted),
+            Err(failure) => (Err(failure), false),
+        };
         if let Err(Failure { kind: FailureKind::Declined, text: why }) = &taken {
             self.observer.ended(self.case, engine, task.procedure, start.elapsed(), None);
             let reason = format!("it declines: {why}");
@@ -95,7 +102,7 @@ impl Running<'_> {
         let recording = self.record(run, taken, start.elapsed());
         let wall = Duration::try_from_secs_f64(recording.wall_s).unwrap_or_default();
         self.observer.ended(self.case, engine, task.procedure, wall, recording.failure.as_deref());
-        Done::Recorded(Box::new(recording), source)
+        Done::Recorded { recording: Box::new(recording), source, was_contradicted }
     }
 
     fn record(&self, run: &Run, taken: Result<Taken, Failure>, wall: Duration) -> Recording {
@@ -139,9 +146,14 @@ impl Running<'_> {
     }
 }
 
+struct Answer {
+    taken: Taken,
+    was_contradicted: bool,
+}
+
 /// What an engine answers to a run: it renders what the shortcut leaves, and the rest follows. Where its spot check contradicts that, it
 /// renders everything.
-fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result<Taken, Failure> {
+fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result<Answer, Failure> {
     let failed = |what: String| Failure::from(EngineError::Solver { engine: planned.engine.name(), what });
     let instrument = planned.instrument().ok_or_else(|| failed("it is not there".to_owned()))?;
     let shortcut = &run.shortcut;
@@ -159,7 +171,7 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
             let mut whole = reader.read(&Question::new(&instrument, &run.job, folder))?;
             whole.cost.wall_s += taken.cost.wall_s + seen.cost.wall_s;
             whole.measurement.notes.push(contradiction);
-            return Ok(whole);
+            return Ok(Answer { taken: whole, was_contradicted: true });
         }
         taken.cost.wall_s += seen.cost.wall_s;
         let work_s = [taken.measurement.work_s, seen.measurement.work_s];
@@ -175,7 +187,7 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
             taken.source = seen.source;
         }
     }
-    Ok(taken)
+    Ok(Answer { taken, was_contradicted: false })
 }
 
 /// Writes the file of an engine's readings, those among all that are its own.
@@ -203,7 +215,8 @@ pub fn not_run(case: &Case, plan: &Plan, status: Status, reason: &str) -> Outcom
         }
     };
     let engines = plan.engines.iter().enumerate().map(engine).collect();
-    Outcome { recordings: vec![], engines, skips: plan.runs.iter().map(skip).collect(), from_cache: 0 }
+    let skips = plan.runs.iter().map(skip).collect();
+    Outcome { recordings: vec![], engines, skips, contradicted: BTreeSet::new(), from_cache: 0 }
 }
 
 fn status(planned: &Planned, recordings: &[Recording]) -> EngineStatus {
@@ -255,7 +268,7 @@ mod tests {
         let planned = Planned { engine: Arc::new(Fake::new("fake", read)), found, asked: Asked::ByName };
         let folder = tempfile::tempdir().unwrap();
         let reader = Reader::bare(&Site::at(folder.path()), Machine::new(1));
-        answer(&planned, &run, &reader, "direct_illuminance").unwrap().measurement
+        answer(&planned, &run, &reader, "direct_illuminance").unwrap().taken.measurement
     }
 
     fn values(measurement: &Measurement) -> Vec<f64> {

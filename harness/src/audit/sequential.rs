@@ -337,7 +337,7 @@ mod tests {
 
     #[test]
     fn what_is_decided_is_not_asked_again_and_what_is_not_is_decided_in_the_end() {
-        let (verdicts, asked, subject) = run(&[0.0, 0.0, 0.013, 0.04], 1e3, 16, 5);
+        let (verdicts, asked, subject) = run(&[0.0, 0.0, 0.013, 0.06], 1e3, 16, 5);
         assert_eq!(verdicts, [Verdict::Pass, Verdict::Pass, Verdict::Pass, Verdict::Fail]);
         assert!(!asked.is_empty() && asked.iter().all(|a| a.targets == [2]), "{asked:?}");
         assert_eq!((subject.looks[0], subject.looks[3]), (1, 1));

@@ -98,7 +98,8 @@ pub struct Comparison {
     /// What the deviation may owe to chance and ignorance; null where there is no deviation.
     #[serde(default)]
     pub budget: Option<ErrorBudget>,
-    /// How probable a deviation this large would be, were the engine just within the tolerance.
+    /// How probable a deviation this large would be, were the engine just within the tolerance; chance counts for as much more as it
+    /// takes to look several times, where that is planned.
     #[serde(default)]
     pub p_value: Option<f64>,
 }

@@ -188,7 +188,7 @@ impl Tolerances {
         let wrong_fail = 100.0 * self.family_wise_error();
         format!(
             "tolerances of class {}{purpose}: a pass is wrong in {wrong_pass:.1} % of comparisons at most, any fail of an engine in \
-             a procedure in {wrong_fail:.0} % (JCGM 106:2012, guarded acceptance; Holm 1979)",
+             a procedure in {wrong_fail:.1} % (JCGM 106:2012, guarded acceptance; Holm 1979)",
             self.class
         )
     }
@@ -268,7 +268,7 @@ mod tests {
         );
         let rule = design.decision_rule();
         assert!(
-            rule.contains("class design") && rule.contains("in 2.3 % of") && rule.contains("in 1 % (JCGM"),
+            rule.contains("class design") && rule.contains("in 2.3 % of") && rule.contains("in 0.1 % (JCGM"),
             "{rule}"
         );
         let bare = Tolerances { rules: vec![], ..table };
