@@ -37,7 +37,7 @@ use crate::judge::{Policy, PolicyChoice, Published, PublishedError};
 use crate::measure::cache::Cache;
 use crate::measure::{Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
-use crate::record::{Doubt, Recording, Status};
+use crate::record::Status;
 use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, SpecError, filtered, suite};
 use crate::system::digest::hexadecimal;
@@ -254,8 +254,8 @@ fn diagnose(plans: &[Plan], reports: &mut [Report]) {
     };
     let mut cases = vec![];
     for (plan, report) in plans.iter().zip(reports) {
-        let is_heavy_tailed = |r: &&Recording| r.stated_errors.iter().any(|s| s.doubt == Some(Doubt::HeavyTail));
-        let silent = report.recordings.iter().filter(is_heavy_tailed).map(|r| r.key.engine.clone()).collect();
+        let heavy = report.recordings.iter().filter(|r| r.states_heavy_tail());
+        let silent = heavy.map(|r| r.key.engine.clone()).collect();
         let comparisons = &mut report.comparisons;
         cases.push(Examined { tasks: &plan.tasks, settings: settings(plan), silent, comparisons });
     }

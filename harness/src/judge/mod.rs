@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::procedures::{self, Target, Task};
 use crate::record::{
-    Doubt, EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, StatedErrors, Uncertainty,
+    EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, StatedErrors, Uncertainty,
 };
 use crate::spec::ToleranceOverride;
 
@@ -288,8 +288,8 @@ const WELL_COVERED: f64 = 1e-3;
 /// Whether its blocks tell so, or how its errors vary from seed to seed, and it is near enough for a heavy tail to have done it.
 fn is_heavy_tailed(recording: &Recording, uncertainty: Uncertainty, deviation: f64, p_value: f64) -> bool {
     let is_near = || uncertainty.standard_error().is_some_and(|error| deviation.abs() < FAR * error);
-    let is_told = || recording.stated_errors.iter().any(|s| s.doubt == Some(Doubt::HeavyTail));
-    recording.skewness.is_some_and(|s| s > MAX_SKEWNESS) && is_near() || is_told() && p_value > WELL_COVERED
+    recording.skewness.is_some_and(|s| s > MAX_SKEWNESS) && is_near()
+        || recording.states_heavy_tail() && p_value > WELL_COVERED
 }
 
 /// Why a sampled value fails nothing, whatever its distance: its interval is not one.

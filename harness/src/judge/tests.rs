@@ -76,6 +76,9 @@ fn a_grid_of_192_meters_at_the_edge_of_its_tolerance_falsely_fails_in_one_run_of
         let share = false_failures(deviation, 8, seed);
         assert!(share <= 0.001 + 0.005, "{share}");
     }
+    // A test that never rejects shows nothing.
+    let far_beyond = false_failures(0.05, 8, 4);
+    assert!(far_beyond > 0.9, "{far_beyond}");
     let well_inside = false_failures(0.01, 8, 3);
     assert!(well_inside <= 0.003, "{well_inside}");
 }

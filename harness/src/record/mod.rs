@@ -176,6 +176,11 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// Whether its standard errors vary from seed to seed as a heavy tail makes them.
+    pub fn states_heavy_tail(&self) -> bool {
+        self.stated_errors.iter().any(|s| s.doubt == Some(Doubt::HeavyTail))
+    }
+
     /// One without readings yet.
     pub fn of(key: ReadingKey, light: Light) -> Self {
         Self {

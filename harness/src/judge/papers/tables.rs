@@ -263,13 +263,15 @@ impl Published {
         let Some(table) = self.tables.get(&task.procedure).filter(|_| self.citation.basis == Basis::Published) else {
             return vec![];
         };
+        let all_changed = table.changed();
         let columns: Vec<Printed<'_>> = table
             .columns
             .keys()
             .map(|column| {
                 let rows = table.rows.iter().enumerate();
-                let cells =
-                    rows.map(|(k, row)| Some((row.cells.get(column)?.as_str(), self.copied(table, k, column)?)));
+                let cells = rows.map(|(k, row)| {
+                    Some((row.cells.get(column)?.as_str(), self.copied(table, &all_changed, k, column)?))
+                });
                 (column.as_str(), cells.collect())
             })
             .collect();
@@ -277,7 +279,7 @@ impl Published {
             [luminaire] if task.procedure == ProcedureId::DirectIlluminance => self.by_the_law(table, luminaire),
             _ => vec![],
         };
-        let changed = table.changed().into_iter().map(|(row, column, expected)| Misfit {
+        let changed = all_changed.iter().map(|&(row, column, expected)| Misfit {
             row,
             column: column.to_owned(),
             printed: table.rows[row].cells[column].clone(),
@@ -294,6 +296,7 @@ impl Published {
         let reference =
             |table: &'t Table| table.columns.iter().find(|(_, c)| c.reference).map(|(name, _)| name.as_str());
         let Some((column, of_intensity)) = reference(table).zip(reference(intensities)) else { return vec![] };
+        let changed = intensities.changed();
         let expected = |(k, row): (usize, &Row)| {
             let from = DVec3::from(row.at_m?) - luminaire.position_m;
             let local = luminaire.orientation.transpose() * from;
@@ -304,18 +307,18 @@ impl Published {
             let same = |a: Option<f64>, b: f64| a.is_some_and(|a| (a - b).abs() <= SAME);
             let is_there = |row: &&Row| same(row.gamma_deg, gamma_deg) && (is_pole || same(row.c_deg, c_deg));
             let intensity =
-                self.copied(intensities, intensities.rows.iter().position(|r| is_there(&r))?, of_intensity)?;
+                self.copied(intensities, &changed, intensities.rows.iter().position(|r| is_there(&r))?, of_intensity)?;
             let cosine = -DVec3::from(row.normal?).normalize().dot(from.normalize());
             Some((k, column, intensity.times(luminaire.flux_scale * cosine / from.length_squared())))
         };
         table.rows.iter().enumerate().filter_map(expected).collect()
     }
 
-    /// A cell of a table, with the interval that its rounding leaves, as it was when it was copied.
-    fn copied(&self, table: &Table, row: usize, column: &str) -> Option<Estimate> {
+    /// A cell of a table, with the interval that its rounding leaves, as it was when it was copied; `changed` are [`Table::changed`].
+    fn copied(&self, table: &Table, changed: &[Changed<'_>], row: usize, column: &str) -> Option<Estimate> {
         let now = self.cell(table.rows[row].cells.get(column)?, table.decimals(column))?;
-        let was = table.changed().into_iter().find(|changed| (changed.0, changed.1) == (row, column));
-        Some(was.map_or(now, |(_, _, value)| Estimate { value, ..now }))
+        let was = changed.iter().find(|changed| (changed.0, changed.1) == (row, column));
+        Some(was.map_or(now, |&(_, _, value)| Estimate { value, ..now }))
     }
 
     fn cell(&self, printed: &str, decimals: usize) -> Option<Estimate> {
@@ -342,6 +345,9 @@ impl Table {
     }
 }
 
+/// A cell that was changed, by row and column, and what it was.
+type Changed<'t> = (usize, &'t str, f64);
+
 /// What a total says beyond the sum of the cells that it is of; `None` where they agree.
 fn missing<'a>(total: Option<&String>, cells: impl Iterator<Item = &'a String>) -> Option<f64> {
     let number = |cell: &String| cell.trim().parse::<f64>().ok();
@@ -353,7 +359,7 @@ fn missing<'a>(total: Option<&String>, cells: impl Iterator<Item = &'a String>) 
 impl Table {
     /// The cells that are not what they were when its control totals were added up, and what they were: where a row and a column lack as
     /// much, or all that lacks is in one of either.
-    fn changed(&self) -> Vec<(usize, &str, f64)> {
+    fn changed(&self) -> Vec<Changed<'_>> {
         let of_row = |(k, row): (usize, &Row)| Some((k, missing(row.total.as_ref(), row.cells.values())?));
         let rows: Vec<(usize, f64)> = self.rows.iter().enumerate().filter_map(of_row).collect();
         let of_column = |(name, total): (&'_ String, &String)| {
