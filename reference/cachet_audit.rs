@@ -80,7 +80,7 @@ fn published(text: &str) -> Result<Vec<Row>, Failure> {
         let Some((place, cells)) = line.strip_prefix("- {").and_then(|row| row.split_once(", cells: {")) else {
             continue;
         };
-        let cells = cells.trim_end_matches('}').split(", ").map(|cell| {
+        let cells = cells.split('}').next().unwrap_or_default().split(", ").map(|cell| {
             let (name, printed) = cell.split_once(": ").ok_or("a cell without a value")?;
             let printed = printed.trim_matches('"');
             let decimals = printed.split_once('.').map_or(0, |(_, fraction)| fraction.len());
