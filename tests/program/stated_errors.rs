@@ -105,3 +105,56 @@ fn nothing_hides_behind_a_stated_error_of_its_own_size() {
     let report = run("stated = 0.3 * lux; lux *= 1.3", SAMPLED, 1);
     assert_eq!(verdicts(&report).2, ["same_for_every_seed"]);
 }
+
+/// Means of eight blocks of .3 %, with their own standard errors.
+const BLOCKS: &str = "blocks = [lux * (1 + .003 * chance.gauss(0, 1)) for _ in range(8)]; lux = sum(blocks) / 8; \
+                      stated = math.sqrt(sum((b - lux) ** 2 for b in blocks) / 56)";
+
+#[test]
+fn light_that_is_lost_at_some_meters_fails_beside_noise_at_the_others() {
+    let lost = "lux, stated = (0.0, 0.0) if meter['position_m'][0] < 3.0 else (lux, stated)";
+    let report = run(&format!("{RANDOM}{BLOCKS}; {lost}"), SAMPLED, 3);
+    let mine = among(&report, "comparisons", &[("engine", "mine")]);
+    let is_lost = |c: &Value| c["value"] == 0.0;
+    assert!(mine.iter().filter(|c| is_lost(c)).count() > 3, "{report}");
+    for comparison in mine {
+        assert_eq!(comparison["verdict"], if is_lost(comparison) { "fail" } else { "pass" }, "{comparison}");
+    }
+}
+
+#[test]
+fn samples_that_happen_to_agree_are_no_claim() {
+    // A tenth of the light in one sample of a thousand.
+    let rare = "hits = sum(chance.random() < .001 for _ in range(1000)); lux *= .9 + .1 * hits; \
+                stated = lux / (.9 + .1 * hits) * .1 * math.sqrt(max(hits - hits * hits / 1000, 0))";
+    for seed in SEEDS {
+        let report = run(&format!("{RANDOM}{rare}"), "\"std_error_lx\": stated, \"degrees_of_freedom\": 999", seed);
+        for comparison in among(&report, "comparisons", &[("engine", "mine")]) {
+            assert_ne!(comparison["verdict"], "fail", "{comparison}");
+        }
+    }
+}
+
+#[test]
+fn nothing_hides_behind_a_single_degree_of_freedom_or_an_error_that_is_withdrawn() {
+    let one = "\"std_error_lx\": stated, \"degrees_of_freedom\": 1";
+    let report = run(&noise(0.5, 0.05, 0.05), one, 1);
+    let (_, fails, doubts) = verdicts(&report);
+    assert!(fails > 15 && doubts == ["more_samples"], "{fails} {doubts:?}");
+    // Two blocks have one, and are not doubted.
+    let two = "blocks = [lux * (1 + .001 * chance.gauss(0, 1)) for _ in range(2)]; lux = sum(blocks) / 2; stated = abs(blocks[0] - lux)";
+    let doubted = SEEDS.filter(|seed| !verdicts(&run(&format!("{RANDOM}{two}"), one, *seed)).2.is_empty()).count();
+    assert!(doubted <= 1, "{doubted}");
+    let withdrawn = "{} if job['budget']['relative_error'] > .003 else {\"std_error_lx\": stated}";
+    let report = run(&noise(0.3, 0.0, 0.24), &format!("**({withdrawn})"), 1);
+    assert_eq!(verdicts(&report).2, ["not_read_again"]);
+}
+
+#[test]
+fn a_program_that_reads_nothing_but_calibration_audits_nothing() {
+    let declining = adapter().replacen("def answer(job):", "def answer(job):\n    if not job[\"case\"].startswith(\"calibration\"):\n        return {\"declined\": \"no\"}", 1);
+    assert!(declining.contains("\"declined\": \"no\""));
+    let spec = [SKEW_ROOM, MINE].concat();
+    let folder = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", SKEW_LAMP), ("adapter.py", &declining)]);
+    folder.run(&["--no-cache"]).exits(3);
+}

@@ -42,10 +42,12 @@ pub(super) fn examine(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Ou
         let all: Vec<Again<'_>> = runs.map(|run| again(running, run, &name, outcome)).collect();
         let of_engine: Variation = all.iter().filter_map(|a| a.sampled.as_deref()).map(Variation::of).sum();
         for Again { task, was_asked, sampled, claims } in all {
+            // What states no error of sampling any more does not read again what did.
+            let is_lost = sampled.as_deref().is_some_and(is_withdrawn);
             let doubts = [
                 sampled.as_deref().and_then(|meters| StatedErrors::of_sampled(meters, &of_engine)),
                 claims.as_deref().and_then(StatedErrors::of_claims),
-                (was_asked && (sampled.is_none() || claims.is_none()))
+                (was_asked && (is_lost || sampled.is_none() || claims.is_none()))
                     .then_some(StatedErrors::doubted(Doubt::NotReadAgain)),
                 is_beyond_tolerance(judge, task, outcome, &name)
                     .then_some(StatedErrors::doubted(Doubt::BeyondTolerance)),
@@ -78,6 +80,17 @@ fn again<'a>(running: &'a Running<'_>, run: &Run, engine: &EngineName, outcome: 
     let claims = contradicted(running, run, readings, &of_claims);
     let was_asked = !(process::is_interrupted() || of_samples.is_empty() && of_claims.is_empty());
     Again { task, was_asked, sampled, claims }
+}
+
+/// Whether at most meters whose error was stated no other seed states one.
+fn is_withdrawn(meters: &[Vec<Estimate>]) -> bool {
+    let states = |e: &Estimate| e.uncertainty.standard_error().is_some_and(|e| e > 0.0);
+    let first = |readings: &&Vec<Estimate>| readings.len() > 1 && readings.last().is_some_and(states);
+    let stated = meters.iter().filter(first);
+    let (all, kept) = stated.fold((0, 0), |(all, kept), readings| {
+        (all + 1, kept + usize::from(readings[..readings.len() - 1].iter().any(states)))
+    });
+    2 * kept < all
 }
 
 /// Whether the bounds that an engine states leave room for any reading within the tolerance and beyond, at most meters.

@@ -207,7 +207,7 @@ impl Judge<'_> {
         let (target, reading) = (&task.targets[k], recording.readings.get(k));
         let believed = |r: &Reading| {
             let stated = StatedErrors::of_looks(&recording.stated_errors, r.uncertainty);
-            believed(stated, largest_portion, held.as_ref().map(|h| h.reference.value))
+            believed(stated, largest_portion, held.as_ref().map(|h| (h.reference.value - r.value).abs()))
         };
         let uncertainty = reading.map_or(Uncertainty::Unstated, believed);
         let basis = held.as_ref().map(|h| h.reference.basis);
@@ -306,8 +306,9 @@ fn unbelievable(uncertainty: Uncertainty, value: f64, is_heavy_tailed: bool) -> 
     }
 }
 
-/// Where a sample is met that rarely, it may carry so many times the light of those elsewhere.
-const BRIGHTER: f64 = 1e4;
+/// Where a sample is met that rarely, it may carry so many times the light of those elsewhere. Sampled alike, portions differ as cosines
+/// and squared distances do, by which light is weighted; a renderer that meets its luminaires by chance alone meets them so everywhere.
+const BRIGHTER: f64 = 100.0;
 
 /// The largest portion that light comes in to an engine's meters: the variance of a reading over its value.
 fn largest_portion(recording: &Recording) -> Option<f64> {
@@ -315,13 +316,13 @@ fn largest_portion(recording: &Recording) -> Option<f64> {
     recording.readings.iter().filter_map(portion).reduce(f64::max).filter(|p| *p > 0.0)
 }
 
-/// The error that a reading has where no sample met anything: were the reference right, and light to come here in portions many times as
-/// large as anywhere else, zero would be so far off by chance. Where that is not far below the reference, it stays not seen.
-fn believed(stated: Uncertainty, largest_portion: Option<f64>, reference: Option<f64>) -> Uncertainty {
-    match (stated, largest_portion, reference) {
-        (Uncertainty::NotSeen, Some(portion), Some(reference)) => {
-            let error = (BRIGHTER * portion * reference).sqrt();
-            if error < MAX_RELATIVE_ERROR * reference { Uncertainty::sampled(error, None) } else { stated }
+/// The error that a reading has where no sample met what is missing: were the reference right, and light to come here in portions many
+/// times as large as anywhere else, so much would be missing by chance. Where that is not far below what is missing, it stays not seen.
+fn believed(stated: Uncertainty, largest_portion: Option<f64>, missing: Option<f64>) -> Uncertainty {
+    match (stated, largest_portion, missing) {
+        (Uncertainty::NotSeen, Some(portion), Some(missing)) => {
+            let error = (BRIGHTER * portion * missing).sqrt();
+            if error < MAX_RELATIVE_ERROR * missing { Uncertainty::sampled(error, None) } else { stated }
         }
         _ => stated,
     }

@@ -117,7 +117,8 @@ fn what_is_never_seen_fails_where_samples_are_many_and_waits_where_they_are_few(
         comparisons.iter().find(|c| c.meter == MeterId::new("grid", 2) && c.key.engine == "radiance").unwrap().verdict
     };
     assert_eq!(verdict(1e-4), Verdict::Fail);
-    assert_eq!(verdict(0.01), Verdict::Inconclusive);
+    assert_eq!(verdict(0.01), Verdict::Fail);
+    assert_eq!(verdict(0.05), Verdict::Inconclusive);
 }
 
 #[test]

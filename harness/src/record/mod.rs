@@ -5,6 +5,7 @@ mod design_effect;
 mod key;
 mod light;
 mod method;
+mod scatter;
 mod stated_errors;
 mod status;
 mod uncertainty;
@@ -42,6 +43,9 @@ impl Quantity {
     }
 }
 
+/// A scatter that rounding makes, relative.
+const ROUNDING: f64 = 1e-6;
+
 /// A value with what is stated of its error, both in one unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Estimate {
@@ -72,6 +76,15 @@ impl Estimate {
         if all.iter().any(|e| is_sampled(e) && e.value > 0.0) {
             let dark = |e: &&mut Self| e.value == 0.0 && e.uncertainty.standard_error() == Some(0.0);
             all.iter_mut().filter(dark).for_each(|e| e.uncertainty = Uncertainty::NotSeen);
+        }
+    }
+
+    /// Tells those whose samples all agree, where those of others do not: what the others met may still be to come there.
+    pub fn mark_agreeing(all: &mut [Self]) {
+        let error = |e: &Self| e.uncertainty.standard_error();
+        if all.iter().any(|e| error(e).is_some_and(|error| error > ROUNDING * e.value)) {
+            let agree = |e: &&mut Self| error(e) == Some(0.0) && e.uncertainty.bound() == 0.0;
+            all.iter_mut().filter(agree).for_each(|e| e.uncertainty = Uncertainty::NotSeen);
         }
     }
 

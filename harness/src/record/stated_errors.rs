@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::scatter::{Scatter, of_repeated};
 use super::{Estimate, Uncertainty, design_effect};
 
 /// Stated errors that vary as they do with a smaller probability are a heavy tail: the chi-squared distribution is only nearly theirs.
@@ -39,7 +40,8 @@ pub struct StatedErrors {
     pub degrees_of_freedom: f64,
     /// How much of their noise the meters share: the variance of their mean over that of independent meters.
     pub design_effect: f64,
-    /// Degrees of freedom by which standard errors vary from seed to seed, where they vary more than those that are stated have it.
+    /// Degrees of freedom by which standard errors vary from seed to seed, where they vary more than those that are stated have it, or
+    /// plainly less.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom_seen: Option<f64>,
     /// The probability of a ratio as far from 1, were the stated errors right.
@@ -59,6 +61,8 @@ pub enum Doubt {
     HeavyTail,
     /// They vary as those of fewer samples than are stated.
     FewerSamples,
+    /// They vary less than those of as few samples as are stated: more of them would be needed to excuse as much.
+    MoreSamples,
     /// What is claimed to be determined scatters.
     Scatters,
     /// Every seed reads the same, although errors of sampling are stated.
@@ -83,44 +87,31 @@ impl StatedErrors {
         }
     }
 
-    /// Of readings whose errors are stated, one list a meter; meters whose error is not of sampling say nothing. `of_engine` is how the
-    /// errors of all that the engine read vary.
+    /// Of readings whose errors are stated, one list a meter; meters whose error is not of sampling say nothing, and all of them too
+    /// little where there are too few. `of_engine` is how the errors of all that the engine read vary.
     pub fn of_sampled(meters: &[Vec<Estimate>], of_engine: &Variation) -> Option<Self> {
-        let draws = meters.iter().map(Vec::len).max()?;
-        let (mut sum, mut freedom, mut deviates) = (0.0, 0.0, vec![vec![]; draws]);
-        for readings in meters {
-            let error = |e: &Estimate| e.uncertainty.standard_error().filter(|e| *e > 0.0);
-            let stated: Vec<(f64, f64)> = readings.iter().filter_map(|e| Some((e.value, error(e)?.powi(-2)))).collect();
-            let weights: f64 = stated.iter().map(|(_, w)| w).sum();
-            let mean = stated.iter().map(|(x, w)| x * w).sum::<f64>() / weights;
-            let of_each: Vec<f64> = stated.iter().map(|(x, w)| w.sqrt() * (x - mean)).collect();
-            sum += of_each.iter().map(|z| z * z).sum::<f64>();
-            freedom += stated.len().saturating_sub(1) as f64;
-            if of_each.len() == draws {
-                deviates.iter_mut().zip(of_each).for_each(|(draw, z)| draw.push(z));
-            }
-        }
-        if !sum.is_finite() {
-            return None;
-        }
+        let Scatter { sum, freedom, deviates } = of_repeated(meters)?;
         let design_effect = design_effect(&deviates);
         let ratio = (sum / freedom).sqrt();
         let degrees_of_freedom = freedom / design_effect;
         let chance = ChiSquared::new(degrees_of_freedom).ok()?;
         let (below, above) = (chance.cdf(sum / design_effect), chance.sf(sum / design_effect));
-        let (varies, varies_beyond) = Variation::of(meters).with(of_engine);
+        let own = Variation::of(meters);
+        let (varies, varies_beyond) = own.with(of_engine);
+        let steady = own.steadier_than_stated().filter(|_| ratio >= SAME);
         let doubt = match ratio {
             r if r < SAME => Some(Doubt::SameForEverySeed),
             _ if varies_beyond && varies.is_some_and(|seen| seen < NORMAL) => Some(Doubt::HeavyTail),
             _ if above < TOLD => Some(Doubt::TooSmall),
             r if below < TOLD && r < 1.0 / MIN_EXCESS => Some(Doubt::TooLarge),
-            _ => varies_beyond.then_some(Doubt::FewerSamples),
+            _ if varies_beyond => Some(Doubt::FewerSamples),
+            _ => steady.map(|_| Doubt::MoreSamples),
         };
         Some(Self {
             ratio: Some(ratio),
             degrees_of_freedom,
             design_effect,
-            degrees_of_freedom_seen: varies,
+            degrees_of_freedom_seen: varies.or(steady),
             p_value: Some(2.0 * below.min(above)),
             of_claims: None,
             doubt,
@@ -132,15 +123,24 @@ impl StatedErrors {
     pub fn of_claims(meters: &[Vec<Estimate>]) -> Option<Self> {
         let mean = |readings: &[Estimate]| readings.iter().map(|e| e.value).sum::<f64>() / readings.len() as f64;
         let brightest = meters.iter().map(|readings| mean(readings)).fold(0.0, f64::max);
-        let (mut sum, mut degrees_of_freedom) = (0.0, 0.0);
+        let (mut sum, mut freedom, mut of_meters) = (0.0, 0.0, vec![]);
         for readings in meters {
             let mean = mean(readings);
             if mean > SAME * brightest {
-                sum += readings.iter().map(|e| (e.value / mean - 1.0).powi(2)).sum::<f64>();
-                degrees_of_freedom += readings.len().saturating_sub(1) as f64;
+                let of_meter = readings.iter().map(|e| (e.value / mean - 1.0).powi(2)).sum::<f64>();
+                let own = readings.len().saturating_sub(1) as f64;
+                sum += of_meter;
+                freedom += own;
+                of_meters.push(Estimate {
+                    value: mean,
+                    uncertainty: Uncertainty::sampled((of_meter / own).sqrt(), Some(own)),
+                });
             }
         }
-        let relative = (sum / degrees_of_freedom).sqrt();
+        let relative = (sum / freedom).sqrt();
+        // Where meters scatter unlike one another, what they scatter by together says little of any one.
+        let across = Variation::across(&of_meters).with(&Variation::default()).0.unwrap_or(freedom);
+        let degrees_of_freedom = freedom.min(across.max(FEWEST));
         let found = Self { degrees_of_freedom, of_claims: Some(relative), ..Self::doubted(Doubt::Scatters) };
         (relative > 0.0 && relative.is_finite()).then_some(found)
     }
@@ -161,7 +161,10 @@ impl StatedErrors {
         let uncertainty = match (estimate.uncertainty, self.ratio, self.of_claims) {
             (Uncertainty::StandardError { value, degrees_of_freedom, bound }, Some(ratio), _) if value > 0.0 => {
                 let seen = self.degrees_of_freedom_seen.map(|seen| seen.max(FEWEST));
-                let stated = [degrees_of_freedom, seen].into_iter().flatten().reduce(f64::min);
+                let stated = match self.doubt {
+                    Some(Doubt::MoreSamples) => seen,
+                    _ => [degrees_of_freedom, seen].into_iter().flatten().reduce(f64::min),
+                };
                 let (by, degrees_of_freedom) = if self.counts(ratio) {
                     // Relative variances of the two standard errors add up.
                     let of_both = stated.map_or(freedom, |stated| (stated.recip() + freedom.recip()).recip());
@@ -200,7 +203,7 @@ impl StatedErrors {
         match self.doubt {
             Some(Doubt::TooSmall | Doubt::TooLarge | Doubt::Scatters) => true,
             Some(Doubt::SameForEverySeed | Doubt::NotReadAgain | Doubt::BeyondTolerance) => false,
-            Some(Doubt::HeavyTail | Doubt::FewerSamples) | None => {
+            Some(Doubt::HeavyTail | Doubt::FewerSamples | Doubt::MoreSamples) | None => {
                 ratio > 1.0 && self.p_value.is_some_and(|p| p < 2.0 * COUNTED)
             }
         }
@@ -219,27 +222,38 @@ pub struct Variation {
     /// The squares over those of as many degrees of freedom as are stated; where none are, of as few as may be, and of many.
     over_few: f64,
     over_many: f64,
+    /// The most degrees of freedom that are stated.
+    most: f64,
 }
 
 impl Variation {
     /// Of readings of one effort, all but the last of each meter.
     pub fn of(meters: &[Vec<Estimate>]) -> Self {
-        let mut all = Self::default();
-        for readings in meters {
-            let repeated = readings.iter().take(readings.len().saturating_sub(1)).map(|e| e.uncertainty);
-            let stated = repeated.filter_map(|u| Some((u.standard_error()?, u.degrees_of_freedom())));
-            let logs: Vec<(f64, Option<f64>)> =
-                stated.filter(|(e, _)| *e > 0.0).map(|(e, n)| (2.0 * e.ln(), n)).collect();
-            let mean = logs.iter().map(|(log, _)| log).sum::<f64>() / logs.len() as f64;
-            for (log, stated) in &logs {
-                let square = (log - mean).powi(2);
-                all.squares += square;
-                all.over_few += square / trigamma(stated.unwrap_or(FEW) / 2.0);
-                all.over_many += square / trigamma(stated.unwrap_or(MANY) / 2.0);
-            }
-            all.freedom += logs.len().saturating_sub(1) as f64;
+        meters.iter().map(|readings| Self::across(&readings[..readings.len().saturating_sub(1)])).sum()
+    }
+
+    /// Of estimates whose standard errors would be about the same.
+    fn across(estimates: &[Estimate]) -> Self {
+        let stated = estimates.iter().filter_map(|e| Some((e.uncertainty.standard_error()?, e.uncertainty)));
+        let logs: Vec<(f64, Option<f64>)> =
+            stated.filter(|(e, _)| *e > 0.0).map(|(e, u)| (2.0 * e.ln(), u.degrees_of_freedom())).collect();
+        let mean = logs.iter().map(|(log, _)| log).sum::<f64>() / logs.len() as f64;
+        let mut all = Self { freedom: logs.len().saturating_sub(1) as f64, ..Self::default() };
+        for (log, stated) in &logs {
+            all.most = all.most.max(stated.unwrap_or(MANY));
+            let square = (log - mean).powi(2);
+            all.squares += square;
+            all.over_few += square / trigamma(stated.unwrap_or(FEW) / 2.0);
+            all.over_many += square / trigamma(stated.unwrap_or(MANY) / 2.0);
         }
         all
+    }
+
+    /// The degrees of freedom of standard errors that vary less than it is thought possible of those with as few as are stated: few
+    /// enough to excuse almost anything.
+    fn steadier_than_stated(&self) -> Option<f64> {
+        let is_steadier = || ChiSquared::new(self.freedom).is_ok_and(|c| c.cdf(self.over_many) < UNHEARD_OF);
+        (self.most < NORMAL && is_steadier()).then(|| self.degrees_of_freedom())
     }
 
     fn degrees_of_freedom(&self) -> f64 {
@@ -272,6 +286,7 @@ impl Sum for Variation {
             freedom: a.freedom + b.freedom,
             over_few: a.over_few + b.over_few,
             over_many: a.over_many + b.over_many,
+            most: a.most.max(b.most),
         })
     }
 }
@@ -321,6 +336,12 @@ impl fmt::Display for StatedErrors {
                  by these",
                 self.degrees_of_freedom_seen.unwrap_or(FEWEST)
             ),
+            Some(Doubt::MoreSamples) => write!(
+                f,
+                "its standard errors vary less from seed to seed than those of as few degrees of freedom as it states: as those of {:.3e}; \
+                 verdicts go by these",
+                self.degrees_of_freedom_seen.unwrap_or(MANY)
+            ),
             Some(Doubt::Scatters) => write!(
                 f,
                 "it claims readings without any scatter, and those of other seeds scatter by {:.2e} ({freedom:.0} degrees of \
@@ -363,7 +384,11 @@ mod tests {
     }
 
     fn of(meters: &[Vec<Estimate>]) -> StatedErrors {
-        StatedErrors::of_sampled(meters, &Variation::of(meters)).unwrap()
+        of_sampled(meters).unwrap()
+    }
+
+    fn of_sampled(meters: &[Vec<Estimate>]) -> Option<StatedErrors> {
+        StatedErrors::of_sampled(meters, &Variation::of(meters))
     }
 
     fn told(scatter: f64, stated: f64, doubt: Doubt) -> usize {
@@ -376,7 +401,7 @@ mod tests {
 
     #[test]
     fn errors_three_times_too_small_or_ten_times_too_large_are_told_and_right_ones_are_not() {
-        assert!(told(3.0, 1.0, Doubt::TooSmall) > 980);
+        assert!(told(3.0, 1.0, Doubt::TooSmall) > 960, "{}", told(3.0, 1.0, Doubt::TooSmall));
         assert!(told(0.1, 1.0, Doubt::TooLarge) > 980);
         assert!(told(1.0, 1.0, Doubt::TooSmall) <= 12);
         assert_eq!(told(1.0, 1.0, Doubt::TooLarge), 0);
@@ -397,6 +422,61 @@ mod tests {
         assert!(count(2.0, 6) > 990, "{}", count(2.0, 6));
         assert!(count(0.0, 6) <= 2 && count(0.0, 40) <= 2, "{} {}", count(0.0, 6), count(0.0, 40));
         assert!((trigamma(1.0) - std::f64::consts::PI.powi(2) / 6.0).abs() < 1e-5);
+    }
+
+    /// Means of so many blocks of normal noise with their own standard errors, as an adapter that follows the docs gives them.
+    fn of_blocks(seed: u64, meters: usize, blocks: usize, noise: f64) -> Vec<Vec<Estimate>> {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut reading =
+            || Estimate::of_samples(&(0..blocks).map(|_| 100.0 + noise * normal(&mut random)).collect::<Vec<f64>>());
+        (0..meters).map(|_| (0..4).map(|_| reading()).collect()).collect()
+    }
+
+    #[test]
+    fn right_errors_of_few_blocks_are_not_called_too_small() {
+        for (meters, blocks) in [(20, 2), (60, 2), (20, 4), (20, 8), (220, 8)] {
+            let told = |seed: &u64| {
+                let found = of_sampled(&of_blocks(*seed, meters, blocks, 0.3));
+                found.is_some_and(|found| matches!(found.doubt, Some(Doubt::TooSmall | Doubt::TooLarge)))
+            };
+            let count = (0..600).filter(told).count();
+            assert!(count <= 12, "{count} of 600 with {meters} meters of {blocks} blocks");
+        }
+        // A third of what is stated for so many blocks is plainly too small.
+        let shrunk = |e: &Estimate| Estimate { uncertainty: e.uncertainty.times(1.0 / 3.0), ..*e };
+        let told = |seed: &u64| {
+            let meters = of_blocks(*seed, 12, 4, 0.3);
+            let meters: Vec<Vec<Estimate>> = meters.iter().map(|m| m.iter().map(shrunk).collect()).collect();
+            of(&meters).doubt == Some(Doubt::TooSmall)
+        };
+        assert!((0..100).filter(told).count() > 90);
+    }
+
+    #[test]
+    fn a_steady_error_has_more_degrees_of_freedom_than_one() {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut one =
+            || Estimate { value: 100.0 + 5.0 * normal(&mut random), uncertainty: Uncertainty::sampled(5.0, Some(1.0)) };
+        let meters: Vec<Vec<Estimate>> = (0..30).map(|_| (0..4).map(|_| one()).collect()).collect();
+        let found = of(&meters);
+        assert_eq!(found.doubt, Some(Doubt::MoreSamples), "{found}");
+        assert!(found.correct(meters[0][0]).uncertainty.degrees_of_freedom().unwrap() > 1e3);
+        // Two blocks have one, and their errors show it.
+        let honest = |seed: &u64| of_sampled(&of_blocks(*seed, 30, 2, 0.3)).unwrap().doubt == Some(Doubt::MoreSamples);
+        assert!((0..300).filter(honest).count() <= 1);
+    }
+
+    #[test]
+    fn claims_that_scatter_unlike_one_another_say_little_of_any_one() {
+        let mut random = fastrand::Rng::with_seed(8);
+        let mut claims = |noise: &dyn Fn(usize) -> f64| -> Vec<Vec<Estimate>> {
+            let mut one = |meter| Estimate::exact(100.0 * (1.0 + noise(meter) * normal(&mut random)));
+            (0..20).map(|meter| (0..4).map(|_| one(meter)).collect()).collect()
+        };
+        let alike = StatedErrors::of_claims(&claims(&|_| 0.01)).unwrap();
+        let unlike = StatedErrors::of_claims(&claims(&|meter| if meter < 3 { 0.03 } else { 3e-4 })).unwrap();
+        assert!(alike.degrees_of_freedom > 10.0, "{alike}");
+        assert!(unlike.degrees_of_freedom < 1.5, "{unlike}");
     }
 
     #[test]
@@ -441,8 +521,9 @@ mod tests {
         let found = of(&readings(1, 3.0, 1.0));
         let corrected = found.correct(readings(1, 3.0, 1.0)[0][0]).uncertainty;
         assert!((2.0..4.5).contains(&corrected.standard_error().unwrap()), "{corrected:?}");
-        // 7 and 12.
-        assert!((corrected.degrees_of_freedom().unwrap() - 84.0 / 19.0).abs() < 1e-12);
+        // Seven that are stated, and those of the scatter.
+        let both = (7f64.recip() + found.degrees_of_freedom.recip()).recip();
+        assert!((corrected.degrees_of_freedom().unwrap() - both).abs() < 1e-12);
         let fine = StatedErrors { p_value: Some(0.7), doubt: None, ratio: Some(1.1), ..found.clone() };
         assert_eq!(fine.correct(readings(1, 3.0, 1.0)[0][0]), readings(1, 3.0, 1.0)[0][0]);
         // A bound is no statement about scatter.

@@ -302,6 +302,7 @@ pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Resu
     same_meters(engine, job, answer.readings.iter().map(|reading| reading.meter.as_str()))?;
     let estimate = |r: &ReadingForm| Estimate { value: r.illuminance_lx, uncertainty: r.uncertainty() };
     let mut estimates: Vec<Estimate> = answer.readings.iter().map(estimate).collect();
+    Estimate::mark_agreeing(&mut estimates);
     Estimate::mark_unseen(&mut estimates);
     let (method, effort) = (answer.settings.into_iter().collect(), answer.effort.into_iter().collect());
     Ok(Measurement { estimates, method, effort, notes: answer.notes, ..Measurement::default() })
