@@ -86,11 +86,9 @@ fn again<'a>(running: &'a Running<'_>, run: &Run, engine: &EngineName, outcome: 
 fn is_withdrawn(meters: &[Vec<Estimate>]) -> bool {
     let states = |e: &Estimate| e.uncertainty.standard_error().is_some_and(|e| e > 0.0);
     let first = |readings: &&Vec<Estimate>| readings.len() > 1 && readings.last().is_some_and(states);
-    let stated = meters.iter().filter(first);
-    let (all, kept) = stated.fold((0, 0), |(all, kept), readings| {
-        (all + 1, kept + usize::from(readings[..readings.len() - 1].iter().any(states)))
-    });
-    2 * kept < all
+    let stated: Vec<&Vec<Estimate>> = meters.iter().filter(first).collect();
+    let kept = stated.iter().filter(|readings| readings[..readings.len() - 1].iter().any(states)).count();
+    2 * kept < stated.len()
 }
 
 /// Whether the bounds that an engine states leave room for any reading within the tolerance and beyond, at most meters.

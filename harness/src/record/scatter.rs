@@ -8,7 +8,7 @@ const ENOUGH: f64 = 20.0;
 /// Fewer than these have no variance of such a ratio at all.
 const LEAST: f64 = 6.0;
 /// Of a stated error that tells none.
-const MANY: f64 = 1e6;
+pub(super) const MANY: f64 = 1e6;
 
 /// A sum that would be chi-squared with `freedom` degrees of freedom, were the stated errors right.
 pub(super) struct Scatter {
@@ -18,9 +18,11 @@ pub(super) struct Scatter {
     pub(super) deviates: Vec<Vec<f64>>,
 }
 
-/// The readings of a meter: the sum of their squared deviations, what it would be, and both over the squared reading.
+/// How the readings of a meter scatter.
 struct Meter {
+    /// The sum of their squared deviations over their squared mean.
     squares: f64,
+    /// What that would be, were the stated errors right.
     expected: f64,
     /// Degrees of freedom of both by Welch and Satterthwaite.
     freedom: f64,
