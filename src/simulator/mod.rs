@@ -6,18 +6,21 @@
 mod box_room;
 mod direct;
 mod emission;
+mod final_gather;
 mod gmres;
+mod once_reflected;
 mod path_tracing;
 mod prepared;
 pub mod quadrature;
-mod radiosity;
 mod sampler;
+mod stop;
 mod validate;
 mod visibility;
 
 use crate::scene::{Meter, Scene, Transport};
 use crate::units::Lux;
 pub use prepared::Prepared;
+pub use stop::Stop;
 
 /// Illuminance at every meter, by the cheapest solver that meets `accuracy`.
 ///
@@ -30,6 +33,18 @@ pub fn illuminance(
     accuracy: &Accuracy,
 ) -> Result<Solution, SimulatorError> {
     Prepared::new(scene, transport, accuracy)?.illuminance(meters)
+}
+
+/// Illuminance at every meter by path tracing, which shares no kernel with the other solvers: their certifier.
+pub fn certified(
+    scene: &Scene,
+    meters: &[Meter],
+    transport: Transport,
+    accuracy: &Accuracy,
+) -> Result<Solution, SimulatorError> {
+    validate::scene(scene)?;
+    validate::meters(scene, meters)?;
+    path_tracing::illuminance(scene, meters, transport, accuracy)
 }
 
 /// A value and how far off it may be.
@@ -110,6 +125,9 @@ pub enum SimulatorError {
         /// What to do instead.
         instead: String,
     },
+    /// It was stopped before anything was known.
+    #[error("the simulator was stopped before it knew anything; give it more seconds")]
+    Stopped,
     /// Something has a place, a size or a value that makes no sense.
     #[error("{what} {problem}; {remedy}")]
     Invalid {

@@ -5,8 +5,12 @@
 
 use glam::DVec3;
 
+use crate::scene::Shape;
+
 /// Lengths below this fraction of the scene count as zero.
 const ROUNDING: f64 = 1e-12;
+/// Distances below this fraction of a body count as contact.
+const CONTACT: f64 = 1e-9;
 
 /// A convex flat polygon.
 pub(super) type Polygon = Vec<DVec3>;
@@ -19,6 +23,31 @@ pub(super) struct Occluder {
 }
 
 impl Occluder {
+    /// A box, or a mesh of two triangles that is an axis-aligned plate.
+    pub(super) fn aligned(shape: &Shape) -> Option<Self> {
+        match shape {
+            Shape::Box { min_m, max_m } => Some(Self { min_m: *min_m, max_m: *max_m }),
+            Shape::Mesh { vertices_m, triangles } => {
+                let [a, b] = triangles.as_slice() else { return None };
+                let corner = |i: &u32| vertices_m[*i as usize];
+                let all: Vec<DVec3> = a.iter().chain(b).map(corner).collect();
+                let min_m = all.iter().fold(DVec3::INFINITY, |m, p| m.min(*p));
+                let max_m = all.iter().fold(DVec3::NEG_INFINITY, |m, p| m.max(*p));
+                let extent = max_m - min_m;
+                let area =
+                    |t: &[u32; 3]| 0.5 * (corner(&t[1]) - corner(&t[0])).cross(corner(&t[2]) - corner(&t[0])).length();
+                let whole = extent.x * extent.y + extent.y * extent.z + extent.z * extent.x;
+                let at_corner = |p: &DVec3| p.cmpeq(min_m) | p.cmpeq(max_m);
+                let shared = a.iter().filter(|i| b.contains(i)).map(corner).collect::<Vec<_>>();
+                let [p, q] = shared.as_slice() else { return None };
+                let diagonal = (*p - *q).length() >= (1.0 - CONTACT) * extent.length();
+                let flat = extent.min_element() == 0.0 && all.iter().all(|p| at_corner(p).all());
+                let halves = [a, b].iter().all(|t| (area(t) - 0.5 * whole).abs() <= CONTACT * whole);
+                (flat && diagonal && halves && whole > 0.0).then_some(Self { min_m, max_m })
+            }
+        }
+    }
+
     /// The corners of the face at one end of an axis.
     pub(super) fn face(&self, axis: usize, far: bool) -> [DVec3; 4] {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);

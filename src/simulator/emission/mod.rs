@@ -1,0 +1,332 @@
+//! Direct light from points and from luminous openings, behind boxes that hide some of them.
+//!
+//! A part dA with normal n of an opening of projected area P(w) has the intensity I(w) max(0, n·w) dA / P(w) towards
+//! w, so that all parts together have the intensity of the table; the body of a luminaire blocks no light. A flat
+//! opening has I(w) dA / A on both sides. Where the table is a cosine at every node, the opening has one luminance and
+//! Lambert's polygon formula holds but for the interpolation, which counts as an error.
+
+mod opening;
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use super::quadrature::Gauss;
+use super::visibility::{Occluder, candidates, clip, visible_pieces};
+use super::{Bounded, direct};
+use crate::geometry::configuration_factor::element_to_polygon;
+use crate::photometry::{LuminousIntensityDistribution, Symmetry};
+use crate::scene::{Luminaire, LuminaireModel, Meter};
+use opening::{Opening, Part, Sheet};
+
+/// Relative deviation of a table from a cosine that passes for rounding of its figures; it counts as an error.
+const COSINE_ROUNDING: f64 = 1e-5;
+/// Halvings of a triangle or a square after which an integral stops improving.
+const DEEPEST: u32 = 9;
+/// Parts of an integral after which it stops improving: what is left is its bound.
+const MOST_PARTS: u32 = 4000;
+
+/// A luminaire as the deterministic solvers see it.
+#[derive(Clone, Debug)]
+pub(super) struct Emitter {
+    luminaire: Luminaire,
+    opening: Opening,
+    lambertian: Option<Lambertian>,
+}
+
+/// One luminance on the lower side of a flat opening, and the largest relative error of saying so: of interpolation and of rounded figures.
+#[derive(Clone, Copy, Debug)]
+struct Lambertian {
+    exitance: f64,
+    interpolation: f64,
+}
+
+/// A meter in a luminaire's own frame.
+struct Own {
+    position_m: DVec3,
+    normal: DVec3,
+}
+
+impl Emitter {
+    pub(super) fn new(luminaire: &Luminaire) -> Self {
+        let opening = match luminaire.model {
+            LuminaireModel::Point => Opening::Point,
+            LuminaireModel::Area | LuminaireModel::Impostor => Opening::of(luminaire.photometry.opening),
+        };
+        let horizontal = matches!(opening, Opening::Box(half) if half.z == 0.0);
+        let flat_m2 = opening.flat_m2().filter(|_| horizontal);
+        let lambertian = flat_m2.and_then(|area_m2| lambertian(luminaire, area_m2));
+        Self { luminaire: luminaire.clone(), opening, lambertian }
+    }
+
+    /// Whether it has no extent.
+    pub(super) fn is_point(&self) -> bool {
+        self.opening == Opening::Point
+    }
+
+    /// Whether it is a point or has flat faces with straight edges.
+    pub(super) fn is_polygonal(&self) -> bool {
+        matches!(self.opening, Opening::Point | Opening::Box(_))
+    }
+
+    /// Photometric centre.
+    pub(super) fn centre_m(&self) -> DVec3 {
+        self.luminaire.position_m
+    }
+
+    /// Lower and upper corner of a box that holds all of it.
+    pub(super) fn bounds_m(&self) -> [DVec3; 2] {
+        let half = self.opening.half_m();
+        let turn = self.luminaire.orientation;
+        let reach = turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
+        [self.centre_m() - reach, self.centre_m() + reach]
+    }
+
+    /// Whether it sends light anywhere.
+    pub(super) fn shines(&self) -> bool {
+        self.luminaire.flux_scale > 0.0 && self.luminaire.photometry.distribution.max_intensity().value() > 0.0
+    }
+
+    /// Illuminance in lux at an element, integrated until two refinements agree within `relative_error`.
+    ///
+    /// Boxes are cut out exactly of what has straight edges; nothing may stand before a round opening.
+    pub(super) fn illuminance(&self, meter: &Meter, occluders: &[Occluder], relative_error: f64) -> Bounded {
+        if self.is_point() {
+            let hidden = occluders.iter().any(|o| o.blocks(meter.position_m, self.luminaire.position_m));
+            return if hidden { Bounded::default() } else { direct::point(&self.luminaire, meter) };
+        }
+        let own = self.own(meter);
+        let mut sum = Bounded::default();
+        for sheet in self.opening.facing(own.position_m) {
+            sum = sum
+                + match sheet {
+                    Sheet::Face { corner_m, edges_m } => {
+                        self.face_illuminance(&sheet, corner_m, edges_m, meter, occluders, relative_error)
+                    }
+                    _ => integrate_square(relative_error, &|uv| self.density(&own, &sheet.part(uv))),
+                };
+        }
+        sum
+    }
+
+    fn face_illuminance(
+        &self,
+        sheet: &Sheet,
+        corner_m: DVec3,
+        [a, b]: [DVec3; 2],
+        meter: &Meter,
+        occluders: &[Occluder],
+        relative_error: f64,
+    ) -> Bounded {
+        let corners = [corner_m, corner_m + a, corner_m + a + b, corner_m + b].map(|p| self.to_world(p));
+        let above = clip(&corners, meter.normal, meter.position_m);
+        let mut sum = Bounded::default();
+        if above.len() < 3 {
+            return sum;
+        }
+        let area_m2 = sheet.part([0.5; 2]).area_m2;
+        let hiding = candidates(meter.position_m, &above, occluders);
+        for piece in visible_pieces(meter.position_m, &above, &hiding) {
+            sum = sum + self.piece_illuminance(area_m2, &piece, meter, relative_error);
+        }
+        sum
+    }
+
+    fn piece_illuminance(&self, face_m2: DVec3, piece: &[DVec3], meter: &Meter, relative_error: f64) -> Bounded {
+        if let Some(lambertian) = self.lambertian {
+            let down = self.luminaire.orientation * DVec3::NEG_Z;
+            if down.dot(meter.position_m - piece[0]) <= 0.0 {
+                return Bounded::default();
+            }
+            let value = lambertian.exitance * element_to_polygon(meter.position_m, meter.normal, piece);
+            return Bounded { value, bound: value * (lambertian.interpolation + 1e-13) };
+        }
+        let own = self.own(meter);
+        let unit_m2 = face_m2.normalize_or_zero();
+        integrate(piece, relative_error, &|from: DVec3| {
+            let at_m = self.luminaire.orientation.transpose() * (from - self.luminaire.position_m);
+            self.density(&own, &Part { at_m, area_m2: unit_m2 })
+        })
+    }
+
+    /// One part's light as an estimate of the whole luminaire's, and where it comes from.
+    pub(super) fn sample(&self, meter: &Meter, [u, v]: [f64; 2]) -> (f64, DVec3) {
+        if self.is_point() {
+            return (direct::point(&self.luminaire, meter).value, self.luminaire.position_m);
+        }
+        let own = self.own(meter);
+        let sheets = self.opening.facing(own.position_m);
+        // Each sheet is drawn as often as its area shows from here.
+        let shows = |s: &Sheet| {
+            let part = s.part([0.5; 2]);
+            (part.area_m2.dot((own.position_m - part.at_m).normalize_or_zero())).abs().max(1e-3 * part.area_m2.length())
+        };
+        let weights: Vec<f64> = sheets.iter().map(shows).collect();
+        let total: f64 = weights.iter().sum();
+        let mut rest = u * total;
+        for (k, (sheet, weight)) in sheets.iter().zip(&weights).enumerate() {
+            if rest < *weight || k + 1 == sheets.len() {
+                let (across, share) = if total > 0.0 { (rest / weight, weight / total) } else { (u, 1.0) };
+                let part = sheet.part([across.clamp(0.0, 1.0), v]);
+                return (self.density(&own, &part) / share, self.to_world(part.at_m));
+            }
+            rest -= weight;
+        }
+        (0.0, self.luminaire.position_m)
+    }
+
+    /// Illuminance in lux by a part of the opening.
+    fn density(&self, meter: &Own, part: &Part) -> f64 {
+        let path = meter.position_m - part.at_m;
+        let square = path.length_squared();
+        let away = path / square.sqrt();
+        let cosine = -away.dot(meter.normal);
+        // A place upon the luminaire has no direction: 0 / 0.
+        if cosine <= 0.0 || cosine.is_nan() {
+            return 0.0;
+        }
+        let share = match (self.opening.flat_m2(), &self.opening) {
+            (_, Opening::Line(_) | Opening::Point) => 1.0,
+            (Some(whole_m2), _) => part.area_m2.length() / whole_m2,
+            (None, opening) => part.area_m2.dot(away).max(0.0) / opening.shadow_m2(away),
+        };
+        let table = &self.luminaire.photometry.distribution;
+        table.intensity_towards(away).value() * self.luminaire.flux_scale * share * cosine / square
+    }
+
+    fn own(&self, meter: &Meter) -> Own {
+        let turn = self.luminaire.orientation.transpose();
+        Own { position_m: turn * (meter.position_m - self.luminaire.position_m), normal: turn * meter.normal }
+    }
+
+    fn to_world(&self, own_m: DVec3) -> DVec3 {
+        self.luminaire.position_m + self.luminaire.orientation * own_m
+    }
+
+    /// Illuminance in lux at a meter of a luminaire without extent by way of a flat polygon that faces along `normal` and
+    /// reflects everything: over what is both lit and seen of it, where the light is as smooth as the table.
+    pub(super) fn reflected(
+        &self,
+        meter: &Meter,
+        polygon_m: &[DVec3],
+        normal: DVec3,
+        occluders: &[Occluder],
+        relative_error: f64,
+    ) -> Bounded {
+        let from = self.luminaire.position_m;
+        let above = clip(polygon_m, meter.normal, meter.position_m);
+        let faces = |point: DVec3| (point - polygon_m[0]).dot(normal) > 0.0;
+        if above.len() < 3 || !faces(from) || !faces(meter.position_m) {
+            return Bounded::default();
+        }
+        let light = |p: DVec3| {
+            let away = p - meter.position_m;
+            let r2 = away.length_squared();
+            let cosines = away.dot(meter.normal).max(0.0) * -away.dot(normal) / r2;
+            direct::point(&self.luminaire, &Meter { position_m: p, normal }).value * cosines / (PI * r2)
+        };
+        let mut sum = Bounded::default();
+        for lit in visible_pieces(from, &above, &candidates(from, &above, occluders)) {
+            let hiding = candidates(meter.position_m, &lit, occluders);
+            for seen in visible_pieces(meter.position_m, &lit, &hiding) {
+                sum = sum + integrate(&seen, relative_error, &light);
+            }
+        }
+        sum
+    }
+}
+
+/// Recognises I0 cos gamma, dark above, at every node of a table, as far as its figures are written out.
+fn lambertian(luminaire: &Luminaire, area_m2: f64) -> Option<Lambertian> {
+    let table: &LuminousIntensityDistribution = &luminaire.photometry.distribution;
+    if table.symmetry() != Symmetry::Axial || table.gamma_deg()[0] != 0.0 {
+        return None;
+    }
+    let (gammas, plane) = (table.gamma_deg(), table.plane(0));
+    let cosine = |g: f64| if g < 90.0 { g.to_radians().cos() } else { 0.0 };
+    let off = |(g, i): (&f64, &f64)| ((i - plane[0] * cosine(*g)).abs() - 1e-12 * plane[0]).max(0.0);
+    // Relative at every node, and so at what is interpolated between two; infinite where the cosine is dark.
+    let relative = |node: (&f64, &f64)| if off(node) == 0.0 { 0.0 } else { off(node) / (plane[0] * cosine(*node.0)) };
+    let rounding = gammas.iter().zip(plane).map(relative).fold(0.0, f64::max);
+    if !gammas.contains(&90.0) || rounding > COSINE_ROUNDING {
+        return None;
+    }
+    let widest = gammas.windows(2).filter(|w| w[0] < 90.0).map(|w| (w[1] - w[0]).to_radians()).fold(0.0, f64::max);
+    // A chord of the cosine lies below it by at most the square of the step over 8, relative.
+    let exitance = PI * plane[0] * luminaire.flux_scale / area_m2;
+    Some(Lambertian { exitance, interpolation: widest * widest / 8.0 + rounding })
+}
+
+/// Integral over a convex flat polygon, by triangles that are quartered until two rules agree.
+fn integrate(polygon: &[DVec3], relative_error: f64, f: &impl Fn(DVec3) -> f64) -> Bounded {
+    let rule = Gauss::new(5);
+    let parts: Vec<_> = (2..polygon.len()).map(|k| [polygon[0], polygon[k - 1], polygon[k]]).collect();
+    let quarters = |t: &[DVec3; 3]| {
+        let [ab, bc, ca] = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(p, q)| 0.5 * (p + q));
+        [[t[0], ab, ca], [ab, t[1], bc], [ca, bc, t[2]], [ab, bc, ca]]
+    };
+    refined(parts, relative_error, &quarters, &|t| on_triangle(t, &rule, f))
+}
+
+/// Integral over the unit square, by squares that are quartered until two rules agree.
+fn integrate_square(relative_error: f64, f: &impl Fn([f64; 2]) -> f64) -> Bounded {
+    let rule = Gauss::new(5);
+    let quarters = |&[u, v, side]: &[f64; 3]| {
+        let half = 0.5 * side;
+        [[u, v, half], [u + half, v, half], [u, v + half, half], [u + half, v + half, half]]
+    };
+    let on_square = |&[u, v, side]: &[f64; 3]| {
+        let mut sum = 0.0;
+        for (a, wa) in rule.points() {
+            for (b, wb) in rule.points() {
+                sum += wa * wb * f([u + side * a, v + side * b]);
+            }
+        }
+        sum * side * side
+    };
+    refined(vec![[0.0, 0.0, 1.0]], relative_error, &quarters, &on_square)
+}
+
+/// The sum of a rule over parts that are quartered until the rule agrees with itself, or the parts are too many.
+fn refined<P>(
+    parts: Vec<P>,
+    relative_error: f64,
+    quarters: &impl Fn(&P) -> [P; 4],
+    rule: &impl Fn(&P) -> f64,
+) -> Bounded {
+    let mut open: Vec<(P, f64, u32)> = parts.into_iter().map(|p| (p, 0.0, 0)).collect();
+    for part in &mut open {
+        part.1 = rule(&part.0);
+    }
+    let scale = open.iter().map(|(_, value, _)| value).sum::<f64>().abs();
+    let mut sum = Bounded::default();
+    let mut count = 0;
+    while let Some((part, value, depth)) = open.pop() {
+        let four = quarters(&part);
+        let values = [0, 1, 2, 3].map(|k| rule(&four[k]));
+        let better: f64 = values.iter().sum();
+        let difference = (better - value).abs();
+        count += 1;
+        // Where there is a kink, twice as many parts hold it at every depth.
+        let tolerance = 0.5 * relative_error * scale * 0.5_f64.powi(depth as i32);
+        if difference <= tolerance || depth == DEEPEST || count > MOST_PARTS {
+            sum = sum + Bounded { value: better, bound: difference + 1e-14 * better.abs() };
+        } else {
+            open.extend(four.into_iter().zip(values).map(|(part, value)| (part, value, depth + 1)));
+        }
+    }
+    sum
+}
+
+/// A product rule on a triangle, collapsed towards its first corner.
+fn on_triangle(t: &[DVec3; 3], rule: &Gauss, f: &impl Fn(DVec3) -> f64) -> f64 {
+    let area = (t[1] - t[0]).cross(t[2] - t[0]).length();
+    let mut sum = 0.0;
+    for (a, wa) in rule.nodes.iter().zip(&rule.weights) {
+        for (b, wb) in rule.nodes.iter().zip(&rule.weights) {
+            let p = t[0] + *a * (t[1].lerp(t[2], *b) - t[0]);
+            sum += wa * wb * a * f(p);
+        }
+    }
+    sum * area
+}

@@ -1,0 +1,400 @@
+//! Rooms with bodies and luminaires of any form: one field of reflected light on the walls, gathered at every meter.
+//!
+//! Light straight from the luminaires is integrated over what shows of them; reflected light along rays from the meter
+//! that end on the walls, where light reflected once is known from the luminaires and light reflected more often from
+//! the field. Ward, Rubinstein and Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, and
+//! M. Reichert, *A two-pass radiosity method driven by lights and viewer position* (1992) gather so; here all of it is
+//! done in independent replicates, whose scatter bounds chance, and what polynomials leave out is added up along the rays.
+
+mod field;
+mod grid;
+mod lit;
+mod rays;
+mod surroundings;
+#[cfg(test)]
+mod tests;
+
+use rayon::prelude::*;
+
+use self::field::Field;
+use self::grid::{Cover, Grid};
+use self::lit::{Lights, Lit};
+use self::rays::{Known, Rays};
+use self::surroundings::Surroundings;
+use super::emission::Emitter;
+use super::sampler::{Sampler, mix};
+use super::stop::Stop;
+use super::visibility::Occluder;
+use super::{Accuracy, Bounded, SimulatorError};
+use crate::geometry::Room;
+use crate::scene::{Bounces, Meter, Scene};
+
+/// Independent solutions.
+const REPLICATES: usize = 16;
+/// Standard errors of the replicates' mean that a bound holds: Student's t with 15 degrees of freedom goes beyond it once in
+/// a hundred thousand times.
+const WIDTH: f64 = 6.5;
+/// Places so much brighter than the mean wall are drawn, since rays find them too seldom.
+const PEAKED: f64 = 8.0;
+/// Rays of a meter in each replicate at first, as a power of two.
+const FIRST_RAYS_LOG2: u32 = 7;
+/// Light straight from the luminaires is known on the walls to so many times the error asked for: of what a polynomial leaves
+/// out little is left from afar.
+const LIT: f64 = 2.0;
+/// Rays of a node in each replicate: so many over the relative error asked for, a power of two.
+const NODE_RAYS: f64 = 0.08;
+/// Rays of a node in each replicate at least and at most.
+const NODE_RAYS_LOG2: std::ops::RangeInclusive<u32> = 4..=10;
+/// Where a rectangle's polynomial leaves out more than so many times the error asked for, rays go on.
+const WELL_KNOWN: f64 = 4.0;
+/// Parts of each luminaire that a meter asks in each replicate where bodies may hide it, as powers of two.
+const PARTS_LOG2: std::ops::RangeInclusive<u32> = 6..=16;
+
+/// A scene, with what is known of its light so far.
+#[derive(Debug)]
+pub(super) struct Enclosure {
+    surroundings: Surroundings,
+    /// Boxes as what cuts pieces out of luminaires; `None` where a mesh does, too.
+    occluders: Option<Vec<Occluder>>,
+    emitters: Vec<Emitter>,
+    lit: Option<(f64, Lit)>,
+    solved: Option<Solved>,
+}
+
+/// How far it is gone for meters that need it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Level {
+    /// Rays of a node more than at first, as a power of two.
+    more_log2: u32,
+    /// Rays of a meter at most, as a power of two.
+    rays_log2: u32,
+}
+
+/// The noise of the field is in all rays of a meter: where they no longer help, the field needs more.
+const LEVELS: [Level; 2] = [Level { more_log2: 0, rays_log2: 14 }, Level { more_log2: 3, rays_log2: 17 }];
+
+/// A field with what it was made for.
+#[derive(Debug)]
+struct Solved {
+    bounces: Bounces,
+    accuracy: Accuracy,
+    level: Level,
+    grid: Grid,
+    field: Field,
+    /// How well it is known, by rectangle.
+    known: Vec<Known>,
+}
+
+/// Sums of one meter over the rays so far.
+#[derive(Clone, Debug)]
+struct Sums {
+    lux: [f64; REPLICATES],
+    error_lux: f64,
+    rays_log2: u32,
+    half_way: Option<f64>,
+}
+
+impl Enclosure {
+    pub(super) fn new(scene: &Scene) -> Result<Self, SimulatorError> {
+        let reach_m = scene.luminaires.iter().map(|l| l.position_m.abs().max_element()).fold(0.0, f64::max);
+        let surroundings = Surroundings::new(scene.room, &scene.obstacles, reach_m)
+            .map_err(|e| SimulatorError::Unsupported { what: "a mesh of the scene".into(), instead: e.to_string() })?;
+        let emitters = scene.luminaires.iter().map(Emitter::new).filter(Emitter::shines).collect();
+        let solid = surroundings.bodies().map(|[min_m, max_m]| Occluder { min_m: *min_m, max_m: *max_m });
+        let occluders = surroundings.cuts_exactly.then(|| solid.collect());
+        Ok(Self { surroundings, occluders, emitters, lit: None, solved: None })
+    }
+
+    /// Direct illuminance at the meters, each within a bound.
+    pub(super) fn direct(&self, meters: &[Meter], relative_error: f64, seed: u64, stop: &Stop) -> Vec<Bounded> {
+        let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
+        let one = |(index, meter): (usize, &Meter)| {
+            let seed = mix(mix(seed ^ 0xd1).wrapping_add(index as u64));
+            // Sampled ones share the error; what they must reach together is known once the others are.
+            let (sampled, exact): (Vec<usize>, Vec<usize>) =
+                (0..self.emitters.len()).partition(|k| self.is_sampled(*k, meter));
+            let occluders = self.occluders.as_deref().unwrap_or(&[]);
+            let error = relative_error.clamp(1e-10, 0.1);
+            let light = |k: usize| {
+                if self.emitters[k].is_point() {
+                    let hidden = self.surroundings.is_hidden(self.lifted(meter), self.emitters[k].centre_m());
+                    return if hidden { Bounded::default() } else { self.emitters[k].illuminance(meter, &[], error) };
+                }
+                self.emitters[k].illuminance(meter, occluders, 0.2 * error)
+            };
+            let known = exact.iter().map(|k| light(*k)).fold(Bounded::default(), |a, b| a + b);
+            if sampled.is_empty() {
+                known
+            } else {
+                known + self.sampled(&lights, meter, &sampled, known, error, seed, stop)
+            }
+        };
+        meters.par_iter().enumerate().map(one).collect()
+    }
+
+    /// Whether a luminaire's light must be sampled: something may hide what cannot be cut exactly.
+    fn is_sampled(&self, k: usize, meter: &Meter) -> bool {
+        let emitter = &self.emitters[k];
+        let can_cut = emitter.is_point() || emitter.is_polygonal() && self.occluders.is_some();
+        !can_cut && self.surroundings.may_hide([meter.position_m; 2], emitter.bounds_m())
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn sampled(
+        &self,
+        lights: &Lights,
+        meter: &Meter,
+        which: &[usize],
+        known: Bounded,
+        relative_error: f64,
+        seed: u64,
+        stop: &Stop,
+    ) -> Bounded {
+        let start_m = self.lifted(meter);
+        let mut sums = Sums::default();
+        for log2 in PARTS_LOG2 {
+            let from = if log2 == *PARTS_LOG2.start() { 0 } else { 1 << (log2 - 1) };
+            let mut more = [0.0; REPLICATES];
+            for (replicate, sum) in more.iter_mut().enumerate() {
+                for index in from..1 << log2 {
+                    let mut sampler = Sampler::new(mix(seed.wrapping_add(replicate as u64 + 1)), index);
+                    let parts = sampler.next_pair();
+                    let parts = sampler.moved(parts);
+                    *sum += which.iter().map(|k| lights.sample(*k, meter, start_m, parts)).sum::<f64>();
+                }
+            }
+            sums.add(&more, 0.0, log2);
+            let found = sums.bounded();
+            if found.bound + known.bound <= 0.5 * relative_error * (found.value + known.value) || stop.is_due() {
+                break;
+            }
+        }
+        sums.bounded()
+    }
+
+    fn lifted(&self, meter: &Meter) -> glam::DVec3 {
+        meter.position_m + meter.normal * self.surroundings.lift_m()
+    }
+
+    /// Indirect illuminance at the meters, each within a bound; the error asked for is relative to both with `direct`.
+    pub(super) fn indirect(
+        &mut self,
+        meters: &[Meter],
+        bounces: Bounces,
+        direct: &[Bounded],
+        accuracy: &Accuracy,
+        stop: &Stop,
+    ) -> Result<(Vec<Bounded>, String), SimulatorError> {
+        if bounces == Bounces::AtMost(0) || self.emitters.is_empty() {
+            return Ok((vec![Bounded::default(); meters.len()], "nothing is reflected".into()));
+        }
+        let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
+        let error = accuracy.relative_error;
+        if self.lit.as_ref().is_none_or(|(known, _)| *known > error) {
+            self.lit = Some((error, Lit::new(&lights, LIT * error, stop)));
+            self.solved = None;
+        }
+        let Some((_, lit)) = &self.lit else { return Err(SimulatorError::Stopped) };
+        let mut sums = vec![Sums::default(); meters.len()];
+        let mut open: Vec<usize> = (0..meters.len()).collect();
+        for level in LEVELS {
+            if let Some(room) = self.surroundings.room
+                && !self.solved.as_ref().is_some_and(|s| s.is_for(bounces, accuracy, level))
+            {
+                match Solved::new(&room, lights, lit, bounces, accuracy, level, stop) {
+                    None if level == LEVELS[0] => return Err(SimulatorError::Stopped),
+                    None => break,
+                    solved => self.solved = solved,
+                }
+            }
+            let gather = Gather::new(lights, lit, self.solved.as_ref(), bounces, accuracy, stop);
+            let found: Vec<Sums> =
+                open.par_iter().map(|k| gather.at(*k, &meters[*k], direct[*k], level.rays_log2)).collect();
+            for (k, found) in open.iter().zip(found) {
+                // A later level stopped short of its first rays knows nothing.
+                if found.rays_log2 > 0 && (sums[*k].rays_log2 == 0 || found.bounded().bound < sums[*k].bounded().bound)
+                {
+                    sums[*k] = found;
+                }
+            }
+            open.retain(|k| !sums[*k].meets(error, direct[*k]));
+            if open.is_empty() || self.surroundings.room.is_none() || stop.is_due() {
+                break;
+            }
+        }
+        if sums.iter().any(|s| s.rays_log2 == 0) {
+            return Err(SimulatorError::Stopped);
+        }
+        let most = sums.iter().map(|s| s.rays_log2).max().unwrap_or(0);
+        let text = match &self.solved {
+            Some(s) => format!(
+                "final gather, {REPLICATES} times up to 2^{most} rays a meter, over {} rectangles of reflected light: \
+                 bodies or openings",
+                s.grid.len()
+            ),
+            None => format!("{REPLICATES} times up to 2^{most} rays a meter between bodies in free field"),
+        };
+        Ok((sums.iter().map(Sums::bounded).collect(), text))
+    }
+}
+
+impl Solved {
+    fn new(
+        room: &Room,
+        lights: Lights,
+        lit: &Lit,
+        bounces: Bounces,
+        accuracy: &Accuracy,
+        level: Level,
+        stop: &Stop,
+    ) -> Option<Self> {
+        let grid = Grid::new(*room, lights.surroundings);
+        let known = |k: usize, error_lux: f64, noise_lux: f64| {
+            let error_lux = if grid.cover(k) == Cover::None { error_lux } else { f64::INFINITY };
+            Known { error_lux, noise_lux, side_m: grid.side_m(k) }
+        };
+        let open: Vec<Known> = (0..grid.len()).map(|k| known(k, 0.0, 0.0)).collect();
+        let rays = Rays { lights, lit, grid: Some((&grid, &open)), draws: lit.is_peaked };
+        let log2 = (NODE_RAYS / accuracy.relative_error).log2().ceil().max(0.0) as u32;
+        let count = 1 << (log2.clamp(*NODE_RAYS_LOG2.start(), *NODE_RAYS_LOG2.end()) + level.more_log2);
+        let field = Field::solve(&grid, &rays, bounces, count, accuracy.seed, stop)?;
+        let known = (0..grid.len()).map(|k| known(k, field.error_lux[k], field.noise_lux[k])).collect();
+        Some(Self { bounces, accuracy: *accuracy, level, grid, field, known })
+    }
+
+    fn is_for(&self, bounces: Bounces, accuracy: &Accuracy, level: Level) -> bool {
+        self.bounces == bounces && self.accuracy == *accuracy && self.level.more_log2 >= level.more_log2
+    }
+}
+
+struct Gather<'a> {
+    rays: Rays<'a>,
+    solved: Option<&'a Solved>,
+    bounces: Bounces,
+    accuracy: &'a Accuracy,
+    stop: &'a Stop,
+}
+
+impl<'a> Gather<'a> {
+    fn new(
+        lights: Lights<'a>,
+        lit: &'a Lit,
+        solved: Option<&'a Solved>,
+        bounces: Bounces,
+        accuracy: &'a Accuracy,
+        stop: &'a Stop,
+    ) -> Self {
+        let grid = solved.map(|s| (&s.grid, s.known.as_slice()));
+        let rays = Rays { lights, lit, grid, draws: lit.is_peaked };
+        Self { rays, solved, bounces, accuracy, stop }
+    }
+
+    fn at(&self, index: usize, meter: &Meter, direct: Bounded, most_log2: u32) -> Sums {
+        let mut sums = Sums::default();
+        // The first rays tell how bright it is here, and so what may be left out.
+        let mut limit_lux = self.limit_lux(self.solved.map_or(0.0, |s| s.field.mean_lux));
+        for log2 in FIRST_RAYS_LOG2..=most_log2 {
+            if self.stop.is_due() {
+                break;
+            }
+            let from = if log2 == FIRST_RAYS_LOG2 { 0 } else { 1 << (log2 - 1) };
+            let found = self.replicates(index, meter, from..1 << log2, limit_lux);
+            sums.add(&found.map(|f| f.0), found.iter().map(|f| f.1).sum(), log2);
+            if sums.meets(self.accuracy.relative_error, direct) {
+                break;
+            }
+            let here_lux = self.limit_lux(sums.bounded().value + direct.value);
+            if log2 == FIRST_RAYS_LOG2 && here_lux < 0.5 * limit_lux {
+                limit_lux = here_lux;
+                let again = self.replicates(index, meter, 0..1 << log2, limit_lux);
+                sums = Sums::default();
+                sums.add(&again.map(|f| f.0), again.iter().map(|f| f.1).sum(), log2);
+            }
+        }
+        sums
+    }
+
+    fn limit_lux(&self, lux: f64) -> f64 {
+        WELL_KNOWN * self.accuracy.relative_error * lux
+    }
+
+    fn replicates(
+        &self,
+        index: usize,
+        meter: &Meter,
+        rays: std::ops::Range<u32>,
+        limit_lux: f64,
+    ) -> [(f64, f64); REPLICATES] {
+        let found: Vec<(f64, f64)> = (0..REPLICATES)
+            .into_par_iter()
+            .map(|replicate| self.replicate(index, meter, replicate, rays.clone(), limit_lux))
+            .collect();
+        std::array::from_fn(|k| found[k])
+    }
+
+    fn replicate(
+        &self,
+        index: usize,
+        meter: &Meter,
+        replicate: usize,
+        rays: std::ops::Range<u32>,
+        limit_lux: f64,
+    ) -> (f64, f64) {
+        let most = match self.bounces {
+            Bounces::Converged => u32::MAX,
+            Bounces::AtMost(n) => n,
+        };
+        let scramble = mix(mix(self.accuracy.seed).wrapping_add(((index as u64) << 8 | replicate as u64) + 1));
+        let (mut lux, mut error_lux) = (0.0, 0.0);
+        for ray in rays {
+            let found = self.rays.follow(meter, &mut Sampler::new(scramble, ray), most, limit_lux);
+            lux += found.lux.iter().map(|(_, lux)| lux).sum::<f64>();
+            error_lux += found.error_lux;
+            if let (Some(end), Some(solved)) = (&found.end, self.solved) {
+                lux += solved.field.at(&solved.grid, end, replicate, self.bounces);
+            }
+        }
+        (lux, error_lux)
+    }
+}
+
+impl Default for Sums {
+    fn default() -> Self {
+        Self { lux: [0.0; REPLICATES], error_lux: 0.0, rays_log2: 0, half_way: None }
+    }
+}
+
+impl Sums {
+    fn add(&mut self, lux: &[f64; REPLICATES], error_lux: f64, rays_log2: u32) {
+        self.half_way = (self.rays_log2 > 0).then(|| self.mean_and_error().1);
+        for (sum, lux) in self.lux.iter_mut().zip(lux) {
+            *sum += lux;
+        }
+        self.error_lux += error_lux;
+        self.rays_log2 = rays_log2;
+    }
+
+    /// Mean and standard error of the replicates.
+    fn mean_and_error(&self) -> (f64, f64) {
+        let (n, rays) = (REPLICATES as f64, f64::from(1_u32 << self.rays_log2));
+        let mean = self.lux.iter().sum::<f64>() / n / rays;
+        let square = self.lux.iter().map(|s| (s / rays - mean).powi(2)).sum::<f64>();
+        (mean, (square / (n * (n - 1.0))).sqrt())
+    }
+
+    fn meets(&self, relative_error: f64, direct: Bounded) -> bool {
+        let found = self.bounded();
+        self.rays_log2 > 0 && found.bound + direct.bound <= relative_error * (found.value + direct.value)
+    }
+
+    /// Stopping as soon as a noisy error is small prefers errors that are too small by chance: half of the one before counts.
+    fn bounded(&self) -> Bounded {
+        if self.rays_log2 == 0 {
+            return Bounded::default();
+        }
+        let (mean, error) = self.mean_and_error();
+        let error = error.max(0.5 * self.half_way.unwrap_or(0.0));
+        let left_out = self.error_lux / REPLICATES as f64 / f64::from(1_u32 << self.rays_log2);
+        Bounded { value: mean, bound: WIDTH * error + left_out }
+    }
+}

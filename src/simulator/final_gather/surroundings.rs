@@ -1,0 +1,261 @@
+//! What rays of the final gather meet: the room's walls, boxes by formula, triangles through the tree; all in `f64`.
+//!
+//! It shares nothing with the path tracer but the tree of triangles, so that each can be held against the other.
+
+use glam::{DVec2, DVec3};
+
+use crate::geometry::bvh::{BvhError, Ray, TriangleBvh};
+use crate::geometry::{Mesh, Room, Surface};
+use crate::scene::{Obstacle, Shape};
+use crate::simulator::visibility::Occluder;
+
+/// Boxes beyond which the tree is faster than trying each in turn.
+const MOST_BOXES: usize = 32;
+/// How far rays start off a triangle, of the scene's extent.
+const LIFT: f64 = 1e-10;
+/// The part of the way to a luminaire beyond which nothing hides it: it may lie upon what holds it.
+const FAR_END: f64 = 1.0 - 1e-10;
+
+/// Everything that blocks or reflects.
+#[derive(Debug)]
+pub(super) struct Surroundings {
+    pub(super) room: Option<Room>,
+    boxes: Vec<Body>,
+    tree: Tree,
+    reflectances: Vec<f64>,
+    /// Boxes round all bodies, flat ones on the walls left out.
+    bounds: Vec<[DVec3; 2]>,
+    /// Those of them that are boxes.
+    solid: Vec<[DVec3; 2]>,
+    /// Whether there are no others, meshes that lie flat on a wall apart.
+    pub(super) cuts_exactly: bool,
+    extent_m: f64,
+}
+
+struct Tree(TriangleBvh);
+
+impl std::fmt::Debug for Tree {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Tree")
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Body {
+    min_m: DVec3,
+    max_m: DVec3,
+    reflectance: f64,
+}
+
+/// A place on a diffuse surface, seen from one side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) point_m: DVec3,
+    /// Towards the side that is seen.
+    pub(super) normal: DVec3,
+    pub(super) reflectance: f64,
+    /// The wall, where it is on one.
+    pub(super) wall: Option<usize>,
+    pub(super) distance_m: f64,
+}
+
+impl Surroundings {
+    pub(super) fn new(room: Option<Room>, obstacles: &[Obstacle], reach_m: f64) -> Result<Self, BvhError> {
+        let count = obstacles.iter().filter(|o| Occluder::aligned(&o.shape).is_some()).count();
+        let (mut boxes, mut bounds, mut solid, mut reflectances) = (vec![], vec![], vec![], vec![]);
+        let (mut vertices, mut triangles): (Vec<DVec3>, Vec<[u32; 3]>) = (vec![], vec![]);
+        for Obstacle { shape, reflectance } in obstacles {
+            let mut add = |v: &[DVec3], t: &[[u32; 3]]| {
+                let first = vertices.len() as u32;
+                vertices.extend(v);
+                triangles.extend(t.iter().map(|f| f.map(|k| first + k)));
+            };
+            match (Occluder::aligned(shape), shape) {
+                (Some(Occluder { min_m, max_m }), _) if count <= MOST_BOXES => {
+                    boxes.push(Body { min_m, max_m, reflectance: *reflectance });
+                    solid.push([min_m, max_m]);
+                }
+                (_, Shape::Box { min_m, max_m }) => {
+                    let mesh = Mesh::cuboid(*min_m, *max_m);
+                    add(&mesh.vertices_m, &mesh.triangles);
+                    solid.push([*min_m, *max_m]);
+                }
+                (_, Shape::Mesh { vertices_m, triangles }) => {
+                    add(vertices_m, triangles);
+                    let low = vertices_m.iter().fold(DVec3::INFINITY, |a, b| a.min(*b));
+                    let high = vertices_m.iter().fold(DVec3::NEG_INFINITY, |a, b| a.max(*b));
+                    bounds.extend((!vertices_m.is_empty()).then_some([low, high]));
+                }
+            }
+            reflectances.resize(triangles.len(), *reflectance);
+        }
+        let stands = |b: &[DVec3; 2]| !room.is_some_and(|room| lies_on_a_wall(&room, *b));
+        solid.retain(stands);
+        bounds.retain(stands);
+        let cuts_exactly = bounds.is_empty();
+        bounds.extend(&solid);
+        let reach_m = bounds.iter().flatten().map(|p| p.abs().max_element()).fold(reach_m, f64::max);
+        let extent_m = reach_m.max(room.map_or(0.0, |r| r.size_m.max_element()));
+        Ok(Self {
+            room,
+            boxes,
+            tree: Tree(TriangleBvh::new(&vertices, &triangles)?),
+            reflectances,
+            bounds,
+            solid,
+            cuts_exactly,
+            extent_m,
+        })
+    }
+
+    /// How far rays start off what may be a triangle.
+    pub(super) fn lift_m(&self) -> f64 {
+        LIFT * self.extent_m
+    }
+
+    /// The first surface that a ray along a unit vector meets.
+    pub(super) fn closest(&self, from_m: DVec3, direction: DVec3) -> Option<Place> {
+        let mut nearest = self.room.map(|room| wall(&room, from_m, direction));
+        // What lies flat on a wall is what one sees of the two.
+        let mut reach = nearest.map_or(f64::INFINITY, |place| place.distance_m + 0.1 * self.lift_m());
+        for body in &self.boxes {
+            if let Some(place) = body.meet(from_m, direction, reach) {
+                reach = place.distance_m;
+                nearest = Some(place);
+            }
+        }
+        if self.reflectances.is_empty() {
+            return nearest;
+        }
+        match self.tree.0.closest(&Ray { origin_m: from_m, direction }, reach) {
+            None => nearest,
+            Some(hit) => {
+                let normal = if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal };
+                let point_m = from_m + hit.distance * direction + normal * self.lift_m();
+                let reflectance = self.reflectances[hit.triangle as usize];
+                let point_m = self.room.map_or(point_m, |room| point_m.clamp(DVec3::ZERO, room.size_m));
+                Some(Place { point_m, normal, reflectance, wall: None, distance_m: hit.distance })
+            }
+        }
+    }
+
+    /// Boxes, flat ones on the walls left out, as their lower and upper corners.
+    pub(super) fn bodies(&self) -> impl Iterator<Item = &[DVec3; 2]> {
+        self.solid.iter()
+    }
+
+    /// Whether a body stands between two points.
+    pub(super) fn is_hidden(&self, from_m: DVec3, to_m: DVec3) -> bool {
+        let direction = to_m - from_m;
+        self.boxes.iter().any(|b| b.blocks(from_m, direction))
+            || !self.reflectances.is_empty() && self.tree.0.occluded(&Ray { origin_m: from_m, direction }, FAR_END)
+    }
+
+    /// Whether a body may stand between any two points of two boxes.
+    pub(super) fn may_hide(&self, from: [DVec3; 2], to: [DVec3; 2]) -> bool {
+        self.bounds.iter().any(|bounds| is_between(*bounds, from, to))
+    }
+}
+
+/// Whether a box may meet the hull of two others: not if it is beyond both along an axis, nor where it is away from
+/// a sphere that moves from one to the other, a distance that is convex.
+fn is_between([min_m, max_m]: [DVec3; 2], from: [DVec3; 2], to: [DVec3; 2]) -> bool {
+    let (low, high) = (from[0].min(to[0]), from[1].max(to[1]));
+    if max_m.cmple(low).any() || min_m.cmpge(high).any() {
+        return false;
+    }
+    let sphere = |[a, b]: [DVec3; 2]| (0.5 * (a + b), 0.5 * (b - a).length());
+    let ((a_m, a_radius), (b_m, b_radius)) = (sphere(from), sphere(to));
+    let gap = |t: f64| {
+        let centre = a_m.lerp(b_m, t);
+        (min_m - centre).max(centre - max_m).max(DVec3::ZERO).length() - (a_radius + t * (b_radius - a_radius))
+    };
+    let (mut near, mut far) = (0.0, 1.0);
+    for _ in 0..24 {
+        let (p, q) = (near + (far - near) / 3.0, far - (far - near) / 3.0);
+        let (at_p, at_q) = (gap(p), gap(q));
+        if at_p <= 0.0 || at_q <= 0.0 {
+            return true;
+        }
+        if at_p < at_q { far = q } else { near = p }
+    }
+    gap(0.5 * (near + far)) <= 1e-6 * (b_m - a_m).length()
+}
+
+/// Whether a box without thickness lies on a wall: it covers that and hides nothing.
+fn lies_on_a_wall(room: &Room, [min_m, max_m]: [DVec3; 2]) -> bool {
+    (0..3).any(|k| min_m[k] == max_m[k] && (min_m[k] == 0.0 || max_m[k] == room.size_m[k]))
+}
+
+/// Where a ray from inside leaves the room, exactly upon the wall, so that no ray leaks.
+fn wall(room: &Room, from_m: DVec3, direction: DVec3) -> Place {
+    let (mut distance_m, mut axis) = (f64::INFINITY, 0);
+    for k in 0..3 {
+        let end = if direction[k] > 0.0 { room.size_m[k] } else { 0.0 };
+        let t = (end - from_m[k]) / direction[k];
+        if direction[k] != 0.0 && t < distance_m {
+            (distance_m, axis) = (t, k);
+        }
+    }
+    let distance_m = distance_m.max(0.0);
+    let far = direction[axis] > 0.0;
+    let mut point_m = (from_m + distance_m * direction).clamp(DVec3::ZERO, room.size_m);
+    point_m[axis] = if far { room.size_m[axis] } else { 0.0 };
+    let wall = 2 * axis + usize::from(far);
+    let surface = WALLS[wall];
+    let reflectance = room.reflectance.of(surface);
+    Place { point_m, normal: surface.inward_normal(), reflectance, wall: Some(wall), distance_m }
+}
+
+/// The walls by axis, near and far.
+pub(super) const WALLS: [Surface; 6] =
+    [Surface::WallXMin, Surface::WallXMax, Surface::WallYMin, Surface::WallYMax, Surface::Floor, Surface::Ceiling];
+
+/// The two axes along a wall.
+pub(super) fn along(wall: usize) -> [usize; 2] {
+    let axis = wall / 2;
+    [(axis + 1) % 3, (axis + 2) % 3]
+}
+
+/// Where on its wall a point lies, in metres.
+pub(super) fn on_wall(wall: usize, point_m: DVec3) -> DVec2 {
+    let [a, b] = along(wall);
+    DVec2::new(point_m[a], point_m[b])
+}
+
+/// The point in the room of a place on a wall.
+pub(super) fn off_wall(room: &Room, wall: usize, at_m: DVec2) -> DVec3 {
+    let [a, b] = along(wall);
+    let mut point_m = DVec3::ZERO;
+    (point_m[a], point_m[b]) = (at_m.x, at_m.y);
+    point_m[wall / 2] = if wall % 2 == 1 { room.size_m[wall / 2] } else { 0.0 };
+    point_m
+}
+
+impl Body {
+    fn slabs(&self, from_m: DVec3, direction: DVec3) -> (DVec3, DVec3) {
+        let (a, b) = ((self.min_m - from_m) / direction, (self.max_m - from_m) / direction);
+        (a.min(b), a.max(b))
+    }
+
+    fn meet(&self, from_m: DVec3, direction: DVec3, reach: f64) -> Option<Place> {
+        let (near, far) = self.slabs(from_m, direction);
+        let (enter, exit) = (near.max_element(), far.min_element());
+        // What starts on a face and leaves has its exit at 0, since places lie exactly upon their face.
+        if !(enter <= exit && exit > 0.0 && enter >= 0.0 && enter < reach) {
+            return None;
+        }
+        let axis = near.max_position();
+        let ahead = direction[axis] > 0.0;
+        let mut point_m = (from_m + enter * direction).clamp(self.min_m, self.max_m);
+        point_m[axis] = if ahead { self.min_m[axis] } else { self.max_m[axis] };
+        let normal = DVec3::AXES[axis] * if ahead { -1.0 } else { 1.0 };
+        Some(Place { point_m, normal, reflectance: self.reflectance, wall: None, distance_m: enter })
+    }
+
+    fn blocks(&self, from_m: DVec3, direction: DVec3) -> bool {
+        let (near, far) = self.slabs(from_m, direction);
+        let (enter, exit) = (near.max_element(), far.min_element());
+        enter <= exit && exit > 0.0 && enter < FAR_END
+    }
+}

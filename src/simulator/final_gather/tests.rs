@@ -1,0 +1,184 @@
+//! Laws that rooms with bodies and luminous openings must obey.
+
+use std::f64::consts::PI;
+
+use approx::assert_relative_eq;
+use glam::DVec3;
+
+use crate::geometry::configuration_factor::element_to_polygon;
+use crate::geometry::{Reflectances, Room};
+use crate::photometry::{LuminousIntensityDistribution, LuminousOpening};
+use crate::scene::{Bounces, Meter, Obstacle, Scene, Shape, Transport};
+use crate::simulator::path_tracing::test_scenes::{S2_VALUES, luminaire, s1, s1_meters, s2, s2_meters, up};
+use crate::simulator::{Accuracy, Uncertainty, illuminance};
+
+fn bound(uncertainty: Uncertainty) -> f64 {
+    match uncertainty {
+        Uncertainty::Bound(bound) => bound,
+        other @ Uncertainty::StandardError { .. } => panic!("{other:?} is no bound"),
+    }
+}
+
+fn accuracy(relative_error: f64) -> Accuracy {
+    Accuracy { relative_error, seed: 1 }
+}
+
+fn cuboid(min: [f64; 3], max: [f64; 3], reflectance: f64) -> Obstacle {
+    Obstacle { shape: Shape::Box { min_m: DVec3::from(min), max_m: DVec3::from(max) }, reflectance }
+}
+
+#[test]
+fn direct_light_of_s2_is_exact() {
+    let accuracy = Accuracy { relative_error: 1e-6, seed: 1 };
+    let solution = illuminance(&s2(), &s2_meters(), Transport::Direct, &accuracy).unwrap();
+    for (estimate, v) in solution.estimates.iter().zip(S2_VALUES) {
+        assert!((estimate.illuminance.value() - v[2]).abs() <= 5.1e-6, "{estimate:?} at {} {}", v[0], v[1]);
+    }
+}
+
+#[test]
+fn mean_direct_light_of_s2_over_all_meters_is_exact() {
+    let free = |m: &Meter| !matches!((m.position_m.x, m.position_m.y), (5.5..=7.5, 0.5..=1.5));
+    let at = |i: i32, j: i32| up(0.5 * f64::from(i) + 0.25, 0.5 * f64::from(j) + 0.25, 0.8);
+    let meters: Vec<Meter> = (0..16).flat_map(|i| (0..12).map(move |j| at(i, j))).filter(free).collect();
+    assert_eq!(meters.len(), 184);
+    let accuracy = Accuracy { relative_error: 1e-6, seed: 1 };
+    let solution = illuminance(&s2(), &meters, Transport::Direct, &accuracy).unwrap();
+    let mean = solution.estimates.iter().map(|e| e.illuminance.value()).sum::<f64>() / 184.0;
+    assert!((mean - 153.848671).abs() < 6e-7, "{mean}");
+}
+
+#[test]
+fn indirect_light_of_s2_lies_within_its_bound() {
+    let converged = Transport::Indirect(Bounces::Converged);
+    let solution = illuminance(&s2(), &s2_meters(), converged, &accuracy(0.02)).unwrap();
+    for (estimate, v) in solution.estimates.iter().zip(S2_VALUES) {
+        let error = (estimate.illuminance.value() - v[3]).abs();
+        let bound = bound(estimate.uncertainty);
+        assert!(error <= bound + 3.0 * v[4], "{error} beyond {bound} at {} {}", v[0], v[1]);
+        assert!(error <= 0.01 * v[3], "{error} of {} at {} {}", v[3], v[0], v[1]);
+    }
+}
+
+#[test]
+fn an_empty_room_comes_out_as_hp_collocation_says() {
+    // A body too small to matter sends the scene to radiosity.
+    let mut scene = s1();
+    let meters = s1_meters();
+    let integrated = (Bounces::AtMost(1), "integrated");
+    for (bounces, solver) in [Bounces::Converged, Bounces::AtMost(2), Bounces::AtMost(3)]
+        .map(|bounces| (bounces, "final gather"))
+        .into_iter()
+        .chain([integrated])
+    {
+        scene.obstacles.clear();
+        let exact = illuminance(&scene, &meters, Transport::Indirect(bounces), &accuracy(1e-4)).unwrap();
+        let (min_m, max_m) = (DVec3::new(10.0, 10.0, 0.0), DVec3::new(10.01, 10.01, 0.01));
+        let shape = Shape::Box { min_m, max_m };
+        scene.obstacles.push(Obstacle { shape, reflectance: 0.2 });
+        let solution = illuminance(&scene, &meters, Transport::Indirect(bounces), &accuracy(0.02)).unwrap();
+        assert!(solution.solver.contains(solver), "{}", solution.solver);
+        for (estimate, exact) in solution.estimates.iter().zip(&exact.estimates) {
+            let error = (estimate.illuminance - exact.illuminance).value().abs();
+            let bound = bound(estimate.uncertainty) + bound(exact.uncertainty);
+            assert!(error <= bound, "{bounces:?}: {error} beyond {bound}");
+            assert!(error <= 5e-3 * exact.illuminance.value(), "{bounces:?}: {error}");
+        }
+    }
+}
+
+/// CIE 171 case 5.3: a 1 m square of exitance 1000 π centred on the ceiling of a black room, 4 m by 4 m by 3 m.
+#[test]
+fn an_area_source_lights_walls_and_floor_as_configuration_factors_say() {
+    let gamma: Vec<f64> = (0..=9000).map(|k| 0.01 * f64::from(k)).collect();
+    let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
+    let distribution = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
+    let opening = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
+    let source = luminaire(distribution, opening, DVec3::new(2.0, 2.0, 3.0));
+    let room = Room { size_m: DVec3::new(4.0, 4.0, 3.0), reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+    let scene = Scene { room: Some(room), obstacles: vec![], luminaires: vec![source] };
+    let wall = [(2.75, 32.677), (2.25, 75.194), (1.75, 81.323), (1.25, 69.061), (0.75, 53.404), (0.25, 40.002)];
+    let floor = [(0.25, 61.424), (0.75, 79.255), (1.25, 95.667), (1.75, 105.778)];
+    // A nanometre off the surfaces.
+    let on_wall = wall.map(|(z, lux)| (Meter { position_m: DVec3::new(2.0, 1e-9, z), normal: DVec3::Y }, lux));
+    let on_floor = floor.map(|(y, lux)| (up(2.0, y, 1e-9), lux));
+    let (meters, published): (Vec<_>, Vec<_>) = on_wall.into_iter().chain(on_floor).unzip();
+    let found = illuminance(&scene, &meters, Transport::Total(Bounces::Converged), &accuracy(1e-2)).unwrap();
+    for ((estimate, meter), published) in found.estimates.iter().zip(&meters).zip(published) {
+        let square = [(1.5, 1.5), (2.5, 1.5), (2.5, 2.5), (1.5, 2.5)].map(|(x, y)| DVec3::new(x, y, 3.0));
+        let exact = 1000.0 * PI * element_to_polygon(meter.position_m, meter.normal, &square);
+        assert_relative_eq!(estimate.illuminance.value(), exact, max_relative = 1e-6);
+        assert_relative_eq!(exact, published, epsilon = 1e-3);
+    }
+}
+
+/// CIE 171 case 5.7 with a luminous surface: what shows of it over a screen is a rectangle.
+#[test]
+fn a_screen_leaves_the_closed_form_of_what_shows_of_a_luminous_surface() {
+    let gamma: Vec<f64> = (0..=9000).map(|k| 0.01 * f64::from(k)).collect();
+    let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
+    let distribution = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
+    let opening = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
+    let source = luminaire(distribution, opening, DVec3::new(1.0, 2.0, 3.0));
+    let room = Room { size_m: DVec3::new(4.0, 4.0, 3.5), reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+    let obstacles = vec![cuboid([1.99, 0.0, 0.0], [2.01, 4.0, 2.0], 0.0)];
+    let scene = Scene { room: Some(room), obstacles, luminaires: vec![source] };
+    for meter in [up(3.0, 2.0, 0.8), up(2.7, 3.5, 0.9), up(3.9, 0.3, 0.5)] {
+        // Over the nearer edge of the screen's top.
+        let p = meter.position_m;
+        let from_x = (p.x - (3.0 - p.z) * (p.x - 2.01) / (2.0 - p.z)).max(0.5);
+        let shown = [(from_x, 1.5), (1.5, 1.5), (1.5, 2.5), (from_x, 2.5)].map(|(x, y)| DVec3::new(x, y, 3.0));
+        let exact = if from_x < 1.5 { 1000.0 * PI * element_to_polygon(p, DVec3::Z, &shown) } else { 0.0 };
+        let found = illuminance(&scene, &[meter], Transport::Direct, &accuracy(1e-6)).unwrap().estimates[0];
+        assert_relative_eq!(found.illuminance.value(), exact, max_relative = 1e-6);
+        assert!((found.illuminance.value() - exact).abs() <= bound(found.uncertainty), "{found:?} for {exact}");
+    }
+}
+
+/// Against path tracing at 184 meters, which `cargo bench --bench simulator` reads too: x, y, lux, standard error.
+#[test]
+fn bounds_hold_at_every_meter_of_s2() {
+    let lines = include_str!("../../../reference/analytic/values/s2_indirect.txt")
+        .lines()
+        .filter(|line| !line.starts_with('#'));
+    let truth: Vec<Vec<f64>> = lines.map(|line| line.split(' ').map(|n| n.parse().unwrap()).collect()).collect();
+    assert_eq!(truth.len(), 184);
+    let meters: Vec<Meter> = truth.iter().map(|v| up(v[0], v[1], 0.8)).collect();
+    let converged = Transport::Indirect(Bounces::Converged);
+    let solution = illuminance(&s2(), &meters, converged, &accuracy(0.01)).unwrap();
+    assert!(!solution.solver.contains("path tracing"), "{}", solution.solver);
+    let mut errors = vec![];
+    for (estimate, v) in solution.estimates.iter().zip(&truth) {
+        let error = (estimate.illuminance.value() - v[2]).abs();
+        let bound = bound(estimate.uncertainty);
+        assert!(error <= bound + 3.0 * v[3], "{error} beyond {bound} at {} {}", v[0], v[1]);
+        errors.push(error / v[2]);
+    }
+    errors.sort_by(f64::total_cmp);
+    assert!(errors[92] <= 1e-3 && errors[183] <= 1e-2, "median {}, worst {}", errors[92], errors[183]);
+}
+
+#[test]
+fn a_cosine_table_with_rounded_figures_lights_like_the_cosine_within_its_bound() {
+    let exact = s2();
+    let mut rounded = s2();
+    for lamp in &mut rounded.luminaires {
+        let table = &lamp.photometry.distribution;
+        let figures = |i: &f64| (i * 1e6).round() / 1e6;
+        let candela = table.plane(0).iter().map(figures).collect();
+        let table = LuminousIntensityDistribution::axial(table.gamma_deg().to_vec(), candela).unwrap();
+        *lamp = luminaire(table, lamp.photometry.opening, lamp.position_m);
+    }
+    let direct =
+        |scene: &Scene| illuminance(scene, &s2_meters(), Transport::Direct, &accuracy(1e-3)).unwrap().estimates;
+    for (a, b) in direct(&exact).iter().zip(direct(&rounded)) {
+        let off = (a.illuminance - b.illuminance).value().abs();
+        assert!(off <= 1e-6 * a.illuminance.value(), "{a:?} {b:?}");
+        if b.illuminance.value() == 0.0 {
+            continue;
+        }
+        // The closed formula's bound, not a quadrature's.
+        assert!(bound(b.uncertainty) > 9e-6 * b.illuminance.value(), "{b:?}");
+        assert!(bound(b.uncertainty) < 1.1e-5 * b.illuminance.value(), "{b:?}");
+    }
+}
