@@ -76,8 +76,23 @@ pub fn plate(room: &Room, luminaire: &Luminaire) -> Option<Obstacle> {
     if normal.dot(surface.inward_normal()) < 0.0 {
         vertices_m.reverse();
     }
-    let triangles = (2..vertices_m.len() as u32).map(|k| [0, k - 1, k]).collect();
+    let triangles = fan(vertices_m.len()).collect();
     Some(Obstacle { shape: Shape::Mesh { vertices_m, triangles }, reflectance: 0.0 })
+}
+
+/// The triangles of a convex polygon.
+fn fan(corners: usize) -> impl Iterator<Item = [u32; 3]> {
+    (2..corners as u32).map(|k| [0, k - 1, k])
+}
+
+/// Whether it is one polygon that turns the same way at all of its corners, as [`plate`] makes them.
+pub fn is_plate(obstacle: &Obstacle) -> bool {
+    let Shape::Mesh { vertices_m: p, triangles } = &obstacle.shape else { return false };
+    let at = |k: usize| p[k % p.len()];
+    let turn = |k: usize| (at(k + 1) - at(k)).cross(at(k + 2) - at(k + 1));
+    triangles.iter().copied().eq(fan(p.len()))
+        && !triangles.is_empty()
+        && (0..p.len()).all(|k| turn(k).dot(turn(0)) > 0.0)
 }
 
 /// Gives corners whose coordinates differ by the rounding of a quarter turn's cosine the same ones.
