@@ -7,14 +7,14 @@
 
 use glam::DVec3;
 
-pub use super::layers::Layers;
+use super::layers::refuse;
+pub use super::layers::{Exitances, Layers};
 pub use super::room_flux::zonal_flux;
-use super::zonal_cavity::{CavityReflectances, Coefficients};
-use super::{Calculated, NotApplicable};
+use super::{Calculated, NotApplicable, Validity, inverse_square};
 use crate::geometry::Room;
 use crate::geometry::configuration_factor::element_to_parallel_rectangle;
 use crate::scene::{Meter, Scene};
-use crate::units::{Lumen, LumenPerSquareMetre, Lux};
+use crate::units::Lux;
 
 /// Indirect illuminance, all reflections, of a meter that faces up; for many meters of a scene keep its [`Layers`].
 pub fn indirect_illuminance(scene: &Scene, meter: &Meter) -> Result<Calculated, NotApplicable> {
@@ -26,31 +26,40 @@ pub fn total_illuminance(scene: &Scene, meter: &Meter) -> Result<Calculated, Not
     Layers::of(scene)?.total_illuminance(scene, meter)
 }
 
-const METHOD: &str = "infinite plane - exitance difference method";
+impl Layers {
+    /// Indirect illuminance, all reflections, of a meter that faces up.
+    pub fn indirect_illuminance(&self, meter: &Meter) -> Result<Calculated, NotApplicable> {
+        if meter.normal.dot(DVec3::Z) < 1.0 - 1e-9 {
+            return Err(refuse("the meter does not face straight up; the method knows work planes only"));
+        }
+        if !self.room.contains(meter.position_m, 0.0) {
+            return Err(refuse("the meter lies outside the room"));
+        }
+        let of_one = |solved: &Exitances| {
+            let factor = ceiling_factor(&self.room, solved.luminaire_height_m, meter.position_m);
+            let walls = solved.walls.value();
+            walls + factor * (solved.ceiling_cavity.value() - walls)
+        };
+        let work_plane_m = meter.position_m.z;
+        let illuminance = Lux(self.exitances(work_plane_m)?.iter().map(of_one).sum());
+        let mut objections = self.objections.clone();
+        objections.extend(self.unevenness(work_plane_m));
+        Ok(Calculated { illuminance, validity: Validity::from_objections(&objections) })
+    }
 
-pub(super) fn refuse(reason: impl Into<String>) -> NotApplicable {
-    NotApplicable { method: METHOD, reason: reason.into() }
-}
-
-/// The zonal cavity solution that IP-ED rests on, for luminaires at one height and one height of work plane.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Exitances {
-    /// Mean exitance of the ceiling cavity's opening, `M_cc`.
-    pub ceiling_cavity: LumenPerSquareMetre,
-    /// Mean exitance of the walls, `M_w`.
-    pub walls: LumenPerSquareMetre,
-    /// Mean illuminance of the work plane, direct and indirect.
-    pub work_plane: Lux,
-    /// Room, ceiling and floor cavity ratio: RCR, CCR, FCR.
-    pub cavity_ratios: [f64; 3],
-    /// Effective reflectances.
-    pub reflectances: CavityReflectances,
-    /// Coefficients by which flux over floor area is multiplied.
-    pub coefficients: Coefficients,
-    /// Flux of the luminaires.
-    pub flux: Lumen,
-    /// Their height in metres, where the ceiling cavity begins.
-    pub luminaire_height_m: f64,
+    /// Direct by inverse square plus indirect by IP-ED, in the scene that these layers are of.
+    pub fn total_illuminance(&self, scene: &Scene, meter: &Meter) -> Result<Calculated, NotApplicable> {
+        let indirect = self.indirect_illuminance(meter)?;
+        let direct = inverse_square::direct_illuminance(scene, meter)?;
+        let mut objections = vec![];
+        for part in [&direct, &indirect] {
+            if let Validity::Approximate(why) = &part.validity {
+                objections.push(why.clone());
+            }
+        }
+        let illuminance = direct.illuminance + indirect.illuminance;
+        Ok(Calculated { illuminance, validity: Validity::from_objections(&objections) })
+    }
 }
 
 /// Configuration factor of the room's plan at `height_m`, seen from a point below that faces up.

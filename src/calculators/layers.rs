@@ -1,27 +1,45 @@
 //! A scene as IP-ED sees it: an empty room of mean reflectances, and the zonal flux of its luminaires by their height.
 
-use glam::DVec3;
-
-use super::exitance_difference::{Exitances, ceiling_factor, refuse};
+use super::NotApplicable;
 use super::room_flux::entering;
-use super::zonal_cavity::{Cavity, CavityReflectances, ZonalFlux, coefficients};
+use super::zonal_cavity::{Cavity, CavityReflectances, Coefficients, ZonalFlux, coefficients};
 use super::zonal_multiplier::ZonalMultipliers;
-use super::{Calculated, NotApplicable, Validity, inverse_square};
 use crate::geometry::{Room, Surface};
-use crate::scene::{Meter, Obstacle, Scene, flush};
+use crate::scene::{Obstacle, Scene, flush};
 use crate::units::{Lumen, LumenPerSquareMetre, Lux};
 
-/// A scene as IP-ED sees it: an empty room, and the zonal flux of its luminaires, those at one height added up.
+/// The zonal cavity solution that IP-ED rests on, for luminaires at one height and one height of work plane.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exitances {
+    /// Mean exitance of the ceiling cavity's opening, `M_cc`.
+    pub ceiling_cavity: LumenPerSquareMetre,
+    /// Mean exitance of the walls, `M_w`.
+    pub walls: LumenPerSquareMetre,
+    /// Mean illuminance of the work plane, direct and indirect.
+    pub work_plane: Lux,
+    /// Room, ceiling and floor cavity ratio: RCR, CCR, FCR.
+    pub cavity_ratios: [f64; 3],
+    /// Effective reflectances.
+    pub reflectances: CavityReflectances,
+    /// Coefficients by which flux over floor area is multiplied.
+    pub coefficients: Coefficients,
+    /// Flux of the luminaires.
+    pub flux: Lumen,
+    /// Their height in metres, where the ceiling cavity begins.
+    pub luminaire_height_m: f64,
+}
+
+/// An empty room, and the zonal flux of its luminaires, those at one height added up.
 ///
 /// Each height has cavities of its own, so that luminaires are solved apart and their light is added: one that is off changes
 /// nothing, and two give what they give one by one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layers {
-    room: Room,
+    pub(super) room: Room,
     /// Of ceiling, walls and floor.
     reflectances: [f64; 3],
-    layers: Vec<Layer>,
-    objections: Vec<String>,
+    by_height: Vec<Layer>,
+    pub(super) objections: Vec<String>,
 }
 
 /// The luminaires at one height that are on.
@@ -46,7 +64,7 @@ impl Layers {
         {
             return Err(refuse("only bodies reflect, the room does not; the method knows surfaces of the room alone"));
         }
-        let mut layers: Vec<Layer> = vec![];
+        let mut by_height: Vec<Layer> = vec![];
         for luminaire in &scene.luminaires {
             let zonal = entering(&room, luminaire);
             if zonal.down_lm() + zonal.up_lm() == 0.0 {
@@ -56,52 +74,18 @@ impl Layers {
                 return Err(refuse(format!("`{}` lies outside the room", luminaire.id)));
             }
             let (height_m, id) = (luminaire.position_m.z, luminaire.id.clone());
-            match layers.iter_mut().find(|layer| layer.height_m == height_m) {
+            match by_height.iter_mut().find(|layer| layer.height_m == height_m) {
                 Some(layer) => (layer.zonal, layer.count) = (layer.zonal.plus(&zonal), layer.count + 1),
-                None => layers.push(Layer { height_m, zonal, id, count: 1 }),
+                None => by_height.push(Layer { height_m, zonal, id, count: 1 }),
             }
         }
         let reflectances = reflectances(scene, &room);
-        Ok(Self { room, reflectances, layers, objections: objections(scene, &room) })
+        Ok(Self { room, reflectances, by_height, objections: objections(scene, &room) })
     }
 
     /// Zonal cavity solutions for a work plane at `work_plane_m` above the floor, one a height of luminaires.
     pub fn exitances(&self, work_plane_m: f64) -> Result<Vec<Exitances>, NotApplicable> {
-        self.layers.iter().map(|layer| self.solve(layer, work_plane_m)).collect()
-    }
-
-    /// Indirect illuminance, all reflections, of a meter that faces up.
-    pub fn indirect_illuminance(&self, meter: &Meter) -> Result<Calculated, NotApplicable> {
-        if meter.normal.dot(DVec3::Z) < 1.0 - 1e-9 {
-            return Err(refuse("the meter does not face straight up; the method knows work planes only"));
-        }
-        if !self.room.contains(meter.position_m, 0.0) {
-            return Err(refuse("the meter lies outside the room"));
-        }
-        let of_one = |solved: &Exitances| {
-            let factor = ceiling_factor(&self.room, solved.luminaire_height_m, meter.position_m);
-            let walls = solved.walls.value();
-            walls + factor * (solved.ceiling_cavity.value() - walls)
-        };
-        let work_plane_m = meter.position_m.z;
-        let illuminance = Lux(self.exitances(work_plane_m)?.iter().map(of_one).sum());
-        let mut objections = self.objections.clone();
-        objections.extend(self.unevenness(work_plane_m));
-        Ok(Calculated { illuminance, validity: Validity::from_objections(&objections) })
-    }
-
-    /// Direct by inverse square plus indirect by IP-ED, in the scene that these layers are of.
-    pub fn total_illuminance(&self, scene: &Scene, meter: &Meter) -> Result<Calculated, NotApplicable> {
-        let indirect = self.indirect_illuminance(meter)?;
-        let direct = inverse_square::direct_illuminance(scene, meter)?;
-        let mut objections = vec![];
-        for part in [&direct, &indirect] {
-            if let Validity::Approximate(why) = &part.validity {
-                objections.push(why.clone());
-            }
-        }
-        let illuminance = direct.illuminance + indirect.illuminance;
-        Ok(Calculated { illuminance, validity: Validity::from_objections(&objections) })
+        self.by_height.iter().map(|layer| self.solve(layer, work_plane_m)).collect()
     }
 
     fn solve(&self, layer: &Layer, work_plane_m: f64) -> Result<Exitances, NotApplicable> {
@@ -123,7 +107,7 @@ impl Layers {
             floor_cavity: floor.effective_reflectance(base_floor, walls),
         };
         let flux = zonal.down_lm() + zonal.up_lm();
-        let coefficients = coefficients(&zonal, flux, &room_cavity, &reflectances, &ZonalMultipliers::LM57)
+        let coefficients = coefficients(zonal, flux, &room_cavity, &reflectances, &ZonalMultipliers::LM57)
             .map_err(|error| refuse(error.to_string()))?;
         let per_area = flux / (width * length);
         Ok(Exitances {
@@ -139,9 +123,9 @@ impl Layers {
     }
 
     /// Whether luminaires hang too far apart for their height.
-    fn unevenness(&self, work_plane_m: f64) -> Option<String> {
-        let count: usize = self.layers.iter().map(|layer| layer.count).sum();
-        let lowest_m = self.layers.iter().map(|layer| layer.height_m).reduce(f64::min)?;
+    pub(super) fn unevenness(&self, work_plane_m: f64) -> Option<String> {
+        let count: usize = self.by_height.iter().map(|layer| layer.count).sum();
+        let lowest_m = self.by_height.iter().map(|layer| layer.height_m).reduce(f64::min)?;
         let spacing_m = (self.room.size_m.x * self.room.size_m.y / count as f64).sqrt();
         let allowed_m = SPACING_CRITERION * (lowest_m - work_plane_m);
         (spacing_m > allowed_m).then(|| {
@@ -185,4 +169,10 @@ fn objections(scene: &Scene, room: &Room) -> Vec<String> {
         found.push(format!("{bodies} obstacle(s) are left out"));
     }
     found
+}
+
+const METHOD: &str = "infinite plane - exitance difference method";
+
+pub(super) fn refuse(reason: impl Into<String>) -> NotApplicable {
+    NotApplicable { method: METHOD, reason: reason.into() }
 }

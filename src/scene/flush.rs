@@ -71,7 +71,9 @@ pub fn plate(room: &Room, luminaire: &Luminaire) -> Option<Obstacle> {
         own.into_iter().map(|p| luminaire.position_m + luminaire.orientation * p).collect();
     straighten(&mut vertices_m, room.size_m.max_element());
     let plane_m = if surface.is_far() { room.size_m[surface.axis()] } else { 0.0 };
-    vertices_m.iter_mut().for_each(|p| p[surface.axis()] = plane_m);
+    for corner in &mut vertices_m {
+        corner[surface.axis()] = plane_m;
+    }
     let normal = (vertices_m[1] - vertices_m[0]).cross(vertices_m[2] - vertices_m[1]);
     if normal.dot(surface.inward_normal()) < 0.0 {
         vertices_m.reverse();

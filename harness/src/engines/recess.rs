@@ -29,7 +29,9 @@ pub(super) fn apart(job: &Job) -> Cow<'_, Job> {
     for obstacle in &mut moved.scene.obstacles {
         let surface = flush::lies_on(&room, obstacle);
         if let (Some(surface), Shape::Mesh { vertices_m, .. }) = (surface, &mut obstacle.shape) {
-            vertices_m.iter_mut().for_each(|p| *p += inwards(surface));
+            for corner in vertices_m {
+                *corner += inwards(surface);
+            }
         }
     }
     Cow::Owned(moved)
