@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
-use luminaire::calculators::exitance_difference::{self, Exitances};
+use luminaire::calculators::exitance_difference::{self, Layers};
 use luminaire::calculators::{inverse_square, uniform_surfaces};
 use luminaire::geometry::{Reflectances, Room};
 use luminaire::photometry::read_file;
@@ -199,7 +199,7 @@ fn indirect(text: &mut String, rows: &[Row], scene: &Scene) -> Result<(), Failur
 
 /// The flux with which IP-ED prints each cell of the paper's own column: IP-ED is linear in upward flux alone.
 fn needed_flux(text: &mut String, rows: &[Row], scene: &Scene) -> Result<(), Failure> {
-    let flux = Exitances::of(scene, 2.0)?.flux.value();
+    let flux: f64 = Layers::of(scene)?.exitances(2.0)?.iter().map(|layer| layer.flux.value()).sum();
     writeln!(text, "| IP-ED, lx | printed | flux that gives it, lm | within rounding, lm |")?;
     writeln!(text, "|---|---|---|---|")?;
     for row in rows.iter().filter(|row| row.table == "Table 3") {

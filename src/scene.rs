@@ -1,5 +1,7 @@
 //! What is simulated and exported: a room (or none), obstacles, luminaires; and the meters that read it.
 
+pub mod flush;
+
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
@@ -47,6 +49,25 @@ pub enum Shape {
     },
 }
 
+impl Shape {
+    /// The area of its surface in square metres, of a mesh counted on one side.
+    pub fn area_m2(&self) -> f64 {
+        match self {
+            Self::Box { min_m, max_m } => {
+                let s = *max_m - *min_m;
+                2.0 * (s.x * s.y + s.y * s.z + s.z * s.x)
+            }
+            Self::Mesh { vertices_m, triangles } => {
+                let half = |t: &[u32; 3]| {
+                    let [a, b, c] = t.map(|v| vertices_m[v as usize]);
+                    0.5 * (b - a).cross(c - a).length()
+                };
+                triangles.iter().map(half).sum()
+            }
+        }
+    }
+}
+
 /// A luminaire in its place.
 #[derive(Clone, Debug)]
 pub struct Luminaire {
@@ -70,7 +91,7 @@ pub enum LuminaireModel {
     /// All light from the photometric centre.
     Point,
     /// Light from the file's luminous opening. The opening itself neither blocks nor reflects: a body that does, such as
-    /// the black back of a ceiling panel, is an obstacle of its own.
+    /// the black back of a hanging panel, is an obstacle of its own; [`flush::plate`] makes that of a recessed one.
     Area,
     /// An impostor surface that a renderer samples for the light behind it (Radiance's illum).
     Impostor,

@@ -119,11 +119,17 @@ impl FiveTimesRule {
 /// |1/3 - sin^2 theta| at most: error of a Lambertian square times (distance / side)^2.
 const FAR_ERROR: f64 = 2.0 / 3.0;
 
+/// Corners that stand for a round outline.
+const CORNERS: u32 = 720;
+
 /// Relative error of the point formula for a flat Lambertian opening in the luminaire's place: the exact twin.
 ///
 /// `None` for openings with height or none at all, and where part of the opening lies behind the meter's plane.
 pub fn lambertian_twin(luminaire: &Luminaire, meter: &Meter) -> Option<f64> {
-    let corners: Vec<DVec3> = flat_outline_m(&luminaire.photometry.opening)?
+    let corners: Vec<DVec3> = luminaire
+        .photometry
+        .opening
+        .flat_outline_m(CORNERS)?
         .into_iter()
         .map(|corner| luminaire.position_m + luminaire.orientation * corner)
         .collect();
@@ -155,27 +161,6 @@ pub fn largest_dimension_m(opening: &LuminousOpening) -> f64 {
         }
         LuminousOpening::Ellipsoid { x_m, y_m, z_m } => x_m.max(y_m).max(z_m),
         LuminousOpening::LyingCylinder { length_m, diameter_m, .. } => length_m.max(diameter_m),
-    }
-}
-
-/// The outline of a flat opening in the luminaire's own frame; an ellipse as 720 corners of equal area.
-fn flat_outline_m(opening: &LuminousOpening) -> Option<Vec<DVec3>> {
-    match *opening {
-        LuminousOpening::Box { x_m, y_m, height_m: 0.0 } if x_m > 0.0 && y_m > 0.0 => {
-            let corner = |u: f64, v: f64| DVec3::new(u * x_m, v * y_m, 0.0);
-            Some(vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)])
-        }
-        LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 } if x_m > 0.0 && y_m > 0.0 => {
-            let count = 720;
-            let step = std::f64::consts::TAU / f64::from(count);
-            let swell = 0.5 * (step / step.sin()).sqrt();
-            let corner = |k: u32| {
-                let (sin, cos) = (f64::from(k) * step).sin_cos();
-                DVec3::new(swell * x_m * cos, swell * y_m * sin, 0.0)
-            };
-            Some((0..count).map(corner).collect())
-        }
-        _ => None,
     }
 }
 

@@ -13,6 +13,8 @@ pub mod closed_form;
 mod deviation;
 pub mod exitance_difference;
 pub mod inverse_square;
+mod layers;
+mod room_flux;
 pub mod uniform_surfaces;
 mod utilization_print;
 mod validity;

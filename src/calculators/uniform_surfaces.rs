@@ -11,7 +11,7 @@ use super::NotApplicable;
 use crate::geometry::configuration_factor::{adjacent_rectangles, element_to_polygon, opposed_rectangles};
 use crate::geometry::{Room, Surface};
 use crate::photometry::direction;
-use crate::scene::{Luminaire, Meter, Scene};
+use crate::scene::{Luminaire, Meter, Scene, flush};
 use crate::units::{Lumen, LumenPerSquareMetre, Lux};
 
 const METHOD: &str = "balance of six uniform surfaces";
@@ -90,6 +90,7 @@ pub fn form_factors(room: &Room) -> [[f64; 6]; 6] {
 fn first_flux(room: &Room, luminaire: &Luminaire) -> [f64; 6] {
     let (planes, bands) = (720, 720);
     let mut flux = [0.0; 6];
+    let lost = flush::surface_of(room, luminaire);
     for band in 0..bands {
         let edge = |k: i32| (std::f64::consts::PI * f64::from(k) / f64::from(bands)).cos();
         let solid = std::f64::consts::TAU / f64::from(planes) * (edge(band) - edge(band + 1));
@@ -99,7 +100,11 @@ fn first_flux(room: &Room, luminaire: &Luminaire) -> [f64; 6] {
             let towards = direction(c_deg, gamma_deg);
             let intensity = luminaire.intensity_towards(towards).value();
             if intensity > 0.0 {
-                flux[landing(room, luminaire.position_m, towards)] += intensity * solid;
+                let surface = landing(room, luminaire.position_m, towards);
+                // What a luminaire in the plane of a surface sends into that is lost.
+                if lost != Some(Surface::ALL[surface]) {
+                    flux[surface] += intensity * solid;
+                }
             }
         }
     }

@@ -153,6 +153,12 @@ impl ZonalFlux {
         Self(std::array::from_fn(|zone| self.0[zone] + other.0[zone]))
     }
 
+    /// What of it goes below the horizon.
+    #[must_use]
+    pub fn downward(&self) -> Self {
+        Self(std::array::from_fn(|zone| if zone < 9 { self.0[zone] } else { 0.0 }))
+    }
+
     /// The zonal flux of a dimmed luminaire.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {

@@ -9,6 +9,7 @@ mod goniometer;
 mod lint;
 pub mod lm63;
 mod outdoor;
+mod outline;
 mod planes;
 mod resample;
 mod sampler;

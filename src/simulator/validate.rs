@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{Accuracy, SimulatorError};
 use crate::geometry::Surface;
-use crate::scene::{LuminaireModel, Meter, Scene, Shape};
+use crate::scene::{Meter, Scene, Shape};
 
 /// Meters nearer to a surface than this fraction of the room lie on it.
 const ON_SURFACE: f64 = 1e-12;
@@ -66,11 +66,6 @@ pub(super) fn scene(scene: &Scene) -> Result<(), SimulatorError> {
         }
         if scene.room.is_some_and(|room| !room.contains(p, 0.0)) {
             return invalid(&what, format!("stands at {p}, outside the room"), "move it inside");
-        }
-        // An opening may be flush with a surface; of a single point on one, nobody can say where its light goes.
-        let on_surface = scene.room.is_some_and(|room| p.cmple(DVec3::ZERO).any() || p.cmpge(room.size_m).any());
-        if on_surface && luminaire.model == LuminaireModel::Point {
-            return invalid(&what, format!("is a point at {p}, on a surface of the room"), "move it off the surface");
         }
     }
     Ok(())

@@ -17,6 +17,7 @@ mod mesh_files;
 mod negative_controls;
 mod planning;
 mod policy;
+mod recessed;
 mod repeatability;
 mod stated_errors;
 mod stops;

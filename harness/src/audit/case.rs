@@ -27,6 +27,12 @@ pub(super) struct Stop {
     pub(super) status: Status,
 }
 
+impl Stop {
+    pub(super) fn interrupted() -> Self {
+        Self { why: "not run: the run was interrupted".to_owned(), status: Status::Failed }
+    }
+}
+
 impl Audit<'_> {
     /// Runs and judges one case, unless the audit has stopped before it.
     pub(super) fn case(

@@ -41,7 +41,7 @@ use crate::record::Status;
 use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, SpecError, filtered, suite};
 use crate::system::digest::hexadecimal;
-use crate::system::files::{self, FileError};
+use crate::system::files::FileError;
 use crate::system::process;
 use crate::system::slots::side_by_side;
 
@@ -199,7 +199,8 @@ fn audited(
     options.observer.planned(cases, &plans);
     let audit = Audit { options, reader: options.reader() };
     let is_alone = cases.iter().filter(|case| !case.is_known()).count() == 1;
-    let stop: Mutex<Option<Stop>> = Mutex::new(None);
+    // Planning many meters takes its time, too.
+    let stop: Mutex<Option<Stop>> = Mutex::new(process::is_interrupted().then(Stop::interrupted));
     let folder_of = |case: &Case| match case.is_known() {
         true => options.out.join(&case.name),
         false if is_alone => options.out.clone(),
@@ -211,11 +212,11 @@ fn audited(
         let stopped = stop.lock().clone();
         let report = audit.case(case, plan, &policies[k], published[k].as_ref(), stopped.as_ref(), &folder)?;
         if folder != options.out {
-            files::keep_json(&folder.join("report.json"), &report)?;
+            report.keep(&folder.join("report.json"))?;
         }
         let mut stop = stop.lock();
         if process::is_interrupted() {
-            *stop = Some(Stop { why: "not run: the run was interrupted".to_owned(), status: Status::Failed });
+            *stop = Some(Stop::interrupted());
         } else if options.after_failure == AfterFailure::Stop
             && stop.is_none()
             && matches!(report.worst(), Exit::Failed | Exit::Engine)
@@ -233,13 +234,13 @@ fn audited(
     for (case, report) in cases.iter().zip(&reports) {
         let folder = folder_of(case);
         if folder != options.out && report.comparisons.iter().any(|c| c.diagnosis.is_some()) {
-            files::keep_json(&folder.join("report.json"), report)?;
+            report.keep(&folder.join("report.json"))?;
         }
     }
     let mut report = Report::joined(spec, reports);
     // Cases ran side by side: their seconds do not add up.
     report.wall_s = clock.elapsed().as_secs_f64();
-    files::keep_json(&options.out.join("report.json"), &report)?;
+    report.keep(&options.out.join("report.json"))?;
     Ok(report)
 }
 

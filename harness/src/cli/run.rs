@@ -44,7 +44,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
     drop(progress);
     if let Some(held) = &held {
         report.baseline = Some(held.hold(&report, &root)?);
-        files::keep_json(&root.join("report.json"), &report).into_diagnostic()?;
+        report.keep(&root.join("report.json")).into_diagnostic()?;
     }
     print_report(&report, &root, &args.views)?;
     Ok(report.exit())

@@ -151,14 +151,14 @@ pub(super) fn within(relative_error: f64, job: Job) -> Job {
 }
 
 /// 1000 cd downwards, and the cosine elsewhere, straight between quarter degrees.
-pub(super) fn lambertian() -> LuminousIntensityDistribution {
+pub(crate) fn lambertian() -> LuminousIntensityDistribution {
     let gamma: Vec<f64> = (0..=360).map(|k| 0.25 * f64::from(k)).collect();
     let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0)).collect();
     LuminousIntensityDistribution::axial(gamma, candela).unwrap()
 }
 
 /// A luminaire that sends out its light from an opening.
-pub(super) fn with_opening(lamp: Luminaire, opening: LuminousOpening) -> Luminaire {
+pub(crate) fn with_opening(lamp: Luminaire, opening: LuminousOpening) -> Luminaire {
     let photometry = Arc::new(Photometry { opening, ..(*lamp.photometry).clone() });
     Luminaire { photometry, model: LuminaireModel::Area, ..lamp }
 }

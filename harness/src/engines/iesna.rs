@@ -1,6 +1,7 @@
 //! The engine `iesna`: inverse-square method and infinite plane - exitance difference, read like any renderer.
 
-use luminaire::calculators::{Calculated, NotApplicable, Validity, exitance_difference, inverse_square};
+use luminaire::calculators::exitance_difference::Layers;
+use luminaire::calculators::{Calculated, NotApplicable, Validity, inverse_square};
 use luminaire::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
 
 use super::{Absent, Engine, EngineError, Entry, Job, Measurement, Site, Support, Version, Workbench, checked};
@@ -38,8 +39,9 @@ impl Engine for Iesna {
 
     fn supports(&self, job: &Job) -> Support {
         let mut objections = vec![];
+        let calculator = Calculator::of(job);
         for station in &job.stations {
-            match Validity::of(&calculate(job, &station.meter)) {
+            match Validity::of(&calculator.calculate(&station.meter)) {
                 Validity::Supported => {}
                 Validity::Approximate(why) => objections.push(why),
                 Validity::No(why) => return Support::No(format!("{}: {why}", station.id)),
@@ -61,9 +63,11 @@ impl Engine for Iesna {
         let mut measurement = Measurement::default();
         measurement.method.insert("method".into(), method(job.transport).into());
         let mut notes = vec![];
+        let calculator = Calculator::of(job);
         for station in &job.stations {
             let what = |error: NotApplicable| format!("{}: {error}", station.id);
-            let calculated = calculate(job, &station.meter)
+            let calculated = calculator
+                .calculate(&station.meter)
                 .map_err(|error| EngineError::Solver { engine: ID, what: what(error) })?;
             let value = calculated.illuminance.value();
             // The inverse-square method is exact for what it is meant for; the others know no bound.
@@ -90,12 +94,27 @@ fn in_short(mut objections: Vec<String>) -> Vec<String> {
     objections
 }
 
-fn calculate(job: &Job, meter: &Meter) -> Result<Calculated, NotApplicable> {
-    let scene: &Scene = &job.scene;
-    match job.transport {
-        Transport::Direct => inverse_square::direct_illuminance(scene, meter),
-        Transport::Indirect(_) => exitance_difference::indirect_illuminance(scene, meter),
-        Transport::Total(_) => exitance_difference::total_illuminance(scene, meter),
+/// A job's scene, the zonal flux of its luminaires worked out once for all meters where reflected light is asked for.
+struct Calculator<'a> {
+    scene: &'a Scene,
+    transport: Transport,
+    layers: Option<Result<Layers, NotApplicable>>,
+}
+
+impl<'a> Calculator<'a> {
+    fn of(job: &'a Job) -> Self {
+        let (scene, transport) = (&job.scene, job.transport);
+        let layers = (transport != Transport::Direct).then(|| Layers::of(scene));
+        Self { scene, transport, layers }
+    }
+
+    fn calculate(&self, meter: &Meter) -> Result<Calculated, NotApplicable> {
+        let Some(layers) = &self.layers else { return inverse_square::direct_illuminance(self.scene, meter) };
+        let layers = layers.as_ref().map_err(Clone::clone)?;
+        match self.transport {
+            Transport::Total(_) => layers.total_illuminance(self.scene, meter),
+            _ => layers.indirect_illuminance(meter),
+        }
     }
 }
 

@@ -10,7 +10,7 @@ pub(super) mod tests;
 
 use glam::DVec3;
 use luminaire::geometry::Surface;
-use luminaire::scene::{Luminaire, LuminaireModel, Shape, Transport};
+use luminaire::scene::{Luminaire, LuminaireModel, Shape, Transport, flush};
 use parking_lot::Mutex;
 
 use self::backend::Backend;
@@ -128,8 +128,8 @@ fn luminaire_close_to_a_surface(job: &Job) -> Option<&str> {
     let lights = |l: &Luminaire, path: DVec3| path.length() < close_m && l.intensity_towards(path).value() > 0.0;
     let lights_the_room = |l: &Luminaire, s: Surface| {
         let distance_m = (l.position_m - room.corners(s)[0]).dot(s.inward_normal());
-        // A flush luminaire, too, has a direction towards its surface.
-        lights(l, -s.inward_normal() * distance_m.max(1e-9 * close_m))
+        // What one in the plane of a surface sends into it is lost.
+        flush::surface_of(&room, l) != Some(s) && lights(l, -s.inward_normal() * distance_m)
     };
     let lights_an_obstacle = |l: &Luminaire, shape: &Shape| match shape {
         Shape::Box { min_m, max_m } => lights(l, l.position_m.clamp(*min_m, *max_m) - l.position_m),

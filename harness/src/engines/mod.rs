@@ -18,6 +18,7 @@ mod install;
 mod mitsuba;
 mod povray;
 mod radiance;
+mod recess;
 #[cfg(test)]
 mod repetition_tests;
 mod settings;

@@ -203,9 +203,10 @@ impl KnownDeviations {
     }
 
     /// What every entry came to that is about these comparisons of one task.
-    pub(super) fn on_record(&self, comparisons: &[Comparison], content: &str) -> Vec<OnRecord> {
+    pub(super) fn on_record(&self, comparisons: &[&Comparison], content: &str) -> Vec<OnRecord> {
         let one = |entry: &KnownDeviation| {
-            let about = || comparisons.iter().filter(|c| c.verdict != Verdict::Missing && entry.is_about(c, content));
+            let about =
+                || comparisons.iter().copied().filter(|c| c.verdict != Verdict::Missing && entry.is_about(c, content));
             let why = entry.told();
             let by_it = |c: &&Comparison| {
                 c.verdict == Verdict::KnownDeviation && entry.is_at(c) && c.diagnosis.as_ref() == Some(&why)

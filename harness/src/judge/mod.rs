@@ -126,7 +126,7 @@ impl Judge<'_> {
     /// What every entry on record came to that is about comparisons of a task; `recordings` as for [`Self::compare`].
     pub fn on_record(&self, comparisons: &[Comparison], recordings: &[&Recording]) -> Vec<OnRecord> {
         let one = |recording: &&Recording| {
-            let mine: Vec<Comparison> = comparisons.iter().filter(|c| c.key == recording.key).cloned().collect();
+            let mine: Vec<&Comparison> = comparisons.iter().filter(|c| c.key == recording.key).collect();
             self.known.on_record(&mine, &recording.content_sha256)
         };
         recordings.iter().flat_map(one).collect()

@@ -17,6 +17,7 @@ mod terminal;
 pub(crate) mod words;
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::time::SystemTime;
 
 use schemars::JsonSchema;
@@ -26,6 +27,7 @@ use crate::judge::{Bias, Comparison, Consensus, OnRecord, PaperSplit, Policy, Po
 use crate::plan::Skip;
 use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Role, Status};
 use crate::spec::Case;
+use crate::system::files::{self, FileError};
 
 pub use accepted::{BaselineCheck, BaselineLine};
 pub use budget::budgets;
@@ -38,6 +40,9 @@ pub use junit::junit;
 pub use markdown::markdown;
 pub use read::{ReadReport, ReportError};
 pub use terminal::{Detail, Style, terminal};
+
+/// A report of more comparisons than this is laid out in rows.
+const LONG: usize = 10_000;
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Report {
@@ -191,6 +196,12 @@ impl Report {
         joined.engines.sort_by_key(|e| crate::engines::all().iter().position(|known| known.name() == e.id));
         let joined = Self { spec, summary, ..joined };
         Self { paper_splits: papers::splits(&joined), ..joined }
+    }
+
+    /// Writes it to a file, which is seen whole or not at all.
+    pub fn keep(&self, path: &Path) -> Result<(), FileError> {
+        let is_long = self.comparisons.len().max(self.readings.len()) > LONG;
+        if is_long { files::keep_rows(path, self) } else { files::keep_json(path, self) }
     }
 
     /// How many cases specs ask for.

@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
-use luminaire::geometry::{Mesh, Room, Surface};
+use luminaire::geometry::{Mesh, Room};
 use luminaire::photometry::{self, Photometry};
-use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, orientation};
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, flush, orientation};
 use sha2::{Digest, Sha256};
 
 use super::cases::Variant;
 use super::model::{
     Budget, EngineSettings, GridSpec, LuminaireSpec, MeterSet, ModelSpec, ObstacleSpec, Spec, ToleranceOverride,
 };
+use super::mounting::unmountable;
 use super::{Source, SpecError, suggestion};
 use crate::procedures::{Angles, Asked, AtAngles, Names, Procedures, Task};
 use crate::record::ProcedureId;
@@ -122,8 +123,9 @@ impl<'a> Builder<'a> {
         let message = format!("format version {} is not known", spec.luxproof);
         self.source.require(spec.luxproof == 1, "luxproof", message, "this program reads version 1")?;
         let room = self.room(&spec)?;
-        let obstacles = self.obstacles(&spec.obstacles, &room)?;
+        let mut obstacles = self.obstacles(&spec.obstacles, &room)?;
         let luminaires = self.luminaires(&spec.luminaires, &room)?;
+        obstacles.extend(self.recesses(&luminaires, &room)?);
         let scene = Scene { room: Some(room), obstacles, luminaires };
         let mut meters = BTreeMap::new();
         for (name, set) in &spec.meters {
@@ -208,11 +210,10 @@ impl<'a> Builder<'a> {
             let is_name = !spec.id.is_empty() && ids.insert(&spec.id);
             let message = format!("`{}` is no unique name", spec.id);
             self.source.require(is_name, &at("id"), message, "give every luminaire an id of its own")?;
-            let position_m = DVec3::from(spec.at_m);
-            // A luminous opening may be flush with a surface; light from a single point on one would be half lost.
-            let margin = if spec.model == ModelSpec::Point { SURFACE_MARGIN * room.size_m.max_element() } else { 0.0 };
-            let inside = position_m.is_finite() && room.contains(position_m, margin);
-            let message = format!("{position_m} lies outside the room or on its surface");
+            // What is nearly in the plane of a surface is meant to be recessed in it.
+            let position_m = flush::snapped(room, DVec3::from(spec.at_m));
+            let inside = position_m.is_finite() && room.contains(position_m, 0.0);
+            let message = format!("{position_m} lies outside the room");
             self.source.require(inside, &at("at_m"), message, within(room))?;
             let is_factor = spec.flux_scale.is_finite() && spec.flux_scale >= 0.0;
             let message = format!("{} is no factor", spec.flux_scale);
@@ -241,13 +242,27 @@ impl<'a> Builder<'a> {
             let message = format!("it gives the luminaire {brightest_cd:e} cd, and nothing is so bright");
             let help = "correct the factor, or the candela of the photometric file";
             self.source.require(brightest_cd <= BRIGHTEST_CD, &at("flux_scale"), message, help)?;
-            if let Some(message) = sticks_out(&luminaire, room) {
-                let help = "move or turn it, or read it as `model: point`; an opening may be flush with a surface";
+            if let Some((message, help)) = unmountable(&luminaire, room) {
                 return Err(self.source.error_at(&at("at_m"), message, help));
             }
             luminaires.push(luminaire);
         }
         Ok(luminaires)
+    }
+
+    /// The pieces of surface that flush openings replace, which must not overlap.
+    fn recesses(&self, luminaires: &[Luminaire], room: &Room) -> Result<Vec<Obstacle>, SpecError> {
+        let mut plates: Vec<(&str, Obstacle)> = vec![];
+        for (k, luminaire) in luminaires.iter().enumerate() {
+            let Some(plate) = flush::plate(room, luminaire) else { continue };
+            if let Some((other, _)) = plates.iter().find(|(_, other)| flush::overlap(room, other, &plate)) {
+                let message = format!("its luminous opening overlaps that of `{other}` in the plane of the surface");
+                let help = "move one of them: where one opening is, there is no room for another";
+                return Err(self.source.error_at(&format!("luminaires[{k}].at_m"), message, help));
+            }
+            plates.push((&luminaire.id, plate));
+        }
+        Ok(plates.into_iter().map(|(_, plate)| plate).collect())
     }
 
     fn photometry(&mut self, at: &str, path: &Path) -> Result<Arc<Photometry>, SpecError> {
@@ -407,28 +422,6 @@ fn misplaced(point: DVec3, scene: &Scene) -> Option<(&'static str, String)> {
         return Some(("lies in a luminaire's photometric centre", "move it away".to_owned()));
     }
     None
-}
-
-/// Nearer to a surface than this, in metres, an opening is flush with it.
-const FLUSH_M: f64 = 1e-9;
-
-/// How far the luminous opening sticks out of the room, where it does: light from behind a surface is the simulator's alone.
-fn sticks_out(luminaire: &Luminaire, room: &Room) -> Option<String> {
-    if luminaire.model == LuminaireModel::Point {
-        return None;
-    }
-    let to_own = luminaire.orientation.transpose();
-    let beyond_m = |surface: Surface| {
-        let outward = -surface.inward_normal();
-        let plane_m = if surface.is_far() { room.size_m[surface.axis()] } else { 0.0 };
-        let reach_m = luminaire.photometry.opening.reach_m(to_own * outward);
-        luminaire.position_m.dot(outward) + reach_m - plane_m
-    };
-    let by = Surface::ALL.into_iter().map(|s| (beyond_m(s), s)).max_by(|a, b| a.0.total_cmp(&b.0));
-    let (beyond_m, surface) = by.filter(|(m, _)| *m > FLUSH_M)?;
-    // Whole nanometres: further digits are rounding.
-    let beyond_m = (beyond_m * 1e9).round() / 1e9;
-    Some(format!("its luminous opening sticks out of the room by {beyond_m} m through the {}", surface.name()))
 }
 
 fn extent(shape: &Shape) -> (DVec3, DVec3) {

@@ -7,6 +7,7 @@ mod cases;
 mod content;
 mod locate;
 mod model;
+mod mounting;
 mod suite;
 
 use std::path::{Path, PathBuf};

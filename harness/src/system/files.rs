@@ -1,11 +1,15 @@
 //! Files that are seen whole or not at all, whoever reads or is killed meanwhile.
 
 use std::fs::Permissions;
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use serde::Serialize;
+use serde_json::Serializer;
+use serde_json::ser::{Formatter, PrettyFormatter};
+
+use super::rows::Rows;
 
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {source}")]
@@ -17,34 +21,53 @@ pub struct FileError {
 /// How the names of files begin that are not finished.
 pub(crate) const UNFINISHED: &str = ".unfinished-";
 
+/// Bytes that are written at a time.
+const BUFFER: usize = 1 << 16;
+
 /// Puts a file with these bytes into the place of what is there; its folder is made if need be.
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    replace_by(&mut tempfile::Builder::new(), path, bytes)
+    replace_by(&mut tempfile::Builder::new(), path, |file| file.write_all(bytes))
 }
 
 /// The same for a file that others are to read: with the permissions that the user gives to new files.
 pub(crate) fn replace_shared(path: &Path, bytes: &[u8]) -> io::Result<()> {
     // The system takes off what the user's mask forbids.
-    replace_by(tempfile::Builder::new().permissions(Permissions::from_mode(0o666)), path, bytes)
+    replace_by(tempfile::Builder::new().permissions(Permissions::from_mode(0o666)), path, |file| file.write_all(bytes))
 }
 
-fn replace_by(builder: &mut tempfile::Builder<'_, '_>, path: &Path, bytes: &[u8]) -> io::Result<()> {
+fn replace_by(
+    builder: &mut tempfile::Builder<'_, '_>,
+    path: &Path,
+    write: impl FnOnce(&mut tempfile::NamedTempFile) -> io::Result<()>,
+) -> io::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder)?;
     let mut file = builder.prefix(UNFINISHED).tempfile_in(folder)?;
-    file.write_all(bytes)?;
+    write(&mut file)?;
     file.persist(path).map_err(|e| e.error)?;
     Ok(())
 }
 
 /// The same with a value as JSON for people, a line feed at its end.
 pub(crate) fn replace_json<T: Serialize>(path: &Path, value: &T) -> io::Result<()> {
-    let mut bytes = serde_json::to_vec_pretty(value)?;
-    bytes.push(b'\n');
-    replace(path, &bytes)
+    replace_by(&mut tempfile::Builder::new(), path, |file| written(file, value, PrettyFormatter::new()))
 }
 
 /// The same, the error with its path.
 pub(crate) fn keep_json<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
     replace_json(path, value).map_err(|source| FileError { path: path.display().to_string(), source })
+}
+
+/// The same with an item of a list a line, for what is too long to be read.
+pub(crate) fn keep_rows<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
+    replace_by(&mut tempfile::Builder::new(), path, |file| written(file, value, Rows::new()))
+        .map_err(|source| FileError { path: path.display().to_string(), source })
+}
+
+/// As it is made: a report of 1e5 meters is some 100 MB.
+fn written(file: &mut tempfile::NamedTempFile, value: &impl Serialize, layout: impl Formatter) -> io::Result<()> {
+    let mut writer = BufWriter::with_capacity(BUFFER, file);
+    value.serialize(&mut Serializer::with_formatter(&mut writer, layout))?;
+    writer.write_all(b"\n")?;
+    writer.flush()
 }

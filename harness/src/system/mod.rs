@@ -5,4 +5,5 @@ pub mod envelope;
 pub mod files;
 pub mod process;
 pub(crate) mod random;
+mod rows;
 pub mod slots;

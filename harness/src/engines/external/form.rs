@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::engines::contract::same_meters;
-use crate::engines::{EngineError, Job, Measurement, Station};
+use crate::engines::{EngineError, Job, Measurement, Station, recess};
 use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
 use crate::spec::Budget;
 
@@ -186,6 +186,7 @@ fn no_smaller_than_counts(error_lx: f64) -> f64 {
 
 impl ExternalJob {
     pub fn of(job: &Job) -> Self {
+        let job = &*recess::apart(job);
         let light = match job.transport {
             Transport::Direct => Light::Direct,
             Transport::Indirect(_) => Light::Indirect,

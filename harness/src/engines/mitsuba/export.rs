@@ -18,7 +18,7 @@ use self::tables::Tables;
 use super::ID;
 use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
 use crate::engines::settings::Preset;
-use crate::engines::{EngineError, Job, SceneFile};
+use crate::engines::{EngineError, Job, SceneFile, recess};
 
 const READ: &str = include_str!("../../../drivers/mitsuba_read.py");
 const GONIOMETRIC: &str = include_str!("../../../drivers/mitsuba_goniometric.py");
@@ -28,6 +28,7 @@ const HIGH_REFLECTANCE: f64 = 0.95;
 
 pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.coordinates);
+    let job = &*recess::apart(job);
     let tables = Tables::of(job);
     let mut files = vec![
         SceneFile::text("scene.xml", scene_xml(job, &frame, &tables)),

@@ -12,7 +12,7 @@ use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport};
 
 use crate::engines::effort;
-use crate::engines::{Job, SceneFile, Station};
+use crate::engines::{Job, SceneFile, Station, recess};
 
 use super::frame::{Frame, candela, seats};
 use super::opening::{self, Part};
@@ -39,9 +39,11 @@ pub(super) enum Light {
 
 pub(super) fn scene(job: &Job, settings: &Settings) -> SceneFile {
     let frame = Frame::of(job, settings.coordinates);
+    let points = points(job);
+    let job = &*recess::apart(job);
     let mut text = head(job, settings, frame);
     text.push_str(&meters(job, frame));
-    text.push_str(&luminaires(job, frame));
+    text.push_str(&luminaires(job, frame, points));
     text.push_str(&surroundings(job, frame));
     SceneFile::text(SCENE, text)
 }
@@ -223,7 +225,7 @@ camera { mesh_camera { 1 0 mesh { Aim } } location <0, 0, .002> direction <0, 0,
 #end
 ";
 
-fn luminaires(job: &Job, frame: Frame) -> String {
+fn luminaires(job: &Job, frame: Frame, points: usize) -> String {
     let mut text = String::from(
         "\n// Luminaires: a point light behind a small sphere whose pigment filters it to the luminous intensity distribution.\n\
          #declare AngleGamma = function(x, y, z) { degrees(atan2(sqrt(x*x + y*y), -z)) }\n\
@@ -239,12 +241,12 @@ fn luminaires(job: &Job, frame: Frame) -> String {
             declared.push(distribution);
             text.push_str(&pigment::declare(&format!("Distribution{number}"), distribution));
         }
-        text.push_str(&one_luminaire(job, luminaire, number, frame));
+        text.push_str(&one_luminaire(job, luminaire, number, frame, points));
     }
     text
 }
 
-fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame) -> String {
+fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame, points: usize) -> String {
     let (axes, most) = (luminaire.orientation, candela(luminaire));
     let matrix = [axes.x_axis, axes.y_axis, axes.z_axis].map(numbers).join(", ");
     let mut text = format!(
@@ -261,7 +263,6 @@ fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame) 
         let line = |part: &Part| format!("Luminaire({}, {})\n", place(part), candela * part.share);
         parts(luminaire, points).iter().map(line).collect()
     };
-    let points = points(job);
     if luminaire.model == LuminaireModel::Point || job.transport == Transport::Direct {
         text.push_str(&instances(points));
     } else {
@@ -272,7 +273,7 @@ fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame) 
 
 /// Point lights along an opening for direct light: more where obstacles or nearness would show them.
 pub(super) fn points(job: &Job) -> usize {
-    let few_do = job.scene.obstacles.is_empty() && opening::too_near(job, POINTS).is_none();
+    let few_do = !recess::has_bodies(job) && opening::too_near(job, POINTS).is_none();
     if few_do { POINTS } else { POINTS_PAST_OBSTACLES }
 }
 

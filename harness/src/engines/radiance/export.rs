@@ -13,7 +13,7 @@ pub(super) use self::luminaires::{EDGE_DEG, disc_error, ies2rad_options, swallow
 use super::options::Options;
 use super::settings::Settings;
 use crate::engines::settings::Coordinates;
-use crate::engines::{Job, SceneFile};
+use crate::engines::{Job, SceneFile, recess};
 
 /// Lumens a watt, by which Radiance's radiometric quantities are photometric (`WHTEFFICACY` in its sources).
 pub(super) const EFFICACY: f64 = 179.0;
@@ -25,6 +25,7 @@ const READ_AHEAD: f64 = 1e-4;
 
 pub(super) fn files(job: &Job, settings: &Settings, options: &Options) -> Vec<SceneFile> {
     let scale = scale(job, settings.coordinates);
+    let job = &*recess::apart(job);
     let mut files = vec![
         SceneFile::text("scene.rad", scene_rad(job, settings, scale)),
         SceneFile::text("meters.txt", meters_txt(job, scale)),

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DMat3, DVec3};
 use luminaire::geometry::{Room, Surface};
 use luminaire::photometry::{LuminousOpening, direction};
-use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape};
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, flush};
 
 use super::{Fill, Shortcut};
 use crate::engines::Job;
@@ -139,14 +139,25 @@ fn keeps_reflectances(room: &Room, motion: &Motion) -> bool {
     Surface::ALL.into_iter().all(|s| image(s).is_some_and(|i| room.reflectance.of(i) == room.reflectance.of(s)))
 }
 
-/// Whether a motion takes one box to another. Of meshes that is not asked.
+/// Whether a motion takes one box to another, or one recessed opening. Of other meshes that is not asked.
 fn is_image(body: &Obstacle, other: &Obstacle, motion: &Motion, near_m: f64) -> bool {
-    let (Shape::Box { min_m, max_m }, Shape::Box { min_m: low, max_m: high }) = (&body.shape, &other.shape) else {
-        return false;
-    };
-    let (a, b) = (motion.point(*min_m), motion.point(*max_m));
     let near = |p: DVec3, q: DVec3| p.distance(q) < near_m;
-    body.reflectance == other.reflectance && near(a.min(b), *low) && near(a.max(b), *high)
+    let is_same_shape = match (&body.shape, &other.shape) {
+        (Shape::Box { min_m, max_m }, Shape::Box { min_m: low, max_m: high }) => {
+            let (a, b) = (motion.point(*min_m), motion.point(*max_m));
+            near(a.min(b), *low) && near(a.max(b), *high)
+        }
+        // Convex, so that their corners say it all.
+        (Shape::Mesh { vertices_m, .. }, Shape::Mesh { vertices_m: others, .. }) => {
+            let is_there = |p: &DVec3| others.iter().any(|q| near(motion.point(*p), *q));
+            flush::is_plate(body)
+                && flush::is_plate(other)
+                && vertices_m.len() == others.len()
+                && vertices_m.iter().all(is_there)
+        }
+        _ => false,
+    };
+    body.reflectance == other.reflectance && is_same_shape
 }
 
 /// Whether what one luminaire sends somewhere the other sends to the image of that, from an opening that is its image.

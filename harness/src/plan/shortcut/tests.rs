@@ -1,7 +1,8 @@
 //! Laws of shortcuts: what they leave out is what the exact simulation says it is, and what is not symmetric is left alone.
 
 use glam::DVec3;
-use luminaire::scene::{Bounces, LuminaireModel, Obstacle, Scene, Shape, Transport, orientation};
+use luminaire::photometry::LuminousOpening;
+use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport, flush, orientation};
 use luminaire::simulator::{Accuracy, illuminance};
 
 use super::*;
@@ -64,6 +65,25 @@ fn of_an_oblong_room_a_quarter_is_rendered_and_of_a_square_one_with_an_axial_lam
     // Every meter that is filled in is traced to the one that was rendered.
     assert_eq!(settings["mirrored_meters"].matches(" is ").count(), 13, "{settings:?}");
     assert!(shortcut.omissions.iter().all(|o| !o.reason.is_empty() && o.share > 0.0 && o.share <= 1.0));
+}
+
+#[test]
+fn recessed_panels_are_as_symmetric_as_their_places() {
+    let mut job = symmetric_job(DVec3::new(6.0, 4.0, 3.0), Transport::Direct);
+    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.4, height_m: 0.0 };
+    let panel = |x, y| {
+        let lamp = fixtures::luminaire("panel", DVec3::new(x, y, 3.0), fixtures::lambertian());
+        fixtures::with_opening(lamp, opening)
+    };
+    let mount = |job: &mut Job, panels: Vec<Luminaire>| {
+        let room = job.scene.room.unwrap();
+        job.scene.obstacles = panels.iter().filter_map(|l| flush::plate(&room, l)).collect();
+        job.scene.luminaires = panels;
+    };
+    mount(&mut job, vec![panel(1.5, 1.0), panel(4.5, 1.0), panel(1.5, 3.0), panel(4.5, 3.0)]);
+    assert_eq!(holds(&job).job.stations.len(), 4);
+    mount(&mut job, vec![panel(1.5, 1.0), panel(4.5, 1.0), panel(1.5, 3.0), panel(4.4, 3.0)]);
+    assert_eq!(holds(&job).job.stations.len(), 16);
 }
 
 #[test]

@@ -7,7 +7,7 @@
 //! Satterthwaite (GUM G.4.1); a mean has those of all its meters together, and a variance that is larger by what its weights are
 //! uncertain by (Meier, Variance of a weighted mean, Biometrics 9 (1953) 59).
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::fmt;
 
 use schemars::JsonSchema;
@@ -163,16 +163,16 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
         return bare(a, State::Refused, notes);
     }
     let mut change = bare(a, State::Unchanged, notes);
+    let [by_meter_before, by_meter_now] = [a, b].map(by_meter);
     for before in &a.readings {
-        if let Some(now) = b.readings.iter().find(|now| now.meter == before.meter && now.quantity == before.quantity) {
+        if let Some(now) = by_meter_now.get(&(&before.meter, before.quantity)) {
             change.meters.push(meter(before, now));
         } else {
             change.state = State::Vanished;
             change.notes.push(format!("{} is not read any more", before.meter));
         }
     }
-    let is_held = |now: &&Reading| a.readings.iter().any(|r| r.meter == now.meter && r.quantity == now.quantity);
-    for now in b.readings.iter().filter(|now| !is_held(now)) {
+    for now in b.readings.iter().filter(|now| !by_meter_before.contains_key(&(&now.meter, now.quantity))) {
         if change.state == State::Unchanged {
             change.state = State::New;
         }
@@ -180,6 +180,11 @@ fn pair(a: &Entry, b: &Entry, comparability: Comparability) -> EntryChange {
     }
     change.mean = mean(&change.meters);
     change
+}
+
+/// Readings by what they are of; of one that stands there twice the first.
+fn by_meter(entry: &Entry) -> HashMap<(&MeterId, Quantity), &Reading> {
+    entry.readings.iter().rev().map(|r| ((&r.meter, r.quantity), r)).collect()
 }
 
 fn short(hash: &str) -> String {

@@ -9,7 +9,7 @@ use std::fmt::Write;
 use glam::{DMat3, DVec3};
 use luminaire::geometry::Surface;
 use luminaire::photometry::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, lm63};
-use luminaire::scene::{Luminaire, Meter, Transport};
+use luminaire::scene::{Luminaire, Meter, Transport, flush};
 
 use super::{EFFICACY, box_faces, polygon};
 use crate::engines::radiance::route::{Route, route};
@@ -68,7 +68,8 @@ pub(in crate::engines::radiance) fn disc_error(job: &Job, settings: &Settings) -
 /// Measured: 1.5 % at a meter of case S2 where this says 3 %.
 pub(in crate::engines::radiance) fn swallowed(job: &Job, settings: &Settings) -> Option<f64> {
     let room = job.scene.room.filter(|_| job.transport != Transport::Direct)?;
-    let has_extent = |l: &&Luminaire| route(l, settings) != Route::Point;
+    // What meets a recessed one ends on its black face in any case.
+    let has_extent = |l: &&Luminaire| route(l, settings) != Route::Point && flush::recess_of(&job.scene, l).is_none();
     let extended: Vec<&Luminaire> = job.scene.luminaires.iter().filter(has_extent).collect();
     if extended.is_empty() {
         return None;

@@ -1,0 +1,86 @@
+//! Recessed luminaires for programs that cannot tell surfaces in one plane apart: plate and opening come a hair into the room.
+
+use std::borrow::Cow;
+
+use glam::DVec3;
+use luminaire::geometry::Surface;
+use luminaire::scene::{Luminaire, Shape, flush};
+
+use super::Job;
+
+/// How far a plate comes into the room, in parts of its largest extent: .03 mm in 6 m, a hundred times what 32-bit floats resolve
+/// there. Openings come twice as far; at two metres below one that moves 3e-5 of its light.
+pub(super) const APART: f64 = 5e-6;
+
+/// The job with its flush plates before their surfaces and recessed openings before their plates; the job itself without them.
+pub(super) fn apart(job: &Job) -> Cow<'_, Job> {
+    let Some(room) =
+        job.scene.room.filter(|room| job.scene.obstacles.iter().any(|o| flush::lies_on(room, o).is_some()))
+    else {
+        return Cow::Borrowed(job);
+    };
+    let inwards = |surface: Surface| APART * room.size_m.max_element() * surface.inward_normal();
+    let luminaire = |l: &Luminaire| {
+        let moved_m = flush::recess_of(&job.scene, l).map_or(DVec3::ZERO, |s| 2.0 * inwards(s));
+        Luminaire { position_m: l.position_m + moved_m, ..l.clone() }
+    };
+    let mut moved = job.clone();
+    moved.scene.luminaires = job.scene.luminaires.iter().map(luminaire).collect();
+    for obstacle in &mut moved.scene.obstacles {
+        let surface = flush::lies_on(&room, obstacle);
+        if let (Some(surface), Shape::Mesh { vertices_m, .. }) = (surface, &mut obstacle.shape) {
+            for corner in vertices_m {
+                *corner += inwards(surface);
+            }
+        }
+    }
+    Cow::Owned(moved)
+}
+
+/// Whether bodies stand in the room, recessed openings apart: those hide nothing.
+pub(super) fn has_bodies(job: &Job) -> bool {
+    let lies = |o| job.scene.room.is_some_and(|room| flush::lies_on(&room, o).is_some());
+    job.scene.obstacles.iter().any(|o| !lies(o))
+}
+
+#[cfg(test)]
+mod tests {
+    use luminaire::photometry::LuminousOpening;
+    use luminaire::scene::{LuminaireModel, Obstacle, Transport};
+
+    use super::*;
+    use crate::engines::fixtures;
+
+    fn office() -> Job {
+        let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+        let size_m = DVec3::new(6.0, 4.0, 3.0);
+        let room = fixtures::room(size_m, 0.2, 0.5, 0.8);
+        let lamp = |id, x| fixtures::luminaire(id, DVec3::new(x, 2.0, 3.0), fixtures::lambertian());
+        let mut job = fixtures::s1(Transport::Direct);
+        let panel = fixtures::with_opening(lamp("panel", 2.0), opening);
+        job.scene.obstacles = vec![flush::plate(&room, &panel).unwrap()];
+        (job.scene.room, job.scene.luminaires) = (Some(room), vec![panel, lamp("point", 4.0)]);
+        job
+    }
+
+    #[test]
+    fn a_plate_comes_before_its_surface_the_opening_before_it_and_a_point_stays() {
+        let job = office();
+        let moved = apart(&job);
+        let plate = |o: &Obstacle| match &o.shape {
+            Shape::Mesh { vertices_m, .. } => vertices_m[0].z,
+            Shape::Box { .. } => f64::NAN,
+        };
+        let [panel, point] = &moved.scene.luminaires[..] else { panic!("luminaires are lost") };
+        assert_eq!((plate(&moved.scene.obstacles[0]), panel.position_m.z, point.position_m.z), (2.99997, 2.99994, 3.0));
+        assert_eq!(moved.scene.luminaires[0].model, LuminaireModel::Area);
+        assert!(!has_bodies(&job));
+    }
+
+    #[test]
+    fn what_is_not_recessed_is_exported_as_it_is() {
+        let mut job = office();
+        job.scene.obstacles = vec![fixtures::cuboid([0.0, 0.0, 2.0], [1.0, 1.0, 3.0], 0.5)];
+        assert!(matches!(apart(&job), Cow::Borrowed(_)) && has_bodies(&job));
+    }
+}
