@@ -18,6 +18,7 @@ mod negative_controls;
 mod planning;
 mod policy;
 mod repeatability;
+mod repetitions;
 mod stated_errors;
 mod stops;
 mod suite;
