@@ -58,6 +58,6 @@ fn options_of_repetitions_need_specs_and_sense() {
     folder.luxproof(&["selftest", "--engines", "radiance"]).exits(2);
     let axial = root().join("reference/specs/axial.yaml");
     let args = ["selftest", "--repetitions", "3", axial.to_str().unwrap()];
-    folder.luxproof(&[&args[..], &["--relative-error", "-1"]].concat()).exits(2).complains("numbers above 0");
+    folder.luxproof(&[&args[..], &["--relative-error", "0"]].concat()).exits(2).complains("numbers above 0");
     folder.luxproof(&[&args[..], &["--engines", "radiance"]].concat()).exits(3);
 }
