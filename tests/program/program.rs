@@ -19,6 +19,7 @@ mod planning;
 mod policy;
 mod recessed;
 mod repeatability;
+mod repetitions;
 mod stated_errors;
 mod stops;
 mod suite;

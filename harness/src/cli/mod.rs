@@ -12,6 +12,7 @@ mod history;
 mod measuring;
 pub(crate) mod photometry;
 mod progress;
+mod repetitions;
 mod run;
 mod selftest;
 mod stress;
@@ -207,7 +208,7 @@ impl Cli {
             Command::History(action) => history::history(&action),
             Command::Diff(args) => diff::diff(&args),
             Command::Accept(args) => accept::accept(&args),
-            Command::Selftest(args) => selftest::run_selftest(&args),
+            Command::Selftest(args) => selftest::run_selftest(&args, &site, || cache::folder(self.cache_dir)),
             Command::Bench(args) => bench::run(&args, &site),
             Command::Stress(args) => stress::run(&args, &site),
             Command::ReadOne => measuring::read_one(&site),

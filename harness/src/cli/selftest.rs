@@ -1,10 +1,13 @@
-//! `luxproof selftest`: the scorecard of faults, and how good intervals and p-values are.
+//! `luxproof selftest`: the scorecard of faults, how good intervals and p-values are, and whether stated errors are honest.
 
 use clap::Args;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
+use super::repetitions::{RepetitionArgs, repeat};
 use super::{TextOrJson, json, print};
+use crate::engines::Site;
 use crate::experiments::selftest::{calibrations, naming, selftest};
+use crate::measure::cache::Cache;
 use crate::report::Exit;
 
 #[derive(Debug, Args)]
@@ -24,12 +27,30 @@ pub(super) struct SelftestArgs {
     /// Draw so many faults of each kind at random, in rooms at random: how often are they named rightly, wrongly, not at all?
     #[arg(long, value_name = "N", conflicts_with = "calibration")]
     naming: Option<usize>,
+    #[command(flatten)]
+    repeated: RepetitionArgs,
     /// View of the scorecard to print
     #[arg(long, value_enum, value_name = "FORMAT", default_value_t = TextOrJson::Terminal)]
     format: TextOrJson,
 }
 
-pub(super) fn run_selftest(args: &SelftestArgs) -> Result<Exit, Diagnostic> {
+pub(super) fn run_selftest(
+    args: &SelftestArgs,
+    site: &Site,
+    cache: impl FnOnce() -> Result<Cache, Diagnostic>,
+) -> Result<Exit, Diagnostic> {
+    if let Some(seeds) = args.repeated.repetitions {
+        let found = repeat(&args.repeated, seeds, args.seed, site, cache()?)?;
+        print(&match args.format {
+            TextOrJson::Terminal => found.to_string(),
+            TextOrJson::Json => json(&found)?,
+        })?;
+        return Ok(match (found.is_complete(), found.is_good()) {
+            (false, _) => Exit::Engine,
+            (true, false) => Exit::Failed,
+            (true, true) => Exit::Passed,
+        });
+    }
     if args.calibration {
         let found = calibrations(args.seed);
         print(&match args.format {

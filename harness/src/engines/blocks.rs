@@ -88,16 +88,24 @@ impl Blocks {
 
     /// How much of their noise stations share; `None` for fewer blocks than tell.
     pub fn design_effect(&self) -> Option<f64> {
+        let alone: Vec<Vec<(usize, f64)>> = self.stations().map(|k| vec![(k, 1.0)]).collect();
+        let all = self.deviates(&alone);
+        let is_sampled = all.iter().flatten().any(|z| *z != 0.0);
+        (self.count() >= MIN_BLOCKS && is_sampled).then(|| design_effect(&all))
+    }
+
+    /// By block, how far weighted sums over stations are from their means, in standard deviations; 0 where nothing varies.
+    pub fn deviates(&self, sums: &[Vec<(usize, f64)>]) -> Vec<Vec<f64>> {
         let n = self.count() as f64;
-        let of = |k: usize| {
-            let mean = self.0.iter().map(|b| b[k]).sum::<f64>() / n;
-            let deviation = (self.0.iter().map(|b| (b[k] - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-            (deviation > 0.0).then_some((k, mean, deviation))
-        };
-        let sampled: Vec<(usize, f64, f64)> = self.stations().filter_map(of).collect();
-        let deviates = |b: &Vec<f64>| sampled.iter().map(|(k, mean, deviation)| (b[*k] - mean) / deviation).collect();
-        let all: Vec<Vec<f64>> = self.0.iter().map(deviates).collect();
-        (self.count() >= MIN_BLOCKS && !sampled.is_empty()).then(|| design_effect(&all))
+        let mut all = vec![vec![]; self.count()];
+        for weights in sums {
+            let of_blocks: Vec<f64> = self.0.iter().map(|b| weights.iter().map(|(k, w)| w * b[*k]).sum()).collect();
+            let mean = of_blocks.iter().sum::<f64>() / n;
+            let deviation = (of_blocks.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+            let deviate = |b: f64| if deviation > 0.0 { (b - mean) / deviation } else { 0.0 };
+            all.iter_mut().zip(of_blocks).for_each(|(block, b)| block.push(deviate(b)));
+        }
+        all
     }
 
     /// Blocks of other stations, each a factor times one of these, or dark.

@@ -286,20 +286,35 @@ pub struct Forgotten {
     skewness: Option<f64>,
 }
 
+/// The stations of targets with what each counts for, the first target's first.
+fn weights(targets: &[&Target]) -> Vec<Vec<(usize, f64)>> {
+    let mut first = 0;
+    let of = |target: &&Target| {
+        let weights: Vec<_> = target.aspects.iter().enumerate().map(|(k, a)| (first + k, a.weight)).collect();
+        first += weights.len();
+        weights
+    };
+    targets.iter().map(of).collect()
+}
+
 impl Measurement {
     /// The readings of targets, whose stations these are, target by target.
     pub fn readings<'a>(&self, targets: impl IntoIterator<Item = &'a Target>) -> Vec<Estimate> {
-        let mut first = 0;
-        let reading = |target: &Target| {
-            let weights: Vec<_> = target.aspects.iter().enumerate().map(|(k, a)| (first + k, a.weight)).collect();
-            first += weights.len();
+        let targets: Vec<&Target> = targets.into_iter().collect();
+        let reading = |(target, weights): (&&Target, Vec<(usize, f64)>)| {
             let sum = self.weighted(&weights);
             match target.quadrature {
                 0.0 => sum,
                 relative => Estimate { uncertainty: sum.uncertainty.within(relative * sum.value.abs()), ..sum },
             }
         };
-        targets.into_iter().map(reading).collect()
+        targets.iter().zip(weights(&targets)).map(reading).collect()
+    }
+
+    /// Of each part that was sampled, block by block, how far the readings of targets are from their means, see [`Blocks::deviates`].
+    pub fn deviates<'a>(&self, targets: impl IntoIterator<Item = &'a Target>) -> Vec<Vec<Vec<f64>>> {
+        let weights = weights(&targets.into_iter().collect::<Vec<_>>());
+        self.samples.iter().map(|part| part.deviates(&weights)).collect()
     }
 
     /// Takes the blocks of a part of the light, and gives its estimates.

@@ -1,7 +1,7 @@
 //! Seeded repetitions of case S1 on the real renderers: unbiased, and with standard errors that are what they say.
 //!
-//! Few and small, so that every test run affords them; `benchmarks/repetitions.py` does twenty at audit
-//! size, and `benchmarks/repetitions.md` has its figures.
+//! Few and small, so that every test run affords them; `luxproof selftest --repetitions` does as many as one likes on any spec, and
+//! `benchmarks/repetitions.md` has its figures.
 
 use super::fixtures::{CONVERGED, S1_INDIRECT_LX, s1, workbench};
 use super::mitsuba::Mitsuba;

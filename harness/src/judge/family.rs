@@ -10,7 +10,7 @@
 //! 1982).
 
 /// Which of the hypotheses behind these p-values are rejected at a family-wise level.
-pub(super) fn rejected(p_values: &[f64], level: f64) -> Vec<bool> {
+pub fn rejected(p_values: &[f64], level: f64) -> Vec<bool> {
     let mut order: Vec<usize> = (0..p_values.len()).collect();
     order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));
     let mut rejected = vec![false; p_values.len()];

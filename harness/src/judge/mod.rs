@@ -31,6 +31,7 @@ use papers::Input;
 pub use crate::record::Basis;
 pub use bias::{Bias, SINGLE_PRECISION, WeightedMean, two_sided};
 pub use consensus::{Consensus, Witness};
+pub use family::rejected;
 pub use known::{Glob, How, KnownBreak, KnownDeviation, KnownDeviations, OnRecord, State};
 pub use papers::{Misfit, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
 pub use papers::{PaperSplit, Share, Stages, shares};

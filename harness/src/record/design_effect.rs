@@ -17,6 +17,25 @@ pub fn design_effect(deviates: &[Vec<f64>]) -> f64 {
     if is_shared && effect.is_finite() { effect } else { 1.0 }
 }
 
+/// The same of the sum over meters of squared deviates: noise in opposite directions is as much one as noise in the same.
+///
+/// It is one more than the mean over meters of their squared correlations with all others, each less what chance makes of it; all of
+/// them where draws are too few to tell.
+pub fn design_effect_of_squares(deviates: &[Vec<f64>]) -> f64 {
+    let (draws, all) = (deviates.len() as f64, deviates.first().map_or(0, Vec::len));
+    let norm = |k: &usize| deviates.iter().map(|draw| draw[*k].powi(2)).sum::<f64>();
+    let meters: Vec<(usize, f64)> = (0..all).map(|k| (k, norm(&k))).filter(|(_, norm)| *norm > 0.0).collect();
+    let by_chance = 1.0 / (draws - 1.0);
+    let square = |(a, b): (&(usize, f64), &(usize, f64))| {
+        let product: f64 = deviates.iter().map(|draw| draw[a.0] * draw[b.0]).sum();
+        (product * product / (a.1 * b.1) - by_chance) / (1.0 - by_chance)
+    };
+    let pairs = meters.iter().enumerate().flat_map(|(k, a)| meters[..k].iter().map(move |b| (a, b)));
+    let count = meters.len().max(1) as f64;
+    let effect = 1.0 + 2.0 * pairs.map(square).sum::<f64>() / count;
+    if effect.is_finite() { effect.clamp(1.0, count) } else { count }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,5 +1,6 @@
 //! Readings: what one engine says at one meter, with its uncertainty.
 
+mod agreement;
 mod basis;
 mod design_effect;
 mod key;
@@ -13,8 +14,9 @@ mod uncertainty;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use agreement::Agreement;
 pub use basis::Basis;
-pub use design_effect::design_effect;
+pub use design_effect::{design_effect, design_effect_of_squares};
 pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
 pub use light::{Light, UnknownLight};
 pub use method::{Effort, Method};

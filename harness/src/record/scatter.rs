@@ -14,6 +14,8 @@ pub(super) const MANY: f64 = 1e6;
 pub(super) struct Scatter {
     pub(super) sum: f64,
     pub(super) freedom: f64,
+    /// Degrees of freedom of the readings alone, were the stated errors known for certain.
+    pub(super) of_readings: f64,
     /// By draw, of every meter that has them all: deviations from the meter's mean, in its standard errors.
     pub(super) deviates: Vec<Vec<f64>>,
 }
@@ -71,7 +73,7 @@ pub(super) fn of_repeated(meters: &[Vec<Estimate>]) -> Option<Scatter> {
         variance += 2.0 * above * (above + below - 2.0) / (below - 4.0);
     }
     let effective = 2.0 * freedom * freedom / variance;
-    let scatter = Scatter { sum: sum * effective / freedom, freedom: effective, deviates };
+    let scatter = Scatter { sum: sum * effective / freedom, freedom: effective, of_readings: freedom, deviates };
     (scatter.sum.is_finite() && effective > 0.0).then_some(scatter)
 }
 

@@ -89,7 +89,7 @@ impl StatedErrors {
     /// Of readings whose errors are stated, one list a meter; meters whose error is not of sampling say nothing, and all of them too
     /// little where there are too few. `of_engine` is how the errors of all that the engine read vary.
     pub fn of_sampled(meters: &[Vec<Estimate>], of_engine: &Variation) -> Option<Self> {
-        let Scatter { sum, freedom, deviates } = of_repeated(meters)?;
+        let Scatter { sum, freedom, deviates, .. } = of_repeated(meters)?;
         let design_effect = design_effect(&deviates);
         let ratio = (sum / freedom).sqrt();
         let degrees_of_freedom = freedom / design_effect;

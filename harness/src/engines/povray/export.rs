@@ -64,7 +64,7 @@ pub(super) fn arguments(job: &Job, light: Light, seed: u32, blanks: usize, image
 /// the same few hundred inclinations in every block, however the scene was turned, and their error did not average out:
 /// up to 2 % at a count of 100.
 pub(super) fn blanks(seed: u32, parts: u32) -> usize {
-    // Fibonacci hashing (Knuth, The Art of Computer Programming, vol. 3, 6.4) spreads successive seeds evenly.
+    // Fibonacci hashing (Knuth, The Art of Computer Programming, vol. 3, 6.4): unlike the turn of the scene by the same seed.
     let spread = f64::from(seed.wrapping_mul(2_654_435_769)) / 2_f64.powi(32);
     1 + (spread * f64::from(parts.clamp(1, MAX_BLANKS))) as usize
 }

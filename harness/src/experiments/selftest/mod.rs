@@ -1,7 +1,8 @@
-//! The self-test: every known fault is put into a witness's readings, and the harness must catch it and name it.
+//! The self-test: every known fault is put into a witness's readings, and the harness must catch it and name it; and are stated errors honest?
 
 mod calibration;
 mod naming;
+pub mod repetitions;
 
 use std::fmt;
 use std::path::Path;
