@@ -31,14 +31,18 @@ impl Prepared {
     pub fn new(scene: &Scene, transport: Transport, accuracy: &Accuracy) -> Result<Self, SimulatorError> {
         validate::scene(scene)?;
         validate::accuracy(accuracy)?;
-        let points_only = scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
-        let solver = if points_only && scene.obstacles.is_empty() {
-            Solver::Empty(EmptyRoom::default())
-        } else {
+        let solver = if Self::is_sampled(scene) {
             Solver::Enclosed(Box::new(Enclosure::new(scene)?), OnceReflected::new(scene))
+        } else {
+            Solver::Empty(EmptyRoom::default())
         };
         let (scene, accuracy) = (scene.clone(), *accuracy);
         Ok(Self { scene, transport, accuracy, factor: 1.0, solver })
+    }
+
+    /// Whether a scene has bodies or luminaires of any extent, whose light is sampled: the finer, the longer it takes.
+    pub fn is_sampled(scene: &Scene) -> bool {
+        !scene.obstacles.is_empty() || scene.luminaires.iter().any(|l| l.model != LuminaireModel::Point)
     }
 
     /// The same light field with every luminaire dimmed by one more factor, not negative: nothing is solved again.

@@ -4,8 +4,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// What ends a solution early; what is known by then comes with its larger bound.
+///
+/// Rays are counted beforehand, so that the same count gives the same values on an idle and on a busy machine; a flag or a
+/// deadline ends where it happens to be.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stop {
+    /// Rays that may be followed in all, as far as a first look at every meter allows.
+    pub rays: Option<u64>,
     /// Raised from outside, by a signal say.
     pub flag: Option<&'static AtomicBool>,
     /// When time is up.
@@ -14,7 +19,12 @@ pub struct Stop {
 
 impl Stop {
     /// Never.
-    pub const NEVER: Self = Self { flag: None, deadline: None };
+    pub const NEVER: Self = Self { rays: None, flag: None, deadline: None };
+
+    /// The binary logarithm of the rays that each of so many may have of a third of them all.
+    pub(super) fn third_log2(&self, shares: usize) -> u32 {
+        self.rays.map_or(u32::MAX, |rays| (rays / 3 / shares.max(1) as u64).max(1).ilog2())
+    }
 
     /// Whether it is time.
     pub fn is_due(&self) -> bool {

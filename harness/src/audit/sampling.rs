@@ -7,11 +7,27 @@ use crate::judge::{Judge, Sampling};
 use crate::measure::{Question, Source, Taken};
 use crate::plan::{Plan, Run};
 use crate::procedures::Task;
-use crate::record::{Recording, StatedErrors};
+use crate::record::{EngineName, Recording, StatedErrors};
 use crate::system::files::FileError;
 
 /// Gives the jobs of a plan the budget of their first look.
+///
+/// A witness that has to sample itself works as finely as the narrowest tolerance asks that is judged by it, and no finer.
 pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
+    let tolerance = |run: &Run| {
+        let subjects = plan.engines.iter().map(|e| &e.engine).filter(|engine| !engine.is_witness());
+        let relative = |engine: EngineName| judge.tolerance(&plan.tasks[run.task], engine.as_str()).relative;
+        subjects.map(|engine| relative(engine.name())).reduce(f64::min)
+    };
+    let wide: Vec<Option<f64>> = plan.runs.iter().map(tolerance).collect();
+    for (run, tolerance) in plan.runs.iter_mut().zip(wide) {
+        let engine = &plan.engines[run.engine].engine;
+        if engine.is_witness() && engine.samples(&run.job) {
+            let relative_error = run.job.budget.relative_error.max(tolerance.unwrap_or(0.0));
+            run.job.budget.relative_error = relative_error;
+            run.shortcut.job.budget.relative_error = relative_error;
+        }
+    }
     if sampling == Sampling::Accurate {
         return;
     }

@@ -33,6 +33,11 @@ pub trait Engine: Send + Sync {
         self.role() == Role::Witness
     }
 
+    /// Whether a witness has to sample what the job asks, so that it should be no finer than its use.
+    fn samples(&self, _job: &Job) -> bool {
+        false
+    }
+
     /// Whether its driver is ours, which has seen how its blocks scatter: what others state of their errors is looked into.
     fn is_vouched_for(&self) -> bool {
         true

@@ -21,6 +21,8 @@ const CHECKS: [[f64; 2]; 6] = [[0.5, 0.5], [0.02, 0.02], [0.98, 0.98], [0.02, 0.
 const DEEPEST: u32 = 9;
 /// Quarterings at most that only part what bodies may hide from what they cannot.
 const DEEPEST_FOR_SHADOW: u32 = 4;
+/// Random places that tell how bright the walls are on the mean.
+const PLACES: u64 = 64;
 /// Dim places need be known to this part of the wall's mean only.
 const DIM: f64 = 0.1;
 
@@ -197,7 +199,6 @@ pub(super) fn polynomial(rule: &Gauss, values: &[f64], t: DVec2) -> f64 {
 /// The mean over random places on all walls, bodies left out.
 fn mean_lux(lights: &Lights, relative_error: f64) -> f64 {
     let Some(room) = lights.surroundings.room else { return 0.0 };
-    const PLACES: u64 = 64;
     let unit = |k: u64| (mix(k) >> 11) as f64 / (1_u64 << 53) as f64;
     let one = |k: u64| {
         let wall = (k % 6) as usize;

@@ -17,7 +17,7 @@ mod tests;
 use rayon::prelude::*;
 
 use self::field::Field;
-use self::grid::{Cover, Grid};
+use self::grid::{Cover, Grid, NODES};
 use self::lit::{Lights, Lit};
 use self::rays::{Known, Rays};
 use self::surroundings::Surroundings;
@@ -207,9 +207,9 @@ impl Enclosure {
                     solved => self.solved = solved,
                 }
             }
+            let most_log2 = level.rays_log2.min(stop.third_log2(REPLICATES * open.len())).max(FIRST_RAYS_LOG2);
             let gather = Gather::new(lights, lit, self.solved.as_ref(), bounces, accuracy, stop);
-            let found: Vec<Sums> =
-                open.par_iter().map(|k| gather.at(*k, &meters[*k], direct[*k], level.rays_log2)).collect();
+            let found: Vec<Sums> = open.par_iter().map(|k| gather.at(*k, &meters[*k], direct[*k], most_log2)).collect();
             for (k, found) in open.iter().zip(found) {
                 // A later level stopped short of its first rays knows nothing.
                 if found.rays_log2 > 0 && (sums[*k].rays_log2 == 0 || found.bounded().bound < sums[*k].bounded().bound)
@@ -256,7 +256,9 @@ impl Solved {
         let open: Vec<Known> = (0..grid.len()).map(|k| known(k, 0.0, 0.0)).collect();
         let rays = Rays { lights, lit, grid: Some((&grid, &open)), draws: lit.is_peaked };
         let log2 = (NODE_RAYS / accuracy.relative_error).log2().ceil().max(0.0) as u32;
-        let count = 1 << (log2.clamp(*NODE_RAYS_LOG2.start(), *NODE_RAYS_LOG2.end()) + level.more_log2);
+        let affordable = stop.third_log2(REPLICATES * NODES * grid.len()).max(*NODE_RAYS_LOG2.start());
+        let log2 = log2.clamp(*NODE_RAYS_LOG2.start(), *NODE_RAYS_LOG2.end()) + level.more_log2;
+        let count = 1 << log2.min(affordable);
         let field = Field::solve(&grid, &rays, bounces, count, accuracy.seed, stop)?;
         let known = (0..grid.len()).map(|k| known(k, field.error_lux[k], field.noise_lux[k])).collect();
         Some(Self { bounces, accuracy: *accuracy, level, grid, field, known })
