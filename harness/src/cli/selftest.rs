@@ -6,7 +6,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 use super::repetitions::{RepetitionArgs, repeat};
 use super::{TextOrJson, json, print};
 use crate::engines::Site;
-use crate::experiments::selftest::{calibrations, naming, selftest};
+use crate::experiments::selftest::{calibrations, coverage, naming, selftest};
 use crate::measure::cache::Cache;
 use crate::report::Exit;
 
@@ -27,6 +27,12 @@ pub(super) struct SelftestArgs {
     /// Draw so many faults of each kind at random, in rooms at random: how often are they named rightly, wrongly, not at all?
     #[arg(long, value_name = "N", conflicts_with = "calibration")]
     naming: Option<usize>,
+    /// Solve so many rooms at random: do the simulator's bounds hold against path tracing?
+    #[arg(long, value_name = "ROOMS", conflicts_with_all = ["calibration", "naming"])]
+    coverage: Option<usize>,
+    /// Relative error that is asked of the simulator there
+    #[arg(long, value_name = "E", default_value_t = 0.02, requires = "coverage")]
+    coverage_error: f64,
     #[command(flatten)]
     repeated: RepetitionArgs,
     /// View of the scorecard to print
@@ -56,6 +62,14 @@ pub(super) fn run_selftest(
         print(&match args.format {
             TextOrJson::Terminal => found.to_string(),
             TextOrJson::Json => serde_json::to_string(&found).into_diagnostic()? + "\n",
+        })?;
+        return Ok(if found.is_good() { Exit::Passed } else { Exit::Failed });
+    }
+    if let Some(rooms) = args.coverage {
+        let found = coverage(rooms, args.coverage_error, args.seed);
+        print(&match args.format {
+            TextOrJson::Terminal => found.to_string(),
+            TextOrJson::Json => json(&found)?,
         })?;
         return Ok(if found.is_good() { Exit::Passed } else { Exit::Failed });
     }

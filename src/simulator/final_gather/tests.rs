@@ -145,7 +145,7 @@ fn bounds_hold_at_every_meter_of_s2() {
     assert_eq!(truth.len(), 184);
     let meters: Vec<Meter> = truth.iter().map(|v| up(v[0], v[1], 0.8)).collect();
     let converged = Transport::Indirect(Bounces::Converged);
-    let solution = illuminance(&s2(), &meters, converged, &accuracy(0.01)).unwrap();
+    let solution = illuminance(&s2(), &meters, converged, &accuracy(0.03)).unwrap();
     assert!(!solution.solver.contains("path tracing"), "{}", solution.solver);
     let mut errors = vec![];
     for (estimate, v) in solution.estimates.iter().zip(&truth) {
@@ -155,7 +155,7 @@ fn bounds_hold_at_every_meter_of_s2() {
         errors.push(error / v[2]);
     }
     errors.sort_by(f64::total_cmp);
-    assert!(errors[92] <= 1e-3 && errors[183] <= 1e-2, "median {}, worst {}", errors[92], errors[183]);
+    assert!(errors[92] <= 2e-3 && errors[183] <= 0.03, "median {}, worst {}", errors[92], errors[183]);
 }
 
 #[test]

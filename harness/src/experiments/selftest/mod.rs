@@ -1,6 +1,7 @@
 //! The self-test: every known fault is put into a witness's readings, and the harness must catch it and name it; and are stated errors honest?
 
 mod calibration;
+mod coverage;
 mod naming;
 pub mod repetitions;
 
@@ -18,6 +19,7 @@ use crate::spec::Case;
 use crate::system::random::normal;
 
 pub use calibration::{Calibrations, calibrations};
+pub use coverage::{Coverage, coverage};
 pub use naming::{Named, Naming, naming};
 
 /// The specs and their luminaires, laid out as in the repository.

@@ -1,0 +1,173 @@
+//! A room at random: luminaires of every form, boxes and meshes, and meters where bounds are hardest to keep.
+
+use std::sync::Arc;
+
+use fastrand::Rng;
+use glam::{DMat3, DVec3};
+use luminaire::geometry::{Mesh, Reflectances, Room};
+use luminaire::photometry::{HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Photometry};
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape};
+
+use super::Kind;
+
+/// Of one more than another surface, a meter lies this much at least off any, as a power of ten in metres.
+const CLOSEST_LOG10: f64 = -3.0;
+/// Meters nearer to a surface than that lie close to it.
+const CLOSE_LOG10: f64 = -1.3;
+
+/// Random numbers with the ranges that rooms take them from.
+struct Draw(Rng);
+
+impl Draw {
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.0.f64()
+    }
+
+    fn one_in(&mut self, count: usize) -> bool {
+        self.0.usize(0..count) == 0
+    }
+
+    fn close_m(&mut self) -> f64 {
+        10_f64.powf(self.within(CLOSEST_LOG10, CLOSE_LOG10))
+    }
+}
+
+/// A scene and its meters, each with where it is.
+pub(super) fn room(seed: u64, meters: usize) -> (Scene, Vec<(Kind, Meter)>) {
+    let mut draw = Draw(Rng::with_seed(seed));
+    let size_m = DVec3::new(draw.within(3.0, 10.0), draw.within(3.0, 8.0), draw.within(2.4, 4.5));
+    let mut rho = || draw.within(0.05, 0.85);
+    let reflectance = Reflectances {
+        floor: rho(),
+        ceiling: rho(),
+        wall_x_min: rho(),
+        wall_x_max: rho(),
+        wall_y_min: rho(),
+        wall_y_max: rho(),
+    };
+    let luminaires = (0..draw.0.usize(1..5)).map(|k| luminaire(&mut draw, k, size_m)).collect();
+    let bodies = bodies(&mut draw, size_m);
+    let obstacle = |[min_m, max_m]: &[DVec3; 2]| {
+        let mesh = Mesh::cuboid(*min_m, *max_m);
+        let shape = if draw.one_in(3) {
+            Shape::Mesh { vertices_m: mesh.vertices_m, triangles: mesh.triangles }
+        } else {
+            Shape::Box { min_m: *min_m, max_m: *max_m }
+        };
+        Obstacle { shape, reflectance: draw.within(0.1, 0.8) }
+    };
+    let obstacles = bodies.iter().map(obstacle).collect();
+    let scene = Scene { room: Some(Room { size_m, reflectance }), obstacles, luminaires };
+    let mut found = vec![];
+    while found.len() < meters {
+        let (kind, meter) = meter(&mut draw, size_m, &bodies, &scene.luminaires);
+        let p = meter.position_m;
+        let inside = p.cmpgt(DVec3::ZERO).all() && p.cmplt(size_m).all();
+        let holds = |[low, high]: &[DVec3; 2]| p.cmpge(*low - 1e-6).all() && p.cmple(*high + 1e-6).all();
+        if inside && !bodies.iter().any(holds) {
+            found.push((kind, meter));
+        }
+    }
+    (scene, found)
+}
+
+fn luminaire(draw: &mut Draw, index: usize, size_m: DVec3) -> Luminaire {
+    let opening = match draw.0.usize(0..6) {
+        0 => LuminousOpening::Point,
+        1 => LuminousOpening::Box { x_m: draw.within(0.1, 0.8), y_m: draw.within(0.1, 0.8), height_m: 0.0 },
+        2 => LuminousOpening::Box {
+            x_m: draw.within(0.1, 0.6),
+            y_m: draw.within(0.1, 0.6),
+            height_m: draw.within(0.05, 0.3),
+        },
+        3 => {
+            let diameter_m = draw.within(0.1, 0.5);
+            LuminousOpening::Ellipsoid { x_m: diameter_m, y_m: diameter_m, z_m: diameter_m }
+        }
+        4 => LuminousOpening::Ellipse {
+            x_m: draw.within(0.1, 0.5),
+            y_m: draw.within(0.1, 0.5),
+            height_m: if draw.one_in(2) { 0.0 } else { 0.2 },
+        },
+        _ => LuminousOpening::LyingCylinder {
+            axis: HorizontalAxis::X,
+            length_m: draw.within(0.3, 1.2),
+            diameter_m: 0.08,
+        },
+    };
+    let below_m = if draw.one_in(3) { draw.within(0.2, 0.3) } else { draw.within(0.4, 1.2) };
+    let (x, y) = (draw.within(0.8, size_m.x - 0.8), draw.within(0.8, size_m.y - 0.8));
+    let photometry = Photometry { opening, ..Photometry::of(distribution(draw)) };
+    Luminaire {
+        id: format!("luminaire {index}"),
+        photometry: Arc::new(photometry),
+        position_m: DVec3::new(x, y, size_m.z - below_m),
+        orientation: DMat3::IDENTITY,
+        flux_scale: 1.0,
+        model: if opening == LuminousOpening::Point { LuminaireModel::Point } else { LuminaireModel::Area },
+    }
+}
+
+fn distribution(draw: &mut Draw) -> LuminousIntensityDistribution {
+    let step_deg = [1, 5, 10][draw.0.usize(0..3)];
+    let gamma_deg: Vec<f64> = (0..=180).step_by(step_deg).map(f64::from).collect();
+    let (peak, power) = (draw.within(100.0, 1000.0), draw.0.i32(1..9));
+    let form = draw.0.usize(0..3);
+    let candela = gamma_deg.iter().map(|g| {
+        let (sin, cos) = g.to_radians().sin_cos();
+        match form {
+            0 => peak * cos.max(0.0).powi(power),
+            1 => peak,
+            _ => peak * (0.3 + sin * sin + if cos < 0.0 { 0.7 } else { 0.0 }),
+        }
+    });
+    let candela = candela.collect();
+    LuminousIntensityDistribution::axial(gamma_deg, candela)
+        .unwrap_or_else(|e| unreachable!("tables made here are sound: {e}"))
+}
+
+fn bodies(draw: &mut Draw, size_m: DVec3) -> Vec<[DVec3; 2]> {
+    let mut bodies: Vec<[DVec3; 2]> = vec![];
+    for _ in 0..draw.0.usize(0..5) {
+        let extent_m = DVec3::new(draw.within(0.3, 1.8), draw.within(0.3, 1.2), draw.within(0.3, 1.2));
+        let x = if draw.one_in(5) { 0.0 } else { draw.within(0.05, size_m.x - extent_m.x - 0.05) };
+        let y = draw.within(0.05, size_m.y - extent_m.y - 0.05);
+        let low = DVec3::new(x, y, if draw.one_in(3) { draw.within(0.1, 0.4) } else { 0.0 });
+        let high = low + extent_m;
+        let meets = |[a, b]: &[DVec3; 2]| low.cmplt(*b + 0.01).all() && high.cmpgt(*a - 0.01).all();
+        if !bodies.iter().any(meets) {
+            bodies.push([low, high]);
+        }
+    }
+    bodies
+}
+
+fn meter(draw: &mut Draw, size_m: DVec3, bodies: &[[DVec3; 2]], luminaires: &[Luminaire]) -> (Kind, Meter) {
+    let axis = DVec3::AXES[draw.0.usize(0..3)];
+    let any = if draw.one_in(2) { axis } else { -axis };
+    let inner = DVec3::new(
+        draw.within(0.1, size_m.x - 0.1),
+        draw.within(0.1, size_m.y - 0.1),
+        draw.within(0.1, size_m.z - 0.1),
+    );
+    let (a, b, c) = (draw.close_m(), draw.close_m(), draw.close_m());
+    let (kind, mut position_m, normal) = match draw.0.usize(0..8) {
+        0 => (Kind::Wall, DVec3::new(a, inner.y, inner.z), any),
+        1 => (Kind::Edge, DVec3::new(a, b, inner.z), any),
+        2 => (Kind::Corner, DVec3::new(a, b, c), any),
+        3 if !bodies.is_empty() => {
+            let [low, high] = bodies[draw.0.usize(0..bodies.len())];
+            let beside = DVec3::new(high.x + a, draw.within(low.y, high.y), draw.within(low.z, high.z));
+            (Kind::Body, beside, any)
+        }
+        4 => {
+            let above = luminaires[draw.0.usize(0..luminaires.len())].position_m;
+            (Kind::Luminaire, above - DVec3::Z * draw.within(0.25, 1.0), DVec3::Z)
+        }
+        _ => (Kind::Open, inner, DVec3::Z),
+    };
+    if draw.one_in(3) && kind != Kind::Body {
+        position_m.x = size_m.x - position_m.x;
+    }
+    (kind, Meter { position_m, normal })
+}
