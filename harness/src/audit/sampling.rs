@@ -15,15 +15,17 @@ use crate::system::files::FileError;
 /// A witness that has to sample itself works as finely as the narrowest tolerance asks that is judged by it, and no finer.
 pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
     let tolerance = |run: &Run| {
-        let subjects = plan.engines.iter().map(|e| &e.engine).filter(|engine| !engine.is_witness());
+        let engines = || plan.engines.iter().map(|e| &e.engine);
         let relative = |engine: EngineName| judge.tolerance(&plan.tasks[run.task], engine.as_str()).relative;
-        subjects.map(|engine| relative(engine.name())).reduce(f64::min)
+        let subjects = engines().filter(|engine| !engine.is_witness()).map(|engine| relative(engine.name()));
+        // Where nobody is judged, what would be.
+        subjects.chain([relative(EngineName::from("subject"))]).fold(f64::INFINITY, f64::min)
     };
-    let wide: Vec<Option<f64>> = plan.runs.iter().map(tolerance).collect();
+    let wide: Vec<f64> = plan.runs.iter().map(tolerance).collect();
     for (run, tolerance) in plan.runs.iter_mut().zip(wide) {
         let engine = &plan.engines[run.engine].engine;
         if engine.is_witness() && engine.samples(&run.job) {
-            let relative_error = run.job.budget.relative_error.max(tolerance.unwrap_or(0.0));
+            let relative_error = run.job.budget.relative_error.max(tolerance);
             run.job.budget.relative_error = relative_error;
             run.shortcut.job.budget.relative_error = relative_error;
         }
