@@ -4,7 +4,6 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::rays::Known;
 use super::surroundings::{Surroundings, WALLS, off_wall, on_wall};
 use crate::scene::Meter;
 use crate::simulator::emission::Emitter;
@@ -37,6 +36,8 @@ pub(super) struct Lit {
     reflected_lm: f64,
     /// Whether some place is so much brighter than the mean that rays would find it too seldom.
     pub(super) is_peaked: bool,
+    /// Exitance of the brightest place in lm/m².
+    pub(super) peak: f64,
 }
 
 #[derive(Debug)]
@@ -73,6 +74,29 @@ struct Bright {
     size_m: DVec2,
 }
 
+/// How well light is known on a rectangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Known {
+    /// How far off it may be; infinite where bodies cover a part.
+    pub(super) error_lux: f64,
+    /// Standard error of its mean, which the replicates show in their scatter.
+    pub(super) noise_lux: f64,
+    pub(super) side_m: f64,
+}
+
+impl Known {
+    /// The part of a polynomial's error that is left in what a place sees of its rectangle: what it leaves out is as often
+    /// too bright as too dim, and from afar one cannot tell the one from the other.
+    pub(super) fn left_lux(&self, distance_m: f64) -> f64 {
+        self.error_lux * (self.side_m / distance_m).min(1.0)
+    }
+
+    /// Whether a ray may end on it: what is left out and its noise are below a limit.
+    pub(super) fn is_enough(&self, distance_m: f64, limit_lux: f64) -> bool {
+        (self.error_lux + 2.0 * self.noise_lux) * (self.side_m / distance_m).min(1.0) <= limit_lux
+    }
+}
+
 /// Direct illuminance at a place, and how far off it may be besides chance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Light {
@@ -104,7 +128,7 @@ impl Lit {
     pub(super) fn new(lights: &Lights, relative_error: f64, stop: &Stop) -> Self {
         let rule = Gauss::new(ORDER);
         let Some(room) = lights.surroundings.room else {
-            return Self { walls: vec![], rule, bright: vec![], reflected_lm: 0.0, is_peaked: false };
+            return Self { walls: vec![], rule, bright: vec![], reflected_lm: 0.0, is_peaked: false, peak: 0.0 };
         };
         let mean: f64 = mean_lux(lights, relative_error);
         let wall = |wall: usize| {
@@ -132,7 +156,7 @@ impl Lit {
             area += size_m.x * size_m.y;
         }
         let is_peaked = peak * area > super::PEAKED * reflected_lm;
-        Self { walls, rule, bright, reflected_lm, is_peaked }
+        Self { walls, rule, bright, reflected_lm, is_peaked, peak }
     }
 
     /// Direct illuminance at a place on a wall; `u` draws the parts of luminaires that must be asked.

@@ -18,8 +18,8 @@ use rayon::prelude::*;
 
 use self::field::Field;
 use self::grid::{Cover, Grid, NODES};
-use self::lit::{Lights, Lit};
-use self::rays::{Known, Rays};
+use self::lit::{Known, Lights, Lit};
+use self::rays::Rays;
 use self::surroundings::Surroundings;
 use super::emission::Emitter;
 use super::sampler::{Sampler, mix};
@@ -34,6 +34,11 @@ const REPLICATES: usize = 16;
 /// Standard errors of the replicates' mean that a bound holds: Student's t with 15 degrees of freedom goes beyond it once in
 /// a hundred thousand times.
 const WIDTH: f64 = 6.5;
+/// Samples that miss a part of all that they are drawn from, of which so many times one over their number may be unseen: by chance
+/// it is more once in a hundred thousand times.
+const UNSEEN: f64 = 11.5;
+/// Bounds below this part of what luminaires would give that nothing hides need not be narrower.
+const DARK: f64 = 1e-4;
 /// Places so much brighter than the mean wall are drawn, since rays find them too seldom.
 const PEAKED: f64 = 8.0;
 /// Rays of a meter in each replicate at first, as a power of two.
@@ -71,7 +76,12 @@ struct Level {
 }
 
 /// The noise of the field is in all rays of a meter: where they no longer help, the field needs more.
-const LEVELS: [Level; 2] = [Level { more_log2: 0, rays_log2: 14 }, Level { more_log2: 3, rays_log2: 17 }];
+/// A first look at every meter comes before, so that a solution that is stopped knows all of them.
+const LEVELS: [Level; 3] = [
+    Level { more_log2: 0, rays_log2: FIRST_RAYS_LOG2 },
+    Level { more_log2: 0, rays_log2: 14 },
+    Level { more_log2: 3, rays_log2: 17 },
+];
 
 /// A field with what it was made for.
 #[derive(Debug)]
@@ -92,6 +102,8 @@ struct Sums {
     error_lux: f64,
     rays_log2: u32,
     half_way: Option<f64>,
+    /// The most that a single ray may bring from a place that none has met.
+    brightest_lux: f64,
 }
 
 impl Enclosure {
@@ -151,7 +163,9 @@ impl Enclosure {
         stop: &Stop,
     ) -> Bounded {
         let start_m = self.lifted(meter);
-        let mut sums = Sums::default();
+        let bare = |k: &usize| self.emitters[*k].illuminance(meter, &[], 1e-2).value;
+        let bare_lux: f64 = which.iter().map(bare).sum();
+        let mut sums = Sums { brightest_lux: bare_lux, ..Sums::default() };
         for log2 in PARTS_LOG2 {
             let from = if log2 == *PARTS_LOG2.start() { 0 } else { 1 << (log2 - 1) };
             let mut more = [0.0; REPLICATES];
@@ -165,7 +179,8 @@ impl Enclosure {
             }
             sums.add(&more, 0.0, log2);
             let found = sums.bounded();
-            if found.bound + known.bound <= 0.5 * relative_error * (found.value + known.value) || stop.is_due() {
+            let enough = 0.5 * relative_error * (found.value + known.value);
+            if found.bound + known.bound <= enough.max(DARK * bare_lux) || stop.is_due() {
                 break;
             }
         }
@@ -292,7 +307,9 @@ impl<'a> Gather<'a> {
     }
 
     fn at(&self, index: usize, meter: &Meter, direct: Bounded, most_log2: u32) -> Sums {
-        let mut sums = Sums::default();
+        // Where bright places are drawn none is left unseen.
+        let brightest_lux = if self.rays.draws { 0.0 } else { self.rays.lit.peak };
+        let mut sums = Sums { brightest_lux, ..Sums::default() };
         // The first rays tell how bright it is here, and so what may be left out.
         let mut limit_lux = self.limit_lux(self.solved.map_or(0.0, |s| s.field.mean_lux));
         for log2 in FIRST_RAYS_LOG2..=most_log2 {
@@ -309,7 +326,7 @@ impl<'a> Gather<'a> {
             if log2 == FIRST_RAYS_LOG2 && here_lux < 0.5 * limit_lux {
                 limit_lux = here_lux;
                 let again = self.replicates(index, meter, 0..1 << log2, limit_lux);
-                sums = Sums::default();
+                sums = Sums { brightest_lux, ..Sums::default() };
                 sums.add(&again.map(|f| f.0), again.iter().map(|f| f.1).sum(), log2);
             }
         }
@@ -362,7 +379,7 @@ impl<'a> Gather<'a> {
 
 impl Default for Sums {
     fn default() -> Self {
-        Self { lux: [0.0; REPLICATES], error_lux: 0.0, rays_log2: 0, half_way: None }
+        Self { lux: [0.0; REPLICATES], error_lux: 0.0, rays_log2: 0, half_way: None, brightest_lux: 0.0 }
     }
 }
 
@@ -396,7 +413,7 @@ impl Sums {
         }
         let (mean, error) = self.mean_and_error();
         let error = error.max(0.5 * self.half_way.unwrap_or(0.0));
-        let left_out = self.error_lux / REPLICATES as f64 / f64::from(1_u32 << self.rays_log2);
-        Bounded { value: mean, bound: WIDTH * error + left_out }
+        let rays = REPLICATES as f64 * f64::from(1_u32 << self.rays_log2);
+        Bounded { value: mean, bound: WIDTH * error + self.error_lux / rays + UNSEEN / rays * self.brightest_lux }
     }
 }

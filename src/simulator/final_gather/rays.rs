@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::grid::{Grid, Spot};
-use super::lit::{Lights, Lit};
+use super::lit::{Known, Lights, Lit};
 use super::surroundings::{Place, WALLS, off_wall};
 use crate::scene::Meter;
 use crate::simulator::sampler::Sampler;
@@ -28,29 +28,6 @@ pub(super) struct Rays<'a> {
     pub(super) grid: Option<(&'a Grid, &'a [Known])>,
     /// Whether bright places are drawn, too.
     pub(super) draws: bool,
-}
-
-/// How well reflected light is known on a rectangle.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Known {
-    /// How far off it may be; infinite where bodies cover a part.
-    pub(super) error_lux: f64,
-    /// Standard error of its mean, which the replicates show in their scatter.
-    pub(super) noise_lux: f64,
-    pub(super) side_m: f64,
-}
-
-impl Known {
-    /// The part of a polynomial's error that is left in what a place sees of its rectangle: what it leaves out is as often
-    /// too bright as too dim, and from afar one cannot tell the one from the other.
-    fn left_lux(&self, distance_m: f64) -> f64 {
-        self.error_lux * (self.side_m / distance_m).min(1.0)
-    }
-
-    /// Whether a ray may end on it: what is left out and its noise are below a limit.
-    fn is_enough(&self, distance_m: f64, limit_lux: f64) -> bool {
-        (self.error_lux + 2.0 * self.noise_lux) * (self.side_m / distance_m).min(1.0) <= limit_lux
-    }
 }
 
 /// What one ray found.
