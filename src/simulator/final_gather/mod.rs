@@ -233,7 +233,7 @@ impl Enclosure {
                 }
             }
             open.retain(|k| !sums[*k].meets(error, direct[*k]));
-            if open.is_empty() || self.surroundings.room.is_none() || stop.is_due() {
+            if open.is_empty() || stop.is_due() {
                 break;
             }
         }
