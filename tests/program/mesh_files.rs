@@ -66,8 +66,7 @@ fn a_crate_from_a_file_reads_what_the_same_box_reads() {
     assert_eq!((mesh.len(), cuboid.len(), empty.len()), (6, 6, 6));
     for (name, at) in &mesh {
         let exact = &cuboid[name];
-        let reflected = name.starts_with("indirect");
-        assert_eq!((at.estimated, exact.estimated), (reflected, false), "{name}");
+        assert_eq!((at.estimated, exact.estimated), (false, false), "{name}");
         let allowed = at.within_lux + exact.within_lux;
         assert!(allowed <= 0.02 * exact.lux + 1e-9, "{name}: {allowed}");
         assert!((at.lux - exact.lux).abs() <= allowed, "{name}: {} for {} within {allowed}", at.lux, exact.lux);
