@@ -20,7 +20,7 @@ const METERS: usize = 30;
 const FINER: f64 = 3.0;
 /// Standard errors of the certifier, seven degrees of freedom, that it is off by once in a thousand times.
 const CERTIFIED_WITHIN: f64 = 5.4;
-/// Boundaries of the histogram: error over bound.
+/// Boundaries of the histogram: error over bound and the certifier's own error together.
 const BINS: [f64; 5] = [0.03, 0.1, 0.3, 1.0, f64::INFINITY];
 
 /// Where a meter is.
@@ -42,7 +42,7 @@ pub struct Coverage {
     pub readings: usize,
     /// Readings beyond their bound by more than the certifier may be off.
     pub beyond: Vec<Miss>,
-    /// How often an error lies within .03, .1, .3 and 1 bounds and beyond, by kind of meter.
+    /// How often an error lies within .03, .1, .3 and 1 of the bound and the certifier's error together, and beyond, by kind of meter.
     pub histogram: BTreeMap<Kind, [usize; BINS.len()]>,
     /// What could not be solved, with its reason.
     pub refused: Vec<String>,
@@ -119,7 +119,7 @@ impl Coverage {
             // What the certifier itself may be off says nothing of the bound.
             let beyond = ((value_lx - certified_lx).abs() - allowed).max(0.0);
             let ratio = if beyond == 0.0 { 0.0 } else { beyond / bound_lx };
-            let error = (value_lx - certified_lx).abs() / bound_lx.max(allowed);
+            let error = (value_lx - certified_lx).abs() / (bound_lx + allowed);
             let bin = BINS.iter().position(|b| error.min(f64::MAX) <= *b).unwrap_or(BINS.len() - 1);
             self.histogram.entry(*kind).or_default()[bin] += 1;
             if ratio > 1.0 + 1e-9 || value_lx.is_nan() {
@@ -143,7 +143,7 @@ impl Coverage {
 
 impl fmt::Display for Coverage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let head = ["meters", "readings", "within .03", ".1", ".3", "1 bound", "beyond, with the certifier's error"];
+        let head = ["meters", "readings", "within .03", ".1", ".3", "1", "beyond bound and the certifier's error"];
         let row = |(kind, bins): (&Kind, &[usize; BINS.len()])| {
             let name: &str = kind.into();
             let total: usize = bins.iter().sum();
