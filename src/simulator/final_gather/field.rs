@@ -8,8 +8,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::REPLICATES;
-use super::grid::{Cover, Grid, NODES, tail};
-use super::lit::polynomial;
+use super::grid::{Cover, Grid, NODES, polynomial, tail};
 use super::rays::{End, Rays};
 use super::surroundings::WALLS;
 use crate::scene::{Bounces, Meter};

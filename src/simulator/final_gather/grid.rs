@@ -145,6 +145,15 @@ pub(super) enum Cover {
     Whole,
 }
 
+/// A polynomial by its values at the nodes.
+pub(super) fn polynomial(rule: &Gauss, values: &[f64], t: DVec2) -> f64 {
+    let (mut a, mut b) = ([0.0; ORDER], [0.0; ORDER]);
+    rule.lagrange(t.x, &mut a);
+    rule.lagrange(t.y, &mut b);
+    let row = |i: usize| (0..ORDER).map(|j| b[j] * values[ORDER * i + j]).sum::<f64>();
+    (0..ORDER).map(|i| a[i] * row(i)).sum()
+}
+
 /// What a polynomial of a rectangle may leave out: its terms of the highest degree, beyond their own noise.
 ///
 /// `values` are those of independent solutions; Legendre's terms of a smooth function fall from degree to degree.

@@ -4,6 +4,7 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::grid::{NODES, ORDER, polynomial};
 use super::surroundings::{Surroundings, WALLS, off_wall, on_wall};
 use crate::scene::Meter;
 use crate::simulator::emission::Emitter;
@@ -11,9 +12,6 @@ use crate::simulator::quadrature::Gauss;
 use crate::simulator::sampler::mix;
 use crate::simulator::stop::Stop;
 
-/// Nodes of a rectangle along each side.
-const ORDER: usize = 4;
-const NODES: usize = ORDER * ORDER;
 /// Where a rectangle's polynomial is held against the light, besides its nodes.
 const CHECKS: [[f64; 2]; 6] = [[0.5, 0.5], [0.02, 0.02], [0.98, 0.98], [0.02, 0.98], [0.98, 0.02], [0.5, 0.02]];
 /// Quarterings at most.
@@ -167,8 +165,10 @@ impl Lit {
         };
         let t = (at_m - part.corner_m) / part.size_m;
         let side_m = part.size_m.max_element();
-        let mut light =
-            Light { lux: self.value(leaf, t), known: Known { error_lux: leaf.error_lux, noise_lux: 0.0, side_m } };
+        let mut light = Light {
+            lux: polynomial(&self.rule, &leaf.lux, t),
+            known: Known { error_lux: leaf.error_lux, noise_lux: 0.0, side_m },
+        };
         for k in &leaf.asked {
             light.lux += lights.sample(*k as usize, meter, meter.position_m, u);
         }
@@ -205,19 +205,6 @@ impl Lit {
             }
         }
     }
-
-    fn value(&self, leaf: &Leaf, t: DVec2) -> f64 {
-        polynomial(&self.rule, &leaf.lux, t)
-    }
-}
-
-/// A polynomial by its values at the nodes.
-pub(super) fn polynomial(rule: &Gauss, values: &[f64], t: DVec2) -> f64 {
-    let (mut a, mut b) = ([0.0; ORDER], [0.0; ORDER]);
-    rule.lagrange(t.x, &mut a);
-    rule.lagrange(t.y, &mut b);
-    let row = |i: usize| (0..ORDER).map(|j| b[j] * values[ORDER * i + j]).sum::<f64>();
-    (0..ORDER).map(|i| a[i] * row(i)).sum()
 }
 
 /// The mean over random places on all walls, bodies left out.

@@ -96,7 +96,7 @@ struct Solved {
 }
 
 /// Sums of one meter over the rays so far.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Sums {
     lux: [f64; REPLICATES],
     error_lux: f64,
@@ -374,12 +374,6 @@ impl<'a> Gather<'a> {
             }
         }
         (lux, error_lux)
-    }
-}
-
-impl Default for Sums {
-    fn default() -> Self {
-        Self { lux: [0.0; REPLICATES], error_lux: 0.0, rays_log2: 0, half_way: None, brightest_lux: 0.0 }
     }
 }
 
