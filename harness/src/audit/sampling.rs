@@ -65,8 +65,9 @@ pub(super) fn sample_on(
         let found = stated.get(&(engine.clone(), task.procedure)).map_or(&[][..], Vec::as_slice);
         let mut sample = |ask: &Ask| {
             let mut taken = look(running, run, ask)?;
-            for estimate in &mut taken.measurement.estimates {
-                *estimate = StatedErrors::corrected(found, *estimate);
+            let meter = |k: &usize| std::iter::repeat_n(&task.targets[*k].id, task.stations_of(*k).len());
+            for (estimate, meter) in taken.measurement.estimates.iter_mut().zip(ask.targets.iter().flat_map(meter)) {
+                *estimate = StatedErrors::corrected(found, meter, *estimate);
             }
             outcome.from_cache += usize::from(taken.source == Source::Cache);
             Ok((taken.measurement, taken.cost))

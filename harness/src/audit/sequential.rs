@@ -28,6 +28,10 @@ const FIRST_LOOK: f64 = 3.5;
 /// The part of the seconds that the first look is granted, likewise.
 const FIRST_SHARE: f64 = 0.5;
 
+/// An engine whose standard errors fall with effort by less than this part of what they should samples as much whatever it is granted: then
+/// its looks count alike.
+const DEAF: f64 = 0.5;
+
 /// What a further look asks of an engine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ask {
@@ -66,6 +70,8 @@ pub fn refine(
     }
     subject.looks = vec![1; subject.readings.len()];
     let (first_s, mut total_weight) = (subject.work_s().max(SHORTEST_S), 1.0);
+    let falls = subject.stated_errors.iter().filter_map(|s| s.falls_with_effort).reduce(f64::min);
+    let is_deaf = falls.is_some_and(|falls| falls < DEAF);
     for look in 2..=LOOKS {
         let targets = undecided(judge, task, witnesses, subject);
         if targets.is_empty() {
@@ -99,11 +105,12 @@ pub fn refine(
         subject.skewness = measurement.skewness().or(subject.skewness);
         subject.effort.extend(measurement.effort.iter().map(|(k, v)| (format!("look{look}_{k}"), v.clone())));
         let estimates = measurement.readings(ask.targets.iter().map(|k| &task.targets[*k]));
+        let counts = if is_deaf { 1.0 } else { weight };
         for (&k, estimate) in ask.targets.iter().zip(&estimates) {
-            combine(&mut subject.readings[k], total_weight, estimate, weight);
+            combine(&mut subject.readings[k], total_weight, estimate, counts);
             subject.looks[k] = look;
         }
-        total_weight += weight;
+        total_weight += counts;
     }
 }
 

@@ -207,7 +207,7 @@ impl Judge<'_> {
     ) -> Comparison {
         let (target, reading) = (&task.targets[k], recording.readings.get(k));
         let believed = |r: &Reading| {
-            let stated = StatedErrors::of_looks(&recording.stated_errors, r.uncertainty);
+            let stated = StatedErrors::of_looks(&recording.stated_errors, &r.meter, r.uncertainty);
             believed(stated, largest_portion, held.as_ref().map(|h| (h.reference.value - r.value).abs()))
         };
         let uncertainty = reading.map_or(Uncertainty::Unstated, believed);
@@ -259,7 +259,7 @@ impl Judge<'_> {
         let allowed = tolerance.around(reference.value);
         comparison.verdict = judge(deviation, budget.expanded, allowed);
         let p_value = budget.p_value(deviation, allowed);
-        let is_heavy_tailed = is_heavy_tailed(recording, comparison.uncertainty, deviation, p_value);
+        let is_heavy_tailed = is_heavy_tailed(recording, &comparison, deviation, p_value);
         let waits = unbelievable(comparison.uncertainty, value, is_heavy_tailed);
         if let Some(why) = waits.filter(|_| comparison.verdict == Verdict::Fail) {
             comparison.verdict = Verdict::Inconclusive;
@@ -287,10 +287,11 @@ const FAR: f64 = 100.0;
 const WELL_COVERED: f64 = 1e-3;
 
 /// Whether its blocks tell so, or how its errors vary from seed to seed, and it is near enough for a heavy tail to have done it.
-fn is_heavy_tailed(recording: &Recording, uncertainty: Uncertainty, deviation: f64, p_value: f64) -> bool {
+fn is_heavy_tailed(recording: &Recording, comparison: &Comparison, deviation: f64, p_value: f64) -> bool {
+    let Comparison { meter, uncertainty, .. } = comparison;
     let is_near = || uncertainty.standard_error().is_some_and(|error| deviation.abs() < FAR * error);
     recording.skewness.is_some_and(|s| s > MAX_SKEWNESS) && is_near()
-        || recording.states_heavy_tail() && p_value > WELL_COVERED
+        || StatedErrors::heavy_tail(&recording.stated_errors, meter).is_some() && p_value > WELL_COVERED
 }
 
 /// Why a sampled value fails nothing, whatever its distance: its interval is not one.
