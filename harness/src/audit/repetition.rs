@@ -92,7 +92,9 @@ impl Again<'_> {
             let at = limits(compared, |c, allowed| c.uncertainty.is_sampled().then_some(UNCHECKED * allowed));
             StatedErrors::doubted_at(Doubt::NotReadAgain, at)
         };
-        let not_read_again = if is_refused { unchecked() } else { None };
+        // Samples that meet nothing with other seeds state nothing either: they scatter, and are not capped.
+        let is_steady = sampled.is_none_or(|meters| meters.iter().all(|readings| is_same(readings)));
+        let not_read_again = if is_refused && is_steady { unchecked() } else { None };
         [
             of_sampled.map(|found| StatedErrors { falls_with_effort, ..found }),
             self.claims.as_deref().and_then(StatedErrors::of_claims),
@@ -199,6 +201,13 @@ fn falls_with_effort(meters: &[Vec<Estimate>]) -> Option<f64> {
     };
     let more: Vec<f64> = meters.iter().filter_map(of_meter).collect();
     (!more.is_empty()).then(|| more.iter().sum::<f64>() / more.len() as f64 / EFFORT.recip().ln())
+}
+
+/// Whether readings of other seeds are one but for rounding.
+fn is_same(readings: &[Estimate]) -> bool {
+    let values = || readings.iter().map(|e| e.value);
+    let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    high - low <= SINGLE_PRECISION * high.abs()
 }
 
 /// Whether at most meters whose error was stated no other seed states one.
