@@ -285,7 +285,7 @@ impl Build<'_> {
         let up = self.face.on(DVec3::Z);
         let (low, high) = (corner_m + EDGE * size_m, corner_m + (1.0 - EDGE) * size_m);
         let mut middle_m = corner_m + 0.5 * size_m;
-        let heights = self.lights.emitters.iter().flat_map(|e| e.bounds_m()).map(|b| self.face.on(b));
+        let heights = self.lights.emitters.iter().flat_map(Emitter::bounds_m).map(|b| self.face.on(b));
         let inside =
             heights.filter(|at_m| up != DVec2::ZERO && at_m.dot(up) > low.dot(up) && at_m.dot(up) < high.dot(up));
         let nearest = inside.map(|at_m| (at_m - middle_m).dot(up)).min_by(|a, b| a.abs().total_cmp(&b.abs()));

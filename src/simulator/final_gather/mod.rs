@@ -259,7 +259,7 @@ impl Enclosure {
             let node_rays = self.solved.as_ref().map_or(0, |s| s.rays() << (better_log2 - more_log2));
             // What is cheaper comes first.
             if better_log2 > more_log2
-                && (most_log2 == MOST_RAYS_LOG2 || node_rays < RAY * open.len() << (most_log2 + MORE_RAYS_LOG2))
+                && (most_log2 == MOST_RAYS_LOG2 || node_rays < (RAY * open.len()) << (most_log2 + MORE_RAYS_LOG2))
             {
                 more_log2 = better_log2;
             } else if most_log2 < MOST_RAYS_LOG2 {
