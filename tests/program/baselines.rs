@@ -152,7 +152,7 @@ fn a_report_of_another_version_is_told_and_one_that_does_not_fit_refused() {
 fn sealed(mut report: serde_json::Value) -> String {
     report["checksum"] = "".into();
     let checksum = Sha256::digest(report.to_string());
-    report["checksum"] = checksum.iter().map(|byte| format!("{byte:02x}")).collect::<String>().into();
+    report["checksum"] = checksum.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat().into();
     report.to_string()
 }
 

@@ -4,7 +4,7 @@
 //! then departs in all of them at once; or that none does. Readings are normal about an unknown truth (flat prior), with the
 //! covariance that the hypothesis gives them; its probability follows by Bayes' rule (Kass & Raftery, J. Am. Statist. Assoc. 90,
 //! 1995). So witnesses that share a component count once, and the reference has no privilege. Programs of users' whose readings
-//! are closer to another's than independent work comes share something too, whatever they say, see [`is_copy`].
+//! are closer to another's than independent work comes share something too, whatever they say, see `is_copy`.
 
 use itertools::Itertools;
 use schemars::JsonSchema;

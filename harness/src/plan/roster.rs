@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use itertools::Itertools;
+
 use super::{Asked, Selection};
 use crate::engines::{self, Absent, Engine, EngineError, Job, Site, Version};
 use crate::procedures::Task;
@@ -106,7 +108,7 @@ impl Roster {
                 if !ours.contains(&share)
                     && !others().any(|(other, of)| **other == share || shares(of).contains(&share))
                 {
-                    let known = Vec::from_iter(ours.iter().map(String::as_str)).join(", ");
+                    let known = ours.iter().join(", ");
                     told.push(format!(
                         "engines.{name}.shares: no other engine is or has `{share}`, so that it ties nobody; ours are and have {known}"
                     ));

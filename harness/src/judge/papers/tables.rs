@@ -390,6 +390,9 @@ impl Table {
 /// A cell that was changed, by row and column, and what it was.
 type Changed<'t> = (usize, &'t str, f64);
 
+/// A row or a column, and what its control total says beyond the sum of its cells.
+type Lack<Of> = (Of, f64);
+
 /// What a total says beyond the sum of the cells that it is of; `None` where they agree.
 fn missing<'a>(total: Option<&String>, cells: impl Iterator<Item = &'a String>) -> Option<f64> {
     let number = |cell: &String| cell.trim().parse::<f64>().ok();
@@ -400,7 +403,7 @@ fn missing<'a>(total: Option<&String>, cells: impl Iterator<Item = &'a String>) 
 
 impl Table {
     /// The rows and columns whose control totals are not the sums of their cells, and what the totals say beyond.
-    fn lacking(&self) -> (Vec<(usize, f64)>, Vec<(&str, f64)>) {
+    fn lacking(&self) -> (Vec<Lack<usize>>, Vec<Lack<&str>>) {
         let of_row = |(k, row): (usize, &Row)| Some((k, missing(row.total.as_ref(), row.cells.values())?));
         let of_column = |(name, total): (&'_ String, &String)| {
             missing(Some(total), self.rows.iter().filter_map(|row| row.cells.get(name)))
