@@ -21,8 +21,6 @@ use opening::{Opening, Part, Sheet};
 
 /// Relative deviation of a table from a cosine that passes for rounding of its figures; it counts as an error.
 const COSINE_ROUNDING: f64 = 1e-5;
-/// Relative errors from which rules need fewer nodes.
-const ROUGH: f64 = 5e-5;
 /// Halvings of a triangle or a square after which an integral stops improving.
 const DEEPEST: u32 = 9;
 /// Parts of an integral after which it stops improving: what is left is its bound.
@@ -54,11 +52,6 @@ impl Precision {
     /// To a part of itself, however dim it is.
     pub(super) const fn relative(relative_error: f64) -> Self {
         Self { relative_error, error_lux: 0.0 }
-    }
-
-    /// Nodes of a rule along each side: where much may be left out, fewer are enough.
-    fn order(self) -> usize {
-        if self.relative_error < ROUGH { 5 } else { 3 }
     }
 }
 
@@ -284,7 +277,7 @@ fn lambertian(luminaire: &Luminaire, area_m2: f64) -> Option<Lambertian> {
 
 /// Integral over a convex flat polygon, by triangles that are quartered until two rules agree.
 fn integrate(polygon: &[DVec3], precision: Precision, f: &impl Fn(DVec3) -> f64) -> Bounded {
-    let rule = Gauss::new(precision.order());
+    let rule = Gauss::new(5);
     let parts: Vec<_> = (2..polygon.len()).map(|k| [polygon[0], polygon[k - 1], polygon[k]]).collect();
     let quarters = |t: &[DVec3; 3]| {
         let [ab, bc, ca] = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(p, q)| 0.5 * (p + q));
@@ -295,7 +288,7 @@ fn integrate(polygon: &[DVec3], precision: Precision, f: &impl Fn(DVec3) -> f64)
 
 /// Integral over the unit square, by squares that are quartered until two rules agree.
 fn integrate_square(precision: Precision, f: &impl Fn([f64; 2]) -> f64) -> Bounded {
-    let rule = Gauss::new(precision.order());
+    let rule = Gauss::new(5);
     let quarters = |&[u, v, side]: &[f64; 3]| {
         let half = 0.5 * side;
         [[u, v, half], [u + half, v, half], [u, v + half, half], [u + half, v + half, half]]

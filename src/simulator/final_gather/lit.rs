@@ -300,7 +300,7 @@ impl Build<'_> {
         let all = 0..self.lights.emitters.len();
         let (asked, clear): (Vec<usize>, Vec<usize>) = all.partition(|k| self.lights.may_be_hidden(*k, corners_m));
         // Two refinements agree far less well than the finer one is right.
-        let relative_error = self.relative_error.min(2e-3);
+        let relative_error = self.relative_error.min(1e-3);
         let precision = Precision { relative_error, error_lux: relative_error * self.floor_lux };
         let lux_at = |t: DVec2, which: &[usize]| -> f64 {
             let meter = meter(t);

@@ -47,7 +47,7 @@ const PEAKED: f64 = 16.0;
 const FIRST_RAYS_LOG2: u32 = 7;
 /// Light straight from the luminaires is known on the walls to so many times the error asked for: of what a polynomial leaves
 /// out little is left from afar.
-const LIT: f64 = 0.5;
+const LIT: f64 = 1.0;
 /// Rays of a node in each replicate: so many over the relative error asked for, a power of two.
 const NODE_RAYS: f64 = 0.08;
 /// Rays of a node in each replicate at least and at most.
