@@ -36,7 +36,7 @@ impl Lab {
         let files = folder.map(|f| f.unwrap()).map(|f| (name(&f), fs::read(f.path()).unwrap())).collect();
         let mut report = self.0.json(&format!("{out}/report.json"));
         let own = report.as_object_mut().unwrap();
-        assert!(own.remove("started").is_some() && own.remove("checksum").is_some() && own.remove("wall_s").is_some());
+        assert!(own.remove("started").is_some() && own.remove("wall_s").is_some());
         (files, serde_json::to_string_pretty(&report).unwrap())
     }
 

@@ -34,7 +34,7 @@ fn said(folder: &Folder, seed: &str, more: &[&str]) -> Value {
 fn timeless(value: &mut Value) {
     match value {
         Value::Object(fields) => {
-            fields.retain(|key, _| !["started", "wall_s", "checksum"].contains(&key.as_str()));
+            fields.retain(|key, _| key != "started" && key != "wall_s");
             fields.values_mut().for_each(timeless);
         }
         Value::Array(items) => items.iter_mut().for_each(timeless),

@@ -48,7 +48,7 @@ const LONG: usize = 10_000;
 pub struct Report {
     /// Version of the format: 1.
     pub luxproof: u32,
-    /// SHA-256 of the rest as it was written, white space between its parts and this value left out: what was edited is refused.
+    /// SHA-256 of the rest as it was written, times, white space between its parts and this value left out: what was edited is refused.
     #[serde(default)]
     pub checksum: String,
     pub tool_version: String,
