@@ -148,10 +148,16 @@ fn a_report_of_another_version_is_told_and_one_that_does_not_fit_refused() {
     room.luxproof(&["report", "spec.yaml"]).exits(2).complains("is no report of luxproof");
 }
 
-/// A report as luxproof would have written it.
+/// A report as luxproof would have written it: times and the checksum itself do not count.
 fn sealed(mut report: serde_json::Value) -> String {
     report["checksum"] = "".into();
-    let checksum = Sha256::digest(report.to_string());
+    let mut counted = report.to_string();
+    for name in ["\"checksum\"", "\"started\"", "\"wall_s\""] {
+        let mut parts = counted.split(name);
+        let first = parts.next().unwrap_or_default().to_owned();
+        counted = parts.fold(first, |said, part| said + name + &part[part.find([',', '}']).unwrap()..]);
+    }
+    let checksum = Sha256::digest(counted);
     report["checksum"] = checksum.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat().into();
     report.to_string()
 }
