@@ -8,6 +8,7 @@
 mod opening;
 
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 use glam::DVec3;
 
@@ -25,6 +26,9 @@ const COSINE_ROUNDING: f64 = 1e-5;
 const DEEPEST: u32 = 9;
 /// Parts of an integral after which it stops improving: what is left is its bound.
 const MOST_PARTS: u32 = 4000;
+
+/// The rule along each side of a part.
+static RULE: LazyLock<Gauss> = LazyLock::new(|| Gauss::new(5));
 
 /// A luminaire as the deterministic solvers see it.
 #[derive(Clone, Debug)]
@@ -277,26 +281,24 @@ fn lambertian(luminaire: &Luminaire, area_m2: f64) -> Option<Lambertian> {
 
 /// Integral over a convex flat polygon, by triangles that are quartered until two rules agree.
 fn integrate(polygon: &[DVec3], precision: Precision, f: &impl Fn(DVec3) -> f64) -> Bounded {
-    let rule = Gauss::new(5);
     let parts: Vec<_> = (2..polygon.len()).map(|k| [polygon[0], polygon[k - 1], polygon[k]]).collect();
     let quarters = |t: &[DVec3; 3]| {
         let [ab, bc, ca] = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(p, q)| 0.5 * (p + q));
         [[t[0], ab, ca], [ab, t[1], bc], [ca, bc, t[2]], [ab, bc, ca]]
     };
-    refined(parts, precision, &quarters, &|t| on_triangle(t, &rule, f))
+    refined(parts, precision, &quarters, &|t| on_triangle(t, f))
 }
 
 /// Integral over the unit square, by squares that are quartered until two rules agree.
 fn integrate_square(precision: Precision, f: &impl Fn([f64; 2]) -> f64) -> Bounded {
-    let rule = Gauss::new(5);
     let quarters = |&[u, v, side]: &[f64; 3]| {
         let half = 0.5 * side;
         [[u, v, half], [u + half, v, half], [u, v + half, half], [u + half, v + half, half]]
     };
     let on_square = |&[u, v, side]: &[f64; 3]| {
         let mut sum = 0.0;
-        for (a, wa) in rule.points() {
-            for (b, wb) in rule.points() {
+        for (a, wa) in RULE.points() {
+            for (b, wb) in RULE.points() {
                 sum += wa * wb * f([u + side * a, v + side * b]);
             }
         }
@@ -338,12 +340,12 @@ fn refined<P>(
 }
 
 /// A product rule on a triangle, collapsed towards its first corner.
-fn on_triangle(t: &[DVec3; 3], rule: &Gauss, f: &impl Fn(DVec3) -> f64) -> f64 {
+fn on_triangle(t: &[DVec3; 3], f: &impl Fn(DVec3) -> f64) -> f64 {
     let area = (t[1] - t[0]).cross(t[2] - t[0]).length();
     let mut sum = 0.0;
-    for (a, wa) in rule.nodes.iter().zip(&rule.weights) {
-        for (b, wb) in rule.nodes.iter().zip(&rule.weights) {
-            let p = t[0] + *a * (t[1].lerp(t[2], *b) - t[0]);
+    for (a, wa) in RULE.points() {
+        for (b, wb) in RULE.points() {
+            let p = t[0] + a * (t[1].lerp(t[2], b) - t[0]);
             sum += wa * wb * a * f(p);
         }
     }

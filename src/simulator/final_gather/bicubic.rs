@@ -28,13 +28,9 @@ pub(super) struct Bicubic {
 impl Bicubic {
     pub(super) fn new() -> Self {
         let rule = Gauss::new(ORDER);
-        let nodes: [f64; ORDER] = std::array::from_fn(|k| rule.nodes[k]);
-        let apart = |k: usize| (0..ORDER).filter(|j| *j != k).map(|j| nodes[k] - nodes[j]).product::<f64>();
-        Self {
-            nodes,
-            weights: std::array::from_fn(|k| rule.weights[k]),
-            scale: std::array::from_fn(|k| 1.0 / apart(k)),
-        }
+        let [nodes, weights, scale] =
+            [&rule.nodes, &rule.weights, &rule.barycentric].map(|values| std::array::from_fn(|k| values[k]));
+        Self { nodes, weights, scale }
     }
 
     /// Where a node lies.

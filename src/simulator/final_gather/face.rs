@@ -7,6 +7,11 @@ use crate::geometry::{Room, Surface};
 /// Faces of boxes smaller than this part of the room's mean wall reflect so little that rays go on from them.
 const SMALL: f64 = 0.01;
 
+/// The mean area of a room's walls.
+pub(super) fn mean_wall_m2(size_m: DVec3) -> f64 {
+    (size_m.x * size_m.y + size_m.y * size_m.z + size_m.z * size_m.x) / 3.0
+}
+
 /// An axis-aligned rectangle of uniform reflectance, seen from one side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Face {
@@ -50,8 +55,7 @@ impl Face {
         let face = Self::new(axis, far, within, DVec3::AXES[axis] * if far { 1.0 } else { -1.0 }, reflectance);
         let plane_m = corners_m[usize::from(far)][axis];
         let is_seen = if far { plane_m >= 0.0 && plane_m < s[axis] } else { plane_m > 0.0 && plane_m <= s[axis] };
-        let mean_wall_m2 = (s.x * s.y + s.y * s.z + s.z * s.x) / 3.0;
-        (is_seen && reflectance > 0.0 && face.area_m2() >= SMALL * mean_wall_m2).then_some(face)
+        (is_seen && reflectance > 0.0 && face.area_m2() >= SMALL * mean_wall_m2(s)).then_some(face)
     }
 
     pub(super) fn size_m(&self) -> DVec2 {

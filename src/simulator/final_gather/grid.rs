@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 
 use super::bicubic::{Bicubic, NODES};
-use super::face::Face;
+use super::face::{Face, mean_wall_m2};
 use super::surroundings::Surroundings;
 
 /// Width of the strips along a room's edges, of the shorter side of a face.
@@ -42,7 +42,7 @@ impl Grid {
     pub(super) fn new(surroundings: &Surroundings) -> Self {
         let faces = surroundings.faces.clone();
         let size_m = surroundings.room.map_or(DVec3::ZERO, |room| room.size_m);
-        let side_m = SIDE * ((size_m.x * size_m.y + size_m.y * size_m.z + size_m.z * size_m.x) / 3.0).sqrt();
+        let side_m = SIDE * mean_wall_m2(size_m).sqrt();
         let cover = |face: &Face| surroundings.bodies().filter_map(|b| face.covered_by(*b)).collect();
         let covers: Vec<Vec<[DVec2; 2]>> = faces.iter().map(cover).collect();
         let cut = |index: usize, k: usize| {

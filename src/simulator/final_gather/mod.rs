@@ -45,7 +45,7 @@ const DARK: f64 = 1e-4;
 const PEAKED: f64 = 16.0;
 /// Rays of a meter in each replicate at first, as a power of two.
 const FIRST_RAYS_LOG2: u32 = 7;
-/// Light straight from the luminaires is known on the walls to so many times the error asked for: of what a polynomial leaves
+/// Light straight from the luminaires is known on the faces to so many times the error asked for: of what a polynomial leaves
 /// out little is left from afar.
 const LIT: f64 = 1.0;
 /// Rays of a node in each replicate: so many over the relative error asked for, a power of two.
@@ -104,7 +104,7 @@ struct Solved {
 #[derive(Clone, Debug, Default)]
 struct Sums {
     lux: [f64; REPLICATES],
-    /// The part of the first rays' light that is the field's chance.
+    /// The part of it that is the field's chance.
     chance_lux: [f64; REPLICATES],
     error_lux: f64,
     rays_log2: u32,
@@ -138,15 +138,12 @@ impl Enclosure {
             let error = relative_error.clamp(1e-10, 0.1);
             let precision = Precision::relative(0.2 * error);
             let light = |k: usize| {
-                if self.emitters[k].is_point() {
-                    let hidden = self.surroundings.is_hidden(self.lifted(meter), self.emitters[k].centre_m());
-                    return if hidden {
-                        Bounded::default()
-                    } else {
-                        self.emitters[k].illuminance(meter, &[], precision)
-                    };
+                let emitter = &self.emitters[k];
+                if !emitter.is_point() {
+                    return emitter.illuminance(meter, occluders, precision);
                 }
-                self.emitters[k].illuminance(meter, occluders, precision)
+                let hidden = self.surroundings.is_hidden(self.lifted(meter), emitter.centre_m());
+                if hidden { Bounded::default() } else { emitter.illuminance(meter, &[], precision) }
             };
             let known = exact.iter().map(|k| light(*k)).fold(Bounded::default(), |a, b| a + b);
             if sampled.is_empty() {
@@ -359,18 +356,17 @@ impl<'a> Gather<'a> {
             if log2 > FIRST_RAYS_LOG2 {
                 continue;
             }
-            let mut first = None;
+            let needs_log2 = |sums: &Sums| sums.field_needs_log2(self.accuracy.relative_error, direct);
+            let first_needs_log2 = needs_log2(&sums);
             for wary in WARY {
                 let here = self.limit(sums.bounded().value + direct.value, wary);
-                let needs_log2 = sums.field_needs_log2(self.accuracy.relative_error, direct);
-                if here.error_lux < 0.5 * limit.error_lux || wary > 1.0 && needs_log2 > 0.0 {
+                if here.error_lux < 0.5 * limit.error_lux || wary > 1.0 && needs_log2(&sums) > 0.0 {
                     limit = here;
                     sums = Sums { brightest_lux, ..Sums::default() };
                     sums.add(&self.replicates(index, meter, 0..1 << log2, limit), log2);
                 }
-                first = first.or(Some(needs_log2));
             }
-            sums.needs_log2 = first.unwrap_or(0.0);
+            sums.needs_log2 = first_needs_log2;
         }
         sums
     }
