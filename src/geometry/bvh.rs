@@ -1,41 +1,53 @@
 //! Ray casting against triangles: an `f32` tree proposes candidates, an `f64` watertight test decides.
 //!
-//! Tree: compressed wide bounding volume hierarchy, H. Ylitie, T. Karras, S. Laine, "Efficient incoherent ray
-//! traversal on GPUs through compressed wide BVHs", HPG 2017. Hit: S. Woop, C. Benthin, I. Wald, "Watertight
-//! ray/triangle intersection", JCGT 2(1), 2013. This is the only file that knows `obvhs` and `f32`.
+//! `obvhs` builds the tree: D. Meister, J. Bittner, "Parallel locally-ordered clustering for bounding volume hierarchy
+//! construction", TVCG 24(3), 2018, and "Parallel reinsertion for bounding volume hierarchy optimization", CGF 37(2), 2018. We
+//! walk it four boxes at a time, since what `obvhs` walks is slower (`benchmarks/bvh.md`): H. Dammertz, J. Hanika, A. Keller,
+//! "Shallow bounding volume hierarchies for fast SIMD ray tracing of incoherent rays", CGF 27(4), 2008. Hit: S. Woop,
+//! C. Benthin, I. Wald, "Watertight ray/triangle intersection", JCGT 2(1), 2013. This is the only file that knows `obvhs` and `f32`.
 //!
 //! The tree may propose too much but never too little: it lives in a frame where the scene spans
-//! `FRAME_EXTENT` units (its node test holds an absolute 1e-4), every box is padded by `PADDING` units, which
-//! exceeds the sum of all `f32` roundings of origin, direction, box and slab test (about 4e-3 units), rays enter the
-//! tree at its bounds instead of far outside, and no `f32` distance ever rejects a hit.
+//! `FRAME_EXTENT` units, every box is padded by `PADDING` units, which exceeds the sum of all `f32` roundings of origin,
+//! direction, box and slab test (about 8e-3 units), rays from far outside enter the tree at its bounds, and no `f32`
+//! distance ever rejects a hit.
 
-use glam::{DVec3, Vec3A};
-use obvhs::BvhBuildParams;
+// A ray takes some 100 ns: a call in its innermost loops is a tenth of that.
+#![allow(clippy::inline_always)]
+
+use glam::{DVec3, Vec3A, Vec4};
 use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
-use obvhs::ploc::PlocBuilder;
-use obvhs::ray::RayHit;
+use obvhs::fast_stack;
+use obvhs::faststack::FastStack;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 /// Extent of the scene in the tree's own frame.
 const FRAME_EXTENT: f64 = 1e4;
 /// How far each box is grown in the tree's own frame.
 const PADDING: f64 = 2e-2;
-/// Levels that the traversal's fixed stack of 32 holds; beyond, it loses nodes in silence.
-const MAX_DEPTH: usize = 31;
-/// Levels of the binary tree beyond which turning it into a wide one, which recurses, could exhaust the stack.
-const MAX_BINARY_DEPTH: usize = 1000;
-/// Primitives a leaf, the most that the wide node can hold.
-const LEAF_SIZE: u32 = 3;
-/// More triangles than this would need more than about 16 GiB to build.
-const MAX_TRIANGLES: usize = 1 << 26;
+/// Children of a node: what a register of the least x86-64 holds.
+const WIDTH: usize = 4;
+/// Triangles of a leaf at most.
+const LEAF_SIZE: u32 = 4;
+/// What a node's test costs, in tests of a triangle.
+const NODE_COST: f32 = 2.0;
+/// Of all nodes these are looked at for a better place in the tree; ten times as many win nothing.
+const REINSERTED: f32 = 0.05;
+/// Marks a child that is a leaf; its count and its first triangle follow.
+const LEAF: u32 = 1 << 31;
+/// Where in a leaf its count stands.
+const COUNT_BIT: u32 = 26;
+/// More triangles than this would need more than about 16 GiB to build, and their number would not fit a leaf.
+const MAX_TRIANGLES: usize = 1 << COUNT_BIT;
 
 /// Triangles that rays can be cast against.
 pub struct TriangleBvh {
-    tree: CwBvh,
+    tree: Tree,
     /// In the order of the tree's leaves.
     triangles: Vec<[[f64; 3]; 3]>,
+    normals: Vec<DVec3>,
     /// Index of each of them in the input.
     indices: Vec<u32>,
     frame: Frame,
@@ -88,14 +100,6 @@ pub enum BvhError {
         /// How many there may be.
         limit: usize,
     },
-    /// Triangles piled so that no tree of bounded depth holds them.
-    #[error("the triangles pile up so that the search tree is {depth} levels deep, {limit} at most; remove duplicates")]
-    TooDeep {
-        /// Depth reached.
-        depth: usize,
-        /// Depth allowed.
-        limit: usize,
-    },
 }
 
 impl TriangleBvh {
@@ -109,11 +113,11 @@ impl TriangleBvh {
         distinct(&mut kept, corners);
         let corners: Vec<_> = kept.iter().map(|k| corners(*k)).collect();
         let frame = Frame::around(corners.as_flattened());
-        let mut tree = build(corners.iter().map(|c| frame.padded_box(*c)).collect())?;
-        let order = std::mem::take(&mut tree.primitive_indices);
-        let triangles = order.iter().map(|&k| corners[k as usize].map(|v| v.to_array())).collect();
+        let (tree, order) = build(&corners.iter().map(|c| frame.padded_box(*c)).collect::<Vec<_>>());
+        let triangles: Vec<_> = order.iter().map(|&k| corners[k as usize].map(|v| v.to_array())).collect();
+        let normals = order.iter().map(|&k| normal(corners[k as usize])).collect();
         let indices = order.iter().map(|&k| kept[k as usize]).collect();
-        Ok(Self { tree, triangles, indices, frame })
+        Ok(Self { tree, triangles, normals, indices, frame })
     }
 
     /// The nearest hit at a distance in `0..t_max`.
@@ -121,25 +125,27 @@ impl TriangleBvh {
         let (narrow, entry) = self.frame.narrow(ray, t_max)?;
         let shear = Shear::along(ray);
         let mut best = (t_max, u32::MAX, usize::MAX);
-        self.tree.ray_traverse(narrow, &mut RayHit::none(), |_, slot| match shear.distance(&self.triangles[slot]) {
-            Some(t) if t < best.0 || (t == best.0 && self.indices[slot] < best.1 && best.2 != usize::MAX) => {
+        self.tree.walk(&narrow, |slot| {
+            let t = shear.distance(&self.triangles[slot])?;
+            (t < best.0 || (t == best.0 && self.indices[slot] < best.1 && best.2 != usize::MAX)).then(|| {
                 best = (t, self.indices[slot], slot);
                 entry.widen(t)
-            }
-            _ => f32::INFINITY,
+            })
         });
         let (distance, triangle, slot) = best;
-        (slot != usize::MAX).then(|| Hit { distance, triangle, normal: normal(&self.triangles[slot]) })
+        (slot != usize::MAX).then(|| Hit { distance, triangle, normal: self.normals[slot] })
     }
 
     /// Whether anything lies at a distance in `0..t_max`.
     pub fn occluded(&self, ray: &Ray, t_max: f64) -> bool {
         let Some((narrow, _)) = self.frame.narrow(ray, t_max) else { return false };
         let shear = Shear::along(ray);
-        !self.tree.ray_traverse_miss(narrow, |_, slot| match shear.distance(&self.triangles[slot]) {
-            Some(t) if t < t_max => 0.0,
-            _ => f32::INFINITY,
-        })
+        let mut found = false;
+        self.tree.walk(&narrow, |slot| {
+            found = shear.distance(&self.triangles[slot]).is_some_and(|t| t < t_max);
+            found.then_some(f32::NEG_INFINITY)
+        });
+        found
     }
 
     /// How many triangles can be hit.
@@ -182,23 +188,34 @@ impl Frame {
         Aabb { min: single(a.min(b).min(c) - PADDING), max: single(a.max(b).max(c) + PADDING) }
     }
 
-    /// The part of the ray that lies within the scene's bounds, in single precision; `None` where there is none.
-    fn narrow(&self, ray: &Ray, t_max: f64) -> Option<(obvhs::ray::Ray, Entry)> {
+    /// The ray in single precision, from near the scene's bounds or within; `None` where it passes them by.
+    fn narrow(&self, ray: &Ray, t_max: f64) -> Option<(Narrow, Entry)> {
         let origin = (ray.origin_m - self.centre_m) * self.scale;
-        let units_per_t = ray.direction.length() * self.scale;
-        let direction = ray.direction / ray.direction.length();
-        // A zero component divides to an infinity, or to a NaN on the very bound, which `min` and `max` pass over.
-        let (low, high) = ((-self.half - origin) / direction, (self.half - origin) / direction);
-        let pairs = [(low.x, high.x), (low.y, high.y), (low.z, high.z)];
-        let near = pairs.iter().fold(0.0_f64, |t, (a, b)| t.max(a.min(*b)));
-        let far = pairs.iter().fold(t_max * units_per_t, |t, (a, b)| t.min(a.max(*b)));
-        if near > far + PADDING {
-            return None;
+        let steepest = ray.direction.abs().max_element();
+        let (direction, units_per_t) = (ray.direction / steepest, steepest * self.scale);
+        let (mut near, mut far) = (0.0_f64, t_max * units_per_t);
+        if origin.abs().cmpgt(self.half + FRAME_EXTENT).any() {
+            // A zero component divides to an infinity, or to a NaN on the very bound, which `min` and `max` pass over.
+            let (low, high) = ((-self.half - origin) / direction, (self.half - origin) / direction);
+            for (a, b) in [(low.x, high.x), (low.y, high.y), (low.z, high.z)] {
+                near = near.max(a.min(b));
+                far = far.min(a.max(b));
+            }
+            if near > far + PADDING {
+                return None;
+            }
         }
         let entry = Entry { t: near / units_per_t, units_per_t };
-        let start = single(origin + near * direction);
-        let ray = obvhs::ray::Ray::new(start, single(direction), 0.0, entry.widen(far / units_per_t));
-        Some((ray, entry))
+        let reach = entry.widen(far / units_per_t);
+        let origin = single(origin + near * direction).to_array();
+        // Finite, so that no product with zero is NaN: a ray that is steeper stays beside a plane all along.
+        let inverse = single(direction).recip().clamp(Vec3A::splat(-1e30), Vec3A::splat(1e30)).to_array();
+        let [x, y, z] = [0, 1, 2].map(|k| Along {
+            origin: Vec4::splat(origin[k]),
+            inverse: Vec4::splat(inverse[k]),
+            backward: usize::from(inverse[k] < 0.0),
+        });
+        Some((Narrow { along: [x, y, z], reach }, entry))
     }
 }
 
@@ -230,27 +247,35 @@ impl Shear {
     /// The distance at which the ray meets the triangle, on either side, edges and corners included.
     ///
     /// Two triangles that share an edge compute its edge function from the same products, so that no ray slips between.
+    #[inline(always)]
     fn distance(&self, triangle: &[[f64; 3]; 3]) -> Option<f64> {
         let [x, y, z] = self.axes;
-        let [a, b, c] = triangle.map(|v| {
+        let sheared = |v: &[f64; 3]| {
             let z_to = v[z] - self.origin[z];
-            [v[x] - self.origin[x] - self.by[0] * z_to, v[y] - self.origin[y] - self.by[1] * z_to, self.by[2] * z_to]
-        });
-        let u = c[0] * b[1] - c[1] * b[0];
-        let v = a[0] * c[1] - a[1] * c[0];
-        let w = b[0] * a[1] - b[1] * a[0];
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            (v[x] - self.origin[x] - self.by[0] * z_to, v[y] - self.origin[y] - self.by[1] * z_to, self.by[2] * z_to)
+        };
+        // One by one: `map` is a call that costs as much as the test.
+        let (a, b, c) = (sheared(&triangle[0]), sheared(&triangle[1]), sheared(&triangle[2]));
+        let u = c.0 * b.1 - c.1 * b.0;
+        let v = a.0 * c.1 - a.1 * c.0;
+        let w = b.0 * a.1 - b.1 * a.0;
+        let (least, most) = (lesser(lesser(u, v), w), -lesser(lesser(-u, -v), -w));
+        if least < 0.0 && most > 0.0 {
             return None;
         }
         let determinant = u + v + w;
-        let t = (u * a[2] + v * b[2] + w * c[2]) / determinant;
+        let t = (u * a.2 + v * b.2 + w * c.2) / determinant;
         // Edge-on triangles give 0 / 0, which is not >= 0.
         (t >= 0.0).then_some(t)
     }
 }
 
-fn normal(triangle: &[[f64; 3]; 3]) -> DVec3 {
-    let [a, b, c] = triangle.map(DVec3::from);
+/// One instruction, other than `f64::min`, which has a NaN give way.
+fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a).normalize()
 }
 
@@ -299,39 +324,176 @@ fn distinct(kept: &mut Vec<u32>, corners: impl Fn(u32) -> [DVec3; 3]) {
     kept.extend(keyed.into_iter().map(|(_, k)| k));
 }
 
-/// As `obvhs`'s own builder does, but checking the depth between the steps, since the later ones rely on it.
-fn build(boxes: Vec<Aabb>) -> Result<CwBvh, BvhError> {
+fn build(boxes: &[Aabb]) -> (Tree, Vec<u32>) {
     if boxes.is_empty() {
-        return Ok(CwBvh::default());
+        return (Tree { nodes: vec![], stack: 0 }, vec![]);
     }
-    let params = BvhBuildParams::medium_build();
-    let (distance, threshold) = (params.ploc_search_distance, params.search_depth_threshold);
     let indices = (0..boxes.len() as u32).collect();
-    let mut binary =
-        PlocBuilder::with_capacity(boxes.len()).build(distance, &boxes, indices, params.sort_precision, threshold);
-    drop(boxes);
-    if binary.max_depth > MAX_BINARY_DEPTH {
-        return Err(BvhError::TooDeep { depth: binary.max_depth, limit: MAX_BINARY_DEPTH });
-    }
-    ReinsertionOptimizer::default().run(&mut binary, params.reinsertion_batch_ratio, None);
-    let tree = bvh2_to_cwbvh(&binary, LEAF_SIZE, true, false);
-    let depth = depth(&tree);
-    if depth > MAX_DEPTH {
-        return Err(BvhError::TooDeep { depth, limit: MAX_DEPTH });
-    }
-    Ok(tree)
+    let (distance, precision) = (PlocSearchDistance::Medium, SortPrecision::U64);
+    let mut binary = PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, indices, precision, 3);
+    ReinsertionOptimizer::default().run(&mut binary, REINSERTED, None);
+    collapse(&mut binary, LEAF_SIZE, NODE_COST);
+    Tree::of(&binary)
 }
 
-fn depth(tree: &CwBvh) -> usize {
-    let mut deepest = 0;
-    let mut open: Vec<(usize, usize)> = if tree.nodes.is_empty() { vec![] } else { vec![(0, 1)] };
-    while let Some((index, depth)) = open.pop() {
-        deepest = deepest.max(depth);
-        let node = &tree.nodes[index];
-        let first = node.child_base_idx as usize;
-        open.extend((0..node.imask.count_ones() as usize).map(|k| (first + k, depth + 1)));
+/// A ray in the tree's frame, its direction 1 where it is steepest.
+struct Narrow {
+    along: [Along; 3],
+    reach: f32,
+}
+
+/// A ray along an axis.
+struct Along {
+    origin: Vec4,
+    inverse: Vec4,
+    /// 1 where it meets the upper planes first.
+    backward: usize,
+}
+
+struct Tree {
+    nodes: Vec<Node>,
+    /// How much may lie on a walk's stack.
+    stack: usize,
+}
+
+/// The boxes of `WIDTH` children, in two lines of the cache.
+#[repr(align(64))]
+struct Node {
+    /// Lower and upper planes along each axis; of no child an empty box.
+    planes: [[Vec4; 3]; 2],
+    /// Indices of nodes, or leaves.
+    children: [u32; WIDTH],
+}
+
+impl Tree {
+    /// Opens the largest child of each node until it has `WIDTH`.
+    ///
+    /// Triangles go where their nodes do, so that what a ray meets one after the other lies close together.
+    fn of(binary: &Bvh2) -> (Self, Vec<u32>) {
+        let mut order = vec![];
+        let mut nodes: Vec<Node> = vec![];
+        let mut deepest = 0;
+        // What is to become a node, the child that it is, and how deep it lies.
+        let mut open = vec![(0, None, 1)];
+        while let Some((root, child_of, depth)) = open.pop() {
+            deepest = deepest.max(depth);
+            let index = nodes.len();
+            if let Some((parent, lane)) = child_of {
+                let parent: &mut Node = &mut nodes[parent];
+                parent.children[lane] = index as u32;
+            }
+            let mut children = vec![root];
+            while children.len() < WIDTH {
+                let area = |k: &usize| binary.nodes[children[*k] as usize].aabb().half_area();
+                let inner = (0..children.len()).filter(|k| !binary.nodes[children[*k] as usize].is_leaf());
+                let Some(largest) = inner.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
+                let first = binary.nodes[children[largest] as usize].first_index;
+                children[largest] = first;
+                children.push(first + 1);
+            }
+            let mut node = Node { planes: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]], children: [0; WIDTH] };
+            for (lane, child) in children.into_iter().enumerate() {
+                let it = &binary.nodes[child as usize];
+                for axis in 0..3 {
+                    node.planes[0][axis][lane] = it.aabb().min[axis];
+                    node.planes[1][axis][lane] = it.aabb().max[axis];
+                }
+                if it.is_leaf() {
+                    node.children[lane] = LEAF | it.prim_count << COUNT_BIT | order.len() as u32;
+                    let first = it.first_index as usize;
+                    order.extend_from_slice(&binary.primitive_indices[first..first + it.prim_count as usize]);
+                } else {
+                    open.push((child, Some((index, lane)), depth + 1));
+                }
+            }
+            nodes.push(node);
+        }
+        (Self { nodes, stack: (WIDTH - 1) * deepest }, order)
     }
-    deepest
+
+    /// Asks `meets` of every triangle that the ray may meet, near ones first; it answers with how far hits are of interest from then on.
+    #[inline(always)]
+    fn walk(&self, ray: &Narrow, meets: impl FnMut(usize) -> Option<f32>) {
+        // Trees of 32 levels need no allocation; deeper ones are of piles of triangles.
+        fast_stack!(u64, (96), self.stack.max(1), stack, { self.walk_with(&mut stack, ray, meets) });
+    }
+
+    #[inline(always)]
+    fn walk_with(&self, stack: &mut impl FastStack<u64>, ray: &Narrow, mut meets: impl FnMut(usize) -> Option<f32>) {
+        let mut reach = ray.reach;
+        let mut next = 0;
+        if self.nodes.is_empty() {
+            return;
+        }
+        loop {
+            if next & LEAF == 0 {
+                let node = &self.nodes[next as usize];
+                if let Some(nearest) = node.children_before(reach, ray, stack) {
+                    next = nearest;
+                    continue;
+                }
+            } else {
+                let first = (next & ((1 << COUNT_BIT) - 1)) as usize;
+                for slot in first..first + (next >> COUNT_BIT & 31) as usize {
+                    if let Some(nearer) = meets(slot) {
+                        reach = nearer;
+                        if reach < 0.0 {
+                            return;
+                        }
+                    }
+                }
+            }
+            // What lies beyond a hit that was found since is passed over.
+            next = loop {
+                match stack.pop() {
+                    None => return,
+                    Some(child) if f32::from_bits((child >> 32) as u32) <= reach => break child as u32,
+                    Some(_) => {}
+                }
+            };
+        }
+    }
+}
+
+impl Node {
+    /// The nearest child that the ray may meet; the others go onto the stack, the farthest first.
+    #[inline(always)]
+    fn children_before(&self, reach: f32, ray: &Narrow, stack: &mut impl FastStack<u64>) -> Option<u32> {
+        let mut near = Vec4::ZERO;
+        let mut far = Vec4::splat(reach);
+        for (axis, along) in ray.along.iter().enumerate() {
+            near = near.max((self.planes[along.backward & 1][axis] - along.origin) * along.inverse);
+            far = far.min((self.planes[1 - (along.backward & 1)][axis] - along.origin) * along.inverse);
+        }
+        let mut met = near.cmple(far).bitmask();
+        let near = near.to_array();
+        // Distances are not negative, so that their bits sort as they do.
+        let mut child = || {
+            if met == 0 {
+                return None;
+            }
+            let lane = met.trailing_zeros() as usize % WIDTH;
+            met &= met - 1;
+            Some(u64::from(near[lane].to_bits()) << 32 | u64::from(self.children[lane]))
+        };
+        let mut nearest = child()?;
+        if let Some(mut second) = child() {
+            (nearest, second) = (nearest.min(second), nearest.max(second));
+            if let Some(mut third) = child() {
+                (second, third) = (second.min(third), second.max(third));
+                (nearest, second) = (nearest.min(second), nearest.max(second));
+                if let Some(mut fourth) = child() {
+                    (third, fourth) = (third.min(fourth), third.max(fourth));
+                    (second, third) = (second.min(third), second.max(third));
+                    (nearest, second) = (nearest.min(second), nearest.max(second));
+                    stack.push(fourth);
+                }
+                stack.push(third);
+            }
+            stack.push(second);
+        }
+        Some(nearest as u32)
+    }
 }
 
 #[cfg(test)]

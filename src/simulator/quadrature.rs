@@ -11,7 +11,7 @@ pub struct Gauss {
     /// Weights, summing to 1.
     pub weights: Vec<f64>,
     /// Reciprocals of what the product of distances to all other nodes is at each.
-    barycentric: Vec<f64>,
+    pub(crate) barycentric: Vec<f64>,
 }
 
 impl Gauss {

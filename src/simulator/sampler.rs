@@ -16,7 +16,9 @@ pub(crate) struct Sampler {
     seed: u64,
     index: u32,
     dimension: usize,
-    /// The shuffled index of the current block, bits reversed.
+    /// The block whose index is shuffled.
+    block: usize,
+    /// The shuffled index of that block, bits reversed.
     shuffled: u32,
 }
 
@@ -25,7 +27,7 @@ impl Sampler {
     ///
     /// The first 2^m points of every sequence are balanced, so that one may double their number at any time.
     pub(crate) fn new(seed: u64, index: u32) -> Self {
-        Self { seed, index, dimension: 0, shuffled: 0 }
+        Self { seed, index, dimension: 0, block: usize::MAX, shuffled: 0 }
     }
 
     /// The next coordinate, in 0..1, of 53 bits.
@@ -36,8 +38,10 @@ impl Sampler {
             let key = mix(self.seed ^ u64::from(self.index).wrapping_mul(0x9e37_79b9_7f4a_7c15));
             return unit(mix(key.wrapping_add(dimension as u64)));
         }
-        if dimension.is_multiple_of(BLOCK) {
-            let seed = mix(self.seed ^ 0x5851_f42d_4c95_7f2d_u64.wrapping_mul(1 + dimension as u64));
+        if dimension / BLOCK != self.block {
+            self.block = dimension / BLOCK;
+            let first = self.block * BLOCK;
+            let seed = mix(self.seed ^ 0x5851_f42d_4c95_7f2d_u64.wrapping_mul(1 + first as u64));
             self.shuffled = laine_karras(self.index.reverse_bits(), seed as u32);
         }
         let digits = sobol_reversed(dimension % BLOCK, self.shuffled);
@@ -51,6 +55,12 @@ impl Sampler {
     /// The next two coordinates.
     pub(crate) fn next_pair(&mut self) -> [f64; 2] {
         [self.next(), self.next()]
+    }
+
+    /// Goes to a coordinate, so that none is drawn that nobody asks for.
+    pub(crate) fn from(&mut self, dimension: usize) -> &mut Self {
+        self.dimension = dimension;
+        self
     }
 
     /// Two coordinates moved on round the unit square and folded, all points of the sequence by the same random way.

@@ -3,6 +3,8 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
+use sha2::{Digest, Sha256};
+
 use crate::support::{Answer, Folder, LAMP, OWN, ROOM, TWO_METERS};
 
 /// As a baseline has it of the program that is tested.
@@ -146,6 +148,20 @@ fn a_report_of_another_version_is_told_and_one_that_does_not_fit_refused() {
     room.luxproof(&["report", "spec.yaml"]).exits(2).complains("is no report of luxproof");
 }
 
+/// A report as luxproof would have written it: times and the checksum itself do not count.
+fn sealed(mut report: serde_json::Value) -> String {
+    report["checksum"] = "".into();
+    let mut counted = report.to_string();
+    for name in ["\"checksum\"", "\"started\"", "\"wall_s\""] {
+        let mut parts = counted.split(name);
+        let first = parts.next().unwrap_or_default().to_owned();
+        counted = parts.fold(first, |said, part| said + name + &part[part.find([',', '}']).unwrap()..]);
+    }
+    let checksum = Sha256::digest(counted);
+    report["checksum"] = checksum.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().concat().into();
+    report.to_string()
+}
+
 #[test]
 fn two_runs_that_agree_differ_in_nothing_and_a_planted_change_exits_1() {
     let room = room();
@@ -157,6 +173,16 @@ fn two_runs_that_agree_differ_in_nothing_and_a_planted_change_exits_1() {
     let reading = &mut report["readings"].as_array_mut().unwrap()[0];
     reading["value"] = (1.01 * reading["value"].as_f64().unwrap()).into();
     room.write("later/report.json", &report.to_string());
+    for command in [
+        &["diff", "out", "later/report.json"][..],
+        &["report", "later/report.json"],
+        &["accept", "later", "--all", "--reason", "as it is today"],
+        &["history", "add", "later/report.json", "--history", "nights.jsonl"],
+    ] {
+        room.luxproof(command).exits(2).complains("was edited");
+    }
+    assert!(!room.path("baselines").exists() && !room.path("nights.jsonl").exists());
+    room.write("later/report.json", &sealed(report));
     room.luxproof(&["diff", "out", "later/report.json"]).exits(1).prints("CHANGED").prints("+1.0000 %");
     let changes = room.luxproof(&["diff", "out", "later", "--format", "json"]).json();
     let changed = changes["entries"].as_array().unwrap().iter().filter(|e| e["state"] == "changed").count();
@@ -191,7 +217,7 @@ fn what_is_accepted_anew_every_night_is_a_drift_in_the_history_still_and_fails_w
                 }
             }
         }
-        room.write("out/report.json", &report.to_string());
+        room.write("out/report.json", &sealed(report));
         room.luxproof(&["accept", "out", "--all", "--reason", "as it is today"]).exits(0);
         let date = format!("2026-01-{night:02}");
         room.luxproof(&["history", "add", "out/report.json", "--history", "nights.jsonl", "--night", &date]).exits(0);

@@ -23,6 +23,7 @@ mod repetition;
 mod sampling;
 pub mod sequential;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -37,6 +38,7 @@ use crate::judge::{Policy, PolicyChoice, Published, PublishedError};
 use crate::measure::cache::Cache;
 use crate::measure::{Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
+use crate::procedures::Task;
 use crate::record::Status;
 use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, SpecError, filtered, suite};
@@ -210,7 +212,7 @@ fn audited(
         let (case, plan) = (&cases[k], &plans[k]);
         let folder = folder_of(case);
         let stopped = stop.lock().clone();
-        let report = audit.case(case, plan, &policies[k], published[k].as_ref(), stopped.as_ref(), &folder)?;
+        let mut report = audit.case(case, plan, &policies[k], published[k].as_ref(), stopped.as_ref(), &folder)?;
         if folder != options.out {
             report.keep(&folder.join("report.json"))?;
         }
@@ -231,13 +233,14 @@ fn audited(
     let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
     let mut reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
     diagnose(&plans, &mut reports);
-    for (case, report) in cases.iter().zip(&reports) {
+    for (case, report) in cases.iter().zip(&mut reports) {
         let folder = folder_of(case);
         if folder != options.out && report.comparisons.iter().any(|c| c.diagnosis.is_some()) {
             report.keep(&folder.join("report.json"))?;
         }
     }
     let mut report = Report::joined(spec, reports);
+    report.published_findings = published_findings(cases, &plans, &published);
     // Cases ran side by side: their seconds do not add up.
     report.wall_s = clock.elapsed().as_secs_f64();
     report.keep(&options.out.join("report.json"))?;
@@ -280,6 +283,16 @@ pub fn chosen(specs: &[PathBuf], options: &Options<'_>) -> Result<(Vec<Case>, Ve
 /// The published tables of each case.
 pub fn published(cases: &[Case]) -> Result<Vec<Option<Published>>, PublishedError> {
     cases.iter().map(|case| case.published.as_deref().map(Published::read).transpose()).collect()
+}
+
+/// What of the published files stands for nothing in all cases that are held against each.
+fn published_findings(cases: &[Case], plans: &[Plan], published: &[Option<Published>]) -> Vec<String> {
+    let mut files: BTreeMap<&Path, (&Published, Vec<&Task>)> = BTreeMap::new();
+    for ((case, plan), published) in cases.iter().zip(plans).zip(published) {
+        let Some((path, published)) = case.published.as_deref().zip(published.as_ref()) else { continue };
+        files.entry(path).or_insert((published, vec![])).1.extend(&plan.tasks);
+    }
+    files.values().flat_map(|(published, tasks)| published.findings(tasks)).collect()
 }
 
 /// The folder of one case of several, a spec's own name not twice.

@@ -6,6 +6,7 @@
 mod code;
 mod command;
 mod form;
+mod imports;
 #[cfg(test)]
 mod tests;
 
@@ -130,7 +131,8 @@ impl Engine for External {
     }
 
     /// The version of an adapter is the hash of what its command says. What runs is more: the files that it names, all code below the
-    /// folders of these and below that in which it runs, which it may load or start, and what it depends on by `depends_on`.
+    /// folders of these and below that in which it runs, which it may load or start, what Python would import from elsewhere, and what it
+    /// depends on by `depends_on`.
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         let remedy = format!("correct engines.{}", self.id);
         let absent = |reason| Absent { reason, remedy: remedy.clone() };
@@ -149,8 +151,17 @@ impl Engine for External {
             tracing::warn!("{}: no word of its command names a file of its own: name them in `depends_on`", self.id);
             text += " (its files are not known)";
         }
+        let imports = imports::of(&self.command, &own, &self.folder, site);
+        if self.depends_on.is_empty() && !imports.unknown.is_empty() {
+            let unknown = imports.unknown.join(", ");
+            tracing::warn!(
+                "{}: not found, so that a change is not noticed: {unknown}; name its files in `depends_on`",
+                self.id
+            );
+            text += " (not all of its imports)";
+        }
         let named = fingerprint::listed(std::iter::once(program).chain(own));
-        let others = fingerprint::listed(self.depends_on.iter().cloned());
+        let others = fingerprint::listed(self.depends_on.iter().cloned().chain(imports.roots));
         let files = named.into_iter().chain(code.files).chain(others).collect();
         Ok(Version { text, fingerprint: fingerprint::of_files(&self.id, site, files) })
     }

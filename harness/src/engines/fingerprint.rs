@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -19,16 +20,55 @@ use crate::system::files;
 /// Of more files than this only the number counts.
 const MAX_FILES: usize = 20_000;
 
-/// Hashes of files that have not changed since, by path: size and time of change tell.
+/// Hashes of files that have not changed since, by path.
 type Memo = BTreeMap<PathBuf, Known>;
 
-const SCHEMA: Schema = Schema { of: "hashes of engine files", version: 1 };
+const SCHEMA: Schema = Schema { of: "hashes of engine files", version: 2 };
 
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 struct Known {
-    size: u64,
-    changed_ns: u128,
+    /// Before it was read.
+    state: State,
+    #[serde(skip, default = "settled")]
+    is_settled: bool,
     sha256: String,
+}
+
+/// Nothing else is kept.
+const fn settled() -> bool {
+    true
+}
+
+/// What tells that a file is as it was: besides its size and the time of its contents, which anyone may set, the time of the system's
+/// own when any of it was last changed, and which file it is.
+#[derive(Clone, PartialEq, Serialize, Deserialize)]
+struct State {
+    size: u64,
+    modified: (i64, i64),
+    changed: (i64, i64),
+    file: (u64, u64),
+}
+
+/// Clocks of file systems go by ticks: what was changed less than this before it was read may change once more and look the same.
+const TICK: Duration = Duration::from_millis(20);
+
+impl State {
+    fn of(path: &Path) -> io::Result<Self> {
+        let data = path.metadata()?;
+        Ok(Self {
+            size: data.size(),
+            modified: (data.mtime(), data.mtime_nsec()),
+            changed: (data.ctime(), data.ctime_nsec()),
+            file: (data.dev(), data.ino()),
+        })
+    }
+
+    /// Whether whatever changes the file from now on changes this.
+    fn is_settled(&self) -> bool {
+        let nanoseconds = i128::from(self.changed.0) * 1_000_000_000 + i128::from(self.changed.1);
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().saturating_sub(TICK);
+        i128::try_from(now.as_nanos()).is_ok_and(|settled| nanoseconds < settled)
+    }
 }
 
 /// SHA-256 of the names and contents of an engine's files and folders, 16 hexadecimal digits of it; what cannot be read is
@@ -53,7 +93,7 @@ pub(super) fn of_files(engine: &EngineName, site: &Site, files: Vec<(PathBuf, Pa
         let known = seen(&path, memo.get(&path));
         let content = known.as_ref().map_or_else(ToString::to_string, |k| k.sha256.clone());
         hash.update(format!("{}\0{content}\n", name.display()));
-        now.extend(known.map(|known| (path, known)));
+        now.extend(known.ok().filter(|known| known.is_settled).map(|known| (path, known)));
     }
     if now != memo {
         // Where it cannot be kept, files are read again next time.
@@ -73,13 +113,11 @@ fn kept(place: &Path, engine: &EngineName) -> Memo {
 }
 
 fn seen(path: &Path, earlier: Option<&Known>) -> io::Result<Known> {
-    let data = path.metadata()?;
-    let changed_ns = data.modified()?.duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
-    let size = data.len();
-    if let Some(known) = earlier.filter(|k| k.size == size && k.changed_ns == changed_ns) {
-        return Ok(known.clone());
+    let state = State::of(path)?;
+    match earlier.filter(|known| known.state == state) {
+        Some(known) => Ok(known.clone()),
+        None => Ok(Known { is_settled: state.is_settled(), state, sha256: sha256(path)? }),
     }
-    Ok(Known { size, changed_ns, sha256: sha256(path)? })
 }
 
 /// By pieces: libraries may be larger than what memory is left.
@@ -119,6 +157,7 @@ mod tests {
         std::fs::create_dir_all(root.join("part")).unwrap();
         std::fs::write(root.join("part/a"), "one").unwrap();
         std::os::unix::fs::symlink(&root, root.join("part/circle")).unwrap();
+        std::thread::sleep(2 * TICK);
         let now = || of(&EngineName::new("mine"), &site, [root.clone(), root.clone()]);
         let mut seen = vec![now()];
         assert_eq!(now(), seen[0]);
@@ -137,12 +176,34 @@ mod tests {
     }
 
     #[test]
+    fn a_change_that_keeps_size_and_time_is_noticed_and_so_is_another_file_in_place_of_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, site) = (folder.path().join("rtrace"), Site::at(folder.path().join("site")));
+        std::fs::write(&file, "one").unwrap();
+        std::thread::sleep(2 * TICK);
+        let time = file.metadata().unwrap().modified().unwrap();
+        let set = |path: &Path| File::options().write(true).open(path).unwrap().set_modified(time).unwrap();
+        let now = || of(&EngineName::new("mine"), &site, [file.clone()]);
+        let before = now();
+        std::fs::write(&file, "two").unwrap();
+        set(&file);
+        let edited = now();
+        assert_ne!(before, edited);
+        let other = folder.path().join("other");
+        std::fs::write(&other, "six").unwrap();
+        set(&other);
+        std::fs::rename(&other, &file).unwrap();
+        assert_ne!(edited, now());
+    }
+
+    #[test]
     fn hashes_that_were_edited_cut_or_moved_are_never_believed() {
         let folder = tempfile::tempdir().unwrap();
         let (root, site) = (folder.path().join("engine"), Site::at(folder.path().join("site")));
         std::fs::create_dir_all(&root).unwrap();
         std::fs::write(root.join("a"), "one").unwrap();
         let (engine, other) = (EngineName::new("mine"), EngineName::new("other"));
+        std::thread::sleep(2 * TICK);
         let right = of(&engine, &site, [root.clone()]);
         let place = |name: &str| site.root().join("fingerprints").join(name);
         let sound = std::fs::read_to_string(place("mine.json")).unwrap();
@@ -152,7 +213,7 @@ mod tests {
         for (name, text) in [
             ("mine.json", edited.as_str()),
             ("mine.json", &sound[..sound.len() / 2]),
-            ("mine.json", &sound.replace("files 1", "files 0")),
+            ("mine.json", &sound.replace("files 2", "files 0")),
             ("mine.json", ""),
             ("other.json", &sound),
         ] {

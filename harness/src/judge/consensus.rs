@@ -3,15 +3,17 @@
 //! Each hypothesis says that one component departs: a witness's own code, or something that several witnesses share, which
 //! then departs in all of them at once; or that none does. Readings are normal about an unknown truth (flat prior), with the
 //! covariance that the hypothesis gives them; its probability follows by Bayes' rule (Kass & Raftery, J. Am. Statist. Assoc. 90,
-//! 1995). So witnesses that share a component count once, and the reference has no privilege.
+//! 1995). So witnesses that share a component count once, and the reference has no privilege. Programs of users' whose readings
+//! are closer to another's than independent work comes share something too, whatever they say, see `is_copy`.
 
+use itertools::Itertools;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Component, Judge, Tolerance, of_reading};
-use crate::engines::FILE_READER;
+use crate::engines::{self, FILE_READER};
 use crate::procedures::Task;
-use crate::record::{Basis, ProcedureId, Reading, Recording, Uncertainty};
+use crate::record::{Basis, EngineName, ProcedureId, Reading, Recording, Uncertainty};
 
 /// Independent witnesses that a statement takes.
 const FEWEST: usize = 3;
@@ -25,6 +27,11 @@ const ALLOWANCE: f64 = 1.0 / 3.0;
 const SHARED: f64 = 0.5;
 /// A component that departs does so by up to this many times the reading.
 const LARGEST_DEPARTURE: f64 = 10.0;
+/// Independent readings that are off lie apart by a tenth of what they state of their chance; where they state none, by a tenth of the
+/// tolerance, which no two programs with a fault each come to meet.
+const CLOSE: f64 = 0.1;
+/// How often chance may bring sampled readings that close.
+const BY_CHANCE: f64 = 0.01;
 /// Rounding of readings: keeps covariances regular where tolerance and uncertainty are zero.
 const ROUNDING: f64 = 1e-12;
 
@@ -40,6 +47,9 @@ pub struct Consensus {
     pub witnesses: Vec<Witness>,
     /// How many of them are independent: those that share a component count once.
     pub independent: usize,
+    /// Those that count once, together, and what ties them; one witness each where nothing does.
+    #[serde(default)]
+    pub groups: Vec<Group>,
     /// At how many meters any two differ by more than their tolerances.
     pub differing: usize,
     /// Who departs, where the odds are good enough to name them; several where it is what they share.
@@ -52,6 +62,19 @@ pub struct Consensus {
     pub text: String,
     /// What it assumes, and what it is blind to.
     pub assumptions: String,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Group {
+    pub witnesses: Vec<String>,
+    pub share: Vec<String>,
+}
+
+impl std::fmt::Display for Group {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let why = if self.share.is_empty() { String::new() } else { format!(" ({})", self.share.join(", ")) };
+        write!(f, "{}{why}", self.witnesses.join(" = "))
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -69,17 +92,27 @@ pub struct Witness {
 
 struct WitnessReadings {
     name: String,
+    /// Whether its program is none of ours: what it has in common with others is known from what it says and does only.
+    is_users: bool,
     shares: Vec<String>,
     /// Value and standard uncertainty at each target.
     readings: Vec<Option<(f64, f64)>>,
     /// What its tolerance allows at each target, in the quantity's unit.
     allowed: Vec<f64>,
+    /// Whether its uncertainty is chance, by which its readings scatter about those of others.
+    is_sampled: bool,
 }
 
 impl WitnessReadings {
     fn new(name: &str, shares: Vec<String>, readings: Vec<Option<(f64, f64)>>, tolerance: Tolerance) -> Self {
         let around = |r: &Option<(f64, f64)>| r.map_or(0.0, |(value, _)| tolerance.around(value));
-        Self { name: name.to_owned(), shares, allowed: readings.iter().map(around).collect(), readings }
+        let allowed = readings.iter().map(around).collect();
+        Self { name: name.to_owned(), is_users: false, shares, allowed, readings, is_sampled: false }
+    }
+
+    /// Whether it has something that others name so: itself, too.
+    fn has(&self, share: &str) -> bool {
+        self.name == share || self.shares.iter().any(|s| s == share)
     }
 }
 
@@ -94,20 +127,22 @@ impl Judge<'_> {
     /// nobody read anything.
     pub fn consensus(&self, task: &Task, recordings: &[&Recording]) -> Option<Consensus> {
         let case = recordings.first()?.key.case.clone();
-        let witnesses = witnesses(self, task, recordings);
+        let mut witnesses = witnesses(self, task, recordings);
         if witnesses.is_empty() {
             return None;
         }
-        let hypotheses = hypotheses(&witnesses);
-        let independent = independent(&witnesses);
+        let reference = task.reference();
+        let reference = reference.engine();
         let telling: Vec<usize> = (0..task.targets.len()).filter(|k| differ(&witnesses, *k)).collect();
+        tie_copies(&mut witnesses, reference.map(EngineName::as_str), &telling);
+        let hypotheses = hypotheses(&witnesses);
+        let groups = groups(&witnesses);
+        let independent = groups.len();
         let probabilities = if telling.is_empty() || independent < FEWEST {
             vec![0.0; hypotheses.len()]
         } else {
             probabilities(&witnesses, &hypotheses, &telling)
         };
-        let reference = task.reference();
-        let reference = reference.engine();
         let shown = witnesses.iter().enumerate().map(|(i, t)| Witness {
             name: t.name.clone(),
             is_reference: reference.is_some_and(|r| *r == t.name),
@@ -120,6 +155,7 @@ impl Judge<'_> {
             procedure: task.procedure,
             witnesses: shown.collect(),
             independent,
+            groups,
             differing: telling.len(),
             departs: vec![],
             component: None,
@@ -152,7 +188,12 @@ fn witnesses(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<W
             Some((reading.value, combined(&of_reading(&reading.uncertainty))))
         };
         let readings = (0..task.targets.len()).map(read).collect();
-        WitnessReadings::new(&recording.key.engine, recording.components.clone(), readings, allowed)
+        let is_chance = |r: &Reading| r.uncertainty.standard_error().is_some_and(|error| error > 0.0);
+        WitnessReadings {
+            is_users: engines::entry(&recording.key.engine).is_none(),
+            is_sampled: recording.readings.iter().any(is_chance),
+            ..WitnessReadings::new(&recording.key.engine, recording.components.clone(), readings, allowed)
+        }
     };
     let mut witnesses: Vec<WitnessReadings> =
         recordings.iter().filter(|r| !r.readings.is_empty()).map(of_engine).collect();
@@ -178,35 +219,84 @@ fn hypotheses(witnesses: &[WitnessReadings]) -> Vec<Hypothesis> {
     let own = witnesses.iter().enumerate().map(|(i, t)| Hypothesis { name: t.name.clone(), holders: vec![i] });
     let mut hypotheses: Vec<Hypothesis> = own.collect();
     for name in witnesses.iter().flat_map(|t| &t.shares) {
-        let has = |i: &usize| witnesses[*i].shares.contains(name);
-        let holders: Vec<usize> = (0..witnesses.len()).filter(has).collect();
+        let holders: Vec<usize> = (0..witnesses.len()).filter(|i| witnesses[*i].has(name)).collect();
         // What the same witnesses share besides is the same hypothesis: two of them would take each other's odds.
-        if hypotheses.iter().all(|s| s.name != *name && s.holders != holders)
-            && holders.len() > 1
-            && holders.len() < witnesses.len()
-        {
+        if hypotheses.iter().all(|s| s.holders != holders) && holders.len() > 1 && holders.len() < witnesses.len() {
             hypotheses.push(Hypothesis { name: name.clone(), holders });
         }
     }
     hypotheses
 }
 
-/// How many groups are left when witnesses that share something go together. The reader of photometric files, which nearly
+/// What is left when witnesses that share something go together. The reader of photometric files, which nearly
 /// all have, does not tie them: that it departs is a hypothesis of its own, or else a blind spot that is told.
-fn independent(witnesses: &[WitnessReadings]) -> usize {
+fn groups(witnesses: &[WitnessReadings]) -> Vec<Group> {
+    let all: Vec<&str> = witnesses.iter().flat_map(|w| &w.shares).map(String::as_str).unique().collect();
+    let ties = all.into_iter().filter(|share| *share != FILE_READER);
+    let ties = ties.map(|share| (share, (0..witnesses.len()).filter(|i| witnesses[*i].has(share)).collect_vec()));
+    let ties: Vec<(&str, Vec<usize>)> = ties.filter(|(_, holders)| holders.len() > 1).collect();
     let mut group: Vec<usize> = (0..witnesses.len()).collect();
-    for i in 0..witnesses.len() {
-        for j in 0..i {
-            let tie = |s: &&String| *s != FILE_READER && witnesses[j].shares.contains(s);
-            if witnesses[i].shares.iter().any(|s| tie(&s)) {
-                let (from, to) = (group[i], group[j]);
-                group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
-            }
-        }
+    for (_, holders) in &ties {
+        let tied: Vec<usize> = holders.iter().map(|i| group[*i]).collect();
+        group.iter_mut().filter(|g| tied.contains(g)).for_each(|g| *g = tied[0]);
     }
-    group.sort_unstable();
-    group.dedup();
-    group.len()
+    let made = group.iter().unique().map(|of| {
+        let members = || (0..witnesses.len()).filter(|i| group[*i] == *of);
+        let share = ties.iter().filter(|(_, holders)| group[holders[0]] == *of).map(|(share, _)| (*share).to_owned());
+        Group { witnesses: members().map(|i| witnesses[i].name.clone()).collect(), share: share.collect() }
+    });
+    made.collect()
+}
+
+/// Writes what copies have in common among what they share, as if they had said it.
+fn tie_copies(witnesses: &mut [WitnessReadings], reference: Option<&str>, telling: &[usize]) {
+    let reference = witnesses.iter().position(|w| reference == Some(&w.name));
+    let are_one =
+        |[i, j]: &[usize; 2]| is_copy([&witnesses[*i], &witnesses[*j]], reference.map(|r| &witnesses[r]), telling);
+    let copies: Vec<[usize; 2]> = (0..witnesses.len()).array_combinations().filter(are_one).collect();
+    // Each goes with the first of those that it is tied to, however many are between them.
+    let mut first: Vec<usize> = (0..witnesses.len()).collect();
+    for [i, j] in copies {
+        let (to, from) = (first[i].min(first[j]), first[i].max(first[j]));
+        first.iter_mut().filter(|of| **of == from).for_each(|of| *of = to);
+    }
+    for (k, to) in first.iter().enumerate().filter(|(_, to)| first.iter().filter(|of| of == to).count() > 1) {
+        let share = format!("the readings of {}", witnesses[*to].name);
+        witnesses[k].shares.push(share);
+    }
+}
+
+/// Whether two witnesses, a program of a user's among them, read alike as only one program does: to the last digit at every
+/// meter, or far closer than they state or any two need come, where both are off the reference. Where they agree with
+/// it, the truth is reason enough.
+fn is_copy(two: [&WitnessReadings; 2], reference: Option<&WitnessReadings>, telling: &[usize]) -> bool {
+    let [a, b] = two;
+    if !a.is_users && !b.is_users {
+        return false;
+    }
+    let both = |k: usize| Some((a.readings[k]?, b.readings[k]?));
+    let common = || (0..a.readings.len()).filter_map(both);
+    let distinct = common().map(|((value, _), _)| value.to_bits()).filter(|bits| *bits != 0).unique().count();
+    if distinct > 1 && common().all(|((one, _), (other, _))| one.to_bits() == other.to_bits()) {
+        return true;
+    }
+    let is_off = |k: usize, w: &WitnessReadings, (value, _): (f64, f64)| {
+        let held = reference.and_then(|r| Some((r.readings[k]?.0, r.allowed[k])));
+        held.is_none_or(|(right, allowed)| (value - right).abs() > allowed.max(w.allowed[k]))
+    };
+    let off = telling.iter().filter_map(|k| both(*k).map(|two| (*k, two)));
+    let off = off.filter(|(k, (one, other))| is_off(*k, a, *one) && is_off(*k, b, *other));
+    let is_sampled = a.is_sampled || b.is_sampled;
+    let squares: Vec<f64> = off
+        .map(|(k, ((one, u), (other, v)))| {
+            let scale = if is_sampled { u.hypot(v) } else { a.allowed[k].min(b.allowed[k]) };
+            ((one - other) / scale.max(ROUNDING * one.abs())).powi(2)
+        })
+        .collect();
+    let (n, mean) = (squares.len() as f64, squares.iter().sum::<f64>() / squares.len() as f64);
+    // Chernoff's bound of what chance does to a mean of squares of normal values.
+    let chance = (mean * (1.0 - mean).exp()).powf(0.5 * n);
+    mean < CLOSE.powi(2) && (!is_sampled || chance < BY_CHANCE)
 }
 
 /// Whether any two witnesses are further apart at a target than the wider of their tolerances and twice their noise.
@@ -344,9 +434,10 @@ fn told(
     if telling == 0 {
         return format!("{count} witnesses, {} of them independent, agree", found.independent);
     }
+    let independent = found.groups.iter().join(", ");
     if found.independent < FEWEST {
         return format!(
-            "witnesses differ, but only {} of {count} are independent: three could tell who departs",
+            "witnesses differ, but only {} of {count} are independent: three could tell who departs; independent are {independent}",
             found.independent
         );
     }
@@ -359,7 +450,9 @@ fn told(
         let likely: Vec<String> =
             likely.map(|k| format!("{} ({:.0} %)", hypotheses[*k].name, 100.0 * probabilities[*k])).collect();
         let whom = if likely.is_empty() { "nobody in particular".to_owned() } else { likely.join(" or ") };
-        return format!("witnesses differ at {telling} meters, and it is open who departs: {whom}");
+        return format!(
+            "witnesses differ at {telling} meters, and it is open who departs: {whom}; independent are {independent}"
+        );
     }
     let hypothesis = &hypotheses[best];
     let names: Vec<&str> = hypothesis.holders.iter().map(|i| witnesses[*i].name.as_str()).collect();
@@ -374,7 +467,7 @@ fn told(
         by.max_by(|a, b| a.abs().total_cmp(&b.abs())).map_or(String::new(), |d| format!(" by {:+.1} %", 100.0 * d));
     let at = if odds >= HIGHEST_ODDS { "more than 10000".to_owned() } else { format!("{odds:.0}") };
     format!(
-        "{}{who} depart{} from the others{by} at {telling} meters{shared}; odds {at} to 1",
+        "{}{who} depart{} from the others{by} at {telling} meters{shared}; odds {at} to 1; independent are {independent}",
         if is_reference { "the reference itself: " } else { "" },
         if names.len() > 1 { "" } else { "s" },
     )
@@ -472,6 +565,56 @@ mod tests {
             3,
         );
         assert_eq!((found.independent, found.departs.len()), (2, 0), "{}", found.text);
+    }
+
+    /// Readings of meters by their factors, with a claim of what they are good to.
+    fn exact(engines: &[(&str, f64)], claim: impl Fn(usize) -> Uncertainty) -> Consensus {
+        let witness = |(engine, factor): &(&str, f64)| {
+            let value = |k: usize| (10.0 + k as f64 * 0.37) * factor;
+            let read: Vec<_> = (0..METERS).map(|k| Estimate { value: value(k), uncertainty: claim(k) }).collect();
+            Recording { components: vec![FILE_READER.to_owned()], ..recording(engine, &read) }
+        };
+        let recordings: Vec<Recording> = engines.iter().map(witness).collect();
+        built_in().consensus(&task(METERS), &recordings.iter().collect::<Vec<_>>()).unwrap()
+    }
+
+    #[test]
+    fn copies_are_told_by_their_readings_whatever_their_files_are() {
+        let claim = |_: usize| Uncertainty::Bound(1e-12);
+        for factor in [1.06, 1.06 * (1.0 + 1e-6), 1.06 * (1.0 + 5e-4)] {
+            let found = exact(&[("simulator", 1.0), ("a", 1.06), ("b", factor), ("c", 1.06)], claim);
+            assert_eq!((found.independent, found.departs.len()), (2, 0), "{}", found.text);
+            assert!(found.text.contains("a = b = c (the readings of a"), "{}", found.text);
+        }
+        // Against two of ours they are one that departs, not three that outvote.
+        let engines = [("simulator", 1.0), ("mitsuba", 1.0), ("a", 1.06), ("b", 1.06), ("c", 1.06)];
+        assert_eq!(exact(&engines, claim).departs, ["a", "b", "c"]);
+        // A copy of one of ours adds nothing to it; ours are known to be different programs.
+        let found = exact(&[("simulator", 1.0), ("radiance", 1.06), ("a", 1.06)], claim);
+        assert_eq!(found.independent, 2, "{}", found.text);
+        let found = exact(&[("simulator", 1.0), ("radiance", 1.06), ("mitsuba", 1.06)], claim);
+        assert_eq!(found.departs, ["simulator"], "{}", found.text);
+        // Whoever is right agrees with the reference, and may be believed about a third.
+        let found = exact(&[("simulator", 1.0), ("a", 1.0 + 1e-9), ("b", 1.06)], claim);
+        assert_eq!((found.independent, &found.departs[..]), (3, &["b".to_owned()][..]), "{}", found.text);
+    }
+
+    #[test]
+    fn the_same_noise_is_one_program_and_noise_of_its_own_is_not() {
+        let claim = |k: usize| Uncertainty::sampled(5e-3 * (10.0 + k as f64), None);
+        let found = exact(&[("simulator", 1.0), ("a", 1.1), ("b", 1.1 + 1e-5)], claim);
+        assert_eq!(found.independent, 2, "{}", found.text);
+        let engines: [(&str, &[&str], f64); 3] = [("simulator", &[], 1.1), ("a", &[], 1.0), ("b", &[], 1.0)];
+        for seed in 0..50 {
+            assert_eq!(statement(&engines, seed).independent, 3);
+        }
+    }
+
+    #[test]
+    fn whoever_names_an_engine_among_what_it_shares_goes_with_it() {
+        let found = statement(&[("simulator", &[], 1.0), ("radiance", &[], 1.1), ("a", &["radiance"], 1.1)], 3);
+        assert_eq!((found.independent, found.departs.len()), (2, 0), "{}", found.text);
+        assert!(found.text.contains("radiance = a (radiance)"), "{}", found.text);
     }
 
     #[test]

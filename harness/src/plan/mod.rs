@@ -5,6 +5,7 @@ mod roster;
 mod shortcut;
 mod spot_check;
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use schemars::JsonSchema;
@@ -168,17 +169,25 @@ pub struct Planner<'a> {
     skipping: Skipping,
     roster: Roster,
     repeated: Repeated,
+    /// What was said of what engines say that they share, once a run.
+    told: BTreeSet<String>,
 }
 
 impl<'a> Planner<'a> {
     pub fn new(selection: &'a Selection, site: &'a Site, skipping: Skipping) -> Self {
-        Self { selection, site, skipping, roster: Roster::new(), repeated: Repeated::default() }
+        Self { selection, site, skipping, roster: Roster::new(), repeated: Repeated::default(), told: BTreeSet::new() }
     }
 
     pub fn plan(&mut self, case: &Case) -> Result<Plan, SpecError> {
         let tasks = tasks(case, self.selection)?;
         self.roster.check_settings(case, &tasks[0])?;
         let chosen = self.roster.chosen(case, self.selection)?;
+        for told in self.roster.shared_with_nobody(case, &tasks) {
+            if !self.told.contains(&told) {
+                tracing::warn!("{told}");
+                self.told.insert(told);
+            }
+        }
         let mut plan = self.whole(case, tasks, chosen);
         if self.skipping == Skipping::Allowed {
             self.shorten(case, &mut plan);

@@ -1,7 +1,10 @@
 //! Who takes part: the engines that a command line and a spec choose, each asked for its version once and only if it has work.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+use itertools::Itertools;
 
 use super::{Asked, Selection};
 use crate::engines::{self, Absent, Engine, EngineError, Job, Site, Version};
@@ -83,6 +86,36 @@ impl Roster {
             engine.check_settings(&job).map_err(|error| misset(case, name.as_str(), error, help))?;
         }
         Ok(())
+    }
+
+    /// A sentence for each name in the `shares` of a program of a user's that no other engine of the case is or has: it ties nobody.
+    pub(super) fn shared_with_nobody(&self, case: &Case, tasks: &[Task]) -> Vec<String> {
+        let shares = |settings: &EngineSettings| -> Vec<String> {
+            let listed = settings.0.get("shares").and_then(|s| serde_json::from_value(s.clone()).ok());
+            listed.unwrap_or_default()
+        };
+        let ours = self.ours.iter().flat_map(|engine| {
+            let job = |task| Job { settings: case.settings_of(engine.name().as_str()), ..Job::of_task(case, task) };
+            let parts = tasks.iter().flat_map(move |task| engine.components(&job(task)));
+            std::iter::once(engine.name().to_string()).chain(parts)
+        });
+        let ours: BTreeSet<String> = ours.collect();
+        let theirs: Vec<_> = case.engines.iter().flatten().collect();
+        let mut told = vec![];
+        for (name, settings) in &theirs {
+            let others = || theirs.iter().filter(|(other, _)| other != name);
+            for share in shares(settings) {
+                if !ours.contains(&share)
+                    && !others().any(|(other, of)| **other == share || shares(of).contains(&share))
+                {
+                    let known = ours.iter().join(", ");
+                    told.push(format!(
+                        "engines.{name}.shares: no other engine is or has `{share}`, so that it ties nobody; ours are and have {known}"
+                    ));
+                }
+            }
+        }
+        told
     }
 
     fn external(

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{Kind, biases, decision_rules, departures, notes, policies, splits};
+use super::notes::{Kind, biases, decision_rules, departures, notes, policies, splits, tables};
 use super::words::{mark, percent, significant};
 use super::{Report, papers};
 use crate::record::ProcedureId;
@@ -62,6 +62,9 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
         for departure in &departures {
             line(format!("- {departure}"));
         }
+    }
+    for (k, told) in tables(report).iter().enumerate() {
+        line(format!("{}- {told}", if k == 0 { "\nWhat does not fit in published tables:\n\n" } else { "" }));
     }
     worst_deviations(report, &mut line);
     if let Some(check) = &report.baseline {

@@ -48,6 +48,9 @@ const LONG: usize = 10_000;
 pub struct Report {
     /// Version of the format: 1.
     pub luxproof: u32,
+    /// SHA-256 of the rest as it was written, times, white space between its parts and this value left out: what was edited is refused.
+    #[serde(default)]
+    pub checksum: String,
     pub tool_version: String,
     /// When the run started (RFC 3339, UTC).
     pub started: String,
@@ -80,6 +83,9 @@ pub struct Report {
     /// The published tables that the cases are held against, as they are printed.
     #[serde(default)]
     pub published: Vec<PublishedTable>,
+    /// What of them stands for nothing here, or not for what was copied: rows at no meter, control totals that do not fit.
+    #[serde(default)]
+    pub published_findings: Vec<String>,
     /// What the photometric files say where their luminous intensity is read back.
     #[serde(default)]
     pub curves: Vec<Curve>,
@@ -198,8 +204,9 @@ impl Report {
         Self { paper_splits: papers::splits(&joined), ..joined }
     }
 
-    /// Writes it to a file, which is seen whole or not at all.
-    pub fn keep(&self, path: &Path) -> Result<(), FileError> {
+    /// Writes it to a file with its checksum; the file is seen whole or not at all.
+    pub fn keep(&mut self, path: &Path) -> Result<(), FileError> {
+        self.seal().map_err(|e| FileError { path: path.display().to_string(), source: e.into() })?;
         let is_long = self.comparisons.len().max(self.readings.len()) > LONG;
         if is_long { files::keep_rows(path, self) } else { files::keep_json(path, self) }
     }

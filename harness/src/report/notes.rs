@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::Report;
 use super::words::plural;
-use crate::judge::{Bias, OnRecord, PolicyRecord, Split, State, Verdict};
+use crate::judge::{Bias, Misfit, OnRecord, PolicyRecord, Split, State, Verdict};
 use crate::plan::{EVERYONE, Skip};
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 
@@ -91,6 +91,20 @@ pub(super) fn biases(report: &Report, procedure: ProcedureId) -> Vec<String> {
 /// What verdicts are for and how often they are wrong.
 pub(super) fn decision_rules(report: &Report) -> BTreeSet<&str> {
     report.cases.iter().map(|c| c.decision_rule.as_str()).filter(|rule| !rule.is_empty()).collect()
+}
+
+/// What of published tables is not to be relied on: a line for the cells of each, and one for each row and total.
+pub(super) fn tables(report: &Report) -> Vec<String> {
+    let cells = report.published.iter().filter(|table| !table.misfits.is_empty()).map(|table| {
+        let cell = |m: &Misfit| format!("{} {} of row {}", m.column, m.printed, m.row + 1);
+        let cells = table.misfits.iter().map(cell).collect::<Vec<_>>().join(", ");
+        format!("{}: {} not fit the table: {cells}", table.name, count_do(table.misfits.len()))
+    });
+    cells.chain(report.published_findings.iter().cloned()).collect()
+}
+
+fn count_do(cells: usize) -> String {
+    format!("{} {}", plural(cells, "printed cell"), if cells == 1 { "does" } else { "do" })
 }
 
 /// Which policy judged, and what it requires in vain; nothing where there is none.

@@ -1,8 +1,9 @@
-//! Reading a report back: its version is looked at, whatever else it holds.
+//! Reading a report back: its version is looked at, whatever else it holds, and its checksum.
 
 use serde::Deserialize;
 
 use super::{Report, Summary};
+use crate::system::envelope;
 
 /// The version of the format that this program writes.
 pub(super) const VERSION: u32 = 1;
@@ -11,8 +12,7 @@ pub(super) const VERSION: u32 = 1;
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadReport {
     pub report: Report,
-    /// What the user should know of it: another version, of which only what both have is seen, or counts that are not those of its
-    /// verdicts, which are counted anew.
+    /// What the user should know of it: another version, of which only what both have is seen.
     pub doubt: Option<String>,
 }
 
@@ -23,6 +23,11 @@ pub enum ReportError {
     Foreign(serde_json::Error),
     #[error("is damaged or was edited: {0}; run its spec again, finished readings are in the cache")]
     Damaged(serde_json::Error),
+    #[error(
+        "was edited, or is by a luxproof that wrote no checksums: its checksum is not that of what it says; run its spec again, finished \
+         readings are in the cache"
+    )]
+    Edited,
     #[error(
         "is a report of version {found}, by luxproof {by}, where this one reads version {VERSION} ({source}); \
          view it with the luxproof that wrote it, or run its spec again"
@@ -41,18 +46,22 @@ struct Head {
 impl Report {
     pub fn from_json(text: &str) -> Result<ReadReport, ReportError> {
         let mut report: Self = serde_json::from_str(text).map_err(|source| Self::refusal(text, source))?;
-        let (found, told) = (report.luxproof, report.summary);
+        let found = report.luxproof;
+        if found == VERSION && checksum(text) != report.checksum {
+            return Err(ReportError::Edited);
+        }
         report.summary = Summary::of(&report.comparisons, &report.skips);
-        let doubt = if found != VERSION {
-            Some(format!(
-                "is a report of version {found} where this luxproof reads version {VERSION}: what it does not know it passes over"
-            ))
-        } else if told != report.summary {
-            Some("was edited: its summary is not that of its verdicts, which are counted anew".to_owned())
-        } else {
-            None
-        };
+        let doubt = (found != VERSION).then(|| {
+            format!("is a report of version {found} where this luxproof reads version {VERSION}: what it does not know it passes over")
+        });
         Ok(ReadReport { report, doubt })
+    }
+
+    /// Gives it the checksum of what it says now.
+    pub(super) fn seal(&mut self) -> serde_json::Result<()> {
+        self.checksum.clear();
+        self.checksum = checksum(&serde_json::to_string(self)?);
+        Ok(())
     }
 
     fn refusal(text: &str, source: serde_json::Error) -> ReportError {
@@ -64,12 +73,25 @@ impl Report {
     }
 }
 
+/// That of a report's text but for times and the checksum that it names: the same run says the same tomorrow.
+fn checksum(text: &str) -> String {
+    const LEFT_OUT: [&str; 3] = ["\"checksum\"", "\"started\"", "\"wall_s\""];
+    let without = |text: String, name: &&str| -> String {
+        let mut parts = text.split(name);
+        let first = parts.next().unwrap_or_default().to_owned();
+        parts.fold(first, |kept, part| kept + name + &part[part.find([',', '}']).unwrap_or(part.len())..])
+    };
+    envelope::checksum(&LEFT_OUT.iter().fold(text.to_owned(), without))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn text(version: u32) -> String {
-        serde_json::to_string(&Report { luxproof: version, tool_version: "9.1".into(), ..Report::default() }).unwrap()
+        let mut report = Report { luxproof: version, tool_version: "9.1".into(), ..Report::default() };
+        report.seal().unwrap();
+        serde_json::to_string(&report).unwrap()
     }
 
     #[test]
@@ -81,12 +103,18 @@ mod tests {
     }
 
     #[test]
-    fn verdicts_are_counted_anew() {
-        let edited =
-            Report { summary: Summary { fail: 3, ..Summary::default() }, luxproof: VERSION, ..Report::default() };
-        let read = Report::from_json(&serde_json::to_string(&edited).unwrap()).unwrap();
-        assert_eq!(read.report.summary, Summary::default());
-        assert!(read.doubt.unwrap().starts_with("was edited"));
+    fn what_was_edited_is_refused_and_what_is_laid_out_anew_is_not() {
+        let sound = text(VERSION);
+        let value: serde_json::Value = serde_json::from_str(&sound).unwrap();
+        assert!(Report::from_json(&sound.replace("\":", "\" :\n  ")).is_ok());
+        for edited in [
+            sound.replace("\"9.1\"", "\"9.2\""),
+            sound.replace("\"fail\":0", "\"fail\":3"),
+            sound.replace(value["checksum"].as_str().unwrap(), ""),
+        ] {
+            assert_ne!(edited, sound);
+            assert!(matches!(Report::from_json(&edited), Err(ReportError::Edited)), "{edited}");
+        }
     }
 
     #[test]

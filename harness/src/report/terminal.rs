@@ -7,7 +7,7 @@ use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArr
 use itertools::Itertools;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{Kind, Note, biases, departures, diagnoses, notes, policies, splits};
+use super::notes::{self, Kind, Note, biases, decision_rules, departures, diagnoses, notes, policies, splits};
 use super::words::{mark, percent, plural, significant, value};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
@@ -46,7 +46,7 @@ pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&s
     let mut text = String::new();
     writeln!(text, "\nluxproof {}: {}", report.tool_version, report.spec.title).ok();
     writeln!(text, "{}", engines_line(report)).ok();
-    for line in policies(report) {
+    for line in policies(report).iter().map(String::as_str).chain(decision_rules(report)) {
         writeln!(text, "{line}").ok();
     }
     writeln!(text).ok();
@@ -59,13 +59,15 @@ pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&s
         section(&mut text, &heading, biases(report, procedure).into_iter());
     }
     let most = if detail == Detail::All { usize::MAX } else { BRIEF };
-    let departures = departures(report).into_iter().take(most).map(|line| shortened(&line, detail));
+    // In full: without who is independent of whom a claim says nothing.
+    let departures = departures(report).into_iter().take(most);
     section(&mut text, "Who departs from the other witnesses, the reference included", departures);
     let diagnoses = diagnoses(report).into_iter().take(most).map(|line| shortened(&line, detail));
     section(&mut text, "What explains failures", diagnoses);
     let line = |c: &Comparison| format!("{}{}", report.of_suite(&c.key.case, ": "), deviation_line(c));
     let worst = worst(report, 5).into_iter().map(|c| shortened(&line(c), detail));
     section(&mut text, "Worst deviations (by verdict, then deviation over tolerance)", worst);
+    section(&mut text, "What does not fit in published tables", notes::tables(report).into_iter());
     baseline(report, detail, &mut text);
     told(report, detail, &mut text);
     writeln!(text, "{} in {:.1} s", report.summary, report.wall_s).ok();

@@ -110,7 +110,7 @@ pub(crate) fn open<'a, T: Deserialize<'a>>(schema: Schema, text: &'a [u8]) -> Re
 }
 
 /// SHA-256 over JSON less the white space outside its strings.
-fn checksum(json: &str) -> String {
+pub(crate) fn checksum(json: &str) -> String {
     let mut hash = Sha256::new();
     let (mut is_string, mut is_escaped, mut start) = (false, false, 0);
     for (at, byte) in json.bytes().enumerate() {

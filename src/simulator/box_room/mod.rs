@@ -329,7 +329,7 @@ impl BoxField {
 /// Irradiance after all the reflections that count, from that after one and what a further one makes of it.
 fn interreflect(step: impl Fn(&[f64]) -> Vec<f64>, known: &[f64], bounces: Bounces) -> Vec<f64> {
     match bounces {
-        Bounces::Converged => gmres::solve(step, known, 1e-14),
+        Bounces::Converged => gmres::solve(step, known, known.to_vec(), 1e-14),
         Bounces::AtMost(count) => (2..count).fold(known.to_vec(), |u, _| {
             let again = step(&u);
             known.iter().zip(&again).map(|(g, k)| g + k).collect()

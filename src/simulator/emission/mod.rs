@@ -8,6 +8,7 @@
 mod opening;
 
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 use glam::DVec3;
 
@@ -26,6 +27,9 @@ const DEEPEST: u32 = 9;
 /// Parts of an integral after which it stops improving: what is left is its bound.
 const MOST_PARTS: u32 = 4000;
 
+/// The rule along each side of a part.
+static RULE: LazyLock<Gauss> = LazyLock::new(|| Gauss::new(5));
+
 /// A luminaire as the deterministic solvers see it.
 #[derive(Clone, Debug)]
 pub(super) struct Emitter {
@@ -39,6 +43,20 @@ pub(super) struct Emitter {
 struct Lambertian {
     exitance: f64,
     interpolation: f64,
+}
+
+/// How finely light is integrated: to a part of itself, or to so many lux where that is more.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Precision {
+    pub(super) relative_error: f64,
+    pub(super) error_lux: f64,
+}
+
+impl Precision {
+    /// To a part of itself, however dim it is.
+    pub(super) const fn relative(relative_error: f64) -> Self {
+        Self { relative_error, error_lux: 0.0 }
+    }
 }
 
 /// A meter in a luminaire's own frame.
@@ -87,10 +105,10 @@ impl Emitter {
         self.luminaire.flux_scale > 0.0 && self.luminaire.photometry.distribution.max_intensity().value() > 0.0
     }
 
-    /// Illuminance in lux at an element, integrated until two refinements agree within `relative_error`.
+    /// Illuminance in lux at an element, integrated until two refinements agree as precisely as asked.
     ///
     /// Boxes are cut out exactly of what has straight edges; nothing may stand before a round opening.
-    pub(super) fn illuminance(&self, meter: &Meter, occluders: &[Occluder], relative_error: f64) -> Bounded {
+    pub(super) fn illuminance(&self, meter: &Meter, occluders: &[Occluder], precision: Precision) -> Bounded {
         if self.is_point() {
             let hidden = occluders.iter().any(|o| o.blocks(meter.position_m, self.luminaire.position_m));
             return if hidden { Bounded::default() } else { direct::point(&self.luminaire, meter) };
@@ -101,9 +119,13 @@ impl Emitter {
             sum = sum
                 + match sheet {
                     Sheet::Face { corner_m, edges_m } => {
-                        self.face_illuminance(&sheet, corner_m, edges_m, meter, occluders, relative_error)
+                        self.face_illuminance(&sheet, corner_m, edges_m, meter, occluders, precision)
                     }
-                    _ => integrate_square(relative_error, &|uv| self.density(&own, &sheet.part(uv))),
+                    // A disc's radius goes with the root of its area.
+                    _ if sheet.is_disc() => {
+                        integrate_square(precision, &|[s, v]| 2.0 * s * self.density(&own, &sheet.part([s * s, v])))
+                    }
+                    _ => integrate_square(precision, &|uv| self.density(&own, &sheet.part(uv))),
                 };
         }
         sum
@@ -116,7 +138,7 @@ impl Emitter {
         [a, b]: [DVec3; 2],
         meter: &Meter,
         occluders: &[Occluder],
-        relative_error: f64,
+        precision: Precision,
     ) -> Bounded {
         let corners = [corner_m, corner_m + a, corner_m + a + b, corner_m + b].map(|p| self.to_world(p));
         let above = clip(&corners, meter.normal, meter.position_m);
@@ -127,12 +149,12 @@ impl Emitter {
         let area_m2 = sheet.part([0.5; 2]).area_m2;
         let hiding = candidates(meter.position_m, &above, occluders);
         for piece in visible_pieces(meter.position_m, &above, &hiding) {
-            sum = sum + self.piece_illuminance(area_m2, &piece, meter, relative_error);
+            sum = sum + self.piece_illuminance(area_m2, &piece, meter, precision);
         }
         sum
     }
 
-    fn piece_illuminance(&self, face_m2: DVec3, piece: &[DVec3], meter: &Meter, relative_error: f64) -> Bounded {
+    fn piece_illuminance(&self, face_m2: DVec3, piece: &[DVec3], meter: &Meter, precision: Precision) -> Bounded {
         if let Some(lambertian) = self.lambertian {
             let down = self.luminaire.orientation * DVec3::NEG_Z;
             if down.dot(meter.position_m - piece[0]) <= 0.0 {
@@ -143,7 +165,7 @@ impl Emitter {
         }
         let own = self.own(meter);
         let unit_m2 = face_m2.normalize_or_zero();
-        integrate(piece, relative_error, &|from: DVec3| {
+        integrate(piece, precision, &|from: DVec3| {
             let at_m = self.luminaire.orientation.transpose() * (from - self.luminaire.position_m);
             self.density(&own, &Part { at_m, area_m2: unit_m2 })
         })
@@ -211,7 +233,7 @@ impl Emitter {
         polygon_m: &[DVec3],
         normal: DVec3,
         occluders: &[Occluder],
-        relative_error: f64,
+        precision: Precision,
     ) -> Bounded {
         let from = self.luminaire.position_m;
         let above = clip(polygon_m, meter.normal, meter.position_m);
@@ -229,7 +251,7 @@ impl Emitter {
         for lit in visible_pieces(from, &above, &candidates(from, &above, occluders)) {
             let hiding = candidates(meter.position_m, &lit, occluders);
             for seen in visible_pieces(meter.position_m, &lit, &hiding) {
-                sum = sum + integrate(&seen, relative_error, &light);
+                sum = sum + integrate(&seen, precision, &light);
             }
         }
         sum
@@ -258,39 +280,37 @@ fn lambertian(luminaire: &Luminaire, area_m2: f64) -> Option<Lambertian> {
 }
 
 /// Integral over a convex flat polygon, by triangles that are quartered until two rules agree.
-fn integrate(polygon: &[DVec3], relative_error: f64, f: &impl Fn(DVec3) -> f64) -> Bounded {
-    let rule = Gauss::new(5);
+fn integrate(polygon: &[DVec3], precision: Precision, f: &impl Fn(DVec3) -> f64) -> Bounded {
     let parts: Vec<_> = (2..polygon.len()).map(|k| [polygon[0], polygon[k - 1], polygon[k]]).collect();
     let quarters = |t: &[DVec3; 3]| {
         let [ab, bc, ca] = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(p, q)| 0.5 * (p + q));
         [[t[0], ab, ca], [ab, t[1], bc], [ca, bc, t[2]], [ab, bc, ca]]
     };
-    refined(parts, relative_error, &quarters, &|t| on_triangle(t, &rule, f))
+    refined(parts, precision, &quarters, &|t| on_triangle(t, f))
 }
 
 /// Integral over the unit square, by squares that are quartered until two rules agree.
-fn integrate_square(relative_error: f64, f: &impl Fn([f64; 2]) -> f64) -> Bounded {
-    let rule = Gauss::new(5);
+fn integrate_square(precision: Precision, f: &impl Fn([f64; 2]) -> f64) -> Bounded {
     let quarters = |&[u, v, side]: &[f64; 3]| {
         let half = 0.5 * side;
         [[u, v, half], [u + half, v, half], [u, v + half, half], [u + half, v + half, half]]
     };
     let on_square = |&[u, v, side]: &[f64; 3]| {
         let mut sum = 0.0;
-        for (a, wa) in rule.points() {
-            for (b, wb) in rule.points() {
+        for (a, wa) in RULE.points() {
+            for (b, wb) in RULE.points() {
                 sum += wa * wb * f([u + side * a, v + side * b]);
             }
         }
         sum * side * side
     };
-    refined(vec![[0.0, 0.0, 1.0]], relative_error, &quarters, &on_square)
+    refined(vec![[0.0, 0.0, 1.0]], precision, &quarters, &on_square)
 }
 
 /// The sum of a rule over parts that are quartered until the rule agrees with itself, or the parts are too many.
 fn refined<P>(
     parts: Vec<P>,
-    relative_error: f64,
+    precision: Precision,
     quarters: &impl Fn(&P) -> [P; 4],
     rule: &impl Fn(&P) -> f64,
 ) -> Bounded {
@@ -299,6 +319,7 @@ fn refined<P>(
         part.1 = rule(&part.0);
     }
     let scale = open.iter().map(|(_, value, _)| value).sum::<f64>().abs();
+    let asked = (precision.relative_error * scale).max(precision.error_lux);
     let mut sum = Bounded::default();
     let mut count = 0;
     while let Some((part, value, depth)) = open.pop() {
@@ -308,7 +329,7 @@ fn refined<P>(
         let difference = (better - value).abs();
         count += 1;
         // Where there is a kink, twice as many parts hold it at every depth.
-        let tolerance = 0.5 * relative_error * scale * 0.5_f64.powi(depth as i32);
+        let tolerance = 0.5 * asked * 0.5_f64.powi(depth as i32);
         if difference <= tolerance || depth == DEEPEST || count > MOST_PARTS {
             sum = sum + Bounded { value: better, bound: difference + 1e-14 * better.abs() };
         } else {
@@ -319,12 +340,12 @@ fn refined<P>(
 }
 
 /// A product rule on a triangle, collapsed towards its first corner.
-fn on_triangle(t: &[DVec3; 3], rule: &Gauss, f: &impl Fn(DVec3) -> f64) -> f64 {
+fn on_triangle(t: &[DVec3; 3], f: &impl Fn(DVec3) -> f64) -> f64 {
     let area = (t[1] - t[0]).cross(t[2] - t[0]).length();
     let mut sum = 0.0;
-    for (a, wa) in rule.nodes.iter().zip(&rule.weights) {
-        for (b, wb) in rule.nodes.iter().zip(&rule.weights) {
-            let p = t[0] + *a * (t[1].lerp(t[2], *b) - t[0]);
+    for (a, wa) in RULE.points() {
+        for (b, wb) in RULE.points() {
+            let p = t[0] + a * (t[1].lerp(t[2], b) - t[0]);
             sum += wa * wb * a * f(p);
         }
     }

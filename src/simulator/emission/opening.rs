@@ -132,6 +132,11 @@ impl Opening {
 }
 
 impl Sheet {
+    /// Whether the unit square's first coordinate is the area within a circle.
+    pub(super) fn is_disc(&self) -> bool {
+        matches!(self, Self::Disc { .. } | Self::Cap { .. } | Self::Laid(_, Laid::Disc { .. }))
+    }
+
     pub(super) fn part(&self, [u, v]: [f64; 2]) -> Part {
         match *self {
             Self::Line(half) => Part { at_m: half * (2.0 * u - 1.0), area_m2: DVec3::ZERO },

@@ -1,19 +1,21 @@
-//! Light straight from the luminaires on the walls: polynomials on rectangles that are quartered until they agree with
+//! Light straight from the luminaires on the faces: polynomials on rectangles that are quartered until they agree with
 //! it, for the luminaires that nothing can hide from there; the others are asked at every place anew.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::grid::{NODES, ORDER, polynomial};
-use super::surroundings::{Surroundings, WALLS, off_wall, on_wall};
+use super::bicubic::{Bicubic, NODES};
+use super::face::Face;
+use super::surroundings::Surroundings;
 use crate::scene::Meter;
-use crate::simulator::emission::Emitter;
-use crate::simulator::quadrature::Gauss;
+use crate::simulator::emission::{Emitter, Precision};
 use crate::simulator::sampler::mix;
 use crate::simulator::stop::Stop;
 
 /// Where a rectangle's polynomial is held against the light, besides its nodes.
 const CHECKS: [[f64; 2]; 6] = [[0.5, 0.5], [0.02, 0.02], [0.98, 0.98], [0.02, 0.98], [0.98, 0.02], [0.5, 0.02]];
+/// Heights of luminaires nearer to an edge than this part of a rectangle do not part it.
+const EDGE: f64 = 0.02;
 /// Quarterings at most.
 const DEEPEST: u32 = 9;
 /// Quarterings at most that only part what bodies may hide from what they cannot.
@@ -23,12 +25,12 @@ const PLACES: u64 = 64;
 /// Dim places need be known to this part of the wall's mean only.
 const DIM: f64 = 0.1;
 
-/// Direct illuminance on the walls of a room.
+/// Direct illuminance on the faces of a room.
 #[derive(Debug)]
 pub(super) struct Lit {
-    walls: Vec<Vec<Part>>,
-    rule: Gauss,
-    /// Leaves of all walls by what they reflect, for drawing places where much light falls.
+    faces: Vec<Vec<Part>>,
+    bicubic: Bicubic,
+    /// Leaves of all faces by what they reflect, for drawing places where much light falls.
     bright: Vec<Bright>,
     /// All that is reflected, in lumens.
     reflected_lm: f64,
@@ -47,8 +49,8 @@ struct Part {
 
 #[derive(Debug)]
 enum Kind {
-    /// Index of the first of four quarters.
-    Quartered(usize),
+    /// Index of the first of four quarters, and where they meet.
+    Quartered(usize, DVec2),
     Leaf(Box<Leaf>),
 }
 
@@ -67,7 +69,7 @@ struct Leaf {
 #[derive(Debug)]
 struct Bright {
     up_to_lm: f64,
-    wall: usize,
+    face: usize,
     corner_m: DVec2,
     size_m: DVec2,
 }
@@ -83,16 +85,34 @@ pub(super) struct Known {
 }
 
 impl Known {
-    /// The part of a polynomial's error that is left in what a place sees of its rectangle: what it leaves out is as often
-    /// too bright as too dim, and from afar one cannot tell the one from the other.
+    /// The part of a polynomial's error that is left in what a place sees of its rectangle: what it leaves out has no mean and
+    /// no slope, and from afar one sees no more of it.
     pub(super) fn left_lux(&self, distance_m: f64) -> f64 {
-        self.error_lux * (self.side_m / distance_m).min(1.0)
+        self.error_lux * self.shows(distance_m)
     }
 
-    /// Whether a ray may end on it: what is left out and its noise are below a limit.
-    pub(super) fn is_enough(&self, distance_m: f64, limit_lux: f64) -> bool {
-        (self.error_lux + 2.0 * self.noise_lux) * (self.side_m / distance_m).min(1.0) <= limit_lux
+    /// Whether a ray may end on it: what is left out and its noise are below their limits.
+    pub(super) fn is_enough(&self, distance_m: f64, limit: Limit) -> bool {
+        let shows = self.shows(distance_m);
+        self.error_lux * shows <= limit.error_lux && self.noise_lux * shows <= limit.noise_lux
     }
+
+    /// How much of a place's view it takes.
+    fn shows(&self, distance_m: f64) -> f64 {
+        (self.side_m / distance_m).powi(2).min(1.0)
+    }
+}
+
+/// How well light must be known for a ray to end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limit {
+    pub(super) error_lux: f64,
+    pub(super) noise_lux: f64,
+}
+
+impl Limit {
+    /// Everything is known well enough.
+    pub(super) const NONE: Self = Self { error_lux: 0.0, noise_lux: 0.0 };
 }
 
 /// Direct illuminance at a place, and how far off it may be besides chance.
@@ -124,51 +144,51 @@ impl Lights<'_> {
 impl Lit {
     /// To a relative error at each place, dim ones apart.
     pub(super) fn new(lights: &Lights, relative_error: f64, stop: &Stop) -> Self {
-        let rule = Gauss::new(ORDER);
-        let Some(room) = lights.surroundings.room else {
-            return Self { walls: vec![], rule, bright: vec![], reflected_lm: 0.0, is_peaked: false, peak: 0.0 };
-        };
+        let bicubic = Bicubic::new();
         let mean: f64 = mean_lux(lights, relative_error);
-        let wall = |wall: usize| {
-            let size_m = on_wall(wall, room.size_m);
-            let build = Build { lights, rule: &rule, wall, relative_error, floor_lux: DIM * mean, stop };
+        let one = |face: &Face| {
+            let build = Build { lights, bicubic, face, relative_error, floor_lux: DIM * mean, stop };
+            let (corner_m, size_m) = (face.corners_m[0], face.size_m());
             let mut parts = vec![];
-            if room.reflectance.of(WALLS[wall]) > 0.0 {
-                let first = build.leaf(DVec2::ZERO, size_m);
-                parts.push(Part { corner_m: DVec2::ZERO, size_m, kind: Kind::Quartered(0) });
+            if face.reflectance > 0.0 {
+                let first = build.leaf(corner_m, size_m);
+                parts.push(Part { corner_m, size_m, kind: Kind::Quartered(0, corner_m) });
                 build.grow(&mut parts, 0, first, 0);
             }
             parts
         };
-        let walls: Vec<Vec<Part>> = (0..WALLS.len()).into_par_iter().map(wall).collect();
-        let (mut bright, mut reflected_lm, mut peak, mut area) = (vec![], 0.0, 0.0_f64, 0.0);
-        for (wall, parts) in walls.iter().enumerate() {
+        let all = &lights.surroundings.faces;
+        let faces: Vec<Vec<Part>> = all.par_iter().map(one).collect();
+        let (mut bright, mut reflected_lm, mut peak) = (vec![], 0.0, 0.0_f64);
+        for (face, parts) in faces.iter().enumerate() {
             for part in parts {
                 let Kind::Leaf(leaf) = &part.kind else { continue };
-                let area_m2 = part.size_m.x * part.size_m.y;
-                reflected_lm += leaf.exitance * area_m2;
+                reflected_lm += leaf.exitance * part.size_m.element_product();
                 peak = peak.max(leaf.exitance);
-                bright.push(Bright { up_to_lm: reflected_lm, wall, corner_m: part.corner_m, size_m: part.size_m });
+                bright.push(Bright { up_to_lm: reflected_lm, face, corner_m: part.corner_m, size_m: part.size_m });
             }
-            let size_m = on_wall(wall, room.size_m);
-            area += size_m.x * size_m.y;
         }
-        let is_peaked = peak * area > super::PEAKED * reflected_lm;
-        Self { walls, rule, bright, reflected_lm, is_peaked, peak }
+        let area_m2: f64 = all.iter().map(Face::area_m2).sum();
+        let is_peaked = peak * area_m2 > super::PEAKED * reflected_lm;
+        Self { faces, bicubic, bright, reflected_lm, is_peaked, peak }
     }
 
-    /// Direct illuminance at a place on a wall; `u` draws the parts of luminaires that must be asked.
-    pub(super) fn at(&self, lights: &Lights, wall: usize, meter: &Meter, u: [f64; 2]) -> Light {
-        let at_m = on_wall(wall, meter.position_m);
-        let Some((part, leaf)) = self.leaf(wall, at_m) else {
+    /// Direct illuminance at a place on a face; `u` draws the parts of luminaires that must be asked.
+    pub(super) fn at(&self, lights: &Lights, face: usize, meter: &Meter, u: impl FnOnce() -> [f64; 2]) -> Light {
+        let at_m = lights.surroundings.faces[face].on(meter.position_m);
+        let Some((part, leaf)) = self.leaf(face, at_m) else {
             return Light { lux: 0.0, known: Known { error_lux: 0.0, noise_lux: 0.0, side_m: 0.0 } };
         };
         let t = (at_m - part.corner_m) / part.size_m;
         let side_m = part.size_m.max_element();
         let mut light = Light {
-            lux: polynomial(&self.rule, &leaf.lux, t),
+            lux: self.bicubic.at(&leaf.lux, t),
             known: Known { error_lux: leaf.error_lux, noise_lux: 0.0, side_m },
         };
+        if leaf.asked.is_empty() {
+            return light;
+        }
+        let u = u();
         for k in &leaf.asked {
             light.lux += lights.sample(*k as usize, meter, meter.position_m, u);
         }
@@ -184,22 +204,23 @@ impl Lit {
         let lumens = bright.up_to_lm - below;
         let across = ((at - below) / lumens).clamp(0.0, 1.0);
         let place = bright.corner_m + bright.size_m * DVec2::new(across, v);
-        Some((bright.wall, place, lumens / self.reflected_lm / (bright.size_m.x * bright.size_m.y)))
+        Some((bright.face, place, lumens / self.reflected_lm / bright.size_m.element_product()))
     }
 
     /// The density of [`Self::draw`] at a place, per square metre.
-    pub(super) fn density(&self, wall: usize, point_m: DVec3) -> f64 {
-        self.leaf(wall, on_wall(wall, point_m)).map_or(0.0, |(_, leaf)| leaf.exitance / self.reflected_lm)
+    pub(super) fn density(&self, lights: &Lights, face: usize, point_m: DVec3) -> f64 {
+        self.leaf(face, lights.surroundings.faces[face].on(point_m))
+            .map_or(0.0, |(_, leaf)| leaf.exitance / self.reflected_lm)
     }
 
-    fn leaf(&self, wall: usize, at_m: DVec2) -> Option<(&Part, &Leaf)> {
-        let parts = &self.walls[wall];
+    fn leaf(&self, face: usize, at_m: DVec2) -> Option<(&Part, &Leaf)> {
+        let parts = &self.faces[face];
         let mut part = parts.first()?;
         loop {
             match &part.kind {
                 Kind::Leaf(leaf) => return Some((part, leaf)),
-                Kind::Quartered(first) => {
-                    let far = (at_m - part.corner_m).cmpge(0.5 * part.size_m);
+                Kind::Quartered(first, middle_m) => {
+                    let far = at_m.cmpge(*middle_m);
                     part = &parts[first + usize::from(far.x) + 2 * usize::from(far.y)];
                 }
             }
@@ -209,21 +230,22 @@ impl Lit {
 
 /// The mean over random places on all walls, bodies left out.
 fn mean_lux(lights: &Lights, relative_error: f64) -> f64 {
-    let Some(room) = lights.surroundings.room else { return 0.0 };
+    let Some(walls) = lights.surroundings.room.map(|room| Face::walls(&room)) else { return 0.0 };
     let unit = |k: u64| (mix(k) >> 11) as f64 / (1_u64 << 53) as f64;
+    let precision = Precision::relative(relative_error.max(1e-3));
     let one = |k: u64| {
-        let wall = (k % 6) as usize;
-        let at_m = on_wall(wall, room.size_m) * DVec2::new(unit(2 * k + 1), unit(2 * k + 2));
-        let meter = Meter { position_m: off_wall(&room, wall, at_m), normal: WALLS[wall].inward_normal() };
-        lights.emitters.iter().map(|e| e.illuminance(&meter, &[], relative_error.max(1e-3)).value).sum::<f64>()
+        let wall = walls[(k % 6) as usize];
+        let at_m = wall.size_m() * DVec2::new(unit(2 * k + 1), unit(2 * k + 2));
+        let meter = Meter { position_m: wall.off(at_m), normal: wall.normal };
+        lights.emitters.iter().map(|e| e.illuminance(&meter, &[], precision).value).sum::<f64>()
     };
     (0..PLACES).map(one).sum::<f64>() / PLACES as f64
 }
 
 struct Build<'a> {
     lights: &'a Lights<'a>,
-    rule: &'a Gauss,
-    wall: usize,
+    bicubic: Bicubic,
+    face: &'a Face,
     relative_error: f64,
     floor_lux: f64,
     stop: &'a Stop,
@@ -239,60 +261,61 @@ impl Build<'_> {
             parts[index].kind = Kind::Leaf(Box::new(leaf));
             return;
         }
-        let (corner_m, half_m) = (parts[index].corner_m, 0.5 * parts[index].size_m);
+        let (corner_m, size_m) = (parts[index].corner_m, parts[index].size_m);
+        let middle_m = self.middle_m(corner_m, size_m);
+        let (near_m, far_m) = (middle_m - corner_m, corner_m + size_m - middle_m);
+        let quarters = [
+            (corner_m, near_m),
+            (DVec2::new(middle_m.x, corner_m.y), DVec2::new(far_m.x, near_m.y)),
+            (DVec2::new(corner_m.x, middle_m.y), DVec2::new(near_m.x, far_m.y)),
+            (middle_m, far_m),
+        ];
         let first = parts.len();
-        parts[index].kind = Kind::Quartered(first);
-        let quarters: Vec<(DVec2, Leaf)> = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE]
-            .into_par_iter()
-            .map(|q| {
-                let at_m = corner_m + q * half_m;
-                (at_m, self.leaf(at_m, half_m))
-            })
-            .collect();
-        let leaves: Vec<Leaf> = quarters
-            .into_iter()
-            .map(|(corner_m, leaf)| {
-                parts.push(Part { corner_m, size_m: half_m, kind: Kind::Quartered(0) });
-                leaf
-            })
-            .collect();
+        parts[index].kind = Kind::Quartered(first, middle_m);
+        let leaves: Vec<Leaf> = quarters.par_iter().map(|(corner_m, size_m)| self.leaf(*corner_m, *size_m)).collect();
+        let part = |(corner_m, size_m)| Part { corner_m, size_m, kind: Kind::Quartered(0, corner_m) };
+        parts.extend(quarters.map(part));
         for (k, leaf) in leaves.into_iter().enumerate() {
             self.grow(parts, first + k, leaf, depth + 1);
         }
     }
 
+    /// Where a rectangle is quartered: in its middle, or at the height of a luminaire, above which it may send no light.
+    fn middle_m(&self, corner_m: DVec2, size_m: DVec2) -> DVec2 {
+        let up = self.face.on(DVec3::Z);
+        let (low, high) = (corner_m + EDGE * size_m, corner_m + (1.0 - EDGE) * size_m);
+        let mut middle_m = corner_m + 0.5 * size_m;
+        let heights = self.lights.emitters.iter().flat_map(Emitter::bounds_m).map(|b| self.face.on(b));
+        let inside =
+            heights.filter(|at_m| up != DVec2::ZERO && at_m.dot(up) > low.dot(up) && at_m.dot(up) < high.dot(up));
+        let nearest = inside.map(|at_m| (at_m - middle_m).dot(up)).min_by(|a, b| a.abs().total_cmp(&b.abs()));
+        middle_m += up * nearest.unwrap_or(0.0);
+        middle_m
+    }
+
     /// A rectangle with the luminaires that may be hidden from it told apart.
     fn leaf(&self, corner_m: DVec2, size_m: DVec2) -> Leaf {
-        let room = self.lights.surroundings.room;
-        let meter = |t: DVec2| Meter {
-            position_m: room.map_or(DVec3::ZERO, |room| off_wall(&room, self.wall, corner_m + t * size_m)),
-            normal: WALLS[self.wall].inward_normal(),
-        };
+        let meter = |t: DVec2| Meter { position_m: self.face.off(corner_m + t * size_m), normal: self.face.normal };
         let corners_m = [meter(DVec2::ZERO).position_m, meter(DVec2::ONE).position_m];
         let all = 0..self.lights.emitters.len();
         let (asked, clear): (Vec<usize>, Vec<usize>) = all.partition(|k| self.lights.may_be_hidden(*k, corners_m));
-        let error = (0.2 * self.relative_error).min(1e-3);
+        // Two refinements agree far less well than the finer one is right.
+        let relative_error = self.relative_error.min(1e-3);
+        let precision = Precision { relative_error, error_lux: relative_error * self.floor_lux };
         let lux_at = |t: DVec2, which: &[usize]| -> f64 {
             let meter = meter(t);
-            which.iter().map(|k| self.lights.emitters[*k].illuminance(&meter, &[], error).value).sum()
+            which.iter().map(|k| self.lights.emitters[*k].illuminance(&meter, &[], precision).value).sum()
         };
-        let n = &self.rule.nodes;
-        let node = |k: usize| DVec2::new(n[k / ORDER], n[k % ORDER]);
-        let lux = std::array::from_fn(|k| lux_at(node(k), &clear));
+        let lux = std::array::from_fn(|k| lux_at(self.bicubic.node(k), &clear));
         let off = |t: &[f64; 2]| {
             let t = DVec2::from_array(*t);
-            (polynomial(self.rule, &lux, t) - lux_at(t, &clear)).abs()
+            (self.bicubic.at(&lux, t) - lux_at(t, &clear)).abs()
         };
         let error_lux = CHECKS.iter().map(off).fold(0.0, f64::max);
-        let by_area: f64 = (0..NODES).map(|k| self.weight(k) * lux[k]).sum();
+        let by_area: f64 = (0..NODES).map(|k| self.bicubic.weight(k) * lux[k]).sum();
         // What may be hidden counts by half, so that no place that is lit is drawn never.
-        let hidden: f64 = (0..NODES).map(|k| self.weight(k) * lux_at(node(k), &asked)).sum();
-        let rho = room.map_or(0.0, |room| room.reflectance.of(WALLS[self.wall]));
-        let exitance = rho * (by_area.max(0.0) + 0.5 * hidden).max(0.02 * self.floor_lux);
+        let hidden: f64 = (0..NODES).map(|k| self.bicubic.weight(k) * lux_at(self.bicubic.node(k), &asked)).sum();
+        let exitance = self.face.reflectance * (by_area.max(0.0) + 0.5 * hidden).max(0.02 * self.floor_lux);
         Leaf { lux, error_lux, asked: asked.iter().map(|k| *k as u32).collect(), exitance }
-    }
-
-    fn weight(&self, node: usize) -> f64 {
-        self.rule.weights[node / ORDER] * self.rule.weights[node % ORDER]
     }
 }

@@ -1,11 +1,13 @@
-//! Rooms with bodies and luminaires of any form: one field of reflected light on the walls, gathered at every meter.
+//! Rooms with bodies and luminaires of any form: one field of reflected light on walls and larger bodies, gathered at every meter.
 //!
 //! Light straight from the luminaires is integrated over what shows of them; reflected light along rays from the meter
-//! that end on the walls, where light reflected once is known from the luminaires and light reflected more often from
+//! that end there, where light reflected once is known from the luminaires and light reflected more often from
 //! the field. Ward, Rubinstein and Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, and
 //! M. Reichert, *A two-pass radiosity method driven by lights and viewer position* (1992) gather so; here all of it is
 //! done in independent replicates, whose scatter bounds chance, and what polynomials leave out is added up along the rays.
 
+mod bicubic;
+mod face;
 mod field;
 mod grid;
 mod lit;
@@ -16,17 +18,17 @@ mod tests;
 
 use rayon::prelude::*;
 
+use self::bicubic::NODES;
 use self::field::Field;
-use self::grid::{Cover, Grid, NODES};
-use self::lit::{Known, Lights, Lit};
+use self::grid::{Cover, Grid};
+use self::lit::{Known, Lights, Limit, Lit};
 use self::rays::Rays;
 use self::surroundings::Surroundings;
-use super::emission::Emitter;
+use super::emission::{Emitter, Precision};
 use super::sampler::{Sampler, mix};
 use super::stop::Stop;
 use super::visibility::Occluder;
 use super::{Accuracy, Bounded, SimulatorError};
-use crate::geometry::Room;
 use crate::scene::{Bounces, Meter, Scene};
 
 /// Independent solutions.
@@ -40,12 +42,12 @@ const UNSEEN: f64 = 11.5;
 /// Bounds below this part of what luminaires would give that nothing hides need not be narrower.
 const DARK: f64 = 1e-4;
 /// Places so much brighter than the mean wall are drawn, since rays find them too seldom.
-const PEAKED: f64 = 8.0;
+const PEAKED: f64 = 16.0;
 /// Rays of a meter in each replicate at first, as a power of two.
 const FIRST_RAYS_LOG2: u32 = 7;
-/// Light straight from the luminaires is known on the walls to so many times the error asked for: of what a polynomial leaves
+/// Light straight from the luminaires is known on the faces to so many times the error asked for: of what a polynomial leaves
 /// out little is left from afar.
-const LIT: f64 = 2.0;
+const LIT: f64 = 1.0;
 /// Rays of a node in each replicate: so many over the relative error asked for, a power of two.
 const NODE_RAYS: f64 = 0.08;
 /// Rays of a node in each replicate at least and at most.
@@ -66,29 +68,32 @@ pub(super) struct Enclosure {
     solved: Option<Solved>,
 }
 
-/// How far it is gone for meters that need it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Level {
-    /// Rays of a node more than at first, as a power of two.
-    more_log2: u32,
-    /// Rays of a meter at most, as a power of two.
-    rays_log2: u32,
-}
-
-/// The noise of the field is in all rays of a meter: where they no longer help, the field needs more.
-/// A first look at every meter comes before, so that a solution that is stopped knows all of them.
-const LEVELS: [Level; 3] = [
-    Level { more_log2: 0, rays_log2: FIRST_RAYS_LOG2 },
-    Level { more_log2: 0, rays_log2: 14 },
-    Level { more_log2: 3, rays_log2: 17 },
-];
+/// Rays of a meter in each replicate at most, and times more than a look before, as powers of two.
+const MOST_RAYS_LOG2: u32 = 17;
+const MORE_RAYS_LOG2: u32 = 3;
+/// Times more rays of a node than a look before, and than at first, at most, as powers of two.
+const MORE_LOG2: f64 = 3.0;
+const MOST_LOG2: u32 = 4;
+/// The part of meters that do not decide that the field needs more: hard ones have rays that go on.
+const HARD: f64 = 0.3;
+/// Where the field scatters too much at a meter its noise counts so many times, one after the other.
+const WARY: [f64; 3] = [1.0, 8.0, 64.0];
+/// What following a meter's ray costs, in rays of a node.
+const RAY: usize = 2;
+/// The power of the number of rays by which the field's variance falls.
+const RATE: f64 = 1.6;
+/// The part of a bound that the field's noise may have.
+const FIELD_PART: f64 = 0.6;
 
 /// A field with what it was made for.
 #[derive(Debug)]
 struct Solved {
     bounces: Bounces,
     accuracy: Accuracy,
-    level: Level,
+    /// Times more rays of a node than at first, as a power of two.
+    more_log2: u32,
+    /// Rays of a node.
+    count: u32,
     grid: Grid,
     field: Field,
     /// How well it is known, by rectangle.
@@ -99,9 +104,13 @@ struct Solved {
 #[derive(Clone, Debug, Default)]
 struct Sums {
     lux: [f64; REPLICATES],
+    /// The part of it that is the field's chance.
+    chance_lux: [f64; REPLICATES],
     error_lux: f64,
     rays_log2: u32,
     half_way: Option<f64>,
+    /// What [`Self::field_needs_log2`] said of the first rays.
+    needs_log2: f64,
     /// The most that a single ray may bring from a place that none has met.
     brightest_lux: f64,
 }
@@ -127,12 +136,14 @@ impl Enclosure {
                 (0..self.emitters.len()).partition(|k| self.is_sampled(*k, meter));
             let occluders = self.occluders.as_deref().unwrap_or(&[]);
             let error = relative_error.clamp(1e-10, 0.1);
+            let precision = Precision::relative(0.2 * error);
             let light = |k: usize| {
-                if self.emitters[k].is_point() {
-                    let hidden = self.surroundings.is_hidden(self.lifted(meter), self.emitters[k].centre_m());
-                    return if hidden { Bounded::default() } else { self.emitters[k].illuminance(meter, &[], error) };
+                let emitter = &self.emitters[k];
+                if !emitter.is_point() {
+                    return emitter.illuminance(meter, occluders, precision);
                 }
-                self.emitters[k].illuminance(meter, occluders, 0.2 * error)
+                let hidden = self.surroundings.is_hidden(self.lifted(meter), emitter.centre_m());
+                if hidden { Bounded::default() } else { emitter.illuminance(meter, &[], precision) }
             };
             let known = exact.iter().map(|k| light(*k)).fold(Bounded::default(), |a, b| a + b);
             if sampled.is_empty() {
@@ -163,21 +174,21 @@ impl Enclosure {
         stop: &Stop,
     ) -> Bounded {
         let start_m = self.lifted(meter);
-        let bare = |k: &usize| self.emitters[*k].illuminance(meter, &[], 1e-2).value;
+        let bare = |k: &usize| self.emitters[*k].illuminance(meter, &[], Precision::relative(1e-2)).value;
         let bare_lux: f64 = which.iter().map(bare).sum();
         let mut sums = Sums { brightest_lux: bare_lux, ..Sums::default() };
         for log2 in PARTS_LOG2 {
             let from = if log2 == *PARTS_LOG2.start() { 0 } else { 1 << (log2 - 1) };
-            let mut more = [0.0; REPLICATES];
-            for (replicate, sum) in more.iter_mut().enumerate() {
+            let mut more = [More::default(); REPLICATES];
+            for (replicate, more) in more.iter_mut().enumerate() {
                 for index in from..1 << log2 {
                     let mut sampler = Sampler::new(mix(seed.wrapping_add(replicate as u64 + 1)), index);
                     let parts = sampler.next_pair();
                     let parts = sampler.moved(parts);
-                    *sum += which.iter().map(|k| lights.sample(*k, meter, start_m, parts)).sum::<f64>();
+                    more.lux += which.iter().map(|k| lights.sample(*k, meter, start_m, parts)).sum::<f64>();
                 }
             }
-            sums.add(&more, 0.0, log2);
+            sums.add(&more, log2);
             let found = sums.bounded();
             let enough = 0.5 * relative_error * (found.value + known.value);
             if found.bound + known.bound <= enough.max(DARK * bare_lux) || stop.is_due() {
@@ -212,28 +223,45 @@ impl Enclosure {
         let Some((_, lit)) = &self.lit else { return Err(SimulatorError::Stopped) };
         let mut sums = vec![Sums::default(); meters.len()];
         let mut open: Vec<usize> = (0..meters.len()).collect();
-        for level in LEVELS {
-            if let Some(room) = self.surroundings.room
-                && !self.solved.as_ref().is_some_and(|s| s.is_for(bounces, accuracy, level))
+        let (mut more_log2, mut most_log2) = (0, FIRST_RAYS_LOG2);
+        loop {
+            if self.surroundings.room.is_some()
+                && !self.solved.as_ref().is_some_and(|s| s.is_for(bounces, accuracy, more_log2))
             {
-                match Solved::new(&room, lights, lit, bounces, accuracy, level, stop) {
-                    None if level == LEVELS[0] => return Err(SimulatorError::Stopped),
+                match Solved::new(lights, lit, bounces, accuracy, more_log2, stop) {
+                    None if self.solved.is_none() => return Err(SimulatorError::Stopped),
                     None => break,
                     solved => self.solved = solved,
                 }
             }
-            let most_log2 = level.rays_log2.min(stop.third_log2(REPLICATES * open.len())).max(FIRST_RAYS_LOG2);
+            let affordable = stop.third_log2(REPLICATES * open.len()).max(FIRST_RAYS_LOG2);
             let gather = Gather::new(lights, lit, self.solved.as_ref(), bounces, accuracy, stop);
-            let found: Vec<Sums> = open.par_iter().map(|k| gather.at(*k, &meters[*k], direct[*k], most_log2)).collect();
+            let at = |k: &usize| gather.at(*k, &meters[*k], direct[*k], most_log2.min(affordable));
+            let found: Vec<Sums> = open.par_iter().map(at).collect();
+            let mut needs: Vec<f64> = found.iter().map(|sums| sums.needs_log2).collect();
             for (k, found) in open.iter().zip(found) {
-                // A later level stopped short of its first rays knows nothing.
+                // A later look stopped short of its first rays knows nothing.
                 if found.rays_log2 > 0 && (sums[*k].rays_log2 == 0 || found.bounded().bound < sums[*k].bounded().bound)
                 {
                     sums[*k] = found;
                 }
             }
             open.retain(|k| !sums[*k].meets(error, direct[*k]));
-            if open.is_empty() || stop.is_due() {
+            if open.is_empty() || stop.is_due() || most_log2 > affordable {
+                break;
+            }
+            needs.sort_by(f64::total_cmp);
+            let needed = needs[((1.0 - HARD) * (needs.len() - 1) as f64) as usize].ceil().clamp(0.0, MORE_LOG2) as u32;
+            let better_log2 = (more_log2 + needed).min(MOST_LOG2);
+            let node_rays = self.solved.as_ref().map_or(0, |s| s.rays() << (better_log2 - more_log2));
+            // What is cheaper comes first.
+            if better_log2 > more_log2
+                && (most_log2 == MOST_RAYS_LOG2 || node_rays < (RAY * open.len()) << (most_log2 + MORE_RAYS_LOG2))
+            {
+                more_log2 = better_log2;
+            } else if most_log2 < MOST_RAYS_LOG2 {
+                most_log2 = (most_log2 + MORE_RAYS_LOG2).min(MOST_RAYS_LOG2);
+            } else {
                 break;
             }
         }
@@ -255,32 +283,36 @@ impl Enclosure {
 
 impl Solved {
     fn new(
-        room: &Room,
         lights: Lights,
         lit: &Lit,
         bounces: Bounces,
         accuracy: &Accuracy,
-        level: Level,
+        more_log2: u32,
         stop: &Stop,
     ) -> Option<Self> {
-        let grid = Grid::new(*room, lights.surroundings);
+        let grid = Grid::new(lights.surroundings);
         let known = |k: usize, error_lux: f64, noise_lux: f64| {
             let error_lux = if grid.cover(k) == Cover::None { error_lux } else { f64::INFINITY };
-            Known { error_lux, noise_lux, side_m: grid.side_m(k) }
+            Known { error_lux, noise_lux, side_m: grid.longer_m(k) }
         };
         let open: Vec<Known> = (0..grid.len()).map(|k| known(k, 0.0, 0.0)).collect();
-        let rays = Rays { lights, lit, grid: Some((&grid, &open)), draws: lit.is_peaked };
+        let rays = Rays { lights, lit, grid: Some((&grid, &open)), draws: false };
         let log2 = (NODE_RAYS / accuracy.relative_error).log2().ceil().max(0.0) as u32;
         let affordable = stop.third_log2(REPLICATES * NODES * grid.len()).max(*NODE_RAYS_LOG2.start());
-        let log2 = log2.clamp(*NODE_RAYS_LOG2.start(), *NODE_RAYS_LOG2.end()) + level.more_log2;
-        let count = 1 << log2.min(affordable);
-        let field = Field::solve(&grid, &rays, bounces, count, accuracy.seed, stop)?;
+        let log2 = log2.clamp(*NODE_RAYS_LOG2.start(), *NODE_RAYS_LOG2.end()) + more_log2;
+        let count: u32 = 1 << log2.min(affordable);
+        let field = Field::solve(&grid, &rays, bounces, count, *accuracy, stop)?;
         let known = (0..grid.len()).map(|k| known(k, field.error_lux[k], field.noise_lux[k])).collect();
-        Some(Self { bounces, accuracy: *accuracy, level, grid, field, known })
+        Some(Self { bounces, accuracy: *accuracy, more_log2, count, grid, field, known })
     }
 
-    fn is_for(&self, bounces: Bounces, accuracy: &Accuracy, level: Level) -> bool {
-        self.bounces == bounces && self.accuracy == *accuracy && self.level.more_log2 >= level.more_log2
+    /// Rays of all nodes in each replicate, about.
+    fn rays(&self) -> usize {
+        self.grid.len() * NODES * self.count as usize
+    }
+
+    fn is_for(&self, bounces: Bounces, accuracy: &Accuracy, more_log2: u32) -> bool {
+        self.bounces == bounces && self.accuracy == *accuracy && self.more_log2 >= more_log2
     }
 }
 
@@ -310,45 +342,43 @@ impl<'a> Gather<'a> {
         // Where bright places are drawn none is left unseen.
         let brightest_lux = if self.rays.draws { 0.0 } else { self.rays.lit.peak };
         let mut sums = Sums { brightest_lux, ..Sums::default() };
-        // The first rays tell how bright it is here, and so what may be left out.
-        let mut limit_lux = self.limit_lux(self.solved.map_or(0.0, |s| s.field.mean_lux));
+        // The first rays tell how bright it is here and what the field scatters, and so where rays may end.
+        let mut limit = self.limit(self.solved.map_or(0.0, |s| s.field.mean_lux), 1.0);
         for log2 in FIRST_RAYS_LOG2..=most_log2 {
             if self.stop.is_due() {
                 break;
             }
             let from = if log2 == FIRST_RAYS_LOG2 { 0 } else { 1 << (log2 - 1) };
-            let found = self.replicates(index, meter, from..1 << log2, limit_lux);
-            sums.add(&found.map(|f| f.0), found.iter().map(|f| f.1).sum(), log2);
+            sums.add(&self.replicates(index, meter, from..1 << log2, limit), log2);
             if sums.meets(self.accuracy.relative_error, direct) {
                 break;
             }
-            let here_lux = self.limit_lux(sums.bounded().value + direct.value);
-            if log2 == FIRST_RAYS_LOG2 && here_lux < 0.5 * limit_lux {
-                limit_lux = here_lux;
-                let again = self.replicates(index, meter, 0..1 << log2, limit_lux);
-                sums = Sums { brightest_lux, ..Sums::default() };
-                sums.add(&again.map(|f| f.0), again.iter().map(|f| f.1).sum(), log2);
+            if log2 > FIRST_RAYS_LOG2 {
+                continue;
             }
+            let needs_log2 = |sums: &Sums| sums.field_needs_log2(self.accuracy.relative_error, direct);
+            let first_needs_log2 = needs_log2(&sums);
+            for wary in WARY {
+                let here = self.limit(sums.bounded().value + direct.value, wary);
+                if here.error_lux < 0.5 * limit.error_lux || wary > 1.0 && needs_log2(&sums) > 0.0 {
+                    limit = here;
+                    sums = Sums { brightest_lux, ..Sums::default() };
+                    sums.add(&self.replicates(index, meter, 0..1 << log2, limit), log2);
+                }
+            }
+            sums.needs_log2 = first_needs_log2;
         }
         sums
     }
 
-    fn limit_lux(&self, lux: f64) -> f64 {
-        WELL_KNOWN * self.accuracy.relative_error * lux
+    fn limit(&self, lux: f64, wary: f64) -> Limit {
+        let error_lux = WELL_KNOWN * self.accuracy.relative_error * lux;
+        Limit { error_lux, noise_lux: error_lux / wary }
     }
 
-    fn replicates(
-        &self,
-        index: usize,
-        meter: &Meter,
-        rays: std::ops::Range<u32>,
-        limit_lux: f64,
-    ) -> [(f64, f64); REPLICATES] {
-        let found: Vec<(f64, f64)> = (0..REPLICATES)
-            .into_par_iter()
-            .map(|replicate| self.replicate(index, meter, replicate, rays.clone(), limit_lux))
-            .collect();
-        std::array::from_fn(|k| found[k])
+    fn replicates(&self, index: usize, meter: &Meter, rays: std::ops::Range<u32>, limit: Limit) -> Vec<More> {
+        let one = |replicate| self.replicate(index, meter, replicate, rays.clone(), limit);
+        (0..REPLICATES).into_par_iter().map(one).collect()
     }
 
     fn replicate(
@@ -357,34 +387,56 @@ impl<'a> Gather<'a> {
         meter: &Meter,
         replicate: usize,
         rays: std::ops::Range<u32>,
-        limit_lux: f64,
-    ) -> (f64, f64) {
+        limit: Limit,
+    ) -> More {
         let most = match self.bounces {
             Bounces::Converged => u32::MAX,
             Bounces::AtMost(n) => n,
         };
         let scramble = mix(mix(self.accuracy.seed).wrapping_add(((index as u64) << 8 | replicate as u64) + 1));
-        let (mut lux, mut error_lux) = (0.0, 0.0);
+        let mut more = More::default();
         for ray in rays {
-            let found = self.rays.follow(meter, &mut Sampler::new(scramble, ray), most, limit_lux);
-            lux += found.lux.iter().map(|(_, lux)| lux).sum::<f64>();
-            error_lux += found.error_lux;
+            let found = self.rays.follow(meter, &mut Sampler::new(scramble, ray), most, limit);
+            more.lux += found.lux.iter().map(|(_, lux)| lux).sum::<f64>();
+            more.error_lux += found.error_lux;
             if let (Some(end), Some(solved)) = (&found.end, self.solved) {
-                lux += solved.field.at(&solved.grid, end, replicate, self.bounces);
+                let (lux, chance_lux) = solved.field.at(&solved.grid, end, replicate, self.bounces);
+                more.lux += lux;
+                more.chance_lux += chance_lux;
             }
         }
-        (lux, error_lux)
+        more
     }
 }
 
+/// What further rays of one replicate add up to.
+#[derive(Clone, Copy, Debug, Default)]
+struct More {
+    lux: f64,
+    /// The part of it that is the field's chance.
+    chance_lux: f64,
+    error_lux: f64,
+}
+
 impl Sums {
-    fn add(&mut self, lux: &[f64; REPLICATES], error_lux: f64, rays_log2: u32) {
+    fn add(&mut self, more: &[More], rays_log2: u32) {
         self.half_way = (self.rays_log2 > 0).then(|| self.mean_and_error().1);
-        for (sum, lux) in self.lux.iter_mut().zip(lux) {
-            *sum += lux;
+        for (k, more) in more.iter().enumerate() {
+            self.lux[k] += more.lux;
+            self.chance_lux[k] += more.chance_lux;
+            self.error_lux += more.error_lux;
         }
-        self.error_lux += error_lux;
         self.rays_log2 = rays_log2;
+    }
+
+    /// How many times more rays the field's nodes need for a bound that is asked for, as a power of two.
+    fn field_needs_log2(&self, relative_error: f64, direct: Bounded) -> f64 {
+        let (n, rays) = (REPLICATES as f64, f64::from(1_u32 << self.rays_log2));
+        let found = self.bounded();
+        let noise = WIDTH * (self.chance_lux.iter().map(|c| (c / rays).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
+        let asked = relative_error * (found.value + direct.value) - direct.bound - self.error_lux / (n * rays);
+        // Where something else is too large already the field cannot help.
+        if asked <= 0.0 || noise == 0.0 { 0.0 } else { 2.0 / RATE * (noise / (FIELD_PART * asked)).log2() }
     }
 
     /// Mean and standard error of the replicates.

@@ -1,7 +1,7 @@
 //! Rays from a place: light that was reflected once where they end, and where light reflected more often is asked for.
 //!
-//! A ray ends on a wall where reflected light is known. From bodies, and from places on walls where it is not known
-//! well enough, it goes on, by roulette after the second time, so that nothing is lost on the mean. Where much light
+//! A ray ends on a face where reflected light is known. From other bodies, and from places where it is not known well
+//! enough, it goes on, by roulette after the second time, so that nothing is lost on the mean. Where much light
 //! falls, places are drawn from the light itself, too; both ways share the work by the balance heuristic (E. Veach,
 //! L. Guibas, SIGGRAPH 1995), so that a small bright place is neither missed nor counted twice.
 
@@ -9,9 +9,10 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
+use super::face::Face;
 use super::grid::{Grid, Spot};
-use super::lit::{Known, Lights, Lit};
-use super::surroundings::{Place, WALLS, off_wall};
+use super::lit::{Known, Lights, Limit, Lit};
+use super::surroundings::Place;
 use crate::scene::Meter;
 use crate::simulator::sampler::Sampler;
 
@@ -19,6 +20,11 @@ use crate::simulator::sampler::Sampler;
 const ROULETTE_FROM: u32 = 3;
 /// The likeliest that a ray survives roulette, so that it ends even where everything reflects all light.
 const SURVIVAL: f64 = 0.95;
+
+/// Coordinates of a ray's sample before those of its reflections, and of each reflection: its direction, the parts of
+/// luminaires, and roulette.
+const DRAWN: usize = 4;
+const PER_REFLECTION: usize = 5;
 
 /// All that rays need.
 pub(super) struct Rays<'a> {
@@ -37,7 +43,7 @@ pub(super) struct Found {
     pub(super) lux: Vec<(u32, f64)>,
     /// How far off that may be besides chance.
     pub(super) error_lux: f64,
-    /// Where it ended on a wall, if it did.
+    /// Where it ended on a face, if it did.
     pub(super) end: Option<End>,
 }
 
@@ -53,7 +59,7 @@ pub(super) struct End {
 
 impl Rays<'_> {
     /// One ray from a place, cosine-distributed about its normal, that goes on from where more than a limit may be left out.
-    pub(super) fn follow(&self, meter: &Meter, sampler: &mut Sampler, most: u32, limit_lux: f64) -> Found {
+    pub(super) fn follow(&self, meter: &Meter, sampler: &mut Sampler, most: u32, limit: Limit) -> Found {
         let mut found = Found::default();
         if self.draws {
             self.draw(meter, sampler, &mut found);
@@ -62,7 +68,8 @@ impl Rays<'_> {
         let mut at = *meter;
         let mut weight = 1.0;
         for reflection in 1..=most {
-            let (toward, parts, chance) = (sampler.next_pair(), sampler.next_pair(), sampler.next());
+            let dimension = DRAWN + PER_REFLECTION * (reflection - 1) as usize;
+            let toward = sampler.from(dimension).next_pair();
             let start_m = if reflection == 1 { at.position_m + at.normal * around.lift_m() } else { at.position_m };
             let Some(place) = around.closest(start_m, cosine_direction(at.normal, toward)) else { break };
             weight *= place.reflectance;
@@ -70,11 +77,11 @@ impl Rays<'_> {
                 break;
             }
             let share = if reflection == 1 { self.share(meter, &place) } else { 1.0 };
-            self.light(&place, parts, weight * share, reflection, &mut found);
-            if let (Some(wall), Some((grid, known))) = (place.wall, self.grid) {
-                let spot = grid.spot(wall, place.point_m);
+            self.light(&place, || sampler.from(dimension + 2).next_pair(), weight * share, reflection, &mut found);
+            if let (Some(face), Some((grid, known))) = (place.face, self.grid) {
+                let spot = grid.spot(face, place.point_m);
                 let known = &known[spot.rectangle as usize];
-                if known.is_enough(place.distance_m, limit_lux) {
+                if known.is_enough(place.distance_m, limit) {
                     found.error_lux += weight * known.left_lux(place.distance_m);
                     found.end = Some(End { spot, weight, reflections: reflection });
                     break;
@@ -82,7 +89,7 @@ impl Rays<'_> {
             }
             if reflection >= ROULETTE_FROM {
                 let survival = place.reflectance.min(SURVIVAL);
-                if chance >= survival {
+                if sampler.from(dimension + 4).next() >= survival {
                     break;
                 }
                 weight /= survival;
@@ -93,13 +100,14 @@ impl Rays<'_> {
     }
 
     /// Adds light straight from the luminaires at a place, with a weight.
-    fn light(&self, place: &Place, parts: [f64; 2], weight: f64, reflection: u32, found: &mut Found) {
+    fn light(&self, place: &Place, parts: impl FnOnce() -> [f64; 2], weight: f64, reflection: u32, found: &mut Found) {
         let meter = Meter { position_m: place.point_m, normal: place.normal };
-        let lux = if let Some(wall) = place.wall {
-            let light = self.lit.at(&self.lights, wall, &meter, parts);
+        let lux = if let Some(face) = place.face {
+            let light = self.lit.at(&self.lights, face, &meter, parts);
             found.error_lux += weight * light.known.left_lux(place.distance_m);
             light.lux
         } else {
+            let parts = parts();
             (0..self.lights.emitters.len()).map(|k| self.lights.sample(k, &meter, place.point_m, parts)).sum()
         };
         found.lux.push((reflection, weight * lux));
@@ -107,30 +115,30 @@ impl Rays<'_> {
 
     /// The part of a place's light that a ray counts where the place may be drawn, too.
     fn share(&self, meter: &Meter, place: &Place) -> f64 {
-        let Some(wall) = place.wall.filter(|_| self.draws) else { return 1.0 };
+        let Some(face) = place.face.filter(|_| self.draws) else { return 1.0 };
         let Some(own) = ray_density(meter, place.point_m, place.normal) else { return 1.0 };
-        own / (own + self.lit.density(wall, place.point_m))
+        own / (own + self.lit.density(&self.lights, face, place.point_m))
     }
 
     /// Light reflected once by a place that is drawn from what the walls reflect.
     fn draw(&self, meter: &Meter, sampler: &mut Sampler, found: &mut Found) {
-        let (at, parts) = (sampler.next_pair(), sampler.next_pair());
+        let at = sampler.next_pair();
         let around = self.lights.surroundings;
-        let Some(room) = around.room else { return };
-        let Some((wall, at_m, density)) = self.lit.draw(at) else { return };
-        let (point_m, normal) = (off_wall(&room, wall, at_m), WALLS[wall].inward_normal());
+        let Some((face, at_m, density)) = self.lit.draw(at) else { return };
+        let Face { normal, .. } = around.faces[face];
+        let point_m = around.faces[face].off(at_m);
         let Some(own) = ray_density(meter, point_m, normal) else { return };
         let way = point_m - meter.position_m;
         let start_m = meter.position_m + meter.normal * around.lift_m();
-        // What lies flat on the wall covers it: the ray itself tells what it meets.
+        // What lies flat on a wall covers it: the ray itself tells what it meets.
         let Some(place) = around.closest(start_m, way.normalize()) else { return };
-        if place.wall != Some(wall) || (place.point_m - point_m).length() > 1e-6 * way.length() {
+        if place.face != Some(face) || (place.point_m - point_m).length() > 1e-6 * way.length() {
             return;
         }
         let place = Place { point_m, normal, ..place };
         // The density of rays is cos cos / (pi r²), the very kernel of irradiance.
         let weight = place.reflectance * own / (own + density);
-        self.light(&place, parts, weight, 1, found);
+        self.light(&place, || sampler.from(2).next_pair(), weight, 1, found);
     }
 }
 

@@ -2,10 +2,11 @@
 //!
 //! It shares nothing with the path tracer but the tree of triangles, so that each can be held against the other.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
+use super::face::Face;
 use crate::geometry::bvh::{BvhError, Ray, TriangleBvh};
-use crate::geometry::{Mesh, Room, Surface};
+use crate::geometry::{Mesh, Room};
 use crate::scene::{Obstacle, Shape};
 use crate::simulator::visibility::Occluder;
 
@@ -20,6 +21,8 @@ const FAR_END: f64 = 1.0 - 1e-10;
 #[derive(Debug)]
 pub(super) struct Surroundings {
     pub(super) room: Option<Room>,
+    /// The room's walls and larger faces of boxes; none in free field.
+    pub(super) faces: Vec<Face>,
     boxes: Vec<Body>,
     tree: Tree,
     reflectances: Vec<f64>,
@@ -45,6 +48,8 @@ struct Body {
     min_m: DVec3,
     max_m: DVec3,
     reflectance: f64,
+    /// Its faces among all, at twice the axis and one more at its far end.
+    faces: [Option<usize>; 6],
 }
 
 /// A place on a diffuse surface, seen from one side.
@@ -54,14 +59,15 @@ pub(super) struct Place {
     /// Towards the side that is seen.
     pub(super) normal: DVec3,
     pub(super) reflectance: f64,
-    /// The wall, where it is on one.
-    pub(super) wall: Option<usize>,
+    /// The face, where it is on one.
+    pub(super) face: Option<usize>,
     pub(super) distance_m: f64,
 }
 
 impl Surroundings {
     pub(super) fn new(room: Option<Room>, obstacles: &[Obstacle], reach_m: f64) -> Result<Self, BvhError> {
         let count = obstacles.iter().filter(|o| Occluder::aligned(&o.shape).is_some()).count();
+        let mut faces: Vec<Face> = room.iter().flat_map(Face::walls).collect();
         let (mut boxes, mut bounds, mut solid, mut reflectances) = (vec![], vec![], vec![], vec![]);
         let (mut vertices, mut triangles): (Vec<DVec3>, Vec<[u32; 3]>) = (vec![], vec![]);
         for Obstacle { shape, reflectance } in obstacles {
@@ -72,7 +78,13 @@ impl Surroundings {
             };
             match (Occluder::aligned(shape), shape) {
                 (Some(Occluder { min_m, max_m }), _) if count <= MOST_BOXES => {
-                    boxes.push(Body { min_m, max_m, reflectance: *reflectance });
+                    let mut add = |k: usize| {
+                        let face = Face::of_box(&room?, [min_m, max_m], k / 2, k % 2 == 1, *reflectance)?;
+                        faces.push(face);
+                        Some(faces.len() - 1)
+                    };
+                    let own = std::array::from_fn(&mut add);
+                    boxes.push(Body { min_m, max_m, reflectance: *reflectance, faces: own });
                     solid.push([min_m, max_m]);
                 }
                 (_, Shape::Box { min_m, max_m }) => {
@@ -98,6 +110,7 @@ impl Surroundings {
         let extent_m = reach_m.max(room.map_or(0.0, |r| r.size_m.max_element()));
         Ok(Self {
             room,
+            faces,
             boxes,
             tree: Tree(TriangleBvh::new(&vertices, &triangles)?),
             reflectances,
@@ -115,7 +128,7 @@ impl Surroundings {
 
     /// The first surface that a ray along a unit vector meets.
     pub(super) fn closest(&self, from_m: DVec3, direction: DVec3) -> Option<Place> {
-        let mut nearest = self.room.map(|room| wall(&room, from_m, direction));
+        let mut nearest = self.room.map(|room| self.wall(&room, from_m, direction));
         // What lies flat on a wall is what one sees of the two.
         let mut reach = nearest.map_or(f64::INFINITY, |place| place.distance_m + 0.1 * self.lift_m());
         for body in &self.boxes {
@@ -134,9 +147,28 @@ impl Surroundings {
                 let point_m = from_m + hit.distance * direction + normal * self.lift_m();
                 let reflectance = self.reflectances[hit.triangle as usize];
                 let point_m = self.room.map_or(point_m, |room| point_m.clamp(DVec3::ZERO, room.size_m));
-                Some(Place { point_m, normal, reflectance, wall: None, distance_m: hit.distance })
+                Some(Place { point_m, normal, reflectance, face: None, distance_m: hit.distance })
             }
         }
+    }
+
+    /// Where a ray from inside leaves the room, exactly upon the wall, so that no ray leaks.
+    fn wall(&self, room: &Room, from_m: DVec3, direction: DVec3) -> Place {
+        let (mut distance_m, mut axis) = (f64::INFINITY, 0);
+        for k in 0..3 {
+            let end = if direction[k] > 0.0 { room.size_m[k] } else { 0.0 };
+            let t = (end - from_m[k]) / direction[k];
+            if direction[k] != 0.0 && t < distance_m {
+                (distance_m, axis) = (t, k);
+            }
+        }
+        let distance_m = distance_m.max(0.0);
+        let far = direction[axis] > 0.0;
+        let mut point_m = (from_m + distance_m * direction).clamp(DVec3::ZERO, room.size_m);
+        point_m[axis] = if far { room.size_m[axis] } else { 0.0 };
+        let index = 2 * axis + usize::from(far);
+        let Face { normal, reflectance, .. } = self.faces[index];
+        Place { point_m, normal, reflectance, face: Some(index), distance_m }
     }
 
     /// Boxes, flat ones on the walls left out, as their lower and upper corners.
@@ -187,51 +219,6 @@ fn lies_on_a_wall(room: &Room, [min_m, max_m]: [DVec3; 2]) -> bool {
     (0..3).any(|k| min_m[k] == max_m[k] && (min_m[k] == 0.0 || max_m[k] == room.size_m[k]))
 }
 
-/// Where a ray from inside leaves the room, exactly upon the wall, so that no ray leaks.
-fn wall(room: &Room, from_m: DVec3, direction: DVec3) -> Place {
-    let (mut distance_m, mut axis) = (f64::INFINITY, 0);
-    for k in 0..3 {
-        let end = if direction[k] > 0.0 { room.size_m[k] } else { 0.0 };
-        let t = (end - from_m[k]) / direction[k];
-        if direction[k] != 0.0 && t < distance_m {
-            (distance_m, axis) = (t, k);
-        }
-    }
-    let distance_m = distance_m.max(0.0);
-    let far = direction[axis] > 0.0;
-    let mut point_m = (from_m + distance_m * direction).clamp(DVec3::ZERO, room.size_m);
-    point_m[axis] = if far { room.size_m[axis] } else { 0.0 };
-    let wall = 2 * axis + usize::from(far);
-    let surface = WALLS[wall];
-    let reflectance = room.reflectance.of(surface);
-    Place { point_m, normal: surface.inward_normal(), reflectance, wall: Some(wall), distance_m }
-}
-
-/// The walls by axis, near and far.
-pub(super) const WALLS: [Surface; 6] =
-    [Surface::WallXMin, Surface::WallXMax, Surface::WallYMin, Surface::WallYMax, Surface::Floor, Surface::Ceiling];
-
-/// The two axes along a wall.
-pub(super) fn along(wall: usize) -> [usize; 2] {
-    let axis = wall / 2;
-    [(axis + 1) % 3, (axis + 2) % 3]
-}
-
-/// Where on its wall a point lies, in metres.
-pub(super) fn on_wall(wall: usize, point_m: DVec3) -> DVec2 {
-    let [a, b] = along(wall);
-    DVec2::new(point_m[a], point_m[b])
-}
-
-/// The point in the room of a place on a wall.
-pub(super) fn off_wall(room: &Room, wall: usize, at_m: DVec2) -> DVec3 {
-    let [a, b] = along(wall);
-    let mut point_m = DVec3::ZERO;
-    (point_m[a], point_m[b]) = (at_m.x, at_m.y);
-    point_m[wall / 2] = if wall % 2 == 1 { room.size_m[wall / 2] } else { 0.0 };
-    point_m
-}
-
 impl Body {
     fn slabs(&self, from_m: DVec3, direction: DVec3) -> (DVec3, DVec3) {
         let (a, b) = ((self.min_m - from_m) / direction, (self.max_m - from_m) / direction);
@@ -250,7 +237,8 @@ impl Body {
         let mut point_m = (from_m + enter * direction).clamp(self.min_m, self.max_m);
         point_m[axis] = if ahead { self.min_m[axis] } else { self.max_m[axis] };
         let normal = DVec3::AXES[axis] * if ahead { -1.0 } else { 1.0 };
-        Some(Place { point_m, normal, reflectance: self.reflectance, wall: None, distance_m: enter })
+        let face = self.faces[2 * axis + usize::from(!ahead)];
+        Some(Place { point_m, normal, reflectance: self.reflectance, face, distance_m: enter })
     }
 
     fn blocks(&self, from_m: DVec3, direction: DVec3) -> bool {

@@ -155,7 +155,7 @@ fn bounds_hold_at_every_meter_of_s2() {
         errors.push(error / v[2]);
     }
     errors.sort_by(f64::total_cmp);
-    assert!(errors[92] <= 2e-3 && errors[183] <= 0.03, "median {}, worst {}", errors[92], errors[183]);
+    assert!(errors[92] <= 3e-3 && errors[183] <= 0.03, "median {}, worst {}", errors[92], errors[183]);
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod tests;
 use rayon::prelude::*;
 
 use super::Bounded;
-use super::emission::Emitter;
+use super::emission::{Emitter, Precision};
 use super::visibility::Occluder;
 use crate::scene::{Meter, Scene};
 use faces::Face;
@@ -41,13 +41,13 @@ impl OnceReflected {
 
     /// Illuminance at the meters.
     pub(super) fn illuminance(&self, meters: &[Meter], relative_error: f64) -> Vec<Bounded> {
-        let error = relative_error.clamp(1e-9, 1e-3);
+        let precision = Precision::relative(relative_error.clamp(1e-9, 1e-3));
         let at = |meter: &Meter| {
             let mut sum = Bounded::default();
             for face in &self.faces {
                 for emitter in &self.emitters {
                     let Bounded { value, bound } =
-                        emitter.reflected(meter, &face.corners_m, face.normal, &self.occluders, error);
+                        emitter.reflected(meter, &face.corners_m, face.normal, &self.occluders, precision);
                     sum = sum + Bounded { value: face.reflectance * value, bound: face.reflectance * bound };
                 }
             }

@@ -1,7 +1,7 @@
 //! The code that a program may load: scripts, modules and libraries below the folders that it starts from.
 
 use std::collections::{BTreeSet, VecDeque};
-use std::fs::{File, Metadata};
+use std::fs::File;
 use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -55,7 +55,7 @@ pub(super) fn below(roots: &[PathBuf], except: &Path) -> Code {
                 if !name.starts_with('.') && name != "__pycache__" && !is_output {
                     waiting.push_back((root, path));
                 }
-            } else if is_code(&name, &data) {
+            } else if is_code(&path) {
                 code.files.push((path.strip_prefix(root).unwrap_or(&path).to_owned(), path));
             }
         }
@@ -69,8 +69,9 @@ pub(super) fn below(roots: &[PathBuf], except: &Path) -> Code {
 }
 
 /// By its suffix, or as an executable file without one; a version is none.
-fn is_code(name: &str, data: &Metadata) -> bool {
-    let name = name.to_lowercase();
+pub(super) fn is_code(path: &Path) -> bool {
+    let Ok(data) = path.metadata() else { return false };
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     let suffix = Path::new(&name).extension().and_then(|s| s.to_str()).unwrap_or_default();
     let is_version = suffix.chars().all(|c| c.is_ascii_digit());
     let is_executable = data.permissions().mode() & 0o111 != 0;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
+use super::code;
 use crate::system::digest::hexadecimal;
 
 /// Programs that run what somebody else wrote, without the numbers of their versions.
@@ -12,6 +13,28 @@ const RUNNERS: &[&str] = &[
     "awk", "bash", "bun", "cargo", "conda", "dash", "deno", "docker", "dotnet", "env", "fish", "java", "julia", "ksh",
     "lua", "luajit", "make", "mono", "nice", "node", "npx", "octave", "perl", "php", "podman", "poetry", "pypy",
     "python", "r", "rscript", "ruby", "sh", "ssh", "stdbuf", "time", "timeout", "uv",
+];
+
+/// Words of a line that makes another file part of a program, in the languages that adapters are written in.
+const IMPORTING: &[&str] = &[
+    "import",
+    "from",
+    "require",
+    "require_relative",
+    "include",
+    "use",
+    "using",
+    "source",
+    "load",
+    "library",
+    "mod",
+    "import_module",
+    "__import__",
+    "dofile",
+    "run_path",
+    "runpy",
+    "exec",
+    "open",
 ];
 
 /// After these a word is a program itself.
@@ -58,11 +81,22 @@ pub(super) fn is_unknown(command: &[String], folder: &Path) -> bool {
     is_runner(&command[0]) && own_files(command, folder).is_empty() && inline(command).is_none()
 }
 
-/// What makes its readings, by content, whatever it is called and however it is started: one name a file, program or text.
+/// What makes its readings, by content, whatever it is called and however it is started: one name a file, program or text. What
+/// its files import from beside them counts as they do.
 pub(super) fn parts(command: &[String], folder: &Path) -> BTreeSet<String> {
-    let contents = own_files(command, folder).into_iter().filter_map(|path| std::fs::read(path).ok());
-    // Two empty files have nothing in common.
-    let mut parts: BTreeSet<String> = contents.filter(|bytes| !bytes.is_empty()).map(|bytes| hash(&bytes)).collect();
+    let mut files = own_files(command, folder);
+    let (mut parts, mut next) = (BTreeSet::new(), 0);
+    while let Some(path) = files.get(next) {
+        next += 1;
+        // Two empty files have nothing in common.
+        let Some(bytes) = std::fs::read(path).ok().filter(|bytes| !bytes.is_empty()) else { continue };
+        parts.insert(hash(&bytes));
+        for path in imports(path, &bytes) {
+            if !files.contains(&path) {
+                files.push(path);
+            }
+        }
+    }
     if !command[0].contains('/') && !is_runner(&command[0]) {
         parts.insert(command[0].clone());
     }
@@ -70,6 +104,38 @@ pub(super) fn parts(command: &[String], folder: &Path) -> BTreeSet<String> {
         parts.insert(inline(command).map_or_else(|| contents_of(command, folder), |text| hash(text.as_bytes())));
     }
     parts.into_iter().map(|part| format!("the program {part}")).collect()
+}
+
+/// Files beside a source, or in folders beside it, that a line of it imports, loads or names: of whatever language.
+fn imports(path: &Path, source: &[u8]) -> Vec<PathBuf> {
+    let (Some(folder), Ok(text)) = (path.parent(), std::str::from_utf8(source)) else { return vec![] };
+    let is_word = |c: char| c.is_alphanumeric() || "_-./".contains(c);
+    let mut found = vec![];
+    for line in text.lines() {
+        let words: Vec<&str> = line.split(|c| !is_word(c)).map(|word| word.trim_matches(['.', '/'])).collect();
+        let imports = words.iter().filter_map(|word| word.rsplit('.').next()).any(|last| IMPORTING.contains(&last));
+        for word in words.into_iter().filter(|word| !word.is_empty() && !IMPORTING.contains(word)) {
+            if word.contains('.') {
+                found.extend(Some(folder.join(word)).filter(|path| path.is_file()));
+            }
+            if imports {
+                let module = folder.join(word.replace('.', "/"));
+                found.extend(files_of(&module, |_| true));
+                let is_named = |file: &Path| file.file_stem() == module.file_name();
+                found.extend(module.parent().into_iter().flat_map(|beside| files_of(beside, is_named)));
+            }
+        }
+    }
+    found.retain(|file| file != path);
+    found
+}
+
+/// The files of code of a folder, not of those in it.
+fn files_of(folder: &Path, is_wanted: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
+    let entries = folder.read_dir().into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut files: Vec<PathBuf> = entries.filter(|path| is_wanted(path) && code::is_code(path)).collect();
+    files.sort();
+    files
 }
 
 /// Hash of a command, its files by what is in them.
@@ -157,6 +223,41 @@ mod tests {
         assert!(!of(&["./tool", "-u"]).is_disjoint(&of(&["./tool"])));
         assert!(!of(&["mycalc", "--fast"]).is_disjoint(&of(&["mycalc"])));
         assert!(of(&["sh", "-c", "cat"]).is_disjoint(&of(&["sh", "-c", "tac"])));
+    }
+
+    #[test]
+    fn programs_that_import_one_module_are_one() {
+        let kept = tempfile::tempdir().unwrap();
+        for place in ["one/lib", "two/lib"] {
+            std::fs::create_dir_all(kept.path().join(place)).unwrap();
+        }
+        let write = |name: &str, text: &str| std::fs::write(kept.path().join(name), text).unwrap();
+        let (kernel, deep) = ("def answer(job): ...", "def deep(): ...");
+        write("one/kernel.py", kernel);
+        write("two/kernel.py", kernel);
+        write("one/lib/deep.py", deep);
+        write("two/lib/deep.py", deep);
+        let of = |place: &str, source: &str| {
+            write(&format!("{place}/a.py"), &format!("# {place}\n{source}"));
+            write(&format!("{place}/between.py"), &format!("# {place}\nimport kernel"));
+            parts(&words(&["python3", "a.py"]), &kept.path().join(place))
+        };
+        for source in [
+            "import json, kernel",
+            "from kernel import answer as a",
+            "from .kernel import answer",
+            "import lib.deep",
+            "from lib import deep",
+            "import between",
+            "exec(open('kernel.py').read())",
+            "path = 'kernel.py'",
+            "importlib.import_module('kernel')",
+        ] {
+            assert!(!of("one", source).is_disjoint(&of("two", source)), "{source}");
+        }
+        for source in ["import json, sys", "kernel = 3", "# a is not the kernel of it"] {
+            assert!(of("one", source).is_disjoint(&of("two", source)), "{source}");
+        }
     }
 
     #[test]

@@ -160,6 +160,42 @@ fn the_fingerprint_changes_with_what_a_command_starts_or_loads_without_naming_it
 }
 
 #[test]
+fn the_fingerprint_changes_with_what_python_imports_from_elsewhere_and_what_nobody_finds_is_told() {
+    let kept = tempfile::tempdir().unwrap();
+    for inner in ["spec", "elsewhere/package", "other"] {
+        std::fs::create_dir_all(kept.path().join(inner)).unwrap();
+    }
+    let write = |name: &str, text: &str| std::fs::write(kept.path().join(name), text).unwrap();
+    let set = "import os, sys\nsys.path.insert(0, os.path.join(os.path.dirname(__file__), '..', 'elsewhere'))\n";
+    write("spec/adapter.py", &format!("{set}import json, package\n"));
+    write("elsewhere/package/__init__.py", "import deep");
+    write("elsewhere/package/part.py", "one");
+    write("elsewhere/deep.py", "one");
+    write("other/mine.py", "one");
+    let site = Site::at(kept.path().join("engines"));
+    let now = |command: serde_json::Value| {
+        let settings = BTreeMap::from([("command".to_owned(), command)]);
+        External::new("mine", &settings, &kept.path().join("spec")).unwrap().probe(&site).unwrap()
+    };
+    let plain = || now(json!(["python3", "-B", "adapter.py"]));
+    let mut before = plain();
+    for name in ["elsewhere/package/part.py", "elsewhere/deep.py"] {
+        write(name, "another");
+        assert_ne!(before, plain(), "{name}");
+        before = plain();
+    }
+    assert!(!before.text.contains("imports"), "{}", before.text);
+    write("spec/adapter.py", "import mine\ntry:\n    import perhaps\nexcept ImportError: pass\n");
+    assert!(plain().text.ends_with("(not all of its imports)"));
+    let place = format!("PYTHONPATH={}", kept.path().join("other").display());
+    let set = || now(json!(["env", place, "python3", "adapter.py"]));
+    let before = set();
+    assert!(before.text.starts_with("sha256:") && !before.text.contains("imports"), "{}", before.text);
+    write("other/mine.py", "another");
+    assert_ne!(before.fingerprint, set().fingerprint);
+}
+
+#[test]
 fn a_program_of_which_nothing_is_known_says_so_in_its_version() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("table.txt"), "one").unwrap();

@@ -2,7 +2,7 @@
 //!
 //! The format is described at the top of `reference/published/cachet.yaml`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use glam::DVec3;
@@ -15,6 +15,7 @@ use super::fit::{Misfit, Printed, misfits};
 use crate::judge::{Basis, Reference};
 use crate::procedures::{Target, Task};
 use crate::record::{Estimate, MeterId, ProcedureId, Quantity, Uncertainty};
+use crate::spec::Source;
 
 /// Places within so many metres, and directions within so many degrees, are the same, as the format says.
 const SAME: f64 = 1e-6;
@@ -31,6 +32,9 @@ pub struct Published {
     /// What is known of the luminaire's flux beyond our file.
     flux: Option<PublishedFlux>,
     pub(super) tables: BTreeMap<ProcedureId, Table>,
+    /// Where it stands.
+    #[serde(skip)]
+    source: Source,
 }
 
 /// The flux of a paper's luminaire, as far as its tables tell.
@@ -170,7 +174,8 @@ impl Published {
     pub fn read(path: &Path) -> Result<Self, PublishedError> {
         let fail = |message: String| PublishedError { file: path.display().to_string(), message };
         let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
-        let published: Self = crate::spec::from_yaml(&text).map_err(fail)?;
+        let mut published: Self = crate::spec::from_yaml(&text).map_err(fail)?;
+        published.source = Source::new(path.to_owned(), text);
         if published.version != 1 {
             return Err(fail(format!("format version {} is not known; this program reads 1", published.version)));
         }
@@ -180,6 +185,43 @@ impl Published {
             return Err(fail(format!("the cell \"{bad}\" is no number")));
         }
         Ok(published)
+    }
+
+    /// What of its tables stands for nothing in the tasks that are held against it, or not for what was copied: rows at no meter,
+    /// control totals that their cells do not add up to. Each with its place in the file.
+    pub fn findings(&self, tasks: &[&Task]) -> Vec<String> {
+        let mut found = vec![];
+        for (procedure, table) in &self.tables {
+            let is_its = |task: &&&Task| task.procedure == *procedure && task.quantity == table.quantity;
+            let targets: Vec<&Target> = tasks.iter().filter(is_its).flat_map(|task| &task.targets).collect();
+            if targets.is_empty() {
+                continue;
+            }
+            let told = |place: &str, what: String, help: &str| {
+                let place = format!("tables.{procedure}.{place}");
+                self.source.error_at(&place, format!("{}: {what}", table.name), help).to_string()
+            };
+            let used: BTreeSet<usize> =
+                targets.iter().filter_map(|target| table.rows.iter().position(|row| row.is_at(target))).collect();
+            for k in (0..table.rows.len()).filter(|k| !used.contains(k)) {
+                let help = "a row is held against readings at its own place, to 1e-6 m or degrees, and the first of its place alone";
+                found.push(told(&format!("rows[{k}]"), "the row belongs to no meter and is not used".to_owned(), help));
+            }
+            let (changed, (rows, columns)) = (table.changed(), table.lacking());
+            let off = |total: &str, missing: f64| {
+                let sum = total.trim().parse::<f64>().unwrap_or(f64::NAN) - missing;
+                format!("the control total {total} is of cells that add up to {}", (sum * 1e6).round() / 1e6)
+            };
+            let help = "a total or a cell was changed since they were copied";
+            for (k, missing) in rows.into_iter().filter(|(k, _)| changed.iter().all(|c| c.0 != *k)) {
+                let total = table.rows[k].total.as_deref().unwrap_or_default();
+                found.push(told(&format!("rows[{k}].total"), off(total, missing), help));
+            }
+            for (name, missing) in columns.into_iter().filter(|(name, _)| changed.iter().all(|c| c.1 != *name)) {
+                found.push(told(&format!("totals.{name}"), off(&table.totals[name], missing), help));
+            }
+        }
+        found
     }
 
     /// The references that the paper holds for a reading of `engine` at one target.
@@ -348,6 +390,9 @@ impl Table {
 /// A cell that was changed, by row and column, and what it was.
 type Changed<'t> = (usize, &'t str, f64);
 
+/// A row or a column, and what its control total says beyond the sum of its cells.
+type Lack<Of> = (Of, f64);
+
 /// What a total says beyond the sum of the cells that it is of; `None` where they agree.
 fn missing<'a>(total: Option<&String>, cells: impl Iterator<Item = &'a String>) -> Option<f64> {
     let number = |cell: &String| cell.trim().parse::<f64>().ok();
@@ -357,22 +402,29 @@ fn missing<'a>(total: Option<&String>, cells: impl Iterator<Item = &'a String>) 
 }
 
 impl Table {
-    /// The cells that are not what they were when its control totals were added up, and what they were: where a row and a column lack as
-    /// much, or all that lacks is in one of either.
-    fn changed(&self) -> Vec<Changed<'_>> {
+    /// The rows and columns whose control totals are not the sums of their cells, and what the totals say beyond.
+    fn lacking(&self) -> (Vec<Lack<usize>>, Vec<Lack<&str>>) {
         let of_row = |(k, row): (usize, &Row)| Some((k, missing(row.total.as_ref(), row.cells.values())?));
-        let rows: Vec<(usize, f64)> = self.rows.iter().enumerate().filter_map(of_row).collect();
         let of_column = |(name, total): (&'_ String, &String)| {
-            let cells = self.rows.iter().filter_map(|row| row.cells.get(name));
-            Some((name.clone(), missing(Some(total), cells)?))
+            missing(Some(total), self.rows.iter().filter_map(|row| row.cells.get(name)))
         };
-        let columns: Vec<(String, f64)> = self.totals.iter().filter_map(of_column).collect();
-        let place = |(&(row, of_row), (column, of_column)): (&(usize, f64), &(String, f64))| {
+        let columns = self.totals.iter().filter_map(|column| Some((column.0.as_str(), of_column(column)?)));
+        (self.rows.iter().enumerate().filter_map(of_row).collect(), columns.collect())
+    }
+
+    /// The cells that are not what they were when its control totals were added up, and what they were: where a row and a column lack as
+    /// much, or else all that lacks is in one of either.
+    fn changed(&self) -> Vec<Changed<'_>> {
+        let (rows, columns) = self.lacking();
+        let is_one =
+            |of_row: f64, of_column: f64| (of_row - of_column).abs() <= ROUNDING_OF_SUMS * of_row.abs().max(1.0);
+        let any_is_one = rows.iter().cartesian_product(&columns).any(|(row, column)| is_one(row.1, column.1));
+        let place = |(&(row, of_row), &(column, of_column)): (&(usize, f64), &(&str, f64))| {
             let (column, cell) = self.rows[row].cells.get_key_value(column)?;
-            let is_one = (of_row - of_column).abs() <= ROUNDING_OF_SUMS * of_row.abs().max(1.0);
             let lacks = match (rows.len(), columns.len()) {
-                (1, _) => *of_column,
-                _ if is_one || columns.len() == 1 => of_row,
+                _ if is_one(of_row, of_column) => of_row,
+                (1, _) if !any_is_one => of_column,
+                (_, 1) if !any_is_one => of_row,
                 _ => return None,
             };
             Some((row, column.as_str(), cell.trim().parse::<f64>().ok()? + lacks))
@@ -396,6 +448,8 @@ impl Row {
 
 #[cfg(test)]
 mod tests {
+    use luminaire::scene::Meter;
+
     use super::*;
 
     #[test]
@@ -405,6 +459,51 @@ mod tests {
             let published = Published::read(&folder.join(format!("{name}.yaml"))).unwrap();
             assert_eq!(published.citation.basis, basis, "{name}");
         }
+    }
+
+    #[test]
+    fn places_and_totals_that_were_edited_are_told_with_their_lines() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference/published/cachet.yaml");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let procedure = ProcedureId::DirectIlluminance;
+        let place = |(k, row): (usize, &Row)| {
+            let meter = Meter { position_m: row.at_m.unwrap().into(), normal: row.normal.unwrap().into() };
+            Target::of_one(MeterId::new("ceiling", k), meter, 1.0)
+        };
+        let rows = Published::read(&path).unwrap().tables[&procedure].rows.clone();
+        let targets = rows.iter().enumerate().map(place).collect();
+        let task = Task { procedure, targets, ..crate::judge::tests::task(1) };
+        let folder = tempfile::tempdir().unwrap();
+        let found = |old: &str, new: &str| {
+            let (file, edited) = (folder.path().join("t.yaml"), text.replacen(old, new, 1));
+            std::fs::write(&file, &edited).unwrap();
+            let line = text.find(old).map_or(0, |at| text[..at].lines().count());
+            (Published::read(&file).unwrap().findings(&[&task]), format!("t.yaml:{line}:"))
+        };
+        assert!(found("", "").0.is_empty());
+        for (old, new, says) in [
+            ("[2, 10, 17], normal", "[2, 10, 77], normal", "no meter"),
+            ("[2, 10, 17], normal: [0, 0, -1]", "[2, 10, 17], normal: [0, 0, 1]", "no meter"),
+            ("[2, 10, 17], normal", "[2, 2, 17], normal", "no meter"),
+            ("total: \"6.75\"", "total: \"9.75\"", "the control total 9.75 is of cells that add up to 6.75"),
+            ("totals: {inverse_square: \"25.40\"", "totals: {inverse_square: \"25.90\"", "add up to 25.4"),
+        ] {
+            let (told, place) = found(old, new);
+            let [one] = &told[..] else { panic!("{new}: {told:?}") };
+            assert!(one.contains(&place) && one.contains(says), "{place} {one}");
+        }
+        // A cell is named by itself, whatever other total was edited besides.
+        assert!(found("inverse_square: \"2.24\"", "inverse_square: \"2.84\"").0.is_empty());
+        let both = text.replacen("inverse_square: \"2.24\"", "inverse_square: \"2.84\"", 1).replacen(
+            "\"25.33\"",
+            "\"25.83\"",
+            1,
+        );
+        let file = folder.path().join("both.yaml");
+        std::fs::write(&file, both).unwrap();
+        let published = Published::read(&file).unwrap();
+        let changed = published.tables[&procedure].changed();
+        assert_eq!((changed.len(), published.findings(&[&task]).len()), (1, 1), "{changed:?}");
     }
 
     #[test]

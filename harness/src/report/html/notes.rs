@@ -5,12 +5,12 @@ use std::collections::BTreeSet;
 use maud::{Markup, html};
 
 use super::super::Report;
-use super::super::notes::{Kind, Note, departures, notes, splits};
+use super::super::notes::{Kind, Note, departures, notes, splits, tables};
 use super::super::words::plural;
 use super::{minus, table};
 
 pub(super) fn section(report: &Report) -> Markup {
-    let (notes, splits, departures) = (notes(report), splits(report), departures(report));
+    let (notes, splits, departures, tables) = (notes(report), splits(report), departures(report), tables(report));
     html! {
         h2 id="notes-title" { "Skipped, approximated, noted" }
         @if report.summary.skipped == 0 {
@@ -23,6 +23,10 @@ pub(super) fn section(report: &Report) -> Markup {
         @if !departures.is_empty() {
             h3 { "Who departs from the other witnesses, the reference included" }
             ul.notes { @for line in &departures { li { (minus(line)) } } }
+        }
+        @if !tables.is_empty() {
+            h3 { "What does not fit in published tables" }
+            ul.notes { @for line in &tables { li { (line) } } }
         }
         @if !splits.is_empty() {
             h3 { "Methods apart from renderers" }

@@ -1,0 +1,92 @@
+//! Rectangles that reflect and on which light is known: the walls of the room and the larger faces of boxes.
+
+use glam::{DVec2, DVec3};
+
+use crate::geometry::{Room, Surface};
+
+/// Faces of boxes smaller than this part of the room's mean wall reflect so little that rays go on from them.
+const SMALL: f64 = 0.01;
+
+/// The mean area of a room's walls.
+pub(super) fn mean_wall_m2(size_m: DVec3) -> f64 {
+    (size_m.x * size_m.y + size_m.y * size_m.z + size_m.z * size_m.x) / 3.0
+}
+
+/// An axis-aligned rectangle of uniform reflectance, seen from one side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Face {
+    axis: usize,
+    plane_m: f64,
+    /// Lower and upper corner along the two axes that follow its own.
+    pub(super) corners_m: [DVec2; 2],
+    pub(super) normal: DVec3,
+    pub(super) reflectance: f64,
+}
+
+impl Face {
+    /// The side of a box that one sees along an axis, from its far end or from its near one.
+    fn new(axis: usize, far: bool, [min_m, max_m]: [DVec3; 2], normal: DVec3, reflectance: f64) -> Self {
+        let along = |p: DVec3| DVec2::new(p[(axis + 1) % 3], p[(axis + 2) % 3]);
+        let plane_m = if far { max_m[axis] } else { min_m[axis] };
+        Self { axis, plane_m, corners_m: [along(min_m), along(max_m)], normal, reflectance }
+    }
+
+    /// The walls of a room, at twice the axis and one more at its far end.
+    pub(super) fn walls(room: &Room) -> [Self; 6] {
+        const WALLS: [Surface; 6] = [
+            Surface::WallXMin,
+            Surface::WallXMax,
+            Surface::WallYMin,
+            Surface::WallYMax,
+            Surface::Floor,
+            Surface::Ceiling,
+        ];
+        std::array::from_fn(|k| {
+            let surface = WALLS[k];
+            let reflectance = room.reflectance.of(surface);
+            Self::new(k / 2, k % 2 == 1, [DVec3::ZERO, room.size_m], surface.inward_normal(), reflectance)
+        })
+    }
+
+    /// The face of a box at an end of an axis, or `None` where it cannot be seen or is too small to matter.
+    pub(super) fn of_box(room: &Room, corners_m: [DVec3; 2], axis: usize, far: bool, reflectance: f64) -> Option<Self> {
+        let s = room.size_m;
+        let within = corners_m.map(|p| p.clamp(DVec3::ZERO, s));
+        let face = Self::new(axis, far, within, DVec3::AXES[axis] * if far { 1.0 } else { -1.0 }, reflectance);
+        let plane_m = corners_m[usize::from(far)][axis];
+        let is_seen = if far { plane_m >= 0.0 && plane_m < s[axis] } else { plane_m > 0.0 && plane_m <= s[axis] };
+        (is_seen && reflectance > 0.0 && face.area_m2() >= SMALL * mean_wall_m2(s)).then_some(face)
+    }
+
+    pub(super) fn size_m(&self) -> DVec2 {
+        self.corners_m[1] - self.corners_m[0]
+    }
+
+    pub(super) fn area_m2(&self) -> f64 {
+        self.size_m().element_product()
+    }
+
+    /// Where on its plane a point lies, in metres.
+    pub(super) fn on(&self, point_m: DVec3) -> DVec2 {
+        DVec2::new(point_m[(self.axis + 1) % 3], point_m[(self.axis + 2) % 3])
+    }
+
+    /// The point in the room of a place on its plane.
+    pub(super) fn off(&self, at_m: DVec2) -> DVec3 {
+        let mut point_m = DVec3::ZERO;
+        point_m[self.axis] = self.plane_m;
+        (point_m[(self.axis + 1) % 3], point_m[(self.axis + 2) % 3]) = (at_m.x, at_m.y);
+        point_m
+    }
+
+    /// What a box hides of it that stands on it or reaches through it, as corners on its plane.
+    pub(super) fn covered_by(&self, [min_m, max_m]: [DVec3; 2]) -> Option<[DVec2; 2]> {
+        let (low, high) = (min_m[self.axis], max_m[self.axis]);
+        let before = if self.normal[self.axis] > 0.0 {
+            low <= self.plane_m && high > self.plane_m
+        } else {
+            high >= self.plane_m && low < self.plane_m
+        };
+        before.then(|| [self.on(min_m), self.on(max_m)])
+    }
+}
