@@ -287,6 +287,7 @@ mod tests {
         let told = format!(
             "{both} decided by both, {contrary} contrary, {only_accurate} and {only_decided} by one; {cost:?} s"
         );
+        eprintln!("{told}");
         // Each is wrong now and then at the very edge; what only accurate sampling decides is there, too, where its one look may spend more.
         assert!(contrary <= 6, "{told}");
         assert!(only_accurate < both / 25 && cost[1] < 0.6 * cost[0], "{told}");

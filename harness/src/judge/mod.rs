@@ -254,8 +254,7 @@ impl Judge<'_> {
             return comparison;
         };
         comparison.relative_deviation = Some((value - reference.value) / reference.value).filter(|d| d.is_finite());
-        let sound = value >= 0.0 && reference.value >= 0.0;
-        let deviation = if sound { value - reference.value } else { f64::NAN };
+        let deviation = if reference.value >= 0.0 { value - reference.value } else { f64::NAN };
         let allowed = tolerance.around(reference.value);
         comparison.verdict = judge(deviation, budget.expanded, allowed);
         let p_value = budget.p_value(deviation, allowed);
