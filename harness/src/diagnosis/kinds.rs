@@ -95,7 +95,8 @@ fn of_surfaces(tasks: &[Task]) -> Vec<Fault> {
         all.push(fault.about(name(surface)).with([Parameter::new("", right, 0.02, (0.0, MOST))]));
     }
     let most = Surface::ALL.map(|s| room.reflectance.of(s)).into_iter().fold(0.01, f64::max);
-    let here = Fault::new("reflectances", "every surface reflects {0} times what it should, in this case alone", scaled);
+    let here =
+        Fault::new("reflectances", "every surface reflects {0} times what it should, in this case alone", scaled);
     all.push(here.with([Parameter::new("", 1.0, 0.02, (0.0, MOST / most))]));
     all
 }

@@ -423,7 +423,10 @@ pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Resu
             let what = format!("read {value} lx ({uncertainty:?}) at {meter}");
             return Err(EngineError::Output { engine, what });
         }
-        if [value.abs(), uncertainty.standard_error().unwrap_or(0.0), uncertainty.bound()].iter().any(|v| *v > BRIGHTEST_LX) {
+        if [value.abs(), uncertainty.standard_error().unwrap_or(0.0), uncertainty.bound()]
+            .iter()
+            .any(|v| *v > BRIGHTEST_LX)
+        {
             let what =
                 format!("read {value:e} lx ({uncertainty:?}) at {meter}: beyond {BRIGHTEST_LX:e} lx nothing is light");
             return Err(EngineError::Output { engine, what });
@@ -453,7 +456,8 @@ mod tests {
         for judged in [[1.0, 0.0], [1.0, -1.0]] {
             assert!(checked(&ENGINE, &job(2), measurement(&judged)).is_ok());
         }
-        for bad in [&[1.0][..], &[1.0, 1e308], &[1.0, -1e308], &[1.0, f64::NAN], &[1.0, f64::INFINITY], &[1.0, 1.0, 1.0]]
+        for bad in
+            [&[1.0][..], &[1.0, 1e308], &[1.0, -1e308], &[1.0, f64::NAN], &[1.0, f64::INFINITY], &[1.0, 1.0, 1.0]]
         {
             assert!(checked(&ENGINE, &job(2), measurement(bad)).is_err(), "{bad:?}");
         }

@@ -40,6 +40,27 @@ fn a_lambertian_rectangle_follows_lamberts_polygon_formula() {
 }
 
 #[test]
+fn light_of_others_passes_through_an_opening() {
+    let openings = [
+        LuminousOpening::Box { x_m: 1.0, y_m: 0.5, height_m: 0.0 },
+        LuminousOpening::Box { x_m: 0.5, y_m: 0.5, height_m: 0.2 },
+        LuminousOpening::Ellipse { x_m: 0.5, y_m: 0.5, height_m: 0.1 },
+        LuminousOpening::Ellipsoid { x_m: 0.4, y_m: 0.4, z_m: 0.4 },
+    ];
+    for opening in openings {
+        let below = panel(DVec3::ZERO, opening);
+        let mut job = free_field(below.clone(), &[[0.1, 0.0, -2.0]], DVec3::Z);
+        let alone = read(&job);
+        job.scene.luminaires = vec![luminaire("above", DVec3::new(-0.1, 0.0, 2.0), lambertian())];
+        let above = read(&job);
+        job.scene.luminaires.push(below);
+        let sum = [alone.estimates[0].value + above.estimates[0].value];
+        assert!(above.estimates[0].value > 0.1 * sum[0]);
+        assert!(worst(&relative_deviations(&read(&job), &sum)) < 5e-3, "{opening:?}");
+    }
+}
+
+#[test]
 fn a_lambertian_disc_and_a_sphere_follow_their_closed_forms() {
     let disc = LuminousOpening::Ellipse { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
     let job = free_field(panel(DVec3::ZERO, disc), &[[0.0, 0.0, -1.0], [0.0, 0.0, -3.0]], DVec3::Z);
