@@ -10,7 +10,7 @@ use crate::engines::Measurement;
 use crate::judge::{Comparison, Judge, LOOKS, Source, Verdict};
 use crate::measure::Cost;
 use crate::procedures::Task;
-use crate::record::{Estimate, Reading, Recording, Uncertainty};
+use crate::record::{Estimate, Reading, Recording, Spending, Uncertainty};
 use crate::report::words::rounded;
 use crate::spec::Budget;
 
@@ -69,6 +69,8 @@ pub fn refine(
         return;
     }
     subject.looks = vec![1; subject.readings.len()];
+    let is_coarse = first.relative_error > budget.relative_error;
+    subject.spending = if is_coarse { Spending::InTheEnd } else { Spending::AtOnce };
     let (first_s, mut total_weight) = (subject.work_s().max(SHORTEST_S), 1.0);
     let falls = subject.stated_errors.iter().filter_map(|s| s.falls_with_effort).reduce(f64::min);
     let is_deaf = falls.is_some_and(|falls| falls < DEAF);
@@ -220,17 +222,17 @@ mod tests {
     }
 
     /// One run: what becomes of meters that are truly so far from a reference of 1, with a tolerance of 2 %, of an engine that
-    /// comes to a relative error of .004 in one second.
+    /// comes to a relative error of `noise` in one second.
     fn run_within(
         deviations: &[f64],
         (first, whole): (Budget, Budget),
-        blocks: usize,
+        (noise, blocks): (f64, usize),
         seed: u64,
     ) -> (Vec<Verdict>, Vec<Ask>, Recording) {
-        let effort = |relative_error: f64| (0.004 / relative_error).powi(2);
+        let effort = |relative_error: f64| (noise / relative_error).powi(2);
         let truth = deviations.iter().map(|d| 1.0 + d).collect();
         let random = fastrand::Rng::with_seed(seed);
-        let mut engine = Synthetic { truth, noise: 0.004, blocks, random };
+        let mut engine = Synthetic { truth, noise, blocks, random };
         let targets: Vec<usize> = (0..deviations.len()).collect();
         let first_s = effort(first.relative_error);
         let mut subject = recording("radiance", &engine.measurement(&targets, first_s).estimates);
@@ -256,18 +258,18 @@ mod tests {
 
     fn run(deviations: &[f64], seconds: f64, blocks: usize, seed: u64) -> (Vec<Verdict>, Vec<Ask>, Recording) {
         let budget = |seconds| Budget { relative_error: 0.004, seconds };
-        run_within(deviations, (budget(1.0), budget(seconds)), blocks, seed)
+        run_within(deviations, (budget(1.0), budget(seconds)), (0.004, blocks), seed)
     }
 
     #[test]
     fn sampling_until_decided_decides_as_accurate_sampling_does_in_a_thousand_pairs() {
-        let whole = Budget { relative_error: 0.0005, seconds: 100.0 };
+        let whole = Budget { relative_error: 0.0005, seconds: 600.0 };
         let decided = first_look(whole, 0.02);
         let (mut both, mut contrary, mut only_accurate, mut only_decided, mut cost) = (0, 0, 0, 0, [0.0; 2]);
         for seed in 0..1000 {
             let mut random = fastrand::Rng::with_seed(seed);
             let deviations: Vec<f64> = (0..6).map(|_| 0.015 * normal(&mut random)).collect();
-            let pair = [whole, decided].map(|first| run_within(&deviations, (first, whole), 16, 7000 + seed));
+            let pair = [whole, decided].map(|first| run_within(&deviations, (first, whole), (0.01, 16), 7000 + seed));
             for (total, one) in cost.iter_mut().zip(&pair) {
                 *total += one.2.work_s();
             }
@@ -287,10 +289,9 @@ mod tests {
         let told = format!(
             "{both} decided by both, {contrary} contrary, {only_accurate} and {only_decided} by one; {cost:?} s"
         );
-        eprintln!("{told}");
-        // Each is wrong now and then at the very edge; what only accurate sampling decides is there, too, where its one look may spend more.
-        assert!(contrary <= 6, "{told}");
-        assert!(only_accurate < both / 25 && cost[1] < 0.6 * cost[0], "{told}");
+        // Each leaves open now and then what lies at the very edge, and neither more often than the other.
+        assert!(contrary <= 6 && cost[1] < cost[0], "{told}");
+        assert!(only_accurate + only_decided < both / 25 && only_accurate <= only_decided + both / 100, "{told}");
     }
 
     #[test]

@@ -369,7 +369,7 @@ impl ScoredReference {
 /// The share of its error that a decision about a reading may spend: all of it where only one look was planned.
 fn share_of_reading(recording: &Recording, k: usize) -> f64 {
     let is_sampled = recording.readings.get(k).is_some_and(|r| r.uncertainty.is_sampled());
-    recording.looks.get(k).filter(|_| is_sampled).map_or(1.0, |look| share_of_error(*look))
+    recording.looks.get(k).filter(|_| is_sampled).map_or(1.0, |look| share_of_error(recording.spending, *look))
 }
 
 /// What is uncertain of a reading.
