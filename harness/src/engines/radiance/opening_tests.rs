@@ -40,6 +40,27 @@ fn a_lambertian_rectangle_follows_lamberts_polygon_formula() {
 }
 
 #[test]
+fn light_that_grazes_an_opening_is_read_and_what_rtrace_leaves_out_is_told() {
+    let even = LuminousIntensityDistribution::axial(vec![0.0, 90.0, 180.0], vec![500.0, 100.0, 100.0]).unwrap();
+    let opening = LuminousOpening::Box { x_m: 0.3, y_m: 1.2, height_m: 0.0 };
+    let lamp = with_opening(luminaire("panel", DVec3::ZERO, even), opening);
+    for below_m in [0.3, 0.02, 2e-3, 1e-3, 1e-4] {
+        let job = free_field(lamp.clone(), &[[-2.0, 1.6, -below_m]], DVec3::X);
+        let right = simulator::illuminance(
+            &job.scene,
+            &[job.stations[0].meter.clone()],
+            Transport::Direct,
+            &Accuracy { relative_error: 1e-4, seed: 1 },
+        );
+        let right = right.unwrap().estimates[0].illuminance.value();
+        let Estimate { value, uncertainty } = read(&job).estimates[0];
+        let error = 4.0 * uncertainty.standard_error().unwrap() + uncertainty.bound();
+        assert!((value - right).abs() < error, "{below_m} m: {value} +- {uncertainty:?}, {right}");
+        assert!(error < 0.02 * right || below_m < 1e-3, "{below_m} m: {uncertainty:?} of {right}");
+    }
+}
+
+#[test]
 fn light_of_others_passes_through_an_opening() {
     let openings = [
         LuminousOpening::Box { x_m: 1.0, y_m: 0.5, height_m: 0.0 },
