@@ -171,7 +171,11 @@ impl Search<'_> {
         found.retain(accounts);
         for &sheet in open.iter() {
             let explain = found.iter().filter(|held| held.explained.contains(&sheet));
-            causes[sheet] = rivals(explain.sorted_by(|a, b| a.cause.score.total_cmp(&b.cause.score)).collect());
+            let explain = explain.sorted_by(|a, b| a.cause.score.total_cmp(&b.cause.score)).collect_vec();
+            let is_better = |held: &Held| explain.first().is_some_and(|e| held.cause.score + RIVAL < e.cause.score);
+            if !found.iter().any(|held| held.borne.contains(&sheet) && is_better(held)) {
+                causes[sheet] = rivals(explain);
+            }
         }
         let is_settled = |sheet: &usize| found.iter().any(|h| h.explained.contains(sheet) || h.borne.contains(sheet));
         open.retain(|sheet| !is_settled(sheet));
@@ -208,6 +212,9 @@ impl Search<'_> {
             };
             let mut held = self.weighed(&fault, &predict)?;
             let (factor, error) = *held.cause.parameters.last()?;
+            if !held.explained.iter().any(|k| self.sheets[*k].would_fail(factor)) {
+                return None;
+            }
             let named = self.named_factor(factor, error);
             let other = named.unwrap_or_else(|| format!("factor {factor:.4}, none of those known"));
             held.cause = held.cause.renamed("two", format!("two faults: {}, and {other}", fault.what));
