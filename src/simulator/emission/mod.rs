@@ -42,6 +42,8 @@ static RULE: LazyLock<Gauss> = LazyLock::new(|| Gauss::new(5));
 #[derive(Clone, Debug)]
 pub(super) struct Emitter {
     luminaire: Luminaire,
+    /// The largest intensity of all.
+    peak_cd: f64,
     opening: Opening,
     lambertian: Option<Lambertian>,
 }
@@ -82,7 +84,8 @@ impl Emitter {
         let horizontal = matches!(opening, Opening::Box(half) if half.z == 0.0);
         let flat_m2 = opening.flat_m2().filter(|_| horizontal);
         let lambertian = flat_m2.and_then(|area_m2| lambertian(luminaire, area_m2));
-        Self { luminaire: luminaire.clone(), opening, lambertian }
+        let peak_cd = luminaire.photometry.distribution.max_intensity().value() * luminaire.flux_scale;
+        Self { luminaire: luminaire.clone(), peak_cd, opening, lambertian }
     }
 
     /// Whether it has no extent.
@@ -110,7 +113,7 @@ impl Emitter {
 
     /// Whether it sends light anywhere.
     pub(super) fn shines(&self) -> bool {
-        self.luminaire.flux_scale > 0.0 && self.luminaire.photometry.distribution.max_intensity().value() > 0.0
+        self.peak_cd > 0.0
     }
 
     /// Illuminance in lux at an element, integrated until two refinements agree as precisely as asked.
@@ -154,9 +157,8 @@ impl Emitter {
 
     /// Light too dim to be told from none, in lux.
     fn untold_lux(&self, own: &Own) -> f64 {
-        let peak = self.luminaire.photometry.distribution.max_intensity().value() * self.luminaire.flux_scale;
         let nearest_m = own.position_m.abs() - self.opening.half_m();
-        UNTOLD * peak / nearest_m.max(DVec3::ZERO).length_squared().max(self.opening.half_m().length_squared())
+        UNTOLD * self.peak_cd / nearest_m.max(DVec3::ZERO).length_squared().max(self.opening.half_m().length_squared())
     }
 
     /// The brightest that is found along an edge: of what reaches above the meter's horizon there, the highest is met closely.
