@@ -42,9 +42,20 @@ pub fn certified(
     transport: Transport,
     accuracy: &Accuracy,
 ) -> Result<Solution, SimulatorError> {
+    certified_until(scene, meters, transport, accuracy, &Stop::NEVER)
+}
+
+/// As [`certified`], until it is stopped: what is known by then comes with its larger standard error.
+pub fn certified_until(
+    scene: &Scene,
+    meters: &[Meter],
+    transport: Transport,
+    accuracy: &Accuracy,
+    stop: &Stop,
+) -> Result<Solution, SimulatorError> {
     validate::scene(scene)?;
     validate::meters(scene, meters)?;
-    path_tracing::illuminance(scene, meters, transport, accuracy)
+    path_tracing::illuminance(scene, meters, transport, accuracy, stop)
 }
 
 /// A value and how far off it may be.

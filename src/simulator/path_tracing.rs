@@ -15,6 +15,7 @@ use self::emitter::Emitter;
 use self::path::{ENDLESS, Integrand, Wanted};
 use self::world::World;
 use super::sampler::{Sampler, mix};
+use super::stop::Stop;
 use super::{Accuracy, Estimate, SimulatorError, Solution, Uncertainty};
 use crate::geometry::{Room, Surface};
 use crate::scene::{Bounces, Meter, Scene, Transport};
@@ -47,8 +48,9 @@ pub(crate) fn illuminance(
     meters: &[Meter],
     transport: Transport,
     accuracy: &Accuracy,
+    stop: &Stop,
 ) -> Result<Solution, SimulatorError> {
-    PathTracer::new(scene)?.solve(meters, transport, accuracy, FIRST_LOG2..=LAST_LOG2)
+    PathTracer::new(scene)?.solve(meters, transport, accuracy, FIRST_LOG2..=LAST_LOG2, stop)
 }
 
 /// A scene made ready for path tracing.
@@ -92,6 +94,7 @@ impl<'a> PathTracer<'a> {
         transport: Transport,
         accuracy: &Accuracy,
         points_log2: std::ops::RangeInclusive<u32>,
+        stop: &Stop,
     ) -> Result<Solution, SimulatorError> {
         let wanted = self.wanted(transport)?;
         let meters = (0..).zip(meters).map(|(k, m)| self.check(k, m)).collect::<Result<Vec<_>, _>>()?;
@@ -105,7 +108,10 @@ impl<'a> PathTracer<'a> {
                 .filter(|&m| log2 == *points_log2.start() || !sums[m].narrow_enough(accuracy.relative_error))
                 .collect();
             let from = if log2 == *points_log2.start() { 0 } else { 1 << (log2 - 1) };
-            let blocks = block_sums(&integrand, &meters, &open, accuracy.seed, from..1 << log2);
+            let blocks = block_sums(&integrand, &meters, &open, accuracy.seed, from..1 << log2, stop);
+            if stop.is_due() {
+                break;
+            }
             for (&m, blocks) in open.iter().zip(&blocks) {
                 sums[m].half_way = (from > 0).then(|| sums[m].mean_and_error().1);
                 sums[m].points_log2 = log2;
@@ -117,6 +123,9 @@ impl<'a> PathTracer<'a> {
                     return Err(unsupported(&what, "lower the reflectances, or move the meter off the luminaire"));
                 }
             }
+        }
+        if sums.iter().any(|s| s.points_log2 == 0) {
+            return Err(SimulatorError::Stopped);
         }
         let most = sums.iter().map(|s| s.points_log2).max().unwrap_or(0);
         Ok(Solution {
@@ -202,6 +211,7 @@ fn block_sums(
     open: &[usize],
     seed: u64,
     points: std::ops::Range<u32>,
+    stop: &Stop,
 ) -> Vec<Vec<Vec<f64>>> {
     let block = 1 << BLOCK_LOG2;
     let starts: Vec<u32> = points.clone().step_by(block as usize).collect();
@@ -212,6 +222,10 @@ fn block_sums(
             let scramble = mix(mix(seed).wrapping_add(((meter as u64) << 8) | u64::from(replicate)));
             let meter = &meters[meter];
             let sum = |start: &u32| {
+                // What is stopped halfway is thrown away.
+                if stop.is_due() {
+                    return 0.0;
+                }
                 let end = (start + block).min(points.end);
                 (*start..end).map(|index| integrand.path(meter, &mut Sampler::new(scramble, index))).sum()
             };

@@ -71,7 +71,7 @@ impl Prepared {
         let (direct, text) = match self.transport {
             Transport::Indirect(_) => (vec![Bounded::default(); meters.len()], None),
             Transport::Direct | Transport::Total(_) => {
-                let (values, text) = self.direct(meters, stop);
+                let (values, text) = self.direct(meters, stop)?;
                 (values, Some(text))
             }
         };
@@ -83,18 +83,18 @@ impl Prepared {
         Ok(bounded(&sum, &text.map_or(how.clone(), |text| format!("{text}; {how}"))))
     }
 
-    fn direct(&self, meters: &[Meter], stop: &Stop) -> (Vec<Bounded>, &'static str) {
-        match &self.solver {
+    fn direct(&self, meters: &[Meter], stop: &Stop) -> Result<(Vec<Bounded>, &'static str), SimulatorError> {
+        Ok(match &self.solver {
             Solver::Enclosed(enclosure, _) => {
                 let Accuracy { relative_error, seed } = self.accuracy;
                 let text = "luminaires integrated over what shows of them";
-                (enclosure.direct(meters, relative_error, seed, stop), text)
+                (enclosure.direct(meters, relative_error, seed, stop)?, text)
             }
             Solver::Empty(_) => {
                 let values = meters.iter().map(|m| direct::illuminance(&self.scene, m)).collect();
                 (values, "inverse square: point luminaires, nothing in between")
             }
-        }
+        })
     }
 
     fn indirect(
@@ -110,11 +110,11 @@ impl Prepared {
                 Ok((vec![Bounded::default(); meters.len()], "free field: nothing reflects".into()))
             }
             (Solver::Empty(empty), Some(room)) => {
-                Ok(empty.indirect(&room, &self.scene.luminaires, bounces, meters, relative_error))
+                empty.indirect(&room, &self.scene.luminaires, bounces, meters, relative_error, stop)
             }
             (Solver::Enclosed(_, Some(once)), _) if bounces == Bounces::AtMost(1) => {
                 let text = "light reflected once, integrated over what is both lit and seen";
-                Ok((once.illuminance(meters, relative_error), text.into()))
+                Ok((once.illuminance(meters, relative_error, stop)?, text.into()))
             }
             (Solver::Enclosed(enclosure, _), _) => enclosure.indirect(meters, bounces, direct, &self.accuracy, stop),
         }

@@ -1,5 +1,7 @@
 //! Sampling until comparisons are decided: which budget first looks get, and further looks through the run's reader.
 
+use std::collections::BTreeSet;
+
 use super::jobs::{self, Found, Outcome, Running};
 use super::sequential::{self, Ask};
 use crate::engines::{Job, Station};
@@ -8,6 +10,7 @@ use crate::measure::{Question, Source, Taken};
 use crate::plan::{Plan, Run};
 use crate::procedures::Task;
 use crate::record::{EngineName, Recording, StatedErrors};
+use crate::spec::Budget;
 use crate::system::files::FileError;
 
 /// Gives the jobs of a plan the budget of their first look.
@@ -43,8 +46,77 @@ pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
     }
 }
 
+/// How much finer a sampled reference is asked again where its own error leaves a comparison undecided: to a tenth of the tolerance, after
+/// the quarter of its first look, so that it adds half a percent to a combined uncertainty (JCGM 100:2008, 5.1.2).
+const FINER: f64 = 0.4;
+
 /// Takes further looks wherever a comparison is undecided; the observer hears of each.
+///
+/// References come first, since no sample of a subject makes up for what its reference does not know, and last, where
+/// what subjects were sampled to lies closer to the tolerance than their first looks did.
 pub(super) fn sample_on(
+    running: &Running<'_>,
+    judge: &Judge<'_>,
+    stated: &Found,
+    outcome: &mut Outcome,
+) -> Result<(), FileError> {
+    let mut refined = BTreeSet::new();
+    refine_references(running, judge, outcome, &mut refined)?;
+    sample_subjects(running, judge, stated, outcome)?;
+    refine_references(running, judge, outcome, &mut refined)
+}
+
+/// Asks sampled references more finely, once at each target that they leave undecided.
+fn refine_references(
+    running: &Running<'_>,
+    judge: &Judge<'_>,
+    outcome: &mut Outcome,
+    refined: &mut BTreeSet<(usize, usize)>,
+) -> Result<(), FileError> {
+    for (index, run) in running.plan.runs.iter().enumerate() {
+        let (planned, task) = (&running.plan.engines[run.engine], &running.plan.tasks[run.task]);
+        let engine = planned.engine.name();
+        if !planned.engine.is_witness() || !planned.engine.samples(&run.job) {
+            continue;
+        }
+        let of_task: Vec<&Recording> =
+            outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure).collect();
+        let mut targets = sequential::undecided_by_reference(judge, task, &of_task);
+        targets.retain(|k| refined.insert((index, *k)));
+        let mine = outcome.recordings.iter().position(|r| r.key.engine == engine && r.key.procedure == task.procedure);
+        let Some(mine) = mine.filter(|_| !targets.is_empty()) else { continue };
+        let relative_error = FINER * run.job.budget.relative_error;
+        let ask = Ask { look: 2, targets, budget: Budget { relative_error, ..run.job.budget } };
+        let recording = &mut outcome.recordings[mine];
+        match look(running, run, &ask) {
+            Ok(taken) => {
+                outcome.from_cache += usize::from(taken.source == Source::Cache);
+                recording.wall_s += taken.cost.wall_s;
+                let estimates = taken.measurement.readings(ask.targets.iter().map(|k| &task.targets[*k]));
+                for (k, estimate) in ask.targets.iter().zip(estimates) {
+                    let reading = &mut recording.readings[*k];
+                    if estimate.uncertainty.standard() < reading.uncertainty.standard() {
+                        (reading.value, reading.uncertainty) = (estimate.value, estimate.uncertainty);
+                    }
+                }
+                let count = ask.targets.len();
+                recording
+                    .notes
+                    .push(format!("read more finely at {count} meters, whose comparisons it left undecided"));
+                if let Some(status) = outcome.engines.iter_mut().find(|e| e.id == engine) {
+                    status.wall_s += taken.cost.wall_s;
+                }
+            }
+            Err(why) => {
+                recording.notes.push(format!("reading {} meters more finely gave nothing: {why}", ask.targets.len()));
+            }
+        }
+        jobs::keep(running.folder, &engine, &outcome.recordings)?;
+    }
+    Ok(())
+}
+
+fn sample_subjects(
     running: &Running<'_>,
     judge: &Judge<'_>,
     stated: &Found,

@@ -7,7 +7,7 @@
 //! ([`crate::judge::share_of_error`]).
 
 use crate::engines::Measurement;
-use crate::judge::{Comparison, Judge, LOOKS, Source, Verdict};
+use crate::judge::{Basis, Comparison, Judge, LOOKS, Source, Verdict};
 use crate::measure::Cost;
 use crate::procedures::Task;
 use crate::record::{Estimate, Reading, Recording, Spending, Uncertainty};
@@ -136,6 +136,23 @@ fn undecided(judge: &Judge<'_>, task: &Task, witnesses: &[&Recording], subject: 
     let is_open = |c: &&Comparison| c.key.engine == subject.key.engine && effort(c).is_some_and(f64::is_finite);
     let open: Vec<&Comparison> = compared.iter().filter(is_open).collect();
     (0..task.targets.len()).filter(|k| open.iter().any(|c| c.meter == task.targets[*k].id)).collect()
+}
+
+/// The targets at which a comparison is undecided and its reference's own error takes more than half of the way from the
+/// deviation to the tolerance.
+pub fn undecided_by_reference(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<usize> {
+    let recordings: Vec<&Recording> = recordings.to_vec();
+    let is_blurred = |c: &Comparison| -> Option<bool> {
+        let (reference, budget) = (c.reference.as_ref()?, c.budget.as_ref()?);
+        let of_reference = budget.components.iter().filter(|part| part.source == Source::Reference);
+        let square: f64 = of_reference.map(|part| part.uncertainty.powi(2)).sum();
+        let way = (c.tolerance.around(reference.value) - c.deviation?.abs()).abs();
+        Some(reference.basis == Basis::Exact && budget.coverage_factor * square.sqrt() > 0.5 * way)
+    };
+    let compared = judge.compare(task, &recordings);
+    let blurred: Vec<&Comparison> =
+        compared.iter().filter(|c| c.verdict == Verdict::Inconclusive && is_blurred(c).unwrap_or(false)).collect();
+    (0..task.targets.len()).filter(|k| blurred.iter().any(|c| c.meter == task.targets[*k].id)).collect()
 }
 
 /// How many times the samples an undecided comparison needs, at its present deviation; infinite where no number would do, and

@@ -15,6 +15,7 @@ use super::kernel::Receiver;
 use super::{EFFORTS, Effort};
 use crate::geometry::Room;
 use crate::scene::Luminaire;
+use crate::simulator::stop::Stop;
 
 /// Relative flux that may be in the wrong place at any effort: where steps of tables cross elements, no order helps.
 pub(super) const MISPLACED: f64 = 4e-4;
@@ -39,12 +40,15 @@ impl ProjectedSources {
     }
 
     /// Irradiance at receivers, in lux, of light reflected once.
-    pub(super) fn irradiance(&self, receivers: &[Receiver]) -> Vec<f64> {
+    pub(super) fn irradiance(&self, receivers: &[Receiver], stop: &Stop) -> Vec<f64> {
         let read = || self.read.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, lux)) = read().iter().find(|(of, _)| of == receivers) {
             return lux.clone();
         }
-        let lux = self.sum(&FOR_METERS, |some| some.irradiance(receivers));
+        let lux = self.sum(&FOR_METERS, stop, |some| some.irradiance(receivers, stop));
+        if stop.is_due() {
+            return vec![0.0; receivers.len()];
+        }
         let mut read = read();
         read.truncate(KEPT - 1);
         read.insert(0, (receivers.to_vec(), lux.clone()));
@@ -52,18 +56,19 @@ impl ProjectedSources {
     }
 
     /// Direct irradiance in lux for the nodes to stand for: its moments with their polynomials are those of the light.
-    pub(super) fn projected(&self, grid: &Grid, effort: &Effort) -> Vec<f64> {
-        let mut lux = self.sum(effort, |some| some.at_nodes(grid));
+    pub(super) fn projected(&self, grid: &Grid, effort: &Effort, stop: &Stop) -> Vec<f64> {
+        let mut lux = self.sum(effort, stop, |some| some.at_nodes(grid));
+        lux.resize(grid.len(), 0.0);
         for (node, value) in lux.iter_mut().enumerate() {
             *value /= grid.node(node).1;
         }
         lux
     }
 
-    /// Sums in the same order on any number of threads.
-    fn sum(&self, effort: &Effort, of: impl Fn(&FirstBounce) -> Vec<f64> + Sync) -> Vec<f64> {
-        let some = |some: &[Luminaire]| of(&FirstBounce::new(&self.room, some, effort));
-        let parts: Vec<_> = self.luminaires.par_chunks(TOGETHER).map(some).collect();
+    /// Sums in the same order on any number of threads; of those alone that were done before it was stopped.
+    fn sum(&self, effort: &Effort, stop: &Stop, of: impl Fn(&FirstBounce) -> Vec<f64> + Sync) -> Vec<f64> {
+        let some = |some: &[Luminaire]| (!stop.is_due()).then(|| of(&FirstBounce::new(&self.room, some, effort)));
+        let parts: Vec<_> = self.luminaires.par_chunks(TOGETHER).filter_map(some).collect();
         let add = |mut sum: Vec<f64>, part: Vec<f64>| {
             sum.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
             sum

@@ -12,6 +12,7 @@ use super::BoxField;
 use crate::geometry::Room;
 use crate::scene::Meter;
 use crate::simulator::Bounded;
+use crate::simulator::stop::Stop;
 
 /// A difference of two efforts, times this and the rate, bounds the error of the finer one.
 const SAFETY: f64 = 5.0;
@@ -42,9 +43,10 @@ pub(super) struct Reading {
 }
 
 impl Reading {
-    pub(super) fn of(field: &BoxField, meters: &[Meter]) -> Self {
-        let probes = if meters.len() < ENOUGH { field.probes().to_vec() } else { vec![] };
-        Self { lux: field.illuminance(meters), probes, imbalance: field.imbalance }
+    /// `None` where it was stopped.
+    pub(super) fn of(field: &BoxField, meters: &[Meter], stop: &Stop) -> Option<Self> {
+        let probes = if meters.len() < ENOUGH { field.probes(stop)?.to_vec() } else { vec![] };
+        Some(Self { lux: field.illuminance(meters, stop)?, probes, imbalance: field.imbalance })
     }
 
     /// The largest relative difference from another effort, over all meters, and over the probes where meters are few.

@@ -20,6 +20,7 @@ use super::patch::{Ground, Patch, Points, Rules};
 use super::symmetry::reflectance;
 use crate::geometry::Room;
 use crate::scene::Luminaire;
+use crate::simulator::stop::Stop;
 
 /// Cells are not halved below this fraction of the room.
 const SMALLEST: f64 = 1e-12;
@@ -66,18 +67,19 @@ impl FirstBounce {
     }
 
     /// Irradiance at receivers, in lux, of light reflected once.
-    pub(super) fn irradiance(&self, receivers: &[Receiver]) -> Vec<f64> {
+    pub(super) fn irradiance(&self, receivers: &[Receiver], stop: &Stop) -> Vec<f64> {
         if receivers.len() <= TOGETHER {
-            return self.irradiance_together(receivers);
+            return self.irradiance_together(receivers, stop);
         }
-        receivers.par_chunks(TOGETHER).flat_map_iter(|together| self.irradiance_together(together)).collect()
+        receivers.par_chunks(TOGETHER).flat_map_iter(|together| self.irradiance_together(together, stop)).collect()
     }
 
-    fn irradiance_together(&self, receivers: &[Receiver]) -> Vec<f64> {
+    /// Of what was done before it was stopped.
+    fn irradiance_together(&self, receivers: &[Receiver], stop: &Stop) -> Vec<f64> {
         let mut sums = vec![0.0; receivers.len()];
         for face in Face::ALL {
             let rho = reflectance(&self.room, face);
-            if rho == 0.0 {
+            if rho == 0.0 || stop.is_due() {
                 continue;
             }
             let mut on_face = vec![0.0; receivers.len()];
@@ -90,7 +92,7 @@ impl FirstBounce {
                     Visible::Nothing => {}
                 }
             }
-            for source in &self.sources {
+            for source in self.sources.iter().take_while(|_| !stop.is_due()) {
                 let ground = self.ground(source, face);
                 for patch in &source.faces[face.0] {
                     self.walk(patch, ground, receivers, &mut in_view, &mut on_face);

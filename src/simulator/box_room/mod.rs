@@ -21,7 +21,8 @@ use rayon::prelude::*;
 
 use crate::geometry::Room;
 use crate::scene::{Bounces, Luminaire, Meter};
-use crate::simulator::{Bounded, gmres};
+use crate::simulator::stop::Stop;
+use crate::simulator::{Bounded, SimulatorError, gmres};
 use crowd::ProjectedSources;
 use error::Reading;
 use first_bounce::FirstBounce;
@@ -143,15 +144,16 @@ impl EmptyRoom {
         bounces: Bounces,
         meters: &[Meter],
         relative_error: f64,
-    ) -> (Vec<Bounded>, String) {
+        stop: &Stop,
+    ) -> Result<(Vec<Bounded>, String), SimulatorError> {
         // Entering the pool of threads once: each small job that is sent there on its own costs as much as it does. Where
         // a few meters read what is solved, even that costs as much as they do.
         let level = first_level(relative_error);
         let is_solved = [level, level + 1].iter().all(|level| self.fields.iter().any(|(at, _)| at == level));
         if is_solved && meters.len() < FEW {
-            self.climb(room, luminaires, bounces, meters, relative_error)
+            self.climb(room, luminaires, bounces, meters, relative_error, stop)
         } else {
-            rayon::scope(|_| self.climb(room, luminaires, bounces, meters, relative_error))
+            rayon::scope(|_| self.climb(room, luminaires, bounces, meters, relative_error, stop))
         }
     }
 
@@ -162,7 +164,8 @@ impl EmptyRoom {
         bounces: Bounces,
         meters: &[Meter],
         relative_error: f64,
-    ) -> (Vec<Bounded>, String) {
+        stop: &Stop,
+    ) -> Result<(Vec<Bounded>, String), SimulatorError> {
         let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires));
         let few = FEW_LUMINAIRES[usize::from(relative_error >= PROJECTION_REACHES)];
         if luminaires.len() > few && self.crowd.is_none() {
@@ -176,16 +179,23 @@ impl EmptyRoom {
                     Some(crowd) => First::Many(Arc::clone(crowd)),
                     None => First::Few(FirstBounce::new(room, luminaires, &EFFORTS[level])),
                 };
-                let field = BoxField::solve(room, first, symmetries, bounces, &EFFORTS[level]);
-                self.fields.push((level, field));
+                let field = BoxField::solve(room, first, symmetries, bounces, &EFFORTS[level], stop);
+                self.fields.extend(field.map(|field| (level, field)));
             }
             let field = self.fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field);
-            readings.extend(field.map(|field| Reading::of(field, meters)));
-            level += 1;
-            let Some(values) = error::bounded(&readings, room, meters) else { continue };
+            let reading = field.and_then(|field| Reading::of(field, meters, stop));
+            let is_stopped = reading.is_none();
+            readings.extend(reading);
+            level += usize::from(!is_stopped);
+            let values = match error::bounded(&readings, room, meters) {
+                Some(values) => values,
+                None if is_stopped => return Err(SimulatorError::Stopped),
+                None => continue,
+            };
             let worst =
                 values.iter().map(|v| if v.bound == 0.0 { 0.0 } else { v.bound / v.value.abs() }).fold(0.0, f64::max);
             let why = match EFFORTS.get(level) {
+                _ if is_stopped => format!("stopped, its bound is {worst:.0e}"),
                 _ if worst <= relative_error => {
                     format!("its bound of {worst:.0e} meets the {relative_error:.0e} asked for")
                 }
@@ -203,7 +213,7 @@ impl EmptyRoom {
             let text = format!(
                 "hp collocation, order {order} with {elements_per_half} element(s) a half side: empty box, {light}; {why}"
             );
-            return (values, text);
+            return Ok((values, text));
         }
     }
 }
@@ -235,10 +245,10 @@ enum First {
 }
 
 impl First {
-    fn irradiance(&self, receivers: &[Receiver]) -> Vec<f64> {
+    fn irradiance(&self, receivers: &[Receiver], stop: &Stop) -> Vec<f64> {
         match self {
-            Self::Few(few) => few.irradiance(receivers),
-            Self::Many(many) => many.irradiance(receivers),
+            Self::Few(few) => few.irradiance(receivers, stop),
+            Self::Many(many) => many.irradiance(receivers, stop),
         }
     }
 }
@@ -252,7 +262,15 @@ enum Gathers {
 }
 
 impl BoxField {
-    fn solve(room: &Room, first: First, symmetries: &Symmetries, bounces: Bounces, effort: &Effort) -> Self {
+    /// `None` where it was stopped: what is not done by then is zero, and worth nothing.
+    fn solve(
+        room: &Room,
+        first: First,
+        symmetries: &Symmetries,
+        bounces: Bounces,
+        effort: &Effort,
+        stop: &Stop,
+    ) -> Option<Self> {
         let grid = Grid::new(room.size_m, effort);
         let gathers = match bounces {
             Bounces::AtMost(0) => Gathers::Nothing,
@@ -261,16 +279,16 @@ impl BoxField {
         };
         if gathers != Gathers::All {
             let exitance = vec![0.0; grid.len()];
-            return Self { exitance, grid, first, gathers, probes: OnceLock::new(), imbalance: 0.0 };
+            return Some(Self { exitance, grid, first, gathers, probes: OnceLock::new(), imbalance: 0.0 });
         }
         let orbits = Orbits::new(&grid, &symmetries.of_room);
         let light = orbits.under(&symmetries.of_light);
-        let operator = Operator::new(&grid, orbits);
+        let operator = Operator::new(&grid, orbits, stop)?;
         let rho: Vec<f64> = (0..grid.len()).map(|node| symmetry::reflectance(room, grid.place(node).0)).collect();
         let (known, imbalance) = match &first {
-            First::Few(few) => known(&grid, few, &light),
+            First::Few(few) => known(&grid, few, &light, stop),
             First::Many(many) => {
-                let lux = operator.apply(&exitance(&many.projected(&grid, effort), &rho));
+                let lux = operator.apply(&exitance(&many.projected(&grid, effort, stop), &rho));
                 (light.representatives.iter().map(|node| lux[*node]).collect(), crowd::MISPLACED)
             }
         };
@@ -285,16 +303,22 @@ impl BoxField {
                 let few = rows.len() < 500;
                 if few { rows.iter().map(lux).collect() } else { rows.par_iter().map(lux).collect() }
             };
-            light.unfold(&interreflect(step, &known, bounces))
+            light.unfold(&interreflect(step, &known, bounces, stop))
         } else {
-            interreflect(|u| operator.apply(&exitance(u, &rho)), &light.unfold(&known), bounces)
+            interreflect(|u| operator.apply(&exitance(u, &rho)), &light.unfold(&known), bounces, stop)
         };
         let exitance = exitance(&irradiance, &rho);
-        Self { exitance, grid, first, gathers, probes: OnceLock::new(), imbalance }
+        let field = Self { exitance, grid, first, gathers, probes: OnceLock::new(), imbalance };
+        (!stop.is_due()).then_some(field)
     }
 
-    fn probes(&self) -> &[f64] {
-        self.probes.get_or_init(|| self.illuminance(&error::probes(self.grid.size_m)))
+    fn probes(&self, stop: &Stop) -> Option<&[f64]> {
+        if self.probes.get().is_none() {
+            let lux = self.illuminance(&error::probes(self.grid.size_m), stop)?;
+            // Whoever was first has found the same.
+            let _ = self.probes.set(lux);
+        }
+        self.probes.get().map(Vec::as_slice)
     }
 
     /// Area-mean indirect exitance in lm/m².
@@ -304,16 +328,19 @@ impl BoxField {
         areas().zip(&self.exitance).map(|(a, m)| a * m).sum::<f64>() / areas().sum::<f64>()
     }
 
-    /// Indirect illuminance at meters inside the room, in lux.
-    pub(super) fn illuminance(&self, meters: &[Meter]) -> Vec<f64> {
+    /// Indirect illuminance at meters inside the room, in lux; `None` where it was stopped.
+    pub(super) fn illuminance(&self, meters: &[Meter], stop: &Stop) -> Option<Vec<f64>> {
         if self.gathers == Gathers::Nothing {
-            return vec![0.0; meters.len()];
+            return Some(vec![0.0; meters.len()]);
         }
         let receiver = |m: &Meter| Receiver { position_m: m.position_m, normal: m.normal, face: None };
         let receivers: Vec<_> = meters.iter().map(receiver).collect();
-        let mut lux = self.first.irradiance(&receivers);
+        let mut lux = self.first.irradiance(&receivers, stop);
         if self.gathers == Gathers::All {
             let gather = |(lux, receiver): (&mut f64, &Receiver)| {
+                if stop.is_due() {
+                    return;
+                }
                 *lux += gmres::dot(&balanced_row(&self.grid, receiver), &self.exitance);
             };
             if receivers.len() < FEW {
@@ -322,18 +349,26 @@ impl BoxField {
                 lux.par_iter_mut().zip(&receivers).for_each(gather);
             }
         }
-        lux
+        (!stop.is_due()).then_some(lux)
     }
 }
 
 /// Irradiance after all the reflections that count, from that after one and what a further one makes of it.
-fn interreflect(step: impl Fn(&[f64]) -> Vec<f64>, known: &[f64], bounces: Bounces) -> Vec<f64> {
+fn interreflect(step: impl Fn(&[f64]) -> Vec<f64>, known: &[f64], bounces: Bounces, stop: &Stop) -> Vec<f64> {
     match bounces {
         Bounces::Converged => gmres::solve(step, known, known.to_vec(), 1e-14),
-        Bounces::AtMost(count) => (2..count).fold(known.to_vec(), |u, _| {
-            let again = step(&u);
-            known.iter().zip(&again).map(|(g, k)| g + k).collect()
-        }),
+        Bounces::AtMost(count) => {
+            let mut u = known.to_vec();
+            for _ in 2..count {
+                let further: Vec<f64> = known.iter().zip(&step(&u)).map(|(g, k)| g + k).collect();
+                // What another reflection no longer changes, no further one does.
+                if further == u || stop.is_due() {
+                    break;
+                }
+                u = further;
+            }
+            u
+        }
     }
 }
 
@@ -341,9 +376,9 @@ fn interreflect(step: impl Fn(&[f64]) -> Vec<f64>, known: &[f64], bounces: Bounc
 ///
 /// Where a jump or a kink of a table crosses an edge of the room, interpolation between nodes misses some flux. A
 /// closed room loses none, so the nodes are scaled to carry all of it, and the correction counts as an error.
-fn known(grid: &Grid, first: &FirstBounce, orbits: &Orbits) -> (Vec<f64>, f64) {
+fn known(grid: &Grid, first: &FirstBounce, orbits: &Orbits, stop: &Stop) -> (Vec<f64>, f64) {
     let receivers: Vec<_> = orbits.representatives.iter().map(|node| receiver_at(grid, *node)).collect();
-    let mut known = first.irradiance(&receivers);
+    let mut known = first.irradiance(&receivers, stop);
     let at_nodes = orbits.orbit.iter().enumerate().map(|(node, orbit)| known[*orbit as usize] * grid.node(node).1);
     let (flux, landed) = (first.reflected_flux(), at_nodes.sum::<f64>());
     if landed == 0.0 {
@@ -388,14 +423,14 @@ struct Operator {
 }
 
 impl Operator {
-    fn new(grid: &Grid, orbits: Orbits) -> Self {
-        let row = |&node: &usize| balanced_row(grid, &receiver_at(grid, node));
-        let rows = orbits.representatives.par_iter().map(row).collect();
+    fn new(grid: &Grid, orbits: Orbits, stop: &Stop) -> Option<Self> {
+        let row = |&node: &usize| (!stop.is_due()).then(|| balanced_row(grid, &receiver_at(grid, node)));
+        let rows = orbits.representatives.par_iter().map(row).collect::<Option<_>>()?;
         let mut operator = Self { orbits, rows };
         operator.balance_columns(grid);
         operator.rows.par_iter_mut().for_each(|row| balance(row));
         operator.balance_columns(grid);
-        operator
+        Some(operator)
     }
 
     /// Scales columns so that every node's light falls somewhere in full: no flux is lost or made.

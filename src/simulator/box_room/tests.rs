@@ -14,7 +14,7 @@ use crate::simulator::box_room::grid::Grid;
 use crate::simulator::box_room::symmetry::Symmetries;
 use crate::simulator::box_room::{BoxField, EFFORTS, Effort, First};
 use crate::simulator::quadrature::Gauss;
-use crate::simulator::{Accuracy, Estimate, Prepared, Uncertainty, illuminance};
+use crate::simulator::{Accuracy, Estimate, Prepared, Stop, Uncertainty, illuminance};
 
 pub(super) fn point(position_m: DVec3, distribution: LuminousIntensityDistribution) -> Luminaire {
     let photometry = Photometry::of(distribution);
@@ -138,7 +138,7 @@ fn bounds_hold_in_random_rooms_against_higher_orders() {
             let mut found = indirect(&scene, &meters, relative_error);
             found.push(indirect(&scene, &meters[..1], relative_error)[0]);
             for (truth, (value, bound)) in
-                field.illuminance(&[&meters[..], &meters[..1]].concat()).into_iter().zip(found)
+                field.illuminance(&[&meters[..], &meters[..1]].concat(), &Stop::NEVER).unwrap().into_iter().zip(found)
             {
                 // The higher order errs by less than 5e-4 itself.
                 let error = (value - truth).abs();
@@ -247,7 +247,7 @@ fn a_luminaire_turned_against_its_table_turned_back_reads_the_same() {
 fn solve(scene: &Scene, effort: &Effort) -> BoxField {
     let (room, luminaires) = (scene.room.unwrap(), &scene.luminaires);
     let first = First::Few(FirstBounce::new(&room, luminaires, effort));
-    BoxField::solve(&room, first, &Symmetries::of(&room, luminaires), Bounces::Converged, effort)
+    BoxField::solve(&room, first, &Symmetries::of(&room, luminaires), Bounces::Converged, effort, &Stop::NEVER).unwrap()
 }
 
 /// Area-mean indirect illuminance of a 4 m cube of one reflectance with 10 000 lm at its centre, from the nodes.
@@ -413,4 +413,26 @@ fn what_is_shared_out_among_nodes_is_all_the_flux_at_the_place_where_it_lands() 
     }
     let mean = (0..grid.len()).map(|k| at_nodes[k] * grid.node(k).0).sum::<DVec3>() / flux;
     assert!((mean - landed / sum).length() < 0.01 * room.size_m.length(), "{mean} {}", landed / sum);
+}
+
+#[test]
+fn a_raised_flag_ends_it_within_a_second() {
+    static RAISED: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(true);
+    let stop = Stop { flag: Some(&RAISED), ..Stop::NEVER };
+    let ((scene, meters), begun) = (s1(), std::time::Instant::now());
+    for bounces in [Bounces::AtMost(1_000_000), Bounces::Converged] {
+        let mut prepared = Prepared::new(&scene, Transport::Total(bounces), &accuracy(1e-7)).unwrap();
+        let stopped = prepared.illuminance_until(&meters, &stop);
+        assert!(matches!(stopped, Err(crate::simulator::SimulatorError::Stopped)), "{stopped:?}");
+        // What was not finished is kept nowhere.
+        assert!(prepared.illuminance(&meters).unwrap().estimates[0].illuminance.value() > 0.0);
+    }
+    let stopped = crate::simulator::certified_until(
+        &scene,
+        &meters,
+        Transport::Indirect(Bounces::Converged),
+        &accuracy(1e-7),
+        &stop,
+    );
+    assert!(stopped.is_err() && begun.elapsed().as_secs() < 30);
 }

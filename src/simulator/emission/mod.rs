@@ -27,6 +27,14 @@ const DEEPEST: u32 = 9;
 /// Parts of an integral after which it stops improving: what is left is its bound.
 const MOST_PARTS: u32 = 4000;
 
+/// Steps along each edge of a sheet where no light was found within, and how often the brightest step is looked at more closely.
+const OUTLINE: usize = 16;
+const CLOSER: usize = 3;
+/// Light below this part of what a luminaire would give that faces the meter at its brightest is not told from none: what
+/// rises above a horizon between two steps of the outline, or is lit through a table's last figures alone. Slivers a
+/// thousandth as high as the opening, behind a table of cos³, were off by 2e-10 of it where two rules agreed.
+const UNTOLD: f64 = 1e-9;
+
 /// The rule along each side of a part.
 static RULE: LazyLock<Gauss> = LazyLock::new(|| Gauss::new(5));
 
@@ -34,6 +42,8 @@ static RULE: LazyLock<Gauss> = LazyLock::new(|| Gauss::new(5));
 #[derive(Clone, Debug)]
 pub(super) struct Emitter {
     luminaire: Luminaire,
+    /// The largest intensity of all.
+    peak_cd: f64,
     opening: Opening,
     lambertian: Option<Lambertian>,
 }
@@ -74,7 +84,8 @@ impl Emitter {
         let horizontal = matches!(opening, Opening::Box(half) if half.z == 0.0);
         let flat_m2 = opening.flat_m2().filter(|_| horizontal);
         let lambertian = flat_m2.and_then(|area_m2| lambertian(luminaire, area_m2));
-        Self { luminaire: luminaire.clone(), opening, lambertian }
+        let peak_cd = luminaire.photometry.distribution.max_intensity().value() * luminaire.flux_scale;
+        Self { luminaire: luminaire.clone(), peak_cd, opening, lambertian }
     }
 
     /// Whether it has no extent.
@@ -102,7 +113,7 @@ impl Emitter {
 
     /// Whether it sends light anywhere.
     pub(super) fn shines(&self) -> bool {
-        self.luminaire.flux_scale > 0.0 && self.luminaire.photometry.distribution.max_intensity().value() > 0.0
+        self.peak_cd > 0.0
     }
 
     /// Illuminance in lux at an element, integrated until two refinements agree as precisely as asked.
@@ -116,19 +127,57 @@ impl Emitter {
         let own = self.own(meter);
         let mut sum = Bounded::default();
         for sheet in self.opening.facing(own.position_m) {
-            sum = sum
-                + match sheet {
-                    Sheet::Face { corner_m, edges_m } => {
-                        self.face_illuminance(&sheet, corner_m, edges_m, meter, occluders, precision)
-                    }
-                    // A disc's radius goes with the root of its area.
-                    _ if sheet.is_disc() => {
-                        integrate_square(precision, &|[s, v]| 2.0 * s * self.density(&own, &sheet.part([s * s, v])))
-                    }
-                    _ => integrate_square(precision, &|uv| self.density(&own, &sheet.part(uv))),
-                };
+            let found = match sheet {
+                Sheet::Face { corner_m, edges_m } => {
+                    self.face_illuminance(&sheet, corner_m, edges_m, meter, occluders, precision)
+                }
+                // A disc's radius goes with the root of its area.
+                _ if sheet.is_disc() => {
+                    integrate_square(precision, &|[s, v]| 2.0 * s * self.density(&own, &sheet.part([s * s, v])))
+                }
+                _ => integrate_square(precision, &|uv| self.density(&own, &sheet.part(uv))),
+            };
+            let edges = [
+                ([0.0, 0.0], [1.0, 0.0]),
+                ([1.0, 0.0], [1.0, 1.0]),
+                ([1.0, 1.0], [0.0, 1.0]),
+                ([0.0, 1.0], [0.0, 0.0]),
+            ];
+            let is_dark = found.value == 0.0;
+            sum = sum + found;
+            if !matches!(sheet, Sheet::Face { .. }) && is_above(self.opening.half_m(), &own) {
+                sum.bound += self.untold_lux(&own);
+                let part = |[a, b]: [f64; 2], [c, d]: [f64; 2], t: f64| sheet.part([a + t * (c - a), b + t * (d - b)]);
+                let looks = edges.iter().map(|(from, to)| self.brightest(&own, &|t| part(*from, *to, t)));
+                sum.bound += if is_dark { looks.fold(0.0, f64::max) } else { 0.0 };
+            }
         }
         sum
+    }
+
+    /// Light too dim to be told from none, in lux.
+    fn untold_lux(&self, own: &Own) -> f64 {
+        let nearest_m = own.position_m.abs() - self.opening.half_m();
+        UNTOLD * self.peak_cd / nearest_m.max(DVec3::ZERO).length_squared().max(self.opening.half_m().length_squared())
+    }
+
+    /// The brightest that is found along an edge: of what reaches above the meter's horizon there, the highest is met closely.
+    ///
+    /// Where a rule's nodes see nothing, what is lit is a sliver between them: the part of a convex sheet beyond a plane, the
+    /// meter's horizon or the luminaire's own, which reaches the outline if it is there at all.
+    fn brightest(&self, own: &Own, edge: &impl Fn(f64) -> Part) -> f64 {
+        let height = |t: f64| (edge(t).at_m - own.position_m).dot(own.normal);
+        let mut brightest =
+            (0..=OUTLINE).map(|k| self.density(own, &edge(k as f64 / OUTLINE as f64))).fold(0.0, f64::max);
+        let (mut from, mut to) = (0.0, 1.0);
+        for _ in 0..CLOSER {
+            let step = (to - from) / OUTLINE as f64;
+            let all = (0..=OUTLINE).map(|k| from + step * k as f64);
+            let Some(highest) = all.max_by(|a, b| height(*a).total_cmp(&height(*b))) else { break };
+            brightest = brightest.max(self.density(own, &edge(highest)));
+            (from, to) = ((highest - step).max(0.0), (highest + step).min(1.0));
+        }
+        brightest
     }
 
     fn face_illuminance(
@@ -165,10 +214,19 @@ impl Emitter {
         }
         let own = self.own(meter);
         let unit_m2 = face_m2.normalize_or_zero();
-        integrate(piece, precision, &|from: DVec3| {
+        let part = |from: DVec3| {
             let at_m = self.luminaire.orientation.transpose() * (from - self.luminaire.position_m);
-            self.density(&own, &Part { at_m, area_m2: unit_m2 })
-        })
+            Part { at_m, area_m2: unit_m2 }
+        };
+        let mut found = integrate(piece, precision, &|from| self.density(&own, &part(from)));
+        found.bound += self.untold_lux(&own);
+        if found.value == 0.0 {
+            let edge = |k: usize, t: f64| part(piece[k].lerp(piece[(k + 1) % piece.len()], t));
+            let looks = (0..piece.len()).map(|k| self.brightest(&own, &|t| edge(k, t)));
+            let piece_m2 = (2..piece.len()).map(|k| (piece[k - 1] - piece[0]).cross(piece[k] - piece[0]).length());
+            found.bound += 0.5 * piece_m2.sum::<f64>() * looks.fold(0.0, f64::max);
+        }
+        found
     }
 
     /// One part's light as an estimate of the whole luminaire's, and where it comes from.
@@ -256,6 +314,11 @@ impl Emitter {
         }
         sum
     }
+}
+
+/// Whether a corner of a box about a luminaire's centre lies above a meter's horizon.
+fn is_above(half_m: DVec3, own: &Own) -> bool {
+    half_m.dot(own.normal.abs()) > own.position_m.dot(own.normal)
 }
 
 /// Recognises I0 cos gamma, dark above, at every node of a table, as far as its figures are written out.
@@ -350,4 +413,63 @@ fn on_triangle(t: &[DVec3; 3], f: &impl Fn(DVec3) -> f64) -> f64 {
         }
     }
     sum * area
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::DMat3;
+
+    use super::*;
+    use crate::photometry::{LuminousOpening, Photometry};
+
+    const SIDE_M: f64 = 0.2;
+
+    /// Meters beside openings of which a sliver alone sends light there: what is above the meter, by a table that is dark above.
+    #[test]
+    fn a_sliver_that_no_node_meets_is_within_the_bound() {
+        let gamma_deg: Vec<f64> = (0..=180).map(f64::from).collect();
+        let candela = gamma_deg.iter().map(|g| 1e3 * g.to_radians().cos().max(0.0).powi(3)).collect();
+        let table = LuminousIntensityDistribution::axial(gamma_deg, candela).unwrap();
+        let openings = [
+            LuminousOpening::Box { x_m: SIDE_M, y_m: SIDE_M, height_m: SIDE_M },
+            LuminousOpening::Ellipse { x_m: SIDE_M, y_m: SIDE_M, height_m: SIDE_M },
+            LuminousOpening::Ellipsoid { x_m: SIDE_M, y_m: SIDE_M, z_m: SIDE_M },
+        ];
+        for opening in openings {
+            for below_m in [1e-3, 1e-4, 1e-5] {
+                let photometry = Photometry { opening, ..Photometry::of(table.clone()) };
+                let emitter = Emitter::new(&Luminaire {
+                    id: "l".into(),
+                    photometry: Arc::new(photometry),
+                    position_m: DVec3::ZERO,
+                    orientation: DMat3::IDENTITY,
+                    flux_scale: 1.0,
+                    model: LuminaireModel::Area,
+                });
+                let position_m = DVec3::new(1.0, 0.03, 0.5 * SIDE_M - below_m);
+                let meter = Meter { position_m, normal: DVec3::NEG_X };
+                let found = emitter.illuminance(&meter, &[], Precision::relative(1e-4));
+                // All that is seen, so finely that the sliver is met.
+                let own = emitter.own(&meter);
+                let mut truth = 0.0;
+                for sheet in emitter.opening.facing(own.position_m) {
+                    let n = 3000;
+                    for i in 0..n {
+                        for j in 0..40 {
+                            // Where the sliver is, along either coordinate, steps are fine.
+                            let [fine, coarse] = [(f64::from(i) + 0.5) / f64::from(n), (f64::from(j) + 0.5) / 40.0];
+                            let fine = 1.0 - (1.0 - fine).powi(3);
+                            let weight = 3.0 * (1.0 - (f64::from(i) + 0.5) / f64::from(n)).powi(2);
+                            let uv = if matches!(sheet, Sheet::Cap { .. }) { [fine, coarse] } else { [coarse, fine] };
+                            truth += weight * emitter.density(&own, &sheet.part(uv)) / f64::from(40 * n);
+                        }
+                    }
+                }
+                let Bounded { value, bound } = found;
+                assert!((value - truth).abs() <= bound + 1e-2 * value, "{opening:?}, {below_m} m: {found:?}, {truth}");
+            }
+        }
+    }
 }

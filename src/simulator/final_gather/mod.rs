@@ -57,6 +57,9 @@ const WELL_KNOWN: f64 = 4.0;
 /// Parts of each luminaire that a meter asks in each replicate where bodies may hide it, as powers of two.
 const PARTS_LOG2: std::ops::RangeInclusive<u32> = 6..=16;
 
+/// Rays after which one looks whether it is time to stop.
+const LOOK: u32 = 256;
+
 /// A scene, with what is known of its light so far.
 #[derive(Debug)]
 pub(super) struct Enclosure {
@@ -127,7 +130,13 @@ impl Enclosure {
     }
 
     /// Direct illuminance at the meters, each within a bound.
-    pub(super) fn direct(&self, meters: &[Meter], relative_error: f64, seed: u64, stop: &Stop) -> Vec<Bounded> {
+    pub(super) fn direct(
+        &self,
+        meters: &[Meter],
+        relative_error: f64,
+        seed: u64,
+        stop: &Stop,
+    ) -> Result<Vec<Bounded>, SimulatorError> {
         let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
         let one = |(index, meter): (usize, &Meter)| {
             let seed = mix(mix(seed ^ 0xd1).wrapping_add(index as u64));
@@ -138,18 +147,21 @@ impl Enclosure {
             let error = relative_error.clamp(1e-10, 0.1);
             let precision = Precision::relative(0.2 * error);
             let light = |k: usize| {
+                if stop.is_due() {
+                    return Err(SimulatorError::Stopped);
+                }
                 let emitter = &self.emitters[k];
                 if !emitter.is_point() {
-                    return emitter.illuminance(meter, occluders, precision);
+                    return Ok(emitter.illuminance(meter, occluders, precision));
                 }
                 let hidden = self.surroundings.is_hidden(self.lifted(meter), emitter.centre_m());
-                if hidden { Bounded::default() } else { emitter.illuminance(meter, &[], precision) }
+                Ok(if hidden { Bounded::default() } else { emitter.illuminance(meter, &[], precision) })
             };
-            let known = exact.iter().map(|k| light(*k)).fold(Bounded::default(), |a, b| a + b);
+            let known = exact.iter().try_fold(Bounded::default(), |sum, k| Ok(sum + light(*k)?))?;
             if sampled.is_empty() {
-                known
+                Ok(known)
             } else {
-                known + self.sampled(&lights, meter, &sampled, known, error, seed, stop)
+                Ok(known + self.sampled(&lights, meter, &sampled, known, error, seed, stop)?)
             }
         };
         meters.par_iter().enumerate().map(one).collect()
@@ -172,7 +184,7 @@ impl Enclosure {
         relative_error: f64,
         seed: u64,
         stop: &Stop,
-    ) -> Bounded {
+    ) -> Result<Bounded, SimulatorError> {
         let start_m = self.lifted(meter);
         let bare = |k: &usize| self.emitters[*k].illuminance(meter, &[], Precision::relative(1e-2)).value;
         let bare_lux: f64 = which.iter().map(bare).sum();
@@ -181,21 +193,24 @@ impl Enclosure {
             let from = if log2 == *PARTS_LOG2.start() { 0 } else { 1 << (log2 - 1) };
             let mut more = [More::default(); REPLICATES];
             for (replicate, more) in more.iter_mut().enumerate() {
-                for index in from..1 << log2 {
+                for index in (from..1 << log2).take_while(|k| !(k % LOOK == 0 && stop.is_due())) {
                     let mut sampler = Sampler::new(mix(seed.wrapping_add(replicate as u64 + 1)), index);
                     let parts = sampler.next_pair();
                     let parts = sampler.moved(parts);
                     more.lux += which.iter().map(|k| lights.sample(*k, meter, start_m, parts)).sum::<f64>();
                 }
             }
+            if stop.is_due() {
+                break;
+            }
             sums.add(&more, log2);
             let found = sums.bounded();
             let enough = 0.5 * relative_error * (found.value + known.value);
-            if found.bound + known.bound <= enough.max(DARK * bare_lux) || stop.is_due() {
+            if found.bound + known.bound <= enough.max(DARK * bare_lux) {
                 break;
             }
         }
-        sums.bounded()
+        if sums.rays_log2 == 0 { Err(SimulatorError::Stopped) } else { Ok(sums.bounded()) }
     }
 
     fn lifted(&self, meter: &Meter) -> glam::DVec3 {
@@ -349,7 +364,11 @@ impl<'a> Gather<'a> {
                 break;
             }
             let from = if log2 == FIRST_RAYS_LOG2 { 0 } else { 1 << (log2 - 1) };
-            sums.add(&self.replicates(index, meter, from..1 << log2, limit), log2);
+            let more = self.replicates(index, meter, from..1 << log2, limit);
+            if self.stop.is_due() {
+                break;
+            }
+            sums.add(&more, log2);
             if sums.meets(self.accuracy.relative_error, direct) {
                 break;
             }
@@ -396,6 +415,10 @@ impl<'a> Gather<'a> {
         let scramble = mix(mix(self.accuracy.seed).wrapping_add(((index as u64) << 8 | replicate as u64) + 1));
         let mut more = More::default();
         for ray in rays {
+            // What is stopped halfway is thrown away.
+            if ray % LOOK == 0 && self.stop.is_due() {
+                break;
+            }
             let found = self.rays.follow(meter, &mut Sampler::new(scramble, ray), most, limit);
             more.lux += found.lux.iter().map(|(_, lux)| lux).sum::<f64>();
             more.error_lux += found.error_lux;

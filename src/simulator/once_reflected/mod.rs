@@ -7,9 +7,10 @@ mod tests;
 
 use rayon::prelude::*;
 
-use super::Bounded;
 use super::emission::{Emitter, Precision};
+use super::stop::Stop;
 use super::visibility::Occluder;
+use super::{Bounded, SimulatorError};
 use crate::scene::{Meter, Scene};
 use faces::Face;
 
@@ -40,11 +41,19 @@ impl OnceReflected {
     }
 
     /// Illuminance at the meters.
-    pub(super) fn illuminance(&self, meters: &[Meter], relative_error: f64) -> Vec<Bounded> {
+    pub(super) fn illuminance(
+        &self,
+        meters: &[Meter],
+        relative_error: f64,
+        stop: &Stop,
+    ) -> Result<Vec<Bounded>, SimulatorError> {
         let precision = Precision::relative(relative_error.clamp(1e-9, 1e-3));
         let at = |meter: &Meter| {
             let mut sum = Bounded::default();
             for face in &self.faces {
+                if stop.is_due() {
+                    return Err(SimulatorError::Stopped);
+                }
                 for emitter in &self.emitters {
                     let Bounded { value, bound } =
                         emitter.reflected(meter, &face.corners_m, face.normal, &self.occluders, precision);
@@ -52,7 +61,7 @@ impl OnceReflected {
                 }
             }
             // Clipping and the angles round.
-            Bounded { bound: sum.bound + 1e-11 * sum.value, ..sum }
+            Ok(Bounded { bound: sum.bound + 1e-11 * sum.value, ..sum })
         };
         meters.par_iter().map(at).collect()
     }

@@ -14,7 +14,8 @@ use crate::scene::{Luminaire, Obstacle, Shape, orientation};
 /// Value and standard error in lux, at a fixed effort.
 pub(super) fn solve(scene: &Scene, meters: &[Meter], transport: Transport, seed: u64, log2: u32) -> Vec<(f64, f64)> {
     let accuracy = Accuracy { relative_error: 0.0, seed };
-    let solution = PathTracer::new(scene).unwrap().solve(meters, transport, &accuracy, log2..=log2).unwrap();
+    let solution =
+        PathTracer::new(scene).unwrap().solve(meters, transport, &accuracy, log2..=log2, &Stop::NEVER).unwrap();
     solution.estimates.iter().map(value_and_error).collect()
 }
 
@@ -85,7 +86,8 @@ fn intervals_still_cover_when_their_width_decides_where_to_stop() {
     let (scene, meters) = (s1(), s1_meters());
     let tracer = PathTracer::new(&scene).unwrap();
     let trial = |seed| {
-        let solution = tracer.solve(&meters, CONVERGED, &Accuracy { relative_error: 0.02, seed }, 4..=12).unwrap();
+        let solution =
+            tracer.solve(&meters, CONVERGED, &Accuracy { relative_error: 0.02, seed }, 4..=12, &Stop::NEVER).unwrap();
         solution.estimates.iter().map(value_and_error).collect()
     };
     let trials: Vec<Vec<_>> = (0..200).map(trial).collect();
@@ -105,7 +107,8 @@ fn light_cut_after_n_reflections_is_what_a_renderer_that_stops_there_finds() {
         }
     }
     let accuracy = Accuracy { relative_error: 0.1, seed: 1 };
-    let none = illuminance(&s1(), &s1_meters(), Transport::Indirect(Bounces::AtMost(0)), &accuracy).unwrap();
+    let none =
+        illuminance(&s1(), &s1_meters(), Transport::Indirect(Bounces::AtMost(0)), &accuracy, &Stop::NEVER).unwrap();
     assert!(none.estimates.iter().all(|e| e.illuminance.value() == 0.0));
 }
 
@@ -117,7 +120,7 @@ fn light_straight_from_points_is_exact_and_triangles_hide_it() {
     let down = |x: f64, y: f64| Meter { position_m: DVec3::new(x, y, 17.0), normal: DVec3::NEG_Z };
     let meters = [down(2.0, 2.0), down(2.0, 10.0), down(10.0, 10.0)];
     let accuracy = Accuracy { relative_error: 0.1, seed: 1 };
-    let found = illuminance(&scene, &meters, Transport::Direct, &accuracy).unwrap();
+    let found = illuminance(&scene, &meters, Transport::Direct, &accuracy, &Stop::NEVER).unwrap();
     for (estimate, exact) in found.estimates.iter().zip([0.0, 2.230931614869, 13.559183673469]) {
         assert!((estimate.illuminance.value() - exact).abs() <= 1e-12 * (1.0 + exact), "{estimate:?}");
         assert!(matches!(estimate.uncertainty, Uncertainty::Bound(bound) if bound < 1e-11), "{estimate:?}");
@@ -354,8 +357,9 @@ fn turned_asymmetric_luminaires_agree_with_the_deterministic_solver() {
 #[test]
 fn what_cannot_be_traced_is_refused_with_the_reason() {
     let accuracy = Accuracy { relative_error: 0.1, seed: 1 };
-    let refusal =
-        |scene: &Scene, meter: Meter| illuminance(scene, &[meter], CONVERGED, &accuracy).unwrap_err().to_string();
+    let refusal = |scene: &Scene, meter: Meter| {
+        illuminance(scene, &[meter], CONVERGED, &accuracy, &Stop::NEVER).unwrap_err().to_string()
+    };
     let inside = up(2.0, 2.0, 2.0);
     for (meter, expected) in [
         (up(2.0, 2.0, -1.0), "outside the room"),

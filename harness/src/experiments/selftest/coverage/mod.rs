@@ -7,12 +7,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use luminaire::scene::{Bounces, Meter, Transport};
-use luminaire::simulator::{Accuracy, Solution, Uncertainty, certified, illuminance};
+use luminaire::simulator::{Accuracy, Prepared, Solution, Stop, Uncertainty, certified_until};
 use serde::Serialize;
 use strum::IntoStaticStr;
 
 use super::super::tables;
-use crate::system::process::is_interrupted;
+use crate::system::process::{interrupt_flag, is_interrupted};
 
 /// Meters of a room.
 const METERS: usize = 30;
@@ -72,12 +72,10 @@ impl Coverage {
 pub fn coverage(rooms: usize, relative_error: f64, seed: u64) -> Coverage {
     let mut coverage = Coverage::default();
     for index in 0..rooms as u64 {
-        if is_interrupted() {
-            break;
-        }
         let own = fastrand::Rng::with_seed(seed ^ (index << 32)).u64(..);
         match solved(own, index, relative_error) {
             Ok((meters, transport, found, truth)) => coverage.add(own, &meters, transport, &found, &truth),
+            Err(_) if is_interrupted() => break,
             Err(why) => coverage.refused.push(format!("room {own}: {why}")),
         }
     }
@@ -96,9 +94,11 @@ fn solved(seed: u64, index: u64, relative_error: f64) -> Result<Solved, luminair
     ];
     let transport = lights[index as usize % lights.len()];
     let places: Vec<Meter> = meters.iter().map(|(_, meter)| *meter).collect();
-    let found = illuminance(&scene, &places, transport, &Accuracy { relative_error, seed })?;
+    let stop = Stop { flag: Some(interrupt_flag()), ..Stop::NEVER };
+    let accuracy = Accuracy { relative_error, seed };
+    let found = Prepared::new(&scene, transport, &accuracy)?.illuminance_until(&places, &stop)?;
     let fine = Accuracy { relative_error: relative_error / FINER, seed: seed.rotate_left(17) };
-    let truth = certified(&scene, &places, transport, &fine)?;
+    let truth = certified_until(&scene, &places, transport, &fine, &stop)?;
     Ok((meters, transport, found, truth))
 }
 
