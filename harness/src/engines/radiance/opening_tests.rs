@@ -48,7 +48,7 @@ fn light_that_grazes_an_opening_is_read_and_what_rtrace_leaves_out_is_told() {
         let job = free_field(lamp.clone(), &[[-2.0, 1.6, -below_m]], DVec3::X);
         let right = simulator::illuminance(
             &job.scene,
-            &[job.stations[0].meter.clone()],
+            &[job.stations[0].meter],
             Transport::Direct,
             &Accuracy { relative_error: 1e-4, seed: 1 },
         );

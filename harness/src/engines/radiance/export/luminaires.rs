@@ -254,7 +254,7 @@ impl Body<'_> {
 enum Source {
     /// It ends there: one so small that it hides nothing.
     Solid,
-    /// It passes, as in photometry: an illum in front of nothing.
+    /// That of points passes, as in photometry: an illum in front of nothing. One illum hides another even so.
     SeenThrough,
 }
 
