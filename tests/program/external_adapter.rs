@@ -104,7 +104,7 @@ fn zero_hits_are_not_seen_and_fail_only_where_samples_are_many() {
         assert_ne!(of("plane[0]")["verdict"], "fail");
         (of("plane[1]"), code)
     };
-    let (unseen, code) = unlucky(1e-1);
+    let (unseen, code) = unlucky(2e-1);
     assert_eq!(code, Some(4));
     assert_eq!((&unseen["verdict"], &unseen["uncertainty"]["kind"]), (&"inconclusive".into(), &"not_seen".into()));
     assert!(unseen["diagnosis"].as_str().unwrap().starts_with("not seen"), "{unseen}");
