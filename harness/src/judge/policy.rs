@@ -74,7 +74,7 @@ impl ProfileBudget {
 pub enum Sampling {
     /// At the relative error of the spec's budget; beyond it only what is undecided
     Accurate,
-    /// As soon as every comparison is decided, which is much earlier where readings agree
+    /// As soon as every comparison is decided, which is much earlier where readings agree; a program of yours starts from the spec's budget
     #[default]
     Decided,
 }
