@@ -6,7 +6,7 @@ use luminaire::geometry::Surface;
 use luminaire::scene::{Luminaire, Transport};
 
 use super::fault::{Fault, Parameter};
-use super::faults::{LUMINAIRES, POWER, TURN, in_room, name, names, of_specs, raised, reflectance, reflects};
+use super::faults::{LUMINAIRES, POWER, TURN, each_reflectance, name, names, of_specs, raised, reflects};
 use super::tables::is_axial;
 use super::wrong::Wrong;
 use crate::procedures::Task;
@@ -104,12 +104,7 @@ fn of_surfaces(tasks: &[Task]) -> Vec<Fault> {
 /// Every surface's reflectance, of bodies too, by a factor.
 fn scaled(wrong: &mut Wrong, p: &[f64]) -> bool {
     let by = |r: f64| (p[0] * r).min(MOST.max(r));
-    let is_lit = in_room(wrong, |room| {
-        for surface in Surface::ALL {
-            let r = reflectance(room, surface);
-            *r = by(*r);
-        }
-    });
+    let is_lit = each_reflectance(wrong, by);
     if is_lit {
         wrong.scene().obstacles.iter_mut().for_each(|o| o.reflectance = by(o.reflectance));
     }
