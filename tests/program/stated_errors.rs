@@ -183,6 +183,16 @@ fn nothing_hides_behind_an_error_that_is_wide_at_some_meters_alone() {
 }
 
 #[test]
+fn an_error_that_is_never_shown_again_counts_no_more_than_was_asked() {
+    let once = "job['seed'] == 1 or sys.exit('one seed is enough'); stated = .1 * lux";
+    for (bias, failing) in [(0.04, 23), (0.0, 0)] {
+        let report = run(&format!("{once}; lux *= 1 + {bias}"), SAMPLED, 1);
+        let (_, fails, doubts) = verdicts(&report);
+        assert_eq!((fails, doubts), (failing, vec![&Value::from("not_read_again")]));
+    }
+}
+
+#[test]
 fn looks_of_a_program_that_hears_of_no_effort_count_alike() {
     let report = run(&noise(0.03, 0.003, 0.003), SAMPLED, 1);
     let (_, fails, doubts) = verdicts(&report);

@@ -29,7 +29,8 @@ const EFFORT: f64 = 0.25;
 const PART: f64 = 0.05;
 /// Of a procedure's meters whose stated errors are contradicted, how often one is by chance.
 const TOLD: f64 = 0.005;
-/// An error that nobody could check counts up to this part of the tolerance: with it, what lies twice as far off as is allowed fails.
+/// An error that nobody could check counts up to this part of the tolerance, and up to what was asked for: with it, what lies twice as far
+/// off as is allowed fails.
 const UNCHECKED: f64 = 0.5;
 
 /// What a run read again.
@@ -89,7 +90,7 @@ impl Again<'_> {
         // What states no error of sampling any more does not read again what did.
         let is_refused = sampled.is_none_or(is_withdrawn);
         let unchecked = || {
-            let at = limits(compared, |c, allowed| c.uncertainty.is_sampled().then_some(UNCHECKED * allowed));
+            let at = limits(compared, |c, allowed| c.uncertainty.is_sampled().then(|| self.unchecked(c, allowed)));
             StatedErrors::doubted_at(Doubt::NotReadAgain, at)
         };
         // Samples that meet nothing with other seeds state nothing either: they scatter, and are not capped.
@@ -107,13 +108,19 @@ impl Again<'_> {
         .collect()
     }
 
+    /// What an error counts that nobody could check.
+    fn unchecked(&self, comparison: &Comparison, allowed: f64) -> f64 {
+        let asked = self.run.job.budget.relative_error * comparison.value.unwrap_or(0.0).abs();
+        asked.min(UNCHECKED * allowed)
+    }
+
     /// Where nothing but a stated error keeps readings from failing, all that was sampled is read again: do those meters, by themselves,
     /// scatter as is stated there?
     fn of_sheltered(&self, running: &Running<'_>, now: &[Comparison]) -> Option<StatedErrors> {
         let task = self.task;
         let is_beyond = |c: &Comparison, allowed: f64| c.deviation.is_some_and(|d| d.abs() > allowed);
         let at = limits(now, |c, allowed| {
-            (c.verdict == Verdict::Inconclusive && is_beyond(c, allowed)).then_some(UNCHECKED * allowed)
+            (c.verdict == Verdict::Inconclusive && is_beyond(c, allowed)).then(|| self.unchecked(c, allowed))
         });
         let meters = self.sampled.as_ref()?;
         let sheltered: Vec<usize> =

@@ -202,9 +202,13 @@ impl StatedErrors {
             (Some(Doubt::BeyondTolerance), Uncertainty::StandardError { value, degrees_of_freedom, .. }) => {
                 Uncertainty::StandardError { value, degrees_of_freedom, bound: most }
             }
+            // What counts instead is no estimate of any samples.
+            (Some(Doubt::NotReadAgain), Uncertainty::StandardError { value, bound, .. }) if value > most => {
+                Uncertainty::StandardError { value: most, degrees_of_freedom: None, bound }
+            }
             (Some(Doubt::NotReadAgain), Uncertainty::StandardError { value, degrees_of_freedom, bound }) => {
                 let degrees_of_freedom = degrees_of_freedom.map(|few| few.max(FEW));
-                Uncertainty::StandardError { value: value.min(most), degrees_of_freedom, bound }
+                Uncertainty::StandardError { value, degrees_of_freedom, bound }
             }
             (Some(Doubt::TooLarge), Uncertainty::StandardError { bound, .. }) => {
                 Uncertainty::StandardError { value: most, degrees_of_freedom: Some(self.degrees_of_freedom), bound }
