@@ -260,8 +260,9 @@ fn diagnose(plans: &[Plan], reports: &mut [Report]) {
     for (plan, report) in plans.iter().zip(reports) {
         let heavy = report.recordings.iter().filter(|r| r.states_heavy_tail());
         let silent = heavy.map(|r| r.key.engine.clone()).collect();
+        let design_effects = report.recordings.iter().filter_map(|r| Some((r.key.clone(), r.design_effect?))).collect();
         let comparisons = &mut report.comparisons;
-        cases.push(Examined { tasks: &plan.tasks, settings: settings(plan), silent, comparisons });
+        cases.push(Examined { tasks: &plan.tasks, settings: settings(plan), silent, design_effects, comparisons });
     }
     diagnosis::diagnose(&mut cases);
 }

@@ -22,7 +22,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::judge::{Basis, Comparison, Verdict};
 use crate::procedures::Task;
-use crate::record::{EngineName, ProcedureId};
+use crate::record::{EngineName, ProcedureId, ReadingKey};
 use crate::system::process;
 
 pub use cause::Cause;
@@ -45,6 +45,8 @@ pub struct Examined<'a> {
     pub settings: BTreeMap<EngineName, String>,
     /// Engines of which nothing is explained: noise with a heavy tail looks like any fault.
     pub silent: BTreeSet<EngineName>,
+    /// How much of their noise the readings of an engine share, where that is known.
+    pub design_effects: BTreeMap<ReadingKey, f64>,
     pub comparisons: &'a mut [Comparison],
 }
 
@@ -53,7 +55,13 @@ type Subject = (EngineName, String);
 /// What is predicted once for every engine: the case, the procedure and what it is judged by.
 type Place = (usize, ProcedureId, Basis);
 
-impl Examined<'_> {
+impl<'a> Examined<'a> {
+    /// Of engines that are all set alike, of which nothing more is known.
+    pub fn new(tasks: &'a [Task], comparisons: &'a mut [Comparison]) -> Self {
+        let (settings, silent, design_effects) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());
+        Self { tasks, settings, silent, design_effects, comparisons }
+    }
+
     fn subject(&self, comparison: &Comparison) -> Subject {
         let engine = &comparison.key.engine;
         (engine.clone(), self.settings.get(engine).cloned().unwrap_or_default())
@@ -111,8 +119,10 @@ fn explain_subject(cases: &mut [Examined<'_>], chosen: &[usize], subject: &Subje
         let readings: Vec<&Comparison> = group.iter().map(|(_, k)| &case.comparisons[*k]).collect();
         let right = readings.iter().filter_map(|c| Some(c.reference.as_ref()?.value)).collect();
         let model = Model::new(place, task, right);
+        let shared = readings.first().and_then(|c| case.design_effects.get(&c.key).copied());
         if let Some(sheet) = Sheet::of(models.len(), &model, &readings).filter(|s| s.right.len() == task.targets.len())
         {
+            let sheet = sheet.sharing(shared);
             models.push(model);
             sheets.push(sheet);
             members.push(group);

@@ -358,6 +358,9 @@ impl Search<'_> {
                 fitted = self.best(self.all, fault, &[from], &touched, Some(&corrections))?;
             }
         }
+        // Noise that readings share moves parameters as if there were fewer of them.
+        let shared = touched.iter().map(|k| self.sheets[*k].design_effect).fold(1.0, f64::max);
+        fitted.parameters.iter_mut().for_each(|(_, error)| *error *= shared.sqrt());
         let is_off = |((value, error), parameter): (&(f64, f64), &Parameter)| {
             let from = parameter.starts.first().map_or(f64::INFINITY, |s| (value - s).abs());
             from > SEEN * error || parameter.starts.len() > 1

@@ -28,6 +28,8 @@ pub struct Sheet {
     pub allowed: Vec<f64>,
     /// Whether any of it fails.
     pub fails: bool,
+    /// How much of their noise the readings share: the variance of their mean over that of independent readings.
+    pub design_effect: f64,
     slack: f64,
     /// Part of every standard deviation, in the readings' unit.
     floor: f64,
@@ -56,6 +58,7 @@ impl Sheet {
             uncertainty: vec![],
             allowed: vec![],
             fails: members.iter().any(|c| c.verdict == Verdict::Fail),
+            design_effect: 1.0,
             slack: if of.is_thinned() { THINNED } else { SLACK },
             floor: 0.0,
             is_rough: false,
@@ -154,9 +157,16 @@ impl Sheet {
         if self.fails { sigma } else { sigma.hypot(self.allowed[k]) }
     }
 
+    /// The same readings, which share so much of their noise.
+    #[must_use]
+    pub fn sharing(self, design_effect: Option<f64>) -> Self {
+        Self { design_effect: design_effect.unwrap_or(1.0).max(1.0), ..self }
+    }
+
     /// Sums of products for the factor that makes a prediction fit best: with itself and with what was read.
     pub fn products(&self, predicted: &[f64]) -> (f64, f64) {
-        let term = |k: usize| (predicted[k] / self.width(k), self.read[k] / self.width(k));
+        let width = |k: usize| self.design_effect.sqrt() * self.width(k);
+        let term = |k: usize| (predicted[k] / width(k), self.read[k] / width(k));
         self.told().map(term).fold((0.0, 0.0), |(square, product), (p, r)| (square + p * p, product + p * r))
     }
 

@@ -1,7 +1,5 @@
 //! What is named, and what is better left unsaid.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use luminaire::scene::{Bounces, Transport};
 
 use super::*;
@@ -71,12 +69,7 @@ fn judged(tasks: &[Task], read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<Comparison> 
 
 fn found(tasks: &[Task], read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<Vec<Cause>> {
     let mut comparisons = judged(tasks, read);
-    explain(&mut [Examined {
-        tasks,
-        settings: BTreeMap::new(),
-        silent: BTreeSet::new(),
-        comparisons: &mut comparisons,
-    }])
+    explain(&mut [Examined::new(tasks, &mut comparisons)])
 }
 
 /// What is said of all that is explained, in one list.
@@ -112,6 +105,18 @@ fn a_factor_is_named_with_its_evidence_and_what_nothing_explains_is_left_unsaid(
     assert_eq!((unknown.len(), unknown[0].id), (1, "factor"));
     assert_eq!(found([1.1, 0.8, 1.3, 0.95]), []);
     assert_eq!(found([1.0; 4]), [], "right readings need no cause");
+}
+
+#[test]
+fn a_factor_of_readings_that_share_their_noise_is_as_uncertain_as_of_fewer() {
+    let tasks = [task(Transport::Direct)];
+    let error = |shared: Option<f64>| {
+        let mut comparisons = judged(&tasks, &|m| m.right.iter().map(|r| 1.37 * r).collect());
+        let design_effects = shared.map(|d| (comparisons[0].key.clone(), d)).into_iter().collect();
+        let mut case = [Examined { design_effects, ..Examined::new(&tasks, &mut comparisons) }];
+        explain(&mut case)[0][0].evidence.factor.unwrap().1
+    };
+    assert!((error(Some(4.0)) / error(None) - 2.0).abs() < 1e-9);
 }
 
 #[test]

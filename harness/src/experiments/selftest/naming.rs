@@ -1,7 +1,6 @@
 //! How often a diagnosis is right: faults drawn at random, kind by kind, in rooms drawn at random, judged and
 //! explained like readings of a real engine, scenes of the calibration included.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::Arc;
 
@@ -215,15 +214,7 @@ fn one(
         return;
     }
     let start = std::time::Instant::now();
-    let mut cases = [
-        Examined { tasks: &tasks, settings: BTreeMap::new(), silent: BTreeSet::new(), comparisons: &mut mine },
-        Examined {
-            tasks: calibration,
-            settings: BTreeMap::new(),
-            silent: BTreeSet::new(),
-            comparisons: &mut of_calibration,
-        },
-    ];
+    let mut cases = [Examined::new(&tasks, &mut mine), Examined::new(calibration, &mut of_calibration)];
     let found = diagnosis::explain(&mut cases);
     let took_s = start.elapsed().as_secs_f64();
     named.worst_s = named.worst_s.max(took_s);
