@@ -23,6 +23,11 @@ fn own_run(room: &Folder) -> Answer {
     room.run(&["--engines", OWN, "--format", "json"])
 }
 
+/// An error as a line: line breaks of the drawn message carry no meaning.
+fn told(answer: &Answer) -> String {
+    answer.stderr.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ")
+}
+
 /// The spec with one replacement must be refused with exit 2, name the place and leave no run behind.
 #[track_caller]
 fn refused(from: &str, to: &str, place: &str, says: &str) {
@@ -33,10 +38,7 @@ fn refused(from: &str, to: &str, place: &str, says: &str) {
 #[track_caller]
 fn refused_files(spec: &str, lamp: &str, place: &str, says: &str) {
     let room = Folder::new(&[("spec.yaml", spec), ("lamp.ies", lamp)]);
-    let output = own_run(&room).exits(2);
-    // Line breaks of the drawn message carry no meaning.
-    let words: Vec<&str> = output.stderr.split_whitespace().filter(|w| *w != "│").collect();
-    let error = words.join(" ");
+    let error = told(&own_run(&room).exits(2));
     assert!(error.contains(place), "no place `{place}` in: {error}");
     assert!(error.contains(says), "no `{says}` in: {error}");
     assert!(!room.path("out").exists(), "a run was begun");
@@ -99,6 +101,35 @@ fn an_opening_that_sticks_out_of_the_room_is_refused_and_one_flush_with_the_ceil
         let room = Folder::new(&[("spec.yaml", &at(place)), ("lamp.ies", &panel)]);
         room.luxproof(&["check", "spec.yaml"]).exits(0);
     }
+}
+
+#[test]
+fn a_name_that_is_more_than_a_line_is_refused() {
+    refused("id: lamp,", r#"id: "a\n!touch pwned\n#","#, "spec.yaml:7:", "is no name");
+    refused("id: lamp,", "id: ' ',", "spec.yaml:7:", "is no name");
+    refused("id: lamp,", &format!("id: {},", "a".repeat(101)), "spec.yaml:7:", "1 to 100 printable characters");
+    refused("title: a test room", r#"title: "a\u2028b""#, "spec.yaml:2:", "is no title");
+}
+
+#[test]
+fn what_never_ends_is_not_opened() {
+    for (from, to) in [("photometry: lamp.ies", "photometry: pipe"), ("photometry: lamp.ies", "photometry: /dev/zero")]
+    {
+        let room = Folder::new(&[("spec.yaml", &spec().replace(from, to)), ("lamp.ies", LAMP)]);
+        let made = std::process::Command::new("mkfifo").arg(room.path("pipe")).status();
+        assert!(made.is_ok_and(|status| status.success()));
+        for spec in ["spec.yaml", "pipe", "/dev/zero"] {
+            let refused = told(&room.luxproof(&["check", spec]).exits(2));
+            assert!(refused.contains("no regular file"), "{refused}");
+        }
+    }
+}
+
+#[test]
+fn a_matrix_beyond_counting_is_refused_at_once() {
+    let choices: String = (0..10).map(|k| format!("c{k}: , ")).collect();
+    let axes: String = (0..9).map(|k| format!("  axis{k}: {{{choices}}}\n")).collect();
+    refused_files(&format!("{}cases:\n{axes}", spec()), LAMP, "spec.yaml:", "10000 cases at most");
 }
 
 #[test]

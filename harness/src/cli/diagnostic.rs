@@ -4,10 +4,12 @@ use miette::{LabeledSpan, NamedSource, Report, Severity, SourceSpan};
 
 use crate::audit::AuditError;
 use crate::spec::SpecError;
+use crate::system::files::{MAX_BYTES, read_bounded};
 
 pub(crate) fn diagnose(error: SpecError) -> Report {
     let name = error.file.display().to_string();
-    let text = std::fs::read(&error.file).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).ok();
+    let bytes = error.line.and_then(|_| read_bounded(&error.file, MAX_BYTES).ok());
+    let text = bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let span = text.as_ref().and_then(|t| span(t, error.line?, error.column.unwrap_or(1)));
     let place = match (error.line, error.column) {
         (Some(line), Some(column)) => format!("{name}:{line}:{column}"),

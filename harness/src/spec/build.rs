@@ -19,6 +19,7 @@ use super::{Source, SpecError, suggestion};
 use crate::procedures::{Angles, Asked, AtAngles, Names, Procedures, Task};
 use crate::record::ProcedureId;
 use crate::system::digest::hexadecimal;
+use crate::system::files::{MAX_BYTES, read_bounded};
 
 /// Nearest a meter or a luminaire may come to a surface, relative to the room's largest extent.
 ///
@@ -30,6 +31,10 @@ const BRIGHTEST_CD: f64 = 1e30;
 
 /// More meters than this are a slip of the pen.
 const MAX_METERS: usize = 1_000_000;
+
+/// The longest name, and the longest title, in characters.
+const MAX_NAME: usize = 100;
+const MAX_TITLE: usize = 1000;
 
 /// A spec, read, checked and built: all that the rest of the program needs.
 #[derive(Clone, Debug, Default)]
@@ -129,6 +134,7 @@ impl<'a> Builder<'a> {
         let scene = Scene { room: Some(room), obstacles, luminaires };
         let mut meters = BTreeMap::new();
         for (name, set) in &spec.meters {
+            self.name("meters", name)?;
             meters.insert(name.clone(), self.meter_set(name, set, &scene)?);
         }
         self.procedures(&spec.procedures, &spec.luminaires, &meters)?;
@@ -138,9 +144,13 @@ impl<'a> Builder<'a> {
         if let Some(file) = &published {
             self.take_in("published", file)?;
         }
-        let name = self.source.path.file_stem().map_or_else(|| "spec".into(), |s| s.to_string_lossy().into_owned());
+        let name = self.source.path.file_stem().map_or_else(|| "spec".into(), |s| s.to_string_lossy());
+        let name = printable(&name, MAX_NAME);
+        let title = spec.title.as_deref().unwrap_or(&name);
+        let help = format!("give a line of at most {MAX_TITLE} printable characters");
+        self.source.require(is_line(title, MAX_TITLE), "title", "this is no title", help)?;
         Ok(Case {
-            title: spec.title.unwrap_or_else(|| name.clone()),
+            title: title.to_owned(),
             name,
             path: self.source.path.clone(),
             sha256: hexadecimal(&self.hash.finalize()),
@@ -207,9 +217,9 @@ impl<'a> Builder<'a> {
         let mut luminaires = vec![];
         for (k, spec) in specs.iter().enumerate() {
             let at = |field: &str| format!("luminaires[{k}].{field}");
-            let is_name = !spec.id.is_empty() && ids.insert(&spec.id);
+            self.name(&at("id"), &spec.id)?;
             let message = format!("`{}` is no unique name", spec.id);
-            self.source.require(is_name, &at("id"), message, "give every luminaire an id of its own")?;
+            self.source.require(ids.insert(&spec.id), &at("id"), message, "give every luminaire an id of its own")?;
             // What is nearly in the plane of a surface is meant to be recessed in it.
             let position_m = flush::snapped(room, DVec3::from(spec.at_m));
             let inside = position_m.is_finite() && room.contains(position_m, 0.0);
@@ -263,6 +273,14 @@ impl<'a> Builder<'a> {
             plates.push((&luminaire.id, plate));
         }
         Ok(plates.into_iter().map(|(_, plate)| plate).collect())
+    }
+
+    /// Refuses what is no name: names stand in scenes, logs and views, where a line break begins something else.
+    fn name(&self, at: &str, name: &str) -> Result<(), SpecError> {
+        let is_name = is_line(name, MAX_NAME) && name.trim() == name && !name.is_empty();
+        let message = format!("`{}` is no name", printable(name, MAX_NAME));
+        let help = format!("give 1 to {MAX_NAME} printable characters, no blank at either end");
+        self.source.require(is_name, at, message, help)
     }
 
     fn photometry(&mut self, at: &str, path: &Path) -> Result<Arc<Photometry>, SpecError> {
@@ -391,13 +409,28 @@ impl<'a> Builder<'a> {
     }
 
     fn take_in(&mut self, at: &str, path: &Path) -> Result<(), SpecError> {
-        let bytes = std::fs::read(path).map_err(|error| {
+        let bytes = read_bounded(path, MAX_BYTES).map_err(|error| {
             let message = format!("{} cannot be read: {error}", path.display());
             self.source.error_at(at, message, "paths are relative to the spec's folder")
         })?;
         self.hash.update(bytes);
         Ok(())
     }
+}
+
+/// Whether a text is one line of so many characters at most: no control character, and none that breaks or turns a line.
+fn is_line(text: &str, most: usize) -> bool {
+    text.chars().count() <= most && !text.chars().any(is_unprintable)
+}
+
+fn is_unprintable(c: char) -> bool {
+    let breaks_or_turns = matches!(c, '\u{2028}' | '\u{2029}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    c.is_control() || breaks_or_turns || c == '\u{feff}'
+}
+
+/// A text as a line of so many characters at most.
+fn printable(text: &str, most: usize) -> String {
+    text.chars().take(most).map(|c| if is_unprintable(c) { '\u{fffd}' } else { c }).collect()
 }
 
 /// What is wrong with a meter at this point, and what to do.

@@ -50,6 +50,9 @@ pub(super) fn variants(source: &Source) -> Result<Vec<Variant>, SpecError> {
     Ok(variants)
 }
 
+/// More cases than these are a slip of the pen.
+const MAX_CASES: usize = 10_000;
+
 const FORM: &str = "give a list of overrides, each with a `name`, or a matrix {axis: {name: override, ...}, ...}";
 
 fn listed(source: &Source, list: Vec<Value>) -> Result<Vec<Override>, SpecError> {
@@ -87,6 +90,10 @@ fn matrix(source: &Source, axes: Mapping) -> Result<Vec<Vec<Override>>, SpecErro
             };
             overrides.push(Override { name, place, says });
         }
+        let count = combinations.len().saturating_mul(overrides.len());
+        let message = format!("{count} combinations and more");
+        let help = format!("a spec holds {MAX_CASES} cases at most: make several of it");
+        source.require(count <= MAX_CASES, &format!("cases.{axis}"), message, help)?;
         let with = |head: &Vec<Override>| {
             overrides.iter().map(|o| [head.as_slice(), std::slice::from_ref(o)].concat()).collect::<Vec<_>>()
         };

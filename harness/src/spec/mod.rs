@@ -12,6 +12,8 @@ mod suite;
 
 use std::path::{Path, PathBuf};
 
+use crate::system::files::read_bounded;
+
 pub use build::Case;
 pub use content::content;
 pub use model::{Budget, EngineSettings, Spec, ToleranceOverride};
@@ -43,6 +45,9 @@ fn place(file: &Path, line: Option<usize>, column: Option<usize>) -> String {
     format!("{}:{}{} ", file.display(), number(line), number(column))
 }
 
+/// The most bytes of a spec or policy; one of 100,000 meters has some 5 MB.
+const MAX_SPEC_BYTES: u64 = 64 << 20;
+
 /// A spec or policy file as it was read: its text, kept for the places of errors.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
@@ -55,7 +60,8 @@ pub struct Source {
 impl Source {
     pub fn read(path: &Path) -> Result<Self, SpecError> {
         let fail = |message: String, help| SpecError::of(path, message, help);
-        let bytes = std::fs::read(path).map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
+        let bytes =
+            read_bounded(path, MAX_SPEC_BYTES).map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
         let text = String::from_utf8(bytes).map_err(|e| fail(format!("is not UTF-8: {e}"), "save it as UTF-8"))?;
         Ok(Self::new(path.to_owned(), text))
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Case, SpecError};
 use crate::procedures::known;
+use crate::system::files::read_bounded;
 
 /// The cases of several specs, folders or patterns, in the order given; the files of a folder are sorted by name.
 pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
@@ -73,7 +74,7 @@ fn specs_of(folder: &Path) -> Result<Vec<PathBuf>, SpecError> {
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
         if path.extension().is_some_and(|e| e == "yaml" || e == "yml") && path.is_file() {
-            let text = std::fs::read(&path).map_err(unreadable)?;
+            let text = read_bounded(&path, super::MAX_SPEC_BYTES).map_err(unreadable)?;
             if String::from_utf8_lossy(&text).lines().any(|l| l.starts_with("luxproof:")) {
                 specs.push(path);
             }

@@ -1,7 +1,7 @@
 //! Files that are seen whole or not at all, whoever reads or is killed meanwhile.
 
-use std::fs::Permissions;
-use std::io::{self, BufWriter, Write};
+use std::fs::{File, Permissions};
+use std::io::{self, BufWriter, Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
@@ -16,6 +16,22 @@ use super::rows::Rows;
 pub struct FileError {
     pub path: String,
     pub source: io::Error,
+}
+
+/// The most bytes of a spec, or of a file that one names: the largest photometric files have some MB, a mesh of a million triangles 60.
+pub(crate) const MAX_BYTES: u64 = 256 << 20;
+
+/// The bytes of a regular file of at most so many: nothing else is opened, since a pipe waits for ever and a device never ends.
+pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let refused = |why: String| io::Error::new(io::ErrorKind::InvalidInput, why);
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(refused("it is no regular file".to_owned()));
+    }
+    let mut bytes = vec![];
+    // Some files tell no size: what is read counts.
+    File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+    let is_whole = bytes.len() as u64 <= most;
+    is_whole.then_some(bytes).ok_or_else(|| refused(format!("it has more than {} MB", most >> 20)))
 }
 
 /// How the names of files begin that are not finished.
