@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use itertools::Itertools;
 use serde_json::Value;
 
 use crate::support::{Answer, Folder, LAMP, OWN, ROOM, TWO_METERS, root};
@@ -127,9 +128,9 @@ fn what_never_ends_is_not_opened() {
 
 #[test]
 fn a_matrix_beyond_counting_is_refused_at_once() {
-    let choices: String = (0..10).map(|k| format!("c{k}: , ")).collect();
-    let axes: String = (0..9).map(|k| format!("  axis{k}: {{{choices}}}\n")).collect();
-    refused_files(&format!("{}cases:\n{axes}", spec()), LAMP, "spec.yaml:", "10000 cases at most");
+    let choices = (0..10).map(|k| format!("c{k}: ")).join(", ");
+    let axes = (0..9).map(|k| format!("  axis{k}: {{{choices}}}")).join("\n");
+    refused_files(&format!("{}cases:\n{axes}\n", spec()), LAMP, "spec.yaml:", "10000 cases at most");
 }
 
 #[test]

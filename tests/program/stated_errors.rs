@@ -183,6 +183,34 @@ fn nothing_hides_behind_an_error_that_is_wide_at_some_meters_alone() {
 }
 
 #[test]
+fn a_bound_that_does_not_hold_doubles_no_tolerance() {
+    let off = |bias: f64| run(&format!("lux *= 1 + {bias}"), "\"error_bound_lx\": .009 * lux", 1);
+    let report = off(0.017);
+    let (_, fails, doubts) = verdicts(&report);
+    assert_eq!((fails, doubts), (23, vec![&Value::from("refuted")]));
+    // One that holds is believed.
+    assert_eq!(verdicts(&off(0.0085)).1, 0);
+}
+
+#[test]
+fn the_residue_of_rounding_is_no_scatter() {
+    // A tenth of the light in one block of thirty: at most meters none meets it.
+    let rare = "blocks = [.9 * lux + (3 * lux if chance.random() < 1 / 30 else 0) for _ in range(8)]; lux = sum(blocks) / 8; \
+                stated = math.sqrt(sum((b - lux) ** 2 for b in blocks) / 56)";
+    let mut agree = 0;
+    for seed in SEEDS {
+        let report = run(&format!("{RANDOM}{rare}"), SAMPLED, seed);
+        for comparison in among(&report, "comparisons", &[("engine", "mine"), ("procedure", "luminous_intensity")]) {
+            if comparison["relative_deviation"].as_f64().unwrap() < -0.09 {
+                assert_ne!(comparison["verdict"], "fail", "{comparison}");
+                agree += 1;
+            }
+        }
+    }
+    assert!(agree > 100, "{agree}");
+}
+
+#[test]
 fn an_error_that_is_never_shown_again_counts_no_more_than_was_asked() {
     let once = "job['seed'] == 1 or sys.exit('one seed is enough'); stated = .1 * lux";
     for (bias, failing) in [(0.04, 23), (0.0, 0)] {

@@ -10,7 +10,7 @@ use std::ops::RangeInclusive;
 use super::jobs::{Found, Outcome, Running};
 use super::sampling::{seed_of_look, stations_of};
 use crate::engines::{Job, Measurement};
-use crate::judge::{Comparison, Judge, LOOKS, SINGLE_PRECISION, Verdict, rejected};
+use crate::judge::{Comparison, Judge, LOOKS, SINGLE_PRECISION, Source, Verdict, rejected};
 use crate::measure::Question;
 use crate::plan::{Fill, Run};
 use crate::procedures::Task;
@@ -32,6 +32,9 @@ const TOLD: f64 = 0.005;
 /// An error that nobody could check counts up to this part of the tolerance, and up to what was asked for: with it, what lies twice as far
 /// off as is allowed fails.
 const UNCHECKED: f64 = 0.5;
+
+/// Standard uncertainties that hold nearly all of an error.
+const NEARLY_ALL: f64 = 3.0;
 
 /// What a run read again.
 struct Again<'a> {
@@ -102,6 +105,7 @@ impl Again<'_> {
             (self.was_asked && (is_refused || self.claims.is_none()))
                 .then(|| not_read_again.unwrap_or_else(|| StatedErrors::doubted(Doubt::NotReadAgain))),
             beyond_tolerance(compared),
+            refuted(compared),
         ]
         .into_iter()
         .flatten()
@@ -234,6 +238,19 @@ fn beyond_tolerance(compared: &[Comparison]) -> Option<StatedErrors> {
         (bound >= allowed && bound > SINGLE_PRECISION * brightest).then_some(0.0)
     });
     StatedErrors::doubted_at(Doubt::BeyondTolerance, at)
+}
+
+/// Where readings lie beyond the tolerance, and farther off than the bounds that an engine states and everything else explain: a claim that
+/// does not hold shelters nothing.
+fn refuted(compared: &[Comparison]) -> Option<StatedErrors> {
+    let at = limits(compared, |c, allowed| {
+        let (bound, deviation, budget) = (c.uncertainty.bound(), c.deviation?.abs(), c.budget.as_ref()?);
+        let others = budget.components.iter().filter(|part| part.source != Source::Discretisation);
+        let others = others.map(|part| part.uncertainty.powi(2)).sum::<f64>().sqrt();
+        let reach = bound.max(allowed) + budget.coverage_factor.max(NEARLY_ALL) * others;
+        (bound > 0.0 && bound < allowed && deviation > reach).then_some(0.0)
+    });
+    StatedErrors::doubted_at(Doubt::Refuted, at)
 }
 
 fn estimate(reading: &Reading) -> Estimate {

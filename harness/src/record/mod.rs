@@ -81,11 +81,11 @@ impl Estimate {
         }
     }
 
-    /// Tells those whose samples all agree, where those of others do not: what the others met may still be to come there.
+    /// Tells those whose samples all agree but for rounding, where those of others do not: what the others met may still be to come there.
     pub fn mark_agreeing(all: &mut [Self]) {
-        let error = |e: &Self| e.uncertainty.standard_error();
-        if all.iter().any(|e| error(e).is_some_and(|error| error > ROUNDING * e.value)) {
-            let agree = |e: &&mut Self| error(e) == Some(0.0) && e.uncertainty.bound() == 0.0;
+        let scatters = |e: &Self| Some(e.uncertainty.standard_error()? > ROUNDING * e.value.abs());
+        if all.iter().any(|e| scatters(e) == Some(true)) {
+            let agree = |e: &&mut Self| scatters(e) == Some(false) && e.uncertainty.bound() == 0.0;
             all.iter_mut().filter(agree).for_each(|e| e.uncertainty = Uncertainty::NotSeen);
         }
     }

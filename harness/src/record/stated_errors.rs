@@ -77,6 +77,8 @@ pub enum Doubt {
     NotReadAgain,
     /// A bound is beyond the tolerance, and nothing shows that it is meant: nothing could ever fail there.
     BeyondTolerance,
+    /// The true value does not lie within a bound, and what is read lies beyond the tolerance.
+    Refuted,
 }
 
 impl StatedErrors {
@@ -198,17 +200,14 @@ impl StatedErrors {
     /// What a reading's error is where no more than this counts.
     fn allow(&self, most: f64, estimate: Estimate) -> Uncertainty {
         match (self.doubt, estimate.uncertainty) {
-            (Some(Doubt::BeyondTolerance), Uncertainty::Bound(_)) => Uncertainty::Bound(most),
-            (Some(Doubt::BeyondTolerance), Uncertainty::StandardError { value, degrees_of_freedom, .. }) => {
-                Uncertainty::StandardError { value, degrees_of_freedom, bound: most }
-            }
-            // What counts instead is no estimate of any samples.
-            (Some(Doubt::NotReadAgain), Uncertainty::StandardError { value, bound, .. }) if value > most => {
-                Uncertainty::StandardError { value: most, degrees_of_freedom: None, bound }
-            }
-            (Some(Doubt::NotReadAgain), Uncertainty::StandardError { value, degrees_of_freedom, bound }) => {
-                let degrees_of_freedom = degrees_of_freedom.map(|few| few.max(FEW));
-                Uncertainty::StandardError { value, degrees_of_freedom, bound }
+            (Some(Doubt::BeyondTolerance | Doubt::Refuted), Uncertainty::Bound(_)) => Uncertainty::Bound(most),
+            (
+                Some(Doubt::BeyondTolerance | Doubt::Refuted),
+                Uncertainty::StandardError { value, degrees_of_freedom, .. },
+            ) => Uncertainty::StandardError { value, degrees_of_freedom, bound: most },
+            // Nobody has seen the samples that would make it less certain than it is said to be.
+            (Some(Doubt::NotReadAgain), Uncertainty::StandardError { value, bound, .. }) => {
+                Uncertainty::StandardError { value: value.min(most), degrees_of_freedom: None, bound }
             }
             (Some(Doubt::TooLarge), Uncertainty::StandardError { bound, .. }) => {
                 Uncertainty::StandardError { value: most, degrees_of_freedom: Some(self.degrees_of_freedom), bound }
@@ -279,7 +278,7 @@ impl StatedErrors {
         match self.doubt {
             // What is the same for every seed owes nothing to chance.
             Some(Doubt::TooSmall | Doubt::TooLarge | Doubt::SameForEverySeed | Doubt::Scatters) => true,
-            Some(Doubt::NotReadAgain | Doubt::BeyondTolerance) => false,
+            Some(Doubt::NotReadAgain | Doubt::BeyondTolerance | Doubt::Refuted) => false,
             Some(Doubt::HeavyTail | Doubt::FewerSamples | Doubt::MoreSamples) | None => {
                 ratio > 1.0 && self.p_value.is_some_and(|p| p < 2.0 * COUNTED)
             }
@@ -449,6 +448,10 @@ impl fmt::Display for StatedErrors {
                      half the tolerance"
                 )
             }
+            Some(Doubt::Refuted) => write!(
+                f,
+                "the bounds that it states {at} do not hold: the true values lie outside; its readings are judged as they stand"
+            ),
             Some(Doubt::BeyondTolerance) => write!(
                 f,
                 "the bounds that it states {at} are beyond the tolerance: nothing that it reads there could ever fail; its readings \
