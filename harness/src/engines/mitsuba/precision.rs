@@ -9,7 +9,7 @@ use crate::engines::cells::{Cells, LookUp};
 const EPSILON: f64 = 5.960_464_477_539_063e-8;
 /// Roundings between a table and an illuminance: distance, square, cosine, interpolation, product.
 const ROUNDINGS: f64 = 16.0;
-/// So far outside a table's range our emitter takes a direction for its last angle (`EDGE_DEG` of mitsuba_goniometric.py).
+/// So far outside a table's range our emitter takes a direction for its last angle (`EDGE_DEG` of `mitsuba_goniometric.py`).
 const EDGE_DEG: f64 = 5e-5;
 
 /// What rounding may do to light that comes straight from points.

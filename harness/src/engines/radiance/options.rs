@@ -57,7 +57,7 @@ impl Sources {
 
     /// Arguments for direct light alone.
     pub(super) fn direct(self, ratio: f64) -> Vec<String> {
-        words(format!("-I -ab 0 {}", self.options(Some(ratio))))
+        words(&format!("-I -ab 0 {}", self.options(Some(ratio))))
     }
 
     /// Options of rtrace; where direct light alone is asked for, sources are divided to a ratio. Every shadow is tested.
@@ -71,7 +71,7 @@ impl Sources {
     }
 }
 
-fn words(text: String) -> Vec<String> {
+fn words(text: &str) -> Vec<String> {
     text.split(' ').map(str::to_owned).collect()
 }
 
@@ -84,8 +84,8 @@ impl Options {
                 Some(Bounces::Converged) => DEFAULT_BOUNCES,
                 None => 0,
             };
-            let direct = words("-I -ab 0".into());
-            return Self { part_of_total: direct.clone(), direct, total: words(format!("-I -ab {bounces}")) };
+            let direct = words("-I -ab 0");
+            return Self { part_of_total: direct.clone(), direct, total: words(&format!("-I -ab {bounces}")) };
         }
         let sources = Sources::of(job, settings);
         // -u+: random numbers proper, since the fixed sequence of -u- repeats a bias of .3 % in every block (case S1,
@@ -95,8 +95,8 @@ impl Options {
         let bounces = bounces(job);
         Self {
             direct: sources.direct(grazing::ratio_of_all(job, settings)),
-            total: words(format!("-I -ab {bounces} {} {ambient}", sources.options(None))),
-            part_of_total: words(format!("-I -ab 0 {}", sources.options(None))),
+            total: words(&format!("-I -ab {bounces} {} {ambient}", sources.options(None))),
+            part_of_total: words(&format!("-I -ab 0 {}", sources.options(None))),
         }
     }
 }
