@@ -31,6 +31,8 @@ const ROUNDINGS: f64 = 8.0;
 /// How many times as fine the rules are along a side that tell what an opening's point lights leave out, and how many lights these differ by.
 const FINER: usize = 3;
 const APART: usize = 1;
+/// What a rule errs by over its difference from a finer one, where errors fall as its points along a side grow, as at a shadow's edge.
+const RICHARDSON: f64 = FINER as f64 / (FINER - 1) as f64;
 /// How much wider than a filter what passes it is taken to be.
 const FILTER_MARGIN: f64 = 0.05;
 /// Point lights along each side of an opening, few first.
@@ -68,7 +70,7 @@ pub(super) fn points(job: &Job) -> usize {
         let [few, more, other] = [*points, FINER * points, FINER * points - APART].map(|n| Lights::of(job, &bodies, n));
         let left_out = |meter: &Meter| {
             let [few, more, other] = [&few, &more, &other].map(|lights| lights.illuminance_lx(meter));
-            ((few - more).abs() + (more - other).abs(), more)
+            (RICHARDSON * (few - more).abs() + (more - other).abs(), more)
         };
         opening::too_near(job, *points).is_none()
             && job
@@ -112,7 +114,7 @@ impl<'a> DirectError<'a> {
         let aside =
             |axis: DVec3| [aim, -aim].map(|by| (rendered(by * axis) - read).abs()).into_iter().fold(0.0, f64::max);
         let lights: usize = self.exported.luminaires.iter().map(|(_, parts)| parts.len()).sum();
-        (read - one).abs()
+        RICHARDSON * (read - one).abs()
             + (one - other).abs()
             + aside(along)
             + aside(meter.normal.cross(along))

@@ -390,14 +390,14 @@ fn a_meter_in_a_penumbra_and_one_in_the_plane_of_an_opening_are_read_within_thei
             luminaires: vec![lamp],
         };
         let mut job = job(scene, &floor.chain(wall).collect::<Vec<_>>(), Transport::Direct);
-        job.budget.relative_error = 5e-3;
+        job.budget = Budget { relative_error: 5e-3, seconds: 60.0 };
         let right = simulated_lx(&job, 1e-4);
         // A shadow's edge falls between two of the point lights along a side, of which there are 48.
         let unhidden = right[..12].iter().copied().fold(0.0, f64::max);
         for (k, (found, right)) in read(&job).estimates.iter().zip(right).enumerate() {
             let bound = found.uncertainty.bound();
             assert!((found.value - right).abs() <= bound + 2e-4 * right, "{shape:?} {k}: {found:?} for {right}");
-            assert!(k > 14 || bound < 0.03 * unhidden.max(right), "{shape:?} {k}: {found:?} for {right}");
+            assert!(k > 14 || bound < 0.05 * unhidden.max(right), "{shape:?} {k}: {found:?} for {right}");
         }
     }
 }
