@@ -22,7 +22,11 @@ engines: {mitsuba: {preset: fast}, radiance: {preset: fast}, povray: {preset: fa
 /// What a procedure's printed command gives on standard output, and its folder.
 fn by_hand(engine: &str, procedure: &str) -> (String, Folder) {
     let axial = fs::read_to_string(root().join("reference/luminaires/axial.ies")).unwrap();
-    let folder = Folder::for_renderers(&[("spec.yaml", SPEC), ("axial.ies", &axial)]);
+    by_hand_of(&[("spec.yaml", SPEC), ("axial.ies", &axial)], engine, procedure)
+}
+
+fn by_hand_of(files: &[(&str, &str)], engine: &str, procedure: &str) -> (String, Folder) {
+    let folder = Folder::for_renderers(files);
     let export = ["export", "spec.yaml", "--engine", engine, "--procedures", procedure, "--out", "scenes"];
     let printed = folder.luxproof(&export).stdout;
     let command = printed.lines().find(|l| l.trim_start().starts_with("cd ")).unwrap_or_else(|| panic!("{printed}"));
@@ -48,6 +52,30 @@ fn radiance_prints_the_illuminance_of_each_meter() {
     // rcalc prints six digits.
     agree(&numbers(&by_hand("radiance", "direct_illuminance").0), &S1_DIRECT_LX, 2e-6);
     agree(&numbers(&by_hand("radiance", "indirect_illuminance").0), &S1_INDIRECT_LX, 0.05);
+}
+
+#[test]
+fn radiance_adds_up_luminaires_that_hide_one_another() {
+    let panel = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0.6 0.6 0\n1 1 50\n0 90\n0\n100 100\n";
+    let read = |lamps: &[&str], procedure: &str| {
+        let lamps: Vec<String> = lamps.iter().map(|l| format!("{{photometry: panel.ies, model: area, {l}}}")).collect();
+        let spec = format!(
+            "luxproof: 1\nroom: {{size_m: [4, 4, 3], reflectance: {{floor: 0.5, walls: 0.5, ceiling: 0.5}}}}\nluminaires: [{}]\n\
+             meters: {{floor: {{points_m: [[2, 2, 0.1], [2.4, 1.8, 0.5]], normal: [0, 0, 1]}}}}\nprocedures:\n  \
+             direct_illuminance: {{meters: floor}}\n  indirect_illuminance: {{meters: floor, bounces: 1}}\n\
+             engines: {{radiance: {{preset: fast}}}}\n",
+            lamps.join(", ")
+        );
+        numbers(&by_hand_of(&[("spec.yaml", &spec), ("panel.ies", panel)], "radiance", procedure).0)
+    };
+    let (below, above) = ("id: below, at_m: [2, 2, 2]", "id: above, at_m: [2, 2, 2.8]");
+    // A block of direct light is a sample of each panel's parts.
+    for (procedure, tolerance) in [("direct_illuminance", 0.02), ("indirect_illuminance", 0.1)] {
+        let alone = [below, above].map(|lamp| read(&[lamp], procedure));
+        let sum: Vec<f64> = alone[0].iter().zip(&alone[1]).map(|(a, b)| a + b).collect();
+        assert!(alone[1].iter().zip(&sum).all(|(above, sum)| above > &(0.2 * sum)), "{alone:?}");
+        agree(&read(&[below, above], procedure), &sum, tolerance);
+    }
 }
 
 #[test]

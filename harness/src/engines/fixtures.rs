@@ -61,6 +61,60 @@ pub(crate) fn quadrant() -> LuminousIntensityDistribution {
     LuminousIntensityDistribution::new(c, vec![0.0, 30.0, 60.0, 90.0], candela).unwrap()
 }
 
+/// Random angles, C 90 to 270 and a part of gamma, and random values, half of them dark.
+pub(crate) fn random_table(random: &mut fastrand::Rng) -> LuminousIntensityDistribution {
+    let mut between = |low: f64, high: f64, count: usize| {
+        let mut all: Vec<f64> = (0..count).map(|_| low + (high - low) * random.f64()).collect();
+        all.sort_by(f64::total_cmp);
+        all
+    };
+    let c: Vec<f64> = [vec![90.0], between(91.0, 269.0, 3), vec![270.0]].concat();
+    let gamma = between(0.0, 180.0, 5);
+    let candela = (0..c.len() * gamma.len()).map(|_| (1000.0 * random.f64() - 500.0).max(0.0)).collect();
+    LuminousIntensityDistribution::new(c, gamma, candela).unwrap()
+}
+
+/// Direct light of luminaires with random tables, turned anyhow and a thousand times as bright as one another, at twelve meters, of which
+/// four lie nearly in the plane of one; where `openings` is given, from flat openings past a box.
+pub(crate) fn random_room(random: &mut fastrand::Rng, openings: bool) -> Job {
+    let size_m = DVec3::new(8.0, 6.0, 3.5);
+    let between = |low: DVec3, high: DVec3, random: &mut fastrand::Rng| {
+        low + (high - low) * DVec3::from_array([(); 3].map(|()| random.f64()))
+    };
+    let luminaires: Vec<Luminaire> = (0..3)
+        .map(|k| {
+            let at_m = between(DVec3::new(0.8, 0.8, 2.0), size_m - DVec3::splat(0.8), random);
+            let mut lamp = luminaire(&format!("l{k}"), at_m, random_table(random));
+            if k > 0 {
+                lamp.orientation = orientation(360.0 * random.f64(), 180.0 * random.f64(), 360.0 * random.f64());
+            }
+            lamp.flux_scale = [1.0, 1000.0, 0.001][k];
+            let shape = match k {
+                0 => LuminousOpening::Box { x_m: 0.6, y_m: 0.3, height_m: 0.0 },
+                1 => LuminousOpening::Ellipse { x_m: 0.2, y_m: 0.2, height_m: 0.0 },
+                _ => LuminousOpening::Point,
+            };
+            if openings { with_opening(lamp, shape) } else { lamp }
+        })
+        .collect();
+    let low = [[1.0, 2.0, 0.0], [3.0, 3.0, 0.9]];
+    let obstacles = if openings { vec![cuboid(low[0], low[1], 0.0)] } else { vec![] };
+    let beside = luminaires[0].position_m.z;
+    let points: Vec<[f64; 3]> = (0..12)
+        .map(|k| {
+            let mut p = between(DVec3::new(3.2, 0.1, 0.1), size_m - DVec3::new(0.1, 0.1, 1.6), random);
+            if k < 4 {
+                p = DVec3::new(0.02, p.y, beside + [0.3, 0.02, -0.02, -0.2][k]);
+            }
+            p.to_array()
+        })
+        .collect();
+    let mut stations = stations(&points, DVec3::Z);
+    stations[..4].iter_mut().for_each(|s| s.meter.normal = DVec3::X);
+    let scene = Scene { room: Some(room(size_m, 0.0, 0.0, 0.0)), obstacles, luminaires };
+    within(5e-3, job(scene, stations, Transport::Direct))
+}
+
 pub(crate) fn room(size_m: DVec3, floor: f64, walls: f64, ceiling: f64) -> Room {
     Room { size_m, reflectance: Reflectances::with_equal_walls(floor, walls, ceiling) }
 }

@@ -6,6 +6,7 @@
 
 mod blocks;
 mod catalogue;
+mod cells;
 mod contract;
 mod effort;
 mod external;

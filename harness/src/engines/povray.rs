@@ -7,6 +7,7 @@
 //! variance away. What all blocks share, the bias of interpolating the later ones, is named beside the readings.
 
 mod bench;
+mod direct_error;
 mod export;
 mod frame;
 mod opening;
@@ -231,7 +232,7 @@ fn filters_in_the_way(job: &Job) -> Option<String> {
 /// A meter so near an opening that it tells the opening's point lights apart.
 fn too_near(job: &Job) -> Option<String> {
     let is_read = !matches!(job.transport, Transport::Indirect(_));
-    is_read.then(|| opening::too_near(job, export::points(job))).flatten()
+    is_read.then(|| opening::too_near(job, export::MOST_POINTS)).flatten()
 }
 
 fn distance_to_segment(point: glam::DVec3, from: glam::DVec3, to: glam::DVec3) -> f64 {

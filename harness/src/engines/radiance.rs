@@ -11,6 +11,9 @@ mod options;
 mod route;
 mod sampling;
 mod settings;
+mod superposition;
+#[cfg(test)]
+mod superposition_tests;
 #[cfg(test)]
 pub(super) mod tests;
 mod tools;
@@ -65,7 +68,10 @@ impl Engine for Radiance {
         let known = [
             (left_out, format!("light after {} bounces is left out", options::bounces(job))),
             (out_of_the_box(job, &settings), "rtrace's defaults cut reflections short and interpolate a cache".into()),
-            (export::disc_error(job, &settings), "a round opening is sampled as a square of the same area".into()),
+            (
+                export::disc_error(job, &settings),
+                "parts of a round opening count alike and are not as dense everywhere".into(),
+            ),
             (export::swallowed(job, &settings), "extended sources swallow the reflected light that meets them".into()),
         ];
         let known: Vec<_> = known.into_iter().filter_map(|(size, why)| Some((size?, why))).collect();
@@ -130,12 +136,16 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
     for (k, luminaire) in job.scene.luminaires.iter().enumerate() {
         tools.ies2rad(workbench, k, luminaire, route::route(luminaire, &settings))?;
     }
-    tools.compile(workbench)?;
+    let scenes = superposition::scenes(job, &settings).len();
+    tools.compile(workbench, scenes)?;
     let rows = export::rows(job, export::scale(job, settings.coordinates));
-    let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows };
+    let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows, scenes };
     let options = printed_options(job, &settings);
     let mut measurement = Measurement::default();
     measurement.effort.insert("seed".into(), job.seed.to_string());
+    if scenes > 1 {
+        measurement.effort.insert("scenes".into(), scenes.to_string());
+    }
 
     let direct = match job.transport {
         Transport::Indirect(_) => vec![],
@@ -171,12 +181,17 @@ fn direct(
 ) -> Result<Vec<Estimate>, EngineError> {
     let Sampler { job, settings, .. } = *sampler;
     if Sources::of(job, settings) == Sources::Openings && settings.preset != Preset::Default {
-        let ratio = grazing::ratio(job, settings);
-        let lost_lx = |station: &Station| grazing::lost_lx(job, &station.meter, ratio);
-        let means = measurement.take(sampler.direct(options)?).into_iter().zip(&job.stations);
+        let lost_lx =
+            |Station { meter, .. }: &Station| grazing::lost_lx(job, meter, grazing::ratio(job, settings, meter));
+        let means = measurement.take(sampler.direct()?).into_iter().zip(&job.stations);
         let whole = means.map(|(mean, station)| {
-            let all = sampled(mean);
-            Estimate { uncertainty: all.uncertainty.within(lost_lx(station)), ..all }
+            let (all, lost_lx) = (sampled(mean), lost_lx(station));
+            let uncertainty = match all.uncertainty {
+                // No sample met light where rtrace leaves all of it out.
+                Uncertainty::NotSeen if lost_lx > 0.0 => Uncertainty::Bound(lost_lx),
+                other => other.within(lost_lx),
+            };
+            Estimate { uncertainty, ..all }
         });
         return Ok(whole.collect());
     }

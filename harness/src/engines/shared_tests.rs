@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use glam::{BVec3, DVec3};
 use luminaire::geometry::Reflectances;
-use luminaire::scene::{Bounces, Obstacle, Shape, Transport, orientation};
+use luminaire::scene::{Bounces, Meter, Obstacle, Shape, Transport, orientation};
+use luminaire::simulator::{self, Accuracy};
 
 use super::fixtures::*;
 use super::mitsuba::tests as mitsuba;
@@ -214,4 +215,29 @@ pub(super) fn furnished() -> Job {
     job.scene.obstacles = vec![desk, Obstacle { shape: mesh, reflectance: 0.25 }];
     job.stations.truncate(2);
     job
+}
+
+/// Readings of random rooms are no farther from the simulator's than both bounds allow, and bounds are small enough to decide: below the
+/// verification tolerance of direct light, 1 % or .001 lx.
+pub(super) fn bounds_hold_and_decide(read: impl Fn(&Job) -> Measurement, openings: bool) {
+    let mut random = fastrand::Rng::with_seed(18);
+    let (mut wide, mut all) = (0, 0);
+    for _ in 0..6 {
+        let job = random_room(&mut random, openings);
+        let meters: Vec<Meter> = job.stations.iter().map(|s| s.meter).collect();
+        let accuracy = Accuracy { relative_error: 1e-4, seed: 1 };
+        let right = simulator::illuminance(&job.scene, &meters, job.transport, &accuracy).unwrap();
+        for (found, (right, station)) in read(&job).estimates.iter().zip(right.estimates.iter().zip(&job.stations)) {
+            let of_reference = match right.uncertainty {
+                simulator::Uncertainty::Bound(bound) => bound,
+                simulator::Uncertainty::StandardError { value, .. } => 5.0 * value,
+            };
+            let (bound, right) = (found.uncertainty.bound(), right.illuminance.value());
+            let off = (found.value - right).abs();
+            assert!(off <= bound + of_reference, "{}: {found:?} for {right} within {of_reference}", station.id);
+            wide += usize::from(bound > (0.01 * right).max(1e-3));
+            all += 1;
+        }
+    }
+    assert!(wide * 20 <= all, "{wide} of {all} bounds decide nothing");
 }

@@ -16,6 +16,7 @@ mod surroundings;
 #[cfg(test)]
 mod tests;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use self::bicubic::NODES;
@@ -141,8 +142,8 @@ impl Enclosure {
         let one = |(index, meter): (usize, &Meter)| {
             let seed = mix(mix(seed ^ 0xd1).wrapping_add(index as u64));
             // Sampled ones share the error; what they must reach together is known once the others are.
-            let (sampled, exact): (Vec<usize>, Vec<usize>) =
-                (0..self.emitters.len()).partition(|k| self.is_sampled(*k, meter));
+            let seen = (0..self.emitters.len()).filter(|k| !self.is_all_hidden(*k, meter));
+            let (sampled, exact): (Vec<usize>, Vec<usize>) = seen.partition(|k| self.is_sampled(*k, meter));
             let occluders = self.occluders.as_deref().unwrap_or(&[]);
             let error = relative_error.clamp(1e-10, 0.1);
             let precision = Precision::relative(0.2 * error);
@@ -172,6 +173,16 @@ impl Enclosure {
         let emitter = &self.emitters[k];
         let can_cut = emitter.is_point() || emitter.is_polygonal() && self.occluders.is_some();
         !can_cut && self.surroundings.may_hide([meter.position_m; 2], emitter.bounds_m())
+    }
+
+    /// Whether one box hides all of a luminaire, which no number of samples could prove: what a convex body hides from a point is convex,
+    /// and so all that lies between corners that it hides.
+    fn is_all_hidden(&self, k: usize, meter: &Meter) -> bool {
+        let ends_m = self.emitters[k].bounds_m();
+        let from_m = self.lifted(meter);
+        let corner_m = |c: usize| DVec3::from_array([0, 1, 2].map(|axis| ends_m[c >> axis & 1][axis]));
+        let hides = |occluder: &Occluder| (0..8).all(|c| occluder.blocks(from_m, corner_m(c)));
+        self.occluders.iter().flatten().any(hides)
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -213,7 +224,7 @@ impl Enclosure {
         if sums.rays_log2 == 0 { Err(SimulatorError::Stopped) } else { Ok(sums.bounded()) }
     }
 
-    fn lifted(&self, meter: &Meter) -> glam::DVec3 {
+    fn lifted(&self, meter: &Meter) -> DVec3 {
         meter.position_m + meter.normal * self.surroundings.lift_m()
     }
 

@@ -37,6 +37,26 @@ fn direct_light_of_s2_is_exact() {
 }
 
 #[test]
+fn a_round_opening_behind_a_box_is_dark_without_doubt_and_one_that_shows_a_sliver_is_not() {
+    let round = LuminousOpening::Ellipse { x_m: 0.5, y_m: 0.5, height_m: 0.0 };
+    let even = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![1e6, 1e6]).unwrap();
+    let at = |x_m: f64| {
+        let lamp = luminaire(even.clone(), round, DVec3::new(0.0, 0.0, 3.0));
+        let scene =
+            Scene { luminaires: vec![lamp], obstacles: vec![cuboid([-1.0; 3], [1.0; 3], 0.5)], ..Scene::default() };
+        illuminance(&scene, &[up(x_m, 0.0, -1.5)], Transport::Direct, &accuracy(1e-3)).unwrap().estimates[0]
+    };
+    // Its edge rises over the box's at 1 + 2.5 / 2 (1 - .25) = 1.9375 m.
+    for x_m in [0.0, 0.5, 1.0, 1.5, 1.93] {
+        assert_eq!((at(x_m).illuminance.value(), bound(at(x_m).uncertainty)), (0.0, 0.0), "{x_m}");
+    }
+    for x_m in [1.94, 2.1] {
+        let found = at(x_m);
+        assert!(bound(found.uncertainty) > 0.0 && (x_m < 2.0 || found.illuminance.value() > 0.0), "{x_m}: {found:?}");
+    }
+}
+
+#[test]
 fn mean_direct_light_of_s2_over_all_meters_is_exact() {
     let free = |m: &Meter| !matches!((m.position_m.x, m.position_m.y), (5.5..=7.5, 0.5..=1.5));
     let at = |i: i32, j: i32| up(0.5 * f64::from(i) + 0.25, 0.5 * f64::from(j) + 0.25, 0.8);

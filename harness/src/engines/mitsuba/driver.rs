@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::ID;
-use super::precision::float_error_lx;
+use super::precision::FloatError;
 use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
 use crate::engines::blocks::{Blocks, Sampling};
 use crate::engines::contract::same_meters;
@@ -97,7 +97,8 @@ impl Driver<'_> {
     /// Direct light of points: what is left is the rounding of 32-bit floats.
     fn determined(&mut self, part: &Part) -> Result<Vec<Estimate>, EngineError> {
         let block = self.ask(&Request { part: &part.name, side: 1, seeds: vec![None] })?.concat();
-        let bound = |k| Uncertainty::Bound(float_error_lx(self.job, self.settings, k));
+        let error = FloatError::of(self.job, self.settings);
+        let bound = |k| Uncertainty::Bound(error.at_lx(k));
         Ok(block.into_iter().enumerate().map(|(k, value)| Estimate { value, uncertainty: bound(k) }).collect())
     }
 

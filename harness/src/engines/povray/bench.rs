@@ -3,20 +3,19 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use glam::DVec3;
-use luminaire::calculators::inverse_square::from_luminaire;
-use luminaire::scene::{Bounces, Luminaire, Meter, Transport};
+use luminaire::scene::{Bounces, Transport};
 
 use crate::engines::blocks::{MIN_BLOCKS, Sampling};
 use crate::engines::image::read_rgb;
 use crate::engines::settings::Preset;
-use crate::engines::{EngineError, Job, Measurement, SceneFile, Site, Station, Workbench};
+use crate::engines::{EngineError, Job, Measurement, SceneFile, Site, Workbench, recess};
 use crate::record::{Effort, Estimate, Method, Uncertainty};
 use crate::system::process::Invocation;
 use crate::system::random::seed;
 use crate::system::slots::side_by_side;
 
 use super::ID;
+use super::direct_error::{self, DirectError};
 use super::export::{self, Light};
 use super::frame::{self, Frame};
 use super::pixels::{self, Readout, Seen};
@@ -113,16 +112,14 @@ impl<'a> Bench<'a> {
                 }
             }
         }
-        let mut estimates = vec![];
         let frame = Frame::of(self.job, self.settings.coordinates);
-        let shifts = frame::seats(self.job, frame)
-            .into_iter()
-            .zip(&self.job.stations)
-            .map(|(p, s)| self.shift_lx(frame.metres(p), s));
-        for ((look, scale), shift_lx) in looks.iter().zip(&first).zip(shifts) {
+        let apart = recess::apart(self.job);
+        let error = DirectError::of(self.job, &apart, frame, direct_error::points(self.job))?;
+        let seats = frame::seats(&apart, frame);
+        let mut estimates = vec![];
+        for ((look, station), seat) in looks.iter().zip(&self.job.stations).zip(seats) {
             let Look::Done { lx, resolution_lx } = *look else { continue };
-            // Bilinear maps in single precision are off by a share of the largest intensity, not of this one.
-            let bound = resolution_lx + DIRECT_RELATIVE * lx + self.table_error() * scale_of(*scale) + shift_lx;
+            let bound = resolution_lx + error.at_lx(&station.meter, seat, lx);
             estimates.push(Estimate { value: lx, uncertainty: Uncertainty::Bound(bound) });
         }
         let effort = Effort::from([("looks", taken.to_string()), ("arguments", self.printed_arguments(run))]);
@@ -286,19 +283,6 @@ impl<'a> Bench<'a> {
         seed(&[self.job.seed, block as u64])
     }
 
-    /// What a disc that does not lie quite at its meter may read otherwise.
-    fn shift_lx(&self, seat_m: DVec3, station: &Station) -> f64 {
-        let seated = Meter { position_m: seat_m, ..station.meter };
-        let shift =
-            |l: &Luminaire| (from_luminaire(l, &seated).value() - from_luminaire(l, &station.meter).value()).abs();
-        self.job.scene.luminaires.iter().map(shift).sum()
-    }
-
-    fn table_error(&self) -> f64 {
-        let axial = |l: &Luminaire| l.photometry.distribution.c_deg().len() == 1;
-        if self.job.scene.luminaires.iter().all(axial) { AXIAL_TABLE } else { BILINEAR_TABLE }
-    }
-
     fn printed_arguments(&self, run: Run) -> String {
         self.arguments(run, "image.ppm").join(" ")
     }
@@ -312,12 +296,6 @@ impl<'a> Bench<'a> {
         output(format!("the disc of {id} was not seen: something hides it from 2 mm away"))
     }
 }
-
-/// Direct light's error relative to a reading: single-precision colours and the fade-distance law, as measured.
-const DIRECT_RELATIVE: f64 = 5e-7;
-/// A map's error relative to the largest intensity, as measured: one plane, and several.
-const AXIAL_TABLE: f64 = 2e-7;
-const BILINEAR_TABLE: f64 = 1e-6;
 
 /// What POV-Ray's statistics count: tests of rays against shapes and the boxes around them, in rows that end in a share of successes.
 fn intersection_tests(said: &str) -> f64 {

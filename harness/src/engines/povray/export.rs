@@ -14,6 +14,7 @@ use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport};
 use crate::engines::effort;
 use crate::engines::{Job, SceneFile, Station, recess};
 
+use super::direct_error;
 use super::frame::{Frame, candela, seats};
 use super::opening::{self, Part};
 use super::pigment;
@@ -25,9 +26,8 @@ pub(super) const SCENE: &str = "scene.pov";
 /// Radius of the filter round a light, in scene units; POV-Ray silently ignores one of 1e-3.
 pub(super) const FILTER_RADIUS: f64 = 0.002;
 
-/// Points along each side of a luminous opening: for direct light, and for direct light past obstacles.
-const POINTS: usize = 6;
-const POINTS_PAST_OBSTACLES: usize = 12;
+/// Points along each side of a luminous opening for direct light, at most.
+pub(super) const MOST_POINTS: usize = 48;
 /// For indirect light, which does not see the difference.
 const POINTS_INDIRECT: usize = 2;
 
@@ -39,7 +39,7 @@ pub(super) enum Light {
 
 pub(super) fn scene(job: &Job, settings: &Settings) -> SceneFile {
     let frame = Frame::of(job, settings.coordinates);
-    let points = points(job);
+    let points = direct_error::points(job);
     let job = &*recess::apart(job);
     let mut text = head(job, settings, frame);
     text.push_str(&meters(job, frame));
@@ -269,12 +269,6 @@ fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame, 
         write!(text, "#if (Indirect)\n{}#else\n{}#end\n", instances(POINTS_INDIRECT), instances(points)).ok();
     }
     text
-}
-
-/// Point lights along an opening for direct light: more where obstacles or nearness would show them.
-pub(super) fn points(job: &Job) -> usize {
-    let few_do = !recess::has_bodies(job) && opening::too_near(job, POINTS).is_none();
-    if few_do { POINTS } else { POINTS_PAST_OBSTACLES }
 }
 
 pub(super) fn parts(luminaire: &Luminaire, points: usize) -> Vec<Part> {

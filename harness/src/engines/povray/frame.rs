@@ -113,12 +113,19 @@ const CLEAR: f64 = 2e-5;
 /// How far a ray may pass a disc's centre: the aim's triangles are kept in single precision, here up to 500 units from
 /// the origin. A front turned by t then seems nearer by t `AIM`, while it lies t^2/2 of the distance behind further off.
 const AIM: f64 = 3e-5;
+/// Half the spacing of 32-bit floats at 1.
+const EPSILON: f64 = 5.960_464_477_539_063e-8;
 /// Sine of the angle below which two discs are one.
 const PARALLEL: f64 = 1e-9;
 /// Sine of the angle below which crossing discs would have to lie further behind their meters than they may.
 const NARROW: f64 = 0.05;
 /// Discs nearer than this to each other may cross.
 const REACH: f64 = 5e-3;
+
+/// How far from the centre of a disc at a point of the scene its ray may meet it.
+pub(super) fn aim(point: DVec3) -> f64 {
+    3f64.sqrt() * EPSILON * (point.abs().max_element() + 1.0)
+}
 
 /// The pairs of meters whose discs may hide one another, and the sine of the angle between them: 1 where they face away from
 /// each other, as a back hides nothing, but stands off from a front like any other.

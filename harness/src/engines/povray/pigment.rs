@@ -12,7 +12,7 @@ use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
 pub(super) const MAX_ENTRIES: usize = 256;
 
 /// Where a table ends with light short of a pole, it falls to zero within this.
-const EDGE_DEG: f64 = 1e-3;
+pub(super) const EDGE_DEG: f64 = 1e-3;
 
 /// `#declare <name> = pigment {...}` whose filter is intensity relative to the table's largest.
 pub(super) fn declare(name: &str, distribution: &LuminousIntensityDistribution) -> String {

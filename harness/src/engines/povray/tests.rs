@@ -150,7 +150,8 @@ fn a_meter_that_faces_away_reads_nothing() {
     let mut job = s1(Transport::Direct);
     job.stations[1].meter.normal = DVec3::Z;
     let measured = read(&job);
-    assert_eq!(measured.estimates[1].value, 0.0);
+    let away = measured.estimates[1];
+    assert!(away.value == 0.0 && away.uncertainty.bound() < 1e-9, "{away:?}");
     assert!(measured.estimates[0].value > 0.8);
 }
 
@@ -362,5 +363,41 @@ fn wrong_exports_are_seen_in_the_readings() {
         let mut wrong = right.clone();
         tamper(&mut wrong);
         assert!(worst_relative(&read(&wrong), &exact) > 0.05, "{name} was not seen");
+    }
+}
+
+#[test]
+fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
+    shared_tests::bounds_hold_and_decide(read, false);
+    shared_tests::bounds_hold_and_decide(read, true);
+}
+
+#[test]
+fn a_meter_in_a_penumbra_and_one_in_the_plane_of_an_opening_are_read_within_their_bounds() {
+    let even = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0, 100.0]).unwrap();
+    let shapes = [
+        LuminousOpening::Box { x_m: 1.2, y_m: 0.6, height_m: 0.0 },
+        LuminousOpening::Ellipse { x_m: 0.1, y_m: 0.1, height_m: 0.0 },
+    ];
+    for shape in shapes {
+        let lamp = with_opening(luminaire("lamp", DVec3::new(2.0, 2.0, 2.5), even.clone()), shape);
+        // From full light into the box's shadow, and ever nearer to the opening's plane.
+        let floor = (0..12).map(|k| (DVec3::new(2.9 + 0.06 * f64::from(k), 2.0, 1e-3), DVec3::Z));
+        let wall = [1.0, 0.1, 0.01, 1e-3, 1e-4].map(|z| (DVec3::new(1e-3, 1.7, 2.5 - z), DVec3::X));
+        let scene = Scene {
+            room: Some(room(DVec3::new(5.0, 4.0, 3.0), 0.0, 0.0, 0.0)),
+            obstacles: vec![cuboid([2.6, 1.5, 1.0], [2.8, 2.5, 1.6], 0.0)],
+            luminaires: vec![lamp],
+        };
+        let mut job = job(scene, &floor.chain(wall).collect::<Vec<_>>(), Transport::Direct);
+        job.budget = Budget { relative_error: 5e-3, seconds: 60.0 };
+        let right = simulated_lx(&job, 1e-4);
+        // A shadow's edge falls between two of the point lights along a side, of which there are 48.
+        let unhidden = right[..12].iter().copied().fold(0.0, f64::max);
+        for (k, (found, right)) in read(&job).estimates.iter().zip(right).enumerate() {
+            let bound = found.uncertainty.bound();
+            assert!((found.value - right).abs() <= bound + 2e-4 * right, "{shape:?} {k}: {found:?} for {right}");
+            assert!(k > 14 || bound < 0.05 * unhidden.max(right), "{shape:?} {k}: {found:?} for {right}");
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! A job as a folder of Radiance files that anyone can run by hand; pure.
 //!
 //! `scene.rad` holds surfaces and luminaires, `luminaire-<n>.dat` the candela tables, `meters.txt` the meters and
-//! `run.sh` the commands. Formats: Ward and Shakespeare, *Rendering with Radiance* (1998); refman of Radiance 6.
+//! `run.sh` the commands; luminaires that hide one another are in `luminaires-<n>.rad`, added up scene by scene. Formats: Ward and Shakespeare, *Rendering with Radiance* (1998); refman of Radiance 6.
 
 mod luminaires;
 
@@ -12,6 +12,7 @@ use luminaire::scene::{Obstacle, Shape, Transport};
 pub(super) use self::luminaires::{EDGE_DEG, disc_error, ies2rad_options, swallowed, unsupported};
 use super::options::Options;
 use super::settings::Settings;
+use super::superposition;
 use crate::engines::settings::Coordinates;
 use crate::engines::{Job, SceneFile, recess};
 
@@ -26,13 +27,36 @@ const READ_AHEAD: f64 = 1e-4;
 pub(super) fn files(job: &Job, settings: &Settings, options: &Options) -> Vec<SceneFile> {
     let scale = scale(job, settings.coordinates);
     let job = &*recess::apart(job);
+    let scenes = superposition::scenes(job, settings);
     let mut files = vec![
-        SceneFile::text("scene.rad", scene_rad(job, settings, scale)),
+        SceneFile::text("scene.rad", scene_rad(job, settings, scale, &scenes)),
         SceneFile::text("meters.txt", meters_txt(job, scale)),
-        SceneFile::text("run.sh", run_sh(job, settings, options)),
+        SceneFile::text("run.sh", run_sh(job, settings, options, scenes.len())),
     ];
+    if scenes.len() > 1 {
+        let rad = |(k, scene): (usize, &Vec<usize>)| {
+            let head = format!("# {}\n# Scene {} of {}.\n", title(job), k + 1, scenes.len());
+            SceneFile::text(&luminaires_name(k), head + &luminaires::rad(job, settings, scale, scene))
+        };
+        files.extend(scenes.iter().enumerate().map(rad));
+    }
     files.extend(luminaires::files(job, settings));
     files
+}
+
+/// The octree of a scene, one of so many.
+pub(super) fn octree(scene: usize, scenes: usize) -> String {
+    if scenes == 1 { "scene.oct".to_owned() } else { format!("scene-{}.oct", scene + 1) }
+}
+
+/// The files that a scene, one of so many, is compiled from.
+pub(super) fn parts(scene: usize, scenes: usize) -> Vec<String> {
+    let luminaires = (scenes > 1).then(|| luminaires_name(scene));
+    std::iter::once("scene.rad".to_owned()).chain(luminaires).collect()
+}
+
+fn luminaires_name(scene: usize) -> String {
+    format!("luminaires-{}.rad", scene + 1)
 }
 
 /// Radiance's units a metre: 1 for ordinary rooms, a power of ten where its absolute tolerances (1e-6) come near.
@@ -58,7 +82,7 @@ fn meters_txt(job: &Job, scale: f64) -> String {
     rows(job, scale).iter().map(row).collect()
 }
 
-fn run_sh(job: &Job, settings: &Settings, options: &Options) -> String {
+fn run_sh(job: &Job, settings: &Settings, options: &Options, scenes: usize) -> String {
     let [r, g, b] = WEIGHTS.map(|w| EFFICACY * w);
     let lux = format!("rcalc -e '$1={r}*$1+{g}*$2+{b}*$3'");
     let mut text = format!(
@@ -68,17 +92,32 @@ fn run_sh(job: &Job, settings: &Settings, options: &Options) -> String {
         title(job)
     );
     text += &luminaires::commands(job, settings);
-    text += "oconv -f scene.rad > scene.oct\n";
-    let rtrace = |args: &[String]| format!("rtrace -h {} scene.oct < meters.txt | {lux}", args.join(" "));
-    let direct = rtrace(&options.direct);
-    let total = rtrace(&options.total);
+    if scenes > 1 {
+        text += "# Rays towards one illum end on the front of another: luminaires that hide one another are read apart and added up.\n";
+    }
+    for scene in 0..scenes {
+        text += &format!("oconv -f {} > {}\n", parts(scene, scenes).join(" "), octree(scene, scenes));
+    }
+    let rtrace = |args: &[String], scene: usize| {
+        format!("rtrace -h {} {} < meters.txt | {lux}", args.join(" "), octree(scene, scenes))
+    };
+    // Prints the light of all scenes, or writes it into a file.
+    let read = |args: &[String], name: &str, into: &str| {
+        if scenes == 1 {
+            return format!("{}{into}\n", rtrace(args, 0));
+        }
+        let files: Vec<String> = (1..=scenes).map(|scene| format!("{name}-{scene}.txt")).collect();
+        let each = files.iter().enumerate().map(|(scene, file)| format!("{} > {file}\n", rtrace(args, scene)));
+        let sum: Vec<String> = (1..=scenes).map(|scene| format!("${scene}")).collect();
+        each.collect::<String>() + &format!("rlam {} | rcalc -e '$1={}'{into}\n", files.join(" "), sum.join("+"))
+    };
     match job.transport {
-        Transport::Direct => text += &format!("{direct}\n"),
-        Transport::Total(_) => text += &format!("{total}\n"),
+        Transport::Direct => text += &read(&options.direct, "direct", ""),
+        Transport::Total(_) => text += &read(&options.total, "total", ""),
         Transport::Indirect(_) => {
             text += "# Indirect light is all light less the direct.\n";
-            let direct = rtrace(&options.part_of_total);
-            text += &format!("{direct} > direct.txt\n{total} > total.txt\n");
+            text += &read(&options.part_of_total, "direct", " > direct.txt");
+            text += &read(&options.total, "total", " > total.txt");
             text += "rlam total.txt direct.txt | rcalc -e '$1=$1-$2'\n";
         }
     }
@@ -90,7 +129,7 @@ fn title(job: &Job) -> String {
     format!("luxproof: case {}, procedure {}", line(&job.case), job.procedure)
 }
 
-fn scene_rad(job: &Job, settings: &Settings, scale: f64) -> String {
+fn scene_rad(job: &Job, settings: &Settings, scale: f64, scenes: &[Vec<usize>]) -> String {
     let mut text = format!("# {}\n# Run by hand: sh run.sh. Units: ", title(job));
     text += &if scale == 1.0 { "metres.\n".to_owned() } else { format!("{scale} to the metre.\n") };
     if let Some(room) = &job.scene.room {
@@ -105,7 +144,9 @@ fn scene_rad(job: &Job, settings: &Settings, scale: f64) -> String {
         text += &format!("\n# Obstacle {k}.\n");
         text += &obstacle_rad(k, obstacle, scale);
     }
-    text += &luminaires::rad(job, settings, scale);
+    if let [all] = scenes {
+        text += &luminaires::rad(job, settings, scale, all);
+    }
     text
 }
 

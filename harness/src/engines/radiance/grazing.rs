@@ -16,15 +16,23 @@ const MOST_PARTS: f64 = 64.0;
 /// The nearest that a meter is taken to be, in radii of a luminaire's opening.
 const CLOSEST: f64 = 0.1;
 /// Ratios of a part's size to its distance (`-ds`), the finest first; 0: a source is one part.
-const RATIOS: [f64; 6] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.0];
+pub(super) const RATIOS: [f64; 6] = [0.02, 0.04, 0.08, 0.16, 0.32, 0.0];
 
-/// The finest division of the sources that leaves out nothing but what any division does.
-pub(super) fn ratio(job: &Job, settings: &Settings) -> f64 {
-    let openings = job.scene.luminaires.iter().filter(|l| route(l, settings) == Route::Opening);
-    let pairs: Vec<(&Luminaire, &Meter)> =
-        openings.flat_map(|l| job.stations.iter().map(move |s| (l, &s.meter))).collect();
-    let is_seen = |ratio: f64| pairs.iter().all(|(l, meter)| is_whole(l, meter, ratio) || !is_whole(l, meter, 0.0));
+/// The finest division of the sources that leaves out nothing at a meter but what any division does.
+pub(super) fn ratio(job: &Job, settings: &Settings, meter: &Meter) -> f64 {
+    let is_opening = |l: &&Luminaire| route(l, settings) == Route::Opening;
+    let is_seen = |ratio: f64| {
+        let mut openings = job.scene.luminaires.iter().filter(is_opening);
+        openings.all(|l| is_whole(l, meter, ratio) || !is_whole(l, meter, 0.0))
+    };
     RATIOS.into_iter().find(|ratio| is_seen(*ratio)).unwrap_or(0.0)
+}
+
+/// The same for all of a job's meters: the coarsest of theirs.
+pub(super) fn ratio_of_all(job: &Job, settings: &Settings) -> f64 {
+    let coarseness = |ratio: &f64| RATIOS.iter().position(|r| r == ratio);
+    let all = job.stations.iter().map(|s| ratio(job, settings, &s.meter));
+    all.max_by_key(coarseness).unwrap_or(RATIOS[0])
 }
 
 /// What direct light at a meter lacks at most, in lux: all of that of luminaires in whose planes it nearly lies.

@@ -58,6 +58,10 @@ fn light_that_grazes_an_opening_is_read_and_what_rtrace_leaves_out_is_told() {
         assert!((value - right).abs() < error, "{below_m} m: {value} +- {uncertainty:?}, {right}");
         assert!(error < 0.02 * right || below_m < 1e-3, "{below_m} m: {uncertainty:?} of {right}");
     }
+    // All of it is left out, which no sample tells.
+    let job = free_field(lamp, &[[-2.0, 1.6, -1e-5], [-2.0, 1.6, -0.3]], DVec3::X);
+    let Estimate { value, uncertainty } = read(&job).estimates[0];
+    assert!(value == 0.0 && uncertainty.bound() > exact_direct_lx(&job)[0], "{uncertainty:?}");
 }
 
 #[test]

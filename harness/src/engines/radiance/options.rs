@@ -55,20 +55,28 @@ impl Sources {
         }
     }
 
-    /// Options of rtrace; a finer subdivision where direct light alone is asked for. Every shadow is tested.
-    fn options(self, job: &Job, settings: &Settings, alone: bool) -> String {
+    /// Arguments for direct light alone.
+    pub(super) fn direct(self, ratio: f64) -> Vec<String> {
+        words(&format!("-I -ab 0 {}", self.options(Some(ratio))))
+    }
+
+    /// Options of rtrace; where direct light alone is asked for, sources are divided to a ratio. Every shadow is tested.
+    fn options(self, alone: Option<f64>) -> String {
         match (self, alone) {
             (Self::Points, _) => "-ds 0 -dj 0 -dt 0 -dc 1".to_owned(),
-            (Self::Openings, true) => format!("-u+ -ds {} -dj 1 -dt 0 -dc 1", grazing::ratio(job, settings)),
-            (Self::Openings, false) => "-ds 0.1 -dj 0 -dt 0 -dc 1".to_owned(),
+            (Self::Openings, Some(ratio)) => format!("-u+ -ds {ratio} -dj 1 -dt 0 -dc 1"),
+            (Self::Openings, None) => "-ds 0.1 -dj 0 -dt 0 -dc 1".to_owned(),
             (Self::Ies2rad, _) => "-ds 0.2 -dj 0 -dt 0 -dc 1".to_owned(),
         }
     }
 }
 
+fn words(text: &str) -> Vec<String> {
+    text.split(' ').map(str::to_owned).collect()
+}
+
 impl Options {
     pub(super) fn of(job: &Job, settings: &Settings, divisions: u32) -> Self {
-        let words = |text: String| -> Vec<String> { text.split(' ').map(str::to_owned).collect() };
         // -I: irradiance at points.
         if settings.preset == Preset::Default {
             let bounces = match job.reflections() {
@@ -76,8 +84,8 @@ impl Options {
                 Some(Bounces::Converged) => DEFAULT_BOUNCES,
                 None => 0,
             };
-            let direct = words("-I -ab 0".into());
-            return Self { part_of_total: direct.clone(), direct, total: words(format!("-I -ab {bounces}")) };
+            let direct = words("-I -ab 0");
+            return Self { part_of_total: direct.clone(), direct, total: words(&format!("-I -ab {bounces}")) };
         }
         let sources = Sources::of(job, settings);
         // -u+: random numbers proper, since the fixed sequence of -u- repeats a bias of .3 % in every block (case S1,
@@ -86,9 +94,9 @@ impl Options {
         let ambient = format!("-u+ -aa 0 -ad {divisions} -as 0 -lr 0 -lw {:e}", ROULETTE / f64::from(divisions));
         let bounces = bounces(job);
         Self {
-            direct: words(format!("-I -ab 0 {}", sources.options(job, settings, true))),
-            total: words(format!("-I -ab {bounces} {} {ambient}", sources.options(job, settings, false))),
-            part_of_total: words(format!("-I -ab 0 {}", sources.options(job, settings, false))),
+            direct: sources.direct(grazing::ratio_of_all(job, settings)),
+            total: words(&format!("-I -ab {bounces} {} {ambient}", sources.options(None))),
+            part_of_total: words(&format!("-I -ab 0 {}", sources.options(None))),
         }
     }
 }

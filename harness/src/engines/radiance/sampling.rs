@@ -5,7 +5,9 @@
 
 use std::ops::Range;
 
-use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options, ROULETTE, bounces};
+use super::export;
+use super::grazing;
+use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options, ROULETTE, Sources, bounces};
 use super::settings::Settings;
 use super::tools::Tools;
 use crate::engines::blocks::{Blocks, MIN_BLOCKS, Sampled, Sampling};
@@ -50,6 +52,8 @@ pub(super) struct Sampler<'a> {
     pub(super) tools: &'a Tools,
     pub(super) workbench: &'a Workbench,
     pub(super) rows: Vec<[f64; 6]>,
+    /// How many scenes there are, whose light adds up.
+    pub(super) scenes: usize,
 }
 
 /// Direct light that is subtracted should add little to the error.
@@ -58,14 +62,29 @@ const DIRECT_ERROR: f64 = 0.3;
 const DIRECT_SHARE: f64 = 0.3;
 
 impl Sampler<'_> {
-    /// Direct light of openings, whose samples are jittered; in one process a wave.
-    pub(super) fn direct(&self, options: &Options) -> Result<Sampled, EngineError> {
+    /// Direct light of openings, whose samples are jittered, each meter's with its own division of the sources; in one process a wave and a
+    /// division.
+    pub(super) fn direct(&self) -> Result<Sampled, EngineError> {
         let Budget { relative_error, seconds } = self.job.budget;
         let (error, share) = if self.job.reflections().is_none() { (1.0, 1.0) } else { (DIRECT_ERROR, DIRECT_SHARE) };
         let budget = Budget { relative_error: error * relative_error, seconds: share * seconds };
         let rays = self.rows.len() as f64 * effort::shadow_rays(self.job, MAX_PARTS);
         let rule = Sampling::within(budget, SHADOW_RAY_S * rays * effort::a_ray(self.job));
-        rule.run(|numbers| self.process(&options.direct, Stream::Direct, &numbers))
+        let ratios: Vec<f64> =
+            self.job.stations.iter().map(|s| grazing::ratio(self.job, self.settings, &s.meter)).collect();
+        rule.run(|numbers| {
+            let mut blocks = vec![vec![0.0; self.rows.len()]; numbers.len()];
+            for ratio in grazing::RATIOS {
+                let stations: Vec<usize> = (0..ratios.len()).filter(|k| ratios[*k] == ratio).collect();
+                let rows: Vec<[f64; 6]> = stations.iter().map(|k| self.rows[*k]).collect();
+                let options = Sources::Openings.direct(ratio);
+                let read = self.process(&options, Stream::Direct, &numbers, &rows)?;
+                for (block, read) in blocks.iter_mut().zip(read) {
+                    stations.iter().zip(read).for_each(|(k, lx)| block[*k] = lx);
+                }
+            }
+            Ok(blocks)
+        })
     }
 
     /// Blocks of all light as the preset asks for; `known_lx` is direct light that does not count for the error asked.
@@ -108,7 +127,7 @@ impl Sampler<'_> {
 
     fn block_s(&self, divisions: u32) -> f64 {
         let (hits, reflecting) = self.hits();
-        let rays = hits + reflecting * effort::shadow_rays(self.job, PARTS);
+        let rays = hits * self.scenes as f64 + reflecting * effort::shadow_rays(self.job, PARTS);
         RAY_S * f64::from(divisions) * self.rows.len() as f64 * rays * effort::a_ray(self.job)
     }
 
@@ -137,27 +156,44 @@ impl Sampler<'_> {
         numbers: Range<usize>,
     ) -> Result<Vec<Vec<f64>>, EngineError> {
         let blocks: Vec<usize> = numbers.collect();
-        let one = |k: &usize| self.process(options, stream, &(*k..k + 1));
+        let one = |k: &usize| self.process(options, stream, &(*k..k + 1), &self.rows);
         let read = side_by_side(self.workbench.jobs.clamp(1, MAX_PARALLEL), &blocks, one);
         Ok(read.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
     }
 
-    /// Blocks that follow one another in one process.
+    /// Blocks of some rows that follow one another in one process; none of no rows.
     fn process(
         &self,
         options: &[String],
         stream: Stream,
         numbers: &Range<usize>,
+        rows: &[[f64; 6]],
     ) -> Result<Vec<Vec<f64>>, EngineError> {
-        let rows: Vec<[f64; 6]> = std::iter::repeat_n(&self.rows, numbers.len()).flatten().copied().collect();
-        let seed = seed(&[self.job.seed, stream as u64, numbers.start as u64]);
-        let read = self.tools.rtrace(self.workbench, options, seed, &rows)?;
-        Ok(read.chunks(self.rows.len()).map(<[f64]>::to_vec).collect())
+        let Some(first) = rows.first() else { return Ok(vec![]) };
+        let all: Vec<[f64; 6]> = std::iter::repeat_n(rows, numbers.len()).flatten().copied().collect();
+        // Rows that are read apart draw other numbers.
+        let place = self.rows.iter().position(|row| row == first).unwrap_or(0);
+        let own = (place > 0).then_some(place as u64);
+        let stream: Vec<u64> = [self.job.seed, stream as u64, numbers.start as u64].into_iter().chain(own).collect();
+        let read = self.all_scenes(options, &stream, &all)?;
+        Ok(read.chunks(rows.len()).map(<[f64]>::to_vec).collect())
     }
 
     /// Light that rtrace finds anew each time to the last digit.
     pub(super) fn determined(&self, options: &[String]) -> Result<Vec<f64>, EngineError> {
-        self.tools.rtrace(self.workbench, options, seed(&[self.job.seed]), &self.rows)
+        self.all_scenes(options, &[self.job.seed], &self.rows)
+    }
+
+    /// What all scenes give together, each with random numbers of its own.
+    fn all_scenes(&self, options: &[String], stream: &[u64], rows: &[[f64; 6]]) -> Result<Vec<f64>, EngineError> {
+        let mut sum = vec![0.0; rows.len()];
+        for scene in 0..self.scenes {
+            let own: Vec<u64> = stream.iter().copied().chain((scene > 0).then_some(u64::MAX - scene as u64)).collect();
+            let octree = export::octree(scene, self.scenes);
+            let read = self.tools.rtrace(self.workbench, options, &octree, seed(&own), rows)?;
+            sum.iter_mut().zip(read).for_each(|(sum, lx)| *sum += lx);
+        }
+        Ok(sum)
     }
 
     pub(super) fn options(&self, divisions: u32) -> Vec<String> {

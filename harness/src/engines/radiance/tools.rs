@@ -17,8 +17,6 @@ pub(super) struct Tools {
     clock: PathBuf,
 }
 
-const OCTREE: &str = "scene.oct";
-
 impl Tools {
     pub(super) fn find(site: &Site) -> Result<Self, Absent> {
         let absent = |reason: String| Absent { reason, remedy: "run `luxproof engines install`".into() };
@@ -45,9 +43,13 @@ impl Tools {
         Ok(Version::of(&ID, version, site, [self.package.clone(), self.clock.clone()]))
     }
 
-    pub(super) fn compile(&self, workbench: &Workbench) -> Result<(), EngineError> {
-        let run = self.prepared(workbench.invoke(self.program("oconv"))).args(["-f", "scene.rad"]);
-        workbench.write(&[SceneFile { name: OCTREE.to_owned(), bytes: run.run()?.stdout }])
+    pub(super) fn compile(&self, workbench: &Workbench, scenes: usize) -> Result<(), EngineError> {
+        for scene in 0..scenes {
+            let compiled = self.prepared(workbench.invoke(self.program("oconv")));
+            let compiled = compiled.args(["-f".to_owned()]).args(export::parts(scene, scenes)).run()?;
+            workbench.write(&[SceneFile { name: export::octree(scene, scenes), bytes: compiled.stdout }])?;
+        }
+        Ok(())
     }
 
     /// Lets ies2rad make `luminaire-<k>.rad`, where the luminaire goes that way.
@@ -79,12 +81,13 @@ impl Tools {
         &self,
         workbench: &Workbench,
         options: &[String],
+        octree: &str,
         seed: u32,
         rows: &[[f64; 6]],
     ) -> Result<Vec<f64>, EngineError> {
         let stdin = rows.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         let run = self.seeded(workbench.invoke(self.program("rtrace")), seed);
-        let finished = run.args(["-h", "-fdd"]).args(options).args([OCTREE]).stdin(stdin).run()?;
+        let finished = run.args(["-h", "-fdd"]).args(options).args([octree]).stdin(stdin).run()?;
         parse(&finished.stdout, rows.len())
     }
 

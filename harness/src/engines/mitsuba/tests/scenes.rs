@@ -146,3 +146,8 @@ fn what_cannot_be_read_well_is_said_beforehand() {
     impostor.scene.luminaires[0].model = LuminaireModel::Impostor;
     assert!(matches!(support(&impostor), Support::No(_)));
 }
+
+#[test]
+fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
+    crate::engines::shared_tests::bounds_hold_and_decide(read, false);
+}
