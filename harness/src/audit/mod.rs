@@ -73,6 +73,8 @@ pub struct Options<'a> {
     pub after_failure: AfterFailure,
     /// Whether engines read scenes of known answer besides.
     pub calibration: Calibration,
+    /// Whether it is asked why what fails does.
+    pub diagnosis: Diagnosis,
     pub observer: &'a dyn Observer,
 }
 
@@ -82,6 +84,14 @@ pub enum Calibration {
     /// They do, and are judged by them like by any other case.
     Judged,
     /// They do not, and the report says so.
+    LeftOut,
+}
+
+/// Whether it is asked why what fails does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Diagnosis {
+    Sought,
+    /// It takes longer than many a case, and who asks for verdicts alone has no use for it.
     LeftOut,
 }
 
@@ -108,6 +118,7 @@ impl Options<'_> {
             sampling: None,
             after_failure: AfterFailure::GoOn,
             calibration: Calibration::Judged,
+            diagnosis: Diagnosis::Sought,
             observer: &Silent,
         }
     }
@@ -232,7 +243,9 @@ fn audited(
     let side = if options.after_failure == AfterFailure::Stop { 1 } else { options.jobs.clamp(1, MAX_CASES_AT_A_TIME) };
     let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
     let mut reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
-    diagnose(&plans, &mut reports);
+    if options.diagnosis == Diagnosis::Sought {
+        diagnose(&plans, &mut reports);
+    }
     for (case, report) in cases.iter().zip(&mut reports) {
         let folder = folder_of(case);
         if folder != options.out && report.comparisons.iter().any(|c| c.diagnosis.is_some()) {

@@ -2,6 +2,7 @@
 
 pub mod bench;
 mod deviation;
+mod draw;
 pub mod selftest;
 pub mod stress;
 mod tables;

@@ -6,16 +6,18 @@ mod build;
 mod cases;
 mod content;
 mod locate;
-mod model;
+pub mod model;
 mod mounting;
 mod suite;
+mod write;
 
 use std::path::{Path, PathBuf};
 
 pub use build::Case;
 pub use content::content;
 pub use model::{Budget, EngineSettings, Spec, ToleranceOverride};
-pub use suite::{filtered, suite};
+pub use suite::{filtered, specs, suite};
+pub use write::yaml;
 
 /// What is wrong with a spec, where, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
