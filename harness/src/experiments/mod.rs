@@ -3,6 +3,7 @@
 pub mod bench;
 mod deviation;
 mod draw;
+pub mod hunt;
 pub mod selftest;
 pub mod stress;
 mod tables;
