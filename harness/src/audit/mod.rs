@@ -75,6 +75,7 @@ pub struct Options<'a> {
     pub calibration: Calibration,
     /// Whether it is asked why what fails does.
     pub diagnosis: Diagnosis,
+    pub stated_errors: StatedErrors,
     pub observer: &'a dyn Observer,
 }
 
@@ -93,6 +94,15 @@ pub enum Diagnosis {
     Sought,
     /// It takes longer than many a case, and who asks for verdicts alone has no use for it.
     LeftOut,
+}
+
+/// Whether what programs of users' state of their errors is looked into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StatedErrors {
+    /// They read again with other seeds.
+    LookedInto,
+    /// Nothing is read again: for many looks at once, of which the last is made with open eyes.
+    Believed,
 }
 
 /// What a failed case means to those after it.
@@ -119,6 +129,7 @@ impl Options<'_> {
             after_failure: AfterFailure::GoOn,
             calibration: Calibration::Judged,
             diagnosis: Diagnosis::Sought,
+            stated_errors: StatedErrors::LookedInto,
             observer: &Silent,
         }
     }

@@ -21,8 +21,8 @@ use self::draft::Draft;
 pub use self::feature::{Feature, FeatureCoverage};
 pub use self::finding::{Finding, KnownFinding};
 use self::grammar::{Generated, Grammar, ROUND};
+use self::oracle::{Look, Question, Sighting, Tribunal, Tried, panicked, sightings};
 pub use self::oracle::{Oracle, Sign, Symptom};
-use self::oracle::{Question, Sighting, Tribunal, Tried, panicked, sightings};
 use self::shrink::{Shrinker, Shrunk, level};
 use crate::audit::{AuditError, Diagnosis};
 use crate::engines::Site;
@@ -227,8 +227,7 @@ impl Hunter<'_> {
         let question = Question {
             symptom: None,
             procedures: self.options.procedures.clone(),
-            seed: self.options.seed,
-            diagnosis: Diagnosis::LeftOut,
+            look: Look::with(self.options.seed),
         };
         match self.tribunal.audit(&paths, &question, &folder.join("out"))? {
             Tried::Report(report) => {
@@ -267,7 +266,7 @@ impl Hunter<'_> {
             return Ok(());
         };
         (self.options.told)(&format!("{}: {}: shrinking", generated.name, sighting.symptom));
-        let diagnosis = sighting.text.clone();
+        let diagnosis = sighting.diagnosis();
         let until = (Instant::now() + self.options.shrink).min(end + self.options.shrink);
         let start = (generated.draft.clone(), sighting);
         let shrunk = Shrinker::new(&self.tribunal, start, self.options.seed + 3 * OTHER_SEED, until).run()?;
@@ -292,7 +291,8 @@ impl Hunter<'_> {
         let mut found = None;
         for (k, diagnosis) in [Diagnosis::Sought, Diagnosis::LeftOut].into_iter().enumerate() {
             let seed = self.options.seed + (k as u64 + 1) * OTHER_SEED;
-            let again = self.tribunal.shows(&[draft], &sighting.symptom, seed, diagnosis)?.pop().flatten();
+            let look = Look { diagnosis, ..Look::with(seed) };
+            let again = self.tribunal.shows(&[draft], &sighting.symptom, look)?.pop().flatten();
             let Some(again) = again.filter(|s| s.p_value <= level(self.confirmed)) else { return Ok(None) };
             found.get_or_insert(again);
         }
@@ -376,8 +376,7 @@ pub fn shrink(options: &ShrinkOptions<'_>) -> Result<Shrinking, HuntError> {
         let question = Question {
             symptom: None,
             procedures: options.procedures.clone(),
-            seed: options.seed,
-            diagnosis: Diagnosis::Sought,
+            look: Look { diagnosis: Diagnosis::Sought, ..Look::with(options.seed) },
         };
         let all = match tribunal.audit(&[path], &question, &own.path().join("out"))? {
             Tried::Report(report) => sightings(&report, "c0", &engines),
@@ -385,7 +384,7 @@ pub fn shrink(options: &ShrinkOptions<'_>) -> Result<Shrinking, HuntError> {
             Tried::Panicked => vec![panicked()],
         };
         let Some(sighting) = all.into_iter().find(|s| s.p_value <= level(1)) else { continue };
-        let diagnosis = sighting.text.clone();
+        let diagnosis = sighting.diagnosis();
         let until = Instant::now() + options.time;
         let Shrunk { draft, sighting, looks, is_minimal } =
             Shrinker::new(&tribunal, (draft, sighting), options.seed + OTHER_SEED, until).run()?;

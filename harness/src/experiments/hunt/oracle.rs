@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::draft::Draft;
 use super::grammar::Engines;
-use crate::audit::{self, AuditError, Calibration, Diagnosis, Options};
+use crate::audit::{self, AuditError, Calibration, Diagnosis, Options, StatedErrors};
 use crate::engines::{self, Coordinates, Site};
 use crate::experiments::Progress;
 use crate::experiments::stress::{self, Magnitudes};
@@ -77,6 +77,13 @@ pub(super) struct Sighting {
     pub(super) text: Option<String>,
 }
 
+impl Sighting {
+    /// The fault that explains the failing reading, where one does.
+    pub(super) fn diagnosis(&self) -> Option<String> {
+        self.comparison.as_ref().filter(|c| c.verdict == Verdict::Fail)?.diagnosis.clone()
+    }
+}
+
 /// What of a report is about one case.
 struct OfCase<'a> {
     report: &'a Report,
@@ -119,7 +126,7 @@ impl OfCase<'_> {
             comparison: Some(worst.clone()),
             p_value: worst.p_value.unwrap_or(0.0),
             size: worst.relative_deviation,
-            text: worst.diagnosis.clone(),
+            text: None,
         }
     }
 
@@ -184,8 +191,22 @@ pub(super) struct Question {
     /// Only this symptom, where one is followed up.
     pub(super) symptom: Option<Symptom>,
     pub(super) procedures: Vec<ProcedureId>,
+    pub(super) look: Look,
+}
+
+/// How closely engines are looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
     pub(super) seed: u64,
     pub(super) diagnosis: Diagnosis,
+    pub(super) stated_errors: StatedErrors,
+}
+
+impl Look {
+    /// For a verdict alone.
+    pub(super) const fn with(seed: u64) -> Self {
+        Self { seed, diagnosis: Diagnosis::LeftOut, stated_errors: StatedErrors::LookedInto }
+    }
 }
 
 /// What an audit of several specs gave.
@@ -207,9 +228,10 @@ impl Tribunal<'_> {
         let procedures = question.symptom.as_ref().map_or_else(|| question.procedures.clone(), |s| vec![s.procedure]);
         let options = Options {
             jobs: self.jobs,
-            selection: Selection { engines, procedures, seed: question.seed },
+            selection: Selection { engines, procedures, seed: question.look.seed },
             calibration: Calibration::LeftOut,
-            diagnosis: question.diagnosis,
+            diagnosis: question.look.diagnosis,
+            stated_errors: question.look.stated_errors,
             sampling: Some(Sampling::Decided),
             ..Options::new(self.site.clone(), out.to_owned())
         };
@@ -226,8 +248,7 @@ impl Tribunal<'_> {
         &self,
         drafts: &[&Draft],
         symptom: &Symptom,
-        seed: u64,
-        diagnosis: Diagnosis,
+        look: Look,
     ) -> Result<Vec<Option<Sighting>>, AuditError> {
         let folder = tempfile::tempdir().map_err(|source| no_folder(&std::env::temp_dir(), source))?;
         let mut paths: Vec<Option<PathBuf>> = vec![];
@@ -241,7 +262,7 @@ impl Tribunal<'_> {
             let laws = [law.clone()];
             let broken = |path: &Option<PathBuf>| {
                 let case = Case::load(path.as_ref()?).ok()?;
-                self.broken(&case, Some(&symptom.engine), &laws, seed).into_iter().find(|s| s.symptom == *symptom)
+                self.broken(&case, Some(&symptom.engine), &laws, look.seed).into_iter().find(|s| s.symptom == *symptom)
             };
             return Ok(paths.iter().map(broken).collect());
         }
@@ -250,7 +271,7 @@ impl Tribunal<'_> {
         if sound.is_empty() {
             return Ok(found);
         }
-        let question = Question { symptom: Some(symptom.clone()), procedures: vec![], seed, diagnosis };
+        let question = Question { symptom: Some(symptom.clone()), procedures: vec![], look };
         match self.audit(&sound, &question, &folder.path().join("out"))? {
             Tried::Report(report) => {
                 for (k, _) in paths.iter().enumerate().filter(|(_, path)| path.is_some()) {
@@ -267,7 +288,7 @@ impl Tribunal<'_> {
             // Who of them it was shows one by one.
             Tried::Panicked => {
                 for (k, draft) in drafts.iter().enumerate().filter(|(k, _)| paths[*k].is_some()) {
-                    found[k] = self.shows(&[draft], symptom, seed, diagnosis)?.pop().flatten();
+                    found[k] = self.shows(&[draft], symptom, look)?.pop().flatten();
                 }
             }
         }

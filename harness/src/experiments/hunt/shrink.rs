@@ -7,9 +7,9 @@ use std::time::Instant;
 use sha2::{Digest, Sha256};
 
 use super::draft::Draft;
-use super::oracle::{Sighting, Tribunal};
+use super::oracle::{Look, Sighting, Tribunal};
 use super::steps::{self, Step};
-use crate::audit::{AuditError, Diagnosis};
+use crate::audit::{AuditError, StatedErrors};
 use crate::system::process;
 
 /// The chance that all looks of a shrinking share of taking chance for a failure.
@@ -35,6 +35,7 @@ pub(super) struct Shrinker<'a> {
     sighting: Sighting,
     looks: usize,
     tried: HashSet<Vec<u8>>,
+    stated_errors: StatedErrors,
 }
 
 impl<'a> Shrinker<'a> {
@@ -45,10 +46,44 @@ impl<'a> Shrinker<'a> {
         seed: u64,
         until: Instant,
     ) -> Self {
-        Self { tribunal, seed, until, best: draft, sighting, looks: 0, tried: HashSet::new() }
+        Self {
+            tribunal,
+            seed,
+            until,
+            best: draft,
+            sighting,
+            looks: 0,
+            tried: HashSet::new(),
+            stated_errors: StatedErrors::LookedInto,
+        }
     }
 
+    /// What claims no chance is taken by its word meanwhile, since to ask again costs as much as to ask; what is left must show with
+    /// open eyes, or else all of it is done again so.
     pub(super) fn run(mut self) -> Result<Shrunk, AuditError> {
+        let claims_chance = self.sighting.comparison.as_ref().is_some_and(|c| c.uncertainty.is_sampled());
+        let start = (self.best.clone(), self.sighting.clone());
+        if !claims_chance {
+            self.stated_errors = StatedErrors::Believed;
+        }
+        let shrunk = self.descend()?;
+        if claims_chance || process::is_interrupted() || self.shows_again(&shrunk)? {
+            return Ok(shrunk);
+        }
+        (self.best, self.sighting) = start;
+        self.tried.clear();
+        self.stated_errors = StatedErrors::LookedInto;
+        self.descend()
+    }
+
+    fn shows_again(&mut self, shrunk: &Shrunk) -> Result<bool, AuditError> {
+        self.looks += 1;
+        let look = Look::with(self.seed.wrapping_add(self.looks as u64));
+        let again = self.tribunal.shows(&[&shrunk.draft], &shrunk.sighting.symptom, look)?.pop().flatten();
+        Ok(again.is_some_and(|s| s.p_value <= level(self.looks)))
+    }
+
+    fn descend(&mut self) -> Result<Shrunk, AuditError> {
         // What is left out first makes all further looks cheaper; it may take more digits than it saves.
         self.take_first(steps::focused(&self.best, &self.sighting))?;
         let mut is_minimal = false;
@@ -61,7 +96,8 @@ impl<'a> Shrinker<'a> {
             }
         }
         let is_minimal = is_minimal && !self.is_over();
-        Ok(Shrunk { draft: self.best.tidied(), sighting: self.sighting, looks: self.looks, is_minimal })
+        let (draft, sighting) = (self.best.clone().tidied(), self.sighting.clone());
+        Ok(Shrunk { draft, sighting, looks: self.looks, is_minimal })
     }
 
     fn is_over(&self) -> bool {
@@ -84,7 +120,8 @@ impl<'a> Shrinker<'a> {
             }
             let seed = self.seed.wrapping_add(self.looks as u64);
             let drafts: Vec<&Draft> = batch.iter().collect();
-            let found = self.tribunal.shows(&drafts, &self.sighting.symptom, seed, Diagnosis::LeftOut)?;
+            let look = Look { stated_errors: self.stated_errors, ..Look::with(seed) };
+            let found = self.tribunal.shows(&drafts, &self.sighting.symptom, look)?;
             for (draft, found) in batch.iter().zip(found) {
                 self.looks += 1;
                 if let Some(sighting) = found.filter(|s| s.p_value <= level(self.looks)) {

@@ -47,7 +47,9 @@ pub(super) fn distribution(draw: &mut Draw, allowed: &BTreeSet<Feature>) -> Lumi
     let mut candela: Vec<f64> = Vec::with_capacity(count);
     for &c in &c_deg {
         for &gamma in &gamma_deg {
-            candela.push(to_digits(value(draw, c, gamma), 4));
+            let candela_there = value(draw, c, gamma);
+            // The cosine of 90 degrees is not quite zero, but nobody measures that.
+            candela.push(if candela_there > 1e-12 * peak { to_digits(candela_there, 4) } else { 0.0 });
         }
     }
     if c_deg.len() > 2 && has(draw, Feature::OddValue, 3) {
