@@ -116,7 +116,13 @@ pub fn hunt(options: &Options<'_>) -> Result<Hunt, HuntError> {
     let grammar = Grammar { seed: options.seed, engines: &options.engines, budget: options.budget };
     let end = clock + options.time;
     while Instant::now() < end && !process::is_interrupted() && !hunter.has_enough() {
+        let before = hunter.hunt.clone();
         hunter.round(&grammar, end)?;
+        if process::is_interrupted() {
+            // The round is begun again another time; what it found by now stays.
+            let findings = std::mem::take(&mut hunter.hunt.findings);
+            hunter.hunt = Hunt { findings, ..before };
+        }
         hunter.hunt.seconds = before_s + clock.elapsed().as_secs_f64();
         hunter.keep()?;
     }
