@@ -181,7 +181,7 @@ fn export(
         made.and_then(|()| std::fs::write(&path, &file.bytes)).map_err(|e| file_error(&path, e))?;
     }
     if let Some(command) = &command {
-        let path = folder.join("run.sh");
+        let path = folder.join("by-hand.sh");
         let script = format!(
             "#!/bin/sh\n# What luxproof runs, by hand, in this folder.\ncd \"$(dirname \"$0\")\" && {command}\n"
         );
