@@ -11,6 +11,7 @@ mod cylindrical;
 mod external_adapter;
 mod furnished_office;
 mod guide;
+mod hunt;
 mod main_job;
 mod measuring;
 mod mesh_files;

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::{Instant, SystemTime};
 
-use super::jobs::{self, Outcome, Running};
-use super::{AuditError, Options, repetition, sampling, sequential};
+use super::jobs::{self, Found, Outcome, Running};
+use super::{AuditError, Options, StatedErrors, repetition, sampling, sequential};
 use crate::judge::{Comparison, Judge, Policy, Published};
 use crate::measure::Reader;
 use crate::plan::{Plan, Skip};
@@ -83,7 +83,10 @@ impl Audit<'_> {
         let running = Running { case, plan, folder, reader, observer };
         let mut outcome = running.run()?;
         if !process::is_interrupted() {
-            let stated = repetition::examine(&running, judge, &mut outcome);
+            let stated = match self.options.stated_errors {
+                StatedErrors::LookedInto => repetition::examine(&running, judge, &mut outcome),
+                StatedErrors::Believed => Found::new(),
+            };
             sampling::sample_on(&running, judge, &stated, &mut outcome)?;
         }
         if outcome.from_cache > 0 {

@@ -10,9 +10,11 @@ use super::observer::Observer;
 use parking_lot::Mutex;
 
 use crate::engines::{EngineError, Measurement};
-use crate::measure::{Cost, Failure, FailureKind, Question, Reader, Source, Taken};
+use crate::measure::{Cost, Failure, Question, Reader, Source, Taken};
 use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
-use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, StatedErrors, Status};
+use crate::record::{
+    EngineName, EngineStatus, FailureKind, ProcedureId, Reading, ReadingKey, Recording, StatedErrors, Status,
+};
 use crate::spec::{Case, content};
 use crate::system::files::{self, FileError};
 use crate::system::slots::side_by_side;
@@ -108,6 +110,7 @@ impl Running<'_> {
     fn record(&self, run: &Run, taken: Result<Taken, Failure>, wall: Duration) -> Recording {
         let (planned, task) = (&self.plan.engines[run.engine], &self.plan.tasks[run.task]);
         let engine = planned.engine.name();
+        let failure_kind = taken.as_ref().err().map(|failure| failure.kind);
         let (measurement, wall_s, failure) = match taken {
             Ok(taken) => (taken.measurement, taken.cost.wall_s, None),
             Err(error) => {
@@ -140,6 +143,7 @@ impl Running<'_> {
             components: planned.engine.components(&run.job),
             command: planned.engine.command_by_hand(&run.job, &self.reader.site),
             failure,
+            failure_kind,
             readings: readings.collect(),
             ..Recording::of(ReadingKey::new(&self.case.name, task.procedure, engine), task.light())
         }

@@ -73,6 +73,9 @@ pub struct Options<'a> {
     pub after_failure: AfterFailure,
     /// Whether engines read scenes of known answer besides.
     pub calibration: Calibration,
+    /// Whether it is asked why what fails does.
+    pub diagnosis: Diagnosis,
+    pub stated_errors: StatedErrors,
     pub observer: &'a dyn Observer,
 }
 
@@ -83,6 +86,23 @@ pub enum Calibration {
     Judged,
     /// They do not, and the report says so.
     LeftOut,
+}
+
+/// Whether it is asked why what fails does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Diagnosis {
+    Sought,
+    /// It takes longer than many a case, and who asks for verdicts alone has no use for it.
+    LeftOut,
+}
+
+/// Whether what programs of users' state of their errors is looked into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StatedErrors {
+    /// They read again with other seeds.
+    LookedInto,
+    /// Nothing is read again: for many looks at once, of which the last is made with open eyes.
+    Believed,
 }
 
 /// What a failed case means to those after it.
@@ -108,6 +128,8 @@ impl Options<'_> {
             sampling: None,
             after_failure: AfterFailure::GoOn,
             calibration: Calibration::Judged,
+            diagnosis: Diagnosis::Sought,
+            stated_errors: StatedErrors::LookedInto,
             observer: &Silent,
         }
     }
@@ -232,7 +254,9 @@ fn audited(
     let side = if options.after_failure == AfterFailure::Stop { 1 } else { options.jobs.clamp(1, MAX_CASES_AT_A_TIME) };
     let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
     let mut reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
-    diagnose(&plans, &mut reports);
+    if options.diagnosis == Diagnosis::Sought {
+        diagnose(&plans, &mut reports);
+    }
     for (case, report) in cases.iter().zip(&mut reports) {
         let folder = folder_of(case);
         if folder != options.out && report.comparisons.iter().any(|c| c.diagnosis.is_some()) {

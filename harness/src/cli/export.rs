@@ -7,8 +7,8 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::diagnostic::diagnose;
 use super::{complain, print};
-use crate::engines::{self, Site};
-use crate::plan::{Selection, plan};
+use crate::engines::Site;
+use crate::plan::{Export, NotExported, Selection, plan};
 use crate::record::ProcedureId;
 use crate::report::Exit;
 use crate::spec::{Case, suite};
@@ -49,15 +49,16 @@ fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Resul
     let plan = plan(case, &selection, site).map_err(diagnose)?;
     let chosen = |e: usize| plan.engines[e].engine.name() == args.engine;
     let mut exported = 0;
-    // An export needs no installed engine: what is skipped for absence is exported all the same.
-    for (e, planned) in plan.engines.iter().enumerate().filter(|(e, _)| chosen(*e)) {
+    for e in (0..plan.engines.len()).filter(|e| chosen(*e)) {
         for task in &plan.tasks {
-            let job = plan.job(case, e, task, selection.seed);
-            if let engines::Support::No(reason) = planned.engine.supports(&job) {
-                complain(&format!("{}: {reason}", task.procedure));
-                continue;
-            }
-            let files = planned.engine.export(&job).into_diagnostic()?;
+            let Export { files, command } = match plan.export(case, e, task, selection.seed, site) {
+                Ok(export) => export,
+                Err(NotExported::Unsupported(reason)) => {
+                    complain(&format!("{}: {reason}", task.procedure));
+                    continue;
+                }
+                Err(NotExported::Engine(error)) => return Err(error).into_diagnostic(),
+            };
             let folder = out.join(task.procedure.name());
             std::fs::create_dir_all(&folder).into_diagnostic()?;
             for file in &files {
@@ -65,7 +66,7 @@ fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Resul
                 std::fs::write(&path, &file.bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
                 print(&format!("{}\n", path.display()))?;
             }
-            if let Some(command) = planned.engine.command_by_hand(&job, site) {
+            if let Some(command) = command {
                 print(&format!("  cd {} && {command}\n", folder.display()))?;
             }
             exported += files.len();

@@ -9,6 +9,7 @@ mod diff;
 mod engines;
 mod export;
 mod history;
+mod hunt;
 mod measuring;
 pub(crate) mod photometry;
 mod progress;
@@ -86,6 +87,10 @@ enum Command {
     },
     /// Run time against error, for every engine, solver and preset
     Bench(bench::BenchArgs),
+    /// Random specs until engines, witnesses or laws disagree; each finding shrunk, in a folder to hand over
+    Hunt(hunt::HuntArgs),
+    /// The smallest spec in which an engine still fails the same way
+    Shrink(hunt::ShrinkArgs),
     /// Numerical stability: laws that must hold whatever the scene, driven until something breaks
     Stress(stress::StressArgs),
     /// Take one reading for another process of this program
@@ -210,6 +215,8 @@ impl Cli {
             Command::Accept(args) => accept::accept(&args),
             Command::Selftest(args) => selftest::run_selftest(&args, &site, || cache::folder(self.cache_dir)),
             Command::Bench(args) => bench::run(&args, &site),
+            Command::Hunt(args) => hunt::run(&args, &site),
+            Command::Shrink(args) => hunt::shrink(&args, &site),
             Command::Stress(args) => stress::run(&args, &site),
             Command::ReadOne => measuring::read_one(&site),
             Command::Schema { of } => schema(of),

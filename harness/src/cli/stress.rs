@@ -9,7 +9,7 @@ use super::diagnostic::diagnose;
 use super::measuring::{Bar, MeasuringArgs};
 use super::{json, print};
 use crate::engines::{Coordinates, Site};
-use crate::experiments::stress::{self, Options, StressReport};
+use crate::experiments::stress::{self, Magnitudes, Options, StressReport};
 use crate::judge::KnownDeviations;
 use crate::laws;
 use crate::record::EngineName;
@@ -76,6 +76,7 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
             budget: Budget { relative_error: 1e-3, seconds: args.seconds },
             limit: Duration::from_secs_f64(args.limit.clamp(1.0, 1e9)),
             laws: &args.laws,
+            magnitudes: Magnitudes::All,
             seed: args.measuring.seed,
             coordinates: if args.raw { Coordinates::Raw } else { Coordinates::Fitted },
             known: if args.raw { &[] } else { record.breaks() },

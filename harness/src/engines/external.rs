@@ -26,6 +26,9 @@ const FOLDER_VARIABLE: &str = "LUXPROOF_SCENE_DIR";
 
 const JOB_FILE: &str = "job.json";
 
+/// The setting that names the folder in which it runs and from which its paths count, in place of the spec's.
+pub(crate) const RUN_IN: &str = "run_in";
+
 /// Folders of programs that have nothing to do with each other.
 const INSTALLED: [&str; 6] = ["/bin", "/sbin", "/usr/bin", "/usr/sbin", "/usr/local/bin", "/usr/local/sbin"];
 
@@ -76,7 +79,12 @@ impl External {
         }
         // The folder of a spec that is named without one is the working directory.
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        let folder = std::path::absolute(folder).map_err(|e| EngineError::io(folder, e))?;
+        let folder = match settings.get(RUN_IN).map(serde_json::Value::as_str) {
+            None => folder.to_owned(),
+            Some(Some(other)) => folder.join(other),
+            Some(None) => return Err(error(RUN_IN, "must be a folder")),
+        };
+        let folder = std::path::absolute(&folder).map_err(|e| EngineError::io(&folder, e))?;
         let list = |key: &str| match words(key) {
             None => Ok(vec![]),
             Some(list) => list.map_err(|_| error(key, "must be a list of names")),

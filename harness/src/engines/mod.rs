@@ -40,6 +40,7 @@ pub use contract::{
     checked, share,
 };
 use contract::{OWN_LOOKUP, geometry_mib};
+pub(crate) use external::RUN_IN;
 pub use external::{ExternalJob, ExternalReadings};
 pub(crate) use iesna::method as method_of_iesna;
 pub use install::{InstallOutcome, InstallState, install};

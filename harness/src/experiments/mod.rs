@@ -2,6 +2,8 @@
 
 pub mod bench;
 mod deviation;
+mod draw;
+pub mod hunt;
 pub mod selftest;
 pub mod stress;
 mod tables;

@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 use crate::engines::simulator::Simulator;
 use crate::engines::{Job, Version};
 use crate::laws::Place;
-use crate::measure::{Failure, FailureKind, Instrument, Question, Reader, Taken, Trial};
+use crate::measure::{Failure, Instrument, Question, Reader, Taken, Trial};
+use crate::record::FailureKind;
 use crate::spec::{Budget, Case};
 
 pub(super) type Settings = BTreeMap<String, serde_json::Value>;

@@ -31,6 +31,13 @@ pub struct Law {
     pub variant: fn(&Job, f64) -> Option<Variant>,
 }
 
+impl Law {
+    /// The mildest magnitude that changes anything, as its place among all.
+    pub fn mild(&self) -> usize {
+        self.magnitudes.iter().position(|m| *m != 0.0).unwrap_or(0)
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Light {
     Direct,

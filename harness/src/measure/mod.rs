@@ -10,7 +10,7 @@ mod subprocess;
 
 pub use answer::answer;
 pub use machine::Machine;
-pub use outcome::{Cost, Failure, FailureKind, Source, Taken};
+pub use outcome::{Cost, Failure, Source, Taken};
 pub use question::{Instrument, Question, Trial};
 pub use reader::Reader;
 pub use subprocess::{Isolation, READ_ONE};

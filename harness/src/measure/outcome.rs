@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::engines::{EngineError, Measurement};
+use crate::record::FailureKind;
 use crate::system::process::ProcessError;
 
 /// What a reading took the engine, now or when it was asked first.
@@ -36,24 +37,6 @@ pub enum Source {
 pub struct Failure {
     pub kind: FailureKind,
     pub text: String,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FailureKind {
-    /// The engine says that it cannot do such a job: a skip.
-    Declined,
-    /// It cannot do this one: a setting makes no sense to it, or its solver gave up.
-    Refused,
-    Nan,
-    /// It ended with an error or was killed.
-    Crash,
-    Hang,
-    /// It ended well and readings were missing.
-    SilentLoss,
-    Interrupted,
-    /// It was not begun: the time for beginning was over.
-    TimeUp,
 }
 
 impl Failure {

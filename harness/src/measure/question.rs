@@ -4,9 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::cache::{Entry, Key, key};
-use super::outcome::FailureKind;
 use crate::engines::{Engine, EngineError, Job, Version};
 use crate::laws::Place;
+use crate::record::FailureKind;
 use crate::spec::Case;
 
 #[derive(Clone)]

@@ -7,11 +7,11 @@ use std::time::Instant;
 
 use super::cache::{Cache, Entry, Key, Lookup};
 use super::machine::Machine;
-use super::outcome::{Cost, Failure, FailureKind, Source, Taken};
+use super::outcome::{Cost, Failure, Source, Taken};
 use super::question::Question;
 use super::subprocess::{self, Isolation, Request};
 use crate::engines::{Engine, EngineError, Job, Measurement, Site, Support, Workbench, checked, share};
-use crate::record::ReadingKey;
+use crate::record::{FailureKind, ReadingKey};
 use crate::system::process::{self, PeakMemory, ProcessError};
 use crate::system::slots::Share;
 

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::outcome::{Failure, FailureKind, Taken};
+use super::outcome::{Failure, Taken};
 use super::question::{Question, Trial};
 use crate::engines::{EngineError, Workbench};
 use crate::laws::Place;
-use crate::record::ReadingKey;
+use crate::record::{FailureKind, ReadingKey};
 use crate::spec::Budget;
 use crate::system::process::Invocation;
 

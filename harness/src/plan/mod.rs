@@ -11,7 +11,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::engines::{Absent, Engine, Job, Site, Support, Version};
+use crate::engines::{Absent, Engine, EngineError, Job, SceneFile, Site, Support, Version};
 use crate::measure::Instrument;
 use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
@@ -146,6 +146,39 @@ impl Plan {
     /// What an engine of the plan is asked for a task, whether it is there or not.
     pub fn job(&self, case: &Case, engine: usize, task: &Task, seed: u64) -> Job {
         job(case, &self.engines[engine].engine.name(), task, seed)
+    }
+}
+
+/// A task as an engine's native files, with the command that runs them by hand where there is one.
+pub struct Export {
+    pub files: Vec<SceneFile>,
+    pub command: Option<String>,
+}
+
+/// Why there is none.
+#[derive(Debug, thiserror::Error)]
+pub enum NotExported {
+    #[error("{0}")]
+    Unsupported(String),
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+}
+
+impl Plan {
+    /// An export needs no installed engine: what is skipped for absence is exported all the same.
+    pub fn export(
+        &self,
+        case: &Case,
+        engine: usize,
+        task: &Task,
+        seed: u64,
+        site: &Site,
+    ) -> Result<Export, NotExported> {
+        let (job, engine) = (self.job(case, engine, task, seed), &self.engines[engine].engine);
+        if let Support::No(reason) = engine.supports(&job) {
+            return Err(NotExported::Unsupported(reason));
+        }
+        Ok(Export { files: engine.export(&job)?, command: engine.command_by_hand(&job, site) })
     }
 }
 

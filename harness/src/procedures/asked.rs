@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::Deserialize;
 use serde::de::{Deserializer, Error, MapAccess, Visitor};
+use serde::ser::Serializer;
+use serde::{Deserialize, Serialize};
 
 use super::{Asked, table};
 use crate::record::ProcedureId;
@@ -31,6 +32,13 @@ impl JsonSchema for Procedures {
             "type": "object", "description": "What is measured; at least one.",
             "properties": properties, "additionalProperties": false,
         })
+    }
+}
+
+/// As a spec writes them, each in its form.
+impl Serialize for Procedures {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(id, asked)| (id, asked.written(id.row().form))))
     }
 }
 

@@ -2,8 +2,8 @@
 
 use luminaire::scene::Bounces;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
-use serde::Deserialize;
 use serde::de::{Deserializer, IgnoredAny, MapAccess};
+use serde::{Deserialize, Serialize};
 
 use super::shapes::{Found, Shapes};
 
@@ -27,6 +27,38 @@ pub enum Asked {
     Meters(AtMeters),
 }
 
+/// What a spec writes of a procedure.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub(super) enum Written<'a> {
+    Angles(&'a AtAngles),
+    Meters {
+        meters: &'a Names,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        bounces: Option<u32>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        light: Option<AnyLight>,
+    },
+}
+
+impl Asked {
+    /// As it stands in a spec of this form; what the form takes for granted is left out.
+    pub(super) fn written(&self, form: Option<Form>) -> Written<'_> {
+        match self {
+            Self::Angles(asked) => Written::Angles(asked),
+            Self::Meters(AtMeters { meters, bounces, light }) => {
+                let counts = matches!(form, Some(Form::MetersAndBounces | Form::MetersAndLight));
+                let bounces = match bounces {
+                    Bounces::AtMost(n) if counts => Some(*n),
+                    _ => None,
+                };
+                let chosen = form == Some(Form::MetersAndLight) && *light != AnyLight::default();
+                Written::Meters { meters, bounces, light: chosen.then_some(*light) }
+            }
+        }
+    }
+}
+
 /// Illuminance at meters of the room.
 #[derive(Clone, Debug)]
 pub struct AtMeters {
@@ -36,7 +68,7 @@ pub struct AtMeters {
 }
 
 /// The light that a spec chooses, where a procedure leaves the choice.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AnyLight {
     /// Straight from the luminaires and reflected.
@@ -49,7 +81,7 @@ pub enum AnyLight {
 }
 
 /// Intensity from illuminance at a distance, the luminaire alone in free field.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "LuminousIntensity")]
 pub struct AtAngles {
@@ -58,7 +90,7 @@ pub struct AtAngles {
     /// Measuring distance in metres.
     pub distance_m: f64,
     /// Where: the photometric file's own angles, or lists.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Angles::is_all")]
     pub angles: Angles,
 }
 
@@ -125,8 +157,8 @@ impl Form {
 }
 
 /// Directions of an intensity, in the luminaire's own frame.
-#[derive(Clone, Debug, Default, JsonSchema)]
-#[schemars(untagged)]
+#[derive(Clone, Debug, Default, Serialize, JsonSchema)]
+#[serde(untagged)]
 pub enum Angles {
     /// Every node of the file's table.
     #[default]
@@ -134,6 +166,13 @@ pub enum Angles {
     Photometry,
     /// Every combination of the listed angles.
     Listed(AngleLists),
+}
+
+impl Angles {
+    /// Whether it is what a spec means that names none.
+    fn is_all(&self) -> bool {
+        matches!(self, Self::Photometry)
+    }
 }
 
 #[derive(JsonSchema)]
@@ -144,7 +183,7 @@ enum PhotometryWord {
 }
 
 /// Lists of angles in degrees.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AngleLists {
     /// From the nadir.
@@ -169,8 +208,8 @@ impl<'de> Deserialize<'de> for Angles {
 }
 
 /// One name or a list of names.
-#[derive(Clone, Debug, JsonSchema)]
-#[schemars(untagged)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[serde(untagged)]
 pub enum Names {
     /// One.
     One(String),

@@ -10,6 +10,6 @@ pub mod table;
 mod task;
 
 pub use asked::Procedures;
-pub use form::{Angles, Asked, AtAngles, AtMeters, Form, Names};
+pub use form::{AngleLists, Angles, AnyLight, Asked, AtAngles, AtMeters, Form, Names};
 pub use table::{Procedure, Reference};
 pub use task::{Aspect, Direction, Target, Task};

@@ -21,7 +21,7 @@ pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
 pub use light::{Light, UnknownLight};
 pub use method::{Effort, Method};
 pub use stated_errors::{Doubt, StatedErrors, Variation};
-pub use status::{EngineStatus, Role, Status};
+pub use status::{EngineStatus, FailureKind, Role, Status};
 pub use uncertainty::Uncertainty;
 
 /// The physical quantity of a reading and its unit.
@@ -199,6 +199,9 @@ pub struct Recording {
     pub command: Option<String>,
     /// Why there are no readings, if there are none.
     pub failure: Option<String>,
+    /// How they came to be none; files of before it was told have a text alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure_kind: Option<FailureKind>,
     /// The readings, one a meter; a report lists them by themselves.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub readings: Vec<Reading>,
@@ -235,6 +238,7 @@ impl Recording {
             stated_errors: vec![],
             command: None,
             failure: None,
+            failure_kind: None,
             readings: vec![],
         }
     }

@@ -72,3 +72,23 @@ pub enum Role {
     #[default]
     Renderer,
 }
+
+/// How a reading came to nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema, strum::Display)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum FailureKind {
+    /// The engine says that it cannot do such a job: a skip.
+    Declined,
+    /// It cannot do this one: a setting makes no sense to it, or its solver gave up.
+    Refused,
+    Nan,
+    /// It ended with an error or was killed.
+    Crash,
+    Hang,
+    /// It ended well and readings were missing.
+    SilentLoss,
+    Interrupted,
+    /// It was not begun: the time for beginning was over.
+    TimeUp,
+}

@@ -6,9 +6,10 @@ mod build;
 mod cases;
 mod content;
 mod locate;
-mod model;
+pub mod model;
 mod mounting;
 mod suite;
+mod write;
 
 use std::path::{Path, PathBuf};
 
@@ -17,7 +18,8 @@ use crate::system::files::read_bounded;
 pub use build::Case;
 pub use content::content;
 pub use model::{Budget, EngineSettings, Spec, ToleranceOverride};
-pub use suite::{filtered, suite};
+pub use suite::{filtered, specs, suite};
+pub use write::yaml;
 
 /// What is wrong with a spec, where, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -12,40 +12,40 @@ use crate::procedures::Procedures;
 use crate::procedures::shapes::{Found, Shapes};
 
 /// A luxproof spec: a room, luminaires, measuring points and the procedures to run on them.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Spec {
     /// Version of the format: 1.
     pub luxproof: u32,
     /// What the case is, in a line.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
     /// The room.
     pub room: RoomSpec,
     /// Opaque diffuse bodies.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub obstacles: Vec<ObstacleSpec>,
     /// The luminaires, at least one.
     pub luminaires: Vec<LuminaireSpec>,
     /// Named sets of measuring points.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub meters: BTreeMap<String, MeterSet>,
     /// What is measured.
     pub procedures: Procedures,
     /// Engines to run, with settings; all that are there by default.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub engines: Option<BTreeMap<String, EngineSettings>>,
     /// When an engine may stop.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub budget: Budget,
     /// Tables of a paper as further references, relative to the spec.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub published: Option<PathBuf>,
     /// Overrides of the default tolerances, by procedure.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub tolerances: BTreeMap<String, ToleranceOverride>,
     /// Overrides that make a suite of the spec, each a case of its own: a list, each with a `name`, or a matrix.
-    #[serde(default)]
+    #[serde(default, skip_serializing)]
     #[schemars(with = "Option<CasesSchema>")]
     pub cases: Option<IgnoredAny>,
 }
@@ -62,7 +62,7 @@ enum CasesSchema {
 }
 
 /// A closed box room with one corner at the origin, z up.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomSpec {
     /// Extents along x, y, z in metres.
@@ -72,7 +72,7 @@ pub struct RoomSpec {
 }
 
 /// Diffuse reflectances of the surfaces, each 0 to 1.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReflectanceSpec {
     /// Of the floor.
@@ -102,7 +102,8 @@ impl ReflectanceSpec {
 }
 
 /// A number from 0 to 1.
-#[derive(Clone, Copy, Debug, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(transparent)]
 pub struct Fraction(#[schemars(range(min = 0, max = 1))] pub f64);
 
 impl<'de> Deserialize<'de> for Fraction {
@@ -120,8 +121,8 @@ impl Fraction {
 }
 
 /// Reflectance of the walls.
-#[derive(Clone, Debug, JsonSchema)]
-#[schemars(untagged)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[serde(untagged)]
 pub enum Walls {
     /// All four alike.
     All(Fraction),
@@ -130,7 +131,7 @@ pub enum Walls {
 }
 
 /// Reflectance of each wall.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FourWalls {
     /// The wall at x = 0.
@@ -159,19 +160,19 @@ impl<'de> Deserialize<'de> for Walls {
 }
 
 /// An opaque diffuse body: exactly one of `box` and `mesh`.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObstacleSpec {
     /// An axis-aligned box.
-    #[serde(default, rename = "box")]
+    #[serde(default, rename = "box", skip_serializing_if = "Option::is_none")]
     pub cuboid: Option<BoxSpec>,
     /// A triangle mesh.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<MeshSpec>,
 }
 
 /// An axis-aligned box.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoxSpec {
     /// Lower corner in metres.
@@ -183,20 +184,20 @@ pub struct BoxSpec {
 }
 
 /// A triangle mesh from a Wavefront OBJ file.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshSpec {
     /// The file, relative to the spec; its unit is the metre.
     pub file: PathBuf,
     /// Where the file's origin comes to lie, in metres.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub at_m: [f64; 3],
     /// Diffuse reflectance.
     pub reflectance: Fraction,
 }
 
 /// A luminaire in its place.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LuminaireSpec {
     /// Its name.
@@ -206,13 +207,13 @@ pub struct LuminaireSpec {
     /// Photometric centre in metres.
     pub at_m: [f64; 3],
     /// Azimuth about z, then tilt about the turned y axis, then roll about the luminaire's own axis.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub rotate_deg: RotationSpec,
     /// Dimming or maintenance factor.
-    #[serde(default = "one")]
+    #[serde(default = "one", skip_serializing_if = "is_one")]
     pub flux_scale: f64,
     /// How its extent is modelled.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub model: ModelSpec,
 }
 
@@ -220,20 +221,32 @@ fn one() -> f64 {
     1.0
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+fn is_one(x: &f64) -> bool {
+    *x == 1.0
+}
+
+fn is_default<T: Default + PartialEq>(x: &T) -> bool {
+    *x == T::default()
+}
+
 /// Rotation of a luminaire in degrees.
-#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RotationSpec {
     /// About z.
+    #[serde(skip_serializing_if = "is_default")]
     pub azimuth: f64,
     /// About the turned y axis.
+    #[serde(skip_serializing_if = "is_default")]
     pub tilt: f64,
     /// About the luminaire's own axis.
+    #[serde(skip_serializing_if = "is_default")]
     pub roll: f64,
 }
 
 /// How much of a luminaire's body is modelled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ModelSpec {
     /// All light from the photometric centre.
@@ -246,21 +259,21 @@ pub enum ModelSpec {
 }
 
 /// A named set of measuring points: exactly one of `points_m` and `grid`.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeterSet {
     /// Points in metres.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points_m: Option<Vec<[f64; 3]>>,
     /// A regular grid of points.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<GridSpec>,
     /// The normal of all of them, any length.
     pub normal: [f64; 3],
 }
 
 /// A regular grid: origin + i u + j v, i fastest.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridSpec {
     /// First point.
@@ -290,7 +303,8 @@ impl Default for Budget {
 }
 
 /// Settings of one engine; `null` or `{}` for none.
-#[derive(Clone, Debug, Default, PartialEq, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(transparent)]
 pub struct EngineSettings(pub BTreeMap<String, serde_json::Value>);
 
 impl<'de> Deserialize<'de> for EngineSettings {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{Case, SpecError};
+use super::{Case, Source, Spec, SpecError};
 use crate::procedures::known;
 use crate::system::files::read_bounded;
 
@@ -28,6 +28,18 @@ pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
         return Err(SpecError::of(&case.path, message, "give the spec another name"));
     }
     Ok(cases)
+}
+
+/// The specs of a file, each with its name: those of its `cases` with their overrides laid over it, or the one that it is.
+pub fn specs(path: &Path) -> Result<Vec<(String, Spec)>, SpecError> {
+    let source = Source::read(path)?;
+    let spec: Spec = source.parse()?;
+    let stem = path.file_stem().map_or_else(|| "spec".into(), |s| s.to_string_lossy().into_owned());
+    let variants = super::cases::variants(&source)?;
+    if variants.is_empty() {
+        return Ok(vec![(stem, spec)]);
+    }
+    Ok(variants.into_iter().map(|v| (format!("{stem}/{}", v.name), v.spec)).collect())
 }
 
 /// The cases whose names match any of the patterns: a glob where it holds `*`, `?` or `[`, a part of the name otherwise.

@@ -196,7 +196,7 @@ impl ExternalJob {
             Some(Bounces::AtMost(n)) => Some(n),
             Some(Bounces::Converged) | None => None,
         };
-        let ours = ["command", "procedures"];
+        let ours = ["command", "procedures", super::RUN_IN];
         let settings = job.settings.iter().filter(|(k, _)| !ours.contains(&k.as_str()));
         Self {
             luxproof_job: VERSION,

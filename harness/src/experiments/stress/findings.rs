@@ -7,8 +7,8 @@ use serde::Serialize;
 use crate::experiments::deviation::Compared;
 use crate::judge::{How, KnownBreak};
 use crate::laws::Law;
-use crate::measure::{Failure, FailureKind, Instrument};
-use crate::record::{EngineName, ProcedureId};
+use crate::measure::{Failure, Instrument};
+use crate::record::{EngineName, FailureKind, ProcedureId};
 use crate::spec::Case;
 
 /// The deviations whose first magnitude is told.
@@ -109,6 +109,13 @@ pub struct PointReport {
     pub tried: bool,
     #[serde(flatten)]
     pub(super) finding: Finding,
+}
+
+impl PointReport {
+    /// How the law is broken there, if it is.
+    pub fn how(&self) -> Option<How> {
+        self.finding.how
+    }
 }
 
 pub(super) type Found = (usize, &'static Law, PointReport);

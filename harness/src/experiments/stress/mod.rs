@@ -32,11 +32,21 @@ pub struct Options<'a> {
     pub limit: Duration,
     /// The laws by name; empty for all.
     pub laws: &'a [String],
+    pub magnitudes: Magnitudes,
     pub seed: u64,
     /// Which coordinates renderers get.
     pub coordinates: Coordinates,
     /// What is on record of engines as luxproof drives them.
     pub known: &'a [KnownBreak],
+}
+
+/// How far laws are driven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Magnitudes {
+    /// Until something breaks.
+    All,
+    /// No further than every engine must go.
+    Mild,
 }
 
 struct Point {
@@ -106,7 +116,8 @@ fn points(case: &Case, subjects: &[Instrument], options: &Options<'_>) -> Vec<Po
             for task in tasks.filter(|t| law.light.concerns(t.transport)) {
                 let base = Job::of_task(case, &task);
                 let says = |step: &usize| (law.variant)(&base, law.magnitudes[*step]).is_some();
-                let steps = (0..law.magnitudes.len()).filter(says);
+                let tried = |step: &usize| options.magnitudes == Magnitudes::All || *step == law.mild();
+                let steps = (0..law.magnitudes.len()).filter(tried).filter(says);
                 let point = |step| Point { subject, law, step, procedure: task.procedure, base: base.clone() };
                 points.extend(steps.map(point));
             }

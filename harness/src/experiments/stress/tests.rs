@@ -56,6 +56,7 @@ fn stressed_knowing(folder: &std::path::Path, laws: &[&str], time: Duration, kno
         budget: Budget { relative_error: 1e-3, seconds: 1.0 },
         limit: Duration::from_secs(10),
         laws: &laws,
+        magnitudes: Magnitudes::All,
         seed: 1,
         coordinates: Coordinates::Fitted,
         known,

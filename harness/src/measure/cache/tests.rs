@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use super::*;
 use crate::engines::{Blocks, Forgotten, Measurement};
-use crate::measure::{Cost, Failure, FailureKind};
+use crate::measure::{Cost, Failure};
+use crate::record::FailureKind;
 use crate::record::{Estimate, ProcedureId, ReadingKey, Uncertainty};
 use crate::system::envelope::tests::planted;
 

@@ -9,28 +9,7 @@ use luminaire::photometry::{HorizontalAxis, LuminousIntensityDistribution, Lumin
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape};
 
 use super::Kind;
-
-/// Of one more than another surface, a meter lies this much at least off any, as a power of ten in metres.
-const CLOSEST_LOG10: f64 = -3.0;
-/// Meters nearer to a surface than that lie close to it.
-const CLOSE_LOG10: f64 = -1.3;
-
-/// Random numbers with the ranges that rooms take them from.
-struct Draw(Rng);
-
-impl Draw {
-    fn within(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.0.f64()
-    }
-
-    fn one_in(&mut self, count: usize) -> bool {
-        self.0.usize(0..count) == 0
-    }
-
-    fn close_m(&mut self) -> f64 {
-        10_f64.powf(self.within(CLOSEST_LOG10, CLOSE_LOG10))
-    }
-}
+use crate::experiments::draw::Draw;
 
 /// A scene and its meters, each with where it is.
 pub(super) fn room(seed: u64, meters: usize) -> (Scene, Vec<(Kind, Meter)>) {

@@ -6,9 +6,8 @@ use serde::Serialize;
 use super::Repeated;
 use super::group::{Finding, Group, counts};
 use crate::judge::rejected;
-use crate::measure::FailureKind;
 use crate::plan::{Scope, Skip};
-use crate::record::{Agreement, EngineName, Estimate};
+use crate::record::{Agreement, EngineName, Estimate, FailureKind};
 
 /// The chance of any false claim in all of a self-test (Holm).
 pub(super) const LEVEL: f64 = 1e-3;

@@ -1,0 +1,122 @@
+//! A spec that can be changed: typed, with the files that it names, written as a real spec and read back by the ordinary reader.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use luminaire::photometry::{self, Photometry, lm63};
+
+use crate::spec::model::LuminaireSpec;
+use crate::spec::{Case, Spec, SpecError, specs, yaml};
+
+#[derive(Clone, Debug)]
+pub(super) struct Draft {
+    pub(super) spec: Spec,
+    /// By name, beside the spec.
+    pub(super) files: BTreeMap<PathBuf, File>,
+}
+
+/// A file that a spec names.
+#[derive(Clone, Debug)]
+pub(super) struct File {
+    pub(super) bytes: Vec<u8>,
+    /// What it says of a luminaire, where it does.
+    pub(super) photometry: Option<Photometry>,
+}
+
+impl File {
+    /// A photometric file as LM-63-2002, as it is read back.
+    pub(super) fn lm63(photometry: &Photometry) -> Self {
+        let bytes = lm63::write_2002(photometry).text.into_bytes();
+        Self { photometry: lm63::parse(&bytes).ok(), bytes }
+    }
+}
+
+impl Draft {
+    /// The cases of a spec file, each with its name and its files beside it under short names.
+    pub(super) fn read(path: &Path) -> Result<Vec<(String, Self)>, SpecError> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let draft = |(name, spec)| Ok((name, Self::of(spec, folder)?));
+        specs(path)?.into_iter().map(draft).collect()
+    }
+
+    fn of(mut spec: Spec, folder: &Path) -> Result<Self, SpecError> {
+        let mut files: BTreeMap<PathBuf, File> = BTreeMap::new();
+        let mut names: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+        let mut take_in = |named: &mut PathBuf| -> Result<(), SpecError> {
+            let path = folder.join(&*named);
+            if let Some(name) = names.get(&path) {
+                named.clone_from(name);
+                return Ok(());
+            }
+            let base = PathBuf::from(path.file_name().unwrap_or(path.as_os_str()));
+            let other = || PathBuf::from(format!("{}-{}", names.len(), base.display()));
+            let name = if files.contains_key(&base) { other() } else { base.clone() };
+            let unreadable = |e: io::Error| SpecError::of(&path, format!("cannot be read: {e}"), "check the path");
+            let bytes = std::fs::read(&path).map_err(unreadable)?;
+            let photometry = photometry::read_file(&path).ok();
+            files.insert(name.clone(), File { bytes, photometry });
+            named.clone_from(&name);
+            names.insert(path, name);
+            Ok(())
+        };
+        for luminaire in &mut spec.luminaires {
+            take_in(&mut luminaire.photometry)?;
+        }
+        for mesh in spec.obstacles.iter_mut().filter_map(|o| o.mesh.as_mut()) {
+            take_in(&mut mesh.file)?;
+        }
+        if let Some(published) = &mut spec.published {
+            take_in(published)?;
+        }
+        Ok(Self { spec, files })
+    }
+
+    /// What the file of a luminaire says.
+    pub(super) fn photometry(&self, luminaire: &LuminaireSpec) -> Option<&Photometry> {
+        self.files.get(&luminaire.photometry)?.photometry.as_ref()
+    }
+
+    /// The tables of all luminaires.
+    pub(super) fn tables(&self) -> impl Iterator<Item = &Photometry> {
+        self.spec.luminaires.iter().filter_map(|l| self.photometry(l))
+    }
+
+    /// Leaves out the files that nothing names.
+    pub(super) fn tidied(mut self) -> Self {
+        let spec = &self.spec;
+        let photometry = spec.luminaires.iter().map(|l| &l.photometry);
+        let meshes = spec.obstacles.iter().filter_map(|o| o.mesh.as_ref().map(|m| &m.file));
+        let named: Vec<PathBuf> = photometry.chain(meshes).chain(&spec.published).cloned().collect();
+        self.files.retain(|name, _| named.contains(name));
+        self
+    }
+
+    /// Writes the spec under a name, and its files beside it.
+    pub(super) fn write(&self, folder: &Path, name: &str) -> io::Result<PathBuf> {
+        std::fs::create_dir_all(folder)?;
+        for (name, file) in &self.files {
+            std::fs::write(folder.join(name), &file.bytes)?;
+        }
+        let path = folder.join(name).with_extension("yaml");
+        std::fs::write(&path, yaml(&self.spec))?;
+        Ok(path)
+    }
+
+    /// What the ordinary reader makes of it.
+    pub(super) fn case(&self) -> Option<Case> {
+        let folder = tempfile::tempdir().ok()?;
+        Case::load(&self.write(folder.path(), "spec").ok()?).ok()
+    }
+
+    /// Lines of the spec.
+    pub(super) fn lines(&self) -> usize {
+        yaml(&self.spec).lines().count()
+    }
+
+    /// C planes and gamma angles of the largest table.
+    pub(super) fn table(&self) -> [usize; 2] {
+        let size = |p: &Photometry| [p.distribution.c_deg().len(), p.distribution.gamma_deg().len()];
+        self.tables().map(size).max_by_key(|[c, gamma]| c * gamma).unwrap_or_default()
+    }
+}
