@@ -1,5 +1,6 @@
 //! Which luminaires are read together. A shadow ray towards one illum ends on the front of another (`wrongsource` of rtrace's `source.c`), while in
-//! photometry openings hide nothing. Light superposes: luminaires that hide one another are scenes of their own, whose readings add up.
+//! photometry openings hide nothing; of two points in one spot, whose spheres are one surface, it reads one. Light superposes: luminaires that hide
+//! one another are scenes of their own, whose readings add up.
 
 use glam::DVec3;
 use luminaire::scene::{Luminaire, Transport};
@@ -12,7 +13,8 @@ use crate::engines::{Job, recess};
 pub(super) fn scenes(job: &Job, settings: &Settings) -> Vec<Vec<usize>> {
     let job = &*recess::apart(job);
     let all: Vec<Source<'_>> = job.scene.luminaires.iter().map(|l| Source::of(l, settings)).collect();
-    let apart = |a: usize, b: usize| all[a].hides(&all[b], job) || all[b].hides(&all[a], job);
+    let apart =
+        |a: usize, b: usize| all[a].is_one_with(&all[b]) || all[a].hides(&all[b], job) || all[b].hides(&all[a], job);
     let mut scenes = vec![vec![]];
     for k in 0..all.len() {
         match scenes.iter_mut().find(|scene| scene.iter().all(|other| !apart(k, *other))) {
@@ -25,6 +27,9 @@ pub(super) fn scenes(job: &Job, settings: &Settings) -> Vec<Vec<usize>> {
 
 /// What reaches less far behind a flat opening, in parts of its size, lies in its plane.
 const IN_PLANE: f64 = 1e-6;
+
+/// Points that come closer are one surface to rtrace: their spheres are two millionths in radius at least.
+const ONE_SPOT_M: f64 = 1e-5;
 
 /// A luminaire as a body that shadow rays may meet.
 struct Source<'a> {
@@ -52,6 +57,12 @@ impl<'a> Source<'a> {
             Route::Opening | Route::Ies2radIllum | Route::Ies2radLight => vec![1.0, -1.0],
         };
         Self { luminaire, route, radius_m: 0.5 * extent.with_z(height_m).length(), stops, is_flat: height_m == 0.0 }
+    }
+
+    /// Whether both are points in one spot.
+    fn is_one_with(&self, other: &Self) -> bool {
+        let distance_m = self.luminaire.position_m.distance(other.luminaire.position_m);
+        (self.route, other.route) == (Route::Point, Route::Point) && distance_m < ONE_SPOT_M
     }
 
     /// Whether it may stand in another's light towards a meter, or, where light is reflected, towards any point.

@@ -78,6 +78,17 @@ fn light_of_another_opening_passes_through_an_opening() {
 }
 
 #[test]
+fn points_in_one_spot_and_angles_and_candela_that_single_precision_can_hardly_tell_are_read() {
+    let spiked = [(0.0, 100.0), (60.0, 80.0), (90.0, 6.63e-62), (90.000_000_1, 0.0), (180.0, 0.0)];
+    let (gamma_deg, candela) = spiked.into_iter().unzip();
+    let table = LuminousIntensityDistribution::axial(gamma_deg, candela).unwrap();
+    let lamp = luminaire("lamp", DVec3::ZERO, table);
+    let job = of(vec![lamp.clone(), Luminaire { id: "other".into(), ..lamp }], &[[0.3, 0.2, -2.0]], Transport::Direct);
+    let (found, right) = (read(&job).estimates[0], exact_direct_lx(&job)[0]);
+    assert!((found.value - right).abs() < 1e-4 * right, "{found:?} for {right}");
+}
+
+#[test]
 fn no_reflected_light_is_lost_either_nor_what_the_file_order_has_to_do_with_it() {
     let (below, above) = (lamp([2.0, 2.0, 1.5], LARGE_PANEL), lamp([2.0, 2.0, 2.8], PANEL));
     let of_first = Transport::Indirect(Bounces::AtMost(1));

@@ -373,7 +373,7 @@ fn dat_name(k: usize) -> String {
 /// The candela table in Radiance's data format: gamma alone, or C (0 to 360) by gamma; zero outside its gamma range.
 fn dat(distribution: &LuminousIntensityDistribution) -> String {
     let padded = distribution.padded(EDGE_DEG);
-    let axis = |angles: &[f64]| format!("0 0 {}\n{}\n", angles.len(), joined(angles));
+    let axis = |angles: &[f64]| format!("0 0 {}\n{}\n", angles.len(), joined(&rising(angles)));
     if padded.symmetry() == Symmetry::Axial {
         return format!("1\n{}{}\n", axis(padded.gamma_deg()), joined(padded.plane(0)));
     }
@@ -382,8 +382,24 @@ fn dat(distribution: &LuminousIntensityDistribution) -> String {
     format!("2\n{}{}{planes}", axis(full.c_deg()), axis(full.gamma_deg()))
 }
 
+/// Angles that rise in single precision, too, in which rtrace holds them: one that would be equal to the one before is the next.
+fn rising(angles: &[f64]) -> Vec<f64> {
+    let mut last = f32::NEG_INFINITY;
+    let next = |angle: &f64| {
+        let is_rising = *angle as f32 > last;
+        last = if is_rising { *angle as f32 } else { last.next_up() };
+        if is_rising { *angle } else { f64::from(last) }
+    };
+    angles.iter().map(next).collect()
+}
+
+/// The most characters of a number written out: rtrace's reader takes words of 63.
+const MAX_WORD: usize = 40;
+
 fn joined(values: &[f64]) -> String {
-    values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
+    let word =
+        |value: &f64| Some(value.to_string()).filter(|w| w.len() <= MAX_WORD).unwrap_or_else(|| format!("{value:e}"));
+    values.iter().map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// Small against the nearest surface, luminaire and meter, so that the sphere touches none of them.
