@@ -615,7 +615,7 @@ mod tests {
         assert_eq!(StatedErrors::corrected(&found, &there, wide(200.0)), wide(200.0));
         let limit = |doubt| StatedErrors::doubted_at(doubt, [(here.clone(), 0.01)].into()).unwrap();
         let unchecked = StatedErrors::corrected(&[limit(Doubt::NotReadAgain)], &here, wide(200.0));
-        assert_eq!(unchecked.uncertainty, Uncertainty::sampled(2.0, Some(7.0)));
+        assert_eq!(unchecked.uncertainty, Uncertainty::sampled(2.0, None));
         let bounded = Estimate { value: 200.0, uncertainty: Uncertainty::Bound(50.0) };
         let judged = StatedErrors::corrected(&[limit(Doubt::BeyondTolerance)], &here, bounded);
         assert_eq!(judged.uncertainty, Uncertainty::Bound(2.0));
