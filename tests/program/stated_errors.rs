@@ -207,7 +207,7 @@ fn the_residue_of_rounding_is_no_scatter() {
             }
         }
     }
-    assert!(agree > 100, "{agree}");
+    assert!(agree > 40, "{agree}");
 }
 
 #[test]

@@ -63,6 +63,7 @@ pub(super) fn examine(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Ou
             let task = again.task;
             let mut doubts = again.doubts(&of_engine, &compared(judge, task, outcome, &name, &[]));
             let now = compared(judge, task, outcome, &name, &doubts);
+            doubts.extend(refuted(&now));
             doubts.extend(again.of_sheltered(running, &now));
             found.insert((name.clone(), task.procedure), doubts);
         }
@@ -105,7 +106,6 @@ impl Again<'_> {
             (self.was_asked && (is_refused || self.claims.is_none()))
                 .then(|| not_read_again.unwrap_or_else(|| StatedErrors::doubted(Doubt::NotReadAgain))),
             beyond_tolerance(compared),
-            refuted(compared),
         ]
         .into_iter()
         .flatten()
@@ -240,15 +240,16 @@ fn beyond_tolerance(compared: &[Comparison]) -> Option<StatedErrors> {
     StatedErrors::doubted_at(Doubt::BeyondTolerance, at)
 }
 
-/// Where readings lie beyond the tolerance, and farther off than the bounds that an engine states and everything else explain: a claim that
-/// does not hold shelters nothing.
+/// Where bounds that an engine states keep readings from failing that lie beyond the tolerance, and farther off than the bounds and everything
+/// else explain: a claim that does not hold shelters nothing.
 fn refuted(compared: &[Comparison]) -> Option<StatedErrors> {
     let at = limits(compared, |c, allowed| {
         let (bound, deviation, budget) = (c.uncertainty.bound(), c.deviation?.abs(), c.budget.as_ref()?);
         let others = budget.components.iter().filter(|part| part.source != Source::Discretisation);
         let others = others.map(|part| part.uncertainty.powi(2)).sum::<f64>().sqrt();
         let reach = bound.max(allowed) + budget.coverage_factor.max(NEARLY_ALL) * others;
-        (bound > 0.0 && bound < allowed && deviation > reach).then_some(0.0)
+        let is_sheltered = c.verdict == Verdict::Inconclusive && bound > 0.0 && bound < allowed;
+        (is_sheltered && deviation > reach).then_some(0.0)
     });
     StatedErrors::doubted_at(Doubt::Refuted, at)
 }

@@ -41,8 +41,8 @@ const RUNGS: [usize; 4] = [6, 12, 24, export::MOST_POINTS];
 const LEFT_OUT: f64 = 0.25;
 /// Seconds that are counted for one of them and a meter in all looks: on a usual server, half as much again as was measured there.
 const LIGHT_S: f64 = 1.5e-4;
-/// Of the seconds of a budget, what more than the fewest of them may take.
-const SHARE: f64 = 0.25;
+/// Of the seconds of a budget, what more than the fewest two of them may take: the rest is for starting and reading out.
+const SHARE: f64 = 0.75;
 
 /// The light of a job's luminaires as exported and as they are.
 pub(super) struct DirectError<'a> {
@@ -82,8 +82,9 @@ pub(super) fn points(job: &Job) -> usize {
     let lights = |points: usize| job.scene.luminaires.iter().map(|l| export::parts(l, points).len()).sum::<usize>();
     let is_affordable =
         |points: &usize| LIGHT_S * (lights(*points) * job.stations.len()) as f64 <= SHARE * job.budget.seconds;
-    let affordable = RUNGS.into_iter().skip(1).take_while(is_affordable);
-    let rungs: Vec<usize> = std::iter::once(RUNGS[0]).chain(affordable).collect();
+    let (fewest, more) = RUNGS.split_at(2);
+    let affordable = more.iter().take_while(|points| is_affordable(points));
+    let rungs: Vec<usize> = fewest.iter().chain(affordable).copied().collect();
     rungs.iter().copied().find(enough).unwrap_or(rungs[rungs.len() - 1])
 }
 
