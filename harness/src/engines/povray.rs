@@ -206,7 +206,7 @@ fn unsupported_luminaire(luminaire: &Luminaire) -> Option<String> {
 /// A luminaire's filter dims whatever passes through it: another luminaire's light towards a meter must not.
 fn filters_in_the_way(job: &Job) -> Option<String> {
     let coordinates = Settings::of(job).map_or(Coordinates::Fitted, |s| s.coordinates);
-    let radius_m = 1.5 * export::FILTER_RADIUS / frame::Frame::of(job, coordinates).scale;
+    let radius_m = 1.5 * opening::FILTER_RADIUS / frame::Frame::of(job, coordinates).scale;
     let lit: Vec<&Luminaire> = job.scene.luminaires.iter().filter(|l| frame::candela(l) > 0.0).collect();
     for (k, a) in lit.iter().enumerate() {
         for (_, b) in lit.iter().enumerate().filter(|(j, _)| *j != k) {
@@ -232,7 +232,7 @@ fn filters_in_the_way(job: &Job) -> Option<String> {
 /// A meter so near an opening that it tells the opening's point lights apart.
 fn too_near(job: &Job) -> Option<String> {
     let is_read = !matches!(job.transport, Transport::Indirect(_));
-    is_read.then(|| opening::too_near(job, export::MOST_POINTS)).flatten()
+    is_read.then(|| opening::too_near(job, opening::MOST_POINTS)).flatten()
 }
 
 fn distance_to_segment(point: glam::DVec3, from: glam::DVec3, to: glam::DVec3) -> f64 {

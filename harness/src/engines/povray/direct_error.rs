@@ -8,7 +8,6 @@ use luminaire::geometry::Mesh;
 use luminaire::geometry::bvh::{BvhError, Ray, TriangleBvh};
 use luminaire::scene::{Luminaire, Meter, Shape, Transport};
 
-use super::export;
 use super::frame::{self, Frame};
 use super::opening::{self, Part};
 use super::pigment;
@@ -29,20 +28,19 @@ const LOOK_UP: LookUp = LookUp {
 /// Roundings of a light's colour on its way to the pixel, besides one for each light that is added.
 const ROUNDINGS: f64 = 8.0;
 /// How many times as fine the rules are along a side that tell what an opening's point lights leave out, and how many lights these differ by.
-const FINER: usize = 3;
+const FINER: usize = 5;
 const APART: usize = 1;
 /// What a rule errs by over its difference from a finer one, where errors fall as its points along a side grow, as at a shadow's edge.
 const RICHARDSON: f64 = FINER as f64 / (FINER - 1) as f64;
 /// How much wider than a filter what passes it is taken to be.
 const FILTER_MARGIN: f64 = 0.05;
 /// Point lights along each side of an opening, few first.
-const RUNGS: [usize; 4] = [6, 12, 24, export::MOST_POINTS];
+const RUNGS: [usize; 4] = [6, 12, 24, opening::MOST_POINTS];
 /// What they may leave out, in parts of the relative error that is asked for.
 const LEFT_OUT: f64 = 0.25;
-/// Seconds that are counted for one of them and a meter in all looks: on a usual server, half as much again as was measured there.
-const LIGHT_S: f64 = 1.5e-4;
-/// Of the seconds of a budget, what more than the fewest two of them may take: the rest is for starting and reading out.
-const SHARE: f64 = 0.75;
+/// Seconds that are counted for one of them and a meter in all looks, on a usual server. More than the fewest two rungs take no more of
+/// them than a budget has.
+const LIGHT_S: f64 = 1e-4;
 
 /// The light of a job's luminaires as exported and as they are.
 pub(super) struct DirectError<'a> {
@@ -61,11 +59,11 @@ struct Lights<'a> {
 
 /// How many point lights along each side of an opening give direct light as well as it is asked for.
 pub(super) fn points(job: &Job) -> usize {
-    let is_extended = |l: &Luminaire| export::parts(l, 2).len() > 1;
+    let is_extended = |l: &Luminaire| opening::parts_of(l, 2).len() > 1;
     if matches!(job.transport, Transport::Indirect(_)) || !job.scene.luminaires.iter().any(is_extended) {
         return RUNGS[0];
     }
-    let Ok(bodies) = bodies(job).map(Rc::new) else { return export::MOST_POINTS };
+    let Ok(bodies) = bodies(job).map(Rc::new) else { return opening::MOST_POINTS };
     let enough = |points: &usize| {
         let [few, more, other] = [*points, FINER * points, FINER * points - APART].map(|n| Lights::of(job, &bodies, n));
         let left_out = |meter: &Meter| {
@@ -79,9 +77,8 @@ pub(super) fn points(job: &Job) -> usize {
                 .map(|s| left_out(&s.meter))
                 .all(|(out, lx)| out <= LEFT_OUT * job.budget.relative_error * lx)
     };
-    let lights = |points: usize| job.scene.luminaires.iter().map(|l| export::parts(l, points).len()).sum::<usize>();
-    let is_affordable =
-        |points: &usize| LIGHT_S * (lights(*points) * job.stations.len()) as f64 <= SHARE * job.budget.seconds;
+    let lights = |points: usize| job.scene.luminaires.iter().map(|l| opening::parts_of(l, points).len()).sum::<usize>();
+    let is_affordable = |points: &usize| LIGHT_S * (lights(*points) * job.stations.len()) as f64 <= job.budget.seconds;
     let (fewest, more) = RUNGS.split_at(2);
     let affordable = more.iter().take_while(|points| is_affordable(points));
     let rungs: Vec<usize> = fewest.iter().chain(affordable).copied().collect();
@@ -134,7 +131,7 @@ impl<'a> DirectError<'a> {
 
     /// Light that passes through the filter round another light on its way, as in the plane of an opening, and may be lost there.
     fn of_filters_lx(&self, meter: &Meter) -> f64 {
-        let radius_m = export::FILTER_RADIUS * (1.0 + FILTER_MARGIN) / self.frame.scale;
+        let radius_m = opening::FILTER_RADIUS * (1.0 + FILTER_MARGIN) / self.frame.scale;
         let of = |(luminaire, parts): &(&Luminaire, Vec<Part>)| {
             let places_m: Vec<Vec<DVec3>> = self.exported.near(luminaire, meter, radius_m);
             let table = &luminaire.photometry.distribution;
@@ -178,7 +175,7 @@ impl<'a> Lights<'a> {
 
     fn of(job: &'a Job, bodies: &Rc<TriangleBvh>, points: usize) -> Self {
         let lit = job.scene.luminaires.iter().filter(|l| frame::candela(l) > 0.0);
-        Self { bodies: Rc::clone(bodies), luminaires: lit.map(|l| (l, export::parts(l, points))).collect() }
+        Self { bodies: Rc::clone(bodies), luminaires: lit.map(|l| (l, opening::parts_of(l, points))).collect() }
     }
 
     fn illuminance_lx(&self, meter: &Meter) -> f64 {

@@ -16,19 +16,14 @@ use crate::engines::{Job, SceneFile, Station, recess};
 
 use super::direct_error;
 use super::frame::{Frame, candela, seats};
-use super::opening::{self, Part};
+use super::opening::{self, FILTER_RADIUS, Part};
 use super::pigment;
 use super::pixels::Readout;
 use super::settings::{POOL, Settings};
 
 pub(super) const SCENE: &str = "scene.pov";
 
-/// Radius of the filter round a light, in scene units; POV-Ray silently ignores one of 1e-3.
-pub(super) const FILTER_RADIUS: f64 = 0.002;
-
-/// Points along each side of a luminous opening for direct light, at most.
-pub(super) const MOST_POINTS: usize = 48;
-/// For indirect light, which does not see the difference.
+/// Points along each side of a luminous opening for indirect light, which does not see the difference.
 const POINTS_INDIRECT: usize = 2;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -261,7 +256,7 @@ fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame, 
     let place = |part: &Part| vector(frame.point(luminaire.position_m + axes * part.offset_m));
     let instances = |points: usize| -> String {
         let line = |part: &Part| format!("Luminaire({}, {})\n", place(part), candela * part.share);
-        parts(luminaire, points).iter().map(line).collect()
+        opening::parts_of(luminaire, points).iter().map(line).collect()
     };
     if luminaire.model == LuminaireModel::Point || job.transport == Transport::Direct {
         text.push_str(&instances(points));
@@ -269,14 +264,6 @@ fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame, 
         write!(text, "#if (Indirect)\n{}#else\n{}#end\n", instances(POINTS_INDIRECT), instances(points)).ok();
     }
     text
-}
-
-pub(super) fn parts(luminaire: &Luminaire, points: usize) -> Vec<Part> {
-    let whole = vec![Part { offset_m: DVec3::ZERO, share: 1.0 }];
-    match luminaire.model {
-        LuminaireModel::Point => whole,
-        _ => opening::parts(luminaire.photometry.opening, points).unwrap_or(whole),
-    }
 }
 
 fn surroundings(job: &Job, frame: Frame) -> String {

@@ -21,6 +21,21 @@ pub(super) struct Part {
     pub(super) share: f64,
 }
 
+/// Radius of the filter round a light, in scene units; POV-Ray silently ignores one of 1e-3.
+pub(super) const FILTER_RADIUS: f64 = 0.002;
+
+/// Points along each side of a luminous opening for direct light, at most.
+pub(super) const MOST_POINTS: usize = 48;
+
+/// The parts that stand for a luminaire, so many along each side of its opening.
+pub(super) fn parts_of(luminaire: &Luminaire, points: usize) -> Vec<Part> {
+    let whole = vec![Part { offset_m: DVec3::ZERO, share: 1.0 }];
+    match luminaire.model {
+        LuminaireModel::Point => whole,
+        _ => parts(luminaire.photometry.opening, points).unwrap_or(whole),
+    }
+}
+
 /// The parts of an opening, `n` by `n`; `None` where the opening is not flat.
 pub(super) fn parts(opening: LuminousOpening, n: usize) -> Option<Vec<Part>> {
     let rule = Gauss::new(n);
