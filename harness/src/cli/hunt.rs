@@ -197,10 +197,7 @@ fn hunted(args: &HuntArgs, site: &Site) -> Result<Hunted, Diagnostic> {
             continue;
         }
         let settings = declared.get(&name).cloned().unwrap_or_default();
-        let engine = match engines::entry(&name) {
-            Some(entry) => (entry.make)(),
-            None => engines::external(&name, &settings.0, Path::new("")).into_diagnostic()?,
-        };
+        let engine = engines::named(&name, &settings.0, Path::new("")).into_diagnostic()?;
         match engine.probe(site) {
             Ok(_) => drop(chosen.insert(name, settings)),
             Err(absent) if is_named => return Ok(Err(format!("{name}: {absent}"))),

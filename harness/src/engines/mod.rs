@@ -48,6 +48,15 @@ pub use settings::Coordinates;
 pub use site::{Site, SiteError};
 pub use workbench::{EngineError, SceneFile, Workbench};
 
+/// The engine that everybody has by this name, or else a program of the user's.
+pub fn named(
+    name: &str,
+    settings: &BTreeMap<String, serde_json::Value>,
+    folder: &Path,
+) -> Result<Box<dyn Engine>, EngineError> {
+    entry(name).map_or_else(|| external(name, settings, folder), |entry| Ok((entry.make)()))
+}
+
 /// A program that a spec names as an engine of its own, `engines: {<name>: {command: [...]}}`; paths are relative to `folder`.
 pub fn external(
     name: &str,

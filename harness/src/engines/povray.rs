@@ -77,10 +77,7 @@ impl Engine for PovRay {
     }
 
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
-        let settings = Settings::of(job)?;
-        let ini =
-            "; POV-Ray takes this file for the user's and the system's povray.ini, which could change settings.\n";
-        Ok(vec![export::scene(job, &settings), SceneFile::text("povray.ini", ini)])
+        Ok(files(job, &Settings::of(job)?, direct_error::points(job)))
     }
 
     fn command_by_hand(&self, job: &Job, site: &Site) -> Option<String> {
@@ -108,9 +105,9 @@ impl Engine for PovRay {
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
-        let settings = Settings::of(job)?;
-        workbench.write(&self.export(job)?)?;
-        let bench = bench::Bench::new(job, workbench, &settings)?;
+        let (settings, points) = (Settings::of(job)?, direct_error::points(job));
+        workbench.write(&files(job, &settings, points))?;
+        let bench = bench::Bench::new(job, workbench, &settings, points)?;
         let measurement = match job.transport {
             Transport::Direct | Transport::Total(Bounces::AtMost(0)) => bench.direct()?,
             Transport::Indirect(Bounces::AtMost(0)) => darkness(job),
@@ -119,6 +116,11 @@ impl Engine for PovRay {
         };
         checked(&ID, job, measurement)
     }
+}
+
+fn files(job: &Job, settings: &Settings, points: usize) -> Vec<SceneFile> {
+    let ini = "; POV-Ray takes this file for the user's and the system's povray.ini, which could change settings.\n";
+    vec![export::scene(job, settings, points), SceneFile::text("povray.ini", ini)]
 }
 
 fn darkness(job: &Job) -> Measurement {

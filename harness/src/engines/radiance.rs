@@ -181,11 +181,10 @@ fn direct(
 ) -> Result<Vec<Estimate>, EngineError> {
     let Sampler { job, settings, .. } = *sampler;
     if Sources::of(job, settings) == Sources::Openings && settings.preset != Preset::Default {
-        let lost_lx =
-            |Station { meter, .. }: &Station| grazing::lost_lx(job, meter, grazing::ratio(job, settings, meter));
-        let means = measurement.take(sampler.direct()?).into_iter().zip(&job.stations);
-        let whole = means.map(|(mean, station)| {
-            let (all, lost_lx) = (sampled(mean), lost_lx(station));
+        let ratios: Vec<f64> = job.stations.iter().map(|s| grazing::ratio(job, settings, &s.meter)).collect();
+        let means = measurement.take(sampler.direct(&ratios)?).into_iter().zip(&job.stations);
+        let whole = means.zip(&ratios).map(|((mean, station), ratio)| {
+            let (all, lost_lx) = (sampled(mean), grazing::lost_lx(job, &station.meter, *ratio));
             let uncertainty = match all.uncertainty {
                 // No sample met light where rtrace leaves all of it out.
                 Uncertainty::NotSeen if lost_lx > 0.0 => Uncertainty::Bound(lost_lx),

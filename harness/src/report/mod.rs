@@ -206,7 +206,7 @@ impl Report {
 
     /// Writes it to a file with its checksum; the file is seen whole or not at all.
     pub fn keep(&mut self, path: &Path) -> Result<(), FileError> {
-        self.seal().map_err(|e| FileError { path: path.display().to_string(), source: e.into() })?;
+        self.seal().map_err(|e| FileError::of(path, e))?;
         let is_long = self.comparisons.len().max(self.readings.len()) > LONG;
         if is_long { files::keep_rows(path, self) } else { files::keep_json(path, self) }
     }

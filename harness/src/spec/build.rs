@@ -144,8 +144,7 @@ impl<'a> Builder<'a> {
         if let Some(file) = &published {
             self.take_in("published", file)?;
         }
-        let name = self.source.path.file_stem().map_or_else(|| "spec".into(), |s| s.to_string_lossy());
-        let name = printable(&name, MAX_NAME);
+        let name = name_of(&self.source.path);
         let title = spec.title.as_deref().unwrap_or(&name);
         let help = format!("give a line of at most {MAX_TITLE} printable characters");
         self.source.require(is_line(title, MAX_TITLE), "title", "this is no title", help)?;
@@ -416,6 +415,12 @@ impl<'a> Builder<'a> {
         self.hash.update(bytes);
         Ok(())
     }
+}
+
+/// A spec's name: its file's, as a line.
+pub(super) fn name_of(path: &Path) -> String {
+    let stem = path.file_stem().map_or_else(|| "spec".into(), |s| s.to_string_lossy());
+    printable(&stem, MAX_NAME)
 }
 
 /// Whether a text is one line of so many characters at most: no control character, and none that breaks or turns a line.

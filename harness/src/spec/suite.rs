@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::build::name_of;
 use super::{Case, Source, Spec, SpecError};
 use crate::procedures::known;
 use crate::system::files::read_bounded;
@@ -34,7 +35,7 @@ pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
 pub fn specs(path: &Path) -> Result<Vec<(String, Spec)>, SpecError> {
     let source = Source::read(path)?;
     let spec: Spec = source.parse()?;
-    let stem = path.file_stem().map_or_else(|| "spec".into(), |s| s.to_string_lossy().into_owned());
+    let stem = name_of(path);
     let variants = super::cases::variants(&source)?;
     if variants.is_empty() {
         return Ok(vec![(stem, spec)]);

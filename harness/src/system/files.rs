@@ -18,6 +18,12 @@ pub struct FileError {
     pub source: io::Error,
 }
 
+impl FileError {
+    pub(crate) fn of(path: &Path, source: impl Into<io::Error>) -> Self {
+        Self { path: path.display().to_string(), source: source.into() }
+    }
+}
+
 /// The most bytes of a spec, or of a file that one names: the largest photometric files have some MB, a mesh of a million triangles 60.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
@@ -71,13 +77,13 @@ pub(crate) fn replace_json<T: Serialize>(path: &Path, value: &T) -> io::Result<(
 
 /// The same, the error with its path.
 pub(crate) fn keep_json<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
-    replace_json(path, value).map_err(|source| FileError { path: path.display().to_string(), source })
+    replace_json(path, value).map_err(|source| FileError::of(path, source))
 }
 
 /// The same with an item of a list a line, for what is too long to be read.
 pub(crate) fn keep_rows<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
     replace_by(&mut tempfile::Builder::new(), path, |file| written(file, value, Rows::new()))
-        .map_err(|source| FileError { path: path.display().to_string(), source })
+        .map_err(|source| FileError::of(path, source))
 }
 
 /// As it is made: a report of 1e5 meters is some 100 MB.

@@ -521,6 +521,18 @@ mod tests {
 
     const SIDE_M: f64 = 0.2;
 
+    /// An opening about the origin that is not turned.
+    fn upright(opening: LuminousOpening, table: &LuminousIntensityDistribution) -> Emitter {
+        Emitter::new(&Luminaire {
+            id: "l".into(),
+            photometry: Arc::new(Photometry { opening, ..Photometry::of(table.clone()) }),
+            position_m: DVec3::ZERO,
+            orientation: DMat3::IDENTITY,
+            flux_scale: 1.0,
+            model: LuminaireModel::Area,
+        })
+    }
+
     /// Meters beside openings of which a sliver alone sends light there: what is above the meter, by a table that is dark above.
     #[test]
     fn a_sliver_that_no_node_meets_is_within_the_bound() {
@@ -534,15 +546,7 @@ mod tests {
         ];
         for opening in openings {
             for below_m in [1e-3, 1e-4, 1e-5] {
-                let photometry = Photometry { opening, ..Photometry::of(table.clone()) };
-                let emitter = Emitter::new(&Luminaire {
-                    id: "l".into(),
-                    photometry: Arc::new(photometry),
-                    position_m: DVec3::ZERO,
-                    orientation: DMat3::IDENTITY,
-                    flux_scale: 1.0,
-                    model: LuminaireModel::Area,
-                });
+                let emitter = upright(opening, &table);
                 let position_m = DVec3::new(1.0, 0.03, 0.5 * SIDE_M - below_m);
                 let meter = Meter { position_m, normal: DVec3::NEG_X };
                 let found = emitter.illuminance(&meter, &[], Precision::relative(1e-4));
@@ -582,15 +586,7 @@ mod tests {
         ];
         let gammas_deg = [8.6, 9.3, 9.7, 10.0, 10.6, 11.5];
         for (opening, gamma_deg) in openings.into_iter().flat_map(|o| gammas_deg.map(|g| (o, g))) {
-            let photometry = Photometry { opening, ..Photometry::of(table.clone()) };
-            let emitter = Emitter::new(&Luminaire {
-                id: "l".into(),
-                photometry: Arc::new(photometry),
-                position_m: DVec3::ZERO,
-                orientation: DMat3::IDENTITY,
-                flux_scale: 1.0,
-                model: LuminaireModel::Area,
-            });
+            let emitter = upright(opening, &table);
             let (sin, cos) = f64::to_radians(gamma_deg).sin_cos();
             let meter = Meter { position_m: 0.8 * DVec3::new(0.8 * sin, 0.6 * sin, -cos), normal: DVec3::Z };
             let own = emitter.own(&meter);

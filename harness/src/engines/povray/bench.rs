@@ -15,7 +15,7 @@ use crate::system::random::seed;
 use crate::system::slots::side_by_side;
 
 use super::ID;
-use super::direct_error::{self, DirectError};
+use super::direct_error::DirectError;
 use super::export::{self, Light};
 use super::frame::{self, Frame};
 use super::pixels::{self, Readout, Seen};
@@ -39,6 +39,8 @@ pub(super) struct Bench<'a> {
     job: &'a Job,
     workbench: &'a Workbench,
     settings: &'a Settings,
+    /// Point lights along each side of an opening.
+    points: usize,
     program: PathBuf,
 }
 
@@ -85,8 +87,13 @@ impl Run {
 }
 
 impl<'a> Bench<'a> {
-    pub(super) fn new(job: &'a Job, workbench: &'a Workbench, settings: &'a Settings) -> Result<Self, EngineError> {
-        Ok(Self { job, workbench, settings, program: program(&workbench.site)? })
+    pub(super) fn new(
+        job: &'a Job,
+        workbench: &'a Workbench,
+        settings: &'a Settings,
+        points: usize,
+    ) -> Result<Self, EngineError> {
+        Ok(Self { job, workbench, settings, points, program: program(&workbench.site)? })
     }
 
     /// Direct light: deterministic, read at rising magnification until the read-out no longer matters.
@@ -114,7 +121,7 @@ impl<'a> Bench<'a> {
         }
         let frame = Frame::of(self.job, self.settings.coordinates);
         let apart = recess::apart(self.job);
-        let error = DirectError::of(self.job, &apart, frame, direct_error::points(self.job))?;
+        let error = DirectError::of(self.job, &apart, frame, self.points)?;
         let seats = frame::seats(&apart, frame);
         let mut estimates = vec![];
         for ((look, station), seat) in looks.iter().zip(&self.job.stations).zip(seats) {

@@ -14,7 +14,6 @@ use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport};
 use crate::engines::effort;
 use crate::engines::{Job, SceneFile, Station, recess};
 
-use super::direct_error;
 use super::frame::{Frame, candela, seats};
 use super::opening::{self, FILTER_RADIUS, Part};
 use super::pigment;
@@ -32,9 +31,9 @@ pub(super) enum Light {
     Indirect,
 }
 
-pub(super) fn scene(job: &Job, settings: &Settings) -> SceneFile {
+/// With so many point lights along each side of an opening.
+pub(super) fn scene(job: &Job, settings: &Settings, points: usize) -> SceneFile {
     let frame = Frame::of(job, settings.coordinates);
-    let points = direct_error::points(job);
     let job = &*recess::apart(job);
     let mut text = head(job, settings, frame);
     text.push_str(&meters(job, frame));

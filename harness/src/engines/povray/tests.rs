@@ -312,7 +312,8 @@ fn filter_spheres_are_never_so_small_that_povray_ignores_them_and_one_that_is_wo
     let ignored = scene.replace(&format!("sphere {{ 0, {}", radius(&scene)), "sphere { 0, 0.0005");
     assert_ne!(ignored, scene);
     bench.write(&[SceneFile::text("scene.pov", ignored)]).unwrap();
-    let found = bench::Bench::new(&job, &bench, &settings).unwrap().direct().unwrap();
+    let points = direct_error::points(&job);
+    let found = bench::Bench::new(&job, &bench, &settings, points).unwrap().direct().unwrap();
     let off = worst_relative(&found, &exact_direct_lx(&job));
     // The asymmetric scene of the calibration fails at 1 %.
     assert!(off > 0.2, "an ignored filter changes readings by {off} only");

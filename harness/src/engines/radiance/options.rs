@@ -77,27 +77,35 @@ fn words(text: &str) -> Vec<String> {
 
 impl Options {
     pub(super) fn of(job: &Job, settings: &Settings, divisions: u32) -> Self {
+        let total = Self::total(job, settings, divisions);
         // -I: irradiance at points.
+        if settings.preset == Preset::Default {
+            let direct = words("-I -ab 0");
+            return Self { part_of_total: direct.clone(), direct, total };
+        }
+        let sources = Sources::of(job, settings);
+        Self {
+            direct: sources.direct(grazing::ratio_of_all(job, settings)),
+            total,
+            part_of_total: words(&format!("-I -ab 0 {}", sources.options(None))),
+        }
+    }
+
+    /// Arguments for all light.
+    pub(super) fn total(job: &Job, settings: &Settings, divisions: u32) -> Vec<String> {
         if settings.preset == Preset::Default {
             let bounces = match job.reflections() {
                 Some(Bounces::AtMost(n)) => n,
                 Some(Bounces::Converged) => DEFAULT_BOUNCES,
                 None => 0,
             };
-            let direct = words("-I -ab 0");
-            return Self { part_of_total: direct.clone(), direct, total: words(&format!("-I -ab {bounces}")) };
+            return words(&format!("-I -ab {bounces}"));
         }
-        let sources = Sources::of(job, settings);
         // -u+: random numbers proper, since the fixed sequence of -u- repeats a bias of .3 % in every block (case S1,
         // up to 7 standard errors of 120 blocks). -aa 0: no cache; -as 0: no supersampling, which is biased;
         // -lr 0: Russian roulette below weight -lw.
         let ambient = format!("-u+ -aa 0 -ad {divisions} -as 0 -lr 0 -lw {:e}", ROULETTE / f64::from(divisions));
-        let bounces = bounces(job);
-        Self {
-            direct: sources.direct(grazing::ratio_of_all(job, settings)),
-            total: words(&format!("-I -ab {bounces} {} {ambient}", sources.options(None))),
-            part_of_total: words(&format!("-I -ab 0 {}", sources.options(None))),
-        }
+        words(&format!("-I -ab {} {} {ambient}", bounces(job), Sources::of(job, settings).options(None)))
     }
 }
 

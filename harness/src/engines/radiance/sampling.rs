@@ -62,16 +62,14 @@ const DIRECT_ERROR: f64 = 0.3;
 const DIRECT_SHARE: f64 = 0.3;
 
 impl Sampler<'_> {
-    /// Direct light of openings, whose samples are jittered, each meter's with its own division of the sources; in one process a wave and a
-    /// division.
-    pub(super) fn direct(&self) -> Result<Sampled, EngineError> {
+    /// Direct light of openings, whose samples are jittered, each meter's with the division of the sources that is its own; in one process a
+    /// wave and a division.
+    pub(super) fn direct(&self, ratios: &[f64]) -> Result<Sampled, EngineError> {
         let Budget { relative_error, seconds } = self.job.budget;
         let (error, share) = if self.job.reflections().is_none() { (1.0, 1.0) } else { (DIRECT_ERROR, DIRECT_SHARE) };
         let budget = Budget { relative_error: error * relative_error, seconds: share * seconds };
         let rays = self.rows.len() as f64 * effort::shadow_rays(self.job, MAX_PARTS);
         let rule = Sampling::within(budget, SHADOW_RAY_S * rays * effort::a_ray(self.job));
-        let ratios: Vec<f64> =
-            self.job.stations.iter().map(|s| grazing::ratio(self.job, self.settings, &s.meter)).collect();
         rule.run(|numbers| {
             let mut blocks = vec![vec![0.0; self.rows.len()]; numbers.len()];
             for ratio in grazing::RATIOS {
@@ -197,6 +195,6 @@ impl Sampler<'_> {
     }
 
     pub(super) fn options(&self, divisions: u32) -> Vec<String> {
-        Options::of(self.job, self.settings, divisions).total
+        Options::total(self.job, self.settings, divisions)
     }
 }

@@ -8,6 +8,7 @@ use luminaire::photometry::{self, Photometry, lm63};
 
 use crate::spec::model::LuminaireSpec;
 use crate::spec::{Case, Spec, SpecError, specs, yaml};
+use crate::system::files::{MAX_BYTES, read_bounded};
 
 #[derive(Clone, Debug)]
 pub(super) struct Draft {
@@ -53,7 +54,7 @@ impl Draft {
             let other = || PathBuf::from(format!("{}-{}", names.len(), base.display()));
             let name = if files.contains_key(&base) { other() } else { base.clone() };
             let unreadable = |e: io::Error| SpecError::of(&path, format!("cannot be read: {e}"), "check the path");
-            let bytes = std::fs::read(&path).map_err(unreadable)?;
+            let bytes = read_bounded(&path, MAX_BYTES).map_err(unreadable)?;
             let photometry = photometry::read_file(&path).ok();
             files.insert(name.clone(), File { bytes, photometry });
             named.clone_from(&name);

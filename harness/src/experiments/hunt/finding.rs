@@ -10,16 +10,17 @@ use luminaire::scene::{LuminaireModel, Meter, Scene, Transport};
 use luminaire::simulator::{Accuracy, Stop, Uncertainty as Solved, certified_until};
 use serde::{Deserialize, Serialize};
 
+use super::HuntError;
 use super::draft::Draft;
 use super::feature::Feature;
 use super::oracle::{Oracle, Sighting, Symptom, Tribunal};
-use super::{HuntError, file_error};
 use crate::engines::display_name;
 use crate::judge::Comparison;
 use crate::plan::{Export, Selection, plan};
 use crate::procedures::Task;
 use crate::record::ProcedureId;
 use crate::spec::{Case, SpecError, from_yaml, yaml};
+use crate::system::files::FileError;
 use crate::system::process::interrupt_flag;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -127,7 +128,7 @@ pub(super) fn write(
     folder: &Path,
     seed: u64,
 ) -> Result<Finding, HuntError> {
-    let path = draft.write(folder, "spec").map_err(|e| file_error(folder, e))?;
+    let path = draft.write(folder, "spec").map_err(|e| FileError::of(folder, e))?;
     let case = Case::load(&path)?;
     let symptom = &sighting.symptom;
     let version = tribunal.instrument(&symptom.engine, &case).map(|i| i.version.text).unwrap_or_default();
@@ -152,7 +153,7 @@ pub(super) fn write(
     let witness = task.as_ref().and_then(|task| second_witness(task, sighting, seed));
     let issue = Issue { finding: &finding, draft, sighting, task: task.as_ref(), witness, scene }.text();
     let path = folder.join("issue.md");
-    std::fs::write(&path, issue).map_err(|e| file_error(&path, e))?;
+    std::fs::write(&path, issue).map_err(|e| FileError::of(&path, e))?;
     Ok(finding)
 }
 
@@ -178,14 +179,14 @@ fn export(
     for file in &files {
         let path = folder.join(&file.name);
         let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-        made.and_then(|()| std::fs::write(&path, &file.bytes)).map_err(|e| file_error(&path, e))?;
+        made.and_then(|()| std::fs::write(&path, &file.bytes)).map_err(|e| FileError::of(&path, e))?;
     }
     if let Some(command) = &command {
         let path = folder.join("by-hand.sh");
         let script = format!(
             "#!/bin/sh\n# What luxproof runs, by hand, in this folder.\ncd \"$(dirname \"$0\")\" && {command}\n"
         );
-        std::fs::write(&path, script).map_err(|e| file_error(&path, e))?;
+        std::fs::write(&path, script).map_err(|e| FileError::of(&path, e))?;
     }
     Ok(Some((files.iter().map(|f| PathBuf::from(&f.name)).collect(), command)))
 }

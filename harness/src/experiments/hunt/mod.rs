@@ -141,18 +141,14 @@ fn resumed(options: &Options<'_>) -> Result<Hunt, HuntError> {
     let bytes = match std::fs::read(&path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(fresh),
-        Err(source) => return Err(file_error(&path, source).into()),
+        Err(source) => return Err(FileError::of(&path, source).into()),
     };
-    let kept: Hunt = serde_json::from_slice(&bytes).map_err(|e| file_error(&path, e.into()))?;
+    let kept: Hunt = serde_json::from_slice(&bytes).map_err(|e| FileError::of(&path, e))?;
     if kept.seed != options.seed || kept.engines != engines {
         let engines = kept.engines.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
         return Err(HuntError::OfAnother { path, seed: kept.seed, engines });
     }
     Ok(kept)
-}
-
-fn file_error(path: &Path, source: io::Error) -> FileError {
-    FileError { path: path.display().to_string(), source }
 }
 
 struct Hunter<'a> {
@@ -179,7 +175,7 @@ impl Hunter<'_> {
     fn keep(&self) -> Result<(), HuntError> {
         files::keep_json(&self.options.out.join(STATE), &self.hunt)?;
         let path = self.options.out.join("index.md");
-        std::fs::write(&path, page::page(&self.hunt)).map_err(|e| file_error(&path, e))?;
+        std::fs::write(&path, page::page(&self.hunt)).map_err(|e| FileError::of(&path, e))?;
         Ok(())
     }
 
@@ -193,7 +189,7 @@ impl Hunter<'_> {
             all.is_empty() || all.iter().any(|p| g.case.task(*p).is_some())
         };
         let round: Vec<Generated> = (first..last).filter_map(|n| grammar.spec(n)).filter(wanted).collect();
-        let folder = tempfile::tempdir().map_err(|e| file_error(&std::env::temp_dir(), e))?;
+        let folder = tempfile::tempdir().map_err(|e| FileError::of(&std::env::temp_dir(), e))?;
         let seen = self.seen(&round, folder.path())?;
         if process::is_interrupted() {
             return Ok(());
@@ -228,7 +224,7 @@ impl Hunter<'_> {
         let mut paths = vec![];
         for generated in round {
             let own = folder.join(&generated.name);
-            paths.push(generated.draft.write(&own, &generated.name).map_err(|e| file_error(&own, e))?);
+            paths.push(generated.draft.write(&own, &generated.name).map_err(|e| FileError::of(&own, e))?);
         }
         let question = Question {
             symptom: None,
@@ -323,7 +319,7 @@ impl Hunter<'_> {
         finding.features = features;
         finding.known = self.known.iter().find(|k| k.accounts_for(&finding)).map(|k| k.cause.clone());
         let original = folder.join("original");
-        generated.draft.write(&original, "spec").map_err(|e| file_error(&original, e))?;
+        generated.draft.write(&original, "spec").map_err(|e| FileError::of(&original, e))?;
         files::keep_json(&folder.join("finding.json"), &finding)?;
         (self.options.told)(&format!(
             "{id}: {} ({} lines, table {:?}, {looks} looks)",
@@ -377,8 +373,8 @@ pub fn shrink(options: &ShrinkOptions<'_>) -> Result<Shrinking, HuntError> {
         let of_engine = draft.spec.engines.as_ref().and_then(|e| e.get(options.engine.as_str())).cloned();
         let engines = BTreeMap::from([(options.engine.clone(), of_engine.unwrap_or_default())]);
         let tribunal = Tribunal { site: &options.site, engines: &engines, jobs: options.jobs, limit: LIMIT };
-        let own = tempfile::tempdir().map_err(|e| file_error(&std::env::temp_dir(), e))?;
-        let path = draft.write(own.path(), "c0").map_err(|e| file_error(own.path(), e))?;
+        let own = tempfile::tempdir().map_err(|e| FileError::of(&std::env::temp_dir(), e))?;
+        let path = draft.write(own.path(), "c0").map_err(|e| FileError::of(own.path(), e))?;
         let question = Question {
             symptom: None,
             procedures: options.procedures.clone(),

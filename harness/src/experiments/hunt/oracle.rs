@@ -20,6 +20,7 @@ use crate::plan::Selection;
 use crate::record::{EngineName, FailureKind, ProcedureId};
 use crate::report::Report;
 use crate::spec::{Case, SpecError};
+use crate::system::files::FileError;
 
 /// What an engine does wrong, as it is recognised elsewhere.
 #[derive(Clone, Debug, Display, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -250,11 +251,11 @@ impl Tribunal<'_> {
         symptom: &Symptom,
         look: Look,
     ) -> Result<Vec<Option<Sighting>>, AuditError> {
-        let folder = tempfile::tempdir().map_err(|source| no_folder(&std::env::temp_dir(), source))?;
+        let folder = tempfile::tempdir().map_err(|source| FileError::of(&std::env::temp_dir(), source))?;
         let mut paths: Vec<Option<PathBuf>> = vec![];
         for (k, draft) in drafts.iter().enumerate() {
             let path = draft.write(&folder.path().join(k.to_string()), &format!("c{k}"));
-            let path = path.map_err(|source| no_folder(folder.path(), source))?;
+            let path = path.map_err(|source| FileError::of(folder.path(), source))?;
             let sound = Case::load(&path).is_ok_and(|case| case.task(symptom.procedure).is_some());
             paths.push(sound.then_some(path));
         }
@@ -338,12 +339,9 @@ impl Tribunal<'_> {
     }
 
     pub(super) fn instrument(&self, name: &EngineName, case: &Case) -> Option<Instrument> {
-        let engine: Arc<dyn engines::Engine> = if let Some(entry) = engines::entry(name) {
-            Arc::from((entry.make)())
-        } else {
-            let folder = case.path.parent().unwrap_or(Path::new(""));
-            Arc::from(engines::external(name, &self.engines.get(name)?.0, folder).ok()?)
-        };
+        let folder = case.path.parent().unwrap_or(Path::new(""));
+        let settings = self.engines.get(name).cloned().unwrap_or_default();
+        let engine: Arc<dyn engines::Engine> = Arc::from(engines::named(name, &settings.0, folder).ok()?);
         let version = engine.probe(self.site).ok()?;
         Some(Instrument { engine, version })
     }
@@ -354,10 +352,6 @@ pub(super) fn panicked() -> Sighting {
     let symptom =
         Symptom { engine: EngineName::SIMULATOR, procedure: ProcedureId::DirectIlluminance, oracle: Oracle::Panic };
     Sighting { symptom, comparison: None, p_value: 0.0, size: None, text: None }
-}
-
-fn no_folder(path: &Path, source: std::io::Error) -> AuditError {
-    AuditError::File(crate::system::files::FileError { path: path.display().to_string(), source })
 }
 
 /// Nobody watches single readings of a hunt.

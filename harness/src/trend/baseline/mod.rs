@@ -104,7 +104,7 @@ impl Baseline {
 
     pub fn read(path: &Path) -> Result<Self, BaselineError> {
         let name = || path.display().to_string();
-        let text = fs::read(path).map_err(|source| FileError { path: name(), source })?;
+        let text = fs::read(path).map_err(|source| FileError::of(path, source))?;
         let opened = envelope::open(SCHEMA, &text).and_then(|sealed| sealed.about_what(Self::subject));
         let baseline: Self = opened.map_err(|why| BaselineError::Refused { path: name(), why })?;
         baseline.check(&name())?;
@@ -153,7 +153,7 @@ impl Baseline {
     }
 
     pub fn write(&self, path: &Path) -> Result<(), BaselineError> {
-        let fail = |source| FileError { path: path.display().to_string(), source };
+        let fail = |source| FileError::of(path, source);
         let text = self.text().map_err(|e| fail(e.into()))?;
         Ok(files::replace_shared(path, text.as_bytes()).map_err(fail)?)
     }

@@ -25,7 +25,7 @@ pub(super) fn whole_lines(text: &[u8]) -> (&[u8], Option<usize>) {
 /// A history is made if there is none, appended to, or replaced as a whole: never half written. A night that is run again
 /// takes the place of its earlier lines, case by case, so that repeating a night is harmless.
 pub fn add(path: &Path, lines: &[Line<'_>]) -> Result<Added, HistoryError> {
-    let fail = |source| FileError { path: path.display().to_string(), source };
+    let fail = |source| FileError::of(path, source);
     let old = match fs::read(path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => vec![],
         read => read.map_err(fail)?,

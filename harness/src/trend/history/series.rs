@@ -53,7 +53,7 @@ pub struct History {
 
 impl History {
     pub fn read(path: &Path) -> Result<Self, HistoryError> {
-        let bytes = fs::read(path).map_err(|source| FileError { path: path.display().to_string(), source })?;
+        let bytes = fs::read(path).map_err(|source| FileError::of(path, source))?;
         Self::parse(&bytes, path)
     }
 
