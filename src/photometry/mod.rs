@@ -62,12 +62,17 @@ pub struct Photometry {
 
 /// Reads a photometric file of any kind: by its content, then by its extension (.ies, .ldt, .xml).
 pub fn read_file(path: &Path) -> Result<Photometry, ReadError> {
+    read_by(path, &|path| std::fs::read(path))
+}
+
+/// The same for whoever decides which files are opened: the file and, of LM-63, the tilt factors that it names beside it.
+pub fn read_by(path: &Path, open: &dyn Fn(&Path) -> std::io::Result<Vec<u8>>) -> Result<Photometry, ReadError> {
     let located = |error: ReadError| ReadError { file: path.to_path_buf(), ..error };
-    let bytes = std::fs::read(path).map_err(|error| {
+    let bytes = open(path).map_err(|error| {
         located(ReadError { file: path.into(), line: 0, column: 0, problem: Problem::Io { reason: error.to_string() } })
     })?;
     let read = match Kind::of(path, &bytes) {
-        Some(Kind::Lm63) => lm63::parse_with(&bytes, lm63::tilt_file_beside(path)),
+        Some(Kind::Lm63) => lm63::parse_with(&bytes, lm63::tilt_file_beside(path, open)),
         Some(Kind::Eulumdat) => eulumdat::parse(&bytes),
         Some(Kind::Tm33) => tm33::parse(&bytes),
         None => Err(Text::new(&bytes).error(0, Problem::Unrecognised)),

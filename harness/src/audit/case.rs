@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::time::{Instant, SystemTime};
 
-use super::jobs::{self, Found, Outcome, Running};
+use super::jobs::{self, Outcome, Running};
+use super::repetition::Examined;
 use super::{AuditError, Options, StatedErrors, repetition, sampling, sequential};
 use crate::judge::{Comparison, Judge, Policy, Published};
 use crate::measure::Reader;
@@ -83,11 +84,12 @@ impl Audit<'_> {
         let running = Running { case, plan, folder, reader, observer };
         let mut outcome = running.run()?;
         if !process::is_interrupted() {
-            let stated = match self.options.stated_errors {
+            let examined = match self.options.stated_errors {
                 StatedErrors::LookedInto => repetition::examine(&running, judge, &mut outcome),
-                StatedErrors::Believed => Found::new(),
+                StatedErrors::Believed => Examined::default(),
             };
-            sampling::sample_on(&running, judge, &stated, &mut outcome)?;
+            sampling::sample_on(&running, judge, &examined.found, &mut outcome)?;
+            examined.examine_looks(&running, judge, &mut outcome);
         }
         if outcome.from_cache > 0 {
             let count = outcome.from_cache;

@@ -41,7 +41,7 @@ use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping
 use crate::procedures::Task;
 use crate::record::Status;
 use crate::report::{Exit, Report, SpecRecord};
-use crate::spec::{Case, SpecError, filtered, suite};
+use crate::spec::{Case, SpecError, Trust, filtered, suite};
 use crate::system::digest::hexadecimal;
 use crate::system::files::FileError;
 use crate::system::process;
@@ -65,6 +65,8 @@ pub struct Options<'a> {
     pub filter: Vec<String>,
     /// Whether readings may be left out that follow from others.
     pub skipping: Skipping,
+    /// Whose specs they are.
+    pub trust: Trust,
     /// Which project policies judge, and by which of their profiles.
     pub policy: PolicyChoice,
     /// When sampling stops; `None`: as the profile says.
@@ -124,6 +126,7 @@ impl Options<'_> {
             selection: Selection { seed: 1, ..Selection::default() },
             filter: vec![],
             skipping: Skipping::Allowed,
+            trust: Trust::Own,
             policy: PolicyChoice::default(),
             sampling: None,
             after_failure: AfterFailure::GoOn,
@@ -190,7 +193,7 @@ pub fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<Report, Aud
             let (cases, policies) = chosen(&[path.to_owned()], options)?;
             (cases, common(&policies)?)
         }
-        None => (vec![Case::default()], Arc::new(options.policy.read(options.policy.file.as_deref())?)),
+        None => (vec![Case::default()], Arc::new(options.policy.read(options.policy.file.as_deref(), Trust::Own)?)),
     };
     let known = Planner::new(&options.selection, &options.site, options.skipping).examinations(&of)?;
     let (cases, plans): (Vec<_>, Vec<_>) = known.into_iter().unzip();
@@ -293,7 +296,7 @@ fn diagnose(plans: &[Plan], reports: &mut [Report]) {
 
 /// The cases that are asked for, under the profile chosen, each with its policy; all read and checked before any engine starts.
 pub fn chosen(specs: &[PathBuf], options: &Options<'_>) -> Result<(Vec<Case>, Vec<Arc<Policy>>), SpecError> {
-    let mut cases = suite(specs).and_then(|all| filtered(all, &options.filter))?;
+    let mut cases = suite(specs, options.trust).and_then(|all| filtered(all, &options.filter))?;
     // Of a suite, the cases that the chosen procedures concern; a choice that concerns none is refused by the planner.
     if cases.iter().any(|case| options.selection.concerns(case)) {
         cases.retain(|case| options.selection.concerns(case));

@@ -10,12 +10,13 @@ use std::ops::RangeInclusive;
 use super::jobs::{Found, Outcome, Running};
 use super::sampling::{seed_of_look, stations_of};
 use crate::engines::{Job, Measurement};
-use crate::judge::{Comparison, Judge, LOOKS, SINGLE_PRECISION, Source, Verdict, rejected};
+use crate::judge::{Comparison, Judge, LOOKS, SINGLE_PRECISION, Source, Verdict};
 use crate::measure::Question;
 use crate::plan::{Fill, Run};
 use crate::procedures::Task;
 use crate::record::{
-    Doubt, EngineName, Estimate, MeterId, Reading, ReadingKey, Recording, StatedErrors, Uncertainty, Variation,
+    Doubt, EngineName, Estimate, MeterId, Reading, ReadingKey, Recording, Sheltered, StatedErrors, Tails, Uncertainty,
+    Variation,
 };
 use crate::spec::Budget;
 use crate::system::process;
@@ -27,8 +28,6 @@ const FURTHER: RangeInclusive<u32> = 4..=6;
 const EFFORT: f64 = 0.25;
 /// The part of what is claimed that is read again, one reading of a task at least.
 const PART: f64 = 0.05;
-/// Of a procedure's meters whose stated errors are contradicted, how often one is by chance.
-const TOLD: f64 = 0.005;
 /// An error that nobody could check counts up to this part of the tolerance, and up to what was asked for: with it, what lies twice as far
 /// off as is allowed fails.
 const UNCHECKED: f64 = 0.5;
@@ -40,40 +39,75 @@ const NEARLY_ALL: f64 = 3.0;
 struct Again<'a> {
     run: &'a Run,
     task: &'a Task,
+    engine: EngineName,
     was_asked: bool,
     /// Whether everything was rendered, whatever the plan's shortcut.
     is_whole: bool,
     /// The targets that were sampled.
     targets: Vec<usize>,
+    /// Those of claims without chance.
+    claimed: Vec<usize>,
     /// Target by target, what was sampled and what was claimed to be determined and is not; `None` where it did not answer.
     sampled: Option<Vec<Vec<Estimate>>>,
     claims: Option<Vec<Vec<Estimate>>>,
+    /// What all that its engine read again shows.
+    tails: Tails,
+}
+
+/// What was found of stated errors, and what it was found by.
+#[derive(Default)]
+pub(super) struct Examined<'a> {
+    pub(super) found: Found,
+    again: Vec<Again<'a>>,
 }
 
 /// Reads again, tells in the recordings what is found, and gives readings the errors that they have: by engine and procedure, of what
 /// it sampled and of what it claims.
-pub(super) fn examine(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Outcome) -> Found {
-    let mut found = Found::new();
+pub(super) fn examine<'a>(running: &'a Running<'_>, judge: &Judge<'_>, outcome: &mut Outcome) -> Examined<'a> {
+    let mut examined = Examined::default();
     for (e, planned) in running.plan.engines.iter().enumerate().filter(|(_, p)| !p.engine.is_vouched_for()) {
         let name = planned.engine.name();
         let runs = running.plan.runs.iter().filter(|run| run.engine == e);
-        let all: Vec<Again<'_>> = runs.map(|run| again(running, run, &name, outcome)).collect();
+        let mut all: Vec<Again<'_>> = runs.map(|run| again(running, run, &name, outcome)).collect();
         let of_engine: Variation = all.iter().filter_map(Again::rendered).map(|meters| Variation::of(&meters)).sum();
-        for again in all {
-            let task = again.task;
-            let mut doubts = again.doubts(&of_engine, &compared(judge, task, outcome, &name, &[]));
-            let now = compared(judge, task, outcome, &name, &doubts);
+        let scatters = |again: &Again<'_>| again.rendered().into_iter().chain(again.claims.clone()).flatten().collect();
+        let of_all: Vec<Vec<Estimate>> = all.iter().flat_map(|again| -> Vec<_> { scatters(again) }).collect();
+        let tails = Tails::of(&of_all);
+        let of_tails = StatedErrors::of_tails(&of_all, tails);
+        for again in &mut all {
+            again.tails = tails;
+            let compared = |found: &[StatedErrors]| again.compared(judge, outcome, Some(found));
+            let mut doubts = again.doubts(&of_engine, &compared(&[]));
+            doubts.extend(of_tails.clone());
+            let now = compared(&doubts);
             doubts.extend(refuted(&now));
             doubts.extend(again.of_sheltered(running, &now));
-            found.insert((name.clone(), task.procedure), doubts);
+            examined.found.insert((name.clone(), again.task.procedure), doubts);
         }
+        examined.again.extend(all);
     }
     for recording in &mut outcome.recordings {
         let ReadingKey { engine, procedure, .. } = &recording.key;
-        let Some(of_engine) = found.get(&(engine.clone(), *procedure)) else { continue };
+        let Some(of_engine) = examined.found.get(&(engine.clone(), *procedure)) else { continue };
         correct(recording, of_engine);
     }
-    found
+    examined
+}
+
+impl Examined<'_> {
+    /// The same where further looks left nothing but what they state between readings and a verdict.
+    pub(super) fn examine_looks(&self, running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Outcome) {
+        for again in &self.again {
+            let now = again.compared(judge, outcome, None);
+            let doubts = [beyond_tolerance(&now), refuted(&now)].into_iter().flatten();
+            let doubts: Vec<StatedErrors> = doubts.chain(again.of_sheltered(running, &now)).collect();
+            let is_mine = |r: &&mut Recording| r.key.engine == again.engine && r.key.procedure == again.task.procedure;
+            for recording in outcome.recordings.iter_mut().filter(is_mine) {
+                apply(recording, &doubts);
+                recording.stated_errors.extend(doubts.iter().cloned());
+            }
+        }
+    }
 }
 
 impl Again<'_> {
@@ -118,35 +152,58 @@ impl Again<'_> {
         asked.min(UNCHECKED * allowed)
     }
 
-    /// Where nothing but a stated error keeps readings from failing, all that was sampled is read again: do those meters, by themselves,
-    /// scatter as is stated there?
-    fn of_sheltered(&self, running: &Running<'_>, now: &[Comparison]) -> Option<StatedErrors> {
-        let task = self.task;
+    /// Where nothing but a stated error keeps readings from failing, all that was sampled is read again: how do those meters, by themselves,
+    /// scatter?
+    fn of_sheltered(&self, running: &Running<'_>, now: &[Comparison]) -> Vec<StatedErrors> {
         let is_beyond = |c: &Comparison, allowed: f64| c.deviation.is_some_and(|d| d.abs() > allowed);
-        let at = limits(now, |c, allowed| {
-            (c.verdict == Verdict::Inconclusive && is_beyond(c, allowed)).then(|| self.unchecked(c, allowed))
-        });
-        let meters = self.sampled.as_ref()?;
-        let sheltered: Vec<usize> =
-            (0..meters.len()).filter(|n| at.contains_key(&task.targets[self.targets[*n]].id)).collect();
-        if sheltered.is_empty() || process::is_interrupted() {
-            return None;
+        let is_kept = |c: &Comparison| c.verdict == Verdict::Inconclusive && c.uncertainty.is_sampled();
+        let at = limits(now, |c, allowed| (is_kept(c) && is_beyond(c, allowed)).then(|| self.unchecked(c, allowed)));
+        let is_sheltered = |k: usize| at.contains_key(&self.task.targets[k].id);
+        let (run, is_whole) = (self.run, self.is_whole);
+        let kinds = [(&self.targets, &self.sampled, true), (&self.claimed, &self.claims, false)];
+        let mut meters = vec![];
+        for (targets, read, is_sampled) in kinds {
+            let Some(read) = read.as_ref().filter(|read| !read.is_empty()) else { continue };
+            if process::is_interrupted() || !targets.iter().any(|k| is_sheltered(*k)) {
+                continue;
+            }
+            let ask = |number| {
+                if is_sampled {
+                    sampled(running, run, is_whole, targets, number)
+                } else {
+                    claimed_again(running, run, targets, number)
+                }
+            };
+            let further: Vec<Vec<Estimate>> = FURTHER.filter_map(ask).collect();
+            if further.is_empty() {
+                return StatedErrors::doubted_at(Doubt::NotReadAgain, at).into_iter().collect();
+            }
+            for (n, (k, read)) in targets.iter().zip(read).enumerate().filter(|(_, (k, _))| is_sheltered(**k)) {
+                let meter = self.task.targets[*k].id.clone();
+                let readings: Vec<Estimate> = read.iter().copied().chain(further.iter().map(|all| all[n])).collect();
+                meters.push(Sheltered { counts: counts(now, &meter), meter, readings });
+            }
         }
-        let ask = |number| sampled(running, self.run, self.is_whole, &self.targets, number);
-        let further: Vec<Vec<Estimate>> = FURTHER.filter_map(ask).collect();
-        if further.is_empty() {
-            return StatedErrors::doubted_at(Doubt::NotReadAgain, at);
-        }
-        let all: Vec<Vec<Estimate>> = sheltered
-            .iter()
-            .map(|n| meters[*n].iter().copied().chain(further.iter().map(|estimates| estimates[*n])).collect())
-            .collect();
-        let p_values: Vec<f64> = all.iter().map(|readings| StatedErrors::too_large_alone(readings)).collect();
-        let contradicted = rejected(&p_values, TOLD).into_iter().zip(sheltered.iter().zip(&all)).filter(|(is, _)| *is);
-        StatedErrors::too_large_at(
-            contradicted.map(|(_, (n, readings))| (task.targets[self.targets[*n]].id.clone(), readings.as_slice())),
-        )
+        StatedErrors::of_sheltered(&meters, self.tails)
     }
+
+    /// How the engine's readings of the task compare, were this found of what it states; `None`: as they are.
+    fn compared(&self, judge: &Judge<'_>, outcome: &Outcome, found: Option<&[StatedErrors]>) -> Vec<Comparison> {
+        let of_task = outcome.recordings.iter().filter(|r| r.key.procedure == self.task.procedure);
+        let mut of_task: Vec<Recording> = of_task.cloned().collect();
+        if let Some(found) = found {
+            of_task.iter_mut().filter(|r| r.key.engine == self.engine).for_each(|mine| correct(mine, found));
+        }
+        let mut compared = judge.compare(self.task, &of_task.iter().collect::<Vec<_>>());
+        compared.retain(|c| c.key.engine == self.engine);
+        compared
+    }
+}
+
+/// The relative standard error that counts at a meter; nothing where no sample met anything.
+fn counts(compared: &[Comparison], meter: &MeterId) -> Option<f64> {
+    let here = compared.iter().find(|c| c.meter == *meter)?;
+    Some(here.uncertainty.standard_error()? / here.value?.abs()).filter(|relative| relative.is_finite())
 }
 
 fn again<'a>(running: &'a Running<'_>, run: &'a Run, engine: &EngineName, outcome: &Outcome) -> Again<'a> {
@@ -162,29 +219,19 @@ fn again<'a>(running: &'a Running<'_>, run: &'a Run, engine: &EngineName, outcom
     let sampled = repeated(readings, &targets, |number| sampled(running, run, is_whole, &targets, number));
     let claims = contradicted(running, run, readings, &of_claims);
     let was_asked = !(process::is_interrupted() || targets.is_empty() && of_claims.is_empty());
-    Again { run, task, was_asked, is_whole, targets, sampled, claims }
-}
-
-/// How an engine's readings of a task compare, were this found of what it states.
-fn compared(
-    judge: &Judge<'_>,
-    task: &Task,
-    outcome: &Outcome,
-    engine: &EngineName,
-    found: &[StatedErrors],
-) -> Vec<Comparison> {
-    let mut of_task: Vec<Recording> =
-        outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure).cloned().collect();
-    of_task.iter_mut().filter(|r| r.key.engine == *engine).for_each(|mine| correct(mine, found));
-    let mut compared = judge.compare(task, &of_task.iter().collect::<Vec<_>>());
-    compared.retain(|c| c.key.engine == *engine);
-    compared
+    let (engine, claimed, tails) = (engine.clone(), of_claims, Tails::Unknown);
+    Again { run, task, engine, was_asked, is_whole, targets, claimed, sampled, claims, tails }
 }
 
 /// Tells in a recording what is found of it, and gives its readings the errors that they have.
 fn correct(recording: &mut Recording, found: &[StatedErrors]) {
     recording.stated_errors = found.to_vec();
     recording.design_effect = found.iter().filter(|s| s.ratio.is_some()).map(|s| s.design_effect).reduce(f64::max);
+    apply(recording, found);
+}
+
+/// Gives readings the errors that they have by what is found.
+fn apply(recording: &mut Recording, found: &[StatedErrors]) {
     for reading in &mut recording.readings {
         reading.uncertainty = StatedErrors::corrected(found, &reading.meter, estimate(reading)).uncertainty;
     }

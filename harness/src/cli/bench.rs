@@ -13,7 +13,7 @@ use crate::engines::Site;
 use crate::experiments::bench::{self, BenchReport, Knobs, Options};
 use crate::record::ProcedureId;
 use crate::report::Exit;
-use crate::spec::suite;
+use crate::spec::{Trust, suite};
 use crate::system::files;
 
 #[derive(Debug, Args)]
@@ -49,11 +49,11 @@ enum BenchFormat {
     Svg,
 }
 
-pub(super) fn run(args: &BenchArgs, site: &Site) -> Result<Exit, Diagnostic> {
+pub(super) fn run(args: &BenchArgs, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
     if !args.seconds.iter().chain([&args.minutes]).all(|s| s.is_finite() && *s >= 0.0) || args.seconds.is_empty() {
         return Err(miette::miette!("--seconds and --minutes must be numbers from 0"));
     }
-    let cases = suite(&args.measuring.specs).map_err(diagnose)?;
+    let cases = suite(&args.measuring.specs, trust).map_err(diagnose)?;
     let subjects = args.measuring.subjects(site)?;
     let first = args.measuring.specs.first().map_or(std::path::Path::new("suite"), PathBuf::as_path);
     let folder = args.measuring.folder("bench", first);

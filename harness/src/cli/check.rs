@@ -14,10 +14,10 @@ use crate::judge::PolicyRecord;
 use crate::plan::{Asked, Planner, cost_s};
 use crate::record::EngineName;
 use crate::report::Exit;
-use crate::spec::{filtered, suite};
+use crate::spec::{Trust, filtered, suite};
 
-pub(super) fn check(selected: &Selected, site: &Site) -> Result<Exit, Diagnostic> {
-    let mut cases = suite(&selected.specs).and_then(|all| filtered(all, &selected.filter)).map_err(diagnose)?;
+pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
+    let mut cases = suite(&selected.specs, trust).and_then(|all| filtered(all, &selected.filter)).map_err(diagnose)?;
     let policies = selected.policy.of_cases(&cases).map_err(diagnose)?;
     audit::published(&cases).into_diagnostic()?;
     let mut out = String::new();

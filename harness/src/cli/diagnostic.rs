@@ -10,6 +10,8 @@ pub(crate) fn diagnose(error: SpecError) -> Report {
     let name = error.file.display().to_string();
     let bytes = error.line.and_then(|_| read_bounded(&error.file, MAX_BYTES).ok());
     let text = bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    // What no terminal shows says nothing, and the printer cannot lay it out.
+    let text = text.filter(|text| text.lines().all(|line| line.len() <= MAX_LINE));
     let span = text.as_ref().and_then(|t| span(t, error.line?, error.column.unwrap_or(1)));
     let place = match (error.line, error.column) {
         (Some(line), Some(column)) => format!("{name}:{line}:{column}"),
@@ -17,14 +19,25 @@ pub(crate) fn diagnose(error: SpecError) -> Report {
         _ => name.clone(),
     };
     let mut diagnostic =
-        miette::MietteDiagnostic::new(format!("{place}: {}", error.message)).with_severity(Severity::Error);
-    diagnostic.help = error.help;
+        miette::MietteDiagnostic::new(format!("{place}: {}", shortened(&error.message))).with_severity(Severity::Error);
+    diagnostic.help = error.help.as_deref().map(shortened);
     match (text, span) {
         (Some(text), Some(span)) => {
             let diagnostic = diagnostic.with_label(LabeledSpan::new_with_span(Some("here".to_owned()), span));
             Report::new(diagnostic).with_source_code(NamedSource::new(name, text))
         }
         _ => Report::new(diagnostic),
+    }
+}
+
+/// The longest line that is shown of a file, in bytes, and the longest message in characters.
+const MAX_LINE: usize = 2000;
+const MAX_MESSAGE: usize = 2000;
+
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(MAX_MESSAGE) {
+        Some((end, _)) => format!("{} ...", &text[..end]),
+        None => text.to_owned(),
     }
 }
 

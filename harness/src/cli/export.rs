@@ -11,7 +11,7 @@ use crate::engines::Site;
 use crate::plan::{Export, NotExported, Selection, plan};
 use crate::record::ProcedureId;
 use crate::report::Exit;
-use crate::spec::{Case, suite};
+use crate::spec::{Case, Trust, suite};
 
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {
@@ -28,8 +28,8 @@ pub(super) struct ExportArgs {
     procedures: Vec<ProcedureId>,
 }
 
-pub(super) fn export(args: &ExportArgs, site: &Site) -> Result<Exit, Diagnostic> {
-    let cases = suite(std::slice::from_ref(&args.spec)).map_err(diagnose)?;
+pub(super) fn export(args: &ExportArgs, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
+    let cases = suite(std::slice::from_ref(&args.spec), trust).map_err(diagnose)?;
     let mut exported = 0;
     for case in &cases {
         // One folder a case, where there are several.

@@ -22,6 +22,7 @@ mod views;
 use std::io::Write;
 use std::path::PathBuf;
 
+use clap::builder::FalseyValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 use serde::Serialize;
@@ -33,7 +34,7 @@ use crate::judge::{PolicyChoice, ProjectPolicy};
 use crate::plan::{Selection, Skipping};
 use crate::record::ProcedureId;
 use crate::report::{Exit, Report};
-use crate::spec::Spec;
+use crate::spec::{Spec, Trust};
 
 use views::Views;
 
@@ -47,6 +48,9 @@ pub struct Cli {
     /// Where readings are kept between runs [default: the user's cache folder]
     #[arg(long, global = true, env = "LUXPROOF_CACHE", value_name = "DIR")]
     cache_dir: Option<PathBuf>,
+    /// Take specs for those of a stranger: they name files below their own folders alone, start no program, and are of bounded size
+    #[arg(long, global = true, env = "LUXPROOF_UNTRUSTED", value_parser = FalseyValueParser::new())]
+    untrusted: bool,
     /// Print more of what happens to stderr
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
@@ -196,14 +200,15 @@ impl Cli {
             Some(folder) => Site::at(std::path::absolute(folder).into_diagnostic()?),
             None => Site::of_user().into_diagnostic()?,
         };
+        let trust = if self.untrusted { Trust::Stranger } else { Trust::Own };
         match self.command {
             Command::Run(mut args) => {
                 args.views.all |= self.verbose > 0;
-                run::run(&args, &site, &cache::folder(self.cache_dir)?)
+                run::run(&args, &site, &cache::folder(self.cache_dir)?, trust)
             }
             Command::Cache { action } => cache::manage(action, &cache::folder(self.cache_dir)?),
-            Command::Check(args) => check::check(&args, &site),
-            Command::Export(args) => export::export(&args, &site),
+            Command::Check(args) => check::check(&args, &site, trust),
+            Command::Export(args) => export::export(&args, &site, trust),
             Command::Engines { action } => engines::manage_engines(action, &site),
             Command::Photometry(args) => photometry::run(&args),
             Command::Report(mut args) => {
@@ -213,11 +218,17 @@ impl Cli {
             Command::History(action) => history::history(&action),
             Command::Diff(args) => diff::diff(&args),
             Command::Accept(args) => accept::accept(&args),
+            Command::Selftest(_) | Command::Hunt(_) | Command::Shrink(_) if trust == Trust::Stranger => {
+                Err(miette::miette!(
+                    help = "check and run take such specs",
+                    "this command works on specs of the user's own alone, and --untrusted or LUXPROOF_UNTRUSTED says that these are not"
+                ))
+            }
             Command::Selftest(args) => selftest::run_selftest(&args, &site, || cache::folder(self.cache_dir)),
-            Command::Bench(args) => bench::run(&args, &site),
+            Command::Bench(args) => bench::run(&args, &site, trust),
             Command::Hunt(args) => hunt::run(&args, &site),
             Command::Shrink(args) => hunt::shrink(&args, &site),
-            Command::Stress(args) => stress::run(&args, &site),
+            Command::Stress(args) => stress::run(&args, &site, trust),
             Command::ReadOne => measuring::read_one(&site),
             Command::Schema { of } => schema(of),
         }

@@ -1,5 +1,6 @@
 //! How far a run is: one bar with the time left on a terminal, a line a job elsewhere.
 
+use std::collections::BTreeSet;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
@@ -9,7 +10,7 @@ use parking_lot::Mutex;
 use crate::audit::Observer;
 use crate::engines::Engine;
 use crate::plan::{Plan, Run};
-use crate::record::ProcedureId;
+use crate::record::{EngineName, ProcedureId};
 use crate::spec::Case;
 
 pub(super) struct Progress {
@@ -62,8 +63,25 @@ impl Progress {
     }
 }
 
+/// The programs that specs have us run, each told once.
+fn programs(cases: &[Case], plans: &[Plan]) -> BTreeSet<String> {
+    let of_case = |(case, plan): (&Case, &Plan)| -> Vec<String> {
+        let command = |engine: EngineName| {
+            let words = case.settings_of(engine.as_str()).remove("command")?;
+            let words: Vec<String> =
+                words.as_array()?.iter().map(|word| word.as_str().unwrap_or("?").to_owned()).collect();
+            Some(format!("{}: engines.{engine} runs `{}`", case.path.display(), words.join(" ")))
+        };
+        plan.engines.iter().filter_map(|planned| command(planned.engine.name())).collect()
+    };
+    cases.iter().zip(plans).flat_map(of_case).collect()
+}
+
 impl Observer for Progress {
     fn planned(&self, cases: &[Case], plans: &[Plan]) {
+        for program in programs(cases, plans) {
+            self.line(&program);
+        }
         let mut work = self.work.lock();
         for (case, plan) in cases.iter().zip(plans) {
             let costs = |r: &&Run| !plan.engines[r.engine].engine.is_witness();

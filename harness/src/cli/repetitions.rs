@@ -13,7 +13,7 @@ use crate::measure::cache::Cache;
 use crate::measure::{Machine, Reader};
 use crate::plan::Selection;
 use crate::record::ProcedureId;
-use crate::spec::{filtered, suite};
+use crate::spec::{Trust, filtered, suite};
 use crate::system::process;
 
 #[derive(Debug, Args)]
@@ -59,7 +59,7 @@ pub(super) fn repeat(
         return Err(miette::miette!("--relative-error and --seconds must be numbers above 0"));
     }
     let selection = Selection { engines: args.engines.clone(), procedures: args.procedures.clone(), seed };
-    let mut cases = suite(&args.specs).and_then(|all| filtered(all, &args.filter)).map_err(diagnose)?;
+    let mut cases = suite(&args.specs, Trust::Own).and_then(|all| filtered(all, &args.filter)).map_err(diagnose)?;
     // A choice of procedures that concerns no case is refused by the planner.
     if cases.iter().any(|case| selection.concerns(case)) {
         cases.retain(|case| selection.concerns(case));

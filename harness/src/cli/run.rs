@@ -14,11 +14,12 @@ use crate::audit::{self, AfterFailure, Calibration, Options};
 use crate::engines::Site;
 use crate::measure::cache::Cache;
 use crate::report::{BaselineCheck, Exit, Report};
+use crate::spec::Trust;
 use crate::system::files;
 use crate::system::process;
 use crate::trend::baseline::{self, Baseline, Comparability, Entry};
 
-pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Diagnostic> {
+pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> Result<Exit, Diagnostic> {
     let progress = Progress::new();
     let options = Options {
         cache: Some(cache.clone()).filter(|_| !args.no_cache),
@@ -26,6 +27,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache) -> Result<Exit, Di
         selection: args.selected.selection(),
         filter: args.selected.filter.clone(),
         skipping: args.selected.skipping(),
+        trust,
         policy: args.selected.policy.clone(),
         sampling: args.sampling,
         after_failure: if args.fail_fast { AfterFailure::Stop } else { AfterFailure::GoOn },

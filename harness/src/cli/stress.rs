@@ -14,7 +14,7 @@ use crate::judge::KnownDeviations;
 use crate::laws;
 use crate::record::EngineName;
 use crate::report::Exit;
-use crate::spec::{Budget, Case, suggestion, suite};
+use crate::spec::{Budget, Case, Trust, suggestion, suite};
 use crate::system::files;
 
 #[derive(Debug, Args)]
@@ -49,7 +49,7 @@ enum StressFormat {
 }
 
 /// Stresses every case; the exit code tells whether our own exact solver broke a law.
-pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
+pub(super) fn run(args: &StressArgs, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
     for law in &args.laws {
         if laws::find(law).is_none() {
             let help = suggestion(law, laws::all().map(|l| l.id));
@@ -61,7 +61,7 @@ pub(super) fn run(args: &StressArgs, site: &Site) -> Result<Exit, Diagnostic> {
         return Err(miette::miette!("--minutes, --seconds and --limit must be numbers from 0"));
     }
     let cases: Vec<Case> =
-        suite(&args.measuring.specs).map_err(diagnose)?.into_iter().filter(stress::concerns).collect();
+        suite(&args.measuring.specs, trust).map_err(diagnose)?.into_iter().filter(stress::concerns).collect();
     if cases.is_empty() {
         return Err(miette::miette!("there is neither direct nor indirect illuminance to stress in these specs"));
     }

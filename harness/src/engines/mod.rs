@@ -7,6 +7,7 @@
 mod blocks;
 mod catalogue;
 mod cells;
+mod comment;
 mod contract;
 mod effort;
 mod external;

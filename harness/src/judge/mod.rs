@@ -210,7 +210,11 @@ impl Judge<'_> {
             let stated = StatedErrors::of_looks(&recording.stated_errors, &r.meter, r.uncertainty);
             believed(stated, largest_portion, held.as_ref().map(|h| (h.reference.value - r.value).abs()))
         };
-        let uncertainty = reading.map_or(Uncertainty::Unstated, believed);
+        let believed = reading.map_or(Uncertainty::Unstated, believed);
+        let truth = held.as_ref().map(|h| h.reference.value);
+        let to_come =
+            reading.zip(truth).and_then(|(r, truth)| StatedErrors::to_come(&recording.stated_errors, r.value, truth));
+        let uncertainty = to_come.map_or(believed, |error| believed.at_least(error));
         let basis = held.as_ref().map(|h| h.reference.basis);
         let (tolerance, tolerance_source) =
             basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();

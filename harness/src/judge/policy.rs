@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 use super::tolerance::{Rule, ToleranceClass};
 use super::{Judge, KnownDeviation, KnownDeviations, Published, Tolerances, known, tolerance};
 use crate::record::EngineName;
-use crate::spec::{Budget, Case, Source, SpecError, suggestion};
+use crate::spec::{Budget, Case, Source, SpecError, Trust, suggestion};
 use crate::system::digest::hexadecimal;
 
 /// The name of a project's policy, beside a spec or in a folder above it.
@@ -102,7 +102,9 @@ impl PolicyChoice {
             if let Some(policy) = read.get(&file) {
                 return Ok(Arc::clone(policy));
             }
-            let policy = Arc::new(self.read(file.as_deref())?);
+            // A file that the user named is the user's own.
+            let trust = if self.file.is_some() { Trust::Own } else { case.source.trust };
+            let policy = Arc::new(self.read(file.as_deref(), trust)?);
             read.insert(file, Arc::clone(&policy));
             Ok(policy)
         };
@@ -110,7 +112,7 @@ impl PolicyChoice {
     }
 
     /// Ours, with that of a file where there is one.
-    pub fn read(&self, file: Option<&Path>) -> Result<Policy, SpecError> {
+    pub fn read(&self, file: Option<&Path>, trust: Trust) -> Result<Policy, SpecError> {
         let Some(file) = file else {
             let help = format!("write a {POLICY_FILE} beside the spec, or name one with --policy");
             if let Some(name) = &self.profile {
@@ -120,7 +122,7 @@ impl PolicyChoice {
             let class = self.tolerance_class.unwrap_or_default();
             return Ok(Policy { tolerances: policy.tolerances.of_class(class), ..policy });
         };
-        let source = Source::read(file)?;
+        let source = Source::read(file, trust)?;
         let project: ProjectPolicy = source.parse()?;
         tolerance::check(&source, &project.tolerances)?;
         known::check(&source, &project.known_deviations)?;

@@ -20,7 +20,8 @@ pub use design_effect::{design_effect, design_effect_of_squares};
 pub use key::{EngineName, MeterId, ProcedureId, ReadingKey, UnknownProcedure};
 pub use light::{Light, UnknownLight};
 pub use method::{Effort, Method};
-pub use stated_errors::{Doubt, StatedErrors, Variation};
+pub use scatter::Tails;
+pub use stated_errors::{Doubt, Sheltered, StatedErrors, Variation};
 pub use status::{EngineStatus, FailureKind, Role, Status};
 pub use uncertainty::Uncertainty;
 

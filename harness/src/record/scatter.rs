@@ -1,14 +1,24 @@
 //! How repeated readings scatter, over what is stated of their errors, which itself is estimated from few samples.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, StudentsT};
 
-use super::Estimate;
+use super::{Estimate, ROUNDING};
 
 /// Degrees of freedom of stated errors that are put together before readings are held against them: a ratio of variances with fewer below
 /// has hardly a mean.
 const ENOUGH: f64 = 20.0;
 /// Fewer than these have no variance of such a ratio at all.
 const LEAST: f64 = 6.0;
+/// Scatters are put together where it is no less probable that they are of one size.
+const ALIKE: f64 = 0.05;
+/// How often a meter whose readings are normal has one that is called an outlier.
+const OUTLIER: f64 = 0.05;
+/// So many of them are less probable than this: their tails are heavy.
+const TOO_MANY: f64 = 0.005;
+/// So many are no less probable than this: their tails are normal.
+const ENOUGH_BY_CHANCE: f64 = 0.1;
+/// The fewest meters that show normal tails: a heavy one that matters would have told itself in one of five.
+const TELLING: u64 = 20;
 /// Of a stated error that tells none.
 pub(super) const MANY: f64 = 1e6;
 
@@ -84,10 +94,20 @@ pub(super) struct Alone {
     /// Relative to their mean.
     pub(super) relative: f64,
     pub(super) freedom: f64,
-    /// Over the geometric mean of what is stated.
+    /// Over the geometric mean of what is stated; infinite where nothing is.
     pub(super) ratio: f64,
     /// The probability of so little, were the stated errors right.
     pub(super) p_value: f64,
+}
+
+impl Alone {
+    /// Over this relative standard error, where its readings state none.
+    pub(super) fn against(self, counts: Option<f64>) -> Self {
+        let Some(counts) = counts.filter(|_| self.ratio.is_infinite()) else { return self };
+        let ratio = self.relative / counts;
+        let p_value = ChiSquared::new(self.freedom).map_or(1.0, |chance| chance.cdf(self.freedom * ratio * ratio));
+        Self { ratio, p_value, ..self }
+    }
 }
 
 /// Of three readings of one meter with other seeds, or more.
@@ -102,11 +122,64 @@ pub(super) fn of_one(readings: &[Estimate]) -> Option<Alone> {
     // What met nothing states nothing, and scatters all the same.
     let mean = readings.iter().map(|e| e.value).sum::<f64>() / n;
     let squares: f64 = readings.iter().map(|e| (e.value - mean).powi(2)).sum();
-    let over = squares / (logs.iter().sum::<f64>() / logs.len() as f64).exp();
-    let p_value = ChiSquared::new(freedom).ok()?.cdf(over);
+    let over =
+        if logs.is_empty() { f64::INFINITY } else { squares / (logs.iter().sum::<f64>() / logs.len() as f64).exp() };
+    let p_value = if over.is_finite() { ChiSquared::new(freedom).ok()?.cdf(over) } else { 1.0 };
     let relative = (squares / freedom).sqrt() / mean.abs();
     let alone = Alone { relative, freedom, ratio: (over / freedom).sqrt(), p_value };
-    (relative.is_finite() && over.is_finite()).then_some(alone)
+    (relative.is_finite() && !over.is_nan()).then_some(alone)
+}
+
+/// Of what readings with other seeds scatter by, over what is stated of each meter: together, where they are alike by M. S. Bartlett's test
+/// (Proc. R. Soc. Lond. A 160 (1937)); with the degrees of freedom of all.
+pub(super) fn alike(ratios: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let freedom: f64 = ratios.iter().map(|(_, f)| f).sum();
+    let square = ratios.iter().map(|(r, f)| f * r * r).sum::<f64>() / freedom;
+    let apart = freedom * square.ln() - ratios.iter().map(|(r, f)| f * (r * r).ln()).sum::<f64>();
+    let others = ratios.len() as f64 - 1.0;
+    let correction = 1.0 + (ratios.iter().map(|(_, f)| f.recip()).sum::<f64>() - freedom.recip()) / (3.0 * others);
+    let chance = ChiSquared::new(others).ok()?;
+    (chance.sf(apart / correction) > ALIKE).then_some((square.sqrt(), freedom))
+}
+
+/// What readings with other seeds show of the tails that they are from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tails {
+    /// As few lie far from the others of their meter as of a normal distribution.
+    Normal,
+    /// More do: a few samples hold much of the light.
+    Heavy,
+    /// They are too few to tell.
+    Unknown,
+}
+
+impl Tails {
+    /// Of readings of meters, one list a meter: how many have one that F. E. Grubbs would call an outlier (Technometrics 11 (1969)).
+    pub fn of(meters: &[Vec<Estimate>]) -> Self {
+        let judged: Vec<bool> = meters.iter().filter_map(|readings| has_outlier(readings)).collect();
+        let (n, outliers) = (judged.len() as u64, judged.iter().filter(|is| **is).count() as u64);
+        let chance = Binomial::new(OUTLIER, n).ok();
+        let by_chance = outliers.checked_sub(1).zip(chance).map_or(1.0, |(fewer, chance)| chance.sf(fewer));
+        match by_chance {
+            p if p < TOO_MANY => Self::Heavy,
+            p if p < ENOUGH_BY_CHANCE || n < TELLING => Self::Unknown,
+            _ => Self::Normal,
+        }
+    }
+}
+
+/// Whether one reading of a meter lies far from the others; nothing where they are too few, or all one but for rounding.
+fn has_outlier(readings: &[Estimate]) -> Option<bool> {
+    let n = readings.len() as f64;
+    let mean = readings.iter().map(|e| e.value).sum::<f64>() / n;
+    let deviation = (readings.iter().map(|e| (e.value - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+    let farthest = readings.iter().map(|e| (e.value - mean).abs()).fold(0.0, f64::max);
+    if readings.len() < 4 || deviation <= ROUNDING * mean.abs() {
+        return None;
+    }
+    let t = StudentsT::new(0.0, 1.0, n - 2.0).ok()?.inverse_cdf(1.0 - OUTLIER / (2.0 * n));
+    let critical = (n - 1.0) / n.sqrt() * (t * t / (n - 2.0 + t * t)).sqrt();
+    Some(farthest / deviation > critical)
 }
 
 /// Of readings with their stated variances and degrees of freedom.
@@ -136,4 +209,46 @@ fn of_expected(group: &[Meter]) -> f64 {
 fn of(group: &[Meter], freedom: impl Fn(&Meter) -> f64) -> f64 {
     let all: f64 = group.iter().map(|m| m.expected).sum();
     all.powi(2) / group.iter().map(|m| m.expected.powi(2) / freedom(m)).sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::system::random::normal;
+
+    /// How often of 300 engines that read 24 meters with four seeds the tails are called each: normal, heavy.
+    fn called(reading: impl Fn(&mut fastrand::Rng) -> f64) -> (usize, usize) {
+        let tails = |seed: u64| {
+            let mut random = fastrand::Rng::with_seed(seed);
+            let meter = |_| (0..4).map(|_| Estimate::exact(reading(&mut random))).collect();
+            Tails::of(&(0..24).map(meter).collect::<Vec<Vec<Estimate>>>())
+        };
+        let all: Vec<Tails> = (0..300).map(tails).collect();
+        let count = |wanted| all.iter().filter(|t| **t == wanted).count();
+        (count(Tails::Normal), count(Tails::Heavy))
+    }
+
+    #[test]
+    fn normal_readings_have_normal_tails_and_a_few_large_samples_a_heavy_one() {
+        let (_, heavy) = called(|random| 100.0 + normal(random));
+        assert!(heavy <= 6, "{heavy} of 300");
+        let hits = |random: &mut fastrand::Rng| if random.f64() < 0.1 { 50.0 } else { 0.0 };
+        let (normal_tails, _) = called(|random| 95.0 + 0.5 * normal(random) + hits(random));
+        assert!(normal_tails <= 12, "{normal_tails} of 300");
+        // Means of eight samples whose logarithms have a standard deviation of 2.
+        let (normal_tails, _) = called(|random| (0..8).map(|_| (2.0 * normal(random)).exp()).sum());
+        assert!(normal_tails <= 15, "{normal_tails} of 300");
+        let few: Vec<Vec<Estimate>> =
+            (0..5).map(|k| (0..4).map(|n| Estimate::exact(f64::from(k * n))).collect()).collect();
+        assert_eq!(Tails::of(&few), Tails::Unknown);
+    }
+
+    #[test]
+    fn scatters_of_one_size_are_put_together() {
+        let (ratio, freedom) = alike(&[(1.0, 6.0), (1.2, 6.0), (0.8, 6.0)]).unwrap();
+        assert!((ratio - (3.08_f64 / 3.0).sqrt()).abs() < 1e-12 && freedom == 18.0);
+        assert_eq!(alike(&[(1.0, 6.0), (100.0, 6.0)]), None);
+        assert_eq!(alike(&[(1.0, 6.0)]), None);
+        assert_eq!(alike(&[(1.0, 6.0), (0.0, 6.0)]), None);
+    }
 }

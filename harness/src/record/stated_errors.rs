@@ -8,8 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::scatter::{MANY, Scatter, of_one, of_repeated};
-use super::{Estimate, MeterId, Uncertainty, design_effect};
+use super::scatter::{Alone, MANY, Scatter, Tails, alike, of_one, of_repeated};
+use super::{Estimate, MeterId, ROUNDING, Uncertainty, design_effect};
 
 /// Stated errors that vary as they do with a smaller probability are a heavy tail: the chi-squared distribution is only nearly theirs.
 const UNHEARD_OF: f64 = 1e-4;
@@ -26,8 +26,6 @@ const NORMAL: f64 = 3.0;
 const FEWEST: f64 = 0.5;
 /// A procedure's standard errors vary less than the engine's others where it is less probable than this that they vary alike.
 const STEADIER: f64 = 0.003;
-/// What readings that are the same differ by, in what is stated of them: rounding.
-const SAME: f64 = 1e-6;
 /// How many times too large a stated error is before that is told: some care is nobody's fault.
 const MIN_EXCESS: f64 = 3.0;
 
@@ -51,6 +49,9 @@ pub struct StatedErrors {
     /// How its standard errors fall with effort: 1 where their squares do in inverse proportion, 0 where they stay.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub falls_with_effort: Option<f64>,
+    /// The largest part of the light of a meter that one sample holds, where some do that lie far from all others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_portion: Option<f64>,
     /// The meters that this is about, and the relative error that counts there; empty where it is about all.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub at: BTreeMap<MeterId, f64>,
@@ -81,6 +82,36 @@ pub enum Doubt {
     Refuted,
 }
 
+/// A meter where nothing but an error keeps a reading from failing.
+pub struct Sheltered {
+    pub meter: MeterId,
+    /// With other seeds, the one that is judged among them.
+    pub readings: Vec<Estimate>,
+    /// The relative standard error that keeps it; `None` where no sample met anything.
+    pub counts: Option<f64>,
+}
+
+/// How readings of a meter are seen to scatter.
+struct Seen {
+    relative: f64,
+    freedom: f64,
+}
+
+/// How meters scatter together, where that is alike over what counts of each; they show less where they share their noise.
+fn together(meters: &[(&Sheltered, &Alone, f64)]) -> Option<Vec<Seen>> {
+    let ratios: Vec<(f64, f64)> = meters.iter().map(|(_, one, counts)| (one.relative / counts, one.freedom)).collect();
+    let (ratio, freedom) = alike(&ratios)?;
+    let deviates = |(m, one, _): &(&Sheltered, &Alone, f64)| -> Vec<f64> {
+        let mean = m.readings.iter().map(|e| e.value).sum::<f64>() / m.readings.len() as f64;
+        m.readings.iter().map(|e| (e.value / mean - 1.0) / one.relative).collect()
+    };
+    let of_meters: Vec<Vec<f64>> = meters.iter().map(deviates).collect();
+    let draws = of_meters.iter().map(Vec::len).min()?;
+    let by_draw: Vec<Vec<f64>> = (0..draws).map(|k| of_meters.iter().map(|z| z[k]).collect()).collect();
+    let freedom = freedom / design_effect(&by_draw);
+    Some(meters.iter().map(|(_, _, counts)| Seen { relative: ratio * counts, freedom }).collect())
+}
+
 impl StatedErrors {
     /// Nothing found but a doubt.
     pub const fn doubted(doubt: Doubt) -> Self {
@@ -92,6 +123,7 @@ impl StatedErrors {
             p_value: None,
             of_claims: None,
             falls_with_effort: None,
+            largest_portion: None,
             at: BTreeMap::new(),
             doubt: Some(doubt),
         }
@@ -102,22 +134,53 @@ impl StatedErrors {
         (!at.is_empty()).then(|| Self { at, ..Self::doubted(doubt) })
     }
 
-    /// Meters by themselves: of each, how probable it is that its readings scatter by so little, were the errors right that are stated
-    /// there; 1 where these are not far too large.
-    pub fn too_large_alone(meter: &[Estimate]) -> f64 {
-        of_one(meter).filter(|one| one.ratio < 1.0 / MIN_EXCESS).map_or(1.0, |one| one.p_value)
+    /// What counts where nothing but an error keeps readings from failing: how they scatter with other seeds, where that is less, together
+    /// where they scatter alike over what is stated. Of tails that are not known to be normal only what is plainly contradicted counts less,
+    /// and where they are heavy, nothing does.
+    pub fn of_sheltered<'a>(meters: &'a [Sheltered], tails: Tails) -> Vec<Self> {
+        let alone = |m: &'a Sheltered| Some((m, of_one(&m.readings)?.against(m.counts)));
+        let alone: Vec<(&Sheltered, Alone)> = meters.iter().filter_map(alone).collect();
+        let is_contradicted = |one: &Alone| one.ratio < 1.0 / MIN_EXCESS && one.p_value < TOLD / meters.len() as f64;
+        let unseen = alone.iter().filter(|(m, _)| m.counts.is_none() && tails != Tails::Heavy);
+        let (same, others): (Vec<_>, Vec<_>) = unseen.partition(|(_, one)| one.relative <= ROUNDING);
+        let stated = alone.iter().filter_map(|(m, one)| Some((*m, one, m.counts?)));
+        let stated: Vec<(&Sheltered, &Alone, f64)> = stated
+            .filter(|(_, one, _)| tails == Tails::Normal || tails == Tails::Unknown && is_contradicted(one))
+            .collect();
+        let is_told = !stated.is_empty() && stated.iter().all(|(_, one, _)| is_contradicted(one));
+        let own = |one: &Alone| Seen { relative: one.relative, freedom: one.freedom };
+        let of_stated = together(&stated).unwrap_or_else(|| stated.iter().map(|(_, one, _)| own(one)).collect());
+        let less = stated.iter().zip(of_stated).filter(|((_, _, counts), seen)| seen.relative < *counts);
+        let less: Vec<(&Sheltered, Seen)> =
+            less.map(|((m, ..), seen)| (*m, seen)).chain(others.into_iter().map(|(m, one)| (*m, own(one)))).collect();
+        let degrees_of_freedom = less.iter().map(|(_, seen)| seen.freedom).fold(f64::INFINITY, f64::min);
+        let at = less.into_iter().map(|(m, seen)| (m.meter.clone(), seen.relative)).collect();
+        let narrower = Self::doubted_at(Doubt::TooLarge, at);
+        let narrower =
+            narrower.map(|found| Self { degrees_of_freedom, doubt: found.doubt.filter(|_| is_told), ..found });
+        let same = same.into_iter().map(|(m, _)| (m.meter.clone(), 0.0)).collect();
+        Self::doubted_at(Doubt::SameForEverySeed, same).into_iter().chain(narrower).collect()
     }
 
-    /// What counts at meters whose stated errors their readings of other seeds contradict: how these scatter.
-    pub fn too_large_at<'a>(meters: impl IntoIterator<Item = (MeterId, &'a [Estimate])>) -> Option<Self> {
-        let (mut at, mut fewest) = (BTreeMap::new(), f64::INFINITY);
-        for (meter, readings) in meters {
-            if let Some(one) = of_one(readings) {
-                at.insert(meter, one.relative);
-                fewest = fewest.min(one.freedom);
-            }
-        }
-        Some(Self { degrees_of_freedom: fewest, ..Self::doubted_at(Doubt::TooLarge, at)? })
+    /// What is found of an engine by all readings with other seeds: a few samples hold much of the light.
+    pub fn of_tails(meters: &[Vec<Estimate>], tails: Tails) -> Option<Self> {
+        let portion =
+            |e: &Estimate| Some((e.uncertainty.standard_error()? / e.value).powi(2)).filter(|p| p.is_finite());
+        let largest_portion = meters.iter().flatten().filter_map(portion).reduce(f64::max)?;
+        let found = Self { largest_portion: Some(largest_portion), ..Self::doubted(Doubt::HeavyTail) };
+        (tails == Tails::Heavy).then_some(found)
+    }
+
+    /// The error of a reading below the truth where samples met light, but none of the few that hold much: were they still to come, how many of
+    /// them has Poisson's law.
+    pub fn to_come(found: &[Self], value: f64, truth: f64) -> Option<f64> {
+        let portion = found.iter().filter_map(|f| f.largest_portion).reduce(f64::max)?;
+        (value < truth).then(|| (portion * truth * (truth - value)).sqrt())
+    }
+
+    /// Whether it is about how readings scatter at single meters.
+    fn is_of_scatter_at(&self, meter: &MeterId) -> bool {
+        self.at.contains_key(meter) && matches!(self.doubt, None | Some(Doubt::TooLarge | Doubt::SameForEverySeed))
     }
 
     /// Of readings whose errors are stated, one list a meter; meters whose error is not of sampling say nothing, and all of them too
@@ -131,9 +194,9 @@ impl StatedErrors {
         let (below, above) = (chance.cdf(sum / design_effect), chance.sf(sum / design_effect));
         let own = Variation::of(meters);
         let (varies, varies_beyond) = own.with(of_engine);
-        let steady = own.steadier_than_stated().filter(|_| ratio >= SAME);
+        let steady = own.steadier_than_stated().filter(|_| ratio >= ROUNDING);
         let doubt = match ratio {
-            r if r < SAME => Some(Doubt::SameForEverySeed),
+            r if r < ROUNDING => Some(Doubt::SameForEverySeed),
             // Samples of a heavy tail scatter by what they state, too.
             r if below < TOLD && r < 1.0 / MIN_EXCESS => Some(Doubt::TooLarge),
             _ if varies_beyond && varies.is_some_and(|seen| seen < NORMAL) => Some(Doubt::HeavyTail),
@@ -166,7 +229,7 @@ impl StatedErrors {
         let (mut sum, mut freedom, mut of_meters) = (0.0, 0.0, vec![]);
         for readings in meters {
             let mean = mean(readings);
-            if mean > SAME * brightest {
+            if mean > ROUNDING * brightest {
                 let of_meter = readings.iter().map(|e| (e.value / mean - 1.0).powi(2)).sum::<f64>();
                 let own = readings.len().saturating_sub(1) as f64;
                 sum += of_meter;
@@ -209,9 +272,11 @@ impl StatedErrors {
             (Some(Doubt::NotReadAgain), Uncertainty::StandardError { value, bound, .. }) => {
                 Uncertainty::StandardError { value: value.min(most), degrees_of_freedom: None, bound }
             }
-            (Some(Doubt::TooLarge), Uncertainty::StandardError { bound, .. }) => {
+            (None | Some(Doubt::TooLarge), Uncertainty::StandardError { bound, .. }) => {
                 Uncertainty::StandardError { value: most, degrees_of_freedom: Some(self.degrees_of_freedom), bound }
             }
+            (None, Uncertainty::NotSeen) => Uncertainty::sampled(most, Some(self.degrees_of_freedom)),
+            (Some(Doubt::SameForEverySeed), Uncertainty::NotSeen) => Uncertainty::Exact,
             (_, stated) => stated,
         }
     }
@@ -219,7 +284,7 @@ impl StatedErrors {
     /// The degrees of freedom of a heavy tail at a meter, where there is one; where readings of other seeds contradict what is stated, no
     /// tail excuses it.
     pub fn heavy_tail(found: &[Self], meter: &MeterId) -> Option<f64> {
-        let is_contradicted = found.iter().any(|f| f.doubt == Some(Doubt::TooLarge) && f.at.contains_key(meter));
+        let is_contradicted = found.iter().any(|f| f.is_of_scatter_at(meter));
         let heavy = found.iter().filter(|f| f.doubt == Some(Doubt::HeavyTail) && !is_contradicted);
         heavy.filter_map(|f| f.degrees_of_freedom_seen).reduce(f64::min)
     }
@@ -411,6 +476,11 @@ impl fmt::Display for StatedErrors {
                  degrees of freedom); verdicts go by the scatter",
                 ratio.recip()
             ),
+            Some(Doubt::HeavyTail) if self.largest_portion.is_some() => write!(
+                f,
+                "a heavy tail: at more meters than by chance one seed reads far from all others, so that a few of its samples hold much of \
+                 the light and others are still to come; what is missing fails nothing that a few of them would bring"
+            ),
             Some(Doubt::HeavyTail) => write!(
                 f,
                 "a heavy tail: its standard errors vary from seed to seed as those of {:.1} degrees of freedom do, so that a few of its \
@@ -457,6 +527,9 @@ impl fmt::Display for StatedErrors {
                 "the bounds that it states {at} are beyond the tolerance: nothing that it reads there could ever fail; its readings \
                  are judged as they stand"
             ),
+            None if !at.is_empty() => {
+                write!(f, "verdicts {at} go by how readings of other seeds scatter, which is less than what it states")
+            }
             None => write!(
                 f,
                 "readings of other seeds scatter by {ratio:.2} of what it states ({freedom:.0} degrees of freedom)"
@@ -551,12 +624,16 @@ mod tests {
         assert!((0..100).filter(told).count() > 90);
     }
 
+    fn too_large_alone(readings: &[Estimate]) -> f64 {
+        of_one(readings).filter(|one| one.ratio < 1.0 / MIN_EXCESS).map_or(1.0, |one| one.p_value)
+    }
+
     /// How many of 300 procedures of 24 honest meters, seven readings each, have one whose stated error seems contradicted by itself.
     fn contradicted(reading: impl Fn(&mut fastrand::Rng) -> Estimate) -> usize {
         let is_found = |seed: &u64| {
             let mut random = fastrand::Rng::with_seed(*seed);
             let mut meter = || (0..7).map(|_| reading(&mut random)).collect::<Vec<Estimate>>();
-            (0..24).any(|_| StatedErrors::too_large_alone(&meter()) < TOLD / 24.0)
+            (0..24).any(|_| too_large_alone(&meter()) < TOLD / 24.0)
         };
         (0..300).filter(is_found).count()
     }
@@ -596,7 +673,7 @@ mod tests {
                     value: 100.0 + scatter * normal(&mut random),
                     uncertainty: Uncertainty::sampled(stated * (varies * normal(&mut random)).exp(), Some(7.0)),
                 };
-                StatedErrors::too_large_alone(&(0..7).map(|_| one()).collect::<Vec<Estimate>>()) < TOLD / 24.0
+                too_large_alone(&(0..7).map(|_| one()).collect::<Vec<Estimate>>()) < TOLD / 24.0
             });
             let count = found.count();
             assert!(count > 170, "{scatter} {stated} {varies}: {count} of 200");
@@ -608,7 +685,9 @@ mod tests {
         let [here, there] = ["desk[0]", "desk[1]"].map(|id| MeterId(id.to_owned()));
         let wide = |value| Estimate { value, uncertainty: Uncertainty::sampled(30.0, Some(7.0)) };
         let readings = [99.0, 100.0, 101.0].map(wide);
-        let found = [StatedErrors::too_large_at([(here.clone(), &readings[..])]).unwrap()];
+        let meter = Sheltered { meter: here.clone(), readings: readings.to_vec(), counts: Some(0.3) };
+        let found = StatedErrors::of_sheltered(&[meter], Tails::Unknown);
+        assert_eq!(found[0].doubt, Some(Doubt::TooLarge), "{found:?}");
         let corrected = StatedErrors::corrected(&found, &here, wide(200.0)).uncertainty;
         assert!((corrected.standard_error().unwrap() - 2.0).abs() < 1e-12, "{corrected:?}");
         assert_eq!(corrected.degrees_of_freedom(), Some(2.0));
@@ -619,6 +698,67 @@ mod tests {
         let bounded = Estimate { value: 200.0, uncertainty: Uncertainty::Bound(50.0) };
         let judged = StatedErrors::corrected(&[limit(Doubt::BeyondTolerance)], &here, bounded);
         assert_eq!(judged.uncertainty, Uncertainty::Bound(2.0));
+    }
+
+    /// Meters whose readings of seven seeds scatter by a hundredth of these and state these.
+    fn sheltered(random: &mut fastrand::Rng, of_meters: &[(f64, f64)], is_honest: bool) -> Vec<Sheltered> {
+        let chi = |random: &mut fastrand::Rng| ((0..7).map(|_| normal(random).powi(2)).sum::<f64>() / 7.0).sqrt();
+        let reading = |random: &mut fastrand::Rng, (scatter, stated): (f64, f64)| {
+            let varies = if is_honest { chi(random) } else { 1.0 };
+            let uncertainty = Uncertainty::sampled(stated * varies, Some(7.0));
+            Estimate { value: 100.0 + scatter * normal(random), uncertainty }
+        };
+        let one = |(k, of_meter): (usize, &(f64, f64))| {
+            let readings: Vec<Estimate> = (0..7).map(|_| reading(random, *of_meter)).collect();
+            let counts = readings[3].uncertainty.standard_error().map(|e| e / 100.0).filter(|e| *e > 0.0);
+            Sheltered { meter: MeterId::new("desk", k), readings, counts }
+        };
+        of_meters.iter().enumerate().map(one).collect()
+    }
+
+    #[test]
+    fn where_tails_are_normal_no_error_counts_that_is_larger_than_readings_scatter() {
+        let mut random = fastrand::Rng::with_seed(11);
+        let alike = sheltered(&mut random, &[(0.5, 1.45); 24], false);
+        let found = StatedErrors::of_sheltered(&alike, Tails::Normal);
+        assert!(found.len() == 1 && found[0].at.len() == 24 && found[0].degrees_of_freedom > 100.0, "{found:?}");
+        assert!(found[0].at.values().all(|seen| (0.0044..0.0056).contains(seen)), "{found:?}");
+        assert_eq!(StatedErrors::of_sheltered(&alike, Tails::Unknown), []);
+        // One bad apple does not spoil the others.
+        let mut unlike = vec![(0.1, 5.0); 23];
+        unlike.push((5.0, 5.0));
+        let found = StatedErrors::of_sheltered(&sheltered(&mut random, &unlike, false), Tails::Normal);
+        assert!(found[0].at.values().filter(|seen| **seen < 0.003).count() == 23, "{found:?}");
+        assert_eq!(found[0].degrees_of_freedom, 6.0);
+        // Every seed reads the same, although samples are said to have met nothing.
+        let mut unseen = sheltered(&mut random, &[(0.0, 1.0)], false);
+        unseen[0].counts = None;
+        let found = StatedErrors::of_sheltered(&unseen, Tails::Unknown);
+        assert_eq!(found[0].doubt, Some(Doubt::SameForEverySeed));
+        let there = Estimate { value: 5.0, uncertainty: Uncertainty::NotSeen };
+        assert_eq!(StatedErrors::corrected(&found, &unseen[0].meter, there).uncertainty, Uncertainty::Exact);
+        assert_eq!(StatedErrors::of_sheltered(&unseen, Tails::Heavy), []);
+    }
+
+    #[test]
+    fn honest_readings_lie_within_what_counts_as_often_as_is_said() {
+        // Two intervals are tried, so that twice as many may lie outside.
+        const LEVEL: f64 = 0.01;
+        let beyond = |seed: &u64| {
+            let mut random = fastrand::Rng::with_seed(*seed);
+            let of_meters: Vec<(f64, f64)> = (0..24).map(|k| 0.1 * f64::from(1 + k % 5)).map(|s| (s, s)).collect();
+            let meters = sheltered(&mut random, &of_meters, true);
+            let found = StatedErrors::of_sheltered(&meters, Tails::Normal);
+            meters.iter().any(|m| {
+                let judged = StatedErrors::corrected(&found, &m.meter, m.readings[3]);
+                let (error, freedom) =
+                    (judged.uncertainty.standard_error().unwrap(), judged.uncertainty.degrees_of_freedom().unwrap());
+                let chance = statrs::distribution::StudentsT::new(0.0, 1.0, freedom).unwrap();
+                2.0 * chance.sf((judged.value - 100.0).abs() / error) < LEVEL / 24.0
+            })
+        };
+        let count = (0..600).filter(beyond).count();
+        assert!(count <= 18, "{count} of 600");
     }
 
     #[test]

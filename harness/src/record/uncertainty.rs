@@ -138,6 +138,17 @@ impl Uncertainty {
         }
     }
 
+    /// The same with a standard error that is no smaller than this.
+    #[must_use]
+    pub fn at_least(&self, error: f64) -> Self {
+        match *self {
+            Self::StandardError { value, degrees_of_freedom, bound } if value > 0.0 => {
+                Self::StandardError { value: value.max(error), degrees_of_freedom, bound }
+            }
+            other => other,
+        }
+    }
+
     /// Whether what is stated are numbers.
     pub fn is_finite(&self) -> bool {
         self.standard_error().is_none_or(f64::is_finite) && self.bound().is_finite()

@@ -15,11 +15,11 @@ use super::model::{
     Budget, EngineSettings, GridSpec, LuminaireSpec, MeterSet, ModelSpec, ObstacleSpec, Spec, ToleranceOverride,
 };
 use super::mounting::unmountable;
-use super::{Source, SpecError, suggestion};
+use super::trust::Limits;
+use super::{Source, SpecError, Trust, suggestion};
 use crate::procedures::{Angles, Asked, AtAngles, Names, Procedures, Task};
 use crate::record::ProcedureId;
 use crate::system::digest::hexadecimal;
-use crate::system::files::{MAX_BYTES, read_bounded};
 
 /// Nearest a meter or a luminaire may come to a surface, relative to the room's largest extent.
 ///
@@ -87,23 +87,24 @@ impl Case {
         ProcedureId::ALL.iter().copied().filter_map(|procedure| self.task(procedure))
     }
 
-    /// Reads, checks and builds the case of a spec file, without the overrides of its `cases`.
+    /// Reads, checks and builds the case of a spec file of the user's own, without the overrides of its `cases`.
     pub fn load(path: &Path) -> Result<Self, SpecError> {
-        let source = Source::read(path)?;
+        let source = Source::read(path, Trust::Own)?;
         let spec: Spec = source.parse()?;
-        Builder::new(&source).build(spec)
+        Builder::new(&source, &mut source.trust.limits()).build(spec)
     }
 
     /// All cases of a spec file: those of its `cases`, or the one that it is.
-    pub fn load_all(path: &Path) -> Result<Vec<Self>, SpecError> {
-        let source = Source::read(path)?;
+    pub fn load_all(path: &Path, trust: Trust) -> Result<Vec<Self>, SpecError> {
+        let source = Source::read(path, trust)?;
         let spec: Spec = source.parse()?;
         let variants = super::cases::variants(&source)?;
+        let mut left = trust.limits();
         if variants.is_empty() {
-            return Ok(vec![Builder::new(&source).build(spec)?]);
+            return Ok(vec![Builder::new(&source, &mut left).build(spec)?]);
         }
         let build = |v: Variant| {
-            let mut builder = Builder::new(&v.source);
+            let mut builder = Builder::new(&v.source, &mut left);
             builder.hash.update(&v.name);
             let case = builder.build(v.spec)?;
             Ok(Self { name: format!("{}/{}", case.name, v.name), only_engines: v.engines, ..case })
@@ -116,17 +117,30 @@ struct Builder<'a> {
     source: &'a Source,
     folder: &'a Path,
     hash: Sha256,
+    /// What the cases of the file may still ask for.
+    left: &'a mut Limits,
 }
 
 impl<'a> Builder<'a> {
-    fn new(source: &'a Source) -> Self {
-        Self { source, folder: source.path.parent().unwrap_or(Path::new("")), hash: Sha256::new() }
+    fn new(source: &'a Source, left: &'a mut Limits) -> Self {
+        Self { source, folder: source.path.parent().unwrap_or(Path::new("")), hash: Sha256::new(), left }
+    }
+
+    /// Takes so many of what is left of something.
+    fn take(&mut self, at: &str, what: &str, count: usize, of: fn(&mut Limits) -> &mut usize) -> Result<(), SpecError> {
+        let left = of(self.left);
+        let (all, enough) = (*left, count <= *left);
+        *left = left.saturating_sub(count);
+        let message = format!("{count} {what} are more than the {all} that are left to a spec that is not trusted");
+        self.source.require(enough, at, message, "make several of it, or run it without --untrusted if it is yours")
     }
 
     fn build(mut self, spec: Spec) -> Result<Case, SpecError> {
         self.hash.update(&self.source.text);
         let message = format!("format version {} is not known", spec.luxproof);
         self.source.require(spec.luxproof == 1, "luxproof", message, "this program reads version 1")?;
+        self.source.trust.starts_no_program(self.source, &spec)?;
+        self.take("luminaires", "luminaires", spec.luminaires.len(), |left| &mut left.luminaires)?;
         let room = self.room(&spec)?;
         let mut obstacles = self.obstacles(&spec.obstacles, &room)?;
         let luminaires = self.luminaires(&spec.luminaires, &room)?;
@@ -135,7 +149,8 @@ impl<'a> Builder<'a> {
         let mut meters = BTreeMap::new();
         for (name, set) in &spec.meters {
             self.name("meters", name)?;
-            meters.insert(name.clone(), self.meter_set(name, set, &scene)?);
+            let set = self.meter_set(name, set, &scene)?;
+            meters.insert(name.clone(), set);
         }
         self.procedures(&spec.procedures, &spec.luminaires, &meters)?;
         self.budget(spec.budget)?;
@@ -187,11 +202,12 @@ impl<'a> Builder<'a> {
                 }
                 (None, Some(mesh)) => {
                     let path = self.beside(&mesh.file);
-                    self.take_in(&format!("{at}.mesh.file"), &path)?;
-                    let read = Mesh::read_obj(&path).map_err(|error| {
+                    let bytes = self.take_in(&format!("{at}.mesh.file"), &path)?;
+                    let read = Mesh::parse_obj(&mut bytes.as_slice(), &path).map_err(|error| {
                         let help = "give a Wavefront OBJ file of triangles or polygons, in metres, z up";
                         self.source.error_at(&format!("{at}.mesh.file"), error.to_string(), help)
                     })?;
+                    self.take(&at, "triangles", read.triangles.len(), |left| &mut left.triangles)?;
                     let Mesh { vertices_m, triangles } = read.moved(DVec3::from(mesh.at_m));
                     Obstacle { shape: Shape::Mesh { vertices_m, triangles }, reflectance: mesh.reflectance.0 }
                 }
@@ -284,7 +300,9 @@ impl<'a> Builder<'a> {
 
     fn photometry(&mut self, at: &str, path: &Path) -> Result<Arc<Photometry>, SpecError> {
         self.take_in(at, path)?;
-        photometry::read_file(path).map(Arc::new).map_err(|error| SpecError {
+        let (trust, folder) = (self.source.trust, self.folder);
+        let read = photometry::read_by(path, &|path| trust.read_named(folder, path));
+        read.map(Arc::new).map_err(|error| SpecError {
             file: path.to_owned(),
             // The reader counts from 1; 0 is no place.
             line: Some(error.line).filter(|l| *l > 0),
@@ -294,7 +312,7 @@ impl<'a> Builder<'a> {
         })
     }
 
-    fn meter_set(&self, name: &str, set: &MeterSet, scene: &Scene) -> Result<Vec<Meter>, SpecError> {
+    fn meter_set(&mut self, name: &str, set: &MeterSet, scene: &Scene) -> Result<Vec<Meter>, SpecError> {
         let at = format!("meters.{name}");
         let normal = DVec3::from(set.normal);
         let Some(normal) = normal.try_normalize().filter(|_| normal.is_finite()) else {
@@ -302,8 +320,14 @@ impl<'a> Builder<'a> {
             return Err(self.source.error_at(&format!("{at}.normal"), message, "give a vector other than zero"));
         };
         let points: Vec<DVec3> = match (&set.points_m, &set.grid) {
-            (Some(points), None) => points.iter().map(|p| DVec3::from(*p)).collect(),
-            (None, Some(grid)) => self.grid(&at, grid)?,
+            (Some(points), None) => {
+                self.take(&at, "meters", points.len(), |left| &mut left.meters)?;
+                points.iter().map(|p| DVec3::from(*p)).collect()
+            }
+            (None, Some(grid)) => {
+                self.take(&at, "meters", self.count(&at, grid)?, |left| &mut left.meters)?;
+                points_of(grid)
+            }
             _ => {
                 let message = "a meter set is either points or a grid";
                 return Err(self.source.error_at(&at, message, "give exactly one of `points_m` and `grid`"));
@@ -319,17 +343,17 @@ impl<'a> Builder<'a> {
         Ok(points.into_iter().map(|position_m| Meter { position_m, normal }).collect())
     }
 
-    fn grid(&self, at: &str, grid: &GridSpec) -> Result<Vec<DVec3>, SpecError> {
+    /// How many points a grid has.
+    fn count(&self, at: &str, grid: &GridSpec) -> Result<usize, SpecError> {
         let [nu, nv] = grid.counts;
-        let sound = nu.checked_mul(nv).is_some_and(|n| (1..=MAX_METERS).contains(&n));
+        let count = nu.checked_mul(nv).filter(|n| (1..=MAX_METERS).contains(n));
         let help = format!("give counts whose product lies between 1 and {MAX_METERS}");
-        self.source.require(sound, &format!("{at}.grid.counts"), format!("{nu} x {nv} points"), help)?;
-        let (origin, u, v) = (DVec3::from(grid.origin_m), DVec3::from(grid.u_m), DVec3::from(grid.v_m));
-        Ok((0..nv).flat_map(|j| (0..nu).map(move |i| origin + u * i as f64 + v * j as f64)).collect())
+        let error = || self.source.error_at(&format!("{at}.grid.counts"), format!("{nu} x {nv} points"), help);
+        count.ok_or_else(error)
     }
 
     fn procedures(
-        &self,
+        &mut self,
         procedures: &Procedures,
         luminaires: &[LuminaireSpec],
         meters: &BTreeMap<String, Vec<Meter>>,
@@ -345,19 +369,25 @@ impl<'a> Builder<'a> {
     }
 
     fn meter_sets(
-        &self,
+        &mut self,
         procedure: ProcedureId,
         names: &Names,
         meters: &BTreeMap<String, Vec<Meter>>,
     ) -> Result<(), SpecError> {
-        let Some(name) = names.iter().find(|name| !meters.contains_key(*name)) else { return Ok(()) };
-        let message = format!("there is no meter set `{name}`");
-        let help = suggestion(name, meters.keys().map(String::as_str));
-        Err(self.source.error_at(&format!("procedures.{procedure}.meters"), message, help))
+        let at = format!("procedures.{procedure}.meters");
+        if let Some(name) = names.iter().find(|name| !meters.contains_key(*name)) {
+            let message = format!("there is no meter set `{name}`");
+            let help = suggestion(name, meters.keys().map(String::as_str));
+            return Err(self.source.error_at(&at, message, help));
+        }
+        let mut known = HashSet::new();
+        let twice = names.iter().find(|name| !known.insert(*name));
+        let message = format!("`{}` stands there twice", twice.map_or("", |name| name));
+        self.source.require(twice.is_none(), &at, message, "name every set once")
     }
 
     fn angles(
-        &self,
+        &mut self,
         procedure: ProcedureId,
         intensity: &AtAngles,
         luminaires: &[LuminaireSpec],
@@ -375,7 +405,11 @@ impl<'a> Builder<'a> {
         let (gamma, c) = (all(&lists.gamma_deg, |g| (0.0..=180.0).contains(g)), all(&lists.c_deg, |c| c.is_finite()));
         let help = "list gamma angles from 0 (nadir) to 180 (zenith)";
         self.source.require(gamma, &at("angles.gamma_deg"), "not a list of gamma angles", help)?;
-        self.source.require(c, &at("angles.c_deg"), "not a list of C angles", "list C planes in degrees")
+        self.source.require(c, &at("angles.c_deg"), "not a list of C angles", "list C planes in degrees")?;
+        let count = lists.gamma_deg.len().saturating_mul(lists.c_deg.len());
+        let help = format!("a procedure measures at {MAX_METERS} angles at most");
+        self.source.require(count <= MAX_METERS, &at("angles"), format!("{count} angles"), help)?;
+        self.take(&at("angles"), "angles", count, |left| &mut left.meters)
     }
 
     fn budget(&self, budget: Budget) -> Result<(), SpecError> {
@@ -407,14 +441,21 @@ impl<'a> Builder<'a> {
         self.folder.join(file)
     }
 
-    fn take_in(&mut self, at: &str, path: &Path) -> Result<(), SpecError> {
-        let bytes = read_bounded(path, MAX_BYTES).map_err(|error| {
+    /// The bytes of a file that the spec names, which are part of what it is.
+    fn take_in(&mut self, at: &str, path: &Path) -> Result<Vec<u8>, SpecError> {
+        let bytes = self.source.trust.read_named(self.folder, path).map_err(|error| {
             let message = format!("{} cannot be read: {error}", path.display());
             self.source.error_at(at, message, "paths are relative to the spec's folder")
         })?;
-        self.hash.update(bytes);
-        Ok(())
+        self.hash.update(&bytes);
+        Ok(bytes)
     }
+}
+
+fn points_of(grid: &GridSpec) -> Vec<DVec3> {
+    let [nu, nv] = grid.counts;
+    let (origin, u, v) = (DVec3::from(grid.origin_m), DVec3::from(grid.u_m), DVec3::from(grid.v_m));
+    (0..nv).flat_map(|j| (0..nu).map(move |i| origin + u * i as f64 + v * j as f64)).collect()
 }
 
 /// A spec's name: its file's, as a line.

@@ -38,6 +38,8 @@ pub(super) fn variants(source: &Source) -> Result<Vec<Variant>, SpecError> {
         Value::Mapping(axes) => matrix(source, axes)?,
         _ => return Err(source.error_at("cases", "neither a list nor a matrix", FORM)),
     };
+    let (count, most) = (combinations.len(), source.trust.limits().cases);
+    source.require(count <= most, "cases", format!("{count} cases"), format!("a spec holds {most} cases at most"))?;
     source.require(!combinations.is_empty(), "cases", "there are none", "give at least one, or leave `cases` out")?;
     let mut variants: Vec<Variant> = vec![];
     for overrides in combinations {
@@ -49,9 +51,6 @@ pub(super) fn variants(source: &Source) -> Result<Vec<Variant>, SpecError> {
     }
     Ok(variants)
 }
-
-/// More cases than these are a slip of the pen.
-const MAX_CASES: usize = 10_000;
 
 const FORM: &str = "give a list of overrides, each with a `name`, or a matrix {axis: {name: override, ...}, ...}";
 
@@ -92,8 +91,9 @@ fn matrix(source: &Source, axes: Mapping) -> Result<Vec<Vec<Override>>, SpecErro
         }
         let count = combinations.len().saturating_mul(overrides.len());
         let message = format!("{count} combinations and more");
-        let help = format!("a spec holds {MAX_CASES} cases at most: make several of it");
-        source.require(count <= MAX_CASES, &format!("cases.{axis}"), message, help)?;
+        let most = source.trust.limits().cases;
+        let help = format!("a spec holds {most} cases at most: make several of it");
+        source.require(count <= most, &format!("cases.{axis}"), message, help)?;
         let with = |head: &Vec<Override>| {
             overrides.iter().map(|o| [head.as_slice(), std::slice::from_ref(o)].concat()).collect::<Vec<_>>()
         };

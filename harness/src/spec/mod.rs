@@ -9,16 +9,17 @@ mod locate;
 pub mod model;
 mod mounting;
 mod suite;
+mod trust;
 mod write;
 
 use std::path::{Path, PathBuf};
-
-use crate::system::files::read_bounded;
 
 pub use build::Case;
 pub use content::content;
 pub use model::{Budget, EngineSettings, Spec, ToleranceOverride};
 pub use suite::{filtered, specs, suite};
+pub use trust::Trust;
+use trust::too_deep;
 pub use write::yaml;
 
 /// What is wrong with a spec, where, and what to do.
@@ -50,26 +51,32 @@ fn place(file: &Path, line: Option<usize>, column: Option<usize>) -> String {
 /// The most bytes of a spec or policy; one of 100,000 meters has some 5 MB.
 const MAX_SPEC_BYTES: u64 = 64 << 20;
 
+const TOO_DEEP: &str = "lists in lists, too deep to be read";
+const DEPTH: &str = "close what is open: a spec is a few brackets deep";
+
 /// A spec or policy file as it was read: its text, kept for the places of errors.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
     pub path: PathBuf,
     pub text: String,
+    /// Whose it is.
+    pub trust: Trust,
     /// The places of the overrides that lie over it, such as `cases[1]`; none but in a case of a suite.
     overrides: Vec<String>,
 }
 
 impl Source {
-    pub fn read(path: &Path) -> Result<Self, SpecError> {
+    pub fn read(path: &Path, trust: Trust) -> Result<Self, SpecError> {
         let fail = |message: String, help| SpecError::of(path, message, help);
-        let bytes =
-            read_bounded(path, MAX_SPEC_BYTES).map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
+        let bytes = trust.read_spec(path).map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
         let text = String::from_utf8(bytes).map_err(|e| fail(format!("is not UTF-8: {e}"), "save it as UTF-8"))?;
-        Ok(Self::new(path.to_owned(), text))
+        let error = |line| SpecError { line: Some(line), ..fail(TOO_DEEP.to_owned(), DEPTH) };
+        too_deep(&text).map_or(Ok(()), |line| Err(error(line)))?;
+        Ok(Self { trust, ..Self::new(path.to_owned(), text) })
     }
 
     pub fn new(path: PathBuf, text: String) -> Self {
-        Self { path, text, overrides: vec![] }
+        Self { path, text, trust: Trust::Own, overrides: vec![] }
     }
 
     /// Parses the text as a spec or a policy; unknown keys are errors with the nearest known key.
@@ -121,7 +128,10 @@ impl Source {
 
 /// Parses one of the project's own YAML tables; the error text carries line and column.
 pub fn from_yaml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
-    serde_yaml::from_str(text).map_err(|e| e.to_string())
+    match too_deep(text) {
+        Some(line) => Err(format!("{TOO_DEEP} at line {line}")),
+        None => serde_yaml::from_str(text).map_err(|e| e.to_string()),
+    }
 }
 
 /// A help text that names the known key closest to an unknown one, read off serde's message.

@@ -4,16 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::build::name_of;
-use super::{Case, Source, Spec, SpecError};
+use super::{Case, Source, Spec, SpecError, Trust};
 use crate::procedures::known;
-use crate::system::files::read_bounded;
 
 /// The cases of several specs, folders or patterns, in the order given; the files of a folder are sorted by name.
-pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
+pub fn suite(asked: &[PathBuf], trust: Trust) -> Result<Vec<Case>, SpecError> {
     let mut cases: Vec<Case> = vec![];
     for path in asked {
-        for file in files(path)? {
-            cases.extend(Case::load_all(&file)?);
+        for file in files(path, trust)? {
+            cases.extend(Case::load_all(&file, trust)?);
         }
     }
     let mut names: BTreeMap<&str, &Path> = BTreeMap::new();
@@ -33,7 +32,7 @@ pub fn suite(asked: &[PathBuf]) -> Result<Vec<Case>, SpecError> {
 
 /// The specs of a file, each with its name: those of its `cases` with their overrides laid over it, or the one that it is.
 pub fn specs(path: &Path) -> Result<Vec<(String, Spec)>, SpecError> {
-    let source = Source::read(path)?;
+    let source = Source::read(path, Trust::Own)?;
     let spec: Spec = source.parse()?;
     let stem = name_of(path);
     let variants = super::cases::variants(&source)?;
@@ -65,9 +64,9 @@ pub fn filtered(cases: Vec<Case>, patterns: &[String]) -> Result<Vec<Case>, Spec
 }
 
 /// The spec files that a path stands for: itself, the specs of a folder, or what a pattern matches.
-fn files(path: &Path) -> Result<Vec<PathBuf>, SpecError> {
+fn files(path: &Path, trust: Trust) -> Result<Vec<PathBuf>, SpecError> {
     if path.is_dir() {
-        return specs_of(path);
+        return specs_of(path, trust);
     }
     let Some(pattern) = path.to_str().filter(|p| !path.exists() && p.contains(['*', '?', '['])) else {
         return Ok(vec![path.to_owned()]);
@@ -81,13 +80,15 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, SpecError> {
 }
 
 /// The YAML files of a folder that are specs, by name; tables and the like beside them are left alone.
-fn specs_of(folder: &Path) -> Result<Vec<PathBuf>, SpecError> {
+fn specs_of(folder: &Path, trust: Trust) -> Result<Vec<PathBuf>, SpecError> {
     let unreadable = |e: std::io::Error| SpecError::of(folder, format!("cannot be read: {e}"), "check the path");
     let mut specs = vec![];
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
         if path.extension().is_some_and(|e| e == "yaml" || e == "yml") && path.is_file() {
-            let text = read_bounded(&path, super::MAX_SPEC_BYTES).map_err(unreadable)?;
+            let text = trust
+                .read_spec(&path)
+                .map_err(|e| SpecError::of(&path, format!("cannot be read: {e}"), "check the path"))?;
             if String::from_utf8_lossy(&text).lines().any(|l| l.starts_with("luxproof:")) {
                 specs.push(path);
             }
@@ -110,7 +111,7 @@ mod tests {
     }
 
     fn names(paths: &[PathBuf]) -> Result<Vec<String>, SpecError> {
-        suite(paths).map(|cases| cases.into_iter().map(|c| c.name).collect())
+        suite(paths, Trust::Own).map(|cases| cases.into_iter().map(|c| c.name).collect())
     }
 
     #[test]
@@ -126,7 +127,7 @@ mod tests {
     fn a_filter_is_a_glob_or_a_part_of_the_name_and_never_leaves_nothing() {
         let chosen = |patterns: &[&str]| {
             let patterns: Vec<String> = patterns.iter().map(|p| (*p).to_owned()).collect();
-            let cases = filtered(suite(&[reference("analytic")]).unwrap(), &patterns)?;
+            let cases = filtered(suite(&[reference("analytic")], Trust::Own).unwrap(), &patterns)?;
             Ok::<_, SpecError>(cases.into_iter().map(|c| c.name).collect::<Vec<_>>())
         };
         assert_eq!(chosen(&["rho-"]).unwrap(), ["cie-5.8/rho-10", "cie-5.8/rho-50", "cie-5.8/rho-90"]);

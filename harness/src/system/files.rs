@@ -40,6 +40,16 @@ pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     is_whole.then_some(bytes).ok_or_else(|| refused(format!("it has more than {} MB", most >> 20)))
 }
 
+/// Reads what a path stands for, wherever links lead, if that lies below a folder.
+pub(crate) fn read_below(folder: &Path, path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let real = path.canonicalize()?;
+    if !real.starts_with(folder.canonicalize()?) {
+        return Err(io::Error::new(io::ErrorKind::PermissionDenied, "it does not lie below the spec's folder"));
+    }
+    read_bounded(&real, most)
+}
+
 /// How the names of files begin that are not finished.
 pub(crate) const UNFINISHED: &str = ".unfinished-";
 

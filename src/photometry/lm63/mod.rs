@@ -245,13 +245,16 @@ fn parse_tilt(bytes: &[u8]) -> Result<Tilt, String> {
 }
 
 /// Reads the tilt file that an LM-63 file names, beside it and nowhere else.
-pub(super) fn tilt_file_beside(path: &Path) -> impl FnOnce(&str) -> Result<Vec<u8>, String> {
+pub(super) fn tilt_file_beside(
+    path: &Path,
+    open: &dyn Fn(&Path) -> std::io::Result<Vec<u8>>,
+) -> impl FnOnce(&str) -> Result<Vec<u8>, String> {
     move |name| {
         let plain = Path::new(name).file_name().is_some_and(|last| last == name);
         if !plain {
             return Err("only a file in the same folder is looked for".into());
         }
         let beside = path.with_file_name(name);
-        std::fs::read(&beside).map_err(|error| format!("{}: {error}", beside.display()))
+        open(&beside).map_err(|error| format!("{}: {error}", beside.display()))
     }
 }

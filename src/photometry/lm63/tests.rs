@@ -162,7 +162,7 @@ fn tilt_factors_are_kept() {
     });
     assert_eq!(tilt(read.unwrap()), Some(expected));
     assert_eq!(
-        tilt_file_beside(Path::new("a/b.ies"))("../x").unwrap_err(),
+        tilt_file_beside(Path::new("a/b.ies"), &|path| std::fs::read(path))("../x").unwrap_err(),
         "only a file in the same folder is looked for"
     );
 }

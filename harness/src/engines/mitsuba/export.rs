@@ -17,6 +17,7 @@ pub(super) use self::stock::obstacle_to_stock;
 use self::tables::Tables;
 use super::ID;
 use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
+use crate::engines::comment::Comment;
 use crate::engines::settings::Preset;
 use crate::engines::{EngineError, Job, SceneFile, recess};
 
@@ -141,7 +142,7 @@ fn emitter(luminaire: &Luminaire, table: &str, frame: &Frame) -> String {
         </transform>
     </emitter>
 "#,
-        id = comment_text(&luminaire.id),
+        id = Comment(&luminaire.id),
         opening = opening::xml(luminaire, frame),
         scale = luminaire.flux_scale * frame.scale * frame.scale,
         matrix = frame.matrix(luminaire.position_m, luminaire.orientation),
@@ -149,7 +150,7 @@ fn emitter(luminaire: &Luminaire, table: &str, frame: &Frame) -> String {
 }
 
 fn header(job: &Job, what: &str) -> String {
-    let (case, procedure) = (comment_text(&job.case), job.procedure);
+    let (case, procedure) = (Comment(&job.case), job.procedure);
     format!(
         r#"<?xml version="1.0" encoding="utf-8"?>
 <!-- {case}: {procedure}.
@@ -192,8 +193,4 @@ fn integrator(job: &Job, kind: &str) -> String {
 fn reflections_until(reflectance: f64, share: f64) -> i64 {
     const MAX: f64 = 1e5;
     (share.max(1e-9).ln() / reflectance.ln()).clamp(1.0, MAX).ceil() as i64
-}
-
-fn comment_text(text: &str) -> String {
-    text.replace("--", "- -")
 }

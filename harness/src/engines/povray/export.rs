@@ -11,6 +11,7 @@ use luminaire::geometry::Surface;
 use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport};
 
+use crate::engines::comment::Comment;
 use crate::engines::effort;
 use crate::engines::{Job, SceneFile, Station, recess};
 
@@ -107,7 +108,7 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
             (Light::Direct, "direct light (Indirect=0) and reflected light (Indirect=1), to be added")
         }
     };
-    let (case, procedure) = (one_line(&job.case), job.procedure);
+    let (case, procedure) = (Comment(&job.case), job.procedure);
     let arguments = arguments(job, part, 0, 0, "scene.ppm").join(" ");
     let (unit_m, origin_m, indirect) = (1.0 / frame.scale, vector(frame.centre_m), u8::from(part == Light::Indirect));
     let light = if (frame.light - 1.0).abs() > f64::EPSILON {
@@ -248,7 +249,7 @@ fn one_luminaire(job: &Job, luminaire: &Luminaire, number: usize, frame: Frame, 
          light_source {{ P rgb Brightness*Candela/(2*F*F) fade_distance F fade_power 2 transform {{ Turn }} }}\n  \
          sphere {{ 0, {FILTER_RADIUS} pigment {{ Distribution{number} }} finish {{ ambient 0 diffuse 0 }}\n    \
          hollow no_image no_reflection no_radiosity\n    matrix <{matrix}, 0, 0, 0> translate P transform {{ Turn }} }}\n#end\n",
-        one_line(&luminaire.id),
+        Comment(&luminaire.id),
         luminaire.model.name()
     );
     let candela = most * frame.scale * frame.scale * frame.light;
@@ -328,9 +329,4 @@ fn vector(v: DVec3) -> String {
 fn numbers(v: DVec3) -> String {
     let clean = |x: f64| if x == 0.0 { 0.0 } else { x };
     format!("{}, {}, {}", clean(v.x), clean(v.y), clean(v.z))
-}
-
-/// Names come from specs: a line break would end the comment they stand in.
-fn one_line(text: &str) -> String {
-    text.replace(|c: char| c.is_control(), " ")
 }

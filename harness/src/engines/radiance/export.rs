@@ -13,6 +13,7 @@ pub(super) use self::luminaires::{EDGE_DEG, disc_error, ies2rad_options, swallow
 use super::options::Options;
 use super::settings::Settings;
 use super::superposition;
+use crate::engines::comment::Comment;
 use crate::engines::settings::Coordinates;
 use crate::engines::{Job, SceneFile, recess};
 
@@ -125,8 +126,7 @@ fn run_sh(job: &Job, settings: &Settings, options: &Options, scenes: usize) -> S
 }
 
 fn title(job: &Job) -> String {
-    let line = |s: &str| s.replace(['\n', '\r'], " ");
-    format!("luxproof: case {}, procedure {}", line(&job.case), job.procedure)
+    format!("luxproof: case {}, procedure {}", Comment(&job.case), job.procedure)
 }
 
 fn scene_rad(job: &Job, settings: &Settings, scale: f64, scenes: &[Vec<usize>]) -> String {

@@ -16,6 +16,7 @@ use crate::judge::{Basis, Reference};
 use crate::procedures::{Target, Task};
 use crate::record::{Estimate, MeterId, ProcedureId, Quantity, Uncertainty};
 use crate::spec::Source;
+use crate::system::files::{MAX_BYTES, read_bounded};
 
 /// Places within so many metres, and directions within so many degrees, are the same, as the format says.
 const SAME: f64 = 1e-6;
@@ -173,7 +174,8 @@ pub struct PublishedError {
 impl Published {
     pub fn read(path: &Path) -> Result<Self, PublishedError> {
         let fail = |message: String| PublishedError { file: path.display().to_string(), message };
-        let text = std::fs::read_to_string(path).map_err(|e| fail(e.to_string()))?;
+        let bytes = read_bounded(path, MAX_BYTES).map_err(|e| fail(e.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|e| fail(format!("is not UTF-8: {e}")))?;
         let mut published: Self = crate::spec::from_yaml(&text).map_err(fail)?;
         published.source = Source::new(path.to_owned(), text);
         if published.version != 1 {

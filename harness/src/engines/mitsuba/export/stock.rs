@@ -11,7 +11,8 @@ use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 use super::frame::Frame;
 use super::surfaces::list;
 use super::tables::Tables;
-use super::{comment_text, has_surfaces, header, integrator};
+use super::{has_surfaces, header, integrator};
+use crate::engines::comment::Comment;
 use crate::engines::mitsuba::settings::Settings;
 use crate::engines::settings::Preset;
 use crate::engines::{Job, SceneFile, Station};
@@ -127,7 +128,7 @@ fn filtered_point(job: &Job, luminaire: &Luminaire, table: usize, frame: &Frame)
         </bsdf>
     </shape>
 "#,
-        id = comment_text(&luminaire.id),
+        id = Comment(&luminaire.id),
         at = list(frame.to_scene(luminaire.position_m)),
         intensity = peak_cd * luminaire.flux_scale * frame.scale * frame.scale,
         radius = radius_m(job, luminaire) * frame.scale,
@@ -176,7 +177,7 @@ fn meters(job: &Job, settings: &Settings, frame: &Frame) -> String {
 fn patch_and_eye(station: &Station, frame: &Frame, size: f64) -> (String, String) {
     let (at, normal) = (frame.to_scene(station.meter.position_m), station.meter.normal);
     let radius = PATCH * size;
-    let id = comment_text(&station.id.0);
+    let id = Comment(&station.id.0);
     let eye = format!(
         r#"        <sensor type="radiancemeter"> <!-- {id} -->
             <point name="origin" value="{}"/>
@@ -206,7 +207,7 @@ fn irradiance_meter(station: &Station, frame: &Frame, size: f64) -> (String, Str
             <sensor type="irradiancemeter"> {ONE_PIXEL} </sensor>
         </shape>
 "#,
-        comment_text(&station.id.0),
+        Comment(&station.id.0),
         disk_transform(at, normal, PATCH * size)
     );
     (meter, String::new())

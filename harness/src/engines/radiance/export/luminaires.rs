@@ -12,6 +12,7 @@ use luminaire::photometry::{Details, LuminousIntensityDistribution, LuminousOpen
 use luminaire::scene::{Luminaire, Meter, Transport, flush};
 
 use super::{EFFICACY, box_faces, polygon};
+use crate::engines::comment::Comment;
 use crate::engines::radiance::route::{Route, route};
 use crate::engines::radiance::settings::Settings;
 use crate::engines::{Job, SceneFile};
@@ -187,7 +188,7 @@ fn by_ies2rad(k: usize, luminaire: &Luminaire, scale: f64) -> String {
         euler_deg(luminaire.orientation).iter().map(|(axis, a)| format!(" -r{axis} {a}")).collect();
     let turns = turns.concat();
     let size = if scale == 1.0 { String::new() } else { format!(" -s {scale}") };
-    let comment = format!("\n# Luminaire {}: by ies2rad, see run.sh.\n", luminaire.id);
+    let comment = format!("\n# Luminaire {}: by ies2rad, see run.sh.\n", Comment(&luminaire.id));
     format!("{comment}!xform{size}{turns} -t {} {} {} luminaire-{k}.rad\n", p.x, p.y, p.z)
 }
 
@@ -195,15 +196,18 @@ fn by_ies2rad(k: usize, luminaire: &Luminaire, scale: f64) -> String {
 fn point(k: usize, luminaire: &Luminaire, radius: f64, scale: f64) -> String {
     let factor = luminaire.flux_scale * scale * scale / (EFFICACY * PI * radius * radius);
     let p = luminaire.position_m * scale;
-    let mut text =
-        format!("\n# Luminaire {}: a point, as a sphere of radius {radius}; its table is in candela.\n", luminaire.id);
+    let mut text = format!(
+        "\n# Luminaire {}: a point, as a sphere of radius {radius}; its table is in candela.\n",
+        Comment(&luminaire.id)
+    );
     text += &light(k, luminaire, Source::Solid, "corr", &[factor]);
     text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
     text
 }
 
 fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
-    let mut text = format!("\n# Luminaire {}: its luminous opening; its table is in candela.\n", luminaire.id);
+    let mut text =
+        format!("\n# Luminaire {}: its luminous opening; its table is in candela.\n", Comment(&luminaire.id));
     let body = Body { k, luminaire, scale };
     let factor = luminaire.flux_scale / EFFICACY;
     match luminaire.photometry.opening {

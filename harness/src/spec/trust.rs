@@ -1,0 +1,99 @@
+//! Whose specs are read, and what those of a stranger may not.
+
+use std::io;
+use std::path::Path;
+
+use super::{MAX_SPEC_BYTES, Source, Spec, SpecError};
+use crate::system::files::{MAX_BYTES, read_below, read_bounded};
+
+/// Whose specs are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Trust {
+    /// The user's own: they name files anywhere, and programs to run as engines.
+    #[default]
+    Own,
+    /// A stranger's: they name files below their own folder alone, start nothing, and are no larger than [`Limits`] says.
+    Stranger,
+}
+
+/// How much specs may ask for, all cases of a file together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Limits {
+    pub(super) spec_bytes: u64,
+    /// Of a file that it names.
+    pub(super) file_bytes: u64,
+    pub(super) cases: usize,
+    pub(super) luminaires: usize,
+    pub(super) meters: usize,
+    pub(super) triangles: usize,
+}
+
+impl Trust {
+    /// What a stranger's spec asks for is planned within a second and 200 MB.
+    pub(super) const fn limits(self) -> Limits {
+        match self {
+            Self::Own => Limits {
+                spec_bytes: MAX_SPEC_BYTES,
+                file_bytes: MAX_BYTES,
+                cases: 10_000,
+                luminaires: usize::MAX,
+                meters: usize::MAX,
+                triangles: usize::MAX,
+            },
+            Self::Stranger => Limits {
+                spec_bytes: 1 << 20,
+                file_bytes: 4 << 20,
+                cases: 100,
+                luminaires: 500,
+                meters: 10_000,
+                triangles: 50_000,
+            },
+        }
+    }
+
+    /// The bytes of a spec or policy; a stranger's is no link to somewhere else.
+    pub(super) fn read_spec(self, path: &Path) -> io::Result<Vec<u8>> {
+        if self == Self::Stranger && std::fs::symlink_metadata(path)?.is_symlink() {
+            return Err(io::Error::new(io::ErrorKind::PermissionDenied, "it is a link"));
+        }
+        read_bounded(path, self.limits().spec_bytes)
+    }
+
+    /// The bytes of a file that a spec in this folder names.
+    pub(super) fn read_named(self, folder: &Path, path: &Path) -> io::Result<Vec<u8>> {
+        let most = self.limits().file_bytes;
+        match self {
+            Self::Own => read_bounded(path, most),
+            Self::Stranger => read_below(folder, path, most),
+        }
+    }
+
+    /// Refuses programs that a stranger would have us run.
+    pub(super) fn starts_no_program(self, source: &Source, spec: &Spec) -> Result<(), SpecError> {
+        let engines = spec.engines.iter().flatten();
+        let named = engines.filter(|(_, settings)| settings.0.contains_key("command")).map(|(name, _)| name).next();
+        let Some(name) = named.filter(|_| self == Self::Stranger) else { return Ok(()) };
+        let message = "it would run a program, and the spec is not trusted";
+        Err(source.error_at(&format!("engines.{name}.command"), message, "run it without --untrusted if it is yours"))
+    }
+}
+
+/// How deep lists and mappings may lie in one another: what a YAML reader makes of deeper ones takes it the square of their number.
+const MAX_DEPTH: usize = 64;
+
+/// The line, counted from 1, at which lists and mappings in brackets lie too deep in one another; those in quotes count as well.
+pub(super) fn too_deep(text: &str) -> Option<usize> {
+    let mut depth = 0_usize;
+    text.lines()
+        .position(|line| {
+            line.bytes().any(|byte| {
+                match byte {
+                    b'[' | b'{' => depth += 1,
+                    b']' | b'}' => depth = depth.saturating_sub(1),
+                    _ => {}
+                }
+                depth > MAX_DEPTH
+            })
+        })
+        .map(|line| line + 1)
+}
