@@ -25,3 +25,4 @@ mod stated_errors;
 mod stops;
 mod suite;
 mod support;
+mod untrusted;

@@ -1,0 +1,150 @@
+//! Specs of a stranger: what they may not name, start or ask for, and what they say that no engine, view or log must obey.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+
+use crate::support::{Answer, Folder, LAMP, MINE, ROOM, TWO_METERS};
+
+const DIRECT: &str = "procedures:\n  direct_illuminance: {meters: plane}\n";
+
+fn spec() -> String {
+    [ROOM, TWO_METERS, DIRECT].concat()
+}
+
+fn room(spec: &str) -> Folder {
+    Folder::new(&[("spec.yaml", spec), ("lamp.ies", LAMP)])
+}
+
+/// What is said of a spec with one replacement, as a line; it must be refused, and as a user's own not for this reason.
+#[track_caller]
+fn refused(from: &str, to: &str, says: &str) -> String {
+    assert!(spec().contains(from), "the replacement must change the spec");
+    said(&room(&spec().replace(from, to)), says)
+}
+
+#[track_caller]
+fn said(room: &Folder, says: &str) -> String {
+    let answer = room.luxproof(&["check", "--untrusted", "spec.yaml", "--engines", "simulator"]).exits(2);
+    let line = answer.stderr.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
+    assert!(line.contains(says), "no `{says}` in {line}");
+    line
+}
+
+#[test]
+fn files_lie_below_the_folder_wherever_links_lead_and_nothing_of_others_is_told() {
+    let secret = "TILT of a secret";
+    let outside = Folder::new(&[("secret", secret), ("lamp.ies", LAMP)]);
+    let place = outside.path("secret");
+    for (from, to) in [
+        ("photometry: lamp.ies", format!("photometry: {}", place.display())),
+        ("photometry: lamp.ies", "photometry: link.ies".to_owned()),
+        ("photometry: lamp.ies", "photometry: tilted.ies".to_owned()),
+        ("procedures:", format!("published: {}\nprocedures:", place.display())),
+        ("meters:\n", format!("obstacles:\n  - mesh: {{file: {}, reflectance: 0.5}}\nmeters:\n", place.display())),
+    ] {
+        let room = room(&spec().replace(from, &to));
+        symlink(&place, room.path("link.ies")).unwrap();
+        // An LM-63 file names a file of tilt factors beside it, which is a link.
+        room.write("tilted.ies", &LAMP.replace("TILT=NONE", "TILT=link.ies"));
+        let told = said(&room, "below the spec's folder");
+        assert!(!told.contains(secret), "{told}");
+    }
+    // The spec itself, and a policy beside it.
+    let room = room(&spec());
+    fs::rename(room.path("spec.yaml"), room.path("away")).unwrap();
+    symlink(&place, room.path("spec.yaml")).unwrap();
+    assert!(!said(&room, "it is a link").contains(secret));
+    fs::remove_file(room.path("spec.yaml")).unwrap();
+    fs::rename(room.path("away"), room.path("spec.yaml")).unwrap();
+    symlink(&place, room.path("luxproof.yaml")).unwrap();
+    assert!(!said(&room, "it is a link").contains(secret));
+}
+
+#[test]
+fn no_program_is_started_and_those_of_the_users_own_are_told() {
+    let room = Folder::new(&[("spec.yaml", &[&spec(), MINE].concat()), ("lamp.ies", LAMP)]);
+    said(&room, "engines.mine.command: it would run a program");
+    let as_set = |value: &str| Answer::of(room.command(&["check", "spec.yaml"]).env("LUXPROOF_UNTRUSTED", value));
+    as_set("1").exits(2).complains("not trusted");
+    assert_ne!(as_set("0").code, Some(2));
+    // In a case of a suite likewise.
+    let cases = "cases:\n  - {name: a, engines: {mine: {command: [touch, pwned]}}}\n";
+    said(&self::room(&(spec() + cases)), "it would run a program");
+    let answer = room.run(&["--engines", "mine"]);
+    assert!(answer.stderr.contains("engines.mine runs `python3"), "{}", answer.stderr);
+    for command in ["hunt", "selftest"] {
+        Answer::of(room.command(&[command]).env("LUXPROOF_UNTRUSTED", "1")).exits(2).complains("user's own alone");
+    }
+}
+
+#[test]
+fn what_it_asks_for_is_bounded() {
+    let meters = spec().lines().find(|line| line.contains("points_m")).unwrap().to_owned();
+    let grid = "  plane: {grid: {origin_m: [1, 1, 1], u_m: [0.01, 0, 0], v_m: [0, 0.01, 0], counts: [101, 100]}, normal: [0, 0, 1]}";
+    refused(&meters, grid, "10100 meters are more than the 10000");
+    let lamp = spec().lines().find(|line| line.contains("id: lamp")).unwrap().to_owned();
+    let many = (0..501).map(|k| lamp.replace("id: lamp", &format!("id: lamp{k}"))).collect::<Vec<_>>().join("\n");
+    refused(&lamp, &many, "501 luminaires are more than the 500");
+    let listed = (0..200).map(|k| (f64::from(k) * 0.9).to_string()).collect::<Vec<_>>().join(", ");
+    let angles = format!(
+        "procedures:\n  luminous_intensity: {{luminaire: lamp, distance_m: 5, angles: {{gamma_deg: [{listed}], c_deg: [{listed}]}}}}\n"
+    );
+    refused(DIRECT, &angles, "40000 angles are more than the 9998");
+    let cases: String = (0..101).map(|k| format!("  - {{name: c{k}}}\n")).collect();
+    said(&room(&(spec() + "cases:\n" + &cases)), "a spec holds 100 cases at most");
+    refused("title: a test room", &format!("title: {}", "a".repeat(1 << 20)), "more than 1 MB");
+    refused("meters: plane", "meters: [plane, plane]", "stands there twice");
+}
+
+#[test]
+fn depth_and_length_are_refused_and_told_in_a_few_lines() {
+    for text in [
+        "title: ".to_owned() + &"[".repeat(100_000),
+        "title: ".to_owned() + &"[".repeat(100_000) + &"]".repeat(100_000),
+        "title: ".to_owned() + &"{a: ".repeat(10_000),
+        "k".repeat(900_000) + ": 1",
+        "title: \"".to_owned() + &"\\".repeat(900_001) + "\"",
+    ] {
+        let answer = room(&format!("luxproof: 1\n{text}\n")).luxproof(&["check", "spec.yaml"]).exits(2);
+        assert!(answer.stderr.len() < 10_000, "{} bytes", answer.stderr.len());
+    }
+}
+
+#[test]
+fn no_name_title_or_keyword_is_obeyed_by_any_engine_or_view() {
+    // Whatever a parser lets through: on one line and printable.
+    let hostile = r#"!touch pwned; $(touch pwned) `touch pwned` #include "/etc/passwd" */ --> <img src=x onerror=alert(1)> %s%n =1+1 \"#;
+    let quoted = |text: &str| format!("'{}'", text.replace('\'', "''"));
+    let named = |prefix: &str| quoted(format!("{prefix}{}", &hostile[..90]).trim());
+    let spec = spec()
+        .replace("title: a test room", &format!("title: {}", quoted(hostile)))
+        .replace("id: lamp", &format!("id: {}", named("!")))
+        .replace("plane", &named("@"));
+    let lamp = LAMP.replacen("TILT=NONE", &format!("[MANUFAC] {hostile}\n[OTHER] !touch pwned\nTILT=NONE"), 1);
+    let room = Folder::for_renderers(&[("spec.yaml", &spec), ("lamp.ies", &lamp)]);
+    room.luxproof(&["check", "--untrusted", "spec.yaml"]).exits(0);
+    let args = ["--untrusted", "--no-cache", "--format", "markdown", "--format", "html", "--format", "junit"];
+    let answer = room.run(&args);
+    assert_eq!(answer.code, Some(0), "{}\n{}", answer.stdout, answer.stderr);
+    let files = walk(room.path("."));
+    assert!(!files.iter().any(|file| file.ends_with("pwned")), "{files:?}");
+    let lines = |text: &str| -> Vec<String> { text.lines().map(|line| line.trim().to_owned()).collect() };
+    for file in files.iter().filter(|file| file.contains("/scenes/")) {
+        let Ok(text) = fs::read_to_string(file) else { continue };
+        let begins = |line: &String| line.starts_with("!touch") || line.starts_with("#include \"/etc");
+        assert!(!lines(&text).iter().any(begins), "{file}: {text}");
+    }
+}
+
+/// All files below a folder.
+fn walk(folder: std::path::PathBuf) -> Vec<String> {
+    let mut files = vec![];
+    for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        if entry.is_dir() {
+            files.extend(walk(entry));
+        } else {
+            files.push(entry.display().to_string());
+        }
+    }
+    files
+}
