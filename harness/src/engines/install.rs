@@ -76,7 +76,7 @@ fn lock(site: &Site) -> Result<File, InstallError> {
 }
 
 fn step(site: &Site, program: impl Into<PathBuf>) -> Invocation {
-    Invocation::new(program, site.root(), LIMIT, site.root().join("install.log"))
+    Invocation::new(program, site.root(), LIMIT, site.root().join("install.log")).of_user()
 }
 
 impl Component {
