@@ -23,7 +23,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use miette::{IntoDiagnostic, Report as Diagnostic};
+use miette::{Context, IntoDiagnostic, Report as Diagnostic};
 use serde::Serialize;
 
 use self::photometry::PhotometryArgs;
@@ -232,7 +232,7 @@ fn print(text: &str) -> Result<(), Diagnostic> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         // Whoever reads has seen enough (`| head`): that is no error of ours.
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        written => written.into_diagnostic(),
+        written => written.into_diagnostic().wrap_err("standard output"),
     }
 }
 
