@@ -24,4 +24,5 @@ mod repetitions;
 mod stated_errors;
 mod stops;
 mod suite;
+mod supervision;
 mod support;
