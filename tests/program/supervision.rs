@@ -134,7 +134,7 @@ fn a_confined_engine_writes_in_its_own_folders_alone() {
     confined(&folder, "cat read && echo dark > bench/a && echo dark > $TMPDIR/b && echo dark > /dev/null")
         .exits(0)
         .prints("light");
-    let code = if sandbox_in_words().starts_with("on (") { 1 } else { 0 };
+    let code = i32::from(sandbox_in_words().starts_with("on ("));
     for script in ["echo dark 2>/dev/null > read", "mkdir elsewhere 2>/dev/null", "kill -0 $PPID 2>/dev/null"] {
         let is_refused = confined(&folder, &format!("({script}) || exit 1")).exits(code);
         assert!(is_refused.stdout.is_empty(), "{script}");

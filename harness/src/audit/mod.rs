@@ -169,11 +169,12 @@ pub fn run(specs: &[PathBuf], options: &Options<'_>) -> Result<Report, AuditErro
 /// The same; as long as the claim is kept the folder is the caller's.
 pub fn run_and_hold(specs: &[PathBuf], options: &Options<'_>) -> Result<(Report, Claim), AuditError> {
     let (mut cases, mut policies) = chosen(specs, options)?;
-    let claim = Claim::of(&options.out)?;
     let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
     let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
     let spec = subject(specs, &cases);
     let known = planner.calibrations(&cases, &plans)?;
+    // What is refused leaves nothing behind.
+    let claim = Claim::of(&options.out)?;
     match options.calibration {
         Calibration::Judged => {
             let policy = common(&policies)?;

@@ -45,7 +45,7 @@ impl Claim {
             }
             // Some file systems know no locks.
             Err(TryLockError::Error(error)) => {
-                tracing::warn!(folder = %folder.display(), %error, "it cannot be locked")
+                tracing::warn!(folder = %folder.display(), %error, "it cannot be locked");
             }
         }
         // That an old lock is there does not say that new files can be.
