@@ -29,7 +29,7 @@ const TOLD: [&str; 8] = ["PATH", "HOME", "USER", "LOGNAME", "LANG", "TMPDIR", "T
 /// How long a supervisor may take to end what it supervises.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// How often memory is looked at in the long run.
-const LOOK: Duration = Duration::from_millis(50);
+const LOOK: Duration = Duration::from_millis(100);
 
 pub(super) fn supervise_from_now_on() {
     SUPERVISED.store(adopt(), Ordering::Relaxed);
