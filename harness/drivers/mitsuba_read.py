@@ -39,6 +39,7 @@ def main():
     mi.set_variant(options.variant or job["variant"])
     if is_jit():
         dr.set_thread_count(options.threads)
+    sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
     import mitsuba_goniometric  # registers the emitters, for the variant just set
 
     folder = os.path.dirname(os.path.abspath(options.job))

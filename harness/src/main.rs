@@ -1,13 +1,17 @@
-//! The `luxproof` program: parses the command line, keeps Ctrl-C orderly, prints errors with their place, sets the exit code.
+//! The `luxproof` program, which supervises what it runs by processes of its own: parses the command line, keeps Ctrl-C orderly, prints errors with their place, sets the exit code.
 
 use std::process::ExitCode;
 
 use clap::Parser;
 use luxproof::cli::{Cli, complain};
 use luxproof::report::Exit;
+use luxproof::system::process;
 use tracing_subscriber::EnvFilter;
 
 fn main() -> ExitCode {
+    if let Some(exit) = process::supervise() {
+        return exit;
+    }
     // clap itself exits with 2 on a usage error, as the exit codes want it.
     let cli = Cli::parse();
     let level = ["warn", "info", "debug", "trace"][usize::from(cli.verbosity()).min(3)];
@@ -18,7 +22,7 @@ fn main() -> ExitCode {
         .log_internal_errors(false)
         .without_time()
         .init();
-    if let Err(error) = ctrlc::set_handler(luxproof::system::process::interrupt) {
+    if let Err(error) = ctrlc::set_handler(process::interrupt) {
         tracing::warn!(%error, "Ctrl-C will not stop renderers in order");
     }
     let exit = cli.run().unwrap_or_else(|error| {

@@ -24,5 +24,6 @@ mod repetitions;
 mod stated_errors;
 mod stops;
 mod suite;
+mod supervision;
 mod support;
 mod untrusted;

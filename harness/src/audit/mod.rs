@@ -42,8 +42,9 @@ use crate::procedures::Task;
 use crate::record::Status;
 use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, SpecError, Trust, filtered, suite};
+use crate::system::claim::{Claim, ClaimError};
 use crate::system::digest::hexadecimal;
-use crate::system::files::FileError;
+use crate::system::files::{Care, FileError};
 use crate::system::process;
 use crate::system::slots::side_by_side;
 
@@ -155,18 +156,28 @@ pub enum AuditError {
     Published(#[from] PublishedError),
     #[error(transparent)]
     File(#[from] FileError),
+    #[error(transparent)]
+    Claim(#[from] ClaimError),
 }
 
 /// More cases at a time would only wait for the machine's slots, each on threads of its own.
 const MAX_CASES_AT_A_TIME: usize = 8;
 
-/// Runs every case of specs, folders and patterns and judges what engines read; files are written below [`Options::out`] alone.
+/// Runs every case of specs, folders and patterns and judges what engines read; files are written below [`Options::out`] alone, by one
+/// run at a time.
 pub fn run(specs: &[PathBuf], options: &Options<'_>) -> Result<Report, AuditError> {
+    run_and_hold(specs, options).map(|(report, _)| report)
+}
+
+/// The same; as long as the claim is kept the folder is the caller's.
+pub fn run_and_hold(specs: &[PathBuf], options: &Options<'_>) -> Result<(Report, Claim), AuditError> {
     let (mut cases, mut policies) = chosen(specs, options)?;
     let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
     let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
     let spec = subject(specs, &cases);
     let known = planner.calibrations(&cases, &plans)?;
+    // What is refused leaves nothing behind.
+    let claim = Claim::of(&options.out)?;
     match options.calibration {
         Calibration::Judged => {
             let policy = common(&policies)?;
@@ -183,7 +194,7 @@ pub fn run(specs: &[PathBuf], options: &Options<'_>) -> Result<Report, AuditErro
             plans[0].skips.extend(scenes.map(skip));
         }
     }
-    audited(spec, &cases, plans, &policies, options)
+    audited(spec, &cases, plans, &policies, options).map(|report| (report, claim))
 }
 
 /// Lets engines, those of a spec too where one is given, read the scenes of known answer, and judges what they read.
@@ -239,7 +250,7 @@ fn audited(
         let stopped = stop.lock().clone();
         let mut report = audit.case(case, plan, &policies[k], published[k].as_ref(), stopped.as_ref(), &folder)?;
         if folder != options.out {
-            report.keep(&folder.join("report.json"))?;
+            keep(&mut report, &folder, Care::Usual)?;
         }
         let mut stop = stop.lock();
         if process::is_interrupted() {
@@ -263,15 +274,25 @@ fn audited(
     for (case, report) in cases.iter().zip(&mut reports) {
         let folder = folder_of(case);
         if folder != options.out && report.comparisons.iter().any(|c| c.diagnosis.is_some()) {
-            report.keep(&folder.join("report.json"))?;
+            keep(report, &folder, Care::Usual)?;
         }
     }
     let mut report = Report::joined(spec, reports);
     report.published_findings = published_findings(cases, &plans, &published);
     // Cases ran side by side: their seconds do not add up.
     report.wall_s = clock.elapsed().as_secs_f64();
-    report.keep(&options.out.join("report.json"))?;
+    keep(&mut report, &options.out, Care::Lasting)?;
     Ok(report)
+}
+
+fn keep(report: &mut Report, folder: &Path, care: Care) -> Result<(), FileError> {
+    if let Some(aside) = report.keep_in(folder, care)? {
+        let aside = aside.display();
+        tracing::warn!(
+            "an earlier report has readings that were not asked for this time, or is of another spec: it stays as {aside}"
+        );
+    }
+    Ok(())
 }
 
 /// Says why what fails does, by all that an engine read in the run.

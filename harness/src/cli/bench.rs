@@ -14,6 +14,7 @@ use crate::experiments::bench::{self, BenchReport, Knobs, Options};
 use crate::record::ProcedureId;
 use crate::report::Exit;
 use crate::spec::{Trust, suite};
+use crate::system::claim::Claim;
 use crate::system::files;
 
 #[derive(Debug, Args)]
@@ -57,6 +58,7 @@ pub(super) fn run(args: &BenchArgs, site: &Site, trust: Trust) -> Result<Exit, D
     let subjects = args.measuring.subjects(site)?;
     let first = args.measuring.specs.first().map_or(std::path::Path::new("suite"), PathBuf::as_path);
     let folder = args.measuring.folder("bench", first);
+    let _claim = Claim::of(&folder).into_diagnostic()?;
     let options = Options {
         reader: args.measuring.reader(site, &folder)?,
         repetitions: args.repetitions.max(1),

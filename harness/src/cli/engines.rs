@@ -8,12 +8,13 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 use super::diagnostic::not_audited;
 use super::{complain, print};
 use crate::audit::{self, Options};
-use crate::engines::{self, InstallState, Site};
+use crate::engines::{self, InstallOutcome, InstallState, Site, Soundness};
 use crate::judge::PolicyChoice;
 use crate::plan::Skipping;
 use crate::record::{EngineName, EngineStatus, Status};
 use crate::report::{Detail, Exit, Style, terminal};
 use crate::spec::suggestion;
+use crate::system::process;
 
 #[derive(Clone, Debug, Subcommand)]
 pub(super) enum EnginesAction {
@@ -21,6 +22,16 @@ pub(super) enum EnginesAction {
     List,
     /// Fetch missing engines into a folder of our own
     Install {
+        /// Engines by name [default: all]
+        names: Vec<String>,
+    },
+    /// Hold the files of installed engines against the sums that they were installed with
+    Verify {
+        /// Engines by name [default: all]
+        names: Vec<String>,
+    },
+    /// Install anew what is broken or absent
+    Repair {
         /// Engines by name [default: all]
         names: Vec<String>,
     },
@@ -52,6 +63,14 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site) -> Resu
             known_engines(&names)?;
             Ok(report_installation(site, &names))
         }
+        EnginesAction::Verify { names } => {
+            known_engines(&names)?;
+            verify(site, &names)
+        }
+        EnginesAction::Repair { names } => {
+            known_engines(&names)?;
+            Ok(told(&engines::repair(site, &wanted(&names), complain)))
+        }
         EnginesAction::Doctor { names, spec, policy } => examine(site, &names, spec.as_deref(), policy),
     }
 }
@@ -63,6 +82,8 @@ fn examine(site: &Site, names: &[String], spec: Option<&Path>, policy: PolicyCho
     options.selection.engines = names.to_vec();
     let report = audit::examine(spec, &options).map_err(not_audited)?;
     print(&terminal(&report, Style::Plain, Detail::Brief, None))?;
+    print(&format!("sandbox of engines: {}\n", process::sandbox_in_words()))?;
+    print(&format!("memory of an engine: {} MiB at most\n", process::limit_mib()))?;
     let is_absent = |e: &EngineStatus| e.status == Status::Absent;
     Ok(report.exit().max(if report.engines.iter().any(is_absent) { Exit::Engine } else { Exit::Passed }))
 }
@@ -74,12 +95,37 @@ pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
     Err(miette::miette!(help = help, "there is no engine `{name}`"))
 }
 
+/// What is broken fails; what is absent was not asked for.
+fn verify(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
+    let mut exit = Exit::Passed;
+    for (component, soundness) in engines::verify(site, &wanted(names)) {
+        let text = match soundness {
+            Soundness::Sound(files) => format!("sound, {files} files"),
+            Soundness::Absent => "not installed".to_owned(),
+            Soundness::Unknown(why) => format!("not known: {why}"),
+            Soundness::Broken(faults) => {
+                exit = Exit::Engine;
+                format!("broken; run `luxproof engines repair`\n    {}", faults.join("\n    "))
+            }
+        };
+        print(&format!("{component}: {text}\n"))?;
+    }
+    Ok(exit)
+}
+
+/// The engines that are named, or all.
+fn wanted(names: &[String]) -> Vec<EngineName> {
+    let all = engines::all().into_iter().map(|e| e.name());
+    all.filter(|e| names.is_empty() || names.iter().any(|n| e == n)).collect()
+}
+
 /// Installs the engines that are named, or all.
 pub(super) fn report_installation(site: &Site, names: &[String]) -> Exit {
-    let wanted = engines::all().into_iter().map(|e| e.name());
-    let wanted: Vec<_> = wanted.filter(|e| names.is_empty() || names.iter().any(|n| e == n)).collect();
-    let outcomes = engines::install(site, &wanted, complain);
-    for outcome in &outcomes {
+    told(&engines::install(site, &wanted(names), complain))
+}
+
+fn told(outcomes: &[InstallOutcome]) -> Exit {
+    for outcome in outcomes {
         complain(&format!("{}: {}", outcome.component, outcome.detail));
     }
     let failed = outcomes.iter().any(|o| o.state == InstallState::Failed);

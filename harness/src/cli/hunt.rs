@@ -15,6 +15,7 @@ use crate::experiments::hunt::{self, Finding, Hunt, HuntError, Options, ShrinkOp
 use crate::record::{EngineName, ProcedureId};
 use crate::report::Exit;
 use crate::spec::{Budget, EngineSettings, specs, suggestion};
+use crate::system::claim::Claim;
 use crate::system::process;
 
 #[derive(Debug, Args)]
@@ -121,6 +122,7 @@ pub(super) fn run(args: &HuntArgs, site: &Site) -> Result<Exit, Diagnostic> {
         out: args.out.clone(),
         told: &complain,
     };
+    let _claim = Claim::of(&args.out).into_diagnostic()?;
     let found = hunt::hunt(&options).map_err(not_hunted)?;
     print(&match args.format {
         TextOrJson::Json => json(&found)?,
@@ -227,6 +229,7 @@ pub(super) fn shrink(args: &ShrinkArgs, site: &Site) -> Result<Exit, Diagnostic>
         jobs: args.jobs.unwrap_or_else(process::cores),
         out: out.clone(),
     };
+    let _claim = Claim::of(&out).into_diagnostic()?;
     match hunt::shrink(&options).map_err(not_hunted)? {
         Shrinking::Found(finding) => {
             print(&match args.format {

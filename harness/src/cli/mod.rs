@@ -24,7 +24,7 @@ use std::path::PathBuf;
 
 use clap::builder::FalseyValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use miette::{IntoDiagnostic, Report as Diagnostic};
+use miette::{Context, IntoDiagnostic, Report as Diagnostic};
 use serde::Serialize;
 
 use self::photometry::PhotometryArgs;
@@ -243,7 +243,7 @@ fn print(text: &str) -> Result<(), Diagnostic> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         // Whoever reads has seen enough (`| head`): that is no error of ours.
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        written => written.into_diagnostic(),
+        written => written.into_diagnostic().wrap_err("standard output"),
     }
 }
 

@@ -13,8 +13,10 @@ use super::views::print_report;
 use crate::audit::{self, AfterFailure, Calibration, Options};
 use crate::engines::Site;
 use crate::measure::cache::Cache;
-use crate::report::{BaselineCheck, Exit, Report};
+use crate::report::earlier::Earlier;
+use crate::report::{self, BaselineCheck, Exit, Report};
 use crate::spec::Trust;
+use crate::system::claim::Claim;
 use crate::system::files;
 use crate::system::process;
 use crate::trend::baseline::{self, Baseline, Comparability, Entry};
@@ -38,15 +40,16 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> R
     if args.install {
         // Every spec is read and checked before anything is fetched.
         audit::chosen(&args.selected.specs, &options).map_err(diagnose)?;
+        Claim::of(&options.out).into_diagnostic()?;
         report_installation(site, &args.selected.engines);
     }
     let held = args.baseline.as_deref().map(|path| Held::read(path, &args.selected.specs, &options)).transpose()?;
-    let mut report = audit::run(&args.selected.specs, &options).map_err(not_audited)?;
+    let (mut report, _claim) = audit::run_and_hold(&args.selected.specs, &options).map_err(not_audited)?;
     let root = options.out.clone();
     drop(progress);
     if let Some(held) = &held {
         report.baseline = Some(held.hold(&report, &root)?);
-        report.keep(&root.join("report.json")).into_diagnostic()?;
+        report.keep(&root.join(report::FILE)).into_diagnostic()?;
     }
     print_report(&report, &root, &args.views)?;
     Ok(report.exit())
@@ -90,12 +93,32 @@ impl Held {
     }
 }
 
-/// The folder of the run: by default that of the one spec or folder, or one for all where there are several.
+/// The folder of the run: by default that of the one spec or folder, or one for all where there are several. A spec whose namesake from
+/// elsewhere has its report there takes the name of its own folder besides.
 fn out_folder(args: &RunArgs) -> PathBuf {
-    let stem = match &args.selected.specs[..] {
-        [one] if !one.display().to_string().contains('*') => one.file_stem(),
+    let one = match &args.selected.specs[..] {
+        [one] if !one.display().to_string().contains('*') => Some(one),
         _ => None,
     };
-    let name = stem.map_or(Path::new("suite"), Path::new);
-    args.out.clone().unwrap_or_else(|| Path::new("luxproof-out").join(name))
+    let name = one.and_then(|one| one.file_stem()).unwrap_or("suite".as_ref());
+    let usual = Path::new("luxproof-out").join(name);
+    let is_namesake = |earlier: &Earlier| one.is_some_and(|one| !is_same(Path::new(earlier.subject()), one));
+    let besides = || {
+        let whole = std::path::absolute(one?).ok()?;
+        let folder = whole.parent()?.file_name()?;
+        Some(usual.with_file_name([name, folder].join("-".as_ref())))
+    };
+    let chosen = || match Earlier::at(&usual.join(report::FILE)).filter(is_namesake).and_then(|_| besides()) {
+        Some(other) => other,
+        None => usual.clone(),
+    };
+    args.out.clone().unwrap_or_else(chosen)
+}
+
+/// Whether a spec of an earlier run is this one; whether one that is gone was is not known.
+fn is_same(earlier: &Path, now: &Path) -> bool {
+    match (earlier.canonicalize(), now.canonicalize()) {
+        (Ok(earlier), Ok(now)) => earlier == now || now.is_dir(),
+        _ => true,
+    }
 }

@@ -15,6 +15,7 @@ use crate::laws;
 use crate::record::EngineName;
 use crate::report::Exit;
 use crate::spec::{Budget, Case, Trust, suggestion, suite};
+use crate::system::claim::Claim;
 use crate::system::files;
 
 #[derive(Debug, Args)]
@@ -70,6 +71,7 @@ pub(super) fn run(args: &StressArgs, site: &Site, trust: Trust) -> Result<Exit, 
     let mut reports = vec![];
     for case in &cases {
         let folder = args.measuring.folder("stress", &case.path);
+        let _claim = Claim::of(&folder).into_diagnostic()?;
         let options = Options {
             reader: args.measuring.reader(site, &folder)?,
             time: Duration::from_secs_f64((60.0 * args.minutes).min(1e9)),

@@ -103,7 +103,7 @@ impl External {
     fn invocation(&self, job: &Job, workbench: &Workbench) -> Result<Invocation, EngineError> {
         let program = self.program(&workbench.site).ok_or_else(|| self.output(self.absence()))?;
         let input = ExternalJob::of(job).to_json().map_err(|e| self.output(format!("the job is no JSON: {e}")))?;
-        let run = Invocation::new(program, &self.folder, workbench.limit, &workbench.log);
+        let run = Invocation::new(program, &self.folder, workbench.limit, &workbench.log).of_user();
         let run = Invocation { peak: workbench.peak.clone(), ..run };
         Ok(run.args(&self.command[1..]).env(FOLDER_VARIABLE, &workbench.scene_dir).stdin(input))
     }

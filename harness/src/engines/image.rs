@@ -13,7 +13,7 @@ pub(super) fn read_rgb(engine: &EngineName, workbench: &Workbench, path: &Path) 
     let python = workbench.site.python().ok_or_else(|| {
         output("OpenImageIO is not there to read its image; run `luxproof engines install`".to_owned())
     })?;
-    let invocation = workbench.invoke(python).args(["-".as_ref(), path.as_os_str()]);
+    let invocation = workbench.invoke(python).args(["-I".as_ref(), "-".as_ref(), path.as_os_str()]);
     let done = invocation.stdin(DRIVER.as_bytes().to_vec()).run()?;
     pixels(&done.stdout).map_err(|what| output(format!("OpenImageIO {what} of {}", path.display())))
 }

@@ -4,6 +4,7 @@
 
 mod debian;
 mod venv;
+mod verify;
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -15,6 +16,7 @@ use super::Site;
 use super::catalogue::ALL;
 use super::contract::Component;
 use crate::record::EngineName;
+pub use verify::Soundness;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InstallOutcome {
@@ -61,6 +63,23 @@ pub fn install(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&st
     outcomes
 }
 
+/// Whether what the named engines need (all engines if `engines` is empty) is what was installed, component by component.
+pub fn verify(site: &Site, engines: &[EngineName]) -> Vec<(&'static str, Soundness)> {
+    components(engines).into_iter().map(|component| (component.name(), component.soundness(site))).collect()
+}
+
+/// Installs anew what of it is broken or absent, and says per component what was done.
+pub fn repair(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str)) -> Vec<InstallOutcome> {
+    let components = components(engines);
+    let lock = match lock(site) {
+        Ok(lock) => lock,
+        Err(error) => return components.iter().map(|c| c.failed(&error)).collect(),
+    };
+    let outcomes = components.iter().map(|c| c.repair(site, &mut progress)).collect();
+    drop(lock);
+    outcomes
+}
+
 fn components(engines: &[EngineName]) -> Vec<Component> {
     let all = [Component::PythonPackages, Component::PovRay, Component::LibLlvm, Component::LibFaketime];
     let named = || ALL.iter().filter(|entry| engines.is_empty() || engines.contains(&entry.name));
@@ -76,7 +95,7 @@ fn lock(site: &Site) -> Result<File, InstallError> {
 }
 
 fn step(site: &Site, program: impl Into<PathBuf>) -> Invocation {
-    Invocation::new(program, site.root(), LIMIT, site.root().join("install.log"))
+    Invocation::new(program, site.root(), LIMIT, site.root().join("install.log")).of_user()
 }
 
 impl Component {
@@ -92,13 +111,43 @@ impl Component {
     fn install(self, site: &Site, progress: &mut dyn FnMut(&str)) -> InstallOutcome {
         let present = match self {
             Self::PythonPackages => Some(site.venv()).filter(|_| venv::is_current(site)),
+            other => other.found(site),
+        };
+        match present {
+            Some(path) => self.outcome(InstallState::Present, path.display().to_string()),
+            None => self.install_anew(site, progress),
+        }
+    }
+
+    fn repair(self, site: &Site, progress: &mut dyn FnMut(&str)) -> InstallOutcome {
+        match self.soundness(site) {
+            Soundness::Sound(files) => self.outcome(InstallState::Present, format!("{files} files are as installed")),
+            Soundness::Unknown(why) => self.outcome(InstallState::Present, why),
+            Soundness::Broken(_) | Soundness::Absent => self.install_anew(site, progress),
+        }
+    }
+
+    fn soundness(self, site: &Site) -> Soundness {
+        let found = self.found(site);
+        match self {
+            Self::PythonPackages => venv::soundness(site),
+            Self::PovRay => verify::debian(site, found, &debian::POVRAY_PACKAGES),
+            Self::LibLlvm => verify::debian(site, found, &debian::LLVM_PACKAGES),
+            Self::LibFaketime => verify::debian(site, found, &debian::LIBFAKETIME_PACKAGES),
+        }
+    }
+
+    /// The program or library that engines use.
+    fn found(self, site: &Site) -> Option<PathBuf> {
+        match self {
+            Self::PythonPackages => site.python(),
             Self::PovRay => site.program("povray"),
             Self::LibLlvm => site.llvm(),
             Self::LibFaketime => site.libfaketime(),
-        };
-        if let Some(path) = present {
-            return self.outcome(InstallState::Present, path.display().to_string());
         }
+    }
+
+    fn install_anew(self, site: &Site, progress: &mut dyn FnMut(&str)) -> InstallOutcome {
         let installed = match self {
             Self::PythonPackages => venv::install(site, progress),
             Self::PovRay => debian::install_povray(site, progress),

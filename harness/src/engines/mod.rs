@@ -44,7 +44,7 @@ use contract::{OWN_LOOKUP, geometry_mib};
 pub(crate) use external::RUN_IN;
 pub use external::{ExternalJob, ExternalReadings};
 pub(crate) use iesna::method as method_of_iesna;
-pub use install::{InstallOutcome, InstallState, install};
+pub use install::{InstallOutcome, InstallState, Soundness, install, repair, verify};
 pub use settings::Coordinates;
 pub use site::{Site, SiteError};
 pub use workbench::{EngineError, SceneFile, Workbench};

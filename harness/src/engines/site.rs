@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use etcetera::BaseStrategy;
 
-/// Where engines are found. Layout of the folder: `venv/` (Python packages), `debian/` (unpacked Debian packages).
+/// Where engines are found. Layout of the folder: `venv/` (Python packages), `debian/` (unpacked Debian packages),
+/// `kernels/` (compiled by Dr.Jit).
 #[derive(Clone, Debug)]
 pub struct Site {
     root: PathBuf,
@@ -40,13 +41,22 @@ impl Site {
     }
 
     pub fn python_package(&self, name: &str) -> Option<PathBuf> {
-        let versions = std::fs::read_dir(self.venv().join("lib")).ok()?;
-        let package = |v: std::fs::DirEntry| v.path().join("site-packages").join(name);
-        versions.flatten().map(package).find(|p| p.is_dir())
+        self.python_folders().into_iter().map(|folder| folder.join(name)).find(|p| p.is_dir())
+    }
+
+    /// The folders of Python packages: one, where one Python made them.
+    pub fn python_folders(&self) -> Vec<PathBuf> {
+        let versions = std::fs::read_dir(self.venv().join("lib")).into_iter().flatten().flatten();
+        versions.map(|version| version.path().join("site-packages")).collect()
     }
 
     pub fn debian(&self) -> PathBuf {
         self.root.join("debian")
+    }
+
+    /// What Dr.Jit keeps of the kernels that it compiles.
+    pub fn kernels(&self) -> PathBuf {
+        self.root.join("kernels")
     }
 
     /// A program: first among our unpacked packages, then on PATH.

@@ -166,7 +166,7 @@ fn in_process(engine: &dyn Engine, job: &Job, bench: &Workbench) -> Result<(Meas
     let measurement = checked(&engine.name(), job, engine.read(job, bench)?)?;
     let (wall, cpu) = (clock.elapsed(), process::cpu_time().saturating_sub(cpu));
     if bench.peak.mib().is_none() {
-        bench.peak.look_at("self");
+        bench.peak.look_at_self();
     }
     let cost = Cost { wall_s: wall.as_secs_f64(), cpu_s: cpu.as_secs_f64(), peak_mib: bench.peak.mib() };
     Ok((measurement, cost))

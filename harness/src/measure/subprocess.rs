@@ -59,7 +59,8 @@ pub(super) fn read(program: &Path, request: &Request, bench: &Workbench) -> Resu
     let no_json = |what, e| Failure::new(FailureKind::Crash, format!("the {what} is no JSON: {e}"));
     let input = serde_json::to_vec(request).map_err(|e| no_json("request", e))?;
     // The spec's path counts from where this process is.
-    let run = Invocation::new(program, Path::new("."), bench.limit, &bench.log).args([READ_ONE]).stdin(input);
+    let run = Invocation::new(program, Path::new("."), bench.limit, &bench.log).of_user();
+    let run = run.args([READ_ONE]).stdin(input);
     let done = run.run().map_err(EngineError::from)?;
     serde_json::from_slice::<Result<Taken, Failure>>(&done.stdout).map_err(|e| no_json("reading apart", e))?
 }

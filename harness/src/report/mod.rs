@@ -4,6 +4,7 @@ mod accepted;
 mod budget;
 mod csv;
 mod curve;
+pub(crate) mod earlier;
 mod exit;
 mod html;
 mod junit;
@@ -17,7 +18,7 @@ mod terminal;
 pub(crate) mod words;
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use schemars::JsonSchema;
@@ -27,7 +28,7 @@ use crate::judge::{Bias, Comparison, Consensus, OnRecord, PaperSplit, Policy, Po
 use crate::plan::Skip;
 use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Role, Status};
 use crate::spec::Case;
-use crate::system::files::{self, FileError};
+use crate::system::files::{self, Care, FileError};
 
 pub use accepted::{BaselineCheck, BaselineLine};
 pub use budget::budgets;
@@ -43,6 +44,8 @@ pub use terminal::{Detail, Style, terminal};
 
 /// A report of more comparisons than this is laid out in rows.
 const LONG: usize = 10_000;
+/// What it is called in the folder of a run.
+pub(crate) const FILE: &str = "report.json";
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Report {
@@ -206,9 +209,24 @@ impl Report {
 
     /// Writes it to a file with its checksum; the file is seen whole or not at all.
     pub fn keep(&mut self, path: &Path) -> Result<(), FileError> {
-        self.seal().map_err(|e| FileError::of(path, e))?;
+        self.keep_with(Care::Lasting, path)
+    }
+
+    /// Writes it to `report.json` of a folder. A report there that says more, of engines, procedures or cases that were left out this time,
+    /// or speaks of another spec, stays beside it, by a name that is returned.
+    pub(crate) fn keep_in(&mut self, folder: &Path, care: Care) -> Result<Option<PathBuf>, FileError> {
+        let path = folder.join(FILE);
+        let aside = earlier::put_aside(self, &path).map_err(|e| FileError::of(&path, e))?;
+        self.keep_with(care, &path)?;
+        Ok(aside)
+    }
+
+    fn keep_with(&mut self, care: Care, path: &Path) -> Result<(), FileError> {
+        let fail = |e| FileError::of(path, e);
+        self.seal().map_err(|e| fail(e.into()))?;
         let is_long = self.comparisons.len().max(self.readings.len()) > LONG;
-        if is_long { files::keep_rows(path, self) } else { files::keep_json(path, self) }
+        let kept = if is_long { files::replace_rows(path, self, care) } else { files::replace_json(path, self, care) };
+        kept.map_err(fail)
     }
 
     /// How many cases specs ask for.

@@ -56,44 +56,64 @@ pub(crate) const UNFINISHED: &str = ".unfinished-";
 /// Bytes that are written at a time.
 const BUFFER: usize = 1 << 16;
 
+/// What a machine that stops at once may take with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Care {
+    /// The file: what it holds can be had again.
+    Usual,
+    /// Nothing: it is on the disk before it takes the place of what was there.
+    Lasting,
+}
+
 /// Puts a file with these bytes into the place of what is there; its folder is made if need be.
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    replace_by(&mut tempfile::Builder::new(), path, |file| file.write_all(bytes))
+    replace_by(&mut tempfile::Builder::new(), path, Care::Usual, |file| file.write_all(bytes))
+}
+
+/// The same for what cannot be had again.
+pub(crate) fn replace_lastingly(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    replace_by(&mut tempfile::Builder::new(), path, Care::Lasting, |file| file.write_all(bytes))
 }
 
 /// The same for a file that others are to read: with the permissions that the user gives to new files.
 pub(crate) fn replace_shared(path: &Path, bytes: &[u8]) -> io::Result<()> {
     // The system takes off what the user's mask forbids.
-    replace_by(tempfile::Builder::new().permissions(Permissions::from_mode(0o666)), path, |file| file.write_all(bytes))
+    let mut shared = tempfile::Builder::new();
+    shared.permissions(Permissions::from_mode(0o666));
+    replace_by(&mut shared, path, Care::Lasting, |file| file.write_all(bytes))
 }
 
 fn replace_by(
     builder: &mut tempfile::Builder<'_, '_>,
     path: &Path,
+    care: Care,
     write: impl FnOnce(&mut tempfile::NamedTempFile) -> io::Result<()>,
 ) -> io::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder)?;
     let mut file = builder.prefix(UNFINISHED).tempfile_in(folder)?;
     write(&mut file)?;
+    if care == Care::Usual {
+        return file.persist(path).map(drop).map_err(|e| e.error);
+    }
+    file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
-    Ok(())
+    File::open(folder)?.sync_all()
 }
 
 /// The same with a value as JSON for people, a line feed at its end.
-pub(crate) fn replace_json<T: Serialize>(path: &Path, value: &T) -> io::Result<()> {
-    replace_by(&mut tempfile::Builder::new(), path, |file| written(file, value, PrettyFormatter::new()))
+pub(crate) fn replace_json<T: Serialize>(path: &Path, value: &T, care: Care) -> io::Result<()> {
+    replace_by(&mut tempfile::Builder::new(), path, care, |file| written(file, value, PrettyFormatter::new()))
 }
 
 /// The same, the error with its path.
 pub(crate) fn keep_json<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
-    replace_json(path, value).map_err(|source| FileError::of(path, source))
+    replace_json(path, value, Care::Usual).map_err(|source| FileError::of(path, source))
 }
 
 /// The same with an item of a list a line, for what is too long to be read.
-pub(crate) fn keep_rows<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
-    replace_by(&mut tempfile::Builder::new(), path, |file| written(file, value, Rows::new()))
-        .map_err(|source| FileError::of(path, source))
+pub(crate) fn replace_rows<T: Serialize>(path: &Path, value: &T, care: Care) -> io::Result<()> {
+    replace_by(&mut tempfile::Builder::new(), path, care, |file| written(file, value, Rows::new()))
 }
 
 /// As it is made: a report of 1e5 meters is some 100 MB.

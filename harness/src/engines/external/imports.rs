@@ -40,6 +40,7 @@ pub(super) fn of(words: &[String], files: &[PathBuf], folder: &Path, site: &Site
         let is_flag = |w: &&String| w.starts_with('-') && !["-c", "-m", "-"].contains(&w.as_str());
         let log = tempfile::tempdir().map_err(|e| e.to_string())?;
         let mut run = Invocation::new(program, folder, LIMIT, log.path().join("log"))
+            .of_user()
             .args(after.iter().take_while(is_flag))
             .args(["-c", DRIVER])
             .args(sources);

@@ -9,13 +9,16 @@ use itertools::Itertools;
 
 use super::{InstallError, step};
 use crate::engines::Site;
+use crate::system::files;
 
+pub(super) const POVRAY_PACKAGES: [&str; 1] = ["povray"];
+pub(super) const LIBFAKETIME_PACKAGES: [&str; 1] = ["libfaketime"];
 /// The libLLVM packages that Mitsuba works with, the best known first.
-const LLVM_PACKAGES: [&str; 5] = ["libllvm19", "libllvm20", "libllvm18", "libllvm17t64", "libllvm17"];
+pub(super) const LLVM_PACKAGES: [&str; 5] = ["libllvm19", "libllvm20", "libllvm18", "libllvm17t64", "libllvm17"];
 
 pub(super) fn install_povray(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install POV-Ray 3.7 so that `povray` is on PATH (macOS: `brew install povray`)";
-    let found = fetched(site, ("POV-Ray", &["povray"]), |site| site.program("povray"), remedy, progress)?;
+    let found = fetched(site, ("POV-Ray", &POVRAY_PACKAGES), |site| site.program("povray"), remedy, progress)?;
     // Seen to start, with the libraries that were unpacked beside it.
     let mut check = step(site, &found).args(["--version"]);
     if let Some(path) = site.library_path() {
@@ -32,7 +35,7 @@ pub(super) fn install_llvm(site: &Site, progress: &mut dyn FnMut(&str)) -> Resul
 
 pub(super) fn install_libfaketime(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install libfaketime, with which rtrace's random numbers can be repeated";
-    fetched(site, ("libfaketime", &["libfaketime"]), Site::libfaketime, remedy, progress)
+    fetched(site, ("libfaketime", &LIBFAKETIME_PACKAGES), Site::libfaketime, remedy, progress)
 }
 
 /// Where the file is that the first of these packages brings.
@@ -97,7 +100,8 @@ impl<'a> Apt<'a> {
     fn install_one(&self, package: &str) -> Result<(), InstallError> {
         let install = ["install", "-y", "-q", "--no-install-recommends"];
         if self.system_wide {
-            return self.apt(&[&install[..], &[package]].concat());
+            // What is there and broken is fetched again, too.
+            return self.apt(&[&install[..], &["--reinstall", package]].concat());
         }
         // --reinstall: it may be installed where PATH does not lead; its dependencies then are there as well.
         self.apt(&[&install[..], &["--download-only", "--reinstall", package]].concat())?;
@@ -115,10 +119,21 @@ impl<'a> Apt<'a> {
         let root = self.site.debian();
         fs::create_dir_all(&root).map_err(|e| InstallError::io(&root, e))?;
         for package in &packages {
+            self.keep_sums(package)?;
             step(self.site, "dpkg").args(["-x".as_ref(), package.as_os_str(), root.as_os_str()]).run()?;
             fs::remove_file(package).map_err(|e| InstallError::io(package, e))?;
         }
         Ok(())
+    }
+
+    /// Keeps what a package says of its files, which unpacking leaves behind.
+    fn keep_sums(&self, package: &Path) -> Result<(), InstallError> {
+        let kept = sums(self.site).join(package.with_extension("md5sums").file_name().unwrap_or_default());
+        match step(self.site, "dpkg-deb").args(["--info".as_ref(), package.as_os_str(), "md5sums".as_ref()]).run() {
+            Ok(said) => files::replace(&kept, &said.stdout).map_err(|e| InstallError::io(&kept, e)),
+            // Not every package has sums.
+            Err(_) => Ok(()),
+        }
     }
 
     /// Runs apt-get, on our own lists and cache where the system's are not ours to change.
@@ -144,6 +159,11 @@ impl<'a> Apt<'a> {
     fn state(&self) -> PathBuf {
         self.site.root().join("apt")
     }
+}
+
+/// The folder of what unpacked packages say of their files.
+pub(super) fn sums(site: &Site) -> PathBuf {
+    site.root().join("debian-sums")
 }
 
 fn is_package(path: &Path) -> bool {

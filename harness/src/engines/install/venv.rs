@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
+use super::verify::{self, Soundness};
 use super::{InstallError, step};
 use crate::engines::Site;
 use crate::system::digest::hexadecimal;
@@ -15,7 +16,18 @@ const LOCK: &str = include_str!("../../../engines.lock");
 
 pub(super) fn is_current(site: &Site) -> bool {
     let linked = fs::read_link(site.venv()).is_ok_and(|target| target == Path::new(&folder_name()));
-    linked && site.python().is_some()
+    linked && matches!(soundness(site), Soundness::Sound(_))
+}
+
+/// Whether the packages are what the lock pins and what was installed.
+pub(super) fn soundness(site: &Site) -> Soundness {
+    verify::python(site, &pinned())
+}
+
+/// The packages that every Python gets, as the lock names them: `mitsuba==3.9.1`.
+fn pinned() -> Vec<String> {
+    let lines = LOCK.lines().filter_map(|line| line.strip_suffix(" \\"));
+    lines.filter(|line| line.contains("==") && !line.contains(';')).map(str::to_owned).collect()
 }
 
 pub(super) fn install(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
@@ -98,6 +110,11 @@ mod tests {
         let folder = root.join(folder_name());
         fs::create_dir_all(folder.join("bin")).unwrap();
         fs::write(folder.join("bin/python"), "").unwrap();
+        for package in pinned() {
+            let named = folder.join("lib/python3/site-packages").join(package.replace("==", "-") + ".dist-info");
+            fs::create_dir_all(&named).unwrap();
+            fs::write(named.join("RECORD"), "").unwrap();
+        }
         let site = Site::at(root);
         put_in_place(&site, &folder).unwrap();
         site

@@ -42,12 +42,12 @@ impl Backend {
         }
         let backend = |llvm, versions| Self { root: site.root().to_owned(), python: python.clone(), llvm, versions };
         for library in site.llvms() {
-            match probe(&python, "llvm_ad_mono", Some(&library)) {
+            match probe(site, &python, "llvm_ad_mono", Some(&library)) {
                 Ok(versions) => return Ok(backend(Some(library), versions)),
                 Err(reason) => tracing::debug!(library = %library.display(), reason, "unusable libLLVM"),
             }
         }
-        probe(&python, "scalar_rgb", None).map(|versions| backend(None, versions)).map_err(absent)
+        probe(site, &python, "scalar_rgb", None).map(|versions| backend(None, versions)).map_err(absent)
     }
 
     pub(super) fn is_of(&self, site: &Site) -> bool {
@@ -79,10 +79,10 @@ impl Backend {
     /// The command that reads an exported job, and a remark if it cannot use the variant asked for.
     pub(super) fn invocation(&self, workbench: &Workbench, settings: &Settings) -> (Invocation, Option<String>) {
         let threads = workbench.jobs.max(1).to_string();
-        let mut run =
-            workbench.invoke(&self.python).args(["mitsuba_read.py", "job.json", "--serve", "--threads", &threads]);
-        // Scene folders stay as exported.
-        run = run.env("PYTHONDONTWRITEBYTECODE", "1");
+        // Neither the user's Python nor its packages; scene folders stay as exported.
+        let isolated = workbench.invoke(&self.python).args(["-I", "-B"]);
+        let run = isolated.args(["mitsuba_read.py", "job.json", "--serve", "--threads", &threads]);
+        let run = with_kernels(run, &workbench.site);
         match &self.llvm {
             Some(library) => (run.env("DRJIT_LIBLLVM_PATH", library), None),
             None if settings.variant.starts_with("llvm") => {
@@ -97,11 +97,20 @@ impl Backend {
     }
 }
 
-fn probe(python: &Path, variant: &str, llvm: Option<&Path>) -> Result<Versions, String> {
+/// With a place for the kernels that Dr.Jit compiles, so that each is compiled once.
+fn with_kernels(run: Invocation, site: &Site) -> Invocation {
+    let folder = site.kernels();
+    // Where it cannot be made they are compiled each time, and Dr.Jit says so in the log.
+    std::fs::create_dir_all(&folder).ok();
+    run.env("DRJIT_CACHE_DIR", &folder).may_write(folder)
+}
+
+fn probe(site: &Site, python: &Path, variant: &str, llvm: Option<&Path>) -> Result<Versions, String> {
     let folder = tempfile::tempdir().map_err(|e| format!("no temporary folder: {e}"))?;
     let mut run = Invocation::new(python, folder.path(), PROBE_LIMIT, folder.path().join("log"))
-        .args(["-", variant])
+        .args(["-I", "-", variant])
         .stdin(PROBE.into());
+    run = with_kernels(run, site);
     if let Some(library) = llvm {
         run = run.env("DRJIT_LIBLLVM_PATH", library);
     }

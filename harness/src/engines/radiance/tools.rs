@@ -10,6 +10,11 @@ use crate::engines::workbench::by_hand;
 use crate::engines::{Absent, EngineError, SceneFile, Site, Version, Workbench};
 use crate::system::process::{self, Invocation};
 
+/// Bytes of an octree, which holds the scene, at most.
+const LARGEST_OCTREE: usize = 1 << 30;
+/// Bytes that rtrace gives for a row.
+const ROW: usize = 24;
+
 #[derive(Clone, Debug)]
 pub(super) struct Tools {
     package: PathBuf,
@@ -45,7 +50,7 @@ impl Tools {
 
     pub(super) fn compile(&self, workbench: &Workbench, scenes: usize) -> Result<(), EngineError> {
         for scene in 0..scenes {
-            let compiled = self.prepared(workbench.invoke(self.program("oconv")));
+            let compiled = self.prepared(workbench.invoke(self.program("oconv"))).longest_answer(LARGEST_OCTREE);
             let compiled = compiled.args(["-f".to_owned()]).args(export::parts(scene, scenes)).run()?;
             workbench.write(&[SceneFile { name: export::octree(scene, scenes), bytes: compiled.stdout }])?;
         }
@@ -87,7 +92,8 @@ impl Tools {
     ) -> Result<Vec<f64>, EngineError> {
         let stdin = rows.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         let run = self.seeded(workbench.invoke(self.program("rtrace")), seed);
-        let finished = run.args(["-h", "-fdd"]).args(options).args([octree]).stdin(stdin).run()?;
+        let run = run.args(["-h", "-fdd"]).args(options).args([octree]).stdin(stdin);
+        let finished = run.longest_answer(ROW * rows.len()).run()?;
         parse(&finished.stdout, rows.len())
     }
 

@@ -43,10 +43,10 @@ pub fn add(path: &Path, lines: &[Line<'_>]) -> Result<Added, HistoryError> {
     let added = Added { replaced, cut_short };
     if added == Added::default() {
         let mut file = fs::OpenOptions::new().create(true).append(true).open(path).map_err(fail)?;
-        file.write_all(&new).map_err(fail)?;
+        file.write_all(&new).and_then(|()| file.sync_all()).map_err(fail)?;
     } else {
         let kept: Vec<u8> = before().filter(stays).flatten().copied().chain(new).collect();
-        files::replace(path, &kept).map_err(fail)?;
+        files::replace_lastingly(path, &kept).map_err(fail)?;
     }
     Ok(added)
 }

@@ -1,0 +1,136 @@
+//! Programs run as a library runs them, without a supervisor; tests/program/supervision.rs runs them under one.
+
+use std::fs;
+use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::*;
+
+fn shell(script: &str, limit_s: f64, folder: &Path) -> Result<Finished, ProcessError> {
+    Invocation::new("sh", folder, Duration::from_secs_f64(limit_s), folder.join("log")).args(["-c", script]).run()
+}
+
+#[test]
+fn output_and_messages_are_kept_apart_and_stderr_is_logged() {
+    let folder = tempfile::tempdir().unwrap();
+    let done = shell("echo out; echo err >&2", 10.0, folder.path()).unwrap();
+    assert_eq!(done.stdout, b"out\n");
+    assert_eq!(done.stderr, "err\n");
+    assert!(fs::read_to_string(folder.path().join("log")).unwrap().ends_with("err\n\n"));
+}
+
+#[test]
+fn a_failing_program_is_an_error_with_its_last_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = shell("echo no such lamp >&2; exit 3", 10.0, folder.path()).unwrap_err();
+    let text = error.to_string();
+    assert!(matches!(error, ProcessError::Failed { .. }));
+    assert!(text.contains("exit code 3") && text.contains("no such lamp"), "{text}");
+}
+
+#[test]
+fn a_timeout_kills_the_grandchildren_too() {
+    let folder = tempfile::tempdir().unwrap();
+    // The grandchild would write the file after 1 s if it lived.
+    let script = "(sleep 1; touch survivor) & sleep 30";
+    let error = shell(script, 0.2, folder.path()).unwrap_err();
+    assert!(matches!(error, ProcessError::TimedOut { .. }), "{error}");
+    thread::sleep(Duration::from_millis(1300));
+    assert!(!folder.path().join("survivor").exists());
+}
+
+#[test]
+fn what_a_program_leaves_behind_does_not_hold_its_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = Instant::now();
+    // A session of its own is out of the group's reach.
+    let done = shell("setsid sleep 60 & echo answer", 30.0, folder.path()).unwrap();
+    assert_eq!(done.stdout, b"answer\n");
+    assert!(start.elapsed() < Duration::from_secs(30), "{:?}", start.elapsed());
+}
+
+fn conversation(script: &str, limit_s: f64, folder: &Path) -> Conversation {
+    let limit = Duration::from_secs_f64(limit_s);
+    Invocation::new("sh", folder, limit, folder.join("log")).args(["-c", script]).converse().unwrap()
+}
+
+#[test]
+fn a_conversation_answers_line_by_line_and_its_messages_are_logged() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut echo = conversation("echo ready; while read x; do echo \"<$x>\"; done; echo bye >&2", 10.0, folder.path());
+    assert_eq!(echo.listen().unwrap(), "ready");
+    assert_eq!([echo.ask("one").unwrap(), echo.ask("two").unwrap()], ["<one>", "<two>"]);
+    echo.end().unwrap();
+    assert!(echo.peak_mib().is_some());
+    assert!(fs::read_to_string(folder.path().join("log")).unwrap().ends_with("bye\n\n"));
+}
+
+#[test]
+fn a_conversation_with_no_answer_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = |script, limit_s| conversation(script, limit_s, folder.path()).ask("?").unwrap_err();
+    let failed = error("read x; echo no such lamp >&2; exit 3", 10.0).to_string();
+    assert!(failed.contains("exit code 3") && failed.contains("no such lamp"), "{failed}");
+    assert!(matches!(error("read x", 10.0), ProcessError::Silent { .. }));
+    assert!(matches!(error("(sleep 1; touch survivor) & sleep 30", 0.2), ProcessError::TimedOut { .. }));
+    thread::sleep(Duration::from_millis(1300));
+    assert!(!folder.path().join("survivor").exists());
+}
+
+#[test]
+fn memory_and_processor_time_of_a_program_are_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |script: &str| {
+        let invocation = Invocation::new("sh", folder.path(), Duration::from_secs(20), folder.path().join("log"));
+        let invocation = invocation.args(["-c", script]);
+        invocation.run().unwrap();
+        invocation.peak.mib().unwrap()
+    };
+    let before = cpu_time();
+    let (small, large) = (run("sleep 0.1"), run("x=$(head -c 50000000 /dev/zero | tr '\\0' a); sleep 0.1"));
+    assert!(small > 0.1 && large > small + 40.0, "{small} {large}");
+    assert!(cpu_time() > before + Duration::from_millis(5));
+}
+
+#[test]
+fn a_program_that_is_not_there_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = Invocation::new("no-such-renderer", folder.path(), Duration::from_secs(1), folder.path().join("log"));
+    assert!(run.run().unwrap_err().to_string().contains("no-such-renderer"));
+}
+
+#[test]
+fn command_lines_can_be_pasted_into_a_shell() {
+    let run = Invocation::new("rtrace", Path::new("."), Duration::ZERO, "log").args(["-ab", "99", "it's.oct"]);
+    assert_eq!(run.command_line(), r"rtrace -ab 99 'it'\''s.oct'");
+    let run = run.env("RAYPATH", ".:/my lib");
+    assert_eq!(run.command_line_with_env(), r"RAYPATH='.:/my lib' rtrace -ab 99 'it'\''s.oct'");
+}
+
+#[test]
+fn an_engine_is_told_of_the_environment_what_every_program_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    let env =
+        || Invocation::new("env", folder.path(), Duration::from_secs(20), folder.path().join("log")).env("OWN", "x");
+    let names = |run: Invocation| -> Vec<String> {
+        let said = String::from_utf8(run.run().unwrap().stdout).unwrap();
+        said.lines().filter_map(|line| Some(line.split_once('=')?.0.to_owned())).collect()
+    };
+    // Cargo sets this one for its tests.
+    let (told, all) = ("PATH".to_owned(), "CARGO_MANIFEST_DIR".to_owned());
+    let confined = names(env());
+    assert!(
+        confined.contains(&told) && confined.contains(&"OWN".to_owned()) && !confined.contains(&all),
+        "{confined:?}"
+    );
+    assert!(names(env().of_user()).contains(&all));
+}
+
+#[test]
+fn an_answer_that_is_too_long_ends_its_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let endless = Invocation::new("cat", folder.path(), Duration::from_secs(60), folder.path().join("log"));
+    let error = endless.args(["/dev/zero"]).longest_answer(1 << 20).run().unwrap_err();
+    assert!(matches!(error, ProcessError::TooMuch { bytes: 1_048_576, .. }), "{error}");
+}
