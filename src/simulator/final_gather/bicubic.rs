@@ -51,6 +51,39 @@ impl Bicubic {
         std::array::from_fn(|k| self.scale[k] * others[k])
     }
 
+    /// Lagrange's polynomials of all nodes at a place.
+    pub(super) fn basis(&self, t: DVec2) -> [f64; NODES] {
+        let (a, b) = (self.lagrange(t.x), self.lagrange(t.y));
+        std::array::from_fn(|k| a[k / ORDER] * b[k % ORDER])
+    }
+
+    /// The polynomial that comes closest to those on parts of the square, and how far off it is in its root mean square; each part with
+    /// its corner and size, values at its nodes and its own error. Moments up to degree 3 stay as they are, since products of two
+    /// such polynomials are summed exactly by Gauss's rule.
+    pub(super) fn joined<'a>(
+        &self,
+        parts: impl Iterator<Item = (DVec2, DVec2, &'a [f64; NODES], f64)>,
+    ) -> ([f64; NODES], f64) {
+        let (mut joined, mut square) = ([0.0; NODES], 0.0);
+        for (corner, size, values, error) in parts {
+            let area = size.element_product();
+            square += area * error * error;
+            for (k, value) in values.iter().enumerate() {
+                let weight = area * self.weight(k);
+                square += weight * value * value;
+                let basis = self.basis(corner + size * self.node(k));
+                for (joined, basis) in joined.iter_mut().zip(basis) {
+                    *joined += weight * value * basis;
+                }
+            }
+        }
+        for (k, joined) in joined.iter_mut().enumerate() {
+            *joined /= self.weight(k);
+            square -= self.weight(k) * *joined * *joined;
+        }
+        (joined, square.max(0.0).sqrt())
+    }
+
     /// The value at a place by those at the nodes.
     pub(super) fn at(&self, values: &[f64; NODES], t: DVec2) -> f64 {
         let (a, b) = (self.lagrange(t.x), self.lagrange(t.y));

@@ -53,9 +53,17 @@ impl Face {
         let s = room.size_m;
         let within = corners_m.map(|p| p.clamp(DVec3::ZERO, s));
         let face = Self::new(axis, far, within, DVec3::AXES[axis] * if far { 1.0 } else { -1.0 }, reflectance);
-        let plane_m = corners_m[usize::from(far)][axis];
-        let is_seen = if far { plane_m >= 0.0 && plane_m < s[axis] } else { plane_m > 0.0 && plane_m <= s[axis] };
+        let is_seen = Self::is_seen(room, corners_m, axis, far);
         (is_seen && reflectance > 0.0 && face.area_m2() >= SMALL * mean_wall_m2(s)).then_some(face)
+    }
+
+    /// Whether the face of a box at an end of an axis looks into the room and has an area.
+    pub(super) fn is_seen(room: &Room, corners_m: [DVec3; 2], axis: usize, far: bool) -> bool {
+        let plane_m = corners_m[usize::from(far)][axis];
+        let size_m = room.size_m[axis];
+        let [low, high] = corners_m.map(|p| p.clamp(DVec3::ZERO, room.size_m));
+        let has_area = (1..3).all(|k| high[(axis + k) % 3] > low[(axis + k) % 3]);
+        has_area && if far { plane_m >= 0.0 && plane_m < size_m } else { plane_m > 0.0 && plane_m <= size_m }
     }
 
     pub(super) fn size_m(&self) -> DVec2 {
@@ -77,6 +85,22 @@ impl Face {
         point_m[self.axis] = self.plane_m;
         (point_m[(self.axis + 1) % 3], point_m[(self.axis + 2) % 3]) = (at_m.x, at_m.y);
         point_m
+    }
+
+    /// How far before it the room ends.
+    pub(super) fn before_m(&self, size_m: DVec3) -> f64 {
+        if self.normal[self.axis] > 0.0 { size_m[self.axis] - self.plane_m } else { self.plane_m }
+    }
+
+    /// How far before it a box stands, where that is within a part of its own shorter side.
+    pub(super) fn gap_m(&self, [min_m, max_m]: [DVec3; 2], part: f64) -> Option<f64> {
+        let gap_m = if self.normal[self.axis] > 0.0 {
+            min_m[self.axis] - self.plane_m
+        } else {
+            self.plane_m - max_m[self.axis]
+        };
+        let is_near = gap_m > 0.0 && gap_m < part * (self.on(max_m) - self.on(min_m)).min_element();
+        is_near.then_some(gap_m)
     }
 
     /// What a box hides of it that stands on it or reaches through it, as corners on its plane.

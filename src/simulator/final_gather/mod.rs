@@ -15,6 +15,9 @@ mod rays;
 mod surroundings;
 #[cfg(test)]
 mod tests;
+mod view;
+
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -24,6 +27,7 @@ use self::grid::{Cover, Grid};
 use self::lit::{Known, Lights, Limit, Lit};
 use self::rays::Rays;
 use self::surroundings::Surroundings;
+use self::view::{Left, View};
 use super::emission::{Emitter, Precision};
 use super::sampler::{Sampler, mix};
 use super::stop::Stop;
@@ -88,6 +92,11 @@ const RATE: f64 = 1.6;
 /// The part of a bound that the field's noise may have.
 const FIELD_PART: f64 = 0.6;
 
+/// What large rectangles may be off of light reflected once, each, of the error asked for.
+const OF_LIT: f64 = 3e-3;
+/// The same at the nodes of the field.
+const OF_LIT_AT_NODES: f64 = 3e-2;
+
 /// A field with what it was made for.
 #[derive(Debug)]
 struct Solved {
@@ -99,8 +108,42 @@ struct Solved {
     count: u32,
     grid: Grid,
     field: Field,
+    once: Option<Arc<Once>>,
     /// How well it is known, by rectangle.
     known: Vec<Known>,
+}
+
+/// Light reflected once at the nodes of all rectangles, integrated over what they see.
+#[derive(Debug)]
+struct Once {
+    lux: Vec<[f64; NODES]>,
+    /// How far off that is on the mean of each.
+    off_lux: Vec<f64>,
+}
+
+impl Once {
+    /// `None` where something that reflects is not known on rectangles, or where it was stopped.
+    fn new(lights: Lights, lit: &Lit, grid: &Grid, relative_error: f64, stop: &Stop) -> Option<Self> {
+        let surroundings = lights.surroundings;
+        let occluders = surroundings.hiding().filter(|_| lit.is_whole)?;
+        let tolerance_lux = OF_LIT_AT_NODES * relative_error * lit.mean_exitance(&surroundings.faces);
+        let one = |k: usize| {
+            let (face, nodes) = grid.nodes(k);
+            let is_idle = face.reflectance == 0.0 || grid.cover(k) == Cover::Whole;
+            nodes.map(|position_m| {
+                if is_idle || stop.is_due() {
+                    return Bounded::default();
+                }
+                let meter = Meter { position_m, normal: face.normal };
+                let view = View { meter: &meter, occluders, bicubic: &grid.bicubic };
+                lit.shown_of_all(&view, &surroundings.faces, tolerance_lux)
+            })
+        };
+        let all: Vec<[Bounded; NODES]> = (0..grid.len()).into_par_iter().map(one).collect();
+        let lux = all.iter().map(|nodes| nodes.map(|node| node.value)).collect();
+        let off = |nodes: &[Bounded; NODES]| nodes.iter().map(|node| node.bound).sum::<f64>() / NODES as f64;
+        (!stop.is_due()).then(|| Self { lux, off_lux: all.iter().map(off).collect() })
+    }
 }
 
 /// Sums of one meter over the rays so far.
@@ -243,7 +286,8 @@ impl Enclosure {
             if self.surroundings.room.is_some()
                 && !self.solved.as_ref().is_some_and(|s| s.is_for(bounces, accuracy, more_log2))
             {
-                match Solved::new(lights, lit, bounces, accuracy, more_log2, stop) {
+                let once = self.solved.as_ref().and_then(|solved| solved.once.clone());
+                match Solved::new(lights, lit, once, bounces, accuracy, more_log2, stop) {
                     None if self.solved.is_none() => return Err(SimulatorError::Stopped),
                     None => break,
                     solved => self.solved = solved,
@@ -300,25 +344,28 @@ impl Solved {
     fn new(
         lights: Lights,
         lit: &Lit,
+        once: Option<Arc<Once>>,
         bounces: Bounces,
         accuracy: &Accuracy,
         more_log2: u32,
         stop: &Stop,
     ) -> Option<Self> {
-        let grid = Grid::new(lights.surroundings);
+        let grid = Grid::new(lights.surroundings, accuracy.relative_error);
         let known = |k: usize, error_lux: f64, noise_lux: f64| {
             let error_lux = if grid.cover(k) == Cover::None { error_lux } else { f64::INFINITY };
             Known { error_lux, noise_lux, side_m: grid.longer_m(k) }
         };
         let open: Vec<Known> = (0..grid.len()).map(|k| known(k, 0.0, 0.0)).collect();
-        let rays = Rays { lights, lit, grid: Some((&grid, &open)), draws: false };
+        let once = once.or_else(|| Once::new(lights, lit, &grid, accuracy.relative_error, stop).map(Arc::new));
+        let rays = Rays { lights, lit, grid: Some((&grid, &open)), draws: false, knows_once: once.is_some() };
         let log2 = (NODE_RAYS / accuracy.relative_error).log2().ceil().max(0.0) as u32;
         let affordable = stop.third_log2(REPLICATES * NODES * grid.len()).max(*NODE_RAYS_LOG2.start());
         let log2 = log2.clamp(*NODE_RAYS_LOG2.start(), *NODE_RAYS_LOG2.end()) + more_log2;
         let count: u32 = 1 << log2.min(affordable);
-        let field = Field::solve(&grid, &rays, bounces, count, *accuracy, stop)?;
+        let of_nodes = once.as_ref().map(|once| once.lux.as_slice());
+        let field = Field::solve(&grid, &rays, of_nodes, bounces, count, *accuracy, stop)?;
         let known = (0..grid.len()).map(|k| known(k, field.error_lux[k], field.noise_lux[k])).collect();
-        Some(Self { bounces, accuracy: *accuracy, more_log2, count, grid, field, known })
+        Some(Self { bounces, accuracy: *accuracy, more_log2, count, grid, field, once, known })
     }
 
     /// Rays of all nodes in each replicate, about.
@@ -349,11 +396,68 @@ impl<'a> Gather<'a> {
         stop: &'a Stop,
     ) -> Self {
         let grid = solved.map(|s| (&s.grid, s.known.as_slice()));
-        let rays = Rays { lights, lit, grid, draws: lit.is_peaked };
+        let rays = Rays { lights, lit, grid, draws: lit.is_peaked, knows_once: false };
         Self { rays, solved, bounces, accuracy, stop }
     }
 
     fn at(&self, index: usize, meter: &Meter, direct: Bounded, most_log2: u32) -> Sums {
+        let shown = self.shown(meter, direct);
+        if let Some(shown) = shown.as_ref().filter(|shown| {
+            let is_enough = shown.meets(self.accuracy.relative_error, direct);
+            is_enough || shown.needs_log2 > 0.0
+        }) {
+            return shown.clone();
+        }
+        let sampled = self.sampled(index, meter, direct, most_log2);
+        match shown {
+            Some(shown) if sampled.rays_log2 == 0 || shown.bounded().bound <= sampled.bounded().bound => shown,
+            _ => sampled,
+        }
+    }
+
+    /// Light integrated over what of every rectangle shows, where all that reflects is known on rectangles: what is left to chance is the
+    /// field's.
+    fn shown(&self, meter: &Meter, direct: Bounded) -> Option<Sums> {
+        let (solved, lights, lit) = (self.solved?, self.rays.lights, self.rays.lit);
+        let occluders = lights.surroundings.hiding().filter(|_| lit.is_whole)?;
+        let grid = &solved.grid;
+        let view = View { meter, occluders, bicubic: &grid.bicubic };
+        let (mut lux, mut left, mut error_lux) = ([0.0; REPLICATES], Left::default(), 0.0);
+        for (k, known) in solved.known.iter().enumerate() {
+            let (face, corner_m, size_m) = grid.rectangle(k);
+            let face = &lights.surroundings.faces[face];
+            if face.reflectance == 0.0 || grid.cover(k) == Cover::Whole {
+                continue;
+            }
+            let Some(values) = solved.field.of_rectangle(k, self.bounces) else { break };
+            let Some(shown) = view.of(face, corner_m, size_m) else { continue };
+            let weights = shown.weights();
+            let mut most = 0.0_f64;
+            for (lux, values) in lux.iter_mut().zip(values) {
+                *lux += face.reflectance * weights.of_nodes.iter().zip(values).map(|(w, v)| w * v).sum::<f64>();
+                most = values.iter().fold(most, |most, v| most.max(v.abs()));
+            }
+            let seen = face.reflectance * shown.factor;
+            left.add(seen * shown.left() * known.error_lux);
+            left.add(seen * solved.once.as_ref().map_or(0.0, |once| once.off_lux[k]));
+            error_lux += face.reflectance * weights.error * most;
+        }
+        let mean = lux.iter().sum::<f64>() / REPLICATES as f64;
+        let tolerance_lux = OF_LIT * self.accuracy.relative_error * (mean + direct.value);
+        let once = lit.shown_of_all(&view, &lights.surroundings.faces, tolerance_lux);
+        let scale = f64::from(1_u32 << FIRST_RAYS_LOG2);
+        let mut sums = Sums {
+            lux: lux.map(|lux| scale * (lux + once.value)),
+            chance_lux: lux.map(|lux| scale * (lux - mean)),
+            error_lux: REPLICATES as f64 * scale * (error_lux + left.bound() + once.bound),
+            rays_log2: FIRST_RAYS_LOG2,
+            ..Sums::default()
+        };
+        sums.needs_log2 = sums.field_needs_log2(self.accuracy.relative_error, direct);
+        Some(sums)
+    }
+
+    fn sampled(&self, index: usize, meter: &Meter, direct: Bounded, most_log2: u32) -> Sums {
         // Where bright places are drawn none is left unseen.
         let brightest_lux = if self.rays.draws { 0.0 } else { self.rays.lit.peak };
         let mut sums = Sums { brightest_lux, ..Sums::default() };

@@ -16,6 +16,8 @@ const MOST_BOXES: usize = 32;
 const LIFT: f64 = 1e-10;
 /// The part of the way to a luminaire beyond which nothing hides it: it may lie upon what holds it.
 const FAR_END: f64 = 1.0 - 1e-10;
+/// How far before its wall that lies which lies flat on it and hides it, of the scene's extent.
+const FLUSH: f64 = 1e-8;
 
 /// Everything that blocks or reflects.
 #[derive(Debug)]
@@ -33,6 +35,8 @@ pub(super) struct Surroundings {
     /// Whether there are no others, meshes that lie flat on a wall apart.
     pub(super) cuts_exactly: bool,
     extent_m: f64,
+    /// What hides a face from a place where everything that reflects is a face; `None` where something else does, too.
+    hiding: Option<Vec<Occluder>>,
 }
 
 struct Tree(TriangleBvh);
@@ -108,7 +112,11 @@ impl Surroundings {
         bounds.extend(&solid);
         let reach_m = bounds.iter().flatten().map(|p| p.abs().max_element()).fold(reach_m, f64::max);
         let extent_m = reach_m.max(room.map_or(0.0, |r| r.size_m.max_element()));
+        let hiding = room
+            .filter(|_| triangles.is_empty())
+            .and_then(|room| boxes.iter().map(|body: &Body| body.hides(&room, FLUSH * extent_m)).collect());
         Ok(Self {
+            hiding,
             room,
             faces,
             boxes,
@@ -119,6 +127,11 @@ impl Surroundings {
             cuts_exactly,
             extent_m,
         })
+    }
+
+    /// What hides faces from a place, where everything that reflects is a face.
+    pub(super) fn hiding(&self) -> Option<&[Occluder]> {
+        self.hiding.as_deref()
     }
 
     /// How far rays start off what may be a triangle.
@@ -220,6 +233,22 @@ fn lies_on_a_wall(room: &Room, [min_m, max_m]: [DVec3; 2]) -> bool {
 }
 
 impl Body {
+    /// Itself, if all of it that reflects is known as a face; what lies flat on a wall a hair before it.
+    fn hides(&self, room: &Room, hair_m: f64) -> Option<Occluder> {
+        let corners_m = [self.min_m, self.max_m];
+        let is_flush = lies_on_a_wall(room, corners_m);
+        let is_known = |k: usize| self.faces[k].is_some() || !Face::is_seen(room, corners_m, k / 2, k % 2 == 1);
+        let is_black = self.reflectance == 0.0;
+        let into = |k: usize| {
+            let flat = self.min_m[k] == self.max_m[k];
+            let at_far = self.max_m[k] == room.size_m[k];
+            if flat && (at_far || self.min_m[k] == 0.0) { if at_far { -hair_m } else { hair_m } } else { 0.0 }
+        };
+        let moved = DVec3::from_array(std::array::from_fn(into));
+        (is_black || !is_flush && (0..6).all(is_known))
+            .then_some(Occluder { min_m: self.min_m + moved, max_m: self.max_m + moved })
+    }
+
     fn slabs(&self, from_m: DVec3, direction: DVec3) -> (DVec3, DVec3) {
         let (a, b) = ((self.min_m - from_m) / direction, (self.max_m - from_m) / direction);
         (a.min(b), a.max(b))
