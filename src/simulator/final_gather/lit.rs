@@ -9,7 +9,6 @@ use super::face::{Face, mean_wall_m2};
 use super::surroundings::Surroundings;
 use super::view::{Left, View};
 use crate::scene::Meter;
-use crate::simulator::Bounded;
 use crate::simulator::emission::{Emitter, Precision};
 use crate::simulator::sampler::mix;
 use crate::simulator::stop::Stop;
@@ -197,17 +196,16 @@ impl Lit {
         Self { faces, bicubic, bright, reflected_lm, is_peaked, peak, is_whole }
     }
 
-    /// Light reflected once by all faces to a meter, with its bound: what rectangles leave out is of either sign, one as the other.
-    pub(super) fn shown_of_all(&self, view: &View, faces: &[Face], tolerance_lux: f64) -> Bounded {
-        let (mut lux, mut left, mut missed_lux) = (0.0, Left::default(), 0.0);
+    /// Light reflected once by all faces to a meter, and what it may be off.
+    pub(super) fn shown_of_all(&self, view: &View, faces: &[Face], tolerance_lux: f64) -> (f64, Left) {
+        let (mut lux, mut left) = (0.0, Left::default());
         for face in faces.iter().enumerate() {
-            self.add_shown(view, face, tolerance_lux, &mut |value, left_lux, rule_lux| {
+            self.add_shown(view, face, tolerance_lux, &mut |value, left_lux| {
                 lux += value;
                 left.add(left_lux);
-                missed_lux += rule_lux;
             });
         }
-        Bounded { value: lux, bound: left.bound() + missed_lux }
+        (lux, left)
     }
 
     /// The mean over all faces of light reflected once, in lm/m².
@@ -216,13 +214,13 @@ impl Lit {
     }
 
     /// Light reflected once by a face to a meter, rectangle by rectangle: from afar by polynomials of large ones, as far as what is off
-    /// there is below a tolerance. To each belongs what its polynomial leaves out and what the rule misses.
+    /// there is below a tolerance. To each belongs what its polynomial leaves out and the rule misses.
     fn add_shown(
         &self,
         view: &View,
         (index, face): (usize, &Face),
         tolerance_lux: f64,
-        add: &mut impl FnMut(f64, f64, f64),
+        add: &mut impl FnMut(f64, f64),
     ) {
         let mut open = vec![0];
         while let Some(k) = open.pop() {
@@ -243,8 +241,8 @@ impl Lit {
             let weights = shown.weights();
             let value: f64 = weights.of_nodes.iter().zip(values).map(|(w, v)| w * v).sum();
             let most = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-            let left_lux = shown.factor * shown.left() * error_lux;
-            add(face.reflectance * value, face.reflectance * left_lux, face.reflectance * weights.error * most);
+            let left_lux = shown.factor * shown.left() * error_lux + weights.error * most;
+            add(face.reflectance * value, face.reflectance * left_lux);
         }
     }
 

@@ -27,7 +27,7 @@ use self::grid::{Cover, Grid};
 use self::lit::{Known, Lights, Limit, Lit};
 use self::rays::Rays;
 use self::surroundings::Surroundings;
-use self::view::{Left, View};
+use self::view::View;
 use super::emission::{Emitter, Precision};
 use super::sampler::{Sampler, mix};
 use super::stop::Stop;
@@ -136,7 +136,9 @@ impl Once {
                 }
                 let meter = Meter { position_m, normal: face.normal };
                 let view = View { meter: &meter, occluders, bicubic: &grid.bicubic };
-                lit.shown_of_all(&view, &surroundings.faces, tolerance_lux)
+                let (value, left) = lit.shown_of_all(&view, &surroundings.faces, tolerance_lux);
+                // At one node of many: none of their errors is any other's.
+                Bounded { value, bound: left.by_chance() }
             })
         };
         let all: Vec<[Bounded; NODES]> = (0..grid.len()).into_par_iter().map(one).collect();
@@ -422,7 +424,7 @@ impl<'a> Gather<'a> {
         let occluders = lights.surroundings.hiding().filter(|_| lit.is_whole)?;
         let grid = &solved.grid;
         let view = View { meter, occluders, bicubic: &grid.bicubic };
-        let (mut lux, mut left, mut error_lux) = ([0.0; REPLICATES], Left::default(), 0.0);
+        let (mut lux, mut error_lux) = ([0.0; REPLICATES], 0.0);
         for (k, known) in solved.known.iter().enumerate() {
             let (face, corner_m, size_m) = grid.rectangle(k);
             let face = &lights.surroundings.faces[face];
@@ -437,19 +439,18 @@ impl<'a> Gather<'a> {
                 *lux += face.reflectance * weights.of_nodes.iter().zip(values).map(|(w, v)| w * v).sum::<f64>();
                 most = values.iter().fold(most, |most, v| most.max(v.abs()));
             }
-            let seen = face.reflectance * shown.factor;
-            left.add(seen * shown.left() * known.error_lux);
-            left.add(seen * solved.once.as_ref().map_or(0.0, |once| once.off_lux[k]));
-            error_lux += face.reflectance * weights.error * most;
+            let of_nodes_lux = solved.once.as_ref().map_or(0.0, |once| once.off_lux[k]);
+            let left_lux = shown.factor * (shown.left() * known.error_lux + of_nodes_lux);
+            error_lux += face.reflectance * (left_lux + weights.error * most);
         }
         let mean = lux.iter().sum::<f64>() / REPLICATES as f64;
         let tolerance_lux = OF_LIT * self.accuracy.relative_error * (mean + direct.value);
-        let once = lit.shown_of_all(&view, &lights.surroundings.faces, tolerance_lux);
+        let (once, once_left) = lit.shown_of_all(&view, &lights.surroundings.faces, tolerance_lux);
         let scale = f64::from(1_u32 << FIRST_RAYS_LOG2);
         let mut sums = Sums {
-            lux: lux.map(|lux| scale * (lux + once.value)),
+            lux: lux.map(|lux| scale * (lux + once)),
             chance_lux: lux.map(|lux| scale * (lux - mean)),
-            error_lux: REPLICATES as f64 * scale * (error_lux + left.bound() + once.bound),
+            error_lux: REPLICATES as f64 * scale * (error_lux + once_left.sum),
             rays_log2: FIRST_RAYS_LOG2,
             ..Sums::default()
         };

@@ -21,10 +21,11 @@ const OF_A_CONSTANT: f64 = 4.0;
 /// Standard deviations within which the sum of many errors of either sign lies.
 const APART: f64 = 4.0;
 
-/// What many rectangles leave out together: of either sign, one as the other, so that their squares add up where they are many.
+/// What many rectangles leave out together.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Left {
-    sum: f64,
+    /// Were it all of one sign.
+    pub(super) sum: f64,
     square: f64,
 }
 
@@ -34,7 +35,8 @@ impl Left {
         self.square += left_lux * left_lux;
     }
 
-    pub(super) fn bound(&self) -> f64 {
+    /// Were it of either sign, one as the other.
+    pub(super) fn by_chance(&self) -> f64 {
         self.sum.min(APART * self.square.sqrt())
     }
 }
