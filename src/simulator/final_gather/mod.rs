@@ -2,7 +2,8 @@
 //!
 //! Light straight from the luminaires is integrated over what shows of them; reflected light along rays from the meter
 //! that end there, where light reflected once is known from the luminaires and light reflected more often from
-//! the field. Ward, Rubinstein and Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, and
+//! the field; where nothing else reflects but faces on which light is known, over what shows of these, without a ray.
+//! Ward, Rubinstein and Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, and
 //! M. Reichert, *A two-pass radiosity method driven by lights and viewer position* (1992) gather so; here all of it is
 //! done in independent replicates, whose scatter bounds chance, and what polynomials leave out is added up along the rays.
 
