@@ -16,8 +16,6 @@ const MOST_BOXES: usize = 32;
 const LIFT: f64 = 1e-10;
 /// The part of the way to a luminaire beyond which nothing hides it: it may lie upon what holds it.
 const FAR_END: f64 = 1.0 - 1e-10;
-/// How far before its wall that lies which lies flat on it and hides it, of the scene's extent.
-const FLUSH: f64 = 1e-8;
 
 /// Everything that blocks or reflects.
 #[derive(Debug)]
@@ -114,7 +112,7 @@ impl Surroundings {
         let extent_m = reach_m.max(room.map_or(0.0, |r| r.size_m.max_element()));
         let hiding = room
             .filter(|_| triangles.is_empty())
-            .and_then(|room| boxes.iter().map(|body: &Body| body.hides(&room, FLUSH * extent_m)).collect());
+            .and_then(|room| boxes.iter().map(|body: &Body| body.hides(&room)).collect());
         Ok(Self {
             hiding,
             room,
@@ -233,20 +231,12 @@ fn lies_on_a_wall(room: &Room, [min_m, max_m]: [DVec3; 2]) -> bool {
 }
 
 impl Body {
-    /// Itself, if all of it that reflects is known as a face; what lies flat on a wall a hair before it.
-    fn hides(&self, room: &Room, hair_m: f64) -> Option<Occluder> {
+    /// Itself, if all of it that reflects is known as a face. What lies flat on a wall is left to rays.
+    fn hides(&self, room: &Room) -> Option<Occluder> {
         let corners_m = [self.min_m, self.max_m];
-        let is_flush = lies_on_a_wall(room, corners_m);
         let is_known = |k: usize| self.faces[k].is_some() || !Face::is_seen(room, corners_m, k / 2, k % 2 == 1);
-        let is_black = self.reflectance == 0.0;
-        let into = |k: usize| {
-            let flat = self.min_m[k] == self.max_m[k];
-            let at_far = self.max_m[k] == room.size_m[k];
-            if flat && (at_far || self.min_m[k] == 0.0) { if at_far { -hair_m } else { hair_m } } else { 0.0 }
-        };
-        let moved = DVec3::from_array(std::array::from_fn(into));
-        (is_black || !is_flush && (0..6).all(is_known))
-            .then_some(Occluder { min_m: self.min_m + moved, max_m: self.max_m + moved })
+        let is_all = self.reflectance == 0.0 || (0..6).all(is_known);
+        (is_all && !lies_on_a_wall(room, corners_m)).then_some(Occluder { min_m: self.min_m, max_m: self.max_m })
     }
 
     fn slabs(&self, from_m: DVec3, direction: DVec3) -> (DVec3, DVec3) {
