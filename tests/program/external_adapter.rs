@@ -90,9 +90,13 @@ fn zero_hits_are_not_seen_and_fail_only_where_samples_are_many() {
     let unlucky = |error: f64| {
         let stated = format!("\"std_error_lx\": {error} * lux, \"degrees_of_freedom\": 7");
         let sampled = adapter().replace("\"error_bound_lx\": 1e-12 * lux", &stated);
+        let noise = format!("(1 + {error} * noise.gauss(0, 1))");
         let unlucky = sampled.replace(
             "    for meter in job[\"meters\"]:\n        lux =",
-            "    for meter in job[\"meters\"]:\n        lux = 0.0 if meter[\"id\"] == \"plane[1]\" else",
+            &format!(
+                "    import random\n    noise = random.Random(job[\"seed\"])\n    for meter in job[\"meters\"]:\n        \
+                 lux = 0.0 if meter[\"id\"] == \"plane[1]\" else {noise} *"
+            ),
         );
         assert!(unlucky != sampled && sampled != adapter());
         let (report, code) = run(&folder(&unlucky));
@@ -100,7 +104,7 @@ fn zero_hits_are_not_seen_and_fail_only_where_samples_are_many() {
         assert_ne!(of("plane[0]")["verdict"], "fail");
         (of("plane[1]"), code)
     };
-    let (unseen, code) = unlucky(1e-1);
+    let (unseen, code) = unlucky(2e-1);
     assert_eq!(code, Some(4));
     assert_eq!((&unseen["verdict"], &unseen["uncertainty"]["kind"]), (&"inconclusive".into(), &"not_seen".into()));
     assert!(unseen["diagnosis"].as_str().unwrap().starts_with("not seen"), "{unseen}");

@@ -32,7 +32,9 @@ fn agree(report: &Value, procedure: &str, engine: &str, known: &[f64], tolerance
 
 #[test]
 fn case_s1_is_read_right_by_every_engine() {
-    let (report, _) = run("reference/specs/axial.yaml", "direct_illuminance,indirect_illuminance");
+    let accurate = ["reference/specs/axial.yaml", "--sampling", "accurate", "--engines", &ENGINES.join(",")];
+    let procedures = ["--procedures", "direct_illuminance,indirect_illuminance"];
+    let (report, _) = run_reference(&[&accurate[..], &procedures].concat());
     for (engine, tolerance) in
         [("simulator", 1e-9), ("iesna", 1e-9), ("radiance", 1e-6), ("povray", 1e-5), ("mitsuba", 1e-5)]
     {

@@ -10,7 +10,7 @@ const MEASURED: &str = "meters:
 procedures:
   direct_illuminance: {meters: desk}
   indirect_illuminance: {meters: desk, bounces: converged}
-budget: {relative_error: 0.05, seconds: 30}
+budget: {relative_error: 0.02, seconds: 30}
 ";
 
 /// Four-sided faces and half metres, as drawing programs write them; one face counts its corners from the end.

@@ -4,29 +4,43 @@
 //! read three times more at a quarter of the effort; of what it claims without any chance a random twentieth is read again, and
 //! all of it where that is another value.
 
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+
 use super::jobs::{Found, Outcome, Running};
 use super::sampling::{seed_of_look, stations_of};
-use crate::engines::Job;
-use crate::judge::{Comparison, Judge, LOOKS, SINGLE_PRECISION};
+use crate::engines::{Job, Measurement};
+use crate::judge::{Comparison, Judge, LOOKS, SINGLE_PRECISION, Verdict, rejected};
 use crate::measure::Question;
-use crate::plan::Run;
+use crate::plan::{Fill, Run};
 use crate::procedures::Task;
 use crate::record::{
-    Doubt, EngineName, Estimate, Reading, ReadingKey, Recording, StatedErrors, Uncertainty, Variation,
+    Doubt, EngineName, Estimate, MeterId, Reading, ReadingKey, Recording, StatedErrors, Uncertainty, Variation,
 };
 use crate::spec::Budget;
 use crate::system::process;
 
-const REPETITIONS: u32 = 3;
+const REPETITIONS: RangeInclusive<u32> = 1..=3;
+/// Those that follow where a stated error alone keeps a reading from failing.
+const FURTHER: RangeInclusive<u32> = 4..=6;
 /// Effort of each against that of the first look.
 const EFFORT: f64 = 0.25;
 /// The part of what is claimed that is read again, one reading of a task at least.
 const PART: f64 = 0.05;
+/// Of a procedure's meters whose stated errors are contradicted, how often one is by chance.
+const TOLD: f64 = 0.005;
+/// An error that nobody could check counts up to this part of the tolerance: with it, what lies twice as far off as is allowed fails.
+const UNCHECKED: f64 = 0.5;
 
 /// What a run read again.
 struct Again<'a> {
+    run: &'a Run,
     task: &'a Task,
     was_asked: bool,
+    /// Whether everything was rendered, whatever the plan's shortcut.
+    is_whole: bool,
+    /// The targets that were sampled.
+    targets: Vec<usize>,
     /// Target by target, what was sampled and what was claimed to be determined and is not; `None` where it did not answer.
     sampled: Option<Vec<Vec<Estimate>>>,
     claims: Option<Vec<Vec<Estimate>>>,
@@ -40,46 +54,160 @@ pub(super) fn examine(running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Ou
         let name = planned.engine.name();
         let runs = running.plan.runs.iter().filter(|run| run.engine == e);
         let all: Vec<Again<'_>> = runs.map(|run| again(running, run, &name, outcome)).collect();
-        let of_engine: Variation = all.iter().filter_map(|a| a.sampled.as_deref()).map(Variation::of).sum();
-        for Again { task, was_asked, sampled, claims } in all {
-            // What states no error of sampling any more does not read again what did.
-            let is_lost = sampled.as_deref().is_some_and(is_withdrawn);
-            let doubts = [
-                sampled.as_deref().and_then(|meters| StatedErrors::of_sampled(meters, &of_engine)),
-                claims.as_deref().and_then(StatedErrors::of_claims),
-                (was_asked && (is_lost || sampled.is_none() || claims.is_none()))
-                    .then_some(StatedErrors::doubted(Doubt::NotReadAgain)),
-                is_beyond_tolerance(judge, task, outcome, &name)
-                    .then_some(StatedErrors::doubted(Doubt::BeyondTolerance)),
-            ];
-            found.insert((name.clone(), task.procedure), doubts.into_iter().flatten().collect());
+        let of_engine: Variation = all.iter().filter_map(Again::rendered).map(|meters| Variation::of(&meters)).sum();
+        for again in all {
+            let task = again.task;
+            let mut doubts = again.doubts(&of_engine, &compared(judge, task, outcome, &name, &[]));
+            let now = compared(judge, task, outcome, &name, &doubts);
+            doubts.extend(again.of_sheltered(running, &now));
+            found.insert((name.clone(), task.procedure), doubts);
         }
     }
     for recording in &mut outcome.recordings {
         let ReadingKey { engine, procedure, .. } = &recording.key;
         let Some(of_engine) = found.get(&(engine.clone(), *procedure)) else { continue };
-        recording.stated_errors.clone_from(of_engine);
-        recording.design_effect =
-            of_engine.iter().filter(|s| s.ratio.is_some()).map(|s| s.design_effect).reduce(f64::max);
-        for reading in &mut recording.readings {
-            reading.uncertainty = StatedErrors::corrected(of_engine, estimate(reading)).uncertainty;
-        }
+        correct(recording, of_engine);
     }
     found
 }
 
-fn again<'a>(running: &'a Running<'_>, run: &Run, engine: &EngineName, outcome: &Outcome) -> Again<'a> {
+impl Again<'_> {
+    /// What was sampled at meters that were rendered: what mirrors them tells nothing more of it.
+    fn rendered(&self) -> Option<Vec<Vec<Estimate>>> {
+        let is_rendered = |k: usize| {
+            let stations = &self.run.shortcut.fill[self.task.stations_of(k)];
+            self.is_whole || stations.iter().any(|fill| matches!(fill, Fill::Rendered(_)))
+        };
+        let meters = self.targets.iter().zip(self.sampled.as_ref()?).filter(|(k, _)| is_rendered(**k));
+        Some(meters.map(|(_, readings)| readings.clone()).collect())
+    }
+
+    fn doubts(&self, of_engine: &Variation, compared: &[Comparison]) -> Vec<StatedErrors> {
+        let (sampled, rendered) = (self.sampled.as_deref(), self.rendered());
+        let of_sampled = rendered.as_deref().and_then(|meters| StatedErrors::of_sampled(meters, of_engine));
+        let falls_with_effort = rendered.as_deref().and_then(falls_with_effort);
+        // What states no error of sampling any more does not read again what did.
+        let is_refused = sampled.is_none_or(is_withdrawn);
+        let unchecked = || {
+            let at = limits(compared, |c, allowed| c.uncertainty.is_sampled().then_some(UNCHECKED * allowed));
+            StatedErrors::doubted_at(Doubt::NotReadAgain, at)
+        };
+        // Samples that meet nothing with other seeds state nothing either: they scatter, and are not capped.
+        let is_steady = sampled.is_none_or(|meters| meters.iter().all(|readings| is_same(readings)));
+        let not_read_again = if is_refused && is_steady { unchecked() } else { None };
+        [
+            of_sampled.map(|found| StatedErrors { falls_with_effort, ..found }),
+            self.claims.as_deref().and_then(StatedErrors::of_claims),
+            (self.was_asked && (is_refused || self.claims.is_none()))
+                .then(|| not_read_again.unwrap_or_else(|| StatedErrors::doubted(Doubt::NotReadAgain))),
+            beyond_tolerance(compared),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    /// Where nothing but a stated error keeps readings from failing, all that was sampled is read again: do those meters, by themselves,
+    /// scatter as is stated there?
+    fn of_sheltered(&self, running: &Running<'_>, now: &[Comparison]) -> Option<StatedErrors> {
+        let task = self.task;
+        let is_beyond = |c: &Comparison, allowed: f64| c.deviation.is_some_and(|d| d.abs() > allowed);
+        let at = limits(now, |c, allowed| {
+            (c.verdict == Verdict::Inconclusive && is_beyond(c, allowed)).then_some(UNCHECKED * allowed)
+        });
+        let meters = self.sampled.as_ref()?;
+        let sheltered: Vec<usize> =
+            (0..meters.len()).filter(|n| at.contains_key(&task.targets[self.targets[*n]].id)).collect();
+        if sheltered.is_empty() || process::is_interrupted() {
+            return None;
+        }
+        let ask = |number| sampled(running, self.run, self.is_whole, &self.targets, number);
+        let further: Vec<Vec<Estimate>> = FURTHER.filter_map(ask).collect();
+        if further.is_empty() {
+            return StatedErrors::doubted_at(Doubt::NotReadAgain, at);
+        }
+        let all: Vec<Vec<Estimate>> = sheltered
+            .iter()
+            .map(|n| meters[*n].iter().copied().chain(further.iter().map(|estimates| estimates[*n])).collect())
+            .collect();
+        let p_values: Vec<f64> = all.iter().map(|readings| StatedErrors::too_large_alone(readings)).collect();
+        let contradicted = rejected(&p_values, TOLD).into_iter().zip(sheltered.iter().zip(&all)).filter(|(is, _)| *is);
+        StatedErrors::too_large_at(
+            contradicted.map(|(_, (n, readings))| (task.targets[self.targets[*n]].id.clone(), readings.as_slice())),
+        )
+    }
+}
+
+fn again<'a>(running: &'a Running<'_>, run: &'a Run, engine: &EngineName, outcome: &Outcome) -> Again<'a> {
     let task = &running.plan.tasks[run.task];
     let mine = outcome.recordings.iter().find(|r| r.key.engine == *engine && r.key.procedure == task.procedure);
     let readings = mine.map_or(&[][..], |r| &r.readings);
     let of = |is_sampled: bool| -> Vec<usize> {
         (0..readings.len()).filter(|k| readings[*k].uncertainty.is_sampled() == is_sampled).collect()
     };
-    let (of_samples, of_claims) = (of(true), rendered(running, run, of(false)));
-    let sampled = repeated(running, run, readings, &of_samples, EFFORT);
+    let (targets, of_claims) = (of(true), rendered(running, run, of(false)));
+    let is_whole =
+        run.shortcut.job.stations.is_empty() || outcome.contradicted.contains(&(engine.clone(), task.procedure));
+    let sampled = repeated(readings, &targets, |number| sampled(running, run, is_whole, &targets, number));
     let claims = contradicted(running, run, readings, &of_claims);
-    let was_asked = !(process::is_interrupted() || of_samples.is_empty() && of_claims.is_empty());
-    Again { task, was_asked, sampled, claims }
+    let was_asked = !(process::is_interrupted() || targets.is_empty() && of_claims.is_empty());
+    Again { run, task, was_asked, is_whole, targets, sampled, claims }
+}
+
+/// How an engine's readings of a task compare, were this found of what it states.
+fn compared(
+    judge: &Judge<'_>,
+    task: &Task,
+    outcome: &Outcome,
+    engine: &EngineName,
+    found: &[StatedErrors],
+) -> Vec<Comparison> {
+    let mut of_task: Vec<Recording> =
+        outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure).cloned().collect();
+    of_task.iter_mut().filter(|r| r.key.engine == *engine).for_each(|mine| correct(mine, found));
+    let mut compared = judge.compare(task, &of_task.iter().collect::<Vec<_>>());
+    compared.retain(|c| c.key.engine == *engine);
+    compared
+}
+
+/// Tells in a recording what is found of it, and gives its readings the errors that they have.
+fn correct(recording: &mut Recording, found: &[StatedErrors]) {
+    recording.stated_errors = found.to_vec();
+    recording.design_effect = found.iter().filter(|s| s.ratio.is_some()).map(|s| s.design_effect).reduce(f64::max);
+    for reading in &mut recording.readings {
+        reading.uncertainty = StatedErrors::corrected(found, &reading.meter, estimate(reading)).uncertainty;
+    }
+}
+
+/// By meter, over its readings, the least error that this makes of a comparison and what is allowed there.
+fn limits(compared: &[Comparison], error: impl Fn(&Comparison, f64) -> Option<f64>) -> BTreeMap<MeterId, f64> {
+    let mut at = BTreeMap::new();
+    for c in compared {
+        let (Some(value), Some(reference)) = (c.value, &c.reference) else { continue };
+        let Some(error) = error(c, c.tolerance.around(reference.value)) else { continue };
+        let relative = if value == 0.0 { 0.0 } else { error / value.abs() };
+        at.entry(c.meter.clone()).and_modify(|least: &mut f64| *least = least.min(relative)).or_insert(relative);
+    }
+    at
+}
+
+/// How errors that are stated for this part of the effort are larger than those for all of it: 1 by its square root, 0 not at all.
+fn falls_with_effort(meters: &[Vec<Estimate>]) -> Option<f64> {
+    let log = |e: &Estimate| e.uncertainty.standard_error().filter(|e| *e > 0.0).map(|e| 2.0 * e.ln());
+    let of_meter = |readings: &Vec<Estimate>| {
+        let (first, others) = readings.split_last()?;
+        let others: Vec<f64> = others.iter().filter_map(log).collect();
+        Some(others.iter().sum::<f64>() / others.len() as f64 - log(first)?).filter(|more| more.is_finite())
+    };
+    let more: Vec<f64> = meters.iter().filter_map(of_meter).collect();
+    (!more.is_empty()).then(|| more.iter().sum::<f64>() / more.len() as f64 / EFFORT.recip().ln())
+}
+
+/// Whether readings of other seeds are one but for rounding.
+fn is_same(readings: &[Estimate]) -> bool {
+    let values = || readings.iter().map(|e| e.value);
+    let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    high - low <= SINGLE_PRECISION * high.abs()
 }
 
 /// Whether at most meters whose error was stated no other seed states one.
@@ -91,15 +219,14 @@ fn is_withdrawn(meters: &[Vec<Estimate>]) -> bool {
     2 * kept < stated.len()
 }
 
-/// Whether the bounds that an engine states leave room for any reading within the tolerance and beyond, at most meters.
-fn is_beyond_tolerance(judge: &Judge<'_>, task: &Task, outcome: &Outcome, engine: &EngineName) -> bool {
-    let of_task: Vec<&Recording> = outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure).collect();
-    let compared = judge.compare(task, &of_task);
-    let mine = compared.iter().filter(|c| c.key.engine == *engine);
-    let is_wide =
-        |c: &Comparison| c.reference.as_ref().is_some_and(|r| c.uncertainty.bound() >= c.tolerance.around(r.value));
-    let wide: Vec<bool> = mine.map(is_wide).collect();
-    2 * wide.iter().filter(|w| **w).count() > wide.len()
+/// Where the bounds that an engine states leave room for any reading within the tolerance and beyond: there none counts.
+fn beyond_tolerance(compared: &[Comparison]) -> Option<StatedErrors> {
+    let brightest = compared.iter().filter_map(|c| c.value).fold(0.0, f64::max);
+    let at = limits(compared, |c, allowed| {
+        let bound = c.uncertainty.bound();
+        (bound >= allowed && bound > SINGLE_PRECISION * brightest).then_some(0.0)
+    });
+    StatedErrors::doubted_at(Doubt::BeyondTolerance, at)
 }
 
 fn estimate(reading: &Reading) -> Estimate {
@@ -126,47 +253,69 @@ fn contradicted(
     if drawn.is_empty() {
         return Some(vec![]);
     }
-    let again = read(running, run, &drawn, 1, 1.0)?;
+    let again = claimed_again(running, run, &drawn, 1)?;
     let brightest = readings.iter().map(|r| r.value).fold(0.0, f64::max);
     let differs = |(k, now): (&usize, &Estimate)| {
         let bound = readings[*k].uncertainty.bound() + now.uncertainty.bound();
         (now.value - readings[*k].value).abs() > bound + SINGLE_PRECISION * now.value.max(brightest)
     };
-    if drawn.iter().zip(&again).any(differs) { repeated(running, run, readings, claimed, 1.0) } else { Some(vec![]) }
+    if drawn.iter().zip(&again).any(differs) {
+        let mut all = repeated(readings, claimed, |number| claimed_again(running, run, claimed, number))?;
+        for seen in &mut all {
+            seen.retain(|e| e.uncertainty != Uncertainty::NotSeen);
+        }
+        Some(all)
+    } else {
+        Some(vec![])
+    }
 }
 
 /// The readings of targets with those of other seeds; `None` where the engine does not answer again.
 fn repeated(
-    running: &Running<'_>,
-    run: &Run,
     readings: &[Reading],
     targets: &[usize],
-    effort: f64,
+    ask: impl Fn(u32) -> Option<Vec<Estimate>>,
 ) -> Option<Vec<Vec<Estimate>>> {
     if targets.is_empty() {
         return Some(vec![]);
     }
-    let again: Vec<Vec<Estimate>> =
-        (1..=REPETITIONS).filter_map(|number| read(running, run, targets, number, effort)).collect();
+    let again: Vec<Vec<Estimate>> = REPETITIONS.filter_map(ask).collect();
     let of = |(k, target): (usize, &usize)| {
         let seen = again.iter().map(|estimates| estimates[k]);
-        seen.chain([estimate(&readings[*target])]).filter(|e| e.uncertainty != Uncertainty::NotSeen).collect()
+        seen.chain([estimate(&readings[*target])]).collect()
     };
     (!again.is_empty()).then(|| targets.iter().enumerate().map(of).collect())
 }
 
-fn read(running: &Running<'_>, run: &Run, targets: &[usize], number: u32, effort: f64) -> Option<Vec<Estimate>> {
+/// What was sampled, by the very job that was: what depends on which meters are asked does so again.
+fn sampled(running: &Running<'_>, run: &Run, is_whole: bool, targets: &[usize], number: u32) -> Option<Vec<Estimate>> {
+    let task = &running.plan.tasks[run.task];
+    let asked = if is_whole { &run.job } else { &run.shortcut.job };
+    let taken = answer(running, run, asked.clone(), number, EFFORT)?;
+    let whole = if is_whole { taken } else { run.shortcut.complete(taken, &run.job) };
+    let all = whole.readings(&task.targets);
+    Some(targets.iter().map(|k| all[*k]).collect())
+}
+
+fn claimed_again(running: &Running<'_>, run: &Run, targets: &[usize], number: u32) -> Option<Vec<Estimate>> {
+    let task = &running.plan.tasks[run.task];
+    let job = Job { stations: stations_of(run, task, targets), ..run.job.clone() };
+    let taken = answer(running, run, job, number, 1.0)?;
+    Some(taken.readings(targets.iter().map(|k| &task.targets[*k])))
+}
+
+/// An engine's answer to a job with a seed of its own and this part of the effort.
+fn answer(running: &Running<'_>, run: &Run, job: Job, number: u32, effort: f64) -> Option<Measurement> {
     let (planned, task) = (&running.plan.engines[run.engine], &running.plan.tasks[run.task]);
-    let Budget { relative_error, seconds } = run.job.budget;
+    let Budget { relative_error, seconds } = job.budget;
     let job = Job {
-        stations: stations_of(run, task, targets),
         budget: Budget { relative_error: relative_error / effort.sqrt(), seconds: effort * seconds },
         // Beyond those of all looks.
-        seed: seed_of_look(run.job.seed, LOOKS + number),
-        ..run.job.clone()
+        seed: seed_of_look(job.seed, LOOKS + number),
+        ..job
     };
     let folder = format!("{}/repetition-{number}", task.procedure);
     let taken = running.reader.read(&Question::new(&planned.instrument()?, &job, &folder));
     let taken = taken.inspect_err(|error| tracing::warn!("{}: not read again: {error}", planned.engine.name())).ok()?;
-    Some(taken.measurement.readings(targets.iter().map(|k| &task.targets[*k])))
+    Some(taken.measurement)
 }

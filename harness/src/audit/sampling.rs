@@ -37,9 +37,10 @@ pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
         return;
     }
     for run in &mut plan.runs {
-        let engine = plan.engines[run.engine].engine.name();
-        if !plan.engines[run.engine].engine.is_witness() {
-            let tolerance = judge.tolerance(&plan.tasks[run.task], engine.as_str());
+        let engine = &plan.engines[run.engine].engine;
+        // A program of a user's is judged at the budget that the spec gives: who knows what it makes of another.
+        if !engine.is_witness() && engine.is_vouched_for() {
+            let tolerance = judge.tolerance(&plan.tasks[run.task], engine.name().as_str());
             run.job.budget = sequential::first_look(run.job.budget, tolerance.relative);
             run.shortcut.job.budget = run.job.budget;
         }
@@ -137,8 +138,9 @@ fn sample_subjects(
         let found = stated.get(&(engine.clone(), task.procedure)).map_or(&[][..], Vec::as_slice);
         let mut sample = |ask: &Ask| {
             let mut taken = look(running, run, ask)?;
-            for estimate in &mut taken.measurement.estimates {
-                *estimate = StatedErrors::corrected(found, *estimate);
+            let meter = |k: &usize| std::iter::repeat_n(&task.targets[*k].id, task.stations_of(*k).len());
+            for (estimate, meter) in taken.measurement.estimates.iter_mut().zip(ask.targets.iter().flat_map(meter)) {
+                *estimate = StatedErrors::corrected(found, meter, *estimate);
             }
             outcome.from_cache += usize::from(taken.source == Source::Cache);
             Ok((taken.measurement, taken.cost))

@@ -161,7 +161,7 @@ struct RunArgs {
     /// Leave out the scenes of known answer, which tell a wrong engine from a difficult room
     #[arg(long)]
     no_calibration: bool,
-    /// When sampling stops [default: as the policy's profile says, else accurate]
+    /// When sampling stops [default: as the policy's profile says, else decided]
     #[arg(long, value_enum, value_name = "WHEN")]
     sampling: Option<Sampling>,
 }

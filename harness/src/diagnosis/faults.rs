@@ -279,7 +279,7 @@ pub(super) fn names(tasks: &[Task]) -> Vec<String> {
     tasks.iter().flat_map(|t| &t.scene.luminaires).map(|l| l.id.clone()).unique().collect()
 }
 
-pub(super) fn in_room(wrong: &mut Wrong, change: impl Fn(&mut Room)) -> bool {
+fn in_room(wrong: &mut Wrong, change: impl Fn(&mut Room)) -> bool {
     if wrong.task().transport == Transport::Direct || wrong.task().scene.room.is_none() {
         return false;
     }
@@ -292,15 +292,20 @@ pub(super) fn reflects(wrong: &mut Wrong, surface: Surface, value: f64) -> bool 
 
 /// Every reflectance to a power.
 pub(super) fn raised(wrong: &mut Wrong, power: f64) -> bool {
+    each_reflectance(wrong, |r| r.powf(power))
+}
+
+/// Another reflectance of every surface of the room.
+pub(super) fn each_reflectance(wrong: &mut Wrong, of: impl Fn(f64) -> f64) -> bool {
     in_room(wrong, |room| {
         for surface in Surface::ALL {
             let r = reflectance(room, surface);
-            *r = r.powf(power);
+            *r = of(*r);
         }
     })
 }
 
-pub(super) fn reflectance(room: &mut Room, surface: Surface) -> &mut f64 {
+fn reflectance(room: &mut Room, surface: Surface) -> &mut f64 {
     let r = &mut room.reflectance;
     match surface {
         Surface::Floor => &mut r.floor,

@@ -6,13 +6,15 @@ use luminaire::geometry::Surface;
 use luminaire::scene::{Luminaire, Transport};
 
 use super::fault::{Fault, Parameter};
-use super::faults::{LUMINAIRES, POWER, TURN, in_room, name, names, of_specs, raised, reflectance, reflects};
+use super::faults::{LUMINAIRES, POWER, TURN, each_reflectance, name, names, of_specs, raised, reflects};
 use super::tables::is_axial;
 use super::wrong::Wrong;
 use crate::procedures::Task;
 
 /// A metre and less that things are out of place by.
 const AWAY_M: (f64, f64) = (-3.0, 3.0);
+/// A surface reflects so much at most.
+const MOST: f64 = 0.995;
 
 /// Every kind that cases may show.
 pub fn kinds(cases: &[&[Task]]) -> Vec<Fault> {
@@ -33,6 +35,8 @@ fn degrees(anywhere: bool) -> Parameter {
 
 fn of_engine() -> Vec<Fault> {
     vec![
+        Fault::new("reflectances", "every surface of every room reflects {0} times what it should", scaled)
+            .with([Parameter::new("", 1.0, 0.02, (0.0, 10.0))]),
         Fault::new("turned", "distributions are turned by {0} in C", |wrong, p| {
             let turn = DMat3::from_rotation_z(p[0].to_radians());
             wrong.luminaires(|l| {
@@ -88,15 +92,23 @@ fn of_surfaces(tasks: &[Task]) -> Vec<Fault> {
         let right = room.reflectance.of(surface);
         let what = format!("{} reflects {{0}} instead of {right}", name(surface));
         let fault = Fault::new("reflectance", what, move |wrong, p| reflects(wrong, surface, p[0]));
-        all.push(fault.about(name(surface)).with([Parameter::new("", right, 0.02, (0.0, 0.995))]));
+        all.push(fault.about(name(surface)).with([Parameter::new("", right, 0.02, (0.0, MOST))]));
     }
     let most = Surface::ALL.map(|s| room.reflectance.of(s)).into_iter().fold(0.01, f64::max);
-    let scaled = Fault::new("reflectances", "every surface reflects {0} times what it should", |wrong, p| {
-        let by = p[0];
-        in_room(wrong, |room| Surface::ALL.into_iter().for_each(|s| *reflectance(room, s) *= by))
-    });
-    all.push(scaled.with([Parameter::new("", 1.0, 0.02, (0.0, 0.995 / most))]));
+    let here =
+        Fault::new("reflectances", "every surface reflects {0} times what it should, in this case alone", scaled);
+    all.push(here.with([Parameter::new("", 1.0, 0.02, (0.0, MOST / most))]));
     all
+}
+
+/// Every surface's reflectance, of bodies too, by a factor.
+fn scaled(wrong: &mut Wrong, p: &[f64]) -> bool {
+    let by = |r: f64| (p[0] * r).min(MOST.max(r));
+    let is_lit = each_reflectance(wrong, by);
+    if is_lit {
+        wrong.scene().obstacles.iter_mut().for_each(|o| o.reflectance = by(o.reflectance));
+    }
+    is_lit
 }
 
 /// A change of one luminaire, or of all at once.

@@ -129,7 +129,11 @@ type Predict<'a> = dyn Fn(usize, Fidelity) -> Option<Vec<f64>> + 'a;
 /// A cause with the sheets that it explains.
 struct Held {
     cause: Cause,
+    /// The one case that it is of.
+    case: Option<usize>,
     explained: Vec<usize>,
+    /// Failing sheets in which it shows, and leaves no more than an engine may be off, but more than chance.
+    borne: Vec<usize>,
     count_of_parameters: usize,
 }
 
@@ -140,7 +144,7 @@ impl Search<'_> {
         let mut causes = vec![vec![]; self.sheets.len()];
         if self.sheets.iter().all(|sheet| sheet.read.iter().all(|r| *r == 0.0)) {
             let dark = (0..self.bench.listed.len()).filter(|f| self.bench.listed[*f].id == "dark");
-            Self::settle(&dark.filter_map(|f| self.of_listed(f)).collect::<Vec<_>>(), &mut open, &mut causes);
+            self.settle(dark.filter_map(|f| self.of_listed(f)).collect(), &mut open, &mut causes);
             return causes;
         }
         for stage in [Self::listed, Self::fitted, Self::with_factors, Self::pairs] {
@@ -151,18 +155,30 @@ impl Search<'_> {
             if self.is_spent() {
                 break;
             }
-            Self::settle(&found, &mut open, &mut causes);
+            self.settle(found, &mut open, &mut causes);
         }
         causes
     }
 
-    /// Says of the open sheets that are explained by what.
-    fn settle(found: &[Held], open: &mut Vec<usize>, causes: &mut [Vec<Cause>]) {
+    /// Says of the open sheets that are explained by what. What is of one case alone must account for all that is open there, or
+    /// is one of several things that are wrong with it; and where a fault of the engine shows without explaining everything, nothing
+    /// explains the rest alone.
+    fn settle(&self, mut found: Vec<Held>, open: &mut Vec<usize>, causes: &mut [Vec<Cause>]) {
+        let accounts = |held: &Held| {
+            let of_case = |k: &&usize| held.case.is_some_and(|case| self.sheets[**k].case == case);
+            open.iter().filter(of_case).all(|k| held.explained.contains(k) || held.borne.contains(k))
+        };
+        found.retain(accounts);
         for &sheet in open.iter() {
             let explain = found.iter().filter(|held| held.explained.contains(&sheet));
-            causes[sheet] = rivals(explain.sorted_by(|a, b| a.cause.score.total_cmp(&b.cause.score)).collect());
+            let explain = explain.sorted_by(|a, b| a.cause.score.total_cmp(&b.cause.score)).collect_vec();
+            let is_better = |held: &Held| explain.first().is_some_and(|e| held.cause.score + RIVAL < e.cause.score);
+            if !found.iter().any(|held| held.borne.contains(&sheet) && is_better(held)) {
+                causes[sheet] = rivals(explain);
+            }
         }
-        open.retain(|sheet| !found.iter().any(|held| held.explained.contains(sheet)));
+        let is_settled = |sheet: &usize| found.iter().any(|h| h.explained.contains(sheet) || h.borne.contains(sheet));
+        open.retain(|sheet| !is_settled(sheet));
     }
 
     fn listed(&self, _open: &[usize]) -> Vec<Held> {
@@ -196,6 +212,9 @@ impl Search<'_> {
             };
             let mut held = self.weighed(&fault, &predict)?;
             let (factor, error) = *held.cause.parameters.last()?;
+            if !held.explained.iter().any(|k| self.sheets[*k].would_fail(factor)) {
+                return None;
+            }
             let named = self.named_factor(factor, error);
             let other = named.unwrap_or_else(|| format!("factor {factor:.4}, none of those known"));
             held.cause = held.cause.renamed("two", format!("two faults: {}, and {other}", fault.what));
@@ -513,14 +532,18 @@ impl Search<'_> {
 
     fn held(&self, fault: &Fault, predicted: &BTreeMap<usize, Vec<f64>>, factor: (f64, f64)) -> Option<Held> {
         let count_of_parameters = fault.count_of_parameters();
-        let (mut explained, mut score, mut left, mut telling) = (vec![], 0.0, 0.0, 0);
+        let (mut explained, mut borne, mut score, mut left, mut telling) = (vec![], vec![], 0.0, 0.0, 0);
         for (k, sheet) in self.sheets.iter().enumerate() {
             let found = sheet.stand(predicted.get(&k).unwrap_or(&sheet.right));
             score += found.chi_squared();
-            if let (Stand::Explained(chi_squared), Some(p), true) = (found, predicted.get(&k), sheet.fails) {
-                left += chi_squared;
-                telling += sheet.telling(p);
-                explained.push(k);
+            match (found, predicted.get(&k)) {
+                (Stand::Explained(chi_squared), Some(p)) if sheet.fails => {
+                    left += chi_squared;
+                    telling += sheet.telling(p);
+                    explained.push(k);
+                }
+                (Stand::Borne(_), Some(_)) if sheet.fails => borne.push(k),
+                _ => {}
             }
         }
         let all: usize = explained.iter().map(|k| self.sheets[*k].count()).sum();
@@ -542,7 +565,7 @@ impl Search<'_> {
         score += count_of_parameters as f64 * (told as f64).ln().max(1.0);
         let (id, about) = (fault.id, fault.about.clone());
         let cause = Cause { id, about, what, parameters, evidence, score };
-        Some(Held { cause, explained, count_of_parameters })
+        Some(Held { cause, case: fault.case, explained, borne, count_of_parameters })
     }
 
     /// What readings are times the reference.
@@ -562,8 +585,8 @@ fn rivals(sorted: Vec<&Held>) -> Vec<Cause> {
     let mut kept: Vec<&Held> = vec![];
     for held in sorted {
         let is_nested = |other: &&Held| {
-            other.cause.about == held.cause.about && other.count_of_parameters != held.count_of_parameters
-                || other.cause.what == held.cause.what
+            let is_alike = other.count_of_parameters == held.count_of_parameters && other.case == held.case;
+            other.cause.about == held.cause.about && !is_alike || other.cause.what == held.cause.what
         };
         let is_worse = kept.first().is_some_and(|best| held.cause.score > best.cause.score + RIVAL);
         if !is_worse && !kept.iter().any(is_nested) {

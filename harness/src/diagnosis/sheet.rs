@@ -115,6 +115,11 @@ impl Sheet {
         if self.right[k] > 0.0 { self.allowed[k] * predicted / self.right[k] } else { self.allowed[k] }
     }
 
+    /// Whether what is right but for this factor would be further off than it may.
+    pub fn would_fail(&self, factor: f64) -> bool {
+        self.right.iter().zip(&self.allowed).any(|(right, allowed)| ((factor - 1.0) * right).abs() > *allowed)
+    }
+
     pub fn chi_squared(&self, predicted: &[f64]) -> f64 {
         self.told().map(|k| ((self.read[k] - predicted[k]) / self.sigma(k, predicted[k])).powi(2)).sum()
     }

@@ -409,7 +409,8 @@ fn count_readings(engine: &EngineName, job: &Job, found: usize) -> Result<(), En
 /// No light is so bright: the sun's surface gives 1e10 lx. What is made of readings, fourth powers among it, stays a number below this.
 const BRIGHTEST_LX: f64 = 1e30;
 
-/// Checks what every engine must hold: one finite, non-negative value a station that can be light.
+/// Checks what every engine must hold: one finite value a station, no brighter than light can be. What is negative is no light, but a number
+/// to be judged like any other.
 pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
     count_readings(engine, job, measurement.estimates.len())?;
     for (estimate, station) in measurement.estimates.iter().zip(&job.stations) {
@@ -418,11 +419,14 @@ pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Resu
         if !value.is_finite() || !uncertainty.is_finite() {
             return Err(EngineError::NotFinite { engine, meter, value, uncertainty });
         }
-        if value < 0.0 || !uncertainty.is_sound() {
+        if !uncertainty.is_sound() {
             let what = format!("read {value} lx ({uncertainty:?}) at {meter}");
             return Err(EngineError::Output { engine, what });
         }
-        if [value, uncertainty.standard_error().unwrap_or(0.0), uncertainty.bound()].iter().any(|v| *v > BRIGHTEST_LX) {
+        if [value.abs(), uncertainty.standard_error().unwrap_or(0.0), uncertainty.bound()]
+            .iter()
+            .any(|v| *v > BRIGHTEST_LX)
+        {
             let what =
                 format!("read {value:e} lx ({uncertainty:?}) at {meter}: beyond {BRIGHTEST_LX:e} lx nothing is light");
             return Err(EngineError::Output { engine, what });
@@ -448,9 +452,12 @@ mod tests {
     }
 
     #[test]
-    fn missing_rows_nan_infinity_and_negative_readings_are_errors() {
-        assert!(checked(&ENGINE, &job(2), measurement(&[1.0, 0.0])).is_ok());
-        for bad in [&[1.0][..], &[1.0, 1e308], &[1.0, f64::NAN], &[1.0, f64::INFINITY], &[-1e-9, 1.0], &[1.0, 1.0, 1.0]]
+    fn missing_rows_nan_and_infinity_are_errors_and_negative_readings_are_none() {
+        for judged in [[1.0, 0.0], [1.0, -1.0]] {
+            assert!(checked(&ENGINE, &job(2), measurement(&judged)).is_ok());
+        }
+        for bad in
+            [&[1.0][..], &[1.0, 1e308], &[1.0, -1e308], &[1.0, f64::NAN], &[1.0, f64::INFINITY], &[1.0, 1.0, 1.0]]
         {
             assert!(checked(&ENGINE, &job(2), measurement(bad)).is_err(), "{bad:?}");
         }

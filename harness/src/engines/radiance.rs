@@ -4,6 +4,7 @@ mod export;
 #[cfg(test)]
 mod failure_tests;
 mod float_error;
+mod grazing;
 #[cfg(test)]
 mod opening_tests;
 mod options;
@@ -170,7 +171,14 @@ fn direct(
 ) -> Result<Vec<Estimate>, EngineError> {
     let Sampler { job, settings, .. } = *sampler;
     if Sources::of(job, settings) == Sources::Openings && settings.preset != Preset::Default {
-        return Ok(measurement.take(sampler.direct(options)?).into_iter().map(sampled).collect());
+        let ratio = grazing::ratio(job, settings);
+        let lost_lx = |station: &Station| grazing::lost_lx(job, &station.meter, ratio);
+        let means = measurement.take(sampler.direct(options)?).into_iter().zip(&job.stations);
+        let whole = means.map(|(mean, station)| {
+            let all = sampled(mean);
+            Estimate { uncertainty: all.uncertainty.within(lost_lx(station)), ..all }
+        });
+        return Ok(whole.collect());
     }
     let direct_lx = sampler.determined(&options.direct)?;
     let pairs = direct_lx.into_iter().zip(&job.stations);

@@ -123,9 +123,15 @@ impl WeightedMean {
         is_number.then_some(mean)
     }
 
-    /// Where meters share noise: their mean is as uncertain as that of so many times fewer.
-    fn sharing(self, design_effect: f64) -> Self {
-        Self { uncertainty: design_effect.sqrt() * self.uncertainty, ..self }
+    /// Where meters share noise: their mean is as uncertain as that of so many times fewer, and its uncertainty is known by as many
+    /// times fewer blocks, but no fewer than those of the meter that has the fewest.
+    fn sharing(self, design_effect: f64, fewest: Option<f64>) -> Self {
+        let of_fewer = |all: f64| (all / design_effect).max(fewest.unwrap_or(0.0).min(all));
+        Self {
+            uncertainty: design_effect.sqrt() * self.uncertainty,
+            degrees_of_freedom: self.degrees_of_freedom.map(of_fewer),
+            ..self
+        }
     }
 
     /// The probability of a mean at least this far from nothing, were there nothing.
@@ -179,7 +185,8 @@ fn of_group(key: &ReadingKey, basis: Basis, all: &[Deviation], design_effect: f6
     // What states no uncertainty would outweigh everything.
     let stated = all.iter().filter(|d| d.uncertainty > SINGLE_PRECISION);
     let stated: Vec<_> = stated.map(|d| (d.relative, d.uncertainty, d.degrees_of_freedom)).collect();
-    let (mean, low, high, of_stated) = match WeightedMean::of(&stated).map(|mean| mean.sharing(design_effect)) {
+    let fewest = stated.iter().filter_map(|(.., freedom)| *freedom).reduce(f64::min);
+    let (mean, low, high, of_stated) = match WeightedMean::of(&stated).map(|mean| mean.sharing(design_effect, fewest)) {
         Some(mean) if stated.len() == all.len() => {
             let spread = Component::normal(Source::MonteCarlo, mean.uncertainty, mean.degrees_of_freedom);
             let expanded = ErrorBudget::new(vec![spread], tail).expanded;
@@ -275,6 +282,18 @@ mod tests {
         let small = |design_effect| (0..200).filter(|seed| p_value(*seed, design_effect) < 0.05).count();
         assert!((2..=20).contains(&small(Some(24.0))), "{}", small(Some(24.0)));
         assert!(small(None) > 100, "the negative control: {}", small(None));
+        // Eight blocks that all meters share are no more than eight.
+        let of_blocks = |seed: u64| {
+            let mut random = fastrand::Rng::with_seed(seed);
+            let one = Estimate::of_samples(&(0..8).map(|_| 1.0 + 0.01 * normal(&mut random)).collect::<Vec<f64>>());
+            let stated = |e: Estimate| {
+                Some((e.value - 1.0, e.uncertainty.standard_error()?, e.uncertainty.degrees_of_freedom()))
+            };
+            let mean = WeightedMean::of(&vec![stated(one).unwrap(); 24]).unwrap();
+            mean.sharing(24.0, Some(7.0)).p_value()
+        };
+        let small = (0..2000).filter(|seed| of_blocks(*seed) < 0.001).count();
+        assert!(small <= 4, "{small} of 2000");
     }
 
     #[test]

@@ -207,7 +207,7 @@ impl Judge<'_> {
     ) -> Comparison {
         let (target, reading) = (&task.targets[k], recording.readings.get(k));
         let believed = |r: &Reading| {
-            let stated = StatedErrors::of_looks(&recording.stated_errors, r.uncertainty);
+            let stated = StatedErrors::of_looks(&recording.stated_errors, &r.meter, r.uncertainty);
             believed(stated, largest_portion, held.as_ref().map(|h| (h.reference.value - r.value).abs()))
         };
         let uncertainty = reading.map_or(Uncertainty::Unstated, believed);
@@ -254,12 +254,11 @@ impl Judge<'_> {
             return comparison;
         };
         comparison.relative_deviation = Some((value - reference.value) / reference.value).filter(|d| d.is_finite());
-        let sound = value >= 0.0 && reference.value >= 0.0;
-        let deviation = if sound { value - reference.value } else { f64::NAN };
+        let deviation = if reference.value >= 0.0 { value - reference.value } else { f64::NAN };
         let allowed = tolerance.around(reference.value);
         comparison.verdict = judge(deviation, budget.expanded, allowed);
         let p_value = budget.p_value(deviation, allowed);
-        let is_heavy_tailed = is_heavy_tailed(recording, comparison.uncertainty, deviation, p_value);
+        let is_heavy_tailed = is_heavy_tailed(recording, &comparison, deviation, p_value);
         let waits = unbelievable(comparison.uncertainty, value, is_heavy_tailed);
         if let Some(why) = waits.filter(|_| comparison.verdict == Verdict::Fail) {
             comparison.verdict = Verdict::Inconclusive;
@@ -287,10 +286,11 @@ const FAR: f64 = 100.0;
 const WELL_COVERED: f64 = 1e-3;
 
 /// Whether its blocks tell so, or how its errors vary from seed to seed, and it is near enough for a heavy tail to have done it.
-fn is_heavy_tailed(recording: &Recording, uncertainty: Uncertainty, deviation: f64, p_value: f64) -> bool {
+fn is_heavy_tailed(recording: &Recording, comparison: &Comparison, deviation: f64, p_value: f64) -> bool {
+    let Comparison { meter, uncertainty, .. } = comparison;
     let is_near = || uncertainty.standard_error().is_some_and(|error| deviation.abs() < FAR * error);
     recording.skewness.is_some_and(|s| s > MAX_SKEWNESS) && is_near()
-        || recording.states_heavy_tail() && p_value > WELL_COVERED
+        || StatedErrors::heavy_tail(&recording.stated_errors, meter).is_some() && p_value > WELL_COVERED
 }
 
 /// Why a sampled value fails nothing, whatever its distance: its interval is not one.
@@ -369,7 +369,7 @@ impl ScoredReference {
 /// The share of its error that a decision about a reading may spend: all of it where only one look was planned.
 fn share_of_reading(recording: &Recording, k: usize) -> f64 {
     let is_sampled = recording.readings.get(k).is_some_and(|r| r.uncertainty.is_sampled());
-    recording.looks.get(k).filter(|_| is_sampled).map_or(1.0, |look| share_of_error(*look))
+    recording.looks.get(k).filter(|_| is_sampled).map_or(1.0, |look| share_of_error(recording.spending, *look))
 }
 
 /// What is uncertain of a reading.

@@ -73,9 +73,9 @@ impl ProfileBudget {
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
     /// At the relative error of the spec's budget; beyond it only what is undecided
-    #[default]
     Accurate,
-    /// As soon as every comparison is decided, which is much earlier where readings agree
+    /// As soon as every comparison is decided, which is much earlier where readings agree; a program of yours starts from the spec's budget
+    #[default]
     Decided,
 }
 

@@ -1,5 +1,7 @@
 //! How repeated readings scatter, over what is stated of their errors, which itself is estimated from few samples.
 
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
 use super::Estimate;
 
 /// Degrees of freedom of stated errors that are put together before readings are held against them: a ratio of variances with fewer below
@@ -75,6 +77,36 @@ pub(super) fn of_repeated(meters: &[Vec<Estimate>]) -> Option<Scatter> {
     let effective = 2.0 * freedom * freedom / variance;
     let scatter = Scatter { sum: sum * effective / freedom, freedom: effective, of_readings: freedom, deviates };
     (scatter.sum.is_finite() && effective > 0.0).then_some(scatter)
+}
+
+/// How the readings of a single meter scatter.
+pub(super) struct Alone {
+    /// Relative to their mean.
+    pub(super) relative: f64,
+    pub(super) freedom: f64,
+    /// Over the geometric mean of what is stated.
+    pub(super) ratio: f64,
+    /// The probability of so little, were the stated errors right.
+    pub(super) p_value: f64,
+}
+
+/// Of three readings of one meter with other seeds, or more.
+///
+/// Normal readings come close together no more often than those of one variance do, the geometric mean of theirs: the density of each near
+/// the mean goes by its standard error. Few degrees of freedom, and errors that vary as a heavy tail has it, make that mean smaller than
+/// what is estimated. The probability is so never too small, and no single large error excuses anything.
+pub(super) fn of_one(readings: &[Estimate]) -> Option<Alone> {
+    let stated = readings.iter().filter_map(|e| e.uncertainty.standard_error()).filter(|e| *e > 0.0);
+    let logs: Vec<f64> = stated.map(|e| 2.0 * e.ln()).collect();
+    let (n, freedom) = (readings.len() as f64, readings.len().checked_sub(1).filter(|n| *n > 1)? as f64);
+    // What met nothing states nothing, and scatters all the same.
+    let mean = readings.iter().map(|e| e.value).sum::<f64>() / n;
+    let squares: f64 = readings.iter().map(|e| (e.value - mean).powi(2)).sum();
+    let over = squares / (logs.iter().sum::<f64>() / logs.len() as f64).exp();
+    let p_value = ChiSquared::new(freedom).ok()?.cdf(over);
+    let relative = (squares / freedom).sqrt() / mean.abs();
+    let alone = Alone { relative, freedom, ratio: (over / freedom).sqrt(), p_value };
+    (relative.is_finite() && over.is_finite()).then_some(alone)
 }
 
 /// Of readings with their stated variances and degrees of freedom.

@@ -1,5 +1,6 @@
 //! What is stated of errors, held against how readings of other seeds scatter.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::iter::Sum;
 
@@ -7,8 +8,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::scatter::{MANY, Scatter, of_repeated};
-use super::{Estimate, Uncertainty, design_effect};
+use super::scatter::{MANY, Scatter, of_one, of_repeated};
+use super::{Estimate, MeterId, Uncertainty, design_effect};
 
 /// Stated errors that vary as they do with a smaller probability are a heavy tail: the chi-squared distribution is only nearly theirs.
 const UNHEARD_OF: f64 = 1e-4;
@@ -45,8 +46,14 @@ pub struct StatedErrors {
     pub degrees_of_freedom_seen: Option<f64>,
     /// The probability of a ratio as far from 1, were the stated errors right.
     pub p_value: Option<f64>,
-    /// Relative scatter of readings that are claimed to have none, root of the mean square.
+    /// Relative scatter of readings that are claimed to have none, or far more than they do, root of the mean square.
     pub of_claims: Option<f64>,
+    /// How its standard errors fall with effort: 1 where their squares do in inverse proportion, 0 where they stay.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub falls_with_effort: Option<f64>,
+    /// The meters that this is about, and the relative error that counts there; empty where it is about all.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub at: BTreeMap<MeterId, f64>,
     pub doubt: Option<Doubt>,
 }
 
@@ -68,7 +75,7 @@ pub enum Doubt {
     SameForEverySeed,
     /// The engine did not read again.
     NotReadAgain,
-    /// What is stated is beyond the tolerance at most meters, and nothing shows that it is meant: nothing could ever fail.
+    /// A bound is beyond the tolerance, and nothing shows that it is meant: nothing could ever fail there.
     BeyondTolerance,
 }
 
@@ -82,8 +89,33 @@ impl StatedErrors {
             degrees_of_freedom_seen: None,
             p_value: None,
             of_claims: None,
+            falls_with_effort: None,
+            at: BTreeMap::new(),
             doubt: Some(doubt),
         }
+    }
+
+    /// Found at some meters, with the relative errors that count there; nothing where there are none.
+    pub fn doubted_at(doubt: Doubt, at: BTreeMap<MeterId, f64>) -> Option<Self> {
+        (!at.is_empty()).then(|| Self { at, ..Self::doubted(doubt) })
+    }
+
+    /// Meters by themselves: of each, how probable it is that its readings scatter by so little, were the errors right that are stated
+    /// there; 1 where these are not far too large.
+    pub fn too_large_alone(meter: &[Estimate]) -> f64 {
+        of_one(meter).filter(|one| one.ratio < 1.0 / MIN_EXCESS).map_or(1.0, |one| one.p_value)
+    }
+
+    /// What counts at meters whose stated errors their readings of other seeds contradict: how these scatter.
+    pub fn too_large_at<'a>(meters: impl IntoIterator<Item = (MeterId, &'a [Estimate])>) -> Option<Self> {
+        let (mut at, mut fewest) = (BTreeMap::new(), f64::INFINITY);
+        for (meter, readings) in meters {
+            if let Some(one) = of_one(readings) {
+                at.insert(meter, one.relative);
+                fewest = fewest.min(one.freedom);
+            }
+        }
+        Some(Self { degrees_of_freedom: fewest, ..Self::doubted_at(Doubt::TooLarge, at)? })
     }
 
     /// Of readings whose errors are stated, one list a meter; meters whose error is not of sampling say nothing, and all of them too
@@ -100,20 +132,27 @@ impl StatedErrors {
         let steady = own.steadier_than_stated().filter(|_| ratio >= SAME);
         let doubt = match ratio {
             r if r < SAME => Some(Doubt::SameForEverySeed),
+            // Samples of a heavy tail scatter by what they state, too.
+            r if below < TOLD && r < 1.0 / MIN_EXCESS => Some(Doubt::TooLarge),
             _ if varies_beyond && varies.is_some_and(|seen| seen < NORMAL) => Some(Doubt::HeavyTail),
             _ if above < TOLD => Some(Doubt::TooSmall),
-            r if below < TOLD && r < 1.0 / MIN_EXCESS => Some(Doubt::TooLarge),
             _ if varies_beyond => Some(Doubt::FewerSamples),
             _ => steady.map(|_| Doubt::MoreSamples),
         };
+        // Where what is stated is far too large, how it varies tells nothing of the readings either: their own scatter counts.
+        let is_contradicted = matches!(doubt, Some(Doubt::TooLarge | Doubt::SameForEverySeed));
+        let of_scatter = Self::of_claims(meters).filter(|_| is_contradicted);
         Some(Self {
             ratio: Some(ratio),
-            degrees_of_freedom,
+            degrees_of_freedom: of_scatter
+                .as_ref()
+                .map_or(degrees_of_freedom, |s| s.degrees_of_freedom.min(degrees_of_freedom)),
             design_effect,
             degrees_of_freedom_seen: varies.or(steady),
             p_value: Some(2.0 * below.min(above)),
-            of_claims: None,
+            of_claims: of_scatter.and_then(|s| s.of_claims),
             doubt,
+            ..Self::doubted(Doubt::TooSmall)
         })
     }
 
@@ -144,10 +183,42 @@ impl StatedErrors {
         (relative > 0.0 && relative.is_finite()).then_some(found)
     }
 
-    /// A reading with the error that it has by all that was found of its engine.
+    /// A reading at a meter with the error that it has by all that was found of its engine.
     #[must_use]
-    pub fn corrected(found: &[Self], estimate: Estimate) -> Estimate {
-        found.iter().fold(estimate, |estimate, stated| stated.correct(estimate))
+    pub fn corrected(found: &[Self], meter: &MeterId, estimate: Estimate) -> Estimate {
+        found.iter().fold(estimate, |estimate, stated| match stated.at.get(meter) {
+            Some(relative) => {
+                Estimate { uncertainty: stated.allow(relative * estimate.value.abs(), estimate), ..estimate }
+            }
+            None if stated.at.is_empty() => stated.correct(estimate),
+            None => estimate,
+        })
+    }
+
+    /// What a reading's error is where no more than this counts.
+    fn allow(&self, most: f64, estimate: Estimate) -> Uncertainty {
+        match (self.doubt, estimate.uncertainty) {
+            (Some(Doubt::BeyondTolerance), Uncertainty::Bound(_)) => Uncertainty::Bound(most),
+            (Some(Doubt::BeyondTolerance), Uncertainty::StandardError { value, degrees_of_freedom, .. }) => {
+                Uncertainty::StandardError { value, degrees_of_freedom, bound: most }
+            }
+            (Some(Doubt::NotReadAgain), Uncertainty::StandardError { value, degrees_of_freedom, bound }) => {
+                let degrees_of_freedom = degrees_of_freedom.map(|few| few.max(FEW));
+                Uncertainty::StandardError { value: value.min(most), degrees_of_freedom, bound }
+            }
+            (Some(Doubt::TooLarge), Uncertainty::StandardError { bound, .. }) => {
+                Uncertainty::StandardError { value: most, degrees_of_freedom: Some(self.degrees_of_freedom), bound }
+            }
+            (_, stated) => stated,
+        }
+    }
+
+    /// The degrees of freedom of a heavy tail at a meter, where there is one; where readings of other seeds contradict what is stated, no
+    /// tail excuses it.
+    pub fn heavy_tail(found: &[Self], meter: &MeterId) -> Option<f64> {
+        let is_contradicted = found.iter().any(|f| f.doubt == Some(Doubt::TooLarge) && f.at.contains_key(meter));
+        let heavy = found.iter().filter(|f| f.doubt == Some(Doubt::HeavyTail) && !is_contradicted);
+        heavy.filter_map(|f| f.degrees_of_freedom_seen).reduce(f64::min)
     }
 
     /// What a reading's error is, by how such readings scatter.
@@ -158,6 +229,10 @@ impl StatedErrors {
     fn correct(&self, estimate: Estimate) -> Estimate {
         let freedom = self.degrees_of_freedom;
         let uncertainty = match (estimate.uncertainty, self.ratio, self.of_claims) {
+            (Uncertainty::StandardError { value, bound, .. }, Some(_), Some(relative)) if value > 0.0 => {
+                let value = relative * estimate.value.abs();
+                Uncertainty::StandardError { value, degrees_of_freedom: Some(freedom), bound }
+            }
             (Uncertainty::StandardError { value, degrees_of_freedom, bound }, Some(ratio), _) if value > 0.0 => {
                 let seen = self.degrees_of_freedom_seen.map(|seen| seen.max(FEWEST));
                 let stated = match self.doubt {
@@ -186,10 +261,8 @@ impl StatedErrors {
     /// What several looks together are uncertain by: as little as one of them where their tail is heavy, since the mean of more such samples
     /// is hardly more normal.
     #[must_use]
-    pub fn of_looks(found: &[Self], together: Uncertainty) -> Uncertainty {
-        let heavy =
-            found.iter().filter(|f| f.doubt == Some(Doubt::HeavyTail)).filter_map(|f| f.degrees_of_freedom_seen);
-        match (together, heavy.reduce(f64::min)) {
+    pub fn of_looks(found: &[Self], meter: &MeterId, together: Uncertainty) -> Uncertainty {
+        match (together, Self::heavy_tail(found, meter)) {
             (Uncertainty::StandardError { value, degrees_of_freedom, bound }, Some(seen)) => {
                 let few = degrees_of_freedom.map_or(seen, |all| all.min(seen)).max(FEWEST);
                 Uncertainty::StandardError { value, degrees_of_freedom: Some(few), bound }
@@ -200,8 +273,9 @@ impl StatedErrors {
 
     fn counts(&self, ratio: f64) -> bool {
         match self.doubt {
-            Some(Doubt::TooSmall | Doubt::TooLarge | Doubt::Scatters) => true,
-            Some(Doubt::SameForEverySeed | Doubt::NotReadAgain | Doubt::BeyondTolerance) => false,
+            // What is the same for every seed owes nothing to chance.
+            Some(Doubt::TooSmall | Doubt::TooLarge | Doubt::SameForEverySeed | Doubt::Scatters) => true,
+            Some(Doubt::NotReadAgain | Doubt::BeyondTolerance) => false,
             Some(Doubt::HeavyTail | Doubt::FewerSamples | Doubt::MoreSamples) | None => {
                 ratio > 1.0 && self.p_value.is_some_and(|p| p < 2.0 * COUNTED)
             }
@@ -311,7 +385,18 @@ fn trigamma(x: f64) -> f64 {
 impl fmt::Display for StatedErrors {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (ratio, freedom) = (self.ratio.unwrap_or(0.0), self.degrees_of_freedom);
+        let at = match self.at.first_key_value() {
+            Some((meter, _)) if self.at.len() == 1 => format!("at {meter}"),
+            Some((meter, _)) => format!("at {} meters ({meter} first)", self.at.len()),
+            None => String::new(),
+        };
         match self.doubt {
+            Some(Doubt::TooLarge) if !at.is_empty() => write!(
+                f,
+                "its standard errors {at} are far too large: its readings of other seeds scatter by {:.2e} at most \
+                 there ({freedom:.0} degrees of freedom); verdicts go by the scatter of each",
+                self.at.values().copied().fold(0.0, f64::max)
+            ),
             Some(Doubt::TooSmall) => write!(
                 f,
                 "its standard errors are {ratio:.1} times too small: that is how its readings of other seeds scatter ({freedom:.0} \
@@ -348,14 +433,22 @@ impl fmt::Display for StatedErrors {
                 self.of_claims.unwrap_or(0.0)
             ),
             Some(Doubt::SameForEverySeed) => {
-                write!(f, "it states errors of sampling and reads the same with every seed: they cannot be checked")
+                write!(
+                    f,
+                    "it states errors of sampling and reads the same with every seed: there is no chance in its readings, and none counts"
+                )
             }
             Some(Doubt::NotReadAgain) => {
-                write!(f, "it did not read again with another seed: what it states of its errors could not be checked")
+                write!(
+                    f,
+                    "it did not read again with another seed: what it states of its errors could not be checked, and counts up to \
+                     half the tolerance"
+                )
             }
             Some(Doubt::BeyondTolerance) => write!(
                 f,
-                "what it states of its errors is beyond the tolerance at most meters: nothing that it reads could ever fail"
+                "the bounds that it states {at} are beyond the tolerance: nothing that it reads there could ever fail; its readings \
+                 are judged as they stand"
             ),
             None => write!(
                 f,
@@ -449,6 +542,90 @@ mod tests {
             of(&meters).doubt == Some(Doubt::TooSmall)
         };
         assert!((0..100).filter(told).count() > 90);
+    }
+
+    /// How many of 300 procedures of 24 honest meters, seven readings each, have one whose stated error seems contradicted by itself.
+    fn contradicted(reading: impl Fn(&mut fastrand::Rng) -> Estimate) -> usize {
+        let is_found = |seed: &u64| {
+            let mut random = fastrand::Rng::with_seed(*seed);
+            let mut meter = || (0..7).map(|_| reading(&mut random)).collect::<Vec<Estimate>>();
+            (0..24).any(|_| StatedErrors::too_large_alone(&meter()) < TOLD / 24.0)
+        };
+        (0..300).filter(is_found).count()
+    }
+
+    #[test]
+    fn right_errors_of_a_meter_are_not_contradicted_by_itself_whatever_the_noise() {
+        type Sample = fn(&mut fastrand::Rng) -> f64;
+        let samples: [(&str, Sample); 4] = [
+            ("normal", |random| 100.0 + 0.3 * normal(random)),
+            ("lognormal 1", |random| normal(random).exp()),
+            ("lognormal 2", |random| (2.0 * normal(random)).exp()),
+            ("Pareto 1.5", |random| random.f64().max(1e-12).powf(-1.0 / 1.5)),
+        ];
+        for (name, sample) in samples {
+            for blocks in [2, 4, 8] {
+                let count = contradicted(|random| {
+                    Estimate::of_samples(&(0..blocks).map(|_| sample(random)).collect::<Vec<f64>>())
+                });
+                assert!(count <= 4, "{count} of 300, {blocks} blocks of {name}");
+            }
+        }
+        // A tenth of the light in one sample of a thousand; where none is met, nothing is stated.
+        let rare = |random: &mut fastrand::Rng| {
+            let hits = f64::from(u32::try_from((0..1000).filter(|_| random.f64() < 1e-3).count()).unwrap());
+            Estimate { value: 0.9 + 0.1 * hits, uncertainty: Uncertainty::sampled(0.1 * hits.sqrt(), Some(999.0)) }
+        };
+        // Seven readings are the same by chance in one of 1,000 such meters.
+        assert!(contradicted(rare) <= 15, "{}", contradicted(rare));
+    }
+
+    #[test]
+    fn a_wide_error_at_a_meter_is_contradicted_by_its_own_scatter_whatever_it_varies_like() {
+        for (scatter, stated, varies) in [(0.2, 30.0, 0.0), (0.2, 6.0, 0.0), (0.2, 5.0, 2.0), (0.0, 1.0, 0.0)] {
+            let found = (0..200).filter(|seed| {
+                let mut random = fastrand::Rng::with_seed(*seed);
+                let mut one = || Estimate {
+                    value: 100.0 + scatter * normal(&mut random),
+                    uncertainty: Uncertainty::sampled(stated * (varies * normal(&mut random)).exp(), Some(7.0)),
+                };
+                StatedErrors::too_large_alone(&(0..7).map(|_| one()).collect::<Vec<Estimate>>()) < TOLD / 24.0
+            });
+            let count = found.count();
+            assert!(count > 170, "{scatter} {stated} {varies}: {count} of 200");
+        }
+    }
+
+    #[test]
+    fn what_is_found_at_a_meter_counts_there_alone() {
+        let [here, there] = ["desk[0]", "desk[1]"].map(|id| MeterId(id.to_owned()));
+        let wide = |value| Estimate { value, uncertainty: Uncertainty::sampled(30.0, Some(7.0)) };
+        let readings = [99.0, 100.0, 101.0].map(wide);
+        let found = [StatedErrors::too_large_at([(here.clone(), &readings[..])]).unwrap()];
+        let corrected = StatedErrors::corrected(&found, &here, wide(200.0)).uncertainty;
+        assert!((corrected.standard_error().unwrap() - 2.0).abs() < 1e-12, "{corrected:?}");
+        assert_eq!(corrected.degrees_of_freedom(), Some(2.0));
+        assert_eq!(StatedErrors::corrected(&found, &there, wide(200.0)), wide(200.0));
+        let limit = |doubt| StatedErrors::doubted_at(doubt, [(here.clone(), 0.01)].into()).unwrap();
+        let unchecked = StatedErrors::corrected(&[limit(Doubt::NotReadAgain)], &here, wide(200.0));
+        assert_eq!(unchecked.uncertainty, Uncertainty::sampled(2.0, Some(7.0)));
+        let bounded = Estimate { value: 200.0, uncertainty: Uncertainty::Bound(50.0) };
+        let judged = StatedErrors::corrected(&[limit(Doubt::BeyondTolerance)], &here, bounded);
+        assert_eq!(judged.uncertainty, Uncertainty::Bound(2.0));
+    }
+
+    #[test]
+    fn no_tail_excuses_errors_that_readings_contradict() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let mut one = || Estimate {
+            value: 100.0 + 0.1 * normal(&mut random),
+            uncertainty: Uncertainty::sampled(0.2 * (2.0 * normal(&mut random)).exp(), Some(7.0)),
+        };
+        let meters: Vec<Vec<Estimate>> = (0..24).map(|_| (0..4).map(|_| one()).collect()).collect();
+        let found = of(&meters);
+        assert_eq!(found.doubt, Some(Doubt::TooLarge), "{found}");
+        let error = found.correct(meters[0][0]).uncertainty;
+        assert!(error.standard_error().unwrap() < 0.2 && error.degrees_of_freedom().unwrap() > 3.0, "{error:?}");
     }
 
     #[test]

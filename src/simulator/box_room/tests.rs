@@ -416,7 +416,7 @@ fn what_is_shared_out_among_nodes_is_all_the_flux_at_the_place_where_it_lands() 
 }
 
 #[test]
-fn a_raised_flag_ends_it_within_a_second() {
+fn a_raised_flag_ends_it_and_nothing_half_done_is_kept() {
     static RAISED: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(true);
     let stop = Stop { flag: Some(&RAISED), ..Stop::NEVER };
     let ((scene, meters), begun) = (s1(), std::time::Instant::now());

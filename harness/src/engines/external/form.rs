@@ -140,7 +140,7 @@ pub struct ExternalReadings {
 struct ReadingForm {
     /// The meter's name.
     meter: String,
-    /// Illuminance, finite and not negative.
+    /// Illuminance, finite; what is negative is judged like any other.
     illuminance_lx: f64,
     /// Standard error of a Monte Carlo mean.
     #[serde(default)]

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use glam::{DVec3, I64Vec3};
 use luminaire::geometry::Surface;
-use luminaire::scene::{Luminaire, Shape};
+use luminaire::scene::{Luminaire, LuminaireModel, Shape};
 
 use super::settings::Settings;
 use crate::engines::Job;
@@ -41,7 +41,13 @@ impl Frame {
         // Meters that need room for their discs get it by the scale of everything else.
         let free =
             seats(job, metres).iter().zip(&job.stations).all(|(seat, s)| *seat == metres.point(s.meter.position_m));
-        if handy && free { metres } else { Self { centre_m, scale: LARGE / size_m.max(f64::MIN_POSITIVE), light } }
+        // The filters round the lights of an opening would stand in each other's light towards its plane.
+        let is_sparse = job.scene.luminaires.iter().all(|l| l.model == LuminaireModel::Point);
+        if handy && free && is_sparse {
+            metres
+        } else {
+            Self { centre_m, scale: LARGE / size_m.max(f64::MIN_POSITIVE), light }
+        }
     }
 
     pub(super) fn point(self, p_m: DVec3) -> DVec3 {

@@ -40,6 +40,48 @@ fn a_lambertian_rectangle_follows_lamberts_polygon_formula() {
 }
 
 #[test]
+fn light_that_grazes_an_opening_is_read_and_what_rtrace_leaves_out_is_told() {
+    let even = LuminousIntensityDistribution::axial(vec![0.0, 90.0, 180.0], vec![500.0, 100.0, 100.0]).unwrap();
+    let opening = LuminousOpening::Box { x_m: 0.3, y_m: 1.2, height_m: 0.0 };
+    let lamp = with_opening(luminaire("panel", DVec3::ZERO, even), opening);
+    for below_m in [0.3, 0.02, 2e-3, 1e-3, 1e-4] {
+        let job = free_field(lamp.clone(), &[[-2.0, 1.6, -below_m]], DVec3::X);
+        let right = simulator::illuminance(
+            &job.scene,
+            &[job.stations[0].meter],
+            Transport::Direct,
+            &Accuracy { relative_error: 1e-4, seed: 1 },
+        );
+        let right = right.unwrap().estimates[0].illuminance.value();
+        let Estimate { value, uncertainty } = read(&job).estimates[0];
+        let error = 4.0 * uncertainty.standard_error().unwrap() + uncertainty.bound();
+        assert!((value - right).abs() < error, "{below_m} m: {value} +- {uncertainty:?}, {right}");
+        assert!(error < 0.02 * right || below_m < 1e-3, "{below_m} m: {uncertainty:?} of {right}");
+    }
+}
+
+#[test]
+fn light_of_others_passes_through_an_opening() {
+    let openings = [
+        LuminousOpening::Box { x_m: 1.0, y_m: 0.5, height_m: 0.0 },
+        LuminousOpening::Box { x_m: 0.5, y_m: 0.5, height_m: 0.2 },
+        LuminousOpening::Ellipse { x_m: 0.5, y_m: 0.5, height_m: 0.1 },
+        LuminousOpening::Ellipsoid { x_m: 0.4, y_m: 0.4, z_m: 0.4 },
+    ];
+    for opening in openings {
+        let below = panel(DVec3::ZERO, opening);
+        let mut job = free_field(below.clone(), &[[0.1, 0.0, -2.0]], DVec3::Z);
+        let alone = read(&job);
+        job.scene.luminaires = vec![luminaire("above", DVec3::new(-0.1, 0.0, 2.0), lambertian())];
+        let above = read(&job);
+        job.scene.luminaires.push(below);
+        let sum = [alone.estimates[0].value + above.estimates[0].value];
+        assert!(above.estimates[0].value > 0.1 * sum[0]);
+        assert!(worst(&relative_deviations(&read(&job), &sum)) < 5e-3, "{opening:?}");
+    }
+}
+
+#[test]
 fn a_lambertian_disc_and_a_sphere_follow_their_closed_forms() {
     let disc = LuminousOpening::Ellipse { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
     let job = free_field(panel(DVec3::ZERO, disc), &[[0.0, 0.0, -1.0], [0.0, 0.0, -3.0]], DVec3::Z);

@@ -2,6 +2,7 @@
 
 use luminaire::scene::Bounces;
 
+use super::grazing;
 use super::route::{Route, route};
 use super::settings::Settings;
 use crate::engines::Job;
@@ -55,12 +56,12 @@ impl Sources {
     }
 
     /// Options of rtrace; a finer subdivision where direct light alone is asked for. Every shadow is tested.
-    const fn options(self, alone: bool) -> &'static str {
+    fn options(self, job: &Job, settings: &Settings, alone: bool) -> String {
         match (self, alone) {
-            (Self::Points, _) => "-ds 0 -dj 0 -dt 0 -dc 1",
-            (Self::Openings, true) => "-u+ -ds 0.02 -dj 1 -dt 0 -dc 1",
-            (Self::Openings, false) => "-ds 0.1 -dj 0 -dt 0 -dc 1",
-            (Self::Ies2rad, _) => "-ds 0.2 -dj 0 -dt 0 -dc 1",
+            (Self::Points, _) => "-ds 0 -dj 0 -dt 0 -dc 1".to_owned(),
+            (Self::Openings, true) => format!("-u+ -ds {} -dj 1 -dt 0 -dc 1", grazing::ratio(job, settings)),
+            (Self::Openings, false) => "-ds 0.1 -dj 0 -dt 0 -dc 1".to_owned(),
+            (Self::Ies2rad, _) => "-ds 0.2 -dj 0 -dt 0 -dc 1".to_owned(),
         }
     }
 }
@@ -85,9 +86,9 @@ impl Options {
         let ambient = format!("-u+ -aa 0 -ad {divisions} -as 0 -lr 0 -lw {:e}", ROULETTE / f64::from(divisions));
         let bounces = bounces(job);
         Self {
-            direct: words(format!("-I -ab 0 {}", sources.options(true))),
-            total: words(format!("-I -ab {bounces} {} {ambient}", sources.options(false))),
-            part_of_total: words(format!("-I -ab 0 {}", sources.options(false))),
+            direct: words(format!("-I -ab 0 {}", sources.options(job, settings, true))),
+            total: words(format!("-I -ab {bounces} {} {ambient}", sources.options(job, settings, false))),
+            part_of_total: words(format!("-I -ab 0 {}", sources.options(job, settings, false))),
         }
     }
 }

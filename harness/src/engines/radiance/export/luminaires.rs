@@ -155,7 +155,7 @@ fn point(k: usize, luminaire: &Luminaire, radius: f64, scale: f64) -> String {
     let p = luminaire.position_m * scale;
     let mut text =
         format!("\n# Luminaire {}: a point, as a sphere of radius {radius}; its table is in candela.\n", luminaire.id);
-    text += &light(k, luminaire, "corr", &[factor]);
+    text += &light(k, luminaire, Source::Solid, "corr", &[factor]);
     text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
     text
 }
@@ -166,7 +166,7 @@ fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
     let factor = luminaire.flux_scale / EFFICACY;
     match luminaire.photometry.opening {
         LuminousOpening::Box { x_m, y_m, height_m: 0.0 } => {
-            text += &light(k, luminaire, "flatcorr", &[factor / (x_m * y_m)]);
+            text += &light(k, luminaire, Source::SeenThrough, "flatcorr", &[factor / (x_m * y_m)]);
             let corner = |u: f64, v: f64, z: f64| DVec3::new(0.5 * u * x_m, 0.5 * v * y_m, z);
             for (z, turn) in body.lit_faces() {
                 let corners = [(-1.0, -turn), (1.0, -turn), (1.0, turn), (-1.0, turn)].map(|(u, v)| corner(u, v, z));
@@ -174,26 +174,26 @@ fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
             }
         }
         LuminousOpening::Box { x_m, y_m, height_m } => {
-            text += &light(k, luminaire, "boxcorr", &[factor, x_m, y_m, height_m]);
+            text += &light(k, luminaire, Source::SeenThrough, "boxcorr", &[factor, x_m, y_m, height_m]);
             let half = 0.5 * DVec3::new(x_m, y_m, height_m);
             for (f, face) in box_faces(-half, half).iter().enumerate() {
                 text += &body.polygon(&f.to_string(), face);
             }
         }
         LuminousOpening::Ellipse { x_m, height_m: 0.0, .. } => {
-            text += &light(k, luminaire, "flatcorr", &[factor / (0.25 * PI * x_m * x_m)]);
+            text += &light(k, luminaire, Source::SeenThrough, "flatcorr", &[factor / (0.25 * PI * x_m * x_m)]);
             for (z, turn) in body.lit_faces() {
                 text += &body.disc(if turn > 0.0 { "up" } else { "down" }, z, turn, 0.5 * x_m);
             }
         }
         LuminousOpening::Ellipse { x_m, height_m, .. } => {
-            text += &light(k, luminaire, "cylcorr", &[factor, x_m, height_m]);
+            text += &light(k, luminaire, Source::SeenThrough, "cylcorr", &[factor, x_m, height_m]);
             text += &body.disc("up", 0.5 * height_m, 1.0, 0.5 * x_m);
             text += &body.disc("down", -0.5 * height_m, -1.0, 0.5 * x_m);
             text += &body.side(height_m, 0.5 * x_m);
         }
         LuminousOpening::Ellipsoid { x_m, .. } => {
-            text += &light(k, luminaire, "corr", &[factor / (0.25 * PI * x_m * x_m)]);
+            text += &light(k, luminaire, Source::SeenThrough, "corr", &[factor / (0.25 * PI * x_m * x_m)]);
             let p = luminaire.position_m * scale;
             let radius = 0.5 * x_m * scale;
             text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
@@ -249,8 +249,17 @@ impl Body<'_> {
     }
 }
 
+/// What becomes of the light of others that meets a source.
+#[derive(Clone, Copy)]
+enum Source {
+    /// It ends there: one so small that it hides nothing.
+    Solid,
+    /// That of points passes, as in photometry: an illum in front of nothing. One illum hides another even so.
+    SeenThrough,
+}
+
 /// The material: the table as a pattern, turned as the luminaire is.
-fn light(k: usize, luminaire: &Luminaire, correction: &str, factors: &[f64]) -> String {
+fn light(k: usize, luminaire: &Luminaire, source: Source, correction: &str, factors: &[f64]) -> String {
     let coordinates = match luminaire.photometry.distribution.symmetry() {
         Symmetry::Axial => "src_theta",
         _ => "src_phi src_theta",
@@ -261,9 +270,13 @@ fn light(k: usize, luminaire: &Luminaire, correction: &str, factors: &[f64]) -> 
         write!(words, " -r{axis} {angle_deg}").ok();
     }
     let factors: Vec<String> = factors.iter().map(|f| format!("{f:e}")).collect();
+    let (kind, behind) = match source {
+        Source::Solid => ("light", "0"),
+        Source::SeenThrough => ("illum", "1 void"),
+    };
     format!(
         "void brightdata luminaire-{k}-candela\n{} {words}\n0\n{} {}\n\
-         luminaire-{k}-candela light luminaire-{k}\n0\n0\n3 1 1 1\n",
+         luminaire-{k}-candela {kind} luminaire-{k}\n{behind}\n0\n3 1 1 1\n",
         words.split(' ').count(),
         factors.len(),
         factors.join(" ")
