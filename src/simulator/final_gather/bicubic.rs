@@ -5,7 +5,7 @@ use glam::DVec2;
 use crate::simulator::quadrature::Gauss;
 
 /// Nodes along each side.
-const ORDER: usize = 4;
+pub(super) const ORDER: usize = 4;
 /// Nodes in all.
 pub(super) const NODES: usize = ORDER * ORDER;
 /// Legendre's terms of the highest degrees, whose size tells what a polynomial leaves out: those of a smooth function fall
@@ -16,10 +16,14 @@ const OWN: f64 = 3.0;
 /// A polynomial's error where it matters most, in its root mean square over the rectangle.
 const WORST: f64 = 2.0;
 
+/// The same of one without noise, in the root mean square of its last terms; and all over a rectangle.
+const EVERYWHERE: f64 = 3.0;
+const BESIDE: f64 = 1.5;
+
 /// The nodes with what Lagrange's polynomials through them need.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bicubic {
-    nodes: [f64; ORDER],
+    pub(super) nodes: [f64; ORDER],
     weights: [f64; ORDER],
     /// Reciprocals of the products of the distances to the other nodes.
     scale: [f64; ORDER],
@@ -44,7 +48,7 @@ impl Bicubic {
     }
 
     /// Lagrange's polynomials at a place.
-    fn lagrange(&self, t: f64) -> [f64; ORDER] {
+    pub(super) fn lagrange(&self, t: f64) -> [f64; ORDER] {
         let [a, b, c, d] = self.nodes.map(|node| t - node);
         let (low, high) = (a * b, c * d);
         let others = [b * high, a * high, low * d, low * c];
@@ -115,6 +119,47 @@ impl Bicubic {
             (mean * mean, terms.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / (count * (count - 1.0)))
         };
         last.map(one).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1))
+    }
+
+    /// What a polynomial without noise leaves out along both sides, where it matters most.
+    ///
+    /// Of x ln x the terms of degree 4 and more add up to three times the root mean square of that of degree 3 at x = 0, and are less
+    /// everywhere else. Odd terms vanish in the middle of what is symmetric: of even ones a ninth goes on to the next.
+    pub(super) fn left_out(&self, values: &[f64; NODES]) -> DVec2 {
+        let of_degree = |degree: usize, axis: usize| {
+            let term = |other: usize| {
+                let (i, j) = if axis == 0 { (degree, other) } else { (other, degree) };
+                self.term(values, i, j).powi(2)
+            };
+            (0..ORDER).map(term).sum::<f64>().sqrt()
+        };
+        let along = |axis: usize| of_degree(3, axis).max(of_degree(2, axis) / 9.0);
+        DVec2::new(along(0), along(1))
+    }
+
+    /// What is left of what polynomials leave out where it is weighed like this: by Schwarz's inequality the root of the sum of squares of
+    /// the weights' own terms of higher degree, which go on as those of degree 3, or as from degree 0 to 2. And the same of what
+    /// leaves out nothing but the mean.
+    pub(super) fn left_of(&self, weights: &[f64; NODES]) -> [f64; 2] {
+        let legendre = self.nodes.map(|t| {
+            let x = 2.0 * t - 1.0;
+            let all = [1.0, x, 1.5 * x * x - 0.5, 2.5 * x * x * x - 1.5 * x];
+            std::array::from_fn::<f64, ORDER, _>(|degree| ((2 * degree + 1) as f64).sqrt() * all[degree])
+        });
+        let mut squares = [0.0; ORDER];
+        let rows: [[f64; ORDER]; ORDER] = std::array::from_fn(|i| {
+            std::array::from_fn(|b| (0..ORDER).map(|j| weights[ORDER * i + j] * legendre[j][b]).sum())
+        });
+        for a in 0..ORDER {
+            for b in 0..ORDER {
+                let term: f64 = (0..ORDER).map(|i| rows[i][b] * legendre[i][a]).sum();
+                squares[a.max(b)] += term * term;
+            }
+        }
+        let factor = squares[0].sqrt();
+        let last = squares[3].sqrt().max(squares[2] / factor.max(f64::MIN_POSITIVE));
+        // Of x ln x all that goes on is less than half of its last terms in the root mean square, and three times these where it is most.
+        [(BESIDE * last).min(EVERYWHERE * factor), (squares[1] + squares[2] + squares[3]).sqrt().min(factor)]
     }
 
     /// Legendre's term of degree `i` and `j`, as its root mean square.

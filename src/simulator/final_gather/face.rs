@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::geometry::{Room, Surface};
+use crate::simulator::visibility::Occluder;
 
 /// Faces of boxes smaller than this part of the room's mean wall reflect so little that rays go on from them.
 const SMALL: f64 = 0.01;
@@ -13,7 +14,7 @@ pub(super) fn mean_wall_m2(size_m: DVec3) -> f64 {
 }
 
 /// An axis-aligned rectangle of uniform reflectance, seen from one side.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Face {
     axis: usize,
     plane_m: f64,
@@ -21,6 +22,8 @@ pub(super) struct Face {
     pub(super) corners_m: [DVec2; 2],
     pub(super) normal: DVec3,
     pub(super) reflectance: f64,
+    /// What lies flat upon it and replaces it there.
+    pub(super) holes: Vec<[DVec2; 2]>,
 }
 
 impl Face {
@@ -28,7 +31,7 @@ impl Face {
     fn new(axis: usize, far: bool, [min_m, max_m]: [DVec3; 2], normal: DVec3, reflectance: f64) -> Self {
         let along = |p: DVec3| DVec2::new(p[(axis + 1) % 3], p[(axis + 2) % 3]);
         let plane_m = if far { max_m[axis] } else { min_m[axis] };
-        Self { axis, plane_m, corners_m: [along(min_m), along(max_m)], normal, reflectance }
+        Self { axis, plane_m, corners_m: [along(min_m), along(max_m)], normal, reflectance, holes: vec![] }
     }
 
     /// The walls of a room, at twice the axis and one more at its far end.
@@ -87,9 +90,25 @@ impl Face {
         point_m
     }
 
-    /// How far before it the room ends.
-    pub(super) fn before_m(&self, size_m: DVec3) -> f64 {
-        if self.normal[self.axis] > 0.0 { size_m[self.axis] - self.plane_m } else { self.plane_m }
+    /// How far before its plane a point lies.
+    pub(super) fn is_before_m(&self, point_m: DVec3) -> f64 {
+        let beyond_m = point_m[self.axis] - self.plane_m;
+        if self.normal[self.axis] > 0.0 { beyond_m } else { -beyond_m }
+    }
+
+    /// What of a box lies before its plane.
+    pub(super) fn before(&self, Occluder { mut min_m, mut max_m }: Occluder) -> Option<Occluder> {
+        if self.normal[self.axis] > 0.0 {
+            min_m[self.axis] = min_m[self.axis].max(self.plane_m);
+        } else {
+            max_m[self.axis] = max_m[self.axis].min(self.plane_m);
+        }
+        (min_m[self.axis] <= max_m[self.axis]).then_some(Occluder { min_m, max_m })
+    }
+
+    /// Where on its plane a plate lies that lies flat upon it and looks where it does.
+    pub(super) fn under(&self, [min_m, max_m]: [DVec3; 2]) -> Option<[DVec2; 2]> {
+        (min_m[self.axis] == self.plane_m && max_m[self.axis] == self.plane_m).then(|| [self.on(min_m), self.on(max_m)])
     }
 
     /// How far before it a box stands, where that is within a part of its own shorter side.

@@ -57,7 +57,6 @@ impl Field {
     pub(super) fn solve(
         grid: &Grid,
         rays: &Rays,
-        once: Option<&[[f64; NODES]]>,
         bounces: Bounces,
         count: u32,
         Accuracy { relative_error, seed }: Accuracy,
@@ -70,7 +69,7 @@ impl Field {
         let mut replicates: Vec<(u32, Vec<Vec<[f64; NODES]>>)> = vec![];
         for replicate in 0..REPLICATES as u64 {
             let scramble = mix(mix(seed).wrapping_add(0xf1e1d << 20 | replicate));
-            let nodes = gather(grid, rays, once, most, count, scramble, stop)?;
+            let nodes = gather(grid, rays, most, count, scramble, stop)?;
             let guess = replicates.last().map(|(_, solutions)| solutions[0].as_slice());
             replicates.push(solved(grid, &nodes, bounces, most, guess, RESIDUAL * relative_error, stop));
         }
@@ -95,20 +94,6 @@ impl Field {
         let (error_lux, noise_lux) = (grid.bicubic.tails(&finest), finest.iter().map(noise).collect());
         let means = orders.iter().map(|order| (0..grid.len()).map(|k| mean(order, k)).collect()).collect();
         Some(Self { orders, means, reflections, error_lux, noise_lux, mean_lux })
-    }
-
-    /// Reflected light at a rectangle's nodes by replicate, of what counts after one reflection.
-    pub(super) fn of_rectangle(
-        &self,
-        rectangle: usize,
-        bounces: Bounces,
-    ) -> Option<impl Iterator<Item = &[f64; NODES]>> {
-        let order = match bounces {
-            Bounces::Converged => 0,
-            Bounces::AtMost(..2) => return None,
-            Bounces::AtMost(most) => (self.reflections.saturating_sub(most - 1) as usize).min(self.orders.len() - 1),
-        };
-        Some(self.orders[order].iter().map(move |solution| &solution[rectangle]))
     }
 
     /// Reflected light where a ray ended, of those that count, and how much of it is this replicate's chance.
@@ -139,15 +124,7 @@ fn at(end: &End) -> DVec2 {
 }
 
 /// The rays of all nodes of one replicate; nodes under bodies have none.
-fn gather(
-    grid: &Grid,
-    rays: &Rays,
-    once: Option<&[[f64; NODES]]>,
-    most: u32,
-    count: u32,
-    scramble: u64,
-    stop: &Stop,
-) -> Option<Vec<Node>> {
+fn gather(grid: &Grid, rays: &Rays, most: u32, count: u32, scramble: u64, stop: &Stop) -> Option<Vec<Node>> {
     let one = |index: usize| -> Option<[Node; NODES]> {
         let covered = grid.cover(index) == Cover::Whole;
         let (face, nodes) = grid.nodes(index);
@@ -164,9 +141,6 @@ fn gather(
                 return node;
             }
             let meter = Meter { position_m: nodes[k], normal: face.normal };
-            if let Some(once) = once {
-                node.lux = vec![0.0, once[index][k]];
-            }
             let own = mix(scramble ^ ((index * NODES + k) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
             for ray in 0..count {
                 let found = rays.follow(&meter, &mut Sampler::new(own, ray), most, Limit::NONE);

@@ -9,21 +9,12 @@ use super::surroundings::Surroundings;
 
 /// Width of the strips along a room's edges, of the shorter side of a face.
 const STRIP: f64 = 1.0 / 16.0;
-/// Sides of rectangles at most, of the room's mean wall.
+/// Sides of rectangles between the strips at most, of the room's mean wall.
 const SIDE: f64 = 0.3;
-/// Cuts of a face along an axis at most, before what lies between them is parted; beyond, rectangles stay partly covered.
-const MOST_CUTS: usize = 16;
-/// Edges of bodies closer than this to another cut, of the face, are left out, and so are strips.
-const SLIM: f64 = 1e-3;
+/// Cuts that bodies on a face add at most; beyond, rectangles stay partly covered.
+const MOST_CUTS: usize = 10;
+/// Cuts closer than this to another, of the face, are left out.
 const APART: f64 = 0.02;
-/// Sides of rectangles in a gap at most, of its width.
-const GAP: f64 = 2.0;
-/// Parts of their own extent within which bodies are close to a face.
-const NEAR: f64 = 0.5;
-/// The error for which rectangles have that side where rays do not go on from them; what cubics leave out falls like its fourth power.
-const SIDE_FOR: f64 = 1e-2;
-/// How much smaller rectangles are made for that at most.
-const SMALLEST: f64 = 0.35;
 
 /// The rectangles of all faces.
 #[derive(Debug)]
@@ -48,58 +39,33 @@ pub(super) struct Spot {
 }
 
 impl Grid {
-    /// For a relative error, where what is left out must be made up by smaller rectangles.
-    pub(super) fn new(surroundings: &Surroundings, relative_error: f64) -> Self {
+    pub(super) fn new(surroundings: &Surroundings) -> Self {
         let faces = surroundings.faces.clone();
         let size_m = surroundings.room.map_or(DVec3::ZERO, |room| room.size_m);
-        let finer = if surroundings.hiding().is_some() {
-            (relative_error / SIDE_FOR).powf(0.25).clamp(SMALLEST, 1.0)
-        } else {
-            1.0
-        };
-        let side_m = finer * SIDE * mean_wall_m2(size_m).sqrt();
+        let side_m = SIDE * mean_wall_m2(size_m).sqrt();
         let cover = |face: &Face| surroundings.bodies().filter_map(|b| face.covered_by(*b)).collect();
         let covers: Vec<Vec<[DVec2; 2]>> = faces.iter().map(cover).collect();
-        // Boxes close before a face, and the walls close before a box, each with its gap.
-        let near_face = |face: &Face| -> Vec<(f64, [DVec2; 2])> {
-            let before = |corners_m: &[DVec3; 2]| Some((face.gap_m(*corners_m, NEAR)?, corners_m.map(|p| face.on(p))));
-            let gap_m = face.before_m(size_m);
-            let wall = gap_m > 0.0 && gap_m < NEAR * face.size_m().min_element();
-            surroundings.bodies().filter_map(before).chain(wall.then_some((gap_m, face.corners_m))).collect()
-        };
-        let near: Vec<Vec<(f64, [DVec2; 2])>> = faces.iter().map(near_face).collect();
         let cut = |index: usize, k: usize| {
             let face = &faces[index];
             let [low, high] = face.corners_m.map(|c| c[k]);
             let (length, end) = (high - low, face.on(size_m)[k]);
             let strip = STRIP * face.size_m().min_element();
-            let mut cuts = vec![low, high];
-            let mut add = |cut: f64, apart: f64| {
-                let is_apart = cut > low && cut < high && cuts.iter().all(|c| (c - cut).abs() > apart * length);
-                if is_apart && cuts.len() < MOST_CUTS {
-                    cuts.push(cut);
+            let [from, to] =
+                [if low == 0.0 { low + strip } else { low }, if high == end { high - strip } else { high }];
+            let inner = ((to - from) / side_m).ceil().max(1.0);
+            let mut cuts: Vec<f64> = (0..=inner as usize).map(|j| from + (to - from) * j as f64 / inner).collect();
+            cuts.extend([low, high]);
+            let edges = covers[index].iter().flatten().map(|p| p[k]).filter(|edge| *edge > low && *edge < high);
+            let before = cuts.len();
+            for edge in edges {
+                let is_apart = cuts.iter().all(|c| (c - edge).abs() > APART * length);
+                if is_apart && cuts.len() < before + MOST_CUTS {
+                    cuts.push(edge);
                 }
-            };
-            // Where bodies stand, lest a rectangle be partly covered.
-            covers[index].iter().flatten().for_each(|p| add(p[k], SLIM));
-            // And where some stand close by, since light changes there.
-            near[index].iter().for_each(|(_, corners)| corners.iter().for_each(|p| add(p[k], APART)));
-            if low == 0.0 {
-                add(low + strip, APART);
-            }
-            if high == end {
-                add(high - strip, APART);
             }
             cuts.sort_by(f64::total_cmp);
-            let parts = |pair: &[f64]| {
-                let (from, to) = (pair[0], pair[1]);
-                let middle = 0.5 * (from + to);
-                let over = near[index].iter().filter(|(_, [low, high])| middle > low[k] && middle < high[k]);
-                let side_m = over.map(|(gap_m, _)| finer * GAP * gap_m).fold(side_m, f64::min);
-                let count = ((to - from) / side_m).ceil().max(1.0);
-                (0..count as usize).map(move |j| from + (to - from) * j as f64 / count)
-            };
-            cuts.windows(2).flat_map(parts).chain([high]).collect()
+            cuts.dedup();
+            cuts
         };
         let cuts: Vec<[Vec<f64>; 2]> = (0..faces.len()).map(|face| [cut(face, 0), cut(face, 1)]).collect();
         let mut first = vec![0];
@@ -128,7 +94,7 @@ impl Grid {
     }
 
     /// Face, corner and size of a rectangle.
-    pub(super) fn rectangle(&self, index: usize) -> (usize, DVec2, DVec2) {
+    fn rectangle(&self, index: usize) -> (usize, DVec2, DVec2) {
         let face = self.first.partition_point(|f| *f <= index) - 1;
         let across = self.cuts[face][1].len() - 1;
         let (i, j) = ((index - self.first[face]) / across, (index - self.first[face]) % across);

@@ -222,10 +222,11 @@ impl Lit {
         tolerance_lux: f64,
         add: &mut impl FnMut(f64, f64),
     ) {
+        let Some(before) = view.before(face) else { return };
         let mut open = vec![0];
         while let Some(k) = open.pop() {
             let Some(part) = self.faces[index].get(k) else { continue };
-            let Some(shown) = view.of(face, part.corner_m, part.size_m) else { continue };
+            let Some(shown) = before.of(part.corner_m, part.size_m) else { continue };
             let (values, error_lux) = match (&part.kind, &part.joined) {
                 (Kind::Leaf(leaf), _) => (&leaf.lux, leaf.error_lux),
                 (Kind::Quartered(first, _), joined) => match joined.as_deref() {
@@ -325,7 +326,7 @@ fn mean_lux(lights: &Lights, relative_error: f64) -> f64 {
     let unit = |k: u64| (mix(k) >> 11) as f64 / (1_u64 << 53) as f64;
     let precision = Precision::relative(relative_error.max(1e-3));
     let one = |k: u64| {
-        let wall = walls[(k % 6) as usize];
+        let wall = &walls[(k % 6) as usize];
         let at_m = wall.size_m() * DVec2::new(unit(2 * k + 1), unit(2 * k + 2));
         let meter = Meter { position_m: wall.off(at_m), normal: wall.normal };
         lights.emitters.iter().map(|e| e.illuminance(&meter, &[], precision).value).sum::<f64>()

@@ -2,33 +2,35 @@
 //!
 //! Light straight from the luminaires is integrated over what shows of them; reflected light along rays from the meter
 //! that end there, where light reflected once is known from the luminaires and light reflected more often from
-//! the field; where nothing else reflects but faces on which light is known, over what shows of these, without a ray.
+//! the field. Where nothing reflects but faces on which light is known, it is integrated over what shows of these, without
+//! a ray, and solved for without chance ([`balance`]).
+//!
 //! Ward, Rubinstein and Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, and
 //! M. Reichert, *A two-pass radiosity method driven by lights and viewer position* (1992) gather so; here all of it is
 //! done in independent replicates, whose scatter bounds chance, and what polynomials leave out is added up along the rays.
 
+mod balance;
 mod bicubic;
 mod face;
 mod field;
 mod grid;
 mod lit;
+mod patches;
 mod rays;
 mod surroundings;
 #[cfg(test)]
 mod tests;
 mod view;
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
-use self::bicubic::NODES;
+use self::balance::{Asked, Balance, Given};
+use self::bicubic::{Bicubic, NODES};
 use self::field::Field;
 use self::grid::{Cover, Grid};
 use self::lit::{Known, Lights, Limit, Lit};
 use self::rays::Rays;
 use self::surroundings::Surroundings;
-use self::view::View;
 use super::emission::{Emitter, Precision};
 use super::sampler::{Sampler, mix};
 use super::stop::Stop;
@@ -74,6 +76,8 @@ pub(super) struct Enclosure {
     emitters: Vec<Emitter>,
     lit: Option<(f64, Lit)>,
     solved: Option<Solved>,
+    /// Of how many reflections, how well, and how often rectangles were made smaller for it.
+    balance: Option<(Bounces, f64, Balance)>,
 }
 
 /// Rays of a meter in each replicate at most, and times more than a look before, as powers of two.
@@ -93,11 +97,6 @@ const RATE: f64 = 1.6;
 /// The part of a bound that the field's noise may have.
 const FIELD_PART: f64 = 0.6;
 
-/// What large rectangles may be off of light reflected once, each, of the error asked for.
-const OF_LIT: f64 = 3e-3;
-/// The same at the nodes of the field.
-const OF_LIT_AT_NODES: f64 = 3e-2;
-
 /// A field with what it was made for.
 #[derive(Debug)]
 struct Solved {
@@ -109,44 +108,8 @@ struct Solved {
     count: u32,
     grid: Grid,
     field: Field,
-    once: Option<Arc<Once>>,
     /// How well it is known, by rectangle.
     known: Vec<Known>,
-}
-
-/// Light reflected once at the nodes of all rectangles, integrated over what they see.
-#[derive(Debug)]
-struct Once {
-    lux: Vec<[f64; NODES]>,
-    /// How far off that is on the mean of each.
-    off_lux: Vec<f64>,
-}
-
-impl Once {
-    /// `None` where something that reflects is not known on rectangles, or where it was stopped.
-    fn new(lights: Lights, lit: &Lit, grid: &Grid, relative_error: f64, stop: &Stop) -> Option<Self> {
-        let surroundings = lights.surroundings;
-        let occluders = surroundings.hiding().filter(|_| lit.is_whole)?;
-        let tolerance_lux = OF_LIT_AT_NODES * relative_error * lit.mean_exitance(&surroundings.faces);
-        let one = |k: usize| {
-            let (face, nodes) = grid.nodes(k);
-            let is_idle = face.reflectance == 0.0 || grid.cover(k) == Cover::Whole;
-            nodes.map(|position_m| {
-                if is_idle || stop.is_due() {
-                    return Bounded::default();
-                }
-                let meter = Meter { position_m, normal: face.normal };
-                let view = View { meter: &meter, occluders, bicubic: &grid.bicubic };
-                let (value, left) = lit.shown_of_all(&view, &surroundings.faces, tolerance_lux);
-                // At one node of many: none of their errors is any other's.
-                Bounded { value, bound: left.by_chance() }
-            })
-        };
-        let all: Vec<[Bounded; NODES]> = (0..grid.len()).into_par_iter().map(one).collect();
-        let lux = all.iter().map(|nodes| nodes.map(|node| node.value)).collect();
-        let off = |nodes: &[Bounded; NODES]| nodes.iter().map(|node| node.bound).sum::<f64>() / NODES as f64;
-        (!stop.is_due()).then(|| Self { lux, off_lux: all.iter().map(off).collect() })
-    }
 }
 
 /// Sums of one meter over the rays so far.
@@ -172,7 +135,7 @@ impl Enclosure {
         let emitters = scene.luminaires.iter().map(Emitter::new).filter(Emitter::shines).collect();
         let solid = surroundings.bodies().map(|[min_m, max_m]| Occluder { min_m: *min_m, max_m: *max_m });
         let occluders = surroundings.cuts_exactly.then(|| solid.collect());
-        Ok(Self { surroundings, occluders, emitters, lit: None, solved: None })
+        Ok(Self { surroundings, occluders, emitters, lit: None, solved: None, balance: None })
     }
 
     /// Direct illuminance at the meters, each within a bound.
@@ -280,17 +243,94 @@ impl Enclosure {
         if self.lit.as_ref().is_none_or(|(known, _)| *known > error) {
             self.lit = Some((error, Lit::new(&lights, LIT * error, stop)));
             self.solved = None;
+            self.balance = None;
         }
+        let mut found = self.balanced(meters, bounces, direct, accuracy, stop);
+        let is_met = |k: &usize| {
+            found.get(*k).is_some_and(|f| f.bound + direct[*k].bound <= error * (f.value + direct[*k].value))
+        };
+        let open: Vec<usize> = (0..meters.len()).filter(|k| !is_met(k)).collect();
+        let text = self.balance.as_ref().map(|(_, _, balance)| {
+            format!("light balanced between {} rectangles, integrated over what shows of them", balance.len())
+        });
+        match text {
+            Some(text) if open.is_empty() => Ok((found, text)),
+            text => match self.gathered(meters, &open, bounces, direct, accuracy, stop) {
+                Err(SimulatorError::Stopped) if !found.is_empty() => Ok((found, text.unwrap_or_default())),
+                Err(error) => Err(error),
+                Ok((sampled, how)) => {
+                    found.resize(meters.len(), Bounded { value: 0.0, bound: f64::INFINITY });
+                    for (k, sampled) in open.iter().zip(sampled) {
+                        if sampled.bound < found[*k].bound {
+                            found[*k] = sampled;
+                        }
+                    }
+                    Ok((found, text.map_or(how.clone(), |text| format!("{text}; {how}"))))
+                }
+            },
+        }
+    }
+
+    /// Indirect illuminance at the meters without chance, for some perhaps not as well as asked; nothing where that is not worth it or
+    /// something reflects that is no known face.
+    fn balanced(
+        &mut self,
+        meters: &[Meter],
+        bounces: Bounces,
+        direct: &[Bounded],
+        accuracy: &Accuracy,
+        stop: &Stop,
+    ) -> Vec<Bounded> {
+        let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
+        let Some((_, lit)) = self.lit.as_ref().filter(|(_, lit)| lit.is_whole) else { return vec![] };
+        let Some(occluders) = self.surroundings.hiding() else { return vec![] };
+        let bicubic = Bicubic::new();
+        let given = Given { lights, lit, occluders, bounces, accuracy: *accuracy, stop, bicubic: &bicubic };
+        let asked: Vec<Asked> =
+            meters.par_iter().zip(direct).map(|(meter, direct)| Asked::new(&given, meter, *direct)).collect();
+        if self.balance.as_ref().is_none_or(|(of, error, _)| *of != bounces || *error > accuracy.relative_error) {
+            self.balance = Balance::new(&given).map(|balance| (bounces, accuracy.relative_error, balance));
+        }
+        let Some((_, _, balance)) = &mut self.balance else { return vec![] };
+        let mut found = vec![];
+        loop {
+            if balance.is_solved() {
+                found = asked.par_iter().map(|asked| balance.at(&given, asked)).collect();
+            }
+            let is_open = |(asked, found): &(&Asked, &Bounded)| !asked.meets(&given, found);
+            let open: Vec<Asked> = if found.is_empty() {
+                asked.clone()
+            } else {
+                asked.iter().zip(&found).filter(is_open).map(|(asked, _)| *asked).collect()
+            };
+            if open.is_empty() || balance.is_spent() || balance.grow(&given, &open).is_none() {
+                break;
+            }
+        }
+        found
+    }
+
+    /// Indirect illuminance at some of the meters by rays.
+    fn gathered(
+        &mut self,
+        meters: &[Meter],
+        which: &[usize],
+        bounces: Bounces,
+        direct: &[Bounded],
+        accuracy: &Accuracy,
+        stop: &Stop,
+    ) -> Result<(Vec<Bounded>, String), SimulatorError> {
+        let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
+        let error = accuracy.relative_error;
         let Some((_, lit)) = &self.lit else { return Err(SimulatorError::Stopped) };
         let mut sums = vec![Sums::default(); meters.len()];
-        let mut open: Vec<usize> = (0..meters.len()).collect();
+        let mut open = which.to_vec();
         let (mut more_log2, mut most_log2) = (0, FIRST_RAYS_LOG2);
         loop {
             if self.surroundings.room.is_some()
                 && !self.solved.as_ref().is_some_and(|s| s.is_for(bounces, accuracy, more_log2))
             {
-                let once = self.solved.as_ref().and_then(|solved| solved.once.clone());
-                match Solved::new(lights, lit, once, bounces, accuracy, more_log2, stop) {
+                match Solved::new(lights, lit, bounces, accuracy, more_log2, stop) {
                     None if self.solved.is_none() => return Err(SimulatorError::Stopped),
                     None => break,
                     solved => self.solved = solved,
@@ -327,6 +367,7 @@ impl Enclosure {
                 break;
             }
         }
+        let sums: Vec<&Sums> = which.iter().map(|k| &sums[*k]).collect();
         if sums.iter().any(|s| s.rays_log2 == 0) {
             return Err(SimulatorError::Stopped);
         }
@@ -339,7 +380,7 @@ impl Enclosure {
             ),
             None => format!("{REPLICATES} times up to 2^{most} rays a meter between bodies in free field"),
         };
-        Ok((sums.iter().map(Sums::bounded).collect(), text))
+        Ok((sums.iter().map(|s| s.bounded()).collect(), text))
     }
 }
 
@@ -347,28 +388,25 @@ impl Solved {
     fn new(
         lights: Lights,
         lit: &Lit,
-        once: Option<Arc<Once>>,
         bounces: Bounces,
         accuracy: &Accuracy,
         more_log2: u32,
         stop: &Stop,
     ) -> Option<Self> {
-        let grid = Grid::new(lights.surroundings, accuracy.relative_error);
+        let grid = Grid::new(lights.surroundings);
         let known = |k: usize, error_lux: f64, noise_lux: f64| {
             let error_lux = if grid.cover(k) == Cover::None { error_lux } else { f64::INFINITY };
             Known { error_lux, noise_lux, side_m: grid.longer_m(k) }
         };
         let open: Vec<Known> = (0..grid.len()).map(|k| known(k, 0.0, 0.0)).collect();
-        let once = once.or_else(|| Once::new(lights, lit, &grid, accuracy.relative_error, stop).map(Arc::new));
-        let rays = Rays { lights, lit, grid: Some((&grid, &open)), draws: false, knows_once: once.is_some() };
+        let rays = Rays { lights, lit, grid: Some((&grid, &open)), draws: false };
         let log2 = (NODE_RAYS / accuracy.relative_error).log2().ceil().max(0.0) as u32;
         let affordable = stop.third_log2(REPLICATES * NODES * grid.len()).max(*NODE_RAYS_LOG2.start());
         let log2 = log2.clamp(*NODE_RAYS_LOG2.start(), *NODE_RAYS_LOG2.end()) + more_log2;
         let count: u32 = 1 << log2.min(affordable);
-        let of_nodes = once.as_ref().map(|once| once.lux.as_slice());
-        let field = Field::solve(&grid, &rays, of_nodes, bounces, count, *accuracy, stop)?;
+        let field = Field::solve(&grid, &rays, bounces, count, *accuracy, stop)?;
         let known = (0..grid.len()).map(|k| known(k, field.error_lux[k], field.noise_lux[k])).collect();
-        Some(Self { bounces, accuracy: *accuracy, more_log2, count, grid, field, once, known })
+        Some(Self { bounces, accuracy: *accuracy, more_log2, count, grid, field, known })
     }
 
     /// Rays of all nodes in each replicate, about.
@@ -399,67 +437,11 @@ impl<'a> Gather<'a> {
         stop: &'a Stop,
     ) -> Self {
         let grid = solved.map(|s| (&s.grid, s.known.as_slice()));
-        let rays = Rays { lights, lit, grid, draws: lit.is_peaked, knows_once: false };
+        let rays = Rays { lights, lit, grid, draws: lit.is_peaked };
         Self { rays, solved, bounces, accuracy, stop }
     }
 
     fn at(&self, index: usize, meter: &Meter, direct: Bounded, most_log2: u32) -> Sums {
-        let shown = self.shown(meter, direct);
-        if let Some(shown) = shown.as_ref().filter(|shown| {
-            let is_enough = shown.meets(self.accuracy.relative_error, direct);
-            is_enough || shown.needs_log2 > 0.0
-        }) {
-            return shown.clone();
-        }
-        let sampled = self.sampled(index, meter, direct, most_log2);
-        match shown {
-            Some(shown) if sampled.rays_log2 == 0 || shown.bounded().bound <= sampled.bounded().bound => shown,
-            _ => sampled,
-        }
-    }
-
-    /// Light integrated over what of every rectangle shows, where all that reflects is known on rectangles: what is left to chance is the
-    /// field's.
-    fn shown(&self, meter: &Meter, direct: Bounded) -> Option<Sums> {
-        let (solved, lights, lit) = (self.solved?, self.rays.lights, self.rays.lit);
-        let occluders = lights.surroundings.hiding().filter(|_| lit.is_whole)?;
-        let grid = &solved.grid;
-        let view = View { meter, occluders, bicubic: &grid.bicubic };
-        let (mut lux, mut error_lux) = ([0.0; REPLICATES], 0.0);
-        for (k, known) in solved.known.iter().enumerate() {
-            let (face, corner_m, size_m) = grid.rectangle(k);
-            let face = &lights.surroundings.faces[face];
-            if face.reflectance == 0.0 || grid.cover(k) == Cover::Whole {
-                continue;
-            }
-            let Some(values) = solved.field.of_rectangle(k, self.bounces) else { break };
-            let Some(shown) = view.of(face, corner_m, size_m) else { continue };
-            let weights = shown.weights();
-            let mut most = 0.0_f64;
-            for (lux, values) in lux.iter_mut().zip(values) {
-                *lux += face.reflectance * weights.of_nodes.iter().zip(values).map(|(w, v)| w * v).sum::<f64>();
-                most = values.iter().fold(most, |most, v| most.max(v.abs()));
-            }
-            let of_nodes_lux = solved.once.as_ref().map_or(0.0, |once| once.off_lux[k]);
-            let left_lux = shown.factor * (shown.left() * known.error_lux + of_nodes_lux);
-            error_lux += face.reflectance * (left_lux + weights.error * most);
-        }
-        let mean = lux.iter().sum::<f64>() / REPLICATES as f64;
-        let tolerance_lux = OF_LIT * self.accuracy.relative_error * (mean + direct.value);
-        let (once, once_left) = lit.shown_of_all(&view, &lights.surroundings.faces, tolerance_lux);
-        let scale = f64::from(1_u32 << FIRST_RAYS_LOG2);
-        let mut sums = Sums {
-            lux: lux.map(|lux| scale * (lux + once)),
-            chance_lux: lux.map(|lux| scale * (lux - mean)),
-            error_lux: REPLICATES as f64 * scale * (error_lux + once_left.sum),
-            rays_log2: FIRST_RAYS_LOG2,
-            ..Sums::default()
-        };
-        sums.needs_log2 = sums.field_needs_log2(self.accuracy.relative_error, direct);
-        Some(sums)
-    }
-
-    fn sampled(&self, index: usize, meter: &Meter, direct: Bounded, most_log2: u32) -> Sums {
         // Where bright places are drawn none is left unseen.
         let brightest_lux = if self.rays.draws { 0.0 } else { self.rays.lit.peak };
         let mut sums = Sums { brightest_lux, ..Sums::default() };

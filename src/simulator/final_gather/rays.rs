@@ -34,8 +34,6 @@ pub(super) struct Rays<'a> {
     pub(super) grid: Option<(&'a Grid, &'a [Known])>,
     /// Whether bright places are drawn, too.
     pub(super) draws: bool,
-    /// Whether light reflected once where a ray first ends is known otherwise.
-    pub(super) knows_once: bool,
 }
 
 /// What one ray found.
@@ -79,9 +77,7 @@ impl Rays<'_> {
                 break;
             }
             let share = if reflection == 1 { self.share(meter, &place) } else { 1.0 };
-            if reflection > 1 || !self.knows_once {
-                self.light(&place, || sampler.from(dimension + 2).next_pair(), weight * share, reflection, &mut found);
-            }
+            self.light(&place, || sampler.from(dimension + 2).next_pair(), weight * share, reflection, &mut found);
             if let (Some(face), Some((grid, known))) = (place.face, self.grid) {
                 let spot = grid.spot(face, place.point_m);
                 let known = &known[spot.rectangle as usize];
