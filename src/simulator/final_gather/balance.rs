@@ -12,7 +12,7 @@ use super::bicubic::{Bicubic, NODES};
 use super::face::{Face, mean_wall_m2};
 use super::lit::{Lights, Lit};
 use super::patches::{Cover, Patch};
-use super::view::{Before, Left, View};
+use super::view::{Before, Left, Shown, View};
 use crate::scene::{Bounces, Meter};
 use crate::simulator::stop::Stop;
 use crate::simulator::visibility::Occluder;
@@ -21,12 +21,18 @@ use crate::simulator::{Accuracy, Bounded, gmres};
 /// What large rectangles may be off of light reflected once, each, of the error asked for: at a meter, and at one node of many.
 const OF_LIT: f64 = 3e-3;
 const OF_LIT_AT_NODES: f64 = 3e-2;
-/// What a rectangle may leave out at a meter, of the error asked for there, and of the mean, times the root of its part of a wall.
-const AT_A_METER: f64 = 0.02;
-const ANYWHERE: f64 = 1.0;
-/// How much less it may be where that was too much, and how often that is tried.
-const LESS: f64 = 0.35;
-const ROUNDS: usize = 4;
+/// What a rectangle of a wall's size may leave out at first, of the error asked for or of a coarse one.
+const ANYWHERE: f64 = 0.05;
+const COARSE: f64 = 4e-3;
+/// What is left of what is wanted, since rectangles once halved leave out less than their share; what is left at most each time; and how often rectangles are made smaller for it.
+const WANTED: f64 = 1.2;
+const PROGRESS: f64 = 0.6;
+const ROUNDS: usize = 5;
+/// Halvings of a rectangle before anyone looks again.
+const AT_ONCE: u32 = 4;
+/// Steps by which what nodes are off is followed back, and of a bisection.
+const ADJOINT_STEPS: usize = 12;
+const HALVINGS: usize = 40;
 /// Rectangles at most: their factors take 80 bytes for each node and each rectangle that it sees.
 const MOST: usize = 900;
 /// The sides of rectangles at first, of the mean wall.
@@ -65,6 +71,9 @@ struct Solution {
     error_lux: Vec<f64>,
     uneven_lux: Vec<f64>,
     off_lux: Vec<f64>,
+    /// What the nodes of each rectangle see of others, and the part of a sum that is left of it by chance.
+    seen: Vec<Vec<Together>>,
+    by_chance: Vec<[f64; 2]>,
 }
 
 /// What a node sees of a rectangle.
@@ -188,61 +197,144 @@ impl Balance {
         Some(Self { cover, patches, once, tails, grown: 0, solution })
     }
 
-    /// Halves rectangles until none leaves out more than its share, and solves; the more often, the smaller the shares.
-    pub(super) fn grow(&mut self, given: &Given, asked: &[Asked]) -> Option<()> {
-        let less = LESS.powi(self.grown as i32);
-        let error = given.accuracy.relative_error;
-        let amplified = given.amplification();
-        let mean_lux = given.mean_lux() * amplified;
-        let step = asked.len().div_ceil(LOOKED_AT).max(1);
-        let looking: Vec<&Asked> = asked.iter().step_by(step).collect();
-        let mut settled = vec![false; self.patches.len()];
-        loop {
-            let is_enough = |k: usize| {
-                let (patch, tail) = (&self.patches[k], self.tails[k].length());
-                let face = &given.faces()[patch.face];
-                let most_lux = less * ANYWHERE * error * mean_lux;
-                let here_lux = face.reflectance * tail;
-                3.0 * here_lux * (patch.area_m2() / given.wall_m2()).sqrt() <= most_lux
-                    && looking.iter().all(|asked| {
-                        let limit_lux = less * AT_A_METER * error * (asked.direct.value + amplified * asked.once.value);
-                        let view = given.view(asked.meter);
-                        let Some(before) = view.before(face) else { return true };
-                        let shown = before.of(patch.corner_m, patch.size_m);
-                        shown.is_none_or(|shown| 3.0 * here_lux * shown.factor * shown.left() <= limit_lux)
-                    })
-            };
-            let good: Vec<bool> = (0..self.patches.len()).into_par_iter().map(|k| settled[k] || is_enough(k)).collect();
-            if given.stop.is_due() {
-                return None;
-            }
-            let wanting: Vec<usize> = (0..good.len()).filter(|k| !good[*k]).collect();
-            if wanting.is_empty() || self.patches.len() + wanting.len() > given.most() {
-                break;
-            }
-            settled = good;
-            let mut parts = vec![];
-            for &k in &wanting {
-                let [low, high] = self.cover.halves(&self.patches[k], self.tails[k].max_position());
-                parts.extend([(k, low), (self.patches.len() + parts.len() / 2, high)]);
-            }
-            let rectangles: Vec<Patch> = parts.iter().map(|(_, patch)| *patch).collect();
-            for ((k, patch), once) in parts.iter().zip(given.once(&rectangles)?) {
-                let tail = amplified * given.bicubic.left_out(&once.lux);
-                if *k < self.patches.len() {
-                    (self.patches[*k], self.once[*k], self.tails[*k]) = (*patch, once, tail);
-                } else {
-                    self.patches.push(*patch);
-                    self.once.push(once);
-                    self.tails.push(tail);
-                    settled.push(false);
-                }
-            }
-        }
+    /// Halves rectangles that leave out too much, and solves: at first where it is too much for any meter, then where it is for
+    /// those that were asked and found like this.
+    pub(super) fn grow(&mut self, given: &Given, asked: &[(Asked, Bounded)]) -> Option<()> {
+        let limits = if self.is_solved() { self.shares(given, asked) } else { self.even_shares(given) };
+        self.divide(given, limits)?;
         self.grown += 1;
         self.solution = self.solve(given)?;
         self.tails = self.solution.lux.iter().map(|lux| given.bicubic.left_out(lux)).collect();
         Some(())
+    }
+
+    /// What rectangles may leave out where nobody has looked yet: the more, the smaller they are.
+    fn even_shares(&self, given: &Given) -> Vec<f64> {
+        let error = given.accuracy.relative_error.max(COARSE);
+        let of = |patch: &Patch| {
+            let part = (patch.area_m2() / given.wall_m2()).sqrt();
+            ANYWHERE * error * given.mean_lux() * given.amplification() / (given.faces()[patch.face].reflectance * part)
+        };
+        self.patches.iter().map(of).collect()
+    }
+
+    /// What rectangles may leave out lest it be too much at some meters: what each adds to their bounds, by itself and by what all
+    /// nodes are off because of it, becomes the same for all.
+    fn shares(&self, given: &Given, asked: &[(Asked, Bounded)]) -> Vec<f64> {
+        let Solution { error_lux, seen, by_chance, .. } = &self.solution;
+        let count = self.patches.len();
+        let reflectance: Vec<f64> = self.patches.iter().map(|patch| given.faces()[patch.face].reflectance).collect();
+        let step = asked.len().div_ceil(LOOKED_AT).max(1);
+        let looking: Vec<&(Asked, Bounded)> = asked.iter().step_by(step).collect();
+        let (mut less, mut own, mut uneven, mut off) = (1.0_f64, vec![0.0; count], vec![0.0; count], vec![0.0; count]);
+        for (asked, found) in &looking {
+            let error = given.accuracy.relative_error;
+            let most_lux = error * (found.value + asked.direct.value) - asked.direct.bound - asked.once.bound;
+            let here_lux = found.bound - asked.once.bound;
+            if most_lux <= 0.0 || here_lux <= most_lux {
+                continue;
+            }
+            less = less.min(most_lux / here_lux);
+            self.for_all_shown(given, asked.meter, |k, face, shown| {
+                let [left, left_uneven] = given.bicubic.left_of(&shown.weights().of_nodes);
+                let part = face.reflectance / (most_lux * looking.len() as f64);
+                own[k] += part * left;
+                uneven[k] += part * left_uneven;
+                off[k] += part * shown.factor;
+            });
+        }
+        let (first_uneven, first_off) = (uneven.clone(), off.clone());
+        for _ in 0..ADJOINT_STEPS {
+            let (mut next_uneven, mut next_off) = (first_uneven.clone(), first_off.clone());
+            for (i, seen) in seen.iter().enumerate() {
+                let [even_part, uneven_part] = by_chance[i];
+                for seen in seen {
+                    let k = seen.patch as usize;
+                    next_off[k] += off[i] * reflectance[k] * seen.factor;
+                    next_uneven[k] += reflectance[k]
+                        * (off[i] * even_part * seen.uneven + uneven[i] * uneven_part * seen.worst_uneven);
+                }
+            }
+            (uneven, off) = (next_uneven, next_off);
+        }
+        for (i, seen) in seen.iter().enumerate() {
+            let [even_part, uneven_part] = by_chance[i];
+            for seen in seen {
+                let k = seen.patch as usize;
+                own[k] += reflectance[k] * (off[i] * even_part * seen.left + uneven[i] * uneven_part * seen.worst_left);
+            }
+        }
+        let adds: Vec<f64> = own.iter().zip(error_lux).map(|(own, error_lux)| own * error_lux).collect();
+        // So much for each that all together come to what is wanted.
+        let wanted = (WANTED * less).min(PROGRESS) * adds.iter().sum::<f64>();
+        let (mut low, mut high) = (0.0, adds.iter().copied().fold(0.0, f64::max));
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            let sum: f64 = adds.iter().map(|add| add.min(middle)).sum();
+            if sum > wanted { high = middle } else { low = middle }
+        }
+        adds.iter()
+            .zip(error_lux)
+            .map(|(add, error_lux)| if *add > 0.0 { error_lux * high / add } else { f64::INFINITY })
+            .collect()
+    }
+
+    /// Halves every rectangle until it leaves out no more than its limit, which is the larger the smaller the parts.
+    fn divide(&mut self, given: &Given, mut limits: Vec<f64>) -> Option<()> {
+        let amplified = given.amplification();
+        loop {
+            let mut parts: Vec<(usize, Patch, f64)> = vec![];
+            let mut count = self.patches.len();
+            for (k, (patch, (tail, limit))) in self.patches.iter().zip(self.tails.iter().zip(&limits)).enumerate() {
+                if tail.length() <= *limit || count >= given.most() {
+                    continue;
+                }
+                // As far as can be told without a look.
+                let mut open = vec![(*patch, *tail, *limit, 0)];
+                let mut index = k;
+                while let Some((patch, tail, limit, depth)) = open.pop() {
+                    if tail.length() <= limit || depth == AT_ONCE || count >= given.most() {
+                        parts.push((index, patch, limit));
+                        index = count;
+                        count += 1;
+                        continue;
+                    }
+                    let axis = tail.max_position();
+                    for half in self.cover.halves(&patch, axis) {
+                        let part = half.size_m[axis] / patch.size_m[axis];
+                        let mut tail = tail;
+                        tail[axis] *= if part < 0.5 { part } else { part.powi(4) };
+                        open.push((half, tail, limit / part, depth + 1));
+                    }
+                }
+                count -= 1;
+            }
+            if parts.is_empty() {
+                return Some(());
+            }
+            let rectangles: Vec<Patch> = parts.iter().map(|(_, patch, _)| *patch).collect();
+            let once = given.once(&rectangles)?;
+            self.patches.resize(count, rectangles[0]);
+            self.once.resize(count, once[0]);
+            self.tails.resize(count, DVec2::ZERO);
+            limits.resize(count, 0.0);
+            for ((k, patch, limit), once) in parts.into_iter().zip(once) {
+                (self.patches[k], self.once[k], limits[k]) = (patch, once, limit);
+                self.tails[k] = amplified * given.bicubic.left_out(&once.lux);
+            }
+        }
+    }
+
+    /// Goes through what a meter sees of all rectangles.
+    fn for_all_shown(&self, given: &Given, meter: &Meter, mut each: impl FnMut(usize, &Face, &Shown)) {
+        let view = given.view(meter);
+        let before: Vec<Option<Before>> = given.faces().iter().map(|face| view.before(face)).collect();
+        for (k, patch) in self.patches.iter().enumerate() {
+            let shown = before[patch.face].as_ref().and_then(|before| before.of(patch.corner_m, patch.size_m));
+            if let Some(shown) = shown {
+                each(k, &given.faces()[patch.face], &shown);
+            }
+        }
     }
 
     pub(super) fn is_solved(&self) -> bool {
@@ -261,21 +353,16 @@ impl Balance {
 
     /// Reflected light at a meter.
     pub(super) fn at(&self, given: &Given, asked: &Asked) -> Bounded {
-        let view = given.view(asked.meter);
         let mut found = asked.once;
-        let before: Vec<Option<Before>> = given.faces().iter().map(|face| view.before(face)).collect();
-        for (k, (patch, lux)) in self.patches.iter().zip(&self.solution.lux).enumerate() {
-            let face = &given.faces()[patch.face];
-            let Some(before) = &before[patch.face] else { continue };
-            let Some(shown) = before.of(patch.corner_m, patch.size_m) else { continue };
+        let Solution { lux, error_lux, uneven_lux, off_lux, .. } = &self.solution;
+        self.for_all_shown(given, asked.meter, |k, face, shown| {
             let weights = shown.weights();
-            let most = lux.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+            let most = lux[k].iter().fold(0.0_f64, |most, v| most.max(v.abs()));
             let [left, uneven] = given.bicubic.left_of(&weights.of_nodes);
-            let left_lux = left * self.solution.error_lux[k] + uneven * self.solution.uneven_lux[k];
-            found.value += face.reflectance * weights.of_nodes.iter().zip(lux).map(|(w, v)| w * v).sum::<f64>();
-            found.bound +=
-                face.reflectance * (left_lux + shown.factor * self.solution.off_lux[k] + weights.error * most);
-        }
+            let left_lux = left * error_lux[k] + uneven * uneven_lux[k] + shown.factor * off_lux[k];
+            found.value += face.reflectance * weights.of_nodes.iter().zip(&lux[k]).map(|(w, v)| w * v).sum::<f64>();
+            found.bound += face.reflectance * (left_lux + weights.error * most);
+        });
         found
     }
 
@@ -323,6 +410,7 @@ impl Balance {
         let residual_lux = RESIDUAL * given.accuracy.relative_error * given.mean_lux();
         let mut uneven_lux = vec![0.0; self.patches.len()];
         let mut off_lux = vec![0.0; self.patches.len()];
+        let mut by_chance = vec![[1.0; 2]; self.patches.len()];
         for _ in 0..STEPS {
             let of = |(once, seen): (&Once, &Vec<Together>)| {
                 let (mut even, mut uneven, mut mean) = (Left::default(), Left::default(), 0.0);
@@ -334,17 +422,20 @@ impl Balance {
                     mean += reflectance[k] * seen.factor * off_lux[k];
                 }
                 let own_lux = once.off_lux + residual_lux;
-                (own_lux + uneven.by_chance(), own_lux + even.by_chance() + mean)
+                let parts = [even, uneven].map(|left| left.by_chance() / left.sum.max(f64::MIN_POSITIVE));
+                (own_lux + uneven.by_chance(), own_lux + even.by_chance() + mean, parts)
             };
-            let next: Vec<(f64, f64)> = self.once.iter().zip(&all).map(of).collect();
-            let change = next.iter().zip(&off_lux).map(|((_, a), b)| (a - b).abs()).fold(0.0, f64::max);
-            let scale = next.iter().map(|(_, off)| *off).fold(0.0, f64::max);
-            (uneven_lux, off_lux) = next.into_iter().unzip();
+            let next: Vec<(f64, f64, [f64; 2])> = self.once.iter().zip(&all).map(of).collect();
+            let change = next.iter().zip(&off_lux).map(|((_, a, _), b)| (a - b).abs()).fold(0.0, f64::max);
+            let scale = next.iter().map(|(_, off, _)| *off).fold(0.0, f64::max);
+            for (k, next) in next.into_iter().enumerate() {
+                (uneven_lux[k], off_lux[k], by_chance[k]) = next;
+            }
             if change <= SETTLED * scale {
                 break;
             }
         }
-        Some(Solution { lux, error_lux, uneven_lux, off_lux })
+        Some(Solution { lux, error_lux, uneven_lux, off_lux, seen: all, by_chance })
     }
 
     /// What every node sees of all rectangles.

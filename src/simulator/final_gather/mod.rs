@@ -292,20 +292,15 @@ impl Enclosure {
             self.balance = Balance::new(&given).map(|balance| (bounces, accuracy.relative_error, balance));
         }
         let Some((_, _, balance)) = &mut self.balance else { return vec![] };
-        let mut found = vec![];
+        let mut found = vec![Bounded { value: 0.0, bound: f64::INFINITY }; asked.len()];
         loop {
-            if balance.is_solved() {
-                found = asked.par_iter().map(|asked| balance.at(&given, asked)).collect();
-            }
-            let is_open = |(asked, found): &(&Asked, &Bounded)| !asked.meets(&given, found);
-            let open: Vec<Asked> = if found.is_empty() {
-                asked.clone()
-            } else {
-                asked.iter().zip(&found).filter(is_open).map(|(asked, _)| *asked).collect()
-            };
-            if open.is_empty() || balance.is_spent() || balance.grow(&given, &open).is_none() {
+            let all = asked.iter().copied().zip(found.iter().copied());
+            let open: Vec<(Asked, Bounded)> =
+                all.filter(|(asked, found)| !balance.is_solved() || !asked.meets(&given, found)).collect();
+            if balance.is_solved() && (open.is_empty() || balance.is_spent()) || balance.grow(&given, &open).is_none() {
                 break;
             }
+            found = asked.par_iter().map(|asked| balance.at(&given, asked)).collect();
         }
         found
     }
