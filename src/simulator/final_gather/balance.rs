@@ -402,7 +402,7 @@ impl Balance {
             return None;
         }
         let lux = lux.as_chunks::<NODES>().0.to_vec();
-        let error_lux: Vec<f64> = lux.iter().map(|lux| given.bicubic.left_out(lux).length()).collect();
+        let error_lux: Vec<f64> = lux.iter().map(|lux| given.bicubic.left_out(lux).element_sum()).collect();
         let most: Vec<f64> = lux.iter().map(|lux| lux.iter().fold(0.0_f64, |most, v| most.max(v.abs()))).collect();
         let (by_patch, _) = rows.as_chunks::<NODES>();
         let all: Vec<Vec<Together>> = by_patch.par_iter().map(|rows| together(given.bicubic, rows)).collect();
