@@ -201,7 +201,12 @@ impl Balance {
     /// those that were asked and found like this.
     pub(super) fn grow(&mut self, given: &Given, asked: &[(Asked, Bounded)]) -> Option<()> {
         let limits = if self.is_solved() { self.shares(given, asked) } else { self.even_shares(given) };
+        let count = self.patches.len();
         self.divide(given, limits)?;
+        if self.is_solved() && self.patches.len() == count {
+            self.grown = ROUNDS;
+            return Some(());
+        }
         self.grown += 1;
         self.solution = self.solve(given)?;
         self.tails = self.solution.lux.iter().map(|lux| given.bicubic.left_out(lux)).collect();
