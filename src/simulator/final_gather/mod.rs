@@ -2,24 +2,31 @@
 //!
 //! Light straight from the luminaires is integrated over what shows of them; reflected light along rays from the meter
 //! that end there, where light reflected once is known from the luminaires and light reflected more often from
-//! the field. Ward, Rubinstein and Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, and
+//! the field. Where nothing reflects but faces on which light is known, it is integrated over what shows of these, without
+//! a ray, and solved for without chance ([`balance`]).
+//!
+//! Ward, Rubinstein and Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, and
 //! M. Reichert, *A two-pass radiosity method driven by lights and viewer position* (1992) gather so; here all of it is
 //! done in independent replicates, whose scatter bounds chance, and what polynomials leave out is added up along the rays.
 
+mod balance;
 mod bicubic;
 mod face;
 mod field;
 mod grid;
 mod lit;
+mod patches;
 mod rays;
 mod surroundings;
 #[cfg(test)]
 mod tests;
+mod view;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use self::bicubic::NODES;
+use self::balance::{Asked, Balance, Given};
+use self::bicubic::{Bicubic, NODES};
 use self::field::Field;
 use self::grid::{Cover, Grid};
 use self::lit::{Known, Lights, Limit, Lit};
@@ -70,6 +77,8 @@ pub(super) struct Enclosure {
     emitters: Vec<Emitter>,
     lit: Option<(f64, Lit)>,
     solved: Option<Solved>,
+    /// Of how many reflections, how well, and how often rectangles were made smaller for it.
+    balance: Option<(Bounces, f64, Balance)>,
 }
 
 /// Rays of a meter in each replicate at most, and times more than a look before, as powers of two.
@@ -127,7 +136,7 @@ impl Enclosure {
         let emitters = scene.luminaires.iter().map(Emitter::new).filter(Emitter::shines).collect();
         let solid = surroundings.bodies().map(|[min_m, max_m]| Occluder { min_m: *min_m, max_m: *max_m });
         let occluders = surroundings.cuts_exactly.then(|| solid.collect());
-        Ok(Self { surroundings, occluders, emitters, lit: None, solved: None })
+        Ok(Self { surroundings, occluders, emitters, lit: None, solved: None, balance: None })
     }
 
     /// Direct illuminance at the meters, each within a bound.
@@ -245,10 +254,83 @@ impl Enclosure {
         if self.lit.as_ref().is_none_or(|(known, _)| *known > error) {
             self.lit = Some((error, Lit::new(&lights, LIT * error, stop)));
             self.solved = None;
+            self.balance = None;
         }
+        let mut found = self.balanced(meters, bounces, direct, accuracy, stop);
+        let is_met = |k: &usize| {
+            found.get(*k).is_some_and(|f| f.bound + direct[*k].bound <= error * (f.value + direct[*k].value))
+        };
+        let open: Vec<usize> = (0..meters.len()).filter(|k| !is_met(k)).collect();
+        let text = self.balance.as_ref().map(|(_, _, balance)| {
+            format!("light balanced between {} rectangles, integrated over what shows of them", balance.len())
+        });
+        match text {
+            Some(text) if open.is_empty() => Ok((found, text)),
+            text => match self.gathered(meters, &open, bounces, direct, accuracy, stop) {
+                Err(SimulatorError::Stopped) if !found.is_empty() => Ok((found, text.unwrap_or_default())),
+                Err(error) => Err(error),
+                Ok((sampled, how)) => {
+                    found.resize(meters.len(), Bounded { value: 0.0, bound: f64::INFINITY });
+                    for (k, sampled) in open.iter().zip(sampled) {
+                        if sampled.bound < found[*k].bound {
+                            found[*k] = sampled;
+                        }
+                    }
+                    Ok((found, text.map_or(how.clone(), |text| format!("{text}; {how}"))))
+                }
+            },
+        }
+    }
+
+    /// Indirect illuminance at the meters without chance, for some perhaps not as well as asked; nothing where that is not worth it or
+    /// something reflects that is no known face.
+    fn balanced(
+        &mut self,
+        meters: &[Meter],
+        bounces: Bounces,
+        direct: &[Bounded],
+        accuracy: &Accuracy,
+        stop: &Stop,
+    ) -> Vec<Bounded> {
+        let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
+        let Some((_, lit)) = self.lit.as_ref().filter(|(_, lit)| lit.is_whole) else { return vec![] };
+        let Some(occluders) = self.surroundings.hiding() else { return vec![] };
+        let bicubic = Bicubic::new();
+        let given = Given { lights, lit, occluders, bounces, accuracy: *accuracy, stop, bicubic: &bicubic };
+        let asked: Vec<Asked> =
+            meters.par_iter().zip(direct).map(|(meter, direct)| Asked::new(&given, meter, *direct)).collect();
+        if self.balance.as_ref().is_none_or(|(of, error, _)| *of != bounces || *error > accuracy.relative_error) {
+            self.balance = Balance::new(&given).map(|balance| (bounces, accuracy.relative_error, balance));
+        }
+        let Some((_, _, balance)) = &mut self.balance else { return vec![] };
+        let mut found = vec![Bounded { value: 0.0, bound: f64::INFINITY }; asked.len()];
+        loop {
+            let all = asked.iter().copied().zip(found.iter().copied());
+            let open: Vec<(Asked, Bounded)> =
+                all.filter(|(asked, found)| !balance.is_solved() || !asked.meets(&given, found)).collect();
+            if balance.is_solved() && (open.is_empty() || balance.is_spent()) || balance.grow(&given, &open).is_none() {
+                break;
+            }
+            found = asked.par_iter().map(|asked| balance.at(&given, asked)).collect();
+        }
+        found
+    }
+
+    /// Indirect illuminance at some of the meters by rays.
+    fn gathered(
+        &mut self,
+        meters: &[Meter],
+        which: &[usize],
+        bounces: Bounces,
+        direct: &[Bounded],
+        accuracy: &Accuracy,
+        stop: &Stop,
+    ) -> Result<(Vec<Bounded>, String), SimulatorError> {
+        let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
+        let error = accuracy.relative_error;
         let Some((_, lit)) = &self.lit else { return Err(SimulatorError::Stopped) };
         let mut sums = vec![Sums::default(); meters.len()];
-        let mut open: Vec<usize> = (0..meters.len()).collect();
+        let mut open = which.to_vec();
         let (mut more_log2, mut most_log2) = (0, FIRST_RAYS_LOG2);
         loop {
             if self.surroundings.room.is_some()
@@ -291,6 +373,7 @@ impl Enclosure {
                 break;
             }
         }
+        let sums: Vec<&Sums> = which.iter().map(|k| &sums[*k]).collect();
         if sums.iter().any(|s| s.rays_log2 == 0) {
             return Err(SimulatorError::Stopped);
         }
@@ -303,7 +386,7 @@ impl Enclosure {
             ),
             None => format!("{REPLICATES} times up to 2^{most} rays a meter between bodies in free field"),
         };
-        Ok((sums.iter().map(Sums::bounded).collect(), text))
+        Ok((sums.iter().map(|s| s.bounded()).collect(), text))
     }
 }
 
