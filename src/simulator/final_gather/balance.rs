@@ -33,8 +33,8 @@ const AT_ONCE: u32 = 4;
 /// Steps by which what nodes are off is followed back, and of a bisection.
 const ADJOINT_STEPS: usize = 12;
 const HALVINGS: usize = 40;
-/// Rectangles at most: their factors take 80 bytes for each node and each rectangle that it sees.
-const MOST: usize = 900;
+/// Rectangles at most: their factors take 80 bytes for each node and each rectangle that it sees, some 300 MiB together.
+const MOST: usize = 512;
 /// The sides of rectangles at first, of the mean wall.
 const SIDE: f64 = 0.6;
 /// Residual of the system, of the error asked for.
@@ -167,6 +167,9 @@ pub(super) struct Asked<'a> {
 impl<'a> Asked<'a> {
     pub(super) fn new(given: &Given, meter: &'a Meter, direct: Bounded) -> Self {
         let tolerance_lux = OF_LIT * given.accuracy.relative_error * (given.mean_lux() + direct.value);
+        if given.stop.is_due() {
+            return Self { meter, direct, once: Bounded::UNREAD };
+        }
         let (value, left) = given.lit.shown_of_all(&given.view(meter), given.faces(), tolerance_lux);
         Self { meter, direct, once: Bounded { value, bound: left.sum } }
     }
@@ -232,7 +235,7 @@ impl Balance {
         let step = asked.len().div_ceil(LOOKED_AT).max(1);
         let looking: Vec<&(Asked, Bounded)> = asked.iter().step_by(step).collect();
         let (mut less, mut own, mut uneven, mut off) = (1.0_f64, vec![0.0; count], vec![0.0; count], vec![0.0; count]);
-        for (asked, found) in &looking {
+        for (asked, found) in looking.iter().take_while(|_| !given.stop.is_due()) {
             let error = given.accuracy.relative_error;
             let most_lux = error * (found.value + asked.direct.value) - asked.direct.bound - asked.once.bound;
             let here_lux = found.bound - asked.once.bound;
@@ -351,13 +354,16 @@ impl Balance {
         self.grown >= ROUNDS
     }
 
-    /// Rectangles.
-    pub(super) fn len(&self) -> usize {
-        self.patches.len()
+    /// What it is.
+    pub(super) fn text(&self) -> String {
+        format!("light balanced between {} rectangles, integrated over what shows of them", self.patches.len())
     }
 
     /// Reflected light at a meter.
     pub(super) fn at(&self, given: &Given, asked: &Asked) -> Bounded {
+        if given.stop.is_due() {
+            return Bounded::UNREAD;
+        }
         let mut found = asked.once;
         let Solution { lux, error_lux, uneven_lux, off_lux, .. } = &self.solution;
         self.for_all_shown(given, asked.meter, |k, face, shown| {
@@ -376,6 +382,9 @@ impl Balance {
         let reflectance: Vec<f64> = self.patches.iter().map(|patch| given.faces()[patch.face].reflectance).collect();
         let once: Vec<f64> = self.once.iter().flat_map(|once| once.lux).collect();
         let apply = |u: &[f64]| -> Vec<f64> {
+            if given.stop.is_due() {
+                return vec![0.0; u.len()];
+            }
             let (u, _) = u.as_chunks::<NODES>();
             let of = |seen: &Seen| {
                 let k = seen.patch as usize;
@@ -417,6 +426,9 @@ impl Balance {
         let mut off_lux = vec![0.0; self.patches.len()];
         let mut by_chance = vec![[1.0; 2]; self.patches.len()];
         for _ in 0..STEPS {
+            if given.stop.is_due() {
+                return None;
+            }
             let of = |(once, seen): (&Once, &Vec<Together>)| {
                 let (mut even, mut uneven, mut mean) = (Left::default(), Left::default(), 0.0);
                 for seen in seen {

@@ -87,7 +87,7 @@ const MORE_RAYS_LOG2: u32 = 3;
 /// Times more rays of a node than a look before, and than at first, at most, as powers of two.
 const MORE_LOG2: f64 = 3.0;
 const MOST_LOG2: u32 = 4;
-/// The part of meters that do not decide that the field needs more: hard ones have rays that go on.
+/// The part of meters that do not decide that the field, or its rectangles, need more: hard ones have rays that go on.
 const HARD: f64 = 0.3;
 /// Where the field scatters too much at a meter its noise counts so many times, one after the other.
 const WARY: [f64; 3] = [1.0, 8.0, 64.0];
@@ -139,14 +139,8 @@ impl Enclosure {
         Ok(Self { surroundings, occluders, emitters, lit: None, solved: None, balance: None })
     }
 
-    /// Direct illuminance at the meters, each within a bound.
-    pub(super) fn direct(
-        &self,
-        meters: &[Meter],
-        relative_error: f64,
-        seed: u64,
-        stop: &Stop,
-    ) -> Result<Vec<Bounded>, SimulatorError> {
+    /// Direct illuminance at the meters, each within a bound, as far as it comes before it is stopped.
+    pub(super) fn direct(&self, meters: &[Meter], relative_error: f64, seed: u64, stop: &Stop) -> Vec<Bounded> {
         let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
         let one = |(index, meter): (usize, &Meter)| {
             let seed = mix(mix(seed ^ 0xd1).wrapping_add(index as u64));
@@ -158,20 +152,20 @@ impl Enclosure {
             let precision = Precision::relative(0.2 * error);
             let light = |k: usize| {
                 if stop.is_due() {
-                    return Err(SimulatorError::Stopped);
+                    return Bounded::UNREAD;
                 }
                 let emitter = &self.emitters[k];
                 if !emitter.is_point() {
-                    return Ok(emitter.illuminance(meter, occluders, precision));
+                    return emitter.illuminance(meter, occluders, precision);
                 }
                 let hidden = self.surroundings.is_hidden(self.lifted(meter), emitter.centre_m());
-                Ok(if hidden { Bounded::default() } else { emitter.illuminance(meter, &[], precision) })
+                if hidden { Bounded::NONE } else { emitter.illuminance(meter, &[], precision) }
             };
-            let known = exact.iter().try_fold(Bounded::default(), |sum, k| Ok(sum + light(*k)?))?;
+            let known = exact.iter().fold(Bounded::NONE, |sum, k| sum + light(*k));
             if sampled.is_empty() {
-                Ok(known)
+                known
             } else {
-                Ok(known + self.sampled(&lights, meter, &sampled, known, error, seed, stop)?)
+                known + self.sampled(&lights, meter, &sampled, known, error, seed, stop)
             }
         };
         meters.par_iter().enumerate().map(one).collect()
@@ -204,7 +198,7 @@ impl Enclosure {
         relative_error: f64,
         seed: u64,
         stop: &Stop,
-    ) -> Result<Bounded, SimulatorError> {
+    ) -> Bounded {
         let start_m = self.lifted(meter);
         let bare = |k: &usize| self.emitters[*k].illuminance(meter, &[], Precision::relative(1e-2)).value;
         let bare_lux: f64 = which.iter().map(bare).sum();
@@ -230,7 +224,7 @@ impl Enclosure {
                 break;
             }
         }
-        if sums.rays_log2 == 0 { Err(SimulatorError::Stopped) } else { Ok(sums.bounded()) }
+        sums.bounded()
     }
 
     fn lifted(&self, meter: &Meter) -> DVec3 {
@@ -256,21 +250,18 @@ impl Enclosure {
             self.solved = None;
             self.balance = None;
         }
-        let mut found = self.balanced(meters, bounces, direct, accuracy, stop);
+        let (mut found, text) = self.balanced(meters, bounces, direct, accuracy, stop);
         let is_met = |k: &usize| {
             found.get(*k).is_some_and(|f| f.bound + direct[*k].bound <= error * (f.value + direct[*k].value))
         };
         let open: Vec<usize> = (0..meters.len()).filter(|k| !is_met(k)).collect();
-        let text = self.balance.as_ref().map(|(_, _, balance)| {
-            format!("light balanced between {} rectangles, integrated over what shows of them", balance.len())
-        });
         match text {
             Some(text) if open.is_empty() => Ok((found, text)),
             text => match self.gathered(meters, &open, bounces, direct, accuracy, stop) {
                 Err(SimulatorError::Stopped) if !found.is_empty() => Ok((found, text.unwrap_or_default())),
                 Err(error) => Err(error),
                 Ok((sampled, how)) => {
-                    found.resize(meters.len(), Bounded { value: 0.0, bound: f64::INFINITY });
+                    found.resize(meters.len(), Bounded::UNREAD);
                     for (k, sampled) in open.iter().zip(sampled) {
                         if sampled.bound < found[*k].bound {
                             found[*k] = sampled;
@@ -282,8 +273,8 @@ impl Enclosure {
         }
     }
 
-    /// Indirect illuminance at the meters without chance, for some perhaps not as well as asked; nothing where that is not worth it or
-    /// something reflects that is no known face.
+    /// Indirect illuminance at the meters without chance, for some perhaps not as well as asked, and how; nothing where that is not worth it
+    /// or something reflects that is no known face.
     fn balanced(
         &mut self,
         meters: &[Meter],
@@ -291,10 +282,10 @@ impl Enclosure {
         direct: &[Bounded],
         accuracy: &Accuracy,
         stop: &Stop,
-    ) -> Vec<Bounded> {
+    ) -> (Vec<Bounded>, Option<String>) {
         let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
-        let Some((_, lit)) = self.lit.as_ref().filter(|(_, lit)| lit.is_whole) else { return vec![] };
-        let Some(occluders) = self.surroundings.hiding() else { return vec![] };
+        let Some((_, lit)) = self.lit.as_ref().filter(|(_, lit)| lit.is_whole) else { return (vec![], None) };
+        let Some(occluders) = self.surroundings.hiding() else { return (vec![], None) };
         let bicubic = Bicubic::new();
         let given = Given { lights, lit, occluders, bounces, accuracy: *accuracy, stop, bicubic: &bicubic };
         let asked: Vec<Asked> =
@@ -302,18 +293,26 @@ impl Enclosure {
         if self.balance.as_ref().is_none_or(|(of, error, _)| *of != bounces || *error > accuracy.relative_error) {
             self.balance = Balance::new(&given).map(|balance| (bounces, accuracy.relative_error, balance));
         }
-        let Some((_, _, balance)) = &mut self.balance else { return vec![] };
-        let mut found = vec![Bounded { value: 0.0, bound: f64::INFINITY }; asked.len()];
+        let Some((_, _, balance)) = &mut self.balance else { return (vec![], None) };
+        let mut found = vec![Bounded::UNREAD; asked.len()];
         loop {
             let all = asked.iter().copied().zip(found.iter().copied());
             let open: Vec<(Asked, Bounded)> =
                 all.filter(|(asked, found)| !balance.is_solved() || !asked.meets(&given, found)).collect();
-            if balance.is_solved() && (open.is_empty() || balance.is_spent()) || balance.grow(&given, &open).is_none() {
+            // What few meters need rays give them for less.
+            let is_enough = balance.is_spent() || open.len() as f64 <= HARD * asked.len() as f64;
+            if balance.is_solved() && is_enough {
                 break;
+            }
+            if balance.grow(&given, &open).is_none() {
+                // Halved, but not solved.
+                let text = balance.text();
+                self.balance = None;
+                return (found, Some(text));
             }
             found = asked.par_iter().map(|asked| balance.at(&given, asked)).collect();
         }
-        found
+        (found, Some(balance.text()))
     }
 
     /// Indirect illuminance at some of the meters by rays.
@@ -374,9 +373,6 @@ impl Enclosure {
             }
         }
         let sums: Vec<&Sums> = which.iter().map(|k| &sums[*k]).collect();
-        if sums.iter().any(|s| s.rays_log2 == 0) {
-            return Err(SimulatorError::Stopped);
-        }
         let most = sums.iter().map(|s| s.rays_log2).max().unwrap_or(0);
         let text = match &self.solved {
             Some(s) => format!(
@@ -572,7 +568,7 @@ impl Sums {
     /// Stopping as soon as a noisy error is small prefers errors that are too small by chance: half of the one before counts.
     fn bounded(&self) -> Bounded {
         if self.rays_log2 == 0 {
-            return Bounded::default();
+            return Bounded::UNREAD;
         }
         let (mean, error) = self.mean_and_error();
         let error = error.max(0.5 * self.half_way.unwrap_or(0.0));
