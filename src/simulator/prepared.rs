@@ -94,7 +94,8 @@ impl Prepared {
         found.resize(meters.len(), self.unread());
         let mut values: Vec<Bounded> = found.iter().map(|[direct, indirect]| *direct + *indirect).collect();
         if stop.is_due() {
-            text += &self.stand_in(meters, &found, &first, &mut values)?;
+            let stopped = self.stand_in(meters, &found, &first, &mut values)?;
+            text = if text.is_empty() { stopped } else { format!("{text}; {stopped}") };
         }
         Ok((values, text))
     }
@@ -151,9 +152,9 @@ impl Prepared {
         }
         let all = values.len();
         Ok(match count {
-            0 => "; stopped, with what was known by then".to_owned(),
+            0 => "stopped, with what was known by then".to_owned(),
             _ => format!(
-                "; stopped: of {count} of {all} meters there is a first look, or what luminaires can give at most"
+                "stopped: of {count} of {all} meters there is a first look, or what luminaires can give at most"
             ),
         })
     }
