@@ -90,7 +90,6 @@ impl Engine for Simulator {
             rays: Some((job.budget.seconds / RAY_S) as u64),
             flag: Some(process::interrupt_flag()),
             deadline: Instant::now().checked_add(workbench.limit),
-            ..Stop::NEVER
         };
         let failed = |what: String| EngineError::Solver { engine: ID, what };
         // On its own threads and no more: what runs beside it counts on the others.
