@@ -47,7 +47,7 @@ pub(crate) fn signed_element_to_polygon(point_m: DVec3, normal: DVec3, polygon_m
 }
 
 /// The subtended angle times the projected edge normal, for edge ends relative to the element.
-fn edge(a: DVec3, b: DVec3, normal: DVec3) -> f64 {
+pub(crate) fn edge(a: DVec3, b: DVec3, normal: DVec3) -> f64 {
     let cross = a.cross(b);
     let length = cross.length();
     if length == 0.0 {

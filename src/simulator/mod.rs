@@ -8,12 +8,15 @@ mod direct;
 mod emission;
 mod final_gather;
 mod gmres;
+mod limits;
 mod once_reflected;
 mod path_tracing;
 mod prepared;
 pub mod quadrature;
 mod sampler;
 mod stop;
+#[cfg(test)]
+mod stop_tests;
 mod validate;
 mod visibility;
 
@@ -63,6 +66,17 @@ pub fn certified_until(
 struct Bounded {
     value: f64,
     bound: f64,
+}
+
+impl Bounded {
+    /// No light.
+    const NONE: Self = Self { value: 0.0, bound: 0.0 };
+    /// What a stopped solver has not come to.
+    const UNREAD: Self = Self { value: 0.0, bound: f64::INFINITY };
+
+    fn is_read(&self) -> bool {
+        self.bound.is_finite()
+    }
 }
 
 impl std::ops::Add for Bounded {

@@ -2,11 +2,18 @@
 
 use super::box_room::EmptyRoom;
 use super::final_gather::Enclosure;
+use super::limits::Limits;
 use super::once_reflected::OnceReflected;
 use super::stop::Stop;
 use super::{Accuracy, Bounded, Estimate, SimulatorError, Solution, Uncertainty, direct, validate};
 use crate::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
 use crate::units::Lux;
+
+/// Meters that are read together where bodies or openings make each of them dear.
+const AT_ONCE: usize = 1024;
+/// Errors from which on a first look comes before, and that of this look.
+const FINE: f64 = 1e-3;
+const FIRST_LOOK: f64 = 2e-2;
 
 /// A scene whose light field is solved once and then answers for any number of meters.
 #[derive(Debug)]
@@ -60,41 +67,132 @@ impl Prepared {
     /// As [`Self::illuminance`], until it is stopped: what is known by then comes with its larger bound.
     pub fn illuminance_until(&mut self, meters: &[Meter], stop: &Stop) -> Result<Solution, SimulatorError> {
         validate::meters(&self.scene, meters)?;
-        let mut solution = self.solve(meters, stop)?;
+        let (values, text) = self.solve(meters, stop)?;
+        let mut solution = bounded(&values, &text);
         for estimate in &mut solution.estimates {
             *estimate = estimate.dimmed(self.factor);
         }
         Ok(solution)
     }
 
-    fn solve(&mut self, meters: &[Meter], stop: &Stop) -> Result<Solution, SimulatorError> {
+    /// Light at meters; where each of them is dear so many at a time, lest all be begun and none known when time is up.
+    fn solve(&mut self, meters: &[Meter], stop: &Stop) -> Result<(Vec<Bounded>, String), SimulatorError> {
+        let first = self.first_look(meters, stop)?;
+        let at_once = match self.solver {
+            Solver::Empty(_) => meters.len(),
+            Solver::Enclosed(..) => AT_ONCE,
+        };
+        let (mut found, mut text) = (Vec::with_capacity(meters.len()), String::new());
+        for some in meters.chunks(at_once.max(1)) {
+            if !found.is_empty() && stop.is_due() {
+                break;
+            }
+            let (parts, how) = self.read(some, stop)?;
+            found.extend(parts);
+            text = how;
+        }
+        found.resize(meters.len(), self.unread());
+        let mut values: Vec<Bounded> = found.iter().map(|[direct, indirect]| *direct + *indirect).collect();
+        if stop.is_due() {
+            let stopped = self.stand_in(meters, &found, &first, &mut values)?;
+            text = if text.is_empty() { stopped } else { format!("{text}; {stopped}") };
+        }
+        Ok((values, text))
+    }
+
+    /// Where what is asked so finely may be stopped, a first look at it, which takes a small part of the time.
+    fn first_look(&self, meters: &[Meter], stop: &Stop) -> Result<Vec<Bounded>, SimulatorError> {
+        let Accuracy { relative_error, seed } = self.accuracy;
+        let is_long = matches!(self.solver, Solver::Enclosed(..)) && self.transport != Transport::Direct;
+        if !is_long || relative_error > FINE || !stop.may_come() {
+            return Ok(vec![]);
+        }
+        let coarse = Accuracy { relative_error: FIRST_LOOK, seed };
+        match Self::new(&self.scene, self.transport, &coarse)?.solve(meters, stop) {
+            Err(SimulatorError::Stopped) => Ok(vec![]),
+            found => Ok(found?.0),
+        }
+    }
+
+    /// What is not known of a meter before anything is.
+    const fn unread(&self) -> [Bounded; 2] {
+        match self.transport {
+            Transport::Direct => [Bounded::UNREAD, Bounded::NONE],
+            Transport::Indirect(_) => [Bounded::NONE, Bounded::UNREAD],
+            Transport::Total(_) => [Bounded::UNREAD; 2],
+        }
+    }
+
+    /// What is not known becomes what a first look found, or what the luminaires can give at most; in words how often that is.
+    fn stand_in(
+        &self,
+        meters: &[Meter],
+        found: &[[Bounded; 2]],
+        first: &[Bounded],
+        values: &mut [Bounded],
+    ) -> Result<String, SimulatorError> {
+        let limits = Limits::new(&self.scene);
+        let reflected = match self.transport {
+            Transport::Direct => Bounded::NONE,
+            Transport::Indirect(bounces) | Transport::Total(bounces) => limits.indirect(bounces),
+        };
+        let mut count = 0;
+        for (k, (value, [direct, indirect])) in values.iter_mut().zip(found).enumerate() {
+            if !value.is_read() {
+                let direct = if direct.is_read() { *direct } else { limits.direct(&meters[k]) };
+                *value = direct + if indirect.is_read() { *indirect } else { reflected };
+                count += 1;
+            }
+            if let Some(first) = first.get(k).filter(|first| first.bound < value.bound) {
+                *value = *first;
+            }
+        }
+        if !values.iter().all(Bounded::is_read) {
+            return Err(SimulatorError::Stopped);
+        }
+        let all = values.len();
+        Ok(match count {
+            0 => "stopped, with what was known by then".to_owned(),
+            _ => format!(
+                "stopped: of {count} of {all} meters there is a first look, or what luminaires can give at most"
+            ),
+        })
+    }
+
+    /// Light at some meters, direct and reflected.
+    fn read(&mut self, meters: &[Meter], stop: &Stop) -> Result<(Vec<[Bounded; 2]>, String), SimulatorError> {
         let (direct, text) = match self.transport {
-            Transport::Indirect(_) => (vec![Bounded::default(); meters.len()], None),
+            Transport::Indirect(_) => (vec![Bounded::NONE; meters.len()], None),
             Transport::Direct | Transport::Total(_) => {
-                let (values, text) = self.direct(meters, stop)?;
+                let (values, text) = self.direct(meters, stop);
                 (values, Some(text))
             }
         };
-        let (Transport::Indirect(bounces) | Transport::Total(bounces)) = self.transport else {
-            return Ok(bounded(&direct, text.unwrap_or_default()));
+        let (indirect, how) = match self.transport {
+            Transport::Direct => (vec![Bounded::NONE; meters.len()], None),
+            Transport::Indirect(bounces) | Transport::Total(bounces) => {
+                match self.indirect(meters, bounces, &direct, stop) {
+                    Err(SimulatorError::Stopped) => (vec![Bounded::UNREAD; meters.len()], None),
+                    found => found.map(|(values, how)| (values, Some(how)))?,
+                }
+            }
         };
-        let (indirect, how) = self.indirect(meters, bounces, &direct, stop)?;
-        let sum: Vec<Bounded> = direct.iter().zip(&indirect).map(|(d, i)| *d + *i).collect();
-        Ok(bounded(&sum, &text.map_or(how.clone(), |text| format!("{text}; {how}"))))
+        let texts: Vec<String> = text.map(str::to_owned).into_iter().chain(how).collect();
+        Ok((direct.into_iter().zip(indirect).map(|(d, i)| [d, i]).collect(), texts.join("; ")))
     }
 
-    fn direct(&self, meters: &[Meter], stop: &Stop) -> Result<(Vec<Bounded>, &'static str), SimulatorError> {
-        Ok(match &self.solver {
+    fn direct(&self, meters: &[Meter], stop: &Stop) -> (Vec<Bounded>, &'static str) {
+        match &self.solver {
             Solver::Enclosed(enclosure, _) => {
                 let Accuracy { relative_error, seed } = self.accuracy;
                 let text = "luminaires integrated over what shows of them";
-                (enclosure.direct(meters, relative_error, seed, stop)?, text)
+                (enclosure.direct(meters, relative_error, seed, stop), text)
             }
             Solver::Empty(_) => {
                 let values = meters.iter().map(|m| direct::illuminance(&self.scene, m)).collect();
                 (values, "inverse square: point luminaires, nothing in between")
             }
-        })
+        }
     }
 
     fn indirect(
@@ -114,7 +212,7 @@ impl Prepared {
             }
             (Solver::Enclosed(_, Some(once)), _) if bounces == Bounces::AtMost(1) => {
                 let text = "light reflected once, integrated over what is both lit and seen";
-                Ok((once.illuminance(meters, relative_error, stop)?, text.into()))
+                Ok((once.illuminance(meters, relative_error, stop), text.into()))
             }
             (Solver::Enclosed(enclosure, _), _) => enclosure.indirect(meters, bounces, direct, &self.accuracy, stop),
         }

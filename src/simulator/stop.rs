@@ -1,5 +1,7 @@
 //! When to stop before the work is done: a flag that somebody else raises, or a time.
 
+#[cfg(test)]
+use std::sync::atomic::AtomicI64;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -15,19 +17,41 @@ pub struct Stop {
     pub flag: Option<&'static AtomicBool>,
     /// When time is up.
     pub deadline: Option<Instant>,
+    /// Looks after which it is time, for tests, which no clock may decide.
+    #[cfg(test)]
+    pub(super) looks: Option<&'static AtomicI64>,
 }
 
 impl Stop {
     /// Never.
-    pub const NEVER: Self = Self { rays: None, flag: None, deadline: None };
+    pub const NEVER: Self = Self {
+        rays: None,
+        flag: None,
+        deadline: None,
+        #[cfg(test)]
+        looks: None,
+    };
 
     /// The binary logarithm of the rays that each of so many may have of a third of them all.
     pub(super) fn third_log2(&self, shares: usize) -> u32 {
         self.rays.map_or(u32::MAX, |rays| (rays / 3 / shares.max(1) as u64).max(1).ilog2())
     }
 
+    /// Whether it may be time before the work is done.
+    pub(super) fn may_come(&self) -> bool {
+        #[cfg(test)]
+        if self.looks.is_some() {
+            return true;
+        }
+        self.flag.is_some() || self.deadline.is_some()
+    }
+
     /// Whether it is time.
     pub fn is_due(&self) -> bool {
+        #[cfg(test)]
+        if self.looks.is_some_and(|left| left.fetch_sub(1, Ordering::Relaxed) <= 0) {
+            return true;
+        }
         self.flag.is_some_and(|flag| flag.load(Ordering::Relaxed)) || self.deadline.is_some_and(|d| Instant::now() >= d)
     }
 }

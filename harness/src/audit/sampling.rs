@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::jobs::{self, Found, Outcome, Running};
 use super::sequential::{self, Ask};
-use crate::engines::{Job, Station};
+use crate::engines::{Job, Measurement, Station};
 use crate::judge::{Judge, Sampling};
 use crate::measure::{Question, Source, Taken};
 use crate::plan::{Plan, Run};
@@ -82,28 +82,15 @@ fn refine_references(
         }
         let of_task: Vec<&Recording> =
             outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure).collect();
-        let mut targets = sequential::undecided_by_reference(judge, task, &of_task);
-        targets.retain(|k| refined.insert((index, *k)));
+        let ask = finer(judge, task, &of_task, run.job.budget, |target| refined.insert((index, target)));
         let mine = outcome.recordings.iter().position(|r| r.key.engine == engine && r.key.procedure == task.procedure);
-        let Some(mine) = mine.filter(|_| !targets.is_empty()) else { continue };
-        let relative_error = FINER * run.job.budget.relative_error;
-        let ask = Ask { look: 2, targets, budget: Budget { relative_error, ..run.job.budget } };
+        let Some((mine, ask)) = mine.zip(ask) else { continue };
         let recording = &mut outcome.recordings[mine];
         match look(running, run, &ask) {
             Ok(taken) => {
                 outcome.from_cache += usize::from(taken.source == Source::Cache);
                 recording.wall_s += taken.cost.wall_s;
-                let estimates = taken.measurement.readings(ask.targets.iter().map(|k| &task.targets[*k]));
-                for (k, estimate) in ask.targets.iter().zip(estimates) {
-                    let reading = &mut recording.readings[*k];
-                    if estimate.uncertainty.standard() < reading.uncertainty.standard() {
-                        (reading.value, reading.uncertainty) = (estimate.value, estimate.uncertainty);
-                    }
-                }
-                let count = ask.targets.len();
-                recording
-                    .notes
-                    .push(format!("read more finely at {count} meters, whose comparisons it left undecided"));
+                take_over(recording, task, &ask, &taken.measurement);
                 if let Some(status) = outcome.engines.iter_mut().find(|e| e.id == engine) {
                     status.wall_s += taken.cost.wall_s;
                 }
@@ -115,6 +102,35 @@ fn refine_references(
         jobs::keep(running.folder, &engine, &outcome.recordings)?;
     }
     Ok(())
+}
+
+/// What a reference is asked more finely: the targets that it leaves undecided and that `is_new` admits, each of them once in a run, so that
+/// no reference that cannot do better is asked for ever.
+fn finer(
+    judge: &Judge<'_>,
+    task: &Task,
+    recordings: &[&Recording],
+    budget: Budget,
+    is_new: impl FnMut(usize) -> bool,
+) -> Option<Ask> {
+    let mut is_new = is_new;
+    let mut targets = sequential::undecided_by_reference(judge, task, recordings);
+    targets.retain(|target| is_new(*target));
+    let budget = Budget { relative_error: FINER * budget.relative_error, ..budget };
+    (!targets.is_empty()).then_some(Ask { look: 2, targets, budget })
+}
+
+/// Readings become what was read more finely, where that says less uncertainty of itself.
+fn take_over(recording: &mut Recording, task: &Task, ask: &Ask, measurement: &Measurement) {
+    let estimates = measurement.readings(ask.targets.iter().map(|k| &task.targets[*k]));
+    for (k, estimate) in ask.targets.iter().zip(estimates) {
+        let reading = &mut recording.readings[*k];
+        if estimate.uncertainty.standard() < reading.uncertainty.standard() {
+            (reading.value, reading.uncertainty) = (estimate.value, estimate.uncertainty);
+        }
+    }
+    let count = ask.targets.len();
+    recording.notes.push(format!("read more finely at {count} meters, whose comparisons it left undecided"));
 }
 
 fn sample_subjects(
@@ -197,6 +213,59 @@ pub(super) fn seed_of_look(seed: u64, look: u32) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::judge::Verdict;
+    use crate::judge::tests::{built_in, recording, task};
+    use crate::record::{Estimate, Uncertainty};
+
+    const BUDGET: Budget = Budget { relative_error: 0.02, seconds: 60.0 };
+
+    fn within(value: f64, bound: f64) -> Estimate {
+        Estimate { value, uncertainty: Uncertainty::Bound(bound) }
+    }
+
+    fn noisy(value: f64, error: f64) -> Estimate {
+        Estimate { value, uncertainty: Uncertainty::sampled(error, None) }
+    }
+
+    /// Meters of indirect light, a tolerance of 2 %: within by far, at its edge behind a bound and behind noise, beyond by far.
+    fn subject() -> Recording {
+        recording("radiance", &[noisy(1.0, 1e-4), noisy(1.018, 1e-4), noisy(1.018, 5e-3), noisy(1.2, 1e-4)])
+    }
+
+    fn asked(reference: &Recording, refined: &mut BTreeSet<usize>) -> Option<Ask> {
+        let of_task = [reference, &subject()];
+        finer(&built_in(), &task(4), &of_task, BUDGET, |target| refined.insert(target))
+    }
+
+    #[test]
+    fn a_reference_is_asked_where_its_bound_leaves_something_open_and_nowhere_else() {
+        let coarse = recording("simulator", &[within(1.0, 5e-3); 4]);
+        let ask = asked(&coarse, &mut BTreeSet::new()).unwrap();
+        assert_eq!(ask.targets, [1, 2]);
+        assert!((ask.budget.relative_error - 0.008).abs() < 1e-15 && ask.budget.seconds == BUDGET.seconds);
+        // What is exact leaves nothing open: noise is the subject's own.
+        let exact = recording("simulator", &[Estimate::exact(1.0); 4]);
+        assert_eq!(asked(&exact, &mut BTreeSet::new()), None);
+    }
+
+    #[test]
+    fn a_finer_reference_decides_and_one_that_cannot_do_better_is_not_asked_again() {
+        let (judge, task, mut refined) = (built_in(), task(4), BTreeSet::new());
+        let mut reference = recording("simulator", &[within(1.0, 5e-3); 4]);
+        let ask = asked(&reference, &mut refined).unwrap();
+        let verdict = |reference: &Recording| {
+            let compared = judge.compare(&task, &[reference, &subject()]);
+            compared.iter().filter(|c| c.key.engine == "radiance").map(|c| c.verdict).nth(1)
+        };
+        assert_eq!(verdict(&reference), Some(Verdict::Inconclusive));
+        // As wide as before at the one, narrower at the other: only what is narrower counts, and neither is asked again.
+        let finer = Measurement { estimates: vec![within(1.0005, 5e-4), within(1.1, 6e-3)], ..Measurement::default() };
+        take_over(&mut reference, &task, &ask, &finer);
+        assert_eq!((reference.readings[1].value, reference.readings[2].value), (1.0005, 1.0));
+        assert_eq!(verdict(&reference), Some(Verdict::Pass));
+        assert_eq!(asked(&reference, &mut refined), None);
+        assert!(sequential::undecided_by_reference(&judge, &task, &[&reference, &subject()]).contains(&2));
+    }
 
     #[test]
     fn every_look_has_a_seed_of_its_own() {

@@ -35,6 +35,10 @@ const CLOSER: usize = 3;
 /// thousandth as high as the opening, behind a table of cos³, were off by 2e-10 of it where two rules agreed.
 const UNTOLD: f64 = 1e-9;
 
+/// Nearer than this to the plane of an opening is in it, and less than this part of its peak is the rounding of a cosine of 90 degrees.
+const IN_PLANE_M: f64 = 1e-9;
+const NO_LIGHT: f64 = 1e-12;
+
 /// The rule along each side of a part.
 static RULE: LazyLock<Gauss> = LazyLock::new(|| Gauss::new(5));
 
@@ -109,6 +113,11 @@ impl Emitter {
         matches!(self.opening, Opening::Point | Opening::Box(_))
     }
 
+    /// Whether boxes can be cut out of it and its shadows have soft edges.
+    pub(super) fn is_cut(&self) -> bool {
+        matches!(self.opening, Opening::Box(_))
+    }
+
     /// Photometric centre.
     pub(super) fn centre_m(&self) -> DVec3 {
         self.luminaire.position_m
@@ -120,6 +129,20 @@ impl Emitter {
         let turn = self.luminaire.orientation;
         let reach = turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
         [self.centre_m() - reach, self.centre_m() + reach]
+    }
+
+    /// The most illuminance in lux that it gives any place of a box: its peak from its nearest place, and nothing behind an opening
+    /// whose table ends in a horizon.
+    pub(super) fn most_lux(&self, [min_m, max_m]: [DVec3; 2]) -> f64 {
+        let [low, high] = self.bounds_m();
+        let apart_m = (min_m - high).max(low - max_m).max(DVec3::ZERO);
+        let down = self.luminaire.orientation * DVec3::NEG_Z;
+        let lowest_m = DVec3::select(down.cmpge(DVec3::ZERO), max_m, min_m);
+        let is_behind = down.dot(lowest_m - self.centre_m()) <= IN_PLANE_M - self.opening.half_m().z;
+        if self.peak_cd == 0.0 || is_behind && is_dark_above(&self.luminaire) {
+            return 0.0;
+        }
+        self.peak_cd / apart_m.length_squared()
     }
 
     /// Whether it sends light anywhere.
@@ -385,6 +408,15 @@ impl CutOff {
         let gamma_deg = away.truncate().length().atan2(-away.z).to_degrees();
         (self.gamma_deg[0]..=self.gamma_deg[1]).contains(&gamma_deg)
     }
+}
+
+/// Whether a table has no light above its horizon: it is zero at every node there and at the last one before.
+fn is_dark_above(luminaire: &Luminaire) -> bool {
+    let table = &luminaire.photometry.distribution;
+    let (gamma_deg, nothing_cd) = (table.gamma_deg(), NO_LIGHT * table.max_intensity().value());
+    let rises = |k: &usize| gamma_deg[(k + 1).min(gamma_deg.len() - 1)] > 90.0;
+    let is_dark = |k: usize| (0..table.c_deg().len()).all(|c| table.plane(c)[k] <= nothing_cd);
+    (0..gamma_deg.len()).filter(rises).all(is_dark)
 }
 
 fn cut_off(luminaire: &Luminaire) -> Option<CutOff> {

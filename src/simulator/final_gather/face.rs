@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::geometry::{Room, Surface};
+use crate::simulator::visibility::Occluder;
 
 /// Faces of boxes smaller than this part of the room's mean wall reflect so little that rays go on from them.
 const SMALL: f64 = 0.01;
@@ -13,7 +14,7 @@ pub(super) fn mean_wall_m2(size_m: DVec3) -> f64 {
 }
 
 /// An axis-aligned rectangle of uniform reflectance, seen from one side.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Face {
     axis: usize,
     plane_m: f64,
@@ -21,6 +22,8 @@ pub(super) struct Face {
     pub(super) corners_m: [DVec2; 2],
     pub(super) normal: DVec3,
     pub(super) reflectance: f64,
+    /// What lies flat upon it and replaces it there.
+    pub(super) holes: Vec<[DVec2; 2]>,
 }
 
 impl Face {
@@ -28,7 +31,7 @@ impl Face {
     fn new(axis: usize, far: bool, [min_m, max_m]: [DVec3; 2], normal: DVec3, reflectance: f64) -> Self {
         let along = |p: DVec3| DVec2::new(p[(axis + 1) % 3], p[(axis + 2) % 3]);
         let plane_m = if far { max_m[axis] } else { min_m[axis] };
-        Self { axis, plane_m, corners_m: [along(min_m), along(max_m)], normal, reflectance }
+        Self { axis, plane_m, corners_m: [along(min_m), along(max_m)], normal, reflectance, holes: vec![] }
     }
 
     /// The walls of a room, at twice the axis and one more at its far end.
@@ -53,9 +56,17 @@ impl Face {
         let s = room.size_m;
         let within = corners_m.map(|p| p.clamp(DVec3::ZERO, s));
         let face = Self::new(axis, far, within, DVec3::AXES[axis] * if far { 1.0 } else { -1.0 }, reflectance);
-        let plane_m = corners_m[usize::from(far)][axis];
-        let is_seen = if far { plane_m >= 0.0 && plane_m < s[axis] } else { plane_m > 0.0 && plane_m <= s[axis] };
+        let is_seen = Self::is_seen(room, corners_m, axis, far);
         (is_seen && reflectance > 0.0 && face.area_m2() >= SMALL * mean_wall_m2(s)).then_some(face)
+    }
+
+    /// Whether the face of a box at an end of an axis looks into the room and has an area.
+    pub(super) fn is_seen(room: &Room, corners_m: [DVec3; 2], axis: usize, far: bool) -> bool {
+        let plane_m = corners_m[usize::from(far)][axis];
+        let size_m = room.size_m[axis];
+        let [low, high] = corners_m.map(|p| p.clamp(DVec3::ZERO, room.size_m));
+        let has_area = (1..3).all(|k| high[(axis + k) % 3] > low[(axis + k) % 3]);
+        has_area && if far { plane_m >= 0.0 && plane_m < size_m } else { plane_m > 0.0 && plane_m <= size_m }
     }
 
     pub(super) fn size_m(&self) -> DVec2 {
@@ -77,6 +88,38 @@ impl Face {
         point_m[self.axis] = self.plane_m;
         (point_m[(self.axis + 1) % 3], point_m[(self.axis + 2) % 3]) = (at_m.x, at_m.y);
         point_m
+    }
+
+    /// How far before its plane a point lies.
+    pub(super) fn is_before_m(&self, point_m: DVec3) -> f64 {
+        let beyond_m = point_m[self.axis] - self.plane_m;
+        if self.normal[self.axis] > 0.0 { beyond_m } else { -beyond_m }
+    }
+
+    /// What of a box lies before its plane.
+    pub(super) fn before(&self, Occluder { mut min_m, mut max_m }: Occluder) -> Option<Occluder> {
+        if self.normal[self.axis] > 0.0 {
+            min_m[self.axis] = min_m[self.axis].max(self.plane_m);
+        } else {
+            max_m[self.axis] = max_m[self.axis].min(self.plane_m);
+        }
+        (min_m[self.axis] <= max_m[self.axis]).then_some(Occluder { min_m, max_m })
+    }
+
+    /// Where on its plane a plate lies that lies flat upon it and looks where it does.
+    pub(super) fn under(&self, [min_m, max_m]: [DVec3; 2]) -> Option<[DVec2; 2]> {
+        (min_m[self.axis] == self.plane_m && max_m[self.axis] == self.plane_m).then(|| [self.on(min_m), self.on(max_m)])
+    }
+
+    /// How far before it a box stands, where that is within a part of its own shorter side.
+    pub(super) fn gap_m(&self, [min_m, max_m]: [DVec3; 2], part: f64) -> Option<f64> {
+        let gap_m = if self.normal[self.axis] > 0.0 {
+            min_m[self.axis] - self.plane_m
+        } else {
+            self.plane_m - max_m[self.axis]
+        };
+        let is_near = gap_m > 0.0 && gap_m < part * (self.on(max_m) - self.on(min_m)).min_element();
+        is_near.then_some(gap_m)
     }
 
     /// What a box hides of it that stands on it or reaches through it, as corners on its plane.

@@ -5,12 +5,14 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::bicubic::{Bicubic, NODES};
-use super::face::Face;
+use super::face::{Face, mean_wall_m2};
 use super::surroundings::Surroundings;
+use super::view::{Left, View};
 use crate::scene::Meter;
 use crate::simulator::emission::{Emitter, Precision};
 use crate::simulator::sampler::mix;
 use crate::simulator::stop::Stop;
+use crate::simulator::visibility::Occluder;
 
 /// Where a rectangle's polynomial is held against the light, besides its nodes.
 const CHECKS: [[f64; 2]; 6] = [[0.5, 0.5], [0.02, 0.02], [0.98, 0.98], [0.02, 0.98], [0.98, 0.02], [0.5, 0.02]];
@@ -22,6 +24,10 @@ const DEEPEST: u32 = 9;
 const DEEPEST_FOR_SHADOW: u32 = 4;
 /// Random places that tell how bright the walls are on the mean.
 const PLACES: u64 = 64;
+/// Luminaires times bodies beyond which cutting these out of those for every place takes longer than rays do.
+const MOST_CUTS: usize = 100;
+/// What a leaf is off, times its part of a wall, of what may be off where bodies are cut out of luminaires: some hundred lie along each shadow.
+const OF_ALL: f64 = 3e-3;
 /// Dim places need be known to this part of the wall's mean only.
 const DIM: f64 = 0.1;
 
@@ -38,6 +44,8 @@ pub(super) struct Lit {
     pub(super) is_peaked: bool,
     /// Exitance of the brightest place in lm/m².
     pub(super) peak: f64,
+    /// Whether no luminaire must be asked anywhere.
+    pub(super) is_whole: bool,
 }
 
 #[derive(Debug)]
@@ -45,6 +53,8 @@ struct Part {
     corner_m: DVec2,
     size_m: DVec2,
     kind: Kind,
+    /// Of four quarters the polynomial that comes closest to theirs, and how far off it is; where they are all that is known.
+    joined: Option<Box<([f64; NODES], f64)>>,
 }
 
 #[derive(Debug)]
@@ -146,31 +156,95 @@ impl Lit {
     pub(super) fn new(lights: &Lights, relative_error: f64, stop: &Stop) -> Self {
         let bicubic = Bicubic::new();
         let mean: f64 = mean_lux(lights, relative_error);
+        let surroundings = lights.surroundings;
+        let solid = surroundings.bodies().map(|[min_m, max_m]| Occluder { min_m: *min_m, max_m: *max_m });
+        let solid: Vec<Occluder> = solid.collect();
+        let can_cut = solid.is_empty() || lights.emitters.iter().all(Emitter::is_cut);
+        let cuts = solid.len() * lights.emitters.len();
+        let occluders = surroundings.hiding().filter(|_| can_cut && cuts <= MOST_CUTS).map(|_| solid);
         let one = |face: &Face| {
-            let build = Build { lights, bicubic, face, relative_error, floor_lux: DIM * mean, stop };
+            let floor_lux = DIM * mean;
+            let wall_m2 = surroundings.room.map_or(f64::INFINITY, |room| mean_wall_m2(room.size_m));
+            let build =
+                Build { lights, bicubic, face, relative_error, floor_lux, wall_m2, occluders: &occluders, stop };
             let (corner_m, size_m) = (face.corners_m[0], face.size_m());
             let mut parts = vec![];
             if face.reflectance > 0.0 {
                 let first = build.leaf(corner_m, size_m);
-                parts.push(Part { corner_m, size_m, kind: Kind::Quartered(0, corner_m) });
+                parts.push(Part { corner_m, size_m, kind: Kind::Quartered(0, corner_m), joined: None });
                 build.grow(&mut parts, 0, first, 0);
+                if occluders.is_some() {
+                    join(&bicubic, &mut parts);
+                }
             }
             parts
         };
         let all = &lights.surroundings.faces;
         let faces: Vec<Vec<Part>> = all.par_iter().map(one).collect();
-        let (mut bright, mut reflected_lm, mut peak) = (vec![], 0.0, 0.0_f64);
+        let (mut bright, mut reflected_lm, mut peak, mut is_whole) = (vec![], 0.0, 0.0_f64, occluders.is_some());
         for (face, parts) in faces.iter().enumerate() {
             for part in parts {
                 let Kind::Leaf(leaf) = &part.kind else { continue };
                 reflected_lm += leaf.exitance * part.size_m.element_product();
                 peak = peak.max(leaf.exitance);
+                is_whole &= leaf.asked.is_empty();
                 bright.push(Bright { up_to_lm: reflected_lm, face, corner_m: part.corner_m, size_m: part.size_m });
             }
         }
         let area_m2: f64 = all.iter().map(Face::area_m2).sum();
         let is_peaked = peak * area_m2 > super::PEAKED * reflected_lm;
-        Self { faces, bicubic, bright, reflected_lm, is_peaked, peak }
+        Self { faces, bicubic, bright, reflected_lm, is_peaked, peak, is_whole }
+    }
+
+    /// Light reflected once by all faces to a meter, and what it may be off.
+    pub(super) fn shown_of_all(&self, view: &View, faces: &[Face], tolerance_lux: f64) -> (f64, Left) {
+        let (mut lux, mut left) = (0.0, Left::default());
+        for face in faces.iter().enumerate() {
+            self.add_shown(view, face, tolerance_lux, &mut |value, left_lux| {
+                lux += value;
+                left.add(left_lux);
+            });
+        }
+        (lux, left)
+    }
+
+    /// The mean over all faces of light reflected once, in lm/m².
+    pub(super) fn mean_exitance(&self, faces: &[Face]) -> f64 {
+        self.reflected_lm / faces.iter().map(Face::area_m2).sum::<f64>()
+    }
+
+    /// Light reflected once by a face to a meter, rectangle by rectangle: from afar by polynomials of large ones, as far as what is off
+    /// there is below a tolerance. To each belongs what its polynomial leaves out and the rule misses.
+    fn add_shown(
+        &self,
+        view: &View,
+        (index, face): (usize, &Face),
+        tolerance_lux: f64,
+        add: &mut impl FnMut(f64, f64),
+    ) {
+        let Some(before) = view.before(face) else { return };
+        let mut open = vec![0];
+        while let Some(k) = open.pop() {
+            let Some(part) = self.faces[index].get(k) else { continue };
+            let Some(shown) = before.of(part.corner_m, part.size_m) else { continue };
+            let (values, error_lux) = match (&part.kind, &part.joined) {
+                (Kind::Leaf(leaf), _) => (&leaf.lux, leaf.error_lux),
+                (Kind::Quartered(first, _), joined) => match joined.as_deref() {
+                    Some((values, error_lux)) if shown.factor * shown.left() * error_lux <= tolerance_lux => {
+                        (values, *error_lux)
+                    }
+                    _ => {
+                        open.extend(*first..first + 4);
+                        continue;
+                    }
+                },
+            };
+            let weights = shown.weights();
+            let value: f64 = weights.of_nodes.iter().zip(values).map(|(w, v)| w * v).sum();
+            let most = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+            let left_lux = shown.factor * shown.left() * error_lux + weights.error * most;
+            add(face.reflectance * value, face.reflectance * left_lux);
+        }
     }
 
     /// Direct illuminance at a place on a face; `u` draws the parts of luminaires that must be asked.
@@ -228,13 +302,31 @@ impl Lit {
     }
 }
 
+/// Finds for every part that is quartered the polynomial closest to those of its quarters, which lie behind it.
+fn join(bicubic: &Bicubic, parts: &mut [Part]) {
+    for k in (0..parts.len()).rev() {
+        let Kind::Quartered(first, _) = parts[k].kind else { continue };
+        let (corner_m, size_m) = (parts[k].corner_m, parts[k].size_m);
+        let of = |quarter: &Part| ((quarter.corner_m - corner_m) / size_m, quarter.size_m / size_m);
+        let quarters = parts[first..first + 4].iter().filter_map(|quarter| {
+            let (corner, size) = of(quarter);
+            match (&quarter.kind, &quarter.joined) {
+                (Kind::Leaf(leaf), _) => Some((corner, size, &leaf.lux, leaf.error_lux)),
+                (_, Some(joined)) => Some((corner, size, &joined.0, joined.1)),
+                (_, None) => None,
+            }
+        });
+        parts[k].joined = Some(Box::new(bicubic.joined(quarters)));
+    }
+}
+
 /// The mean over random places on all walls, bodies left out.
 fn mean_lux(lights: &Lights, relative_error: f64) -> f64 {
     let Some(walls) = lights.surroundings.room.map(|room| Face::walls(&room)) else { return 0.0 };
     let unit = |k: u64| (mix(k) >> 11) as f64 / (1_u64 << 53) as f64;
     let precision = Precision::relative(relative_error.max(1e-3));
     let one = |k: u64| {
-        let wall = walls[(k % 6) as usize];
+        let wall = &walls[(k % 6) as usize];
         let at_m = wall.size_m() * DVec2::new(unit(2 * k + 1), unit(2 * k + 2));
         let meter = Meter { position_m: wall.off(at_m), normal: wall.normal };
         lights.emitters.iter().map(|e| e.illuminance(&meter, &[], precision).value).sum::<f64>()
@@ -248,6 +340,9 @@ struct Build<'a> {
     face: &'a Face,
     relative_error: f64,
     floor_lux: f64,
+    wall_m2: f64,
+    /// Bodies, where they can be cut out of luminaires.
+    occluders: &'a Option<Vec<Occluder>>,
     stop: &'a Stop,
 }
 
@@ -255,7 +350,15 @@ impl Build<'_> {
     /// Puts a leaf in its place, or its quarters where it is not good enough.
     fn grow(&self, parts: &mut Vec<Part>, index: usize, leaf: Leaf, depth: u32) {
         let mean = leaf.lux.iter().map(|l| l.abs()).sum::<f64>() / NODES as f64;
-        let is_good = leaf.error_lux <= self.relative_error * mean.max(self.floor_lux);
+        let limit_lux = self.relative_error * mean.max(self.floor_lux);
+        let is_good = match self.occluders {
+            // What is off on a small part is little of all: where shadows have edges no part is small enough for another measure.
+            Some(occluders) if !occluders.is_empty() => {
+                let part = parts[index].size_m.element_product() / self.wall_m2;
+                leaf.error_lux * part <= OF_ALL * limit_lux
+            }
+            _ => leaf.error_lux <= limit_lux,
+        };
         let is_clear = leaf.asked.is_empty() || depth >= DEEPEST_FOR_SHADOW;
         if is_good && is_clear || depth >= DEEPEST || self.stop.is_due() {
             parts[index].kind = Kind::Leaf(Box::new(leaf));
@@ -273,7 +376,7 @@ impl Build<'_> {
         let first = parts.len();
         parts[index].kind = Kind::Quartered(first, middle_m);
         let leaves: Vec<Leaf> = quarters.par_iter().map(|(corner_m, size_m)| self.leaf(*corner_m, *size_m)).collect();
-        let part = |(corner_m, size_m)| Part { corner_m, size_m, kind: Kind::Quartered(0, corner_m) };
+        let part = |(corner_m, size_m)| Part { corner_m, size_m, kind: Kind::Quartered(0, corner_m), joined: None };
         parts.extend(quarters.map(part));
         for (k, leaf) in leaves.into_iter().enumerate() {
             self.grow(parts, first + k, leaf, depth + 1);
@@ -298,13 +401,16 @@ impl Build<'_> {
         let meter = |t: DVec2| Meter { position_m: self.face.off(corner_m + t * size_m), normal: self.face.normal };
         let corners_m = [meter(DVec2::ZERO).position_m, meter(DVec2::ONE).position_m];
         let all = 0..self.lights.emitters.len();
-        let (asked, clear): (Vec<usize>, Vec<usize>) = all.partition(|k| self.lights.may_be_hidden(*k, corners_m));
+        let may_be_hidden = |k: usize| self.lights.may_be_hidden(k, corners_m);
+        let (asked, clear): (Vec<usize>, Vec<usize>) = all.partition(|k| self.occluders.is_none() && may_be_hidden(*k));
+        let is_hidden = clear.iter().any(|k| may_be_hidden(*k));
+        let occluders = self.occluders.as_deref().filter(|_| is_hidden).unwrap_or(&[]);
         // Two refinements agree far less well than the finer one is right.
         let relative_error = self.relative_error.min(1e-3);
         let precision = Precision { relative_error, error_lux: relative_error * self.floor_lux };
         let lux_at = |t: DVec2, which: &[usize]| -> f64 {
             let meter = meter(t);
-            which.iter().map(|k| self.lights.emitters[*k].illuminance(&meter, &[], precision).value).sum()
+            which.iter().map(|k| self.lights.emitters[*k].illuminance(&meter, occluders, precision).value).sum()
         };
         let lux = std::array::from_fn(|k| lux_at(self.bicubic.node(k), &clear));
         let off = |t: &[f64; 2]| {

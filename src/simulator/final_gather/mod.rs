@@ -2,24 +2,31 @@
 //!
 //! Light straight from the luminaires is integrated over what shows of them; reflected light along rays from the meter
 //! that end there, where light reflected once is known from the luminaires and light reflected more often from
-//! the field. Ward, Rubinstein and Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, and
+//! the field. Where nothing reflects but faces on which light is known, it is integrated over what shows of these, without
+//! a ray, and solved for without chance ([`balance`]).
+//!
+//! Ward, Rubinstein and Clear, "A ray tracing solution for diffuse interreflection", SIGGRAPH 1988, and
 //! M. Reichert, *A two-pass radiosity method driven by lights and viewer position* (1992) gather so; here all of it is
 //! done in independent replicates, whose scatter bounds chance, and what polynomials leave out is added up along the rays.
 
+mod balance;
 mod bicubic;
 mod face;
 mod field;
 mod grid;
 mod lit;
+mod patches;
 mod rays;
 mod surroundings;
 #[cfg(test)]
 mod tests;
+mod view;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use self::bicubic::NODES;
+use self::balance::{Asked, Balance, Given};
+use self::bicubic::{Bicubic, NODES};
 use self::field::Field;
 use self::grid::{Cover, Grid};
 use self::lit::{Known, Lights, Limit, Lit};
@@ -70,6 +77,8 @@ pub(super) struct Enclosure {
     emitters: Vec<Emitter>,
     lit: Option<(f64, Lit)>,
     solved: Option<Solved>,
+    /// Of how many reflections, how well, and how often rectangles were made smaller for it.
+    balance: Option<(Bounces, f64, Balance)>,
 }
 
 /// Rays of a meter in each replicate at most, and times more than a look before, as powers of two.
@@ -78,7 +87,7 @@ const MORE_RAYS_LOG2: u32 = 3;
 /// Times more rays of a node than a look before, and than at first, at most, as powers of two.
 const MORE_LOG2: f64 = 3.0;
 const MOST_LOG2: u32 = 4;
-/// The part of meters that do not decide that the field needs more: hard ones have rays that go on.
+/// The part of meters that do not decide that the field, or its rectangles, need more: hard ones have rays that go on.
 const HARD: f64 = 0.3;
 /// Where the field scatters too much at a meter its noise counts so many times, one after the other.
 const WARY: [f64; 3] = [1.0, 8.0, 64.0];
@@ -127,17 +136,11 @@ impl Enclosure {
         let emitters = scene.luminaires.iter().map(Emitter::new).filter(Emitter::shines).collect();
         let solid = surroundings.bodies().map(|[min_m, max_m]| Occluder { min_m: *min_m, max_m: *max_m });
         let occluders = surroundings.cuts_exactly.then(|| solid.collect());
-        Ok(Self { surroundings, occluders, emitters, lit: None, solved: None })
+        Ok(Self { surroundings, occluders, emitters, lit: None, solved: None, balance: None })
     }
 
-    /// Direct illuminance at the meters, each within a bound.
-    pub(super) fn direct(
-        &self,
-        meters: &[Meter],
-        relative_error: f64,
-        seed: u64,
-        stop: &Stop,
-    ) -> Result<Vec<Bounded>, SimulatorError> {
+    /// Direct illuminance at the meters, each within a bound, as far as it comes before it is stopped.
+    pub(super) fn direct(&self, meters: &[Meter], relative_error: f64, seed: u64, stop: &Stop) -> Vec<Bounded> {
         let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
         let one = |(index, meter): (usize, &Meter)| {
             let seed = mix(mix(seed ^ 0xd1).wrapping_add(index as u64));
@@ -149,20 +152,20 @@ impl Enclosure {
             let precision = Precision::relative(0.2 * error);
             let light = |k: usize| {
                 if stop.is_due() {
-                    return Err(SimulatorError::Stopped);
+                    return Bounded::UNREAD;
                 }
                 let emitter = &self.emitters[k];
                 if !emitter.is_point() {
-                    return Ok(emitter.illuminance(meter, occluders, precision));
+                    return emitter.illuminance(meter, occluders, precision);
                 }
                 let hidden = self.surroundings.is_hidden(self.lifted(meter), emitter.centre_m());
-                Ok(if hidden { Bounded::default() } else { emitter.illuminance(meter, &[], precision) })
+                if hidden { Bounded::NONE } else { emitter.illuminance(meter, &[], precision) }
             };
-            let known = exact.iter().try_fold(Bounded::default(), |sum, k| Ok(sum + light(*k)?))?;
+            let known = exact.iter().fold(Bounded::NONE, |sum, k| sum + light(*k));
             if sampled.is_empty() {
-                Ok(known)
+                known
             } else {
-                Ok(known + self.sampled(&lights, meter, &sampled, known, error, seed, stop)?)
+                known + self.sampled(&lights, meter, &sampled, known, error, seed, stop)
             }
         };
         meters.par_iter().enumerate().map(one).collect()
@@ -195,7 +198,7 @@ impl Enclosure {
         relative_error: f64,
         seed: u64,
         stop: &Stop,
-    ) -> Result<Bounded, SimulatorError> {
+    ) -> Bounded {
         let start_m = self.lifted(meter);
         let bare = |k: &usize| self.emitters[*k].illuminance(meter, &[], Precision::relative(1e-2)).value;
         let bare_lux: f64 = which.iter().map(bare).sum();
@@ -221,7 +224,7 @@ impl Enclosure {
                 break;
             }
         }
-        if sums.rays_log2 == 0 { Err(SimulatorError::Stopped) } else { Ok(sums.bounded()) }
+        sums.bounded()
     }
 
     fn lifted(&self, meter: &Meter) -> DVec3 {
@@ -245,10 +248,88 @@ impl Enclosure {
         if self.lit.as_ref().is_none_or(|(known, _)| *known > error) {
             self.lit = Some((error, Lit::new(&lights, LIT * error, stop)));
             self.solved = None;
+            self.balance = None;
         }
+        let (mut found, text) = self.balanced(meters, bounces, direct, accuracy, stop);
+        let is_met = |k: &usize| {
+            found.get(*k).is_some_and(|f| f.bound + direct[*k].bound <= error * (f.value + direct[*k].value))
+        };
+        let open: Vec<usize> = (0..meters.len()).filter(|k| !is_met(k)).collect();
+        match text {
+            Some(text) if open.is_empty() => Ok((found, text)),
+            text => match self.gathered(meters, &open, bounces, direct, accuracy, stop) {
+                Err(SimulatorError::Stopped) if !found.is_empty() => Ok((found, text.unwrap_or_default())),
+                Err(error) => Err(error),
+                Ok((sampled, how)) => {
+                    found.resize(meters.len(), Bounded::UNREAD);
+                    for (k, sampled) in open.iter().zip(sampled) {
+                        if sampled.bound < found[*k].bound {
+                            found[*k] = sampled;
+                        }
+                    }
+                    Ok((found, text.map_or(how.clone(), |text| format!("{text}; {how}"))))
+                }
+            },
+        }
+    }
+
+    /// Indirect illuminance at the meters without chance, for some perhaps not as well as asked, and how; nothing where that is not worth it
+    /// or something reflects that is no known face.
+    fn balanced(
+        &mut self,
+        meters: &[Meter],
+        bounces: Bounces,
+        direct: &[Bounded],
+        accuracy: &Accuracy,
+        stop: &Stop,
+    ) -> (Vec<Bounded>, Option<String>) {
+        let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
+        let Some((_, lit)) = self.lit.as_ref().filter(|(_, lit)| lit.is_whole) else { return (vec![], None) };
+        let Some(occluders) = self.surroundings.hiding() else { return (vec![], None) };
+        let bicubic = Bicubic::new();
+        let given = Given { lights, lit, occluders, bounces, accuracy: *accuracy, stop, bicubic: &bicubic };
+        let asked: Vec<Asked> =
+            meters.par_iter().zip(direct).map(|(meter, direct)| Asked::new(&given, meter, *direct)).collect();
+        if self.balance.as_ref().is_none_or(|(of, error, _)| *of != bounces || *error > accuracy.relative_error) {
+            self.balance = Balance::new(&given).map(|balance| (bounces, accuracy.relative_error, balance));
+        }
+        let Some((_, _, balance)) = &mut self.balance else { return (vec![], None) };
+        let mut found = vec![Bounded::UNREAD; asked.len()];
+        loop {
+            let all = asked.iter().copied().zip(found.iter().copied());
+            let open: Vec<(Asked, Bounded)> =
+                all.filter(|(asked, found)| !balance.is_solved() || !asked.meets(&given, found)).collect();
+            // What few meters need rays give them for less.
+            let is_enough = balance.is_spent() || open.len() as f64 <= HARD * asked.len() as f64;
+            if balance.is_solved() && is_enough {
+                break;
+            }
+            if balance.grow(&given, &open).is_none() {
+                // Halved, but not solved.
+                let text = balance.text();
+                self.balance = None;
+                return (found, Some(text));
+            }
+            found = asked.par_iter().map(|asked| balance.at(&given, asked)).collect();
+        }
+        (found, Some(balance.text()))
+    }
+
+    /// Indirect illuminance at some of the meters by rays.
+    fn gathered(
+        &mut self,
+        meters: &[Meter],
+        which: &[usize],
+        bounces: Bounces,
+        direct: &[Bounded],
+        accuracy: &Accuracy,
+        stop: &Stop,
+    ) -> Result<(Vec<Bounded>, String), SimulatorError> {
+        let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
+        let error = accuracy.relative_error;
         let Some((_, lit)) = &self.lit else { return Err(SimulatorError::Stopped) };
         let mut sums = vec![Sums::default(); meters.len()];
-        let mut open: Vec<usize> = (0..meters.len()).collect();
+        let mut open = which.to_vec();
         let (mut more_log2, mut most_log2) = (0, FIRST_RAYS_LOG2);
         loop {
             if self.surroundings.room.is_some()
@@ -291,9 +372,7 @@ impl Enclosure {
                 break;
             }
         }
-        if sums.iter().any(|s| s.rays_log2 == 0) {
-            return Err(SimulatorError::Stopped);
-        }
+        let sums: Vec<&Sums> = which.iter().map(|k| &sums[*k]).collect();
         let most = sums.iter().map(|s| s.rays_log2).max().unwrap_or(0);
         let text = match &self.solved {
             Some(s) => format!(
@@ -303,7 +382,7 @@ impl Enclosure {
             ),
             None => format!("{REPLICATES} times up to 2^{most} rays a meter between bodies in free field"),
         };
-        Ok((sums.iter().map(Sums::bounded).collect(), text))
+        Ok((sums.iter().map(|s| s.bounded()).collect(), text))
     }
 }
 
@@ -489,7 +568,7 @@ impl Sums {
     /// Stopping as soon as a noisy error is small prefers errors that are too small by chance: half of the one before counts.
     fn bounded(&self) -> Bounded {
         if self.rays_log2 == 0 {
-            return Bounded::default();
+            return Bounded::UNREAD;
         }
         let (mean, error) = self.mean_and_error();
         let error = error.max(0.5 * self.half_way.unwrap_or(0.0));

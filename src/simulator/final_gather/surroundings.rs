@@ -33,6 +33,8 @@ pub(super) struct Surroundings {
     /// Whether there are no others, meshes that lie flat on a wall apart.
     pub(super) cuts_exactly: bool,
     extent_m: f64,
+    /// What hides a face from a place where everything that reflects is a face; `None` where something else does, too.
+    hiding: Option<Vec<Occluder>>,
 }
 
 struct Tree(TriangleBvh);
@@ -108,7 +110,12 @@ impl Surroundings {
         bounds.extend(&solid);
         let reach_m = bounds.iter().flatten().map(|p| p.abs().max_element()).fold(reach_m, f64::max);
         let extent_m = reach_m.max(room.map_or(0.0, |r| r.size_m.max_element()));
+        let hiding = room.filter(|_| triangles.is_empty()).and_then(|room| what_hides(&room, &boxes));
+        for face in &mut faces[..6 * usize::from(room.is_some())] {
+            face.holes = boxes.iter().filter_map(|body| face.under([body.min_m, body.max_m])).collect();
+        }
         Ok(Self {
+            hiding,
             room,
             faces,
             boxes,
@@ -119,6 +126,11 @@ impl Surroundings {
             cuts_exactly,
             extent_m,
         })
+    }
+
+    /// What hides faces from a place, where everything that reflects is a face.
+    pub(super) fn hiding(&self) -> Option<&[Occluder]> {
+        self.hiding.as_deref()
     }
 
     /// How far rays start off what may be a triangle.
@@ -219,7 +231,33 @@ fn lies_on_a_wall(room: &Room, [min_m, max_m]: [DVec3; 2]) -> bool {
     (0..3).any(|k| min_m[k] == max_m[k] && (min_m[k] == 0.0 || max_m[k] == room.size_m[k]))
 }
 
+/// What hides faces from a place, where everything that reflects is a face; what lies flat on a wall replaces that and hides nothing.
+fn what_hides(room: &Room, boxes: &[Body]) -> Option<Vec<Occluder>> {
+    let is_apart =
+        |(k, body): (usize, &Body)| boxes.iter().enumerate().all(|(j, other)| j == k || !body.lies_upon(other));
+    let is_known = boxes.iter().all(|body| body.is_known(room)) && boxes.iter().enumerate().all(is_apart);
+    let solid = boxes.iter().map(|body| [body.min_m, body.max_m]).filter(|b| !lies_on_a_wall(room, *b));
+    is_known.then(|| solid.map(|[min_m, max_m]| Occluder { min_m, max_m }).collect())
+}
+
 impl Body {
+    /// Whether all of it that reflects is a face.
+    fn is_known(&self, room: &Room) -> bool {
+        let corners_m = [self.min_m, self.max_m];
+        let is_known = |k: usize| self.faces[k].is_some() || !Face::is_seen(room, corners_m, k / 2, k % 2 == 1);
+        self.reflectance == 0.0 || (0..6).all(is_known)
+    }
+
+    /// Whether it is a plate in the plane of one of another's faces, so that one cannot tell them apart.
+    fn lies_upon(&self, other: &Self) -> bool {
+        (0..3).any(|k| {
+            let (b, c) = ((k + 1) % 3, (k + 2) % 3);
+            let over = |axis: usize| self.min_m[axis] < other.max_m[axis] && self.max_m[axis] > other.min_m[axis];
+            let plane_m = self.min_m[k];
+            plane_m == self.max_m[k] && (plane_m == other.min_m[k] || plane_m == other.max_m[k]) && over(b) && over(c)
+        })
+    }
+
     fn slabs(&self, from_m: DVec3, direction: DVec3) -> (DVec3, DVec3) {
         let (a, b) = ((self.min_m - from_m) / direction, (self.max_m - from_m) / direction);
         (a.min(b), a.max(b))

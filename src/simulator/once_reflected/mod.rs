@@ -7,10 +7,10 @@ mod tests;
 
 use rayon::prelude::*;
 
+use super::Bounded;
 use super::emission::{Emitter, Precision};
 use super::stop::Stop;
 use super::visibility::Occluder;
-use super::{Bounded, SimulatorError};
 use crate::scene::{Meter, Scene};
 use faces::Face;
 
@@ -40,28 +40,23 @@ impl OnceReflected {
         Some(Self { faces: faces::faces(&room, &bodies), occluders, emitters })
     }
 
-    /// Illuminance at the meters.
-    pub(super) fn illuminance(
-        &self,
-        meters: &[Meter],
-        relative_error: f64,
-        stop: &Stop,
-    ) -> Result<Vec<Bounded>, SimulatorError> {
+    /// Illuminance at the meters, as far as it comes before it is stopped.
+    pub(super) fn illuminance(&self, meters: &[Meter], relative_error: f64, stop: &Stop) -> Vec<Bounded> {
         let precision = Precision::relative(relative_error.clamp(1e-9, 1e-3));
         let at = |meter: &Meter| {
             let mut sum = Bounded::default();
             for face in &self.faces {
-                if stop.is_due() {
-                    return Err(SimulatorError::Stopped);
-                }
                 for emitter in &self.emitters {
+                    if stop.is_due() {
+                        return Bounded::UNREAD;
+                    }
                     let Bounded { value, bound } =
                         emitter.reflected(meter, &face.corners_m, face.normal, &self.occluders, precision);
                     sum = sum + Bounded { value: face.reflectance * value, bound: face.reflectance * bound };
                 }
             }
             // Clipping and the angles round.
-            Ok(Bounded { bound: sum.bound + 1e-11 * sum.value, ..sum })
+            Bounded { bound: sum.bound + 1e-11 * sum.value, ..sum }
         };
         meters.par_iter().map(at).collect()
     }

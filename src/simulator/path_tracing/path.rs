@@ -167,10 +167,12 @@ impl<'a> Integrand<'a> {
 
     fn reflected(&self, emitter: &Emitter, at: &Vertex, parts: [f64; 2], along: [f64; 2]) -> Option<f64> {
         let ray = emitter.emit(parts, along);
-        if ray.candela == 0.0 || !self.world.contains(ray.from_m) {
+        let start_m = ray.from_m + self.world.lift_m() * ray.direction;
+        // What an opening in the plane of a surface sends into that is lost.
+        if ray.candela == 0.0 || !self.world.contains(ray.from_m) || !self.world.holds(start_m) {
             return None;
         }
-        let hit = self.world.closest(ray.from_m + self.world.lift_m() * ray.direction, ray.direction)?;
+        let hit = self.world.closest(start_m, ray.direction)?;
         let path = at.point_m - hit.point_m;
         let square = path.length_squared();
         let cosines = hit.normal.dot(path) * at.normal.dot(-path);

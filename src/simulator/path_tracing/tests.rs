@@ -384,3 +384,21 @@ fn what_cannot_be_traced_is_refused_with_the_reason() {
     });
     assert!(refusal(&broken, inside).contains("mesh"));
 }
+
+#[test]
+fn what_a_flush_opening_sends_into_its_own_surface_is_lost() {
+    let at_m = DVec3::new(2.0, 2.0, 3.0);
+    let gamma_deg = vec![0.0, 89.0, 91.0, 180.0];
+    let reflected = |above: f64| {
+        let candela = vec![500.0, 500.0, above, above];
+        let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+        let lamp = luminaire(LuminousIntensityDistribution::axial(gamma_deg.clone(), candela).unwrap(), opening, at_m);
+        let room =
+            Room { size_m: DVec3::new(5.0, 4.0, 3.0), reflectance: Reflectances::with_equal_walls(0.5, 0.5, 0.8) };
+        let scene = Scene { room: Some(room), obstacles: vec![back(at_m)], luminaires: vec![lamp] };
+        solve(&scene, &[up(2.0, 2.0, 1.0)], CONVERGED, 1, 12)[0]
+    };
+    let ([(dark, a), (bright, b)], allowed) = ([0.0, 500.0].map(reflected), 5.4);
+    // Near the horizon both shine into the room alike but for a degree.
+    assert!((dark - bright).abs() < allowed * a.hypot(b) + 0.01 * dark, "{dark} +- {a}, {bright} +- {b}");
+}

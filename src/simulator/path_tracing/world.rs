@@ -122,6 +122,11 @@ impl World {
         self.room.is_none_or(|room| room.contains(point_m, -self.lift_m()))
     }
 
+    /// Whether a point lies on this side of every room surface.
+    pub(super) fn holds(&self, point_m: DVec3) -> bool {
+        self.room.is_none_or(|room| room.contains(point_m, 0.0))
+    }
+
     /// The least distance in metres to a room surface or a box; infinite in free field.
     pub(super) fn clearance_m(&self, point_m: DVec3) -> f64 {
         let room = self.room.map_or(f64::INFINITY, |r| point_m.min(r.size_m - point_m).min_element().abs());

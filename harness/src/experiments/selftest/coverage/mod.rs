@@ -44,6 +44,8 @@ pub struct Coverage {
     pub beyond: Vec<Miss>,
     /// How often an error lies within .03, .1, .3 and 1 of the bound and the certifier's error together, and beyond, by kind of meter.
     pub histogram: BTreeMap<Kind, [usize; BINS.len()]>,
+    /// How many rooms each solver answered, some meters perhaps by the last that is named.
+    pub rooms_by_solver: BTreeMap<String, usize>,
     /// What could not be solved, with its reason.
     pub refused: Vec<String>,
 }
@@ -105,6 +107,7 @@ fn solved(seed: u64, index: u64, relative_error: f64) -> Result<Solved, luminair
 impl Coverage {
     fn add(&mut self, seed: u64, meters: &[(Kind, Meter)], light: Transport, found: &Solution, truth: &Solution) {
         self.rooms += 1;
+        *self.rooms_by_solver.entry(words(&found.solver)).or_default() += 1;
         for (((kind, meter), own), truth) in meters.iter().zip(&found.estimates).zip(&truth.estimates) {
             self.readings += 1;
             let bound_lx = match own.uncertainty {
@@ -119,7 +122,8 @@ impl Coverage {
             // What the certifier itself may be off says nothing of the bound.
             let beyond = ((value_lx - certified_lx).abs() - allowed).max(0.0);
             let ratio = if beyond == 0.0 { 0.0 } else { beyond / bound_lx };
-            let error = (value_lx - certified_lx).abs() / (bound_lx + allowed);
+            // Nothing is off where nothing is lit, though its bound is nothing, too.
+            let error = (value_lx - certified_lx).abs() / (bound_lx + allowed).max(f64::MIN_POSITIVE);
             let bin = BINS.iter().position(|b| error.min(f64::MAX) <= *b).unwrap_or(BINS.len() - 1);
             self.histogram.entry(*kind).or_default()[bin] += 1;
             if ratio > 1.0 + 1e-9 || value_lx.is_nan() {
@@ -141,6 +145,14 @@ impl Coverage {
     }
 }
 
+/// What a solver says of itself, without its numbers.
+fn words(solver: &str) -> String {
+    let head = |part: &str| part.split([',', ':']).next().unwrap_or(part).trim().to_owned();
+    let is_word = |word: &&str| !word.contains(|c: char| c.is_ascii_digit());
+    let parts = solver.split("; ").map(|part| head(part).split(' ').filter(is_word).collect::<Vec<_>>().join(" "));
+    parts.collect::<Vec<_>>().join("; ")
+}
+
 impl fmt::Display for Coverage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let head = ["meters", "readings", "within .03", ".1", ".3", "1", "beyond bound and the certifier's error"];
@@ -150,6 +162,9 @@ impl fmt::Display for Coverage {
             [name.to_owned(), total.to_string()].into_iter().chain(bins.iter().map(usize::to_string)).collect()
         };
         writeln!(f, "{}", tables::terminal(head.map(str::to_owned).into(), self.histogram.iter().map(row).collect()))?;
+        for (solver, rooms) in &self.rooms_by_solver {
+            writeln!(f, "{rooms} rooms: {solver}")?;
+        }
         for miss in &self.beyond {
             writeln!(
                 f,

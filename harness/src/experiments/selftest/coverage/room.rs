@@ -1,4 +1,7 @@
 //! A room at random: luminaires of every form, boxes and meshes, and meters where bounds are hardest to keep.
+//!
+//! Every second room is a plain one, as most offices are: bodies are boxes, all of whose faces are large, and openings have flat sides,
+//! half of them in the plane of the ceiling. There light is balanced between rectangles; elsewhere it is gathered by rays.
 
 use std::sync::Arc;
 
@@ -6,14 +9,24 @@ use fastrand::Rng;
 use glam::{DMat3, DVec3};
 use luminaire::geometry::{Mesh, Reflectances, Room};
 use luminaire::photometry::{HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Photometry};
-use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape};
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, flush};
 
 use super::Kind;
 use crate::experiments::draw::Draw;
 
+/// What a room is furnished with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Style {
+    /// Boxes with large faces, openings with flat sides.
+    Plain,
+    /// Anything.
+    Mixed,
+}
+
 /// A scene and its meters, each with where it is.
 pub(super) fn room(seed: u64, meters: usize) -> (Scene, Vec<(Kind, Meter)>) {
     let mut draw = Draw(Rng::with_seed(seed));
+    let style = draw.one_of(&[Style::Plain, Style::Mixed]);
     let size_m = DVec3::new(draw.within(3.0, 10.0), draw.within(3.0, 8.0), draw.within(2.4, 4.5));
     let mut rho = || draw.within(0.05, 0.85);
     let reflectance = Reflectances {
@@ -24,19 +37,28 @@ pub(super) fn room(seed: u64, meters: usize) -> (Scene, Vec<(Kind, Meter)>) {
         wall_y_min: rho(),
         wall_y_max: rho(),
     };
-    let luminaires = (0..draw.0.usize(1..5)).map(|k| luminaire(&mut draw, k, size_m)).collect();
-    let bodies = bodies(&mut draw, size_m);
+    let room = Room { size_m, reflectance };
+    let (mut luminaires, mut plates): (Vec<Luminaire>, Vec<Obstacle>) = (vec![], vec![]);
+    for k in 0..draw.0.usize(1..5) {
+        let luminaire = luminaire(&mut draw, k, size_m, style);
+        let plate = flush::plate(&room, &luminaire);
+        if plate.iter().all(|own| !plates.iter().any(|other| flush::overlap(&room, other, own))) {
+            luminaires.push(luminaire);
+            plates.extend(plate);
+        }
+    }
+    let bodies = bodies(&mut draw, size_m, style);
     let obstacle = |[min_m, max_m]: &[DVec3; 2]| {
         let mesh = Mesh::cuboid(*min_m, *max_m);
-        let shape = if draw.one_in(3) {
+        let shape = if style == Style::Mixed && draw.one_in(3) {
             Shape::Mesh { vertices_m: mesh.vertices_m, triangles: mesh.triangles }
         } else {
             Shape::Box { min_m: *min_m, max_m: *max_m }
         };
         Obstacle { shape, reflectance: draw.within(0.1, 0.8) }
     };
-    let obstacles = bodies.iter().map(obstacle).collect();
-    let scene = Scene { room: Some(Room { size_m, reflectance }), obstacles, luminaires };
+    let obstacles = bodies.iter().map(obstacle).chain(plates).collect();
+    let scene = Scene { room: Some(room), obstacles, luminaires };
     let mut found = vec![];
     while found.len() < meters {
         let (kind, meter) = meter(&mut draw, size_m, &bodies, &scene.luminaires);
@@ -50,8 +72,12 @@ pub(super) fn room(seed: u64, meters: usize) -> (Scene, Vec<(Kind, Meter)>) {
     (scene, found)
 }
 
-fn luminaire(draw: &mut Draw, index: usize, size_m: DVec3) -> Luminaire {
-    let opening = match draw.0.usize(0..6) {
+fn luminaire(draw: &mut Draw, index: usize, size_m: DVec3, style: Style) -> Luminaire {
+    let kind = match style {
+        Style::Plain => draw.0.usize(1..3),
+        Style::Mixed => draw.0.usize(0..6),
+    };
+    let opening = match kind {
         0 => LuminousOpening::Point,
         1 => LuminousOpening::Box { x_m: draw.within(0.1, 0.8), y_m: draw.within(0.1, 0.8), height_m: 0.0 },
         2 => LuminousOpening::Box {
@@ -74,7 +100,14 @@ fn luminaire(draw: &mut Draw, index: usize, size_m: DVec3) -> Luminaire {
             diameter_m: 0.08,
         },
     };
-    let below_m = if draw.one_in(3) { draw.within(0.2, 0.3) } else { draw.within(0.4, 1.2) };
+    let is_flush = style == Style::Plain && kind == 1 && draw.one_in(2);
+    let below_m = if is_flush {
+        0.0
+    } else if draw.one_in(3) {
+        draw.within(0.2, 0.3)
+    } else {
+        draw.within(0.4, 1.2)
+    };
     let (x, y) = (draw.within(0.8, size_m.x - 0.8), draw.within(0.8, size_m.y - 0.8));
     let photometry = Photometry { opening, ..Photometry::of(distribution(draw)) };
     Luminaire {
@@ -105,11 +138,17 @@ fn distribution(draw: &mut Draw) -> LuminousIntensityDistribution {
         .unwrap_or_else(|e| unreachable!("tables made here are sound: {e}"))
 }
 
-fn bodies(draw: &mut Draw, size_m: DVec3) -> Vec<[DVec3; 2]> {
+fn bodies(draw: &mut Draw, size_m: DVec3, style: Style) -> Vec<[DVec3; 2]> {
+    let least_m = if style == Style::Plain { 0.6 } else { 0.3 };
     let mut bodies: Vec<[DVec3; 2]> = vec![];
     for _ in 0..draw.0.usize(0..5) {
-        let extent_m = DVec3::new(draw.within(0.3, 1.8), draw.within(0.3, 1.2), draw.within(0.3, 1.2));
-        let x = if draw.one_in(5) { 0.0 } else { draw.within(0.05, size_m.x - extent_m.x - 0.05) };
+        let extent_m = DVec3::new(draw.within(least_m, 1.8), draw.within(least_m, 1.2), draw.within(least_m, 1.2));
+        let x = match draw.0.usize(0..5) {
+            0 => 0.0,
+            // A gap that light hardly finds.
+            1 => close_m(draw),
+            _ => draw.within(0.05, size_m.x - extent_m.x - 0.05),
+        };
         let y = draw.within(0.05, size_m.y - extent_m.y - 0.05);
         let low = DVec3::new(x, y, if draw.one_in(3) { draw.within(0.1, 0.4) } else { 0.0 });
         let high = low + extent_m;
@@ -121,6 +160,24 @@ fn bodies(draw: &mut Draw, size_m: DVec3) -> Vec<[DVec3; 2]> {
     bodies
 }
 
+/// As close to a surface as meters come, every other time a millimetre.
+fn close_m(draw: &mut Draw) -> f64 {
+    if draw.one_in(2) { 1e-3 } else { draw.close_m() }
+}
+
+/// Beside one of a body's faces, every third time at one of its edges.
+fn beside(draw: &mut Draw, [low, high]: [DVec3; 2]) -> DVec3 {
+    let axis = draw.0.usize(0..3);
+    let mut position_m = DVec3::from_array([0, 1, 2].map(|k| draw.within(low[k], high[k])));
+    let ends = [low, high].map(|p| p[axis]);
+    position_m[axis] = if draw.one_in(2) { ends[0] - close_m(draw) } else { ends[1] + close_m(draw) };
+    if draw.one_in(3) {
+        let along = (axis + 1) % 3;
+        position_m[along] = if draw.one_in(2) { low[along] + close_m(draw) } else { high[along] - close_m(draw) };
+    }
+    position_m
+}
+
 fn meter(draw: &mut Draw, size_m: DVec3, bodies: &[[DVec3; 2]], luminaires: &[Luminaire]) -> (Kind, Meter) {
     let axis = DVec3::AXES[draw.0.usize(0..3)];
     let any = if draw.one_in(2) { axis } else { -axis };
@@ -129,15 +186,14 @@ fn meter(draw: &mut Draw, size_m: DVec3, bodies: &[[DVec3; 2]], luminaires: &[Lu
         draw.within(0.1, size_m.y - 0.1),
         draw.within(0.1, size_m.z - 0.1),
     );
-    let (a, b, c) = (draw.close_m(), draw.close_m(), draw.close_m());
+    let (a, b, c) = (close_m(draw), close_m(draw), close_m(draw));
     let (kind, mut position_m, normal) = match draw.0.usize(0..8) {
         0 => (Kind::Wall, DVec3::new(a, inner.y, inner.z), any),
         1 => (Kind::Edge, DVec3::new(a, b, inner.z), any),
         2 => (Kind::Corner, DVec3::new(a, b, c), any),
         3 if !bodies.is_empty() => {
-            let [low, high] = bodies[draw.0.usize(0..bodies.len())];
-            let beside = DVec3::new(high.x + a, draw.within(low.y, high.y), draw.within(low.z, high.z));
-            (Kind::Body, beside, any)
+            let body = bodies[draw.0.usize(0..bodies.len())];
+            (Kind::Body, beside(draw, body), any)
         }
         4 => {
             let above = luminaires[draw.0.usize(0..luminaires.len())].position_m;
