@@ -90,8 +90,8 @@ fn what_it_asks_for_is_bounded() {
         "procedures:\n  luminous_intensity: {{luminaire: lamp, distance_m: 5, angles: {{gamma_deg: [{listed}], c_deg: [{listed}]}}}}\n"
     );
     refused(DIRECT, &angles, "40000 angles are more than the 9998");
-    let cases: String = (0..101).map(|k| format!("  - {{name: c{k}}}\n")).collect();
-    said(&room(&(spec() + "cases:\n" + &cases)), "a spec holds 100 cases at most");
+    let cases: Vec<String> = (0..101).map(|k| format!("  - {{name: c{k}}}\n")).collect();
+    said(&room(&(spec() + "cases:\n" + &cases.concat())), "a spec holds 100 cases at most");
     refused("title: a test room", &format!("title: {}", "a".repeat(1 << 20)), "more than 1 MB");
     refused("meters: plane", "meters: [plane, plane]", "stands there twice");
 }

@@ -20,7 +20,7 @@ pub(crate) fn diagnose(error: SpecError) -> Report {
     };
     let mut diagnostic =
         miette::MietteDiagnostic::new(format!("{place}: {}", shortened(&error.message))).with_severity(Severity::Error);
-    diagnostic.help = error.help.as_deref().map(shortened);
+    diagnostic.help = error.help.map(|help| shortened(&help));
     match (text, span) {
         (Some(text), Some(span)) => {
             let diagnostic = diagnostic.with_label(LabeledSpan::new_with_span(Some("here".to_owned()), span));

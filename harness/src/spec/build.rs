@@ -139,7 +139,7 @@ impl<'a> Builder<'a> {
         self.hash.update(&self.source.text);
         let message = format!("format version {} is not known", spec.luxproof);
         self.source.require(spec.luxproof == 1, "luxproof", message, "this program reads version 1")?;
-        self.source.trust.starts_no_program(self.source, &spec)?;
+        self.programs(&spec)?;
         self.take("luminaires", "luminaires", spec.luminaires.len(), |left| &mut left.luminaires)?;
         let room = self.room(&spec)?;
         let mut obstacles = self.obstacles(&spec.obstacles, &room)?;
@@ -178,6 +178,15 @@ impl<'a> Builder<'a> {
             tolerances,
             source: self.source.clone(),
         })
+    }
+
+    /// Refuses programs that a stranger would have us run.
+    fn programs(&self, spec: &Spec) -> Result<(), SpecError> {
+        let mut engines = spec.engines.iter().flatten();
+        let Some((name, _)) = engines.find(|(_, settings)| settings.0.contains_key("command")) else { return Ok(()) };
+        let message = "it would run a program, and the spec is not trusted";
+        let help = "run it without --untrusted if it is yours";
+        self.source.require(self.source.trust == Trust::Own, &format!("engines.{name}.command"), message, help)
     }
 
     fn room(&self, spec: &Spec) -> Result<Room, SpecError> {

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::Path;
 
-use super::{MAX_SPEC_BYTES, Source, Spec, SpecError};
+use super::MAX_SPEC_BYTES;
 use crate::system::files::{MAX_BYTES, read_below, read_bounded};
 
 /// Whose specs are read.
@@ -66,15 +66,6 @@ impl Trust {
             Self::Own => read_bounded(path, most),
             Self::Stranger => read_below(folder, path, most),
         }
-    }
-
-    /// Refuses programs that a stranger would have us run.
-    pub(super) fn starts_no_program(self, source: &Source, spec: &Spec) -> Result<(), SpecError> {
-        let engines = spec.engines.iter().flatten();
-        let named = engines.filter(|(_, settings)| settings.0.contains_key("command")).map(|(name, _)| name).next();
-        let Some(name) = named.filter(|_| self == Self::Stranger) else { return Ok(()) };
-        let message = "it would run a program, and the spec is not trusted";
-        Err(source.error_at(&format!("engines.{name}.command"), message, "run it without --untrusted if it is yours"))
     }
 }
 
