@@ -3,7 +3,7 @@
 use std::fs;
 use std::os::unix::fs::symlink;
 
-use crate::support::{Answer, Folder, LAMP, MINE, ROOM, TWO_METERS};
+use crate::support::{Answer, Folder, LAMP, MINE, ROOM, TWO_METERS, root};
 
 const DIRECT: &str = "procedures:\n  direct_illuminance: {meters: plane}\n";
 
@@ -134,6 +134,14 @@ fn no_name_title_or_keyword_is_obeyed_by_any_engine_or_view() {
         let begins = |line: &String| line.starts_with("!touch") || line.starts_with("#include \"/etc");
         assert!(!lines(&text).iter().any(begins), "{file}: {text}");
     }
+}
+
+#[test]
+fn random_hostile_specs_and_damaged_files_are_refused_or_without_effect() {
+    let script = root().join("ci/hostile");
+    let mut hostile = std::process::Command::new("python3");
+    hostile.arg(script).args(["--specs", "200", "--traced", "0", "--flips", "10", "--seconds", "20"]);
+    Answer::of(hostile.env("LUXPROOF", env!("CARGO_BIN_EXE_luxproof"))).exits(0).prints("200 specs");
 }
 
 /// All files below a folder.
