@@ -126,6 +126,8 @@ fn no_name_title_or_keyword_is_obeyed_by_any_engine_or_view() {
     let args = ["--untrusted", "--no-cache", "--format", "markdown", "--format", "html", "--format", "junit"];
     let answer = room.run(&args);
     assert_eq!(answer.code, Some(0), "{}\n{}", answer.stdout, answer.stderr);
+    // None of the views lets a name be markup.
+    assert!(answer.stdout.contains("&lt;img src=x") && !answer.stdout.contains("<img src=x"), "{}", answer.stdout);
     let files = walk(room.path("."));
     assert!(!files.iter().any(|file| file.ends_with("pwned")), "{files:?}");
     let lines = |text: &str| -> Vec<String> { text.lines().map(|line| line.trim().to_owned()).collect() };

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::Site;
 use crate::record::{EngineName, MeterId, Uncertainty};
+use crate::system::printable;
 use crate::system::process::{Invocation, PeakMemory, ProcessError};
 
 #[derive(Clone, Debug, PartialEq)]
@@ -83,6 +84,6 @@ impl EngineError {
     }
 
     pub fn output(engine: EngineName, what: impl Into<String>) -> Self {
-        Self::Output { engine, what: what.into() }
+        Self::Output { engine, what: printable::lines(&what.into()) }
     }
 }

@@ -8,7 +8,7 @@ pub fn csv(report: &Report) -> String {
     // Writing to memory fails on no condition that a report can meet; a file without lines would be noticed at once.
     writer.write_record(COLUMNS.map(|(name, _)| name)).ok();
     for c in &report.comparisons {
-        writer.write_record(COLUMNS.map(|(_, of)| of(c))).ok();
+        writer.write_record(COLUMNS.map(|(_, of)| inert(of(c)))).ok();
     }
     writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
 }
@@ -44,6 +44,31 @@ const COLUMNS: [Column; 25] = [
     ("diagnosis", |c| c.diagnosis.clone().unwrap_or_default()),
 ];
 
+/// What a spreadsheet takes for no formula: a text that begins like one has an apostrophe before it, and numbers stay numbers.
+fn inert(text: String) -> String {
+    let begins = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    if begins && text.parse::<f64>().is_err() { format!("'{text}") } else { text }
+}
+
 fn number(value: Option<f64>) -> String {
     value.map(|v| v.to_string()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_text_is_a_formula_and_every_number_stays_one() {
+        for (text, shown) in [
+            ("=HYPERLINK(1)[0]", "'=HYPERLINK(1)[0]"),
+            ("@desk[0]", "'@desk[0]"),
+            ("-1.5e-3", "-1.5e-3"),
+            ("+12", "+12"),
+            ("-a", "'-a"),
+            ("desk[0]", "desk[0]"),
+        ] {
+            assert_eq!(inert(text.to_owned()), shown);
+        }
+    }
 }

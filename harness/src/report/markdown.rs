@@ -15,20 +15,20 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
         text.push_str(&l);
         text.push('\n');
     };
-    line(format!("## luxproof: {}", report.spec.title));
+    line(format!("## luxproof: {}", plain(&report.spec.title)));
     line(format!("\n{} in {:.1} s\n", report.summary, report.wall_s));
     for rule in decision_rules(report) {
         line(format!("{rule}\n"));
     }
     for policy in policies(report) {
-        line(format!("{policy}\n"));
+        line(format!("{}\n", plain(&policy.to_string())));
     }
     let engines: Vec<&str> = report.engines.iter().map(|e| e.id.as_str()).collect();
     line(format!("| {}procedure | against | {} |", report.of_suite("case", " | "), engines.join(" | ")));
     line(format!("|---|---|{}", "---|".repeat(engines.len() + usize::from(report.is_suite()))));
     for row in matrix(report) {
         let cells: Vec<String> = row.cells.iter().map(Cell::text).collect();
-        let case = report.of_suite(&row.case, " | ");
+        let case = report.of_suite(&cell(&row.case), " | ");
         line(format!("| {case}{} | {} | {} |", row.label, row.basis, cells.join(" | ")));
     }
     for grid in papers::grids(report) {
@@ -53,18 +53,22 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
     if !splits.is_empty() {
         line(String::new());
         for (place, split) in splits {
-            line(format!("- {place}: {split}"));
+            line(format!("- {}: {}", plain(&place), plain(&split)));
         }
     }
     let departures = departures(report);
     if !departures.is_empty() {
         line("\nWho departs from the other witnesses, the reference included:\n".into());
         for departure in &departures {
-            line(format!("- {departure}"));
+            line(format!("- {}", plain(departure)));
         }
     }
     for (k, told) in tables(report).iter().enumerate() {
-        line(format!("{}- {told}", if k == 0 { "\nWhat does not fit in published tables:\n\n" } else { "" }));
+        line(format!(
+            "{}- {told}",
+            if k == 0 { "\nWhat does not fit in published tables:\n\n" } else { "" },
+            told = plain(told)
+        ));
     }
     worst_deviations(report, &mut line);
     if let Some(check) = &report.baseline {
@@ -72,11 +76,12 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
         for (k, entry) in check.departures().enumerate() {
             let gap = if k == 0 { "\n" } else { "" };
             let place = format!("{} {} {}", entry.key.case, entry.key.procedure, entry.key.engine);
-            line(format!("{gap}- **{}** {place}: {}", entry.state.to_lowercase(), entry.details.join("; ")));
+            let details = plain(&entry.details.join("; "));
+            line(format!("{gap}- **{}** {}: {details}", entry.state.to_lowercase(), plain(&place)));
         }
     }
     for (k, note) in notes(report).iter().filter(|n| n.kind <= Kind::Shortcut).enumerate() {
-        line(format!("{}- {}", if k == 0 { "\n" } else { "" }, note.line(report)));
+        line(format!("{}- {}", if k == 0 { "\n" } else { "" }, plain(&note.line(report))));
     }
     if let Some(link) = link {
         writeln!(text, "\n[The whole report]({link})").ok();
@@ -95,10 +100,10 @@ fn worst_deviations(report: &Report, line: &mut impl FnMut(String)) {
             let number = |v: Option<f64>| v.map_or("-".to_owned(), significant);
             line(format!(
                 "| {}{} {} | {} | {} | {} | {} | {} |",
-                report.of_suite(&c.key.case, " "),
+                report.of_suite(&cell(&c.key.case), " "),
                 c.key.engine,
                 c.key.procedure,
-                c.meter,
+                cell(&c.meter.0),
                 number(c.value),
                 number(c.reference.as_ref().map(|r| r.value)),
                 c.relative_deviation.map_or("-".to_owned(), percent),
@@ -108,7 +113,12 @@ fn worst_deviations(report: &Report, line: &mut impl FnMut(String)) {
     }
 }
 
-/// Text that cannot end a cell of a table.
+/// Text that is no markup: what people and programs wrote begins no element of HTML, which Markdown lets through.
+fn plain(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// Text that cannot end a cell of a table either.
 fn cell(text: &str) -> String {
-    text.replace('|', "\\|").replace('\n', " ")
+    plain(text).replace('|', "\\|").replace('\n', " ")
 }

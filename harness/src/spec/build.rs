@@ -20,6 +20,7 @@ use super::{Source, SpecError, Trust, suggestion};
 use crate::procedures::{Angles, Asked, AtAngles, Names, Procedures, Task};
 use crate::record::ProcedureId;
 use crate::system::digest::hexadecimal;
+use crate::system::printable;
 
 /// Nearest a meter or a luminaire may come to a surface, relative to the room's largest extent.
 ///
@@ -302,7 +303,7 @@ impl<'a> Builder<'a> {
     /// Refuses what is no name: names stand in scenes, logs and views, where a line break begins something else.
     fn name(&self, at: &str, name: &str) -> Result<(), SpecError> {
         let is_name = is_line(name, MAX_NAME) && name.trim() == name && !name.is_empty();
-        let message = format!("`{}` is no name", printable(name, MAX_NAME));
+        let message = format!("`{}` is no name", printable::line(name, MAX_NAME));
         let help = format!("give 1 to {MAX_NAME} printable characters, no blank at either end");
         self.source.require(is_name, at, message, help)
     }
@@ -470,22 +471,12 @@ fn points_of(grid: &GridSpec) -> Vec<DVec3> {
 /// A spec's name: its file's, as a line.
 pub(super) fn name_of(path: &Path) -> String {
     let stem = path.file_stem().map_or_else(|| "spec".into(), |s| s.to_string_lossy());
-    printable(&stem, MAX_NAME)
+    printable::line(&stem, MAX_NAME)
 }
 
 /// Whether a text is one line of so many characters at most: no control character, and none that breaks or turns a line.
 fn is_line(text: &str, most: usize) -> bool {
-    text.chars().count() <= most && !text.chars().any(is_unprintable)
-}
-
-fn is_unprintable(c: char) -> bool {
-    let breaks_or_turns = matches!(c, '\u{2028}' | '\u{2029}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    c.is_control() || breaks_or_turns || c == '\u{feff}'
-}
-
-/// A text as a line of so many characters at most.
-fn printable(text: &str, most: usize) -> String {
-    text.chars().take(most).map(|c| if is_unprintable(c) { '\u{fffd}' } else { c }).collect()
+    text.chars().count() <= most && !text.chars().any(printable::is_unprintable)
 }
 
 /// What is wrong with a meter at this point, and what to do.

@@ -4,6 +4,7 @@ pub mod claim;
 pub(crate) mod digest;
 pub mod envelope;
 pub mod files;
+pub(crate) mod printable;
 pub mod process;
 pub(crate) mod random;
 mod rows;

@@ -13,6 +13,7 @@ use crate::engines::contract::same_meters;
 use crate::engines::{EngineError, Job, Measurement, Station, recess};
 use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
 use crate::spec::Budget;
+use crate::system::printable;
 
 const VERSION: u32 = 1;
 
@@ -294,7 +295,7 @@ pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Resu
         Some(_) if !answer.readings.is_empty() => {
             return Err(output("declined and gave readings: give either `declined` or `readings`"));
         }
-        Some(why) => return Err(EngineError::Declined { engine: engine.clone(), why }),
+        Some(why) => return Err(EngineError::Declined { engine: engine.clone(), why: printable::lines(&why) }),
         None => {}
     }
     if let Some(what) = answer.readings.iter().find_map(ReadingForm::senseless_freedom) {
@@ -305,6 +306,14 @@ pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Resu
     let mut estimates: Vec<Estimate> = answer.readings.iter().map(estimate).collect();
     Estimate::mark_agreeing(&mut estimates);
     Estimate::mark_unseen(&mut estimates);
-    let (method, effort) = (answer.settings.into_iter().collect(), answer.effort.into_iter().collect());
-    Ok(Measurement { estimates, method, effort, notes: answer.notes, ..Measurement::default() })
+    let shown = |said: BTreeMap<String, String>| -> BTreeMap<String, String> {
+        said.into_iter().map(|(key, value)| (printable::lines(&key), printable::lines(&value))).collect()
+    };
+    Ok(Measurement {
+        estimates,
+        method: shown(answer.settings).into_iter().collect(),
+        effort: shown(answer.effort).into_iter().collect(),
+        notes: answer.notes.iter().map(|note| printable::lines(note)).collect(),
+        ..Measurement::default()
+    })
 }

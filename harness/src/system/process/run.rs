@@ -12,6 +12,7 @@ use super::invocation::{Finished, Invocation, ProcessError};
 use super::memory;
 use super::output::{Answer, Messages};
 use super::running::Running;
+use crate::system::printable;
 
 impl Invocation {
     pub fn run(&self) -> Result<Finished, ProcessError> {
@@ -111,5 +112,5 @@ const LAST_WORDS: usize = 8;
 
 fn tail(text: &str, lines: usize) -> String {
     let all: Vec<&str> = text.lines().filter(|l| !l.trim().is_empty()).collect();
-    all[all.len().saturating_sub(lines)..].join("\n")
+    printable::lines(&all[all.len().saturating_sub(lines)..].join("\n"))
 }
