@@ -93,7 +93,8 @@ impl Tools {
         let stdin = rows.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         let run = self.seeded(workbench.invoke(self.program("rtrace")), seed);
         let run = run.args(["-h", "-fdd"]).args(options).args([octree]).stdin(stdin);
-        let finished = run.longest_answer(ROW * rows.len()).run()?;
+        // Some more is read, so that rows too many are told as such.
+        let finished = run.longest_answer(4 * ROW * rows.len()).run()?;
         parse(&finished.stdout, rows.len())
     }
 
