@@ -21,7 +21,7 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
         line(format!("{rule}\n"));
     }
     for policy in policies(report) {
-        line(format!("{}\n", plain(&policy.to_string())));
+        line(format!("{}\n", plain(&policy)));
     }
     let engines: Vec<&str> = report.engines.iter().map(|e| e.id.as_str()).collect();
     line(format!("| {}procedure | against | {} |", report.of_suite("case", " | "), engines.join(" | ")));
@@ -53,7 +53,7 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
     if !splits.is_empty() {
         line(String::new());
         for (place, split) in splits {
-            line(format!("- {}: {}", plain(&place), plain(&split)));
+            line(format!("- {}: {}", plain(&place), plain(split)));
         }
     }
     let departures = departures(report);

@@ -12,7 +12,7 @@ pub enum Trust {
     /// The user's own: they name files anywhere, and programs to run as engines.
     #[default]
     Own,
-    /// A stranger's: they name files below their own folder alone, start nothing, and are no larger than [`Limits`] says.
+    /// A stranger's: they name files below their own folder alone, start nothing, and are bounded in size (SECURITY.md has the numbers).
     Stranger,
 }
 
