@@ -34,14 +34,8 @@ fn hunt(folder: &Folder, more: &[&str]) -> (Value, Option<i32>) {
 
 #[test]
 fn planted_bugs_are_found_made_small_and_handed_over() {
-    for (bug, says) in [
-        ("factor", "too_much"),
-        ("abs_cosine", "too_much"),
-        ("gamma_nearest", "verdict"),
-        ("pi", "too_little"),
-        ("nan_axis", "failure"),
-        ("shadow_none", "too_much"),
-    ] {
+    // `ci/benchmarks/hunt` hunts all that are written.
+    for (bug, says) in [("abs_cosine", "too_much"), ("gamma_nearest", "verdict"), ("nan_axis", "failure")] {
         let folder = planted(bug);
         let (found, code) = hunt(&folder, &["--findings", "1", "--specs", "160", "--minutes", "5"]);
         assert_eq!(code, Some(1), "{bug}: {found}");
