@@ -123,6 +123,9 @@ fn what_never_ends_is_not_opened() {
             let refused = told(&room.luxproof(&["check", spec]).exits(2));
             assert!(refused.contains("no regular file"), "{refused}");
         }
+        for photometry in ["pipe", "/dev/zero"] {
+            room.luxproof(&["photometry", photometry]).exits(2).complains("no regular file");
+        }
     }
 }
 

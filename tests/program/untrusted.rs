@@ -51,6 +51,10 @@ fn files_lie_below_the_folder_wherever_links_lead_and_nothing_of_others_is_told(
     }
     // The spec itself, and a policy beside it.
     let room = room(&spec());
+    symlink(&place, room.path("link.ies")).unwrap();
+    room.write("tilted.ies", &LAMP.replace("TILT=NONE", "TILT=link.ies"));
+    let told = room.luxproof(&["photometry", "tilted.ies", "--untrusted"]).exits(2).complains("cannot be followed");
+    assert!(!told.stderr.contains(secret), "{told:?}");
     fs::rename(room.path("spec.yaml"), room.path("away")).unwrap();
     symlink(&place, room.path("spec.yaml")).unwrap();
     assert!(!said(&room, "it is a link").contains(secret));
@@ -72,6 +76,8 @@ fn no_program_is_started_and_those_of_the_users_own_are_told() {
     said(&self::room(&(spec() + cases)), "it would run a program");
     let answer = room.run(&["--engines", "mine"]);
     assert!(answer.stderr.contains("engines.mine runs `python3"), "{}", answer.stderr);
+    // The doctor would have engines of a spec read scenes of known answer.
+    room.luxproof(&["engines", "doctor", "--spec", "spec.yaml", "--untrusted"]).exits(2).complains("not trusted");
     for command in ["hunt", "selftest"] {
         Answer::of(room.command(&[command]).env("LUXPROOF_UNTRUSTED", "1")).exits(2).complains("user's own alone");
     }

@@ -13,7 +13,7 @@ use crate::judge::PolicyChoice;
 use crate::plan::Skipping;
 use crate::record::{EngineName, EngineStatus, Status};
 use crate::report::{Detail, Exit, Style, terminal};
-use crate::spec::suggestion;
+use crate::spec::{Trust, suggestion};
 use crate::system::process;
 
 #[derive(Clone, Debug, Subcommand)]
@@ -47,7 +47,7 @@ pub(super) enum EnginesAction {
     },
 }
 
-pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site) -> Result<Exit, Diagnostic> {
+pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
     match action.unwrap_or(EnginesAction::List) {
         EnginesAction::List => {
             for engine in engines::all() {
@@ -71,16 +71,18 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site) -> Resu
             known_engines(&names)?;
             Ok(told(&engines::repair(site, &wanted(&names), complain)))
         }
-        EnginesAction::Doctor { names, spec, policy } => examine(site, &names, spec.as_deref(), policy),
+        EnginesAction::Doctor { names, spec, policy } => {
+            let folder = tempfile::tempdir().into_diagnostic()?;
+            let options = Options::new(site.clone(), folder.path().to_owned());
+            let mut options = Options { skipping: Skipping::Nothing, trust, policy, ..options };
+            options.selection.engines = names;
+            examine(spec.as_deref(), &options)
+        }
     }
 }
 
-fn examine(site: &Site, names: &[String], spec: Option<&Path>, policy: PolicyChoice) -> Result<Exit, Diagnostic> {
-    let folder = tempfile::tempdir().into_diagnostic()?;
-    let options = Options::new(site.clone(), folder.path().to_owned());
-    let mut options = Options { skipping: Skipping::Nothing, policy, ..options };
-    options.selection.engines = names.to_vec();
-    let report = audit::examine(spec, &options).map_err(not_audited)?;
+fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<Exit, Diagnostic> {
+    let report = audit::examine(spec, options).map_err(not_audited)?;
     print(&terminal(&report, Style::Plain, Detail::Brief, None))?;
     print(&format!("sandbox of engines: {}\n", process::sandbox_in_words()))?;
     print(&format!("memory of an engine: {} MiB at most\n", process::limit_mib()))?;

@@ -209,8 +209,8 @@ impl Cli {
             Command::Cache { action } => cache::manage(action, &cache::folder(self.cache_dir)?),
             Command::Check(args) => check::check(&args, &site, trust),
             Command::Export(args) => export::export(&args, &site, trust),
-            Command::Engines { action } => engines::manage_engines(action, &site),
-            Command::Photometry(args) => photometry::run(&args),
+            Command::Engines { action } => engines::manage_engines(action, &site, trust),
+            Command::Photometry(args) => photometry::run(&args, trust),
             Command::Report(mut args) => {
                 args.views.all |= self.verbose > 0;
                 views::view(&args)

@@ -60,7 +60,7 @@ impl Trust {
     }
 
     /// The bytes of a file that a spec in this folder names.
-    pub(super) fn read_named(self, folder: &Path, path: &Path) -> io::Result<Vec<u8>> {
+    pub(crate) fn read_named(self, folder: &Path, path: &Path) -> io::Result<Vec<u8>> {
         let most = self.limits().file_bytes;
         match self {
             Self::Own => read_bounded(path, most),

@@ -17,7 +17,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr, miette};
 
 use crate::cli::diagnostic::diagnose;
 use crate::report::Exit;
-use crate::spec::SpecError;
+use crate::spec::{SpecError, Trust};
 
 use summary::Summary;
 
@@ -61,7 +61,7 @@ struct Reading {
 }
 
 /// Reads the files, prints to stdout, writes what was asked for; a refused file makes the exit code 2.
-pub(crate) fn run(args: &PhotometryArgs) -> Result<Exit, Diagnostic> {
+pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnostic> {
     let format = if args.json { Format::Json } else { args.format };
     if format == Format::Sarif && !args.lint {
         return Err(miette!(help = "add --lint", "--format sarif prints lints only"));
@@ -69,7 +69,9 @@ pub(crate) fn run(args: &PhotometryArgs) -> Result<Exit, Diagnostic> {
     if args.files.len() > 1 && (args.polar.is_some() || args.convert.is_some()) {
         return Err(miette!(help = "give one FILE", "--polar and --convert write one file"));
     }
-    let read = |file: &PathBuf| Reading { file: file.clone(), read: photometry::read_file(file) };
+    let open = |file: &Path, path: &Path| trust.read_named(file.parent().unwrap_or(Path::new("")), path);
+    let read = |file: &PathBuf| photometry::read_by(file, &|path| open(file, path));
+    let read = |file: &PathBuf| Reading { file: file.clone(), read: read(file) };
     let readings: Vec<Reading> = args.files.iter().map(read).collect();
     let text = match format {
         Format::Json => json(&readings)?,

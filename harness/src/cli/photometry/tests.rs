@@ -93,16 +93,17 @@ fn conversion_follows_the_extension_and_refusal_is_exit_2() {
     std::fs::write(at("a.ies"), lm63::write_2002(&pendant()).text).unwrap();
     std::fs::write(at("bad.ies"), "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 0\n0 90\n0\n5\n").unwrap();
     let text = |name: &str| at(name).display().to_string();
-    let exit = run(&arguments(&[&text("a.ies"), "--convert", &text("b.ldt"), "--polar", &text("a.svg")])).unwrap();
+    let exit =
+        run(&arguments(&[&text("a.ies"), "--convert", &text("b.ldt"), "--polar", &text("a.svg")]), Trust::Own).unwrap();
     assert_eq!(exit, Exit::Passed);
     let converted = photometry::read_file(&at("b.ldt")).unwrap();
     assert_eq!(converted.format, "EULUMDAT");
     assert_eq!(converted.distribution, pendant().distribution);
     assert!(std::fs::read_to_string(at("a.svg")).unwrap().starts_with("<svg "));
-    assert_eq!(run(&arguments(&[&text("a.ies"), &text("bad.ies"), "--json"])).unwrap(), Exit::Usage);
-    assert!(run(&arguments(&[&text("a.ies"), "--convert", &text("b.doc")])).is_err());
-    assert!(run(&arguments(&[&text("a.ies"), &text("a.ies"), "--polar", "x.svg"])).is_err());
-    assert!(run(&arguments(&[&text("a.ies"), "--format", "sarif"])).is_err());
+    assert_eq!(run(&arguments(&[&text("a.ies"), &text("bad.ies"), "--json"]), Trust::Own).unwrap(), Exit::Usage);
+    assert!(run(&arguments(&[&text("a.ies"), "--convert", &text("b.doc")]), Trust::Own).is_err());
+    assert!(run(&arguments(&[&text("a.ies"), &text("a.ies"), "--polar", "x.svg"]), Trust::Own).is_err());
+    assert!(run(&arguments(&[&text("a.ies"), "--format", "sarif"]), Trust::Own).is_err());
 }
 
 #[test]

@@ -55,7 +55,7 @@ impl Draft {
             let name = if files.contains_key(&base) { other() } else { base.clone() };
             let unreadable = |e: io::Error| SpecError::of(&path, format!("cannot be read: {e}"), "check the path");
             let bytes = read_bounded(&path, MAX_BYTES).map_err(unreadable)?;
-            let photometry = photometry::read_file(&path).ok();
+            let photometry = photometry::read_by(&path, &|path| read_bounded(path, MAX_BYTES)).ok();
             files.insert(name.clone(), File { bytes, photometry });
             named.clone_from(&name);
             names.insert(path, name);
