@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Instant, SystemTime};
 
 use super::jobs::{self, Outcome, Running};
-use super::repetition::Examined;
+use super::repetition::Examination;
 use super::{AuditError, Options, StatedErrors, repetition, sampling, sequential};
 use crate::judge::{Comparison, Judge, Policy, Published};
 use crate::measure::Reader;
@@ -84,12 +84,12 @@ impl Audit<'_> {
         let running = Running { case, plan, folder, reader, observer };
         let mut outcome = running.run()?;
         if !process::is_interrupted() {
-            let examined = match self.options.stated_errors {
+            let examination = match self.options.stated_errors {
                 StatedErrors::LookedInto => repetition::examine(&running, judge, &mut outcome),
-                StatedErrors::Believed => Examined::default(),
+                StatedErrors::Believed => Examination::default(),
             };
-            sampling::sample_on(&running, judge, &examined.found, &mut outcome)?;
-            examined.examine_looks(&running, judge, &mut outcome);
+            sampling::sample_on(&running, judge, &examination.found, &mut outcome)?;
+            examination.examine_looks(&running, judge, &mut outcome);
         }
         if outcome.from_cache > 0 {
             let count = outcome.from_cache;

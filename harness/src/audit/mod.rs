@@ -40,7 +40,7 @@ use crate::measure::{Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
 use crate::procedures::Task;
 use crate::record::Status;
-use crate::report::{Exit, Report, SpecRecord};
+use crate::report::{self, Exit, Report, SpecRecord};
 use crate::spec::{Case, SpecError, Trust, filtered, suite};
 use crate::system::claim::{Claim, ClaimError};
 use crate::system::digest::hexadecimal;
@@ -274,7 +274,7 @@ fn audited(
     for (case, report) in cases.iter().zip(&mut reports) {
         let folder = folder_of(case);
         if folder != options.out && report.comparisons.iter().any(|c| c.diagnosis.is_some()) {
-            keep(report, &folder, Care::Usual)?;
+            report.keep_with(Care::Usual, &folder.join(report::FILE))?;
         }
     }
     let mut report = Report::joined(spec, reports);

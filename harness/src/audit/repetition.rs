@@ -50,57 +50,55 @@ struct Again<'a> {
     /// Target by target, what was sampled and what was claimed to be determined and is not; `None` where it did not answer.
     sampled: Option<Vec<Vec<Estimate>>>,
     claims: Option<Vec<Vec<Estimate>>>,
-    /// What all that its engine read again shows.
-    tails: Tails,
 }
 
 /// What was found of stated errors, and what it was found by.
 #[derive(Default)]
-pub(super) struct Examined<'a> {
+pub(super) struct Examination<'a> {
     pub(super) found: Found,
-    again: Vec<Again<'a>>,
+    /// With the tails that all shows that its engine read again.
+    again: Vec<(Again<'a>, Tails)>,
 }
 
 /// Reads again, tells in the recordings what is found, and gives readings the errors that they have: by engine and procedure, of what
 /// it sampled and of what it claims.
-pub(super) fn examine<'a>(running: &'a Running<'_>, judge: &Judge<'_>, outcome: &mut Outcome) -> Examined<'a> {
-    let mut examined = Examined::default();
+pub(super) fn examine<'a>(running: &'a Running<'_>, judge: &Judge<'_>, outcome: &mut Outcome) -> Examination<'a> {
+    let mut examination = Examination::default();
     for (e, planned) in running.plan.engines.iter().enumerate().filter(|(_, p)| !p.engine.is_vouched_for()) {
         let name = planned.engine.name();
         let runs = running.plan.runs.iter().filter(|run| run.engine == e);
-        let mut all: Vec<Again<'_>> = runs.map(|run| again(running, run, &name, outcome)).collect();
+        let all: Vec<Again<'_>> = runs.map(|run| again(running, run, &name, outcome)).collect();
         let of_engine: Variation = all.iter().filter_map(Again::rendered).map(|meters| Variation::of(&meters)).sum();
         let scatters = |again: &Again<'_>| again.rendered().into_iter().chain(again.claims.clone()).flatten().collect();
         let of_all: Vec<Vec<Estimate>> = all.iter().flat_map(|again| -> Vec<_> { scatters(again) }).collect();
         let tails = Tails::of(&of_all);
         let of_tails = StatedErrors::of_tails(&of_all, tails);
-        for again in &mut all {
-            again.tails = tails;
+        for again in &all {
             let compared = |found: &[StatedErrors]| again.compared(judge, outcome, Some(found));
             let mut doubts = again.doubts(&of_engine, &compared(&[]));
             doubts.extend(of_tails.clone());
             let now = compared(&doubts);
             doubts.extend(refuted(&now));
-            doubts.extend(again.of_sheltered(running, &now));
-            examined.found.insert((name.clone(), again.task.procedure), doubts);
+            doubts.extend(again.of_sheltered(running, &now, tails));
+            examination.found.insert((name.clone(), again.task.procedure), doubts);
         }
-        examined.again.extend(all);
+        examination.again.extend(all.into_iter().map(|again| (again, tails)));
     }
     for recording in &mut outcome.recordings {
         let ReadingKey { engine, procedure, .. } = &recording.key;
-        let Some(of_engine) = examined.found.get(&(engine.clone(), *procedure)) else { continue };
+        let Some(of_engine) = examination.found.get(&(engine.clone(), *procedure)) else { continue };
         correct(recording, of_engine);
     }
-    examined
+    examination
 }
 
-impl Examined<'_> {
+impl Examination<'_> {
     /// The same where further looks left nothing but what they state between readings and a verdict.
     pub(super) fn examine_looks(&self, running: &Running<'_>, judge: &Judge<'_>, outcome: &mut Outcome) {
-        for again in &self.again {
+        for (again, tails) in &self.again {
             let now = again.compared(judge, outcome, None);
             let doubts = [beyond_tolerance(&now), refuted(&now)].into_iter().flatten();
-            let doubts: Vec<StatedErrors> = doubts.chain(again.of_sheltered(running, &now)).collect();
+            let doubts: Vec<StatedErrors> = doubts.chain(again.of_sheltered(running, &now, *tails)).collect();
             let is_mine = |r: &&mut Recording| r.key.engine == again.engine && r.key.procedure == again.task.procedure;
             for recording in outcome.recordings.iter_mut().filter(is_mine) {
                 apply(recording, &doubts);
@@ -154,7 +152,7 @@ impl Again<'_> {
 
     /// Where nothing but a stated error keeps readings from failing, all that was sampled is read again: how do those meters, by themselves,
     /// scatter?
-    fn of_sheltered(&self, running: &Running<'_>, now: &[Comparison]) -> Vec<StatedErrors> {
+    fn of_sheltered(&self, running: &Running<'_>, now: &[Comparison], tails: Tails) -> Vec<StatedErrors> {
         let is_beyond = |c: &Comparison, allowed: f64| c.deviation.is_some_and(|d| d.abs() > allowed);
         let is_kept = |c: &Comparison| c.verdict == Verdict::Inconclusive && c.uncertainty.is_sampled();
         let at = limits(now, |c, allowed| (is_kept(c) && is_beyond(c, allowed)).then(|| self.unchecked(c, allowed)));
@@ -184,7 +182,7 @@ impl Again<'_> {
                 meters.push(Sheltered { counts: counts(now, &meter), meter, readings });
             }
         }
-        StatedErrors::of_sheltered(&meters, self.tails)
+        StatedErrors::of_sheltered(&meters, tails)
     }
 
     /// How the engine's readings of the task compare, were this found of what it states; `None`: as they are.
@@ -219,8 +217,7 @@ fn again<'a>(running: &'a Running<'_>, run: &'a Run, engine: &EngineName, outcom
     let sampled = repeated(readings, &targets, |number| sampled(running, run, is_whole, &targets, number));
     let claims = contradicted(running, run, readings, &of_claims);
     let was_asked = !(process::is_interrupted() || targets.is_empty() && of_claims.is_empty());
-    let (engine, claimed, tails) = (engine.clone(), of_claims, Tails::Unknown);
-    Again { run, task, engine, was_asked, is_whole, targets, claimed, sampled, claims, tails }
+    Again { run, task, engine: engine.clone(), was_asked, is_whole, targets, claimed: of_claims, sampled, claims }
 }
 
 /// Tells in a recording what is found of it, and gives its readings the errors that they have.

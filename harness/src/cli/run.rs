@@ -13,7 +13,7 @@ use super::views::print_report;
 use crate::audit::{self, AfterFailure, Calibration, Options};
 use crate::engines::Site;
 use crate::measure::cache::Cache;
-use crate::report::earlier::Earlier;
+use crate::report::earlier::subject_at;
 use crate::report::{self, BaselineCheck, Exit, Report};
 use crate::spec::Trust;
 use crate::system::claim::Claim;
@@ -102,13 +102,13 @@ fn out_folder(args: &RunArgs) -> PathBuf {
     };
     let name = one.and_then(|one| one.file_stem()).unwrap_or("suite".as_ref());
     let usual = Path::new("luxproof-out").join(name);
-    let is_namesake = |earlier: &Earlier| one.is_some_and(|one| !is_same(Path::new(earlier.subject()), one));
+    let is_namesake = |earlier: &String| one.is_some_and(|one| !is_same(Path::new(earlier), one));
     let besides = || {
         let whole = std::path::absolute(one?).ok()?;
         let folder = whole.parent()?.file_name()?;
         Some(usual.with_file_name([name, folder].join("-".as_ref())))
     };
-    let chosen = || match Earlier::at(&usual.join(report::FILE)).filter(is_namesake).and_then(|_| besides()) {
+    let chosen = || match subject_at(&usual.join(report::FILE)).filter(is_namesake).and_then(|_| besides()) {
         Some(other) => other,
         None => usual.clone(),
     };

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::system::printable::is_unprintable;
+
 /// A text as it may stand in a comment of any engine's scene, of a script, or of XML.
 ///
 /// It stays on its line, since what begins a line of a Radiance scene may be a command, and ends no comment of XML.
@@ -12,9 +14,8 @@ impl fmt::Display for Comment<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut before = ' ';
         for c in self.0.chars() {
-            let breaks = c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
             match c {
-                _ if breaks => write!(f, " ")?,
+                c if is_unprintable(c) => write!(f, " ")?,
                 // Two hyphens end a comment of XML, a backslash at the end of a line joins it to the next.
                 '-' if before == '-' => write!(f, " -")?,
                 '\\' => write!(f, "/")?,

@@ -206,15 +206,14 @@ impl Judge<'_> {
         held: Option<ScoredReference>,
     ) -> Comparison {
         let (target, reading) = (&task.targets[k], recording.readings.get(k));
-        let believed = |r: &Reading| {
-            let stated = StatedErrors::of_looks(&recording.stated_errors, &r.meter, r.uncertainty);
-            believed(stated, largest_portion, held.as_ref().map(|h| (h.reference.value - r.value).abs()))
-        };
-        let believed = reading.map_or(Uncertainty::Unstated, believed);
         let truth = held.as_ref().map(|h| h.reference.value);
-        let to_come =
-            reading.zip(truth).and_then(|(r, truth)| StatedErrors::to_come(&recording.stated_errors, r.value, truth));
-        let uncertainty = to_come.map_or(believed, |error| believed.at_least(error));
+        let uncertain_by = |r: &Reading| {
+            let stated = StatedErrors::of_looks(&recording.stated_errors, &r.meter, r.uncertainty);
+            let believed = believed(stated, largest_portion, truth.map(|truth| (truth - r.value).abs()));
+            let to_come = truth.and_then(|truth| StatedErrors::to_come(&recording.stated_errors, r.value, truth));
+            to_come.map_or(believed, |error| believed.at_least(error))
+        };
+        let uncertainty = reading.map_or(Uncertainty::Unstated, uncertain_by);
         let basis = held.as_ref().map(|h| h.reference.basis);
         let (tolerance, tolerance_source) =
             basis.map(|basis| self.held_to(task, basis, &recording.key.engine)).unwrap_or_default();

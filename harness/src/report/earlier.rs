@@ -5,20 +5,27 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 use super::Report;
 use crate::record::ReadingKey;
 
 /// What an earlier report says, as far as it matters here.
 #[derive(Deserialize)]
-pub(crate) struct Earlier {
+struct Earlier {
     started: String,
-    spec: Subject,
+    spec: Spec,
     readings: Vec<Read>,
 }
 
+/// The rest of a report may be long.
 #[derive(Deserialize)]
 struct Subject {
+    spec: Spec,
+}
+
+#[derive(Deserialize)]
+struct Spec {
     path: String,
 }
 
@@ -28,26 +35,27 @@ struct Read {
     key: ReadingKey,
 }
 
+/// What lies at a path, if it is a report at all.
+fn read<T: DeserializeOwned>(path: &Path) -> Option<T> {
+    serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+}
+
+/// The spec, or the specs, that an earlier report is about.
+pub(crate) fn subject_at(path: &Path) -> Option<String> {
+    read(path).map(|report: Subject| report.spec.path)
+}
+
 impl Earlier {
-    /// The one at a path, if it is a report at all.
-    pub(crate) fn at(path: &Path) -> Option<Self> {
-        serde_json::from_slice(&std::fs::read(path).ok()?).ok()
-    }
-
-    /// The spec, or the specs, that it is about.
-    pub(crate) fn subject(&self) -> &str {
-        &self.spec.path
-    }
-
     fn says_more_than(&self, report: &Report) -> bool {
         let said: BTreeSet<&ReadingKey> = report.readings.iter().map(|reading| &reading.key).collect();
-        self.subject() != report.spec.path || self.readings.iter().any(|reading| !said.contains(&reading.key))
+        self.spec.path != report.spec.path || self.readings.iter().any(|reading| !said.contains(&reading.key))
     }
 }
 
 /// Gives an earlier report that says more a name of its own, after when its run started, and returns that.
 pub(super) fn put_aside(report: &Report, path: &Path) -> io::Result<Option<PathBuf>> {
-    let Some(earlier) = Earlier::at(path).filter(|earlier| earlier.says_more_than(report)) else { return Ok(None) };
+    let earlier = read(path).filter(|earlier: &Earlier| earlier.says_more_than(report));
+    let Some(earlier) = earlier else { return Ok(None) };
     let time: String = earlier.started.chars().filter(char::is_ascii_alphanumeric).collect();
     let names = (1..).map(|k| if k == 1 { format!("report-{time}.json") } else { format!("report-{time}-{k}.json") });
     let free = names.map(|name| path.with_file_name(name)).find(|aside| !aside.exists());

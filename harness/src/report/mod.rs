@@ -221,7 +221,8 @@ impl Report {
         Ok(aside)
     }
 
-    fn keep_with(&mut self, care: Care, path: &Path) -> Result<(), FileError> {
+    /// The same with so much care.
+    pub(crate) fn keep_with(&mut self, care: Care, path: &Path) -> Result<(), FileError> {
         let fail = |e| FileError::of(path, e);
         self.seal().map_err(|e| fail(e.into()))?;
         let is_long = self.comparisons.len().max(self.readings.len()) > LONG;
