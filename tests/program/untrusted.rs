@@ -91,6 +91,15 @@ fn what_it_asks_for_is_bounded() {
     let lamp = spec().lines().find(|line| line.contains("id: lamp")).unwrap().to_owned();
     let many = (0..501).map(|k| lamp.replace("id: lamp", &format!("id: lamp{k}"))).collect::<Vec<_>>().join("\n");
     refused(&lamp, &many, "501 luminaires are more than the 500");
+    // Each within its limit, and together beyond what is planned in a second.
+    let grid = grid.replace("[101, 100]", "[10, 10]");
+    let crowd = many.lines().skip(1).collect::<Vec<_>>().join("\n");
+    said(&room(&spec().replace(&meters, &grid).replace(&lamp, &crowd)), "25000000 pairs of luminaires");
+    let long = LAMP.replacen("[TEST]", &("[OTHER] much said\n".repeat(150_000) + "[TEST]"), 1);
+    let two = room(&spec().replace(&lamp, &format!("{lamp}\n{}", lamp.replace("lamp", "lamq"))));
+    two.write("lamp.ies", &long);
+    two.write("lamq.ies", &long);
+    said(&two, "bytes of files are more than");
     let listed = (0..200).map(|k| (f64::from(k) * 0.9).to_string()).collect::<Vec<_>>().join(", ");
     let angles = format!(
         "procedures:\n  luminous_intensity: {{luminaire: lamp, distance_m: 5, angles: {{gamma_deg: [{listed}], c_deg: [{listed}]}}}}\n"

@@ -153,6 +153,8 @@ impl<'a> Builder<'a> {
             let set = self.meter_set(name, set, &scene)?;
             meters.insert(name.clone(), set);
         }
+        let seen = meters.values().map(Vec::len).sum::<usize>().saturating_mul(spec.luminaires.len().pow(2));
+        self.take("luminaires", "pairs of luminaires as meters see them", seen, |left| &mut left.sights)?;
         self.procedures(&spec.procedures, &spec.luminaires, &meters)?;
         self.budget(spec.budget)?;
         let tolerances = self.tolerances(&spec.tolerances)?;
@@ -457,6 +459,7 @@ impl<'a> Builder<'a> {
             let message = format!("{} cannot be read: {error}", path.display());
             self.source.error_at(at, message, "paths are relative to the spec's folder")
         })?;
+        self.take(at, "bytes of files", bytes.len(), |left| &mut left.bytes)?;
         self.hash.update(&bytes);
         Ok(bytes)
     }

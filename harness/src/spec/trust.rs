@@ -22,10 +22,14 @@ pub(super) struct Limits {
     pub(super) spec_bytes: u64,
     /// Of a file that it names.
     pub(super) file_bytes: u64,
+    /// Of all files that it names, as often as its cases do.
+    pub(super) bytes: usize,
     pub(super) cases: usize,
     pub(super) luminaires: usize,
     pub(super) meters: usize,
     pub(super) triangles: usize,
+    /// Pairs of luminaires as meters see them: whether one stands in the other's light.
+    pub(super) sights: usize,
 }
 
 impl Trust {
@@ -35,18 +39,22 @@ impl Trust {
             Self::Own => Limits {
                 spec_bytes: MAX_SPEC_BYTES,
                 file_bytes: MAX_BYTES,
+                bytes: usize::MAX,
                 cases: 10_000,
                 luminaires: usize::MAX,
                 meters: usize::MAX,
                 triangles: usize::MAX,
+                sights: usize::MAX,
             },
             Self::Stranger => Limits {
                 spec_bytes: 1 << 20,
                 file_bytes: 4 << 20,
+                bytes: 4 << 20,
                 cases: 100,
                 luminaires: 500,
                 meters: 10_000,
                 triangles: 50_000,
+                sights: 20_000_000,
             },
         }
     }
