@@ -6,8 +6,10 @@ mod room;
 use std::collections::BTreeMap;
 use std::fmt;
 
-use luminaire::scene::{Bounces, Meter, Transport};
-use luminaire::simulator::{Accuracy, Prepared, Solution, Stop, Uncertainty, certified_until};
+use luminaire::scene::{Bounces, Meter, Scene, Transport};
+use luminaire::simulator::{
+    Accuracy, Estimate, Prepared, SimulatorError, Solution, Stop, Uncertainty, certified_until,
+};
 use serde::Serialize;
 use strum::IntoStaticStr;
 
@@ -20,6 +22,9 @@ const METERS: usize = 30;
 const FINER: f64 = 3.0;
 /// Standard errors of the certifier, seven degrees of freedom, that it is off by once in a thousand times.
 const CERTIFIED_WITHIN: f64 = 5.4;
+/// How often what seems to be a miss is certified again: the tail of path tracing is heavier than the blocks of one seed tell, so
+/// that among thousands of readings some are certified wrongly.
+const AGAIN: u64 = 3;
 /// Boundaries of the histogram: error over bound and the certifier's own error together.
 const BINS: [f64; 5] = [0.03, 0.1, 0.3, 1.0, f64::INFINITY];
 
@@ -40,8 +45,10 @@ pub enum Kind {
 pub struct Coverage {
     pub rooms: usize,
     pub readings: usize,
-    /// Readings beyond their bound by more than the certifier may be off.
+    /// Readings beyond their bound by more than the certifier may be off, whatever it says again with other seeds.
     pub beyond: Vec<Miss>,
+    /// How many seemed to be, until they were certified with other seeds.
+    pub cleared: usize,
     /// How often an error lies within .03, .1, .3 and 1 of the bound and the certifier's error together, and beyond, by kind of meter.
     pub histogram: BTreeMap<Kind, [usize; BINS.len()]>,
     /// How many rooms each solver answered, some meters perhaps by the last that is named.
@@ -75,8 +82,8 @@ pub fn coverage(rooms: usize, relative_error: f64, seed: u64) -> Coverage {
     let mut coverage = Coverage::default();
     for index in 0..rooms as u64 {
         let own = fastrand::Rng::with_seed(seed ^ (index << 32)).u64(..);
-        match solved(own, index, relative_error) {
-            Ok((meters, transport, found, truth)) => coverage.add(own, &meters, transport, &found, &truth),
+        match Room::of(own, index, relative_error).and_then(|room| coverage.add(&room)) {
+            Ok(()) => {}
             Err(_) if is_interrupted() => break,
             Err(why) => coverage.refused.push(format!("room {own}: {why}")),
         }
@@ -84,64 +91,144 @@ pub fn coverage(rooms: usize, relative_error: f64, seed: u64) -> Coverage {
     coverage
 }
 
-type Solved = (Vec<(Kind, Meter)>, Transport, Solution, Solution);
+/// A room, what the simulator reads in it and what is certified.
+struct Room {
+    seed: u64,
+    scene: Scene,
+    meters: Vec<(Kind, Meter)>,
+    transport: Transport,
+    relative_error: f64,
+    found: Solution,
+    truth: Vec<Certified>,
+}
 
-fn solved(seed: u64, index: u64, relative_error: f64) -> Result<Solved, luminaire::simulator::SimulatorError> {
-    let (scene, meters) = room::room(seed, METERS);
-    let lights = [
-        Transport::Total(Bounces::Converged),
-        Transport::Indirect(Bounces::Converged),
-        Transport::Indirect(Bounces::AtMost(2)),
-        Transport::Direct,
-    ];
-    let transport = lights[index as usize % lights.len()];
-    let places: Vec<Meter> = meters.iter().map(|(_, meter)| *meter).collect();
-    let stop = Stop { flag: Some(interrupt_flag()), ..Stop::NEVER };
-    let accuracy = Accuracy { relative_error, seed };
-    let found = Prepared::new(&scene, transport, &accuracy)?.illuminance_until(&places, &stop)?;
-    let fine = Accuracy { relative_error: relative_error / FINER, seed: seed.rotate_left(17) };
-    let truth = certified_until(&scene, &places, transport, &fine, &stop)?;
-    Ok((meters, transport, found, truth))
+/// What path tracing says of a reading.
+#[derive(Clone, Copy)]
+struct Certified {
+    value_lx: f64,
+    std_error_lx: f64,
+    /// How far off it may be.
+    allowed_lx: f64,
+}
+
+impl Certified {
+    fn of(estimate: &Estimate) -> Self {
+        let value_lx = estimate.illuminance.value();
+        match estimate.uncertainty {
+            Uncertainty::Bound(bound) => Self { value_lx, std_error_lx: bound, allowed_lx: bound },
+            Uncertainty::StandardError { value, .. } => Self::sampled(value_lx, value),
+        }
+    }
+
+    fn sampled(value_lx: f64, std_error_lx: f64) -> Self {
+        Self { value_lx, std_error_lx, allowed_lx: CERTIFIED_WITHIN * std_error_lx }
+    }
+
+    /// The mean of several seeds', as uncertain as they say or as they scatter, whichever is more.
+    fn together(seeds: &[Self]) -> Self {
+        let count = seeds.len() as f64;
+        let mean = seeds.iter().map(|c| c.value_lx).sum::<f64>() / count;
+        let said: f64 = seeds.iter().map(|c| c.std_error_lx.powi(2)).sum::<f64>().sqrt() / count;
+        let scatter = seeds.iter().map(|c| (c.value_lx - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        Self::sampled(mean, said.max((scatter / count).sqrt()))
+    }
+}
+
+impl Room {
+    fn of(seed: u64, index: u64, relative_error: f64) -> Result<Self, SimulatorError> {
+        let (scene, meters) = room::room(seed, METERS);
+        let lights = [
+            Transport::Total(Bounces::Converged),
+            Transport::Indirect(Bounces::Converged),
+            Transport::Indirect(Bounces::AtMost(2)),
+            Transport::Direct,
+        ];
+        let transport = lights[index as usize % lights.len()];
+        let places: Vec<Meter> = meters.iter().map(|(_, meter)| *meter).collect();
+        let accuracy = Accuracy { relative_error, seed };
+        let found = Prepared::new(&scene, transport, &accuracy)?.illuminance_until(&places, &stop())?;
+        let mut room = Self { seed, scene, meters, transport, relative_error, found, truth: vec![] };
+        room.truth = room.certified(&places, seed.rotate_left(17))?;
+        Ok(room)
+    }
+
+    fn certified(&self, places: &[Meter], seed: u64) -> Result<Vec<Certified>, SimulatorError> {
+        let fine = Accuracy { relative_error: self.relative_error / FINER, seed };
+        let found = certified_until(&self.scene, places, self.transport, &fine, &stop())?;
+        Ok(found.estimates.iter().map(Certified::of).collect())
+    }
+
+    /// What seeds that have not been looked at say of some meters.
+    fn certified_again(&self, meters: &[usize]) -> Result<Vec<Certified>, SimulatorError> {
+        let places: Vec<Meter> = meters.iter().map(|k| self.meters[*k].1).collect();
+        let mut random = fastrand::Rng::with_seed(self.seed.rotate_left(31));
+        let seeds: Vec<_> = (0..AGAIN).map(|_| self.certified(&places, random.u64(..))).collect::<Result<_, _>>()?;
+        let of = |k: usize| Certified::together(&seeds.iter().map(|seed| seed[k]).collect::<Vec<_>>());
+        Ok((0..meters.len()).map(of).collect())
+    }
+
+    /// The reading of a meter and its bound.
+    fn reading_lx(&self, meter: usize) -> (f64, f64) {
+        let own = &self.found.estimates[meter];
+        let bound_lx = match own.uncertainty {
+            Uncertainty::Bound(bound) => bound,
+            Uncertainty::StandardError { value, .. } => CERTIFIED_WITHIN * value,
+        };
+        (own.illuminance.value(), bound_lx)
+    }
+
+    /// Whether a reading is beyond its bound; what the certifier itself may be off says nothing of that.
+    fn is_beyond(&self, meter: usize, truth: &Certified) -> bool {
+        let (value_lx, bound_lx) = self.reading_lx(meter);
+        let beyond = ((value_lx - truth.value_lx).abs() - truth.allowed_lx).max(0.0);
+        beyond > bound_lx * (1.0 + 1e-9) || value_lx.is_nan()
+    }
+
+    fn miss(&self, meter: usize, truth: &Certified) -> Miss {
+        let ((kind, place), (value_lx, bound_lx)) = (&self.meters[meter], self.reading_lx(meter));
+        Miss {
+            seed: self.seed,
+            light: format!("{:?}", self.transport),
+            kind: *kind,
+            at_m: place.position_m.to_array(),
+            normal: place.normal.to_array(),
+            value_lx,
+            bound_lx,
+            certified_lx: truth.value_lx,
+            certified_std_error_lx: truth.std_error_lx,
+        }
+    }
+}
+
+fn stop() -> Stop {
+    Stop { flag: Some(interrupt_flag()), ..Stop::NEVER }
 }
 
 impl Coverage {
-    fn add(&mut self, seed: u64, meters: &[(Kind, Meter)], light: Transport, found: &Solution, truth: &Solution) {
-        self.rooms += 1;
-        *self.rooms_by_solver.entry(words(&found.solver)).or_default() += 1;
-        for (((kind, meter), own), truth) in meters.iter().zip(&found.estimates).zip(&truth.estimates) {
-            self.readings += 1;
-            let bound_lx = match own.uncertainty {
-                Uncertainty::Bound(bound) => bound,
-                Uncertainty::StandardError { value, .. } => CERTIFIED_WITHIN * value,
-            };
-            let (allowed, certified_std_error_lx) = match truth.uncertainty {
-                Uncertainty::Bound(bound) => (bound, bound),
-                Uncertainty::StandardError { value, .. } => (CERTIFIED_WITHIN * value, value),
-            };
-            let (value_lx, certified_lx) = (own.illuminance.value(), truth.illuminance.value());
-            // What the certifier itself may be off says nothing of the bound.
-            let beyond = ((value_lx - certified_lx).abs() - allowed).max(0.0);
-            let ratio = if beyond == 0.0 { 0.0 } else { beyond / bound_lx };
-            // Nothing is off where nothing is lit, though its bound is nothing, too.
-            let error = (value_lx - certified_lx).abs() / (bound_lx + allowed).max(f64::MIN_POSITIVE);
-            let bin = BINS.iter().position(|b| error.min(f64::MAX) <= *b).unwrap_or(BINS.len() - 1);
-            self.histogram.entry(*kind).or_default()[bin] += 1;
-            if ratio > 1.0 + 1e-9 || value_lx.is_nan() {
-                let (at_m, normal) = (meter.position_m.to_array(), meter.normal.to_array());
-                let light = format!("{light:?}");
-                self.beyond.push(Miss {
-                    seed,
-                    light,
-                    kind: *kind,
-                    at_m,
-                    normal,
-                    value_lx,
-                    bound_lx,
-                    certified_lx,
-                    certified_std_error_lx,
-                });
+    fn add(&mut self, room: &Room) -> Result<(), SimulatorError> {
+        let mut truth = room.truth.clone();
+        let seeming: Vec<usize> = (0..truth.len()).filter(|k| room.is_beyond(*k, &truth[*k])).collect();
+        if !seeming.is_empty() {
+            for (k, again) in seeming.iter().zip(room.certified_again(&seeming)?) {
+                truth[*k] = again;
             }
         }
+        self.rooms += 1;
+        *self.rooms_by_solver.entry(words(&room.found.solver)).or_default() += 1;
+        for (k, truth) in truth.iter().enumerate() {
+            self.readings += 1;
+            let (value_lx, bound_lx) = room.reading_lx(k);
+            // Nothing is off where nothing is lit, though its bound is nothing, too.
+            let may_be = (bound_lx + truth.allowed_lx).max(f64::MIN_POSITIVE);
+            let error = (value_lx - truth.value_lx).abs() / may_be;
+            let bin = BINS.iter().position(|b| error.min(f64::MAX) <= *b).unwrap_or(BINS.len() - 1);
+            self.histogram.entry(room.meters[k].0).or_default()[bin] += 1;
+        }
+        let misses = seeming.iter().filter(|k| room.is_beyond(**k, &truth[**k]));
+        let misses: Vec<Miss> = misses.map(|k| room.miss(*k, &truth[*k])).collect();
+        self.cleared += seeming.len() - misses.len();
+        self.beyond.extend(misses);
+        Ok(())
     }
 }
 
@@ -183,6 +270,13 @@ impl fmt::Display for Coverage {
         for refused in &self.refused {
             writeln!(f, "not solved: {refused}")?;
         }
+        if self.cleared > 0 {
+            let cleared = self.cleared;
+            writeln!(
+                f,
+                "{cleared} readings seemed to be beyond their bound, but are not to {AGAIN} other seeds of the certifier"
+            )?;
+        }
         writeln!(f, "{} readings in {} rooms, {} beyond their bound", self.readings, self.rooms, self.beyond.len())
     }
 }
@@ -193,11 +287,15 @@ mod tests {
 
     #[test]
     fn bounds_hold_in_a_few_random_rooms_and_a_miss_would_be_told() {
-        let mut found = coverage(4, 0.05, 20);
+        let mut found = coverage(4, 0.1, 20);
         assert!(found.is_good() && found.readings == 4 * METERS, "{found}");
-        let (meters, light, mut wrong, truth) = solved(7, 1, 0.05).unwrap();
-        wrong.estimates[3].illuminance = wrong.estimates[3].illuminance * 1.5;
-        found.add(7, &meters, light, &wrong, &truth);
-        assert_eq!(found.beyond.len(), 1, "{found}");
+        let mut room = Room::of(7, 1, 0.1).unwrap();
+        // What is certified wrongly is cleared; a wrong reading is not.
+        room.truth[5] = Certified::sampled(2.0 * room.truth[5].value_lx, 1e-9);
+        let wrong = &mut room.found.estimates[3];
+        wrong.illuminance = wrong.illuminance * 1.5;
+        found.add(&room).unwrap();
+        assert_eq!((found.beyond.len(), found.cleared), (1, 1), "{found}");
+        assert_eq!(found.beyond[0].at_m, room.meters[3].1.position_m.to_array());
     }
 }
