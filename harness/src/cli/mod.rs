@@ -35,6 +35,7 @@ use crate::plan::{Selection, Skipping};
 use crate::record::ProcedureId;
 use crate::report::{Exit, Report};
 use crate::spec::{Spec, Trust};
+use crate::system::process;
 
 use views::Views;
 
@@ -201,6 +202,17 @@ impl Cli {
             None => Site::of_user().into_diagnostic()?,
         };
         let trust = if self.untrusted { Trust::Stranger } else { Trust::Own };
+        // These end in order from their first line; an audit does so once it is planned.
+        let measures = matches!(
+            self.command,
+            Command::Selftest(_)
+                | Command::Bench(_)
+                | Command::Hunt(_)
+                | Command::Shrink(_)
+                | Command::Stress(_)
+                | Command::Engines { .. }
+        );
+        let _under_way = measures.then(process::UnderWay::begin);
         match self.command {
             Command::Run(mut args) => {
                 args.views.all |= self.verbose > 0;
