@@ -9,7 +9,7 @@ use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Scene, Shape, T
 use serde::{Deserialize, Serialize};
 
 use super::blocks::{Blocks, Sampled};
-use super::workbench::{EngineError, SceneFile, Workbench};
+use super::workbench::{EngineError, Rest, SceneFile, Workbench};
 use super::{Site, fingerprint};
 use crate::procedures::{Target, Task};
 use crate::record::{Effort, EngineName, Estimate, Light, MeterId, Method, ProcedureId, Role, Uncertainty};
@@ -421,11 +421,19 @@ pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Resu
     if lost.len() == all {
         return Err(first);
     }
-    let (others, mut rest) = (lost.len() - 1, Measurement { samples: vec![], ..measurement });
+    let Measurement { mut estimates, method, effort, notes, .. } = measurement;
+    let others = lost.len() - 1;
     for k in lost {
-        rest.estimates[k] = Estimate { value: f64::NAN, uncertainty: Uncertainty::Unstated };
+        estimates[k] = Estimate { value: f64::NAN, uncertainty: Uncertainty::Unstated };
     }
+    let rest = Rest { estimates, method, effort, notes };
     Err(EngineError::AtMeters { first: first.into(), others, rest: rest.into() })
+}
+
+impl From<Rest> for Measurement {
+    fn from(Rest { estimates, method, effort, notes }: Rest) -> Self {
+        Self { estimates, method, effort, notes, ..Self::default() }
+    }
 }
 
 /// Why a number cannot be a reading.

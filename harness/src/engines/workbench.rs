@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::{Measurement, Site};
-use crate::record::{EngineName, MeterId, Uncertainty};
+use super::Site;
+use crate::record::{Effort, EngineName, Estimate, MeterId, Method, Uncertainty};
 use crate::system::files::remedy;
 use crate::system::printable;
 use crate::system::process::{Invocation, PeakMemory, ProcessError};
@@ -66,7 +66,7 @@ pub enum EngineError {
     NotFinite { engine: EngineName, meter: MeterId, value: f64, uncertainty: Uncertainty },
     /// At some meters; the readings of the others stand in the rest, what is NaN there is lost.
     #[error("{first}{}; the readings of the other meters are kept", and_more(*.others))]
-    AtMeters { first: Box<EngineError>, others: usize, rest: Box<Measurement> },
+    AtMeters { first: Box<EngineError>, others: usize, rest: Box<Rest> },
     #[error("engines.{engine}.{key}: {what}")]
     Setting { engine: EngineName, key: String, what: String },
     /// It cannot do what was asked, as it says itself once it has seen the job: a skip, no failure.
@@ -74,6 +74,15 @@ pub enum EngineError {
     Declined { engine: EngineName, why: String },
     #[error("{engine}: {what}")]
     Solver { engine: EngineName, what: String },
+}
+
+/// What is left of a measurement that lost single meters: NaN stands where nothing was read.
+#[derive(Clone, Debug)]
+pub struct Rest {
+    pub estimates: Vec<Estimate>,
+    pub method: Method,
+    pub effort: Effort,
+    pub notes: Vec<String>,
 }
 
 fn and_more(meters: usize) -> String {

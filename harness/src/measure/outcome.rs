@@ -66,7 +66,7 @@ impl From<EngineError> for Failure {
             EngineError::Setting { .. } | EngineError::Solver { .. } => FailureKind::Refused,
             EngineError::Declined { why, .. } => return Self::new(FailureKind::Declined, why),
             EngineError::AtMeters { first, rest, .. } => {
-                return Self { text, rest: Some(rest), ..Self::from(*first) };
+                return Self { text, rest: Some(Box::new((*rest).into())), ..Self::from(*first) };
             }
         };
         Self::new(kind, text)
