@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
 
+mod any_bytes;
 mod baselines;
 mod by_hand;
 mod cache;
@@ -9,6 +10,7 @@ mod calibration;
 mod command_line;
 mod cylindrical;
 mod external_adapter;
+mod faults;
 mod furnished_office;
 mod guide;
 mod hunt;

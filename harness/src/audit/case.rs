@@ -13,7 +13,7 @@ use crate::procedures::Task;
 use crate::record::{Recording, Status};
 use crate::report::{self, Report};
 use crate::spec::Case;
-use crate::system::process;
+use crate::system::{files, process};
 
 /// What all cases of an audit share.
 pub(super) struct Audit<'a> {
@@ -79,6 +79,10 @@ impl Audit<'_> {
     }
 
     fn readings(&self, case: &Case, plan: &Plan, judge: &Judge<'_>, folder: &Path) -> Result<Outcome, AuditError> {
+        // What a run that was killed left.
+        for place in [folder.to_owned(), folder.join("readings")] {
+            files::sweep(&place);
+        }
         let reader = Reader { out: Some(folder.to_owned()), ..self.reader.clone() };
         let observer = self.options.observer;
         let running = Running { case, plan, folder, reader, observer };

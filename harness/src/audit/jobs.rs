@@ -95,7 +95,7 @@ impl Running<'_> {
             Ok(Answer { taken, was_contradicted }) => (Ok(taken), was_contradicted),
             Err(failure) => (Err(failure), false),
         };
-        if let Err(Failure { kind: FailureKind::Declined, text: why }) = &taken {
+        if let Err(Failure { kind: FailureKind::Declined, text: why, .. }) = &taken {
             self.observer.ended(self.case, engine, task.procedure, start.elapsed(), None);
             let reason = format!("it declines: {why}");
             return Done::Declined(Skip::of(self.case, task, engine.name(), Scope::Procedure, reason));
@@ -115,16 +115,19 @@ impl Running<'_> {
             Ok(taken) => (taken.measurement, taken.cost.wall_s, None),
             Err(error) => {
                 tracing::error!(%engine, procedure = %task.procedure, "{error}");
-                (Measurement::default(), wall.as_secs_f64(), Some(error.to_string()))
+                (error.rest.map_or_else(Measurement::default, |rest| *rest), wall.as_secs_f64(), Some(error.text))
             }
         };
-        let estimates = if failure.is_none() { measurement.readings(&task.targets) } else { vec![] };
+        let was_read = failure.is_none() || !measurement.estimates.is_empty();
+        let estimates = if was_read { measurement.readings(&task.targets) } else { vec![] };
         let readings = estimates.iter().zip(&task.targets).map(|(estimate, target)| Reading {
             meter: target.id.clone(),
             quantity: task.quantity,
             value: estimate.value,
             uncertainty: estimate.uncertainty,
         });
+        // Where a failed engine lost single meters.
+        let readings = readings.filter(|reading| failure.is_none() || reading.value.is_finite());
         Recording {
             version: planned.version().unwrap_or_default(),
             model: task.model(),
@@ -142,9 +145,9 @@ impl Running<'_> {
             wall_s,
             components: planned.engine.components(&run.job),
             command: planned.engine.command_by_hand(&run.job, &self.reader.site),
+            readings: readings.collect(),
             failure,
             failure_kind,
-            readings: readings.collect(),
             ..Recording::of(ReadingKey::new(&self.case.name, task.procedure, engine), task.light())
         }
     }
@@ -164,11 +167,13 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
     let rendered = if shortcut.job.stations.is_empty() {
         Taken { measurement: Measurement::default(), cost: Cost::default(), source: Source::Nobody }
     } else {
-        reader.read(&Question::new(&instrument, &shortcut.job, folder))?
+        let read = reader.read(&Question::new(&instrument, &shortcut.job, folder));
+        read.map_err(|failure| failure.with_rest(|rest| Some(shortcut.complete(rest, &run.job))))?
     };
     let mut taken = Taken { measurement: shortcut.complete(rendered.measurement, &run.job), ..rendered };
     if let Some(job) = run.spot_check_job() {
-        let seen = reader.read(&Question::new(&instrument, &job, &format!("{folder}-spot-check")))?;
+        let seen = reader.read(&Question::new(&instrument, &job, &format!("{folder}-spot-check")));
+        let seen = seen.map_err(|failure| failure.with_rest(|_| None))?;
         if let Err(contradiction) = run.hold(&taken.measurement, &seen.measurement) {
             let name = planned.engine.name();
             tracing::warn!("{name}: {contradiction}");

@@ -178,6 +178,7 @@ pub fn run_and_hold(specs: &[PathBuf], options: &Options<'_>) -> Result<(Report,
     let known = planner.calibrations(&cases, &plans)?;
     // What is refused leaves nothing behind.
     let claim = Claim::of(&options.out)?;
+    options.cache.iter().for_each(Cache::sweep);
     match options.calibration {
         Calibration::Judged => {
             let policy = common(&policies)?;
@@ -228,7 +229,7 @@ fn audited(
     policies: &[Arc<Policy>],
     options: &Options<'_>,
 ) -> Result<Report, AuditError> {
-    let clock = Instant::now();
+    let (clock, _under_way) = (Instant::now(), process::UnderWay::begin());
     let published = published(cases)?;
     for (((case, plan), published), policy) in cases.iter().zip(&mut plans).zip(&published).zip(policies) {
         let sampling = options.sampling.or(policy.profile.sampling).unwrap_or_default();

@@ -207,7 +207,7 @@ fn counts(compared: &[Comparison], meter: &MeterId) -> Option<f64> {
 fn again<'a>(running: &'a Running<'_>, run: &'a Run, engine: &EngineName, outcome: &Outcome) -> Again<'a> {
     let task = &running.plan.tasks[run.task];
     let mine = outcome.recordings.iter().find(|r| r.key.engine == *engine && r.key.procedure == task.procedure);
-    let readings = mine.map_or(&[][..], |r| &r.readings);
+    let readings = mine.filter(|r| r.failure.is_none()).map_or(&[][..], |r| &r.readings);
     let of = |is_sampled: bool| -> Vec<usize> {
         (0..readings.len()).filter(|k| readings[*k].uncertainty.is_sampled() == is_sampled).collect()
     };

@@ -86,6 +86,9 @@ fn refine_references(
         let mine = outcome.recordings.iter().position(|r| r.key.engine == engine && r.key.procedure == task.procedure);
         let Some((mine, ask)) = mine.zip(ask) else { continue };
         let recording = &mut outcome.recordings[mine];
+        if recording.failure.is_some() {
+            continue;
+        }
         match look(running, run, &ask) {
             Ok(taken) => {
                 outcome.from_cache += usize::from(taken.source == Source::Cache);

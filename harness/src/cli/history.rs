@@ -8,6 +8,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 use super::views::read_report;
 use super::{complain, print};
 use crate::report::Exit;
+use crate::system::files;
 use crate::trend::history::{Change, Course, History, Line, add, changes, in_words, lines, site};
 
 #[derive(Debug, Subcommand)]
@@ -109,9 +110,7 @@ fn draw(path: &Path, out: &Path, reports: &[(String, String)]) -> Result<(Histor
     std::fs::create_dir_all(out).into_diagnostic().wrap_err_with(|| out.display().to_string())?;
     let page = out.join("index.html");
     let changes = changes(&history);
-    std::fs::write(&page, site(&history, &changes, reports))
-        .into_diagnostic()
-        .wrap_err_with(|| page.display().to_string())?;
+    files::keep_shared(&page, site(&history, &changes, reports).as_bytes()).into_diagnostic()?;
     let (nights, series) = (history.nights.len(), history.series.len());
     print(&format!("{}: {nights} nights, {series} series, {} changes\n", page.display(), changes.len()))?;
     Ok((history, changes))

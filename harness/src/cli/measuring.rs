@@ -60,6 +60,7 @@ impl MeasuringArgs {
         let machine = Machine::new(self.jobs.unwrap_or_else(process::cores));
         let isolation = Isolation::Subprocess(std::env::current_exe().into_diagnostic()?);
         let cache = Some(Cache::at(folder.join("readings")));
+        cache.iter().for_each(Cache::sweep);
         Ok(Reader { cache, isolation, ..Reader::bare(site, machine) })
     }
 
@@ -74,6 +75,7 @@ pub(super) fn read_one(site: &Site) -> Result<Exit, Diagnostic> {
     let mut text = String::new();
     std::io::stdin().read_to_string(&mut text).into_diagnostic()?;
     let request = serde_json::from_str(&text).into_diagnostic()?;
+    let _under_way = process::UnderWay::begin();
     let taken = measure::answer(&request, site).map_err(|e| miette::miette!("{e}"))?;
     super::print(&serde_json::to_string(&taken).into_diagnostic()?)?;
     Ok(Exit::Passed)

@@ -20,11 +20,11 @@ mod stress;
 mod views;
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::builder::FalseyValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use miette::{Context, IntoDiagnostic, Report as Diagnostic};
+use miette::{IntoDiagnostic, Report as Diagnostic};
 use serde::Serialize;
 
 use self::photometry::PhotometryArgs;
@@ -35,6 +35,8 @@ use crate::plan::{Selection, Skipping};
 use crate::record::ProcedureId;
 use crate::report::{Exit, Report};
 use crate::spec::{Spec, Trust};
+use crate::system::files::FileError;
+use crate::system::process;
 
 use views::Views;
 
@@ -201,6 +203,17 @@ impl Cli {
             None => Site::of_user().into_diagnostic()?,
         };
         let trust = if self.untrusted { Trust::Stranger } else { Trust::Own };
+        // These end in order from their first line; an audit does so once it is planned.
+        let measures = matches!(
+            self.command,
+            Command::Selftest(_)
+                | Command::Bench(_)
+                | Command::Hunt(_)
+                | Command::Shrink(_)
+                | Command::Stress(_)
+                | Command::Engines { .. }
+        );
+        let _under_way = measures.then(process::UnderWay::begin);
         match self.command {
             Command::Run(mut args) => {
                 args.views.all |= self.verbose > 0;
@@ -243,7 +256,7 @@ fn print(text: &str) -> Result<(), Diagnostic> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         // Whoever reads has seen enough (`| head`): that is no error of ours.
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        written => written.into_diagnostic().wrap_err("standard output"),
+        written => written.map_err(|e| FileError::of(Path::new("standard output"), e)).into_diagnostic(),
     }
 }
 

@@ -41,6 +41,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> R
         // Every spec is read and checked before anything is fetched.
         audit::chosen(&args.selected.specs, &options).map_err(diagnose)?;
         Claim::of(&options.out).into_diagnostic()?;
+        let _under_way = process::UnderWay::begin();
         report_installation(site, &args.selected.engines);
     }
     let held = args.baseline.as_deref().map(|path| Held::read(path, &args.selected.specs, &options)).transpose()?;

@@ -8,6 +8,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::{complain, json, print};
 use crate::report::{self, Beside, Detail, Exit, Report, Style};
+use crate::system::files;
 
 /// Which views of a report are printed, and how.
 #[derive(Debug, Args)]
@@ -50,7 +51,7 @@ pub(super) struct ReportArgs {
 
 pub(super) fn print_report(report: &Report, folder: &Path, views: &Views) -> Result<(), Diagnostic> {
     let beside = |path: &PathBuf| {
-        let text = std::fs::read_to_string(path).into_diagnostic();
+        let text = read_text(path);
         let read = text.and_then(|text| Beside::from_json(&text).into_diagnostic());
         read.wrap_err_with(|| path.display().to_string())
     };
@@ -78,7 +79,7 @@ pub(super) fn print_report(report: &Report, folder: &Path, views: &Views) -> Res
 /// The page, also kept in the run's folder; on a terminal only its place is printed.
 fn keep_page(report: &Report, folder: &Path, beside: &[Beside]) -> String {
     let (page, file) = (report::page(report, beside), folder.join("report.html"));
-    if let Err(error) = std::fs::write(&file, &page) {
+    if let Err(error) = files::keep_shared(&file, page.as_bytes()) {
         tracing::warn!(file = %file.display(), %error, "the page is printed, not kept");
     } else if std::io::stdout().is_terminal() {
         return file.display().to_string();
@@ -96,8 +97,13 @@ pub(super) fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
     Ok(report.exit())
 }
 
+fn read_text(file: &Path) -> Result<String, Diagnostic> {
+    let bytes = files::read_kept(file).into_diagnostic()?;
+    String::from_utf8(bytes).into_diagnostic().wrap_err_with(|| file.display().to_string())
+}
+
 pub(super) fn read_report(file: &Path) -> Result<Report, Diagnostic> {
-    let text = std::fs::read_to_string(file).into_diagnostic().wrap_err_with(|| file.display().to_string())?;
+    let text = read_text(file)?;
     let read = Report::from_json(&text).map_err(|why| miette::miette!("{} {why}", file.display()))?;
     if let Some(doubt) = read.doubt {
         complain(&format!("{} {doubt}", file.display()));

@@ -9,7 +9,7 @@ use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Scene, Shape, T
 use serde::{Deserialize, Serialize};
 
 use super::blocks::{Blocks, Sampled};
-use super::workbench::{EngineError, SceneFile, Workbench};
+use super::workbench::{EngineError, Rest, SceneFile, Workbench};
 use super::{Site, fingerprint};
 use crate::procedures::{Target, Task};
 use crate::record::{Effort, EngineName, Estimate, Light, MeterId, Method, ProcedureId, Role, Uncertainty};
@@ -410,29 +410,46 @@ fn count_readings(engine: &EngineName, job: &Job, found: usize) -> Result<(), En
 const BRIGHTEST_LX: f64 = 1e30;
 
 /// Checks what every engine must hold: one finite value a station, no brighter than light can be. What is negative is no light, but a number
-/// to be judged like any other.
+/// to be judged like any other. Where some meters have none, the error holds the readings of the others.
 pub fn checked(engine: &EngineName, job: &Job, measurement: Measurement) -> Result<Measurement, EngineError> {
     count_readings(engine, job, measurement.estimates.len())?;
-    for (estimate, station) in measurement.estimates.iter().zip(&job.stations) {
-        let Estimate { value, uncertainty } = *estimate;
-        let (engine, meter) = (engine.clone(), station.id.clone());
-        if !value.is_finite() || !uncertainty.is_finite() {
-            return Err(EngineError::NotFinite { engine, meter, value, uncertainty });
-        }
-        if !uncertainty.is_sound() {
-            let what = format!("read {value} lx ({uncertainty:?}) at {meter}");
-            return Err(EngineError::Output { engine, what });
-        }
-        if [value.abs(), uncertainty.standard_error().unwrap_or(0.0), uncertainty.bound()]
-            .iter()
-            .any(|v| *v > BRIGHTEST_LX)
-        {
-            let what =
-                format!("read {value:e} lx ({uncertainty:?}) at {meter}: beyond {BRIGHTEST_LX:e} lx nothing is light");
-            return Err(EngineError::Output { engine, what });
-        }
+    let pairs = measurement.estimates.iter().zip(&job.stations).enumerate();
+    let wrong = pairs.filter_map(|(k, (estimate, station))| Some((k, unsound(engine, estimate, station)?)));
+    let (lost, errors): (Vec<usize>, Vec<EngineError>) = wrong.unzip();
+    let all = measurement.estimates.len();
+    let Some(first) = errors.into_iter().next() else { return Ok(measurement) };
+    if lost.len() == all {
+        return Err(first);
     }
-    Ok(measurement)
+    let Measurement { mut estimates, method, effort, notes, .. } = measurement;
+    let others = lost.len() - 1;
+    for k in lost {
+        estimates[k] = Estimate { value: f64::NAN, uncertainty: Uncertainty::Unstated };
+    }
+    let rest = Rest { estimates, method, effort, notes };
+    Err(EngineError::AtMeters { first: first.into(), others, rest: rest.into() })
+}
+
+impl From<Rest> for Measurement {
+    fn from(Rest { estimates, method, effort, notes }: Rest) -> Self {
+        Self { estimates, method, effort, notes, ..Self::default() }
+    }
+}
+
+/// Why a number cannot be a reading.
+fn unsound(engine: &EngineName, estimate: &Estimate, station: &Station) -> Option<EngineError> {
+    let Estimate { value, uncertainty } = *estimate;
+    let (engine, meter) = (engine.clone(), station.id.clone());
+    if !value.is_finite() || !uncertainty.is_finite() {
+        return Some(EngineError::NotFinite { engine, meter, value, uncertainty });
+    }
+    let told = || format!("read {value:e} lx ({uncertainty:?}) at {meter}");
+    if !uncertainty.is_sound() {
+        return Some(EngineError::Output { what: told(), engine });
+    }
+    let all = [value.abs(), uncertainty.standard_error().unwrap_or(0.0), uncertainty.bound()];
+    let what = || format!("{}: beyond {BRIGHTEST_LX:e} lx nothing is light", told());
+    all.iter().any(|v| *v > BRIGHTEST_LX).then(|| EngineError::Output { what: what(), engine })
 }
 
 #[cfg(test)]
@@ -461,6 +478,12 @@ mod tests {
         {
             assert!(checked(&ENGINE, &job(2), measurement(bad)).is_err(), "{bad:?}");
         }
+        let Err(EngineError::AtMeters { rest, others: 0, .. }) =
+            checked(&ENGINE, &job(3), measurement(&[1.0, f64::NAN, 2.0]))
+        else {
+            panic!("one meter is lost, and two are not")
+        };
+        assert_eq!(rest.estimates.iter().map(|e| e.value.is_nan()).collect::<Vec<_>>(), [false, true, false]);
         let mut odd = measurement(&[1.0]);
         odd.estimates[0].uncertainty = Uncertainty::sampled(f64::NAN, None);
         assert!(checked(&ENGINE, &job(1), odd).is_err());

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 pub use self::form::{ExternalJob, ExternalReadings};
 use super::{
-    Absent, Engine, EngineError, FILE_READER, Job, Measurement, SceneFile, Site, Support, Version, Workbench, checked,
+    Absent, Engine, EngineError, FILE_READER, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
     fingerprint,
 };
 use crate::record::{EngineName, ProcedureId, UnknownProcedure};
@@ -215,8 +215,13 @@ impl Engine for External {
         workbench.write(&self.export(job)?)?;
         let run = self.invocation(job, workbench)?;
         let finished = run.run()?;
-        let mut measurement = form::measurement(&finished.stdout, job, &self.id)?;
-        measurement.effort.insert("command".into(), run.command_line());
-        checked(&self.id, job, measurement)
+        let mut measured = ExternalReadings::measured(&finished.stdout, job, &self.id);
+        let effort = match &mut measured {
+            Ok(measurement) => Some(&mut measurement.effort),
+            Err(EngineError::AtMeters { rest, .. }) => Some(&mut rest.effort),
+            Err(_) => None,
+        };
+        effort.map(|effort| effort.insert("command".into(), run.command_line()));
+        measured
     }
 }

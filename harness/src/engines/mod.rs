@@ -47,7 +47,7 @@ pub(crate) use iesna::method as method_of_iesna;
 pub use install::{InstallOutcome, InstallState, Soundness, install, repair, verify};
 pub use settings::Coordinates;
 pub use site::{Site, SiteError};
-pub use workbench::{EngineError, SceneFile, Workbench};
+pub use workbench::{EngineError, Rest, SceneFile, Workbench};
 
 /// The engine that everybody has by this name, or else a program of the user's.
 pub fn named(

@@ -20,13 +20,16 @@ pub(super) mod tests;
 
 use std::path::PathBuf;
 
+use glam::DVec3;
+use itertools::Itertools;
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
+use rayon::prelude::*;
 
 use super::effort;
 use super::settings::{Coordinates, Preset};
 use super::workbench::by_hand;
 use super::{
-    Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Support, Version,
+    Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Station, Support, Version,
     Workbench, checked,
 };
 use crate::record::{EngineName, Estimate};
@@ -210,25 +213,60 @@ fn filters_in_the_way(job: &Job) -> Option<String> {
     let coordinates = Settings::of(job).map_or(Coordinates::Fitted, |s| s.coordinates);
     let radius_m = 1.5 * opening::FILTER_RADIUS / frame::Frame::of(job, coordinates).scale;
     let lit: Vec<&Luminaire> = job.scene.luminaires.iter().filter(|l| frame::candela(l) > 0.0).collect();
-    for (k, a) in lit.iter().enumerate() {
-        for (_, b) in lit.iter().enumerate().filter(|(j, _)| *j != k) {
-            if a.position_m.distance(b.position_m) < 2.0 * radius_m {
-                return Some(format!(
-                    "{} and {} are at the same point, where POV-Ray would filter both by either",
-                    a.id, b.id
-                ));
-            }
-            let passes = |p: glam::DVec3| distance_to_segment(b.position_m, a.position_m, p) < radius_m;
-            if let Some(station) = job.stations.iter().find(|s| passes(s.meter.position_m)) {
-                return Some(format!("{} lies between {} and {}, and would filter its light", b.id, a.id, station.id));
-            }
-        }
-        let near = job.stations.iter().find(|s| a.position_m.distance(s.meter.position_m) < 2.0 * radius_m);
-        if let Some(station) = near {
-            return Some(format!("{} is inside the filter of {}", station.id, a.id));
-        }
+    let places_m: Vec<DVec3> = lit.iter().map(|l| l.position_m).collect();
+    if let Some((a, b)) = near_pair(&places_m, 2.0 * radius_m) {
+        let (a, b) = (&lit[a].id, &lit[b].id);
+        return Some(format!("{a} and {b} are at the same point, where POV-Ray would filter both by either"));
     }
-    None
+    let inside =
+        |station: &&Station| places_m.iter().position(|p| p.distance(station.meter.position_m) < 2.0 * radius_m);
+    // One objection is enough; the first meter that has one tells it, whoever finds it.
+    job.stations.par_iter().find_map_first(|station| {
+        let id = &station.id;
+        if let Some(a) = inside(&station) {
+            return Some(format!("{id} is inside the filter of {}", lit[a].id));
+        }
+        let (a, b) = in_the_way(&places_m, station.meter.position_m, radius_m)?;
+        Some(format!("{} lies between {} and {id}, and would filter its light", lit[b].id, lit[a].id))
+    })
+}
+
+/// A direction along which hardly any two of the points that people choose lie level, so that sorting by it parts them.
+const ASKEW: DVec3 = DVec3::new(0.532_117, 0.341_883, 0.774_597);
+
+/// Numbers of points in order along [`ASKEW`], each with how far it lies along it.
+fn sorted_along(points: impl Iterator<Item = DVec3>) -> Vec<(f64, usize)> {
+    points.map(|p| p.dot(ASKEW)).zip(0..).sorted_by(|a, b| a.0.total_cmp(&b.0)).collect()
+}
+
+/// Those before and after the `k`th in order that lie no further from it than so much.
+fn about(sorted: &[(f64, usize)], k: usize, within: f64) -> impl Iterator<Item = usize> {
+    let is_near = move |other: &&(f64, usize)| (other.0 - sorted[k].0).abs() <= within;
+    let after = sorted[k + 1..].iter().take_while(is_near);
+    sorted[..k].iter().rev().take_while(is_near).chain(after).map(|(_, number)| *number)
+}
+
+/// Two points that are nearer to each other than this.
+fn near_pair(points: &[DVec3], within_m: f64) -> Option<(usize, usize)> {
+    let sorted = sorted_along(points.iter().copied());
+    let near = |(k, (_, a)): (usize, &(f64, usize))| {
+        let b = about(&sorted, k, within_m).find(|b| points[*a].distance(points[*b]) < within_m)?;
+        Some((*a.min(&b), *a.max(&b)))
+    };
+    sorted.iter().enumerate().find_map(near)
+}
+
+/// A light, and another one that its way to a place passes nearer than this, of lights twice as far from each other and from the place. Seen
+/// from there the two are nearly in one direction, so that only few are looked at.
+fn in_the_way(lights_m: &[DVec3], at_m: DVec3, radius_m: f64) -> Option<(usize, usize)> {
+    let sorted = sorted_along(lights_m.iter().map(|p| (p - at_m).normalize_or_zero()));
+    let passes = |a: usize, b: usize| distance_to_segment(lights_m[b], lights_m[a], at_m) < radius_m;
+    let found = |(k, (_, b)): (usize, &(f64, usize))| {
+        // The directions are a chord apart whose angle has this sine at most, half of one; twice the sine is more than the chord.
+        let within = 2.0 * radius_m / lights_m[*b].distance(at_m);
+        Some((about(&sorted, k, within).find(|a| passes(*a, *b))?, *b))
+    };
+    sorted.iter().enumerate().find_map(found)
 }
 
 /// A meter so near an opening that it tells the opening's point lights apart.
@@ -237,8 +275,46 @@ fn too_near(job: &Job) -> Option<String> {
     is_read.then(|| opening::too_near(job, opening::MOST_POINTS)).flatten()
 }
 
-fn distance_to_segment(point: glam::DVec3, from: glam::DVec3, to: glam::DVec3) -> f64 {
+fn distance_to_segment(point: DVec3, from: DVec3, to: DVec3) -> f64 {
     let along = to - from;
     let t = ((point - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     point.distance(from + t * along)
+}
+
+#[cfg(test)]
+mod way_tests {
+    use super::*;
+
+    #[test]
+    fn a_light_in_the_way_is_found_as_by_trying_all() {
+        let mut random = fastrand::Rng::with_seed(7);
+        let radius_m = 0.05;
+        for round in 0..300 {
+            // In rows, as people hang them, and anywhere.
+            let place = |random: &mut fastrand::Rng| match round % 2 {
+                0 => DVec3::new(f64::from(random.u8(0..9)), f64::from(random.u8(0..9)), 3.0),
+                _ => DVec3::new(random.f64(), random.f64(), random.f64()) * 4.0,
+            };
+            let mut lights_m: Vec<DVec3> = vec![];
+            for _ in 0..25 {
+                let p = place(&mut random);
+                if lights_m.iter().all(|l| l.distance(p) >= 2.0 * radius_m) {
+                    lights_m.push(p);
+                }
+            }
+            assert_eq!(near_pair(&lights_m, 2.0 * radius_m), None);
+            let at_m = place(&mut random) + DVec3::new(0.0, 0.0, if round % 3 == 0 { 0.0 } else { -2.0 });
+            if lights_m.iter().any(|l| l.distance(at_m) < 2.0 * radius_m) {
+                continue;
+            }
+            let all = || (0..lights_m.len()).flat_map(|a| (0..lights_m.len()).map(move |b| (a, b)));
+            let passes = |(a, b): (usize, usize)| distance_to_segment(lights_m[b], lights_m[a], at_m) < radius_m;
+            let expected = all().any(|(a, b)| a != b && passes((a, b)));
+            let found = in_the_way(&lights_m, at_m, radius_m);
+            assert_eq!(found.is_some(), expected, "{lights_m:?} {at_m}");
+            assert!(found.is_none_or(passes));
+        }
+        let pair = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y * 1e-3];
+        assert_eq!(near_pair(&pair, 2e-3), Some((1, 2)));
+    }
 }

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::Site;
-use crate::record::{EngineName, MeterId, Uncertainty};
+use crate::record::{Effort, EngineName, Estimate, MeterId, Method, Uncertainty};
+use crate::system::files::remedy;
 use crate::system::printable;
 use crate::system::process::{Invocation, PeakMemory, ProcessError};
 
@@ -57,12 +58,15 @@ pub(super) fn by_hand(program: impl Into<PathBuf>) -> Invocation {
 pub enum EngineError {
     #[error(transparent)]
     Process(#[from] ProcessError),
-    #[error("{path}: {source}")]
+    #[error("{path}: {source}{}", remedy(.source))]
     Io { path: String, source: std::io::Error },
     #[error("{engine} exited without an error, but {what}")]
     Output { engine: EngineName, what: String },
     #[error("{engine} exited without an error, but read {value} lx ({uncertainty:?}) at {meter}")]
     NotFinite { engine: EngineName, meter: MeterId, value: f64, uncertainty: Uncertainty },
+    /// At some meters; the readings of the others stand in the rest, what is NaN there is lost.
+    #[error("{first}{}; the readings of the other meters are kept", and_more(*.others))]
+    AtMeters { first: Box<EngineError>, others: usize, rest: Box<Rest> },
     #[error("engines.{engine}.{key}: {what}")]
     Setting { engine: EngineName, key: String, what: String },
     /// It cannot do what was asked, as it says itself once it has seen the job: a skip, no failure.
@@ -70,6 +74,19 @@ pub enum EngineError {
     Declined { engine: EngineName, why: String },
     #[error("{engine}: {what}")]
     Solver { engine: EngineName, what: String },
+}
+
+/// What is left of a measurement that lost single meters: NaN stands where nothing was read.
+#[derive(Clone, Debug)]
+pub struct Rest {
+    pub estimates: Vec<Estimate>,
+    pub method: Method,
+    pub effort: Effort,
+    pub notes: Vec<String>,
+}
+
+fn and_more(meters: usize) -> String {
+    if meters == 0 { String::new() } else { format!(" (and the like at {meters} more)") }
 }
 
 impl EngineError {

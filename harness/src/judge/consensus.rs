@@ -184,7 +184,7 @@ fn witnesses(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<W
         };
         let read = |k: usize| {
             let is_told = |r: &&Reading| r.value.is_finite() && r.uncertainty != Uncertainty::NotSeen;
-            let reading = recording.readings.get(k).filter(is_told)?;
+            let reading = recording.reading(k, &task.targets[k].id).filter(is_told)?;
             Some((reading.value, combined(&of_reading(&reading.uncertainty))))
         };
         let readings = (0..task.targets.len()).map(read).collect();

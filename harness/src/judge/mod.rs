@@ -149,7 +149,7 @@ impl Judge<'_> {
             let mut family = vec![];
             let largest = largest_portion(recording);
             for (k, target) in task.targets.iter().enumerate() {
-                let reading = recording.readings.get(k);
+                let reading = recording.reading(k, &target.id);
                 let engine = &recording.key.engine;
                 let printed = self.published.iter().flat_map(|p| p.references(task, target, engine, &misfits));
                 let printed =
@@ -205,7 +205,7 @@ impl Judge<'_> {
         largest_portion: Option<f64>,
         held: Option<ScoredReference>,
     ) -> Comparison {
-        let (target, reading) = (&task.targets[k], recording.readings.get(k));
+        let (target, reading) = (&task.targets[k], recording.reading(k, &task.targets[k].id));
         let truth = held.as_ref().map(|h| h.reference.value);
         let uncertain_by = |r: &Reading| {
             let stated = StatedErrors::of_looks(&recording.stated_errors, &r.meter, r.uncertainty);
@@ -396,7 +396,7 @@ fn reference_of_task(task: &Task, recordings: &[&Recording], k: usize, engine: &
         return None;
     }
     let recording = recordings.iter().find(|r| r.key.engine == witness)?;
-    let reading = recording.readings.get(k)?;
+    let reading = recording.reading(k, &task.targets[k].id)?;
     let source = match recording.method.get("solver") {
         Some(solver) if basis == Basis::Exact => format!("{source}: {solver}"),
         _ => source.to_owned(),

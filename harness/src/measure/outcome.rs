@@ -37,17 +37,27 @@ pub enum Source {
 pub struct Failure {
     pub kind: FailureKind,
     pub text: String,
+    /// What was read all the same; NaN where nothing was.
+    #[serde(skip)]
+    pub rest: Option<Box<Measurement>>,
 }
 
 impl Failure {
     pub fn new(kind: FailureKind, text: impl Into<String>) -> Self {
-        Self { kind, text: text.into() }
+        Self { kind, text: text.into(), rest: None }
+    }
+
+    /// The same, what was read all the same made something else.
+    #[must_use]
+    pub fn with_rest(self, made: impl FnOnce(Measurement) -> Option<Measurement>) -> Self {
+        Self { rest: self.rest.and_then(|rest| made(*rest)).map(Box::new), ..self }
     }
 }
 
 impl From<EngineError> for Failure {
     fn from(error: EngineError) -> Self {
-        let kind = match &error {
+        let text = error.to_string();
+        let kind = match error {
             EngineError::Process(ProcessError::TimedOut { .. }) => FailureKind::Hang,
             EngineError::Process(ProcessError::Interrupted { .. }) => FailureKind::Interrupted,
             EngineError::Process(_) | EngineError::Io { .. } => FailureKind::Crash,
@@ -55,7 +65,10 @@ impl From<EngineError> for Failure {
             EngineError::Output { .. } => FailureKind::SilentLoss,
             EngineError::Setting { .. } | EngineError::Solver { .. } => FailureKind::Refused,
             EngineError::Declined { why, .. } => return Self::new(FailureKind::Declined, why),
+            EngineError::AtMeters { first, rest, .. } => {
+                return Self { text, rest: Some(Box::new((*rest).into())), ..Self::from(*first) };
+            }
         };
-        Self::new(kind, error.to_string())
+        Self::new(kind, text)
     }
 }

@@ -184,6 +184,17 @@ impl Drop for WorkPlace {
     }
 }
 
+/// How the names of folders begin that are about to be deleted.
+const OLD: &str = ".old-";
+
+/// Deletes what runs that were killed had begun to delete.
+fn sweep(folder: &Path) {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    for old in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(OLD)) {
+        fs::remove_dir_all(old.path()).ok();
+    }
+}
+
 /// An empty folder, absolute, so that programs can run inside it.
 fn fresh(folder: &Path) -> Result<PathBuf, EngineError> {
     let fail = |e| EngineError::io(folder, e);
@@ -191,7 +202,8 @@ fn fresh(folder: &Path) -> Result<PathBuf, EngineError> {
     let parent = folder.parent().unwrap_or(&folder).to_owned();
     fs::create_dir_all(&parent).map_err(fail)?;
     // What was there is moved away before it is deleted: the engine of a run that was killed may still write into it.
-    let old = tempfile::Builder::new().prefix(".old-").tempdir_in(&parent).map_err(fail)?;
+    sweep(&parent);
+    let old = tempfile::Builder::new().prefix(OLD).tempdir_in(&parent).map_err(fail)?;
     fs::rename(&folder, old.path().join("scene")).or_else(ignore_absence).map_err(fail)?;
     if let Err(error) = old.close() {
         tracing::debug!(%error, "what an earlier run left is still in use");

@@ -244,6 +244,15 @@ impl Recording {
         }
     }
 
+    /// The reading of the target with this number, whose meter is this; one that failed may lack some.
+    pub fn reading(&self, k: usize, meter: &MeterId) -> Option<&Reading> {
+        let known = &self.readings[..self.readings.len().min(k + 1)];
+        match &self.failure {
+            None => self.readings.get(k),
+            Some(_) => known.iter().rev().find(|reading| reading.meter == *meter),
+        }
+    }
+
     /// What sampling has taken of a budget, in seconds: counted where the engine counts, by the clock where not.
     pub fn work_s(&self) -> f64 {
         self.work_s.unwrap_or(self.wall_s)

@@ -9,6 +9,7 @@ use serde::de::DeserializeOwned;
 
 use super::Report;
 use crate::record::ReadingKey;
+use crate::system::files;
 
 /// What an earlier report says, as far as it matters here.
 #[derive(Deserialize)]
@@ -37,7 +38,7 @@ struct Read {
 
 /// What lies at a path, if it is a report at all.
 fn read<T: DeserializeOwned>(path: &Path) -> Option<T> {
-    serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+    serde_json::from_slice(&files::read_kept(path).ok()?).ok()
 }
 
 /// The spec, or the specs, that an earlier report is about.

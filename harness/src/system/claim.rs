@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 use std::time::SystemTime;
 
-use super::files::{FileError, UNFINISHED};
+use super::files::{self, FileError, UNFINISHED};
 
 /// The file that is locked; it stays, since whoever takes it away takes the lock of another with it.
 const NAME: &str = ".luxproof.lock";
@@ -24,13 +24,13 @@ pub enum ClaimError {
     #[error("{folder} is in use by {holder}: wait until that has ended, or name another folder with --out")]
     Taken { folder: String, holder: String },
     #[error("cannot write there: {0}")]
-    File(#[from] FileError),
+    File(FileError),
 }
 
 impl Claim {
     /// Makes the folder if need be, and sees that it can be written.
     pub fn of(folder: &Path) -> Result<Self, ClaimError> {
-        let fail = |source: io::Error| FileError::of(folder, source);
+        let fail = |source: io::Error| ClaimError::File(FileError::of(folder, source));
         std::fs::create_dir_all(folder).map_err(fail)?;
         let file = folder.join(NAME);
         let mut lock =
@@ -48,6 +48,8 @@ impl Claim {
                 tracing::warn!(folder = %folder.display(), %error, "it cannot be locked");
             }
         }
+        // What a run that was killed left: nobody else writes here.
+        files::sweep(folder);
         // That an old lock is there does not say that new files can be.
         tempfile::Builder::new().prefix(UNFINISHED).tempfile_in(folder).map_err(fail)?;
         let now = humantime::format_rfc3339_seconds(SystemTime::now());

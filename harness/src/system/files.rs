@@ -4,6 +4,7 @@ use std::fs::{File, Permissions};
 use std::io::{self, BufWriter, Read, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
+use std::time::Duration;
 
 use serde::Serialize;
 use serde_json::Serializer;
@@ -12,10 +13,31 @@ use serde_json::ser::{Formatter, PrettyFormatter};
 use super::rows::Rows;
 
 #[derive(Debug, thiserror::Error)]
-#[error("{path}: {source}")]
+#[error("{path}: {source}{}", remedy(.source))]
 pub struct FileError {
     pub path: String,
     pub source: io::Error,
+}
+
+/// What can be done about it, where that is known; ends a sentence.
+pub(crate) fn remedy(error: &io::Error) -> &'static str {
+    // What comes out of a temporary file or a writer wraps the system's own error, and keeps its kind.
+    match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "; make room there, and run it again: finished readings are kept"
+        }
+        io::ErrorKind::FileTooLarge => "; the limit of a file's size (`ulimit -f`) is too low",
+        io::ErrorKind::ReadOnlyFilesystem => "; nothing can be written there: name another folder",
+        io::ErrorKind::PermissionDenied => "; ask for the right to it, or name another",
+        _ if is_of_device(error) => "; the disk fails: look at the system's log, or name a folder on another disk",
+        _ => "",
+    }
+}
+
+/// Whether a device failed (EIO), which the standard library has no name for.
+fn is_of_device(error: &io::Error) -> bool {
+    let eio = rustix::io::Errno::IO;
+    error.raw_os_error().map_or_else(|| error.to_string().contains(&eio.to_string()), |code| code == eio.raw_os_error())
 }
 
 impl FileError {
@@ -30,14 +52,25 @@ pub(crate) const MAX_BYTES: u64 = 256 << 20;
 /// The bytes of a regular file of at most so many: nothing else is opened, since a pipe waits for ever and a device never ends.
 pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let refused = |why: String| io::Error::new(io::ErrorKind::InvalidInput, why);
-    if !std::fs::metadata(path)?.is_file() {
+    let metadata = std::fs::metadata(path)?;
+    if !metadata.is_file() {
         return Err(refused("it is no regular file".to_owned()));
     }
     let mut bytes = vec![];
     // Some files tell no size: what is read counts.
-    File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
-    let is_whole = bytes.len() as u64 <= most;
+    if metadata.len() <= most {
+        File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+    }
+    let is_whole = bytes.len().max(metadata.len() as usize) as u64 <= most;
     is_whole.then_some(bytes).ok_or_else(|| refused(format!("it has more than {} MB", most >> 20)))
+}
+
+/// The most bytes of what luxproof wrote itself: a report of a million meters has 1 GB.
+const MAX_KEPT_BYTES: u64 = 2 << 30;
+
+/// What luxproof keeps for its user, or shows with it: reports, histories, baselines.
+pub(crate) fn read_kept(path: &Path) -> Result<Vec<u8>, FileError> {
+    read_bounded(path, MAX_KEPT_BYTES).map_err(|source| FileError::of(path, source))
 }
 
 /// Reads what a path stands for, wherever links lead, if that lies below a folder.
@@ -52,6 +85,9 @@ pub(crate) fn read_below(folder: &Path, path: &Path, most: u64) -> io::Result<Ve
 
 /// How the names of files begin that are not finished.
 pub(crate) const UNFINISHED: &str = ".unfinished-";
+
+/// A writer has locked its file by then.
+const UNTIL_LOCKED: Duration = Duration::from_millis(50);
 
 /// Bytes that are written at a time.
 const BUFFER: usize = 1 << 16;
@@ -83,6 +119,13 @@ pub(crate) fn replace_shared(path: &Path, bytes: &[u8]) -> io::Result<()> {
     replace_by(&mut shared, path, Care::Lasting, |file| file.write_all(bytes))
 }
 
+/// The same, the error with its path. What is no regular file, standard output say, is written as it is.
+pub(crate) fn keep_shared(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    let is_special = std::fs::metadata(path).is_ok_and(|metadata| !metadata.is_file());
+    let kept = if is_special { std::fs::write(path, bytes) } else { replace_shared(path, bytes) };
+    kept.map_err(|source| FileError::of(path, source))
+}
+
 fn replace_by(
     builder: &mut tempfile::Builder<'_, '_>,
     path: &Path,
@@ -92,13 +135,35 @@ fn replace_by(
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder)?;
     let mut file = builder.prefix(UNFINISHED).tempfile_in(folder)?;
+    // As long as it is locked it has a writer. That some file systems know no locks does no harm: nobody sweeps there.
+    file.as_file().try_lock().ok();
     write(&mut file)?;
-    if care == Care::Usual {
-        return file.persist(path).map(drop).map_err(|e| e.error);
+    if care == Care::Lasting {
+        file.as_file().sync_all()?;
     }
-    file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
-    File::open(folder)?.sync_all()
+    if care == Care::Lasting {
+        File::open(folder)?.sync_all()?;
+        sweep(folder);
+    }
+    Ok(())
+}
+
+/// Takes away what killed writers left in a folder: files that nobody has locked any more.
+pub(crate) fn sweep(folder: &Path) {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(UNFINISHED)) {
+        let is_left = File::open(entry.path()).is_ok_and(|file| is_old(&file) && file.try_lock().is_ok());
+        if is_left && entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            std::fs::remove_file(entry.path()).ok();
+        }
+    }
+}
+
+/// Whether it is there long enough for its writer to have locked it.
+fn is_old(file: &File) -> bool {
+    let age = file.metadata().and_then(|metadata| metadata.created().or_else(|_| metadata.modified()));
+    age.is_ok_and(|then| then.elapsed().is_ok_and(|age| age >= UNTIL_LOCKED))
 }
 
 /// The same with a value as JSON for people, a line feed at its end.
@@ -122,4 +187,51 @@ fn written(file: &mut tempfile::NamedTempFile, value: &impl Serialize, layout: i
     value.serialize(&mut Serializer::with_formatter(&mut writer, layout))?;
     writer.write_all(b"\n")?;
     writer.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_killed_writers_left_goes_and_what_is_being_written_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let [left, held, other] = ["left", "held", "other"].map(|name| {
+            let name = if name == "other" { name.to_owned() } else { format!("{UNFINISHED}{name}") };
+            folder.path().join(name)
+        });
+        std::fs::write(&left, "a").unwrap();
+        std::fs::write(&other, "b").unwrap();
+        let writer = File::create(&held).unwrap();
+        writer.try_lock().unwrap();
+        std::thread::sleep(2 * UNTIL_LOCKED);
+        sweep(folder.path());
+        assert_eq!([&left, &held, &other].map(|path| path.exists()), [false, true, true]);
+    }
+
+    #[test]
+    fn what_is_no_file_or_too_large_is_refused_and_not_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("large");
+        // It takes no room, and would be read into memory.
+        File::create(&path).unwrap().set_len(MAX_KEPT_BYTES + 1).unwrap();
+        assert!(read_kept(&path).unwrap_err().to_string().contains("it has more than 2048 MB"));
+        for path in ["/dev/zero", "/"] {
+            assert!(read_kept(Path::new(path)).unwrap_err().to_string().contains("no regular file"), "{path}");
+        }
+    }
+
+    #[test]
+    fn a_full_or_broken_disk_is_told_with_what_to_do() {
+        use rustix::io::Errno;
+        for (errno, says) in [(Errno::NOSPC, "make room"), (Errno::IO, "another disk"), (Errno::ROFS, "another folder")]
+        {
+            let error = io::Error::from_raw_os_error(errno.raw_os_error());
+            let wrapped = io::Error::new(error.kind(), error.to_string());
+            for error in [error, wrapped] {
+                let told = FileError::of(Path::new("out/report.json"), error).to_string();
+                assert!(told.starts_with("out/report.json: ") && told.contains(says), "{told}");
+            }
+        }
+    }
 }

@@ -18,6 +18,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr, miette};
 use crate::cli::diagnostic::diagnose;
 use crate::report::Exit;
 use crate::spec::{SpecError, Trust};
+use crate::system::files;
 
 use summary::Summary;
 
@@ -176,7 +177,7 @@ fn convert(out: &Path, photometry: &Photometry) -> Result<Written, Diagnostic> {
 }
 
 fn save(path: &Path, text: &str) -> Result<(), Diagnostic> {
-    std::fs::write(path, text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+    files::keep_shared(path, text.as_bytes()).into_diagnostic()
 }
 
 fn spec_error(error: &ReadError) -> SpecError {

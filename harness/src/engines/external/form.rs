@@ -7,10 +7,10 @@ use luminaire::geometry::Surface;
 use luminaire::photometry::{HorizontalAxis, LuminousOpening};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::engines::contract::same_meters;
-use crate::engines::{EngineError, Job, Measurement, Station, recess};
+use crate::engines::{EngineError, Job, Measurement, Station, checked, recess};
 use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
 use crate::spec::Budget;
 use crate::system::printable;
@@ -141,20 +141,88 @@ pub struct ExternalReadings {
 struct ReadingForm {
     /// The meter's name.
     meter: String,
-    /// Illuminance, finite; what is negative is judged like any other.
+    /// Illuminance, finite; what is negative is judged like any other. Null or `NaN`: this meter has none, which fails the engine, and those
+    /// of the others are kept.
+    #[serde(deserialize_with = "number")]
     illuminance_lx: f64,
     /// Standard error of a Monte Carlo mean.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "some_number")]
     std_error_lx: Option<f64>,
     /// Distance within which the true value lies, for deterministic methods.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "some_number")]
     error_bound_lx: Option<f64>,
     /// Of the standard error: one less than the independent samples that it was estimated from.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "some_number")]
     degrees_of_freedom: Option<f64>,
     /// Whether the value is claimed to be right to its last digit.
     #[serde(default)]
     exact: bool,
+}
+
+/// A number, or what programs write in its place that have none.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a number")]
+enum Number {
+    Told(f64),
+    Word(NoNumber),
+    Null(()),
+}
+
+/// As Python writes them, in quotes.
+#[derive(Deserialize)]
+enum NoNumber {
+    #[serde(rename = "NaN", alias = "Infinity", alias = "-Infinity")]
+    NotFinite,
+}
+
+impl From<Number> for f64 {
+    fn from(number: Number) -> Self {
+        match number {
+            Number::Told(value) => value,
+            Number::Word(NoNumber::NotFinite) | Number::Null(()) => Self::NAN,
+        }
+    }
+}
+
+fn number<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Number::deserialize(from).map(f64::from)
+}
+
+fn some_number<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    Option::<Number>::deserialize(from).map(|number| number.map(f64::from))
+}
+
+/// JSON with `NaN` and infinities, which Python writes and JSON has not, made words in quotes.
+fn quoted(text: &str) -> String {
+    let (mut quoted, mut is_string, mut is_escaped) = (String::with_capacity(text.len()), false, false);
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        let word = ["NaN", "Infinity", "-Infinity"].into_iter().find(|word| !is_string && rest.starts_with(word));
+        if let Some(word) = word {
+            quoted.extend(["\"", word, "\""]);
+        } else {
+            quoted.push(c);
+        }
+        is_string ^= c == '"' && !is_escaped;
+        is_escaped = is_string && c == '\\' && !is_escaped;
+        rest = &rest[word.map_or(c.len_utf8(), str::len)..];
+    }
+    quoted
+}
+
+impl ExternalReadings {
+    /// What an adapter printed.
+    pub fn from_json(text: &[u8]) -> Result<Self, serde_json::Error> {
+        serde_json::from_slice(text).or_else(|error| {
+            let quoted = quoted(&String::from_utf8_lossy(text));
+            serde_json::from_str(&quoted).map_err(|_| error)
+        })
+    }
+
+    /// The measurement that an adapter printed for a job, checked like every engine's.
+    pub fn measured(text: &[u8], job: &Job, engine: &EngineName) -> Result<Measurement, EngineError> {
+        checked(engine, job, measurement(text, job, engine)?)
+    }
 }
 
 impl ReadingForm {
@@ -284,8 +352,8 @@ fn meter(station: &Station) -> MeterForm {
 }
 
 /// Reads what an adapter printed; every meter must be there once, in order.
-pub(super) fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Result<Measurement, EngineError> {
-    let answer: ExternalReadings = serde_json::from_slice(stdout)
+fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Result<Measurement, EngineError> {
+    let answer = ExternalReadings::from_json(stdout)
         .map_err(|e| EngineError::no_readings(engine.clone(), &String::from_utf8_lossy(stdout), &e))?;
     let output = |what: &str| EngineError::output(engine.clone(), what);
     match answer.declined {

@@ -46,14 +46,23 @@ fn rows_that_are_missing_swapped_or_not_a_number_are_no_readings() {
         (None, "3 readings for 4 meters"),
         (Some(("m[2]", "1")), "gave `m[2]` where `m[3]`"),
         (Some(("m[3]", "1e308")), "read 1e308 lx (Unstated) at m[3]: beyond 1e30 lx nothing is light"),
-        (Some(("m[3]", "NaN")), "no JSON of readings"),
+        (Some(("m[3]", "NaN")), "read NaN lx (Unstated) at m[3]; the readings of the other meters are kept"),
+        (Some(("m[3]", "-Infinity")), "read NaN lx (Unstated) at m[3]"),
+        (Some(("m[3]", "null")), "read NaN lx (Unstated) at m[3]"),
+        (Some(("m[3]", "1, \"std_error_lx\": NaN")), "read 1 lx (StandardError"),
         (Some(("m[3]", "1e999")), "no JSON of readings"),
-        (Some(("m[3]", "null")), "no JSON of readings"),
+        (Some(("m[3]", "\"dark\"")), "no JSON of readings"),
+        (Some(("m[3]", "nan")), "no JSON of readings"),
     ] {
         let rows: Vec<_> = three.into_iter().chain(fourth).collect();
         let error = read(&prints(&rows)).unwrap_err();
-        assert!(matches!(error, EngineError::Output { .. }) && error.to_string().contains(says), "{says}: {error}");
+        assert!(error.to_string().contains(says), "{says}: {error}");
+        if let EngineError::AtMeters { rest, .. } = error {
+            let values: Vec<f64> = rest.estimates.iter().map(|e| e.value).collect();
+            assert!(values[..3] == [1.0; 3] && values[3].is_nan(), "{values:?}");
+        }
     }
+    assert!(matches!(read(&prints(&[("m[0]", "NaN"); 4])), Err(EngineError::Output { .. })), "named wrongly");
     for (last, says) in [
         (r#""std_error_lx": 1e300"#, "nothing is light"),
         (r#""std_error_lx": 1, "degrees_of_freedom": 0.5"#, "`degrees_of_freedom: 0.5` at m[3]: two samples have one"),

@@ -138,10 +138,10 @@ fn resumed(options: &Options<'_>) -> Result<Hunt, HuntError> {
     let path = options.out.join(STATE);
     let engines: BTreeSet<EngineName> = options.engines.keys().cloned().collect();
     let fresh = Hunt { seed: options.seed, engines: engines.clone(), ..Hunt::default() };
-    let bytes = match std::fs::read(&path) {
+    let bytes = match files::read_kept(&path) {
         Ok(bytes) => bytes,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(fresh),
-        Err(source) => return Err(FileError::of(&path, source).into()),
+        Err(error) if error.source.kind() == io::ErrorKind::NotFound => return Ok(fresh),
+        Err(error) => return Err(error.into()),
     };
     let kept: Hunt = serde_json::from_slice(&bytes).map_err(|e| FileError::of(&path, e))?;
     if kept.seed != options.seed || kept.engines != engines {
@@ -175,7 +175,7 @@ impl Hunter<'_> {
     fn keep(&self) -> Result<(), HuntError> {
         files::keep_json(&self.options.out.join(STATE), &self.hunt)?;
         let path = self.options.out.join("index.md");
-        std::fs::write(&path, page::page(&self.hunt)).map_err(|e| FileError::of(&path, e))?;
+        files::keep_shared(&path, page::page(&self.hunt).as_bytes())?;
         Ok(())
     }
 

@@ -48,7 +48,7 @@ impl Cache {
     /// Looks a key up; an entry that was found counts as used today.
     pub fn find(&self, key: &Key) -> Lookup {
         let path = self.path(key);
-        let text = match std::fs::read(&path) {
+        let text = match files::read_bounded(&path, files::MAX_BYTES) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Lookup::Unknown,
             Err(error) => return Lookup::Damaged(format!("{} cannot be read: {error}", path.display())),
@@ -60,6 +60,13 @@ impl Cache {
                 Lookup::Found(Box::new(entry))
             }
             Err(why) => Lookup::Damaged(format!("{} {why}", path.display())),
+        }
+    }
+
+    /// Takes away what writers left that were killed.
+    pub fn sweep(&self) {
+        for folder in std::fs::read_dir(&self.root).into_iter().flatten().flatten() {
+            files::sweep(&folder.path());
         }
     }
 

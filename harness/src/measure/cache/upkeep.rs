@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use super::{Cache, entry};
-use crate::system::files::UNFINISHED;
+use crate::system::files::{MAX_BYTES, UNFINISHED, read_bounded};
 
 /// A file that was begun longer ago than this has no writer any more.
 const WRITERS_LIVE: Duration = Duration::from_secs(3600);
@@ -104,7 +104,7 @@ fn kind(file: &Path) -> Kind {
         return Kind::Unfinished;
     }
     let key = name.trim_end_matches(".json");
-    let checked = std::fs::read(file).map_err(|e| format!("cannot be read: {e}"));
+    let checked = read_bounded(file, MAX_BYTES).map_err(|e| format!("cannot be read: {e}"));
     match checked.and_then(|text| entry::parse(&text, key).map_err(|why| why.to_string())) {
         Ok(_) => Kind::Entry,
         Err(why) => Kind::Damaged(why),

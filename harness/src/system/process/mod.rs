@@ -27,7 +27,7 @@ use std::thread;
 use std::time::Duration;
 
 pub use conversation::Conversation;
-pub use interrupt::{interrupt, interrupt_flag, is_interrupted};
+pub use interrupt::{UnderWay, interrupt, interrupt_flag, is_interrupted};
 pub use invocation::{Finished, Freedom, Invocation, ProcessError};
 pub use memory::{PeakMemory, limit_mib};
 #[cfg(target_os = "linux")]

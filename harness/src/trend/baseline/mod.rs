@@ -7,7 +7,6 @@ mod changes;
 mod review;
 
 use std::collections::{BTreeSet, HashSet};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use itertools::Itertools;
@@ -79,7 +78,8 @@ impl Entry {
             method: recording.method.clone(),
             accepted: String::new(),
             reason: String::new(),
-            readings: mine.map(|r| r.reading.clone()).collect(),
+            // What is left of an engine that failed is not to be expected again.
+            readings: mine.filter(|_| recording.failure.is_none()).map(|r| r.reading.clone()).collect(),
         }
     }
 
@@ -104,7 +104,7 @@ impl Baseline {
 
     pub fn read(path: &Path) -> Result<Self, BaselineError> {
         let name = || path.display().to_string();
-        let text = fs::read(path).map_err(|source| FileError::of(path, source))?;
+        let text = files::read_kept(path)?;
         let opened = envelope::open(SCHEMA, &text).and_then(|sealed| sealed.about_what(Self::subject));
         let baseline: Self = opened.map_err(|why| BaselineError::Refused { path: name(), why })?;
         baseline.check(&name())?;

@@ -1,5 +1,7 @@
 //! The laws of baselines: refused unless they match, noise told apart from shifts, nothing accepted without a reason.
 
+use std::fs;
+
 use serde_json::json;
 
 use super::*;

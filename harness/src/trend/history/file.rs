@@ -26,9 +26,9 @@ pub(super) fn whole_lines(text: &[u8]) -> (&[u8], Option<usize>) {
 /// takes the place of its earlier lines, case by case, so that repeating a night is harmless.
 pub fn add(path: &Path, lines: &[Line<'_>]) -> Result<Added, HistoryError> {
     let fail = |source| FileError::of(path, source);
-    let old = match fs::read(path) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => vec![],
-        read => read.map_err(fail)?,
+    let old = match files::read_kept(path) {
+        Err(error) if error.source.kind() == std::io::ErrorKind::NotFound => vec![],
+        read => read?,
     };
     let mut new = vec![];
     for line in lines {
@@ -44,6 +44,7 @@ pub fn add(path: &Path, lines: &[Line<'_>]) -> Result<Added, HistoryError> {
     if added == Added::default() {
         let mut file = fs::OpenOptions::new().create(true).append(true).open(path).map_err(fail)?;
         file.write_all(&new).and_then(|()| file.sync_all()).map_err(fail)?;
+        files::sweep(path.parent().unwrap_or(Path::new("")));
     } else {
         let kept: Vec<u8> = before().filter(stays).flatten().copied().chain(new).collect();
         files::replace_lastingly(path, &kept).map_err(fail)?;

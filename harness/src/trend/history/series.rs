@@ -1,7 +1,6 @@
 //! The history as series over nights: one a comparison that repeats from night to night.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::fs;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -10,7 +9,7 @@ use super::file::whole_lines;
 use super::line::{HistoryError, Line, Meters, Numbers, Subject};
 use crate::judge::{Basis, Verdict};
 use crate::record::{EngineName, MeterId, ProcedureId, ReadingKey};
-use crate::system::files::FileError;
+use crate::system::files;
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key {
@@ -53,7 +52,7 @@ pub struct History {
 
 impl History {
     pub fn read(path: &Path) -> Result<Self, HistoryError> {
-        let bytes = fs::read(path).map_err(|source| FileError::of(path, source))?;
+        let bytes = files::read_kept(path)?;
         Self::parse(&bytes, path)
     }
 

@@ -1,0 +1,146 @@
+//! What every reader promises of any bytes: no panic, and what is refused is refused with its place. One function a reader, for cargo-fuzz
+//! (`fuzz_targets/`) and for `tests/program/any_bytes.rs`.
+
+use std::fs;
+use std::path::Path;
+
+use luminaire::geometry::Mesh;
+use luminaire::photometry::{eulumdat, lm63, tm33};
+use luminaire::scene::{Meter, Scene, Transport};
+use luxproof::engines::{ExternalReadings, Job, Station};
+use luxproof::record::{EngineName, MeterId, ProcedureId};
+use luxproof::report::{Detail, Report, Style, csv, junit, markdown, page, terminal};
+use luxproof::spec::{Budget, Case, Trust};
+use luxproof::trend::baseline::Baseline;
+use luxproof::trend::history::{History, changes, site};
+
+pub(crate) type Target = fn(&[u8]);
+
+/// All of them, by the names of their folders of seeds.
+pub(crate) const ALL: [(&str, Target); 9] = [
+    ("lm63", lm63),
+    ("eulumdat", eulumdat),
+    ("tm33", tm33),
+    ("obj", obj),
+    ("spec", spec),
+    ("report", report),
+    ("history", history),
+    ("baseline", baseline),
+    ("answer", answer),
+];
+
+/// What was read survives being written.
+pub(crate) fn lm63(bytes: &[u8]) {
+    match lm63::parse_with(bytes, |_| Ok(b"1 2 0 90 1 .9".to_vec())) {
+        Ok(read) => {
+            assert!(read.distribution.flux().value() >= 0.0);
+            let written = lm63::write_2019(&read);
+            let again = lm63::parse(written.text.as_bytes()).expect("a written file is legal");
+            assert_eq!(again.distribution, read.distribution);
+            assert_eq!(again.lamp_lumens, read.lamp_lumens);
+        }
+        Err(error) => assert!(error.line >= 1 && error.column >= 1),
+    }
+}
+
+/// What was read survives being written.
+pub(crate) fn eulumdat(bytes: &[u8]) {
+    match eulumdat::parse(bytes) {
+        Ok(read) => {
+            assert!(read.distribution.flux().value() >= 0.0);
+            let written = eulumdat::write(&read);
+            let again = eulumdat::parse(written.text.as_bytes()).expect("a written file is legal");
+            // Planes that are no mirror images of each other cannot be listed again; that must be said.
+            let same = again.distribution == read.distribution;
+            assert!(same || !written.losses.is_empty());
+            assert_eq!(again.distribution.gamma_deg(), read.distribution.gamma_deg());
+        }
+        Err(error) => assert!(error.line >= 1 && error.column >= 1),
+    }
+}
+
+/// What was read can be written as LM-63.
+pub(crate) fn tm33(bytes: &[u8]) {
+    match tm33::parse(bytes) {
+        Ok(read) => {
+            assert!(read.distribution.flux().value() >= 0.0);
+            let written = lm63::write_2019(&read);
+            let again = lm63::parse(written.text.as_bytes()).expect("a written file is legal");
+            assert_eq!(again.distribution, read.distribution);
+        }
+        Err(error) => assert!(error.line >= 1 && error.column >= 1),
+    }
+}
+
+/// Every triangle has its corners, and they are finite.
+pub(crate) fn obj(mut bytes: &[u8]) {
+    if let Ok(mesh) = Mesh::parse_obj(&mut bytes, Path::new("any.obj")) {
+        assert!(mesh.triangles.iter().flatten().all(|v| (*v as usize) < mesh.vertices_m.len()));
+        assert!(mesh.vertices_m.iter().all(|v| v.is_finite()) && !mesh.volume_m3().is_infinite());
+    }
+}
+
+/// A file of these bytes in a folder of its own, with what they may name beside it.
+fn kept<T>(name: &str, bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
+    const LAMP: &str = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 3 1 1 2 0 0 0\n1 1 0\n0 60 90\n0\n100 80 0\n";
+    let folder = tempfile::tempdir().expect("there is a temporary folder");
+    let path = folder.path().join(name);
+    let written = fs::write(folder.path().join("lamp.ies"), LAMP).and_then(|()| fs::write(&path, bytes));
+    written.expect("it can be written");
+    read(&path)
+}
+
+/// As a stranger's; the message names the file.
+pub(crate) fn spec(bytes: &[u8]) {
+    if let Err(error) = kept("any.yaml", bytes, |path| Case::load_all(path, Trust::Stranger)) {
+        assert!(error.to_string().contains("any.yaml") || error.to_string().contains("lamp.ies"), "{error}");
+    }
+}
+
+/// Also of another version, whose checksum nobody can know: every view can be drawn of it.
+pub(crate) fn report(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    match Report::from_json(text) {
+        Ok(read) => {
+            let report = &read.report;
+            terminal(report, Style::Plain, Detail::All, None);
+            for view in [markdown(report, None), junit(report), csv(report), page(report, &[])] {
+                assert!(!view.is_empty());
+            }
+            report.exit();
+        }
+        Err(error) => assert!(!error.to_string().is_empty()),
+    }
+}
+
+/// Also of formats that have no checksums: the site can be drawn of it.
+pub(crate) fn history(bytes: &[u8]) {
+    if let Ok(history) = kept("any.jsonl", bytes, History::read) {
+        site(&history, &changes(&history), &[]);
+    }
+}
+
+pub(crate) fn baseline(bytes: &[u8]) {
+    if let Err(error) = kept("any.json", bytes, Baseline::read) {
+        assert!(error.to_string().contains("any.json"), "{error}");
+    }
+}
+
+/// What an adapter prints that was asked for two meters: readings of both, or an error.
+pub(crate) fn answer(bytes: &[u8]) {
+    let meter = Meter { position_m: glam::DVec3::ONE, normal: glam::DVec3::Z };
+    let job = Job {
+        case: "any".to_owned(),
+        procedure: ProcedureId::DirectIlluminance,
+        scene: Scene::default(),
+        stations: (0..2).map(|k| Station { id: MeterId::new("m", k), meter }).collect(),
+        transport: Transport::Direct,
+        budget: Budget::default(),
+        seed: 1,
+        settings: std::collections::BTreeMap::new(),
+    };
+    if let Ok(measurement) = ExternalReadings::measured(bytes, &job, &EngineName::from("any")) {
+        assert_eq!(measurement.estimates.len(), 2);
+        assert!(measurement.estimates.iter().all(|e| e.value.is_finite() && e.uncertainty.is_finite()));
+    }
+}
