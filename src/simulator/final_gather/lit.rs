@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::bicubic::{Bicubic, NODES};
 use super::face::{Face, mean_wall_m2};
+use super::grid::Cover;
 use super::surroundings::Surroundings;
 use super::view::{Left, View};
 use crate::scene::Meter;
@@ -18,6 +19,8 @@ use crate::simulator::visibility::Occluder;
 const CHECKS: [[f64; 2]; 6] = [[0.5, 0.5], [0.02, 0.02], [0.98, 0.98], [0.02, 0.98], [0.98, 0.02], [0.5, 0.02]];
 /// Heights of luminaires nearer to an edge than this part of a rectangle do not part it.
 const EDGE: f64 = 0.02;
+/// Parts of a side by which edges of bodies are told from those of a rectangle.
+const SAME: f64 = 1e-9;
 /// Quarterings at most.
 const DEEPEST: u32 = 9;
 /// Quarterings at most that only part what bodies may hide from what they cannot.
@@ -70,6 +73,8 @@ struct Leaf {
     lux: [f64; NODES],
     /// How far off that is.
     error_lux: f64,
+    /// Whether a body stands on a part of it, so that what shows of what is off may have a mean.
+    is_covered: bool,
     /// Luminaires that may be hidden, or whose light is no polynomial here.
     asked: Vec<u32>,
     /// Mean exitance after one reflection in lm/m², as far as it is known beforehand.
@@ -165,8 +170,18 @@ impl Lit {
         let one = |face: &Face| {
             let floor_lux = DIM * mean;
             let wall_m2 = surroundings.room.map_or(f64::INFINITY, |room| mean_wall_m2(room.size_m));
-            let build =
-                Build { lights, bicubic, face, relative_error, floor_lux, wall_m2, occluders: &occluders, stop };
+            let covers = surroundings.bodies().filter_map(|b| face.covered_by(*b)).collect();
+            let build = Build {
+                lights,
+                bicubic,
+                face,
+                covers,
+                relative_error,
+                floor_lux,
+                wall_m2,
+                occluders: &occluders,
+                stop,
+            };
             let (corner_m, size_m) = (face.corners_m[0], face.size_m());
             let mut parts = vec![];
             if face.reflectance > 0.0 {
@@ -254,7 +269,7 @@ impl Lit {
             return Light { lux: 0.0, known: Known { error_lux: 0.0, noise_lux: 0.0, side_m: 0.0 } };
         };
         let t = (at_m - part.corner_m) / part.size_m;
-        let side_m = part.size_m.max_element();
+        let side_m = if leaf.is_covered { f64::INFINITY } else { part.size_m.max_element() };
         let mut light = Light {
             lux: self.bicubic.at(&leaf.lux, t),
             known: Known { error_lux: leaf.error_lux, noise_lux: 0.0, side_m },
@@ -302,6 +317,11 @@ impl Lit {
     }
 }
 
+/// Both ends of a rectangle, a hair inside.
+fn inner(corner_m: DVec2, size_m: DVec2) -> (DVec2, DVec2) {
+    (corner_m + SAME * size_m, corner_m + (1.0 - SAME) * size_m)
+}
+
 /// Finds for every part that is quartered the polynomial closest to those of its quarters, which lie behind it.
 fn join(bicubic: &Bicubic, parts: &mut [Part]) {
     for k in (0..parts.len()).rev() {
@@ -338,6 +358,8 @@ struct Build<'a> {
     lights: &'a Lights<'a>,
     bicubic: Bicubic,
     face: &'a Face,
+    /// Where bodies stand on it.
+    covers: Vec<[DVec2; 2]>,
     relative_error: f64,
     floor_lux: f64,
     wall_m2: f64,
@@ -360,7 +382,7 @@ impl Build<'_> {
             _ => leaf.error_lux <= limit_lux,
         };
         let is_clear = leaf.asked.is_empty() || depth >= DEEPEST_FOR_SHADOW;
-        if is_good && is_clear || depth >= DEEPEST || self.stop.is_due() {
+        if is_good && is_clear && !leaf.is_covered || depth >= DEEPEST || self.stop.is_due() {
             parts[index].kind = Kind::Leaf(Box::new(leaf));
             return;
         }
@@ -383,11 +405,22 @@ impl Build<'_> {
         }
     }
 
-    /// Where a rectangle is quartered: in its middle, or at the height of a luminaire, above which it may send no light.
+    /// Where a rectangle is quartered: in its middle, where a body stands on a part of it, or at the height of a luminaire, above
+    /// which it may send no light.
     fn middle_m(&self, corner_m: DVec2, size_m: DVec2) -> DVec2 {
         let up = self.face.on(DVec3::Z);
         let (low, high) = (corner_m + EDGE * size_m, corner_m + (1.0 - EDGE) * size_m);
         let mut middle_m = corner_m + 0.5 * size_m;
+        if self.cover(corner_m, size_m) == Cover::Part {
+            for axis in 0..2 {
+                let ends = self.covering(corner_m, size_m).flatten().map(|end| end[axis]);
+                let inside = ends.filter(|at_m| *at_m > low[axis] && *at_m < high[axis]);
+                let off = |at_m: &f64| (at_m - middle_m[axis]).abs();
+                let nearest = inside.min_by(|a, b| off(a).total_cmp(&off(b)));
+                middle_m[axis] = nearest.unwrap_or(middle_m[axis]);
+            }
+            return middle_m;
+        }
         let heights = self.lights.emitters.iter().flat_map(Emitter::bounds_m).map(|b| self.face.on(b));
         let inside =
             heights.filter(|at_m| up != DVec2::ZERO && at_m.dot(up) > low.dot(up) && at_m.dot(up) < high.dot(up));
@@ -396,8 +429,32 @@ impl Build<'_> {
         middle_m
     }
 
+    /// Bodies that stand on a rectangle or a part of it.
+    fn covering(&self, corner_m: DVec2, size_m: DVec2) -> impl Iterator<Item = [DVec2; 2]> {
+        let (low, high) = inner(corner_m, size_m);
+        self.covers.iter().copied().filter(move |c| c[0].cmplt(high).all() && c[1].cmpgt(low).all())
+    }
+
+    fn cover(&self, corner_m: DVec2, size_m: DVec2) -> Cover {
+        let (low, high) = inner(corner_m, size_m);
+        let is_whole = |c: [DVec2; 2]| c[0].cmple(low).all() && c[1].cmpge(high).all();
+        let covering = || self.covering(corner_m, size_m);
+        if covering().any(is_whole) {
+            Cover::Whole
+        } else if covering().next().is_some() {
+            Cover::Part
+        } else {
+            Cover::None
+        }
+    }
+
     /// A rectangle with the luminaires that may be hidden from it told apart.
     fn leaf(&self, corner_m: DVec2, size_m: DVec2) -> Leaf {
+        let cover = self.cover(corner_m, size_m);
+        if cover == Cover::Whole {
+            return Leaf { lux: [0.0; NODES], error_lux: 0.0, is_covered: false, asked: vec![], exitance: 0.0 };
+        }
+        let is_covered = cover == Cover::Part;
         let meter = |t: DVec2| Meter { position_m: self.face.off(corner_m + t * size_m), normal: self.face.normal };
         let corners_m = [meter(DVec2::ZERO).position_m, meter(DVec2::ONE).position_m];
         let all = 0..self.lights.emitters.len();
@@ -422,6 +479,6 @@ impl Build<'_> {
         // What may be hidden counts by half, so that no place that is lit is drawn never.
         let hidden: f64 = (0..NODES).map(|k| self.bicubic.weight(k) * lux_at(self.bicubic.node(k), &asked)).sum();
         let exitance = self.face.reflectance * (by_area.max(0.0) + 0.5 * hidden).max(0.02 * self.floor_lux);
-        Leaf { lux, error_lux, asked: asked.iter().map(|k| *k as u32).collect(), exitance }
+        Leaf { lux, error_lux, is_covered, asked: asked.iter().map(|k| *k as u32).collect(), exitance }
     }
 }
