@@ -25,8 +25,8 @@ const SCENE: &str = include_str!("../../../drivers/cycles_scene.py");
 
 /// More reflections Blender does not let anyone ask for.
 pub(super) const MOST_REFLECTIONS: i64 = 1024;
-/// Side of a meter's patch, in parts of the largest coordinate: a hundred times what 32-bit floats resolve there.
-const PATCH: f64 = 1e-5;
+/// Side of a meter's patch, in parts of the largest coordinate: forty times what 32-bit floats resolve there at least.
+const PATCH: f64 = 5e-6;
 
 pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.coordinates);

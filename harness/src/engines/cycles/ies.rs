@@ -3,7 +3,7 @@
 //! Between angles Cycles 4.5 lays a cubic through four neighbours by their numbers (`kernel/util/ies.h`), whatever the angles between
 //! them: straight where neighbours are equally far apart and in line, bent at every kink. It takes the neighbour before the first plane and
 //! behind the last one for dark, and is dark at the last angle itself. So kinks get close neighbours, planes begin and end with cells of
-//! a thousandth of a degree, turned away from C 0, and a row lies behind gamma 180; values where nobody looks make straight lines of
+//! a hair's breadth, turned away from C 0, and a row lies behind gamma 180; values where nobody looks make straight lines of
 //! the curves beside them. What is left is computed and stated, never taken off.
 
 use std::fmt::Write;
@@ -13,6 +13,8 @@ use luminaire::scene::{Luminaire, Meter};
 
 /// Width of the cells that keep a jump, a begin or an end to itself.
 pub(super) const EDGE_DEG: f64 = 1e-3;
+/// Width of the first and the last cell of planes, where Cycles is up to 7 % off: as narrow as 32-bit floats tell apart.
+const HAIR_DEG: f64 = 1e-4;
 /// How far planes are turned (`SEAM_DEG` of `cycles_scene.py`), so that no direction that anyone asks for lies where they begin.
 const SEAM_DEG: f64 = 0.01;
 /// The row behind gamma 180, and those beside nadir. Nothing is looked up between the latter: an arc cosine of 32-bit floats is 0 or
@@ -87,9 +89,9 @@ impl LookedUp {
         let inner: Vec<f64> = c.iter().map(|c| c + SEAM_DEG).filter(|h| *h < end - EDGE_DEG).collect();
         let next = inner.get(1).copied().unwrap_or(end);
         let before = inner.last().copied().unwrap_or(0.0);
-        let begins = [Node::at(0.0), Node::at(EDGE_DEG), Node { deg: SEAM_DEG / 2.0, between: Some((SEAM_DEG, next)) }];
+        let begins = [Node::at(0.0), Node::at(HAIR_DEG), Node { deg: SEAM_DEG / 2.0, between: Some((SEAM_DEG, next)) }];
         let ends = [Node::at(end), Node { deg: end + EDGE_DEG, between: Some((end, before)) }];
-        let ends = ends.into_iter().chain([360.0 - EDGE_DEG, 360.0].map(Node::at));
+        let ends = ends.into_iter().chain([360.0 - HAIR_DEG, 360.0].map(Node::at));
         let h: Vec<Node> = begins.into_iter().chain(inner.into_iter().map(Node::at)).chain(ends).collect();
 
         let exact = |h: f64, v: f64| table.intensity(h - SEAM_DEG, v.min(180.0)).value();
