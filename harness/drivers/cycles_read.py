@@ -171,6 +171,7 @@ class Patches:
         bpy.context.scene.collection.objects.link(patches)
         for kind in ("diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
             setattr(patches, f"visible_{kind}", False)
+        bpy.ops.object.select_all(action="DESELECT")  # imported bodies come selected, and would be baked, too
         bpy.context.view_layer.objects.active = patches
         patches.select_set(True)
         render = bpy.context.scene.render
