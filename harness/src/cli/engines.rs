@@ -22,22 +22,22 @@ pub(super) enum EnginesAction {
     List,
     /// Fetch missing engines into a folder of our own
     Install {
-        /// Engines by name [default: all]
+        /// Engines by name [default: all but cycles]
         names: Vec<String>,
     },
     /// Hold the files of installed engines against the sums that they were installed with
     Verify {
-        /// Engines by name [default: all]
+        /// Engines by name [default: all but cycles]
         names: Vec<String>,
     },
     /// Install anew what is broken or absent
     Repair {
-        /// Engines by name [default: all]
+        /// Engines by name [default: all but cycles]
         names: Vec<String>,
     },
     /// Let engines read scenes of known answer and judge what they read
     Doctor {
-        /// Engines by name [default: all]
+        /// Engines by name [default: all but cycles]
         names: Vec<String>,
         /// The spec whose engines, adapters among them, are examined, too
         #[arg(long, value_name = "FILE")]
@@ -115,10 +115,13 @@ fn verify(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
     Ok(exit)
 }
 
-/// The engines that are named, or all.
+/// The engines that are named, or all but those that want to be named.
 fn wanted(names: &[String]) -> Vec<EngineName> {
     let all = engines::all().into_iter().map(|e| e.name());
-    all.filter(|e| names.is_empty() || names.iter().any(|n| e == n)).collect()
+    let is_wanted = |e: &EngineName| {
+        if names.is_empty() { !engines::is_on_request(e.as_str()) } else { names.iter().any(|n| *e == **n) }
+    };
+    all.filter(is_wanted).collect()
 }
 
 /// Installs the engines that are named, or all.

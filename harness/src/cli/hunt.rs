@@ -195,7 +195,8 @@ fn hunted(args: &HuntArgs, site: &Site) -> Result<Hunted, Diagnostic> {
     let mut chosen = BTreeMap::new();
     for name in known {
         let is_named = args.engines.iter().any(|n| name == *n);
-        if !args.engines.is_empty() && !is_named {
+        let is_left_out = if args.engines.is_empty() { engines::is_on_request(name.as_str()) } else { !is_named };
+        if is_left_out && !declared.contains_key(&name) {
             continue;
         }
         let settings = declared.get(&name).cloned().unwrap_or_default();

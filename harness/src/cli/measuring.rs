@@ -43,7 +43,9 @@ impl MeasuringArgs {
         let mut present = vec![];
         for engine in engines::all() {
             let is_named = self.engines.iter().any(|n| engine.name() == *n);
-            if !self.engines.is_empty() && !is_named {
+            let is_wanted =
+                if self.engines.is_empty() { !engines::is_on_request(engine.name().as_str()) } else { is_named };
+            if !is_wanted {
                 continue;
             }
             match engine.probe(site) {

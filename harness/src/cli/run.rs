@@ -11,7 +11,7 @@ use super::engines::report_installation;
 use super::progress::Progress;
 use super::views::print_report;
 use crate::audit::{self, AfterFailure, Calibration, Options};
-use crate::engines::Site;
+use crate::engines::{self, Site};
 use crate::measure::cache::Cache;
 use crate::report::earlier::subject_at;
 use crate::report::{self, BaselineCheck, Exit, Report};
@@ -39,10 +39,15 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> R
     };
     if args.install {
         // Every spec is read and checked before anything is fetched.
-        audit::chosen(&args.selected.specs, &options).map_err(diagnose)?;
+        let (cases, _) = audit::chosen(&args.selected.specs, &options).map_err(diagnose)?;
         Claim::of(&options.out).into_diagnostic()?;
         let _under_way = process::UnderWay::begin();
         report_installation(site, &args.selected.engines);
+        let named = cases.iter().flat_map(|case| case.engines.iter().flatten()).map(|(name, _)| name.clone());
+        let on_request: Vec<String> = named.filter(|name| engines::is_on_request(name)).collect();
+        if args.selected.engines.is_empty() && !on_request.is_empty() {
+            report_installation(site, &on_request);
+        }
     }
     let held = args.baseline.as_deref().map(|path| Held::read(path, &args.selected.specs, &options)).transpose()?;
     let (mut report, _claim) = audit::run_and_hold(&args.selected.specs, &options).map_err(not_audited)?;

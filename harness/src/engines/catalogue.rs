@@ -1,10 +1,11 @@
 //! The engines that everybody has, one line each.
 
 use super::contract::{Engine, Entry};
-use super::{iesna, mitsuba, povray, radiance, simulator};
+use super::{cycles, iesna, mitsuba, povray, radiance, simulator};
 
 /// In the order of reports: our own witnesses first.
-pub const ALL: &[&Entry] = &[&simulator::ENTRY, &iesna::ENTRY, &mitsuba::ENTRY, &radiance::ENTRY, &povray::ENTRY];
+pub const ALL: &[&Entry] =
+    &[&simulator::ENTRY, &iesna::ENTRY, &mitsuba::ENTRY, &radiance::ENTRY, &povray::ENTRY, &cycles::ENTRY];
 
 pub fn all() -> Vec<Box<dyn Engine>> {
     ALL.iter().map(|entry| (entry.make)()).collect()
@@ -12,6 +13,11 @@ pub fn all() -> Vec<Box<dyn Engine>> {
 
 pub fn entry(name: &str) -> Option<&'static Entry> {
     ALL.iter().copied().find(|entry| entry.name == *name)
+}
+
+/// Whether an engine takes part, and is installed, only where it is named.
+pub fn is_on_request(name: &str) -> bool {
+    entry(name).is_some_and(|entry| entry.is_on_request)
 }
 
 /// An engine as its makers write it; one of the user's by its name.

@@ -100,6 +100,8 @@ pub struct Entry {
     pub colour: (&'static str, &'static str),
     /// What `luxproof engines install` fetches for it.
     pub installs: &'static [Component],
+    /// Whether it takes part, and is installed, only where it is named: it is large.
+    pub is_on_request: bool,
     pub models: &'static [LuminaireModel],
     /// The setting that, `false`, leaves it the coordinates of the spec, where it would get handier ones.
     pub fits_coordinates: Option<&'static str>,
@@ -114,6 +116,8 @@ pub enum Component {
     LibLlvm,
     /// It gives rtrace's random numbers a seed.
     LibFaketime,
+    /// Blender as a Python package, as `blender.lock` pins it, in an environment of its own.
+    Blender,
 }
 
 impl Entry {

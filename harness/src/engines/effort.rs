@@ -53,3 +53,9 @@ pub(super) fn shadow_rays(job: &Job, to_an_opening: f64) -> f64 {
     let of_one = |model| if model == LuminaireModel::Point { 1.0 } else { to_an_opening };
     job.scene.luminaires.iter().map(|l| of_one(l.model)).sum()
 }
+
+/// Reflections after which at most `share` of the light is left where every surface reflects `reflectance`.
+pub(super) fn reflections_until(reflectance: f64, share: f64) -> i64 {
+    const MAX: f64 = 1e5;
+    (share.max(1e-9).ln() / reflectance.ln()).clamp(1.0, MAX).ceil() as i64
+}

@@ -16,6 +16,7 @@ pub(super) static ENTRY: Entry = Entry {
     display_name: "iesna",
     colour: ("#8c6100", "#e6b84d"),
     installs: &[],
+    is_on_request: false,
     models: &[LuminaireModel::Point, LuminaireModel::Area, LuminaireModel::Impostor],
     fits_coordinates: None,
     make: || Box::new(Iesna),

@@ -14,7 +14,7 @@ use crate::system::process::{Invocation, ProcessError};
 
 use super::Site;
 use super::catalogue::ALL;
-use super::contract::Component;
+use super::contract::{Component, Entry};
 use crate::record::EngineName;
 pub use verify::Soundness;
 
@@ -48,7 +48,7 @@ pub(super) enum InstallError {
 /// Longest time for one step: a download of some 150 MB over a slow line.
 const LIMIT: Duration = Duration::from_secs(3600);
 
-/// Installs what the named engines need (all engines if `engines` is empty), and says per component what was done.
+/// Installs what the named engines need (all engines but those on request if `engines` is empty), and says per component what was done.
 ///
 /// `progress` is told of each step before it starts. Another installation into the same site is waited for.
 pub fn install(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str)) -> Vec<InstallOutcome> {
@@ -63,7 +63,7 @@ pub fn install(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&st
     outcomes
 }
 
-/// Whether what the named engines need (all engines if `engines` is empty) is what was installed, component by component.
+/// Whether what the named engines need (all engines but those on request if `engines` is empty) is what was installed, component by component.
 pub fn verify(site: &Site, engines: &[EngineName]) -> Vec<(&'static str, Soundness)> {
     components(engines).into_iter().map(|component| (component.name(), component.soundness(site))).collect()
 }
@@ -81,8 +81,12 @@ pub fn repair(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str
 }
 
 fn components(engines: &[EngineName]) -> Vec<Component> {
-    let all = [Component::PythonPackages, Component::PovRay, Component::LibLlvm, Component::LibFaketime];
-    let named = || ALL.iter().filter(|entry| engines.is_empty() || engines.contains(&entry.name));
+    let all =
+        [Component::PythonPackages, Component::PovRay, Component::LibLlvm, Component::LibFaketime, Component::Blender];
+    let is_wanted = |entry: &&&Entry| {
+        if engines.is_empty() { !entry.is_on_request } else { engines.contains(&entry.name) }
+    };
+    let named = || ALL.iter().filter(is_wanted);
     all.into_iter().filter(|c| named().any(|entry| entry.installs.contains(c))).collect()
 }
 
@@ -105,12 +109,14 @@ impl Component {
             Self::PovRay => "POV-Ray",
             Self::LibLlvm => "libLLVM",
             Self::LibFaketime => "libfaketime",
+            Self::Blender => "Blender",
         }
     }
 
     fn install(self, site: &Site, progress: &mut dyn FnMut(&str)) -> InstallOutcome {
         let present = match self {
-            Self::PythonPackages => Some(site.venv()).filter(|_| venv::is_current(site)),
+            Self::PythonPackages => Some(site.venv()).filter(|_| venv::SHARED.is_current(site)),
+            Self::Blender => Some(site.blender().venv()).filter(|_| venv::BLENDER.is_current(&site.blender())),
             other => other.found(site),
         };
         match present {
@@ -130,7 +136,8 @@ impl Component {
     fn soundness(self, site: &Site) -> Soundness {
         let found = self.found(site);
         match self {
-            Self::PythonPackages => venv::soundness(site),
+            Self::PythonPackages => venv::SHARED.soundness(site),
+            Self::Blender => venv::BLENDER.soundness(&site.blender()),
             Self::PovRay => verify::debian(site, found, &debian::POVRAY_PACKAGES),
             Self::LibLlvm => verify::debian(site, found, &debian::LLVM_PACKAGES),
             Self::LibFaketime => verify::debian(site, found, &debian::LIBFAKETIME_PACKAGES),
@@ -144,12 +151,14 @@ impl Component {
             Self::PovRay => site.program("povray"),
             Self::LibLlvm => site.llvm(),
             Self::LibFaketime => site.libfaketime(),
+            Self::Blender => site.blender().python(),
         }
     }
 
     fn install_anew(self, site: &Site, progress: &mut dyn FnMut(&str)) -> InstallOutcome {
         let installed = match self {
-            Self::PythonPackages => venv::install(site, progress),
+            Self::PythonPackages => venv::SHARED.install(site, progress),
+            Self::Blender => venv::BLENDER.install(&site.blender(), progress),
             Self::PovRay => debian::install_povray(site, progress),
             Self::LibLlvm => debian::install_llvm(site, progress),
             Self::LibFaketime => debian::install_libfaketime(site, progress),
@@ -191,6 +200,7 @@ mod tests {
         let two = [EngineName::new("povray"), EngineName::new("radiance")];
         assert_eq!(components(&two), [PythonPackages, PovRay, LibFaketime]);
         assert_eq!(components(&[EngineName::new("mitsuba")]), [PythonPackages, LibLlvm]);
+        assert_eq!(components(&[EngineName::new("cycles")]), [Component::Blender]);
         assert_eq!(components(&[EngineName::new("simulator"), EngineName::new("iesna")]), []);
     }
 

@@ -1,9 +1,7 @@
 //! Mitsuba 3 (Jakob et al. 2022): its own emitter sampling and path integrator, read without meters in the scene.
 
 mod backend;
-mod driver;
 mod export;
-mod precision;
 mod settings;
 #[cfg(test)]
 pub(super) mod tests;
@@ -14,8 +12,10 @@ use luminaire::scene::{Luminaire, LuminaireModel, Shape, Transport, flush};
 use parking_lot::Mutex;
 
 use self::backend::Backend;
-use self::driver::Driver;
 use self::settings::Settings;
+use super::dialogue::{Cost, Dialogue};
+use super::float_error::{FloatError, Instrument};
+use super::frame::Frame;
 use super::settings::Preset;
 use super::{
     Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench,
@@ -29,6 +29,7 @@ pub(super) static ENTRY: Entry = Entry {
     display_name: "Mitsuba",
     colour: ("#0067a8", "#62b5ea"),
     installs: &[Component::PythonPackages, Component::LibLlvm],
+    is_on_request: false,
     models: &[LuminaireModel::Point, LuminaireModel::Area],
     fits_coordinates: Some("recentre"),
     make: || Box::new(Mitsuba::default()),
@@ -36,6 +37,19 @@ pub(super) static ENTRY: Entry = Entry {
 
 /// Nearer than this to a surface, a point luminaire's spot is too small for paths to find, in parts of the scene's size.
 const CLOSE: f64 = 2.5e-3;
+
+/// So far outside a table's range our emitter takes a direction for its last angle (`EDGE_DEG` of `mitsuba_goniometric.py`).
+const EDGE_DEG: f64 = 5e-5;
+
+/// Seconds that are counted for a ray: on two cores of a usual server, half as much again as was measured there. Where no kernels
+/// are compiled a path costs much.
+fn cost(variant: &str) -> Cost {
+    if variant.starts_with("scalar") {
+        Cost { ray_s: 1e-4, trial_side: Some(2) }
+    } else {
+        Cost { ray_s: 2e-7, trial_side: None }
+    }
+}
 
 /// The engine; remembers which variant works, so that it is tried out once.
 #[derive(Debug, Default)]
@@ -106,7 +120,18 @@ impl Mitsuba {
         workbench.write(files)?;
         let backend = self.backend(&workbench.site).map_err(|absent| EngineError::output(ID, absent.to_string()))?;
         let (run, fallback) = backend.invocation(workbench, settings);
-        let mut measurement = Driver { job, settings, conversation: run.converse()? }.measurement()?;
+        let instrument = Instrument { edge_deg: EDGE_DEG, ..Instrument::default() };
+        let error = FloatError::of(job, Frame::of(job, settings.coordinates), instrument);
+        let dialogue = Dialogue {
+            engine: ID,
+            job,
+            conversation: run.converse()?,
+            fixed: (settings.preset != Preset::Audit).then_some((settings::FIXED_BLOCKS, settings::FIXED_SIDE)),
+            cost,
+            bound_lx: &|k| error.at_lx(k),
+            relative_bound: 0.0,
+        };
+        let mut measurement = dialogue.measurement()?;
         measurement.notes.extend(fallback);
         measurement.effort.insert("command".into(), run.command_line());
         super::checked(&ID, job, measurement)
@@ -122,7 +147,7 @@ impl Mitsuba {
 }
 
 /// A luminaire that lights a surface at a distance that is tiny against the scene.
-fn luminaire_close_to_a_surface(job: &Job) -> Option<&str> {
+pub(super) fn luminaire_close_to_a_surface(job: &Job) -> Option<&str> {
     let room = job.scene.room?;
     let close_m = CLOSE * room.size_m.max_element();
     let lights = |l: &Luminaire, path: DVec3| path.length() < close_m && l.intensity_towards(path).value() > 0.0;

@@ -9,14 +9,19 @@ mod catalogue;
 mod cells;
 mod comment;
 mod contract;
+mod cycles;
+mod dialogue;
 mod effort;
 mod external;
 mod fingerprint;
 #[cfg(test)]
 pub(crate) mod fixtures;
+mod float_error;
+mod frame;
 mod iesna;
 mod image;
 mod install;
+mod meshes;
 mod mitsuba;
 mod povray;
 mod radiance;
@@ -28,6 +33,7 @@ mod settings;
 mod shared_tests;
 pub(crate) mod simulator;
 mod site;
+mod tables;
 mod workbench;
 
 use std::collections::BTreeMap;
@@ -35,7 +41,7 @@ use std::path::Path;
 
 pub use crate::spec::Budget;
 pub use blocks::Blocks;
-pub use catalogue::{ALL, all, display_name, entry};
+pub use catalogue::{ALL, all, display_name, entry, is_on_request};
 pub use contract::{
     Absent, Component, Engine, Entry, FILE_READER, Forgotten, Job, Knob, Measurement, Station, Support, Version,
     checked, share,

@@ -44,6 +44,7 @@ pub(super) static ENTRY: Entry = Entry {
     display_name: "POV-Ray",
     colour: ("#007a5a", "#3fc79d"),
     installs: &[Component::PythonPackages, Component::PovRay],
+    is_on_request: false,
     models: &[LuminaireModel::Point, LuminaireModel::Area],
     fits_coordinates: Some("recentre"),
     make: || Box::new(PovRay),

@@ -39,6 +39,7 @@ pub(super) static ENTRY: Entry = Entry {
     display_name: "Radiance",
     colour: ("#b84a00", "#f08a4b"),
     installs: &[Component::PythonPackages, Component::LibFaketime],
+    is_on_request: false,
     models: &[LuminaireModel::Point, LuminaireModel::Area, LuminaireModel::Impostor],
     fits_coordinates: Some("rescale"),
     make: || Box::new(Radiance),

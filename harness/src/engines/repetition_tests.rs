@@ -3,6 +3,7 @@
 //! Few and small, so that every test run affords them; `luxproof selftest --repetitions` does as many as one likes on any spec, and
 //! `benchmarks/repetitions.md` has its figures.
 
+use super::cycles::Cycles;
 use super::fixtures::{CONVERGED, S1_INDIRECT_LX, s1, workbench};
 use super::mitsuba::Mitsuba;
 use super::povray::PovRay;
@@ -47,9 +48,10 @@ fn renderers_repeat_within_their_standard_errors_and_their_named_bias() {
     let fast = || ("preset", "fast".into());
     // Eight blocks of so few rays, however busy the machine is.
     let endless = Budget { relative_error: 0.5, seconds: 1e6 };
-    let cases: [(&dyn Engine, _, _, _); 3] = [
+    let cases: [(&dyn Engine, _, _, _); 4] = [
         (&Mitsuba::default(), fast(), Budget::default(), 0.0),
         (&Radiance, fast(), Budget::default(), 0.0),
+        (&Cycles, fast(), Budget::default(), 0.0),
         (&PovRay, ("count", 50.into()), endless, 0.005),
     ];
     for (engine, setting, budget, bias) in cases {

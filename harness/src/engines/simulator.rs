@@ -19,6 +19,7 @@ pub(super) static ENTRY: Entry = Entry {
     display_name: "simulator",
     colour: ("#3d4148", "#d5d8dd"),
     installs: &[],
+    is_on_request: false,
     models: &[LuminaireModel::Point, LuminaireModel::Area, LuminaireModel::Impostor],
     fits_coordinates: None,
     make: || Box::new(Simulator),

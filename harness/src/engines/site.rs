@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use etcetera::BaseStrategy;
 
 /// Where engines are found. Layout of the folder: `venv/` (Python packages), `debian/` (unpacked Debian packages),
-/// `kernels/` (compiled by Dr.Jit).
+/// `kernels/` (compiled by Dr.Jit),
+/// `blender/` (a folder like this one, with the packages of Blender).
 #[derive(Clone, Debug)]
 pub struct Site {
     root: PathBuf,
@@ -48,6 +49,11 @@ impl Site {
     pub fn python_folders(&self) -> Vec<PathBuf> {
         let versions = std::fs::read_dir(self.venv().join("lib")).into_iter().flatten().flatten();
         versions.map(|version| version.path().join("site-packages")).collect()
+    }
+
+    /// Where Blender's packages are, which want a Python and a numpy of their own.
+    pub fn blender(&self) -> Self {
+        Self::at(self.root.join("blender"))
     }
 
     pub fn debian(&self) -> PathBuf {

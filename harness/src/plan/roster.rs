@@ -62,7 +62,8 @@ impl Roster {
             } else if let Some(in_spec) = &case.engines {
                 in_spec.contains_key(id.as_str()).then_some(Asked::ByName)
             } else {
-                Some(Asked::ByDefault)
+                // The same spec asks the same engines on every machine, whatever is installed there.
+                (!engines::is_on_request(id.as_str())).then_some(Asked::ByDefault)
             }
         };
         Ok(all.into_iter().filter_map(|engine| asked(engine.as_ref()).map(|asked| (engine, asked))).collect())

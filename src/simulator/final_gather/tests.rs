@@ -10,7 +10,7 @@ use crate::geometry::{Reflectances, Room};
 use crate::photometry::{LuminousIntensityDistribution, LuminousOpening};
 use crate::scene::{Bounces, Meter, Obstacle, Scene, Shape, Transport};
 use crate::simulator::path_tracing::test_scenes::{S2_VALUES, luminaire, s1, s1_meters, s2, s2_meters, up};
-use crate::simulator::{Accuracy, Uncertainty, illuminance};
+use crate::simulator::{Accuracy, Uncertainty, certified, illuminance};
 
 fn bound(uncertainty: Uncertainty) -> f64 {
     match uncertainty {
@@ -200,5 +200,30 @@ fn a_cosine_table_with_rounded_figures_lights_like_the_cosine_within_its_bound()
         // The closed formula's bound, not a quadrature's.
         assert!(bound(b.uncertainty) > 9e-6 * b.illuminance.value(), "{b:?}");
         assert!(bound(b.uncertainty) < 1.1e-5 * b.illuminance.value(), "{b:?}");
+    }
+}
+
+/// A dark slot between a wall and a body that stands on the floor, whose face ends within what large rectangles of the floor would cover.
+#[test]
+fn what_bodies_stand_on_lights_nothing() {
+    let room = Room { size_m: DVec3::new(8.4, 5.0, 3.6), reflectance: Reflectances::with_equal_walls(0.5, 0.2, 0.5) };
+    let even = LuminousIntensityDistribution::axial(vec![0.0, 90.0], vec![500.0, 500.0]).unwrap();
+    let panel = LuminousOpening::Box { x_m: 0.6, y_m: 0.4, height_m: 0.0 };
+    let scene = Scene {
+        room: Some(room),
+        obstacles: vec![cuboid([0.0, 0.205, 0.0], [1.408, 1.174, 1.147], 0.4)],
+        luminaires: vec![
+            luminaire(even.clone(), panel, DVec3::new(3.64, 3.59, 3.39)),
+            luminaire(even, panel, DVec3::new(6.3, 2.07, 3.3)),
+        ],
+    };
+    let meter = Meter { position_m: DVec3::new(0.04, 0.001, 0.17), normal: DVec3::NEG_Z };
+    for bounces in [Bounces::AtMost(1), Bounces::Converged] {
+        let light = Transport::Indirect(bounces);
+        let found = illuminance(&scene, &[meter], light, &accuracy(0.02)).unwrap().estimates[0];
+        let truth = certified(&scene, &[meter], light, &accuracy(0.01)).unwrap().estimates[0];
+        let Uncertainty::StandardError { value: error, .. } = truth.uncertainty else { panic!("{truth:?}") };
+        let off = (found.illuminance.value() - truth.illuminance.value()).abs();
+        assert!(off <= bound(found.uncertainty) + 5.4 * error, "{bounces:?}: {found:?} for {truth:?}");
     }
 }

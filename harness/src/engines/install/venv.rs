@@ -12,64 +12,103 @@ use super::{InstallError, step};
 use crate::engines::Site;
 use crate::system::digest::hexadecimal;
 
-const LOCK: &str = include_str!("../../../engines.lock");
-
-pub(super) fn is_current(site: &Site) -> bool {
-    let linked = fs::read_link(site.venv()).is_ok_and(|target| target == Path::new(&folder_name()));
-    linked && matches!(soundness(site), Soundness::Sound(_))
+/// What an environment holds, and which Python it takes.
+#[derive(Clone, Copy)]
+pub(super) struct Environment {
+    lock: &'static str,
+    what: &'static str,
+    /// Its names, the first that fits is taken.
+    python: &'static [&'static str],
+    fits: fn([u32; 2]) -> bool,
+    remedy: &'static str,
 }
 
-/// Whether the packages are what the lock pins and what was installed.
-pub(super) fn soundness(site: &Site) -> Soundness {
-    verify::python(site, &pinned())
-}
+pub(super) const SHARED: Environment = Environment {
+    lock: include_str!("../../../engines.lock"),
+    what: "Mitsuba, Radiance and OpenImageIO, about 150 MB",
+    python: &["python3"],
+    fits: |version| version >= [3, 10],
+    remedy: "put Python 3.10 or later first on PATH",
+};
 
-/// The packages that every Python gets, as the lock names them: `mitsuba==3.9.1`.
-fn pinned() -> Vec<String> {
-    let lines = LOCK.lines().filter_map(|line| line.strip_suffix(" \\"));
-    lines.filter(|line| line.contains("==") && !line.contains(';')).map(str::to_owned).collect()
-}
+pub(super) const BLENDER: Environment = Environment {
+    lock: include_str!("../../../blender.lock"),
+    what: "Blender, about 350 MB (950 MB on disk)",
+    python: &["python3.11", "python3"],
+    fits: |version| version == [3, 11],
+    remedy: "put a python3.11 on PATH, the only one that Blender 4.5 is made for; without root, `pip install uv` and `uv python install 3.11` bring one",
+};
 
-pub(super) fn install(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
-    let folder = site.root().join(folder_name());
-    remove(&folder)?;
-    progress("making a Python environment");
-    make_environment(site, &folder)?;
-    progress("downloading and installing Mitsuba, Radiance and OpenImageIO, about 150 MB");
-    let lock = folder.join("engines.lock");
-    fs::write(&lock, LOCK).map_err(|e| InstallError::io(&lock, e))?;
-    let pip = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--no-cache-dir"];
-    let pinned = ["--require-hashes", "--only-binary", ":all:", "--requirement"];
-    step(site, folder.join("bin/python")).args(pip).args(pinned).args([lock]).run()?;
-    put_in_place(site, &folder)?;
-    Ok(site.venv().display().to_string())
-}
-
-fn make_environment(site: &Site, folder: &Path) -> Result<(), InstallError> {
-    let Some(python) = site.program("python3") else {
-        let (what, remedy) = ("there is no python3".to_owned(), "install Python 3.10 or later".to_owned());
-        return Err(InstallError::Missing { what, remedy });
-    };
-    let version = step(site, &python).args(["-c", "import sys; print('%d %d' % sys.version_info[:2])"]).run()?;
-    let version = String::from_utf8_lossy(&version.stdout).trim().to_owned();
-    let numbers: Vec<u32> = version.split(' ').filter_map(|n| n.parse().ok()).collect();
-    if numbers.as_slice() < [3, 10].as_slice() {
-        let what = format!("{} is Python {}", python.display(), version.replace(' ', "."));
-        return Err(InstallError::Missing { what, remedy: "put Python 3.10 or later first on PATH".into() });
+impl Environment {
+    pub(super) fn is_current(&self, site: &Site) -> bool {
+        let linked = fs::read_link(site.venv()).is_ok_and(|target| target == Path::new(&self.folder_name()));
+        linked && matches!(self.soundness(site), Soundness::Sound(_))
     }
-    // Without ensurepip `python3 -m venv` fails, which Debian's python3 does until python3-venv is there.
-    let made = step(site, &python).args(["-m", "venv"]).args([folder]).run();
-    made.map(|_| ()).map_err(|error| InstallError::Missing {
-        what: format!("`python3 -m venv` does not work: {error}"),
-        remedy: "on Debian and Ubuntu `apt-get install python3-venv` provides what it needs".into(),
-    })
+
+    /// Whether the packages are what the lock pins and what was installed.
+    pub(super) fn soundness(&self, site: &Site) -> Soundness {
+        verify::python(site, &self.pinned())
+    }
+
+    /// The packages that every Python gets, as the lock names them: `mitsuba==3.9.1`.
+    fn pinned(&self) -> Vec<String> {
+        let lines = self.lock.lines().filter_map(|line| line.strip_suffix(" \\"));
+        lines.filter(|line| line.contains("==") && !line.contains(';')).map(str::to_owned).collect()
+    }
+
+    fn folder_name(&self) -> String {
+        format!("venv-{}", &hexadecimal(&Sha256::digest(self.lock))[..16])
+    }
+
+    pub(super) fn install(&self, site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
+        fs::create_dir_all(site.root()).map_err(|e| InstallError::io(site.root(), e))?;
+        let folder = site.root().join(self.folder_name());
+        remove(&folder)?;
+        progress("making a Python environment");
+        self.make(site, &folder)?;
+        progress(&format!("downloading and installing {}", self.what));
+        let lock = folder.join("engines.lock");
+        fs::write(&lock, self.lock).map_err(|e| InstallError::io(&lock, e))?;
+        let pip = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--no-cache-dir"];
+        let pinned = ["--require-hashes", "--only-binary", ":all:", "--requirement"];
+        step(site, folder.join("bin/python")).args(pip).args(pinned).args([lock]).run()?;
+        put_in_place(site, &folder)?;
+        Ok(site.venv().display().to_string())
+    }
+
+    fn make(&self, site: &Site, folder: &Path) -> Result<(), InstallError> {
+        let python = self.python(site)?;
+        // Without ensurepip `python3 -m venv` fails, which Debian's python3 does until python3-venv is there.
+        let made = step(site, &python).args(["-m", "venv"]).args([folder]).run();
+        made.map(|_| ()).map_err(|error| InstallError::Missing {
+            what: format!("`python3 -m venv` does not work: {error}"),
+            remedy: "on Debian and Ubuntu `apt-get install python3-venv` provides what it needs".into(),
+        })
+    }
+
+    fn python(&self, site: &Site) -> Result<PathBuf, InstallError> {
+        let mut what = format!("there is no {}", self.python[0]);
+        for python in self.python.iter().filter_map(|name| site.program(name)) {
+            // A program of this name may be a stand-in for none.
+            let asked = step(site, &python).args(["-c", "import sys; print('%d %d' % sys.version_info[:2])"]).run();
+            let told = asked.map(|done| String::from_utf8_lossy(&done.stdout).trim().to_owned()).unwrap_or_default();
+            let numbers: Vec<u32> = told.split(' ').filter_map(|n| n.parse().ok()).collect();
+            match numbers[..] {
+                [major, minor] if (self.fits)([major, minor]) => return Ok(python),
+                [major, minor] => what = format!("{} is Python {major}.{minor}", python.display()),
+                _ => what = format!("{} does not tell its version", python.display()),
+            }
+        }
+        Err(InstallError::Missing { what, remedy: self.remedy.to_owned() })
+    }
 }
 
 /// Points the link `venv` at the folder in one rename, then removes environments of earlier locks.
 fn put_in_place(site: &Site, folder: &Path) -> Result<(), InstallError> {
     let link = site.root().join("venv.new");
     remove(&link)?;
-    std::os::unix::fs::symlink(folder_name(), &link).map_err(|e| InstallError::io(&link, e))?;
+    let Some(target) = folder.file_name() else { return Ok(()) };
+    std::os::unix::fs::symlink(target, &link).map_err(|e| InstallError::io(&link, e))?;
     let venv = site.venv();
     if venv.symlink_metadata().is_ok_and(|m| m.is_dir()) {
         remove(&venv)?;
@@ -97,20 +136,16 @@ fn remove(path: &Path) -> Result<(), InstallError> {
     removed.map_err(|e| InstallError::io(path, e))
 }
 
-fn folder_name() -> String {
-    format!("venv-{}", &hexadecimal(&Sha256::digest(LOCK))[..16])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// A site whose environment was made by an installation of this lock.
     fn made(root: &Path) -> Site {
-        let folder = root.join(folder_name());
+        let folder = root.join(SHARED.folder_name());
         fs::create_dir_all(folder.join("bin")).unwrap();
         fs::write(folder.join("bin/python"), "").unwrap();
-        for package in pinned() {
+        for package in SHARED.pinned() {
             let named = folder.join("lib/python3/site-packages").join(package.replace("==", "-") + ".dist-info");
             fs::create_dir_all(&named).unwrap();
             fs::write(named.join("RECORD"), "").unwrap();
@@ -123,30 +158,30 @@ mod tests {
     #[test]
     fn the_lock_pins_every_package_with_hashes() {
         for package in ["mitsuba==3.9.1", "drjit==1.5.0", "pyradiance==1.3.1", "openimageio==3.2.2.0", "numpy==2.4.6"] {
-            let at = LOCK.find(&format!("\n{package}")).unwrap_or_else(|| panic!("{package}"));
-            assert!(LOCK[at + 1..].lines().nth(1).is_some_and(|l| l.contains("--hash=sha256:")), "{package}");
+            let at = SHARED.lock.find(&format!("\n{package}")).unwrap_or_else(|| panic!("{package}"));
+            assert!(SHARED.lock[at + 1..].lines().nth(1).is_some_and(|l| l.contains("--hash=sha256:")), "{package}");
         }
     }
 
     #[test]
     fn an_environment_is_current_only_for_the_lock_it_was_made_from() {
         let root = tempfile::tempdir().unwrap();
-        assert!(!is_current(&Site::at(root.path())));
-        assert!(is_current(&made(root.path())));
+        assert!(!SHARED.is_current(&Site::at(root.path())));
+        assert!(SHARED.is_current(&made(root.path())));
         fs::remove_file(root.path().join("venv")).unwrap();
         std::os::unix::fs::symlink("venv-0123", root.path().join("venv")).unwrap();
-        assert!(!is_current(&Site::at(root.path())));
+        assert!(!SHARED.is_current(&Site::at(root.path())));
     }
 
     #[test]
     fn a_half_made_environment_is_not_current_and_a_link_elsewhere_loses_only_the_link() {
         let root = tempfile::tempdir().unwrap();
-        fs::create_dir_all(root.path().join(folder_name())).unwrap();
-        assert!(!is_current(&Site::at(root.path())));
+        fs::create_dir_all(root.path().join(SHARED.folder_name())).unwrap();
+        assert!(!SHARED.is_current(&Site::at(root.path())));
         let elsewhere = tempfile::tempdir().unwrap();
         fs::write(elsewhere.path().join("kept"), "").unwrap();
         std::os::unix::fs::symlink(elsewhere.path(), root.path().join("venv")).unwrap();
-        assert!(is_current(&made(root.path())));
+        assert!(SHARED.is_current(&made(root.path())));
         assert!(elsewhere.path().join("kept").exists());
     }
 
@@ -155,7 +190,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         fs::create_dir_all(root.path().join("venv-old/bin")).unwrap();
         fs::create_dir_all(root.path().join("venv/bin")).unwrap();
-        assert!(is_current(&made(root.path())));
+        assert!(SHARED.is_current(&made(root.path())));
         assert!(!root.path().join("venv-old").exists());
     }
 }

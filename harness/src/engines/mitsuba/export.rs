@@ -3,23 +3,24 @@
 //! `scene.xml` holds the integrator and the luminaires (emitters that the Python file beside it adds to Mitsuba) and
 //! includes `room.xml`, the surfaces; `job.json` holds the meters, which are no part of the scene.
 
-mod frame;
 mod opening;
+mod placing;
 mod stock;
 mod surfaces;
 mod tables;
 
-use luminaire::scene::{Bounces, Luminaire, Transport};
+use luminaire::scene::{Bounces, Luminaire};
 use serde::Serialize;
 
-pub(super) use self::frame::Frame;
 pub(super) use self::stock::obstacle_to_stock;
-use self::tables::Tables;
 use super::ID;
 use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
 use crate::engines::comment::Comment;
+use crate::engines::dialogue::{self, Seat};
+use crate::engines::frame::Frame;
 use crate::engines::settings::Preset;
-use crate::engines::{EngineError, Job, SceneFile, recess};
+use crate::engines::tables::Tables;
+use crate::engines::{EngineError, Job, SceneFile, effort, meshes, recess};
 
 const READ: &str = include_str!("../../../drivers/mitsuba_read.py");
 const GONIOMETRIC: &str = include_str!("../../../drivers/mitsuba_goniometric.py");
@@ -39,9 +40,9 @@ pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, En
     ];
     if has_surfaces(job) {
         files.push(SceneFile::text("room.xml", surfaces::room_xml(job, &frame)));
-        files.extend(surfaces::meshes(job, &frame));
+        files.extend(meshes::files(job, &frame));
     }
-    files.extend(tables.files()?);
+    files.extend(tables::files(&tables)?);
     files.extend(stock::files(job, settings, &frame, &tables));
     Ok(files)
 }
@@ -64,20 +65,13 @@ struct DriverJob<'a> {
     side: usize,
     film: Option<Film>,
     seed: u64,
-    stations: Vec<DriverStation<'a>>,
+    stations: Vec<Seat<'a>>,
 }
 
 #[derive(Serialize)]
 struct Film {
     tile: usize,
     factor: f64,
-}
-
-#[derive(Serialize)]
-struct DriverStation<'a> {
-    id: &'a str,
-    position: [f64; 3],
-    normal: [f64; 3],
 }
 
 fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, EngineError> {
@@ -90,28 +84,19 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
         Preset::Audit => (2 * FIXED_BLOCKS, 2 * FIXED_SIDE),
         Preset::Fast | Preset::Default => (FIXED_BLOCKS, FIXED_SIDE),
     };
-    let stations = job.stations.iter().map(|s| DriverStation {
-        id: &s.id.0,
-        position: frame.to_scene(s.meter.position_m).to_array(),
-        normal: s.meter.normal.to_array(),
-    });
     let driver_job = DriverJob {
         case: &job.case,
         procedure: job.procedure.name(),
         scene,
         variant: settings.variant,
-        transport: match job.transport {
-            Transport::Direct => "direct",
-            Transport::Indirect(_) => "indirect",
-            Transport::Total(_) => "total",
-        },
+        transport: dialogue::transport(job),
         emitters: job.scene.luminaires.len(),
         extended: job.scene.luminaires.iter().any(opening::is_extended),
         blocks,
         side,
         film,
         seed: job.seed,
-        stations: stations.collect(),
+        stations: dialogue::seats(job, frame),
     };
     serde_json::to_string_pretty(&driver_job)
         .map_err(|e| EngineError::output(ID, format!("the job cannot be written: {e}")))
@@ -120,12 +105,12 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
 fn scene_xml(job: &Job, frame: &Frame, tables: &Tables) -> String {
     let mut xml =
         header(job, "The luminaires; read the meters of job.json with\n         python mitsuba_read.py job.json");
-    xml += &frame.comment();
+    xml += &placing::comment(frame);
     xml += &integrator(job, "path");
     if has_surfaces(job) {
         xml += "    <include filename=\"room.xml\"/>\n";
     }
-    let luminaires = job.scene.luminaires.iter().zip(tables.of_luminaires());
+    let luminaires = job.scene.luminaires.iter().zip(tables.of_luminaire.iter().map(|k| tables::name(*k)));
     xml.extend(luminaires.map(|(luminaire, table)| emitter(luminaire, &table, frame)));
     xml + "</scene>\n"
 }
@@ -145,7 +130,7 @@ fn emitter(luminaire: &Luminaire, table: &str, frame: &Frame) -> String {
         id = Comment(&luminaire.id),
         opening = opening::xml(luminaire, frame),
         scale = luminaire.flux_scale * frame.scale * frame.scale,
-        matrix = frame.matrix(luminaire.position_m, luminaire.orientation),
+        matrix = placing::matrix(frame, luminaire.position_m, luminaire.orientation),
     )
 }
 
@@ -171,7 +156,7 @@ fn integrator(job: &Job, kind: &str) -> String {
         Some(Bounces::AtMost(n)) => (i64::from(n) + 1, 5, format!("{n} diffuse reflections")),
         Some(Bounces::Converged) if highest < HIGH_REFLECTANCE => (-1, 5, "all reflections".to_owned()),
         Some(Bounces::Converged) => {
-            let n = reflections_until(highest, 0.1 * job.budget.relative_error);
+            let n = effort::reflections_until(highest, 0.1 * job.budget.relative_error);
             let why = format!(
                 "{n} reflections leave less than a tenth of the relative error asked for; no Russian roulette, which \
                  would let rare long paths carry the light at reflectance {highest}"
@@ -187,10 +172,4 @@ fn integrator(job: &Job, kind: &str) -> String {
     </integrator>
 "#
     )
-}
-
-/// Reflections after which at most `share` of the light is left where every surface reflects `reflectance`.
-fn reflections_until(reflectance: f64, share: f64) -> i64 {
-    const MAX: f64 = 1e5;
-    (share.max(1e-9).ln() / reflectance.ln()).clamp(1.0, MAX).ceil() as i64
 }

@@ -3,7 +3,7 @@
 use luminaire::photometry::{HorizontalAxis, LuminousOpening};
 use luminaire::scene::{Luminaire, LuminaireModel};
 
-use super::frame::Frame;
+use crate::engines::frame::Frame;
 
 /// Whether light comes from more than a point, so that it must be sampled.
 pub(super) fn is_extended(luminaire: &Luminaire) -> bool {

@@ -8,13 +8,13 @@ use glam::DVec3;
 use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 
-use super::frame::Frame;
 use super::surfaces::list;
-use super::tables::Tables;
-use super::{has_surfaces, header, integrator};
+use super::{has_surfaces, header, integrator, placing};
 use crate::engines::comment::Comment;
+use crate::engines::frame::Frame;
 use crate::engines::mitsuba::settings::Settings;
 use crate::engines::settings::Preset;
+use crate::engines::tables::Tables;
 use crate::engines::{Job, SceneFile, Station};
 
 /// Pixels along a side of a meter's tile, each of Mitsuba's own four samples: more samples in one pixel would drown in its 32-bit sum.
@@ -78,7 +78,7 @@ fn xml(job: &Job, settings: &Settings, frame: &Frame, tables: &Tables) -> String
         settings.variant,
         if reads_patches(job) { " times pi" } else { "" }
     );
-    let mut xml = header(job, &what) + &frame.comment() + &integrator(&patched(job), "volpath");
+    let mut xml = header(job, &what) + &placing::comment(frame) + &integrator(&patched(job), "volpath");
     if has_surfaces(job) {
         xml += "    <include filename=\"room.xml\"/>\n";
     }
@@ -132,7 +132,7 @@ fn filtered_point(job: &Job, luminaire: &Luminaire, table: usize, frame: &Frame)
         at = list(frame.to_scene(luminaire.position_m)),
         intensity = peak_cd * luminaire.flux_scale * frame.scale * frame.scale,
         radius = radius_m(job, luminaire) * frame.scale,
-        matrix = frame.matrix(luminaire.position_m, luminaire.orientation),
+        matrix = placing::matrix(frame, luminaire.position_m, luminaire.orientation),
         image = image_name(table),
         step = 360.0 / columns,
         scale_y = (rows - 1.0) / rows,

@@ -1,16 +1,16 @@
-//! `room.xml`: the room's six surfaces and the obstacles; meshes go into OBJ files of their own.
+//! `room.xml`: the room's six surfaces and the obstacles; meshes lie in OBJ files of their own.
 
 use glam::DVec3;
 use luminaire::geometry::{Room, Surface};
 use luminaire::scene::Shape;
 
-use super::frame::{Frame, plain};
-use super::header;
-use crate::engines::{Job, SceneFile};
+use super::{header, placing};
+use crate::engines::frame::{Frame, plain};
+use crate::engines::{Job, meshes};
 
 pub(super) fn room_xml(job: &Job, frame: &Frame) -> String {
     let mut xml = header(job, "The surfaces, included by the other files.");
-    xml += &frame.comment();
+    xml += &placing::comment(frame);
     if let Some(room) = &job.scene.room {
         for surface in Surface::ALL {
             xml += &rectangle(room, surface, frame);
@@ -24,17 +24,6 @@ pub(super) fn room_xml(job: &Job, frame: &Frame) -> String {
         };
     }
     xml + "</scene>\n"
-}
-
-pub(super) fn meshes(job: &Job, frame: &Frame) -> Vec<SceneFile> {
-    let obstacles = job.scene.obstacles.iter().enumerate();
-    let mesh = |(k, obstacle): (usize, &luminaire::scene::Obstacle)| match &obstacle.shape {
-        Shape::Box { .. } => None,
-        Shape::Mesh { vertices_m, triangles } => {
-            Some(SceneFile::text(&mesh_name(k), obj(vertices_m, triangles, frame)))
-        }
-    };
-    obstacles.filter_map(mesh).collect()
 }
 
 /// Mitsuba's rectangle is the square from -1 to 1 in x and y, facing +z.
@@ -89,22 +78,8 @@ fn mesh(k: usize, bsdf: &str) -> String {
         </bsdf>
     </shape>
 "#,
-        name = mesh_name(k),
+        name = meshes::name(k),
     )
-}
-
-fn mesh_name(k: usize) -> String {
-    format!("obstacle-{k}.obj")
-}
-
-fn obj(vertices_m: &[DVec3], triangles: &[[u32; 3]], frame: &Frame) -> String {
-    let vertex = |v: &DVec3| {
-        let [x, y, z] = frame.to_scene(*v).to_array();
-        format!("v {x} {y} {z}\n")
-    };
-    let face = |[a, b, c]: &[u32; 3]| format!("f {} {} {}\n", a + 1, b + 1, c + 1);
-    let lines = vertices_m.iter().map(vertex).chain(triangles.iter().map(face));
-    std::iter::once("# an obstacle, in the coordinates of room.xml\n".to_owned()).chain(lines).collect()
 }
 
 /// A grey diffuse reflector; `rgb`, since a `spectrum` would be tinted.

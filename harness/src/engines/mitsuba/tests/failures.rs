@@ -14,17 +14,6 @@ fn read_with(script: &str, limit_s: f64) -> EngineError {
     Mitsuba::default().read(&s1(Transport::Direct), &bench).unwrap_err()
 }
 
-/// A driver that says it reads these stations, and answers the one request for direct light with a line.
-fn driver(stations: &[usize], answer: &str) -> String {
-    let stations: Vec<_> = stations.iter().map(|k| format!(r#""m[{k}]""#)).collect();
-    let part = r#"{"name": "direct", "rays": 4, "sampled": false}"#;
-    let greeting = format!(
-        r#"{{"versions": {{}}, "variant": "llvm_ad_mono", "lanes": 131072, "stations": [{}], "parts": [{part}]}}"#,
-        stations.join(", ")
-    );
-    format!("echo '{greeting}'; read request; echo '{answer}'; cat > /dev/null")
-}
-
 #[test]
 fn a_crash_a_hang_and_an_out_of_memory_kill_are_told_apart() {
     shared_tests::crashes_hangs_and_kills_are_told_apart(read_with);
@@ -32,15 +21,15 @@ fn a_crash_a_hang_and_an_out_of_memory_kill_are_told_apart() {
 
 #[test]
 fn answers_that_are_no_readings_are_errors() {
-    let answers = |answer| driver(&[0, 1, 2, 3], answer);
+    let answers = |answer| shared_tests::driver("llvm_ad_mono", &[0, 1, 2, 3], answer);
     for (script, said) in [
         (answers("[[1, 2, 3]]"), "gave 3 readings for 4 meters"),
         (answers("[[1, 2, 3, 4, 5]]"), "gave 5 readings for 4 meters"),
         (answers("[[1, 2, 3, 4], [1, 2, 3, 4]]"), "gave 2 blocks of 1"),
         (answers("[[1, NaN, 3, 4]]"), "no JSON of readings"),
         (answers("[[1, null, 3, 4]]"), "no JSON of readings"),
-        (driver(&[0, 1, 2], "[[1, 2, 3]]"), "gave 3 readings for 4 meters"),
-        (driver(&[0, 2, 1, 3], "[[1, 1, 1, 1]]"), "gave `m[2]`"),
+        (shared_tests::driver("llvm_ad_mono", &[0, 1, 2], "[[1, 2, 3]]"), "gave 3 readings for 4 meters"),
+        (shared_tests::driver("llvm_ad_mono", &[0, 2, 1, 3], "[[1, 1, 1, 1]]"), "gave `m[2]`"),
         ("echo warming up".into(), "no JSON of readings"),
         (":".into(), "ended without an answer"),
     ] {

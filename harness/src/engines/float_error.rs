@@ -1,28 +1,38 @@
-//! How far Mitsuba's 32-bit floats may leave a direct illuminance from the exact value.
+//! How far a renderer's 32-bit floats may leave the direct illuminance of points from the exact value.
 
-use super::export::Frame;
-use super::settings::Settings;
-use crate::engines::Job;
-use crate::engines::cells::{Cells, LookUp};
+use glam::DVec3;
+
+use super::Job;
+use super::cells::{Cells, LookUp};
+use super::frame::Frame;
 
 /// Half the spacing of 32-bit floats at 1.
-const EPSILON: f64 = 5.960_464_477_539_063e-8;
+pub(super) const EPSILON: f64 = 5.960_464_477_539_063e-8;
 /// Roundings between a table and an illuminance: distance, square, cosine, interpolation, product.
 const ROUNDINGS: f64 = 16.0;
-/// So far outside a table's range our emitter takes a direction for its last angle (`EDGE_DEG` of `mitsuba_goniometric.py`).
-const EDGE_DEG: f64 = 5e-5;
+/// How a renderer reads, beyond the rounding of its numbers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Instrument {
+    /// So far outside a table's range a direction counts as its last angle.
+    pub(super) edge_deg: f64,
+    /// Where in its meter it reads, in scene units off the point.
+    pub(super) seat: f64,
+    /// Whether gamma is the arc cosine of a rounded number, which resolves little at the poles.
+    pub(super) by_arc_cosine: bool,
+}
 
 /// What rounding may do to light that comes straight from points.
 pub(super) struct FloatError<'a> {
     job: &'a Job,
     frame: Frame,
+    instrument: Instrument,
     tables: Vec<Cells>,
 }
 
 impl<'a> FloatError<'a> {
-    pub(super) fn of(job: &'a Job, settings: &Settings) -> Self {
+    pub(super) fn of(job: &'a Job, frame: Frame, instrument: Instrument) -> Self {
         let tables = job.scene.luminaires.iter().map(|l| Cells::of(&l.photometry.distribution)).collect();
-        Self { job, frame: Frame::of(job, settings.coordinates), tables }
+        Self { job, frame, instrument, tables }
     }
 
     /// Bound in lux at station `k`.
@@ -37,7 +47,7 @@ impl<'a> FloatError<'a> {
         let (at, lamp) = (self.frame.to_scene(meter.position_m), self.frame.to_scene(luminaire.position_m));
         // Both points are rounded before they are subtracted.
         let largest = at.abs().max(lamp.abs()).max_element();
-        let angle_rad = ROUNDINGS * EPSILON + 4.0 * EPSILON * largest / at.distance(lamp);
+        let angle_rad = ROUNDINGS * EPSILON + (4.0 * EPSILON * largest + self.instrument.seat) / at.distance(lamp);
         let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
         if cosine < -angle_rad {
             return 0.0;
@@ -46,9 +56,9 @@ impl<'a> FloatError<'a> {
         // Near a pole a direction turns by far in C.
         let from_axis = (own.x.hypot(own.y) / own.length()).max(angle_rad);
         let look_up = LookUp {
-            gamma_deg: angle_rad.to_degrees(),
+            gamma_deg: (angle_rad + self.of_arc_cosine_rad(own)).to_degrees(),
             c_deg: (2.0 * angle_rad / from_axis).to_degrees() + 360.0 * EPSILON,
-            edge_deg: EDGE_DEG,
+            edge_deg: self.instrument.edge_deg,
             relative: ROUNDINGS * EPSILON,
         };
         let error_cd = table.error_cd(own, look_up);
@@ -56,5 +66,13 @@ impl<'a> FloatError<'a> {
         let towards =
             error_cd * (cosine.max(0.0) + angle_rad) + intensity_cd * angle_rad * (1.0 + 2.0 * cosine.max(0.0));
         luminaire.flux_scale * towards / ray_m.length_squared()
+    }
+
+    fn of_arc_cosine_rad(&self, own: DVec3) -> f64 {
+        if !self.instrument.by_arc_cosine {
+            return 0.0;
+        }
+        let (off, sine) = (4.0 * EPSILON, own.x.hypot(own.y) / own.length());
+        (off / sine.max(f64::MIN_POSITIVE)).min((2.0 * off).sqrt())
     }
 }

@@ -1,18 +1,17 @@
-//! Talks with the driver in Mitsuba's interpreter: how large a block is, which blocks, and what their readings are.
+//! Talks with a driver in a renderer's own interpreter: how large a block is, which blocks, and what their readings are.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::ID;
-use super::precision::FloatError;
-use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
-use crate::engines::blocks::{Blocks, Sampling};
-use crate::engines::contract::same_meters;
-use crate::engines::effort;
-use crate::engines::settings::Preset;
-use crate::engines::{EngineError, Job, Measurement};
-use crate::record::{Estimate, Uncertainty};
+use luminaire::scene::Transport;
+
+use super::blocks::{Blocks, Sampling};
+use super::contract::same_meters;
+use super::effort;
+use super::frame::Frame;
+use super::{EngineError, Job, Measurement};
+use crate::record::{EngineName, Estimate, Uncertainty};
 use crate::system::process::Conversation;
 
 /// For a standard error that is itself good to 13 %.
@@ -20,14 +19,43 @@ const ENOUGH_BLOCKS: usize = 32;
 /// Strata along a side at least, so that blocks are many strata and their errors near normal; at most, to check often.
 const MIN_SIDE: usize = 64;
 const MAX_SIDE: usize = 256;
-/// The same of the trial where no kernels are compiled and a path costs much.
-const SCALAR_TRIAL_SIDE: usize = 2;
 /// The spread of two blocks is a rough guess of the error of one.
 const PLAN_MARGIN: f64 = 2.0;
 
-/// Seconds that are counted for a ray: on two cores of a usual server, half as much again as was measured there.
-const RAY_S: f64 = 2e-7;
-const SCALAR_RAY_S: f64 = 1e-4;
+/// What a ray takes, as its engine counts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cost {
+    /// Seconds for a ray.
+    pub(super) ray_s: f64,
+    /// Strata along a side of the trial where a path costs much.
+    pub(super) trial_side: Option<usize>,
+}
+
+/// A meter, as drivers read it.
+#[derive(Serialize)]
+pub(super) struct Seat<'a> {
+    id: &'a str,
+    position: [f64; 3],
+    normal: [f64; 3],
+}
+
+pub(super) fn seats<'a>(job: &'a Job, frame: &Frame) -> Vec<Seat<'a>> {
+    let seat = |s: &'a super::Station| Seat {
+        id: &s.id.0,
+        position: frame.to_scene(s.meter.position_m).to_array(),
+        normal: s.meter.normal.to_array(),
+    };
+    job.stations.iter().map(seat).collect()
+}
+
+/// Which light a driver is asked for.
+pub(super) const fn transport(job: &Job) -> &'static str {
+    match job.transport {
+        Transport::Direct => "direct",
+        Transport::Indirect(_) => "indirect",
+        Transport::Total(_) => "total",
+    }
+}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -38,13 +66,6 @@ struct Greeting {
     lanes: usize,
     stations: Vec<String>,
     parts: Vec<Part>,
-}
-
-impl Greeting {
-    /// Whether no kernels are compiled, and a path costs much.
-    fn is_scalar(&self) -> bool {
-        self.variant.starts_with("scalar")
-    }
 }
 
 #[derive(Deserialize)]
@@ -70,16 +91,25 @@ enum Stream {
     Trial = 2,
 }
 
-pub(super) struct Driver<'a> {
+/// A conversation with a driver, and what its engine knows of its readings.
+pub(super) struct Dialogue<'a> {
+    pub(super) engine: EngineName,
     pub(super) job: &'a Job,
-    pub(super) settings: &'a Settings,
     pub(super) conversation: Conversation,
+    /// How many blocks of how many samples along a side, whatever the budget.
+    pub(super) fixed: Option<(usize, usize)>,
+    /// What a ray of a variant costs.
+    pub(super) cost: fn(&str) -> Cost,
+    /// Bound of the direct light of points at a station.
+    pub(super) bound_lx: &'a dyn Fn(usize) -> f64,
+    /// Bound of what is sampled, in parts of the reading.
+    pub(super) relative_bound: f64,
 }
 
-impl Driver<'_> {
+impl Dialogue<'_> {
     pub(super) fn measurement(mut self) -> Result<Measurement, EngineError> {
-        let greeting: Greeting = parse(&self.conversation.listen()?)?;
-        same_meters(&ID, self.job, greeting.stations.iter().map(String::as_str))?;
+        let greeting: Greeting = parse(&self.engine, &self.conversation.listen()?)?;
+        same_meters(&self.engine, self.job, greeting.stations.iter().map(String::as_str))?;
         let mut found =
             Measurement { estimates: vec![Estimate::DARK; self.job.stations.len()], ..Measurement::default() };
         let versions = greeting.versions.iter().map(|(k, v)| (format!("version_{k}"), v.clone()));
@@ -97,8 +127,7 @@ impl Driver<'_> {
     /// Direct light of points: what is left is the rounding of 32-bit floats.
     fn determined(&mut self, part: &Part) -> Result<Vec<Estimate>, EngineError> {
         let block = self.ask(&Request { part: &part.name, side: 1, seeds: vec![None] })?.concat();
-        let error = FloatError::of(self.job, self.settings);
-        let bound = |k| Uncertainty::Bound(error.at_lx(k));
+        let bound = |k| Uncertainty::Bound((self.bound_lx)(k));
         Ok(block.into_iter().enumerate().map(|(k, value)| Estimate { value, uncertainty: bound(k) }).collect())
     }
 
@@ -109,11 +138,11 @@ impl Driver<'_> {
         found: &mut Measurement,
     ) -> Result<Vec<Estimate>, EngineError> {
         let stream = if part.name == "direct" { Stream::Direct } else { Stream::Reflected };
-        let (side, rule) = match self.settings.preset {
-            Preset::Audit => self.plan(part, greeting)?,
-            Preset::Fast | Preset::Default => {
-                let block_s = self.sample_s(part, greeting) * (FIXED_SIDE * FIXED_SIDE) as f64;
-                (FIXED_SIDE, Sampling::fixed(FIXED_BLOCKS, self.job.budget, block_s))
+        let (side, rule) = match self.fixed {
+            None => self.plan(part, greeting)?,
+            Some((blocks, side)) => {
+                let block_s = self.sample_s(part, greeting) * (side * side) as f64;
+                (side, Sampling::fixed(blocks, self.job.budget, block_s))
             }
         };
         let mut read = rule.run(|numbers| self.blocks(part, side, stream, numbers))?;
@@ -121,14 +150,16 @@ impl Driver<'_> {
         let samples = side * side * part.rays / self.job.stations.len().max(1);
         let of_part = [("blocks", read.blocks.count()), ("samples_a_meter_and_block", samples)];
         found.effort.extend(of_part.map(|(key, value)| (format!("{}_{key}", part.name), value.to_string())));
-        Ok(found.take(read))
+        let within =
+            |e: Estimate| Estimate { uncertainty: e.uncertainty.within(self.relative_bound * e.value.abs()), ..e };
+        Ok(found.take(read).into_iter().map(within).collect())
     }
 
     /// Samples along a side of a block so that a block fills the rays in flight at most, and enough blocks about reach the
     /// error and fit in the time.
     fn plan(&mut self, part: &Part, greeting: &Greeting) -> Result<(usize, Sampling<'static>), EngineError> {
         let full = (greeting.lanes / part.rays.max(1)).isqrt().clamp(2, MAX_SIDE);
-        let trial_side = if greeting.is_scalar() { SCALAR_TRIAL_SIDE } else { full };
+        let trial_side = (self.cost)(&greeting.variant).trial_side.unwrap_or(full);
         let trials = self.blocks(part, trial_side, Stream::Trial, 0..2)?;
         let (sample_s, budget) = (self.sample_s(part, greeting), self.job.budget);
         let affordable = ((budget.seconds / ENOUGH_BLOCKS as f64 / sample_s) as usize).isqrt();
@@ -143,8 +174,7 @@ impl Driver<'_> {
     /// Seconds that are counted for one sample of a part at every meter.
     fn sample_s(&self, part: &Part, greeting: &Greeting) -> f64 {
         let rays = if part.name == "direct" { 1.0 } else { 2.0 * effort::path_length(self.job).max(1.0) };
-        let ray_s = if greeting.is_scalar() { SCALAR_RAY_S } else { RAY_S };
-        ray_s * part.rays as f64 * rays * effort::a_ray(self.job)
+        (self.cost)(&greeting.variant).ray_s * part.rays as f64 * rays * effort::a_ray(self.job)
     }
 
     fn blocks(
@@ -159,20 +189,24 @@ impl Driver<'_> {
     }
 
     fn ask(&mut self, request: &Request<'_>) -> Result<Vec<Vec<f64>>, EngineError> {
-        let line = serde_json::to_string(request).map_err(|e| EngineError::output(ID, e.to_string()))?;
-        let blocks: Vec<Vec<f64>> = parse(&self.conversation.ask(&line)?)?;
+        let line =
+            serde_json::to_string(request).map_err(|e| EngineError::output(self.engine.clone(), e.to_string()))?;
+        let blocks: Vec<Vec<f64>> = parse(&self.engine, &self.conversation.ask(&line)?)?;
         let (found, wanted) = (blocks.len(), request.seeds.len());
         if found != wanted {
-            return Err(EngineError::output(ID, format!("gave {found} blocks of {wanted}")));
+            return Err(EngineError::output(self.engine.clone(), format!("gave {found} blocks of {wanted}")));
         }
         let wanted = self.job.stations.len();
         match blocks.iter().find(|block| block.len() != wanted) {
-            Some(block) => Err(EngineError::output(ID, format!("gave {} readings for {wanted} meters", block.len()))),
+            Some(block) => {
+                let what = format!("gave {} readings for {wanted} meters", block.len());
+                Err(EngineError::output(self.engine.clone(), what))
+            }
             None => Ok(blocks),
         }
     }
 }
 
-fn parse<'de, T: Deserialize<'de>>(line: &'de str) -> Result<T, EngineError> {
-    serde_json::from_str(line).map_err(|e| EngineError::no_readings(ID, line, &e))
+fn parse<'de, T: Deserialize<'de>>(engine: &EngineName, line: &'de str) -> Result<T, EngineError> {
+    serde_json::from_str(line).map_err(|e| EngineError::no_readings(engine.clone(), line, &e))
 }

@@ -1,10 +1,10 @@
-//! The coordinates that Mitsuba gets: the spec's own, or moved and scaled where its 32-bit floats need that.
+//! The coordinates that a renderer of 32-bit floats gets: the spec's own, or moved and scaled where these need that.
 
 use glam::{DMat3, DVec3};
 use luminaire::scene::Shape;
 
-use crate::engines::Job;
-use crate::engines::settings::Coordinates;
+use super::Job;
+use super::settings::Coordinates;
 
 /// Farther from the origin than this, in scene sizes, a scene is moved there.
 const FAR: f64 = 2.0;
@@ -15,15 +15,15 @@ const ENOUGH: f64 = 8.0;
 
 /// scene = (world - origin) x scale. Intensities then grow by the square of the scale, so that lux stay lux.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::engines::mitsuba) struct Frame {
+pub(super) struct Frame {
     /// The world point, in metres, that becomes the scene's origin.
-    pub(in crate::engines::mitsuba) origin_m: DVec3,
+    pub(super) origin_m: DVec3,
     /// Scene units a metre; a power of two, which loses no digit.
-    pub(in crate::engines::mitsuba) scale: f64,
+    pub(super) scale: f64,
 }
 
 impl Frame {
-    pub(in crate::engines::mitsuba) fn of(job: &Job, coordinates: Coordinates) -> Self {
+    pub(super) fn of(job: &Job, coordinates: Coordinates) -> Self {
         let raw = Self { origin_m: DVec3::ZERO, scale: 1.0 };
         let (Some((min_m, max_m)), Coordinates::Fitted) = (bounds_m(job), coordinates) else { return raw };
         let (centre_m, size_m) = (0.5 * (min_m + max_m), (max_m - min_m).max_element());
@@ -34,32 +34,31 @@ impl Frame {
         Self { origin_m, scale }
     }
 
-    pub(in crate::engines::mitsuba) fn to_scene(self, point_m: DVec3) -> DVec3 {
+    pub(super) fn to_scene(self, point_m: DVec3) -> DVec3 {
         (point_m - self.origin_m) * self.scale
     }
 
-    /// The rows of a rotation followed by a translation to `position_m`, as Mitsuba's `matrix` wants them.
-    pub(super) fn matrix(&self, position_m: DVec3, orientation: DMat3) -> String {
+    /// What a scene file should say of coordinates that are not the spec's.
+    pub(super) fn remark(self) -> Option<String> {
+        let [x, y, z] = self.origin_m.to_array();
+        let Self { scale, .. } = self;
+        (self != Self { origin_m: DVec3::ZERO, scale: 1.0 }).then(|| {
+            format!(
+                "Here ({x}, {y}, {z}) m is the origin and a metre is {scale} units long, so that 32-bit floats resolve the scene;\n\
+                 intensities carry the factor {}.",
+                scale * scale
+            )
+        })
+    }
+
+    /// The rows of a rotation followed by a translation to `position_m`.
+    pub(super) fn placed(&self, position_m: DVec3, orientation: DMat3) -> [[f64; 4]; 4] {
         let p = self.to_scene(position_m);
         let row = |k: usize| {
             let r = orientation.row(k);
-            format!("{} {} {} {}", plain(r.x), plain(r.y), plain(r.z), plain(p[k]))
+            [plain(r.x), plain(r.y), plain(r.z), plain(p[k])]
         };
-        format!("{}  {}  {}  0 0 0 1", row(0), row(1), row(2))
-    }
-
-    /// A remark for scene files whose coordinates are not the spec's.
-    pub(super) fn comment(&self) -> String {
-        if *self == (Self { origin_m: DVec3::ZERO, scale: 1.0 }) {
-            return String::new();
-        }
-        let [x, y, z] = self.origin_m.to_array();
-        let scale = self.scale;
-        format!(
-            "    <!-- Here ({x}, {y}, {z}) m is the origin and a metre is {scale} units long, so that 32-bit floats \
-             resolve the scene;\n         intensities carry the factor {}. -->\n",
-            scale * scale
-        )
+        [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
     }
 }
 

@@ -1,0 +1,190 @@
+"""Reads illuminance in Blender Cycles: a job (JSON) in, readings (JSON) on standard output.
+
+    python cycles_read.py job.json
+    python cycles_read.py job.json --serve
+
+A meter is a small white patch that no ray but its own meets; illuminance is pi times its baked diffuse light, direct or indirect. Every
+luminaire's direct light is baked by itself, so that none is drawn by chance and points give it exactly. Sums are in 64-bit floats.
+Every block of samples has a seed of its own; the standard error is that of the mean of the blocks.
+
+By itself it reads as many blocks as the job says. With --serve it says what there is to read, and then answers each line of standard
+input, {"part": ..., "side": m, "seeds": [...]}, with one block of m x m samples a meter for every seed, so that luxproof can stop when
+the blocks' spread is small enough.
+"""
+
+import argparse
+import json
+import math
+import os
+import runpy
+import sys
+
+import bpy
+import numpy as np
+
+LANES = 1 << 17  # samples of a block at most
+EXACT_SIDE = 4  # samples along a side of what is not sampled: they differ by where in its patch a meter is alone
+UNREADABLE_CD = 100 * 4 * math.pi / 0.0706650768394 / (4 * math.pi)  # what Cycles lights a scene with in place of a file that it cannot read
+VERSIONS = {"blender": bpy.app.version_string}
+
+
+def main():
+    options = arguments()
+    # Blender's messages must not mix with the answer.
+    answer = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    with open(options.job, encoding="utf-8") as file:
+        job = json.load(file)
+    folder = os.path.dirname(os.path.abspath(options.job))
+    sys.path.insert(0, folder)
+    for table in job["tables"]:
+        check(os.path.join(folder, table))
+    runpy.run_path(os.path.join(folder, "scene.py"))
+    instrument = Instrument(job, options.threads)
+    for line in instrument.served(sys.stdin) if options.serve else [instrument.by_itself()]:
+        print(json.dumps(line, allow_nan=False), file=answer, flush=True)
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description="Reads illuminance in Blender Cycles.")
+    parser.add_argument("job", help="the job, a JSON file beside its scene")
+    parser.add_argument("--serve", action="store_true", help="read blocks as standard input asks for them")
+    parser.add_argument("--threads", type=int, default=os.cpu_count(), help="worker threads; no result depends on them")
+    return parser.parse_args()
+
+
+def check(table):
+    """Fails where Cycles cannot read a table, in place of which it would silently shine evenly."""
+    import cycles_scene
+
+    cycles_scene.start()
+    cycles_scene.stock_luminaire("probe", table, 1, np.eye(4).tolist())
+    directions = np.array([[0.36, 0.48, -0.8], [-0.48, 0.6, -0.64], [0.6, -0.48, 0.64], [-0.36, -0.8, 0.48]])
+    patches = Patches([{"position": d.tolist(), "normal": (-d).tolist()} for d in directions], 1e-4, 1)
+    if np.allclose(patches.bake({"DIRECT"}, 1, 0), UNREADABLE_CD, rtol=1e-3):
+        raise RuntimeError(f"Cycles cannot read {os.path.basename(table)}, and would shine evenly in its place")
+
+
+class Instrument:
+    """The parts of a job's light: for each a function from (m, seed) to a block, and the rays of a block with m = 1."""
+
+    def __init__(self, job, threads):
+        self.job = job
+        self.lights = [o for o in bpy.data.objects if o.type == "LIGHT"]
+        if len(self.lights) != job["emitters"]:
+            raise RuntimeError(f"the scene has {len(self.lights)} lights, the job says {job['emitters']}")
+        solid = any(o.type == "MESH" for o in bpy.data.objects)
+        self.patches = Patches(job["stations"], job["patch"], threads)
+        self.parts = {}
+        count, lights = len(job["stations"]), len(self.lights)
+        if job["transport"] in ("direct", "total") and lights:
+            read, each = (self.direct, lights) if job["apart"] else (self.of_all({"DIRECT"}), 1)
+            self.parts["direct"] = read, count * each
+        if job["transport"] in ("indirect", "total") and lights and solid and job["reflections"]:
+            self.parts["indirect"] = self.of_all({"INDIRECT"}), count
+
+    def is_sampled(self, part):
+        return bool(self.job["extended"] or not self.job["apart"] or part != "direct")
+
+    def of_all(self, kind):
+        return lambda m, seed: self.patches.bake(kind, m * m, seed)
+
+    def direct(self, m, seed):
+        """The light of one luminaire after the other."""
+        total = np.zeros(len(self.job["stations"]))
+        for k, light in enumerate(self.lights):
+            for other in self.lights:
+                other.hide_render = other is not light
+            total += self.patches.bake({"DIRECT"}, m * m, seed + k)
+        for light in self.lights:
+            light.hide_render = False
+        return total
+
+    def block(self, part, m, seed):
+        if seed is None:
+            values = self.parts[part][0](EXACT_SIDE, 0)
+        else:
+            values = self.parts[part][0](m, int(np.random.default_rng([*map(int, seed)]).integers(2**30)))
+        bad = [s["id"] for s, value in zip(self.job["stations"], values) if not math.isfinite(value)]
+        if bad:
+            raise RuntimeError(f"illuminance is not finite at {', '.join(bad)}")
+        return values
+
+    def served(self, requests):
+        parts = [{"name": p, "rays": self.parts[p][1], "sampled": self.is_sampled(p)} for p in self.parts]
+        stations = [s["id"] for s in self.job["stations"]]
+        yield {"versions": VERSIONS, "variant": "CPU", "lanes": LANES, "stations": stations, "parts": parts}
+        for request in map(json.loads, requests):
+            yield [self.block(request["part"], request["side"], seed).tolist() for seed in request["seeds"]]
+
+    def by_itself(self):
+        value, variance = np.zeros(len(self.job["stations"])), np.zeros(len(self.job["stations"]))
+        for k, part in enumerate(self.parts):
+            if not self.is_sampled(part):
+                value += self.block(part, 1, None)
+                continue
+            seeds = ((self.job["seed"], k, b) for b in range(self.job["blocks"]))
+            blocks = np.array([self.block(part, self.job["side"], seed) for seed in seeds])
+            value += blocks.mean(0)
+            variance += blocks.var(0, ddof=1) / len(blocks)
+        rows = zip((s["id"] for s in self.job["stations"]), value.tolist(), np.sqrt(variance).tolist())
+        readings = [{"id": name, "value": lux, "std_error": error} for name, lux, error in rows]
+        return {"versions": VERSIONS, "readings": readings}
+
+
+class Patches:
+    """Small white squares at meters, one texel each. Their normals are given, not taken from corners in 32-bit floats."""
+
+    def __init__(self, stations, side, threads):
+        self.count = len(stations)
+        positions = np.array([s["position"] for s in stations], np.float64).reshape(-1, 3)
+        normals = np.array([s["normal"] for s in stations], np.float64).reshape(-1, 3)
+        aside = np.where(np.abs(normals[:, :1]) > 0.5, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
+        along = np.cross(aside, normals)
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        across = np.cross(normals, along)
+        # Half a side before a surface that the meter lies on.
+        corners = [positions + side / 2 * (normals + x * along + y * across) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        texel = np.arange(self.count)
+        uv = [np.stack([(texel + u) / self.count, np.full(self.count, v)], 1) for u, v in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        mesh = bpy.data.meshes.new("meters")
+        faces = np.arange(4 * self.count).reshape(-1, 4).tolist()
+        mesh.from_pydata(np.stack(corners, 1).reshape(-1, 3).tolist(), [], faces)
+        mesh.uv_layers.new(name="texels").data.foreach_set("uv", np.stack(uv, 1).astype(np.float32).ravel())
+        mesh.shade_smooth()
+        shading = mesh.attributes.new("custom_normal", "FLOAT_VECTOR", "CORNER")
+        shading.data.foreach_set("vector", np.repeat(normals, 4, 0).astype(np.float32).ravel())
+        material = bpy.data.materials.new("meters")
+        material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        white, output, target = (
+            tree.nodes.new("ShaderNode" + kind) for kind in ("BsdfDiffuse", "OutputMaterial", "TexImage")
+        )
+        white.inputs["Color"].default_value = (1, 1, 1, 1)
+        tree.links.new(white.outputs["BSDF"], output.inputs["Surface"])
+        self.image = target.image = bpy.data.images.new("meters", self.count, 1, float_buffer=True, alpha=False)
+        self.image.colorspace_settings.name = "Non-Color"
+        tree.nodes.active = target
+        mesh.materials.append(material)
+        patches = bpy.data.objects.new("meters", mesh)
+        bpy.context.scene.collection.objects.link(patches)
+        for kind in ("diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
+            setattr(patches, f"visible_{kind}", False)
+        bpy.ops.object.select_all(action="DESELECT")  # imported bodies come selected, and would be baked, too
+        bpy.context.view_layer.objects.active = patches
+        patches.select_set(True)
+        render = bpy.context.scene.render
+        render.threads_mode, render.threads = "FIXED", max(1, threads)
+
+    def bake(self, kind, samples, seed):
+        cycles = bpy.context.scene.cycles
+        cycles.samples, cycles.seed = samples, seed
+        bpy.ops.object.bake(type="DIFFUSE", pass_filter=kind, margin=0, use_clear=True, target="IMAGE_TEXTURES")
+        texels = np.empty(4 * self.count, np.float32)
+        self.image.pixels.foreach_get(texels)
+        return math.pi * texels.reshape(-1, 4)[:, 0].astype(np.float64)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,150 @@
+//! The real renderer against closed forms and the converged values of case S1, and what happens when it fails.
+
+use glam::DVec3;
+use luminaire::photometry::LuminousOpening;
+use luminaire::scene::{LuminaireModel, Scene, Transport, orientation};
+
+use super::*;
+use crate::engines::fixtures::*;
+use crate::engines::shared_tests;
+
+mod failures;
+
+pub(in crate::engines) fn read(job: &Job) -> Measurement {
+    read_tampered(job, |_, text| text)
+}
+
+fn read_tampered(job: &Job, tamper: impl Fn(&str, String) -> String) -> Measurement {
+    let read = |files: &[SceneFile], bench: &Workbench| read_files(files, job, &Settings::of(job)?, bench);
+    shared_tests::read_tampered(&Cycles, job, tamper, read)
+}
+
+fn with_preset(mut job: Job, preset: &str) -> Job {
+    job.settings.insert("preset".into(), preset.into());
+    job
+}
+
+#[test]
+fn a_wrong_export_is_seen() {
+    let replaced = [
+        ("cycles.start", "cycles.start"),
+        (", 0.7, [[", ", 2.19911, [["),
+        (", 0.7, [[", ", 1, [["),
+        ("[[1, 0, 0, 0], [0, 1, 0, 0]", "[[0, -1, 0, 0], [1, 0, 0, 0]"),
+    ];
+    shared_tests::wrong_exports_are_seen("scene.py", 1e-4, replaced, |job, tamper| read_tampered(job, tamper));
+}
+
+#[test]
+fn exported_files_are_these() {
+    let mut job = shared_tests::furnished();
+    job.scene.luminaires.push(with_opening(
+        luminaire("panel", DVec3::new(1.0, 1.0, 2.5), quadrant()),
+        LuminousOpening::Ellipse { x_m: 0.6, y_m: 0.3, height_m: 0.0 },
+    ));
+    let files = Cycles.export(&job).unwrap();
+    let golden = files.iter().filter(|f| !f.name.starts_with("cycles_") && !f.name.ends_with(".ies"));
+    let texts = golden.map(|f| format!("==== {}\n{}\n", f.name, String::from_utf8_lossy(&f.bytes)));
+    insta::assert_snapshot!(texts.collect::<Vec<_>>().concat());
+}
+
+#[test]
+fn a_stock_table_is_the_files_own() {
+    let files = Cycles.export(&with_preset(shared_tests::furnished(), "default")).unwrap();
+    let table = files.iter().find(|f| f.name == "table-1.ies").unwrap();
+    insta::assert_snapshot!(String::from_utf8_lossy(&table.bytes));
+}
+
+#[test]
+fn flat_openings_send_out_their_table_on_both_sides() {
+    let (x_m, y_m) = (0.6, 0.3);
+    for opening in
+        [LuminousOpening::Box { x_m, y_m, height_m: 0.0 }, LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 }]
+    {
+        let mut lamp = with_opening(luminaire("area", DVec3::new(1.0, 2.0, 3.0), lopsided()), opening);
+        lamp.orientation = orientation(30.0, 20.0, 10.0);
+        let near = goniometer(&lamp, 0.8, &[10.0, 190.0], &[5.0, 80.0, 165.0]);
+        let deviations = relative_deviations(&read(&near), &simulated_lx(&near, 3e-3));
+        assert!(worst(&deviations) < 6e-3, "{opening:?} {deviations:?}");
+        let far = goniometer(&lamp, 30.0, &[10.0, 190.0], &[5.0, 80.0, 165.0]);
+        let deviations = relative_deviations(&read(&far), &exact_direct_lx(&far));
+        assert!(worst(&deviations) < 3e-3, "{opening:?} {deviations:?}");
+    }
+}
+
+/// An opening has no body, so that plates of half a millimetre stand for the panels' black backs.
+#[test]
+fn panels_over_furniture_give_the_exact_light() {
+    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+    let panel = |[x, y]: [f64; 2]| with_opening(luminaire("panel", DVec3::new(x, y, 2.9994), lambertian()), opening);
+    let back = |[x, y]: [f64; 2]| cuboid([x - 0.3, y - 0.3, 2.9995], [x + 0.3, y + 0.3, 3.0], 0.0);
+    let s2_of = |transport| {
+        let mut job = s2(S2_PANELS_M.map(panel).to_vec(), transport);
+        job.scene.obstacles.extend(S2_PANELS_M.map(back));
+        job.budget.relative_error = 4e-3;
+        job
+    };
+    let direct = read(&s2_of(Transport::Direct));
+    let deviations = relative_deviations(&direct, &S2_DIRECT_LX);
+    assert!(worst(&deviations) < 1e-2 && direct.estimates[5].value == 0.0, "{direct:?} {deviations:?}");
+    let indirect = read(&s2_of(CONVERGED));
+    let deviations = relative_deviations(&indirect, &S2_INDIRECT_LX);
+    assert!(worst(&deviations) < 2e-2 && worst_z(&indirect, &S2_INDIRECT_LX) < 4.5, "{indirect:?} {deviations:?}");
+}
+
+#[test]
+fn far_and_tiny_scenes_are_read_in_coordinates_of_their_own() {
+    let mut far = goniometer(&luminaire("far", DVec3::new(3e6, 0.0, 10.0), lopsided()), 10.0, &[40.0], &[20.0, 120.0]);
+    assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) < 1e-4);
+    far.settings.insert("recentre".into(), false.into());
+    assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) > 1e-3, "raw 32-bit coordinates would do");
+
+    // S1 a thousand times smaller: a million times the lux, direct and reflected.
+    let expected = S1_INDIRECT_LX.map(|lx| 1e6 * lx);
+    assert!(worst_z(&read(&scaled(s1(CONVERGED), 1e-3, 1.0)), &expected) < 4.5);
+}
+
+/// What users get who change nothing: planes mirrored, up to an eighth too much between the only two planes of an axial table.
+#[test]
+fn the_stock_scene_shows_what_cycles_makes_of_an_ies_file() {
+    let axial = read(&with_preset(s1(Transport::Direct), "default"));
+    let off = relative_deviations(&axial, &S1_DIRECT_LX);
+    assert!(off[..3].iter().any(|d| *d > 0.05), "{axial:?}");
+    let mut lamp = luminaire("lamp", DVec3::ZERO, lopsided());
+    lamp.flux_scale = 0.7;
+    let job = goniometer(&lamp, 10.0, &[30.0, 60.0], &[60.0]);
+    let stock = read(&with_preset(job.clone(), "default"));
+    assert!(worst_relative(&stock, &exact_direct_lx(&job)) > 0.1, "{stock:?}");
+}
+
+#[test]
+fn one_seed_gives_the_same_readings_on_any_number_of_threads() {
+    let job = with_preset(s1(CONVERGED), "fast");
+    let with_jobs = |jobs: usize| {
+        let folder = tempfile::tempdir().unwrap();
+        let bench = Workbench { jobs, ..workbench(Site::of_user().unwrap(), folder.path()) };
+        Cycles.read(&job, &bench).unwrap()
+    };
+    let (one, two) = (with_jobs(1), with_jobs(2));
+    assert_eq!(one.estimates, two.estimates);
+    assert_eq!(one.effort["indirect_blocks"], "8");
+    assert!(worst_z(&one, &S1_INDIRECT_LX) < 6.0, "{one:?}");
+}
+
+#[test]
+fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
+    shared_tests::bounds_hold_and_decide(read, false);
+}
+
+#[test]
+fn what_cannot_be_read_well_is_said_beforehand() {
+    assert_eq!(Cycles.supports(&s1(CONVERGED)), Support::Yes);
+    assert!(matches!(Cycles.supports(&with_preset(s1(CONVERGED), "default")), Support::Approximate { .. }));
+    let solid = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.1 };
+    let mut job = s1(Transport::Direct);
+    job.scene.luminaires = vec![with_opening(luminaire("solid", DVec3::splat(10.0), lambertian()), solid)];
+    assert!(matches!(Cycles.supports(&job), Support::No(why) if why.contains("only flat")));
+    job.scene = Scene { luminaires: vec![luminaire("impostor", DVec3::ZERO, lambertian())], ..Scene::default() };
+    job.scene.luminaires[0].model = LuminaireModel::Impostor;
+    assert!(matches!(Cycles.supports(&job), Support::No(_)));
+}
