@@ -103,7 +103,7 @@ impl Engine for Cycles {
     }
 
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
-        export::files(job, &Settings::of(job)?)
+        export::files(job, Settings::of(job)?)
     }
 
     fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
@@ -126,14 +126,14 @@ impl Engine for Cycles {
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
         let settings = Settings::of(job)?;
-        read_files(&export::files(job, &settings)?, job, &settings, workbench)
+        read_files(&export::files(job, settings)?, job, settings, workbench)
     }
 }
 
 fn read_files(
     files: &[SceneFile],
     job: &Job,
-    settings: &Settings,
+    settings: Settings,
     workbench: &Workbench,
 ) -> Result<Measurement, EngineError> {
     workbench.write(files)?;

@@ -52,6 +52,7 @@ impl Site {
     }
 
     /// Where Blender's packages are, which want a Python and a numpy of their own.
+    #[must_use]
     pub fn blender(&self) -> Self {
         Self::at(self.root.join("blender"))
     }

@@ -28,7 +28,7 @@ pub(super) const MOST_REFLECTIONS: i64 = 1024;
 /// Side of a meter's patch, in parts of the largest coordinate: forty times what 32-bit floats resolve there at least.
 const PATCH: f64 = 5e-6;
 
-pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, EngineError> {
+pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.coordinates);
     let job = &*recess::apart(job);
     let tables = Tables::of(job);
@@ -43,7 +43,7 @@ pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, En
     Ok(files)
 }
 
-fn ies_file(distribution: &LuminousIntensityDistribution, settings: &Settings) -> String {
+fn ies_file(distribution: &LuminousIntensityDistribution, settings: Settings) -> String {
     match settings.preset {
         Preset::Default => ies::plain_file(distribution, "[MORE] the table as it is"),
         Preset::Audit | Preset::Fast => {
@@ -76,15 +76,20 @@ struct DriverJob<'a> {
     stations: Vec<Seat<'a>>,
 }
 
-fn job_json(job: &Job, settings: &Settings, frame: &Frame, tables: &Tables<'_>) -> Result<String, EngineError> {
+fn job_json(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -> Result<String, EngineError> {
     let (blocks, side) = settings.by_itself();
     let driver_job = DriverJob {
         case: &job.case,
         procedure: job.procedure.name(),
         transport: dialogue::transport(job),
         reflections: reflections(job),
-        emitters: job.scene.luminaires.iter().map(|l| sides(l).count().max(usize::from(opening(l).is_none()))).sum(),
-        extended: job.scene.luminaires.iter().any(|l| opening(l).is_some()),
+        emitters: job
+            .scene
+            .luminaires
+            .iter()
+            .map(|l| sides(l).count().max(usize::from(Opening::of(l) == Opening::None)))
+            .sum(),
+        extended: job.scene.luminaires.iter().any(|l| Opening::of(l) != Opening::None),
         apart: settings.preset != Preset::Default,
         tables: (0..tables.distinct.len()).map(table).collect(),
         patch: patch(job, frame),
@@ -120,26 +125,40 @@ pub(super) fn reflections(job: &Job) -> i64 {
 
 /// Why a luminaire cannot be had, if so.
 pub(super) fn obstacle(job: &Job, is_stock: bool) -> Option<String> {
-    job.scene.luminaires.iter().filter(|l| l.model == LuminaireModel::Area).find_map(|l| match opening(l) {
-        None => None,
-        Some(_) if is_stock => Some(format!("{}: a stock scene of Blender has IES tables on points only", l.id)),
-        Some(None) => Some(format!("{}: only flat luminous openings are area lights in Cycles", l.id)),
-        Some(Some(_)) => None,
+    job.scene.luminaires.iter().filter(|l| l.model == LuminaireModel::Area).find_map(|l| match Opening::of(l) {
+        Opening::None => None,
+        _ if is_stock => Some(format!("{}: a stock scene of Blender has IES tables on points only", l.id)),
+        Opening::Flat(..) => None,
+        Opening::Solid => Some(format!("{}: only flat luminous openings are area lights in Cycles", l.id)),
     })
 }
 
-/// The shape and size of an area light; `None` of a point, `Some(None)` of what Blender has no light for.
-fn opening(luminaire: &Luminaire) -> Option<Option<(&'static str, [f64; 2])>> {
-    if luminaire.model == LuminaireModel::Point {
-        return None;
-    }
-    let flat = |shape, x_m: f64, y_m: f64| (x_m > 0.0 && y_m > 0.0).then_some((shape, [x_m, y_m]));
-    match luminaire.photometry.opening {
-        LuminousOpening::Point => None,
-        other if other.bounding_box_m() == [0.0; 3] => None,
-        LuminousOpening::Box { x_m, y_m, height_m: 0.0 } => Some(flat("RECTANGLE", x_m, y_m)),
-        LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 } => Some(flat("ELLIPSE", x_m, y_m)),
-        _ => Some(None),
+/// What shines of a luminaire.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Opening {
+    /// A point.
+    None,
+    /// An area light: its shape and both sides in metres.
+    Flat(&'static str, [f64; 2]),
+    /// Blender has no light for it.
+    Solid,
+}
+
+impl Opening {
+    fn of(luminaire: &Luminaire) -> Self {
+        if luminaire.model == LuminaireModel::Point {
+            return Self::None;
+        }
+        let flat = |shape, x_m: f64, y_m: f64| {
+            if x_m > 0.0 && y_m > 0.0 { Self::Flat(shape, [x_m, y_m]) } else { Self::Solid }
+        };
+        match luminaire.photometry.opening {
+            LuminousOpening::Point => Self::None,
+            other if other.bounding_box_m() == [0.0; 3] => Self::None,
+            LuminousOpening::Box { x_m, y_m, height_m: 0.0 } => flat("RECTANGLE", x_m, y_m),
+            LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 } => flat("ELLIPSE", x_m, y_m),
+            _ => Self::Solid,
+        }
     }
 }
 
@@ -151,11 +170,11 @@ fn sides(luminaire: &Luminaire) -> impl Iterator<Item = bool> {
         let lit = |plane: &[f64]| table.gamma_deg().iter().zip(plane).any(|(g, cd)| is_there(*g) && *cd > 0.0);
         (0..table.c_deg().len()).any(|c| lit(table.plane(c)))
     };
-    let flat = opening(luminaire).is_some();
+    let flat = Opening::of(luminaire) != Opening::None;
     [false, true].map(|up| (up, flat && shines(up))).into_iter().filter(|(_, shines)| *shines).map(|(up, _)| up)
 }
 
-fn scene(job: &Job, settings: &Settings, frame: &Frame, tables: &Tables<'_>) -> String {
+fn scene(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -> String {
     let mut text = format!(
         "# {case}: {procedure}.\n\
          # For Blender 4.5 (or its Python package bpy); read the meters of job.json with\n\
@@ -183,8 +202,8 @@ fn scene(job: &Job, settings: &Settings, frame: &Frame, tables: &Tables<'_>) -> 
         let rows = frame.placed(luminaire.position_m, luminaire.orientation).map(|row| list(&row)).join(", ");
         let common = format!("\"luminaire {k}\", \"{}\", {scale}, [{rows}]", table(*of));
         let maker = if settings.preset == Preset::Default { "stock" } else { "point" };
-        match opening(luminaire) {
-            Some(Some((shape, size_m))) => {
+        match Opening::of(luminaire) {
+            Opening::Flat(shape, size_m) => {
                 for up in sides(luminaire) {
                     let (size, up) = (list(&size_m.map(|s| s * frame.scale)), if up { "True" } else { "False" });
                     writeln!(text, "cycles.area_luminaire({common}, \"{shape}\", {size}, upwards={up})").ok();

@@ -41,7 +41,7 @@ fn a_table_that_cycles_cannot_read_is_an_error() {
     let mut files = Cycles.export(&job).unwrap();
     let table = files.iter_mut().find(|f| f.name == "table-0.ies").unwrap();
     table.bytes = b"IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 2".to_vec();
-    let error = read_files(&files, &job, &Settings::of(&job).unwrap(), &bench).unwrap_err();
+    let error = read_files(&files, &job, Settings::of(&job).unwrap(), &bench).unwrap_err();
     assert!(error.to_string().contains("Cycles cannot read table-0.ies"), "{error}");
 }
 

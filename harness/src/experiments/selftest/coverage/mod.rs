@@ -105,7 +105,7 @@ struct Room {
 /// What path tracing says of a reading.
 #[derive(Clone, Copy)]
 struct Certified {
-    value_lx: f64,
+    lux: f64,
     std_error_lx: f64,
     /// How far off it may be.
     allowed_lx: f64,
@@ -113,23 +113,23 @@ struct Certified {
 
 impl Certified {
     fn of(estimate: &Estimate) -> Self {
-        let value_lx = estimate.illuminance.value();
+        let lux = estimate.illuminance.value();
         match estimate.uncertainty {
-            Uncertainty::Bound(bound) => Self { value_lx, std_error_lx: bound, allowed_lx: bound },
-            Uncertainty::StandardError { value, .. } => Self::sampled(value_lx, value),
+            Uncertainty::Bound(bound) => Self { lux, std_error_lx: bound, allowed_lx: bound },
+            Uncertainty::StandardError { value, .. } => Self::sampled(lux, value),
         }
     }
 
-    fn sampled(value_lx: f64, std_error_lx: f64) -> Self {
-        Self { value_lx, std_error_lx, allowed_lx: CERTIFIED_WITHIN * std_error_lx }
+    fn sampled(lux: f64, std_error_lx: f64) -> Self {
+        Self { lux, std_error_lx, allowed_lx: CERTIFIED_WITHIN * std_error_lx }
     }
 
     /// The mean of several seeds', as uncertain as they say or as they scatter, whichever is more.
     fn together(seeds: &[Self]) -> Self {
         let count = seeds.len() as f64;
-        let mean = seeds.iter().map(|c| c.value_lx).sum::<f64>() / count;
+        let mean = seeds.iter().map(|c| c.lux).sum::<f64>() / count;
         let said: f64 = seeds.iter().map(|c| c.std_error_lx.powi(2)).sum::<f64>().sqrt() / count;
-        let scatter = seeds.iter().map(|c| (c.value_lx - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        let scatter = seeds.iter().map(|c| (c.lux - mean).powi(2)).sum::<f64>() / (count - 1.0);
         Self::sampled(mean, said.max((scatter / count).sqrt()))
     }
 }
@@ -180,7 +180,7 @@ impl Room {
     /// Whether a reading is beyond its bound; what the certifier itself may be off says nothing of that.
     fn is_beyond(&self, meter: usize, truth: &Certified) -> bool {
         let (value_lx, bound_lx) = self.reading_lx(meter);
-        let beyond = ((value_lx - truth.value_lx).abs() - truth.allowed_lx).max(0.0);
+        let beyond = ((value_lx - truth.lux).abs() - truth.allowed_lx).max(0.0);
         beyond > bound_lx * (1.0 + 1e-9) || value_lx.is_nan()
     }
 
@@ -194,7 +194,7 @@ impl Room {
             normal: place.normal.to_array(),
             value_lx,
             bound_lx,
-            certified_lx: truth.value_lx,
+            certified_lx: truth.lux,
             certified_std_error_lx: truth.std_error_lx,
         }
     }
@@ -220,7 +220,7 @@ impl Coverage {
             let (value_lx, bound_lx) = room.reading_lx(k);
             // Nothing is off where nothing is lit, though its bound is nothing, too.
             let may_be = (bound_lx + truth.allowed_lx).max(f64::MIN_POSITIVE);
-            let error = (value_lx - truth.value_lx).abs() / may_be;
+            let error = (value_lx - truth.lux).abs() / may_be;
             let bin = BINS.iter().position(|b| error.min(f64::MAX) <= *b).unwrap_or(BINS.len() - 1);
             self.histogram.entry(room.meters[k].0).or_default()[bin] += 1;
         }
@@ -291,7 +291,7 @@ mod tests {
         assert!(found.is_good() && found.readings == 4 * METERS, "{found}");
         let mut room = Room::of(7, 1, 0.1).unwrap();
         // What is certified wrongly is cleared; a wrong reading is not.
-        room.truth[5] = Certified::sampled(2.0 * room.truth[5].value_lx, 1e-9);
+        room.truth[5] = Certified::sampled(2.0 * room.truth[5].lux, 1e-9);
         let wrong = &mut room.found.estimates[3];
         wrong.illuminance = wrong.illuminance * 1.5;
         found.add(&room).unwrap();
