@@ -133,3 +133,39 @@ impl Face {
         before.then(|| [self.on(min_m), self.on(max_m)])
     }
 }
+
+/// How much of a rectangle of a face bodies cover that stand on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cover {
+    None,
+    Part,
+    Whole,
+}
+
+/// Parts of a side by which edges of bodies are told from those of a rectangle.
+const SAME: f64 = 1e-9;
+
+impl Cover {
+    pub(super) fn of(covers: &[[DVec2; 2]], corner_m: DVec2, size_m: DVec2) -> Self {
+        let [low, high] = inside(corner_m, size_m);
+        let is_all = |c: &[DVec2; 2]| c[0].cmple(low).all() && c[1].cmpge(high).all();
+        if covers.iter().any(is_all) {
+            Self::Whole
+        } else if covering(covers, corner_m, size_m).next().is_some() {
+            Self::Part
+        } else {
+            Self::None
+        }
+    }
+}
+
+/// Those that cover a rectangle or a part of it.
+pub(super) fn covering(covers: &[[DVec2; 2]], corner_m: DVec2, size_m: DVec2) -> impl Iterator<Item = &[DVec2; 2]> {
+    let [low, high] = inside(corner_m, size_m);
+    covers.iter().filter(move |c| c[0].cmplt(high).all() && c[1].cmpgt(low).all())
+}
+
+/// Both ends of a rectangle, a hair inside.
+fn inside(corner_m: DVec2, size_m: DVec2) -> [DVec2; 2] {
+    [corner_m + SAME * size_m, corner_m + (1.0 - SAME) * size_m]
+}

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 use super::REPLICATES;
 use super::bicubic::NODES;
-use super::grid::{Cover, Grid};
+use super::face::Cover;
+use super::grid::Grid;
 use super::lit::Limit;
 use super::rays::{End, Rays};
 use crate::scene::{Bounces, Meter};

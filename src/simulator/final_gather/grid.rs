@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 
 use super::bicubic::{Bicubic, NODES};
-use super::face::{Face, mean_wall_m2};
+use super::face::{Cover, Face, mean_wall_m2};
 use super::surroundings::Surroundings;
 
 /// Width of the strips along a room's edges, of the shorter side of a face.
@@ -43,8 +43,7 @@ impl Grid {
         let faces = surroundings.faces.clone();
         let size_m = surroundings.room.map_or(DVec3::ZERO, |room| room.size_m);
         let side_m = SIDE * mean_wall_m2(size_m).sqrt();
-        let cover = |face: &Face| surroundings.bodies().filter_map(|b| face.covered_by(*b)).collect();
-        let covers: Vec<Vec<[DVec2; 2]>> = faces.iter().map(cover).collect();
+        let covers: Vec<Vec<[DVec2; 2]>> = faces.iter().map(|face| surroundings.covers(face)).collect();
         let cut = |index: usize, k: usize| {
             let face = &faces[index];
             let [low, high] = face.corners_m.map(|c| c[k]);
@@ -120,27 +119,9 @@ impl Grid {
         (face, std::array::from_fn(|k| face.off(corner + self.bicubic.node(k) * size)))
     }
 
-    /// How much of a rectangle bodies cover: nothing, something, or all of it.
+    /// How much of a rectangle bodies cover.
     pub(super) fn cover(&self, index: usize) -> Cover {
-        let (face, low, size) = self.rectangle(index);
-        let slack = 1e-9 * size;
-        let (low, high) = (low + slack, low + size - slack);
-        let over = |c: &&[DVec2; 2]| c[0].cmplt(high).all() && c[1].cmpgt(low).all();
-        let all = |c: &[DVec2; 2]| c[0].cmple(low).all() && c[1].cmpge(high).all();
-        if self.covers[face].iter().any(all) {
-            Cover::Whole
-        } else if self.covers[face].iter().any(|c| over(&c)) {
-            Cover::Part
-        } else {
-            Cover::None
-        }
+        let (face, corner_m, size_m) = self.rectangle(index);
+        Cover::of(&self.covers[face], corner_m, size_m)
     }
-}
-
-/// How much of a rectangle bodies cover.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Cover {
-    None,
-    Part,
-    Whole,
 }

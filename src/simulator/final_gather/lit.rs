@@ -5,8 +5,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::bicubic::{Bicubic, NODES};
-use super::face::{Face, mean_wall_m2};
-use super::grid::Cover;
+use super::face::{Cover, Face, covering, mean_wall_m2};
 use super::surroundings::Surroundings;
 use super::view::{Left, View};
 use crate::scene::Meter;
@@ -19,8 +18,6 @@ use crate::simulator::visibility::Occluder;
 const CHECKS: [[f64; 2]; 6] = [[0.5, 0.5], [0.02, 0.02], [0.98, 0.98], [0.02, 0.98], [0.98, 0.02], [0.5, 0.02]];
 /// Heights of luminaires nearer to an edge than this part of a rectangle do not part it.
 const EDGE: f64 = 0.02;
-/// Parts of a side by which edges of bodies are told from those of a rectangle.
-const SAME: f64 = 1e-9;
 /// Quarterings at most.
 const DEEPEST: u32 = 9;
 /// Quarterings at most that only part what bodies may hide from what they cannot.
@@ -170,7 +167,7 @@ impl Lit {
         let one = |face: &Face| {
             let floor_lux = DIM * mean;
             let wall_m2 = surroundings.room.map_or(f64::INFINITY, |room| mean_wall_m2(room.size_m));
-            let covers = surroundings.bodies().filter_map(|b| face.covered_by(*b)).collect();
+            let covers = surroundings.covers(face);
             let build = Build {
                 lights,
                 bicubic,
@@ -317,11 +314,6 @@ impl Lit {
     }
 }
 
-/// Both ends of a rectangle, a hair inside.
-fn inner(corner_m: DVec2, size_m: DVec2) -> (DVec2, DVec2) {
-    (corner_m + SAME * size_m, corner_m + (1.0 - SAME) * size_m)
-}
-
 /// Finds for every part that is quartered the polynomial closest to those of its quarters, which lie behind it.
 fn join(bicubic: &Bicubic, parts: &mut [Part]) {
     for k in (0..parts.len()).rev() {
@@ -411,9 +403,9 @@ impl Build<'_> {
         let up = self.face.on(DVec3::Z);
         let (low, high) = (corner_m + EDGE * size_m, corner_m + (1.0 - EDGE) * size_m);
         let mut middle_m = corner_m + 0.5 * size_m;
-        if self.cover(corner_m, size_m) == Cover::Part {
+        if Cover::of(&self.covers, corner_m, size_m) == Cover::Part {
             for axis in 0..2 {
-                let ends = self.covering(corner_m, size_m).flatten().map(|end| end[axis]);
+                let ends = covering(&self.covers, corner_m, size_m).flatten().map(|end| end[axis]);
                 let inside = ends.filter(|at_m| *at_m > low[axis] && *at_m < high[axis]);
                 let off = |at_m: &f64| (at_m - middle_m[axis]).abs();
                 let nearest = inside.min_by(|a, b| off(a).total_cmp(&off(b)));
@@ -429,28 +421,9 @@ impl Build<'_> {
         middle_m
     }
 
-    /// Bodies that stand on a rectangle or a part of it.
-    fn covering(&self, corner_m: DVec2, size_m: DVec2) -> impl Iterator<Item = [DVec2; 2]> {
-        let (low, high) = inner(corner_m, size_m);
-        self.covers.iter().copied().filter(move |c| c[0].cmplt(high).all() && c[1].cmpgt(low).all())
-    }
-
-    fn cover(&self, corner_m: DVec2, size_m: DVec2) -> Cover {
-        let (low, high) = inner(corner_m, size_m);
-        let is_whole = |c: [DVec2; 2]| c[0].cmple(low).all() && c[1].cmpge(high).all();
-        let covering = || self.covering(corner_m, size_m);
-        if covering().any(is_whole) {
-            Cover::Whole
-        } else if covering().next().is_some() {
-            Cover::Part
-        } else {
-            Cover::None
-        }
-    }
-
     /// A rectangle with the luminaires that may be hidden from it told apart.
     fn leaf(&self, corner_m: DVec2, size_m: DVec2) -> Leaf {
-        let cover = self.cover(corner_m, size_m);
+        let cover = Cover::of(&self.covers, corner_m, size_m);
         if cover == Cover::Whole {
             return Leaf { lux: [0.0; NODES], error_lux: 0.0, is_covered: false, asked: vec![], exitance: 0.0 };
         }

@@ -27,8 +27,9 @@ use rayon::prelude::*;
 
 use self::balance::{Asked, Balance, Given};
 use self::bicubic::{Bicubic, NODES};
+use self::face::Cover;
 use self::field::Field;
-use self::grid::{Cover, Grid};
+use self::grid::Grid;
 use self::lit::{Known, Lights, Limit, Lit};
 use self::rays::Rays;
 use self::surroundings::Surroundings;

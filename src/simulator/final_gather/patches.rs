@@ -60,9 +60,7 @@ pub(super) struct Cover {
 
 impl Cover {
     pub(super) fn new(surroundings: &Surroundings) -> Self {
-        let of = |face: &Face| -> Vec<[DVec2; 2]> {
-            surroundings.bodies().filter_map(|b| face.covered_by(*b)).chain(face.holes.iter().copied()).collect()
-        };
+        let of = |face: &Face| [surroundings.covers(face), face.holes.clone()].concat();
         let end = |face: &Face| surroundings.room.map_or(DVec2::INFINITY, |room| face.on(room.size_m));
         let faces = &surroundings.faces;
         Self { covers: faces.iter().map(of).collect(), ends_m: faces.iter().map(end).collect() }

@@ -2,7 +2,7 @@
 //!
 //! It shares nothing with the path tracer but the tree of triangles, so that each can be held against the other.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::face::Face;
 use crate::geometry::bvh::{BvhError, Ray, TriangleBvh};
@@ -186,6 +186,11 @@ impl Surroundings {
     /// Boxes, flat ones on the walls left out, as their lower and upper corners.
     pub(super) fn bodies(&self) -> impl Iterator<Item = &[DVec3; 2]> {
         self.solid.iter()
+    }
+
+    /// Where bodies stand on a face.
+    pub(super) fn covers(&self, face: &Face) -> Vec<[DVec2; 2]> {
+        self.bodies().filter_map(|body| face.covered_by(*body)).collect()
     }
 
     /// Whether a body stands between two points.
