@@ -117,11 +117,7 @@ fn verify(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
 
 /// The engines that are named, or all but those that want to be named.
 fn wanted(names: &[String]) -> Vec<EngineName> {
-    let all = engines::all().into_iter().map(|e| e.name());
-    let is_wanted = |e: &EngineName| {
-        if names.is_empty() { !engines::is_on_request(e.as_str()) } else { names.iter().any(|n| *e == **n) }
-    };
-    all.filter(is_wanted).collect()
+    engines::all().into_iter().map(|e| e.name()).filter(|e| engines::is_chosen(e, names)).collect()
 }
 
 /// Installs the engines that are named, or all.

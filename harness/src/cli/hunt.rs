@@ -194,16 +194,15 @@ fn hunted(args: &HuntArgs, site: &Site) -> Result<Hunted, Diagnostic> {
     }
     let mut chosen = BTreeMap::new();
     for name in known {
-        let is_named = args.engines.iter().any(|n| name == *n);
-        let is_left_out = if args.engines.is_empty() { engines::is_on_request(name.as_str()) } else { !is_named };
-        if is_left_out && !declared.contains_key(&name) {
+        let is_declared = args.engines.is_empty() && declared.contains_key(&name);
+        if !is_declared && !engines::is_chosen(&name, &args.engines) {
             continue;
         }
         let settings = declared.get(&name).cloned().unwrap_or_default();
         let engine = engines::named(&name, &settings.0, Path::new("")).into_diagnostic()?;
         match engine.probe(site) {
             Ok(_) => drop(chosen.insert(name, settings)),
-            Err(absent) if is_named => return Ok(Err(format!("{name}: {absent}"))),
+            Err(absent) if !args.engines.is_empty() => return Ok(Err(format!("{name}: {absent}"))),
             Err(absent) => complain(&format!("{name}: {absent}")),
         }
     }

@@ -42,15 +42,12 @@ impl MeasuringArgs {
         known_engines(&self.engines)?;
         let mut present = vec![];
         for engine in engines::all() {
-            let is_named = self.engines.iter().any(|n| engine.name() == *n);
-            let is_wanted =
-                if self.engines.is_empty() { !engines::is_on_request(engine.name().as_str()) } else { is_named };
-            if !is_wanted {
+            if !engines::is_chosen(&engine.name(), &self.engines) {
                 continue;
             }
             match engine.probe(site) {
                 Ok(version) => present.push(Instrument { engine: engine.into(), version }),
-                Err(absent) if is_named => return Err(miette::miette!("{}: {absent}", engine.name())),
+                Err(absent) if !self.engines.is_empty() => return Err(miette::miette!("{}: {absent}", engine.name())),
                 Err(absent) => super::complain(&format!("{}: {absent}", engine.name())),
             }
         }

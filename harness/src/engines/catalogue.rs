@@ -1,7 +1,10 @@
 //! The engines that everybody has, one line each.
 
+use std::borrow::Borrow;
+
 use super::contract::{Engine, Entry};
 use super::{cycles, iesna, mitsuba, povray, radiance, simulator};
+use crate::record::EngineName;
 
 /// In the order of reports: our own witnesses first.
 pub const ALL: &[&Entry] =
@@ -18,6 +21,11 @@ pub fn entry(name: &str) -> Option<&'static Entry> {
 /// Whether an engine takes part, and is installed, only where it is named.
 pub fn is_on_request(name: &str) -> bool {
     entry(name).is_some_and(|entry| entry.is_on_request)
+}
+
+/// Whether an engine is among those that are named; where none is, whether it takes part all the same.
+pub fn is_chosen(name: &EngineName, named: &[impl Borrow<str>]) -> bool {
+    if named.is_empty() { !is_on_request(name.as_str()) } else { named.iter().any(|n| name.as_str() == n.borrow()) }
 }
 
 /// An engine as its makers write it; one of the user's by its name.

@@ -13,8 +13,8 @@ use std::time::Duration;
 use crate::system::process::{Invocation, ProcessError};
 
 use super::Site;
-use super::catalogue::ALL;
-use super::contract::{Component, Entry};
+use super::catalogue::{ALL, is_chosen};
+use super::contract::Component;
 use crate::record::EngineName;
 pub use verify::Soundness;
 
@@ -83,10 +83,7 @@ pub fn repair(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str
 fn components(engines: &[EngineName]) -> Vec<Component> {
     let all =
         [Component::PythonPackages, Component::PovRay, Component::LibLlvm, Component::LibFaketime, Component::Blender];
-    let is_wanted = |entry: &&&Entry| {
-        if engines.is_empty() { !entry.is_on_request } else { engines.contains(&entry.name) }
-    };
-    let named = || ALL.iter().filter(is_wanted);
+    let named = || ALL.iter().filter(|entry| is_chosen(&entry.name, engines));
     all.into_iter().filter(|c| named().any(|entry| entry.installs.contains(c))).collect()
 }
 

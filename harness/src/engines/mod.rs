@@ -41,7 +41,7 @@ use std::path::Path;
 
 pub use crate::spec::Budget;
 pub use blocks::Blocks;
-pub use catalogue::{ALL, all, display_name, entry, is_on_request};
+pub use catalogue::{ALL, all, display_name, entry, is_chosen, is_on_request};
 pub use contract::{
     Absent, Component, Engine, Entry, FILE_READER, Forgotten, Job, Knob, Measurement, Station, Support, Version,
     checked, share,
