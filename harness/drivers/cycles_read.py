@@ -5,15 +5,9 @@
 
 A meter is a small white patch that no ray but its own meets; illuminance is pi times its baked diffuse light, direct or indirect. Every
 luminaire's direct light is baked by itself, so that none is drawn by chance and points give it exactly. Sums are in 64-bit floats.
-Every block of samples has a seed of its own; the standard error is that of the mean of the blocks.
-
-By itself it reads as many blocks as the job says. With --serve it says what there is to read, and then answers each line of standard
-input, {"part": ..., "side": m, "seeds": [...]}, with one block of m x m samples a meter for every seed, so that luxproof can stop when
-the blocks' spread is small enough.
+It reads in blocks of samples: see blocks.py.
 """
 
-import argparse
-import json
 import math
 import os
 import runpy
@@ -22,41 +16,27 @@ import sys
 import bpy
 import numpy as np
 
-LANES = 1 << 17  # samples of a block at most
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import blocks
+import cycles_scene
+
 EXACT_SIDE = 4  # samples along a side of what is not sampled: they differ by where in its patch a meter is alone
-UNREADABLE_CD = 100 * 4 * math.pi / 0.0706650768394 / (4 * math.pi)  # what Cycles lights a scene with in place of a file that it cannot read
-VERSIONS = {"blender": bpy.app.version_string}
+UNREADABLE_CD = 100 * cycles_scene.POINT_W / (4 * math.pi)  # what Cycles lights a scene with in place of a file that it cannot read
 
 
 def main():
-    options = arguments()
-    # Blender's messages must not mix with the answer.
-    answer = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    with open(options.job, encoding="utf-8") as file:
-        job = json.load(file)
-    folder = os.path.dirname(os.path.abspath(options.job))
-    sys.path.insert(0, folder)
+    blocks.main("Reads illuminance in Blender Cycles.", instrument)
+
+
+def instrument(job, folder, options):
     for table in job["tables"]:
         check(os.path.join(folder, table))
     runpy.run_path(os.path.join(folder, "scene.py"))
-    instrument = Instrument(job, options.threads)
-    for line in instrument.served(sys.stdin) if options.serve else [instrument.by_itself()]:
-        print(json.dumps(line, allow_nan=False), file=answer, flush=True)
-
-
-def arguments():
-    parser = argparse.ArgumentParser(description="Reads illuminance in Blender Cycles.")
-    parser.add_argument("job", help="the job, a JSON file beside its scene")
-    parser.add_argument("--serve", action="store_true", help="read blocks as standard input asks for them")
-    parser.add_argument("--threads", type=int, default=os.cpu_count(), help="worker threads; no result depends on them")
-    return parser.parse_args()
+    return Instrument(job, options.threads)
 
 
 def check(table):
     """Fails where Cycles cannot read a table, in place of which it would silently shine evenly."""
-    import cycles_scene
-
     cycles_scene.start()
     cycles_scene.stock_luminaire("probe", table, 1, np.eye(4).tolist())
     directions = np.array([[0.36, 0.48, -0.8], [-0.48, 0.6, -0.64], [0.6, -0.48, 0.64], [-0.36, -0.8, 0.48]])
@@ -65,17 +45,14 @@ def check(table):
         raise RuntimeError(f"Cycles cannot read {os.path.basename(table)}, and would shine evenly in its place")
 
 
-class Instrument:
-    """The parts of a job's light: for each a function from (m, seed) to a block, and the rays of a block with m = 1."""
-
+class Instrument(blocks.Instrument):
     def __init__(self, job, threads):
-        self.job = job
+        super().__init__(job, {"blender": bpy.app.version_string}, "CPU")
         self.lights = [o for o in bpy.data.objects if o.type == "LIGHT"]
         if len(self.lights) != job["emitters"]:
             raise RuntimeError(f"the scene has {len(self.lights)} lights, the job says {job['emitters']}")
         solid = any(o.type == "MESH" for o in bpy.data.objects)
         self.patches = Patches(job["stations"], job["patch"], threads)
-        self.parts = {}
         count, lights = len(job["stations"]), len(self.lights)
         if job["transport"] in ("direct", "total") and lights:
             read, each = (self.direct, lights) if job["apart"] else (self.of_all({"DIRECT"}), 1)
@@ -87,49 +64,26 @@ class Instrument:
         return bool(self.job["extended"] or not self.job["apart"] or part != "direct")
 
     def of_all(self, kind):
-        return lambda m, seed: self.patches.bake(kind, m * m, seed)
+        return lambda m, seed: self.patches.bake(kind, *drawn(m, seed))
 
     def direct(self, m, seed):
         """The light of one luminaire after the other."""
-        total = np.zeros(len(self.job["stations"]))
+        total = np.zeros(len(self.stations))
+        samples, seed = drawn(m, seed)
         for k, light in enumerate(self.lights):
             for other in self.lights:
                 other.hide_render = other is not light
-            total += self.patches.bake({"DIRECT"}, m * m, seed + k)
+            total += self.patches.bake({"DIRECT"}, samples, seed + k)
         for light in self.lights:
             light.hide_render = False
         return total
 
-    def block(self, part, m, seed):
-        if seed is None:
-            values = self.parts[part][0](EXACT_SIDE, 0)
-        else:
-            values = self.parts[part][0](m, int(np.random.default_rng([*map(int, seed)]).integers(2**30)))
-        bad = [s["id"] for s, value in zip(self.job["stations"], values) if not math.isfinite(value)]
-        if bad:
-            raise RuntimeError(f"illuminance is not finite at {', '.join(bad)}")
-        return values
 
-    def served(self, requests):
-        parts = [{"name": p, "rays": self.parts[p][1], "sampled": self.is_sampled(p)} for p in self.parts]
-        stations = [s["id"] for s in self.job["stations"]]
-        yield {"versions": VERSIONS, "variant": "CPU", "lanes": LANES, "stations": stations, "parts": parts}
-        for request in map(json.loads, requests):
-            yield [self.block(request["part"], request["side"], seed).tolist() for seed in request["seeds"]]
-
-    def by_itself(self):
-        value, variance = np.zeros(len(self.job["stations"])), np.zeros(len(self.job["stations"]))
-        for k, part in enumerate(self.parts):
-            if not self.is_sampled(part):
-                value += self.block(part, 1, None)
-                continue
-            seeds = ((self.job["seed"], k, b) for b in range(self.job["blocks"]))
-            blocks = np.array([self.block(part, self.job["side"], seed) for seed in seeds])
-            value += blocks.mean(0)
-            variance += blocks.var(0, ddof=1) / len(blocks)
-        rows = zip((s["id"] for s in self.job["stations"]), value.tolist(), np.sqrt(variance).tolist())
-        readings = [{"id": name, "value": lux, "std_error": error} for name, lux, error in rows]
-        return {"versions": VERSIONS, "readings": readings}
+def drawn(m, seed):
+    """The number of samples, and the seed as Blender takes one."""
+    if seed is None:
+        return EXACT_SIDE * EXACT_SIDE, 0
+    return m * m, int(np.random.default_rng([*map(int, seed)]).integers(2**30))
 
 
 class Patches:

@@ -6,16 +6,9 @@
 Meters are no part of the scene, so nothing disturbs the light. Direct light is what `Scene.sample_emitter_direction`
 gives at a meter, which is exact for point sources. Indirect light is E = pi x the mean radiance that the scene's own
 integrator returns along cosine-distributed rays, first directions stratified. Sums are in 64-bit floats, since a film
-adds up in 32. Every block of samples has a seed of its own; the standard error is that of the mean of the blocks.
-
-By itself it reads as many blocks as the job says. With --serve it says what there is to read, and then answers each line
-of standard input, {"part": ..., "side": m, "seeds": [...]}, with one block of m x m samples a meter and emitter for
-every seed, so that luxproof can stop when the blocks' spread is small enough.
+adds up in 32. It reads in blocks of samples, of direct light a meter and emitter: see blocks.py.
 """
 
-import argparse
-import json
-import math
 import os
 import sys
 
@@ -23,52 +16,39 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-LANES = 1 << 17  # rays in flight
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import blocks
+
 CLEAR = 1e-6  # of coordinates: how far off a meter its shadow rays start
 SHADOW_EPSILON = 9e-4  # of distances: how far before an emitter they end, as Mitsuba's own do
 VERSIONS = {"mitsuba": mi.__version__, "drjit": dr.__version__}
 
 
 def main():
-    options = arguments()
-    # Mitsuba's log must not mix with the answer.
-    answer = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    with open(options.job, encoding="utf-8") as file:
-        job = json.load(file)
+    blocks.main("Reads illuminance in Mitsuba 3.", instrument, more)
+
+
+def more(parser):
+    parser.add_argument("--variant", help="Mitsuba variant to use instead of the job's")
+
+
+def instrument(job, folder, options):
     mi.set_variant(options.variant or job["variant"])
     if is_jit():
         dr.set_thread_count(options.threads)
-    sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
     import mitsuba_goniometric  # registers the emitters, for the variant just set
 
-    folder = os.path.dirname(os.path.abspath(options.job))
     # Without optimize=False two luminaires of one kind may be merged into one.
-    scene = mi.load_file(os.path.join(folder, job["scene"]), optimize=False)
-    instrument = Instrument(scene, job)
-    for line in instrument.served(sys.stdin) if options.serve else [instrument.by_itself()]:
-        print(json.dumps(line, allow_nan=False), file=answer, flush=True)
+    return Instrument(mi.load_file(os.path.join(folder, job["scene"]), optimize=False), job)
 
 
-def arguments():
-    parser = argparse.ArgumentParser(description="Reads illuminance in Mitsuba 3.")
-    parser.add_argument("job", help="the job, a JSON file beside its scene")
-    parser.add_argument("--serve", action="store_true", help="read blocks as standard input asks for them")
-    parser.add_argument("--threads", type=int, default=os.cpu_count(), help="worker threads; no result depends on them")
-    parser.add_argument("--variant", help="Mitsuba variant to use instead of the job's")
-    return parser.parse_args()
-
-
-class Instrument:
-    """The parts of a job's light: for each a function from (m, seed) to a block, and the rays of a block with m = 1."""
-
+class Instrument(blocks.Instrument):
     def __init__(self, scene, job):
-        self.job = job
-        self.meters = meters = Meters(job["stations"])
+        super().__init__(job, VERSIONS, mi.variant())
+        meters = Meters(job["stations"])
         emitters = len(scene.emitters())
         if emitters != job["emitters"]:
             raise RuntimeError(f"the scene has {emitters} emitters, the job says {job['emitters']}")
-        self.parts = {}
         if job["film"]:
             self.parts[job["transport"]] = lambda m, seed: film(scene, job["film"], meters.count, seed), meters.count
             return
@@ -80,34 +60,6 @@ class Instrument:
 
     def is_sampled(self, part):
         return bool(self.job["film"] or self.job["extended"] or part != "direct")
-
-    def block(self, part, m, seed):
-        values = self.parts[part][0](m, seed)
-        bad = [s["id"] for s, value in zip(self.job["stations"], values) if not math.isfinite(value)]
-        if bad:
-            raise RuntimeError(f"illuminance is not finite at {', '.join(bad)}")
-        return values
-
-    def served(self, requests):
-        parts = [{"name": p, "rays": self.parts[p][1], "sampled": self.is_sampled(p)} for p in self.parts]
-        stations = [s["id"] for s in self.job["stations"]]
-        yield {"versions": VERSIONS, "variant": mi.variant(), "lanes": LANES, "stations": stations, "parts": parts}
-        for request in map(json.loads, requests):
-            yield [self.block(request["part"], request["side"], seed).tolist() for seed in request["seeds"]]
-
-    def by_itself(self):
-        value, variance = np.zeros(self.meters.count), np.zeros(self.meters.count)
-        for k, part in enumerate(self.parts):
-            if not self.is_sampled(part):
-                value += self.block(part, 1, None)
-                continue
-            seeds = ((self.job["seed"], k, b) for b in range(self.job["blocks"]))
-            blocks = np.array([self.block(part, self.job["side"], seed) for seed in seeds])
-            value += blocks.mean(0)
-            variance += blocks.var(0, ddof=1) / len(blocks)
-        rows = zip((s["id"] for s in self.job["stations"]), value.tolist(), np.sqrt(variance).tolist())
-        readings = [{"id": name, "value": lux, "std_error": error} for name, lux, error in rows]
-        return {"versions": VERSIONS, "variant": mi.variant(), "readings": readings}
 
 
 def film(scene, reading, meters, seed):
@@ -135,7 +87,7 @@ class Meters:
 
     def repeated(self, each):
         """Slices of meters, each meter `each` times, that fit in flight."""
-        step = max(1, LANES // each)
+        step = max(1, Instrument.lanes // each)
         for first in range(0, self.count, step):
             yield np.repeat(np.arange(first, min(first + step, self.count)), each)
 

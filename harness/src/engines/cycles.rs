@@ -148,10 +148,14 @@ fn read_files(
     let instrument = Instrument { edge_deg: 2.0 * ies::EDGE_DEG, seat: patch, by_arc_cosine: true };
     let rounding = FloatError::of(job, frame, instrument);
     let tables = Tables::of(job);
-    let looked_up: Vec<LookedUp> = tables.distinct.iter().map(|d| LookedUp::of(d)).collect();
+    // A stock scene has the tables as they are, and what becomes of them is what one wants to know.
+    let resampled = tables.distinct.iter().filter(|_| settings.preset != Preset::Default);
+    let looked_up: Vec<LookedUp> = resampled.map(|d| LookedUp::of(d)).collect();
     let of_tables_lx = |k: usize| -> f64 {
         let off = job.scene.luminaires.iter().zip(&tables.of_luminaire);
-        off.map(|(luminaire, table)| looked_up[*table].off_lx(luminaire, &job.stations[k].meter)).sum()
+        off.filter_map(|(luminaire, k_th)| Some((luminaire, looked_up.get(*k_th)?)))
+            .map(|(luminaire, table)| table.off_lx(luminaire, &job.stations[k].meter))
+            .sum()
     };
     let misled = looked_up.iter().map(LookedUp::misled_share).fold(0.0, f64::max);
     let bound_lx = |k: usize| rounding.at_lx(k) + of_tables_lx(k);
@@ -162,7 +166,7 @@ fn read_files(
         fixed: settings.fixed(),
         cost: |_| Cost { ray_s: 1e-6, trial_side: None },
         bound_lx: &bound_lx,
-        relative_bound: if settings.preset == Preset::Default { FILM } else { FILM + misled },
+        relative_bound: FILM + misled,
     };
     let mut measurement = dialogue.measurement()?;
     measurement.effort.insert("command".into(), run.command_line());

@@ -14,6 +14,8 @@ use super::{EngineError, Job, Measurement};
 use crate::record::{EngineName, Estimate, Uncertainty};
 use crate::system::process::Conversation;
 
+/// What drivers share, beside theirs.
+pub(super) const BLOCKS: &str = include_str!("../../drivers/blocks.py");
 /// For a standard error that is itself good to 13 %.
 const ENOUGH_BLOCKS: usize = 32;
 /// Strata along a side at least, so that blocks are many strata and their errors near normal; at most, to check often.

@@ -176,6 +176,22 @@ pub(super) fn s2(luminaires: Vec<Luminaire>, transport: Transport) -> Job {
     job(scene, stations(&points.map(|[x, y]| [x, y, 0.8]), DVec3::Z), transport)
 }
 
+/// The same with panels that light downwards. An opening has no body, so that plates of half a millimetre stand for the panels' black backs.
+pub(super) fn s2_with_panels(transport: Transport) -> Job {
+    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+    let panel = |[x, y]: [f64; 2]| with_opening(luminaire("panel", DVec3::new(x, y, 2.9994), lambertian()), opening);
+    let back = |[x, y]: [f64; 2]| cuboid([x - 0.3, y - 0.3, 2.9995], [x + 0.3, y + 0.3, 3.0], 0.0);
+    let mut job = s2(S2_PANELS_M.map(panel).to_vec(), transport);
+    job.scene.obstacles.extend(S2_PANELS_M.map(back));
+    job.budget.relative_error = 4e-3;
+    job
+}
+
+pub(super) fn with_preset(mut job: Job, preset: &str) -> Job {
+    job.settings.insert("preset".into(), preset.into());
+    job
+}
+
 pub(super) fn cuboid(min: [f64; 3], max: [f64; 3], reflectance: f64) -> Obstacle {
     let (min_m, max_m) = (DVec3::from_array(min), DVec3::from_array(max));
     Obstacle { shape: Shape::Box { min_m, max_m }, reflectance }

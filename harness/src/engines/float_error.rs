@@ -10,6 +10,7 @@ use super::frame::Frame;
 pub(super) const EPSILON: f64 = 5.960_464_477_539_063e-8;
 /// Roundings between a table and an illuminance: distance, square, cosine, interpolation, product.
 const ROUNDINGS: f64 = 16.0;
+
 /// How a renderer reads, beyond the rounding of its numbers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Instrument {

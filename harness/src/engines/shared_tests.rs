@@ -108,6 +108,34 @@ fn asymmetric_and_turned_luminaires_read_their_own_table() {
 }
 
 #[test]
+fn panels_over_furniture_give_the_exact_light() {
+    for Renderer { read, .. } in [MITSUBA, CYCLES] {
+        let direct = read(&s2_with_panels(Transport::Direct));
+        let deviations = relative_deviations(&direct, &S2_DIRECT_LX);
+        assert!(worst(&deviations) < 1e-2 && direct.estimates[5].value == 0.0, "{direct:?} {deviations:?}");
+        let indirect = read(&s2_with_panels(CONVERGED));
+        let deviations = relative_deviations(&indirect, &S2_INDIRECT_LX);
+        assert!(worst(&deviations) < 2e-2 && worst_z(&indirect, &S2_INDIRECT_LX) < 4.5, "{indirect:?} {deviations:?}");
+    }
+}
+
+#[test]
+fn far_and_tiny_scenes_are_read_in_coordinates_of_their_own() {
+    for (Renderer { read, .. }, off) in [(MITSUBA, 1e-5), (CYCLES, 1e-4)] {
+        let lamp = luminaire("far", DVec3::new(3e6, 0.0, 10.0), lopsided());
+        let mut far = goniometer(&lamp, 10.0, &[40.0], &[20.0, 120.0]);
+        assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) < off);
+        far.settings.insert("recentre".into(), false.into());
+        let raw = worst(&relative_deviations(&read(&far), &exact_direct_lx(&far)));
+        assert!(raw > 1e-3, "raw 32-bit coordinates would do");
+
+        // S1 a thousand times smaller: a million times the lux, direct and reflected.
+        let expected = S1_INDIRECT_LX.map(|lx| 1e6 * lx);
+        assert!(worst_z(&read(&scaled(s1(CONVERGED), 1e-3, 1.0)), &expected) < 4.5);
+    }
+}
+
+#[test]
 fn several_luminaires_add_up_and_obstacles_throw_shadows() {
     let mut scene = s1(Transport::Direct).scene;
     scene.luminaires.push(luminaire("lopsided", DVec3::new(4.0, 5.0, 12.0), lopsided()));
@@ -200,6 +228,13 @@ pub(super) fn crashes_hangs_and_kills_are_told_apart(read: impl Fn(&str, f64) ->
     }
     let hang = read("sleep 60", 0.4);
     assert!(matches!(hang, EngineError::Process(ProcessError::TimedOut { .. })), "{hang}");
+}
+
+/// The text of exported files but for those whose names begin like this.
+pub(super) fn golden(files: &[SceneFile], without: &[&str]) -> String {
+    let is_shown = |f: &&SceneFile| !without.iter().any(|start| f.name.starts_with(start));
+    let text = |f: &SceneFile| format!("==== {}\n{}\n", f.name, String::from_utf8_lossy(&f.bytes));
+    files.iter().filter(is_shown).map(text).collect::<Vec<_>>().concat()
 }
 
 /// A driver that says it reads these stations, and answers the one request for direct light with a line.

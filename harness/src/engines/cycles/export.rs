@@ -36,6 +36,7 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
         SceneFile::text("scene.py", scene(job, settings, &frame, &tables)),
         SceneFile::text("job.json", job_json(job, settings, &frame, &tables)?),
         SceneFile::text("cycles_read.py", READ),
+        SceneFile::text("blocks.py", dialogue::BLOCKS),
         SceneFile::text("cycles_scene.py", SCENE),
     ];
     files.extend(meshes::files(job, &frame));
@@ -83,12 +84,7 @@ fn job_json(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -
         procedure: job.procedure.name(),
         transport: dialogue::transport(job),
         reflections: reflections(job),
-        emitters: job
-            .scene
-            .luminaires
-            .iter()
-            .map(|l| sides(l).count().max(usize::from(Opening::of(l) == Opening::None)))
-            .sum(),
+        emitters: job.scene.luminaires.iter().map(lights).sum(),
         extended: job.scene.luminaires.iter().any(|l| Opening::of(l) != Opening::None),
         apart: settings.preset != Preset::Default,
         tables: (0..tables.distinct.len()).map(table).collect(),
@@ -162,6 +158,14 @@ impl Opening {
     }
 }
 
+/// Blender's lights of a luminaire.
+fn lights(luminaire: &Luminaire) -> usize {
+    match Opening::of(luminaire) {
+        Opening::None => 1,
+        Opening::Flat(..) | Opening::Solid => sides(luminaire).count(),
+    }
+}
+
 /// The sides of an opening that shine: whether upwards.
 fn sides(luminaire: &Luminaire) -> impl Iterator<Item = bool> {
     let table = &luminaire.photometry.distribution;
@@ -170,8 +174,7 @@ fn sides(luminaire: &Luminaire) -> impl Iterator<Item = bool> {
         let lit = |plane: &[f64]| table.gamma_deg().iter().zip(plane).any(|(g, cd)| is_there(*g) && *cd > 0.0);
         (0..table.c_deg().len()).any(|c| lit(table.plane(c)))
     };
-    let flat = Opening::of(luminaire) != Opening::None;
-    [false, true].map(|up| (up, flat && shines(up))).into_iter().filter(|(_, shines)| *shines).map(|(up, _)| up)
+    [false, true].into_iter().filter(move |up| shines(*up))
 }
 
 fn scene(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -> String {

@@ -19,11 +19,6 @@ fn read_tampered(job: &Job, tamper: impl Fn(&str, String) -> String) -> Measurem
     shared_tests::read_tampered(&Cycles, job, tamper, read)
 }
 
-fn with_preset(mut job: Job, preset: &str) -> Job {
-    job.settings.insert("preset".into(), preset.into());
-    job
-}
-
 #[test]
 fn a_wrong_export_is_seen() {
     let replaced = [
@@ -43,9 +38,7 @@ fn exported_files_are_these() {
         LuminousOpening::Ellipse { x_m: 0.6, y_m: 0.3, height_m: 0.0 },
     ));
     let files = Cycles.export(&job).unwrap();
-    let golden = files.iter().filter(|f| !f.name.starts_with("cycles_") && !f.name.starts_with("table-"));
-    let texts = golden.map(|f| format!("==== {}\n{}\n", f.name, String::from_utf8_lossy(&f.bytes)));
-    insta::assert_snapshot!(texts.collect::<Vec<_>>().concat());
+    insta::assert_snapshot!(shared_tests::golden(&files, &["cycles_", "blocks.py", "table-"]));
 }
 
 #[test]
@@ -70,38 +63,6 @@ fn flat_openings_send_out_their_table_on_both_sides() {
         let deviations = relative_deviations(&read(&far), &exact_direct_lx(&far));
         assert!(worst(&deviations) < 3e-3, "{opening:?} {deviations:?}");
     }
-}
-
-/// An opening has no body, so that plates of half a millimetre stand for the panels' black backs.
-#[test]
-fn panels_over_furniture_give_the_exact_light() {
-    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
-    let panel = |[x, y]: [f64; 2]| with_opening(luminaire("panel", DVec3::new(x, y, 2.9994), lambertian()), opening);
-    let back = |[x, y]: [f64; 2]| cuboid([x - 0.3, y - 0.3, 2.9995], [x + 0.3, y + 0.3, 3.0], 0.0);
-    let s2_of = |transport| {
-        let mut job = s2(S2_PANELS_M.map(panel).to_vec(), transport);
-        job.scene.obstacles.extend(S2_PANELS_M.map(back));
-        job.budget.relative_error = 4e-3;
-        job
-    };
-    let direct = read(&s2_of(Transport::Direct));
-    let deviations = relative_deviations(&direct, &S2_DIRECT_LX);
-    assert!(worst(&deviations) < 1e-2 && direct.estimates[5].value == 0.0, "{direct:?} {deviations:?}");
-    let indirect = read(&s2_of(CONVERGED));
-    let deviations = relative_deviations(&indirect, &S2_INDIRECT_LX);
-    assert!(worst(&deviations) < 2e-2 && worst_z(&indirect, &S2_INDIRECT_LX) < 4.5, "{indirect:?} {deviations:?}");
-}
-
-#[test]
-fn far_and_tiny_scenes_are_read_in_coordinates_of_their_own() {
-    let mut far = goniometer(&luminaire("far", DVec3::new(3e6, 0.0, 10.0), lopsided()), 10.0, &[40.0], &[20.0, 120.0]);
-    assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) < 1e-4);
-    far.settings.insert("recentre".into(), false.into());
-    assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) > 1e-3, "raw 32-bit coordinates would do");
-
-    // S1 a thousand times smaller: a million times the lux, direct and reflected.
-    let expected = S1_INDIRECT_LX.map(|lx| 1e6 * lx);
-    assert!(worst_z(&read(&scaled(s1(CONVERGED), 1e-3, 1.0)), &expected) < 4.5);
 }
 
 /// What users get who change nothing: planes mirrored, up to an eighth too much between the only two planes of an axial table.

@@ -36,6 +36,7 @@ pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, En
         SceneFile::text("scene.xml", scene_xml(job, &frame, &tables)),
         SceneFile::text("job.json", job_json(job, settings, &frame)?),
         SceneFile::text("mitsuba_read.py", READ),
+        SceneFile::text("blocks.py", dialogue::BLOCKS),
         SceneFile::text("mitsuba_goniometric.py", GONIOMETRIC),
     ];
     if has_surfaces(job) {

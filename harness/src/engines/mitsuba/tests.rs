@@ -38,7 +38,5 @@ fn a_wrong_export_is_seen() {
 #[test]
 fn exported_files_are_these() {
     let files = Mitsuba::default().export(&shared_tests::furnished()).unwrap();
-    let golden = files.iter().filter(|f| !f.name.starts_with("mitsuba_") && !f.name.starts_with("opacity-"));
-    let texts = golden.map(|f| format!("==== {}\n{}\n", f.name, String::from_utf8_lossy(&f.bytes)));
-    insta::assert_snapshot!(texts.collect::<Vec<_>>().concat());
+    insta::assert_snapshot!(shared_tests::golden(&files, &["mitsuba_", "blocks.py", "opacity-"]));
 }

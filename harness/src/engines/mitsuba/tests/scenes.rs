@@ -3,7 +3,6 @@
 use luminaire::photometry::{HorizontalAxis, LuminousOpening};
 
 use super::*;
-use crate::engines::fixtures;
 
 #[test]
 fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
@@ -36,40 +35,6 @@ fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
     }
 }
 
-/// An opening has no body, so that plates of half a millimetre stand for the panels' black backs.
-fn s2(transport: Transport) -> Job {
-    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
-    let panel = |[x, y]: [f64; 2]| with_opening(luminaire("panel", DVec3::new(x, y, 2.9994), lambertian()), opening);
-    let back = |[x, y]: [f64; 2]| cuboid([x - 0.3, y - 0.3, 2.9995], [x + 0.3, y + 0.3, 3.0], 0.0);
-    let mut job = fixtures::s2(S2_PANELS_M.map(panel).to_vec(), transport);
-    job.scene.obstacles.extend(S2_PANELS_M.map(back));
-    job.budget.relative_error = 4e-3;
-    job
-}
-
-#[test]
-fn panels_over_furniture_give_the_exact_light() {
-    let direct = read(&s2(Transport::Direct));
-    let deviations = relative_deviations(&direct, &S2_DIRECT_LX);
-    assert!(worst(&deviations) < 1e-2, "{deviations:?}");
-    assert_eq!(direct.estimates[5].value, 0.0);
-    let indirect = read(&s2(CONVERGED));
-    let deviations = relative_deviations(&indirect, &S2_INDIRECT_LX);
-    assert!(worst(&deviations) < 2e-2 && worst_z(&indirect, &S2_INDIRECT_LX) < 4.5, "{indirect:?} {deviations:?}");
-}
-
-#[test]
-fn far_and_tiny_scenes_are_read_in_coordinates_of_their_own() {
-    let mut far = goniometer(&luminaire("far", DVec3::new(3e6, 0.0, 10.0), lopsided()), 10.0, &[40.0], &[20.0, 120.0]);
-    assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) < 1e-5);
-    far.settings.insert("recentre".into(), false.into());
-    assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) > 1e-3, "raw 32-bit coordinates would do");
-
-    // S1 a thousand times smaller: a million times the lux, direct and reflected.
-    let expected = S1_INDIRECT_LX.map(|lx| 1e6 * lx);
-    assert!(worst_z(&read(&scaled(s1(CONVERGED), 1e-3, 1.0)), &expected) < 4.5);
-}
-
 #[test]
 fn bright_rooms_keep_all_their_light() {
     // In a closed room of one reflectance the area-mean indirect illuminance is Phi rho / (A (1 - rho)).
@@ -98,11 +63,6 @@ fn bright_rooms_keep_all_their_light() {
     let flux_lm = 400.0 * std::f64::consts::PI;
     let exact_lx = flux_lm * rho / (96.0 * (1.0 - rho));
     assert!((mean_lx / exact_lx - 1.0).abs() < 5e-3, "{mean_lx} for {exact_lx}: {found:?}");
-}
-
-fn with_preset(mut job: Job, preset: &str) -> Job {
-    job.settings.insert("preset".into(), preset.into());
-    job
 }
 
 #[test]
@@ -135,8 +95,8 @@ fn what_cannot_be_read_well_is_said_beforehand() {
     let support = |job: &Job| Mitsuba::default().supports(job);
     assert_eq!(support(&s1(CONVERGED)), Support::Yes);
     // Panels flush with the ceiling light nothing close by.
-    assert_eq!(support(&s2(CONVERGED)), Support::Yes);
-    assert!(matches!(support(&with_preset(s2(CONVERGED), "default")), Support::No(_)));
+    assert_eq!(support(&s2_with_panels(CONVERGED)), Support::Yes);
+    assert!(matches!(support(&with_preset(s2_with_panels(CONVERGED), "default")), Support::No(_)));
     let mut uplight = s1(CONVERGED);
     uplight.scene.luminaires[0].position_m.z = 19.99;
     assert!(matches!(support(&uplight), Support::Approximate { .. }));
