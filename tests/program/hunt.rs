@@ -108,3 +108,13 @@ fn an_engine_that_nobody_names_is_an_error_with_what_to_do() {
     folder.luxproof(&["hunt", "--engines", "mine"]).exits(2).complains("--spec FILE");
     folder.luxproof(&["hunt", "--engines", "radiance", "--minutes", "0"]).exits(3).complains("radiance");
 }
+
+#[test]
+fn a_hunt_of_named_engines_leaves_out_what_a_spec_declares_besides() {
+    let folder = planted("none");
+    let spec = folder.read("adapters.yaml");
+    let mine = spec.trim_end().rsplit_once("{mine: ").unwrap().1.trim_end_matches('}').to_owned() + "}";
+    folder.write("adapters.yaml", &spec.replace("{mine: ", &format!("{{other: {mine}, mine: ")));
+    let (found, code) = hunt(&folder, &["--specs", "1"]);
+    assert_eq!((&found["engines"], code), (&serde_json::json!(["mine"]), Some(0)), "{found}");
+}
