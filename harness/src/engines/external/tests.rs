@@ -63,6 +63,14 @@ fn rows_that_are_missing_swapped_or_not_a_number_are_no_readings() {
         }
     }
     assert!(matches!(read(&prints(&[("m[0]", "NaN"); 4])), Err(EngineError::Output { .. })), "named wrongly");
+    // Beside others that scatter, too, what is no error is not one of samples that agree.
+    for error in ["NaN", "-Infinity", "-0.01"] {
+        let one = |error: &str| format!("1, \"std_error_lx\": {error}");
+        let rows = [0, 1, 2, 3].map(|k| (format!("m[{k}]"), one(if k == 3 { error } else { "0.01" })));
+        let rows: Vec<(&str, &str)> = rows.iter().map(|(meter, text)| (meter.as_str(), text.as_str())).collect();
+        let Err(EngineError::AtMeters { rest, .. }) = read(&prints(&rows)) else { panic!("{error} is an error") };
+        assert!(rest.estimates[..3].iter().all(|e| e.value == 1.0) && rest.estimates[3].value.is_nan(), "{error}");
+    }
     for (last, says) in [
         (r#""std_error_lx": 1e300"#, "nothing is light"),
         (r#""std_error_lx": 1, "degrees_of_freedom": 0.5"#, "`degrees_of_freedom: 0.5` at m[3]: two samples have one"),
