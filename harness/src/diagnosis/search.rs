@@ -162,7 +162,7 @@ impl Search<'_> {
 
     /// Says of the open sheets that are explained by what. What is of one case alone must account for all that is open there, or
     /// is one of several things that are wrong with it; and where a fault of the engine shows without explaining everything, nothing
-    /// explains the rest alone.
+    /// explains the rest alone. What leaves more than chance in most of what fails only looks like it in the rest: it has no name.
     fn settle(&self, mut found: Vec<Held>, open: &mut Vec<usize>, causes: &mut [Vec<Cause>]) {
         let accounts = |held: &Held| {
             let of_case = |k: &&usize| held.case.is_some_and(|case| self.sheets[**k].case == case);
@@ -173,12 +173,19 @@ impl Search<'_> {
             let explain = found.iter().filter(|held| held.explained.contains(&sheet));
             let explain = explain.sorted_by(|a, b| a.cause.score.total_cmp(&b.cause.score)).collect_vec();
             let is_better = |held: &Held| explain.first().is_some_and(|e| held.cause.score + RIVAL < e.cause.score);
-            if !found.iter().any(|held| held.borne.contains(&sheet) && is_better(held)) {
+            let is_alike = explain.first().is_some_and(|best| !self.carries(best));
+            if !is_alike && !found.iter().any(|held| held.borne.contains(&sheet) && is_better(held)) {
                 causes[sheet] = rivals(explain);
             }
         }
         let is_settled = |sheet: &usize| found.iter().any(|h| h.explained.contains(sheet) || h.borne.contains(sheet));
         open.retain(|sheet| !is_settled(sheet));
+    }
+
+    /// Whether at least half of the failing readings that a cause changes are as it says but for chance.
+    fn carries(&self, held: &Held) -> bool {
+        let readings = |sheets: &[usize]| sheets.iter().map(|k| self.sheets[*k].count()).sum::<usize>();
+        readings(&held.explained) >= readings(&held.borne)
     }
 
     fn listed(&self, _open: &[usize]) -> Vec<Held> {

@@ -64,7 +64,7 @@ struct Put {
 /// Draws a fault for tasks of a case.
 type Draw = fn(&[Task], &mut fastrand::Rng) -> Option<Put>;
 
-const KINDS: [(&str, bool, Draw); 16] = [
+const KINDS: [(&str, bool, Draw); 17] = [
     ("listed", true, |tasks, random| one_of(diagnosis::faults(&[tasks]), diagnosis::Fault::is_plain, random)),
     ("bounces", true, |tasks, random| one_of(diagnosis::faults(&[tasks]), |f| f.id == "bounces-cut", random)),
     ("order of meters", true, |tasks, random| {
@@ -94,6 +94,11 @@ const KINDS: [(&str, bool, Draw); 16] = [
     ("control: wrong table", false, |_, random| {
         let seed = random.u64(..);
         Some(control(move |m| relit(m, |scene| scene.luminaires.iter_mut().for_each(|l| scatter(l, seed)))))
+    }),
+    ("control: reflected light alone brighter", false, |_, random| {
+        let factor = 1.03 + 0.3 * random.f64();
+        let is_reflected = |m: &Model| matches!(m.task.transport, Transport::Indirect(_));
+        Some(control(move |m| m.right.iter().map(|r| if is_reflected(m) { factor * r } else { *r }).collect()))
     }),
     ("control: scatter not stated", false, |_, random| {
         let seed = random.u64(..);
