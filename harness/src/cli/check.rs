@@ -34,7 +34,7 @@ pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Ex
             for run in plan.runs.iter().filter(|r| plan.tasks[r.task].procedure == task.procedure) {
                 let engine = &plan.engines[run.engine].engine;
                 let note = run.approximation.as_ref().map(|a| format!(", approximate: {a}")).unwrap_or_default();
-                let cost_s = left(run) * cost_s(engine.as_ref(), case.budget);
+                let cost_s = left(run) * cost_s(engine.as_ref(), &run.job);
                 writeln!(out, "    run  {:<10} at most about {cost_s:.0} s{note}", engine.name()).into_diagnostic()?;
             }
             for skip in plan.skips.iter().filter(|s| s.key.procedure == task.procedure) {

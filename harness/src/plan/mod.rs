@@ -15,7 +15,7 @@ use crate::engines::{Absent, Engine, EngineError, Job, SceneFile, Site, Support,
 use crate::measure::Instrument;
 use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
-use crate::spec::{Budget, Case, SpecError};
+use crate::spec::{Case, SpecError};
 use luminaire::scene::Transport;
 
 use roster::{Chosen, Roster};
@@ -289,7 +289,7 @@ impl<'a> Planner<'a> {
                 run.shortcut = Shortcut::of(&run.job);
             }
             self.repeated.shorten(&mut run.shortcut, planned.engine.as_ref());
-            let all_s = cost_s(planned.engine.as_ref(), case.budget);
+            let all_s = cost_s(planned.engine.as_ref(), &run.job);
             for omission in &run.shortcut.omissions {
                 let (task, engine) = (&plan.tasks[run.task], planned.engine.name());
                 let (percent, seconds) = (100.0 * omission.share, omission.share * all_s);
@@ -328,9 +328,10 @@ enum Offer {
     Skip(Scope, String),
 }
 
-/// What a run of a whole job may cost, in seconds: the budget for renderers, next to nothing for our own solvers.
-pub fn cost_s(engine: &dyn Engine, budget: Budget) -> f64 {
-    if engine.is_witness() { budget.seconds.min(1.0) } else { budget.seconds }
+/// What a run of a whole job may cost, in seconds: the budget for whatever samples, next to nothing for our own solvers where they do not.
+pub fn cost_s(engine: &dyn Engine, job: &Job) -> f64 {
+    let is_quick = engine.is_witness() && !engine.samples(job);
+    if is_quick { job.budget.seconds.min(1.0) } else { job.budget.seconds }
 }
 
 impl Selection {
