@@ -80,6 +80,9 @@ pub enum DistributionError {
     },
 }
 
+/// Degrees between angles whose slope would be nothing but rounding; files print thousandths.
+const NARROW_DEG: f64 = 1e-9;
+
 impl LuminousIntensityDistribution {
     /// Builds a distribution from C planes, gamma angles (degrees) and intensities `candela[c * gammas + gamma]`.
     ///
@@ -144,7 +147,8 @@ impl LuminousIntensityDistribution {
         self.flux_between(0.0, 180.0)
     }
 
-    /// Flux within `from_deg <= gamma <= to_deg`, exact for the bilinear interpolation.
+    /// Flux within `from_deg <= gamma <= to_deg`, exact for the bilinear interpolation; what lies between angles that differ in no digit
+    /// that a file would print has none.
     ///
     /// Per gamma interval with I = a + m g (g in radians): ∫ I sin g dg = `[-I cos g + m sin g]`; over C the trapezoid
     /// rule is exact.
@@ -153,7 +157,7 @@ impl LuminousIntensityDistribution {
         let mut sum = 0.0;
         for (g, i) in self.gamma_deg.windows(2).zip(average.windows(2)) {
             let (a, b) = (g[0].max(from_deg), g[1].min(to_deg));
-            if b <= a {
+            if b <= a || g[1] - g[0] < NARROW_DEG {
                 continue;
             }
             let slope = (i[1] - i[0]) / (g[1] - g[0]);

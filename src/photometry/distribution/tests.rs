@@ -17,6 +17,14 @@ fn isotropic_flux_is_four_pi() {
 }
 
 #[test]
+fn angles_next_to_each_other_have_no_flux_between_them() {
+    for narrow in [1e-320, 1e-12, 2e-9, 1e-6] {
+        let step = LuminousIntensityDistribution::axial(vec![0.0, narrow, 180.0], vec![9.0, 1.0, 1.0]).unwrap();
+        assert_relative_eq!(step.flux().value(), 4.0 * std::f64::consts::PI, max_relative = 1e-9);
+    }
+}
+
+#[test]
 fn s1_flux_is_the_converged_value() {
     assert_relative_eq!(s1().flux().value(), 1817.2814559, max_relative = 1e-9);
     assert_relative_eq!(s1().full_circle().flux().value(), s1().flux().value(), max_relative = 1e-13);
