@@ -45,7 +45,7 @@ pub enum Problem {
         found: String,
     },
     /// NaN, infinity, or beyond what a double holds.
-    #[error("{what} is `{found}`, which is not finite")]
+    #[error("{what} is `{found}`, which is not finite or beyond 1e300")]
     NotFinite {
         /// What the number stands for.
         what: String,

@@ -12,6 +12,7 @@ use std::collections::HashMap;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
+use super::distribution::is_intensity;
 use super::error::{Problem, ReadError};
 use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
@@ -185,7 +186,7 @@ impl Reader<'_> {
                     Problem::OutOfRange { what: "an intensity".into(), found: value, expected: "zero or more" };
                 return Err(self.error(node, problem));
             }
-            if !candela.is_finite() {
+            if !is_intensity(candela) {
                 let found = format!("{value} x {multiplier}");
                 return Err(self.error(node, Problem::NotFinite { what: "an intensity".into(), found }));
             }

@@ -1,5 +1,6 @@
 //! The lines of a EULUMDAT file, one value each, with the liberties that files take.
 
+use crate::photometry::distribution::is_intensity;
 use crate::photometry::error::{Problem, ReadError};
 use crate::photometry::lint::Lints;
 use crate::photometry::text::{Line, Text, decode, quote};
@@ -225,7 +226,7 @@ impl<'a, 'l> Fields<'a, 'l> {
         if value < 0.0 {
             return Err(self.out_of_range("a luminous intensity", value, "zero or more"));
         }
-        if !candela.is_finite() {
+        if !is_intensity(candela) {
             let found = format!("{value} x {scale}");
             return Err(self.error_here(Problem::NotFinite { what: "a luminous intensity".into(), found }));
         }

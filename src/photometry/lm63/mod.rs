@@ -13,6 +13,7 @@ use std::path::Path;
 
 use self::header::TiltLine;
 use self::numbers::{Number, Numbers};
+use super::distribution::is_intensity;
 use super::error::{Problem, ReadError};
 use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
@@ -206,7 +207,7 @@ fn read_table(mut numbers: Numbers, lamps: &Lamps) -> Result<Table, ReadError> {
                 numbers.lints.note("lm63/broken-record", line, "the values of a horizontal angle do not begin a line");
             }
             let scaled = number.value * lamps.factor;
-            if !scaled.is_finite() {
+            if !is_intensity(scaled) {
                 let found = format!("{} x {}", number.value, lamps.factor);
                 let problem = Problem::NotFinite { what: what.to_string(), found };
                 return Err(numbers.text.error(number.at, problem));
