@@ -27,7 +27,7 @@ pub enum MeshError {
         reason: String,
     },
     /// A vertex with a coordinate that is no finite number.
-    #[error("{path}: vertex {vertex} (counted from 0) is {at}, which is not finite; repair the file", path = path.display())]
+    #[error("{path}: vertex {vertex} (counted from 0) is {at}, which is no place within 1e90 m; repair the file", path = path.display())]
     NotFinite {
         /// The file.
         path: PathBuf,
@@ -43,6 +43,9 @@ pub enum MeshError {
         path: PathBuf,
     },
 }
+
+/// The farthest that a vertex may be off, so that a volume is a number.
+const FAR_M: f64 = 1e90;
 
 impl Mesh {
     /// Reads the faces of every object of an OBJ file, one unit a metre, polygons split into fans of triangles.
@@ -68,7 +71,9 @@ impl Mesh {
             let corners = model.mesh.indices.as_chunks().0;
             mesh.triangles.extend(corners.iter().map(|t: &[u32; 3]| t.map(|v| first + v)));
         }
-        if let Some((vertex, &at)) = mesh.vertices_m.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+        if let Some((vertex, &at)) =
+            mesh.vertices_m.iter().enumerate().find(|(_, v)| v.is_nan() || v.abs().max_element() > FAR_M)
+        {
             return Err(MeshError::NotFinite { path: path.into(), vertex, at });
         }
         if mesh.triangles.is_empty() {
@@ -134,7 +139,8 @@ mod tests {
     fn what_is_no_mesh_is_refused_with_the_file_named() {
         for (text, expected) in [
             ("v 0 0 0\n", "holds no face"),
-            ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
+            ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "no place"),
+            ("v 0 0 1e308\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "no place"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "check the path"),
             ("v 0 0 x\n", "check the path"),
         ] {
