@@ -1,5 +1,6 @@
 //! What is named, and what is better left unsaid.
 
+use itertools::Itertools;
 use luminaire::scene::{Bounces, Transport};
 
 use super::*;
@@ -36,35 +37,37 @@ fn skew(transport: Transport) -> Task {
     task
 }
 
-/// What an engine reads of tasks, to a relative error, judged.
+/// What an engine reads of tasks, judged.
 fn judged(tasks: &[Task], read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<Comparison> {
-    let of_task = |task: &Task| -> Vec<Comparison> {
-        let right = truth(task).unwrap();
-        let model = Model::new(0, task, right.clone());
-        let recording = |engine: &str, values: Vec<f64>, error: f64| Recording {
-            readings: task
-                .targets
-                .iter()
-                .zip(values)
-                .map(|(target, value)| Reading {
-                    meter: target.id.clone(),
-                    quantity: task.quantity,
-                    value,
-                    uncertainty: Uncertainty::sampled(error * value, None),
-                })
-                .collect(),
-            ..Recording::of(ReadingKey::new("case", task.procedure, engine), task.light())
-        };
-        let all = [
-            recording("iesna", right.clone(), 0.0),
-            recording("simulator", right, 0.0),
-            recording("radiance", read(&model), 1e-4),
-        ];
-        let mut comparisons = built_in().compare(task, &all.iter().collect::<Vec<_>>());
-        comparisons.retain(|c| c.key.engine == "radiance");
-        comparisons
+    tasks.iter().flat_map(|task| judged_to(1e-4, task, read)).collect()
+}
+
+/// The same of one task, to a relative error.
+fn judged_to(error: f64, task: &Task, read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<Comparison> {
+    let right = truth(task).unwrap();
+    let model = Model::new(0, task, right.clone());
+    let recording = |engine: &str, values: Vec<f64>, error: f64| Recording {
+        readings: task
+            .targets
+            .iter()
+            .zip(values)
+            .map(|(target, value)| Reading {
+                meter: target.id.clone(),
+                quantity: task.quantity,
+                value,
+                uncertainty: Uncertainty::sampled(error * value, None),
+            })
+            .collect(),
+        ..Recording::of(ReadingKey::new("case", task.procedure, engine), task.light())
     };
-    tasks.iter().flat_map(of_task).collect()
+    let all = [
+        recording("iesna", right.clone(), 0.0),
+        recording("simulator", right, 0.0),
+        recording("radiance", read(&model), error),
+    ];
+    let mut comparisons = built_in().compare(task, &all.iter().collect::<Vec<_>>());
+    comparisons.retain(|c| c.key.engine == "radiance");
+    comparisons
 }
 
 fn found(tasks: &[Task], read: &dyn Fn(&Model) -> Vec<f64>) -> Vec<Vec<Cause>> {
@@ -208,4 +211,19 @@ fn what_no_fault_does_is_left_unsaid() {
     let mean = |m: &Model| m.right.iter().sum::<f64>() / m.right.len() as f64;
     let power = |m: &Model| m.right.iter().map(|r| mean(m) * (r / mean(m)).powf(1.1)).collect();
     assert_eq!(causes(&tasks, &power), []);
+}
+
+#[test]
+fn what_looks_like_a_fault_in_few_coarse_readings_and_not_in_most_is_left_unsaid() {
+    let light = [Transport::Direct, Transport::Indirect(Bounces::Converged)];
+    let (most, few) = (light.map(skew), light.map(task));
+    // As if all surfaces reflected more, but for a part of a percent that only fine readings tell.
+    let brighter = |m: &Model| -> Vec<f64> {
+        let factor = if m.task.transport == Transport::Direct { 1.0 } else { 1.08 };
+        m.right.iter().map(|r| factor * r).collect()
+    };
+    let read = |error, tasks: &[Task]| tasks.iter().flat_map(|task| judged_to(error, task, &brighter)).collect_vec();
+    let (mut fine, mut coarse) = (read(1e-4, &most), read(5e-3, &few));
+    assert!(coarse.iter().any(|c| c.verdict == Verdict::Fail));
+    assert_eq!(explain(&mut [Examined::new(&most, &mut fine), Examined::new(&few, &mut coarse)]).concat(), []);
 }
