@@ -88,9 +88,6 @@ pub(super) fn is_intensity(candela: f64) -> bool {
     candela.abs() <= MOST_CD
 }
 
-/// Degrees between angles whose slope would be nothing but rounding; files print thousandths.
-const NARROW_DEG: f64 = 1e-9;
-
 impl LuminousIntensityDistribution {
     /// Builds a distribution from C planes, gamma angles (degrees) and intensities `candela[c * gammas + gamma]`.
     ///
@@ -155,23 +152,22 @@ impl LuminousIntensityDistribution {
         self.flux_between(0.0, 180.0)
     }
 
-    /// Flux within `from_deg <= gamma <= to_deg`, exact for the bilinear interpolation; what lies between angles that differ in no digit
-    /// that a file would print has none.
+    /// Flux within `from_deg <= gamma <= to_deg`, exact for the bilinear interpolation.
     ///
-    /// Per gamma interval with I = a + m g (g in radians): ∫ I sin g dg = `[-I cos g + m sin g]`; over C the trapezoid
-    /// rule is exact.
+    /// Per gamma interval from a to b, with its middle g and half its width w in radians, ∫ I sin g dg is
+    /// (I(a) + I(b)) sin g sin w + (I(b) - I(a)) cos g (sin w / w - cos w), in which nothing cancels however near a is to b;
+    /// over C the trapezoid rule is exact.
     pub fn flux_between(&self, from_deg: f64, to_deg: f64) -> Lumen {
         let average = self.azimuth_average();
         let mut sum = 0.0;
         for (g, i) in self.gamma_deg.windows(2).zip(average.windows(2)) {
             let (a, b) = (g[0].max(from_deg), g[1].min(to_deg));
-            if b <= a || g[1] - g[0] < NARROW_DEG {
+            if b <= a {
                 continue;
             }
-            let slope = (i[1] - i[0]) / (g[1] - g[0]);
-            let (ia, ib) = (i[0] + slope * (a - g[0]), i[0] + slope * (b - g[0]));
-            let (a, b, m) = (a.to_radians(), b.to_radians(), slope.to_degrees());
-            sum += ia * a.cos() - ib * b.cos() + m * (b.sin() - a.sin());
+            let [ia, ib] = [a, b].map(|at| lerp(i[0], i[1], (at - g[0]) / (g[1] - g[0])));
+            let (middle, half) = ((0.5 * (a + b)).to_radians(), (0.5 * (b - a)).to_radians());
+            sum += (ia + ib) * middle.sin() * half.sin() + (ib - ia) * middle.cos() * uneven(half);
         }
         Lumen(std::f64::consts::TAU * sum)
     }
@@ -350,6 +346,12 @@ fn bracket(nodes: &[f64], x: f64) -> (usize, f64) {
     let k = nodes.partition_point(|n| *n <= x).clamp(1, nodes.len() - 1) - 1;
     let t = (x - nodes[k]) / (nodes[k + 1] - nodes[k]);
     (k, t.clamp(0.0, 1.0))
+}
+
+/// sin w / w - cos w, for small angles by its series, whose first term left out is 6e-17.
+fn uneven(w: f64) -> f64 {
+    let square = w * w;
+    if w < 0.01 { square / 3.0 * (1.0 - square / 10.0 * (1.0 - square / 28.0)) } else { w.sin() / w - w.cos() }
 }
 
 /// Linear interpolation that meets both ends exactly, whatever cancels between them.

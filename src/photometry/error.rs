@@ -44,7 +44,7 @@ pub enum Problem {
         /// What stands there.
         found: String,
     },
-    /// NaN, infinity, or beyond what a double holds.
+    /// NaN, infinity, or too large to reckon with.
     #[error("{what} is `{found}`, which is not finite or beyond 1e300")]
     NotFinite {
         /// What the number stands for.

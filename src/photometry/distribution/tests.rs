@@ -21,6 +21,19 @@ fn angles_next_to_each_other_have_no_flux_between_them() {
     for narrow in [1e-320, 1e-12, 2e-9, 1e-6] {
         let step = LuminousIntensityDistribution::axial(vec![0.0, narrow, 180.0], vec![9.0, 1.0, 1.0]).unwrap();
         assert_relative_eq!(step.flux().value(), 4.0 * std::f64::consts::PI, max_relative = 1e-9);
+        // Light that begins at once begins there, where numbers tell the two angles apart.
+        for at in [1.0, 37.0, 90.0, 179.0] {
+            let begins =
+                LuminousIntensityDistribution::axial(vec![0.0, at, at + narrow, 180.0], vec![0.0, 0.0, 8.0, 0.0]);
+            let all = LuminousIntensityDistribution::axial(vec![0.0, at, 180.0], vec![0.0, 8.0, 0.0]).unwrap();
+            if let Ok(begins) = begins {
+                let right = all.flux_between(at, 180.0).value();
+                assert_relative_eq!(begins.flux().value(), right, max_relative = 2e-6);
+            }
+        }
+    }
+    for half in [0.0099, 0.0101] {
+        assert_relative_eq!(uneven(half), half.sin() / half - half.cos(), max_relative = 1e-11);
     }
 }
 
