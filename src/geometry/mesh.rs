@@ -26,8 +26,8 @@ pub enum MeshError {
         /// What the reader says.
         reason: String,
     },
-    /// A vertex with a coordinate that is no finite number.
-    #[error("{path}: vertex {vertex} (counted from 0) is {at}, which is no place within 1e90 m; repair the file", path = path.display())]
+    /// A vertex with a coordinate that is no number to reckon with.
+    #[error("{path}: vertex {vertex} (counted from 0) is {at}, which is not finite or beyond 1e90 m; repair the file", path = path.display())]
     NotFinite {
         /// The file.
         path: PathBuf,
@@ -139,8 +139,8 @@ mod tests {
     fn what_is_no_mesh_is_refused_with_the_file_named() {
         for (text, expected) in [
             ("v 0 0 0\n", "holds no face"),
-            ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "no place"),
-            ("v 0 0 1e308\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "no place"),
+            ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
+            ("v 0 0 1e308\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "beyond 1e90 m"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "check the path"),
             ("v 0 0 x\n", "check the path"),
         ] {
