@@ -8,7 +8,7 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 use super::views::read_report;
 use super::{complain, print};
 use crate::report::Exit;
-use crate::system::files::{self, FileError};
+use crate::system::files;
 use crate::trend::history::{Change, Course, History, Line, add, changes, in_words, lines, site};
 
 #[derive(Debug, Subcommand)]
@@ -107,7 +107,6 @@ fn tell_of_cut(history: &Path, line: Option<usize>) {
 fn draw(path: &Path, out: &Path, reports: &[(String, String)]) -> Result<(History, Vec<Change>), Diagnostic> {
     let history = History::read(path).into_diagnostic()?;
     tell_of_cut(path, history.cut_short);
-    std::fs::create_dir_all(out).map_err(|e| FileError::of(out, e)).into_diagnostic()?;
     let page = out.join("index.html");
     let changes = changes(&history);
     files::keep_shared(&page, site(&history, &changes, reports).as_bytes()).into_diagnostic()?;

@@ -84,8 +84,8 @@ impl Estimate {
 
     /// Tells those whose samples all agree but for rounding, where those of others do not: what the others met may still be to come there.
     pub fn mark_agreeing(all: &mut [Self]) {
-        // What is no standard error, NaN say, agrees with nothing.
-        let error = |e: &Self| e.uncertainty.standard_error().filter(|error| error.is_finite() && *error >= 0.0);
+        // What is no error, NaN say, agrees with nothing.
+        let error = |e: &Self| e.uncertainty.standard_error().filter(|_| e.uncertainty.is_sound());
         let scatters = |e: &Self| Some(error(e)? > ROUNDING * e.value.abs());
         if all.iter().any(|e| scatters(e) == Some(true)) {
             let agree = |e: &&mut Self| scatters(e) == Some(false) && e.uncertainty.bound() == 0.0;
