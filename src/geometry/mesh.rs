@@ -27,7 +27,7 @@ pub enum MeshError {
         reason: String,
     },
     /// A vertex with a coordinate that is no number to reckon with.
-    #[error("{path}: vertex {vertex} (counted from 0) is {at}, which is not finite or beyond 1e90 m; repair the file", path = path.display())]
+    #[error("{path}: vertex {vertex} (counted from 0) is {at:?}, which is not finite or beyond 1e90 m; repair the file", path = path.display(), at = at.to_array())]
     NotFinite {
         /// The file.
         path: PathBuf,
@@ -140,7 +140,7 @@ mod tests {
         for (text, expected) in [
             ("v 0 0 0\n", "holds no face"),
             ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
-            ("v 0 0 1e308\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "beyond 1e90 m"),
+            ("v 0 0 1e308\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "[0.0, 0.0, 1e308], which is not finite or beyond 1e90 m"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "check the path"),
             ("v 0 0 x\n", "check the path"),
         ] {

@@ -187,7 +187,7 @@ impl Reader<'_> {
                 return Err(self.error(node, problem));
             }
             if !is_intensity(candela) {
-                let found = format!("{value} x {multiplier}");
+                let found = format!("{value:?} x {multiplier:?}");
                 return Err(self.error(node, Problem::NotFinite { what: "an intensity".into(), found }));
             }
             if values.insert((h.to_bits(), v.to_bits()), candela).is_some() {

@@ -227,7 +227,7 @@ impl<'a, 'l> Fields<'a, 'l> {
             return Err(self.out_of_range("a luminous intensity", value, "zero or more"));
         }
         if !is_intensity(candela) {
-            let found = format!("{value} x {scale}");
+            let found = format!("{value:?} x {scale:?}");
             return Err(self.error_here(Problem::NotFinite { what: "a luminous intensity".into(), found }));
         }
         Ok(candela)

@@ -208,7 +208,7 @@ fn read_table(mut numbers: Numbers, lamps: &Lamps) -> Result<Table, ReadError> {
             }
             let scaled = number.value * lamps.factor;
             if !is_intensity(scaled) {
-                let found = format!("{} x {}", number.value, lamps.factor);
+                let found = format!("{:?} x {:?}", number.value, lamps.factor);
                 let problem = Problem::NotFinite { what: what.to_string(), found };
                 return Err(numbers.text.error(number.at, problem));
             }
