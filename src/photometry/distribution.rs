@@ -69,7 +69,7 @@ pub enum DistributionError {
         expected: &'static str,
     },
     /// A value that is no intensity.
-    #[error("the intensity at C {c_deg} gamma {gamma_deg} is {value}; it must lie between 0 and 1e300 cd")]
+    #[error("the intensity at C {c_deg} gamma {gamma_deg} is {value}; it must be finite and not negative")]
     Intensity {
         /// C angle.
         c_deg: f64,
@@ -78,14 +78,6 @@ pub enum DistributionError {
         /// The offending value.
         value: f64,
     },
-}
-
-/// The most candela that an intensity may have: more is no light, and its flux no number.
-const MOST_CD: f64 = 1e300;
-
-/// Whether an intensity is one, whatever its sign.
-pub(super) fn is_intensity(candela: f64) -> bool {
-    candela.abs() <= MOST_CD
 }
 
 impl LuminousIntensityDistribution {
@@ -107,7 +99,7 @@ impl LuminousIntensityDistribution {
         }
         let symmetry = Symmetry::of_planes(&c_deg)?;
         for (k, &value) in candela.iter().enumerate() {
-            if !is_intensity(value) || value < 0.0 {
+            if !value.is_finite() || value < 0.0 {
                 let (c_deg, gamma_deg) = (c_deg[k / gammas], gamma_deg[k % gammas]);
                 return Err(DistributionError::Intensity { c_deg, gamma_deg, value });
             }

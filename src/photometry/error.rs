@@ -5,6 +5,17 @@ use std::path::PathBuf;
 
 use super::DistributionError;
 
+/// The most candela that a file may say: the flux of more is no number.
+const MOST_CD: f64 = 1e300;
+
+/// What a number of a file and its factor come to, in candela.
+pub(super) fn in_candela(what: impl fmt::Display, value: f64, factor: f64) -> Result<f64, Problem> {
+    let candela = value * factor;
+    let is_one = candela.abs() <= MOST_CD;
+    let refused = || Problem::NotFinite { what: what.to_string(), found: format!("{value:?} x {factor:?}") };
+    is_one.then_some(candela).ok_or_else(refused)
+}
+
 /// A refused file: the place (line and column from 1, column in characters) and the problem found there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadError {

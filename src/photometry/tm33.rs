@@ -12,8 +12,7 @@ use std::collections::HashMap;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::distribution::is_intensity;
-use super::error::{Problem, ReadError};
+use super::error::{Problem, ReadError, in_candela};
 use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
 use super::planes;
@@ -180,16 +179,12 @@ impl Reader<'_> {
             };
             let (h, v) = (angle(["h", "horz"])?, angle(["v", "vert"])?);
             let value = self.finite(node, "an intensity", node.text().unwrap_or_default())?;
-            let candela = value * multiplier;
             if value < 0.0 {
                 let problem =
                     Problem::OutOfRange { what: "an intensity".into(), found: value, expected: "zero or more" };
                 return Err(self.error(node, problem));
             }
-            if !is_intensity(candela) {
-                let found = format!("{value:?} x {multiplier:?}");
-                return Err(self.error(node, Problem::NotFinite { what: "an intensity".into(), found }));
-            }
+            let candela = in_candela("an intensity", value, multiplier).map_err(|problem| self.error(node, problem))?;
             if values.insert((h.to_bits(), v.to_bits()), candela).is_some() {
                 let message = format!("the intensity at h {h} v {v} is given twice");
                 return Err(self.error(node, Problem::Xml { message }));

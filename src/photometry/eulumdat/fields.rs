@@ -1,7 +1,6 @@
 //! The lines of a EULUMDAT file, one value each, with the liberties that files take.
 
-use crate::photometry::distribution::is_intensity;
-use crate::photometry::error::{Problem, ReadError};
+use crate::photometry::error::{Problem, ReadError, in_candela};
 use crate::photometry::lint::Lints;
 use crate::photometry::text::{Line, Text, decode, quote};
 
@@ -222,15 +221,10 @@ impl<'a, 'l> Fields<'a, 'l> {
             ReadError { problem, ..error }
         };
         let value = value.map_err(located)?;
-        let candela = value * scale;
         if value < 0.0 {
             return Err(self.out_of_range("a luminous intensity", value, "zero or more"));
         }
-        if !is_intensity(candela) {
-            let found = format!("{value:?} x {scale:?}");
-            return Err(self.error_here(Problem::NotFinite { what: "a luminous intensity".into(), found }));
-        }
-        Ok(candela)
+        in_candela("a luminous intensity", value, scale).map_err(|problem| self.error_here(problem))
     }
 
     /// Refuses further numbers, remarks on further text.

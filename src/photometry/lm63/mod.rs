@@ -13,8 +13,7 @@ use std::path::Path;
 
 use self::header::TiltLine;
 use self::numbers::{Number, Numbers};
-use super::distribution::is_intensity;
-use super::error::{Problem, ReadError};
+use super::error::{Problem, ReadError, in_candela};
 use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
 use super::planes;
@@ -206,13 +205,8 @@ fn read_table(mut numbers: Numbers, lamps: &Lamps) -> Result<Table, ReadError> {
                 let line = numbers.text.line_of(number.at);
                 numbers.lints.note("lm63/broken-record", line, "the values of a horizontal angle do not begin a line");
             }
-            let scaled = number.value * lamps.factor;
-            if !is_intensity(scaled) {
-                let found = format!("{:?} x {:?}", number.value, lamps.factor);
-                let problem = Problem::NotFinite { what: what.to_string(), found };
-                return Err(numbers.text.error(number.at, problem));
-            }
-            candela.push(scaled);
+            let scaled = in_candela(what, number.value, lamps.factor);
+            candela.push(scaled.map_err(|problem| numbers.text.error(number.at, problem))?);
         }
     }
     numbers.finish("candela values", expected)?;
