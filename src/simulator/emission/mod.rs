@@ -113,11 +113,6 @@ impl Emitter {
         matches!(self.opening, Opening::Point | Opening::Box(_))
     }
 
-    /// Whether boxes can be cut out of it and its shadows have soft edges.
-    pub(super) fn is_cut(&self) -> bool {
-        matches!(self.opening, Opening::Box(_))
-    }
-
     /// Photometric centre.
     pub(super) fn centre_m(&self) -> DVec3 {
         self.luminaire.position_m

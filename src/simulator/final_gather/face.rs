@@ -5,8 +5,8 @@ use glam::{DVec2, DVec3};
 use crate::geometry::{Room, Surface};
 use crate::simulator::visibility::Occluder;
 
-/// Faces of boxes smaller than this part of the room's mean wall reflect so little that rays go on from them.
-const SMALL: f64 = 0.01;
+/// Faces of many boxes smaller than this part of the room's mean wall reflect so little that rays go on from them.
+pub(super) const SMALL: f64 = 0.01;
 
 /// The mean area of a room's walls.
 pub(super) fn mean_wall_m2(size_m: DVec3) -> f64 {
@@ -51,13 +51,13 @@ impl Face {
         })
     }
 
-    /// The face of a box at an end of an axis, or `None` where it cannot be seen or is too small to matter.
+    /// The face of a box at an end of an axis, or `None` where it cannot be seen.
     pub(super) fn of_box(room: &Room, corners_m: [DVec3; 2], axis: usize, far: bool, reflectance: f64) -> Option<Self> {
         let s = room.size_m;
         let within = corners_m.map(|p| p.clamp(DVec3::ZERO, s));
         let face = Self::new(axis, far, within, DVec3::AXES[axis] * if far { 1.0 } else { -1.0 }, reflectance);
         let is_seen = Self::is_seen(room, corners_m, axis, far);
-        (is_seen && reflectance > 0.0 && face.area_m2() >= SMALL * mean_wall_m2(s)).then_some(face)
+        (is_seen && reflectance > 0.0).then_some(face)
     }
 
     /// Whether the face of a box at an end of an axis looks into the room and has an area.

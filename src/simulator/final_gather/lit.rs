@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::bicubic::{Bicubic, NODES};
 use super::face::{Cover, Face, covering, mean_wall_m2};
 use super::surroundings::Surroundings;
-use super::view::{Left, View};
+use super::view::{Cast, Left, Shown, View};
 use crate::scene::Meter;
 use crate::simulator::emission::{Emitter, Precision};
 use crate::simulator::sampler::mix;
@@ -35,6 +35,8 @@ const DIM: f64 = 0.1;
 #[derive(Debug)]
 pub(super) struct Lit {
     faces: Vec<Vec<Part>>,
+    /// Shadows of luminaires without extent on each face, by luminaire; none where nothing is cut.
+    casts: Vec<Vec<Option<Cast>>>,
     bicubic: Bicubic,
     /// Leaves of all faces by what they reflect, for drawing places where much light falls.
     bright: Vec<Bright>,
@@ -70,12 +72,25 @@ struct Leaf {
     lux: [f64; NODES],
     /// How far off that is.
     error_lux: f64,
+    /// Luminaires without extent that bodies hide from a part of it.
+    shaded: Vec<Shaded>,
     /// Whether a body stands on a part of it, so that what shows of what is off may have a mean.
     is_covered: bool,
     /// Luminaires that may be hidden, or whose light is no polynomial here.
     asked: Vec<u32>,
     /// Mean exitance after one reflection in lm/m², as far as it is known beforehand.
     exitance: f64,
+}
+
+/// Light of one luminaire whose shadows have sharp edges.
+#[derive(Debug)]
+struct Shaded {
+    emitter: u32,
+    /// Illuminance at the nodes were nothing in its way, and how far off that is.
+    lux: [f64; NODES],
+    error_lux: f64,
+    /// Which of its shadows meet the rectangle.
+    shadows: Vec<u32>,
 }
 
 #[derive(Debug)]
@@ -161,10 +176,20 @@ impl Lit {
         let surroundings = lights.surroundings;
         let solid = surroundings.bodies().map(|[min_m, max_m]| Occluder { min_m: *min_m, max_m: *max_m });
         let solid: Vec<Occluder> = solid.collect();
-        let can_cut = solid.is_empty() || lights.emitters.iter().all(Emitter::is_cut);
-        let cuts = solid.len() * lights.emitters.len();
+        let is_cut = |emitter: &Emitter| {
+            let touches = |o: &Occluder| emitter.centre_m().clamp(o.min_m, o.max_m) == emitter.centre_m();
+            emitter.is_polygonal() && !(emitter.is_point() && solid.iter().any(touches))
+        };
+        let can_cut = solid.is_empty() || lights.emitters.iter().all(is_cut);
+        let cuts = solid.len() * lights.emitters.iter().filter(|emitter| !emitter.is_point()).count();
         let occluders = surroundings.hiding().filter(|_| can_cut && cuts <= MOST_CUTS).map(|_| solid);
-        let one = |face: &Face| {
+        let casts = |face: &Face| -> Vec<Option<Cast>> {
+            let solid = occluders.as_deref().unwrap_or_default();
+            let cast = |emitter: &Emitter| emitter.is_point().then(|| Cast::new(emitter.centre_m(), face, solid))?;
+            lights.emitters.iter().filter(|_| occluders.is_some()).map(cast).collect()
+        };
+        let casts: Vec<Vec<Option<Cast>>> = surroundings.faces.iter().map(casts).collect();
+        let one = |(face, casts): (&Face, &Vec<Option<Cast>>)| {
             let floor_lux = DIM * mean;
             let wall_m2 = surroundings.room.map_or(f64::INFINITY, |room| mean_wall_m2(room.size_m));
             let covers = surroundings.covers(face);
@@ -177,6 +202,7 @@ impl Lit {
                 floor_lux,
                 wall_m2,
                 occluders: &occluders,
+                casts,
                 stop,
             };
             let (corner_m, size_m) = (face.corners_m[0], face.size_m());
@@ -192,7 +218,7 @@ impl Lit {
             parts
         };
         let all = &lights.surroundings.faces;
-        let faces: Vec<Vec<Part>> = all.par_iter().map(one).collect();
+        let faces: Vec<Vec<Part>> = all.par_iter().zip(&casts).map(one).collect();
         let (mut bright, mut reflected_lm, mut peak, mut is_whole) = (vec![], 0.0, 0.0_f64, occluders.is_some());
         for (face, parts) in faces.iter().enumerate() {
             for part in parts {
@@ -205,7 +231,7 @@ impl Lit {
         }
         let area_m2: f64 = all.iter().map(Face::area_m2).sum();
         let is_peaked = peak * area_m2 > super::PEAKED * reflected_lm;
-        Self { faces, bicubic, bright, reflected_lm, is_peaked, peak, is_whole }
+        Self { faces, casts, bicubic, bright, reflected_lm, is_peaked, peak, is_whole }
     }
 
     /// Light reflected once by all faces to a meter, and what it may be off.
@@ -251,11 +277,15 @@ impl Lit {
                     }
                 },
             };
-            let weights = shown.weights();
-            let value: f64 = weights.of_nodes.iter().zip(values).map(|(w, v)| w * v).sum();
-            let most = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-            let left_lux = shown.factor * shown.left() * error_lux + weights.error * most;
+            let (value, left_lux) = read(&shown, values, error_lux);
             add(face.reflectance * value, face.reflectance * left_lux);
+            let Kind::Leaf(leaf) = &part.kind else { continue };
+            for shaded in &leaf.shaded {
+                let cast = self.casts[index][shaded.emitter as usize].as_ref();
+                let Some(lit) = cast.and_then(|cast| shown.lit(cast, &shaded.shadows)) else { continue };
+                let (value, left_lux) = read(&lit, &shaded.lux, shaded.error_lux);
+                add(face.reflectance * value, face.reflectance * left_lux);
+            }
         }
     }
 
@@ -266,11 +296,18 @@ impl Lit {
             return Light { lux: 0.0, known: Known { error_lux: 0.0, noise_lux: 0.0, side_m: 0.0 } };
         };
         let t = (at_m - part.corner_m) / part.size_m;
-        let side_m = if leaf.is_covered { f64::INFINITY } else { part.size_m.max_element() };
+        let is_smooth = !leaf.is_covered && leaf.shaded.is_empty();
+        let side_m = if !is_smooth { f64::INFINITY } else { part.size_m.max_element() };
         let mut light = Light {
             lux: self.bicubic.at(&leaf.lux, t),
             known: Known { error_lux: leaf.error_lux, noise_lux: 0.0, side_m },
         };
+        for shaded in &leaf.shaded {
+            if !lights.surroundings.is_hidden(meter.position_m, lights.emitters[shaded.emitter as usize].centre_m()) {
+                light.lux += self.bicubic.at(&shaded.lux, t);
+                light.known.error_lux += shaded.error_lux;
+            }
+        }
         if leaf.asked.is_empty() {
             return light;
         }
@@ -314,21 +351,31 @@ impl Lit {
     }
 }
 
-/// Finds for every part that is quartered the polynomial closest to those of its quarters, which lie behind it.
+/// Light of a polynomial on what shows of its rectangle, and what it may be off.
+fn read(shown: &Shown, values: &[f64; NODES], error_lux: f64) -> (f64, f64) {
+    let weights = shown.weights();
+    let most = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let value = weights.of_nodes.iter().zip(values).map(|(w, v)| w * v).sum();
+    (value, shown.factor * shown.left() * error_lux + weights.error * most)
+}
+
+/// Finds for every part that is quartered the polynomial closest to those of its quarters, which lie behind it; none where luminaires
+/// have shadows with edges on one of them.
 fn join(bicubic: &Bicubic, parts: &mut [Part]) {
     for k in (0..parts.len()).rev() {
         let Kind::Quartered(first, _) = parts[k].kind else { continue };
         let (corner_m, size_m) = (parts[k].corner_m, parts[k].size_m);
         let of = |quarter: &Part| ((quarter.corner_m - corner_m) / size_m, quarter.size_m / size_m);
-        let quarters = parts[first..first + 4].iter().filter_map(|quarter| {
+        let quarters = parts[first..first + 4].iter().map(|quarter| {
             let (corner, size) = of(quarter);
             match (&quarter.kind, &quarter.joined) {
-                (Kind::Leaf(leaf), _) => Some((corner, size, &leaf.lux, leaf.error_lux)),
+                (Kind::Leaf(leaf), _) if leaf.shaded.is_empty() => Some((corner, size, &leaf.lux, leaf.error_lux)),
                 (_, Some(joined)) => Some((corner, size, &joined.0, joined.1)),
                 (_, None) => None,
             }
         });
-        parts[k].joined = Some(Box::new(bicubic.joined(quarters)));
+        let quarters: Option<Vec<_>> = quarters.collect();
+        parts[k].joined = quarters.map(|quarters| Box::new(bicubic.joined(quarters.into_iter())));
     }
 }
 
@@ -357,21 +404,26 @@ struct Build<'a> {
     wall_m2: f64,
     /// Bodies, where they can be cut out of luminaires.
     occluders: &'a Option<Vec<Occluder>>,
+    /// Shadows on the face of luminaires without extent.
+    casts: &'a [Option<Cast>],
     stop: &'a Stop,
 }
 
 impl Build<'_> {
     /// Puts a leaf in its place, or its quarters where it is not good enough.
     fn grow(&self, parts: &mut Vec<Part>, index: usize, leaf: Leaf, depth: u32) {
-        let mean = leaf.lux.iter().map(|l| l.abs()).sum::<f64>() / NODES as f64;
+        let shaded = || leaf.shaded.iter();
+        let lux = leaf.lux.iter().chain(shaded().flat_map(|shaded| &shaded.lux));
+        let mean = lux.map(|l| l.abs()).sum::<f64>() / NODES as f64;
         let limit_lux = self.relative_error * mean.max(self.floor_lux);
+        let error_lux = leaf.error_lux + shaded().map(|shaded| shaded.error_lux).sum::<f64>();
         let is_good = match self.occluders {
             // What is off on a small part is little of all: where shadows have edges no part is small enough for another measure.
             Some(occluders) if !occluders.is_empty() => {
                 let part = parts[index].size_m.element_product() / self.wall_m2;
-                leaf.error_lux * part <= OF_ALL * limit_lux
+                error_lux * part <= OF_ALL * limit_lux
             }
-            _ => leaf.error_lux <= limit_lux,
+            _ => error_lux <= limit_lux,
         };
         let is_clear = leaf.asked.is_empty() || depth >= DEEPEST_FOR_SHADOW;
         if is_good && is_clear && !leaf.is_covered || depth >= DEEPEST || self.stop.is_due() {
@@ -424,34 +476,68 @@ impl Build<'_> {
     /// A rectangle with the luminaires that may be hidden from it told apart.
     fn leaf(&self, corner_m: DVec2, size_m: DVec2) -> Leaf {
         let cover = Cover::of(&self.covers, corner_m, size_m);
+        let mut leaf = Leaf {
+            lux: [0.0; NODES],
+            error_lux: 0.0,
+            shaded: vec![],
+            is_covered: cover == Cover::Part,
+            asked: vec![],
+            exitance: 0.0,
+        };
         if cover == Cover::Whole {
-            return Leaf { lux: [0.0; NODES], error_lux: 0.0, is_covered: false, asked: vec![], exitance: 0.0 };
+            return leaf;
         }
-        let is_covered = cover == Cover::Part;
         let meter = |t: DVec2| Meter { position_m: self.face.off(corner_m + t * size_m), normal: self.face.normal };
         let corners_m = [meter(DVec2::ZERO).position_m, meter(DVec2::ONE).position_m];
-        let all = 0..self.lights.emitters.len();
-        let may_be_hidden = |k: usize| self.lights.may_be_hidden(k, corners_m);
-        let (asked, clear): (Vec<usize>, Vec<usize>) = all.partition(|k| self.occluders.is_none() && may_be_hidden(*k));
-        let is_hidden = clear.iter().any(|k| may_be_hidden(*k));
-        let occluders = self.occluders.as_deref().filter(|_| is_hidden).unwrap_or(&[]);
+        let emitters = self.lights.emitters;
+        let (mut clear, mut cut, mut sharp) = (vec![], vec![], vec![]);
+        for (k, emitter) in emitters.iter().enumerate() {
+            if !self.lights.may_be_hidden(k, corners_m) {
+                clear.push(k);
+            } else if self.occluders.is_none() {
+                leaf.asked.push(k as u32);
+            } else if !emitter.is_point() {
+                cut.push(k);
+            } else if let Some(cast) = &self.casts[k] {
+                match cast.on(corner_m, size_m) {
+                    Some(shadows) if shadows.is_empty() => clear.push(k),
+                    Some(shadows) => sharp.push((k, shadows)),
+                    None => {}
+                }
+            }
+        }
         // Two refinements agree far less well than the finer one is right.
         let relative_error = self.relative_error.min(1e-3);
         let precision = Precision { relative_error, error_lux: relative_error * self.floor_lux };
-        let lux_at = |t: DVec2, which: &[usize]| -> f64 {
-            let meter = meter(t);
-            which.iter().map(|k| self.lights.emitters[*k].illuminance(&meter, occluders, precision).value).sum()
+        let lux_of =
+            |k: usize, meter: &Meter, solid: &[Occluder]| emitters[k].illuminance(meter, solid, precision).value;
+        let read = |lux_at: &dyn Fn(&Meter) -> f64| {
+            let lux: [f64; NODES] = std::array::from_fn(|k| lux_at(&meter(self.bicubic.node(k))));
+            let off = |t: &[f64; 2]| {
+                let t = DVec2::from_array(*t);
+                (self.bicubic.at(&lux, t) - lux_at(&meter(t))).abs()
+            };
+            (lux, CHECKS.iter().map(off).fold(0.0, f64::max))
         };
-        let lux = std::array::from_fn(|k| lux_at(self.bicubic.node(k), &clear));
-        let off = |t: &[f64; 2]| {
-            let t = DVec2::from_array(*t);
-            (self.bicubic.at(&lux, t) - lux_at(t, &clear)).abs()
+        let solid = self.occluders.as_deref().unwrap_or_default();
+        (leaf.lux, leaf.error_lux) = read(&|meter| {
+            let clear = clear.iter().map(|k| lux_of(*k, meter, &[]));
+            clear.chain(cut.iter().map(|k| lux_of(*k, meter, solid))).sum()
+        });
+        let shaded = |(k, shadows): (usize, Vec<u32>)| {
+            let (lux, error_lux) = read(&|meter| lux_of(k, meter, &[]));
+            Shaded { emitter: k as u32, lux, error_lux, shadows }
         };
-        let error_lux = CHECKS.iter().map(off).fold(0.0, f64::max);
-        let by_area: f64 = (0..NODES).map(|k| self.bicubic.weight(k) * lux[k]).sum();
+        leaf.shaded = sharp.into_iter().map(shaded).collect();
+        let mean = |lux: &[f64; NODES]| (0..NODES).map(|k| self.bicubic.weight(k) * lux[k]).sum::<f64>();
         // What may be hidden counts by half, so that no place that is lit is drawn never.
-        let hidden: f64 = (0..NODES).map(|k| self.bicubic.weight(k) * lux_at(self.bicubic.node(k), &asked)).sum();
-        let exitance = self.face.reflectance * (by_area.max(0.0) + 0.5 * hidden).max(0.02 * self.floor_lux);
-        Leaf { lux, error_lux, is_covered, asked: asked.iter().map(|k| *k as u32).collect(), exitance }
+        let of_asked = |k: &u32| {
+            let lux = std::array::from_fn(|node| lux_of(*k as usize, &meter(self.bicubic.node(node)), &[]));
+            mean(&lux)
+        };
+        let hidden: f64 = leaf.asked.iter().map(of_asked).chain(leaf.shaded.iter().map(|s| mean(&s.lux))).sum();
+        let lux = (mean(&leaf.lux).max(0.0) + 0.5 * hidden.max(0.0)).max(0.02 * self.floor_lux);
+        leaf.exitance = self.face.reflectance * lux;
+        leaf
     }
 }

@@ -4,7 +4,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::face::Face;
+use super::face::{Face, SMALL, mean_wall_m2};
 use crate::geometry::bvh::{BvhError, Ray, TriangleBvh};
 use crate::geometry::{Mesh, Room};
 use crate::scene::{Obstacle, Shape};
@@ -12,6 +12,8 @@ use crate::simulator::visibility::Occluder;
 
 /// Boxes beyond which the tree is faster than trying each in turn.
 const MOST_BOXES: usize = 32;
+/// Boxes up to which all their faces are known, however small.
+const FEW_BOXES: usize = 12;
 /// How far rays start off a triangle, of the scene's extent.
 const LIFT: f64 = 1e-10;
 /// The part of the way to a luminaire beyond which nothing hides it: it may lie upon what holds it.
@@ -69,6 +71,7 @@ pub(super) struct Place {
 impl Surroundings {
     pub(super) fn new(room: Option<Room>, obstacles: &[Obstacle], reach_m: f64) -> Result<Self, BvhError> {
         let count = obstacles.iter().filter(|o| Occluder::aligned(&o.shape).is_some()).count();
+        let least = if count <= FEW_BOXES { 0.0 } else { SMALL };
         let mut faces: Vec<Face> = room.iter().flat_map(Face::walls).collect();
         let (mut boxes, mut bounds, mut solid, mut reflectances) = (vec![], vec![], vec![], vec![]);
         let (mut vertices, mut triangles): (Vec<DVec3>, Vec<[u32; 3]>) = (vec![], vec![]);
@@ -81,9 +84,10 @@ impl Surroundings {
             match (Occluder::aligned(shape), shape) {
                 (Some(Occluder { min_m, max_m }), _) if count <= MOST_BOXES => {
                     let mut add = |k: usize| {
-                        let face = Face::of_box(&room?, [min_m, max_m], k / 2, k % 2 == 1, *reflectance)?;
-                        faces.push(face);
-                        Some(faces.len() - 1)
+                        let room = room?;
+                        let face = Face::of_box(&room, [min_m, max_m], k / 2, k % 2 == 1, *reflectance)?;
+                        let is_known = face.area_m2() >= least * mean_wall_m2(room.size_m);
+                        is_known.then(|| faces.push(face)).map(|()| faces.len() - 1)
                     };
                     let own = std::array::from_fn(&mut add);
                     boxes.push(Body { min_m, max_m, reflectance: *reflectance, faces: own });

@@ -73,6 +73,11 @@ impl Side {
     fn of(&self, at_m: DVec2) -> f64 {
         self.normal.dot(at_m) + self.excess
     }
+
+    /// The same about another origin.
+    fn about(&self, origin: DVec2) -> Self {
+        Self { normal: self.normal, excess: self.of(origin) }
+    }
 }
 
 /// A meter as it stands before a face.
@@ -167,7 +172,7 @@ impl Before<'_> {
         let Self { stand, bicubic, shadows } = self;
         let low = corner_m - stand.foot_m;
         let high = low + size_m;
-        let corners = [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)];
+        let corners = corners(low, size_m);
         let heights = corners.map(|p| stand.horizon.of(p));
         if heights.iter().all(|h| *h <= 0.0) {
             return None;
@@ -195,31 +200,44 @@ impl Before<'_> {
                 return None;
             }
         }
-        let middle_m = low + 0.5 * size_m;
-        let distance_m = (middle_m.length_squared() + stand.before_m * stand.before_m).sqrt();
-        let is_whole = pieces.is_empty();
-        let is_afar = distance_m >= AFAR * size_m.max_element();
-        let factor = if is_afar && is_whole {
-            size_m.element_product() * stand.kernel(middle_m)
-        } else if is_afar {
-            pieces.iter().map(|piece| area_m2(piece) * stand.kernel(middle(piece))).sum()
-        } else if is_whole {
-            stand.factor(&corners)
-        } else {
-            pieces.iter().map(|piece| stand.factor(piece)).sum()
-        };
-        (factor > 0.0).then_some(Shown {
-            stand: *stand,
-            bicubic,
-            corner_m: low,
-            size_m,
-            pieces,
-            is_whole,
-            is_afar,
-            distance_m,
-            factor,
-        })
+        Shown::new(stand, bicubic, [low, size_m], pieces)
     }
+}
+
+/// The shadows that bodies cast on a face from a point before it.
+#[derive(Debug)]
+pub(super) struct Cast {
+    foot_m: DVec2,
+    shadows: Vec<Shadow>,
+}
+
+impl Cast {
+    /// Nothing where the point lies behind the face.
+    pub(super) fn new(from_m: DVec3, face: &Face, occluders: &[Occluder]) -> Option<Self> {
+        let stand = Stand::new(&Meter { position_m: from_m, normal: -face.normal }, face)?;
+        let shadows = occluders.iter().filter_map(|occluder| Shadow::new(&stand, occluder)).collect();
+        Some(Self { foot_m: stand.foot_m, shadows })
+    }
+
+    /// Which shadows meet a rectangle of the face; nothing where one of them covers it.
+    pub(super) fn on(&self, corner_m: DVec2, size_m: DVec2) -> Option<Vec<u32>> {
+        let low = corner_m - self.foot_m;
+        let corners = corners(low, size_m);
+        let all = self.shadows.iter().enumerate();
+        let meeting = all.filter(|(_, shadow)| shadow.may_meet(low, low + size_m, &corners));
+        let mut which = vec![];
+        for (k, shadow) in meeting {
+            if shadow.covers(&corners) {
+                return None;
+            }
+            which.push(k as u32);
+        }
+        Some(which)
+    }
+}
+
+fn corners(low: DVec2, size_m: DVec2) -> [DVec2; 4] {
+    [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y].map(|t| low + t * size_m)
 }
 
 /// Leaves of pieces, or of what is whole so far, what does not lie within all of some sides; whether that is anything.
@@ -291,6 +309,11 @@ impl Shadow {
         &self.sides[..self.count]
     }
 
+    /// Whether it holds all of a rectangle.
+    fn covers(&self, corners: &[DVec2; 4]) -> bool {
+        self.sides().iter().all(|side| corners.iter().all(|p| side.of(*p) >= 0.0))
+    }
+
     fn may_meet(&self, low: DVec2, high: DVec2, corners: &[DVec2; 4]) -> bool {
         // What lies between the meter and a rectangle lies between the meter's foot and that on its plane, too.
         let is_beyond = self.low.cmpge(high.max(DVec2::ZERO)).any() || self.high.cmple(low.min(DVec2::ZERO)).any();
@@ -357,7 +380,55 @@ fn is_solid(polygon: &[DVec2]) -> bool {
         })
 }
 
-impl Shown<'_> {
+impl<'a> Shown<'a> {
+    /// Nothing where no part of it shows.
+    fn new(
+        stand: &Stand<'a>,
+        bicubic: &'a Bicubic,
+        [corner_m, size_m]: [DVec2; 2],
+        pieces: Vec<Polygon>,
+    ) -> Option<Self> {
+        let middle_m = corner_m + 0.5 * size_m;
+        let distance_m = (middle_m.length_squared() + stand.before_m * stand.before_m).sqrt();
+        let is_whole = pieces.is_empty();
+        let is_afar = distance_m >= AFAR * size_m.max_element();
+        let factor = if is_afar && is_whole {
+            size_m.element_product() * stand.kernel(middle_m)
+        } else if is_afar {
+            pieces.iter().map(|piece| area_m2(piece) * stand.kernel(middle(piece))).sum()
+        } else if is_whole {
+            stand.factor(&corners(corner_m, size_m))
+        } else {
+            pieces.iter().map(|piece| stand.factor(piece)).sum()
+        };
+        (factor > 0.0).then_some(Self {
+            stand: *stand,
+            bicubic,
+            corner_m,
+            size_m,
+            pieces,
+            is_whole,
+            is_afar,
+            distance_m,
+            factor,
+        })
+    }
+
+    /// What of it some of the shadows from another point leave lit; nothing where that is nothing.
+    pub(super) fn lit(&self, cast: &Cast, which: &[u32]) -> Option<Self> {
+        let mut pieces = self.pieces.clone();
+        let corners = corners(self.corner_m, self.size_m);
+        let origin_m = self.stand.foot_m - cast.foot_m;
+        for k in which {
+            let shadow = &cast.shadows[*k as usize];
+            let sides = shadow.sides.map(|side| side.about(origin_m));
+            if !leave_outside(&mut pieces, &corners, &sides[..shadow.count]) {
+                return None;
+            }
+        }
+        Self::new(&self.stand, self.bicubic, [self.corner_m, self.size_m], pieces)
+    }
+
     /// The part of what a polynomial leaves out that is left, were all of it seen as it is: of what has neither mean nor slope nor
     /// curvature nor cube nothing but the kernel's own terms of degree 4 is seen from afar.
     pub(super) fn left(&self) -> f64 {
