@@ -297,7 +297,7 @@ impl Lit {
         };
         let t = (at_m - part.corner_m) / part.size_m;
         let is_smooth = !leaf.is_covered && leaf.shaded.is_empty();
-        let side_m = if !is_smooth { f64::INFINITY } else { part.size_m.max_element() };
+        let side_m = if is_smooth { part.size_m.max_element() } else { f64::INFINITY };
         let mut light = Light {
             lux: self.bicubic.at(&leaf.lux, t),
             known: Known { error_lux: leaf.error_lux, noise_lux: 0.0, side_m },
