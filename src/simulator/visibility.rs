@@ -94,8 +94,8 @@ impl Occluder {
         }
         let (middle, half) = (0.5 * (self.min_m + self.max_m) - from, 0.5 * (self.max_m - self.min_m));
         let view = centre - from;
-        (0..polygon.len()).all(|k| {
-            let m = (polygon[k] - from).cross(polygon[(k + 1) % polygon.len()] - from);
+        let edges = (0..polygon.len()).map(|k| [polygon[k] - from, polygon[(k + 1) % polygon.len()] - from]);
+        edges.filter_map(through).all(|m| {
             let m = if m.dot(view) < 0.0 { -m } else { m };
             m.dot(middle) + m.abs().dot(half) > 0.0
         })
@@ -141,7 +141,9 @@ struct Plane {
 
 impl Plane {
     fn of(polygon: &[DVec3], from: DVec3) -> Option<Self> {
-        let normal = (polygon[1] - polygon[0]).cross(polygon[2] - polygon[1]).try_normalize()?;
+        // Of all corners: three of what was cut before may lie on a line.
+        let triangle = |k: usize| (polygon[k - 1] - polygon[0]).cross(polygon[k] - polygon[0]);
+        let normal = (2..polygon.len()).map(triangle).sum::<DVec3>().try_normalize()?;
         let height = (from - polygon[0]).dot(normal);
         (height != 0.0).then(|| Self {
             point: polygon[0],
@@ -151,13 +153,20 @@ impl Plane {
     }
 }
 
+/// The unit normal of the plane through the origin and an edge; none where that has no length to speak of, as what is cut at a corner.
+fn through([a, b]: [DVec3; 2]) -> Option<DVec3> {
+    let normal = a.cross(b);
+    let is_long = normal.length_squared() > (ROUNDING * ROUNDING) * a.length_squared() * b.length_squared();
+    normal.try_normalize().filter(|_| is_long)
+}
+
 /// The pieces of a convex polygon that lie outside the cone from a point through a convex face.
 fn outside_cone(from: DVec3, piece: Polygon, face: &[DVec3]) -> Vec<Polygon> {
     let centre = face.iter().sum::<DVec3>() / face.len() as f64 - from;
     let mut planes = vec![];
     for (k, a) in face.iter().enumerate() {
         let b = face[(k + 1) % face.len()];
-        let Some(m) = (a - from).cross(b - from).try_normalize() else { continue };
+        let Some(m) = through([a - from, b - from]) else { continue };
         let m = if m.dot(centre) < 0.0 { -m } else { m };
         let reach = piece.iter().map(|p| m.dot(p - from)).fold(f64::NEG_INFINITY, f64::max);
         if reach <= ROUNDING * centre.length() {
@@ -260,6 +269,20 @@ mod tests {
         for (min, max) in corners.into_iter().zip(extents) {
             let occluder = Occluder { min_m: DVec3::from(min), max_m: DVec3::from(max) };
             assert_relative_eq!(seen(DVec3::ZERO, DVec3::Z, &CEILING, &[occluder]), whole, max_relative = 1e-14);
+        }
+    }
+
+    /// A polygon that was cut at a corner has an edge without length, which parts nothing from anything.
+    #[test]
+    fn an_edge_without_length_hides_as_much_as_none() {
+        let plate = Occluder { min_m: DVec3::new(-0.3, -0.1, 1.0), max_m: DVec3::new(0.2, 0.4, 1.3) };
+        let whole = seen(DVec3::ZERO, DVec3::Z, &CEILING, &[plate]);
+        for (k, corner) in CEILING.iter().enumerate() {
+            for off_m in [0.0, 1e-16, -3e-16] {
+                let mut twice = CEILING.to_vec();
+                twice.insert(k + 1, *corner + DVec3::new(off_m, -off_m, 0.0));
+                assert_relative_eq!(seen(DVec3::ZERO, DVec3::Z, &twice, &[plate]), whole, max_relative = 1e-13);
+            }
         }
     }
 }
