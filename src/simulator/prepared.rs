@@ -15,6 +15,10 @@ const AT_ONCE: usize = 1024;
 const FINE: f64 = 1e-3;
 const FIRST_LOOK: f64 = 2e-2;
 
+/// Bounds beyond this part of light reflected once tell that two rules have not come to agree, as where a surface is very near: what they
+/// differ by is no bound there.
+const UNAGREED: f64 = 1e-3;
+
 /// A scene whose light field is solved once and then answers for any number of meters.
 #[derive(Debug)]
 pub struct Prepared {
@@ -210,9 +214,23 @@ impl Prepared {
             (Solver::Empty(empty), Some(room)) => {
                 empty.indirect(&room, &self.scene.luminaires, bounces, meters, relative_error, stop)
             }
-            (Solver::Enclosed(_, Some(once)), _) if bounces == Bounces::AtMost(1) => {
-                let text = "light reflected once, integrated over what is both lit and seen";
-                Ok((once.illuminance(meters, relative_error, stop), text.into()))
+            (Solver::Enclosed(enclosure, Some(once)), _) if bounces == Bounces::AtMost(1) => {
+                let mut text = "light reflected once, integrated over what is both lit and seen".to_owned();
+                let mut found = once.illuminance(meters, relative_error, stop);
+                let is_rough = |k: &usize| found[*k].bound > UNAGREED * found[*k].value;
+                let rough: Vec<usize> = (0..meters.len()).filter(is_rough).collect();
+                if !rough.is_empty() && !stop.is_due() {
+                    let some: Vec<Meter> = rough.iter().map(|k| meters[*k]).collect();
+                    let direct: Vec<Bounded> = rough.iter().map(|k| direct[*k]).collect();
+                    let (gathered, how) = enclosure.indirect(&some, bounces, &direct, &self.accuracy, stop)?;
+                    for (k, gathered) in rough.into_iter().zip(gathered) {
+                        if gathered.bound < found[k].bound {
+                            found[k] = gathered;
+                        }
+                    }
+                    text = format!("{text}; {how}");
+                }
+                Ok((found, text))
             }
             (Solver::Enclosed(enclosure, _), _) => enclosure.indirect(meters, bounces, direct, &self.accuracy, stop),
         }
