@@ -5,9 +5,6 @@ use glam::{DVec2, DVec3};
 use crate::geometry::{Room, Surface};
 use crate::simulator::visibility::Occluder;
 
-/// Faces of many boxes smaller than this part of the room's mean wall reflect so little that rays go on from them.
-pub(super) const SMALL: f64 = 0.01;
-
 /// The mean area of a room's walls.
 pub(super) fn mean_wall_m2(size_m: DVec3) -> f64 {
     (size_m.x * size_m.y + size_m.y * size_m.z + size_m.z * size_m.x) / 3.0

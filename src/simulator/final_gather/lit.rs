@@ -1,5 +1,8 @@
 //! Light straight from the luminaires on the faces: polynomials on rectangles that are quartered until they agree with
-//! it, for the luminaires that nothing can hide from there; the others are asked at every place anew.
+//! it. What boxes hide is cut out of luminaires of some extent; luminaires without any have polynomials of their own, as if
+//! nothing hid them, and their shadows are cut out of what is seen. Those that cannot be cut are asked at every place anew.
+
+use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -265,11 +268,11 @@ impl Lit {
         while let Some(k) = open.pop() {
             let Some(part) = self.faces[index].get(k) else { continue };
             let Some(shown) = before.of(part.corner_m, part.size_m) else { continue };
-            let (values, error_lux) = match (&part.kind, &part.joined) {
-                (Kind::Leaf(leaf), _) => (&leaf.lux, leaf.error_lux),
+            let (values, error_lux, shaded) = match (&part.kind, &part.joined) {
+                (Kind::Leaf(leaf), _) => (&leaf.lux, leaf.error_lux, leaf.shaded.as_slice()),
                 (Kind::Quartered(first, _), joined) => match joined.as_deref() {
                     Some((values, error_lux)) if shown.factor * shown.left() * error_lux <= tolerance_lux => {
-                        (values, *error_lux)
+                        (values, *error_lux, &[][..])
                     }
                     _ => {
                         open.extend(*first..first + 4);
@@ -279,8 +282,7 @@ impl Lit {
             };
             let (value, left_lux) = read(&shown, values, error_lux);
             add(face.reflectance * value, face.reflectance * left_lux);
-            let Kind::Leaf(leaf) = &part.kind else { continue };
-            for shaded in &leaf.shaded {
+            for shaded in shaded {
                 let cast = self.casts[index][shaded.emitter as usize].as_ref();
                 let Some(lit) = cast.and_then(|cast| shown.lit(cast, &shaded.shadows)) else { continue };
                 let (value, left_lux) = read(&lit, &shaded.lux, shaded.error_lux);
@@ -328,6 +330,24 @@ impl Lit {
         let across = ((at - below) / lumens).clamp(0.0, 1.0);
         let place = bright.corner_m + bright.size_m * DVec2::new(across, v);
         Some((bright.face, place, lumens / self.reflected_lm / bright.size_m.element_product()))
+    }
+
+    /// The most that a sample may bring to a place that is met by rays and drawn from the light, too: no more than the exitance where it
+    /// comes from, nor than all light from its distance.
+    pub(super) fn brightest(&self, faces: &[Face], from_m: DVec3) -> f64 {
+        let mut below_lm = 0.0;
+        let of = |bright: &Bright| {
+            let lumens = bright.up_to_lm - below_lm;
+            below_lm = bright.up_to_lm;
+            let face = &faces[bright.face];
+            if face.is_before_m(from_m) <= 0.0 {
+                return 0.0;
+            }
+            let nearest_m = face.on(from_m).clamp(bright.corner_m, bright.corner_m + bright.size_m);
+            let all_lux = self.reflected_lm / (PI * (face.off(nearest_m) - from_m).length_squared());
+            all_lux.min(lumens / bright.size_m.element_product())
+        };
+        self.bright.iter().map(of).fold(0.0, f64::max)
     }
 
     /// The density of [`Self::draw`] at a place, per square metre.
@@ -511,7 +531,7 @@ impl Build<'_> {
         let precision = Precision { relative_error, error_lux: relative_error * self.floor_lux };
         let lux_of =
             |k: usize, meter: &Meter, solid: &[Occluder]| emitters[k].illuminance(meter, solid, precision).value;
-        let read = |lux_at: &dyn Fn(&Meter) -> f64| {
+        let polynomial = |lux_at: &dyn Fn(&Meter) -> f64| {
             let lux: [f64; NODES] = std::array::from_fn(|k| lux_at(&meter(self.bicubic.node(k))));
             let off = |t: &[f64; 2]| {
                 let t = DVec2::from_array(*t);
@@ -520,12 +540,12 @@ impl Build<'_> {
             (lux, CHECKS.iter().map(off).fold(0.0, f64::max))
         };
         let solid = self.occluders.as_deref().unwrap_or_default();
-        (leaf.lux, leaf.error_lux) = read(&|meter| {
+        (leaf.lux, leaf.error_lux) = polynomial(&|meter| {
             let clear = clear.iter().map(|k| lux_of(*k, meter, &[]));
             clear.chain(cut.iter().map(|k| lux_of(*k, meter, solid))).sum()
         });
         let shaded = |(k, shadows): (usize, Vec<u32>)| {
-            let (lux, error_lux) = read(&|meter| lux_of(k, meter, &[]));
+            let (lux, error_lux) = polynomial(&|meter| lux_of(k, meter, &[]));
             Shaded { emitter: k as u32, lux, error_lux, shadows }
         };
         leaf.shaded = sharp.into_iter().map(shaded).collect();

@@ -445,8 +445,9 @@ impl<'a> Gather<'a> {
     }
 
     fn at(&self, index: usize, meter: &Meter, direct: Bounded, most_log2: u32) -> Sums {
-        // Where bright places are drawn none is left unseen.
-        let brightest_lux = if self.rays.draws { 0.0 } else { self.rays.lit.peak };
+        let Rays { lit, draws, lights, .. } = self.rays;
+        let faces = &lights.surroundings.faces;
+        let brightest_lux = if draws { lit.brightest(faces, meter.position_m) } else { lit.peak };
         let mut sums = Sums { brightest_lux, ..Sums::default() };
         // The first rays tell how bright it is here and what the field scatters, and so where rays may end.
         let mut limit = self.limit(self.solved.map_or(0.0, |s| s.field.mean_lux), 1.0);

@@ -4,7 +4,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::face::{Face, SMALL, mean_wall_m2};
+use super::face::{Face, mean_wall_m2};
 use crate::geometry::bvh::{BvhError, Ray, TriangleBvh};
 use crate::geometry::{Mesh, Room};
 use crate::scene::{Obstacle, Shape};
@@ -12,8 +12,9 @@ use crate::simulator::visibility::Occluder;
 
 /// Boxes beyond which the tree is faster than trying each in turn.
 const MOST_BOXES: usize = 32;
-/// Boxes up to which all their faces are known, however small.
+/// Boxes up to which all their faces are known; rays go on from those of more that are smaller than a part of the room's mean wall.
 const FEW_BOXES: usize = 12;
+const SMALL: f64 = 0.01;
 /// How far rays start off a triangle, of the scene's extent.
 const LIFT: f64 = 1e-10;
 /// The part of the way to a luminaire beyond which nothing hides it: it may lie upon what holds it.

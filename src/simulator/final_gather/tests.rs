@@ -5,12 +5,16 @@ use std::f64::consts::PI;
 use approx::assert_relative_eq;
 use glam::DVec3;
 
+use super::Enclosure;
 use crate::geometry::configuration_factor::element_to_polygon;
 use crate::geometry::{Mesh, Reflectances, Room};
 use crate::photometry::{LuminousIntensityDistribution, LuminousOpening};
 use crate::scene::{Bounces, Meter, Obstacle, Scene, Shape, Transport};
+use crate::simulator::once_reflected::OnceReflected;
 use crate::simulator::path_tracing::test_scenes::{S2_VALUES, luminaire, s1, s1_meters, s2, s2_meters, up};
-use crate::simulator::{Accuracy, Uncertainty, certified, illuminance};
+use crate::simulator::sampler::mix;
+use crate::simulator::stop::Stop;
+use crate::simulator::{Accuracy, Bounded, Uncertainty, certified, illuminance};
 
 fn bound(uncertainty: Uncertainty) -> f64 {
     match uncertainty {
@@ -224,4 +228,70 @@ fn what_bodies_stand_on_lights_nothing() {
         let off = (found.illuminance.value() - truth.illuminance.value()).abs();
         assert!(off <= bound(found.uncertainty) + 5.4 * error, "{bounces:?}: {found:?} for {truth:?}");
     }
+}
+
+/// Shadows of luminaires without extent in random rooms of boxes, some of which hover, stand or hang: light reflected once is what the
+/// integral over pieces both lit and seen says, which cuts by other planes and knows no polynomial.
+#[test]
+fn shadows_of_points_are_cut_as_another_cutter_cuts_them() {
+    let (mut shaded, mut narrow, mut rooms) = (0, 0, 0);
+    for k in 0..10_u64 {
+        let mut drawn = 1000 * k;
+        let mut unit = || {
+            drawn += 1;
+            (mix(drawn) >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let mut place = |low: DVec3, high: DVec3| low + (high - low) * DVec3::new(unit(), unit(), unit());
+        let size_m = place(DVec3::new(3.0, 3.0, 2.4), DVec3::new(9.0, 7.0, 5.0));
+        let reflectance = Reflectances::with_equal_walls(0.3, 0.5, 0.8);
+        let mut scene = Scene { room: Some(Room { size_m, reflectance }), ..Scene::default() };
+        for j in 0..=k % 3 {
+            let (mut low, mut high) = (place(DVec3::ZERO, 0.7 * size_m), place(DVec3::splat(0.2), DVec3::splat(1.5)));
+            high = (low + high).min(size_m - 0.1);
+            if j % 2 == 0 {
+                low.z = 0.0;
+            }
+            scene.obstacles.push(cuboid(low.to_array(), high.to_array(), 0.4));
+        }
+        let table = LuminousIntensityDistribution::axial(vec![0.0, 60.0, 120.0, 180.0], vec![90.0, 300.0, 200.0, 50.0]);
+        for _ in 0..2 {
+            let at_m = place(DVec3::splat(0.2), size_m - 0.2);
+            scene.luminaires.push(luminaire(table.clone().unwrap(), LuminousOpening::Point, at_m));
+        }
+        let meters: Vec<Meter> = (0..6)
+            .map(|j| {
+                let near = if j % 3 == 0 { 1e-3 } else { 0.1 };
+                let position_m = place(DVec3::splat(near), size_m - near);
+                let position_m = if j % 3 == 0 { position_m.with_z(near) } else { position_m };
+                Meter { position_m, normal: (place(DVec3::NEG_ONE, DVec3::ONE)).normalize() }
+            })
+            .collect();
+        let holds = |b: &Obstacle, p: DVec3| match b.shape {
+            Shape::Box { min_m, max_m } => p.cmpge(min_m).all() && p.cmple(max_m).all(),
+            Shape::Mesh { .. } => false,
+        };
+        let lamps = scene.luminaires.iter().map(|lamp| lamp.position_m);
+        let places: Vec<DVec3> = lamps.chain(meters.iter().map(|meter| meter.position_m)).collect();
+        let is_inside = scene.obstacles.iter().any(|b| places.iter().any(|p| holds(b, *p)));
+        let Some(once) = OnceReflected::new(&scene).filter(|_| !is_inside) else { continue };
+        rooms += 1;
+        let exact = once.illuminance(&meters, 1e-6, &Stop::NEVER);
+        let mut enclosure = Enclosure::new(&scene).unwrap();
+        let direct = vec![Bounded::NONE; meters.len()];
+        let once = Bounces::AtMost(1);
+        let (found, text) = enclosure.indirect(&meters, once, &direct, &accuracy(5e-3), &Stop::NEVER).unwrap();
+        assert!(text.contains("balanced"), "{k}: {text}");
+        scene.obstacles.clear();
+        let bare = Transport::Indirect(once);
+        let bare = illuminance(&scene, &meters, bare, &accuracy(1e-3)).unwrap().estimates;
+        let all = found.iter().zip(&exact).zip(bare);
+        // A hair off a surface the integral itself comes to no end, and says so.
+        for ((found, exact), bare) in all.filter(|((_, exact), _)| exact.bound <= 1e-3 * exact.value) {
+            let off = (found.value - exact.value).abs();
+            assert!(off <= found.bound + exact.bound, "{k}: {found:?} for {exact:?}");
+            narrow += u32::from(found.bound <= 5e-3 * found.value);
+            shaded += u32::from((bare.illuminance.value() - exact.value).abs() > 0.05 * exact.value);
+        }
+    }
+    assert!(rooms >= 5 && shaded >= 12 && narrow >= 4 * rooms, "{shaded}, {narrow} in {rooms} rooms");
 }

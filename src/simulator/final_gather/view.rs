@@ -492,8 +492,7 @@ impl<'a> Shown<'a> {
                 }
             }
         } else if depth == DEEPEST {
-            let corners = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y].map(|t| corner_m + t * size_m);
-            self.add(middle_m, self.stand.factor(&corners), sums);
+            self.add(middle_m, self.stand.factor(&corners(corner_m, size_m)), sums);
         } else {
             // The longer side is halved first, so that parts become square.
             let long = size_m.cmpge(DVec2::splat(0.6 * size_m.max_element()));
