@@ -52,7 +52,7 @@ fn an_unknown_key_is_answered_with_the_nearest_one() {
 
 #[test]
 fn broken_yaml_is_placed() {
-    refused("size_m: [6, 4, 3]", "size_m: [6, 4, [3]", "spec.yaml:4:18", "expected f64");
+    refused("size_m: [6, 4, 3]", "size_m: [6, 4, [3]", "spec.yaml:4:18", "expected a number");
     refused("meters:\n", "meters: }\n", "spec.yaml:8:9", "did not find");
 }
 

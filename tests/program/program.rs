@@ -16,6 +16,7 @@ mod guide;
 mod hunt;
 mod main_job;
 mod measuring;
+mod mistakes;
 mod mesh_files;
 mod negative_controls;
 mod planning;

@@ -19,18 +19,19 @@
 mod case;
 pub mod jobs;
 mod observer;
+mod preflight;
 mod repetition;
 mod sampling;
 pub mod sequential;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use sha2::{Digest, Sha256};
-
+use itertools::Itertools;
 use parking_lot::Mutex;
+use sha2::{Digest, Sha256};
 
 use crate::diagnosis::{self, Examined};
 use crate::engines::Site;
@@ -41,7 +42,7 @@ use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping
 use crate::procedures::Task;
 use crate::record::Status;
 use crate::report::{self, Exit, Report, SpecRecord};
-use crate::spec::{Case, SpecError, Trust, filtered, suite};
+use crate::spec::{Case, Faults, SpecError, Trust, doubts};
 use crate::system::claim::{Claim, ClaimError};
 use crate::system::digest::hexadecimal;
 use crate::system::files::{Care, FileError};
@@ -51,6 +52,7 @@ use crate::system::slots::side_by_side;
 pub use crate::judge::Sampling;
 use case::{Audit, Stop};
 pub use observer::{Observer, Silent};
+pub use preflight::chosen;
 
 pub struct Options<'a> {
     pub site: Site,
@@ -151,13 +153,17 @@ impl Options<'_> {
 #[derive(Debug, thiserror::Error)]
 pub enum AuditError {
     #[error(transparent)]
-    Spec(#[from] SpecError),
-    #[error(transparent)]
-    Published(#[from] PublishedError),
+    Spec(#[from] Faults),
     #[error(transparent)]
     File(#[from] FileError),
     #[error(transparent)]
     Claim(#[from] ClaimError),
+}
+
+impl From<SpecError> for AuditError {
+    fn from(fault: SpecError) -> Self {
+        Self::Spec(fault.into())
+    }
 }
 
 /// More cases at a time would only wait for the machine's slots, each on threads of its own.
@@ -172,6 +178,7 @@ pub fn run(specs: &[PathBuf], options: &Options<'_>) -> Result<Report, AuditErro
 /// The same; as long as the claim is kept the folder is the caller's.
 pub fn run_and_hold(specs: &[PathBuf], options: &Options<'_>) -> Result<(Report, Claim), AuditError> {
     let (mut cases, mut policies) = chosen(specs, options)?;
+    cases.iter().for_each(|case| options.observer.doubted(&doubts(case)));
     let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
     let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
     let spec = subject(specs, &cases);
@@ -205,7 +212,7 @@ pub fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<Report, Aud
             let (cases, policies) = chosen(&[path.to_owned()], options)?;
             (cases, common(&policies)?)
         }
-        None => (vec![Case::default()], Arc::new(options.policy.read(options.policy.file.as_deref(), Trust::Own)?)),
+        None => (vec![Case::default()], Arc::new(options.policy.read(options.policy.file.as_deref(), Trust::Own, &BTreeSet::new())?)),
     };
     let known = Planner::new(&options.selection, &options.site, options.skipping).examinations(&of)?;
     let (cases, plans): (Vec<_>, Vec<_>) = known.into_iter().unzip();
@@ -316,23 +323,15 @@ fn diagnose(plans: &[Plan], reports: &mut [Report]) {
     diagnosis::diagnose(&mut cases);
 }
 
-/// The cases that are asked for, under the profile chosen, each with its policy; all read and checked before any engine starts.
-pub fn chosen(specs: &[PathBuf], options: &Options<'_>) -> Result<(Vec<Case>, Vec<Arc<Policy>>), SpecError> {
-    let mut cases = suite(specs, options.trust).and_then(|all| filtered(all, &options.filter))?;
-    // Of a suite, the cases that the chosen procedures concern; a choice that concerns none is refused by the planner.
-    if cases.iter().any(|case| options.selection.concerns(case)) {
-        cases.retain(|case| options.selection.concerns(case));
-    }
-    let policies = options.policy.of_cases(&cases)?;
-    for (case, policy) in cases.iter_mut().zip(&policies) {
-        case.budget = policy.profile.budget.over(case.budget);
-    }
-    Ok((cases, policies))
-}
-
-/// The published tables of each case.
-pub fn published(cases: &[Case]) -> Result<Vec<Option<Published>>, PublishedError> {
-    cases.iter().map(|case| case.published.as_deref().map(Published::read).transpose()).collect()
+/// The published tables of each case, or all that is wrong with them.
+fn published(cases: &[Case]) -> Result<Vec<Option<Published>>, Faults> {
+    let fault = |path: &Path, error: PublishedError| SpecError::of(path, error.message, "correct the table, or leave `published` out");
+    let read = |case: &Case| {
+        let path = case.published.as_deref();
+        path.map(|path| Published::read(path).map_err(|error| fault(path, error))).transpose()
+    };
+    let (sound, wrong): (Vec<_>, Vec<_>) = cases.iter().map(read).partition_result();
+    Faults::of(wrong).map_or(Ok(sound), Err)
 }
 
 /// What of the published files stands for nothing in all cases that are held against each.

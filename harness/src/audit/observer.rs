@@ -5,10 +5,12 @@ use std::time::Duration;
 use crate::engines::Engine;
 use crate::plan::Plan;
 use crate::record::ProcedureId;
-use crate::spec::Case;
+use crate::spec::{Case, SpecError};
 
 /// Told of what happens in an audit; nothing is asked of it.
 pub trait Observer: Sync {
+    /// What is allowed in a case and hardly meant.
+    fn doubted(&self, _doubts: &[SpecError]) {}
     /// All cases are planned; their plans lie beside them.
     fn planned(&self, _cases: &[Case], _plans: &[Plan]) {}
     fn started(&self, _case: &Case, _engine: &dyn Engine, _what: &str) {}

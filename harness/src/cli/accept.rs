@@ -26,12 +26,8 @@ pub(super) struct AcceptArgs {
     reason: Option<String>,
 }
 
-pub(super) fn read_run(run: &Path) -> Result<Report, Diagnostic> {
-    if run.is_dir() { read_report(&run.join("report.json")) } else { read_report(run) }
-}
-
 pub(super) fn accept(args: &AcceptArgs) -> Result<Exit, Diagnostic> {
-    let report = read_run(&args.run)?;
+    let report = read_report(&args.run)?;
     let path = Baseline::place(args.baseline.as_deref().unwrap_or(Path::new("baselines")), &report.spec);
     let Kept { mut baseline, is_refused } = kept(&path, &report)?;
     let mut candidates = Baseline::candidate(&report).entries;

@@ -6,27 +6,33 @@ use std::fmt::Write;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::Selected;
-use super::diagnostic::diagnose;
+use super::diagnostic::{diagnose, warn};
 use super::print;
-use crate::audit;
+use super::run::out_folder;
+use crate::audit::{self, Options};
 use crate::engines::Site;
 use crate::judge::PolicyRecord;
 use crate::plan::{Asked, Planner, cost_s};
 use crate::record::EngineName;
 use crate::report::Exit;
-use crate::spec::{Trust, filtered, suite};
+use crate::spec::{Trust, doubts};
 
 pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
-    let mut cases = suite(&selected.specs, trust).and_then(|all| filtered(all, &selected.filter)).map_err(diagnose)?;
-    let policies = selected.policy.of_cases(&cases).map_err(diagnose)?;
-    audit::published(&cases).into_diagnostic()?;
+    let selection = selected.selection();
+    let options = Options {
+        selection: selection.clone(),
+        filter: selected.filter.clone(),
+        trust,
+        policy: selected.policy.clone(),
+        ..Options::new(site.clone(), out_folder(selected))
+    };
+    let (cases, policies) = audit::chosen(&selected.specs, &options).map_err(diagnose)?;
+    cases.iter().for_each(|case| warn(&doubts(case)));
     let mut out = String::new();
     let mut exit = Exit::Passed;
-    let selection = selected.selection();
     let mut planned: BTreeMap<&PolicyRecord, BTreeSet<EngineName>> = BTreeMap::new();
     let mut planner = Planner::new(&selection, site, selected.skipping());
-    for (case, policy) in cases.iter_mut().zip(&policies) {
-        case.budget = policy.profile.budget.over(case.budget);
+    for (case, policy) in cases.iter().zip(&policies) {
         let plan = planner.plan(case).map_err(diagnose)?;
         writeln!(out, "{} ({}): {}", case.name, case.path.display(), case.title).into_diagnostic()?;
         for task in &plan.tasks {

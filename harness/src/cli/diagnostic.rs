@@ -1,32 +1,109 @@
-//! Errors for people: the message with the line it is about, underlined.
+//! Errors for people: each message with the line that it is about, underlined; of several every one, by file and place.
 
-use miette::{LabeledSpan, NamedSource, Report, Severity, SourceSpan};
+use std::fmt;
 
+use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode, SourceSpan};
+
+use super::complain;
 use crate::audit::AuditError;
-use crate::spec::SpecError;
+use crate::spec::{Faults, SpecError};
 use crate::system::files::{MAX_BYTES, read_bounded};
 
-pub(crate) fn diagnose(error: SpecError) -> Report {
-    let name = error.file.display().to_string();
-    let bytes = error.line.and_then(|_| read_bounded(&error.file, MAX_BYTES).ok());
-    let text = bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-    // What no terminal shows says nothing, and the printer cannot lay it out.
-    let text = text.filter(|text| text.lines().all(|line| line.len() <= MAX_LINE));
-    let span = text.as_ref().and_then(|t| span(t, error.line?, error.column.unwrap_or(1)));
-    let place = match (error.line, error.column) {
-        (Some(line), Some(column)) => format!("{name}:{line}:{column}"),
-        (Some(line), None) => format!("{name}:{line}"),
-        _ => name.clone(),
-    };
-    let mut diagnostic =
-        miette::MietteDiagnostic::new(format!("{place}: {}", shortened(&error.message))).with_severity(Severity::Error);
-    diagnostic.help = error.help.map(|help| shortened(&help));
-    match (text, span) {
-        (Some(text), Some(span)) => {
-            let diagnostic = diagnostic.with_label(LabeledSpan::new_with_span(Some("here".to_owned()), span));
-            Report::new(diagnostic).with_source_code(NamedSource::new(name, text))
+/// One fault as it is drawn.
+#[derive(Debug)]
+struct Fault {
+    message: String,
+    help: Option<String>,
+    severity: Severity,
+    shown: Option<(NamedSource<String>, SourceSpan)>,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Fault {}
+
+impl Diagnostic for Fault {
+    fn severity(&self) -> Option<Severity> {
+        Some(self.severity)
+    }
+
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.shown.as_ref().map(|(text, _)| text as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let (_, span) = self.shown.as_ref()?;
+        Some(Box::new(std::iter::once(LabeledSpan::new_with_span(Some("here".to_owned()), *span))))
+    }
+}
+
+/// Several, each drawn by itself.
+#[derive(Debug)]
+struct Several(Vec<Fault>);
+
+impl fmt::Display for Several {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} faults", self.0.len())
+    }
+}
+
+impl std::error::Error for Several {}
+
+impl Diagnostic for Several {
+    fn severity(&self) -> Option<Severity> {
+        Some(Severity::Error)
+    }
+
+    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
+        Some(Box::new(self.0.iter().map(|fault| fault as &dyn Diagnostic)))
+    }
+}
+
+pub(crate) fn diagnose(faults: impl Into<Faults>) -> Report {
+    let faults = faults.into();
+    let mut drawn: Vec<Fault> = faults.all().iter().map(|fault| Fault::of(fault, Severity::Error)).collect();
+    match drawn.pop() {
+        Some(one) if drawn.is_empty() => Report::new(one),
+        last => {
+            drawn.extend(last);
+            Report::new(Several(drawn))
         }
-        _ => Report::new(diagnostic),
+    }
+}
+
+/// What is hardly meant, told on standard error.
+pub(super) fn warn(doubts: &[SpecError]) {
+    for doubt in doubts {
+        complain(&format!("{:?}", Report::new(Fault::of(doubt, Severity::Warning))));
+    }
+}
+
+impl Fault {
+    fn of(error: &SpecError, severity: Severity) -> Self {
+        let name = error.file.display().to_string();
+        let bytes = error.line.and_then(|_| read_bounded(&error.file, MAX_BYTES).ok());
+        let text = bytes.map(|bytes| String::from_utf8_lossy(&bytes).trim_start_matches('\u{feff}').to_owned());
+        // What no terminal shows says nothing, and the printer cannot lay it out.
+        let text = text.filter(|text| text.lines().all(|line| line.len() <= MAX_LINE));
+        let place = match (error.line, error.column) {
+            (Some(line), Some(column)) => format!("{name}:{line}:{column}"),
+            (Some(line), None) => format!("{name}:{line}"),
+            _ => name.clone(),
+        };
+        let shown = text.and_then(|text| {
+            let span = span(&text, error.line?, error.column.unwrap_or(1))?;
+            Some((NamedSource::new(name, text), span))
+        });
+        let help = error.help.as_deref().filter(|help| !help.is_empty()).map(shortened);
+        Self { message: format!("{place}: {}", shortened(&error.message)), help, severity, shown }
     }
 }
 
@@ -52,7 +129,7 @@ fn span(text: &str, line: usize, column: usize) -> Option<SourceSpan> {
 
 pub(super) fn not_audited(error: AuditError) -> Report {
     match error {
-        AuditError::Spec(error) => diagnose(error),
+        AuditError::Spec(faults) => diagnose(faults),
         other => Report::from_err(other),
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use miette::Report as Diagnostic;
 
-use super::accept::read_run;
+use super::views::read_report;
 use super::{TextOrJson, json, print};
 use crate::record::ReadingKey;
 use crate::report::{BaselineCheck, BaselineLine, Exit};
@@ -23,7 +23,7 @@ pub(super) struct DiffArgs {
 }
 
 pub(super) fn diff(args: &DiffArgs) -> Result<Exit, Diagnostic> {
-    let [old, new] = [&args.old, &args.new].map(|run| read_run(run).map(|r| Baseline::candidate(&r)));
+    let [old, new] = [&args.old, &args.new].map(|run| read_report(run).map(|r| Baseline::candidate(&r)));
     let changes = compare(&old?.entries, &new?.entries, Comparability::SameSpec);
     print(&match args.format {
         TextOrJson::Terminal => text(&changes),

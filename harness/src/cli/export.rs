@@ -11,7 +11,7 @@ use crate::engines::Site;
 use crate::plan::{Export, NotExported, Selection, plan};
 use crate::record::ProcedureId;
 use crate::report::Exit;
-use crate::spec::{Case, Trust, suite};
+use crate::spec::{Case, SpecError, Trust, suite};
 
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {
@@ -46,7 +46,11 @@ pub(super) fn export(args: &ExportArgs, site: &Site, trust: Trust) -> Result<Exi
 fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Result<usize, Diagnostic> {
     let selection =
         Selection { engines: vec![args.engine.clone()], procedures: args.procedures.clone(), ..Selection::default() };
-    let plan = plan(case, &selection, site).map_err(diagnose)?;
+    let plan = plan(case, &selection, site).map_err(|fault| {
+        // Its option is called otherwise here.
+        let file = if fault.file == Path::new("--engines") { "--engine".into() } else { fault.file.clone() };
+        diagnose(SpecError { file, ..fault })
+    })?;
     let chosen = |e: usize| plan.engines[e].engine.name() == args.engine;
     let mut exported = 0;
     for e in (0..plan.engines.len()).filter(|e| chosen(*e)) {

@@ -48,7 +48,7 @@ pub(super) struct HuntArgs {
     #[arg(long, default_value_t = 3.0, value_name = "M")]
     shrink_minutes: f64,
     /// Threads or processes at a time [default: one a core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = super::at_least_one)]
     jobs: Option<usize>,
     /// Folder of the findings and of their list, index.md
     #[arg(long, value_name = "DIR", default_value = "luxproof-out/hunt")]
@@ -78,7 +78,7 @@ pub(super) struct ShrinkArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Threads or processes at a time [default: one a core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = super::at_least_one)]
     jobs: Option<usize>,
     /// Folder of the minimal spec [default: luxproof-out/shrink/<spec name>]
     #[arg(long, value_name = "DIR")]

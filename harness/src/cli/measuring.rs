@@ -26,7 +26,7 @@ pub(super) struct MeasuringArgs {
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     engines: Vec<String>,
     /// Threads or processes at a time [default: one a core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = super::at_least_one)]
     jobs: Option<usize>,
     /// Seed of every random choice
     #[arg(long, default_value_t = 1)]

@@ -130,6 +130,9 @@ struct Selected {
     /// Render everything, also what follows from other readings
     #[arg(long)]
     no_skips: bool,
+    /// Folder of the run's files [default: luxproof-out/<spec name>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     #[command(flatten)]
     policy: PolicyChoice,
 }
@@ -152,9 +155,6 @@ struct RunArgs {
     /// Install missing engines first
     #[arg(long)]
     install: bool,
-    /// Folder of the run's files [default: luxproof-out/<spec name>]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
     /// Hold the readings against a baseline of `luxproof accept`: a .json file, or a folder that holds one a spec
     #[arg(long, value_name = "FILE|DIR")]
     baseline: Option<PathBuf>,
@@ -164,7 +164,7 @@ struct RunArgs {
     #[arg(long)]
     fail_fast: bool,
     /// Threads or processes at a time [default: one a core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
     jobs: Option<usize>,
     /// Take every reading anew, and keep none
     #[arg(long)]
@@ -249,6 +249,15 @@ impl Cli {
 
     pub fn verbosity(&self) -> u8 {
         self.verbose
+    }
+}
+
+/// A number of things to do at a time.
+fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(0) => Err("nothing is done with none: give 1 or more, or leave the option out".to_owned()),
+        Ok(n) => Ok(n),
+        Err(error) => Err(error.to_string()),
     }
 }
 

@@ -11,7 +11,7 @@ use crate::audit::Observer;
 use crate::engines::Engine;
 use crate::plan::{Plan, Run};
 use crate::record::{EngineName, ProcedureId};
-use crate::spec::Case;
+use crate::spec::{Case, SpecError};
 
 pub(super) struct Progress {
     bar: ProgressBar,
@@ -78,6 +78,10 @@ fn programs(cases: &[Case], plans: &[Plan]) -> BTreeSet<String> {
 }
 
 impl Observer for Progress {
+    fn doubted(&self, doubts: &[SpecError]) {
+        self.bar.suspend(|| super::diagnostic::warn(doubts));
+    }
+
     fn planned(&self, cases: &[Case], plans: &[Plan]) {
         for program in programs(cases, plans) {
             self.line(&program);

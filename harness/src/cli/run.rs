@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
-use super::RunArgs;
-use super::complain;
+use super::{RunArgs, Selected, complain};
 use super::diagnostic::{diagnose, not_audited};
 use super::engines::report_installation;
 use super::progress::Progress;
@@ -35,7 +34,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> R
         after_failure: if args.fail_fast { AfterFailure::Stop } else { AfterFailure::GoOn },
         calibration: if args.no_calibration { Calibration::LeftOut } else { Calibration::Judged },
         observer: &progress,
-        ..Options::new(site.clone(), out_folder(args))
+        ..Options::new(site.clone(), out_folder(&args.selected))
     };
     if args.install {
         // Every spec is read and checked before anything is fetched.
@@ -101,8 +100,8 @@ impl Held {
 
 /// The folder of the run: by default that of the one spec or folder, or one for all where there are several. A spec whose namesake from
 /// elsewhere has its report there takes the name of its own folder besides.
-fn out_folder(args: &RunArgs) -> PathBuf {
-    let one = match &args.selected.specs[..] {
+pub(super) fn out_folder(selected: &Selected) -> PathBuf {
+    let one = match &selected.specs[..] {
         [one] if !one.display().to_string().contains('*') => Some(one),
         _ => None,
     };
@@ -118,7 +117,7 @@ fn out_folder(args: &RunArgs) -> PathBuf {
         Some(other) => other,
         None => usual.clone(),
     };
-    args.out.clone().unwrap_or_else(chosen)
+    selected.out.clone().unwrap_or_else(chosen)
 }
 
 /// Whether a spec of an earlier run is this one; whether one that is gone was is not known.

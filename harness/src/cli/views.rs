@@ -40,7 +40,7 @@ pub(super) enum Format {
 
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
-    /// report.json of a run
+    /// report.json of a run, or the run's folder
     result: PathBuf,
     /// Print the error budget of every deviation, and nothing else
     #[arg(long)]
@@ -88,11 +88,12 @@ fn keep_page(report: &Report, folder: &Path, beside: &[Beside]) -> String {
 }
 
 pub(super) fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
+    let file = report_file(&args.result);
     let report = read_report(&args.result)?;
     if args.budget {
         print(&report::budgets(&report))?;
     } else {
-        print_report(&report, args.result.parent().unwrap_or(Path::new("")), &args.views)?;
+        print_report(&report, file.parent().unwrap_or(Path::new("")), &args.views)?;
     }
     Ok(report.exit())
 }
@@ -102,7 +103,21 @@ fn read_text(file: &Path) -> Result<String, Diagnostic> {
     String::from_utf8(bytes).into_diagnostic().wrap_err_with(|| file.display().to_string())
 }
 
-pub(super) fn read_report(file: &Path) -> Result<Report, Diagnostic> {
+/// The report of a run that is named by its file or its folder.
+pub(super) fn report_file(of: &Path) -> PathBuf {
+    if of.is_dir() { of.join(report::FILE) } else { of.to_owned() }
+}
+
+pub(super) fn read_report(of: &Path) -> Result<Report, Diagnostic> {
+    let file = &report_file(of);
+    if of.is_dir() && !file.exists() {
+        return Err(miette::miette!(
+            help = "give the folder of a run, or its report.json",
+            "{} holds no {}",
+            of.display(),
+            report::FILE
+        ));
+    }
     let text = read_text(file)?;
     let read = Report::from_json(&text).map_err(|why| miette::miette!("{} {why}", file.display()))?;
     if let Some(doubt) = read.doubt {

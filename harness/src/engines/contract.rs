@@ -185,6 +185,20 @@ impl Job {
         }
     }
 
+    /// Settings alone, of whatever job: what is wrong with them does not depend on what is measured.
+    pub fn of_settings(budget: Budget, settings: BTreeMap<String, serde_json::Value>) -> Self {
+        Self {
+            case: String::new(),
+            procedure: ProcedureId::DirectIlluminance,
+            scene: Scene::default(),
+            stations: vec![],
+            transport: Transport::Direct,
+            budget,
+            seed: 1,
+            settings,
+        }
+    }
+
     /// The same whatever case and procedure are called.
     pub(super) fn without_names(&self) -> Self {
         Self { case: String::new(), procedure: ProcedureId::DirectIlluminance, ..self.clone() }

@@ -172,7 +172,7 @@ impl KnownDeviations {
     pub fn built_in() -> Result<Self, SpecError> {
         let source = Source::new(PathBuf::from("reference/known_deviations.yaml"), ON_RECORD.to_owned());
         let OurRecord { known_deviations: deviations, known_breaks: breaks } = source.parse()?;
-        check(&source, &deviations)?;
+        faults(&source, &deviations).into_iter().next().map_or(Ok(()), Err)?;
         let is_told = |b: &KnownBreak| !(b.cause.trim().is_empty() || b.source.trim().is_empty());
         source.require(breaks.iter().all(is_told), "known_breaks", "one lacks cause or source", "give both")?;
         let today = jiff::Timestamp::now().to_zoned(jiff::tz::TimeZone::UTC).date();
@@ -223,22 +223,26 @@ impl KnownDeviations {
     }
 }
 
-/// Refuses entries that claim nothing, or more than can be.
-pub(super) fn check(source: &Source, entries: &[KnownDeviation]) -> Result<(), SpecError> {
-    for (k, entry) in entries.iter().enumerate() {
+/// What of entries claims nothing, or more than can be.
+pub(super) fn faults(source: &Source, entries: &[KnownDeviation]) -> Vec<SpecError> {
+    let of_entry = |(k, entry): (usize, &KnownDeviation)| {
         let at = |field: &str| format!("known_deviations[{k}].{field}");
         let sound = entry.expected.is_finite() && entry.expected >= -1.0 && entry.expected != 0.0;
         let help = "give it relative to the reference: -0.012 is 1.2 % too little";
-        source.require(sound, &at("expected"), "this is no deviation", help)?;
+        let expected = source.require(sound, &at("expected"), "this is no deviation", help);
         let sound = entry.uncertainty >= 0.0 && entry.uncertainty < 0.5 * entry.expected.abs();
         let help =
             "give the standard uncertainty, less than half of the expected deviation: what may be none is not known";
-        source.require(sound, &at("uncertainty"), "this is no uncertainty of a known deviation", help)?;
-        for (field, text) in [("cause", &entry.cause), ("source", &entry.source)] {
-            source.require(!text.trim().is_empty(), &at(field), "this says nothing", "say why, and how it is known")?;
-        }
-    }
-    Ok(())
+        // Of what is no deviation no part is too much.
+        let sound = sound || expected.is_err();
+        let uncertainty =
+            source.require(sound, &at("uncertainty"), "this is no uncertainty of a known deviation", help);
+        let texts = [("cause", &entry.cause), ("source", &entry.source)].map(|(field, text)| {
+            source.require(!text.trim().is_empty(), &at(field), "this says nothing", "say why, and how it is known")
+        });
+        [expected, uncertainty].into_iter().chain(texts).filter_map(Result::err).collect::<Vec<_>>()
+    };
+    entries.iter().enumerate().flat_map(of_entry).collect()
 }
 
 impl KnownDeviation {

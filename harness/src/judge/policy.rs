@@ -2,7 +2,7 @@
 //!
 //! A policy decides verdicts and what a run must hold; no key of a kept reading knows of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -13,8 +13,9 @@ use sha2::{Digest, Sha256};
 
 use super::tolerance::{Rule, ToleranceClass};
 use super::{Judge, KnownDeviation, KnownDeviations, Published, Tolerances, known, tolerance};
+use crate::engines;
 use crate::record::EngineName;
-use crate::spec::{Budget, Case, Source, SpecError, Trust, suggestion};
+use crate::spec::{Budget, Case, Faults, Source, SpecError, Trust, misspelt, suggestion};
 use crate::system::digest::hexadecimal;
 
 /// The name of a project's policy, beside a spec or in a folder above it.
@@ -34,6 +35,27 @@ pub struct ProjectPolicy {
     pub known_deviations: Vec<KnownDeviation>,
     /// How runs differ by occasion; one is chosen by `--profile`.
     pub profiles: BTreeMap<String, Profile>,
+}
+
+impl ProjectPolicy {
+    /// Names of engines that are hardly any but those of ours, with a slip of the pen; others are programs of other specs.
+    fn misspelt(&self, source: &Source, declared: &BTreeSet<&str>) -> Vec<SpecError> {
+        let of_rule = |(k, rule): (usize, &Rule)| Some((format!("tolerances[{k}].engine"), rule.engine()?.clone()));
+        let of_entry = |(k, entry): (usize, &KnownDeviation)| (format!("known_deviations[{k}].engine"), entry.engine.clone());
+        let required = self.required_engines.iter().enumerate();
+        let named = required
+            .map(|(k, engine)| (format!("required_engines[{k}]"), engine.clone()))
+            .chain(self.tolerances.iter().enumerate().filter_map(of_rule))
+            .chain(self.known_deviations.iter().enumerate().map(of_entry));
+        let ours: Vec<EngineName> = engines::all().iter().map(|e| e.name()).collect();
+        let fault = |(at, name): (String, EngineName)| {
+            let plain = name.split('@').next().unwrap_or_default();
+            let is_known = declared.contains(plain) || ours.iter().any(|known| *known == *plain);
+            let meant = misspelt(plain, ours.iter().map(EngineName::as_str)).filter(|_| !is_known)?;
+            Some(source.error_at(&at, format!("there is no engine `{name}`"), format!("did you mean `{meant}`?")))
+        };
+        named.filter_map(fault).collect()
+    }
 }
 
 /// How runs of one occasion differ from what specs say.
@@ -95,51 +117,66 @@ pub struct PolicyChoice {
 
 impl PolicyChoice {
     /// The policy of each case; cases of one file share one.
-    pub fn of_cases(&self, cases: &[Case]) -> Result<Vec<Arc<Policy>>, SpecError> {
+    pub fn of_cases(&self, cases: &[Case]) -> Result<Vec<Arc<Policy>>, Faults> {
         let mut read: BTreeMap<Option<PathBuf>, Arc<Policy>> = BTreeMap::new();
-        let policy = |case: &Case| {
+        let (mut policies, mut faults) = (vec![], vec![]);
+        let mut refused: BTreeSet<Option<PathBuf>> = BTreeSet::new();
+        let declared: BTreeSet<&str> = cases.iter().flat_map(|c| c.engines.iter().flat_map(|e| e.keys().map(String::as_str))).collect();
+        for case in cases {
             let file = self.file.clone().or_else(|| nearest(&case.path));
             if let Some(policy) = read.get(&file) {
-                return Ok(Arc::clone(policy));
+                policies.push(Arc::clone(policy));
+                continue;
             }
             // A file that the user named is the user's own.
             let trust = if self.file.is_some() { Trust::Own } else { case.source.trust };
-            let policy = Arc::new(self.read(file.as_deref(), trust)?);
-            read.insert(file, Arc::clone(&policy));
-            Ok(policy)
-        };
-        cases.iter().map(policy).collect()
+            match self.read(file.as_deref(), trust, &declared) {
+                Ok(policy) => {
+                    let policy = Arc::new(policy);
+                    read.insert(file, Arc::clone(&policy));
+                    policies.push(policy);
+                }
+                Err(of_file) if refused.insert(file) => faults.extend(of_file.all().iter().cloned()),
+                Err(_) => {}
+            }
+        }
+        Faults::of(faults).map_or(Ok(policies), Err)
     }
 
-    /// Ours, with that of a file where there is one.
-    pub fn read(&self, file: Option<&Path>, trust: Trust) -> Result<Policy, SpecError> {
+    /// Ours, with that of a file where there is one; `declared` are engines that specs bring with them.
+    pub fn read(&self, file: Option<&Path>, trust: Trust, declared: &BTreeSet<&str>) -> Result<Policy, Faults> {
         let Some(file) = file else {
             let help = format!("write a {POLICY_FILE} beside the spec, or name one with --policy");
             if let Some(name) = &self.profile {
-                return Err(SpecError::of("--profile", format!("no policy has a profile `{name}`"), help));
+                return Err(SpecError::of("--profile", format!("no policy has a profile `{name}`"), help).into());
             }
             let policy = Policy::built_in()?;
             let class = self.tolerance_class.unwrap_or_default();
             return Ok(Policy { tolerances: policy.tolerances.of_class(class), ..policy });
         };
         let source = Source::read(file, trust)?;
-        let project: ProjectPolicy = source.parse()?;
-        tolerance::check(&source, &project.tolerances)?;
-        known::check(&source, &project.known_deviations)?;
+        let project: ProjectPolicy = source.parse_whole()?;
+        let mut faults = tolerance::faults(&source, &project.tolerances);
+        faults.extend(known::faults(&source, &project.known_deviations));
+        faults.extend(project.misspelt(&source, declared));
         for (name, ProfileBudget { relative_error, seconds }) in project.profiles.iter().map(|(n, p)| (n, p.budget)) {
             for (field, value) in [("relative_error", relative_error), ("seconds", seconds)] {
                 let (at, sound) =
                     (format!("profiles.{name}.budget.{field}"), value.is_none_or(|v| v.is_finite() && v > 0.0));
-                source.require(sound, &at, "this is no budget", "give a positive number")?;
+                faults.extend(source.require(sound, &at, "this is no budget", "give a positive number").err());
             }
         }
-        let profile = match &self.profile {
-            None => Profile::default(),
-            Some(name) => *project.profiles.get(name).ok_or_else(|| {
+        let profile = self.profile.as_ref().map(|name| {
+            project.profiles.get(name).copied().ok_or_else(|| {
                 let help = suggestion(name, project.profiles.keys().map(String::as_str));
                 source.error_at("profiles", format!("there is no profile `{name}`"), help)
-            })?,
-        };
+            })
+        });
+        faults.extend(profile.iter().filter_map(|p| p.as_ref().err()).cloned());
+        if let Some(faults) = Faults::of(faults) {
+            return Err(faults);
+        }
+        let profile = profile.and_then(Result::ok).unwrap_or_default();
         let here = std::env::current_dir().unwrap_or_default();
         let shown = file.strip_prefix(here).unwrap_or(file).display().to_string();
         let class = self.tolerance_class.or(profile.tolerance_class).or(project.tolerance_class).unwrap_or_default();
@@ -213,7 +250,7 @@ profiles: {ci: {budget: {relative_error: 0.005}, sampling: decided}, audit: {}}
 ";
 
     /// A policy in a folder, below which a spec lies.
-    fn read(text: &str, profile: Option<&str>) -> Result<Policy, SpecError> {
+    fn read(text: &str, profile: Option<&str>) -> Result<Policy, Faults> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("specs")).unwrap();
         std::fs::write(folder.path().join(POLICY_FILE), text).unwrap();
@@ -256,7 +293,7 @@ profiles: {ci: {budget: {relative_error: 0.005}, sampling: decided}, audit: {}}
             ("sampling: decided", "sampling: quick", 6, "unknown variant"),
         ] {
             assert!(FILE.contains(right), "{right}");
-            let error = read(&FILE.replacen(right, wrong, 1), None).unwrap_err();
+            let error = read(&FILE.replacen(right, wrong, 1), None).unwrap_err().first();
             assert!(error.line == Some(line) && error.to_string().contains(says), "{wrong}: {error}");
         }
         let error = read(FILE, Some("audi")).unwrap_err();

@@ -129,27 +129,34 @@ struct NotClaimed {
     source: String,
 }
 
-/// Refuses rules that are no numbers or have no source.
-pub(super) fn check(source: &Source, rules: &[Rule]) -> Result<(), SpecError> {
-    for (k, rule) in rules.iter().enumerate() {
+/// What of rules is no number or has no source.
+pub(super) fn faults(source: &Source, rules: &[Rule]) -> Vec<SpecError> {
+    let of_rule = |(k, rule): (usize, &Rule)| {
         let at = |field: &str| format!("tolerances[{k}].{field}");
-        for (field, value) in
-            [("relative", rule.relative), ("absolute_lx", rule.absolute_lx), ("absolute_cd", rule.absolute_cd)]
-        {
+        let values =
+            [("relative", rule.relative), ("absolute_lx", rule.absolute_lx), ("absolute_cd", rule.absolute_cd)];
+        let of_values = values.map(|(field, value)| {
             let sound = value.is_finite() && value >= 0.0;
-            source.require(sound, &at(field), "a tolerance is a number from 0", "give a positive number")?;
-        }
+            source.require(sound, &at(field), "a tolerance is a number from 0", "give a positive number")
+        });
         let help = "say which standard, paper or decision it is from";
-        source.require(!rule.source.trim().is_empty(), &at("source"), "the tolerance has no source", help)?;
+        let of_source = source.require(!rule.source.trim().is_empty(), &at("source"), "the tolerance has no source", help);
+        of_values.into_iter().chain([of_source]).filter_map(Result::err).collect::<Vec<_>>()
+    };
+    rules.iter().enumerate().flat_map(of_rule).collect()
+}
+
+impl Rule {
+    pub(super) const fn engine(&self) -> Option<&EngineName> {
+        self.engine.as_ref()
     }
-    Ok(())
 }
 
 impl Tolerances {
     pub fn built_in() -> Result<Self, SpecError> {
         let source = Source::new(PathBuf::from("reference/tolerances.yaml"), DEFAULTS.to_owned());
         let all: Self = source.parse()?;
-        check(&source, &all.rules)?;
+        faults(&source, &all.rules).into_iter().next().map_or(Ok(()), Err)?;
         let factor = &all.coverage_factor;
         let sound = factor.value.is_finite() && factor.value > 0.0 && !factor.source.trim().is_empty();
         source.require(sound, "coverage_factor", "no factor", "give a positive value and a source")?;

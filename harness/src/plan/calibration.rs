@@ -47,9 +47,8 @@ impl Planner<'_> {
     /// All of them, for the engines of cases.
     pub fn examinations(&mut self, cases: &[Case]) -> Result<Vec<(Case, Plan)>, SpecError> {
         let mut subjects = vec![];
-        let scenes = known::tasks();
         for case in cases {
-            scenes.iter().try_for_each(|scene| self.roster.check_settings(case, scene))?;
+            self.roster.check_settings(case)?;
             let chosen = self.roster.chosen(case, self.selection)?;
             for chosen in chosen.into_iter().filter(|(_, asked)| *asked != Asked::AsReference) {
                 let key = (chosen.0.name(), None, case.settings_of(&chosen.0.name()));

@@ -187,6 +187,12 @@ pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, Spe
     Planner::new(selection, site, Skipping::Allowed).plan(case)
 }
 
+/// All that is wrong with what cases and a command line say of engines; nothing is started.
+pub fn faults(cases: &[Case], selection: &Selection) -> Vec<SpecError> {
+    let mut roster = Roster::new();
+    cases.iter().flat_map(|case| roster.faults(case, selection)).collect()
+}
+
 /// Whether readings may be left out that follow from others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Skipping {
@@ -213,7 +219,7 @@ impl<'a> Planner<'a> {
 
     pub fn plan(&mut self, case: &Case) -> Result<Plan, SpecError> {
         let tasks = tasks(case, self.selection)?;
-        self.roster.check_settings(case, &tasks[0])?;
+        self.roster.check_settings(case)?;
         let chosen = self.roster.chosen(case, self.selection)?;
         for told in self.roster.shared_with_nobody(case, &tasks) {
             if !self.told.contains(&told) {

@@ -9,7 +9,7 @@ use itertools::Itertools;
 use super::{Asked, Selection};
 use crate::engines::{self, Absent, Engine, EngineError, Job, Site, Version};
 use crate::procedures::Task;
-use crate::spec::{Case, EngineSettings, SpecError, suggestion};
+use crate::spec::{Case, EngineSettings, SpecError, Spot, suggestion};
 use crate::system::slots::side_by_side;
 
 /// An engine and why it takes part.
@@ -31,25 +31,42 @@ impl Roster {
         Self { ours, externals: vec![], probed: vec![] }
     }
 
-    /// The engines of a case, in the order of reports.
-    pub(super) fn chosen(&mut self, case: &Case, selection: &Selection) -> Result<Vec<Chosen>, SpecError> {
-        let mut all = self.ours.clone();
+    /// All that is wrong with what a case says of engines, and with the names of engines that were chosen; nothing is started.
+    pub(super) fn faults(&mut self, case: &Case, selection: &Selection) -> Vec<SpecError> {
+        let (all, mut faults) = self.of_case(case);
+        faults.extend(self.faults_of_settings(case));
+        faults.extend(unknown_choices(&all, selection));
+        faults
+    }
+
+    /// Ours and those of a case, and what is wrong with the latter.
+    fn of_case(&mut self, case: &Case) -> (Vec<Arc<dyn Engine>>, Vec<SpecError>) {
+        let (mut all, mut faults) = (self.ours.clone(), vec![]);
         let built_in = names(&all);
         for (name, settings) in case.engines.iter().flatten().filter(|(name, _)| !built_in.contains(*name)) {
+            let at = format!("engines.{name}");
             if !settings.0.contains_key("command") {
-                let place = case.source.error_at(&format!("engines.{name}"), "", "");
                 let (message, known) = unknown(name, &built_in);
-                let help = Some(format!("{known} A program of your own needs `command: [...]`"));
-                return Err(SpecError { message, help, ..place });
+                let help = format!("{known} A program of your own needs `command: [...]`");
+                faults.push(case.source.error_at_spot(Spot::Key, &at, message, help));
+                continue;
             }
             let folder = case.path.parent().unwrap_or(Path::new(""));
             let help = || "give `command: [program, arguments...]`, paths relative to the spec".to_owned();
-            all.push(self.external(name, settings, folder).map_err(|error| misset(case, name, error, help))?);
+            match self.external(name, settings, folder) {
+                Ok(engine) => all.push(engine),
+                Err(error) => faults.push(misset(case, name, error, help)),
+            }
         }
-        let ids = names(&all);
-        if let Some(name) = selection.engines.iter().find(|name| !ids.contains(*name)) {
-            let (message, known) = unknown(name, &ids);
-            return Err(SpecError::of("--engines", message, known));
+        (all, faults)
+    }
+
+    /// The engines of a case, in the order of reports.
+    pub(super) fn chosen(&mut self, case: &Case, selection: &Selection) -> Result<Vec<Chosen>, SpecError> {
+        let (all, mut faults) = self.of_case(case);
+        faults.extend(unknown_choices(&all, selection));
+        if let Some(fault) = faults.into_iter().next() {
+            return Err(fault);
         }
         let asked = |engine: &dyn Engine| {
             let id = engine.name();
@@ -70,7 +87,13 @@ impl Roster {
     }
 
     /// Refuses settings of our own engines that they do not know, whichever of them take part.
-    pub(super) fn check_settings(&self, case: &Case, task: &Task) -> Result<(), SpecError> {
+    pub(super) fn check_settings(&self, case: &Case) -> Result<(), SpecError> {
+        self.faults_of_settings(case).into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Settings tell their faults one by one: each key is looked at as if it stood there alone, and all of them together.
+    fn faults_of_settings(&self, case: &Case) -> Vec<SpecError> {
+        let mut faults = vec![];
         for engine in &self.ours {
             let name = engine.name();
             let settings = case.settings_of(name.as_str());
@@ -83,10 +106,18 @@ impl Roster {
                 }
                 format!("settings of {name}: {known}")
             };
-            let job = Job { settings, ..Job::of_task(case, task) };
-            engine.check_settings(&job).map_err(|error| misset(case, name.as_str(), error, help))?;
+            let check = |settings| {
+                let job = Job::of_settings(case.budget, settings);
+                engine.check_settings(&job).err().map(|error| misset(case, name.as_str(), error, help))
+            };
+            let one_by_one = settings.iter().filter_map(|(key, value)| check([(key.clone(), value.clone())].into()));
+            let mut found: Vec<SpecError> = one_by_one.collect();
+            if found.is_empty() || is_program {
+                found = check(settings.clone()).into_iter().collect();
+            }
+            faults.extend(found);
         }
-        Ok(())
+        faults
     }
 
     /// A sentence for each name in the `shares` of a program of a user's that no other engine of the case is or has: it ties nobody.
@@ -148,6 +179,17 @@ impl Roster {
         self.probed.extend(fresh);
         found
     }
+}
+
+/// Names of engines on the command line that no engine has.
+fn unknown_choices(all: &[Arc<dyn Engine>], selection: &Selection) -> Vec<SpecError> {
+    let ids = names(all);
+    let strange = selection.engines.iter().filter(|name| !ids.contains(*name));
+    let fault = |name: &String| {
+        let (message, known) = unknown(name, &ids);
+        SpecError::of("--engines", message, known)
+    };
+    strange.map(fault).collect()
 }
 
 /// An error in the settings of an engine, at its place in the spec.

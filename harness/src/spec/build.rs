@@ -1,34 +1,28 @@
 //! Spec -> Case: reads the files that a spec names, checks what the shape alone cannot, and builds the scene.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use glam::DVec3;
-use luminaire::geometry::{Mesh, Room};
-use luminaire::photometry::{self, Photometry};
-use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, flush, orientation};
+use luminaire::geometry::Room;
+use luminaire::scene::{Meter, Scene};
 use sha2::{Digest, Sha256};
 
-use super::cases::Variant;
-use super::model::{
-    Budget, EngineSettings, GridSpec, LuminaireSpec, MeterSet, ModelSpec, ObstacleSpec, Spec, ToleranceOverride,
-};
-use super::mounting::unmountable;
+use super::cases::{Variants, variants};
+use super::faults::MAX_FAULTS;
+use super::model::{Budget, EngineSettings, Spec, ToleranceOverride};
+use super::shape::{Mended, Shaped, Trials, shaped};
+use super::tree::tree;
 use super::trust::Limits;
-use super::{Source, SpecError, Trust, suggestion};
-use crate::procedures::{Angles, Asked, AtAngles, Names, Procedures, Task};
+use super::{Faults, Source, SpecError, Trust};
+use crate::procedures::{Procedures, Task};
 use crate::record::ProcedureId;
 use crate::system::digest::hexadecimal;
 use crate::system::printable;
 
-/// Nearest a meter or a luminaire may come to a surface, relative to the room's largest extent.
-///
-/// On the surface itself a renderer's answer depends on rounding, and so would ours.
-const SURFACE_MARGIN: f64 = 1e-9;
-
-/// No luminaire is so bright: the sun itself has some 3e27 cd. What is made of it stays a number below this.
-const BRIGHTEST_CD: f64 = 1e30;
+mod asked;
+mod bodies;
+mod meters;
 
 /// More meters than this are a slip of the pen.
 const MAX_METERS: usize = 1_000_000;
@@ -92,26 +86,62 @@ impl Case {
     pub fn load(path: &Path) -> Result<Self, SpecError> {
         let source = Source::read(path, Trust::Own)?;
         let spec: Spec = source.parse()?;
-        Builder::new(&source, &mut source.trust.limits()).build(spec)
+        let built = Builder::new(&source, &Mended::default(), &mut source.trust.limits()).build(spec);
+        Faults::of(built.faults).map_or(Ok(built.case), |faults| Err(faults.first()))
     }
 
     /// All cases of a spec file: those of its `cases`, or the one that it is.
-    pub fn load_all(path: &Path, trust: Trust) -> Result<Vec<Self>, SpecError> {
-        let source = Source::read(path, trust)?;
-        let spec: Spec = source.parse()?;
-        let variants = super::cases::variants(&source)?;
-        let mut left = trust.limits();
-        if variants.is_empty() {
-            return Ok(vec![Builder::new(&source, &mut left).build(spec)?]);
-        }
-        let build = |v: Variant| {
-            let mut builder = Builder::new(&v.source, &mut left);
-            builder.hash.update(&v.name);
-            let case = builder.build(v.spec)?;
-            Ok(Self { name: format!("{}/{}", case.name, v.name), only_engines: v.engines, ..case })
-        };
-        variants.into_iter().map(build).collect()
+    pub fn load_all(path: &Path, trust: Trust) -> Result<Vec<Self>, Faults> {
+        let Loaded { cases, faults } = Loaded::of(path, trust);
+        Faults::of(faults).map_or(Ok(cases), Err)
     }
+}
+
+/// The cases of a spec file as far as they can be made, and all that is wrong with it.
+#[derive(Debug, Default)]
+pub(super) struct Loaded {
+    pub(super) cases: Vec<Case>,
+    pub(super) faults: Vec<SpecError>,
+}
+
+impl Loaded {
+    pub(super) fn of(path: &Path, trust: Trust) -> Self {
+        let source = match Source::read(path, trust) {
+            Ok(source) => source,
+            Err(fault) => return Self { cases: vec![], faults: vec![fault] },
+        };
+        let tree = tree(&source.text).ok();
+        let Shaped { read, mut faults, mended } = shaped::<Spec>(&source, tree.as_ref());
+        let Variants { all, faults: of_cases } =
+            tree.map(|tree| variants(&source, &tree, &faults)).unwrap_or_default();
+        let has_cases = !all.is_empty() || !of_cases.is_empty();
+        faults.extend(of_cases);
+        let (mut left, mut cases) = (trust.limits(), vec![]);
+        if let Some(spec) = read.filter(|_| !has_cases) {
+            let built = Builder::new(&source, &mended, &mut left).build(spec);
+            faults.extend(built.faults);
+            cases.push(built.case);
+        }
+        for v in all {
+            let mut builder = Builder::new(&v.source, &v.mended, &mut left);
+            builder.hash.update(&v.name);
+            let Built { case, faults: of_case } = builder.build(v.spec);
+            cases.push(Case { name: format!("{}/{}", case.name, v.name), only_engines: v.engines, ..case });
+            faults.extend(of_case);
+            // Another case would say the same, or what nobody waits for.
+            if faults.len() >= MAX_FAULTS {
+                break;
+            }
+        }
+        faults.truncate(MAX_FAULTS);
+        Self { cases, faults }
+    }
+}
+
+/// A case as far as it could be made, and why it is not whole.
+struct Built {
+    case: Case,
+    faults: Vec<SpecError>,
 }
 
 struct Builder<'a> {
@@ -120,53 +150,77 @@ struct Builder<'a> {
     hash: Sha256,
     /// What the cases of the file may still ask for.
     left: &'a mut Limits,
+    /// What nobody wrote is not judged.
+    mended: &'a Mended,
+    faults: Vec<SpecError>,
+    most: usize,
 }
 
 impl<'a> Builder<'a> {
-    fn new(source: &'a Source, left: &'a mut Limits) -> Self {
-        Self { source, folder: source.path.parent().unwrap_or(Path::new("")), hash: Sha256::new(), left }
+    fn new(source: &'a Source, mended: &'a Mended, left: &'a mut Limits) -> Self {
+        let folder = source.path.parent().unwrap_or(Path::new(""));
+        let most = Trials::of(&source.text).faults();
+        Self { source, folder, hash: Sha256::new(), left, mended, faults: vec![], most }
     }
 
-    /// Takes so many of what is left of something.
-    fn take(&mut self, at: &str, what: &str, count: usize, of: fn(&mut Limits) -> &mut usize) -> Result<(), SpecError> {
+    /// Notes what is wrong at a place, unless nobody wrote what stands there.
+    fn fault(&mut self, at: &str, fault: impl FnOnce(&Source) -> SpecError) {
+        if self.faults.len() < self.most && !self.mended.touches(at) {
+            self.faults.push(fault(self.source));
+        }
+    }
+
+    /// Notes a fault unless what stands at a place is sound; whether it is.
+    fn check(&mut self, sound: bool, at: &str, message: impl Into<String>, help: impl Into<String>) -> bool {
+        if !sound {
+            self.fault(at, |source| source.error_at(at, message, help));
+        }
+        sound
+    }
+
+    /// Takes so many of what is left of something; whether there are as many.
+    fn take(&mut self, at: &str, what: &str, count: usize, of: fn(&mut Limits) -> &mut usize) -> bool {
         let left = of(self.left);
         let (all, enough) = (*left, count <= *left);
         *left = left.saturating_sub(count);
         let message = format!("{count} {what} are more than the {all} that are left to a spec that is not trusted");
-        self.source.require(enough, at, message, "make several of it, or run it without --untrusted if it is yours")
+        self.check(enough, at, message, "make several of it, or run it without --untrusted if it is yours")
     }
 
-    fn build(mut self, spec: Spec) -> Result<Case, SpecError> {
+    fn build(mut self, spec: Spec) -> Built {
         self.hash.update(&self.source.text);
         let message = format!("format version {} is not known", spec.luxproof);
-        self.source.require(spec.luxproof == 1, "luxproof", message, "this program reads version 1")?;
-        self.programs(&spec)?;
-        self.take("luminaires", "luminaires", spec.luminaires.len(), |left| &mut left.luminaires)?;
-        let room = self.room(&spec)?;
-        let mut obstacles = self.obstacles(&spec.obstacles, &room)?;
-        let luminaires = self.luminaires(&spec.luminaires, &room)?;
-        obstacles.extend(self.recesses(&luminaires, &room)?);
-        let scene = Scene { room: Some(room), obstacles, luminaires };
+        self.check(spec.luxproof == 1, "luxproof", message, "this program reads version 1");
+        self.programs(&spec);
+        let is_few = self.take("luminaires", "luminaires", spec.luminaires.len(), |left| &mut left.luminaires);
+        let room = self.room(&spec);
+        let mut obstacles = self.obstacles(&spec.obstacles, room.as_ref());
+        let mut luminaires = vec![];
+        if is_few {
+            luminaires = self.luminaires(&spec.luminaires, room.as_ref());
+            obstacles.extend(room.iter().flat_map(|room| self.recesses(&luminaires, room)));
+        }
+        let luminaires = luminaires.into_iter().map(|(_, luminaire)| luminaire).collect();
+        let scene = Scene { room, obstacles, luminaires };
         let mut meters = BTreeMap::new();
         for (name, set) in &spec.meters {
-            self.name("meters", name)?;
-            let set = self.meter_set(name, set, &scene)?;
-            meters.insert(name.clone(), set);
+            self.name("meters", name);
+            meters.extend(self.meter_set(name, set, &scene).map(|set| (name.clone(), set)));
         }
         let seen = meters.values().map(Vec::len).sum::<usize>().saturating_mul(spec.luminaires.len().pow(2));
-        self.take("luminaires", "pairs of luminaires as meters see them", seen, |left| &mut left.sights)?;
-        self.procedures(&spec.procedures, &spec.luminaires, &meters)?;
-        self.budget(spec.budget)?;
-        let tolerances = self.tolerances(&spec.tolerances)?;
+        self.take("luminaires", "pairs of luminaires as meters see them", seen, |left| &mut left.sights);
+        self.procedures(&spec);
+        self.budget(spec.budget);
+        let tolerances = self.tolerances(&spec.tolerances);
         let published = spec.published.map(|file| self.beside(&file));
-        if let Some(file) = &published {
-            self.take_in("published", file)?;
+        if let Some(file) = published.as_ref().filter(|_| !self.mended.touches("published")) {
+            self.take_in("published", file);
         }
         let name = name_of(&self.source.path);
         let title = spec.title.as_deref().unwrap_or(&name);
         let help = format!("give a line of at most {MAX_TITLE} printable characters");
-        self.source.require(is_line(title, MAX_TITLE), "title", "this is no title", help)?;
-        Ok(Case {
+        self.check(is_line(title, MAX_TITLE), "title", "this is no title", help);
+        let case = Case {
             title: title.to_owned(),
             name,
             path: self.source.path.clone(),
@@ -180,273 +234,36 @@ impl<'a> Builder<'a> {
             published,
             tolerances,
             source: self.source.clone(),
-        })
+        };
+        Built { case, faults: self.faults }
     }
 
     /// Refuses programs that a stranger would have us run.
-    fn programs(&self, spec: &Spec) -> Result<(), SpecError> {
+    fn programs(&mut self, spec: &Spec) {
         let mut engines = spec.engines.iter().flatten();
-        let Some((name, _)) = engines.find(|(_, settings)| settings.0.contains_key("command")) else { return Ok(()) };
+        let Some((name, _)) = engines.find(|(_, settings)| settings.0.contains_key("command")) else { return };
         let message = "it would run a program, and the spec is not trusted";
         let help = "run it without --untrusted if it is yours";
-        self.source.require(self.source.trust == Trust::Own, &format!("engines.{name}.command"), message, help)
+        self.check(self.source.trust == Trust::Own, &format!("engines.{name}.command"), message, help);
     }
 
-    fn room(&self, spec: &Spec) -> Result<Room, SpecError> {
+    /// `None` where its size is not known: nothing lies in it or out of it.
+    fn room(&mut self, spec: &Spec) -> Option<Room> {
+        let mut is_sized = !self.mended.touches("room.size_m");
         for (k, size) in spec.room.size_m.iter().enumerate() {
             let (at, message) = (format!("room.size_m[{k}]"), format!("{size} m is no extent"));
-            self.source.require(size.is_finite() && *size > 0.0, &at, message, "give a positive number of metres")?;
+            let sound = size.is_finite() && *size > 0.0;
+            is_sized &= self.check(sound, &at, message, "give a positive number of metres");
         }
-        Ok(Room { size_m: DVec3::from(spec.room.size_m), reflectance: spec.room.reflectance.build() })
-    }
-
-    fn obstacles(&mut self, specs: &[ObstacleSpec], room: &Room) -> Result<Vec<Obstacle>, SpecError> {
-        let mut obstacles = vec![];
-        for (k, spec) in specs.iter().enumerate() {
-            let at = format!("obstacles[{k}]");
-            let obstacle = match (&spec.cuboid, &spec.mesh) {
-                (Some(cuboid), None) => {
-                    let (min_m, max_m) = (DVec3::from(cuboid.min_m), DVec3::from(cuboid.max_m));
-                    let sound = min_m.is_finite() && max_m.is_finite() && min_m.cmplt(max_m).all();
-                    let message = format!("the box from {min_m} to {max_m} has no volume");
-                    self.source.require(sound, &at, message, "give min_m below max_m on every axis")?;
-                    Obstacle { shape: Shape::Box { min_m, max_m }, reflectance: cuboid.reflectance.0 }
-                }
-                (None, Some(mesh)) => {
-                    let path = self.beside(&mesh.file);
-                    let bytes = self.take_in(&format!("{at}.mesh.file"), &path)?;
-                    let read = Mesh::parse_obj(&mut bytes.as_slice(), &path).map_err(|error| {
-                        let help = "give a Wavefront OBJ file of triangles or polygons, in metres, z up";
-                        self.source.error_at(&format!("{at}.mesh.file"), error.to_string(), help)
-                    })?;
-                    self.take(&at, "triangles", read.triangles.len(), |left| &mut left.triangles)?;
-                    let Mesh { vertices_m, triangles } = read.moved(DVec3::from(mesh.at_m));
-                    Obstacle { shape: Shape::Mesh { vertices_m, triangles }, reflectance: mesh.reflectance.0 }
-                }
-                _ => {
-                    let message = "an obstacle is either a box or a mesh";
-                    return Err(self.source.error_at(&at, message, "give exactly one of `box` and `mesh`"));
-                }
-            };
-            let (low, high) = extent(&obstacle.shape);
-            let outside = low.min_element() < 0.0 || high.cmpgt(room.size_m).any();
-            let message = format!("it reaches from {low} to {high}, outside the room");
-            self.source.require(!outside, &at, message, within(room))?;
-            obstacles.push(obstacle);
-        }
-        Ok(obstacles)
-    }
-
-    fn luminaires(&mut self, specs: &[LuminaireSpec], room: &Room) -> Result<Vec<Luminaire>, SpecError> {
-        self.source.require(!specs.is_empty(), "luminaires", "there are none", "give at least one luminaire")?;
-        let mut ids = HashSet::new();
-        let mut files: BTreeMap<PathBuf, Arc<Photometry>> = BTreeMap::new();
-        let mut luminaires = vec![];
-        for (k, spec) in specs.iter().enumerate() {
-            let at = |field: &str| format!("luminaires[{k}].{field}");
-            self.name(&at("id"), &spec.id)?;
-            let message = format!("`{}` is no unique name", spec.id);
-            self.source.require(ids.insert(&spec.id), &at("id"), message, "give every luminaire an id of its own")?;
-            // What is nearly in the plane of a surface is meant to be recessed in it.
-            let position_m = flush::snapped(room, DVec3::from(spec.at_m));
-            let inside = position_m.is_finite() && room.contains(position_m, 0.0);
-            let message = format!("{position_m} lies outside the room");
-            self.source.require(inside, &at("at_m"), message, within(room))?;
-            let is_factor = spec.flux_scale.is_finite() && spec.flux_scale >= 0.0;
-            let message = format!("{} is no factor", spec.flux_scale);
-            self.source.require(is_factor, &at("flux_scale"), message, "give a number from 0")?;
-            let turn = spec.rotate_deg;
-            let finite = [turn.azimuth, turn.tilt, turn.roll].iter().all(|a| a.is_finite());
-            self.source.require(finite, &at("rotate_deg"), "angles must be finite", "give degrees")?;
-            let path = self.beside(&spec.photometry);
-            let photometry = match files.get(&path) {
-                Some(read) => Arc::clone(read),
-                None => Arc::clone(files.entry(path.clone()).or_insert(self.photometry(&at("photometry"), &path)?)),
-            };
-            let luminaire = Luminaire {
-                id: spec.id.clone(),
-                photometry,
-                position_m,
-                orientation: orientation(turn.azimuth, turn.tilt, turn.roll),
-                flux_scale: spec.flux_scale,
-                model: match spec.model {
-                    ModelSpec::Point => LuminaireModel::Point,
-                    ModelSpec::Area => LuminaireModel::Area,
-                    ModelSpec::Impostor => LuminaireModel::Impostor,
-                },
-            };
-            let brightest_cd = luminaire.photometry.distribution.max_intensity().value() * luminaire.flux_scale;
-            let message = format!("it gives the luminaire {brightest_cd:e} cd, and nothing is so bright");
-            let help = "correct the factor, or the candela of the photometric file";
-            self.source.require(brightest_cd <= BRIGHTEST_CD, &at("flux_scale"), message, help)?;
-            if let Some((message, help)) = unmountable(&luminaire, room) {
-                return Err(self.source.error_at(&at("at_m"), message, help));
-            }
-            luminaires.push(luminaire);
-        }
-        Ok(luminaires)
-    }
-
-    /// The pieces of surface that flush openings replace, which must not overlap.
-    fn recesses(&self, luminaires: &[Luminaire], room: &Room) -> Result<Vec<Obstacle>, SpecError> {
-        let mut plates: Vec<(&str, Obstacle)> = vec![];
-        for (k, luminaire) in luminaires.iter().enumerate() {
-            let Some(plate) = flush::plate(room, luminaire) else { continue };
-            if let Some((other, _)) = plates.iter().find(|(_, other)| flush::overlap(room, other, &plate)) {
-                let message = format!("its luminous opening overlaps that of `{other}` in the plane of the surface");
-                let help = "move one of them: where one opening is, there is no room for another";
-                return Err(self.source.error_at(&format!("luminaires[{k}].at_m"), message, help));
-            }
-            plates.push((&luminaire.id, plate));
-        }
-        Ok(plates.into_iter().map(|(_, plate)| plate).collect())
+        is_sized.then(|| Room { size_m: DVec3::from(spec.room.size_m), reflectance: spec.room.reflectance.build() })
     }
 
     /// Refuses what is no name: names stand in scenes, logs and views, where a line break begins something else.
-    fn name(&self, at: &str, name: &str) -> Result<(), SpecError> {
+    fn name(&mut self, at: &str, name: &str) {
         let is_name = is_line(name, MAX_NAME) && name.trim() == name && !name.is_empty();
         let message = format!("`{}` is no name", printable::line(name, MAX_NAME));
         let help = format!("give 1 to {MAX_NAME} printable characters, no blank at either end");
-        self.source.require(is_name, at, message, help)
-    }
-
-    fn photometry(&mut self, at: &str, path: &Path) -> Result<Arc<Photometry>, SpecError> {
-        self.take_in(at, path)?;
-        let (trust, folder) = (self.source.trust, self.folder);
-        let read = photometry::read_by(path, &|path| trust.read_named(folder, path));
-        read.map(Arc::new).map_err(|error| SpecError {
-            file: path.to_owned(),
-            // The reader counts from 1; 0 is no place.
-            line: Some(error.line).filter(|l| *l > 0),
-            column: Some(error.column).filter(|c| *c > 0),
-            message: error.message(),
-            help: Some(error.help().to_owned()),
-        })
-    }
-
-    fn meter_set(&mut self, name: &str, set: &MeterSet, scene: &Scene) -> Result<Vec<Meter>, SpecError> {
-        let at = format!("meters.{name}");
-        let normal = DVec3::from(set.normal);
-        let Some(normal) = normal.try_normalize().filter(|_| normal.is_finite()) else {
-            let message = "the normal has no direction";
-            return Err(self.source.error_at(&format!("{at}.normal"), message, "give a vector other than zero"));
-        };
-        let points: Vec<DVec3> = match (&set.points_m, &set.grid) {
-            (Some(points), None) => {
-                self.take(&at, "meters", points.len(), |left| &mut left.meters)?;
-                points.iter().map(|p| DVec3::from(*p)).collect()
-            }
-            (None, Some(grid)) => {
-                self.take(&at, "meters", self.count(&at, grid)?, |left| &mut left.meters)?;
-                points_of(grid)
-            }
-            _ => {
-                let message = "a meter set is either points or a grid";
-                return Err(self.source.error_at(&at, message, "give exactly one of `points_m` and `grid`"));
-            }
-        };
-        self.source.require(!points.is_empty(), &at, "the set holds no points", "give at least one")?;
-        for (k, &point) in points.iter().enumerate() {
-            if let Some((message, help)) = misplaced(point, scene) {
-                let path = if set.grid.is_some() { format!("{at}.grid") } else { format!("{at}.points_m[{k}]") };
-                return Err(self.source.error_at(&path, format!("{name}[{k}] at {point} {message}"), help));
-            }
-        }
-        Ok(points.into_iter().map(|position_m| Meter { position_m, normal }).collect())
-    }
-
-    /// How many points a grid has.
-    fn count(&self, at: &str, grid: &GridSpec) -> Result<usize, SpecError> {
-        let [nu, nv] = grid.counts;
-        let count = nu.checked_mul(nv).filter(|n| (1..=MAX_METERS).contains(n));
-        let help = format!("give counts whose product lies between 1 and {MAX_METERS}");
-        let error = || self.source.error_at(&format!("{at}.grid.counts"), format!("{nu} x {nv} points"), help);
-        count.ok_or_else(error)
-    }
-
-    fn procedures(
-        &mut self,
-        procedures: &Procedures,
-        luminaires: &[LuminaireSpec],
-        meters: &BTreeMap<String, Vec<Meter>>,
-    ) -> Result<(), SpecError> {
-        self.source.require(!procedures.0.is_empty(), "procedures", "there are none", "give at least one procedure")?;
-        for (procedure, asked) in &procedures.0 {
-            match asked {
-                Asked::Meters(asked) => self.meter_sets(*procedure, &asked.meters, meters)?,
-                Asked::Angles(asked) => self.angles(*procedure, asked, luminaires)?,
-            }
-        }
-        Ok(())
-    }
-
-    fn meter_sets(
-        &mut self,
-        procedure: ProcedureId,
-        names: &Names,
-        meters: &BTreeMap<String, Vec<Meter>>,
-    ) -> Result<(), SpecError> {
-        let at = format!("procedures.{procedure}.meters");
-        if let Some(name) = names.iter().find(|name| !meters.contains_key(*name)) {
-            let message = format!("there is no meter set `{name}`");
-            let help = suggestion(name, meters.keys().map(String::as_str));
-            return Err(self.source.error_at(&at, message, help));
-        }
-        let mut known = HashSet::new();
-        let twice = names.iter().find(|name| !known.insert(*name));
-        let message = format!("`{}` stands there twice", twice.map_or("", |name| name));
-        self.source.require(twice.is_none(), &at, message, "name every set once")
-    }
-
-    fn angles(
-        &mut self,
-        procedure: ProcedureId,
-        intensity: &AtAngles,
-        luminaires: &[LuminaireSpec],
-    ) -> Result<(), SpecError> {
-        let at = |field: &str| format!("procedures.{procedure}.{field}");
-        let ids = || luminaires.iter().map(|l| l.id.as_str());
-        let message = format!("there is no luminaire `{}`", intensity.luminaire);
-        let help = suggestion(&intensity.luminaire, ids());
-        self.source.require(ids().any(|id| id == intensity.luminaire), &at("luminaire"), message, help)?;
-        let is_distance = intensity.distance_m.is_finite() && intensity.distance_m > 0.0;
-        let message = format!("{} m is no distance", intensity.distance_m);
-        self.source.require(is_distance, &at("distance_m"), message, "give a positive number of metres")?;
-        let Angles::Listed(lists) = &intensity.angles else { return Ok(()) };
-        let all = |list: &[f64], sound: fn(&f64) -> bool| !list.is_empty() && list.iter().all(sound);
-        let (gamma, c) = (all(&lists.gamma_deg, |g| (0.0..=180.0).contains(g)), all(&lists.c_deg, |c| c.is_finite()));
-        let help = "list gamma angles from 0 (nadir) to 180 (zenith)";
-        self.source.require(gamma, &at("angles.gamma_deg"), "not a list of gamma angles", help)?;
-        self.source.require(c, &at("angles.c_deg"), "not a list of C angles", "list C planes in degrees")?;
-        let count = lists.gamma_deg.len().saturating_mul(lists.c_deg.len());
-        let help = format!("a procedure measures at {MAX_METERS} angles at most");
-        self.source.require(count <= MAX_METERS, &at("angles"), format!("{count} angles"), help)?;
-        self.take(&at("angles"), "angles", count, |left| &mut left.meters)
-    }
-
-    fn budget(&self, budget: Budget) -> Result<(), SpecError> {
-        for (field, value) in [("relative_error", budget.relative_error), ("seconds", budget.seconds)] {
-            let (at, message) = (format!("budget.{field}"), format!("{value} is no budget"));
-            self.source.require(value.is_finite() && value > 0.0, &at, message, "give a positive number")?;
-        }
-        Ok(())
-    }
-
-    fn tolerances(
-        &self,
-        tolerances: &BTreeMap<String, ToleranceOverride>,
-    ) -> Result<BTreeMap<ProcedureId, ToleranceOverride>, SpecError> {
-        let one = |(name, tolerance): (&String, &ToleranceOverride)| {
-            let procedure = name.parse::<ProcedureId>().map_err(|_| {
-                let help = suggestion(name, ProcedureId::NAMES.iter().copied());
-                self.source.error_at("tolerances", format!("`{name}` is no procedure"), help)
-            })?;
-            let values = [tolerance.relative, tolerance.absolute_lx, tolerance.absolute_cd];
-            let (at, sound) = (format!("tolerances.{name}"), values.iter().all(|v| v.is_finite() && *v >= 0.0));
-            self.source.require(sound, &at, "a tolerance is a number from 0", "give positive numbers")?;
-            Ok((procedure, *tolerance))
-        };
-        tolerances.iter().map(one).collect()
+        self.check(is_name, at, message, help);
     }
 
     fn beside(&self, file: &Path) -> PathBuf {
@@ -454,21 +271,20 @@ impl<'a> Builder<'a> {
     }
 
     /// The bytes of a file that the spec names, which are part of what it is.
-    fn take_in(&mut self, at: &str, path: &Path) -> Result<Vec<u8>, SpecError> {
-        let bytes = self.source.trust.read_named(self.folder, path).map_err(|error| {
-            let message = format!("{} cannot be read: {error}", path.display());
-            self.source.error_at(at, message, "paths are relative to the spec's folder")
-        })?;
-        self.take(at, "bytes of files", bytes.len(), |left| &mut left.bytes)?;
-        self.hash.update(&bytes);
-        Ok(bytes)
+    fn take_in(&mut self, at: &str, path: &Path) -> Option<Vec<u8>> {
+        match self.source.trust.read_named(self.folder, path) {
+            Ok(bytes) => {
+                let is_few = self.take(at, "bytes of files", bytes.len(), |left| &mut left.bytes);
+                self.hash.update(&bytes);
+                is_few.then_some(bytes)
+            }
+            Err(error) => {
+                let message = format!("{} cannot be read: {error}", path.display());
+                self.check(false, at, message, "paths are relative to the spec's folder");
+                None
+            }
+        }
     }
-}
-
-fn points_of(grid: &GridSpec) -> Vec<DVec3> {
-    let [nu, nv] = grid.counts;
-    let (origin, u, v) = (DVec3::from(grid.origin_m), DVec3::from(grid.u_m), DVec3::from(grid.v_m));
-    (0..nv).flat_map(|j| (0..nu).map(move |i| origin + u * i as f64 + v * j as f64)).collect()
 }
 
 /// A spec's name: its file's, as a line.
@@ -480,39 +296,6 @@ pub(super) fn name_of(path: &Path) -> String {
 /// Whether a text is one line of so many characters at most: no control character, and none that breaks or turns a line.
 fn is_line(text: &str, most: usize) -> bool {
     text.chars().count() <= most && !text.chars().any(printable::is_unprintable)
-}
-
-/// What is wrong with a meter at this point, and what to do.
-fn misplaced(point: DVec3, scene: &Scene) -> Option<(&'static str, String)> {
-    let room = scene.room.as_ref()?;
-    let margin = SURFACE_MARGIN * room.size_m.max_element();
-    if !point.is_finite() || !room.contains(point, -margin) {
-        return Some(("lies outside the room", within(room)));
-    }
-    if !room.contains(point, margin) {
-        let help = "a meter on a surface sees half of nothing: move it inwards, by 1e-6 m say".to_owned();
-        return Some(("lies on a surface of the room", help));
-    }
-    let inside = |shape: &Shape| match shape {
-        Shape::Box { min_m, max_m } => point.cmpge(*min_m).all() && point.cmple(*max_m).all(),
-        Shape::Mesh { .. } => false,
-    };
-    if scene.obstacles.iter().any(|o| inside(&o.shape)) {
-        return Some(("lies inside an obstacle or on its surface", "move it out, by 1e-6 m at least".to_owned()));
-    }
-    if scene.luminaires.iter().any(|l| l.position_m.distance(point) <= margin) {
-        return Some(("lies in a luminaire's photometric centre", "move it away".to_owned()));
-    }
-    None
-}
-
-fn extent(shape: &Shape) -> (DVec3, DVec3) {
-    match shape {
-        Shape::Box { min_m, max_m } => (*min_m, *max_m),
-        Shape::Mesh { vertices_m, .. } => {
-            vertices_m.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
-        }
-    }
 }
 
 fn within(room: &Room) -> String {

@@ -3,9 +3,14 @@
 //! A mapping is laid over a mapping key by key, and over a list whose items have an `id` item by item; everything else
 //! replaces what was there.
 
+use std::collections::HashSet;
+
 use serde_yaml::{Mapping, Value};
 
+use super::faults::MAX_FAULTS;
 use super::model::{EngineSettings, Spec};
+use super::shape::{self, Mended, Shaped, Trials};
+use super::tree::Tree;
 use super::{Source, SpecError};
 
 /// One case of a spec: its text with overrides laid over it.
@@ -14,10 +19,19 @@ pub(super) struct Variant {
     /// Its name; the parts of a matrix are joined by hyphens.
     pub(super) name: String,
     pub(super) spec: Spec,
+    /// Where something was put that nobody wrote.
+    pub(super) mended: Mended,
     /// The engines that its overrides name: the case is for these alone.
     pub(super) engines: Option<Vec<String>>,
     /// The spec's text, knowing which overrides lie over it.
     pub(super) source: Source,
+}
+
+/// The cases of a spec, in its order, as far as they can be read; none for a spec without `cases`.
+#[derive(Debug, Default)]
+pub(super) struct Variants {
+    pub(super) all: Vec<Variant>,
+    pub(super) faults: Vec<SpecError>,
 }
 
 /// An override: its name, its place in the spec, and what it says.
@@ -28,33 +42,50 @@ struct Override {
     says: Mapping,
 }
 
-/// The cases of a spec, in its order; empty for a spec without `cases`.
-pub(super) fn variants(source: &Source) -> Result<Vec<Variant>, SpecError> {
-    let text: Value = serde_yaml::from_str(&source.text).map_err(|e| source.error_at("", e.to_string(), ""))?;
-    let Value::Mapping(mut base) = text else { return Ok(vec![]) };
-    let Some(cases) = base.remove("cases") else { return Ok(vec![]) };
+/// `of_base` is what is wrong with the spec itself, which is not told of every case again.
+pub(super) fn variants(source: &Source, tree: &Tree, of_base: &[SpecError]) -> Variants {
+    let Value::Mapping(mut base) = tree.value.clone() else { return Variants::default() };
+    let Some(cases) = base.remove("cases") else { return Variants::default() };
+    let mut found = Variants::default();
     let combinations = match cases {
-        Value::Sequence(list) => listed(source, list)?.into_iter().map(|o| vec![o]).collect(),
-        Value::Mapping(axes) => matrix(source, axes)?,
-        _ => return Err(source.error_at("cases", "neither a list nor a matrix", FORM)),
+        Value::Sequence(list) => Ok(listed(source, list, &mut found.faults).into_iter().map(|o| vec![o]).collect()),
+        Value::Mapping(axes) => matrix(source, axes),
+        _ => Err(source.error_at("cases", "neither a list nor a matrix", FORM)),
     };
-    let (count, most) = (combinations.len(), source.trust.limits().cases);
-    source.require(count <= most, "cases", format!("{count} cases"), format!("a spec holds {most} cases at most"))?;
-    source.require(!combinations.is_empty(), "cases", "there are none", "give at least one, or leave `cases` out")?;
-    let mut variants: Vec<Variant> = vec![];
+    let checked = combinations.and_then(|combinations: Vec<_>| {
+        let (count, most) = (combinations.len(), source.trust.limits().cases);
+        source.require(count <= most, "cases", format!("{count} cases"), format!("a spec holds {most} cases at most"))?;
+        let any = !combinations.is_empty() || !found.faults.is_empty();
+        source.require(any, "cases", "there are none", "give at least one, or leave `cases` out")?;
+        Ok(combinations)
+    });
+    let combinations = checked.unwrap_or_else(|fault| {
+        found.faults.push(fault);
+        vec![]
+    });
+    let (mut names, trials) = (HashSet::new(), Trials::of(&source.text));
     for overrides in combinations {
-        let variant = combined(source, &base, &overrides)?;
-        let is_new = variants.iter().all(|v| v.name != variant.name);
-        let message = format!("two cases are named `{}`", variant.name);
-        source.require(is_new, &overrides[0].place, message, "give every case a name of its own")?;
-        variants.push(variant);
+        match combined(source, &base, &overrides, of_base, &trials, &mut found.faults) {
+            Ok(Some(variant)) => {
+                let message = format!("two cases are named `{}`", variant.name);
+                let is_new = names.insert(variant.name.clone());
+                let help = "give every case a name of its own";
+                found.faults.extend(source.require(is_new, &overrides[0].place, message, help).err());
+                found.all.push(variant);
+            }
+            Ok(None) => {}
+            Err(fault) => found.faults.push(fault),
+        }
+        if found.faults.len() >= MAX_FAULTS {
+            break;
+        }
     }
-    Ok(variants)
+    found
 }
 
 const FORM: &str = "give a list of overrides, each with a `name`, or a matrix {axis: {name: override, ...}, ...}";
 
-fn listed(source: &Source, list: Vec<Value>) -> Result<Vec<Override>, SpecError> {
+fn listed(source: &Source, list: Vec<Value>, faults: &mut Vec<SpecError>) -> Vec<Override> {
     let item = |(k, value): (usize, Value)| {
         let place = format!("cases[{k}]");
         let Value::Mapping(mut says) = value else {
@@ -66,7 +97,15 @@ fn listed(source: &Source, list: Vec<Value>) -> Result<Vec<Override>, SpecError>
         check_name(source, &place, &name)?;
         Ok(Override { name, place, says })
     };
-    list.into_iter().enumerate().map(item).collect()
+    let mut overrides = vec![];
+    for found in list.into_iter().enumerate().map(item) {
+        match found {
+            Ok(found) => overrides.push(found),
+            Err(fault) if faults.len() < MAX_FAULTS => faults.push(fault),
+            Err(_) => break,
+        }
+    }
+    overrides
 }
 
 /// Every combination of one override an axis, the last axis fastest.
@@ -110,7 +149,15 @@ fn check_name(source: &Source, place: &str, name: &str) -> Result<(), SpecError>
     source.require(sound, place, format!("`{name}` is no name of a case"), help)
 }
 
-fn combined(source: &Source, base: &Mapping, overrides: &[Override]) -> Result<Variant, SpecError> {
+/// `None` where what is wrong is told already and nothing can be made of the rest.
+fn combined(
+    source: &Source,
+    base: &Mapping,
+    overrides: &[Override],
+    of_base: &[SpecError],
+    trials: &Trials,
+    faults: &mut Vec<SpecError>,
+) -> Result<Option<Variant>, SpecError> {
     let names: Vec<&str> = overrides.iter().map(|o| o.name.as_str()).collect();
     let name = names.join("-");
     let mut text = Value::Mapping(base.clone());
@@ -126,16 +173,19 @@ fn combined(source: &Source, base: &Mapping, overrides: &[Override]) -> Result<V
             engines = Some(own.keys().filter_map(Value::as_str).map(str::to_owned).collect());
         }
     }
-    let mut spec: Spec = serde_yaml::from_value(text).map_err(|error| {
-        let message = format!("with the overrides of case `{name}`: {error}");
-        let help = super::nearest_key(&message).unwrap_or_else(|| FORM.to_owned());
-        source.error_at(&overrides[0].place, message, help)
-    })?;
+    let places = overrides.iter().map(|o| o.place.clone()).collect();
+    let own = Source { overrides: places, ..source.clone() };
+    let Shaped { read, faults: of_shape, mended } = shape::mended::<Spec>(&own, text, trials);
+    let told = |fault: &SpecError| of_base.iter().any(|base| base.message == fault.message);
+    faults.extend(of_shape.into_iter().filter(|fault| !told(fault)).map(|fault| {
+        let message = format!("with the overrides of case `{name}`: {}", fault.message);
+        SpecError { message, help: fault.help.or_else(|| Some(FORM.to_owned())), ..fault }
+    }));
+    let Some(mut spec) = read else { return Ok(None) };
     if let (Some(own), Some(all)) = (&engines, &mut spec.engines) {
         all.retain(|id, _: &mut EngineSettings| own.contains(id));
     }
-    let overrides = overrides.iter().map(|o| o.place.clone()).collect();
-    Ok(Variant { name, spec, engines, source: Source { overrides, ..source.clone() } })
+    Ok(Some(Variant { name, spec, mended, engines, source: own }))
 }
 
 /// Lays an override over a value; the error is the id of an item that is not there.
@@ -171,7 +221,9 @@ mod tests {
     fn of(cases: &str) -> Result<Vec<Variant>, SpecError> {
         let second = "  - {id: b, photometry: a.ies, at_m: [2, 2, 2]}\nmeters:\n";
         let base = MINIMAL.replace("meters:\n", second) + "  indirect_illuminance: {meters: plane}\n";
-        variants(&Source::new("spec.yaml".into(), base + cases))
+        let source = Source::new("spec.yaml".into(), base + cases);
+        let Variants { all, faults } = variants(&source, &crate::spec::tree::tree(&source.text).unwrap(), &[]);
+        faults.into_iter().next().map_or(Ok(all), Err)
     }
 
     #[test]

@@ -4,12 +4,23 @@ use std::fmt;
 
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
+/// What of a place is pointed at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Spot {
+    Value,
+    /// The key before it.
+    Key,
+    /// The same key where it stands once more.
+    SecondKey,
+}
+
 /// Line and column (from 1) of a path such as `meters.ceiling.points_m[2]`, or of its longest part that exists.
-pub(super) fn locate(text: &str, path: &str) -> Option<(usize, usize)> {
+pub(super) fn locate(text: &str, path: &str, spot: Spot) -> Option<(usize, usize)> {
     let steps = steps(path);
     (0..=steps.len()).rev().find_map(|n| {
         let deserializer = serde_yaml::Deserializer::from_str(text);
-        let error = Walk(&steps[..n]).deserialize(deserializer).err()?;
+        let spot = if n == steps.len() { spot } else { Spot::Value };
+        let error = Walk(&steps[..n], spot).deserialize(deserializer).err()?;
         let location = error.location().filter(|_| error.to_string().contains(MARK))?;
         Some((location.line(), location.column()))
     })
@@ -22,7 +33,34 @@ fn steps(path: &str) -> Vec<&str> {
     path.split(['.', '[']).map(|step| step.trim_end_matches(']')).filter(|step| !step.is_empty()).collect()
 }
 
-struct Walk<'a>(&'a [&'a str]);
+struct Walk<'a>(&'a [&'a str], Spot);
+
+/// A key of a mapping; that which is looked for fails, and tells its place with that.
+struct Key<'a> {
+    wanted: &'a str,
+    is_it: bool,
+}
+
+impl<'de> DeserializeSeed<'de> for Key<'_> {
+    /// Whether it is the key that is wanted.
+    type Value = bool;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<bool, D::Error> {
+        deserializer.deserialize_str(self)
+    }
+}
+
+impl Visitor<'_> for Key<'_> {
+    type Value = bool;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a key")
+    }
+
+    fn visit_str<E: Error>(self, key: &str) -> Result<bool, E> {
+        if key == self.wanted && self.is_it { Err(E::custom(MARK)) } else { Ok(key == self.wanted) }
+    }
+}
 
 impl<'de> DeserializeSeed<'de> for Walk<'_> {
     type Value = ();
@@ -41,9 +79,16 @@ impl<'de> Visitor<'de> for Walk<'_> {
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
         let Some((wanted, rest)) = self.0.split_first() else { return Err(A::Error::custom(MARK)) };
-        while let Some(key) = map.next_key::<String>()? {
-            if key == *wanted {
-                return map.next_value_seed(Walk(rest));
+        let mut before = match self.1 {
+            Spot::Key if rest.is_empty() => Some(0),
+            Spot::SecondKey if rest.is_empty() => Some(1),
+            _ => None,
+        };
+        while let Some(is_wanted) = map.next_key_seed(Key { wanted, is_it: before == Some(0) })? {
+            match &mut before {
+                None if is_wanted => return map.next_value_seed(Walk(rest, self.1)),
+                Some(before) if is_wanted => *before -= 1,
+                _ => {}
             }
             map.next_value::<IgnoredAny>()?;
         }
@@ -58,7 +103,7 @@ impl<'de> Visitor<'de> for Walk<'_> {
         for _ in 0usize..wanted {
             seq.next_element::<IgnoredAny>()?;
         }
-        seq.next_element_seed(Walk(rest)).map(|_| ())
+        seq.next_element_seed(Walk(rest, self.1)).map(|_| ())
     }
     // Scalars fall through to the default methods, which fail with "expected luxproof-was-here".
 }
@@ -77,7 +122,10 @@ mod tests {
             ("room.size_m[1]", (2, 15)),
             ("room.reflectance.floor", (2, 3)),
         ] {
-            assert_eq!(locate(text, path), Some(place), "{path}");
+            assert_eq!(locate(text, path, Spot::Value), Some(place), "{path}");
         }
+        let twice = "room: {size_m: 1, size_m: 2}\n";
+        assert_eq!(locate(twice, "room.size_m", Spot::Key), Some((1, 8)));
+        assert_eq!(locate(twice, "room.size_m", Spot::SecondKey), Some((1, 19)));
     }
 }

@@ -5,19 +5,29 @@
 mod build;
 mod cases;
 mod content;
+mod faults;
+mod homes;
 mod locate;
 pub mod model;
 mod mounting;
+mod plausible;
+mod shape;
 mod suite;
+mod tree;
 mod trust;
 mod write;
 
 use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
+
 pub use build::Case;
 pub use content::content;
+pub use faults::Faults;
+pub(crate) use locate::Spot;
 pub use model::{Budget, EngineSettings, Spec, ToleranceOverride};
-pub use suite::{filtered, specs, suite};
+pub use plausible::doubts;
+pub use suite::{Suite, filtered, specs, suite};
 pub use trust::Trust;
 use trust::too_deep;
 pub use write::yaml;
@@ -51,6 +61,8 @@ fn place(file: &Path, line: Option<usize>, column: Option<usize>) -> String {
 /// The most bytes of a spec or policy; one of 100,000 meters has some 5 MB.
 const MAX_SPEC_BYTES: u64 = 64 << 20;
 
+const NO_YAML: &str = "look for a bracket, a quote or a colon that is missing here or in the lines above";
+
 const TOO_DEEP: &str = "lists in lists, too deep to be read";
 const DEPTH: &str = "close what is open: a spec is a few brackets deep";
 
@@ -69,7 +81,14 @@ impl Source {
     pub fn read(path: &Path, trust: Trust) -> Result<Self, SpecError> {
         let fail = |message: String, help| SpecError::of(path, message, help);
         let bytes = trust.read_spec(path).map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
-        let text = String::from_utf8(bytes).map_err(|e| fail(format!("is not UTF-8: {e}"), "save it as UTF-8"))?;
+        let is_utf_16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
+        let encoding = |e| match is_utf_16 {
+            true => fail("is UTF-16".to_owned(), "save it as UTF-8"),
+            false => fail(format!("is not UTF-8: {e}"), "save it as UTF-8"),
+        };
+        let text = String::from_utf8(bytes).map_err(encoding)?;
+        // The mark that some editors put before UTF-8 is no part of the text.
+        let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
         let error = |line| SpecError { line: Some(line), ..fail(TOO_DEEP.to_owned(), DEPTH) };
         too_deep(&text).map_or(Ok(()), |line| Err(error(line)))?;
         Ok(Self { trust, ..Self::new(path.to_owned(), text) })
@@ -84,23 +103,57 @@ impl Source {
         serde_yaml::from_str(&self.text).map_err(|error| {
             let message = error.to_string();
             // serde_yaml ends its message with the place, which the error carries already.
-            let message = message.split(" at line ").next().unwrap_or(&message).to_owned();
-            let help = nearest_key(&message);
+            let message = message.split(" at line ").next().unwrap_or(&message);
             let location = error.location();
-            SpecError {
+            let of_shape = ["unknown ", "missing field", "invalid ", "duplicate "].iter().any(|word| message.contains(word));
+            let fault = SpecError {
                 file: self.path.clone(),
                 line: location.as_ref().map(serde_yaml::Location::line),
                 column: location.as_ref().map(serde_yaml::Location::column),
-                message,
-                help,
-            }
+                message: shape::plain(message),
+                help: nearest_key(message).or_else(|| (!of_shape).then(|| NO_YAML.to_owned())),
+            };
+            if of_shape { fault } else { self.tab().unwrap_or(fault) }
         })
+    }
+
+    /// A tab where YAML wants blanks, which its reader calls otherwise.
+    fn tab(&self) -> Option<SpecError> {
+        let blank = |line: &&str| line.trim().is_empty() || line.trim_start().starts_with('#');
+        let lines = self.text.lines().enumerate().filter(|(_, line)| !blank(line));
+        let found = lines.map(|(k, line)| (k, &line[..line.len() - line.trim_start().len()]));
+        let (line, column) = found.filter_map(|(k, indent)| Some((k, indent.find('\t')?))).next()?;
+        let fault = SpecError::of(&self.path, "a tab stands in the indentation", "YAML is indented by blanks: put two for each tab");
+        Some(SpecError { line: Some(line + 1), column: Some(column + 1), ..fault })
+    }
+
+    /// The same with every fault of its shape, not only the first.
+    pub fn parse_whole<T: serde::de::DeserializeOwned + JsonSchema>(&self) -> Result<T, Faults> {
+        let shape::Shaped { read, faults, .. } = shape::shaped(self, tree::tree(&self.text).ok().as_ref());
+        match (read, Faults::of(faults)) {
+            (Some(read), None) => Ok(read),
+            (_, Some(faults)) => Err(faults),
+            (None, None) => Err(self.error_at("", "this cannot be read", NO_YAML).into()),
+        }
     }
 
     /// An error at a place in the file, given as a path such as `meters.ceiling.points_m[2]`.
     pub fn error_at(&self, path: &str, message: impl Into<String>, help: impl Into<String>) -> SpecError {
-        let place = self.overridden(path).or_else(|| locate::locate(&self.text, path));
-        let error = SpecError::of(&self.path, format!("{path}: {}", message.into()), help);
+        let message = message.into();
+        let message = if path.is_empty() { message } else { format!("{path}: {message}") };
+        self.error_at_spot(Spot::Value, path, message, help)
+    }
+
+    /// The same, of a key perhaps; the message stands for itself.
+    pub(crate) fn error_at_spot(
+        &self,
+        spot: Spot,
+        path: &str,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> SpecError {
+        let place = self.overridden(path, spot).or_else(|| locate::locate(&self.text, path, spot));
+        let error = SpecError::of(&self.path, message, help);
         SpecError { line: place.map(|p| p.0), column: place.map(|p| p.1), ..error }
     }
 
@@ -116,12 +169,13 @@ impl Source {
     }
 
     /// The place of a path in the override that sets it or something near it, if one does.
-    fn overridden(&self, path: &str) -> Option<(usize, usize)> {
+    fn overridden(&self, path: &str, spot: Spot) -> Option<(usize, usize)> {
         let first = path.split(['.', '[']).next().filter(|f| !f.is_empty())?;
+        let locate = |path: &str, spot| locate::locate(&self.text, path, spot);
         self.overrides.iter().rev().find_map(|place| {
-            let nearest = locate::locate(&self.text, &format!("{place}.{first}"));
-            let found = nearest != locate::locate(&self.text, place);
-            if found { locate::locate(&self.text, &format!("{place}.{path}")) } else { None }
+            let nearest = locate(&format!("{place}.{first}"), Spot::Value);
+            let found = nearest != locate(place, Spot::Value);
+            if found { locate(&format!("{place}.{path}"), spot) } else { None }
         })
     }
 }
@@ -136,7 +190,7 @@ pub fn from_yaml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String
 
 /// A help text that names the known key closest to an unknown one, read off serde's message.
 fn nearest_key(message: &str) -> Option<String> {
-    let (_, rest) = message.split_once("unknown field `")?;
+    let (_, rest) = message.split_once("unknown field `").or_else(|| message.split_once("unknown variant `"))?;
     let mut names = rest.split('`').step_by(2);
     let unknown = names.next()?;
     let known: Vec<&str> = names.collect();
@@ -149,6 +203,12 @@ pub fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) 
         Some(name) => format!("did you mean `{name}`?"),
         None => format!("known: {}", known.collect::<Vec<_>>().join(", ")),
     }
+}
+
+/// The candidate of which `word` is a slip of the pen: a letter or two are wrong, missing, doubled or swapped.
+pub fn misspelt<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let near = candidates.map(|c| (strsim::damerau_levenshtein(word, c), c)).filter(|(far, _)| (1..=2).contains(far));
+    near.filter(|(_, c)| c.len() > 4).min().map(|(_, c)| c)
 }
 
 /// The candidate most like `word`, if any is like it at all.

@@ -3,31 +3,66 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::build::name_of;
-use super::{Case, Source, Spec, SpecError, Trust};
+use super::build::{Loaded, name_of};
+use super::cases::{Variants, variants};
+use super::tree::tree;
+use super::{Case, Faults, Source, Spec, SpecError, Trust};
 use crate::procedures::known;
 
-/// The cases of several specs, folders or patterns, in the order given; the files of a folder are sorted by name.
-pub fn suite(asked: &[PathBuf], trust: Trust) -> Result<Vec<Case>, SpecError> {
-    let mut cases: Vec<Case> = vec![];
-    for path in asked {
-        for file in files(path, trust)? {
-            cases.extend(Case::load_all(&file, trust)?);
+/// The cases of several specs, folders or patterns as far as they can be made, and all that is wrong with them.
+#[derive(Debug, Default)]
+pub struct Suite {
+    /// In the order given; the files of a folder are sorted by name.
+    pub cases: Vec<Case>,
+    pub faults: Vec<SpecError>,
+}
+
+impl Suite {
+    pub fn read(asked: &[PathBuf], trust: Trust) -> Self {
+        let mut suite = Self::default();
+        for path in asked {
+            match files(path, trust) {
+                Ok(files) => {
+                    for Loaded { cases, faults } in files.iter().map(|file| Loaded::of(file, trust)) {
+                        suite.cases.extend(cases);
+                        suite.faults.extend(faults);
+                    }
+                }
+                Err(fault) => suite.faults.push(fault),
+            }
         }
+        suite.faults.extend(of_names(&suite.cases));
+        suite
     }
+
+    /// The cases where nothing is wrong with any of them.
+    pub fn sound(self) -> Result<Vec<Case>, Faults> {
+        Faults::of(self.faults).map_or(Ok(self.cases), Err)
+    }
+}
+
+/// The cases of several specs, folders or patterns.
+pub fn suite(asked: &[PathBuf], trust: Trust) -> Result<Vec<Case>, Faults> {
+    Suite::read(asked, trust).sound()
+}
+
+/// What is wrong with the names of cases: a report tells them apart by these.
+fn of_names(cases: &[Case]) -> Vec<SpecError> {
     let mut names: BTreeMap<&str, &Path> = BTreeMap::new();
-    for case in &cases {
+    let mut faults = vec![];
+    for case in cases {
         if let Some(other) = names.insert(&case.name, &case.path) {
             let message = format!("holds a case `{}`, and so does {}", case.name, other.display());
             let help = "run them apart, or rename one: a report tells cases by name";
-            return Err(SpecError::of(&case.path, message, help));
+            faults.push(SpecError::of(&case.path, message, help));
+        }
+        if Path::new(&case.name).starts_with(known::CASE) {
+            let message =
+                format!("`{}` is the name of the scenes of known answer, which every engine reads", known::CASE);
+            faults.push(SpecError::of(&case.path, message, "give the spec another name"));
         }
     }
-    if let Some(case) = cases.iter().find(|c| Path::new(&c.name).starts_with(known::CASE)) {
-        let message = format!("`{}` is the name of the scenes of known answer, which every engine reads", known::CASE);
-        return Err(SpecError::of(&case.path, message, "give the spec another name"));
-    }
-    Ok(cases)
+    faults
 }
 
 /// The specs of a file, each with its name: those of its `cases` with their overrides laid over it, or the one that it is.
@@ -35,11 +70,14 @@ pub fn specs(path: &Path) -> Result<Vec<(String, Spec)>, SpecError> {
     let source = Source::read(path, Trust::Own)?;
     let spec: Spec = source.parse()?;
     let stem = name_of(path);
-    let variants = super::cases::variants(&source)?;
-    if variants.is_empty() {
+    let Variants { all, faults } = tree(&source.text).map(|tree| variants(&source, &tree, &[])).unwrap_or_default();
+    if let Some(fault) = faults.into_iter().next() {
+        return Err(fault);
+    }
+    if all.is_empty() {
         return Ok(vec![(stem, spec)]);
     }
-    Ok(variants.into_iter().map(|v| (format!("{stem}/{}", v.name), v.spec)).collect())
+    Ok(all.into_iter().map(|v| (format!("{stem}/{}", v.name), v.spec)).collect())
 }
 
 /// The cases whose names match any of the patterns: a glob where it holds `*`, `?` or `[`, a part of the name otherwise.
@@ -111,7 +149,7 @@ mod tests {
     }
 
     fn names(paths: &[PathBuf]) -> Result<Vec<String>, SpecError> {
-        suite(paths, Trust::Own).map(|cases| cases.into_iter().map(|c| c.name).collect())
+        suite(paths, Trust::Own).map(|cases| cases.into_iter().map(|c| c.name).collect()).map_err(Faults::first)
     }
 
     #[test]

@@ -238,7 +238,7 @@ impl Tribunal<'_> {
         };
         match catch_unwind(AssertUnwindSafe(|| audit::run(specs, &options))) {
             Ok(Ok(report)) => Ok(Tried::Report(Box::new(report))),
-            Ok(Err(AuditError::Spec(error))) => Ok(Tried::NoSpec(error)),
+            Ok(Err(AuditError::Spec(error))) => Ok(Tried::NoSpec(error.first())),
             Ok(Err(other)) => Err(other),
             Err(_) => Ok(Tried::Panicked),
         }

@@ -1,0 +1,81 @@
+//! What is asked of a scene: procedures, the budget, tolerances.
+
+use std::collections::{BTreeMap, HashSet};
+
+use super::super::model::{Budget, Spec, ToleranceOverride};
+use super::{Builder, MAX_METERS};
+use crate::procedures::{Angles, Asked, AtAngles, Names};
+use crate::record::ProcedureId;
+use crate::spec::{Spot, suggestion};
+
+impl Builder<'_> {
+    pub(super) fn procedures(&mut self, spec: &Spec) {
+        let procedures = &spec.procedures.0;
+        self.check(!procedures.is_empty(), "procedures", "there are none", "give at least one procedure");
+        for (procedure, asked) in procedures {
+            match asked {
+                Asked::Meters(asked) => self.meter_sets(*procedure, &asked.meters, spec),
+                Asked::Angles(asked) => self.angles(*procedure, asked, spec),
+            }
+        }
+    }
+
+    fn meter_sets(&mut self, procedure: ProcedureId, names: &Names, spec: &Spec) {
+        let at = format!("procedures.{procedure}.meters");
+        let mut known = HashSet::new();
+        for name in names.iter() {
+            let help = suggestion(name, spec.meters.keys().map(String::as_str));
+            self.check(spec.meters.contains_key(name), &at, format!("there is no meter set `{name}`"), help);
+            self.check(known.insert(name), &at, format!("`{name}` stands there twice"), "name every set once");
+        }
+    }
+
+    fn angles(&mut self, procedure: ProcedureId, intensity: &AtAngles, spec: &Spec) {
+        let at = |field: &str| format!("procedures.{procedure}.{field}");
+        let ids = || spec.luminaires.iter().map(|l| l.id.as_str());
+        let message = format!("there is no luminaire `{}`", intensity.luminaire);
+        let help = suggestion(&intensity.luminaire, ids());
+        self.check(ids().any(|id| id == intensity.luminaire), &at("luminaire"), message, help);
+        let is_distance = intensity.distance_m.is_finite() && intensity.distance_m > 0.0;
+        let message = format!("{} m is no distance", intensity.distance_m);
+        self.check(is_distance, &at("distance_m"), message, "give a positive number of metres");
+        let Angles::Listed(lists) = &intensity.angles else { return };
+        let all = |list: &[f64], sound: fn(&f64) -> bool| !list.is_empty() && list.iter().all(sound);
+        let (gamma, c) = (all(&lists.gamma_deg, |g| (0.0..=180.0).contains(g)), all(&lists.c_deg, |c| c.is_finite()));
+        let help = "list gamma angles from 0 (nadir) to 180 (zenith)";
+        self.check(gamma, &at("angles.gamma_deg"), "not a list of gamma angles", help);
+        self.check(c, &at("angles.c_deg"), "not a list of C angles", "list C planes in degrees");
+        let count = lists.gamma_deg.len().saturating_mul(lists.c_deg.len());
+        let help = format!("a procedure measures at {MAX_METERS} angles at most");
+        self.check(count <= MAX_METERS, &at("angles"), format!("{count} angles"), help);
+        self.take(&at("angles"), "angles", count, |left| &mut left.meters);
+    }
+
+    pub(super) fn budget(&mut self, budget: Budget) {
+        for (field, value) in [("relative_error", budget.relative_error), ("seconds", budget.seconds)] {
+            let (at, message) = (format!("budget.{field}"), format!("{value} is no budget"));
+            self.check(value.is_finite() && value > 0.0, &at, message, "give a positive number");
+        }
+    }
+
+    pub(super) fn tolerances(
+        &mut self,
+        tolerances: &BTreeMap<String, ToleranceOverride>,
+    ) -> BTreeMap<ProcedureId, ToleranceOverride> {
+        let mut known = BTreeMap::new();
+        for (name, tolerance) in tolerances {
+            let at = format!("tolerances.{name}");
+            let Ok(procedure) = name.parse::<ProcedureId>() else {
+                let help = suggestion(name, ProcedureId::NAMES.iter().copied());
+                let message = format!("tolerances: `{name}` is no procedure");
+                self.fault(&at, |source| source.error_at_spot(Spot::Key, &at, message, help));
+                continue;
+            };
+            let values = [tolerance.relative, tolerance.absolute_lx, tolerance.absolute_cd];
+            let sound = values.iter().all(|v| v.is_finite() && *v >= 0.0);
+            self.check(sound, &at, "a tolerance is a number from 0", "give positive numbers");
+            known.insert(procedure, *tolerance);
+        }
+        known
+    }
+}

@@ -1,0 +1,50 @@
+//! All that is wrong with specs, policies and options, told at once: who mends one fault wants to know of the next.
+
+use std::fmt;
+
+use super::SpecError;
+
+/// More are not told of one file: whoever has made so many mends these first.
+pub(super) const MAX_FAULTS: usize = 50;
+
+/// One fault or more.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Faults(Vec<SpecError>);
+
+impl Faults {
+    /// What there is to tell, each once; `None` where that is nothing.
+    pub fn of(faults: impl IntoIterator<Item = SpecError>) -> Option<Self> {
+        let mut told: Vec<SpecError> = vec![];
+        for fault in faults {
+            if !told.contains(&fault) {
+                told.push(fault);
+            }
+        }
+        (!told.is_empty()).then_some(Self(told))
+    }
+
+    pub fn all(&self) -> &[SpecError] {
+        &self.0
+    }
+
+    /// For who tells one alone.
+    #[must_use]
+    pub fn first(mut self) -> SpecError {
+        self.0.swap_remove(0)
+    }
+}
+
+impl From<SpecError> for Faults {
+    fn from(fault: SpecError) -> Self {
+        Self(vec![fault])
+    }
+}
+
+impl fmt::Display for Faults {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let lines: Vec<String> = self.0.iter().map(ToString::to_string).collect();
+        f.write_str(&lines.join("\n"))
+    }
+}
+
+impl std::error::Error for Faults {}

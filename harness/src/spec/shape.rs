@@ -1,0 +1,372 @@
+//! Every fault in the shape of a file, not only the first: what does not fit is mended in the tree that was read, and read again.
+//!
+//! What is mended is told once; whatever else would be said of its place, or of what was put there, is not.
+
+use std::cell::Cell;
+
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde_path_to_error::Segment;
+use serde_yaml::{Mapping, Value};
+
+use super::faults::MAX_FAULTS;
+use super::homes::homes;
+use super::tree::{Tree, below};
+use super::{Source, SpecError, Spot, nearest_key};
+
+/// What a text says as a `T`, as far as it can be made one.
+pub(super) struct Shaped<T> {
+    /// With what was mended; `None` where nothing helped.
+    pub(super) read: Option<T>,
+    pub(super) faults: Vec<SpecError>,
+    pub(super) mended: Mended,
+}
+
+/// Places at which something was put, or taken away, that nobody wrote.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Mended(Vec<String>);
+
+impl Mended {
+    /// Whether a place is one of them, or lies in one.
+    pub(super) fn holds(&self, path: &str) -> bool {
+        self.0.iter().any(|mended| is_within(path, mended))
+    }
+
+    /// Whether what is said of a place may be of what nobody wrote there.
+    pub(super) fn touches(&self, path: &str) -> bool {
+        self.0.iter().any(|mended| is_within(path, mended) || is_within(mended, path))
+    }
+}
+
+fn is_within(path: &str, whole: &str) -> bool {
+    path.strip_prefix(whole).is_some_and(|rest| whole.is_empty() || rest.is_empty() || rest.starts_with(['.', '[']))
+}
+
+/// How often a tree may still be read to find further faults: as often as some megabytes hold it, so that a long text is not read for ever.
+pub(super) struct Trials(Cell<usize>);
+
+const MAX_BYTES_READ_AGAIN: usize = 8 << 20;
+const MAX_TRIALS: usize = 2000;
+
+impl Trials {
+    pub(super) fn of(text: &str) -> Self {
+        Self(Cell::new((MAX_BYTES_READ_AGAIN / text.len().max(1)).min(MAX_TRIALS)))
+    }
+
+    fn spend(&self) -> bool {
+        let left = self.0.get();
+        self.0.set(left.saturating_sub(1));
+        left > 0
+    }
+
+    /// How many faults are placed in a text: each place is looked for by a walk through all of it.
+    pub(super) fn faults(&self) -> usize {
+        (self.0.get() / 8).clamp(1, MAX_FAULTS)
+    }
+}
+
+/// Reads a text, sound or not; its tree is none where it is no YAML.
+pub(super) fn shaped<T: DeserializeOwned + JsonSchema>(source: &Source, tree: Option<&Tree>) -> Shaped<T> {
+    let twice = tree.map(|tree| twice(source, tree)).unwrap_or_default();
+    let first = match source.parse::<T>() {
+        Ok(read) => return Shaped { read: Some(read), faults: twice, mended: Mended::default() },
+        Err(first) => first,
+    };
+    let Some(tree) = tree else {
+        // What is no YAML has no second fault, since nobody knows where the first ends.
+        return Shaped { read: None, faults: vec![first], mended: Mended::default() };
+    };
+    let mut shaped = mended(source, tree.value.clone(), &Trials::of(&source.text));
+    shaped.faults.extend(twice);
+    if shaped.faults.is_empty() {
+        shaped.faults.push(first);
+    }
+    shaped
+}
+
+/// Keys that stand twice: all but the first would say nothing.
+fn twice(source: &Source, tree: &Tree) -> Vec<SpecError> {
+    let fault = |path: &String| {
+        let message = format!("the key `{}` stands here for the second time", last_key(path));
+        source.error_at_spot(Spot::SecondKey, path, message, "keep one of them; items of a list begin with a hyphen")
+    };
+    tree.twice.iter().take(Trials::of(&source.text).faults()).map(fault).collect()
+}
+
+/// Reads a tree, mending it until it is a `T`.
+pub(super) fn mended<T: DeserializeOwned + JsonSchema>(source: &Source, mut value: Value, trials: &Trials) -> Shaped<T> {
+    let (mut faults, mut mended, most) = (vec![], Mended::default(), trials.faults());
+    loop {
+        let flaw = match attempt::<T>(&value) {
+            Ok(read) => return Shaped { read: Some(read), faults, mended },
+            Err(flaw) => flaw,
+        };
+        if let Some(Moved { from, to }) = misplaced::<T>(&value, &flaw) {
+            faults.push(moved(source, &from, &to));
+            let taken = take(&mut value, &from);
+            let put = taken.is_some_and(|taken| put(&mut value, &to, Some(taken)));
+            if put && faults.len() < most && trials.spend() {
+                continue;
+            }
+            return Shaped { read: None, faults, mended };
+        }
+        if !mended.holds(&flaw.place()) && !flaw.is_of_quotes() {
+            faults.push(flaw.fault::<T>(source));
+        }
+        if faults.len() >= most || !mend::<T>(&mut value, &flaw, trials) {
+            return Shaped { read: None, faults, mended };
+        }
+        mended.0.push(flaw.place());
+    }
+}
+
+/// What keeps a tree from being a `T`, the first of it.
+#[derive(Debug)]
+struct Flaw {
+    /// Where the reader was.
+    path: String,
+    message: String,
+    kind: Kind,
+}
+
+#[derive(Debug)]
+enum Kind {
+    /// A key that is not known, its path being that of the flaw.
+    Unknown,
+    /// A key that is not there.
+    Missing(String),
+    Unfit,
+}
+
+fn attempt<T: DeserializeOwned>(value: &Value) -> Result<T, Flaw> {
+    serde_path_to_error::deserialize(value).map_err(|error| {
+        let path = error.path().iter().fold(String::new(), |path, segment| match segment {
+            Segment::Seq { index } => format!("{path}[{index}]"),
+            Segment::Map { key } => below(&path, key),
+            Segment::Enum { .. } | Segment::Unknown => path,
+        });
+        let message = error.inner().to_string();
+        let last = path.rsplit('.').next().unwrap_or_default();
+        let quoted = message.split('`').nth(1).unwrap_or_default();
+        let kind = if message.starts_with("unknown field `") && quoted == last
+            // A procedure's name is a key, too.
+            || message.starts_with("unknown variant `") && quoted == last
+        {
+            Kind::Unknown
+        } else if message.starts_with("missing field `") {
+            Kind::Missing(quoted.to_owned())
+        } else {
+            Kind::Unfit
+        };
+        Flaw { path, message, kind }
+    })
+}
+
+impl Flaw {
+    /// What has to be mended.
+    fn place(&self) -> String {
+        match &self.kind {
+            Kind::Missing(key) => below(&self.path, key),
+            Kind::Unknown | Kind::Unfit => self.path.clone(),
+        }
+    }
+
+    /// A number where text is meant is text as it was written.
+    fn is_of_quotes(&self) -> bool {
+        let is_scalar = ["integer", "floating point", "boolean"].iter().any(|s| self.message.contains(s));
+        is_scalar && self.message.starts_with("invalid type") && self.message.ends_with("string")
+    }
+
+    fn fault<T: JsonSchema>(&self, source: &Source) -> SpecError {
+        let (message, whole) = (plain(&self.message), parent(&self.path));
+        let at = |path: &str| if path.is_empty() { message.clone() } else { format!("{path}: {message}") };
+        let fault = |spot, told: &str, help: Option<String>| SpecError {
+            message: at(told),
+            help,
+            ..source.error_at_spot(spot, &self.path, "", "")
+        };
+        match &self.kind {
+            Kind::Unknown => fault(Spot::Key, whole, nearest_key(&self.message).or_else(|| home_of::<T>(&self.path))),
+            Kind::Missing(key) => {
+                let within = if self.path.is_empty() { "the file".to_owned() } else { format!("`{}`", self.path) };
+                fault(Spot::Value, &self.path, Some(format!("{within} needs `{key}: ...`")))
+            }
+            Kind::Unfit => {
+                let help = nearest_key(&self.message);
+                fault(Spot::Value, &self.path, help)
+            }
+        }
+    }
+}
+
+/// Serde's words for shapes in those of who writes YAML.
+pub(super) fn plain(message: &str) -> String {
+    let words = [
+        ("expected f64", "expected a number"),
+        ("expected usize", "expected a whole number from 0"),
+        ("expected u32", "expected a whole number from 0"),
+        ("expected u64", "expected a whole number from 0"),
+        ("expected a sequence", "expected a list"),
+        ("expected an array of length", "expected a list of"),
+        ("expected a string", "expected text"),
+        ("expected path string", "expected a path"),
+        ("expected a map", "expected keys with values"),
+        ("invalid type: unit value", "invalid type: nothing"),
+        ("invalid type: sequence", "invalid type: a list"),
+        ("invalid type: map", "invalid type: keys with values"),
+    ];
+    let mut plain = words.iter().fold(message.to_owned(), |text, (serde, ours)| text.replace(serde, ours));
+    if let Some((head, _)) = plain.split_once("expected struct ") {
+        plain = format!("{head}expected keys with values");
+    }
+    plain
+}
+
+/// Where a key belongs that is known elsewhere.
+fn home_of<T: JsonSchema>(path: &str) -> Option<String> {
+    let key = last_key(path);
+    let home = homes::<T>(key).into_iter().next()?;
+    let whose = |of: &str| of.split('.').next().unwrap_or(of).to_owned();
+    Some(match home.strip_suffix("[]").or_else(|| home.strip_suffix(".*")) {
+        _ if home.is_empty() => format!("`{key}` belongs in the first column, below nothing"),
+        Some(list) => format!("`{key}` belongs in an entry of `{list}`"),
+        None if home.contains(['[', '*']) => format!("`{key}` belongs further down in `{}`", whose(&home)),
+        None => format!("`{key}` belongs in `{home}`"),
+    })
+}
+
+/// A key at the wrong depth, whose place is free.
+struct Moved {
+    from: String,
+    to: String,
+}
+
+fn misplaced<T: JsonSchema>(value: &Value, flaw: &Flaw) -> Option<Moved> {
+    match &flaw.kind {
+        Kind::Unknown => {
+            let (key, here) = (last_key(&flaw.path), parent(&flaw.path));
+            let is_free = |home: &String| {
+                let place = get(value, home);
+                home != here && place.is_some_and(|v| v.is_mapping() && v.get(key).is_none())
+            };
+            let home = homes::<T>(key).into_iter().filter(|h| !h.contains(['[', '*'])).find(is_free)?;
+            Some(Moved { from: flaw.path.clone(), to: below(&home, key) })
+        }
+        Kind::Missing(key) => {
+            let known = homes::<T>(key);
+            let mut above = flaw.path.as_str();
+            while !above.is_empty() {
+                above = parent(above);
+                if !known.iter().any(|home| home == above) && get(value, above).is_some_and(|v| v.get(key).is_some()) {
+                    return Some(Moved { from: below(above, key), to: below(&flaw.path, key) });
+                }
+            }
+            None
+        }
+        Kind::Unfit => None,
+    }
+}
+
+fn moved(source: &Source, from: &str, to: &str) -> SpecError {
+    let (key, home) = (last_key(from), parent(to));
+    let (message, help) = if home.is_empty() {
+        (format!("`{key}` stands in `{}`, where it does not belong", parent(from)), "move it out to the first column".to_owned())
+    } else {
+        (format!("`{key}` belongs in `{home}`"), format!("indent it, so that it stands below `{}:`", last_key(home)))
+    };
+    source.error_at_spot(Spot::Key, from, message, help)
+}
+
+/// Makes something of a flaw that fits, whatever it means.
+fn mend<T: DeserializeOwned>(value: &mut Value, flaw: &Flaw, trials: &Trials) -> bool {
+    let place = flaw.place();
+    if matches!(flaw.kind, Kind::Unknown) {
+        return trials.spend() && take(value, &place).is_some();
+    }
+    let earlier = get(value, &place).cloned();
+    let written = earlier.as_ref().filter(|_| flaw.is_of_quotes()).and_then(|v| serde_yaml::to_string(v).ok());
+    let text = written.map(|text| Value::from(text.trim_end()));
+    let numbers = |n: usize| Value::Sequence(vec![Value::from(1); n]);
+    let stock = [
+        Value::Mapping(Mapping::new()),
+        Value::Sequence(vec![]),
+        Value::from(1),
+        numbers(2),
+        numbers(3),
+        Value::from("x"),
+    ];
+    // What may be left out is, but in a list, whose other items keep their places.
+    let leave = (earlier.is_some() && !place.ends_with(']')).then_some(None);
+    for candidate in text.map(Some).into_iter().chain(leave).chain(stock.into_iter().map(Some)) {
+        if !trials.spend() {
+            return false;
+        }
+        if put(value, &place, candidate) && attempt::<T>(value).err().is_none_or(|next| next.comes_after(flaw, &place)) {
+            return true;
+        }
+    }
+    false
+}
+
+impl Flaw {
+    /// Whether it is another than the one that was mended.
+    fn comes_after(&self, earlier: &Self, place: &str) -> bool {
+        match &self.kind {
+            // What was put there fits, and has keys of its own.
+            Kind::Missing(_) if self.path == place => true,
+            _ => self.place() != place && (self.path != earlier.path || self.message != earlier.message),
+        }
+    }
+}
+
+fn last_key(path: &str) -> &str {
+    path.rsplit('.').next().unwrap_or(path)
+}
+
+fn parent(path: &str) -> &str {
+    path.rfind(['.', '[']).map_or("", |end| &path[..end])
+}
+
+/// The steps of a path: a key, or the index of an item.
+fn steps(path: &str) -> impl Iterator<Item = &str> {
+    path.split(['.', '[']).map(|step| step.trim_end_matches(']')).filter(|step| !step.is_empty())
+}
+
+fn get<'a>(value: &'a Value, path: &str) -> Option<&'a Value> {
+    steps(path).try_fold(value, |value, step| match value {
+        Value::Sequence(items) => items.get(step.parse::<usize>().ok()?),
+        other => other.get(step),
+    })
+}
+
+fn get_mut<'a>(value: &'a mut Value, path: &str) -> Option<&'a mut Value> {
+    steps(path).try_fold(value, |value, step| match value {
+        Value::Sequence(items) => items.get_mut(step.parse::<usize>().ok()?),
+        other => other.get_mut(step),
+    })
+}
+
+fn take(value: &mut Value, path: &str) -> Option<Value> {
+    get_mut(value, parent(path))?.as_mapping_mut()?.remove(last_key(path))
+}
+
+/// Puts something at a place, or takes away what is there.
+fn put(value: &mut Value, path: &str, what: Option<Value>) -> bool {
+    let Some(what) = what else { return take(value, path).is_some() };
+    if path.is_empty() {
+        *value = what;
+        return true;
+    }
+    let Some(whole) = get_mut(value, parent(path)) else { return false };
+    match whole {
+        Value::Mapping(keys) => {
+            keys.insert(last_key(path).into(), what);
+            true
+        }
+        Value::Sequence(items) => {
+            let item = steps(path).last().and_then(|k| items.get_mut(k.parse::<usize>().ok()?));
+            item.map(|item| *item = what).is_some()
+        }
+        _ => false,
+    }
+}
