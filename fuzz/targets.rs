@@ -9,7 +9,7 @@ use luminaire::photometry::{eulumdat, lm63, tm33};
 use luminaire::scene::{Meter, Scene, Transport};
 use luxproof::engines::{ExternalReadings, Job, Station};
 use luxproof::record::{EngineName, MeterId, ProcedureId};
-use luxproof::report::{Detail, Report, Style, csv, junit, markdown, page, terminal};
+use luxproof::report::{Detail, Report, Screen, Style, csv, junit, markdown, page, terminal};
 use luxproof::spec::{Budget, Case, Trust};
 use luxproof::trend::baseline::Baseline;
 use luxproof::trend::history::{History, changes, site};
@@ -103,7 +103,7 @@ pub(crate) fn report(bytes: &[u8]) {
     match Report::from_json(text) {
         Ok(read) => {
             let report = &read.report;
-            terminal(report, Style::Plain, Detail::All, None);
+            terminal(report, Screen::new(Style::Plain, Detail::All, None), None);
             for view in [markdown(report, None), junit(report), csv(report), page(report, &[])] {
                 assert!(!view.is_empty());
             }

@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a test that cannot go on has failed")]
 
+mod action;
 mod any_bytes;
+mod at_home;
 mod baselines;
 mod by_hand;
 mod cache;
@@ -16,8 +18,8 @@ mod guide;
 mod hunt;
 mod main_job;
 mod measuring;
-mod mistakes;
 mod mesh_files;
+mod mistakes;
 mod negative_controls;
 mod planning;
 mod policy;

@@ -178,7 +178,9 @@ pub fn run(specs: &[PathBuf], options: &Options<'_>) -> Result<Report, AuditErro
 /// The same; as long as the claim is kept the folder is the caller's.
 pub fn run_and_hold(specs: &[PathBuf], options: &Options<'_>) -> Result<(Report, Claim), AuditError> {
     let (mut cases, mut policies) = chosen(specs, options)?;
-    cases.iter().for_each(|case| options.observer.doubted(&doubts(case)));
+    for case in &cases {
+        options.observer.doubted(&doubts(case));
+    }
     let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
     let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
     let spec = subject(specs, &cases);
@@ -212,7 +214,10 @@ pub fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<Report, Aud
             let (cases, policies) = chosen(&[path.to_owned()], options)?;
             (cases, common(&policies)?)
         }
-        None => (vec![Case::default()], Arc::new(options.policy.read(options.policy.file.as_deref(), Trust::Own, &BTreeSet::new())?)),
+        None => (
+            vec![Case::default()],
+            Arc::new(options.policy.read(options.policy.file.as_deref(), Trust::Own, &BTreeSet::new())?),
+        ),
     };
     let known = Planner::new(&options.selection, &options.site, options.skipping).examinations(&of)?;
     let (cases, plans): (Vec<_>, Vec<_>) = known.into_iter().unzip();
@@ -325,7 +330,16 @@ fn diagnose(plans: &[Plan], reports: &mut [Report]) {
 
 /// The published tables of each case, or all that is wrong with them.
 fn published(cases: &[Case]) -> Result<Vec<Option<Published>>, Faults> {
-    let fault = |path: &Path, error: PublishedError| SpecError::of(path, error.message, "correct the table, or leave `published` out");
+    let fault = |path: &Path, error: PublishedError| {
+        let help = "correct the table, or leave `published` out";
+        // The reader of YAML ends its message with the place.
+        let place = error.message.rsplit_once(" at line ").and_then(|(message, place)| {
+            let (line, column) = place.split_once(" column ")?;
+            Some((message.to_owned(), line.parse().ok(), column.parse().ok()))
+        });
+        let (message, line, column) = place.unwrap_or((error.message, None, None));
+        SpecError { line, column, ..SpecError::of(path, message, help) }
+    };
     let read = |case: &Case| {
         let path = case.published.as_deref();
         path.map(|path| Published::read(path).map_err(|error| fault(path, error))).transpose()

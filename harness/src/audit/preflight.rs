@@ -54,11 +54,13 @@ fn unusable(out: &Path) -> Option<SpecError> {
     let fault = |message: String| Some(SpecError::of(out, message, help));
     let whole = std::path::absolute(out).ok()?;
     let nearest = whole.ancestors().find(|place| place.exists())?;
+    let here = std::env::current_dir().unwrap_or_default();
+    let shown = nearest.strip_prefix(here).unwrap_or(nearest).display();
     if !nearest.is_dir() {
-        return fault(format!("{} is no folder, so that no run can be kept there", nearest.display()));
+        return fault(format!("{shown} is no folder, so that no run can be kept there"));
     }
     match access(nearest, Access::WRITE_OK) {
         Ok(()) => None,
-        Err(error) => fault(format!("{} cannot be written: {error}", nearest.display())),
+        Err(error) => fault(format!("{shown} cannot be written: {error}")),
     }
 }

@@ -27,7 +27,9 @@ pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Ex
         ..Options::new(site.clone(), out_folder(selected))
     };
     let (cases, policies) = audit::chosen(&selected.specs, &options).map_err(diagnose)?;
-    cases.iter().for_each(|case| warn(&doubts(case)));
+    for case in &cases {
+        warn(&doubts(case));
+    }
     let mut out = String::new();
     let mut exit = Exit::Passed;
     let mut planned: BTreeMap<&PolicyRecord, BTreeSet<EngineName>> = BTreeMap::new();

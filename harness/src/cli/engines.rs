@@ -6,6 +6,7 @@ use clap::Subcommand;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::not_audited;
+use super::views::screen;
 use super::{complain, print};
 use crate::audit::{self, Options};
 use crate::engines::{self, InstallOutcome, InstallState, Site, Soundness};
@@ -83,7 +84,7 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site, trust: 
 
 fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<Exit, Diagnostic> {
     let report = audit::examine(spec, options).map_err(not_audited)?;
-    print(&terminal(&report, Style::Plain, Detail::Brief, None))?;
+    print(&terminal(&report, screen(Style::Plain, Detail::Brief), None))?;
     print(&format!("sandbox of engines: {}\n", process::sandbox_in_words()))?;
     print(&format!("memory of an engine: {} MiB at most\n", process::limit_mib()))?;
     let is_absent = |e: &EngineStatus| e.status == Status::Absent;

@@ -10,12 +10,15 @@ mod engines;
 mod export;
 mod history;
 mod hunt;
+mod init;
 mod measuring;
+mod open;
 pub(crate) mod photometry;
 mod progress;
 mod repetitions;
 mod run;
 mod selftest;
+mod shell;
 mod stress;
 mod views;
 
@@ -23,7 +26,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::builder::FalseyValueParser;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
 use serde::Serialize;
 
@@ -42,7 +45,7 @@ use views::Views;
 
 /// Cross-validates renderers on luminaires: does a renderer put the right number of lux where a luminaire should?
 #[derive(Debug, Parser)]
-#[command(name = "luxproof", version, about)]
+#[command(name = "luxproof", version = env!("LUXPROOF_VERSION"), about)]
 pub struct Cli {
     /// Where engines are installed [default: the user's data folder]
     #[arg(long, global = true, env = "LUXPROOF_ENGINES", value_name = "DIR")]
@@ -62,6 +65,8 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Write a first spec that runs, with a photometric file beside it
+    Init(init::InitArgs),
     /// Run every procedure of a spec on every engine, compare and report
     Run(RunArgs),
     /// Validate specs and print the plan: what would run, what is skipped and why
@@ -77,6 +82,8 @@ enum Command {
     Photometry(PhotometryArgs),
     /// View a finished run again
     Report(views::ReportArgs),
+    /// Open a run's page in a browser
+    Open(open::OpenArgs),
     /// Keep a history of nightly runs and draw it
     #[command(subcommand)]
     History(history::Action),
@@ -99,6 +106,10 @@ enum Command {
     Shrink(hunt::ShrinkArgs),
     /// Numerical stability: laws that must hold whatever the scene, driven until something breaks
     Stress(stress::StressArgs),
+    /// Print what a shell needs to complete commands and options
+    Completions(shell::CompletionsArgs),
+    /// Write manual pages, one a command
+    Man(shell::ManArgs),
     /// Take one reading for another process of this program
     #[command(name = crate::measure::READ_ONE, hide = true)]
     ReadOne,
@@ -228,6 +239,10 @@ impl Cli {
                 args.views.all |= self.verbose > 0;
                 views::view(&args)
             }
+            Command::Init(args) => init::init(&args),
+            Command::Completions(args) => shell::completions(&args, Self::command()),
+            Command::Man(args) => shell::man(&args, Self::command()),
+            Command::Open(args) => open::open(&args),
             Command::History(action) => history::history(&action),
             Command::Diff(args) => diff::diff(&args),
             Command::Accept(args) => accept::accept(&args),

@@ -59,7 +59,8 @@ pub(super) fn repeat(
         return Err(miette::miette!("--relative-error and --seconds must be numbers above 0"));
     }
     let selection = Selection { engines: args.engines.clone(), procedures: args.procedures.clone(), seed };
-    let mut cases = suite(&args.specs, Trust::Own).and_then(|all| Ok(filtered(all, &args.filter)?)).map_err(diagnose)?;
+    let mut cases =
+        suite(&args.specs, Trust::Own).and_then(|all| Ok(filtered(all, &args.filter)?)).map_err(diagnose)?;
     // A choice of procedures that concerns no case is refused by the planner.
     if cases.iter().any(|case| selection.concerns(case)) {
         cases.retain(|case| selection.concerns(case));

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
-use super::{RunArgs, Selected, complain};
 use super::diagnostic::{diagnose, not_audited};
 use super::engines::report_installation;
 use super::progress::Progress;
-use super::views::print_report;
+use super::views::{keep_page, print_report};
+use super::{RunArgs, Selected, complain};
 use crate::audit::{self, AfterFailure, Calibration, Options};
 use crate::engines::{self, Site};
 use crate::measure::cache::Cache;
@@ -55,6 +55,9 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> R
     if let Some(held) = &held {
         report.baseline = Some(held.hold(&report, &root)?);
         report.keep(&root.join(report::FILE)).into_diagnostic()?;
+    }
+    if !args.views.has_page() {
+        keep_page(&report::page(&report, &[]), &root);
     }
     print_report(&report, &root, &args.views)?;
     Ok(report.exit())

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
+use terminal_size::terminal_size_of;
 
 use super::{complain, json, print};
-use crate::report::{self, Beside, Detail, Exit, Report, Style};
+use crate::report::{self, Beside, Detail, Exit, Report, Screen, Style};
 use crate::system::files;
 
 /// Which views of a report are printed, and how.
@@ -25,6 +26,13 @@ pub(super) struct Views {
     /// JSON of `luxproof bench` or `luxproof stress` to show with it in HTML
     #[arg(long, value_name = "FILE")]
     beside: Vec<PathBuf>,
+}
+
+impl Views {
+    /// Whether the page is one of them, which is kept where it is printed.
+    pub(super) fn has_page(&self) -> bool {
+        self.format.contains(&Format::Html)
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -64,27 +72,44 @@ pub(super) fn print_report(report: &Report, folder: &Path, views: &Views) -> Res
     };
     for format in &views.format {
         let text = match format {
-            Format::Terminal => report::terminal(report, style, detail, Some(&folder.display().to_string())),
+            Format::Terminal => report::terminal(report, screen(style, detail), Some(&folder.display().to_string())),
             Format::Json => json(report)?,
             Format::Markdown => report::markdown(report, views.link.as_deref()),
             Format::Junit => report::junit(report),
             Format::Csv => report::csv(report),
-            Format::Html => keep_page(report, folder, &beside),
+            Format::Html => page(report, folder, &beside),
         };
         print(&format!("{}\n", text.trim_end()))?;
     }
     Ok(())
 }
 
-/// The page, also kept in the run's folder; on a terminal only its place is printed.
-fn keep_page(report: &Report, folder: &Path, beside: &[Beside]) -> String {
-    let (page, file) = (report::page(report, beside), folder.join("report.html"));
-    if let Err(error) = files::keep_shared(&file, page.as_bytes()) {
-        tracing::warn!(file = %file.display(), %error, "the page is printed, not kept");
-    } else if std::io::stdout().is_terminal() {
-        return file.display().to_string();
+/// As wide as COLUMNS says, or else the terminal that is printed on.
+pub(super) fn screen(style: Style, detail: Detail) -> Screen {
+    let told = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok()).filter(|n| *n > 0);
+    let found = || terminal_size_of(std::io::stdout()).map(|(width, _)| usize::from(width.0));
+    Screen::new(style, detail, told.or_else(found))
+}
+
+/// The page, which lies in the run's folder, too; on a terminal only its place is printed.
+fn page(report: &Report, folder: &Path, beside: &[Beside]) -> String {
+    let page = report::page(report, beside);
+    match keep_page(&page, folder) {
+        Some(file) if std::io::stdout().is_terminal() => file.display().to_string(),
+        _ => page,
     }
-    page
+}
+
+/// Keeps a page in a run's folder; where that fails it is told, since the report itself is kept already.
+pub(super) fn keep_page(page: &str, folder: &Path) -> Option<PathBuf> {
+    let file = folder.join(report::PAGE);
+    match files::keep_shared(&file, page.as_bytes()) {
+        Ok(()) => Some(file),
+        Err(error) => {
+            tracing::warn!(file = %file.display(), %error, "the page is not kept");
+            None
+        }
+    }
 }
 
 pub(super) fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {

@@ -41,7 +41,8 @@ impl ProjectPolicy {
     /// Names of engines that are hardly any but those of ours, with a slip of the pen; others are programs of other specs.
     fn misspelt(&self, source: &Source, declared: &BTreeSet<&str>) -> Vec<SpecError> {
         let of_rule = |(k, rule): (usize, &Rule)| Some((format!("tolerances[{k}].engine"), rule.engine()?.clone()));
-        let of_entry = |(k, entry): (usize, &KnownDeviation)| (format!("known_deviations[{k}].engine"), entry.engine.clone());
+        let of_entry =
+            |(k, entry): (usize, &KnownDeviation)| (format!("known_deviations[{k}].engine"), entry.engine.clone());
         let required = self.required_engines.iter().enumerate();
         let named = required
             .map(|(k, engine)| (format!("required_engines[{k}]"), engine.clone()))
@@ -121,7 +122,8 @@ impl PolicyChoice {
         let mut read: BTreeMap<Option<PathBuf>, Arc<Policy>> = BTreeMap::new();
         let (mut policies, mut faults) = (vec![], vec![]);
         let mut refused: BTreeSet<Option<PathBuf>> = BTreeSet::new();
-        let declared: BTreeSet<&str> = cases.iter().flat_map(|c| c.engines.iter().flat_map(|e| e.keys().map(String::as_str))).collect();
+        let declared: BTreeSet<&str> =
+            cases.iter().flat_map(|c| c.engines.iter().flat_map(|e| e.keys().map(String::as_str))).collect();
         for case in cases {
             let file = self.file.clone().or_else(|| nearest(&case.path));
             if let Some(policy) = read.get(&file) {
@@ -197,7 +199,10 @@ impl PolicyChoice {
 /// The policy beside a spec or in the nearest folder above it, up to the root of the file system.
 fn nearest(spec: &Path) -> Option<PathBuf> {
     let spec = std::path::absolute(spec).ok()?;
-    spec.ancestors().skip(1).map(|folder| folder.join(POLICY_FILE)).find(|file| file.is_file())
+    let found = spec.ancestors().skip(1).map(|folder| folder.join(POLICY_FILE)).find(|file| file.is_file())?;
+    // As a person would name it from here.
+    let here = std::env::current_dir().unwrap_or_default();
+    Some(found.strip_prefix(here).map(Path::to_owned).unwrap_or(found))
 }
 
 /// Which project policy judged, as reports tell it.

@@ -12,7 +12,7 @@ use super::uncertainty::upper_tail_of_normal;
 use crate::record::{EngineName, ProcedureId, Quantity};
 use crate::spec::{Source, SpecError, ToleranceOverride};
 
-const DEFAULTS: &str = include_str!("../../../reference/tolerances.yaml");
+const DEFAULTS: &str = include_str!("../../data/tolerances.yaml");
 
 /// How far a reading may lie from its reference: the larger of the two.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -140,7 +140,8 @@ pub(super) fn faults(source: &Source, rules: &[Rule]) -> Vec<SpecError> {
             source.require(sound, &at(field), "a tolerance is a number from 0", "give a positive number")
         });
         let help = "say which standard, paper or decision it is from";
-        let of_source = source.require(!rule.source.trim().is_empty(), &at("source"), "the tolerance has no source", help);
+        let of_source =
+            source.require(!rule.source.trim().is_empty(), &at("source"), "the tolerance has no source", help);
         of_values.into_iter().chain([of_source]).filter_map(Result::err).collect::<Vec<_>>()
     };
     rules.iter().enumerate().flat_map(of_rule).collect()

@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{Kind, biases, decision_rules, departures, notes, policies, splits, tables};
+use super::notes::{Kind, biases, decision_rules, departures, lacking, notes, policies, splits, tables};
+use super::sentences::{HEADING, sentences};
 use super::words::{mark, percent, significant};
 use super::{Report, papers};
 use crate::record::ProcedureId;
@@ -16,11 +17,18 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
         text.push('\n');
     };
     line(format!("## luxproof: {}", plain(&report.spec.title)));
+    let sentences = sentences(report);
+    if !sentences.is_empty() {
+        line(format!("\n{HEADING}:\n"));
+    }
+    for sentence in &sentences {
+        line(format!("- {}", plain(&sentence.text)));
+    }
     line(format!("\n{} in {:.1} s\n", report.summary, report.wall_s));
     for rule in decision_rules(report) {
         line(format!("{rule}\n"));
     }
-    for policy in policies(report) {
+    for policy in policies(report).into_iter().chain(lacking(report)) {
         line(format!("{}\n", plain(&policy)));
     }
     let engines: Vec<&str> = report.engines.iter().map(|e| e.id.as_str()).collect();

@@ -35,6 +35,17 @@ pub(super) enum Cell {
 }
 
 impl Cell {
+    /// Without counts, where there is little room.
+    pub(super) fn brief(&self) -> String {
+        match self {
+            Self::Judged { verdict, deviation, .. } => {
+                let percent = deviation.map(|d| format!(" {}", percent(d))).unwrap_or_default();
+                format!("{}{percent}", mark(*verdict))
+            }
+            _ => self.text(),
+        }
+    }
+
     pub(super) fn text(&self) -> String {
         match self {
             Self::IsReference => "reference".to_owned(),

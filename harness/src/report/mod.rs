@@ -2,6 +2,7 @@
 
 mod accepted;
 mod budget;
+mod claims;
 mod csv;
 mod curve;
 pub(crate) mod earlier;
@@ -13,6 +14,8 @@ mod matrix;
 mod notes;
 mod papers;
 mod read;
+mod sentences;
+mod statistics;
 pub(crate) mod svg;
 mod terminal;
 pub(crate) mod words;
@@ -21,6 +24,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use luminaire::scene::flush;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -29,9 +33,11 @@ use crate::plan::Skip;
 use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Role, Status};
 use crate::spec::Case;
 use crate::system::files::{self, Care, FileError};
+use crate::system::tool::Tool;
 
 pub use accepted::{BaselineCheck, BaselineLine};
 pub use budget::budgets;
+pub use claims::{Claim, Sentence};
 pub use csv::csv;
 pub use curve::{Curve, curves};
 pub use exit::{Exit, Summary};
@@ -40,12 +46,14 @@ pub use html::{Beside, BesideError, page};
 pub use junit::junit;
 pub use markdown::markdown;
 pub use read::{ReadReport, ReportError};
-pub use terminal::{Detail, Style, terminal};
+pub use statistics::Statistics;
+pub use terminal::{Detail, Screen, Style, terminal};
 
 /// A report of more comparisons than this is laid out in rows.
 const LONG: usize = 10_000;
-/// What it is called in the folder of a run.
+/// What it is called in the folder of a run, and its page.
 pub(crate) const FILE: &str = "report.json";
+pub(crate) const PAGE: &str = "report.html";
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Report {
@@ -55,15 +63,24 @@ pub struct Report {
     #[serde(default)]
     pub checksum: String,
     pub tool_version: String,
+    /// The program that wrote it.
+    #[serde(default)]
+    pub tool: Tool,
     /// When the run started (RFC 3339, UTC).
     pub started: String,
     pub wall_s: f64,
     pub spec: SpecRecord,
+    /// What each renderer can be trusted for, by what follows.
+    #[serde(default)]
+    pub sentences: Vec<Sentence>,
     pub engines: Vec<EngineStatus>,
     /// Every reading against every reference.
     pub comparisons: Vec<Comparison>,
     /// Every reading of every engine, once.
     pub readings: Vec<ReadingRecord>,
+    /// What sets of meters come to, engine by engine.
+    #[serde(default)]
+    pub statistics: Vec<Statistics>,
     /// How each engine was run on each procedure.
     pub recordings: Vec<Recording>,
     /// What was not run, and why.
@@ -113,6 +130,9 @@ pub struct CaseRecord {
     /// Whether it holds scenes of known answer, for which no spec asks.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_known: bool,
+    /// Whether anything stands in its room.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub has_bodies: bool,
 }
 
 /// What was run.
@@ -154,6 +174,7 @@ impl Report {
         Self {
             luxproof: read::VERSION,
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+            tool: Tool::this(),
             started: humantime::format_rfc3339_seconds(started).to_string(),
             cases: vec![CaseRecord {
                 name: case.name.clone(),
@@ -161,6 +182,7 @@ impl Report {
                 policy: policy.record.clone(),
                 decision_rule: policy.tolerances.decision_rule(),
                 is_known: case.is_known(),
+                has_bodies: case.scene.obstacles.iter().any(|o| !flush::is_plate(o)),
             }],
             spec,
             readings: recordings.iter().flat_map(readings).collect(),
@@ -224,6 +246,8 @@ impl Report {
     /// The same with so much care.
     pub(crate) fn keep_with(&mut self, care: Care, path: &Path) -> Result<(), FileError> {
         let fail = |e| FileError::of(path, e);
+        self.sentences = sentences::sentences(self);
+        self.statistics = statistics::statistics(&self.readings);
         self.seal().map_err(|e| fail(e.into()))?;
         let is_long = self.comparisons.len().max(self.readings.len()) > LONG;
         let kept = if is_long { files::replace_rows(path, self, care) } else { files::replace_json(path, self, care) };

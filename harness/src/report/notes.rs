@@ -107,16 +107,22 @@ fn count_do(cells: usize) -> String {
     format!("{} {}", plural(cells, "printed cell"), if cells == 1 { "does" } else { "do" })
 }
 
-/// Which policy judged, and what it requires in vain; nothing where there is none.
+/// Which policy judged; nothing where there is none.
 pub(super) fn policies(report: &Report) -> Vec<String> {
     let line = |p: &PolicyRecord| {
         let profile = p.profile.as_ref().map(|name| format!(", profile {name}")).unwrap_or_default();
         let digits: String = p.sha256.chars().take(12).collect();
         format!("policy {}{profile} (SHA-256 {digits}…)", p.file)
     };
-    let lacking = report.lacking().into_iter();
-    let lacking = lacking.map(|(p, engine)| format!("REQUIRED by {} and without any reading: {engine}", p.file));
-    report.policies().into_iter().map(line).chain(lacking).collect()
+    report.policies().into_iter().map(line).collect()
+}
+
+/// Engines that a policy requires in vain.
+pub(super) fn lacking(report: &Report) -> Vec<String> {
+    let line = |(policy, engine): (&PolicyRecord, &EngineName)| {
+        format!("REQUIRED by {} and without any reading: {engine}", policy.file)
+    };
+    report.lacking().into_iter().map(line).collect()
 }
 
 impl Note<'_> {

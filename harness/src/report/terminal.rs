@@ -1,4 +1,5 @@
-//! The terminal report: a verdict matrix, the readings side by side, the worst deviations, what was skipped, where the files are.
+//! The terminal report: what each renderer can be trusted for, a verdict matrix, lux side by side, the worst deviations, what was left
+//! out, by whom, where the files are.
 
 use std::fmt::Write;
 use std::ops::Range;
@@ -7,17 +8,20 @@ use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArr
 use itertools::Itertools;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{self, Kind, Note, biases, decision_rules, departures, diagnoses, notes, policies, splits};
-use super::words::{mark, percent, plural, significant, value};
+use super::notes::{self, Kind, Note, biases, decision_rules, departures, diagnoses, lacking, notes, policies, splits};
+use super::sentences::{HEADING, sentences};
+use super::statistics::{Statistics, statistics};
+use super::words::{estimate, mark, percent, plural, significant, value, wrapped};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
-use crate::record::{EngineStatus, ProcedureId, Status};
+use crate::record::{EngineStatus, Estimate, MeterId, ProcedureId, Status};
 
 /// More meters than this are summarised instead of listed.
 const LISTED_METERS: usize = 8;
-/// Lines of each kind, and letters of a line, that a brief report spends.
+/// Lines of each kind that a brief report spends.
 const BRIEF: usize = 4;
-const BRIEF_WIDTH: usize = 156;
+/// The narrowest and the widest screen that is laid out for, in letters.
+const WIDTHS: std::ops::RangeInclusive<usize> = 80..=200;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
@@ -33,6 +37,44 @@ pub enum Detail {
     All,
 }
 
+/// What a report is printed on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Screen {
+    pub style: Style,
+    pub detail: Detail,
+    /// Letters to a line.
+    width: usize,
+}
+
+impl Screen {
+    /// One of about so many letters to a line; where nobody knows, as wide as a log.
+    pub fn new(style: Style, detail: Detail, width: Option<usize>) -> Self {
+        Self { style, detail, width: width.unwrap_or(160).clamp(*WIDTHS.start(), *WIDTHS.end()) }
+    }
+
+    /// A line of a brief report ends at the screen's edge.
+    fn shortened(self, line: &str) -> String {
+        // Headings indent what is below them.
+        let most = self.width - 2;
+        if self.detail == Detail::All || line.chars().count() <= most {
+            return line.to_owned();
+        }
+        line.chars().take(most - 1).chain(['…']).collect()
+    }
+
+    /// A table whose columns of engines stand side by side as far as there is room, and below one another beyond.
+    fn fitted(self, engines: usize, draw: impl Fn(Range<usize>, Style) -> String) -> String {
+        let fits = |range| draw(range, Style::Plain).lines().all(|line| line.chars().count() <= self.width);
+        let (mut blocks, mut from) = (vec![], 0);
+        while from < engines || blocks.is_empty() {
+            let to = (from + 1..=engines).rev().find(|to| fits(from..*to)).unwrap_or((from + 1).min(engines));
+            blocks.push(draw(from..to, self.style));
+            from = to.max(from + 1);
+        }
+        blocks.join("\n\n")
+    }
+}
+
 const fn colour(verdict: Verdict) -> Color {
     match verdict {
         Verdict::Pass => Color::Green,
@@ -42,37 +84,42 @@ const fn colour(verdict: Verdict) -> Color {
     }
 }
 
-pub fn terminal(report: &Report, style: Style, detail: Detail, folder: Option<&str>) -> String {
+pub fn terminal(report: &Report, screen: Screen, folder: Option<&str>) -> String {
     let mut text = String::new();
-    writeln!(text, "\nluxproof {}: {}", report.tool_version, report.spec.title).ok();
-    writeln!(text, "{}", engines_line(report)).ok();
-    for line in policies(report).iter().map(String::as_str).chain(decision_rules(report)) {
-        writeln!(text, "{line}").ok();
+    let tool = if report.tool.version.is_empty() { report.tool_version.clone() } else { report.tool.to_string() };
+    writeln!(text, "\nluxproof {tool}: {}\n", report.spec.title).ok();
+    let said = sentences(report).into_iter().map(|s| wrapped(&s.text, screen.width - 2, "    "));
+    section(&mut text, HEADING, said);
+    for line in lacking(report) {
+        writeln!(text, "{line}\n").ok();
     }
-    writeln!(text).ok();
-    writeln!(text, "{}\n", verdicts(report, style)).ok();
-    if detail == Detail::All || !report.is_suite() {
-        tables(report, style, &mut text);
+    writeln!(text, "{}\n", verdicts(report, screen)).ok();
+    if screen.detail == Detail::All || !report.is_suite() {
+        tables(report, screen, &mut text);
     }
-    for procedure in report.procedures().into_iter().filter(|_| detail == Detail::All) {
+    for procedure in report.procedures().into_iter().filter(|_| screen.detail == Detail::All) {
         let heading = format!("Bias of {procedure}: mean deviation, its interval, p of none");
         section(&mut text, &heading, biases(report, procedure).into_iter());
     }
-    let most = if detail == Detail::All { usize::MAX } else { BRIEF };
+    let most = if screen.detail == Detail::All { usize::MAX } else { BRIEF };
     // In full: without who is independent of whom a claim says nothing.
     let departures = departures(report).into_iter().take(most);
     section(&mut text, "Who departs from the other witnesses, the reference included", departures);
-    let diagnoses = diagnoses(report).into_iter().take(most).map(|line| shortened(&line, detail));
+    let diagnoses = diagnoses(report).into_iter().take(most).map(|line| screen.shortened(&line));
     section(&mut text, "What explains failures", diagnoses);
     let line = |c: &Comparison| format!("{}{}", report.of_suite(&c.key.case, ": "), deviation_line(c));
-    let worst = worst(report, 5).into_iter().map(|c| shortened(&line(c), detail));
+    let worst = worst(report, 5).into_iter().map(|c| screen.shortened(&line(c)));
     section(&mut text, "Worst deviations (by verdict, then deviation over tolerance)", worst);
     section(&mut text, "What does not fit in published tables", notes::tables(report).into_iter());
-    baseline(report, detail, &mut text);
-    told(report, detail, &mut text);
-    writeln!(text, "{} in {:.1} s", report.summary, report.wall_s).ok();
+    baseline(report, screen, &mut text);
+    told(report, screen, &mut text);
+    let engines = std::iter::once(engines_line(report)).chain(policies(report));
+    for line in engines.chain(decision_rules(report).into_iter().map(str::to_owned)) {
+        writeln!(text, "{}", wrapped(&line, screen.width, "  ")).ok();
+    }
+    writeln!(text, "\n{}", wrapped(&format!("{} in {:.1} s", report.summary, report.wall_s), screen.width, "  ")).ok();
     if let Some(folder) = folder {
-        writeln!(text, "files: {folder}/report.json, readings/, scenes/<engine>/, logs/").ok();
+        writeln!(text, "files: {folder}/report.html, report.json, readings/, scenes/<engine>/, logs/").ok();
     }
     text
 }
@@ -86,27 +133,30 @@ fn section(text: &mut String, heading: &str, lines: impl Iterator<Item = String>
 }
 
 /// How the run compares with its baseline; what departs from it is told in full.
-fn baseline(report: &Report, detail: Detail, text: &mut String) {
+fn baseline(report: &Report, screen: Screen, text: &mut String) {
     let Some(check) = &report.baseline else { return };
     writeln!(text, "Baseline {}: {}", check.file, check.counts()).ok();
     for entry in check.departures() {
         writeln!(text, "  {:<9} {} {} {}", entry.state, entry.key.case, entry.key.procedure, entry.key.engine).ok();
         for line in &entry.details {
-            writeln!(text, "            {}", shortened(line, detail)).ok();
+            writeln!(text, "            {}", screen.shortened(line)).ok();
         }
     }
     writeln!(text).ok();
 }
 
-fn tables(report: &Report, style: Style, text: &mut String) {
+fn tables(report: &Report, screen: Screen, text: &mut String) {
     for grid in papers::grids(report) {
         let places = 1..grid.head.len() - 1;
-        writeln!(text, "{}\n{}\n", grid.title, drawn(grid.head, grid.rows, places, style)).ok();
+        writeln!(text, "{}\n{}\n", grid.title, drawn(grid.head, grid.rows, places, screen.style)).ok();
     }
     // In a suite the readings of a procedure are those of many rooms: they stay in the files.
     let in_paper = |p: &ProcedureId| report.published.iter().any(|t| t.procedure == *p);
     for procedure in report.procedures().into_iter().filter(|p| !report.is_suite() && !in_paper(p) && !p.is_known()) {
-        if let Some(table) = readings(report, procedure, style) {
+        if let Some(table) = readings(report, procedure, screen) {
+            writeln!(text, "{table}\n").ok();
+        }
+        if let Some(table) = of_sets(report, procedure, screen) {
             writeln!(text, "{table}\n").ok();
         }
     }
@@ -145,27 +195,71 @@ pub(super) fn drawn<R: Into<Row>>(
     table.to_string().lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }
 
-fn verdicts(report: &Report, style: Style) -> String {
+fn verdicts(report: &Report, screen: Screen) -> String {
+    let engines = report.engines.len();
+    let whole = verdicts_of(report, &(0..engines), Cell::text, Style::Plain);
+    let is_wide = whole.lines().any(|line| line.chars().count() > screen.width);
+    let text = if is_wide { Cell::brief } else { Cell::text };
+    screen.fitted(engines, |range, style| verdicts_of(report, &range, text, style))
+}
+
+/// The verdicts of some of the engines.
+fn verdicts_of(report: &Report, engines: &Range<usize>, text: fn(&Cell) -> String, style: Style) -> String {
     let heads = if report.is_suite() { &["Verdicts", "procedure", "against"][..] } else { &["Verdicts", "against"] };
     let mut case = String::new();
     let rows = matrix(report).into_iter().map(|row| {
         // A case is named once, in front of its first row.
         let name = if row.case == case { "" } else { row.case.as_str() };
         let name = report.is_suite().then(|| TableCell::new(name).add_attribute(Attribute::Bold));
-        let cells = row.cells.iter().map(|cell| match cell {
-            Cell::Judged { verdict, .. } => TableCell::new(cell.text()).fg(colour(*verdict)),
-            _ => TableCell::new(cell.text()),
+        let cells = row.cells[engines.clone()].iter().map(|cell| match cell {
+            Cell::Judged { verdict, .. } => TableCell::new(text(cell)).fg(colour(*verdict)),
+            _ => TableCell::new(text(cell)),
         });
         let heads = [TableCell::new(row.label), TableCell::new(row.basis)];
         let cells: Vec<TableCell> = name.into_iter().chain(heads).chain(cells).collect();
         case = row.case;
         cells
     });
-    drawn(heads.iter().copied().chain(report.engines.iter().map(|e| e.id.as_str())), rows, 0..0, style)
+    let names = report.engines[engines.clone()].iter().map(|e| e.id.as_str());
+    drawn(heads.iter().copied().chain(names), rows, 0..0, style)
+}
+
+/// One figure of a set of meters.
+type Figure = fn(&Statistics) -> Option<Estimate>;
+
+/// What large sets of meters come to, engines side by side; `None` where none is.
+fn of_sets(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<String> {
+    let all = statistics(&report.readings);
+    let large = |s: &&Statistics| s.key.procedure == procedure && s.meters > LISTED_METERS;
+    let mine: Vec<&Statistics> = all.iter().filter(large).collect();
+    let sets = mine.iter().map(|s| (s.set.as_str(), s.meters)).unique().collect_vec();
+    let has = |e: &&str| mine.iter().any(|s| s.key.engine == **e);
+    let engines: Vec<&str> = report.engines.iter().map(|e| e.id.as_str()).filter(has).collect();
+    if mine.is_empty() {
+        return None;
+    }
+    let figures: [(&str, Figure); 3] =
+        [("mean [lx]", |s| Some(s.mean)), ("minimum [lx]", |s| Some(s.minimum)), ("uniformity", |s| s.uniformity)];
+    let rows = |range: &Range<usize>| {
+        let of_set = |(set, meters): &(&str, usize)| {
+            figures.map(|(name, figure)| {
+                let of = |engine: &&str| mine.iter().find(|s| s.set == *set && s.key.engine == **engine);
+                let cell = |e| of(e).and_then(|s| figure(s)).map_or("-".to_owned(), |x| estimate(&x));
+                let head = format!("  {set} ({meters} meters): {name}");
+                std::iter::once(head).chain(engines[range.clone()].iter().map(cell)).collect::<Vec<String>>()
+            })
+        };
+        sets.iter().flat_map(of_set).collect::<Vec<_>>()
+    };
+    Some(screen.fitted(engines.len(), |range, style| {
+        let heads =
+            std::iter::once(procedure.to_string()).chain(engines[range.clone()].iter().map(ToString::to_string));
+        drawn(heads, rows(&range), 1..usize::MAX, style)
+    }))
 }
 
 /// The readings of one procedure, engines side by side; `None` where the meters are too many to list.
-fn readings(report: &Report, procedure: ProcedureId, style: Style) -> Option<String> {
+fn readings(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<String> {
     let records: Vec<&ReadingRecord> = report.readings.iter().filter(|r| r.key.procedure == procedure).collect();
     let unit = records.first()?.reading.quantity.unit();
     let meters = records.iter().map(|r| &r.reading.meter).unique().collect_vec();
@@ -174,13 +268,18 @@ fn readings(report: &Report, procedure: ProcedureId, style: Style) -> Option<Str
     }
     let engines: Vec<&str> =
         report.engines.iter().map(|e| e.id.as_str()).filter(|e| records.iter().any(|r| r.key.engine == *e)).collect();
-    let rows = meters.into_iter().map(|meter| {
-        let of = |engine: &&str| records.iter().find(|r| r.reading.meter == *meter && r.key.engine == **engine);
-        let values = engines.iter().map(|e| of(e).map_or("-".to_owned(), |r| value(&r.reading)));
-        [place(report, procedure, &meter.0)].into_iter().chain(values).collect::<Vec<String>>()
-    });
-    let heads = [format!("{procedure} [{unit}]")].into_iter().chain(engines.iter().map(ToString::to_string));
-    Some(drawn(heads, rows, 1..usize::MAX, style))
+    let rows = |range: &Range<usize>| {
+        let row = |meter: &&MeterId| {
+            let of = |engine: &&str| records.iter().find(|r| r.reading.meter == **meter && r.key.engine == **engine);
+            let values = engines[range.clone()].iter().map(|e| of(e).map_or("-".to_owned(), |r| value(&r.reading)));
+            [place(report, procedure, &meter.0)].into_iter().chain(values).collect::<Vec<String>>()
+        };
+        meters.iter().map(row).collect::<Vec<_>>()
+    };
+    Some(screen.fitted(engines.len(), |range, style| {
+        let engines = engines[range.clone()].iter().map(ToString::to_string);
+        drawn(std::iter::once(format!("{procedure} [{unit}]")).chain(engines), rows(&range), 1..usize::MAX, style)
+    }))
 }
 
 fn place(report: &Report, procedure: ProcedureId, meter: &str) -> String {
@@ -208,24 +307,16 @@ fn deviation_line(c: &Comparison) -> String {
     )
 }
 
-/// A line of a brief report ends at the screen's edge.
-fn shortened(line: &str, detail: Detail) -> String {
-    if detail == Detail::All || line.chars().count() <= BRIEF_WIDTH {
-        return line.to_owned();
-    }
-    line.chars().take(BRIEF_WIDTH - 1).chain(['…']).collect()
-}
-
 /// What failed, was skipped or is a shortcut; in a brief report the first of it, and how much more there is.
-fn told(report: &Report, detail: Detail, text: &mut String) {
+fn told(report: &Report, screen: Screen, text: &mut String) {
     let notes = notes(report);
     let is_brief = |n: &&Note<'_>| n.kind <= Kind::Shortcut;
-    let shown = match detail {
+    let shown = match screen.detail {
         Detail::All => notes.len(),
         Detail::Brief => notes.iter().take_while(is_brief).count().min(2 * BRIEF),
     };
     for note in &notes[..shown] {
-        writeln!(text, "  {}", shortened(&note.line(report), detail)).ok();
+        writeln!(text, "  {}", screen.shortened(&note.line(report))).ok();
     }
     let of = |kind: Kind| notes[shown..].iter().filter(|n| n.kind == kind).count();
     let mut left: Vec<String> = [Kind::Failed, Kind::Finding, Kind::Record, Kind::Skipped, Kind::Shortcut]
@@ -234,7 +325,7 @@ fn told(report: &Report, detail: Detail, text: &mut String) {
         .map(|kind| format!("{} more {}", of(kind), kind))
         .collect();
     left.extend(Some(of(Kind::Approximate) + of(Kind::Note)).filter(|n| *n > 0).map(|n| plural(n, "note")));
-    let papers = if detail == Detail::Brief && report.is_suite() { report.published.len() } else { 0 };
+    let papers = if screen.detail == Detail::Brief && report.is_suite() { report.published.len() } else { 0 };
     left.extend(Some(papers).filter(|n| *n > 0).map(|n| plural(n, "published table")));
     if !left.is_empty() {
         writeln!(text, "  {}: --all", left.join(", ")).ok();

@@ -1,18 +1,38 @@
 //! Numbers and words as every view writes them.
 
 use crate::judge::Verdict;
-use crate::record::Reading;
+use crate::record::{Estimate, Reading};
+
+pub(super) fn value(reading: &Reading) -> String {
+    estimate(&Estimate { value: reading.value, uncertainty: reading.uncertainty })
+}
 
 /// Six significant digits, and the standard error in the last two digits that it reaches: `0.9431(12)`.
-pub(super) fn value(reading: &Reading) -> String {
-    match reading.uncertainty.standard_error() {
-        Some(e) if e > 0.0 && reading.value > 0.0 => {
+pub(super) fn estimate(of: &Estimate) -> String {
+    match of.uncertainty.standard_error() {
+        Some(e) if e > 0.0 && of.value > 0.0 => {
             let decimals = (1.0 - e.log10().floor()).clamp(0.0, 9.0) as usize;
             let in_units = (e * 10f64.powf(decimals as f64)).round();
-            format!("{:.decimals$}({in_units})", reading.value)
+            format!("{:.decimals$}({in_units})", of.value)
         }
-        _ => significant(reading.value),
+        _ => significant(of.value),
     }
+}
+
+/// A text in lines of so many letters, but for words that are longer; lines after the first are indented.
+pub(super) fn wrapped(text: &str, width: usize, indent: &str) -> String {
+    let mut lines = vec![String::new()];
+    for word in text.split(' ') {
+        let mut last = lines.pop().unwrap_or_default();
+        let is_first = last.trim().is_empty();
+        if !is_first && last.chars().count() + 1 + word.chars().count() > width {
+            lines.push(std::mem::replace(&mut last, format!("{indent}{word}")));
+        } else {
+            last = if is_first { last + word } else { last + " " + word };
+        }
+        lines.push(last);
+    }
+    lines.join("\n")
 }
 
 /// Six significant digits.

@@ -112,8 +112,7 @@ impl Loaded {
         };
         let tree = tree(&source.text).ok();
         let Shaped { read, mut faults, mended } = shaped::<Spec>(&source, tree.as_ref());
-        let Variants { all, faults: of_cases } =
-            tree.map(|tree| variants(&source, &tree, &faults)).unwrap_or_default();
+        let Variants { all, faults: of_cases } = tree.map(|tree| variants(&source, &tree, &faults)).unwrap_or_default();
         let has_cases = !all.is_empty() || !of_cases.is_empty();
         faults.extend(of_cases);
         let (mut left, mut cases) = (trust.limits(), vec![]);
@@ -129,7 +128,7 @@ impl Loaded {
             cases.push(Case { name: format!("{}/{}", case.name, v.name), only_engines: v.engines, ..case });
             faults.extend(of_case);
             // Another case would say the same, or what nobody waits for.
-            if faults.len() >= MAX_FAULTS {
+            if faults.len() >= Trials::of(&source.text).faults() {
                 break;
             }
         }

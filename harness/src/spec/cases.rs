@@ -7,7 +7,6 @@ use std::collections::HashSet;
 
 use serde_yaml::{Mapping, Value};
 
-use super::faults::MAX_FAULTS;
 use super::model::{EngineSettings, Spec};
 use super::shape::{self, Mended, Shaped, Trials};
 use super::tree::Tree;
@@ -54,7 +53,12 @@ pub(super) fn variants(source: &Source, tree: &Tree, of_base: &[SpecError]) -> V
     };
     let checked = combinations.and_then(|combinations: Vec<_>| {
         let (count, most) = (combinations.len(), source.trust.limits().cases);
-        source.require(count <= most, "cases", format!("{count} cases"), format!("a spec holds {most} cases at most"))?;
+        source.require(
+            count <= most,
+            "cases",
+            format!("{count} cases"),
+            format!("a spec holds {most} cases at most"),
+        )?;
         let any = !combinations.is_empty() || !found.faults.is_empty();
         source.require(any, "cases", "there are none", "give at least one, or leave `cases` out")?;
         Ok(combinations)
@@ -64,6 +68,7 @@ pub(super) fn variants(source: &Source, tree: &Tree, of_base: &[SpecError]) -> V
         vec![]
     });
     let (mut names, trials) = (HashSet::new(), Trials::of(&source.text));
+    let most_faults = trials.faults();
     for overrides in combinations {
         match combined(source, &base, &overrides, of_base, &trials, &mut found.faults) {
             Ok(Some(variant)) => {
@@ -76,7 +81,7 @@ pub(super) fn variants(source: &Source, tree: &Tree, of_base: &[SpecError]) -> V
             Ok(None) => {}
             Err(fault) => found.faults.push(fault),
         }
-        if found.faults.len() >= MAX_FAULTS {
+        if found.faults.len() >= most_faults {
             break;
         }
     }
@@ -97,11 +102,11 @@ fn listed(source: &Source, list: Vec<Value>, faults: &mut Vec<SpecError>) -> Vec
         check_name(source, &place, &name)?;
         Ok(Override { name, place, says })
     };
-    let mut overrides = vec![];
+    let (mut overrides, most) = (vec![], Trials::of(&source.text).faults());
     for found in list.into_iter().enumerate().map(item) {
         match found {
             Ok(found) => overrides.push(found),
-            Err(fault) if faults.len() < MAX_FAULTS => faults.push(fault),
+            Err(fault) if faults.len() < most => faults.push(fault),
             Err(_) => break,
         }
     }

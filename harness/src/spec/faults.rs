@@ -1,6 +1,7 @@
 //! All that is wrong with specs, policies and options, told at once: who mends one fault wants to know of the next.
 
 use std::fmt;
+use std::path::PathBuf;
 
 use super::SpecError;
 
@@ -12,7 +13,7 @@ pub(super) const MAX_FAULTS: usize = 50;
 pub struct Faults(Vec<SpecError>);
 
 impl Faults {
-    /// What there is to tell, each once; `None` where that is nothing.
+    /// What there is to tell, each once and file by file in the order of places; `None` where that is nothing.
     pub fn of(faults: impl IntoIterator<Item = SpecError>) -> Option<Self> {
         let mut told: Vec<SpecError> = vec![];
         for fault in faults {
@@ -20,6 +21,9 @@ impl Faults {
                 told.push(fault);
             }
         }
+        let files: Vec<PathBuf> = told.iter().map(|fault| fault.file.clone()).collect();
+        let file = |fault: &SpecError| files.iter().position(|file| *file == fault.file);
+        told.sort_by_key(|fault| (file(fault), fault.line, fault.column));
         (!told.is_empty()).then_some(Self(told))
     }
 

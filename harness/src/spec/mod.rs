@@ -82,9 +82,9 @@ impl Source {
         let fail = |message: String, help| SpecError::of(path, message, help);
         let bytes = trust.read_spec(path).map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
         let is_utf_16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
-        let encoding = |e| match is_utf_16 {
-            true => fail("is UTF-16".to_owned(), "save it as UTF-8"),
-            false => fail(format!("is not UTF-8: {e}"), "save it as UTF-8"),
+        let encoding = |e| {
+            let why = if is_utf_16 { "is UTF-16".to_owned() } else { format!("is not UTF-8: {e}") };
+            fail(why, "save it as UTF-8")
         };
         let text = String::from_utf8(bytes).map_err(encoding)?;
         // The mark that some editors put before UTF-8 is no part of the text.
@@ -105,15 +105,15 @@ impl Source {
             // serde_yaml ends its message with the place, which the error carries already.
             let message = message.split(" at line ").next().unwrap_or(&message);
             let location = error.location();
-            let of_shape = ["unknown ", "missing field", "invalid ", "duplicate "].iter().any(|word| message.contains(word));
+            let is_yaml = tree::tree(&self.text).is_ok();
             let fault = SpecError {
                 file: self.path.clone(),
                 line: location.as_ref().map(serde_yaml::Location::line),
                 column: location.as_ref().map(serde_yaml::Location::column),
                 message: shape::plain(message),
-                help: nearest_key(message).or_else(|| (!of_shape).then(|| NO_YAML.to_owned())),
+                help: nearest_key(message).or_else(|| (!is_yaml).then(|| NO_YAML.to_owned())),
             };
-            if of_shape { fault } else { self.tab().unwrap_or(fault) }
+            if is_yaml { fault } else { self.tab().or_else(|| self.quote(message)).unwrap_or(fault) }
         })
     }
 
@@ -121,10 +121,24 @@ impl Source {
     fn tab(&self) -> Option<SpecError> {
         let blank = |line: &&str| line.trim().is_empty() || line.trim_start().starts_with('#');
         let lines = self.text.lines().enumerate().filter(|(_, line)| !blank(line));
-        let found = lines.map(|(k, line)| (k, &line[..line.len() - line.trim_start().len()]));
-        let (line, column) = found.filter_map(|(k, indent)| Some((k, indent.find('\t')?))).next()?;
-        let fault = SpecError::of(&self.path, "a tab stands in the indentation", "YAML is indented by blanks: put two for each tab");
+        let mut found = lines.map(|(k, line)| (k, &line[..line.len() - line.trim_start().len()]));
+        let (line, column) = found.find_map(|(k, indent)| Some((k, indent.find('\t')?)))?;
+        let fault = SpecError::of(
+            &self.path,
+            "a tab stands in the indentation",
+            "YAML is indented by blanks: put two for each tab",
+        );
         Some(SpecError { line: Some(line + 1), column: Some(column + 1), ..fault })
+    }
+
+    /// A quote that is open at the text's end, where it was noticed.
+    fn quote(&self, message: &str) -> Option<SpecError> {
+        let is_open = |line: &str| ['\'', '"'].iter().any(|quote| line.matches(*quote).count() % 2 == 1);
+        let (k, line) = self.text.lines().enumerate().find(|(_, line)| is_open(line))?;
+        let column = line.chars().position(|c| c == '\'' || c == '"')?;
+        let fault = SpecError::of(&self.path, "a quote that stands here is not closed", NO_YAML);
+        let is_end = message.contains("unexpected end of stream");
+        is_end.then_some(SpecError { line: Some(k + 1), column: Some(column + 1), ..fault })
     }
 
     /// The same with every fault of its shape, not only the first.
@@ -184,23 +198,34 @@ impl Source {
 pub fn from_yaml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
     match too_deep(text) {
         Some(line) => Err(format!("{TOO_DEEP} at line {line}")),
-        None => serde_yaml::from_str(text).map_err(|e| e.to_string()),
+        None => serde_yaml::from_str(text).map_err(|e| {
+            let place =
+                e.location().map(|l| format!(" at line {} column {}", l.line(), l.column())).unwrap_or_default();
+            let message = e.to_string();
+            shape::plain(message.split(" at line ").next().unwrap_or(&message)) + &place
+        }),
     }
 }
 
 /// A help text that names the known key closest to an unknown one, read off serde's message.
 fn nearest_key(message: &str) -> Option<String> {
+    meant_key(message).map(|key| format!("did you mean `{key}`?"))
+}
+
+/// The known key closest to the unknown one of a message of serde's.
+fn meant_key(message: &str) -> Option<&str> {
     let (_, rest) = message.split_once("unknown field `").or_else(|| message.split_once("unknown variant `"))?;
     let mut names = rest.split('`').step_by(2);
     let unknown = names.next()?;
     let known: Vec<&str> = names.collect();
-    nearest(unknown, known.iter().copied()).map(|k| format!("did you mean `{k}`?"))
+    nearest(unknown, known.into_iter())
 }
 
 /// A help text for an unknown name: the known one most like it, or else all of them.
 pub fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
     match nearest(word, known.clone()) {
         Some(name) => format!("did you mean `{name}`?"),
+        None if known.clone().next().is_none() => "there is none".to_owned(),
         None => format!("known: {}", known.collect::<Vec<_>>().join(", ")),
     }
 }

@@ -61,7 +61,8 @@ fn size(case: &Case) -> Option<SpecError> {
 fn enclosed(case: &Case) -> Vec<SpecError> {
     let scene = &case.scene;
     let faults = scene.luminaires.iter().enumerate().filter_map(|(k, luminaire)| {
-        let body = scene.obstacles.iter().position(|o| is_inside(&o.shape, luminaire.position_m, scene.luminaires.len()))?;
+        let body =
+            scene.obstacles.iter().position(|o| is_inside(&o.shape, luminaire.position_m, scene.luminaires.len()))?;
         let message = format!("`{}` hangs inside obstacles[{body}], which no light leaves", luminaire.id);
         let help = "move one of them, or leave the body out: its light is in the photometric file";
         Some(case.source.error_at(&format!("luminaires[{k}].at_m"), message, help))
@@ -90,7 +91,11 @@ fn wide_tolerances(case: &Case) -> Vec<SpecError> {
     let wide = case.tolerances.iter().filter(|(_, t)| t.relative >= WIDE);
     let fault = |(procedure, tolerance): (&_, &super::ToleranceOverride)| {
         let message = format!("a tolerance of {} % lets nearly everything pass", 100.0 * tolerance.relative);
-        let help = format!("give it relative to the reference: 1 % is 0.01, {} % is {}", tolerance.relative, tolerance.relative / 100.0);
+        let help = format!(
+            "give it relative to the reference: 1 % is 0.01, {} % is {}",
+            tolerance.relative,
+            tolerance.relative / 100.0
+        );
         case.source.error_at(&format!("tolerances.{procedure}.relative"), message, help)
     };
     wide.map(fault).collect()
@@ -114,7 +119,11 @@ fn facing_out(case: &Case) -> Vec<SpecError> {
         };
         let found: Vec<(usize, f64)> = meters.iter().enumerate().filter_map(|(k, m)| Some((k, faces(m)?))).collect();
         let (k, distance) = *found.first()?;
-        let of = if found.len() == meters.len() { "all of them do".to_owned() } else { format!("{} of {} do", found.len(), meters.len()) };
+        let of = if found.len() == meters.len() {
+            "all of them do".to_owned()
+        } else {
+            format!("{} of {} do", found.len(), meters.len())
+        };
         let message = format!("{name}[{k}] turns its back to the room and faces a surface {distance:.4} m away ({of})");
         let help = "the normal points to where light comes from: [0, 0, 1] for a meter that lies on a desk";
         Some(case.source.error_at(&format!("meters.{name}.normal"), message, help))

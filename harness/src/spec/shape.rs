@@ -12,7 +12,7 @@ use serde_yaml::{Mapping, Value};
 use super::faults::MAX_FAULTS;
 use super::homes::homes;
 use super::tree::{Tree, below};
-use super::{Source, SpecError, Spot, nearest_key};
+use super::{Source, SpecError, Spot, meant_key, nearest_key};
 
 /// What a text says as a `T`, as far as it can be made one.
 pub(super) struct Shaped<T> {
@@ -94,7 +94,11 @@ fn twice(source: &Source, tree: &Tree) -> Vec<SpecError> {
 }
 
 /// Reads a tree, mending it until it is a `T`.
-pub(super) fn mended<T: DeserializeOwned + JsonSchema>(source: &Source, mut value: Value, trials: &Trials) -> Shaped<T> {
+pub(super) fn mended<T: DeserializeOwned + JsonSchema>(
+    source: &Source,
+    mut value: Value,
+    trials: &Trials,
+) -> Shaped<T> {
     let (mut faults, mut mended, most) = (vec![], Mended::default(), trials.faults());
     loop {
         let flaw = match attempt::<T>(&value) {
@@ -146,19 +150,19 @@ fn attempt<T: DeserializeOwned>(value: &Value) -> Result<T, Flaw> {
             Segment::Enum { .. } | Segment::Unknown => path,
         });
         let message = error.inner().to_string();
-        let last = path.rsplit('.').next().unwrap_or_default();
-        let quoted = message.split('`').nth(1).unwrap_or_default();
-        let kind = if message.starts_with("unknown field `") && quoted == last
-            // A procedure's name is a key, too.
-            || message.starts_with("unknown variant `") && quoted == last
-        {
-            Kind::Unknown
+        let quoted = message.split('`').nth(1).unwrap_or_default().to_owned();
+        let is_unknown = message.starts_with("unknown field `") || message.starts_with("unknown variant `");
+        // Readers of our own are at the keys' whole when they meet one that they do not know.
+        let here = below(&path, &quoted);
+        if is_unknown && last_key(&path) == quoted {
+            Flaw { path, message, kind: Kind::Unknown }
+        } else if is_unknown && get(value, &path).is_some_and(|keys| keys.get(&quoted).is_some()) {
+            Flaw { path: here, message, kind: Kind::Unknown }
         } else if message.starts_with("missing field `") {
-            Kind::Missing(quoted.to_owned())
+            Flaw { path, message, kind: Kind::Missing(quoted) }
         } else {
-            Kind::Unfit
-        };
-        Flaw { path, message, kind }
+            Flaw { path, message, kind: Kind::Unfit }
+        }
     })
 }
 
@@ -191,12 +195,27 @@ impl Flaw {
                 let within = if self.path.is_empty() { "the file".to_owned() } else { format!("`{}`", self.path) };
                 fault(Spot::Value, &self.path, Some(format!("{within} needs `{key}: ...`")))
             }
-            Kind::Unfit => {
-                let help = nearest_key(&self.message);
-                fault(Spot::Value, &self.path, help)
-            }
+            Kind::Unfit => fault(Spot::Value, &self.path, nearest_key(&self.message).or_else(|| remedy(&self.message))),
         }
     }
+}
+
+/// What to do about a value that does not fit, where more can be said than that.
+fn remedy(message: &str) -> Option<String> {
+    let written = message.rsplit(' ').next().and_then(|word| word.parse::<f64>().ok());
+    let help = match written {
+        Some(percent) if message.contains("lies between 0 and 1") && percent > 1.0 && percent <= 100.0 => {
+            return Some(format!("write {percent} % as {}", percent / 100.0));
+        }
+        _ if message.contains("fewer elements") => "decimals are parted by a point, numbers by commas: 2.5, not 2,5",
+        _ if message.starts_with("invalid length") => "see how many numbers stand there",
+        _ if message.contains("string \"") && message.ends_with("expected f64") => {
+            "give a number; where there is none in sight, a bracket or a comma may be missing before it"
+        }
+        _ if message.contains("lies between 0 and 1") => "give a number from 0 to 1",
+        _ => return None,
+    };
+    Some(help.to_owned())
 }
 
 /// Serde's words for shapes in those of who writes YAML.
@@ -208,6 +227,7 @@ pub(super) fn plain(message: &str) -> String {
         ("expected u64", "expected a whole number from 0"),
         ("expected a sequence", "expected a list"),
         ("expected an array of length", "expected a list of"),
+        ("expected fewer elements in sequence", "which are too many"),
         ("expected a string", "expected text"),
         ("expected path string", "expected a path"),
         ("expected a map", "expected keys with values"),
@@ -270,7 +290,10 @@ fn misplaced<T: JsonSchema>(value: &Value, flaw: &Flaw) -> Option<Moved> {
 fn moved(source: &Source, from: &str, to: &str) -> SpecError {
     let (key, home) = (last_key(from), parent(to));
     let (message, help) = if home.is_empty() {
-        (format!("`{key}` stands in `{}`, where it does not belong", parent(from)), "move it out to the first column".to_owned())
+        (
+            format!("`{key}` stands in `{}`, where it does not belong", parent(from)),
+            "move it out to the first column".to_owned(),
+        )
     } else {
         (format!("`{key}` belongs in `{home}`"), format!("indent it, so that it stands below `{}:`", last_key(home)))
     };
@@ -281,7 +304,13 @@ fn moved(source: &Source, from: &str, to: &str) -> SpecError {
 fn mend<T: DeserializeOwned>(value: &mut Value, flaw: &Flaw, trials: &Trials) -> bool {
     let place = flaw.place();
     if matches!(flaw.kind, Kind::Unknown) {
-        return trials.spend() && take(value, &place).is_some();
+        let Some(taken) = take(value, &place).filter(|_| trials.spend()) else { return false };
+        // A misspelt key is the key that was meant, not one too many and another missing.
+        let meant = meant_key(&flaw.message).map(|key| below(parent(&place), key));
+        if let Some(meant) = meant.filter(|meant| get(value, meant).is_none()) {
+            put(value, &meant, Some(taken));
+        }
+        return true;
     }
     let earlier = get(value, &place).cloned();
     let written = earlier.as_ref().filter(|_| flaw.is_of_quotes()).and_then(|v| serde_yaml::to_string(v).ok());
@@ -301,7 +330,8 @@ fn mend<T: DeserializeOwned>(value: &mut Value, flaw: &Flaw, trials: &Trials) ->
         if !trials.spend() {
             return false;
         }
-        if put(value, &place, candidate) && attempt::<T>(value).err().is_none_or(|next| next.comes_after(flaw, &place)) {
+        if put(value, &place, candidate) && attempt::<T>(value).err().is_none_or(|next| next.comes_after(flaw, &place))
+        {
             return true;
         }
     }

@@ -9,3 +9,4 @@ pub mod process;
 pub(crate) mod random;
 mod rows;
 pub mod slots;
+pub mod tool;

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use luminaire::calculators::zonal_cavity::{UtilizationTable, ZonalFlux};
-use luminaire::photometry::{self, Photometry, ReadError, Severity, Written, eulumdat, lm63};
+use luminaire::photometry::{self, Lint, Photometry, ReadError, Severity, Written, eulumdat, lm63};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr, miette};
 
 use crate::cli::diagnostic::diagnose;
@@ -34,6 +34,9 @@ pub(crate) struct PhotometryArgs {
     /// Print what was tolerated or is doubtful instead of the summary
     #[arg(long)]
     lint: bool,
+    /// Print what was tolerated or is doubtful instead of the summary, and exit with 1 where there is anything
+    #[arg(long, value_enum, value_name = "WHAT", conflicts_with = "utilization")]
+    deny: Option<Deny>,
     /// Print coefficients of utilization over room cavity ratios and reflectances instead of the summary
     #[arg(long, conflicts_with_all = ["lint", "json", "format"])]
     utilization: bool,
@@ -54,6 +57,13 @@ enum Format {
     Json,
     /// Static analysis results for code-review tools; with --lint
     Sarif,
+}
+
+/// What of a file is not let pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Deny {
+    /// Whatever was tolerated or is doubtful
+    Warnings,
 }
 
 struct Reading {
@@ -77,7 +87,7 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
     let text = match format {
         Format::Json => json(&readings)?,
         Format::Sarif => sarif::log(&readings)?,
-        Format::Terminal if args.lint => lints(&readings),
+        Format::Terminal if args.lint || args.deny.is_some() => lints(&readings),
         Format::Terminal if args.utilization => utilization(&readings)?,
         Format::Terminal => summaries(&readings),
     };
@@ -87,7 +97,10 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
             write_files(args, &reading.file, photometry)?;
         }
     }
-    let mut exit = Exit::Passed;
+    let is_warning = |lint: &Lint| lint.severity == Severity::Warning;
+    let is_doubtful = |r: &Reading| r.read.as_ref().is_ok_and(|photometry| photometry.lints.iter().any(is_warning));
+    let denied = args.deny == Some(Deny::Warnings) && readings.iter().any(is_doubtful);
+    let mut exit = if denied { Exit::Failed } else { Exit::Passed };
     for reading in readings {
         if let Err(error) = reading.read {
             exit = Exit::Usage;
@@ -180,7 +193,7 @@ fn save(path: &Path, text: &str) -> Result<(), Diagnostic> {
     files::keep_shared(path, text.as_bytes()).into_diagnostic()
 }
 
-fn spec_error(error: &ReadError) -> SpecError {
+pub(super) fn spec_error(error: &ReadError) -> SpecError {
     let known = |n: usize| (n > 0).then_some(n);
     SpecError {
         file: error.file.clone(),

@@ -86,7 +86,7 @@ pub struct KnownFinding {
     pub source: String,
 }
 
-const ON_RECORD: &str = include_str!("../../../../reference/findings/known.yaml");
+const ON_RECORD: &str = include_str!("../../../data/findings.yaml");
 
 impl KnownFinding {
     pub(super) fn on_record() -> Result<Vec<Self>, SpecError> {

@@ -24,11 +24,11 @@ pub use naming::{Named, Naming, naming};
 
 /// The specs and their luminaires, laid out as in the repository.
 const FILES: [(&str, &str); 5] = [
-    ("specs/axial.yaml", include_str!("../../../../reference/specs/axial.yaml")),
-    ("luminaires/axial.ies", include_str!("../../../../reference/luminaires/axial.ies")),
-    ("selftest/asymmetric.yaml", include_str!("../../../../reference/selftest/asymmetric.yaml")),
-    ("selftest/openings.yaml", include_str!("../../../../reference/selftest/openings.yaml")),
-    ("selftest/lopsided.ies", include_str!("../../../../reference/selftest/lopsided.ies")),
+    ("specs/axial.yaml", include_str!("../../../data/axial.yaml")),
+    ("luminaires/axial.ies", include_str!("../../../data/axial.ies")),
+    ("selftest/asymmetric.yaml", include_str!("../../../data/asymmetric.yaml")),
+    ("selftest/openings.yaml", include_str!("../../../data/openings.yaml")),
+    ("selftest/lopsided.ies", include_str!("../../../data/lopsided.ies")),
 ];
 /// Relative standard error of a direct reading: read-out and rounding of a good renderer.
 const DIRECT_NOISE: f64 = 1e-5;

@@ -15,6 +15,7 @@ mod rows;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::Report;
+use super::sentences::{HEADING, sentences};
 use super::words::{self, plural};
 use crate::judge::Verdict;
 use palette::Palette;
@@ -114,7 +115,12 @@ fn head(report: &Report) -> Markup {
             h1 { (report.spec.title) }
             p.spec { code { (report.spec.path) } }
             @for line in super::notes::decision_rules(report) { p.spec { (line) } }
-            @for line in super::notes::policies(report) { p.spec { (line) } }
+            @for line in super::notes::policies(report).into_iter().chain(super::notes::lacking(report)) { p.spec { (line) } }
+            @let sentences = sentences(report);
+            @if !sentences.is_empty() {
+                h2.trust { (HEADING) }
+                ul.trust { @for sentence in &sentences { li { (minus(&sentence.text)) } } }
+            }
             @if !report.comparisons.is_empty() {
                 div.share aria-hidden="true" {
                     @for (verdict, count) in counts { @if count > 0 {

@@ -61,7 +61,7 @@ fn table(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palette:
                         th scope="col" { span.unseen { "error budget" } }
                     } }
                     tbody {
-                        @for (k, c) in mine.iter().enumerate() { (row(c, rows.add(c, palette), k >= FIRST, suite, palette)) }
+                        @for (k, c) in mine.iter().enumerate() { (row(report, c, rows.add(c, palette), k >= FIRST, palette)) }
                     }
                 }
             }
@@ -75,7 +75,8 @@ fn head(name: &str, key: &str, class: &str) -> Markup {
     html! { th scope="col" class={ "c-" (key) " " (class) } { button.sort type="button" data-key=(key) { (name) } } }
 }
 
-fn row(c: &Comparison, number: usize, hidden: bool, suite: bool, palette: &Palette) -> Markup {
+fn row(report: &Report, c: &Comparison, number: usize, hidden: bool, palette: &Palette) -> Markup {
+    let suite = report.is_suite();
     let unit = c.quantity.unit();
     let value = |v: Option<f64>| v.map_or("–".to_owned(), significant);
     html! {
@@ -88,9 +89,33 @@ fn row(c: &Comparison, number: usize, hidden: bool, suite: bool, palette: &Palet
             td.c-b { (c.basis_name()) }
             td.number { (c.relative_deviation.map_or("–".to_owned(), percent)) }
             td.c-s { (bar(c)) }
-            td class={ "v-" (class(c.verdict)) } { span.glyph aria-hidden="true" { (glyph(c.verdict)) } " " span.word { (c.verdict.name()) } }
+            td class={ "v-" (class(c.verdict)) } { span.glyph aria-hidden="true" { (glyph(c.verdict)) } " " span.word { (c.verdict.name()) }
+                @if c.verdict.is_bad() { details.repeat { summary { "repeat" } code { (repeat(report, c)) } } }
+            }
             td { button.more type="button" aria-label={ "Error budget of " (c.key.engine) " at " (c.meter) } { "budget" } }
         }
+    }
+}
+
+/// The command that reads a reading again.
+fn repeat(report: &Report, c: &Comparison) -> String {
+    if c.key.procedure.is_known() {
+        return format!("luxproof engines doctor {}", quoted(&c.key.engine));
+    }
+    let case = report.cases.iter().find(|case| case.name == c.key.case);
+    let spec = case.map_or(report.spec.path.as_str(), |case| case.spec.path.as_str());
+    let filter = if c.key.case.contains('/') { format!(" --filter {}", quoted(&c.key.case)) } else { String::new() };
+    let (spec, engine) = (quoted(spec), quoted(&c.key.engine));
+    format!("luxproof run {spec}{filter} --engines {engine} --procedures {} --no-cache --out again", c.key.procedure)
+}
+
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./@".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
     }
 }
 

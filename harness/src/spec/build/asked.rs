@@ -25,7 +25,8 @@ impl Builder<'_> {
         let mut known = HashSet::new();
         for name in names.iter() {
             let help = suggestion(name, spec.meters.keys().map(String::as_str));
-            self.check(spec.meters.contains_key(name), &at, format!("there is no meter set `{name}`"), help);
+            let is_there = spec.meters.contains_key(name) || self.mended.holds("meters");
+            self.check(is_there, &at, format!("there is no meter set `{name}`"), help);
             self.check(known.insert(name), &at, format!("`{name}` stands there twice"), "name every set once");
         }
     }
@@ -35,7 +36,9 @@ impl Builder<'_> {
         let ids = || spec.luminaires.iter().map(|l| l.id.as_str());
         let message = format!("there is no luminaire `{}`", intensity.luminaire);
         let help = suggestion(&intensity.luminaire, ids());
-        self.check(ids().any(|id| id == intensity.luminaire), &at("luminaire"), message, help);
+        let is_there = ids().any(|id| id == intensity.luminaire) || self.mended.holds("luminaires");
+        let is_mended = (0..spec.luminaires.len()).any(|k| self.mended.holds(&format!("luminaires[{k}].id")));
+        self.check(is_there || is_mended, &at("luminaire"), message, help);
         let is_distance = intensity.distance_m.is_finite() && intensity.distance_m > 0.0;
         let message = format!("{} m is no distance", intensity.distance_m);
         self.check(is_distance, &at("distance_m"), message, "give a positive number of metres");

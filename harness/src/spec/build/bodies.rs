@@ -108,13 +108,12 @@ impl Builder<'_> {
         let finite = [turn.azimuth, turn.tilt, turn.roll].iter().all(|a| a.is_finite());
         self.check(finite, &at("rotate_deg"), "angles must be finite", "give degrees");
         let path = self.beside(&spec.photometry);
-        let photometry = match files.get(&path) {
-            Some(read) => read.clone(),
-            None => {
-                let read = self.photometry(&at("photometry"), &path);
-                files.entry(path).or_insert(read).clone()
-            }
-        }?;
+        let photometry = if let Some(read) = files.get(&path) {
+            read.clone()?
+        } else {
+            let read = self.photometry(&at("photometry"), &path);
+            files.entry(path).or_insert(read).clone()?
+        };
         let luminaire = Luminaire {
             id: spec.id.clone(),
             photometry,

@@ -10,7 +10,7 @@ use super::super::percent;
 use super::axis::ticks;
 use super::contour::contour;
 use super::{Group, WIDTH, colours, figure};
-use crate::judge::Comparison;
+use crate::judge::{Basis, Comparison};
 use crate::report::Report;
 use crate::report::svg::{label, line, number, text};
 use crate::report::words::{largest, round_step, rounded, significant as six_digits};
@@ -36,16 +36,43 @@ pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette) -> V
         let Some((first, lattice)) = engines.iter().find_map(|e| Some((of_set(e), Lattice::of(&of_set(e))?))) else {
             continue;
         };
-        panels.push(isolux(&group.title(report, &format!("{name}, reference ({})", basis.name())), &first, &lattice));
+        let alike = Alike::of(report, group, basis, name);
+        let title = group.title(report, &format!("{name}, reference ({})", basis.name()));
+        panels.push(isolux(&title, &first, &lattice, &alike));
         let maps: Vec<(&str, Vec<&Comparison>)> =
             engines.iter().map(|e| (*e, of_set(e))).filter(|(_, m)| m.len() == first.len()).collect();
-        let most = maps.iter().flat_map(|(_, m)| m).filter_map(|c| c.relative_deviation).map(|d| 100.0 * d.abs());
-        let most = round_step(most.fold(0.0, f64::max).clamp(1e-4, 100.0));
         for (engine, mine) in &maps {
-            panels.push(map(&group.title(report, &format!("{name}, {engine}")), mine, &lattice, most));
+            panels.push(map(&group.title(report, &format!("{name}, {engine}")), mine, &lattice, &alike));
         }
     }
     panels
+}
+
+/// The scales that maps of one set have in common: of all engines, and of all cases of one spec, which are there to be compared.
+struct Alike {
+    low: f64,
+    high: f64,
+    /// Either way, in per cent.
+    most: f64,
+    whose: &'static str,
+}
+
+impl Alike {
+    fn of(report: &Report, group: &Group<'_>, basis: Basis, name: &str) -> Self {
+        let spec = |case: &str| case.split('/').next().map(str::to_owned);
+        let is_alike = |c: &&Comparison| {
+            let is_of_spec = c.key.procedure == group.procedure && spec(&c.key.case) == spec(group.case);
+            is_of_spec && c.basis() == Some(basis) && c.gamma_deg.is_none() && set(c) == name
+        };
+        let all = report.comparisons.iter().filter(is_alike).collect_vec();
+        let lit = all.iter().filter_map(|c| Some(c.reference.as_ref()?.value));
+        let (low, high) = lit.fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
+        let most = all.iter().filter_map(|c| c.relative_deviation).map(|d| 100.0 * d.abs()).fold(0.0, f64::max);
+        let has_cases = all.iter().any(|c| c.key.case != group.case);
+        let whose =
+            if has_cases { "one scale for all engines and all cases of the spec" } else { "one scale for all engines" };
+        Self { low, high, most: round_step(most.clamp(1e-4, 100.0)), whose }
+    }
 }
 
 fn set(c: &Comparison) -> &str {
@@ -113,9 +140,9 @@ impl Frame {
     }
 }
 
-fn isolux(title: &str, mine: &[&Comparison], lattice: &Lattice) -> Markup {
+fn isolux(title: &str, mine: &[&Comparison], lattice: &Lattice, alike: &Alike) -> Markup {
     let values: Vec<f64> = mine.iter().map(|c| c.reference.as_ref().map_or(f64::NAN, |r| r.value)).collect();
-    let (low, high) = values.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
+    let Alike { low, high, .. } = *alike;
     let frame = lattice.frame();
     let part = |v: f64| if high > low { (v - low) / (high - low) } else { 0.5 };
     let levels: Vec<f64> = ticks(low, high, 6).into_iter().filter(|l| *l > low && *l < high).collect();
@@ -151,7 +178,8 @@ fn isoline(values: &[f64], lattice: &Lattice, frame: &Frame, level: f64) -> Mark
     }
 }
 
-fn map(title: &str, mine: &[&Comparison], lattice: &Lattice, most: f64) -> Markup {
+fn map(title: &str, mine: &[&Comparison], lattice: &Lattice, alike: &Alike) -> Markup {
+    let most = alike.most;
     let frame = lattice.frame();
     let in_percent = |k: usize| mine[k].relative_deviation.map(|d| 100.0 * d);
     let colour = |k: usize| in_percent(k).map_or("none".to_owned(), |p| colours::deviation(p / most));
@@ -165,8 +193,7 @@ fn map(title: &str, mine: &[&Comparison], lattice: &Lattice, most: f64) -> Marku
         (coordinates(lattice, &frame))
         (colour_bar(&frame, |t| colours::deviation(2.0 * t - 1.0), &ends, "deviation from the reference [%]"))
     };
-    let caption =
-        html! { "Mean " (percent(mean / 100.0)) ", worst " (percent(worst / 100.0)) "; one scale for all engines." };
+    let caption = html! { "Mean " (percent(mean / 100.0)) ", worst " (percent(worst / 100.0)) "; " (alike.whose) "." };
     figure(title, frame.size[1] + 46.0 + BAR, &drawing, &caption)
 }
 

@@ -1,0 +1,103 @@
+//! What makes the program at home on a machine: a first spec, completions, manual pages, its version, a run's page.
+
+use std::fs;
+use std::process::Command;
+
+use crate::support::{Answer, Folder, LAMP, OWN, ROOM, TWO_METERS, root};
+
+const DIRECT: &str = "procedures:\n  direct_illuminance: {meters: plane}\n";
+
+#[test]
+fn a_first_spec_runs_as_it_is_written_and_is_not_replaced() {
+    let folder = Folder::new(&[]);
+    let args = ["init", "specs/office.yaml", "--size", "5.4,3.6,2.8", "--title", "an office: \"mine\"", "--yes"];
+    folder.luxproof(&args).exits(0).prints("specs/office.yaml").complains("next: luxproof run specs/office.yaml");
+    let text = folder.read("specs/office.yaml");
+    assert!(
+        text.contains("size_m: [5.4, 3.6, 2.8]") && text.lines().filter(|l| l.contains('#')).count() > 10,
+        "{text}"
+    );
+    folder.luxproof(&["check", "specs/office.yaml"]).exits(0);
+    let run = ["run", "specs/office.yaml", "--engines", OWN, "--no-calibration", "--out", "out"];
+    folder.luxproof(&run).exits(0).prints("an office: \"mine\"");
+    folder.luxproof(&args).exits(2).complains("is there already");
+    folder.luxproof(&[&args[..], &["--force"]].concat()).exits(0);
+    // One's own file is taken along; what is none is refused before anything is written.
+    folder.write("mine.ies", LAMP);
+    folder.luxproof(&["init", "a/first.yaml", "--photometry", "mine.ies", "--yes"]).exits(0).prints("a/mine.ies");
+    folder.luxproof(&["check", "a/first.yaml"]).exits(0);
+    folder.write("bad.ies", "IESNA:LM-63-2002\nTILT=NONE\nx\n");
+    folder.luxproof(&["init", "b/first.yaml", "--photometry", "bad.ies", "--yes"]).exits(2).complains("bad.ies:3");
+    assert!(!folder.path("b").exists());
+    for size in ["6,4", "6,4,0", "6,x,3", "-1,2,3"] {
+        folder.luxproof(&["init", "c.yaml", "--yes", &format!("--size={size}")]).exits(2);
+    }
+    assert!(!folder.path("c.yaml").exists());
+}
+
+#[test]
+fn a_first_spec_of_any_room_is_sound() {
+    for size in ["6,4,3", "1,1,1", "0.3,0.2,0.2", "100,40,12", "3.33,7.77,2.51"] {
+        let folder = Folder::new(&[]);
+        folder.luxproof(&["init", "--yes", "--size", size]).exits(0);
+        let answer = folder.luxproof(&["check", "first.yaml"]).exits(0);
+        assert!(answer.stderr.is_empty(), "{size}: {}", answer.stderr);
+    }
+}
+
+#[test]
+fn completions_and_manual_pages_know_every_command() {
+    let folder = Folder::new(&[]);
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = folder.luxproof(&["completions", shell]).exits(0).stdout;
+        assert!(script.contains("photometry") && script.contains("engines-dir"), "{shell}");
+    }
+    let bash = folder.luxproof(&["completions", "bash"]).stdout;
+    folder.write("complete.bash", &bash);
+    let check = Command::new("bash").args(["-n"]).arg(folder.path("complete.bash")).status();
+    assert!(check.unwrap().success());
+    folder.luxproof(&["man", "--out", "man"]).exits(0);
+    for page in ["luxproof.1", "luxproof-run.1", "luxproof-engines-install.1"] {
+        let text = folder.read(&format!("man/{page}"));
+        assert!(text.contains(".TH") && text.contains("luxproof"), "{page}");
+    }
+    assert!(folder.read("man/luxproof-run.1").contains("baseline"));
+}
+
+#[test]
+fn version_and_report_name_the_commit_of_the_sources() {
+    let folder = Folder::new(&[("spec.yaml", &[ROOM, TWO_METERS, DIRECT].concat()), ("lamp.ies", LAMP)]);
+    folder.run(&["--engines", OWN]).exits(0);
+    let tool = &folder.report()["tool"];
+    let version = folder.luxproof(&["--version"]).exits(0).stdout;
+    let head = Answer::of(Command::new("git").args(["rev-parse", "HEAD"]).current_dir(root()));
+    let is_checkout = head.code == Some(0) && root().join(".git").exists();
+    assert_eq!(tool["version"], env!("CARGO_PKG_VERSION"));
+    if is_checkout {
+        let commit = tool["commit"].as_str().unwrap();
+        assert_eq!(commit, head.stdout.trim(), "built of this commit");
+        let changes = if tool["dirty"] == true { ", with changes" } else { "" };
+        assert_eq!(version.trim(), format!("luxproof {} ({}{changes})", env!("CARGO_PKG_VERSION"), &commit[..12]));
+    }
+    folder.luxproof(&["report", "out"]).exits(0).prints(version.trim());
+}
+
+#[test]
+fn every_run_leaves_a_page_and_open_tells_where() {
+    let folder = Folder::new(&[("spec.yaml", &[ROOM, TWO_METERS, DIRECT].concat()), ("lamp.ies", LAMP)]);
+    folder.run(&["--engines", OWN]).exits(0);
+    let page = folder.read("out/report.html");
+    folder.luxproof(&["open", "out", "--no-browser"]).exits(0).prints("out/report.html");
+    fs::remove_file(folder.path("out/report.html")).unwrap();
+    folder.luxproof(&["open", "out/report.json", "--no-browser"]).exits(0).prints("out/report.html");
+    assert_eq!(folder.read("out/report.html"), page);
+    folder.luxproof(&["open", "cache", "--no-browser"]).exits(2).complains("holds no report.json");
+}
+
+#[test]
+fn photometric_lint_can_be_denied() {
+    let folder = Folder::new(&[("sound.ies", LAMP), ("dark.ies", &LAMP.replace("100 80 0", "0 0 0"))]);
+    folder.luxproof(&["photometry", "--deny", "warnings", "sound.ies"]).exits(0);
+    folder.luxproof(&["photometry", "--deny", "warnings", "sound.ies", "dark.ies"]).exits(1).prints("warning");
+    folder.luxproof(&["photometry", "--deny", "warnings", "dark.ies", "none.ies"]).exits(2);
+}
