@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde_json::Value;
 
-use super::tree::below;
+use super::place::below;
 
 /// Types lie in one another less deep than this.
 const MAX_DEPTH: usize = 8;

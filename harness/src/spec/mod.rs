@@ -10,6 +10,7 @@ mod homes;
 mod locate;
 pub mod model;
 mod mounting;
+mod place;
 mod plausible;
 mod shape;
 mod suite;

@@ -11,7 +11,8 @@ use serde_yaml::{Mapping, Value};
 
 use super::faults::MAX_FAULTS;
 use super::homes::homes;
-use super::tree::{Tree, below};
+use super::place::{below, get, last_key, parent, put, take};
+use super::tree::Tree;
 use super::{Source, SpecError, Spot, meant_key, nearest_key};
 
 /// What a text says as a `T`, as far as it can be made one.
@@ -346,57 +347,5 @@ impl Flaw {
             Kind::Missing(_) if self.path == place => true,
             _ => self.place() != place && (self.path != earlier.path || self.message != earlier.message),
         }
-    }
-}
-
-fn last_key(path: &str) -> &str {
-    path.rsplit('.').next().unwrap_or(path)
-}
-
-fn parent(path: &str) -> &str {
-    path.rfind(['.', '[']).map_or("", |end| &path[..end])
-}
-
-/// The steps of a path: a key, or the index of an item.
-fn steps(path: &str) -> impl Iterator<Item = &str> {
-    path.split(['.', '[']).map(|step| step.trim_end_matches(']')).filter(|step| !step.is_empty())
-}
-
-fn get<'a>(value: &'a Value, path: &str) -> Option<&'a Value> {
-    steps(path).try_fold(value, |value, step| match value {
-        Value::Sequence(items) => items.get(step.parse::<usize>().ok()?),
-        other => other.get(step),
-    })
-}
-
-fn get_mut<'a>(value: &'a mut Value, path: &str) -> Option<&'a mut Value> {
-    steps(path).try_fold(value, |value, step| match value {
-        Value::Sequence(items) => items.get_mut(step.parse::<usize>().ok()?),
-        other => other.get_mut(step),
-    })
-}
-
-fn take(value: &mut Value, path: &str) -> Option<Value> {
-    get_mut(value, parent(path))?.as_mapping_mut()?.remove(last_key(path))
-}
-
-/// Puts something at a place, or takes away what is there.
-fn put(value: &mut Value, path: &str, what: Option<Value>) -> bool {
-    let Some(what) = what else { return take(value, path).is_some() };
-    if path.is_empty() {
-        *value = what;
-        return true;
-    }
-    let Some(whole) = get_mut(value, parent(path)) else { return false };
-    match whole {
-        Value::Mapping(keys) => {
-            keys.insert(last_key(path).into(), what);
-            true
-        }
-        Value::Sequence(items) => {
-            let item = steps(path).last().and_then(|k| items.get_mut(k.parse::<usize>().ok()?));
-            item.map(|item| *item = what).is_some()
-        }
-        _ => false,
     }
 }

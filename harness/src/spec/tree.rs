@@ -6,6 +6,8 @@ use std::fmt;
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_yaml::{Mapping, Value};
 
+use super::place::below;
+
 pub(super) struct Tree {
     pub(super) value: Value,
     /// The paths of keys that stand there once more.
@@ -16,11 +18,6 @@ pub(super) fn tree(text: &str) -> Result<Tree, serde_yaml::Error> {
     let mut twice = vec![];
     let value = Node { at: String::new(), twice: &mut twice }.deserialize(serde_yaml::Deserializer::from_str(text))?;
     Ok(Tree { value, twice })
-}
-
-/// A path's next key.
-pub(super) fn below(path: &str, key: &str) -> String {
-    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
 }
 
 struct Node<'a> {

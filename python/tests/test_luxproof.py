@@ -1,0 +1,71 @@
+"""The package over the program that LUXPROOF names; `ci/python` runs it."""
+
+from __future__ import annotations
+
+import importlib.resources
+from pathlib import Path
+
+import luxproof
+import pytest
+
+REFERENCE = Path(__file__).parents[2] / "reference"
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> luxproof.Report:
+    out = tmp_path_factory.mktemp("run") / "out"
+    spec = REFERENCE / "specs" / "axial.yaml"
+    return luxproof.run(spec, engines=["simulator", "iesna"], out=out, options=["--no-calibration", "--no-cache"])
+
+
+def test_a_run_is_what_load_reads(report: luxproof.Report) -> None:
+    assert report.folder is not None
+    again = luxproof.load(report.folder)
+    assert again.data == report.data == luxproof.load(report.folder / "report.json").data
+    assert report.summary["pass"] > 0 and report.title
+
+
+def test_tables_hold_every_entry_and_say_their_units(report: luxproof.Report) -> None:
+    comparisons = report.comparisons
+    assert len(comparisons) == len(report.data["comparisons"])
+    assert comparisons.attrs["units"]["gamma_deg"] == "deg"
+    first = report.data["comparisons"][0]
+    assert comparisons.loc[0, "reference.value"] == first["reference"]["value"]
+    passed = comparisons[comparisons.verdict == "pass"]
+    assert len(passed) == report.summary["pass"]
+    assert len(report.readings) == len(report.data["readings"])
+    assert list(report.statistics.columns[:5]) == ["case", "procedure", "engine", "set", "meters"]
+    assert isinstance(report.bias.columns[0], str)
+
+
+def test_statistics_are_those_of_the_readings(report: luxproof.Report) -> None:
+    readings, statistics = report.readings, report.statistics
+    readings = readings[readings.quantity == "illuminance_lx"]
+    readings = readings.assign(set=readings.meter.str.rsplit("[", n=1).str[0])
+    mean = readings.groupby(["procedure", "engine", "set"]).value.mean()
+    assert len(statistics) > 0
+    for row in statistics.to_dict("records"):
+        assert row["mean.value"] == pytest.approx(mean[row["procedure"], row["engine"], row["set"]], rel=1e-12)
+
+
+def test_photometry_is_one_row_a_file() -> None:
+    lamps = [REFERENCE / "luminaires" / name for name in ("isotropic.ies", "lambertian-point.ies")]
+    table = luxproof.photometry(*lamps)
+    assert list(table.file) == [str(lamp) for lamp in lamps]
+    assert (table.flux_lm > 0).all() and table.attrs["units"]["max_cd"] == "cd"
+
+
+def test_what_the_program_refuses_is_raised_with_its_place(tmp_path: Path) -> None:
+    spec = tmp_path / "spec.yaml"
+    spec.write_text("luxproof: 1\nroom: {size_m: [1, 2, three]}\n")
+    with pytest.raises(luxproof.LuxproofError, match=r"spec.yaml:2:23"):
+        luxproof.run(spec)
+    with pytest.raises(ValueError, match="no report"):
+        file = tmp_path / "x.json"
+        file.write_text("{}")
+        luxproof.load(file)
+
+
+def test_the_package_is_typed() -> None:
+    assert importlib.resources.files(luxproof).joinpath("py.typed").is_file()
+    assert luxproof.version()[0].isdigit()
