@@ -11,7 +11,7 @@ use divan::Bencher;
 use luxproof::audit::{self, Calibration, Options};
 use luxproof::engines::Site;
 use luxproof::plan::Selection;
-use luxproof::report::{Detail, Report, Style, csv, markdown, terminal};
+use luxproof::report::{Detail, Report, Screen, Style, csv, markdown, terminal};
 use luxproof::trend::baseline::{Baseline, Comparability, compare};
 
 /// Meters along the two sides of a grid.
@@ -57,7 +57,9 @@ fn spec_to_report(bencher: Bencher, grid: [usize; 2]) {
 fn views(bencher: Bencher, grid: [usize; 2]) {
     let folder = tempfile::tempdir().unwrap();
     let report = audited(folder.path(), grid);
-    bencher.bench(|| (terminal(&report, Style::Plain, Detail::All, None), markdown(&report, None), csv(&report)));
+    bencher.bench(|| {
+        (terminal(&report, Screen::new(Style::Plain, Detail::All, None), None), markdown(&report, None), csv(&report))
+    });
 }
 
 #[divan::bench(args = GRIDS, sample_count = 3, sample_size = 1)]

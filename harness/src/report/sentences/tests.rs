@@ -54,7 +54,7 @@ fn said(comparisons: Vec<Comparison>, bodies: &[&str], bias: Vec<Bias>) -> Strin
     let skips = skips.collect();
     let cases = names.into_iter().map(case).collect();
     let engines = vec![serde_json::from_value(engine).unwrap()];
-    let report = Report { engines, comparisons, cases, skips, bias, ..Report::default() };
+    let report = Report { engines, comparisons, skips, bias, cases, ..Report::default() };
     sentences(&report).remove(0).text
 }
 
