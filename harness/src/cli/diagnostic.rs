@@ -5,11 +5,15 @@ use miette::{LabeledSpan, NamedSource, Report, Severity, SourceSpan};
 use crate::audit::AuditError;
 use crate::spec::SpecError;
 use crate::system::files::{MAX_BYTES, read_bounded};
+use crate::system::printable::{self, is_unprintable};
 
 pub(crate) fn diagnose(error: SpecError) -> Report {
     let name = error.file.display().to_string();
     let bytes = error.line.and_then(|_| read_bounded(&error.file, MAX_BYTES).ok());
-    let text = bytes.map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    // A character stays a character, so that places stay what they are.
+    let shown = |c: char| if is_unprintable(c) && c != '\n' && c != '\t' { char::REPLACEMENT_CHARACTER } else { c };
+    let text =
+        bytes.map(|bytes| String::from_utf8_lossy(&bytes).replace("\r\n", "\n").chars().map(shown).collect::<String>());
     // What no terminal shows says nothing, and the printer cannot lay it out.
     let text = text.filter(|text| text.lines().all(|line| line.len() <= MAX_LINE));
     let span = text.as_ref().and_then(|t| span(t, error.line?, error.column.unwrap_or(1)));
@@ -35,9 +39,10 @@ const MAX_LINE: usize = 2000;
 const MAX_MESSAGE: usize = 2000;
 
 fn shortened(text: &str) -> String {
+    let text = printable::lines(text);
     match text.char_indices().nth(MAX_MESSAGE) {
         Some((end, _)) => format!("{} ...", &text[..end]),
-        None => text.to_owned(),
+        None => text,
     }
 }
 
