@@ -33,6 +33,8 @@ const BRIGHTEST_CD: f64 = 1e30;
 /// More meters than this are a slip of the pen.
 const MAX_METERS: usize = 1_000_000;
 
+const TRIANGLES_OF_A_BOX: usize = 12;
+
 /// The longest name, and the longest title, in characters.
 const MAX_NAME: usize = 100;
 const MAX_TITLE: usize = 1000;
@@ -99,18 +101,18 @@ impl Case {
     pub fn load_all(path: &Path, trust: Trust) -> Result<Vec<Self>, SpecError> {
         let source = Source::read(path, trust)?;
         let spec: Spec = source.parse()?;
-        let variants = super::cases::variants(&source)?;
         let mut left = trust.limits();
-        if variants.is_empty() {
+        let Some(variants) = super::cases::variants(&source)? else {
             return Ok(vec![Builder::new(&source, &mut left).build(spec)?]);
-        }
-        let build = |v: Variant| {
+        };
+        let build = |v: Result<Variant, SpecError>| {
+            let v = v?;
             let mut builder = Builder::new(&v.source, &mut left);
             builder.hash.update(&v.name);
             let case = builder.build(v.spec)?;
             Ok(Self { name: format!("{}/{}", case.name, v.name), only_engines: v.engines, ..case })
         };
-        variants.into_iter().map(build).collect()
+        variants.map(build).collect()
     }
 }
 
@@ -207,6 +209,7 @@ impl<'a> Builder<'a> {
             let obstacle = match (&spec.cuboid, &spec.mesh) {
                 (Some(cuboid), None) => {
                     let (min_m, max_m) = (DVec3::from(cuboid.min_m), DVec3::from(cuboid.max_m));
+                    self.take(&at, "triangles", TRIANGLES_OF_A_BOX, |left| &mut left.triangles)?;
                     let sound = min_m.is_finite() && max_m.is_finite() && min_m.cmplt(max_m).all();
                     let message = format!("the box from {min_m} to {max_m} has no volume");
                     self.source.require(sound, &at, message, "give min_m below max_m on every axis")?;

@@ -3,6 +3,8 @@
 //! A mapping is laid over a mapping key by key, and over a list whose items have an `id` item by item; everything else
 //! replaces what was there.
 
+use std::collections::HashSet;
+
 use serde_yaml::{Mapping, Value};
 
 use super::model::{EngineSettings, Spec};
@@ -28,28 +30,35 @@ struct Override {
     says: Mapping,
 }
 
-/// The cases of a spec, in its order; empty for a spec without `cases`.
-pub(super) fn variants(source: &Source) -> Result<Vec<Variant>, SpecError> {
+/// The cases of a spec, in its order, each made when it is asked for: a spec may be large, and its cases many. `None` for a spec without
+/// `cases`.
+pub(super) fn variants(
+    source: &Source,
+) -> Result<Option<impl Iterator<Item = Result<Variant, SpecError>> + use<'_>>, SpecError> {
     let text: Value = serde_yaml::from_str(&source.text).map_err(|e| source.error_at("", e.to_string(), ""))?;
-    let Value::Mapping(mut base) = text else { return Ok(vec![]) };
-    let Some(cases) = base.remove("cases") else { return Ok(vec![]) };
+    let Value::Mapping(mut base) = text else { return Ok(None) };
+    let Some(cases) = base.remove("cases") else { return Ok(None) };
     let combinations = match cases {
         Value::Sequence(list) => listed(source, list)?.into_iter().map(|o| vec![o]).collect(),
         Value::Mapping(axes) => matrix(source, axes)?,
         _ => return Err(source.error_at("cases", "neither a list nor a matrix", FORM)),
     };
-    let (count, most) = (combinations.len(), source.trust.limits().cases);
-    source.require(count <= most, "cases", format!("{count} cases"), format!("a spec holds {most} cases at most"))?;
+    let (count, limits) = (combinations.len(), source.trust.limits());
+    let most = limits.cases.min(limits.values / source.values.max(1));
+    let help = format!("a spec so large holds {most} cases at most: make several of it");
+    source.require(count <= most, "cases", format!("{count} cases"), help)?;
     source.require(!combinations.is_empty(), "cases", "there are none", "give at least one, or leave `cases` out")?;
-    let mut variants: Vec<Variant> = vec![];
-    for overrides in combinations {
-        let variant = combined(source, &base, &overrides)?;
-        let is_new = variants.iter().all(|v| v.name != variant.name);
-        let message = format!("two cases are named `{}`", variant.name);
-        source.require(is_new, &overrides[0].place, message, "give every case a name of its own")?;
-        variants.push(variant);
+    let mut names = HashSet::new();
+    for overrides in &combinations {
+        let name = name_of(overrides);
+        let message = format!("two cases are named `{name}`");
+        source.require(names.insert(name), &overrides[0].place, message, "give every case a name of its own")?;
     }
-    Ok(variants)
+    Ok(Some(combinations.into_iter().map(move |overrides| combined(source, &base, &overrides))))
+}
+
+fn name_of(overrides: &[Override]) -> String {
+    overrides.iter().map(|o| o.name.as_str()).collect::<Vec<_>>().join("-")
 }
 
 const FORM: &str = "give a list of overrides, each with a `name`, or a matrix {axis: {name: override, ...}, ...}";
@@ -111,8 +120,7 @@ fn check_name(source: &Source, place: &str, name: &str) -> Result<(), SpecError>
 }
 
 fn combined(source: &Source, base: &Mapping, overrides: &[Override]) -> Result<Variant, SpecError> {
-    let names: Vec<&str> = overrides.iter().map(|o| o.name.as_str()).collect();
-    let name = names.join("-");
+    let name = name_of(overrides);
     let mut text = Value::Mapping(base.clone());
     let mut engines: Option<Vec<String>> = None;
     for o in overrides {
@@ -171,7 +179,8 @@ mod tests {
     fn of(cases: &str) -> Result<Vec<Variant>, SpecError> {
         let second = "  - {id: b, photometry: a.ies, at_m: [2, 2, 2]}\nmeters:\n";
         let base = MINIMAL.replace("meters:\n", second) + "  indirect_illuminance: {meters: plane}\n";
-        variants(&Source::new("spec.yaml".into(), base + cases))
+        let source = Source::new("spec.yaml".into(), base + cases);
+        variants(&source)?.into_iter().flatten().collect()
     }
 
     #[test]

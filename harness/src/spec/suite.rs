@@ -35,11 +35,8 @@ pub fn specs(path: &Path) -> Result<Vec<(String, Spec)>, SpecError> {
     let source = Source::read(path, Trust::Own)?;
     let spec: Spec = source.parse()?;
     let stem = name_of(path);
-    let variants = super::cases::variants(&source)?;
-    if variants.is_empty() {
-        return Ok(vec![(stem, spec)]);
-    }
-    Ok(variants.into_iter().map(|v| (format!("{stem}/{}", v.name), v.spec)).collect())
+    let Some(variants) = super::cases::variants(&source)? else { return Ok(vec![(stem, spec)]) };
+    variants.map(|v| v.map(|v| (format!("{stem}/{}", v.name), v.spec))).collect()
 }
 
 /// The cases whose names match any of the patterns: a glob where it holds `*`, `?` or `[`, a part of the name otherwise.
