@@ -1,5 +1,6 @@
 //! The `luxproof` program, which supervises what it runs by processes of its own: parses the command line, keeps Ctrl-C orderly, prints errors with their place, sets the exit code.
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -19,6 +20,8 @@ fn main() -> ExitCode {
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
+        // In a file of a workflow colours are noise.
+        .with_ansi(std::io::stderr().is_terminal())
         .log_internal_errors(false)
         .without_time()
         .init();

@@ -32,6 +32,7 @@ pub use lint::{Lint, Severity};
 pub use outdoor::ClassificationZones;
 pub use resample::Resampled;
 pub use sampler::{DirectionSampler, SampledDirection};
+pub use text::is_unprintable;
 pub use write::Written;
 
 use lint::Lints;

@@ -1,4 +1,4 @@
-//! Bytes of a text file as lines and places: any line ending, UTF-8 or Latin-1, with or without byte order mark.
+//! Bytes of a text file as lines and places: any line ending, UTF-8 or Latin-1, with or without byte order mark; and which characters do something.
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -73,18 +73,34 @@ impl<'a> Line<'a> {
     }
 }
 
-/// UTF-8 where it is that, else Latin-1, in which every byte is a character.
+/// Whether a character shows nothing and does something: controls, and what breaks lines or turns their direction.
+pub fn is_unprintable(c: char) -> bool {
+    let breaks_or_turns = matches!(c, '\u{2028}' | '\u{2029}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    c.is_control() || breaks_or_turns || c == '\u{feff}'
+}
+
+/// UTF-8 where it is that, else Latin-1, in which every byte is a character. What would do something to a terminal is replaced, one
+/// character by one: a file's texts are shown wherever it is used.
 pub(crate) fn decode(bytes: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(bytes) {
-        Ok(text) => Cow::Borrowed(text),
-        Err(_) => Cow::Owned(bytes.iter().map(|&b| char::from(b)).collect()),
+        Ok(text) => harmless(text),
+        Err(_) => Cow::Owned(bytes.iter().map(|&b| replaced(char::from(b))).collect()),
     }
+}
+
+/// A text without characters that do something, but for tabs and ends of lines.
+pub(crate) fn harmless(text: &str) -> Cow<'_, str> {
+    if text.chars().all(|c| replaced(c) == c) { text.into() } else { text.chars().map(replaced).collect() }
+}
+
+fn replaced(c: char) -> char {
+    if is_unprintable(c) && !matches!(c, '\t' | '\n' | '\r') { char::REPLACEMENT_CHARACTER } else { c }
 }
 
 /// A short quotation of bytes for a message.
 pub(crate) fn quote(bytes: &[u8]) -> String {
     let text = decode(bytes);
-    let mut short: String = text.chars().take(24).map(|c| if c.is_control() { '?' } else { c }).collect();
+    let mut short: String = text.chars().take(24).map(|c| if is_unprintable(c) { '?' } else { c }).collect();
     if text.chars().nth(24).is_some() {
         short.push('…');
     }
@@ -105,6 +121,19 @@ mod tests {
         for (k, (number, words, place)) in lines.iter().enumerate() {
             assert_eq!((*number, words.as_str(), *place), (k + 1, expected[k], (k + 1, 1)));
         }
+    }
+
+    #[test]
+    fn no_text_of_a_file_does_anything_and_places_stay_the_same() {
+        for (bytes, shown) in [
+            ("a\u{1b}]0;x\u{7}\tb".as_bytes(), "a\u{fffd}]0;x\u{fffd}\tb"),
+            ("\u{202e}für".as_bytes(), "\u{fffd}für"),
+            (b"f\xfcr \x9b31m", "für \u{fffd}31m"),
+            (b"two\r\nlines", "two\r\nlines"),
+        ] {
+            assert_eq!(decode(bytes), shown);
+        }
+        assert_eq!(Text::new(b"a\x1b[31m x").place(7), (1, 8));
     }
 
     #[test]

@@ -8,7 +8,7 @@
 #[cfg(test)]
 mod tests;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use roxmltree::{Document, Node, ParsingOptions};
 
@@ -16,7 +16,7 @@ use super::error::{Problem, ReadError, in_candela};
 use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
 use super::planes;
-use super::text::{Text, decode};
+use super::text::{Text, decode, harmless};
 use super::{Details, LuminousOpening, Photometry};
 
 /// Header elements and the LM-63 keywords that say the same.
@@ -36,6 +36,11 @@ pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
     // Every node costs the reader memory; none is shorter than `<a/>`.
     let nodes_limit = u32::try_from(decoded.len()).unwrap_or(u32::MAX).max(16);
     let options = ParsingOptions { allow_dtd: false, nodes_limit, ..ParsingOptions::default() };
+    if let Some(at) = crowded(&decoded) {
+        let message =
+            format!("a tag of more than {MAX_ATTRIBUTES} attributes, or more than {MAX_NAMESPACES} namespaces");
+        return Err(text.error(at, Problem::Xml { message }));
+    }
     let document = Document::parse_with_options(&decoded, options).map_err(|error| {
         let position = error.pos();
         let (line, column) = (position.row as usize, position.col as usize);
@@ -67,6 +72,56 @@ pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
         lints: vec![],
     };
     Ok(photometry.with_lints(lints))
+}
+
+/// The most attributes of a tag, and different declarations of namespaces in a file: the reader holds each against all others. An angle
+/// has two attributes.
+const MAX_ATTRIBUTES: usize = 64;
+const MAX_NAMESPACES: usize = 64;
+
+/// Where a tag has too many attributes, or namespaces become too many.
+fn crowded(text: &str) -> Option<usize> {
+    let mut known = HashSet::new();
+    let mut is_one_more = |at: usize| {
+        known.insert(text[at..].split(|c: char| c.is_whitespace() || c == '>').next());
+        known.len() > MAX_NAMESPACES
+    };
+    let namespace = text.match_indices("xmlns").map(|(at, _)| at).find(|at| is_one_more(*at));
+    namespace.or_else(|| {
+        let mut rest = 0;
+        while let Some(start) = text[rest..].find('<').map(|at| rest + at) {
+            let tag = &text[start..];
+            // What is no tag has an end of its own.
+            let other = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")]
+                .into_iter()
+                .find(|(begin, _)| tag.starts_with(begin));
+            let (length, attributes) = match other {
+                Some((_, end)) => (tag.find(end).map_or(tag.len(), |at| at + end.len()), 0),
+                None => tag_of(tag),
+            };
+            if attributes > MAX_ATTRIBUTES {
+                return Some(start);
+            }
+            rest = start + length;
+        }
+        None
+    })
+}
+
+/// The length of the tag that a text begins with, and how many attributes it has: what stands in quotes is a value.
+fn tag_of(text: &str) -> (usize, usize) {
+    let (mut quote, mut attributes) = (None, 0);
+    for (at, byte) in text.bytes().enumerate() {
+        match (quote, byte) {
+            (Some(open), _) if open == byte => quote = None,
+            (Some(_), _) => {}
+            (None, b'"' | b'\'') => quote = Some(byte),
+            (None, b'=') => attributes += 1,
+            (None, b'>') => return (at + 1, attributes),
+            (None, _) => {}
+        }
+    }
+    (text.len(), attributes)
 }
 
 /// Whether the bytes begin as XML.
@@ -268,7 +323,9 @@ fn content(parent: Node, name: &str) -> Option<String> {
 fn keywords(root: Node) -> Vec<(String, String)> {
     let Some(header) = child(root, "Header") else { return vec![] };
     let keyword = |node: Node| {
-        let value = node.text().unwrap_or_default().trim();
+        // A reference such as `&#13;` says what no line of a file can.
+        let value = node.text().unwrap_or_default().trim().replace('\r', " ");
+        let value = harmless(&value);
         let name = node.tag_name().name();
         let known = KEYWORDS.iter().find(|(element, _)| *element == name).map(|(_, key)| (*key).to_string());
         (!value.is_empty()).then(|| (known.unwrap_or_else(|| format!("_{name}")), value.to_string()))

@@ -59,7 +59,7 @@ fn every_view_tells_what_departs_from_the_baseline() {
     run(&room, &["--baseline", "baselines"]).exits(1);
     for (view, says) in [
         ("terminal", "Baseline baselines/spec.json: 4 REFUSED"),
-        ("markdown", "Baseline `baselines/spec.json`: 4 REFUSED"),
+        ("markdown", "Baseline baselines/spec.json: 4 REFUSED"),
         ("junit", "<failure message=\"REFUSED\">version: 0.0.1 before"),
         ("html", "4 REFUSED"),
         ("json", "\"is_as_accepted\": false"),

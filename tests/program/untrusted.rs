@@ -95,7 +95,7 @@ fn what_it_asks_for_is_bounded() {
     let grid = grid.replace("[101, 100]", "[10, 10]");
     let crowd = many.lines().skip(1).collect::<Vec<_>>().join("\n");
     said(&room(&spec().replace(&meters, &grid).replace(&lamp, &crowd)), "25000000 pairs of luminaires");
-    let long = LAMP.replacen("[TEST]", &("[OTHER] much said\n".repeat(150_000) + "[TEST]"), 1);
+    let long = LAMP.replacen("[TEST]", &("[OTHER] much said\n".repeat(60_000) + "[TEST]"), 1);
     let two = room(&spec().replace(&lamp, &format!("{lamp}\n{}", lamp.replace("lamp", "lamq"))));
     two.write("lamp.ies", &long);
     two.write("lamq.ies", &long);
@@ -126,50 +126,94 @@ fn depth_and_length_are_refused_and_told_in_a_few_lines() {
 }
 
 #[test]
-fn no_name_title_or_keyword_is_obeyed_by_any_engine_or_view() {
-    // Whatever a parser lets through: on one line and printable.
-    let hostile = r#"!touch pwned; $(touch pwned) `touch pwned` #include "/etc/passwd" */ --> <img src=x onerror=alert(1)> %s%n =1+1 \"#;
-    let quoted = |text: &str| format!("'{}'", text.replace('\'', "''"));
-    let named = |prefix: &str| quoted(format!("{prefix}{}", &hostile[..90]).trim());
-    let spec = spec()
-        .replace("title: a test room", &format!("title: {}", quoted(hostile)))
-        .replace("id: lamp", &format!("id: {}", named("!")))
-        .replace("plane", &named("@"));
-    let lamp = LAMP.replacen("TILT=NONE", &format!("[MANUFAC] {hostile}\n[OTHER] !touch pwned\nTILT=NONE"), 1);
-    let room = Folder::for_renderers(&[("spec.yaml", &spec), ("lamp.ies", &lamp)]);
-    room.luxproof(&["check", "--untrusted", "spec.yaml"]).exits(0);
-    let args = ["--untrusted", "--no-cache", "--format", "markdown", "--format", "html", "--format", "junit"];
-    let answer = room.run(&args);
-    assert_eq!(answer.code, Some(0), "{}\n{}", answer.stdout, answer.stderr);
-    // None of the views lets a name be markup.
-    assert!(answer.stdout.contains("&lt;img src=x") && !answer.stdout.contains("<img src=x"), "{}", answer.stdout);
-    let files = walk(room.path("."));
-    assert!(!files.iter().any(|file| file.ends_with("pwned")), "{files:?}");
-    let lines = |text: &str| -> Vec<String> { text.lines().map(|line| line.trim().to_owned()).collect() };
-    for file in files.iter().filter(|file| file.contains("/scenes/")) {
-        let Ok(text) = fs::read_to_string(file) else { continue };
-        let begins = |line: &String| line.starts_with("!touch") || line.starts_with("#include \"/etc");
-        assert!(!lines(&text).iter().any(begins), "{file}: {text}");
+fn aliases_attributes_and_cases_multiply_nothing() {
+    let long = format!("[{}]", "0,".repeat(150_000));
+    let bomb = |place: &str| place.replace("LONG", &long).replace("MANY", &"*a,".repeat(100));
+    for (more, says) in [
+        ("engines: {simulator: {a: &a LONG, b: [MANY]}}\n", "aliases add more than"),
+        ("cases:\n  - {name: &a a, x: LONG}\n  - {name: b, x: [MANY]}\n", "unknown field"),
+        ("cases:\n  - &a {name: a, x: LONG}\n  - [MANY]\n", "aliases add more than"),
+    ] {
+        let room = room(&(spec() + &bomb(more)));
+        said(&room, says);
+        // Whosever it is.
+        let own = room.luxproof(&["check", "spec.yaml", "--engines", "simulator"]).exits(2);
+        assert!(
+            own.stderr.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ").contains(says),
+            "{own:?}"
+        );
     }
+    // A spec of many values has few cases.
+    let cases = (0..50).map(|k| format!("  - {{name: c{k}}}\n")).collect::<String>();
+    let points = "[1, 1, 0.8]";
+    let many = spec().replace(points, &format!("{points}, ").repeat(9_000)) + "cases:\n" + &cases;
+    said(&room(&many), "cases at most");
+    let boxes = "  - {box: {min_m: [0, 0, 0], max_m: [1, 1, 0.1], reflectance: 0}}\n".repeat(4_500);
+    said(&room(&spec().replace("meters:\n", &format!("obstacles:\n{boxes}meters:\n"))), "triangles are more than");
+    let attributes = (0..100_000).map(|k| format!(" a{k}=''")).collect::<String>();
+    let room = room(&spec().replace("lamp.ies", "lamp.xml"));
+    room.write("lamp.xml", &format!("<IESTM33-22{attributes}/>"));
+    said(&room, "more than 64 attributes");
+}
+
+#[test]
+fn what_does_something_to_a_terminal_is_refused_or_shown_as_what_it_is_not() {
+    let esc = "\\e]0;x\\a";
+    let is_quiet = |answer: &Answer| {
+        let both = answer.stdout.clone() + &answer.stderr;
+        assert!(!both.contains(['\u{1b}', '\u{7}', '\u{9b}', '\u{202e}']), "{both:?}");
+    };
+    for (from, to) in [
+        ("title: a test room".to_owned(), format!("title: \"{esc}\"")),
+        ("title:".to_owned(), format!("\"{esc}\": 1\ntitle:")),
+        ("photometry: lamp.ies".to_owned(), format!("photometry: \"{esc}\"")),
+        ("meters: plane".to_owned(), format!("meters: \"{esc}\"")),
+        ("procedures:".to_owned(), format!("engines: {{\"{esc}\": {{}}}}\nprocedures:")),
+        ("procedures:".to_owned(), format!("tolerances: {{\"{esc}\": {{relative: 1}}}}\nprocedures:")),
+    ] {
+        let room = room(&spec().replace(&from, &to));
+        let answer = room.luxproof(&["check", "spec.yaml", "--engines", "simulator"]).exits(2).complains("U+001B");
+        is_quiet(&answer);
+    }
+    // What is no YAML: photometric files, and the line that a message shows.
+    let room = room(&(spec() + "# \u{202e}\nunknown: 1\n"));
+    is_quiet(&room.luxproof(&["check", "spec.yaml"]).exits(2));
+    for (from, to) in [
+        ("TILT=NONE", "TILT=\u{1b}]0;x\u{7}"),
+        ("1 -1 1 3", "1 \u{1b}]0;x 1 3"),
+        ("[TEST] made", "[LUMCAT] \u{1b}[31m\u{9b}"),
+    ] {
+        room.write("lamp.ies", &LAMP.replace(from, to));
+        let answer = room.luxproof(&["photometry", "lamp.ies"]);
+        is_quiet(&answer);
+        assert!(answer.code == Some(2) || answer.stdout.contains('\u{fffd}'), "{answer:?}");
+    }
+    // A report from elsewhere.
+    room.write("lamp.ies", LAMP);
+    room.write("spec.yaml", &spec());
+    room.run(&["--engines", "simulator"]);
+    let mut report = room.report();
+    report["luxproof"] = 2.into();
+    report["spec"]["title"] = "\u{1b}]0;x\u{7}\u{202e}".into();
+    room.write("other.json", &report.to_string());
+    for format in ["terminal", "markdown", "junit", "csv", "html", "json"] {
+        is_quiet(&room.luxproof(&["report", "other.json", "--format", format]));
+    }
+}
+
+/// Every text of spec, policy, published table, mesh and photometric files is hostile; all engines, all views, under strace.
+#[test]
+fn no_engine_view_or_log_obeys_what_a_text_says() {
+    let mut hostile = std::process::Command::new("python3");
+    hostile.arg(root().join("ci/hostile")).args(["--specs", "0", "--flips", "0", "--scenes", "1"]);
+    let answer = Answer::of(hostile.env("LUXPROOF", env!("CARGO_BIN_EXE_luxproof"))).exits(0);
+    answer.prints("1 scenes of mitsuba, radiance, povray, cycles");
 }
 
 #[test]
 fn random_hostile_specs_and_damaged_files_are_refused_or_without_effect() {
     let script = root().join("ci/hostile");
     let mut hostile = std::process::Command::new("python3");
-    hostile.arg(script).args(["--specs", "200", "--traced", "0", "--flips", "10", "--seconds", "20"]);
+    hostile.arg(script).args(["--specs", "200", "--traced", "0", "--scenes", "0", "--flips", "10", "--seconds", "20"]);
     Answer::of(hostile.env("LUXPROOF", env!("CARGO_BIN_EXE_luxproof"))).exits(0).prints("200 specs");
-}
-
-/// All files below a folder.
-fn walk(folder: std::path::PathBuf) -> Vec<String> {
-    let mut files = vec![];
-    for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
-        if entry.is_dir() {
-            files.extend(walk(entry));
-        } else {
-            files.push(entry.display().to_string());
-        }
-    }
-    files
 }

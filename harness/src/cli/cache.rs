@@ -47,7 +47,7 @@ pub(super) fn manage(action: Option<Action>, cache: &Cache) -> Result<Exit, Diag
 const SHOWN: usize = 5;
 
 fn info(cache: &Cache) -> Result<String, Diagnostic> {
-    let contents = cache.contents().into_diagnostic()?;
+    let contents = cache.contents().into_diagnostic().wrap_err_with(|| cache.root().display().to_string())?;
     let mut lines = vec![format!("readings are kept in {}", cache.root().display())];
     for (engine, (entries, bytes)) in &contents.engines {
         lines.push(format!("{engine:<10} {entries} entries, {}", HumanBytes(*bytes)));

@@ -8,6 +8,7 @@ use super::complain;
 use crate::audit::AuditError;
 use crate::spec::{Faults, SpecError};
 use crate::system::files::{MAX_BYTES, read_bounded};
+use crate::system::printable::{self, is_unprintable};
 
 /// One fault as it is drawn.
 #[derive(Debug)]
@@ -90,7 +91,13 @@ impl Fault {
     fn of(error: &SpecError, severity: Severity) -> Self {
         let name = error.file.display().to_string();
         let bytes = error.line.and_then(|_| read_bounded(&error.file, MAX_BYTES).ok());
-        let text = bytes.map(|bytes| String::from_utf8_lossy(&bytes).trim_start_matches('\u{feff}').to_owned());
+        // A character stays a character, so that places stay what they are.
+        let inert =
+            |c: char| if is_unprintable(c) && c != '\n' && c != '\t' { char::REPLACEMENT_CHARACTER } else { c };
+        let text = bytes.map(|bytes| {
+            let text = String::from_utf8_lossy(&bytes);
+            text.trim_start_matches('\u{feff}').replace("\r\n", "\n").chars().map(inert).collect::<String>()
+        });
         // What no terminal shows says nothing, and the printer cannot lay it out.
         let text = text.filter(|text| text.lines().all(|line| line.len() <= MAX_LINE));
         let place = match (error.line, error.column) {
@@ -112,9 +119,10 @@ const MAX_LINE: usize = 2000;
 const MAX_MESSAGE: usize = 2000;
 
 fn shortened(text: &str) -> String {
+    let text = printable::lines(text);
     match text.char_indices().nth(MAX_MESSAGE) {
         Some((end, _)) => format!("{} ...", &text[..end]),
-        None => text.to_owned(),
+        None => text,
     }
 }
 

@@ -39,6 +39,7 @@ use crate::record::ProcedureId;
 use crate::report::{Exit, Report};
 use crate::spec::{Spec, Trust};
 use crate::system::files::FileError;
+use crate::system::printable;
 use crate::system::process;
 
 use views::Views;
@@ -276,8 +277,9 @@ fn at_least_one(text: &str) -> Result<usize, String> {
     }
 }
 
+/// Whatever it quotes, a terminal obeys none of it.
 fn print(text: &str) -> Result<(), Diagnostic> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    match std::io::stdout().lock().write_all(printable::styled(text).as_bytes()) {
         // Whoever reads has seen enough (`| head`): that is no error of ours.
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         written => written.map_err(|e| FileError::of(Path::new("standard output"), e)).into_diagnostic(),
@@ -286,7 +288,7 @@ fn print(text: &str) -> Result<(), Diagnostic> {
 
 /// Tells something on standard error; that nobody reads it is no reason to stop.
 pub fn complain(text: &str) {
-    writeln!(std::io::stderr().lock(), "{text}").ok();
+    writeln!(std::io::stderr().lock(), "{}", printable::styled(text)).ok();
 }
 
 fn json(value: &(impl Serialize + ?Sized)) -> Result<String, Diagnostic> {

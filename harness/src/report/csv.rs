@@ -2,6 +2,7 @@
 
 use super::Report;
 use crate::judge::{Basis, Comparison};
+use crate::system::printable::csv as inert;
 
 pub fn csv(report: &Report) -> String {
     let mut writer = csv::Writer::from_writer(vec![]);
@@ -44,31 +45,6 @@ const COLUMNS: [Column; 25] = [
     ("diagnosis", |c| c.diagnosis.clone().unwrap_or_default()),
 ];
 
-/// What a spreadsheet takes for no formula: a text that begins like one has an apostrophe before it, and numbers stay numbers.
-fn inert(text: String) -> String {
-    let begins = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
-    if begins && text.parse::<f64>().is_err() { format!("'{text}") } else { text }
-}
-
 fn number(value: Option<f64>) -> String {
     value.map(|v| v.to_string()).unwrap_or_default()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_text_is_a_formula_and_every_number_stays_one() {
-        for (text, shown) in [
-            ("=HYPERLINK(1)[0]", "'=HYPERLINK(1)[0]"),
-            ("@desk[0]", "'@desk[0]"),
-            ("-1.5e-3", "-1.5e-3"),
-            ("+12", "+12"),
-            ("-a", "'-a"),
-            ("desk[0]", "desk[0]"),
-        ] {
-            assert_eq!(inert(text.to_owned()), shown);
-        }
-    }
 }

@@ -8,6 +8,7 @@ use super::sentences::{HEADING, sentences};
 use super::words::{mark, percent, significant};
 use super::{Report, papers};
 use crate::record::ProcedureId;
+use crate::system::printable::markdown as inert;
 
 /// `link` leads to the whole report, where it is published.
 pub fn markdown(report: &Report, link: Option<&str>) -> String {
@@ -16,42 +17,42 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
         text.push_str(&l);
         text.push('\n');
     };
-    line(format!("## luxproof: {}", plain(&report.spec.title)));
+    line(format!("## luxproof: {}", inert(&report.spec.title)));
     let sentences = sentences(report);
     if !sentences.is_empty() {
         line(format!("\n{HEADING}:\n"));
     }
     for sentence in &sentences {
-        line(format!("- {}", plain(&sentence.text)));
+        line(format!("- {}", inert(&sentence.text)));
     }
     line(format!("\n{} in {:.1} s\n", report.summary, report.wall_s));
     for rule in decision_rules(report) {
-        line(format!("{rule}\n"));
+        line(format!("{}\n", inert(rule)));
     }
     for policy in policies(report).into_iter().chain(lacking(report)) {
-        line(format!("{}\n", plain(&policy)));
+        line(format!("{}\n", inert(&policy)));
     }
-    let engines: Vec<&str> = report.engines.iter().map(|e| e.id.as_str()).collect();
+    let engines: Vec<String> = report.engines.iter().map(|e| inert(e.id.as_str())).collect();
     line(format!("| {}procedure | against | {} |", report.of_suite("case", " | "), engines.join(" | ")));
     line(format!("|---|---|{}", "---|".repeat(engines.len() + usize::from(report.is_suite()))));
     for row in matrix(report) {
         let cells: Vec<String> = row.cells.iter().map(Cell::text).collect();
-        let case = report.of_suite(&cell(&row.case), " | ");
-        line(format!("| {case}{} | {} | {} |", row.label, row.basis, cells.join(" | ")));
+        let case = report.of_suite(&inert(&row.case), " | ");
+        line(format!("| {case}{} | {} | {} |", inert(&row.label), row.basis, cells.join(" | ")));
     }
     for grid in papers::grids(report) {
         line(format!(
             "\n<details><summary>{}</summary>\n\n| {} |\n|{}",
-            grid.title,
-            grid.head.join(" | "),
+            inert(&grid.title),
+            joined(&grid.head),
             "---|".repeat(grid.head.len())
         ));
         for row in grid.rows {
-            line(format!("| {} |", row.iter().map(|c| cell(c)).collect::<Vec<_>>().join(" | ")));
+            line(format!("| {} |", joined(&row)));
         }
         line("\n</details>".to_owned());
     }
-    let bias = |p: ProcedureId| biases(report, p).into_iter().map(move |line| format!("- {p}, {line}"));
+    let bias = |p: ProcedureId| biases(report, p).into_iter().map(move |line| format!("- {p}, {}", inert(&line)));
     let biases: Vec<String> = report.procedures().into_iter().flat_map(bias).collect();
     if !biases.is_empty() {
         let summary = "Bias: mean deviation, its interval, p of none";
@@ -61,35 +62,35 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
     if !splits.is_empty() {
         line(String::new());
         for (place, split) in splits {
-            line(format!("- {}: {}", plain(&place), plain(split)));
+            line(format!("- {}: {}", inert(&place), inert(split)));
         }
     }
     let departures = departures(report);
     if !departures.is_empty() {
         line("\nWho departs from the other witnesses, the reference included:\n".into());
         for departure in &departures {
-            line(format!("- {}", plain(departure)));
+            line(format!("- {}", inert(departure)));
         }
     }
     for (k, told) in tables(report).iter().enumerate() {
         line(format!(
             "{}- {told}",
             if k == 0 { "\nWhat does not fit in published tables:\n\n" } else { "" },
-            told = plain(told)
+            told = inert(told)
         ));
     }
     worst_deviations(report, &mut line);
     if let Some(check) = &report.baseline {
-        line(format!("\nBaseline `{}`: {}", check.file, check.counts()));
+        line(format!("\nBaseline {}: {}", inert(&check.file), check.counts()));
         for (k, entry) in check.departures().enumerate() {
             let gap = if k == 0 { "\n" } else { "" };
             let place = format!("{} {} {}", entry.key.case, entry.key.procedure, entry.key.engine);
-            let details = plain(&entry.details.join("; "));
-            line(format!("{gap}- **{}** {}: {details}", entry.state.to_lowercase(), plain(&place)));
+            let details = inert(&entry.details.join("; "));
+            line(format!("{gap}- **{}** {}: {details}", entry.state.to_lowercase(), inert(&place)));
         }
     }
     for (k, note) in notes(report).iter().filter(|n| n.kind <= Kind::Shortcut).enumerate() {
-        line(format!("{}- {}", if k == 0 { "\n" } else { "" }, plain(&note.line(report))));
+        line(format!("{}- {}", if k == 0 { "\n" } else { "" }, inert(&note.line(report))));
     }
     if let Some(link) = link {
         writeln!(text, "\n[The whole report]({link})").ok();
@@ -108,10 +109,10 @@ fn worst_deviations(report: &Report, line: &mut impl FnMut(String)) {
             let number = |v: Option<f64>| v.map_or("-".to_owned(), significant);
             line(format!(
                 "| {}{} {} | {} | {} | {} | {} | {} |",
-                report.of_suite(&cell(&c.key.case), " "),
-                c.key.engine,
+                report.of_suite(&inert(&c.key.case), " "),
+                inert(&c.key.engine),
                 c.key.procedure,
-                cell(&c.meter.0),
+                inert(&c.meter.0),
                 number(c.value),
                 number(c.reference.as_ref().map(|r| r.value)),
                 c.relative_deviation.map_or("-".to_owned(), percent),
@@ -121,12 +122,7 @@ fn worst_deviations(report: &Report, line: &mut impl FnMut(String)) {
     }
 }
 
-/// Text that is no markup: what people and programs wrote begins no element of HTML, which Markdown lets through.
-fn plain(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
-/// Text that cannot end a cell of a table either.
-fn cell(text: &str) -> String {
-    plain(text).replace('|', "\\|").replace('\n', " ")
+/// Cells of a row.
+fn joined(cells: &[String]) -> String {
+    cells.iter().map(|cell| inert(cell)).collect::<Vec<_>>().join(" | ")
 }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::{Report, Summary};
-use crate::system::envelope;
+use crate::system::{envelope, printable};
 
 /// The version of the format that this program writes.
 pub(super) const VERSION: u32 = 1;
@@ -45,7 +45,8 @@ struct Head {
 
 impl Report {
     pub fn from_json(text: &str) -> Result<ReadReport, ReportError> {
-        let mut report: Self = serde_json::from_str(text).map_err(|source| Self::refusal(text, source))?;
+        let mut report: Self =
+            serde_json::from_str(&printable::json(text)).map_err(|source| Self::refusal(text, source))?;
         let found = report.luxproof;
         if found == VERSION && checksum(text) != report.checksum {
             return Err(ReportError::Edited);

@@ -52,13 +52,10 @@ pub(super) fn variants(source: &Source, tree: &Tree, of_base: &[SpecError]) -> V
         _ => Err(source.error_at("cases", "neither a list nor a matrix", FORM)),
     };
     let checked = combinations.and_then(|combinations: Vec<_>| {
-        let (count, most) = (combinations.len(), source.trust.limits().cases);
-        source.require(
-            count <= most,
-            "cases",
-            format!("{count} cases"),
-            format!("a spec holds {most} cases at most"),
-        )?;
+        let (count, limits) = (combinations.len(), source.trust.limits());
+        let most = limits.cases.min(limits.values / source.values.max(1));
+        let help = format!("a spec so large holds {most} cases at most: make several of it");
+        source.require(count <= most, "cases", format!("{count} cases"), help)?;
         let any = !combinations.is_empty() || !found.faults.is_empty();
         source.require(any, "cases", "there are none", "give at least one, or leave `cases` out")?;
         Ok(combinations)

@@ -2,6 +2,7 @@
 //!
 //! The only module that knows `serde_yaml`. Every error names file, line and column.
 
+mod bounds;
 mod build;
 mod cases;
 mod content;
@@ -30,7 +31,6 @@ pub use model::{Budget, EngineSettings, Spec, ToleranceOverride};
 pub use plausible::doubts;
 pub use suite::{Suite, filtered, specs, suite};
 pub use trust::Trust;
-use trust::too_deep;
 pub use write::yaml;
 
 /// What is wrong with a spec, where, and what to do.
@@ -74,6 +74,8 @@ pub struct Source {
     pub text: String,
     /// Whose it is.
     pub trust: Trust,
+    /// How many it has, its aliases followed, at most.
+    values: usize,
     /// The places of the overrides that lie over it, such as `cases[1]`; none but in a case of a suite.
     overrides: Vec<String>,
 }
@@ -91,31 +93,36 @@ impl Source {
         // The mark that some editors put before UTF-8 is no part of the text.
         let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
         let error = |line| SpecError { line: Some(line), ..fail(TOO_DEEP.to_owned(), DEPTH) };
-        too_deep(&text).map_or(Ok(()), |line| Err(error(line)))?;
-        Ok(Self { trust, ..Self::new(path.to_owned(), text) })
+        bounds::too_deep(&text).map_or(Ok(()), |line| Err(error(line)))?;
+        let source = Self { trust, ..Self::new(path.to_owned(), text) };
+        let values = bounds::values(&source.text).map_err(|error| source.misread(&error))?;
+        Ok(Self { values, ..source })
     }
 
     pub fn new(path: PathBuf, text: String) -> Self {
-        Self { path, text, trust: Trust::Own, overrides: vec![] }
+        Self { path, text, trust: Trust::Own, values: 0, overrides: vec![] }
     }
 
     /// Parses the text as a spec or a policy; unknown keys are errors with the nearest known key.
     pub fn parse<T: serde::de::DeserializeOwned>(&self) -> Result<T, SpecError> {
-        serde_yaml::from_str(&self.text).map_err(|error| {
-            let message = error.to_string();
-            // serde_yaml ends its message with the place, which the error carries already.
-            let message = message.split(" at line ").next().unwrap_or(&message);
-            let location = error.location();
-            let is_yaml = tree::tree(&self.text).is_ok();
-            let fault = SpecError {
-                file: self.path.clone(),
-                line: location.as_ref().map(serde_yaml::Location::line),
-                column: location.as_ref().map(serde_yaml::Location::column),
-                message: shape::plain(message),
-                help: nearest_key(message).or_else(|| (!is_yaml).then(|| NO_YAML.to_owned())),
-            };
-            if is_yaml { fault } else { self.tab().or_else(|| self.quote(message)).unwrap_or(fault) }
-        })
+        serde_yaml::from_str(&self.text).map_err(|error| self.misread(&error))
+    }
+
+    /// What its parser refused, with the place.
+    fn misread(&self, error: &serde_yaml::Error) -> SpecError {
+        let message = error.to_string();
+        // serde_yaml ends its message with the place, which the error carries already.
+        let message = message.split(" at line ").next().unwrap_or(&message);
+        let location = error.location();
+        let is_yaml = tree::tree(&self.text).is_ok();
+        let fault = SpecError {
+            file: self.path.clone(),
+            line: location.as_ref().map(serde_yaml::Location::line),
+            column: location.as_ref().map(serde_yaml::Location::column),
+            message: shape::plain(message),
+            help: nearest_key(message).or_else(|| (!is_yaml).then(|| NO_YAML.to_owned())),
+        };
+        if is_yaml { fault } else { self.tab().or_else(|| self.quote(message)).unwrap_or(fault) }
     }
 
     /// A tab where YAML wants blanks, which its reader calls otherwise.
@@ -197,15 +204,14 @@ impl Source {
 
 /// Parses one of the project's own YAML tables; the error text carries line and column.
 pub fn from_yaml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
-    match too_deep(text) {
-        Some(line) => Err(format!("{TOO_DEEP} at line {line}")),
-        None => serde_yaml::from_str(text).map_err(|e| {
-            let place =
-                e.location().map(|l| format!(" at line {} column {}", l.line(), l.column())).unwrap_or_default();
-            let message = e.to_string();
-            shape::plain(message.split(" at line ").next().unwrap_or(&message)) + &place
-        }),
+    if let Some(line) = bounds::too_deep(text) {
+        return Err(format!("{TOO_DEEP} at line {line}"));
     }
+    bounds::values(text).and_then(|_| serde_yaml::from_str(text)).map_err(|e| {
+        let place = e.location().map(|l| format!(" at line {} column {}", l.line(), l.column())).unwrap_or_default();
+        let message = e.to_string();
+        shape::plain(message.split(" at line ").next().unwrap_or(&message)) + &place
+    })
 }
 
 /// A help text that names the known key closest to an unknown one, read off serde's message.

@@ -25,6 +25,8 @@ pub(super) struct Limits {
     /// Of all files that it names, as often as its cases do.
     pub(super) bytes: usize,
     pub(super) cases: usize,
+    /// Values of the text, as often as there are cases of it.
+    pub(super) values: usize,
     pub(super) luminaires: usize,
     pub(super) meters: usize,
     pub(super) triangles: usize,
@@ -41,6 +43,7 @@ impl Trust {
                 file_bytes: MAX_BYTES,
                 bytes: usize::MAX,
                 cases: 10_000,
+                values: usize::MAX,
                 luminaires: usize::MAX,
                 meters: usize::MAX,
                 triangles: usize::MAX,
@@ -48,9 +51,10 @@ impl Trust {
             },
             Self::Stranger => Limits {
                 spec_bytes: 1 << 20,
-                file_bytes: 4 << 20,
-                bytes: 4 << 20,
+                file_bytes: 2 << 20,
+                bytes: 2 << 20,
                 cases: 100,
+                values: 2_000_000,
                 luminaires: 500,
                 meters: 10_000,
                 triangles: 50_000,
@@ -75,24 +79,4 @@ impl Trust {
             Self::Stranger => read_below(folder, path, most),
         }
     }
-}
-
-/// How deep lists and mappings may lie in one another: what a YAML reader makes of deeper ones takes it the square of their number.
-const MAX_DEPTH: usize = 64;
-
-/// The line, counted from 1, at which lists and mappings in brackets lie too deep in one another; those in quotes count as well.
-pub(super) fn too_deep(text: &str) -> Option<usize> {
-    let mut depth = 0_usize;
-    text.lines()
-        .position(|line| {
-            line.bytes().any(|byte| {
-                match byte {
-                    b'[' | b'{' => depth += 1,
-                    b']' | b'}' => depth = depth.saturating_sub(1),
-                    _ => {}
-                }
-                depth > MAX_DEPTH
-            })
-        })
-        .map(|line| line + 1)
 }

@@ -1,11 +1,12 @@
 //! Files that are seen whole or not at all, whoever reads or is killed meanwhile.
 
-use std::fs::{File, Permissions};
+use std::fs::{File, Metadata, Permissions};
 use std::io::{self, BufWriter, Read, Write};
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 use std::time::Duration;
 
+use rustix::fs::OFlags;
 use serde::Serialize;
 use serde_json::Serializer;
 use serde_json::ser::{Formatter, PrettyFormatter};
@@ -49,17 +50,26 @@ impl FileError {
 /// The most bytes of a spec, or of a file that one names: the largest photometric files have some MB, a mesh of a million triangles 60.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
+/// The most bytes of a file that tells no size.
+const MAX_UNTOLD_BYTES: u64 = 1 << 20;
+
 /// The bytes of a regular file of at most so many: nothing else is opened, since a pipe waits for ever and a device never ends.
 pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let refused = |why: String| io::Error::new(io::ErrorKind::InvalidInput, why);
-    let metadata = std::fs::metadata(path)?;
-    if !metadata.is_file() {
-        return Err(refused("it is no regular file".to_owned()));
-    }
+    let regular = |metadata: Metadata| {
+        if metadata.is_file() { Ok(metadata) } else { Err(refused("it is no regular file".to_owned())) }
+    };
+    // Before it is opened, since that alone does something to some devices.
+    std::fs::metadata(path).and_then(regular)?;
+    // And after it, since a pipe may have taken its place. Nor are those files of the system waited for that say they are regular ones.
+    let wait_for_none = OFlags::NONBLOCK.bits().cast_signed();
+    let file = File::options().read(true).custom_flags(wait_for_none).open(path)?;
+    let metadata = file.metadata().and_then(regular)?;
+    // Some files tell no size: what is read counts. Those of the system have no end, so that little is read of them.
+    let most = if metadata.len() == 0 { most.min(MAX_UNTOLD_BYTES) } else { most };
     let mut bytes = vec![];
-    // Some files tell no size: what is read counts.
     if metadata.len() <= most {
-        File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+        file.take(most + 1).read_to_end(&mut bytes)?;
     }
     let is_whole = bytes.len().max(metadata.len() as usize) as u64 <= most;
     is_whole.then_some(bytes).ok_or_else(|| refused(format!("it has more than {} MB", most >> 20)))
@@ -218,6 +228,14 @@ mod tests {
         assert!(read_kept(&path).unwrap_err().to_string().contains("it has more than 2048 MB"));
         for path in ["/dev/zero", "/"] {
             assert!(read_kept(Path::new(path)).unwrap_err().to_string().contains("no regular file"), "{path}");
+        }
+        // These call themselves regular files of no size; the one has no end, and the other waits for the next message of the kernel.
+        for path in ["/proc/self/pagemap", "/proc/kmsg"].map(Path::new).iter().filter(|path| path.exists()) {
+            let (send, receive) = std::sync::mpsc::channel();
+            let path = path.to_path_buf();
+            std::thread::spawn(move || send.send(read_kept(&path).map(|bytes| bytes.len())));
+            let read = receive.recv_timeout(Duration::from_secs(20)).expect("it is not waited for");
+            assert!(read.is_err() || read.is_ok_and(|bytes| bytes <= MAX_UNTOLD_BYTES as usize));
         }
     }
 

@@ -1,7 +1,7 @@
 //! What a TM-33 file means, and which files are refused, where and why.
 
 use super::*;
-use crate::photometry::Symmetry;
+use crate::photometry::{Symmetry, lm63};
 
 const PLAIN: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <IESTM33-22>
@@ -90,4 +90,36 @@ fn refusals_name_the_place() {
 fn entities_cannot_blow_up() {
     let bomb = PLAIN.replace("<IESTM33-22>", "<!DOCTYPE x [<!ENTITY a \"aaaa\">]><IESTM33-22>");
     assert!(parse(bomb.as_bytes()).unwrap_err().message().contains("DTD"));
+}
+
+#[test]
+fn neither_attributes_nor_namespaces_take_the_square_of_their_number() {
+    // Each is held against all others: without a limit the first takes minutes.
+    let many = |what: &str| (0..200_000).map(|k| format!(" {what}{k}='u{k}'")).collect::<String>();
+    let nested: String = (0..20_000).map(|k| format!("<b xmlns:a{k}='u{k}'>")).collect();
+    for text in [
+        PLAIN.replace("<Header>", &format!("<Header{}>", many("a"))),
+        PLAIN.replace("<Header>", &format!("<Header{}>", many("xmlns:a"))),
+        PLAIN.replace("<Header>", &nested),
+        PLAIN.replace("<Header>", &format!("<!-- ' \" --><![CDATA[ '> ]]><?a '?><Header{}>", many("a"))),
+    ] {
+        let error = parse(text.as_bytes()).unwrap_err();
+        assert!(error.message().contains("more than 64"), "{error}");
+    }
+    // What stands in quotes is no attribute, and one namespace is one however often it is declared.
+    let equal = "=".repeat(1000);
+    let often = PLAIN.replace("<IntData", &format!("<IntData xmlns='urn:x' a='>{equal}'"));
+    assert_eq!(
+        parse(often.as_bytes()).map(|read| read.distribution),
+        parse(PLAIN.as_bytes()).map(|read| read.distribution)
+    );
+}
+
+#[test]
+fn no_text_breaks_out_of_the_line_that_it_is_written_on() {
+    let text = PLAIN.replace("Maker &amp; Sons", "Maker&#13;TILT=INCLUDE&#x9b;31m&#x202e;");
+    let read = parse(text.as_bytes()).unwrap();
+    assert_eq!(read.keyword("MANUFAC"), Some("Maker TILT=INCLUDE\u{fffd}31m\u{fffd}"));
+    let again = lm63::parse(lm63::write_2019(&read).text.as_bytes()).unwrap();
+    assert_eq!(again.distribution, read.distribution);
 }

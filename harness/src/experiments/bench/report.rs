@@ -3,25 +3,29 @@
 use super::curve::{Curve, TARGETS};
 use super::{BenchReport, Reference};
 use crate::experiments::tables;
+use crate::system::printable::{csv, markdown};
 
 impl BenchReport {
     pub fn terminal(&self) -> String {
-        self.text(tables::terminal)
+        self.text(tables::terminal, str::to_owned)
     }
 
     pub fn markdown(&self) -> String {
-        self.text(tables::markdown)
+        self.text(tables::markdown, markdown)
     }
 
-    fn text(&self, table: impl Fn(Vec<String>, Vec<Vec<String>>) -> String) -> String {
-        let versions: Vec<String> = self.engines.iter().map(|(id, version)| format!("{id} {version}")).collect();
+    /// With words as the view shows them.
+    fn text(&self, table: impl Fn(Vec<String>, Vec<Vec<String>>) -> String, shown: fn(&str) -> String) -> String {
+        let versions: Vec<String> =
+            self.engines.iter().map(|(id, version)| shown(&format!("{id} {version}"))).collect();
         let mut text = format!("{}.\n{}.\n\n", self.machine, versions.join(", "));
         for pareto in &self.pareto {
             let mine = |c: &&Curve| c.key.case == pareto.case && c.key.procedure == pareto.procedure;
             let curves: Vec<&Curve> = self.curves.iter().filter(mine).collect();
             text.push_str(&format!(
                 "{}, {}: seconds to a relative error (start-up apart in brackets)\n\n",
-                pareto.case, pareto.procedure
+                shown(&pareto.case),
+                pareto.procedure
             ));
             let same = |r: &&Reference| r.case == pareto.case && r.procedure == pareto.procedure;
             for reference in self.references.iter().filter(same) {
@@ -33,7 +37,8 @@ impl BenchReport {
                 ));
             }
             text.push_str(&table(head(), curves.iter().map(|c| row(c)).collect()));
-            let point = |(name, t, e): &(String, f64, f64)| format!("{name} ({}, {})", seconds(*t), percent(*e));
+            let point =
+                |(name, t, e): &(String, f64, f64)| format!("{} ({}, {})", shown(name), seconds(*t), percent(*e));
             let front: Vec<String> = pareto.front.iter().map(point).collect();
             text.push_str(&format!("\nPareto front, by rising time: {}\n\n", front.join("; ")));
         }
@@ -56,7 +61,7 @@ impl BenchReport {
             text.push('\n');
         }
         for why in &self.left_out {
-            text.push_str(&format!("left out: {why}\n"));
+            text.push_str(&format!("left out: {}\n", shown(why)));
         }
         text
     }
@@ -70,7 +75,7 @@ impl BenchReport {
             for p in &c.points {
                 let peak = p.peak_mib.map_or(String::new(), |m| format!("{m:.1}"));
                 let own = [&c.key.case, c.key.procedure.name(), &c.key.engine, &c.preset, &c.solver]
-                    .map(|s| format!("\"{s}\""));
+                    .map(|s| format!("\"{}\"", csv(s.to_owned()).replace('"', "\"\"")));
                 let numbers =
                     [p.relative_error, p.relative_error_low, p.relative_error_high, p.worst_error, p.variance]
                         .map(|x| format!("{x:e}"));

@@ -21,6 +21,7 @@ use crate::procedures::Task;
 use crate::record::ProcedureId;
 use crate::spec::{Case, SpecError, from_yaml, yaml};
 use crate::system::files::FileError;
+use crate::system::printable::{code_block, markdown};
 use crate::system::process::interrupt_flag;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -239,7 +240,8 @@ impl Issue<'_> {
         let Finding { symptom, engine_version, diagnosis, deviation, .. } = self.finding;
         let (engine, quantity) = (display_name(&symptom.engine), symptom.procedure.row().title.to_lowercase());
         let off = deviation.map(|d| format!(" by {:+.3} %", 100.0 * d)).unwrap_or_default();
-        let mut text = format!("# {engine}: {quantity}: {}{off}\n\nVersion: {engine_version}\n\n", symptom.oracle);
+        let mut text =
+            format!("# {engine}: {quantity}: {}{off}\n\nVersion: {}\n\n", symptom.oracle, markdown(engine_version));
         text += "## What\n\n";
         text += &self.scene_in_words();
         text += "\n## Expected and actual\n\n";
@@ -247,21 +249,24 @@ impl Issue<'_> {
         text += "\n## Cause\n\n";
         text += &match diagnosis {
             Some(diagnosis) => {
-                format!("The readings of the larger scene in which it was found are those of this fault: {diagnosis}\n")
+                format!(
+                    "The readings of the larger scene in which it was found are those of this fault: {}\n",
+                    markdown(diagnosis)
+                )
             }
             None => "Unexplained: no known fault reads so.\n".to_owned(),
         };
         text += "\n## How to reproduce\n\n";
         text += &self.by_hand();
         text += &format!(
-            "\nWith luxproof: `luxproof run spec.yaml --engines {}`, where `spec.yaml` is\n\n```yaml\n{}```\n",
+            "\nWith luxproof: `luxproof run spec.yaml --engines {}`, where `spec.yaml` is\n\n{}",
             symptom.engine,
-            yaml(&self.draft.spec)
+            code_block("yaml", &yaml(&self.draft.spec))
         );
         for (name, file) in &self.draft.files {
             if file.bytes.len() < 4000 {
-                let content = String::from_utf8_lossy(&file.bytes).replace('\r', "");
-                text += &format!("\n`{}`:\n\n```\n{}\n```\n", name.display(), content.trim_end());
+                let content = code_block("", &String::from_utf8_lossy(&file.bytes));
+                text += &format!("\n{}:\n\n{content}", markdown(&name.display().to_string()));
             }
         }
         text
@@ -273,7 +278,7 @@ impl Issue<'_> {
         let (lamps, bodies) = (spec.luminaires.len(), spec.obstacles.len());
         let mut text = format!("A room of {x} x {y} x {z} m with {lamps} luminaire(s) and {bodies} further bodies.");
         if let Some(said) = &self.sighting.text {
-            write!(text, " {said}.").ok();
+            write!(text, " {}.", markdown(said)).ok();
         }
         text + "\n"
     }
@@ -290,7 +295,7 @@ impl Issue<'_> {
         }
         text += ":\n\n| who | value | uncertainty |\n|---|---|---|\n";
         let mut row = |who: &str, value: f64, uncertainty: &str| {
-            text += &format!("| {who} | {value:.9} {unit} | {uncertainty} |\n");
+            text += &format!("| {} | {value:.9} {unit} | {uncertainty} |\n", markdown(who));
         };
         if let Some(value) = value {
             row(display_name(&self.finding.symptom.engine), *value, &format!("{uncertainty:?}"));
@@ -330,8 +335,8 @@ impl Issue<'_> {
             let candela = luminaire.intensity_towards(ray).value();
             let lux = inverse_square::from_luminaire(luminaire, &aspect.meter).value();
             text += &format!(
-                "- `{}`: d = {:.6} m, C {c:.4}, gamma {gamma:.4}: I = {candela:.6} cd (bilinear), cos = {cosine:.6}: {lux:.9} lx\n",
-                luminaire.id,
+                "- {}: d = {:.6} m, C {c:.4}, gamma {gamma:.4}: I = {candela:.6} cd (bilinear), cos = {cosine:.6}: {lux:.9} lx\n",
+                markdown(&luminaire.id),
                 ray.length()
             );
         }
@@ -342,8 +347,9 @@ impl Issue<'_> {
         let Some((files, command)) = &self.scene else {
             return "Its readings come from no scene of files.\n".to_owned();
         };
-        let names: Vec<String> = files.iter().map(|f| format!("`{}`", f.display())).collect();
-        let command = command.as_ref().map_or_else(|| ".\n".to_owned(), |c| format!("; in it run\n\n    {c}\n"));
+        let names: Vec<String> = files.iter().map(|f| markdown(&f.display().to_string())).collect();
+        let command =
+            command.as_ref().map_or_else(|| ".\n".to_owned(), |c| format!("; in it run\n\n{}", code_block("sh", c)));
         let law = match &self.finding.symptom.oracle {
             Oracle::Law { law, .. } => format!("This is the scene before it is changed as the law `{law}` says. "),
             _ => String::new(),

@@ -4,6 +4,7 @@ use strum::VariantArray;
 
 use super::{Feature, Finding, Hunt};
 use crate::experiments::tables;
+use crate::system::printable::markdown;
 
 /// As Markdown.
 pub(super) fn page(hunt: &Hunt) -> String {
@@ -23,7 +24,7 @@ pub(super) fn page(hunt: &Hunt) -> String {
     if !hunt.findings.is_empty() {
         let head = ["finding", "what", "off", "where", "explained by", "seen in", "lines", "table", "known"];
         let rows = hunt.findings.iter().map(row).collect();
-        text += &tables::markdown(head.map(str::to_owned).into(), rows);
+        text += &tables::joined(head.map(str::to_owned).into(), rows);
     }
     let [met, all] = coverage.pairs();
     let (seen, there) = (coverage.features.len(), Feature::VARIANTS.len());
@@ -49,15 +50,18 @@ fn row(finding: &Finding) -> Vec<String> {
     } else {
         format!("{}, also {}", finding.symptom, also.join(", "))
     };
-    vec![
-        format!("[{0}]({0}/issue.md)", finding.id),
+    let mut row = [
         what,
         finding.deviation.map(|d| format!("{:+.2} %", 100.0 * d)).unwrap_or_default(),
         if features.is_empty() { "anywhere".to_owned() } else { features.join(", ") },
-        finding.diagnosis.clone().unwrap_or_else(|| "unexplained".to_owned()).replace('|', "/"),
+        finding.diagnosis.clone().unwrap_or_else(|| "unexplained".to_owned()),
         finding.seen.to_string(),
         finding.lines.to_string(),
         format!("{planes} x {gammas}"),
         finding.known.clone().unwrap_or_default(),
     ]
+    .map(|cell| markdown(&cell))
+    .to_vec();
+    row.insert(0, format!("[{0}]({0}/issue.md)", finding.id));
+    row
 }

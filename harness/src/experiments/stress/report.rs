@@ -1,24 +1,26 @@
 //! Views of a stress report: the matrix of what breaks where, for a terminal and as Markdown.
 
 use std::collections::BTreeSet;
-use std::fmt::Write;
 
 use super::findings::{LawReport, PointReport, StressReport};
 use crate::experiments::tables;
 use crate::judge::How;
 use crate::record::EngineName;
+use crate::system::printable::markdown;
 
 impl StressReport {
     pub fn terminal(&self) -> String {
         let (head, rows) = self.matrix();
         let table = tables::terminal(head, rows);
-        format!("{}: breaks at\n\n{table}\n{LEGEND}\n{}", self.case, self.remarks("  "))
+        let remarks: String = self.remarks().iter().map(|line| format!("  {line}\n")).collect();
+        format!("{}: breaks at\n\n{table}\n{LEGEND}\n{remarks}", self.case)
     }
 
     pub fn markdown(&self) -> String {
         let (head, rows) = self.matrix();
         let table = tables::markdown(head, rows);
-        format!("## {}\n\n{table}\n{LEGEND}\n\n{}", self.case, self.remarks("- "))
+        let remarks: String = self.remarks().iter().map(|line| format!("- {}\n", markdown(line))).collect();
+        format!("## {}\n\n{table}\n{LEGEND}\n\n{remarks}", markdown(&self.case))
     }
 
     fn matrix(&self) -> (Vec<String>, Vec<Vec<String>>) {
@@ -38,8 +40,8 @@ impl StressReport {
         (head, rows)
     }
 
-    fn remarks(&self, bullet: &str) -> String {
-        let mut text = String::new();
+    fn remarks(&self) -> Vec<String> {
+        let mut remarks = vec![];
         for law in self.laws.iter().filter(|l| l.how.is_some()) {
             let broken: Vec<&PointReport> = law.points.iter().filter(|p| p.finding.how.is_some()).collect();
             let at = |alike: &[&PointReport]| {
@@ -52,13 +54,13 @@ impl StressReport {
             let known = law.known.join("; ");
             let known = if known.is_empty() { known } else { format!(" Known: {known}.") };
             let (LawReport { engine, law, what, unit, .. }, list) = (law, list.join("; "));
-            writeln!(text, "{bullet}{engine} {law}: {what}. At {unit} {list}{why}.{known}").ok();
+            remarks.push(format!("{engine} {law}: {what}. At {unit} {list}{why}.{known}"));
         }
         for law in self.laws.iter().filter(|l| !l.gone.is_empty()) {
             let gone = law.gone.join("; ");
-            writeln!(text, "{bullet}{} {}: on record, but seen no more: {gone}.", law.engine, law.law).ok();
+            remarks.push(format!("{} {}: on record, but seen no more: {gone}.", law.engine, law.law));
         }
-        text
+        remarks
     }
 }
 

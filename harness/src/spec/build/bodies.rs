@@ -17,6 +17,8 @@ use crate::spec::SpecError;
 /// No luminaire is so bright: the sun itself has some 3e27 cd. What is made of it stays a number below this.
 const BRIGHTEST_CD: f64 = 1e30;
 
+const TRIANGLES_OF_A_BOX: usize = 12;
+
 impl Builder<'_> {
     pub(super) fn obstacles(&mut self, specs: &[ObstacleSpec], room: Option<&Room>) -> Vec<Obstacle> {
         specs.iter().enumerate().filter_map(|(k, spec)| self.obstacle(&format!("obstacles[{k}]"), spec, room)).collect()
@@ -26,6 +28,9 @@ impl Builder<'_> {
         let obstacle = match (&spec.cuboid, &spec.mesh) {
             (Some(cuboid), None) => {
                 let (min_m, max_m) = (DVec3::from(cuboid.min_m), DVec3::from(cuboid.max_m));
+                if !self.take(at, "triangles", TRIANGLES_OF_A_BOX, |left| &mut left.triangles) {
+                    return None;
+                }
                 let sound = min_m.is_finite() && max_m.is_finite() && min_m.cmplt(max_m).all();
                 let message = format!("the box from {min_m} to {max_m} has no volume");
                 if !self.check(sound, at, message, "give min_m below max_m on every axis") {
