@@ -3,7 +3,7 @@
 //! Blender is GPL: it stays a program of its own behind our driver (`drivers/cycles_read.py`), and nothing of it is linked or kept here.
 
 mod export;
-pub(super) mod ies;
+mod ies;
 #[cfg(test)]
 pub(super) mod tests;
 
@@ -32,7 +32,7 @@ pub(super) static ENTRY: Entry = Entry {
 const PACKAGE: Package = Package {
     engine: ID,
     name: "Blender",
-    package: "bpy",
+    module: "bpy",
     site: Site::blender,
     probe: include_str!("../../drivers/cycles_probe.py"),
     driver: "cycles_read.py",

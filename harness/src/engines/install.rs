@@ -100,16 +100,15 @@ fn step(site: &Site, program: impl Into<PathBuf>) -> Invocation {
     Invocation::new(program, site.root(), LIMIT, site.root().join("install.log")).of_user()
 }
 
+/// Installs into a site, telling each step before it starts, and says where.
+type Installer = fn(&Site, &mut dyn FnMut(&str)) -> Result<String, InstallError>;
+
 /// How a component comes to be there.
 enum Recipe {
     /// Packages of Python, and the site that they have for themselves.
     Python(Environment, Site),
     /// Packages of Debian, the program or library of theirs that engines use, and what installs them.
-    Debian {
-        packages: &'static [&'static str],
-        found: fn(&Site) -> Option<PathBuf>,
-        install: fn(&Site, &mut dyn FnMut(&str)) -> Result<String, InstallError>,
-    },
+    Debian { packages: &'static [&'static str], found: fn(&Site) -> Option<PathBuf>, install: Installer },
 }
 
 impl Recipe {
@@ -157,9 +156,7 @@ impl Component {
             Self::LuxCore => Recipe::Python(venv::LUXCORE, site.luxcore()),
             Self::PovRay => debian(&debian::POVRAY_PACKAGES, |site| site.program("povray"), debian::install_povray),
             Self::LibLlvm => debian(&debian::LLVM_PACKAGES, Site::llvm, debian::install_llvm),
-            Self::LibFaketime => {
-                debian(&debian::LIBFAKETIME_PACKAGES, Site::libfaketime, debian::install_libfaketime)
-            }
+            Self::LibFaketime => debian(&debian::LIBFAKETIME_PACKAGES, Site::libfaketime, debian::install_libfaketime),
         }
     }
 

@@ -30,7 +30,7 @@ pub(super) static ENTRY: Entry = Entry {
 const PACKAGE: Package = Package {
     engine: ID,
     name: "LuxCore",
-    package: "pyluxcore",
+    module: "pyluxcore",
     site: Site::luxcore,
     probe: include_str!("../../drivers/luxcore_probe.py"),
     driver: "luxcore_read.py",

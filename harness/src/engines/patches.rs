@@ -1,6 +1,7 @@
 //! Renderers whose meters are small white patches, read by a driver in an environment of Python packages of their own: Cycles and
 //! LuxCore.
 
+pub(super) mod ies_file;
 pub(super) mod opening;
 pub(super) mod resampled;
 pub(super) mod settings;
@@ -38,9 +39,10 @@ const PROBE_LIMIT: Duration = Duration::from_secs(120);
 /// A renderer as such a package.
 pub(super) struct Package {
     pub(super) engine: EngineName,
-    /// As its makers write it, and of Python.
+    /// As its makers write it.
     pub(super) name: &'static str,
-    pub(super) package: &'static str,
+    /// What Python imports.
+    pub(super) module: &'static str,
     pub(super) site: fn(&Site) -> Site,
     pub(super) probe: &'static str,
     pub(super) driver: &'static str,
@@ -61,11 +63,10 @@ impl Package {
     pub(super) fn probe(&self, site: &Site) -> Result<Version, Absent> {
         let absent = |reason: String| Absent { reason, remedy: self.remedy.into() };
         let own = (self.site)(site);
-        let python =
-            own.python().ok_or_else(|| absent(format!("there is no Python environment for {}", self.name)))?;
+        let python = own.python().ok_or_else(|| absent(format!("there is no Python environment for {}", self.name)))?;
         let package = own
-            .python_package(self.package)
-            .ok_or_else(|| absent(format!("the Python package `{}` is missing", self.package)))?;
+            .python_package(self.module)
+            .ok_or_else(|| absent(format!("the Python package `{}` is missing", self.module)))?;
         let folder = tempfile::tempdir().map_err(|e| absent(format!("no temporary folder: {e}")))?;
         let run = Invocation::new(&python, folder.path(), PROBE_LIMIT, folder.path().join("log"));
         let probe = self.probe.as_bytes().to_vec();
@@ -76,7 +77,7 @@ impl Package {
         let told: Told = serde_json::from_str(answer)
             .map_err(|e| absent(format!("the probe of {} answered `{answer}`: {e}", self.name)))?;
         // Wheels keep the libraries of a package beside it.
-        let beside = [format!("{}.libs", self.package), "numpy".into()];
+        let beside = [format!("{}.libs", self.module), "numpy".into()];
         let files = [package].into_iter().chain(beside.iter().filter_map(|name| own.python_package(name)));
         Ok(Version::of(&self.engine, told.version, site, files.chain(python.canonicalize())))
     }
@@ -102,7 +103,8 @@ impl Package {
             .ok_or_else(|| EngineError::output(self.engine.clone(), format!("has no Python; {}", self.remedy)))?;
         let threads = workbench.jobs.max(1).to_string();
         // Neither the user's Python nor its packages; scene folders stay as exported.
-        let run = workbench.invoke(python).args(["-I", "-B", self.driver, "job.json", "--serve", "--threads", &threads]);
+        let run =
+            workbench.invoke(python).args(["-I", "-B", self.driver, "job.json", "--serve", "--threads", &threads]);
         let frame = Frame::of(job, settings.coordinates);
         let instrument = Instrument { edge_deg, seat: patch(job, &frame), by_arc_cosine: true };
         let rounding = FloatError::of(job, frame, instrument);

@@ -63,7 +63,8 @@ fn indirect_light_is_the_converged_value_within_its_standard_error() {
 /// The difference to the converged value, .6 %, is seen as many standard errors.
 #[test]
 fn n_bounces_are_n_diffuse_reflections() {
-    for (Renderer { read, .. }, relative_error, z) in [(MITSUBA, 5e-4, 8.0), (RADIANCE, 8e-4, 5.0), (CYCLES, 8e-4, 5.0), (LUXCORE, 8e-4, 5.0)]
+    for (Renderer { read, .. }, relative_error, z) in
+        [(MITSUBA, 5e-4, 8.0), (RADIANCE, 8e-4, 5.0), (CYCLES, 8e-4, 5.0), (LUXCORE, 8e-4, 5.0)]
     {
         let found = read(&within(relative_error, s1(Transport::Indirect(Bounces::AtMost(7)))));
         assert!(worst_z(&found, &S1_SEVEN_LX) < 4.0, "{found:?}");
@@ -80,7 +81,8 @@ fn total_is_direct_plus_indirect() {
         station.meter.normal = DVec3::NEG_Z;
         station.meter.position_m.z = 17.0;
     }
-    for (Renderer { read, .. }, relative_error) in [(MITSUBA, 1e-3), (RADIANCE, 2e-3), (CYCLES, 2e-3), (LUXCORE, 2e-3)] {
+    for (Renderer { read, .. }, relative_error) in [(MITSUBA, 1e-3), (RADIANCE, 2e-3), (CYCLES, 2e-3), (LUXCORE, 2e-3)]
+    {
         let total = within(relative_error, total.clone());
         let indirect = read(&Job { transport: CONVERGED, ..total.clone() });
         let parts = indirect.estimates.iter().zip(exact_direct_lx(&total));

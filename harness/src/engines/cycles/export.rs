@@ -10,16 +10,17 @@ use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::{Luminaire, Shape};
 
 use super::ID;
-use super::ies::{self, LookedUp};
+use super::ies::LookedUp;
 use crate::engines::comment::Comment;
 use crate::engines::dialogue;
 use crate::engines::frame::{Frame, plain};
+use crate::engines::meshes::Mesh;
+use crate::engines::patches::ies_file;
 use crate::engines::patches::opening::{Opening, Outline};
 use crate::engines::patches::settings::Settings;
 use crate::engines::patches::{self, reflections};
 use crate::engines::settings::Preset;
 use crate::engines::tables::Tables;
-use crate::engines::meshes::Mesh;
 use crate::engines::{EngineError, Job, SceneFile, meshes, recess};
 
 const READ: &str = include_str!("../../../drivers/cycles_read.py");
@@ -38,13 +39,13 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
         SceneFile::text("cycles_scene.py", SCENE),
     ];
     files.extend(meshes::files(job, &frame, Mesh::Obj));
-    files.extend(tables.distinct.iter().enumerate().map(|(k, d)| SceneFile::text(&table(k), ies_file(d, settings))));
+    files.extend(tables.distinct.iter().enumerate().map(|(k, d)| SceneFile::text(&table(k), ies(d, settings))));
     Ok(files)
 }
 
-fn ies_file(distribution: &LuminousIntensityDistribution, settings: Settings) -> String {
+fn ies(distribution: &LuminousIntensityDistribution, settings: Settings) -> String {
     match settings.preset {
-        Preset::Default => ies::plain_file(distribution, "[MORE] the table as it is"),
+        Preset::Default => ies_file::of_table(distribution, "[MORE] the table as it is"),
         Preset::Audit | Preset::Fast => {
             LookedUp::of(distribution).file("[MORE] resampled for the cubic curves of Cycles' IES texture")
         }

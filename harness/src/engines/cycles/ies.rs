@@ -6,10 +6,9 @@
 //! a hair's breadth, turned away from C 0, and a row lies behind gamma 180; values where nobody looks make straight lines of
 //! the curves beside them. What is left is computed and stated, never taken off.
 
-use std::fmt::Write;
-
 use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
 
+use crate::engines::patches::ies_file;
 use crate::engines::patches::resampled::Resampled;
 
 /// Width of the cells that keep a jump, a begin or an end to itself.
@@ -105,7 +104,7 @@ impl LookedUp {
     /// As an LM-63 file.
     pub(super) fn file(&self, about: &str) -> String {
         let keywords = ["[MANUFAC] luxproof", about, &format!("[MORE] planes are turned by {SEAM_DEG} degrees")];
-        file(&keywords, &self.v_deg, &self.h_deg, self.candela.iter().map(Vec::as_slice))
+        ies_file::text(&keywords, &self.v_deg, &self.h_deg, self.candela.iter().map(Vec::as_slice))
     }
 }
 
@@ -125,28 +124,6 @@ impl Resampled for LookedUp {
         let of = |k: Option<usize>| k.and_then(|k| self.candela.get(k)).map_or(0.0, along_gamma);
         cubic([of(k.checked_sub(1)), of(Some(k)), of(Some(k + 1)), of(Some(k + 2))], x).max(0.0)
     }
-}
-
-/// A table as it is, in an LM-63 file.
-pub(in crate::engines) fn plain_file(distribution: &LuminousIntensityDistribution, about: &str) -> String {
-    let planes = (0..distribution.c_deg().len()).map(|c| distribution.plane(c));
-    file(&["[MANUFAC] luxproof", about], distribution.gamma_deg(), distribution.c_deg(), planes)
-}
-
-fn file<'a>(keywords: &[&str], v_deg: &'a [f64], h_deg: &'a [f64], planes: impl Iterator<Item = &'a [f64]>) -> String {
-    let mut text = "IESNA:LM-63-2002\n".to_owned();
-    for line in keywords {
-        writeln!(text, "{line}").ok();
-    }
-    writeln!(text, "TILT=NONE\n1 -1 1 {} {} 1 2 0 0 0\n1 1 0", v_deg.len(), h_deg.len()).ok();
-    for values in [v_deg, h_deg].into_iter().chain(planes) {
-        for line in values.chunks(10) {
-            // Cycles keeps no more of them.
-            let words: Vec<String> = line.iter().map(|v| (*v as f32).to_string()).collect();
-            writeln!(text, "{}", words.join(" ")).ok();
-        }
-    }
-    text
 }
 
 /// Into how many steps every cell is divided, so that cubics keep to what is wanted.

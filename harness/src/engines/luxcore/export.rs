@@ -11,10 +11,10 @@ use luminaire::scene::{Luminaire, Shape};
 use super::ID;
 use super::map::Map;
 use crate::engines::comment::Comment;
-use crate::engines::cycles::ies;
 use crate::engines::dialogue;
 use crate::engines::frame::{Frame, plain};
 use crate::engines::meshes::Mesh;
+use crate::engines::patches::ies_file;
 use crate::engines::patches::opening::{Opening, Outline};
 use crate::engines::patches::settings::Settings;
 use crate::engines::patches::{self, reflections};
@@ -44,7 +44,7 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
     ];
     files.extend(meshes::files(job, &frame, Mesh::Ply));
     files.extend(maps.iter().zip(&tables.distinct).enumerate().map(|(k, (map, table))| match settings.preset {
-        Preset::Default => SceneFile::text(&ies_name(k), ies::plain_file(table, "[MORE] the table as it is")),
+        Preset::Default => SceneFile::text(&ies_name(k), ies_file::of_table(table, "[MORE] the table as it is")),
         Preset::Audit | Preset::Fast => map.file(&map_name(k)),
     }));
     Ok(files)
@@ -70,7 +70,10 @@ fn header(job: &Job, what: &str) -> String {
 
 /// How it is rendered: in tiles of one pass, the one engine of LuxCore whose samples no clock counts.
 fn render_cfg(job: &Job, settings: Settings, frame: &Frame) -> String {
-    let mut text = header(job, "How it is rendered: pyluxcore.RenderConfig(pyluxcore.Properties(\"render.cfg\")) makes a picture of it as it is.");
+    let mut text = header(
+        job,
+        "How it is rendered: pyluxcore.RenderConfig(pyluxcore.Properties(\"render.cfg\")) makes a picture of it as it is.",
+    );
     text += "scene.file = scene.scn\n\
              film.width = 480\nfilm.height = 360\nfilm.filter.type = NONE\n\
              renderengine.type = TILEPATHCPU\nsampler.type = TILEPATHSAMPLER\n\
@@ -145,7 +148,9 @@ impl Scene<'_> {
             None => (DVec3::new(3.0, 3.0, 2.0), DVec3::ZERO),
         };
         let [from, to] = [from, to].map(|p| point(self.frame.to_scene(p)));
-        format!("\nscene.camera.type = perspective\nscene.camera.lookat.orig = {from}\nscene.camera.lookat.target = {to}\nscene.camera.fieldofview = 80\n")
+        format!(
+            "\nscene.camera.type = perspective\nscene.camera.lookat.orig = {from}\nscene.camera.lookat.target = {to}\nscene.camera.fieldofview = 80\n"
+        )
     }
 
     /// A point light with an emission map; LuxCore divides its power by 4 pi times the flux of the map.
@@ -166,8 +171,7 @@ impl Scene<'_> {
         let axes = turned(luminaire.orientation, turned_deg);
         let placed = self.frame.placed(luminaire.position_m, axes);
         // By columns.
-        let matrix: Vec<String> =
-            (0..4).flat_map(|column| placed.map(|row| plain(row[column]).to_string())).collect();
+        let matrix: Vec<String> = (0..4).flat_map(|column| placed.map(|row| plain(row[column]).to_string())).collect();
         write!(
             text,
             "{light}.type = mappoint\n{map}{light}.transformation = {}\n{light}.power = {power}\n{light}.efficiency = 1\n",
@@ -183,9 +187,7 @@ impl Scene<'_> {
         let map = &self.maps[of];
         let [x, y] = size_m.map(|s| 0.5 * s * self.frame.scale);
         let (corners, faces) = match outline {
-            Outline::Rectangle => {
-                (vec![[-x, -y], [x, -y], [x, y], [-x, y]], vec![[0, 1, 2], [0, 2, 3]])
-            }
+            Outline::Rectangle => (vec![[-x, -y], [x, -y], [x, y], [-x, y]], vec![[0, 1, 2], [0, 2, 3]]),
             Outline::Ellipse => polygon(x, y),
         };
         let area: f64 = faces.iter().map(|f| area_of(f.map(|i| corners[i]))).sum();

@@ -128,9 +128,19 @@ fn finest(sizes: &[usize], is_fine: impl Fn(usize) -> bool) -> usize {
     sizes.iter().copied().find(|size| is_fine(*size)).unwrap_or(sizes[sizes.len() - 1])
 }
 
-/// The largest change of slope, a degree.
+/// The largest change of slope along gamma, a degree; beyond a table's ends it is dark.
 fn kink(angles: &[f64], values: &[f64]) -> f64 {
-    slopes(angles, values).windows(2).map(|s| (s[1] - s[0]).abs()).fold(0.0, f64::max)
+    let (first, last) = (angles[0], angles[angles.len() - 1]);
+    let (mut angles, mut values) = (angles.to_vec(), values.to_vec());
+    if first > 0.0 {
+        angles.splice(0..0, [first - 2.0, first - 1.0]);
+        values.splice(0..0, [0.0, 0.0]);
+    }
+    if last < 180.0 {
+        angles.extend([last + 1.0, last + 2.0]);
+        values.extend([0.0, 0.0]);
+    }
+    slopes(&angles, &values).windows(2).map(|s| (s[1] - s[0]).abs()).fold(0.0, f64::max)
 }
 
 /// The largest slope, a degree.
@@ -175,7 +185,10 @@ mod tests {
             let map = Map::of(&distribution);
             assert!(map.texels.len() <= 1440 * 4096 && map.misled_share() < 0.01);
             let file = map.file("a");
-            assert_eq!(file.bytes.len(), format!("Pf\n{} {}\n-1.0\n", map.width, map.height).len() + 4 * map.texels.len());
+            assert_eq!(
+                file.bytes.len(),
+                format!("Pf\n{} {}\n-1.0\n", map.width, map.height).len() + 4 * map.texels.len()
+            );
         }
     }
 }

@@ -27,7 +27,10 @@ fn a_wrong_export_is_seen() {
         (".efficiency = 1\n", ".efficiency = 1\n"),
         (".efficiency = 1\n", ".efficiency = 3.141592653589793\n"),
         (".efficiency = 1\n", ".efficiency = 1.4285714285714286\n"),
-        (".transformation = ", ".transformation = 0 1 0 0 -1 0 0 0 0 0 1 0 0 0 0 1 # "),
+        (
+            ".efficiency = 1\n",
+            ".efficiency = 1\nscene.lights.luminaire0.transformation = 0 1 0 0 -1 0 0 0 0 0 1 0 0 0 0 1\n",
+        ),
     ];
     shared_tests::wrong_exports_are_seen("scene.scn", 1e-4, replaced, |job, tamper| read_tampered(job, tamper));
 }

@@ -84,7 +84,7 @@ pub(in crate::engines) fn a_site_without_its_package_says_what_to_run(engine: &d
     let folder = tempfile::tempdir().unwrap();
     let site = Site::at(folder.path());
     let absent = |site: &Site| engine.probe(site).unwrap_err().to_string();
-    let (own, name) = ((package.site)(&site), package.package);
+    let (own, name) = ((package.site)(&site), package.module);
     assert!(absent(&site).contains(&format!("luxproof engines install {}", package.engine)), "{}", absent(&site));
     write_program(&own.venv().join("bin/python"), "exit 1");
     assert!(absent(&site).contains(&format!("`{name}` is missing")), "{}", absent(&site));
