@@ -7,7 +7,6 @@ job says. With --serve it says what there is to read, and then answers each line
 
 import argparse
 import json
-import math
 import os
 import sys
 
@@ -33,8 +32,13 @@ def main(description, instrument, more=None):
         print(json.dumps(line, allow_nan=False), file=answer, flush=True)
 
 
+def one_by_one(block):
+    """A function from (m, seed) to a block, seed by seed."""
+    return lambda m, seeds: [block(m, seed) for seed in seeds]
+
+
 class Instrument:
-    """The parts of a job's light: for each a function from (m, seed) to a block, and the rays of a block with m = 1."""
+    """The parts of a job's light: for each a function from (m, seeds) to a block a seed, and the rays of a block with m = 1."""
 
     lanes = 1 << 17  # rays in flight
 
@@ -45,28 +49,29 @@ class Instrument:
     def is_sampled(self, part):
         raise NotImplementedError
 
-    def block(self, part, m, seed):
-        values = self.parts[part][0](m, seed)
-        bad = [name for name, value in zip(self.stations, values) if not math.isfinite(value)]
+    def blocks(self, part, m, seeds):
+        """Blocks by meters."""
+        found = np.asarray(self.parts[part][0](m, seeds), np.float64)
+        bad = [name for name, finite in zip(self.stations, np.isfinite(found).all(0)) if not finite]
         if bad:
             raise RuntimeError(f"illuminance is not finite at {', '.join(bad)}")
-        return values
+        return found
 
     def served(self, requests):
         parts = [{"name": p, "rays": self.parts[p][1], "sampled": self.is_sampled(p)} for p in self.parts]
         about = {"versions": self.versions, "variant": self.variant}
         yield {**about, "lanes": self.lanes, "stations": self.stations, "parts": parts}
         for request in map(json.loads, requests):
-            yield [self.block(request["part"], request["side"], seed).tolist() for seed in request["seeds"]]
+            yield self.blocks(request["part"], request["side"], request["seeds"]).tolist()
 
     def by_itself(self):
         value, variance = np.zeros(len(self.stations)), np.zeros(len(self.stations))
         for k, part in enumerate(self.parts):
             if not self.is_sampled(part):
-                value += self.block(part, 1, None)
+                value += self.blocks(part, 1, [None])[0]
                 continue
-            seeds = ((self.job["seed"], k, b) for b in range(self.job["blocks"]))
-            blocks = np.array([self.block(part, self.job["side"], seed) for seed in seeds])
+            seeds = [(self.job["seed"], k, b) for b in range(self.job["blocks"])]
+            blocks = self.blocks(part, self.job["side"], seeds)
             value += blocks.mean(0)
             variance += blocks.var(0, ddof=1) / len(blocks)
         rows = zip(self.stations, value.tolist(), np.sqrt(variance).tolist())

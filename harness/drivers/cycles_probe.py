@@ -9,4 +9,4 @@ import bpy
 
 bpy.ops.wm.read_factory_settings(use_empty=True)
 bpy.context.scene.render.engine = "CYCLES"
-print(json.dumps({"blender": bpy.app.version_string}))
+print(json.dumps({"version": bpy.app.version_string}))

@@ -56,9 +56,9 @@ class Instrument(blocks.Instrument):
         count, lights = len(job["stations"]), len(self.lights)
         if job["transport"] in ("direct", "total") and lights:
             read, each = (self.direct, lights) if job["apart"] else (self.of_all({"DIRECT"}), 1)
-            self.parts["direct"] = read, count * each
+            self.parts["direct"] = blocks.one_by_one(read), count * each
         if job["transport"] in ("indirect", "total") and lights and solid and job["reflections"]:
-            self.parts["indirect"] = self.of_all({"INDIRECT"}), count
+            self.parts["indirect"] = blocks.one_by_one(self.of_all({"INDIRECT"})), count
 
     def is_sampled(self, part):
         return bool(self.job["extended"] or not self.job["apart"] or part != "direct")

@@ -50,13 +50,14 @@ class Instrument(blocks.Instrument):
         if emitters != job["emitters"]:
             raise RuntimeError(f"the scene has {emitters} emitters, the job says {job['emitters']}")
         if job["film"]:
-            self.parts[job["transport"]] = lambda m, seed: film(scene, job["film"], meters.count, seed), meters.count
+            of_film = lambda m, seed: film(scene, job["film"], meters.count, seed)
+            self.parts[job["transport"]] = blocks.one_by_one(of_film), meters.count
             return
         if job["transport"] in ("direct", "total") and emitters:
             rays = meters.count * emitters
-            self.parts["direct"] = lambda m, seed: direct(scene, meters, emitters, m, seed), rays
+            self.parts["direct"] = blocks.one_by_one(lambda m, seed: direct(scene, meters, emitters, m, seed)), rays
         if job["transport"] in ("indirect", "total") and emitters and scene.shapes():
-            self.parts["indirect"] = lambda m, seed: indirect(scene, meters, m, seed), meters.count
+            self.parts["indirect"] = blocks.one_by_one(lambda m, seed: indirect(scene, meters, m, seed)), meters.count
 
     def is_sampled(self, part):
         return bool(self.job["film"] or self.job["extended"] or part != "direct")

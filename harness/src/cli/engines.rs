@@ -23,22 +23,22 @@ pub(super) enum EnginesAction {
     List,
     /// Fetch missing engines into a folder of our own
     Install {
-        /// Engines by name [default: all but cycles]
+        /// Engines by name [default: all but cycles and luxcore]
         names: Vec<String>,
     },
     /// Hold the files of installed engines against the sums that they were installed with
     Verify {
-        /// Engines by name [default: all but cycles]
+        /// Engines by name [default: all but cycles and luxcore]
         names: Vec<String>,
     },
     /// Install anew what is broken or absent
     Repair {
-        /// Engines by name [default: all but cycles]
+        /// Engines by name [default: all but cycles and luxcore]
         names: Vec<String>,
     },
     /// Let engines read scenes of known answer and judge what they read
     Doctor {
-        /// Engines by name [default: all but cycles]
+        /// Engines by name [default: all but cycles and luxcore]
         names: Vec<String>,
         /// The spec whose engines, adapters among them, are examined, too
         #[arg(long, value_name = "FILE")]

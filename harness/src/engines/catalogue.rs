@@ -3,12 +3,19 @@
 use std::borrow::Borrow;
 
 use super::contract::{Engine, Entry};
-use super::{cycles, iesna, mitsuba, povray, radiance, simulator};
+use super::{cycles, iesna, luxcore, mitsuba, povray, radiance, simulator};
 use crate::record::EngineName;
 
 /// In the order of reports: our own witnesses first.
-pub const ALL: &[&Entry] =
-    &[&simulator::ENTRY, &iesna::ENTRY, &mitsuba::ENTRY, &radiance::ENTRY, &povray::ENTRY, &cycles::ENTRY];
+pub const ALL: &[&Entry] = &[
+    &simulator::ENTRY,
+    &iesna::ENTRY,
+    &mitsuba::ENTRY,
+    &radiance::ENTRY,
+    &povray::ENTRY,
+    &cycles::ENTRY,
+    &luxcore::ENTRY,
+];
 
 pub fn all() -> Vec<Box<dyn Engine>> {
     ALL.iter().map(|entry| (entry.make)()).collect()

@@ -118,6 +118,8 @@ pub enum Component {
     LibFaketime,
     /// Blender as a Python package, as `blender.lock` pins it, in an environment of its own.
     Blender,
+    /// LuxCore as a Python package, as `luxcore.lock` pins it, in an environment of its own.
+    LuxCore,
 }
 
 impl Entry {

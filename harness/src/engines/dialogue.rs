@@ -101,7 +101,7 @@ pub(super) struct Dialogue<'a> {
     /// How many blocks of how many samples along a side, whatever the budget.
     pub(super) fixed: Option<(usize, usize)>,
     /// What a ray of a variant costs.
-    pub(super) cost: fn(&str) -> Cost,
+    pub(super) cost: &'a dyn Fn(&str) -> Cost,
     /// Bound of the direct light of points at a station.
     pub(super) bound_lx: &'a dyn Fn(usize) -> f64,
     /// Bound of what is sampled, in parts of the reading.

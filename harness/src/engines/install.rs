@@ -16,6 +16,7 @@ use super::Site;
 use super::catalogue::{ALL, is_chosen};
 use super::contract::Component;
 use crate::record::EngineName;
+use venv::Environment;
 pub use verify::Soundness;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -81,8 +82,8 @@ pub fn repair(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str
 }
 
 fn components(engines: &[EngineName]) -> Vec<Component> {
-    let all =
-        [Component::PythonPackages, Component::PovRay, Component::LibLlvm, Component::LibFaketime, Component::Blender];
+    use Component::{Blender, LibFaketime, LibLlvm, LuxCore, PovRay, PythonPackages};
+    let all = [PythonPackages, PovRay, LibLlvm, LibFaketime, Blender, LuxCore];
     let named = || ALL.iter().filter(|entry| is_chosen(&entry.name, engines));
     all.into_iter().filter(|c| named().any(|entry| entry.installs.contains(c))).collect()
 }
@@ -99,6 +100,27 @@ fn step(site: &Site, program: impl Into<PathBuf>) -> Invocation {
     Invocation::new(program, site.root(), LIMIT, site.root().join("install.log")).of_user()
 }
 
+/// Installs into a site, telling each step before it starts, and says where.
+type Installer = fn(&Site, &mut dyn FnMut(&str)) -> Result<String, InstallError>;
+
+/// How a component comes to be there.
+enum Recipe {
+    /// Packages of Python, and the site that they have for themselves.
+    Python(Environment, Site),
+    /// Packages of Debian, the program or library of theirs that engines use, and what installs them.
+    Debian { packages: &'static [&'static str], found: fn(&Site) -> Option<PathBuf>, install: Installer },
+}
+
+impl Recipe {
+    /// Where it is, unless something of it is missing or not what was installed.
+    fn present(&self, site: &Site) -> Option<PathBuf> {
+        match self {
+            Self::Python(environment, own) => Some(own.venv()).filter(|_| environment.is_current(own)),
+            Self::Debian { found, .. } => found(site),
+        }
+    }
+}
+
 impl Component {
     const fn name(self) -> &'static str {
         match self {
@@ -107,16 +129,12 @@ impl Component {
             Self::LibLlvm => "libLLVM",
             Self::LibFaketime => "libfaketime",
             Self::Blender => "Blender",
+            Self::LuxCore => "LuxCore",
         }
     }
 
     fn install(self, site: &Site, progress: &mut dyn FnMut(&str)) -> InstallOutcome {
-        let present = match self {
-            Self::PythonPackages => Some(site.venv()).filter(|_| venv::SHARED.is_current(site)),
-            Self::Blender => Some(site.blender().venv()).filter(|_| venv::BLENDER.is_current(&site.blender())),
-            other => other.found(site),
-        };
-        match present {
+        match self.recipe(site).present(site) {
             Some(path) => self.outcome(InstallState::Present, path.display().to_string()),
             None => self.install_anew(site, progress),
         }
@@ -130,35 +148,29 @@ impl Component {
         }
     }
 
-    fn soundness(self, site: &Site) -> Soundness {
-        let found = self.found(site);
+    fn recipe(self, site: &Site) -> Recipe {
+        let debian = |packages, found, install| Recipe::Debian { packages, found, install };
         match self {
-            Self::PythonPackages => venv::SHARED.soundness(site),
-            Self::Blender => venv::BLENDER.soundness(&site.blender()),
-            Self::PovRay => verify::debian(site, found, &debian::POVRAY_PACKAGES),
-            Self::LibLlvm => verify::debian(site, found, &debian::LLVM_PACKAGES),
-            Self::LibFaketime => verify::debian(site, found, &debian::LIBFAKETIME_PACKAGES),
+            Self::PythonPackages => Recipe::Python(venv::SHARED, site.clone()),
+            Self::Blender => Recipe::Python(venv::BLENDER, site.blender()),
+            Self::LuxCore => Recipe::Python(venv::LUXCORE, site.luxcore()),
+            Self::PovRay => debian(&debian::POVRAY_PACKAGES, |site| site.program("povray"), debian::install_povray),
+            Self::LibLlvm => debian(&debian::LLVM_PACKAGES, Site::llvm, debian::install_llvm),
+            Self::LibFaketime => debian(&debian::LIBFAKETIME_PACKAGES, Site::libfaketime, debian::install_libfaketime),
         }
     }
 
-    /// The program or library that engines use.
-    fn found(self, site: &Site) -> Option<PathBuf> {
-        match self {
-            Self::PythonPackages => site.python(),
-            Self::PovRay => site.program("povray"),
-            Self::LibLlvm => site.llvm(),
-            Self::LibFaketime => site.libfaketime(),
-            Self::Blender => site.blender().python(),
+    fn soundness(self, site: &Site) -> Soundness {
+        match self.recipe(site) {
+            Recipe::Python(environment, own) => environment.soundness(&own),
+            Recipe::Debian { packages, found, .. } => verify::debian(site, found(site), packages),
         }
     }
 
     fn install_anew(self, site: &Site, progress: &mut dyn FnMut(&str)) -> InstallOutcome {
-        let installed = match self {
-            Self::PythonPackages => venv::SHARED.install(site, progress),
-            Self::Blender => venv::BLENDER.install(&site.blender(), progress),
-            Self::PovRay => debian::install_povray(site, progress),
-            Self::LibLlvm => debian::install_llvm(site, progress),
-            Self::LibFaketime => debian::install_libfaketime(site, progress),
+        let installed = match self.recipe(site) {
+            Recipe::Python(environment, own) => environment.install(&own, progress),
+            Recipe::Debian { install, .. } => install(site, progress),
         };
         match installed {
             Ok(detail) => self.outcome(InstallState::Installed, detail),
@@ -198,6 +210,7 @@ mod tests {
         assert_eq!(components(&two), [PythonPackages, PovRay, LibFaketime]);
         assert_eq!(components(&[EngineName::new("mitsuba")]), [PythonPackages, LibLlvm]);
         assert_eq!(components(&[EngineName::new("cycles")]), [Component::Blender]);
+        assert_eq!(components(&[EngineName::new("luxcore")]), [Component::LuxCore]);
         assert_eq!(components(&[EngineName::new("simulator"), EngineName::new("iesna")]), []);
     }
 

@@ -1,4 +1,4 @@
-//! Meshes among the obstacles, each as an OBJ file of its own.
+//! Meshes among the obstacles, each as a file of its own.
 
 use glam::DVec3;
 use luminaire::scene::Shape;
@@ -6,26 +6,55 @@ use luminaire::scene::Shape;
 use super::frame::Frame;
 use super::{Job, SceneFile};
 
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Mesh {
+    Obj,
+    Ply,
+}
+
 /// The files of a job's meshes.
-pub(super) fn files(job: &Job, frame: &Frame) -> Vec<SceneFile> {
+pub(super) fn files(job: &Job, frame: &Frame, format: Mesh) -> Vec<SceneFile> {
     let mesh = |(k, obstacle): (usize, &luminaire::scene::Obstacle)| match &obstacle.shape {
         Shape::Box { .. } => None,
-        Shape::Mesh { vertices_m, triangles } => Some(SceneFile::text(&name(k), obj(vertices_m, triangles, frame))),
+        Shape::Mesh { vertices_m, triangles } => {
+            let vertices: Vec<DVec3> = vertices_m.iter().map(|v| frame.to_scene(*v)).collect();
+            let text = match format {
+                Mesh::Obj => obj(&vertices, triangles),
+                Mesh::Ply => ply(&vertices, triangles),
+            };
+            Some(SceneFile::text(&name(k, format), text))
+        }
     };
     job.scene.obstacles.iter().enumerate().filter_map(mesh).collect()
 }
 
 /// The file of obstacle `k`.
-pub(super) fn name(k: usize) -> String {
-    format!("obstacle-{k}.obj")
+pub(super) fn name(k: usize, format: Mesh) -> String {
+    let ending = match format {
+        Mesh::Obj => "obj",
+        Mesh::Ply => "ply",
+    };
+    format!("obstacle-{k}.{ending}")
 }
 
-fn obj(vertices_m: &[DVec3], triangles: &[[u32; 3]], frame: &Frame) -> String {
-    let vertex = |v: &DVec3| {
-        let [x, y, z] = frame.to_scene(*v).to_array();
-        format!("v {x} {y} {z}\n")
-    };
+const ABOUT: &str = "an obstacle, in the coordinates of the scene";
+
+fn obj(vertices: &[DVec3], triangles: &[[u32; 3]]) -> String {
+    let vertex = |v: &DVec3| format!("v {} {} {}\n", v.x, v.y, v.z);
     let face = |[a, b, c]: &[u32; 3]| format!("f {} {} {}\n", a + 1, b + 1, c + 1);
-    let lines = vertices_m.iter().map(vertex).chain(triangles.iter().map(face));
-    std::iter::once("# an obstacle, in the coordinates of the scene\n".to_owned()).chain(lines).collect()
+    let lines = vertices.iter().map(vertex).chain(triangles.iter().map(face));
+    std::iter::once(format!("# {ABOUT}\n")).chain(lines).collect()
+}
+
+fn ply(vertices: &[DVec3], triangles: &[[u32; 3]]) -> String {
+    let header = format!(
+        "ply\nformat ascii 1.0\ncomment {ABOUT}\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        vertices.len(),
+        triangles.len()
+    );
+    let vertex = |v: &DVec3| format!("{} {} {}\n", v.x, v.y, v.z);
+    let face = |[a, b, c]: &[u32; 3]| format!("3 {a} {b} {c}\n");
+    let lines = vertices.iter().map(vertex).chain(triangles.iter().map(face));
+    std::iter::once(header).chain(lines).collect()
 }

@@ -127,7 +127,7 @@ impl Mitsuba {
             job,
             conversation: run.converse()?,
             fixed: (settings.preset != Preset::Audit).then_some((settings::FIXED_BLOCKS, settings::FIXED_SIDE)),
-            cost,
+            cost: &cost,
             bound_lx: &|k| error.at_lx(k),
             relative_bound: 0.0,
         };

@@ -5,6 +5,7 @@
 
 use super::cycles::Cycles;
 use super::fixtures::{CONVERGED, S1_INDIRECT_LX, s1, workbench};
+use super::luxcore::LuxCore;
 use super::mitsuba::Mitsuba;
 use super::povray::PovRay;
 use super::radiance::Radiance;
@@ -48,10 +49,11 @@ fn renderers_repeat_within_their_standard_errors_and_their_named_bias() {
     let fast = || ("preset", "fast".into());
     // Eight blocks of so few rays, however busy the machine is.
     let endless = Budget { relative_error: 0.5, seconds: 1e6 };
-    let cases: [(&dyn Engine, _, _, _); 4] = [
+    let cases: [(&dyn Engine, _, _, _); 5] = [
         (&Mitsuba::default(), fast(), Budget::default(), 0.0),
         (&Radiance, fast(), Budget::default(), 0.0),
         (&Cycles, fast(), Budget::default(), 0.0),
+        (&LuxCore, fast(), Budget::default(), 0.0),
         (&PovRay, ("count", 50.into()), endless, 0.005),
     ];
     for (engine, setting, budget, bias) in cases {

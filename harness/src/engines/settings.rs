@@ -121,6 +121,7 @@ mod tests {
             ("mitsuba", "variant", json!("cycles"), "llvm_ad_rgb"),
             ("mitsuba", "preset", json!("best"), "audit, fast or default"),
             ("cycles", "samples", json!(9), "no such setting; there are preset and recentre"),
+            ("luxcore", "preset", json!("best"), "audit, fast or default"),
             ("mitsuba", "samples", json!("9"), "no such setting; there are preset, variant and recentre"),
         ] {
             let text = export_with(engine, key, &value).unwrap_err();

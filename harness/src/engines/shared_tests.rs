@@ -9,6 +9,7 @@ use luminaire::simulator::{self, Accuracy};
 
 use super::cycles::tests as cycles;
 use super::fixtures::*;
+use super::luxcore::tests as luxcore;
 use super::mitsuba::tests as mitsuba;
 use super::povray::tests as povray;
 use super::radiance::tests as radiance;
@@ -30,12 +31,13 @@ struct Renderer {
 
 const MITSUBA: Renderer = Renderer { read: mitsuba::read, direct: [1e-5, 1e-4], turned: [1e-4, 1e-5], unshaded: 1e-5 };
 const CYCLES: Renderer = Renderer { read: cycles::read, direct: [1e-4, 2e-3], turned: [1e-3, 2e-4], unshaded: 1e-3 };
+const LUXCORE: Renderer = Renderer { read: luxcore::read, direct: [1e-4, 1e-3], turned: [1e-3, 2e-4], unshaded: 1e-4 };
 const RADIANCE: Renderer = Renderer { read: radiance::read, direct: [1e-6; 2], turned: [1e-4, 1e-5], unshaded: 1e-5 };
 const POVRAY: Renderer = Renderer { read: povray::read, direct: [1e-6, 1e-4], turned: [0.0, 1e-6], unshaded: 1e-6 };
 
 #[test]
 fn direct_light_follows_the_inverse_square_law_within_its_small_bound() {
-    for Renderer { read, direct: [off, bound], .. } in [MITSUBA, RADIANCE, POVRAY, CYCLES] {
+    for Renderer { read, direct: [off, bound], .. } in [MITSUBA, RADIANCE, POVRAY, CYCLES, LUXCORE] {
         let found = read(&s1(Transport::Direct));
         assert!(worst_relative(&found, &S1_DIRECT_LX) < off, "{found:?}");
         for (estimate, exact) in found.estimates.iter().zip(S1_DIRECT_LX) {
@@ -48,7 +50,7 @@ fn direct_light_follows_the_inverse_square_law_within_its_small_bound() {
 #[test]
 fn indirect_light_is_the_converged_value_within_its_standard_error() {
     for (Renderer { read, .. }, relative_error, stated) in
-        [(MITSUBA, 1e-3, 1.05e-3), (RADIANCE, 2e-3, 2.01e-3), (CYCLES, 2e-3, 2.1e-3)]
+        [(MITSUBA, 1e-3, 1.05e-3), (RADIANCE, 2e-3, 2.01e-3), (CYCLES, 2e-3, 2.1e-3), (LUXCORE, 2e-3, 2.1e-3)]
     {
         let found = read(&within(relative_error, s1(CONVERGED)));
         let off = worst_relative(&found, &S1_INDIRECT_LX);
@@ -61,7 +63,8 @@ fn indirect_light_is_the_converged_value_within_its_standard_error() {
 /// The difference to the converged value, .6 %, is seen as many standard errors.
 #[test]
 fn n_bounces_are_n_diffuse_reflections() {
-    for (Renderer { read, .. }, relative_error, z) in [(MITSUBA, 5e-4, 8.0), (RADIANCE, 8e-4, 5.0), (CYCLES, 8e-4, 5.0)]
+    for (Renderer { read, .. }, relative_error, z) in
+        [(MITSUBA, 5e-4, 8.0), (RADIANCE, 8e-4, 5.0), (CYCLES, 8e-4, 5.0), (LUXCORE, 8e-4, 5.0)]
     {
         let found = read(&within(relative_error, s1(Transport::Indirect(Bounces::AtMost(7)))));
         assert!(worst_z(&found, &S1_SEVEN_LX) < 4.0, "{found:?}");
@@ -78,7 +81,8 @@ fn total_is_direct_plus_indirect() {
         station.meter.normal = DVec3::NEG_Z;
         station.meter.position_m.z = 17.0;
     }
-    for (Renderer { read, .. }, relative_error) in [(MITSUBA, 1e-3), (RADIANCE, 2e-3), (CYCLES, 2e-3)] {
+    for (Renderer { read, .. }, relative_error) in [(MITSUBA, 1e-3), (RADIANCE, 2e-3), (CYCLES, 2e-3), (LUXCORE, 2e-3)]
+    {
         let total = within(relative_error, total.clone());
         let indirect = read(&Job { transport: CONVERGED, ..total.clone() });
         let parts = indirect.estimates.iter().zip(exact_direct_lx(&total));
@@ -93,7 +97,7 @@ fn total_is_direct_plus_indirect() {
 #[test]
 fn asymmetric_and_turned_luminaires_read_their_own_table() {
     for (Renderer { read, turned: off, .. }, distribution) in
-        [MITSUBA, RADIANCE, POVRAY, CYCLES].into_iter().flat_map(|r| [(r, lopsided()), (r, quadrant())])
+        [MITSUBA, RADIANCE, POVRAY, CYCLES, LUXCORE].into_iter().flat_map(|r| [(r, lopsided()), (r, quadrant())])
     {
         let every = |step: u32, end: u32| (0..=end / step).map(|k| f64::from(k * step)).collect::<Vec<_>>();
         let job = goniometer(&turned(distribution), 10.0, &every(15, 345), &every(5, 180));
@@ -109,7 +113,7 @@ fn asymmetric_and_turned_luminaires_read_their_own_table() {
 
 #[test]
 fn panels_over_furniture_give_the_exact_light() {
-    for Renderer { read, .. } in [MITSUBA, CYCLES] {
+    for Renderer { read, .. } in [MITSUBA, CYCLES, LUXCORE] {
         let direct = read(&s2_with_panels(Transport::Direct));
         let deviations = relative_deviations(&direct, &S2_DIRECT_LX);
         assert!(worst(&deviations) < 1e-2 && direct.estimates[5].value == 0.0, "{direct:?} {deviations:?}");
@@ -121,7 +125,7 @@ fn panels_over_furniture_give_the_exact_light() {
 
 #[test]
 fn far_and_tiny_scenes_are_read_in_coordinates_of_their_own() {
-    for (Renderer { read, .. }, off) in [(MITSUBA, 1e-5), (CYCLES, 1e-4)] {
+    for (Renderer { read, .. }, off) in [(MITSUBA, 1e-5), (CYCLES, 1e-4), (LUXCORE, 1e-4)] {
         let lamp = luminaire("far", DVec3::new(3e6, 0.0, 10.0), lopsided());
         let mut far = goniometer(&lamp, 10.0, &[40.0], &[20.0, 120.0]);
         assert!(worst(&relative_deviations(&read(&far), &exact_direct_lx(&far))) < off);
@@ -147,7 +151,7 @@ fn several_luminaires_add_up_and_obstacles_throw_shadows() {
     let (min_m, max_m) = (DVec3::new(2.0, 3.0, 5.5), DVec3::new(4.0, 5.0, 5.6));
     let vertices_m = vec![min_m, max_m.with_y(min_m.y), max_m, min_m.with_y(max_m.y)];
     let plate = Shape::Mesh { vertices_m, triangles: vec![[0, 1, 2], [0, 2, 3]] };
-    for Renderer { read, unshaded, .. } in [MITSUBA, RADIANCE, POVRAY, CYCLES] {
+    for Renderer { read, unshaded, .. } in [MITSUBA, RADIANCE, POVRAY, CYCLES, LUXCORE] {
         assert!(worst_relative(&read(&free), &exact_direct_lx(&free)) < unshaded);
         for shape in [Shape::Box { min_m, max_m }, plate.clone(), closed(min_m, max_m)] {
             let mut shaded = free.clone();

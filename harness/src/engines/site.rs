@@ -8,7 +8,7 @@ use etcetera::BaseStrategy;
 
 /// Where engines are found. Layout of the folder: `venv/` (Python packages), `debian/` (unpacked Debian packages),
 /// `kernels/` (compiled by Dr.Jit),
-/// `blender/` (a folder like this one, with the packages of Blender).
+/// `blender/` and `luxcore/` (folders like this one, with the packages of Blender and of LuxCore).
 #[derive(Clone, Debug)]
 pub struct Site {
     root: PathBuf,
@@ -51,10 +51,15 @@ impl Site {
         versions.map(|version| version.path().join("site-packages")).collect()
     }
 
-    /// Where Blender's packages are, which want a Python and a numpy of their own.
+    /// Where Blender's packages are, which want a Python and a numpy of their own; so do LuxCore's.
     #[must_use]
     pub fn blender(&self) -> Self {
         Self::at(self.root.join("blender"))
+    }
+
+    #[must_use]
+    pub fn luxcore(&self) -> Self {
+        Self::at(self.root.join("luxcore"))
     }
 
     pub fn debian(&self) -> PathBuf {

@@ -6,47 +6,46 @@ use std::fmt::Write;
 
 use glam::DVec3;
 use luminaire::geometry::Surface;
-use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening};
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Shape};
-use serde::Serialize;
+use luminaire::photometry::LuminousIntensityDistribution;
+use luminaire::scene::{Luminaire, Shape};
 
 use super::ID;
-use super::ies::{self, LookedUp};
-use super::settings::Settings;
+use super::ies::LookedUp;
 use crate::engines::comment::Comment;
-use crate::engines::dialogue::{self, Seat};
+use crate::engines::dialogue;
 use crate::engines::frame::{Frame, plain};
+use crate::engines::meshes::Mesh;
+use crate::engines::patches::ies_file;
+use crate::engines::patches::opening::{Opening, Outline};
+use crate::engines::patches::settings::Settings;
+use crate::engines::patches::{self, reflections};
 use crate::engines::settings::Preset;
 use crate::engines::tables::Tables;
-use crate::engines::{EngineError, Job, SceneFile, effort, meshes, recess};
+use crate::engines::{EngineError, Job, SceneFile, meshes, recess};
 
 const READ: &str = include_str!("../../../drivers/cycles_read.py");
 const SCENE: &str = include_str!("../../../drivers/cycles_scene.py");
-
-/// More reflections Blender does not let anyone ask for.
-pub(super) const MOST_REFLECTIONS: i64 = 1024;
-/// Side of a meter's patch, in parts of the largest coordinate: forty times what 32-bit floats resolve there at least.
-const PATCH: f64 = 5e-6;
 
 pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.coordinates);
     let job = &*recess::apart(job);
     let tables = Tables::of(job);
+    let names = (0..tables.distinct.len()).map(table).collect();
     let mut files = vec![
         SceneFile::text("scene.py", scene(job, settings, &frame, &tables)),
-        SceneFile::text("job.json", job_json(job, settings, &frame, &tables)?),
+        patches::job_json(ID, job, settings, &frame, job.scene.luminaires.iter().map(lights).sum(), names)?,
         SceneFile::text("cycles_read.py", READ),
         SceneFile::text("blocks.py", dialogue::BLOCKS),
         SceneFile::text("cycles_scene.py", SCENE),
     ];
-    files.extend(meshes::files(job, &frame));
-    files.extend(tables.distinct.iter().enumerate().map(|(k, d)| SceneFile::text(&table(k), ies_file(d, settings))));
+    files.extend(meshes::files(job, &frame, Mesh::Obj));
+    files.extend(tables.distinct.iter().enumerate().map(|(k, d)| SceneFile::text(&table(k), ies(d, settings))));
     Ok(files)
 }
 
-fn ies_file(distribution: &LuminousIntensityDistribution, settings: Settings) -> String {
+fn ies(distribution: &LuminousIntensityDistribution, settings: Settings) -> String {
     match settings.preset {
-        Preset::Default => ies::plain_file(distribution, "[MORE] the table as it is"),
+        Preset::Default => ies_file::of_table(distribution, "[MORE] the table as it is"),
         Preset::Audit | Preset::Fast => {
             LookedUp::of(distribution).file("[MORE] resampled for the cubic curves of Cycles' IES texture")
         }
@@ -55,107 +54,6 @@ fn ies_file(distribution: &LuminousIntensityDistribution, settings: Settings) ->
 
 fn table(k: usize) -> String {
     format!("table-{k}.ies")
-}
-
-#[derive(Serialize)]
-struct DriverJob<'a> {
-    case: &'a str,
-    procedure: &'a str,
-    transport: &'static str,
-    reflections: i64,
-    emitters: usize,
-    extended: bool,
-    /// Whether direct light is read one luminaire after the other.
-    apart: bool,
-    tables: Vec<String>,
-    /// Side of a meter's patch.
-    patch: f64,
-    /// How many blocks it reads by itself, and how many samples along the side of each.
-    blocks: usize,
-    side: usize,
-    seed: u64,
-    stations: Vec<Seat<'a>>,
-}
-
-fn job_json(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -> Result<String, EngineError> {
-    let (blocks, side) = settings.by_itself();
-    let driver_job = DriverJob {
-        case: &job.case,
-        procedure: job.procedure.name(),
-        transport: dialogue::transport(job),
-        reflections: reflections(job),
-        emitters: job.scene.luminaires.iter().map(lights).sum(),
-        extended: job.scene.luminaires.iter().any(|l| Opening::of(l) != Opening::None),
-        apart: settings.preset != Preset::Default,
-        tables: (0..tables.distinct.len()).map(table).collect(),
-        patch: patch(job, frame),
-        blocks,
-        side,
-        seed: job.seed,
-        stations: dialogue::seats(job, frame),
-    };
-    serde_json::to_string_pretty(&driver_job)
-        .map_err(|e| EngineError::output(ID, format!("the job cannot be written: {e}")))
-}
-
-/// Side of a meter's patch in scene units.
-pub(super) fn patch(job: &Job, frame: &Frame) -> f64 {
-    let room = job.scene.room.iter().flat_map(|r| [DVec3::ZERO, r.size_m]);
-    let points = room.chain(job.scene.luminaires.iter().map(|l| l.position_m));
-    let points = points.chain(job.stations.iter().map(|s| s.meter.position_m));
-    let largest = points.map(|p| frame.to_scene(p).abs().max_element()).fold(0.0, f64::max);
-    PATCH * if largest > 0.0 { largest } else { 1.0 }
-}
-
-/// Diffuse reflections that paths are followed for.
-pub(super) fn reflections(job: &Job) -> i64 {
-    match job.reflections() {
-        None => 0,
-        Some(Bounces::AtMost(n)) => i64::from(n).min(MOST_REFLECTIONS),
-        Some(Bounces::Converged) => {
-            let highest = job.largest_reflectance();
-            effort::reflections_until(highest, 0.1 * job.budget.relative_error).clamp(8, MOST_REFLECTIONS)
-        }
-    }
-}
-
-/// Why a luminaire cannot be had, if so.
-pub(super) fn obstacle(job: &Job, is_stock: bool) -> Option<String> {
-    job.scene.luminaires.iter().filter(|l| l.model == LuminaireModel::Area).find_map(|l| match Opening::of(l) {
-        Opening::None => None,
-        _ if is_stock => Some(format!("{}: a stock scene of Blender has IES tables on points only", l.id)),
-        Opening::Flat(..) => None,
-        Opening::Solid => Some(format!("{}: only flat luminous openings are area lights in Cycles", l.id)),
-    })
-}
-
-/// What shines of a luminaire.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Opening {
-    /// A point.
-    None,
-    /// An area light: its shape and both sides in metres.
-    Flat(&'static str, [f64; 2]),
-    /// Blender has no light for it.
-    Solid,
-}
-
-impl Opening {
-    fn of(luminaire: &Luminaire) -> Self {
-        if luminaire.model == LuminaireModel::Point {
-            return Self::None;
-        }
-        let flat = |shape, x_m: f64, y_m: f64| {
-            if x_m > 0.0 && y_m > 0.0 { Self::Flat(shape, [x_m, y_m]) } else { Self::Solid }
-        };
-        match luminaire.photometry.opening {
-            LuminousOpening::Point => Self::None,
-            other if other.bounding_box_m() == [0.0; 3] => Self::None,
-            LuminousOpening::Box { x_m, y_m, height_m: 0.0 } => flat("RECTANGLE", x_m, y_m),
-            LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 } => flat("ELLIPSE", x_m, y_m),
-            _ => Self::Solid,
-        }
-    }
 }
 
 /// Blender's lights of a luminaire.
@@ -206,7 +104,11 @@ fn scene(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -> S
         let common = format!("\"luminaire {k}\", \"{}\", {scale}, [{rows}]", table(*of));
         let maker = if settings.preset == Preset::Default { "stock" } else { "point" };
         match Opening::of(luminaire) {
-            Opening::Flat(shape, size_m) => {
+            Opening::Flat(outline, size_m) => {
+                let shape = match outline {
+                    Outline::Rectangle => "RECTANGLE",
+                    Outline::Ellipse => "ELLIPSE",
+                };
                 for up in sides(luminaire) {
                     let (size, up) = (list(&size_m.map(|s| s * frame.scale)), if up { "True" } else { "False" });
                     writeln!(text, "cycles.area_luminaire({common}, \"{shape}\", {size}, upwards={up})").ok();
@@ -235,7 +137,7 @@ fn surfaces(text: &mut String, job: &Job, frame: &Frame) {
                 writeln!(text, "cycles.cuboid(\"obstacle {k}\", {reflectance}, {low}, {high})").ok();
             }
             Shape::Mesh { .. } => {
-                writeln!(text, "cycles.body(\"obstacle {k}\", {reflectance}, \"{}\")", meshes::name(k)).ok();
+                writeln!(text, "cycles.body(\"obstacle {k}\", {reflectance}, \"{}\")", meshes::name(k, Mesh::Obj)).ok();
             }
         }
     }

@@ -6,10 +6,10 @@
 //! a hair's breadth, turned away from C 0, and a row lies behind gamma 180; values where nobody looks make straight lines of
 //! the curves beside them. What is left is computed and stated, never taken off.
 
-use std::fmt::Write;
+use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
 
-use luminaire::photometry::{LuminousIntensityDistribution, Symmetry, angles_deg};
-use luminaire::scene::{Luminaire, Meter};
+use crate::engines::patches::ies_file;
+use crate::engines::patches::resampled::Resampled;
 
 /// Width of the cells that keep a jump, a begin or an end to itself.
 pub(super) const EDGE_DEG: f64 = 1e-3;
@@ -104,11 +104,16 @@ impl LookedUp {
     /// As an LM-63 file.
     pub(super) fn file(&self, about: &str) -> String {
         let keywords = ["[MANUFAC] luxproof", about, &format!("[MORE] planes are turned by {SEAM_DEG} degrees")];
-        file(&keywords, &self.v_deg, &self.h_deg, self.candela.iter().map(Vec::as_slice))
+        ies_file::text(&keywords, &self.v_deg, &self.h_deg, self.candela.iter().map(Vec::as_slice))
+    }
+}
+
+impl Resampled for LookedUp {
+    fn table(&self) -> &LuminousIntensityDistribution {
+        &self.of
     }
 
-    /// What Cycles looks up in a direction.
-    pub(super) fn intensity_cd(&self, c_deg: f64, gamma_deg: f64) -> f64 {
+    fn intensity_cd(&self, c_deg: f64, gamma_deg: f64) -> f64 {
         let h = (c_deg + SEAM_DEG).rem_euclid(360.0);
         let (Some((k, x)), Some((j, y))) = (cell(&self.h_deg, h), cell(&self.v_deg, gamma_deg)) else { return 0.0 };
         let along_gamma = |plane: &Vec<f64>| {
@@ -119,54 +124,6 @@ impl LookedUp {
         let of = |k: Option<usize>| k.and_then(|k| self.candela.get(k)).map_or(0.0, along_gamma);
         cubic([of(k.checked_sub(1)), of(Some(k)), of(Some(k + 1)), of(Some(k + 2))], x).max(0.0)
     }
-
-    /// How far its look-up leaves the light of a luminaire at a meter from the table's own, in lux.
-    pub(super) fn off_lx(&self, luminaire: &Luminaire, meter: &Meter) -> f64 {
-        let ray_m = meter.position_m - luminaire.position_m;
-        let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
-        let (c, gamma) = angles_deg(luminaire.orientation.transpose() * ray_m);
-        let off_cd = (self.intensity_cd(c, gamma) - self.of.intensity(c, gamma).value()).abs();
-        luminaire.flux_scale * off_cd * cosine.max(0.0) / ray_m.length_squared()
-    }
-
-    /// The share of the flux that its look-up sends elsewhere, adds or loses.
-    pub(super) fn misled_share(&self) -> f64 {
-        const C: usize = 144;
-        const GAMMA: usize = 720;
-        let (mut off, mut all) = (0.0, f64::MIN_POSITIVE);
-        for j in 0..GAMMA {
-            let gamma = 180.0 * (j as f64 + 0.5) / GAMMA as f64;
-            for k in 0..C {
-                let c = 360.0 * (k as f64 + 0.381_966) / C as f64;
-                let right = self.of.intensity(c, gamma).value();
-                off += (self.intensity_cd(c, gamma) - right).abs() * gamma.to_radians().sin();
-                all += right * gamma.to_radians().sin();
-            }
-        }
-        off / all
-    }
-}
-
-/// A table as it is, in an LM-63 file.
-pub(super) fn plain_file(distribution: &LuminousIntensityDistribution, about: &str) -> String {
-    let planes = (0..distribution.c_deg().len()).map(|c| distribution.plane(c));
-    file(&["[MANUFAC] luxproof", about], distribution.gamma_deg(), distribution.c_deg(), planes)
-}
-
-fn file<'a>(keywords: &[&str], v_deg: &'a [f64], h_deg: &'a [f64], planes: impl Iterator<Item = &'a [f64]>) -> String {
-    let mut text = "IESNA:LM-63-2002\n".to_owned();
-    for line in keywords {
-        writeln!(text, "{line}").ok();
-    }
-    writeln!(text, "TILT=NONE\n1 -1 1 {} {} 1 2 0 0 0\n1 1 0", v_deg.len(), h_deg.len()).ok();
-    for values in [v_deg, h_deg].into_iter().chain(planes) {
-        for line in values.chunks(10) {
-            // Cycles keeps no more of them.
-            let words: Vec<String> = line.iter().map(|v| (*v as f32).to_string()).collect();
-            writeln!(text, "{}", words.join(" ")).ok();
-        }
-    }
-    text
 }
 
 /// Into how many steps every cell is divided, so that cubics keep to what is wanted.

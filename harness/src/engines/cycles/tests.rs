@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use luminaire::photometry::LuminousOpening;
-use luminaire::scene::{LuminaireModel, Scene, Transport, orientation};
+use luminaire::scene::Transport;
 
 use super::*;
 use crate::engines::fixtures::*;
@@ -15,7 +15,7 @@ pub(in crate::engines) fn read(job: &Job) -> Measurement {
 }
 
 fn read_tampered(job: &Job, tamper: impl Fn(&str, String) -> String) -> Measurement {
-    let read = |files: &[SceneFile], bench: &Workbench| read_files(files, job, Settings::of(job)?, bench);
+    let read = |files: &[SceneFile], bench: &Workbench| read_files(files, job, Settings::of(job, &ID)?, bench);
     shared_tests::read_tampered(&Cycles, job, tamper, read)
 }
 
@@ -50,19 +50,7 @@ fn a_stock_table_is_the_files_own() {
 
 #[test]
 fn flat_openings_send_out_their_table_on_both_sides() {
-    let (x_m, y_m) = (0.6, 0.3);
-    for opening in
-        [LuminousOpening::Box { x_m, y_m, height_m: 0.0 }, LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 }]
-    {
-        let mut lamp = with_opening(luminaire("area", DVec3::new(1.0, 2.0, 3.0), lopsided()), opening);
-        lamp.orientation = orientation(30.0, 20.0, 10.0);
-        let near = goniometer(&lamp, 0.8, &[10.0, 190.0], &[5.0, 80.0, 165.0]);
-        let deviations = relative_deviations(&read(&near), &simulated_lx(&near, 3e-3));
-        assert!(worst(&deviations) < 6e-3, "{opening:?} {deviations:?}");
-        let far = goniometer(&lamp, 30.0, &[10.0, 190.0], &[5.0, 80.0, 165.0]);
-        let deviations = relative_deviations(&read(&far), &exact_direct_lx(&far));
-        assert!(worst(&deviations) < 3e-3, "{opening:?} {deviations:?}");
-    }
+    patches::tests::flat_openings_send_out_their_table_on_both_sides(read);
 }
 
 /// What users get who change nothing: planes mirrored, up to an eighth too much between the only two planes of an axial table.
@@ -80,16 +68,7 @@ fn the_stock_scene_shows_what_cycles_makes_of_an_ies_file() {
 
 #[test]
 fn one_seed_gives_the_same_readings_on_any_number_of_threads() {
-    let job = with_preset(s1(CONVERGED), "fast");
-    let with_jobs = |jobs: usize| {
-        let folder = tempfile::tempdir().unwrap();
-        let bench = Workbench { jobs, ..workbench(Site::of_user().unwrap(), folder.path()) };
-        Cycles.read(&job, &bench).unwrap()
-    };
-    let (one, two) = (with_jobs(1), with_jobs(2));
-    assert_eq!(one.estimates, two.estimates);
-    assert_eq!(one.effort["indirect_blocks"], "8");
-    assert!(worst_z(&one, &S1_INDIRECT_LX) < 6.0, "{one:?}");
+    patches::tests::one_seed_gives_the_same_readings_on_any_number_of_threads(&Cycles);
 }
 
 #[test]
@@ -99,13 +78,5 @@ fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
 
 #[test]
 fn what_cannot_be_read_well_is_said_beforehand() {
-    assert_eq!(Cycles.supports(&s1(CONVERGED)), Support::Yes);
-    assert!(matches!(Cycles.supports(&with_preset(s1(CONVERGED), "default")), Support::Approximate { .. }));
-    let solid = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.1 };
-    let mut job = s1(Transport::Direct);
-    job.scene.luminaires = vec![with_opening(luminaire("solid", DVec3::splat(10.0), lambertian()), solid)];
-    assert!(matches!(Cycles.supports(&job), Support::No(why) if why.contains("only flat")));
-    job.scene = Scene { luminaires: vec![luminaire("impostor", DVec3::ZERO, lambertian())], ..Scene::default() };
-    job.scene.luminaires[0].model = LuminaireModel::Impostor;
-    assert!(matches!(Cycles.supports(&job), Support::No(_)));
+    patches::tests::what_cannot_be_read_well_is_said_beforehand(&Cycles);
 }

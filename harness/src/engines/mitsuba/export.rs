@@ -41,7 +41,7 @@ pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, En
     ];
     if has_surfaces(job) {
         files.push(SceneFile::text("room.xml", surfaces::room_xml(job, &frame)));
-        files.extend(meshes::files(job, &frame));
+        files.extend(meshes::files(job, &frame, meshes::Mesh::Obj));
     }
     files.extend(tables::files(&tables)?);
     files.extend(stock::files(job, settings, &frame, &tables));

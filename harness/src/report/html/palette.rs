@@ -11,7 +11,7 @@ use crate::engines;
 use crate::record::{EngineName, EngineStatus};
 
 /// Colours on paper and on black of engines that are none of ours; the last is for those that only another file knows.
-const SPARE: [(&str, &str); 3] = [("#a8457f", "#e294c3"), ("#5b4bb5", "#a89cf0"), ("#7a6a58", "#c9b8a4")];
+const SPARE: [(&str, &str); 3] = [("#a8457f", "#e294c3"), ("#5f6e00", "#b5c447"), ("#7a6a58", "#c9b8a4")];
 
 /// Colours on paper and on black: those of our own engines first, for good, so that two reports read alike.
 fn colours() -> impl Iterator<Item = (&'static str, &'static str)> {
@@ -81,7 +81,7 @@ impl Palette {
     }
 }
 
-/// Outline of a mark: circle, square, triangle, diamond, triangle upside down, pentagon, hexagon, bar.
+/// Outline of a mark: circle, square, triangle, diamond, triangle upside down, pentagon, hexagon, bar, upright bar, cross.
 fn shape(index: usize, x: f64, y: f64, r: f64) -> String {
     let polygon = |corners: u32, turn_deg: f64, size: f64| {
         let corner = |k: u32| {
@@ -98,6 +98,15 @@ fn shape(index: usize, x: f64, y: f64, r: f64) -> String {
         4 => polygon(3, 180.0, 1.3 * r),
         5 => polygon(5, 0.0, 1.15 * r),
         6 => polygon(6, 0.0, 1.1 * r),
-        _ => format!("M{:.1} {:.1}h{:.1}v{:.1}h{:.1}Z", x - r, y - 0.5 * r, 2.0 * r, r, -2.0 * r),
+        7 => format!("M{:.1} {:.1}h{:.1}v{r:.1}h{:.1}Z", x - r, y - 0.5 * r, 2.0 * r, -2.0 * r),
+        8 => format!("M{:.1} {:.1}v{:.1}h{r:.1}v{:.1}Z", x - 0.5 * r, y - r, 2.0 * r, -2.0 * r),
+        _ => {
+            let (arm, long) = (0.6 * r, 0.7 * r);
+            format!(
+                "M{:.1} {:.1}h{arm:.1}v{long:.1}h{long:.1}v{arm:.1}h-{long:.1}v{long:.1}h-{arm:.1}v-{long:.1}h-{long:.1}v-{arm:.1}h{long:.1}Z",
+                x - 0.3 * r,
+                y - r
+            )
+        }
     }
 }

@@ -78,7 +78,7 @@ fn mesh(k: usize, bsdf: &str) -> String {
         </bsdf>
     </shape>
 "#,
-        name = meshes::name(k),
+        name = meshes::name(k, meshes::Mesh::Obj),
     )
 }
 

@@ -1,0 +1,98 @@
+//! LuxCore: its own point lights, emission maps and path tracer, read by looking at small white patches.
+
+mod export;
+mod map;
+#[cfg(test)]
+pub(super) mod tests;
+
+use self::map::Map;
+use super::patches::settings::{self, Settings};
+use super::patches::{self, Package};
+use super::settings::Preset;
+use super::{
+    Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench,
+};
+use crate::record::EngineName;
+
+const ID: EngineName = EngineName::new("luxcore");
+
+pub(super) static ENTRY: Entry = Entry {
+    name: ID,
+    display_name: "LuxCore",
+    colour: ("#5b4bb5", "#a89cf0"),
+    installs: &[Component::LuxCore],
+    is_on_request: true,
+    models: &[luminaire::scene::LuminaireModel::Point, luminaire::scene::LuminaireModel::Area],
+    fits_coordinates: Some("recentre"),
+    make: || Box::new(LuxCore),
+};
+
+const PACKAGE: Package = Package {
+    engine: ID,
+    name: "LuxCore",
+    module: "pyluxcore",
+    site: Site::luxcore,
+    probe: include_str!("../../drivers/luxcore_probe.py"),
+    driver: "luxcore_read.py",
+    remedy: "run `luxproof engines install luxcore`",
+    python: "python3.11",
+    ray_s: 1e-6,
+};
+
+/// What becomes of light in a scene without settings.
+const STOCK: &str = "as installed, LuxCore drops the candela of IES files: a point light of P lm sends out P / 4 pi. It joins zenith to \
+                     nadir, where half of either is lost, looks tables up by .7 degrees in C and gamma, and follows five reflections at most";
+/// What is lost by the first of these.
+const STOCK_LOSS: f64 = 1.0 - 0.25 / std::f64::consts::PI;
+
+pub(super) struct LuxCore;
+
+impl Engine for LuxCore {
+    fn name(&self) -> EngineName {
+        ID
+    }
+
+    fn probe(&self, site: &Site) -> Result<Version, Absent> {
+        PACKAGE.probe(site)
+    }
+
+    fn supports(&self, job: &Job) -> Support {
+        let is_stock = Settings::of(job, &ID).is_ok_and(|s| s.preset == Preset::Default);
+        patches::supports(&ENTRY, job, is_stock, (STOCK, Some(STOCK_LOSS)))
+    }
+
+    fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
+        export::files(job, Settings::of(job, &ID)?)
+    }
+
+    fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
+        Some(PACKAGE.command_by_hand(site))
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        settings::KNOBS
+    }
+
+    fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
+        Settings::of(job, &ID).map(drop)
+    }
+
+    /// One process with a scene a thread.
+    fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
+        512 + threads as u64 * (128 + super::geometry_mib(job))
+    }
+
+    fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
+        let settings = Settings::of(job, &ID)?;
+        read_files(&export::files(job, settings)?, job, settings, workbench)
+    }
+}
+
+fn read_files(
+    files: &[SceneFile],
+    job: &Job,
+    settings: Settings,
+    workbench: &Workbench,
+) -> Result<Measurement, EngineError> {
+    PACKAGE.read(files, job, settings, workbench, Map::of, 0.0)
+}

@@ -1,0 +1,194 @@
+//! Tables as maps of directions, which LuxCore looks up straight between the middles of texels and normalises.
+//!
+//! An emission map spans azimuth and polar angle (`slg/core/sphericalfunction/sphericalfunction.cpp`). Columns lie at whole multiples of
+//! their width, for which its axes are turned by half a column, so that planes of most files keep their place. What texels bend, first at
+//! kinks and at the ends of a table, is computed and stated, never taken off.
+
+use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
+
+use crate::engines::SceneFile;
+use crate::engines::patches::resampled::Resampled;
+
+/// What a straight line across a kink may be off, in parts of the largest intensity, as far as texels go.
+const WANTED: f64 = 1e-4;
+const HEIGHTS: [usize; 4] = [512, 1024, 2048, 4096];
+const WIDTHS: [usize; 3] = [360, 720, 1440];
+/// Columns of an axial table.
+const AXIAL: usize = 8;
+/// The grid that LuxCore takes a map's mean over.
+const MEAN_OVER: [usize; 2] = [512, 256];
+/// What its 131,072 sums in 32-bit floats leave of that mean that is not foreseen here.
+const MEAN_OFF: f64 = 5e-6;
+/// So many degrees are directions of 32-bit floats off, for what is steep.
+const ANGLE_DEG: f64 = 1e-3;
+
+pub(super) struct Map {
+    of: LuminousIntensityDistribution,
+    width: usize,
+    height: usize,
+    /// Row by row, the zenith's first.
+    texels: Vec<f32>,
+}
+
+impl Map {
+    pub(super) fn of(distribution: &LuminousIntensityDistribution) -> Self {
+        let full = distribution.full_circle();
+        let largest = distribution.max_intensity().value();
+        let planes: Vec<&[f64]> = (0..full.c_deg().len()).map(|c| full.plane(c)).collect();
+        let rows: Vec<Vec<f64>> =
+            (0..full.gamma_deg().len()).map(|g| planes.iter().map(|plane| plane[g]).collect()).collect();
+        // Across a kink a straight line a texel long is off by a quarter of it.
+        let is_fine = |kink: f64, texel_deg: f64| 0.25 * kink * texel_deg <= WANTED * largest;
+        let gamma = planes.iter().map(|plane| kink(full.gamma_deg(), plane)).fold(0.0, f64::max);
+        let height = finest(&HEIGHTS, |h| is_fine(gamma, 180.0 / h as f64));
+        let c = rows.iter().map(|row| steepest(full.c_deg(), row)).fold(0.0, f64::max);
+        let width = match distribution.symmetry() {
+            Symmetry::Axial => AXIAL,
+            _ => finest(&WIDTHS, |w| is_fine(2.0 * c, 360.0 / w as f64)),
+        };
+        let (c_deg, gamma_deg) = (360.0 / width as f64, 180.0 / height as f64);
+        let texel = |y: usize, x: usize| distribution.intensity(x as f64 * c_deg, 180.0 - (y as f64 + 0.5) * gamma_deg);
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| texel(y, x).value() as f32)).collect();
+        Self { of: distribution.clone(), width, height, texels }
+    }
+
+    /// How far its axes are turned about the luminaire's own, so that a column lies in C 0.
+    pub(super) fn turned_deg(&self) -> f64 {
+        -180.0 / self.width as f64
+    }
+
+    /// As a portable float map, the lowest row first.
+    pub(super) fn file(&self, name: &str) -> SceneFile {
+        let mut bytes = format!("Pf\n{} {}\n-1.0\n", self.width, self.height).into_bytes();
+        for row in self.texels.chunks(self.width).rev() {
+            bytes.extend(row.iter().flat_map(|texel| texel.to_le_bytes()));
+        }
+        SceneFile { name: name.to_owned(), bytes }
+    }
+
+    /// The flux that LuxCore divides intensities by: 4 pi times its own mean of the map, a sum in 32-bit floats, one after the other.
+    pub(super) fn flux_lm(&self) -> f64 {
+        let [columns, rows] = MEAN_OVER;
+        let (mut sum, mut weights) = (0.0_f32, 0.0_f32);
+        for y in 0..rows {
+            let v = (y as f32 + 0.5) / rows as f32;
+            let weight = (std::f32::consts::PI * v).sin();
+            weights += columns as f32 * weight;
+            for x in 0..columns {
+                sum += self.look_up((x as f32 + 0.5) / columns as f32, v) * weight;
+            }
+        }
+        4.0 * std::f64::consts::PI * f64::from(sum) / f64::from(weights)
+    }
+
+    /// As LuxCore interpolates, in its floats; `u` and `v` run from 0 to 1.
+    fn look_up(&self, u: f32, v: f32) -> f32 {
+        let (s, t) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
+        let (left, ds) = (s.floor(), s - s.floor());
+        let (above, dt) = (t.floor(), t - t.floor());
+        let clamped = |i: f32, count: usize| (i.max(0.0) as usize).min(count - 1);
+        let at = |y: f32, x: f32| self.texels[clamped(y, self.height) * self.width + clamped(x, self.width)];
+        let (ids, idt) = (1.0 - ds, 1.0 - dt);
+        ids * idt * at(above, left)
+            + ids * dt * at(above + 1.0, left)
+            + ds * idt * at(above, left + 1.0)
+            + ds * dt * at(above + 1.0, left + 1.0)
+    }
+
+    fn texel_deg(&self) -> f64 {
+        180.0 / self.height as f64
+    }
+}
+
+impl Resampled for Map {
+    fn table(&self) -> &LuminousIntensityDistribution {
+        &self.of
+    }
+
+    fn intensity_cd(&self, c_deg: f64, gamma_deg: f64) -> f64 {
+        let u = (c_deg - self.turned_deg()).rem_euclid(360.0) / 360.0;
+        f64::from(self.look_up(u as f32, (1.0 - gamma_deg / 180.0) as f32))
+    }
+
+    fn off_cd(&self, c_deg: f64, gamma_deg: f64) -> f64 {
+        let right = self.of.intensity(c_deg, gamma_deg).value();
+        let off = (self.intensity_cd(c_deg, gamma_deg) - right).abs() + MEAN_OFF * right;
+        // Where a table ends with light short of a pole, a texel is a ramp of it, on which no direction is known well enough.
+        let angles = self.of.gamma_deg();
+        let is_at = |end: f64| end > 0.0 && end < 180.0 && (gamma_deg - end).abs() < 1.5 * self.texel_deg();
+        if is_at(angles[0]) || is_at(angles[angles.len() - 1]) {
+            off + self.of.max_intensity().value() * ANGLE_DEG / self.texel_deg()
+        } else {
+            off
+        }
+    }
+}
+
+fn finest(sizes: &[usize], is_fine: impl Fn(usize) -> bool) -> usize {
+    sizes.iter().copied().find(|size| is_fine(*size)).unwrap_or(sizes[sizes.len() - 1])
+}
+
+/// The largest change of slope along gamma, a degree; beyond a table's ends it is dark.
+fn kink(angles: &[f64], values: &[f64]) -> f64 {
+    let (first, last) = (angles[0], angles[angles.len() - 1]);
+    let (mut angles, mut values) = (angles.to_vec(), values.to_vec());
+    if first > 0.0 {
+        angles.splice(0..0, [first - 2.0, first - 1.0]);
+        values.splice(0..0, [0.0, 0.0]);
+    }
+    if last < 180.0 {
+        angles.extend([last + 1.0, last + 2.0]);
+        values.extend([0.0, 0.0]);
+    }
+    slopes(&angles, &values).windows(2).map(|s| (s[1] - s[0]).abs()).fold(0.0, f64::max)
+}
+
+/// The largest slope, a degree.
+fn steepest(angles: &[f64], values: &[f64]) -> f64 {
+    slopes(angles, values).into_iter().map(f64::abs).fold(0.0, f64::max)
+}
+
+fn slopes(angles: &[f64], values: &[f64]) -> Vec<f64> {
+    let slope = |k: usize| (values[k + 1] - values[k]) / (angles[k + 1] - angles[k]);
+    (0..angles.len().saturating_sub(1)).map(slope).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engines::fixtures::{axial_uplight, lambertian, lopsided, quadrant, random_table};
+
+    #[test]
+    fn what_luxcore_looks_up_is_the_table_but_for_little() {
+        for distribution in [axial_uplight(), lopsided(), quadrant(), lambertian()] {
+            let map = Map::of(&distribution);
+            let largest = distribution.max_intensity().value();
+            let mut worst = 0.0_f64;
+            for k in 0..360 {
+                for j in 0..=360 {
+                    let (c, gamma) = (f64::from(k), 0.5 * f64::from(j));
+                    worst = worst.max((map.intensity_cd(c, gamma) - distribution.intensity(c, gamma).value()).abs());
+                }
+            }
+            assert!(worst < 5e-4 * largest, "{worst} of {largest}");
+            assert!(map.misled_share() < 1e-4, "{}", map.misled_share());
+            let flux = distribution.flux().value();
+            assert!((map.flux_lm() / flux - 1.0).abs() < 1e-4, "{} {flux}", map.flux_lm());
+        }
+    }
+
+    #[test]
+    fn any_table_is_a_map_of_bounded_size_that_keeps_most_of_its_flux() {
+        let mut random = fastrand::Rng::with_seed(4);
+        for _ in 0..10 {
+            let distribution = random_table(&mut random);
+            let map = Map::of(&distribution);
+            assert!(map.texels.len() <= 1440 * 4096 && map.misled_share() < 0.01);
+            let file = map.file("a");
+            assert_eq!(
+                file.bytes.len(),
+                format!("Pf\n{} {}\n-1.0\n", map.width, map.height).len() + 4 * map.texels.len()
+            );
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! The real renderer against closed forms and the converged values of case S1, and what happens when it fails.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use luminaire::photometry::LuminousOpening;
+use luminaire::scene::Transport;
+
+use super::*;
+use crate::engines::fixtures::*;
+use crate::engines::shared_tests;
+
+mod failures;
+
+pub(in crate::engines) fn read(job: &Job) -> Measurement {
+    read_tampered(job, |_, text| text)
+}
+
+fn read_tampered(job: &Job, tamper: impl Fn(&str, String) -> String) -> Measurement {
+    let read = |files: &[SceneFile], bench: &Workbench| read_files(files, job, Settings::of(job, &ID)?, bench);
+    shared_tests::read_tampered(&LuxCore, job, tamper, read)
+}
+
+#[test]
+fn a_wrong_export_is_seen() {
+    let replaced = [
+        (".efficiency = 1\n", ".efficiency = 1\n"),
+        (".efficiency = 1\n", ".efficiency = 3.141592653589793\n"),
+        (".efficiency = 1\n", ".efficiency = 1.4285714285714286\n"),
+        (
+            ".efficiency = 1\n",
+            ".efficiency = 1\nscene.lights.luminaire0.transformation = 0 1 0 0 -1 0 0 0 0 0 1 0 0 0 0 1\n",
+        ),
+    ];
+    shared_tests::wrong_exports_are_seen("scene.scn", 1e-4, replaced, |job, tamper| read_tampered(job, tamper));
+}
+
+#[test]
+fn exported_files_are_these() {
+    let mut job = shared_tests::furnished();
+    job.scene.luminaires.push(with_opening(
+        luminaire("panel", DVec3::new(1.0, 1.0, 2.5), quadrant()),
+        LuminousOpening::Box { x_m: 0.6, y_m: 0.3, height_m: 0.0 },
+    ));
+    let files = LuxCore.export(&job).unwrap();
+    insta::assert_snapshot!(shared_tests::golden(&files, &["luxcore_", "blocks.py", "table-"]));
+}
+
+#[test]
+fn flat_openings_send_out_their_table_on_both_sides() {
+    patches::tests::flat_openings_send_out_their_table_on_both_sides(read);
+}
+
+/// What users get who change nothing: the candela are dropped and power is taken for 4 pi times what it is; on the axis upwards there is
+/// half of what goes down.
+#[test]
+fn the_stock_scene_shows_what_luxcore_makes_of_an_ies_file() {
+    let stock = |candela: f64| {
+        let mut lamp = luminaire("lamp", DVec3::ZERO, lopsided());
+        lamp.flux_scale = candela;
+        read(&with_preset(goniometer(&lamp, 10.0, &[30.0], &[20.0, 60.0, 90.0]), "default"))
+    };
+    let lamp = luminaire("lamp", DVec3::ZERO, lopsided());
+    let exact = exact_direct_lx(&goniometer(&lamp, 10.0, &[30.0], &[20.0, 60.0, 90.0]));
+    let exact: Vec<f64> = exact.into_iter().map(|lx| 0.25 / PI * lx).collect();
+    assert!(worst_relative(&stock(1.0), &exact) < 0.01, "{:?} {exact:?}", stock(1.0));
+    let axial = read(&with_preset(s1(Transport::Direct), "default"));
+    let of_them = relative_deviations(&axial, &S1_DIRECT_LX.map(|lx| 0.25 / PI * lx));
+    assert!(of_them[..3].iter().all(|d| d.abs() < 0.01) && (of_them[3] + 0.5).abs() < 0.01, "{of_them:?}");
+}
+
+#[test]
+fn one_seed_gives_the_same_readings_on_any_number_of_threads() {
+    patches::tests::one_seed_gives_the_same_readings_on_any_number_of_threads(&LuxCore);
+}
+
+#[test]
+fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
+    shared_tests::bounds_hold_and_decide(read, false);
+}
+
+#[test]
+fn light_of_openings_past_a_box_is_within_its_error_in_random_rooms() {
+    shared_tests::bounds_hold_and_decide(read, true);
+}
+
+#[test]
+fn what_cannot_be_read_well_is_said_beforehand() {
+    patches::tests::what_cannot_be_read_well_is_said_beforehand(&LuxCore);
+}

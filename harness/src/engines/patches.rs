@@ -1,0 +1,227 @@
+//! Renderers whose meters are small white patches, read by a driver in an environment of Python packages of their own: Cycles and
+//! LuxCore.
+
+pub(super) mod ies_file;
+pub(super) mod opening;
+pub(super) mod resampled;
+pub(super) mod settings;
+#[cfg(test)]
+pub(super) mod tests;
+
+use std::time::Duration;
+
+use glam::DVec3;
+use luminaire::scene::{Bounces, Transport};
+use serde::{Deserialize, Serialize};
+
+use self::opening::Opening;
+use self::resampled::Resampled;
+use self::settings::Settings;
+use super::dialogue::{self, Cost, Dialogue, Seat};
+use super::float_error::{FloatError, Instrument};
+use super::frame::Frame;
+use super::settings::Preset;
+use super::tables::Tables;
+use super::workbench::by_hand;
+use super::{Absent, EngineError, Entry, Job, Measurement, SceneFile, Site, Support, Version, Workbench, effort};
+use crate::record::EngineName;
+use crate::system::process::Invocation;
+
+/// More reflections Blender does not let anyone ask for; LuxCore's random numbers would do for twice as many.
+const MOST_REFLECTIONS: i64 = 1024;
+/// Side of a meter's patch, in parts of the largest coordinate: forty times what 32-bit floats resolve there at least.
+const PATCH: f64 = 5e-6;
+/// What sums of 32-bit floats may be off, in parts of a reading: a film adds up to 65,536 samples, each sum rounded.
+const FILM: f64 = 1e-4;
+/// Importing a renderer takes two seconds; a machine under load may need many.
+const PROBE_LIMIT: Duration = Duration::from_secs(120);
+
+/// A renderer as such a package.
+pub(super) struct Package {
+    pub(super) engine: EngineName,
+    /// As its makers write it.
+    pub(super) name: &'static str,
+    /// What Python imports.
+    pub(super) module: &'static str,
+    pub(super) site: fn(&Site) -> Site,
+    pub(super) probe: &'static str,
+    pub(super) driver: &'static str,
+    /// What has it installed.
+    pub(super) remedy: &'static str,
+    /// A Python of a version that it is made for, to be named where none is installed.
+    pub(super) python: &'static str,
+    /// Seconds that are counted for a ray.
+    pub(super) ray_s: f64,
+}
+
+#[derive(Deserialize)]
+struct Told {
+    version: String,
+}
+
+impl Package {
+    pub(super) fn probe(&self, site: &Site) -> Result<Version, Absent> {
+        let absent = |reason: String| Absent { reason, remedy: self.remedy.into() };
+        let own = (self.site)(site);
+        let python = own.python().ok_or_else(|| absent(format!("there is no Python environment for {}", self.name)))?;
+        let package = own
+            .python_package(self.module)
+            .ok_or_else(|| absent(format!("the Python package `{}` is missing", self.module)))?;
+        let folder = tempfile::tempdir().map_err(|e| absent(format!("no temporary folder: {e}")))?;
+        let run = Invocation::new(&python, folder.path(), PROBE_LIMIT, folder.path().join("log"));
+        let probe = self.probe.as_bytes().to_vec();
+        let finished = run.args(["-I", "-B", "-"]).stdin(probe).run().map_err(|e| absent(e.to_string()))?;
+        // It may greet first: the answer is the last line.
+        let text = String::from_utf8_lossy(&finished.stdout);
+        let answer = text.lines().last().unwrap_or_default();
+        let told: Told = serde_json::from_str(answer)
+            .map_err(|e| absent(format!("the probe of {} answered `{answer}`: {e}", self.name)))?;
+        // Wheels keep the libraries of a package beside it.
+        let beside = [format!("{}.libs", self.module), "numpy".into()];
+        let files = [package].into_iter().chain(beside.iter().filter_map(|name| own.python_package(name)));
+        Ok(Version::of(&self.engine, told.version, site, files.chain(python.canonicalize())))
+    }
+
+    pub(super) fn command_by_hand(&self, site: &Site) -> String {
+        let python = (self.site)(site).python().unwrap_or_else(|| self.python.into());
+        by_hand(python).args([self.driver, "job.json"]).command_line_with_env()
+    }
+
+    /// What it reads of a job's files; `tables` are those that it looks up in a way of its own, none where that is what one wants to know.
+    pub(super) fn read<R: Resampled>(
+        &self,
+        files: &[SceneFile],
+        job: &Job,
+        settings: Settings,
+        workbench: &Workbench,
+        look_up: fn(&luminaire::photometry::LuminousIntensityDistribution) -> R,
+        edge_deg: f64,
+    ) -> Result<Measurement, EngineError> {
+        workbench.write(files)?;
+        let python = (self.site)(&workbench.site).python();
+        let python = python
+            .ok_or_else(|| EngineError::output(self.engine.clone(), format!("has no Python; {}", self.remedy)))?;
+        let threads = workbench.jobs.max(1).to_string();
+        // Neither the user's Python nor its packages; scene folders stay as exported.
+        let run =
+            workbench.invoke(python).args(["-I", "-B", self.driver, "job.json", "--serve", "--threads", &threads]);
+        let frame = Frame::of(job, settings.coordinates);
+        let instrument = Instrument { edge_deg, seat: patch(job, &frame), by_arc_cosine: true };
+        let rounding = FloatError::of(job, frame, instrument);
+        let tables = Tables::of(job);
+        let resampled = tables.distinct.iter().filter(|_| settings.preset != Preset::Default);
+        let looked_up: Vec<R> = resampled.map(|d| look_up(d)).collect();
+        let of_tables_lx = |k: usize| -> f64 {
+            let off = job.scene.luminaires.iter().zip(&tables.of_luminaire);
+            off.filter_map(|(luminaire, k_th)| Some((luminaire, looked_up.get(*k_th)?)))
+                .map(|(luminaire, table)| table.off_lx(luminaire, &job.stations[k].meter))
+                .sum()
+        };
+        let misled = looked_up.iter().map(Resampled::misled_share).fold(0.0, f64::max);
+        let bound_lx = |k: usize| rounding.at_lx(k) + of_tables_lx(k);
+        let dialogue = Dialogue {
+            engine: self.engine.clone(),
+            job,
+            conversation: run.converse()?,
+            fixed: settings.fixed(),
+            cost: &|_| Cost { ray_s: self.ray_s, trial_side: None },
+            bound_lx: &bound_lx,
+            relative_bound: FILM + misled,
+        };
+        let mut measurement = dialogue.measurement()?;
+        measurement.effort.insert("command".into(), run.command_line());
+        super::checked(&self.engine, job, measurement)
+    }
+}
+
+/// Whether it can do a job, `stock` being what its scene without settings does to it, and by how much.
+pub(super) fn supports(entry: &Entry, job: &Job, is_stock: bool, stock: (&str, Option<f64>)) -> Support {
+    if let Some(why) = entry.objection(job).or_else(|| opening::obstacle(entry.display_name, job, is_stock)) {
+        return Support::No(why);
+    }
+    if is_stock {
+        let (why, size) = stock;
+        return Support::Approximate { why: why.into(), size };
+    }
+    let close = super::mitsuba::luminaire_close_to_a_surface(job);
+    if let (Some(id), Transport::Indirect(_) | Transport::Total(_)) = (close, job.transport) {
+        let why = format!("paths seldom find the bright spot that `{id}` throws on a surface close by");
+        return Support::Approximate { why, size: None };
+    }
+    if reflections(job) == MOST_REFLECTIONS && job.reflections() != Some(Bounces::AtMost(0)) {
+        let why = format!("{} follows {MOST_REFLECTIONS} reflections at most", entry.display_name);
+        return Support::Approximate { why, size: None };
+    }
+    Support::Yes
+}
+
+/// Diffuse reflections that paths are followed for.
+pub(super) fn reflections(job: &Job) -> i64 {
+    match job.reflections() {
+        None => 0,
+        Some(Bounces::AtMost(n)) => i64::from(n).min(MOST_REFLECTIONS),
+        Some(Bounces::Converged) => {
+            let highest = job.largest_reflectance();
+            effort::reflections_until(highest, 0.1 * job.budget.relative_error).clamp(8, MOST_REFLECTIONS)
+        }
+    }
+}
+
+/// Side of a meter's patch in scene units.
+pub(super) fn patch(job: &Job, frame: &Frame) -> f64 {
+    let room = job.scene.room.iter().flat_map(|r| [DVec3::ZERO, r.size_m]);
+    let points = room.chain(job.scene.luminaires.iter().map(|l| l.position_m));
+    let points = points.chain(job.stations.iter().map(|s| s.meter.position_m));
+    let largest = points.map(|p| frame.to_scene(p).abs().max_element()).fold(0.0, f64::max);
+    PATCH * if largest > 0.0 { largest } else { 1.0 }
+}
+
+#[derive(Serialize)]
+struct DriverJob<'a> {
+    case: &'a str,
+    procedure: &'a str,
+    transport: &'static str,
+    reflections: i64,
+    emitters: usize,
+    extended: bool,
+    /// Whether direct light is read one luminaire after the other.
+    apart: bool,
+    tables: Vec<String>,
+    /// Side of a meter's patch.
+    patch: f64,
+    /// How many blocks it reads by itself, and how many samples along the side of each.
+    blocks: usize,
+    side: usize,
+    seed: u64,
+    stations: Vec<Seat<'a>>,
+}
+
+/// `job.json` of a scene with so many lights and these tables.
+pub(super) fn job_json(
+    engine: EngineName,
+    job: &Job,
+    settings: Settings,
+    frame: &Frame,
+    emitters: usize,
+    tables: Vec<String>,
+) -> Result<SceneFile, EngineError> {
+    let (blocks, side) = settings.by_itself();
+    let driver_job = DriverJob {
+        case: &job.case,
+        procedure: job.procedure.name(),
+        transport: dialogue::transport(job),
+        reflections: reflections(job),
+        emitters,
+        extended: job.scene.luminaires.iter().any(|l| Opening::of(l) != Opening::None),
+        apart: settings.preset != Preset::Default,
+        tables,
+        patch: patch(job, frame),
+        blocks,
+        side,
+        seed: job.seed,
+        stations: dialogue::seats(job, frame),
+    };
+    let text = serde_json::to_string_pretty(&driver_job)
+        .map_err(|e| EngineError::output(engine, format!("the job cannot be written: {e}")))?;
+    Ok(SceneFile::text("job.json", text))
+}

@@ -1,0 +1,42 @@
+//! A candela table as a renderer looks it up, and what that leaves off.
+
+use luminaire::photometry::{LuminousIntensityDistribution, angles_deg};
+use luminaire::scene::{Luminaire, Meter};
+
+pub(in crate::engines) trait Resampled {
+    /// The table itself.
+    fn table(&self) -> &LuminousIntensityDistribution;
+
+    /// What the renderer looks up in a direction.
+    fn intensity_cd(&self, c_deg: f64, gamma_deg: f64) -> f64;
+
+    /// How far its look-up is off in a direction, in candela.
+    fn off_cd(&self, c_deg: f64, gamma_deg: f64) -> f64 {
+        (self.intensity_cd(c_deg, gamma_deg) - self.table().intensity(c_deg, gamma_deg).value()).abs()
+    }
+
+    /// How far its look-up leaves the light of a luminaire at a meter from the table's own, in lux.
+    fn off_lx(&self, luminaire: &Luminaire, meter: &Meter) -> f64 {
+        let ray_m = meter.position_m - luminaire.position_m;
+        let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
+        let (c, gamma) = angles_deg(luminaire.orientation.transpose() * ray_m);
+        luminaire.flux_scale * self.off_cd(c, gamma) * cosine.max(0.0) / ray_m.length_squared()
+    }
+
+    /// The share of the flux that its look-up sends elsewhere, adds or loses.
+    fn misled_share(&self) -> f64 {
+        const C: usize = 144;
+        const GAMMA: usize = 720;
+        let (mut off, mut all) = (0.0, f64::MIN_POSITIVE);
+        for j in 0..GAMMA {
+            let gamma = 180.0 * (j as f64 + 0.5) / GAMMA as f64;
+            for k in 0..C {
+                let c = 360.0 * (k as f64 + 0.381_966) / C as f64;
+                let sine = gamma.to_radians().sin();
+                off += self.off_cd(c, gamma) * sine;
+                all += self.table().intensity(c, gamma).value() * sine;
+            }
+        }
+        off / all
+    }
+}

@@ -1,0 +1,40 @@
+//! The engines' settings in a spec: `engines: {cycles: {preset: ..., recentre: ...}}`.
+
+use crate::engines::settings::{Coordinates, Given, Preset};
+use crate::engines::{EngineError, Job, Knob};
+use crate::record::EngineName;
+
+pub(in crate::engines) const KNOBS: &[Knob] = &[Preset::KNOB, Knob { key: "recentre", values: &["true", "false"] }];
+
+/// Blocks of the presets whose effort does not follow the budget, and the samples along their side: a stock scene has Blender's own 4096.
+const FIXED_BLOCKS: usize = 8;
+const FAST_SIDE: usize = 32;
+const STOCK_SIDE: usize = 64;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::engines) struct Settings {
+    /// `default` leaves the renderer's own settings and what it makes of an IES file as they are.
+    pub(in crate::engines) preset: Preset,
+    pub(in crate::engines) coordinates: Coordinates,
+}
+
+impl Settings {
+    pub(in crate::engines) fn of(job: &Job, engine: &EngineName) -> Result<Self, EngineError> {
+        let given = Given::of(job, engine.clone(), KNOBS)?;
+        Ok(Self { preset: given.preset()?, coordinates: given.coordinates("recentre")? })
+    }
+
+    /// Blocks and the samples along their side, where these do not follow the budget.
+    pub(in crate::engines) const fn fixed(self) -> Option<(usize, usize)> {
+        match self.preset {
+            Preset::Audit => None,
+            Preset::Fast => Some((FIXED_BLOCKS, FAST_SIDE)),
+            Preset::Default => Some((FIXED_BLOCKS, STOCK_SIDE)),
+        }
+    }
+
+    /// The same of a driver that reads by itself.
+    pub(in crate::engines) fn by_itself(self) -> (usize, usize) {
+        self.fixed().unwrap_or((2 * FIXED_BLOCKS, STOCK_SIDE))
+    }
+}

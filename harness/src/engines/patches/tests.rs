@@ -1,0 +1,94 @@
+//! What holds for Cycles and LuxCore alike: the real renderers, and every way in which one fails.
+
+use glam::DVec3;
+use luminaire::photometry::LuminousOpening;
+use luminaire::scene::{LuminaireModel, Scene, Transport, orientation};
+
+use super::*;
+use crate::engines::Engine;
+use crate::engines::fixtures::*;
+use crate::engines::shared_tests;
+
+pub(in crate::engines) fn flat_openings_send_out_their_table_on_both_sides(read: fn(&Job) -> Measurement) {
+    let (x_m, y_m) = (0.6, 0.3);
+    for opening in
+        [LuminousOpening::Box { x_m, y_m, height_m: 0.0 }, LuminousOpening::Ellipse { x_m, y_m, height_m: 0.0 }]
+    {
+        let mut lamp = with_opening(luminaire("area", DVec3::new(1.0, 2.0, 3.0), lopsided()), opening);
+        lamp.orientation = orientation(30.0, 20.0, 10.0);
+        let near = goniometer(&lamp, 0.8, &[10.0, 190.0], &[5.0, 80.0, 165.0]);
+        let deviations = relative_deviations(&read(&near), &simulated_lx(&near, 3e-3));
+        assert!(worst(&deviations) < 6e-3, "{opening:?} {deviations:?}");
+        let far = goniometer(&lamp, 30.0, &[10.0, 190.0], &[5.0, 80.0, 165.0]);
+        let deviations = relative_deviations(&read(&far), &exact_direct_lx(&far));
+        assert!(worst(&deviations) < 3e-3, "{opening:?} {deviations:?}");
+    }
+}
+
+pub(in crate::engines) fn one_seed_gives_the_same_readings_on_any_number_of_threads(engine: &dyn Engine) {
+    let job = with_preset(s1(CONVERGED), "fast");
+    let with_jobs = |jobs: usize| {
+        let folder = tempfile::tempdir().unwrap();
+        let bench = Workbench { jobs, ..workbench(Site::of_user().unwrap(), folder.path()) };
+        engine.read(&job, &bench).unwrap()
+    };
+    let (one, two) = (with_jobs(1), with_jobs(2));
+    assert_eq!(one.estimates, two.estimates);
+    assert_eq!(one.effort["indirect_blocks"], "8");
+    assert!(worst_z(&one, &S1_INDIRECT_LX) < 6.0, "{one:?}");
+}
+
+pub(in crate::engines) fn what_cannot_be_read_well_is_said_beforehand(engine: &dyn Engine) {
+    assert_eq!(engine.supports(&s1(CONVERGED)), Support::Yes);
+    assert!(matches!(engine.supports(&with_preset(s1(CONVERGED), "default")), Support::Approximate { .. }));
+    let solid = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.1 };
+    let mut job = s1(Transport::Direct);
+    job.scene.luminaires = vec![with_opening(luminaire("solid", DVec3::splat(10.0), lambertian()), solid)];
+    assert!(matches!(engine.supports(&job), Support::No(why) if why.contains("only flat")));
+    job.scene = Scene { luminaires: vec![luminaire("impostor", DVec3::ZERO, lambertian())], ..Scene::default() };
+    job.scene.luminaires[0].model = LuminaireModel::Impostor;
+    assert!(matches!(engine.supports(&job), Support::No(_)));
+}
+
+/// Reads S1 through an interpreter that runs `script`.
+pub(in crate::engines) fn read_with(
+    engine: &dyn Engine,
+    own: fn(&Site) -> Site,
+    script: &str,
+    limit_s: f64,
+) -> EngineError {
+    let folder = tempfile::tempdir().unwrap();
+    let site = Site::at(folder.path().join("site"));
+    write_program(&own(&site).venv().join("bin/python"), script);
+    let bench = Workbench { limit: Duration::from_secs_f64(limit_s), ..workbench(site, folder.path()) };
+    engine.read(&s1(Transport::Direct), &bench).unwrap_err()
+}
+
+pub(in crate::engines) fn answers_that_are_no_readings_are_errors(read_with: impl Fn(&str, f64) -> EngineError) {
+    let answers = |answer| shared_tests::driver("CPU", &[0, 1, 2, 3], answer);
+    for (script, said) in [
+        (answers("[[1, 2, 3]]"), "gave 3 readings for 4 meters"),
+        (answers("[[1, 2, 3, 4], [1, 2, 3, 4]]"), "gave 2 blocks of 1"),
+        (answers("[[1, NaN, 3, 4]]"), "no JSON of readings"),
+        (shared_tests::driver("CPU", &[0, 1, 2], "[[1, 2, 3]]"), "gave 3 readings for 4 meters"),
+        (shared_tests::driver("CPU", &[0, 2, 1, 3], "[[1, 1, 1, 1]]"), "gave `m[2]`"),
+        ("echo warming up".into(), "no JSON of readings"),
+        (":".into(), "ended without an answer"),
+    ] {
+        let error = read_with(&script, 30.0);
+        assert!(error.to_string().contains(said), "{script}: {error}");
+    }
+}
+
+pub(in crate::engines) fn a_site_without_its_package_says_what_to_run(engine: &dyn Engine, package: &Package) {
+    let folder = tempfile::tempdir().unwrap();
+    let site = Site::at(folder.path());
+    let absent = |site: &Site| engine.probe(site).unwrap_err().to_string();
+    let (own, name) = ((package.site)(&site), package.module);
+    assert!(absent(&site).contains(&format!("luxproof engines install {}", package.engine)), "{}", absent(&site));
+    write_program(&own.venv().join("bin/python"), "exit 1");
+    assert!(absent(&site).contains(&format!("`{name}` is missing")), "{}", absent(&site));
+    std::fs::create_dir_all(own.venv().join("lib/python3/site-packages").join(name)).unwrap();
+    write_program(&own.venv().join("bin/python"), "cat > /dev/null; echo no renderer");
+    assert!(absent(&site).contains("answered `no renderer`"), "{}", absent(&site));
+}
