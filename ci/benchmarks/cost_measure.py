@@ -1,11 +1,12 @@
-"""Runs random rooms and notes processor seconds: `cost_measure.py PROGRAM ENGINE FIRST COUNT OUT.jsonl`.
+"""Runs random rooms and notes processor seconds: `cost_measure.py PROGRAM ENGINES FIRST COUNT OUT.jsonl`, engines with commas.
 
-Each room is read by one engine beside our own two, whose seconds, read alone before, are taken off."""
-import json, os, re, resource, shutil, subprocess, sys, tempfile
+Each room is read by our own two alone, and then by each engine beside them, whose seconds are taken off. At the end it says of how many rooms
+`check` told the processor seconds within a factor of 3."""
+import json, math, os, re, resource, shutil, subprocess, sys, tempfile
 
 import rooms
 
-program, engine, first, count, out = sys.argv[1], sys.argv[2], int(sys.argv[3]), int(sys.argv[4]), sys.argv[5]
+program, engines, first, count, out = sys.argv[1], sys.argv[2].split(","), int(sys.argv[3]), int(sys.argv[4]), sys.argv[5]
 
 
 def seconds():
@@ -18,10 +19,10 @@ with tempfile.TemporaryDirectory() as folder, open(out, "a") as found:
         spec = f"{folder}/room.yaml"
         with open(spec, "w") as f:
             f.write(rooms.spec(seed))
-        row = {"seed": seed, "engine": engine}
-        planned = subprocess.run([program, "check", spec, "--engines", engine], capture_output=True, text=True).stdout
+        row = {"seed": seed}
+        planned = subprocess.run([program, "check", spec, "--engines", ",".join(engines)], capture_output=True, text=True).stdout
         row["check"] = [line.strip() for line in planned.splitlines() if line.strip().startswith("run ")]
-        for name in ["simulator"] + [engine] * (engine != "simulator"):
+        for name in ["simulator"] + [e for e in engines if e != "simulator"]:
             before = seconds()
             done = subprocess.run([program, "run", spec, "--engines", name, "--no-cache", "--no-calibration", "--jobs", "1", "--out", f"{folder}/out", "--format", "json"], capture_output=True, text=True)
             row[f"cpu_{name}"] = seconds() - before
@@ -33,3 +34,19 @@ with tempfile.TemporaryDirectory() as folder, open(out, "a") as found:
             shutil.rmtree(f"{folder}/out", ignore_errors=True)
         found.write(json.dumps(row) + "\n")
         found.flush()
+
+told = {}
+with open(out) as found:
+    for row in map(json.loads, found):
+        for name in engines:
+            said = next((line for line in row["check"] if re.match(rf"run +{name} ", line)), "")
+            about = re.search(r"about ([\d.]+) processor s|less than (1) processor s", said)
+            if about and "at most" not in said and name in row and not row[name]["failure"]:
+                seconds = row[f"cpu_{name}"] - (row["cpu_simulator"] if name != "simulator" else 0)
+                procedure = row[name]["procedure"].removesuffix("_illuminance")
+                # What is below a second is told to be no more.
+                off = math.log(max(seconds, 1) / max(float(about[1] or 1), 1))
+                told.setdefault((name, procedure), []).append(off)
+for (name, procedure), off in sorted(told.items()):
+    spread = ", ".join(f"{math.exp(x):.2f}" for x in sorted(off))
+    print(f"{name} {procedure}: {sum(abs(x) <= math.log(3) for x in off)} of {len(off)} rooms within 3 times; times as long as told: {spread}")

@@ -65,7 +65,7 @@ def spec(seed, procedure=None):
         if not any(inside(at, b) for b in bodies):
             meters.append(numbers(at))
     meters = meters or [numbers([0.05, 0.05, 0.05])]
-    procedure = procedure or draw.choice(["direct", "indirect", "total"])
+    procedure = procedure or draw.choice(["direct", "indirect", "indirect", "total", "total"])
     lines = ["luxproof: 1", f'title: "random room {seed}"',
              f"room: {{size_m: {numbers(size)}, reflectance: {{floor: {rho['floor']:.3f}, walls: {rho['walls']:.3f}, ceiling: {rho['ceiling']:.3f}}}}}"]
     if bodies:
@@ -73,7 +73,7 @@ def spec(seed, procedure=None):
         lines += [f"  - box: {{min_m: {numbers(a)}, max_m: {numbers(b)}, reflectance: {draw.uniform(0.1, 0.8):.3f}}}" for a, b in bodies]
     lines += ["luminaires:", *luminaires, "meters:", f"  some: {{points_m: [{', '.join(meters)}], normal: [0, 0, {draw.choice([1, 1, 1, -1])}]}}",
               "procedures:", f"  {procedure}_illuminance: {{meters: some}}",
-              f"budget: {{relative_error: {magnitude(draw, 0.003, 0.05):.4f}, seconds: {magnitude(draw, 10, 60):.0f}}}"]
+              f"budget: {{relative_error: {magnitude(draw, 0.003, 0.05):.4f}, seconds: {magnitude(draw, 8, 40):.0f}}}"]
     return "\n".join(lines) + "\n"
 
 

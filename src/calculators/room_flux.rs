@@ -23,11 +23,12 @@ const MOST: usize = 10_000;
 
 /// Zonal flux of a luminaire as it hangs, flux scale included.
 pub fn zonal_flux(luminaire: &Luminaire) -> ZonalFlux {
-    Attitude::of(luminaire, None).map_or_else(
-        || ZonalFlux::of(&luminaire.photometry.distribution),
-        |attitude| attitude.flux(&luminaire.photometry, None),
-    )
-    .scaled(luminaire.flux_scale)
+    Attitude::of(luminaire, None)
+        .map_or_else(
+            || ZonalFlux::of(&luminaire.photometry.distribution),
+            |attitude| attitude.flux(&luminaire.photometry, None),
+        )
+        .scaled(luminaire.flux_scale)
 }
 
 /// Zonal fluxes of luminaires that hang tilted, which take long: those of one table that hang alike share one.
@@ -114,8 +115,7 @@ impl Attitude {
             let (sin, cos) = (low + 0.5 * step).to_radians().sin_cos();
             let towards = around.iter().map(|a| sin * *a - cos * up);
             let counts = |d: &DVec3| inward.is_none_or(|n| d.dot(n) > 0.0);
-            let sum: f64 =
-                towards.filter(counts).map(|d| photometry.distribution.intensity_towards(d).value()).sum();
+            let sum: f64 = towards.filter(counts).map(|d| photometry.distribution.intensity_towards(d).value()).sum();
             TAU * solid * sum / PLANES as f64
         };
         ZonalFlux(std::array::from_fn(|zone| {
@@ -172,7 +172,10 @@ mod tests {
             for (found, alone) in found.0.iter().zip(&alone.0) {
                 assert_relative_eq!(found, alone, max_relative = 1e-9);
             }
-            assert_eq!(RoomFluxes::default().entering(&room, &scene(vec![luminaire.clone()]).1, None).unwrap()[0], *found);
+            assert_eq!(
+                RoomFluxes::default().entering(&room, &scene(vec![luminaire.clone()]).1, None).unwrap()[0],
+                *found
+            );
         }
     }
 

@@ -9,33 +9,36 @@ use super::Selected;
 use super::diagnostic::diagnose;
 use super::print;
 use crate::audit;
-use crate::engines::Site;
+use crate::engines::{Engine, Site};
 use crate::judge::PolicyRecord;
-use crate::plan::{Asked, Planner, cost_s};
+use crate::plan::{Asked, Planner, Run, cost_s};
 use crate::record::EngineName;
 use crate::report::Exit;
+use crate::report::words::rounded;
 use crate::spec::{Trust, filtered, suite};
 
 pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
     let mut cases = suite(&selected.specs, trust).and_then(|all| filtered(all, &selected.filter)).map_err(diagnose)?;
     let policies = selected.policy.of_cases(&cases).map_err(diagnose)?;
-    audit::published(&cases).into_diagnostic()?;
+    let published = audit::published(&cases).into_diagnostic()?;
     let mut out = String::new();
     let mut exit = Exit::Passed;
     let selection = selected.selection();
     let mut planned: BTreeMap<&PolicyRecord, BTreeSet<EngineName>> = BTreeMap::new();
     let mut planner = Planner::new(&selection, site, selected.skipping());
-    for (case, policy) in cases.iter_mut().zip(&policies) {
+    for ((case, policy), published) in cases.iter_mut().zip(&policies).zip(&published) {
         case.budget = policy.profile.budget.over(case.budget);
-        let plan = planner.plan(case).map_err(diagnose)?;
+        let mut plan = planner.plan(case).map_err(diagnose)?;
+        let sampling = policy.profile.sampling.unwrap_or_default();
+        audit::grant(sampling, policy, case, published.as_ref(), &mut plan);
         writeln!(out, "{} ({}): {}", case.name, case.path.display(), case.title).into_diagnostic()?;
         for task in &plan.tasks {
             writeln!(out, "  {} at {} meters", task.procedure, task.targets.len()).into_diagnostic()?;
             for run in plan.runs.iter().filter(|r| plan.tasks[r.task].procedure == task.procedure) {
                 let engine = &plan.engines[run.engine].engine;
                 let note = run.approximation.as_ref().map(|a| format!(", approximate: {a}")).unwrap_or_default();
-                let cost_s = left(run) * cost_s(engine.as_ref(), &run.job);
-                writeln!(out, "    run  {:<10} at most about {cost_s:.0} s{note}", engine.name()).into_diagnostic()?;
+                let cost = cost(run, engine.as_ref());
+                writeln!(out, "    run  {:<10} {cost}{note}", engine.name()).into_diagnostic()?;
             }
             for skip in plan.skips.iter().filter(|s| s.key.procedure == task.procedure) {
                 let saved = skip.saved.as_ref().map(|s| format!(" (saves {s})")).unwrap_or_default();
@@ -61,7 +64,16 @@ pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Ex
     Ok(exit)
 }
 
+/// What a run is expected to take, or what it may take at most where nobody knows.
+fn cost(run: &Run, engine: &dyn Engine) -> String {
+    match engine.expected_s(&run.job).map(|all_s| left(run) * all_s) {
+        None => format!("at most about {:.0} s", left(run) * cost_s(engine, &run.job)),
+        Some(..1.0) => "less than 1 processor s".to_owned(),
+        Some(seconds) => format!("about {} processor s", rounded(seconds, 2).unwrap_or(seconds)),
+    }
+}
+
 /// The part of a run's work that no shortcut saves.
-fn left(run: &crate::plan::Run) -> f64 {
+fn left(run: &Run) -> f64 {
     run.shortcut.omissions.iter().map(|o| 1.0 - o.share).product()
 }
