@@ -11,11 +11,11 @@ use super::print;
 use crate::audit;
 use crate::engines::{Engine, Site};
 use crate::judge::PolicyRecord;
-use crate::plan::{Asked, Planner, Run, cost_s};
+use crate::plan::{Asked, Planner, Run};
 use crate::record::EngineName;
 use crate::report::Exit;
 use crate::report::words::rounded;
-use crate::spec::{Trust, filtered, suite};
+use crate::spec::{Budget, Trust, filtered, suite};
 
 pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
     let mut cases = suite(&selected.specs, trust).and_then(|all| filtered(all, &selected.filter)).map_err(diagnose)?;
@@ -37,7 +37,7 @@ pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Ex
             for run in plan.runs.iter().filter(|r| plan.tasks[r.task].procedure == task.procedure) {
                 let engine = &plan.engines[run.engine].engine;
                 let note = run.approximation.as_ref().map(|a| format!(", approximate: {a}")).unwrap_or_default();
-                let cost = cost(run, engine.as_ref());
+                let cost = cost(run, engine.as_ref(), case.budget);
                 writeln!(out, "    run  {:<10} {cost}{note}", engine.name()).into_diagnostic()?;
             }
             for skip in plan.skips.iter().filter(|s| s.key.procedure == task.procedure) {
@@ -65,9 +65,10 @@ pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Ex
 }
 
 /// What a run is expected to take, or what it may take at most where nobody knows.
-fn cost(run: &Run, engine: &dyn Engine) -> String {
+fn cost(run: &Run, engine: &dyn Engine, whole: Budget) -> String {
     match engine.expected_s(&run.job).map(|all_s| left(run) * all_s) {
-        None => format!("at most about {:.0} s", left(run) * cost_s(engine, &run.job)),
+        // All looks together, not the first alone.
+        None => format!("at most about {:.0} s", left(run) * whole.seconds),
         Some(..1.0) => "less than 1 processor s".to_owned(),
         Some(seconds) => format!("about {} processor s", rounded(seconds, 2).unwrap_or(seconds)),
     }
