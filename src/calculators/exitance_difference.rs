@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::layers::refuse;
 pub use super::layers::{Exitances, Layers};
-pub use super::room_flux::zonal_flux;
+pub use super::room_flux::{RoomFluxes, zonal_flux};
 use super::{Calculated, NotApplicable, Validity, inverse_square};
 use crate::geometry::Room;
 use crate::geometry::configuration_factor::element_to_parallel_rectangle;

@@ -1,7 +1,9 @@
 //! A scene as IP-ED sees it: an empty room of mean reflectances, and the zonal flux of its luminaires by their height.
 
+use std::sync::atomic::AtomicBool;
+
 use super::NotApplicable;
-use super::room_flux::entering;
+use super::room_flux::RoomFluxes;
 use super::zonal_cavity::{Cavity, CavityReflectances, Coefficients, ZonalFlux, coefficients};
 use super::zonal_multiplier::ZonalMultipliers;
 use crate::geometry::{Room, Surface};
@@ -55,6 +57,11 @@ struct Layer {
 impl Layers {
     /// Of a scene's luminaires that are on, all of which must hang inside its room.
     pub fn of(scene: &Scene) -> Result<Self, NotApplicable> {
+        Self::with(&RoomFluxes::default(), scene, None)
+    }
+
+    /// As [`Self::of`], with what is known of luminaires that hang tilted, until it is stopped.
+    pub fn with(fluxes: &RoomFluxes, scene: &Scene, stop: Option<&AtomicBool>) -> Result<Self, NotApplicable> {
         let room = scene.room.ok_or_else(|| refuse("the scene has no room"))?;
         if scene.luminaires.is_empty() {
             return Err(refuse("the scene has no luminaire"));
@@ -65,8 +72,8 @@ impl Layers {
             return Err(refuse("only bodies reflect, the room does not; the method knows surfaces of the room alone"));
         }
         let mut by_height: Vec<Layer> = vec![];
-        for luminaire in &scene.luminaires {
-            let zonal = entering(&room, luminaire);
+        let entering = fluxes.entering(&room, scene, stop).ok_or_else(|| refuse("it was stopped"))?;
+        for (luminaire, zonal) in scene.luminaires.iter().zip(entering) {
             if zonal.down_lm() + zonal.up_lm() == 0.0 {
                 continue;
             }

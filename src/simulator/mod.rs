@@ -22,7 +22,7 @@ mod visibility;
 
 use crate::scene::{Meter, Scene, Transport};
 use crate::units::Lux;
-pub use prepared::Prepared;
+pub use prepared::{Prepared, Way};
 pub use stop::Stop;
 
 /// Illuminance at every meter, by the cheapest solver that meets `accuracy`.

@@ -29,6 +29,21 @@ pub struct Prepared {
     solver: Solver,
 }
 
+/// How a scene's light is reckoned, known before anything is solved: what it takes depends on it first of all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// Light straight from the luminaires: laws, or integrals over what shows of them.
+    Direct,
+    /// Collocation in an empty box, by point luminaires.
+    Collocation,
+    /// Light reflected once, integrated over what is both lit and seen.
+    Once,
+    /// Light balanced between rectangles; rays where that leaves something open.
+    Balance,
+    /// A final gather by rays.
+    Rays,
+}
+
 #[derive(Debug)]
 enum Solver {
     /// Point luminaires with nothing in between, in a room or in free field.
@@ -54,6 +69,17 @@ impl Prepared {
     /// Whether a scene has bodies or luminaires of any extent, whose light is sampled: the finer, the longer it takes.
     pub fn is_sampled(scene: &Scene) -> bool {
         !scene.obstacles.is_empty() || scene.luminaires.iter().any(|l| l.model != LuminaireModel::Point)
+    }
+
+    /// Which solver serves.
+    pub fn way(&self) -> Way {
+        match (&self.solver, self.transport) {
+            (_, Transport::Direct) => Way::Direct,
+            (Solver::Empty(_), _) => Way::Collocation,
+            (Solver::Enclosed(_, Some(_)), Transport::Indirect(Bounces::AtMost(1))) => Way::Once,
+            (Solver::Enclosed(enclosure, _), _) if enclosure.is_balanced() => Way::Balance,
+            (Solver::Enclosed(..), _) => Way::Rays,
+        }
     }
 
     /// The same light field with every luminaire dimmed by one more factor, not negative: nothing is solved again.

@@ -233,6 +233,11 @@ fn common(policies: &[Arc<Policy>]) -> Result<Arc<Policy>, SpecError> {
     }
 }
 
+/// Gives the jobs of a case's plan the budget of their first look.
+pub fn grant(sampling: Sampling, policy: &Policy, case: &Case, published: Option<&Published>, plan: &mut Plan) {
+    sampling::grant(sampling, &policy.judge(case, published), plan);
+}
+
 /// One report of what is planned for cases.
 fn audited(
     spec: SpecRecord,
@@ -245,7 +250,7 @@ fn audited(
     let published = published(cases)?;
     for (((case, plan), published), policy) in cases.iter().zip(&mut plans).zip(&published).zip(policies) {
         let sampling = options.sampling.or(policy.profile.sampling).unwrap_or_default();
-        sampling::grant(sampling, &policy.judge(case, published.as_ref()), plan);
+        grant(sampling, policy, case, published.as_ref(), plan);
     }
     options.observer.planned(cases, &plans);
     let audit = Audit { options, reader: options.reader() };
@@ -329,7 +334,7 @@ fn diagnose(plans: &[Plan], reports: &mut [Report]) {
 }
 
 /// The published tables of each case, or all that is wrong with them.
-fn published(cases: &[Case]) -> Result<Vec<Option<Published>>, Faults> {
+pub fn published(cases: &[Case]) -> Result<Vec<Option<Published>>, Faults> {
     let fault = |path: &Path, error: PublishedError| {
         let help = "correct the table, or leave `published` out";
         // The reader of YAML ends its message with the place.

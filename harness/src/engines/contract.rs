@@ -75,6 +75,12 @@ pub trait Engine: Send + Sync {
         only_known(&self.name(), job, self.knobs())
     }
 
+    /// Processor seconds that a job is expected to take, further looks among them, with the budget of its first look; `None` where nobody
+    /// knows, as of a program of a user's.
+    fn expected_s(&self, _job: &Job) -> Option<f64> {
+        None
+    }
+
     /// Memory that a job takes on so many threads or processes, in MiB; an estimate on the safe side, of which as much runs side
     /// by side as there is room for. Twice what case S2 took and more, a process each.
     fn memory_mib(&self, job: &Job, threads: usize) -> u64 {

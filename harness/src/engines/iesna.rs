@@ -1,13 +1,18 @@
 //! The engine `iesna`: inverse-square method and infinite plane - exitance difference, read like any renderer.
 
-use luminaire::calculators::exitance_difference::Layers;
+use luminaire::calculators::exitance_difference::{Layers, RoomFluxes};
 use luminaire::calculators::{Calculated, NotApplicable, Validity, inverse_square};
 use luminaire::scene::{Bounces, LuminaireModel, Meter, Scene, Transport};
 
 use super::{Absent, Engine, EngineError, Entry, Job, Measurement, Site, Support, Version, Workbench, checked};
 use crate::record::{EngineName, Estimate, Role, Uncertainty};
+use crate::system::process::{self, ProcessError};
 
-pub(super) struct Iesna;
+#[derive(Default)]
+pub(super) struct Iesna {
+    /// What planning works out is there when it is read.
+    fluxes: RoomFluxes,
+}
 
 const ID: EngineName = EngineName::IESNA;
 
@@ -19,7 +24,7 @@ pub(super) static ENTRY: Entry = Entry {
     is_on_request: false,
     models: &[LuminaireModel::Point, LuminaireModel::Area, LuminaireModel::Impostor],
     fits_coordinates: None,
-    make: || Box::new(Iesna),
+    make: || Box::<Iesna>::default(),
 };
 
 /// Rounding of the inverse-square method in `f64`, relative: a few operations and two arctangents.
@@ -40,7 +45,7 @@ impl Engine for Iesna {
 
     fn supports(&self, job: &Job) -> Support {
         let mut objections = vec![];
-        let calculator = Calculator::of(job);
+        let calculator = Calculator::of(job, &self.fluxes);
         for station in &job.stations {
             match Validity::of(&calculator.calculate(&station.meter)) {
                 Validity::Supported => {}
@@ -60,12 +65,20 @@ impl Engine for Iesna {
         [super::FILE_READER, super::OWN_LOOKUP].map(str::to_owned).to_vec()
     }
 
+    /// What takes long, the flux of luminaires that hang tilted, planning has worked out.
+    fn expected_s(&self, _job: &Job) -> Option<f64> {
+        Some(0.0)
+    }
+
     fn read(&self, job: &Job, _workbench: &Workbench) -> Result<Measurement, EngineError> {
         let mut measurement = Measurement::default();
         measurement.method.insert("method".into(), method(job.transport).into());
         let mut notes = vec![];
-        let calculator = Calculator::of(job);
+        let calculator = Calculator::of(job, &self.fluxes);
         for station in &job.stations {
+            if process::is_interrupted() {
+                return Err(ProcessError::Interrupted { program: ID.to_string() }.into());
+            }
             let what = |error: NotApplicable| format!("{}: {error}", station.id);
             let calculated = calculator
                 .calculate(&station.meter)
@@ -103,9 +116,10 @@ struct Calculator<'a> {
 }
 
 impl<'a> Calculator<'a> {
-    fn of(job: &'a Job) -> Self {
+    fn of(job: &'a Job, fluxes: &RoomFluxes) -> Self {
         let (scene, transport) = (&job.scene, job.transport);
-        let layers = (transport != Transport::Direct).then(|| Layers::of(scene));
+        let stop = Some(process::interrupt_flag());
+        let layers = (transport != Transport::Direct).then(|| Layers::with(fluxes, scene, stop));
         Self { scene, transport, layers }
     }
 

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use luminaire::scene::LuminaireModel;
-use luminaire::simulator::{self, Accuracy, Prepared, Stop};
+use luminaire::simulator::{self, Accuracy, Prepared, Stop, Way};
 
 use super::settings::Given;
 use super::{Absent, Engine, EngineError, Entry, Job, Knob, Measurement, Site, Support, Version, Workbench, checked};
@@ -39,6 +39,26 @@ fn relative_error(job: &Job) -> Result<f64, EngineError> {
     Ok(asked.unwrap_or(MARGIN * job.budget.relative_error))
 }
 
+/// Processor seconds of one core: what solvers took in the mean of random rooms, by their logarithms (`benchmarks/planning.md`).
+fn expected_s(job: &Job, way: Way) -> f64 {
+    let luminaires = &job.scene.luminaires;
+    let points = luminaires.iter().filter(|l| l.model == LuminaireModel::Point).count() as f64;
+    let (all, bodies, stations) =
+        (luminaires.len() as f64, job.scene.obstacles.len() as f64, job.stations.len() as f64);
+    match way {
+        Way::Direct => 2e-6 * stations * all * (1.0 + bodies),
+        Way::Once => 1e-3 * stations * all * (1.0 + bodies),
+        Way::Collocation => 0.1 * all.min(COLLOCATED),
+        Way::Balance => 2.2 * (1.0 + points * bodies / MANY_SHADOWS).powf(0.7),
+        Way::Rays => 5.0,
+    }
+}
+
+/// Shadows of points from which on balance takes longer.
+const MANY_SHADOWS: f64 = 50.0;
+/// Luminaires from which on an empty room takes no longer, since their light is projected.
+const COLLOCATED: f64 = 32.0;
+
 impl Engine for Simulator {
     fn name(&self) -> EngineName {
         ID
@@ -62,6 +82,12 @@ impl Engine for Simulator {
 
     fn samples(&self, job: &Job) -> bool {
         Prepared::is_sampled(&job.scene)
+    }
+
+    fn expected_s(&self, job: &Job) -> Option<f64> {
+        let accuracy = Accuracy { relative_error: relative_error(job).ok()?, seed: job.seed };
+        let way = Prepared::new(&job.scene, job.transport, &accuracy).ok()?.way();
+        Some(expected_s(job, way))
     }
 
     fn knobs(&self) -> &'static [Knob] {

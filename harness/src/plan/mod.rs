@@ -335,7 +335,7 @@ enum Offer {
 }
 
 /// What a run of a whole job may cost, in seconds: the budget for whatever samples, next to nothing for our own solvers where they do not.
-pub fn cost_s(engine: &dyn Engine, job: &Job) -> f64 {
+fn cost_s(engine: &dyn Engine, job: &Job) -> f64 {
     let is_quick = engine.is_witness() && !engine.samples(job);
     if is_quick { job.budget.seconds.min(1.0) } else { job.budget.seconds }
 }

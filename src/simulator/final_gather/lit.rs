@@ -7,18 +7,24 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::bicubic::{Bicubic, NODES};
+use super::bicubic::{Bicubic, NODES, ORDER};
 use super::face::{Cover, Face, covering, mean_wall_m2};
 use super::surroundings::Surroundings;
-use super::view::{Cast, Left, Shown, View};
+use super::view::{Cast, Left, LitPart, View};
 use crate::scene::Meter;
 use crate::simulator::emission::{Emitter, Precision};
+use crate::simulator::quadrature::Gauss;
 use crate::simulator::sampler::mix;
 use crate::simulator::stop::Stop;
 use crate::simulator::visibility::Occluder;
 
 /// Where a rectangle's polynomial is held against the light, besides its nodes.
 const CHECKS: [[f64; 2]; 6] = [[0.5, 0.5], [0.02, 0.02], [0.98, 0.98], [0.02, 0.98], [0.98, 0.02], [0.5, 0.02]];
+/// Nodes along each side of the rule that tells what the mean of a leaf's polynomial is off: none of them is the polynomial's own, and kinks of
+/// a table lie otherwise between them.
+const FINER: usize = ORDER + 1;
+/// What two rules differ by, times which either may miss.
+const BY_CHANCE: f64 = 4.0;
 /// Heights of luminaires nearer to an edge than this part of a rectangle do not part it.
 const EDGE: f64 = 0.02;
 /// Quarterings at most.
@@ -59,7 +65,44 @@ struct Part {
     size_m: DVec2,
     kind: Kind,
     /// Of four quarters the polynomial that comes closest to theirs, and how far off it is; where they are all that is known.
-    joined: Option<Box<([f64; NODES], f64)>>,
+    joined: Option<Box<([f64; NODES], Off)>>,
+}
+
+/// How far off a polynomial is.
+#[derive(Clone, Copy, Debug, Default)]
+struct Off {
+    /// Anywhere.
+    lux: f64,
+    /// In its mean or slopes: where a table has kinks the nodes' own rule misses some of these.
+    mean_lux: f64,
+}
+
+impl Off {
+    const NONE: Self = Self { lux: 0.0, mean_lux: 0.0 };
+
+    /// Holds a polynomial against the light at the nodes of a rule, which finds its residue's mean and slopes. Of smooth light they are next to
+    /// nothing; of kinks two rules miss as much as each other, and by chance the same, but no more than the residue is.
+    fn look(&mut self, bicubic: &Bicubic, rule: &Gauss, lux: &[f64; NODES], lux_at: impl Fn(DVec2) -> f64) {
+        let (mut moments, mut square) = ([0.0_f64; 3], 0.0);
+        for (x, a) in rule.nodes.iter().zip(&rule.weights) {
+            for (y, b) in rule.nodes.iter().zip(&rule.weights) {
+                let t = DVec2::new(*x, *y);
+                let residue = lux_at(t) - bicubic.at(lux, t);
+                self.lux = self.lux.max(residue.abs());
+                square += a * b * residue * residue;
+                // Legendre's first, of a mean square of 1.
+                let slopes = (t - 0.5) * 12.0_f64.sqrt();
+                moments.iter_mut().zip([1.0, slopes.x, slopes.y]).for_each(|(m, p)| *m += a * b * residue * p);
+            }
+        }
+        let largest = moments.iter().fold(0.0_f64, |most, m| most.max(m.abs()));
+        self.mean_lux = (BY_CHANCE * largest).min(square.sqrt());
+    }
+
+    /// What is left of it where a part of what has no mean is.
+    fn left_lux(&self, part: f64) -> f64 {
+        part * self.lux + (1.0 - part) * self.mean_lux.min(self.lux)
+    }
 }
 
 #[derive(Debug)]
@@ -73,8 +116,7 @@ enum Kind {
 struct Leaf {
     /// Illuminance at the nodes by the luminaires that nothing hides.
     lux: [f64; NODES],
-    /// How far off that is.
-    error_lux: f64,
+    off: Off,
     /// Luminaires without extent that bodies hide from a part of it.
     shaded: Vec<Shaded>,
     /// Whether a body stands on a part of it, so that what shows of what is off may have a mean.
@@ -89,9 +131,9 @@ struct Leaf {
 #[derive(Debug)]
 struct Shaded {
     emitter: u32,
-    /// Illuminance at the nodes were nothing in its way, and how far off that is.
+    /// Illuminance at the nodes were nothing in its way.
     lux: [f64; NODES],
-    error_lux: f64,
+    off: Off,
     /// Which of its shadows meet the rectangle.
     shadows: Vec<u32>,
 }
@@ -109,22 +151,26 @@ struct Bright {
 pub(super) struct Known {
     /// How far off it may be; infinite where bodies cover a part.
     pub(super) error_lux: f64,
+    /// How far off its mean may be.
+    pub(super) mean_lux: f64,
     /// Standard error of its mean, which the replicates show in their scatter.
     pub(super) noise_lux: f64,
     pub(super) side_m: f64,
 }
 
 impl Known {
-    /// The part of a polynomial's error that is left in what a place sees of its rectangle: what it leaves out has no mean and
-    /// no slope, and from afar one sees no more of it.
+    const EXACT: Self = Self { error_lux: 0.0, mean_lux: 0.0, noise_lux: 0.0, side_m: 0.0 };
+
+    /// The part of a polynomial's error that is left in what a place sees of its rectangle: but for its mean, what it leaves out has no
+    /// slope, and from afar one sees no more of it.
     pub(super) fn left_lux(&self, distance_m: f64) -> f64 {
-        self.error_lux * self.shows(distance_m)
+        Off { lux: self.error_lux, mean_lux: self.mean_lux }.left_lux(self.shows(distance_m))
     }
 
     /// Whether a ray may end on it: what is left out and its noise are below their limits.
     pub(super) fn is_enough(&self, distance_m: f64, limit: Limit) -> bool {
         let shows = self.shows(distance_m);
-        self.error_lux * shows <= limit.error_lux && self.noise_lux * shows <= limit.noise_lux
+        self.left_lux(distance_m) <= limit.error_lux && self.noise_lux * shows <= limit.noise_lux
     }
 
     /// How much of a place's view it takes.
@@ -177,21 +223,14 @@ impl Lit {
         let bicubic = Bicubic::new();
         let mean: f64 = mean_lux(lights, relative_error);
         let surroundings = lights.surroundings;
-        let solid = surroundings.bodies().map(|[min_m, max_m]| Occluder { min_m: *min_m, max_m: *max_m });
-        let solid: Vec<Occluder> = solid.collect();
-        let is_cut = |emitter: &Emitter| {
-            let touches = |o: &Occluder| emitter.centre_m().clamp(o.min_m, o.max_m) == emitter.centre_m();
-            emitter.is_polygonal() && !(emitter.is_point() && solid.iter().any(touches))
-        };
-        let can_cut = solid.is_empty() || lights.emitters.iter().all(is_cut);
-        let cuts = solid.len() * lights.emitters.iter().filter(|emitter| !emitter.is_point()).count();
-        let occluders = surroundings.hiding().filter(|_| can_cut && cuts <= MOST_CUTS).map(|_| solid);
+        let occluders = cut_out(lights);
         let casts = |face: &Face| -> Vec<Option<Cast>> {
             let solid = occluders.as_deref().unwrap_or_default();
             let cast = |emitter: &Emitter| emitter.is_point().then(|| Cast::new(emitter.centre_m(), face, solid))?;
             lights.emitters.iter().filter(|_| occluders.is_some()).map(cast).collect()
         };
         let casts: Vec<Vec<Option<Cast>>> = surroundings.faces.iter().map(casts).collect();
+        let finer = Gauss::new(FINER);
         let one = |(face, casts): (&Face, &Vec<Option<Cast>>)| {
             let floor_lux = DIM * mean;
             let wall_m2 = surroundings.room.map_or(f64::INFINITY, |room| mean_wall_m2(room.size_m));
@@ -206,6 +245,7 @@ impl Lit {
                 wall_m2,
                 occluders: &occluders,
                 casts,
+                finer: &finer,
                 stop,
             };
             let (corner_m, size_m) = (face.corners_m[0], face.size_m());
@@ -268,11 +308,11 @@ impl Lit {
         while let Some(k) = open.pop() {
             let Some(part) = self.faces[index].get(k) else { continue };
             let Some(shown) = before.of(part.corner_m, part.size_m) else { continue };
-            let (values, error_lux, shaded) = match (&part.kind, &part.joined) {
-                (Kind::Leaf(leaf), _) => (&leaf.lux, leaf.error_lux, leaf.shaded.as_slice()),
+            let (values, off, shaded) = match (&part.kind, &part.joined) {
+                (Kind::Leaf(leaf), _) => (&leaf.lux, leaf.off, leaf.shaded.as_slice()),
                 (Kind::Quartered(first, _), joined) => match joined.as_deref() {
-                    Some((values, error_lux)) if shown.factor * shown.left() * error_lux <= tolerance_lux => {
-                        (values, *error_lux, &[][..])
+                    Some((values, off)) if shown.factor * off.left_lux(shown.left()) <= tolerance_lux => {
+                        (values, *off, &[][..])
                     }
                     _ => {
                         open.extend(*first..first + 4);
@@ -280,12 +320,14 @@ impl Lit {
                     }
                 },
             };
-            let (value, left_lux) = read(&shown, values, error_lux);
+            let (weights, factor, left) = (shown.weights(), shown.factor, shown.left());
+            let all = LitPart { weights, factor, left };
+            let (value, left_lux) = read(&all, values, off);
             add(face.reflectance * value, face.reflectance * left_lux);
             for shaded in shaded {
                 let cast = self.casts[index][shaded.emitter as usize].as_ref();
-                let Some(lit) = cast.and_then(|cast| shown.lit(cast, &shaded.shadows)) else { continue };
-                let (value, left_lux) = read(&lit, &shaded.lux, shaded.error_lux);
+                let Some(lit) = cast.and_then(|cast| shown.lit(&weights, cast, &shaded.shadows)) else { continue };
+                let (value, left_lux) = read(&lit, &shaded.lux, shaded.off);
                 add(face.reflectance * value, face.reflectance * left_lux);
             }
         }
@@ -295,19 +337,20 @@ impl Lit {
     pub(super) fn at(&self, lights: &Lights, face: usize, meter: &Meter, u: impl FnOnce() -> [f64; 2]) -> Light {
         let at_m = lights.surroundings.faces[face].on(meter.position_m);
         let Some((part, leaf)) = self.leaf(face, at_m) else {
-            return Light { lux: 0.0, known: Known { error_lux: 0.0, noise_lux: 0.0, side_m: 0.0 } };
+            return Light { lux: 0.0, known: Known::EXACT };
         };
         let t = (at_m - part.corner_m) / part.size_m;
         let is_smooth = !leaf.is_covered && leaf.shaded.is_empty();
         let side_m = if is_smooth { part.size_m.max_element() } else { f64::INFINITY };
         let mut light = Light {
             lux: self.bicubic.at(&leaf.lux, t),
-            known: Known { error_lux: leaf.error_lux, noise_lux: 0.0, side_m },
+            known: Known { error_lux: leaf.off.lux, mean_lux: leaf.off.mean_lux, noise_lux: 0.0, side_m },
         };
         for shaded in &leaf.shaded {
             if !lights.surroundings.is_hidden(meter.position_m, lights.emitters[shaded.emitter as usize].centre_m()) {
                 light.lux += self.bicubic.at(&shaded.lux, t);
-                light.known.error_lux += shaded.error_lux;
+                light.known.error_lux += shaded.off.lux;
+                light.known.mean_lux += shaded.off.mean_lux;
             }
         }
         if leaf.asked.is_empty() {
@@ -371,12 +414,26 @@ impl Lit {
     }
 }
 
+/// The bodies that are cut out of luminaires, perhaps none; nothing where that cannot be or takes too long, so that luminaires must be asked.
+pub(super) fn cut_out(lights: &Lights) -> Option<Vec<Occluder>> {
+    let bodies = lights.surroundings.bodies();
+    let solid: Vec<Occluder> = bodies.map(|[min_m, max_m]| Occluder { min_m: *min_m, max_m: *max_m }).collect();
+    let is_cut = |emitter: &Emitter| {
+        let touches = |o: &Occluder| emitter.centre_m().clamp(o.min_m, o.max_m) == emitter.centre_m();
+        emitter.is_polygonal() && !(emitter.is_point() && solid.iter().any(touches))
+    };
+    let can_cut = solid.is_empty() || lights.emitters.iter().all(is_cut);
+    let cuts = solid.len() * lights.emitters.iter().filter(|emitter| !emitter.is_point()).count();
+    lights.surroundings.hiding().filter(|_| can_cut && cuts <= MOST_CUTS)?;
+    Some(solid)
+}
+
 /// Light of a polynomial on what shows of its rectangle, and what it may be off.
-fn read(shown: &Shown, values: &[f64; NODES], error_lux: f64) -> (f64, f64) {
-    let weights = shown.weights();
+fn read(lit: &LitPart, values: &[f64; NODES], off: Off) -> (f64, f64) {
+    let LitPart { weights, factor, left } = lit;
     let most = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     let value = weights.of_nodes.iter().zip(values).map(|(w, v)| w * v).sum();
-    (value, shown.factor * shown.left() * error_lux + weights.error * most)
+    (value, factor * off.left_lux(*left) + weights.error * most)
 }
 
 /// Finds for every part that is quartered the polynomial closest to those of its quarters, which lie behind it; none where luminaires
@@ -389,13 +446,18 @@ fn join(bicubic: &Bicubic, parts: &mut [Part]) {
         let quarters = parts[first..first + 4].iter().map(|quarter| {
             let (corner, size) = of(quarter);
             match (&quarter.kind, &quarter.joined) {
-                (Kind::Leaf(leaf), _) if leaf.shaded.is_empty() => Some((corner, size, &leaf.lux, leaf.error_lux)),
+                (Kind::Leaf(leaf), _) if leaf.shaded.is_empty() => Some((corner, size, &leaf.lux, leaf.off)),
                 (_, Some(joined)) => Some((corner, size, &joined.0, joined.1)),
                 (_, None) => None,
             }
         });
         let quarters: Option<Vec<_>> = quarters.collect();
-        parts[k].joined = quarters.map(|quarters| Box::new(bicubic.joined(quarters.into_iter())));
+        parts[k].joined = quarters.map(|quarters| {
+            let mean_lux = quarters.iter().map(|(_, size, _, off)| size.element_product() * off.mean_lux).sum();
+            let parts = quarters.into_iter().map(|(corner, size, lux, off)| (corner, size, lux, off.lux));
+            let (joined, lux) = bicubic.joined(parts);
+            Box::new((joined, Off { lux, mean_lux }))
+        });
     }
 }
 
@@ -426,29 +488,21 @@ struct Build<'a> {
     occluders: &'a Option<Vec<Occluder>>,
     /// Shadows on the face of luminaires without extent.
     casts: &'a [Option<Cast>],
+    finer: &'a Gauss,
     stop: &'a Stop,
 }
 
 impl Build<'_> {
     /// Puts a leaf in its place, or its quarters where it is not good enough.
-    fn grow(&self, parts: &mut Vec<Part>, index: usize, leaf: Leaf, depth: u32) {
-        let shaded = || leaf.shaded.iter();
-        let lux = leaf.lux.iter().chain(shaded().flat_map(|shaded| &shaded.lux));
-        let mean = lux.map(|l| l.abs()).sum::<f64>() / NODES as f64;
-        let limit_lux = self.relative_error * mean.max(self.floor_lux);
-        let error_lux = leaf.error_lux + shaded().map(|shaded| shaded.error_lux).sum::<f64>();
-        let is_good = match self.occluders {
-            // What is off on a small part is little of all: where shadows have edges no part is small enough for another measure.
-            Some(occluders) if !occluders.is_empty() => {
-                let part = parts[index].size_m.element_product() / self.wall_m2;
-                error_lux * part <= OF_ALL * limit_lux
-            }
-            _ => error_lux <= limit_lux,
-        };
+    fn grow(&self, parts: &mut Vec<Part>, index: usize, mut leaf: Leaf, depth: u32) {
         let is_clear = leaf.asked.is_empty() || depth >= DEEPEST_FOR_SHADOW;
-        if is_good && is_clear && !leaf.is_covered || depth >= DEEPEST || self.stop.is_due() {
-            parts[index].kind = Kind::Leaf(Box::new(leaf));
-            return;
+        let (at, is_last) = ([parts[index].corner_m, parts[index].size_m], depth >= DEEPEST || self.stop.is_due());
+        if is_last || is_clear && !leaf.is_covered && self.is_good(&leaf, at[1]) {
+            leaf = self.looked_into(leaf, at);
+            if is_last || self.is_good(&leaf, at[1]) {
+                parts[index].kind = Kind::Leaf(Box::new(leaf));
+                return;
+            }
         }
         let (corner_m, size_m) = (parts[index].corner_m, parts[index].size_m);
         let middle_m = self.middle_m(corner_m, size_m);
@@ -466,6 +520,22 @@ impl Build<'_> {
         parts.extend(quarters.map(part));
         for (k, leaf) in leaves.into_iter().enumerate() {
             self.grow(parts, first + k, leaf, depth + 1);
+        }
+    }
+
+    /// Whether a leaf of so many metres is known as well as it has to be.
+    fn is_good(&self, leaf: &Leaf, size_m: DVec2) -> bool {
+        let shaded = || leaf.shaded.iter();
+        let lux = leaf.lux.iter().chain(shaded().flat_map(|shaded| &shaded.lux));
+        let mean = lux.map(|l| l.abs()).sum::<f64>() / NODES as f64;
+        let limit_lux = self.relative_error * mean.max(self.floor_lux);
+        let error_lux = leaf.off.lux + shaded().map(|shaded| shaded.off.lux).sum::<f64>();
+        match self.occluders {
+            // What is off on a small part is little of all: where shadows have edges no part is small enough for another measure.
+            Some(occluders) if !occluders.is_empty() => {
+                error_lux * size_m.element_product() / self.wall_m2 <= OF_ALL * limit_lux
+            }
+            _ => error_lux <= limit_lux,
         }
     }
 
@@ -498,7 +568,7 @@ impl Build<'_> {
         let cover = Cover::of(&self.covers, corner_m, size_m);
         let mut leaf = Leaf {
             lux: [0.0; NODES],
-            error_lux: 0.0,
+            off: Off::NONE,
             shaded: vec![],
             is_covered: cover == Cover::Part,
             asked: vec![],
@@ -507,57 +577,103 @@ impl Build<'_> {
         if cover == Cover::Whole {
             return leaf;
         }
-        let meter = |t: DVec2| Meter { position_m: self.face.off(corner_m + t * size_m), normal: self.face.normal };
-        let corners_m = [meter(DVec2::ZERO).position_m, meter(DVec2::ONE).position_m];
-        let emitters = self.lights.emitters;
-        let (mut clear, mut cut, mut sharp) = (vec![], vec![], vec![]);
-        for (k, emitter) in emitters.iter().enumerate() {
+        let Lighting { clear, cut, sharp, asked } = self.lighting(corner_m, size_m);
+        leaf.asked = asked;
+        let at = |t: DVec2| self.meter(corner_m + t * size_m);
+        let polynomial = |lux_at: &dyn Fn(&Meter) -> f64| {
+            let lux: [f64; NODES] = std::array::from_fn(|k| lux_at(&at(self.bicubic.node(k))));
+            let off = |t: &[f64; 2]| {
+                let t = DVec2::from_array(*t);
+                (self.bicubic.at(&lux, t) - lux_at(&at(t))).abs()
+            };
+            (lux, Off { lux: CHECKS.iter().map(off).fold(0.0, f64::max), mean_lux: 0.0 })
+        };
+        (leaf.lux, leaf.off) = polynomial(&|meter| self.lux_of_all(&clear, &cut, meter));
+        let shaded = |(k, shadows): (usize, Vec<u32>)| {
+            let (lux, off) = polynomial(&|meter| self.lux_of(k, meter, &[]));
+            Shaded { emitter: k as u32, lux, off, shadows }
+        };
+        leaf.shaded = sharp.into_iter().map(shaded).collect();
+        // What may be hidden counts by half, so that no place that is lit is drawn never.
+        let of_asked = |k: &u32| {
+            let lux = std::array::from_fn(|node| self.lux_of(*k as usize, &at(self.bicubic.node(node)), &[]));
+            self.mean(&lux)
+        };
+        let hidden: f64 = leaf.asked.iter().map(of_asked).chain(leaf.shaded.iter().map(|s| self.mean(&s.lux))).sum();
+        let lux = (self.mean(&leaf.lux).max(0.0) + 0.5 * hidden.max(0.0)).max(0.02 * self.floor_lux);
+        leaf.exitance = self.face.reflectance * lux;
+        leaf
+    }
+
+    /// A leaf that may stay, held against the light at the nodes of another rule.
+    fn looked_into(&self, mut leaf: Leaf, [corner_m, size_m]: [DVec2; 2]) -> Leaf {
+        if self.stop.is_due() || leaf.off.lux == 0.0 && leaf.shaded.iter().all(|shaded| shaded.off.lux == 0.0) {
+            return leaf;
+        }
+        let at = |t: DVec2| self.meter(corner_m + t * size_m);
+        let Lighting { clear, cut, .. } = self.lighting(corner_m, size_m);
+        leaf.off.look(&self.bicubic, self.finer, &leaf.lux, |t| self.lux_of_all(&clear, &cut, &at(t)));
+        for shaded in &mut leaf.shaded {
+            let k = shaded.emitter as usize;
+            shaded.off.look(&self.bicubic, self.finer, &shaded.lux, |t| self.lux_of(k, &at(t), &[]));
+        }
+        leaf
+    }
+
+    fn meter(&self, at_m: DVec2) -> Meter {
+        Meter { position_m: self.face.off(at_m), normal: self.face.normal }
+    }
+
+    /// The mean of a polynomial over its rectangle.
+    fn mean(&self, lux: &[f64; NODES]) -> f64 {
+        (0..NODES).map(|k| self.bicubic.weight(k) * lux[k]).sum()
+    }
+
+    fn lux_of(&self, k: usize, meter: &Meter, solid: &[Occluder]) -> f64 {
+        // Two refinements agree far less well than the finer one is right.
+        let relative_error = self.relative_error.min(1e-3);
+        let precision = Precision { relative_error, error_lux: relative_error * self.floor_lux };
+        self.lights.emitters[k].illuminance(meter, solid, precision).value
+    }
+
+    fn lux_of_all(&self, clear: &[usize], cut: &[usize], meter: &Meter) -> f64 {
+        let solid = self.occluders.as_deref().unwrap_or_default();
+        let clear = clear.iter().map(|k| self.lux_of(*k, meter, &[]));
+        clear.chain(cut.iter().map(|k| self.lux_of(*k, meter, solid))).sum()
+    }
+
+    /// Which luminaires light a rectangle how.
+    fn lighting(&self, corner_m: DVec2, size_m: DVec2) -> Lighting {
+        let corners_m = [self.meter(corner_m).position_m, self.meter(corner_m + size_m).position_m];
+        let mut found = Lighting::default();
+        for (k, emitter) in self.lights.emitters.iter().enumerate() {
             if !self.lights.may_be_hidden(k, corners_m) {
-                clear.push(k);
+                found.clear.push(k);
             } else if self.occluders.is_none() {
-                leaf.asked.push(k as u32);
+                found.asked.push(k as u32);
             } else if !emitter.is_point() {
-                cut.push(k);
+                found.cut.push(k);
             } else if let Some(cast) = &self.casts[k] {
                 match cast.on(corner_m, size_m) {
-                    Some(shadows) if shadows.is_empty() => clear.push(k),
-                    Some(shadows) => sharp.push((k, shadows)),
+                    Some(shadows) if shadows.is_empty() => found.clear.push(k),
+                    Some(shadows) => found.sharp.push((k, shadows)),
                     None => {}
                 }
             }
         }
-        // Two refinements agree far less well than the finer one is right.
-        let relative_error = self.relative_error.min(1e-3);
-        let precision = Precision { relative_error, error_lux: relative_error * self.floor_lux };
-        let lux_of =
-            |k: usize, meter: &Meter, solid: &[Occluder]| emitters[k].illuminance(meter, solid, precision).value;
-        let polynomial = |lux_at: &dyn Fn(&Meter) -> f64| {
-            let lux: [f64; NODES] = std::array::from_fn(|k| lux_at(&meter(self.bicubic.node(k))));
-            let off = |t: &[f64; 2]| {
-                let t = DVec2::from_array(*t);
-                (self.bicubic.at(&lux, t) - lux_at(&meter(t))).abs()
-            };
-            (lux, CHECKS.iter().map(off).fold(0.0, f64::max))
-        };
-        let solid = self.occluders.as_deref().unwrap_or_default();
-        (leaf.lux, leaf.error_lux) = polynomial(&|meter| {
-            let clear = clear.iter().map(|k| lux_of(*k, meter, &[]));
-            clear.chain(cut.iter().map(|k| lux_of(*k, meter, solid))).sum()
-        });
-        let shaded = |(k, shadows): (usize, Vec<u32>)| {
-            let (lux, error_lux) = polynomial(&|meter| lux_of(k, meter, &[]));
-            Shaded { emitter: k as u32, lux, error_lux, shadows }
-        };
-        leaf.shaded = sharp.into_iter().map(shaded).collect();
-        let mean = |lux: &[f64; NODES]| (0..NODES).map(|k| self.bicubic.weight(k) * lux[k]).sum::<f64>();
-        // What may be hidden counts by half, so that no place that is lit is drawn never.
-        let of_asked = |k: &u32| {
-            let lux = std::array::from_fn(|node| lux_of(*k as usize, &meter(self.bicubic.node(node)), &[]));
-            mean(&lux)
-        };
-        let hidden: f64 = leaf.asked.iter().map(of_asked).chain(leaf.shaded.iter().map(|s| mean(&s.lux))).sum();
-        let lux = (mean(&leaf.lux).max(0.0) + 0.5 * hidden.max(0.0)).max(0.02 * self.floor_lux);
-        leaf.exitance = self.face.reflectance * lux;
-        leaf
+        found
     }
+}
+
+/// Luminaires by what stands between them and a rectangle.
+#[derive(Default)]
+struct Lighting {
+    /// Nothing.
+    clear: Vec<usize>,
+    /// Bodies that are cut out of them.
+    cut: Vec<usize>,
+    /// Bodies whose shadows have edges, by their numbers.
+    sharp: Vec<(usize, Vec<u32>)>,
+    /// Bodies that cannot be cut.
+    asked: Vec<u32>,
 }

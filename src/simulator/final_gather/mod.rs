@@ -140,6 +140,11 @@ impl Enclosure {
         Ok(Self { surroundings, occluders, emitters, lit: None, solved: None, balance: None })
     }
 
+    /// Whether reflected light is solved for without chance, before rays read what that leaves open.
+    pub(super) fn is_balanced(&self) -> bool {
+        lit::cut_out(&Lights { surroundings: &self.surroundings, emitters: &self.emitters }).is_some()
+    }
+
     /// Direct illuminance at the meters, each within a bound, as far as it comes before it is stopped.
     pub(super) fn direct(&self, meters: &[Meter], relative_error: f64, seed: u64, stop: &Stop) -> Vec<Bounded> {
         let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
@@ -399,7 +404,7 @@ impl Solved {
         let grid = Grid::new(lights.surroundings);
         let known = |k: usize, error_lux: f64, noise_lux: f64| {
             let error_lux = if grid.cover(k) == Cover::None { error_lux } else { f64::INFINITY };
-            Known { error_lux, noise_lux, side_m: grid.longer_m(k) }
+            Known { error_lux, mean_lux: 0.0, noise_lux, side_m: grid.longer_m(k) }
         };
         let open: Vec<Known> = (0..grid.len()).map(|k| known(k, 0.0, 0.0)).collect();
         let rays = Rays { lights, lit, grid: Some((&grid, &open)), draws: false };

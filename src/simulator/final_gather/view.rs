@@ -143,7 +143,16 @@ pub(super) struct Shown<'a> {
     pub(super) factor: f64,
 }
 
+/// What luminaires light of what shows of a rectangle.
+pub(super) struct LitPart {
+    pub(super) weights: Weights,
+    pub(super) factor: f64,
+    /// As of [`Shown::left`].
+    pub(super) left: f64,
+}
+
 /// The weights of the values at a rectangle's nodes in the illuminance of a meter.
+#[derive(Clone, Copy)]
 pub(super) struct Weights {
     pub(super) of_nodes: [f64; NODES],
     /// How far off their sum with values of at most 1 may be.
@@ -340,11 +349,11 @@ fn clipped(polygon: &[DVec2], side: &Side) -> Polygon {
     kept
 }
 
-/// Adds the pieces of a convex polygon that do not lie within all of some sides.
-fn outside(piece: Polygon, sides: &[Side], left: &mut Vec<Polygon>) {
+/// Adds the pieces of a convex polygon that do not lie within all of some sides; what does is left.
+fn outside(piece: Polygon, sides: &[Side], left: &mut Vec<Polygon>) -> Option<Polygon> {
     if sides.iter().any(|side| piece.iter().all(|p| side.of(*p) <= ROUNDING)) {
         left.push(piece);
-        return;
+        return None;
     }
     let mut inside = piece;
     for side in sides {
@@ -356,10 +365,11 @@ fn outside(piece: Polygon, sides: &[Side], left: &mut Vec<Polygon>) {
             left.push(part);
             inside = clipped(&inside, side);
             if !is_solid(&inside) {
-                break;
+                return None;
             }
         }
     }
+    Some(inside)
 }
 
 fn area_m2(polygon: &[DVec2]) -> f64 {
@@ -414,19 +424,43 @@ impl<'a> Shown<'a> {
         })
     }
 
-    /// What of it some of the shadows from another point leave lit; nothing where that is nothing.
-    pub(super) fn lit(&self, cast: &Cast, which: &[u32]) -> Option<Self> {
-        let mut pieces = self.pieces.clone();
+    /// What of it some of the shadows from another point leave lit, from the weights of all of it; nothing where that is nothing.
+    ///
+    /// Shadows are taken off where they are simpler than what they leave.
+    pub(super) fn lit(&self, all: &Weights, cast: &Cast, which: &[u32]) -> Option<LitPart> {
         let corners = corners(self.corner_m, self.size_m);
+        let mut lit = if self.pieces.is_empty() { vec![corners.to_vec()] } else { self.pieces.clone() };
         let origin_m = self.stand.foot_m - cast.foot_m;
+        let mut shadowed = vec![];
         for k in which {
             let shadow = &cast.shadows[*k as usize];
             let sides = shadow.sides.map(|side| side.about(origin_m));
-            if !leave_outside(&mut pieces, &corners, &sides[..shadow.count]) {
-                return None;
+            let mut left = Vec::with_capacity(lit.len() + 3);
+            for piece in lit.drain(..) {
+                shadowed.extend(outside(piece, &sides[..shadow.count], &mut left));
             }
+            lit = left;
         }
-        Self::new(&self.stand, self.bicubic, [self.corner_m, self.size_m], pieces)
+        if shadowed.is_empty() {
+            return Some(LitPart { weights: *all, factor: self.factor, left: self.left() });
+        }
+        let corners_of = |pieces: &[Polygon]| pieces.iter().map(Vec::len).sum::<usize>();
+        let is_simpler = corners_of(&shadowed) < corners_of(&lit);
+        let part = |pieces| Self::new(&self.stand, self.bicubic, [self.corner_m, self.size_m], pieces);
+        if lit.is_empty() {
+            return None;
+        }
+        if !is_simpler {
+            return part(lit).map(|part| LitPart { weights: part.weights(), factor: part.factor, left: 1.0 });
+        }
+        let Some(part) = part(shadowed) else {
+            return Some(LitPart { weights: *all, factor: self.factor, left: 1.0 });
+        };
+        let hidden = part.weights();
+        let of_nodes: [f64; NODES] = std::array::from_fn(|k| all.of_nodes[k] - hidden.of_nodes[k]);
+        let weights = Weights { of_nodes, error: all.error + hidden.error };
+        // Of what is far away factors are known less well than weights.
+        Some(LitPart { weights, factor: of_nodes.iter().sum::<f64>().max(0.0), left: 1.0 })
     }
 
     /// The part of what a polynomial leaves out that is left, were all of it seen as it is: of what has neither mean nor slope nor
