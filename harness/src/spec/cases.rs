@@ -45,7 +45,8 @@ pub(super) fn variants(
     };
     let (count, limits) = (combinations.len(), source.trust.limits());
     let most = limits.cases.min(limits.values / source.values.max(1));
-    let help = format!("a spec so large holds {most} cases at most: make several of it");
+    let so_large = if most < limits.cases { " so large" } else { "" };
+    let help = format!("a spec{so_large} holds {most} cases at most: make several of it");
     source.require(count <= most, "cases", format!("{count} cases"), help)?;
     source.require(!combinations.is_empty(), "cases", "there are none", "give at least one, or leave `cases` out")?;
     let mut names = HashSet::new();
