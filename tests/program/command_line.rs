@@ -109,7 +109,8 @@ fn a_name_that_is_more_than_a_line_is_refused() {
     refused("id: lamp,", r#"id: "a\n!touch pwned\n#","#, "spec.yaml:7:", "is no name");
     refused("id: lamp,", "id: ' ',", "spec.yaml:7:", "is no name");
     refused("id: lamp,", &format!("id: {},", "a".repeat(101)), "spec.yaml:7:", "1 to 100 printable characters");
-    refused("title: a test room", r#"title: "a\u2028b""#, "spec.yaml:2:", "is no title");
+    refused("title: a test room", r#"title: "a\nb""#, "spec.yaml:2:", "is no title");
+    refused("title: a test room", r#"title: "a\u2028b""#, "spec.yaml:2:", "U+2028, which shows nothing");
 }
 
 #[test]

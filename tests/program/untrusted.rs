@@ -131,7 +131,6 @@ fn aliases_attributes_and_cases_multiply_nothing() {
     let bomb = |place: &str| place.replace("LONG", &long).replace("MANY", &"*a,".repeat(100));
     for (more, says) in [
         ("engines: {simulator: {a: &a LONG, b: [MANY]}}\n", "aliases add more than"),
-        ("cases:\n  - {name: &a a, x: LONG}\n  - {name: b, x: [MANY]}\n", "unknown field"),
         ("cases:\n  - &a {name: a, x: LONG}\n  - [MANY]\n", "aliases add more than"),
     ] {
         let room = room(&(spec() + &bomb(more)));
@@ -146,7 +145,7 @@ fn aliases_attributes_and_cases_multiply_nothing() {
     // A spec of many values has few cases.
     let cases = (0..50).map(|k| format!("  - {{name: c{k}}}\n")).collect::<String>();
     let points = "[1, 1, 0.8]";
-    let many = spec().replace(points, &format!("{points}, ").repeat(9_000)) + "cases:\n" + &cases;
+    let many = spec().replace(points, &(format!("{points}, ").repeat(9_000) + points)) + "cases:\n" + &cases;
     said(&room(&many), "cases at most");
     let boxes = "  - {box: {min_m: [0, 0, 0], max_m: [1, 1, 0.1], reflectance: 0}}\n".repeat(4_500);
     said(&room(&spec().replace("meters:\n", &format!("obstacles:\n{boxes}meters:\n"))), "triangles are more than");

@@ -54,7 +54,8 @@ pub(super) fn variants(source: &Source, tree: &Tree, of_base: &[SpecError]) -> V
     let checked = combinations.and_then(|combinations: Vec<_>| {
         let (count, limits) = (combinations.len(), source.trust.limits());
         let most = limits.cases.min(limits.values / source.values.max(1));
-        let help = format!("a spec so large holds {most} cases at most: make several of it");
+        let so_large = if most < limits.cases { " so large" } else { "" };
+        let help = format!("a spec{so_large} holds {most} cases at most: make several of it");
         source.require(count <= most, "cases", format!("{count} cases"), help)?;
         let any = !combinations.is_empty() || !found.faults.is_empty();
         source.require(any, "cases", "there are none", "give at least one, or leave `cases` out")?;
