@@ -11,24 +11,30 @@
 
 mod balance;
 mod bicubic;
+mod close;
 mod face;
 mod field;
+mod given;
 mod grid;
 mod lit;
 mod patches;
 mod rays;
+mod seen;
+mod solution;
 mod surroundings;
 #[cfg(test)]
 mod tests;
+mod trust;
 mod view;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use self::balance::{Asked, Balance, Given};
+use self::balance::{Asked, Balance};
 use self::bicubic::{Bicubic, NODES};
 use self::face::Cover;
 use self::field::Field;
+use self::given::{FINE, Given};
 use self::grid::Grid;
 use self::lit::{Known, Lights, Limit, Lit};
 use self::rays::Rays;
@@ -306,7 +312,9 @@ impl Enclosure {
             let open: Vec<(Asked, Bounded)> =
                 all.filter(|(asked, found)| !balance.is_solved() || !asked.meets(&given, found)).collect();
             // What few meters need rays give them for less.
-            let is_enough = balance.is_spent() || open.len() as f64 <= HARD * asked.len() as f64;
+            // Where so little is asked for that rays take longer, none is left to them.
+            let hard = if accuracy.relative_error < FINE { 0.0 } else { HARD };
+            let is_enough = balance.is_spent() || open.len() as f64 <= hard * asked.len() as f64;
             if balance.is_solved() && is_enough {
                 break;
             }

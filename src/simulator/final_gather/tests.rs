@@ -87,6 +87,19 @@ fn indirect_light_of_s2_lies_within_its_bound() {
     }
 }
 
+/// What nodes are off is measured by the solution before: without that bounds are ten times as wide, and rays would be asked.
+#[test]
+fn reflected_light_of_s2_is_known_to_a_thousandth() {
+    let converged = Transport::Indirect(Bounces::Converged);
+    let solution = illuminance(&s2(), &s2_meters(), converged, &accuracy(1e-3)).unwrap();
+    assert!(!solution.solver.contains("final gather"), "{}", solution.solver);
+    for (estimate, v) in solution.estimates.iter().zip(S2_VALUES) {
+        let (value, bound) = (estimate.illuminance.value(), bound(estimate.uncertainty));
+        assert!(bound <= 1e-3 * value, "{bound} of {value} at {} {}", v[0], v[1]);
+        assert!((value - v[3]).abs() <= bound + 3.0 * v[4], "{value} +- {bound} at {} {}", v[0], v[1]);
+    }
+}
+
 #[test]
 fn an_empty_room_comes_out_as_hp_collocation_says() {
     // A body too small to matter keeps the scene from hp collocation, and one of triangles from the balance, too.

@@ -1,0 +1,114 @@
+//! What the nodes of rectangles see of all rectangles, and what of that is left of what their polynomials leave out.
+
+use rayon::prelude::*;
+
+use super::bicubic::{Bicubic, NODES};
+use super::face::Face;
+use super::given::Given;
+use super::patches::Patch;
+use super::view::{Before, Shown};
+use crate::scene::Meter;
+
+/// Steps of a weight, of the largest: 16 of them off by half a step each are off by 1e-5 of what they add up to.
+const STEPS: f64 = i16::MAX as f64;
+
+/// What a node sees of a rectangle: its weights in steps, since there are many of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    pub(super) patch: u32,
+    step: f32,
+    missed: f32,
+    weights: [i16; NODES],
+}
+
+impl Seen {
+    fn new(patch: usize, weights: &[f64; NODES], missed: f64) -> Self {
+        let most = weights.iter().fold(f64::MIN_POSITIVE, |most, w| most.max(w.abs()));
+        let steps = weights.map(|w| (w / most * STEPS).round() as i16);
+        Self { patch: patch as u32, step: (most / STEPS) as f32, missed: missed as f32, weights: steps }
+    }
+
+    fn weights(&self) -> [f64; NODES] {
+        self.weights.map(|w| f64::from(w) * f64::from(self.step))
+    }
+
+    /// The sum of values at the rectangle's nodes, weighed.
+    pub(super) fn of(&self, values: &[f64; NODES]) -> f64 {
+        f64::from(self.step) * self.weights.iter().zip(values).map(|(w, v)| f64::from(*w) * v).sum::<f64>()
+    }
+}
+
+/// Goes through what a meter sees of all rectangles.
+pub(super) fn for_all_shown(
+    given: &Given,
+    patches: &[Patch],
+    meter: &Meter,
+    mut each: impl FnMut(usize, &Face, &Shown),
+) {
+    let view = given.view(meter);
+    let before: Vec<Option<Before>> = given.faces().iter().map(|face| view.before(face)).collect();
+    for (k, patch) in patches.iter().enumerate() {
+        let shown = before[patch.face].as_ref().and_then(|before| before.of(patch.corner_m, patch.size_m));
+        if let Some(shown) = shown {
+            each(k, &given.faces()[patch.face], &shown);
+        }
+    }
+}
+
+/// What every node sees of all rectangles; `None` where it was stopped.
+pub(super) fn rows(given: &Given, patches: &[Patch]) -> Option<Vec<Vec<Seen>>> {
+    let row = |meter: &Meter| -> Vec<Seen> {
+        if given.stop.is_due() {
+            return vec![];
+        }
+        let mut row = vec![];
+        for_all_shown(given, patches, meter, |k, _, shown| {
+            let weights = shown.weights();
+            row.push(Seen::new(k, &weights.of_nodes, weights.error));
+        });
+        row
+    };
+    let of_patch =
+        |patch: &Patch| patch.nodes(given.faces(), given.bicubic).iter().map(row).collect::<Vec<Vec<Seen>>>();
+    let rows: Vec<Vec<Vec<Seen>>> = patches.par_iter().map(of_patch).collect();
+    (!given.stop.is_due()).then(|| rows.into_iter().flatten().collect())
+}
+
+/// What the nodes of a rectangle see of another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Together {
+    pub(super) patch: u32,
+    /// On the mean: its factor, and what is left of what has no terms up to degree 3, and of what has no mean.
+    pub(super) factor: f64,
+    pub(super) left: f64,
+    pub(super) uneven: f64,
+    pub(super) missed: f64,
+    /// The same in the root mean square of all nodes.
+    pub(super) worst_left: f64,
+    pub(super) worst_uneven: f64,
+}
+
+pub(super) fn together(bicubic: &Bicubic, rows: &[Vec<Seen>; NODES]) -> Vec<Together> {
+    let mut all: Vec<&Seen> = rows.iter().flatten().collect();
+    all.sort_by_key(|seen| seen.patch);
+    let of = |same: &[&Seen]| {
+        let part = 1.0 / NODES as f64;
+        let mut weights = [0.0; NODES];
+        let (mut missed, mut squares) = (0.0, [0.0; 2]);
+        for seen in same {
+            let own = seen.weights();
+            for (sum, own) in weights.iter_mut().zip(own) {
+                *sum += part * own;
+            }
+            missed += part * f64::from(seen.missed);
+            for (square, left) in squares.iter_mut().zip(bicubic.left_of(&own)) {
+                *square += part * left * left;
+            }
+        }
+        let [left, uneven] = bicubic.left_of(&weights);
+        let [worst_left, worst_uneven] = squares.map(f64::sqrt);
+        let factor = weights.iter().sum();
+        Together { patch: same[0].patch, factor, left, uneven, missed, worst_left, worst_uneven }
+    };
+    all.chunk_by(|a, b| a.patch == b.patch).map(of).collect()
+}
