@@ -92,8 +92,7 @@ impl Fault {
         let name = error.file.display().to_string();
         let bytes = error.line.and_then(|_| read_bounded(&error.file, MAX_BYTES).ok());
         // A character stays a character, so that places stay what they are.
-        let inert =
-            |c: char| if is_unprintable(c) && c != '\n' && c != '\t' { char::REPLACEMENT_CHARACTER } else { c };
+        let inert = |c: char| if is_unprintable(c) && c != '\n' && c != '\t' { char::REPLACEMENT_CHARACTER } else { c };
         let text = bytes.map(|bytes| {
             let text = String::from_utf8_lossy(&bytes);
             text.trim_start_matches('\u{feff}').replace("\r\n", "\n").chars().map(inert).collect::<String>()

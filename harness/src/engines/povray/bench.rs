@@ -78,7 +78,11 @@ impl Run {
     /// Its image's name, no other's that may be made at the same time.
     fn image(self) -> String {
         let Self { seed, count, reflections, .. } = self;
-        if reflections == Reflections::All { format!("seed{seed}.ppm") } else { format!("seed{seed}-first-{count}.ppm") }
+        if reflections == Reflections::All {
+            format!("seed{seed}.ppm")
+        } else {
+            format!("seed{seed}-first-{count}.ppm")
+        }
     }
 
     fn pool(self) -> u32 {
