@@ -41,7 +41,7 @@ const PACKAGE: Package = Package {
 
 /// What becomes of light in a scene without settings.
 const STOCK: &str = "as installed, LuxCore drops the candela of IES files: a point light of P lm sends out P / 4 pi. It joins zenith to \
-                     nadir, where half of either is lost, looks tables up by .7 degrees in C and gamma, and follows five reflections at most";
+                     nadir, where half of either is lost, looks tables up by .7 degrees in C and gamma, and follows few reflections";
 /// What is lost by the first of these.
 const STOCK_LOSS: f64 = 1.0 - 0.25 / std::f64::consts::PI;
 

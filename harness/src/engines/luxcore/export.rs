@@ -81,17 +81,18 @@ fn render_cfg(job: &Job, settings: Settings, frame: &Frame) -> String {
     if settings.preset == Preset::Default {
         return text;
     }
-    let (clear, depth) = (CLEAR * patches::patch(job, frame), reflections(job) + 1);
+    // A path's length counts its first leg, from the camera to the meter, and its last, to the luminaire: read with limits of 1, 2 and 7.
+    let (clear, reflections) = (CLEAR * patches::patch(job, frame), reflections(job));
+    let depth = reflections + 2;
     write!(
         text,
         "# Where rays start: what 32-bit floats resolve here.\n\
          scene.epsilon.min = {clear}\nscene.epsilon.max = {clear}\n\
-         # {n} reflections. Russian roulette by the reflectance alone loses nothing, clamping would.\n\
+         # {reflections} reflections. Russian roulette by the reflectance alone loses nothing, clamping would.\n\
          path.pathdepth.total = {depth}\npath.pathdepth.diffuse = {depth}\n\
          path.russianroulette.depth = 3\npath.russianroulette.cap = 0.01\n\
          path.clamping.variance.maxvalue = 0\n\
          lightstrategy.type = POWER\n",
-        n = depth - 1,
     )
     .ok();
     text
