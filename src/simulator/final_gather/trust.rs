@@ -86,8 +86,7 @@ impl Trust {
 /// How far off the nodes of a rectangle of the coarser solution are by the finer one, unevenly and on the mean.
 fn off(bicubic: &Bicubic, coarse: &Solved, fine: &Solved, p: usize, parts: &[usize]) -> [f64; 2] {
     let patch = &coarse.patches[p];
-    let (mut mean, mut square) = (0.0, 0.0);
-    for node in 0..NODES {
+    let change = |node: usize| {
         let at_m = patch.corner_m + bicubic.node(node) * patch.size_m;
         let within = |k: &&usize| {
             let Patch { corner_m, size_m, .. } = fine.patches[**k];
@@ -97,11 +96,12 @@ fn off(bicubic: &Bicubic, coarse: &Solved, fine: &Solved, p: usize, parts: &[usi
             let Patch { corner_m, size_m, .. } = fine.patches[*k];
             bicubic.at(&fine.lux[*k], (at_m - corner_m) / size_m)
         });
-        let change = lux.map_or(0.0, |lux| lux - coarse.lux[p][node]);
-        mean += bicubic.weight(node) * change;
-        square += bicubic.weight(node) * change * change;
-    }
-    [(square - mean * mean).max(0.0).sqrt(), mean.abs()]
+        lux.map_or(0.0, |lux| lux - coarse.lux[p][node])
+    };
+    let changes: [f64; NODES] = std::array::from_fn(change);
+    let weighed = |of: &dyn Fn(f64) -> f64| -> f64 { (0..NODES).map(|k| bicubic.weight(k) * of(changes[k])).sum() };
+    let mean = weighed(&|change| change);
+    [weighed(&|change| (change - mean).powi(2)).sqrt(), mean.abs()]
 }
 
 #[cfg(test)]
