@@ -114,11 +114,10 @@ fn tag_of(text: &str) -> (usize, usize) {
     for (at, byte) in text.bytes().enumerate() {
         match (quote, byte) {
             (Some(open), _) if open == byte => quote = None,
-            (Some(_), _) => {}
             (None, b'"' | b'\'') => quote = Some(byte),
             (None, b'=') => attributes += 1,
             (None, b'>') => return (at + 1, attributes),
-            (None, _) => {}
+            _ => {}
         }
     }
     (text.len(), attributes)

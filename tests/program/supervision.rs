@@ -151,7 +151,7 @@ fn one_run_at_a_time_has_a_folder_and_it_is_looked_at_first() {
     let claim = Claim::of(&folder.path("out")).unwrap();
     folder.run(&[]).exits(2).complains("in use by process").complains("--out");
     drop(claim);
-    folder.luxproof(&["run", "spec.yaml", "--out", "lamp.ies/out"]).exits(2).complains("cannot write there");
+    folder.luxproof(&["run", "spec.yaml", "--out", "lamp.ies/out"]).exits(2).complains("no run can be kept there");
     assert!(!folder.path("started").exists());
     folder.run(&[]).exits(0);
     assert!(folder.path("started").exists());

@@ -143,13 +143,13 @@ fn aliases_attributes_and_cases_multiply_nothing() {
         );
     }
     // A spec of many values has few cases.
-    let cases = (0..50).map(|k| format!("  - {{name: c{k}}}\n")).collect::<String>();
+    let cases = (0..50).map(|k| format!("  - {{name: c{k}}}\n")).collect::<Vec<_>>().concat();
     let points = "[1, 1, 0.8]";
     let many = spec().replace(points, &(format!("{points}, ").repeat(9_000) + points)) + "cases:\n" + &cases;
     said(&room(&many), "cases at most");
     let boxes = "  - {box: {min_m: [0, 0, 0], max_m: [1, 1, 0.1], reflectance: 0}}\n".repeat(4_500);
     said(&room(&spec().replace("meters:\n", &format!("obstacles:\n{boxes}meters:\n"))), "triangles are more than");
-    let attributes = (0..100_000).map(|k| format!(" a{k}=''")).collect::<String>();
+    let attributes = (0..100_000).map(|k| format!(" a{k}=''")).collect::<Vec<_>>().concat();
     let room = room(&spec().replace("lamp.ies", "lamp.xml"));
     room.write("lamp.xml", &format!("<IESTM33-22{attributes}/>"));
     said(&room, "more than 64 attributes");

@@ -12,14 +12,14 @@ impl StressReport {
     pub fn terminal(&self) -> String {
         let (head, rows) = self.matrix();
         let table = tables::terminal(head, rows);
-        let remarks: String = self.remarks().iter().map(|line| format!("  {line}\n")).collect();
+        let remarks = self.remarks().iter().map(|line| format!("  {line}\n")).collect::<Vec<_>>().concat();
         format!("{}: breaks at\n\n{table}\n{LEGEND}\n{remarks}", self.case)
     }
 
     pub fn markdown(&self) -> String {
         let (head, rows) = self.matrix();
         let table = tables::markdown(head, rows);
-        let remarks: String = self.remarks().iter().map(|line| format!("- {}\n", markdown(line))).collect();
+        let remarks = self.remarks().iter().map(|line| format!("- {}\n", markdown(line))).collect::<Vec<_>>().concat();
         format!("## {}\n\n{table}\n{LEGEND}\n\n{remarks}", markdown(&self.case))
     }
 
