@@ -4,7 +4,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 /// Exporters, drivers and read-out of every engine, and the physics behind our own.
-const SOURCES: [&str; 6] = ["src/engines", "src/system/process", "drivers", "engines.lock", "blender.lock", "../src"];
+const SOURCES: [&str; 7] =
+    ["src/engines", "src/system/process", "drivers", "engines.lock", "blender.lock", "web", "../src"];
 
 fn main() -> std::io::Result<()> {
     let mut hasher = DefaultHasher::new();

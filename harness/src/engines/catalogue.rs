@@ -3,12 +3,20 @@
 use std::borrow::Borrow;
 
 use super::contract::{Engine, Entry};
-use super::{cycles, iesna, mitsuba, povray, radiance, simulator};
+use super::{cycles, iesna, mitsuba, povray, radiance, simulator, web};
 use crate::record::EngineName;
 
 /// In the order of reports: our own witnesses first.
-pub const ALL: &[&Entry] =
-    &[&simulator::ENTRY, &iesna::ENTRY, &mitsuba::ENTRY, &radiance::ENTRY, &povray::ENTRY, &cycles::ENTRY];
+pub const ALL: &[&Entry] = &[
+    &simulator::ENTRY,
+    &iesna::ENTRY,
+    &mitsuba::ENTRY,
+    &radiance::ENTRY,
+    &povray::ENTRY,
+    &cycles::ENTRY,
+    &web::THREE,
+    &web::BABYLON,
+];
 
 pub fn all() -> Vec<Box<dyn Engine>> {
     ALL.iter().map(|entry| (entry.make)()).collect()

@@ -15,7 +15,7 @@ use serde::Deserialize;
 
 use self::export::patch;
 use self::ies::LookedUp;
-use self::settings::Settings;
+use self::settings::{Files, Settings};
 use super::dialogue::{Cost, Dialogue};
 use super::float_error::{FloatError, Instrument};
 use super::frame::Frame;
@@ -61,6 +61,10 @@ impl Engine for Cycles {
         ID
     }
 
+    fn reads_files(&self, job: &Job) -> bool {
+        Settings::of(job).is_ok_and(|settings| settings.photometry == Files::Native)
+    }
+
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         let absent = |reason: String| Absent { reason, remedy: REMEDY.into() };
         let blender = site.blender();
@@ -84,6 +88,11 @@ impl Engine for Cycles {
         let is_stock = settings.is_ok_and(|s| s.preset == Preset::Default);
         if let Some(why) = ENTRY.objection(job).or_else(|| export::obstacle(job, is_stock)) {
             return Support::No(why);
+        }
+        if let Some((one, other)) = self.reads_files(job).then(|| export::two_files_of_a_table(job)).flatten() {
+            return Support::No(format!(
+                "`{one}` and `{other}` have files that differ and say the same table: its textures go by tables"
+            ));
         }
         if is_stock {
             let why = "as installed, Cycles mirrors the C planes of IES files, bends between their angles, is up to an eighth off where \
@@ -149,7 +158,7 @@ fn read_files(
     let rounding = FloatError::of(job, frame, instrument);
     let tables = Tables::of(job);
     // A stock scene has the tables as they are, and what becomes of them is what one wants to know.
-    let resampled = tables.distinct.iter().filter(|_| settings.preset != Preset::Default);
+    let resampled = tables.distinct.iter().filter(|_| !settings.has_plain_tables());
     let looked_up: Vec<LookedUp> = resampled.map(|d| LookedUp::of(d)).collect();
     let of_tables_lx = |k: usize| -> f64 {
         let off = job.scene.luminaires.iter().zip(&tables.of_luminaire);

@@ -5,6 +5,7 @@
 mod debian;
 mod venv;
 mod verify;
+mod web;
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -81,8 +82,15 @@ pub fn repair(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str
 }
 
 fn components(engines: &[EngineName]) -> Vec<Component> {
-    let all =
-        [Component::PythonPackages, Component::PovRay, Component::LibLlvm, Component::LibFaketime, Component::Blender];
+    let all = [
+        Component::PythonPackages,
+        Component::PovRay,
+        Component::LibLlvm,
+        Component::LibFaketime,
+        Component::Blender,
+        Component::WebPackages,
+        Component::Chromium,
+    ];
     let named = || ALL.iter().filter(|entry| is_chosen(&entry.name, engines));
     all.into_iter().filter(|c| named().any(|entry| entry.installs.contains(c))).collect()
 }
@@ -107,6 +115,8 @@ impl Component {
             Self::LibLlvm => "libLLVM",
             Self::LibFaketime => "libfaketime",
             Self::Blender => "Blender",
+            Self::WebPackages => "three.js and Babylon.js",
+            Self::Chromium => "Chromium",
         }
     }
 
@@ -114,6 +124,7 @@ impl Component {
         let present = match self {
             Self::PythonPackages => Some(site.venv()).filter(|_| venv::SHARED.is_current(site)),
             Self::Blender => Some(site.blender().venv()).filter(|_| venv::BLENDER.is_current(&site.blender())),
+            Self::WebPackages => site.web_packages().filter(|_| web::is_current(site)),
             other => other.found(site),
         };
         match present {
@@ -135,6 +146,8 @@ impl Component {
         match self {
             Self::PythonPackages => venv::SHARED.soundness(site),
             Self::Blender => venv::BLENDER.soundness(&site.blender()),
+            Self::WebPackages => web::soundness(site),
+            Self::Chromium => verify::debian(site, found, &debian::CHROMIUM_PACKAGES),
             Self::PovRay => verify::debian(site, found, &debian::POVRAY_PACKAGES),
             Self::LibLlvm => verify::debian(site, found, &debian::LLVM_PACKAGES),
             Self::LibFaketime => verify::debian(site, found, &debian::LIBFAKETIME_PACKAGES),
@@ -149,6 +162,8 @@ impl Component {
             Self::LibLlvm => site.llvm(),
             Self::LibFaketime => site.libfaketime(),
             Self::Blender => site.blender().python(),
+            Self::WebPackages => site.web_packages(),
+            Self::Chromium => site.chromium(),
         }
     }
 
@@ -156,6 +171,8 @@ impl Component {
         let installed = match self {
             Self::PythonPackages => venv::SHARED.install(site, progress),
             Self::Blender => venv::BLENDER.install(&site.blender(), progress),
+            Self::WebPackages => web::install(site, progress),
+            Self::Chromium => debian::install_chromium(site, progress),
             Self::PovRay => debian::install_povray(site, progress),
             Self::LibLlvm => debian::install_llvm(site, progress),
             Self::LibFaketime => debian::install_libfaketime(site, progress),
@@ -198,6 +215,9 @@ mod tests {
         assert_eq!(components(&two), [PythonPackages, PovRay, LibFaketime]);
         assert_eq!(components(&[EngineName::new("mitsuba")]), [PythonPackages, LibLlvm]);
         assert_eq!(components(&[EngineName::new("cycles")]), [Component::Blender]);
+        for name in ["three", "babylon"] {
+            assert_eq!(components(&[EngineName::new(name)]), [Component::WebPackages, Component::Chromium]);
+        }
         assert_eq!(components(&[EngineName::new("simulator"), EngineName::new("iesna")]), []);
     }
 

@@ -5,6 +5,7 @@
 use std::fmt::Write;
 
 use glam::DVec3;
+use itertools::Itertools;
 use luminaire::geometry::Surface;
 use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Shape};
@@ -12,7 +13,7 @@ use serde::Serialize;
 
 use super::ID;
 use super::ies::{self, LookedUp};
-use super::settings::Settings;
+use super::settings::{Files, Settings};
 use crate::engines::comment::Comment;
 use crate::engines::dialogue::{self, Seat};
 use crate::engines::frame::{Frame, plain};
@@ -40,17 +41,33 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
         SceneFile::text("cycles_scene.py", SCENE),
     ];
     files.extend(meshes::files(job, &frame));
-    files.extend(tables.distinct.iter().enumerate().map(|(k, d)| SceneFile::text(&table(k), ies_file(d, settings))));
+    let own = |k: usize| {
+        let of_table =
+            tables.of_luminaire.iter().position(|t| *t == k).filter(|_| settings.photometry == Files::Native)?;
+        Some(job.scene.luminaires[of_table].photometry.lm63_file()?.bytes.to_vec())
+    };
+    let file = |(k, d): (usize, &&_)| match own(k) {
+        Some(bytes) => SceneFile { name: table(k), bytes },
+        None => SceneFile::text(&table(k), ies_file(d, settings)),
+    };
+    files.extend(tables.distinct.iter().enumerate().map(file));
     Ok(files)
 }
 
 fn ies_file(distribution: &LuminousIntensityDistribution, settings: Settings) -> String {
-    match settings.preset {
-        Preset::Default => ies::plain_file(distribution, "[MORE] the table as it is"),
-        Preset::Audit | Preset::Fast => {
-            LookedUp::of(distribution).file("[MORE] resampled for the cubic curves of Cycles' IES texture")
-        }
+    if settings.has_plain_tables() {
+        return ies::plain_file(distribution, "[MORE] the table as it is");
     }
+    LookedUp::of(distribution).file("[MORE] resampled for the cubic curves of Cycles' IES texture")
+}
+
+/// Luminaires whose own files differ, and say the same.
+pub(super) fn two_files_of_a_table(job: &Job) -> Option<(&str, &str)> {
+    let all = &job.scene.luminaires;
+    let differ = |[a, b]: &[&Luminaire; 2]| {
+        a.photometry.distribution == b.photometry.distribution && a.photometry.source != b.photometry.source
+    };
+    all.iter().array_combinations().find(differ).map(|[a, b]| (a.id.as_str(), b.id.as_str()))
 }
 
 fn table(k: usize) -> String {
