@@ -1,63 +1,82 @@
-//! Images that renderers wrote, read with OpenImageIO in a process of its own.
+//! Images that renderers wrote: pixmaps (Netpbm's `P6`), which are their numbers behind a line of text, so that reading one starts no program.
 
 use std::path::Path;
 
-use super::{EngineError, Workbench};
+use super::EngineError;
 use crate::record::EngineName;
 
-const DRIVER: &str = include_str!("../../drivers/read_image.py");
-
-/// The pixels of an RGB image, row by row; integer formats as 0..=1.
-pub(super) fn read_rgb(engine: &EngineName, workbench: &Workbench, path: &Path) -> Result<Vec<[f64; 3]>, EngineError> {
-    let output = |what: String| EngineError::Output { engine: engine.clone(), what };
-    let python = workbench.site.python().ok_or_else(|| {
-        output("OpenImageIO is not there to read its image; run `luxproof engines install`".to_owned())
-    })?;
-    let invocation = workbench.invoke(python).args(["-I".as_ref(), "-".as_ref(), path.as_os_str()]);
-    let done = invocation.stdin(DRIVER.as_bytes().to_vec()).run()?;
-    pixels(&done.stdout).map_err(|what| output(format!("OpenImageIO {what} of {}", path.display())))
+/// The pixels of an RGB image, row by row, as 0..=1.
+pub(super) fn read_rgb(engine: &EngineName, path: &Path) -> Result<Vec<[f64; 3]>, EngineError> {
+    let bytes = std::fs::read(path).map_err(|source| EngineError::io(path, source))?;
+    let told = |what| EngineError::output(engine.clone(), format!("its image {} {what}", path.display()));
+    pixels(&bytes).map_err(told)
 }
 
 fn pixels(bytes: &[u8]) -> Result<Vec<[f64; 3]>, String> {
-    let end = bytes.iter().position(|b| *b == b'\n').ok_or("gave no header")?;
-    let header = std::str::from_utf8(&bytes[..end]).map_err(|_| "gave no text header")?;
-    let sizes: Vec<usize> = header.split_whitespace().map_while(|w| w.parse().ok()).collect();
-    let &[width, height, 3] = sizes.as_slice() else {
-        return Err(format!("gave the header `{header}`, not three channels,"));
+    let mut rest = bytes.strip_prefix(b"P6").ok_or("is no pixmap")?;
+    let [width, height, full] = [(); 3].map(|()| number(&mut rest));
+    let (Some(width), Some(height), Some(full @ 1..=65535)) = (width, height, full) else {
+        return Err("has no header of a pixmap".to_owned());
     };
-    let (data, wanted) = (&bytes[end + 1..], width.saturating_mul(height).saturating_mul(24));
+    // One white space ends the header: whatever follows is numbers, the high byte first where there are two.
+    let data = rest.get(1..).unwrap_or_default();
+    let bytes_each = if full < 256 { 1 } else { 2 };
+    let wanted = width.saturating_mul(height).saturating_mul(3 * bytes_each);
     if data.len() != wanted {
-        return Err(format!("gave {} bytes where {wanted} belong to the {width} x {height} pixels", data.len()));
+        return Err(format!("has {} bytes where {wanted} belong to its {width} x {height} pixels", data.len()));
     }
-    let value = |b: &[u8], k: usize| f64::from_le_bytes(std::array::from_fn(|i| b[8 * k + i]));
-    Ok(data.chunks_exact(24).map(|b| [value(b, 0), value(b, 1), value(b, 2)]).collect())
+    let value = |b: &[u8]| b.iter().fold(0.0, |high, low| 256.0 * high + f64::from(*low)) / full as f64;
+    let pixel = |b: &[u8]| std::array::from_fn(|k| value(&b[k * bytes_each..(k + 1) * bytes_each]));
+    Ok(data.chunks_exact(3 * bytes_each).map(pixel).collect())
+}
+
+/// The next number of a header, behind white space and comments.
+fn number(rest: &mut &[u8]) -> Option<usize> {
+    loop {
+        *rest = rest.trim_ascii_start();
+        let Some(comment) = rest.strip_prefix(b"#") else { break };
+        *rest = &comment[comment.iter().position(|b| *b == b'\n')?..];
+    }
+    let digits = rest.iter().take_while(|b| b.is_ascii_digit()).count();
+    let (number, behind) = rest.split_at(digits);
+    *rest = behind;
+    std::str::from_utf8(number).ok()?.parse().ok()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engines::{Site, fixtures};
 
     #[test]
-    fn a_sixteen_bit_pixmap_is_read_to_the_last_step_and_a_short_one_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let workbench = fixtures::workbench(Site::of_user().unwrap(), folder.path());
-        let path = folder.path().join("two.ppm");
-        let mut bytes = b"P6\n2 1\n65535\n".to_vec();
+    fn pixmaps_are_read_to_the_last_step() {
+        let mut bytes = b"P6\n# by hand\n2 1 # wide\n65535\n".to_vec();
         bytes.extend([0x00, 0x00, 0xff, 0xff, 0x80, 0x00, 0x00, 0x01, 0x12, 0x34, 0xff, 0xfe]);
-        std::fs::write(&path, &bytes).unwrap();
-        let read = read_rgb(&EngineName::new("povray"), &workbench, &path).unwrap();
         let step = |n: u16| f64::from(n) / 65535.0;
-        assert_eq!(read, [[0.0, 1.0, step(0x8000)], [step(1), step(0x1234), step(0xfffe)]]);
-        std::fs::write(&path, &bytes[..bytes.len() - 3]).unwrap();
-        assert!(read_rgb(&EngineName::new("povray"), &workbench, &path).is_err());
+        assert_eq!(pixels(&bytes).unwrap(), [[0.0, 1.0, step(0x8000)], [step(1), step(0x1234), step(0xfffe)]]);
+        // The first number may look like white space.
+        assert_eq!(pixels(b"P6 1 1 255\n\n\x33\xff").unwrap(), [[10.0 / 255.0, 0.2, 1.0]]);
     }
 
     #[test]
-    fn what_is_not_an_rgb_image_is_refused() {
-        assert!(pixels(b"").is_err());
-        assert!(pixels(b"1 1 1\n01234567").is_err());
-        assert!(pixels(b"1 1 3\n0123").is_err());
-        assert!(pixels(b"18446744073709551615 2 3\n").is_err());
+    fn what_is_no_whole_pixmap_is_refused() {
+        let sound = b"P6\n2 1\n255\n123456";
+        assert!(pixels(sound).is_ok());
+        for cut in 0..sound.len() {
+            assert!(pixels(&sound[..cut]).is_err(), "{cut}");
+        }
+        let others: [&[u8]; 7] = [
+            b"P3 1 1 255\n1 2 3",
+            b"P6 1 1 255\n1234",
+            b"P6 1 1 0\n123",
+            b"P6 1 1 65536\n123456",
+            b"P6 -1 1 255\n123",
+            b"P6 18446744073709551615 18446744073709551615 255\n123",
+            b"P6 # endless",
+        ];
+        for bytes in others {
+            assert!(pixels(bytes).is_err(), "{bytes:?}");
+        }
+        let error = read_rgb(&EngineName::new("povray"), Path::new("/nowhere.ppm")).unwrap_err().to_string();
+        assert!(error.contains("nowhere.ppm"), "{error}");
     }
 }

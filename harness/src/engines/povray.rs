@@ -43,7 +43,7 @@ pub(super) static ENTRY: Entry = Entry {
     name: ID,
     display_name: "POV-Ray",
     colour: ("#007a5a", "#3fc79d"),
-    installs: &[Component::PythonPackages, Component::PovRay],
+    installs: &[Component::PovRay],
     is_on_request: false,
     models: &[LuminaireModel::Point, LuminaireModel::Area],
     fits_coordinates: Some("recentre"),
@@ -60,8 +60,6 @@ impl Engine for PovRay {
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         let remedy = || "run `luxproof engines install`, or install the Debian package povray".to_owned();
         let absent = |reason| Absent { reason, remedy: remedy() };
-        let reader = site.python_package("OpenImageIO");
-        let reader = reader.ok_or_else(|| absent("OpenImageIO, which reads its images, is not there".to_owned()))?;
         let program = bench::program(site).map_err(|e| absent(e.to_string()))?;
         let done = process::ask(program.clone(), "--version", |asked| bench::hermetic(asked, site));
         let done = done.map_err(|e| absent(e.to_string()))?;
@@ -73,7 +71,7 @@ impl Engine for PovRay {
         let (unpacked, llvm) = (site.debian(), site.libraries("libLLVM"));
         let is_its = |l: &PathBuf| program.starts_with(&unpacked) && l.starts_with(&unpacked) && !llvm.contains(l);
         let libraries = site.libraries("lib").into_iter().filter(is_its);
-        Ok(Version::of(&ID, version, site, libraries.chain([program.clone(), reader])))
+        Ok(Version::of(&ID, version, site, libraries.chain([program.clone()])))
     }
 
     fn supports(&self, job: &Job) -> Support {
@@ -106,6 +104,11 @@ impl Engine for PovRay {
 
     fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
         Settings::of(job).map(drop)
+    }
+
+    /// Several processes a thread, of some 60 MiB each.
+    fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
+        (threads * bench::SIDE_BY_SIDE) as u64 * (86 + super::geometry_mib(job))
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {

@@ -30,6 +30,8 @@ const TEST_S: f64 = 1.1e-7;
 const FIRST_REFLECTION: f64 = 1.35;
 /// The part of the time that the fewest blocks may take.
 const FIRST_BLOCKS: f64 = 0.9;
+/// Processes for each thread: one that is started alone sleeps most of .7 s, waiting for its own threads in steps of 50 ms.
+pub(super) const SIDE_BY_SIDE: usize = 3;
 /// Looks at direct light at most: each narrows a reading by 1e3 at least.
 const MAX_LOOKS: usize = 10;
 /// Below this share of its upper bound a reading is darkness.
@@ -73,6 +75,12 @@ enum Reflections {
 }
 
 impl Run {
+    /// Its image's name, no other's that may be made at the same time.
+    fn image(self) -> String {
+        let Self { seed, count, reflections, .. } = self;
+        if reflections == Reflections::All { format!("seed{seed}.ppm") } else { format!("seed{seed}-first-{count}.ppm") }
+    }
+
     fn pool(self) -> u32 {
         if self.reflections == Reflections::First && self.count > POOL / 10 { LONG_POOL } else { POOL }
     }
@@ -148,8 +156,7 @@ impl<'a> Bench<'a> {
             measurement.notes.push(few);
         }
         self.keep_readouts(&pilot.readouts)?;
-        let jobs = self.workbench.jobs.max(1);
-        let blocks = Sampling::within(budget, block_s).run(|numbers| self.wave(run, numbers, jobs, &pilot))?;
+        let blocks = Sampling::within(budget, block_s).run(|numbers| self.wave(run, numbers, &pilot))?;
         let made = blocks.blocks.count();
         measurement.estimates = measurement.take(blocks);
         let mut effort = Effort::from([
@@ -206,26 +213,29 @@ impl<'a> Bench<'a> {
         Err(output(format!("reflected light was not read after {MAX_LOOKS} looks")))
     }
 
-    /// Blocks, `jobs` of them side by side, each a process of one thread.
-    fn wave(&self, run: Run, numbers: Range<usize>, jobs: usize, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
+    /// Blocks, each of some runs that add up; every run is a process of one thread.
+    fn wave(&self, run: Run, numbers: Range<usize>, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
         // The pilot is the first of the sequence of seeds.
-        let block = |k: &usize| self.block(Run { seed: self.seed(k + 1), ..run }, pilot);
-        side_by_side(jobs, &numbers.collect::<Vec<_>>(), block).into_iter().collect()
+        let parts = |k| self.parts(Run { seed: self.seed(k + 1), ..run }).into_iter().map(move |part| (k, part));
+        let all: Vec<(usize, (f64, Run))> = numbers.clone().flat_map(parts).collect();
+        let side = SIDE_BY_SIDE * self.workbench.jobs.max(1);
+        let read = side_by_side(side, &all, |(_, (_, run))| self.values(*run, pilot));
+        let mut blocks = vec![vec![0.0; self.job.stations.len()]; numbers.len()];
+        for ((k, (sign, _)), values) in all.into_iter().zip(read) {
+            blocks[k - numbers.start].iter_mut().zip(values?).for_each(|(sum, lx)| *sum += sign * lx);
+        }
+        Ok(blocks)
     }
 
-    /// The first reflection, most of the noise, is read once more with many rays and no cache, and exchanged for the
-    /// one of the same few rays: E = E(all, few rays) - E(first, the same rays) + E(first, many rays).
-    fn block(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
+    /// The runs of a block and their signs. The first reflection, most of the noise, is read once more with many rays and no cache, and
+    /// exchanged for the one of the same few rays: E = E(first, many rays) + E(all, few rays) - E(first, the same rays).
+    fn parts(&self, all: Run) -> Vec<(f64, Run)> {
         if self.settings.preset == Preset::Default {
-            return self.values(run, pilot);
+            return vec![(1.0, all)];
         }
-        let few = Run { reflections: Reflections::First, ..run };
-        let many = self.values(Run { count: FIRST_REFLECTION_RAYS * run.count, ..few }, pilot)?;
-        if self.first_reflection_only() {
-            return Ok(many);
-        }
-        let (all, few) = (self.values(run, pilot)?, self.values(few, pilot)?);
-        Ok(all.iter().zip(&few).zip(&many).map(|((all, few), many)| all - few + many).collect())
+        let few = Run { reflections: Reflections::First, ..all };
+        let many = Run { count: FIRST_REFLECTION_RAYS * all.count, ..few };
+        if self.first_reflection_only() { vec![(1.0, many)] } else { vec![(1.0, many), (1.0, all), (-1.0, few)] }
     }
 
     fn first_reflection_only(&self) -> bool {
@@ -258,11 +268,11 @@ impl<'a> Bench<'a> {
     }
 
     fn render(&self, run: Run, readouts: &[Readout]) -> Result<Rendered, EngineError> {
-        let image = format!("seed{}.ppm", run.seed);
+        let image = run.image();
         let path = self.workbench.scene_dir.join(&image);
         let invocation = self.workbench.invoke(&self.program).args(self.arguments(run, &image));
         let finished = hermetic(invocation, &self.workbench.site).run()?;
-        let pixels = read_rgb(&ID, self.workbench, &path)?;
+        let pixels = read_rgb(&ID, &path)?;
         std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
         let blanks = run.blanks();
         if pixels.len() != blanks + readouts.len() {
