@@ -41,6 +41,10 @@ impl Blocks {
         self.0.len()
     }
 
+    pub(super) fn into_vec(self) -> Vec<Vec<f64>> {
+        self.0
+    }
+
     /// The mean at each station.
     pub fn estimates(&self) -> Vec<Estimate> {
         let mut all: Vec<Estimate> = self.stations().map(|k| self.weighted(&[(k, 1.0)])).collect();

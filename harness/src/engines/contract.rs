@@ -81,6 +81,11 @@ pub trait Engine: Send + Sync {
         threads as u64 * (256 + geometry_mib(job))
     }
 
+    /// Whether its processes sleep most of the time that the job takes: they then hold no slot, which is for who computes.
+    fn mostly_waits(&self, _job: &Job) -> bool {
+        false
+    }
+
     /// The job without what makes no difference to this engine's readings: two jobs that are equal then are one to it. For
     /// most, the names of case and procedure are comments.
     fn cache_identity(&self, job: &Job) -> Job {
@@ -139,6 +144,9 @@ pub struct Knob {
 /// What of the machine an engine is given for a job: one thread for what is determined or quick, many for reflected light, whose
 /// readings are as good as the seconds of the budget allow.
 pub fn share(engine: &dyn Engine, job: &Job, slots: &Slots) -> Share {
+    if engine.mostly_waits(job) {
+        return Share { threads: 0, memory_mib: 0 };
+    }
     let threads = if job.transport == Transport::Direct { 1 } else { slots.threads_a_reading() };
     Share { threads, memory_mib: engine.memory_mib(job, threads) }
 }

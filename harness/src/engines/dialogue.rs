@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use luminaire::scene::Transport;
 
-use super::blocks::{Blocks, Sampling};
+use super::blocks::{Blocks, MIN_BLOCKS, Sampling};
 use super::contract::same_meters;
 use super::effort;
 use super::frame::Frame;
@@ -16,13 +16,14 @@ use crate::system::process::Conversation;
 
 /// What drivers share, beside theirs.
 pub(super) const BLOCKS: &str = include_str!("../../drivers/blocks.py");
-/// For a standard error that is itself good to 13 %.
-const ENOUGH_BLOCKS: usize = 32;
+/// Blocks that effort is planned for, and that suffice where their error is small enough.
+const PLANNED_BLOCKS: usize = 3 * MIN_BLOCKS;
+const ENOUGH_BLOCKS: usize = 2 * MIN_BLOCKS;
 /// Strata along a side at least, so that blocks are many strata and their errors near normal; at most, to check often.
-const MIN_SIDE: usize = 64;
+const MIN_SIDE: usize = 32;
 const MAX_SIDE: usize = 256;
-/// The spread of two blocks is a rough guess of the error of one.
-const PLAN_MARGIN: f64 = 2.0;
+/// Where blocks should be larger by less than this, there are rather more of the trial's size, which count then.
+const WORTH_A_LARGER_SIDE: f64 = 1.5;
 
 /// What a ray takes, as its engine counts.
 #[derive(Clone, Copy, Debug)]
@@ -93,6 +94,9 @@ enum Stream {
     Trial = 2,
 }
 
+/// Samples along a side of a block, when to stop, and blocks that are made already.
+type Planned = (usize, Sampling<'static>, Vec<Vec<f64>>);
+
 /// A conversation with a driver, and what its engine knows of its readings.
 pub(super) struct Dialogue<'a> {
     pub(super) engine: EngineName,
@@ -140,14 +144,21 @@ impl Dialogue<'_> {
         found: &mut Measurement,
     ) -> Result<Vec<Estimate>, EngineError> {
         let stream = if part.name == "direct" { Stream::Direct } else { Stream::Reflected };
-        let (side, rule) = match self.fixed {
+        let (side, rule, mut trial) = match self.fixed {
             None => self.plan(part, greeting)?,
             Some((blocks, side)) => {
                 let block_s = self.sample_s(part, greeting) * (side * side) as f64;
-                (side, Sampling::fixed(blocks, self.job.budget, block_s))
+                (side, Sampling::fixed(blocks, self.job.budget, block_s), vec![])
             }
         };
-        let mut read = rule.run(|numbers| self.blocks(part, side, stream, numbers))?;
+        let mut read = rule.run(|numbers| {
+            let mut blocks: Vec<Vec<f64>> = trial.drain(..trial.len().min(numbers.len())).collect();
+            let more = numbers.start + blocks.len()..numbers.end;
+            if !more.is_empty() {
+                blocks.extend(self.blocks(part, side, stream, more)?);
+            }
+            Ok(blocks)
+        })?;
         read.remark = read.remark.map(|why| format!("{}: {why}", part.name));
         let samples = side * side * part.rays / self.job.stations.len().max(1);
         let of_part = [("blocks", read.blocks.count()), ("samples_a_meter_and_block", samples)];
@@ -157,20 +168,22 @@ impl Dialogue<'_> {
         Ok(found.take(read).into_iter().map(within).collect())
     }
 
-    /// Samples along a side of a block so that a block fills the rays in flight at most, and enough blocks about reach the
-    /// error and fit in the time.
-    fn plan(&mut self, part: &Part, greeting: &Greeting) -> Result<(usize, Sampling<'static>), EngineError> {
+    /// Samples along a side of a block so that a block fills the rays in flight at most, and the blocks that are planned about reach the
+    /// error and fit in the time; with a trial's blocks where these are the first of them.
+    fn plan(&mut self, part: &Part, greeting: &Greeting) -> Result<Planned, EngineError> {
         let full = (greeting.lanes / part.rays.max(1)).isqrt().clamp(2, MAX_SIDE);
-        let trial_side = (self.cost)(&greeting.variant).trial_side.unwrap_or(full);
-        let trials = self.blocks(part, trial_side, Stream::Trial, 0..2)?;
+        let trial_side = (self.cost)(&greeting.variant).trial_side.unwrap_or(MIN_SIDE).min(full);
+        let trial = Blocks::new(self.blocks(part, trial_side, Stream::Trial, 0..MIN_BLOCKS)?);
         let (sample_s, budget) = (self.sample_s(part, greeting), self.job.budget);
         let affordable = ((budget.seconds / ENOUGH_BLOCKS as f64 / sample_s) as usize).isqrt();
-        // The error is that of the mean of two; m x m samples are at least as good as m x m independent ones.
-        let excess = Blocks::new(trials).worst_error(&[]) / budget.relative_error;
-        let needed = trial_side as f64 * PLAN_MARGIN * excess * (2.0 / ENOUGH_BLOCKS as f64).sqrt();
-        let side = (needed.ceil() as usize).max(MIN_SIDE).min(full).min(affordable).max(2);
+        // m x m samples are at least as good as m x m independent ones.
+        let excess = trial.worst_error(&[]) / budget.relative_error;
+        let larger = excess * (MIN_BLOCKS as f64 / PLANNED_BLOCKS as f64).sqrt();
+        let wanted = if larger < WORTH_A_LARGER_SIDE { trial_side as f64 } else { trial_side as f64 * larger };
+        let side = (wanted.ceil() as usize).max(MIN_SIDE).min(full).min(affordable).max(2);
         let within = Sampling::within(budget, sample_s * (side * side) as f64);
-        Ok((side, Sampling { enough_blocks: ENOUGH_BLOCKS, ..within }))
+        let first = if side == trial_side { trial.into_vec() } else { vec![] };
+        Ok((side, Sampling { enough_blocks: ENOUGH_BLOCKS, ..within }, first))
     }
 
     /// Seconds that are counted for one sample of a part at every meter.

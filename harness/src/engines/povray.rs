@@ -50,6 +50,9 @@ pub(super) static ENTRY: Entry = Entry {
     make: || Box::new(PovRay),
 };
 
+/// Shadow rays that POV-Ray traces in a tenth of a second.
+const FEW_RAYS: f64 = 1e4;
+
 pub(super) struct PovRay;
 
 impl Engine for PovRay {
@@ -104,6 +107,13 @@ impl Engine for PovRay {
 
     fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
         Settings::of(job).map(drop)
+    }
+
+    /// Direct light of a few lights is worked out in milliseconds, between starts of .7 s each.
+    fn mostly_waits(&self, job: &Job) -> bool {
+        let at_most = (opening::MOST_POINTS * opening::MOST_POINTS) as f64;
+        let rays = job.stations.len() as f64 * effort::shadow_rays(job, at_most);
+        job.transport == Transport::Direct && rays < FEW_RAYS && super::geometry_mib(job) == 0
     }
 
     /// Several processes a thread, of some 60 MiB each.

@@ -64,9 +64,12 @@ impl Slots {
         self.all.threads.min(MAX_A_READING)
     }
 
-    /// Waits for a share. What asks for more than there is gets all that there is.
+    /// Waits for a share. What asks for more than there is gets all that there is, and what asks for no slot need not wait.
     pub fn take(&self, share: Share) -> Held<'_> {
         let Share { threads, memory_mib } = share;
+        if threads == 0 {
+            return Held { slots: self, share: Share { threads, memory_mib: 0 } };
+        }
         let share =
             Share { threads: threads.clamp(1, self.all.threads), memory_mib: memory_mib.min(self.all.memory_mib) };
         let mut state = self.state.lock();
@@ -85,8 +88,9 @@ impl Slots {
 }
 
 impl Held<'_> {
+    /// Threads that its holder may run, one at least.
     pub fn threads(&self) -> usize {
-        self.share.threads
+        self.share.threads.max(1)
     }
 }
 
@@ -151,6 +155,14 @@ mod tests {
             want
         });
         assert_eq!(done, items.iter().map(|i| i.0).collect::<Vec<_>>(), "results stay in the items' order");
+    }
+
+    #[test]
+    fn who_asks_for_no_slot_waits_for_nobody_and_takes_nothing() {
+        let slots = Slots::with_memory(1, 100);
+        let _all = slots.take(Share { threads: 1, memory_mib: 100 });
+        let sleeper = slots.take(Share { threads: 0, memory_mib: 50 });
+        assert_eq!((sleeper.threads(), slots.state.lock().free.threads), (1, 0));
     }
 
     #[test]

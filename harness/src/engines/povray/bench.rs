@@ -19,7 +19,7 @@ use super::direct_error::DirectError;
 use super::export::{self, Light};
 use super::frame::{self, Frame};
 use super::pixels::{self, Readout, Seen};
-use super::settings::{FIRST_REFLECTION_RAYS, LONG_POOL, POOL, Settings};
+use super::settings::{FIRST_REFLECTION_RAYS, LONG_POOL, MIN_AUDIT_RAYS, POOL, Settings};
 
 /// Rays a sample at least, where the budget is short.
 const MIN_RAYS: f64 = 25.0;
@@ -28,6 +28,8 @@ const MIN_RAYS: f64 = 25.0;
 const TEST_S: f64 = 1.1e-7;
 /// What a block takes with its runs of the first reflection, against one without.
 const FIRST_REFLECTION: f64 = 1.35;
+/// By which power of its rays a sample a block's work grows (case S1: 6.6 times from 50 to 200).
+const WORK_OF_RAYS: f64 = 1.36;
 /// The part of the time that the fewest blocks may take.
 const FIRST_BLOCKS: f64 = 0.9;
 /// Processes for each thread: one that is started alone sleeps most of .7 s, waiting for its own threads in steps of 50 ms.
@@ -78,7 +80,11 @@ impl Run {
     /// Its image's name, no other's that may be made at the same time.
     fn image(self) -> String {
         let Self { seed, count, reflections, .. } = self;
-        if reflections == Reflections::All { format!("seed{seed}.ppm") } else { format!("seed{seed}-first-{count}.ppm") }
+        if reflections == Reflections::All {
+            format!("seed{seed}.ppm")
+        } else {
+            format!("seed{seed}-first-{count}.ppm")
+        }
     }
 
     fn pool(self) -> u32 {
@@ -144,8 +150,10 @@ impl<'a> Bench<'a> {
     pub(super) fn indirect(&self) -> Result<Measurement, EngineError> {
         let count = self.settings.count;
         let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, reflections: Reflections::All };
-        let pilot = self.pilot(run)?;
-        let (budget, mut block_s) = (self.job.budget, FIRST_REFLECTION * pilot.work_s);
+        let pilot_count = count.min(MIN_AUDIT_RAYS);
+        let pilot = self.pilot(Run { count: pilot_count, ..run })?;
+        let more = (f64::from(count) / f64::from(pilot_count)).powf(WORK_OF_RAYS);
+        let (budget, mut block_s) = (self.job.budget, FIRST_REFLECTION * more * pilot.work_s);
         // Time grows a little faster than rays.
         let share = (FIRST_BLOCKS * budget.seconds / (MIN_BLOCKS as f64 * block_s)).max(1e-3).powf(0.8);
         let mut measurement = Measurement { method: self.method(), ..Measurement::default() };
@@ -175,7 +183,7 @@ impl<'a> Bench<'a> {
         Ok(measurement)
     }
 
-    /// A first block, which finds each meter's scale and how much work a block is.
+    /// A first block of few rays, which finds each meter's scale and how much work a block is.
     fn pilot(&self, run: Run) -> Result<Pilot, EngineError> {
         let mut readouts = export::first_readouts(self.job, Light::Indirect);
         let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();

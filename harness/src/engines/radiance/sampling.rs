@@ -19,10 +19,13 @@ use crate::system::slots::side_by_side;
 
 /// Ambient divisions of the trial from which effort is planned.
 const TRIAL_DIVISIONS: u32 = 64;
-/// Planned beyond what the trial's own, uncertain, error suggests.
-const PLAN_MARGIN: f64 = 1.5;
-/// Blocks that effort is planned for.
-const PLANNED_BLOCKS: usize = 2 * MIN_BLOCKS;
+/// The variance of a row falls as a / n^2 + b / n with its divisions n: stratification takes the first term away, what rays bring home of
+/// deeper reflections is the second. So many divisions are a / b: 190 in case S1, 40 to 100 below the published pendant, none in case S2, whose
+/// panels are small (`benchmarks/efficiency.md`). Where it is less than this, blocks come out smaller and more of them are made.
+const STRATIFIED: f64 = 120.0;
+/// Blocks that effort is planned for, and that suffice where their error is small enough.
+const PLANNED_BLOCKS: usize = 3 * MIN_BLOCKS;
+const ENOUGH_BLOCKS: usize = 2 * MIN_BLOCKS;
 const MAX_PARALLEL: usize = 8;
 
 /// Seconds that are counted for a ray to a surface or a luminaire, and for a row where rtrace keeps its cache: on two cores of a
@@ -111,12 +114,12 @@ impl Sampler<'_> {
         let excess = Blocks::new(trial).worst_error(known_lx) / self.job.budget.relative_error;
         let divisions = self.settings.ambient_divisions.unwrap_or_else(|| self.divisions(excess));
         let within = Sampling::within(self.job.budget, self.block_s(divisions));
-        Ok((divisions, Sampling { known_lx, enough_blocks: PLANNED_BLOCKS, ..within }))
+        Ok((divisions, Sampling { known_lx, enough_blocks: ENOUGH_BLOCKS, ..within }))
     }
 
-    /// Divisions a block so that the fewest blocks about meet the budget.
+    /// Divisions a block so that as many blocks as are planned about meet the budget.
     fn divisions(&self, excess: f64) -> u32 {
-        let needed = f64::from(TRIAL_DIVISIONS) * PLAN_MARGIN * excess * excess / 2.0;
+        let needed = divisions_for(excess * excess * MIN_BLOCKS as f64 / PLANNED_BLOCKS as f64);
         let affordable = 0.5 * self.job.budget.seconds / (PLANNED_BLOCKS as f64 * self.block_s(1));
         let divisions = needed.min(affordable).clamp(f64::from(TRIAL_DIVISIONS), f64::from(AUDIT_DIVISIONS));
         // rtrace takes a square number of them.
@@ -196,5 +199,27 @@ impl Sampler<'_> {
 
     pub(super) fn options(&self, divisions: u32) -> Vec<String> {
         Options::total(self.job, self.settings, divisions)
+    }
+}
+
+/// Divisions of a block whose variance is one, where that of the trial's blocks is so much.
+fn divisions_for(variance_of_trial: f64) -> f64 {
+    let trial = f64::from(TRIAL_DIVISIONS);
+    let unstratified = variance_of_trial * trial / (1.0 + STRATIFIED / trial);
+    (unstratified + (unstratified * (unstratified + 4.0 * STRATIFIED)).sqrt()) / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planned_divisions_have_the_variance_that_is_asked_for() {
+        assert!((divisions_for(1.0) - f64::from(TRIAL_DIVISIONS)).abs() < 1e-9);
+        let variance = |n: f64| (1.0 + STRATIFIED / n) / n;
+        for times in [0.1, 3.0, 1e3, 1e6] {
+            let ratio = variance(f64::from(TRIAL_DIVISIONS)) / variance(divisions_for(times));
+            assert!((ratio / times - 1.0).abs() < 1e-9, "{times}: {ratio}");
+        }
     }
 }
