@@ -6,7 +6,9 @@ use clap::Parser;
 use luxproof::cli::{Cli, complain};
 use luxproof::report::Exit;
 use luxproof::system::process;
-use tracing_subscriber::EnvFilter;
+use tracing::Level;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::prelude::*;
 
 fn main() -> ExitCode {
     if let Some(exit) = process::supervise() {
@@ -14,14 +16,9 @@ fn main() -> ExitCode {
     }
     // clap itself exits with 2 on a usage error, as the exit codes want it.
     let cli = Cli::parse();
-    let level = ["warn", "info", "debug", "trace"][usize::from(cli.verbosity()).min(3)];
-    let filter = EnvFilter::new(format!("luxproof={level}"));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .log_internal_errors(false)
-        .without_time()
-        .init();
+    let level = [Level::WARN, Level::INFO, Level::DEBUG, Level::TRACE][usize::from(cli.verbosity()).min(3)];
+    let told = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).log_internal_errors(false).without_time();
+    tracing_subscriber::registry().with(told).with(Targets::new().with_target("luxproof", level)).init();
     if let Err(error) = ctrlc::set_handler(process::interrupt) {
         tracing::warn!(%error, "Ctrl-C will not stop renderers in order");
     }

@@ -6,7 +6,6 @@
 
 use std::path::PathBuf;
 
-use jiff::civil::Date;
 use schemars::JsonSchema;
 use serde::de::{Deserializer, IgnoredAny};
 use serde::{Deserialize, Serialize};
@@ -16,6 +15,7 @@ use super::{Basis, Comparison};
 use crate::procedures::shapes::{Found, Shapes};
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 use crate::spec::{Source, SpecError};
+use crate::system::day::Day;
 
 const ON_RECORD: &str = include_str!("../../../reference/known_deviations.yaml");
 
@@ -24,7 +24,7 @@ const ON_RECORD: &str = include_str!("../../../reference/known_deviations.yaml")
 pub struct KnownDeviations {
     deviations: Vec<KnownDeviation>,
     breaks: Vec<KnownBreak>,
-    today: Date,
+    today: Day,
 }
 
 #[derive(Deserialize)]
@@ -76,7 +76,7 @@ pub struct KnownDeviation {
     /// The last day (UTC) on which it counts, such as 2027-06-30.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<String>")]
-    pub expires: Option<Date>,
+    pub expires: Option<Day>,
 }
 
 /// A name in which `*` stands for anything and `?` for one letter; brackets are those of meters.
@@ -175,8 +175,7 @@ impl KnownDeviations {
         check(&source, &deviations)?;
         let is_told = |b: &KnownBreak| !(b.cause.trim().is_empty() || b.source.trim().is_empty());
         source.require(breaks.iter().all(is_told), "known_breaks", "one lacks cause or source", "give both")?;
-        let today = jiff::Timestamp::now().to_zoned(jiff::tz::TimeZone::UTC).date();
-        Ok(Self { deviations, breaks, today })
+        Ok(Self { deviations, breaks, today: Day::today() })
     }
 
     /// The same with what a project has on record besides.
@@ -192,7 +191,7 @@ impl KnownDeviations {
 
     /// Revises a verdict in the light of the record; `content` is what was measured, `coverage` the factor of intervals.
     pub(super) fn revise(&self, comparison: &mut Comparison, content: &str, coverage: f64) {
-        let in_force = self.deviations.iter().filter(|k| !k.is_expired(self.today));
+        let in_force = self.deviations.iter().filter(|k| !k.is_expired(&self.today));
         let found = in_force.filter(|k| k.is_about(comparison, content) && k.is_at(comparison));
         let Some((_, verdict, why)) = found.filter_map(|k| k.says(comparison, coverage)).min_by_key(|(rank, ..)| *rank)
         else {
@@ -213,7 +212,7 @@ impl KnownDeviations {
             };
             let readings = about().filter(by_it).count();
             let state = match readings {
-                _ if entry.is_expired(self.today) => State::Expired,
+                _ if entry.is_expired(&self.today) => State::Expired,
                 0 => State::NotSeen,
                 _ => State::Seen,
             };
@@ -242,8 +241,8 @@ pub(super) fn check(source: &Source, entries: &[KnownDeviation]) -> Result<(), S
 }
 
 impl KnownDeviation {
-    fn is_expired(&self, today: Date) -> bool {
-        self.expires.is_some_and(|last| today > last)
+    fn is_expired(&self, today: &Day) -> bool {
+        self.expires.as_ref().is_some_and(|last| today > last)
     }
 
     fn is_about(&self, c: &Comparison, content: &str) -> bool {
@@ -310,7 +309,7 @@ mod tests {
         let source = Source::new("record.yaml".into(), format!("known_breaks: []\nknown_deviations:\n{entries}"));
         let OurRecord { known_deviations: deviations, known_breaks: breaks } = source.parse().unwrap();
         check(&source, &deviations).unwrap();
-        KnownDeviations { deviations, breaks, today: jiff::civil::date(2027, 6, 30) }
+        KnownDeviations { deviations, breaks, today: Day::try_from("2027-06-30".to_owned()).unwrap() }
     }
 
     /// The comparison of a reading that lies so far off, at the tolerance of 2 %, and what the entries came to.

@@ -1,16 +1,16 @@
 //! Names of what is read: case, procedure, engine and meter, each written once.
 
 use std::borrow::{Borrow, Cow};
+use std::fmt;
+use std::ops::Deref;
 use std::str::FromStr;
 
-use derive_more::{Deref, Display};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray, VariantNames};
 
 /// What a recording is of: one engine on one procedure of one case.
-#[derive(Clone, Debug, Display, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
-#[display("{engine} {procedure} of {case}")]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct ReadingKey {
     pub case: String,
     pub procedure: ProcedureId,
@@ -25,6 +25,12 @@ impl ReadingKey {
     /// Whether it is of this procedure of this case, whoever reads it.
     pub fn is_of(&self, case: &str, procedure: ProcedureId) -> bool {
         self.case == case && self.procedure == procedure
+    }
+}
+
+impl fmt::Display for ReadingKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {} of {}", self.engine, self.procedure, self.case)
     }
 }
 
@@ -86,9 +92,8 @@ impl FromStr for ProcedureId {
 }
 
 /// The name of an engine in specs, on the command line and in reports.
-#[derive(Clone, Debug, Display, Deref, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
-#[deref(forward)]
 pub struct EngineName(Cow<'static, str>);
 
 impl EngineName {
@@ -113,6 +118,20 @@ impl<T: Into<String>> From<T> for EngineName {
     }
 }
 
+impl fmt::Display for EngineName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0, f)
+    }
+}
+
+impl Deref for EngineName {
+    type Target = str;
+
+    fn deref(&self) -> &str {
+        &self.0
+    }
+}
+
 impl Borrow<str> for EngineName {
     fn borrow(&self) -> &str {
         self
@@ -126,9 +145,15 @@ impl<T: AsRef<str> + ?Sized> PartialEq<T> for EngineName {
 }
 
 /// A meter of a case: `<set>[k]`, or `<luminaire>[k]` for readings of luminous intensity.
-#[derive(Clone, Debug, Display, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct MeterId(pub String);
+
+impl fmt::Display for MeterId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0, f)
+    }
+}
 
 impl MeterId {
     /// The `k`-th meter of a set.

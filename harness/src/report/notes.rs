@@ -76,7 +76,7 @@ fn idle(known: &OnRecord) -> Option<String> {
     let what = match known.state {
         State::Seen => return None,
         State::NotSeen => "is not seen".to_owned(),
-        State::Expired => entry.expires.map(|last| format!("has expired on {last}"))?,
+        State::Expired => entry.expires.as_ref().map(|last| format!("has expired on {last}"))?,
     };
     Some(format!("the known deviation of {percent:+.2} %{at} {what}: {}", entry.told()))
 }

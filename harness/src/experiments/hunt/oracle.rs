@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use derive_more::Display;
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::draft::Draft;
@@ -23,8 +24,7 @@ use crate::spec::{Case, SpecError};
 use crate::system::files::FileError;
 
 /// What an engine does wrong, as it is recognised elsewhere.
-#[derive(Clone, Debug, Display, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[display("{engine}: {oracle} ({procedure})")]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Symptom {
     pub engine: EngineName,
     pub procedure: ProcedureId,
@@ -32,36 +32,48 @@ pub struct Symptom {
 }
 
 /// Who says that something is wrong.
-#[derive(Clone, Debug, Display, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Oracle {
     /// A reading lies off its reference, by more than is allowed and than chance brings about.
-    #[display("reads {_0}")]
     Verdict(Sign),
     /// It departs from the other witnesses, as it does not from its reference, or is that itself.
-    #[display("departs from the other witnesses")]
     Consensus,
     /// Nothing was read.
-    #[display("fails: {_0}")]
     Failure(FailureKind),
     /// A comparison stays undecided that no sample can decide.
-    #[display("stays undecided without need")]
     Undecided,
     /// A law of light is broken by its own readings.
-    #[display("breaks the law `{law}`: {how}")]
     Law { law: String, how: How },
     /// This program itself did not survive it.
-    #[display("luxproof panics")]
     Panic,
 }
 
-#[derive(Clone, Copy, Debug, Display, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sign {
-    #[display("too much")]
     TooMuch,
-    #[display("too little")]
     TooLittle,
+}
+
+impl fmt::Display for Symptom {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {} ({})", self.engine, self.oracle, self.procedure)
+    }
+}
+
+impl fmt::Display for Oracle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Verdict(Sign::TooMuch) => f.write_str("reads too much"),
+            Self::Verdict(Sign::TooLittle) => f.write_str("reads too little"),
+            Self::Consensus => f.write_str("departs from the other witnesses"),
+            Self::Failure(kind) => write!(f, "fails: {kind}"),
+            Self::Undecided => f.write_str("stays undecided without need"),
+            Self::Law { law, how } => write!(f, "breaks the law `{law}`: {how}"),
+            Self::Panic => f.write_str("luxproof panics"),
+        }
+    }
 }
 
 /// A symptom in a spec, where it shows most.

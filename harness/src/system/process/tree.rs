@@ -14,16 +14,18 @@ pub(super) struct Memory {
 
 #[cfg(target_os = "linux")]
 mod linux {
-    use procfs::process::Process;
-    use procfs::{Current, Meminfo, ProcResult};
+    use std::fs::{read_dir, read_to_string};
 
     use super::Memory;
 
     /// Where a container is told how much memory it may have.
     const CONTAINER: &str = "/sys/fs/cgroup/memory.max";
 
-    fn open(process: u32) -> ProcResult<Process> {
-        Process::new(process.cast_signed())
+    /// The KiB that a file of `/proc` states in the line that begins so.
+    fn kib(file: &str, line: &str) -> Option<u64> {
+        let text = read_to_string(file).ok()?;
+        let rest = text.lines().find_map(|l| l.strip_prefix(line)?.strip_prefix(':'))?;
+        rest.trim().strip_suffix(" kB")?.trim().parse().ok()
     }
 
     /// All that a process started and that these started in their turn, as long as none between has ended.
@@ -37,27 +39,29 @@ mod linux {
     }
 
     pub(in super::super) fn children(of: u32) -> Vec<u32> {
-        let tasks = open(of).and_then(|process| process.tasks());
-        tasks.into_iter().flatten().flatten().filter_map(|task| task.children().ok()).flatten().collect()
+        let tasks = read_dir(format!("/proc/{of}/task")).into_iter().flatten().flatten();
+        let children = |task: std::fs::DirEntry| read_to_string(task.path().join("children")).unwrap_or_default();
+        tasks
+            .map(children)
+            .flat_map(|all| all.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>())
+            .collect()
     }
 
     pub(in super::super) fn memory(process: u32) -> Option<Memory> {
-        let status = open(process).and_then(|process| process.status()).ok()?;
-        Some(Memory { now_kib: status.vmrss?, peak_kib: status.vmhwm? })
+        let status = format!("/proc/{process}/status");
+        Some(Memory { now_kib: kib(&status, "VmRSS")?, peak_kib: kib(&status, "VmHWM")? })
     }
 
     /// What a process has by itself, and its part of what it shares.
     pub(in super::super) fn proportional_kib(process: u32) -> Option<u64> {
-        let rollup = open(process).and_then(|process| process.smaps_rollup()).ok()?;
-        let bytes = rollup.memory_map_rollup.0.iter().filter_map(|map| map.extension.map.get("Pss")).sum::<u64>();
-        Some(bytes / 1024)
+        kib(&format!("/proc/{process}/smaps_rollup"), "Pss")
     }
 
     /// Of this machine, or of the container where that has less.
     pub(in super::super) fn total_mib() -> Option<u64> {
-        let machine = Meminfo::current().ok()?.mem_total;
-        let container = std::fs::read_to_string(CONTAINER).ok().and_then(|text| text.trim().parse().ok());
-        Some(container.map_or(machine, |most: u64| most.min(machine)) >> 20)
+        let machine = kib("/proc/meminfo", "MemTotal")? >> 10;
+        let container = read_to_string(CONTAINER).ok().and_then(|text| text.trim().parse::<u64>().ok());
+        Some(container.map_or(machine, |most| machine.min(most >> 20)))
     }
 }
 

@@ -4,6 +4,7 @@ use super::line::{Line, Numbers};
 use super::series::{History, Key, Series};
 use crate::judge::{Basis, Verdict};
 use crate::record::{MeterId, ProcedureId, Quantity, ReadingKey};
+use crate::system::day::Day;
 use crate::system::random::normal;
 
 const ENGINES: [&str; 5] = ["iesna", "mitsuba", "povray", "radiance", "simulator"];
@@ -130,5 +131,5 @@ impl Synthetic {
 
 fn date(night: usize) -> String {
     let day = std::time::SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(86_400 * (20_454 + night as u64));
-    humantime::format_rfc3339_seconds(day).to_string()[..10].to_owned()
+    Day::of(day).to_string()
 }
