@@ -20,8 +20,8 @@ use crate::system::slots::side_by_side;
 /// Ambient divisions of the trial from which effort is planned.
 const TRIAL_DIVISIONS: u32 = 64;
 /// The variance of a row falls as a / n^2 + b / n with its divisions n: stratification takes the first term away, what rays bring home of
-/// deeper reflections is the second. So many divisions are a / b: 190 in case S1, 40 to 100 below the published pendant, none in case S2, whose
-/// panels are small (`benchmarks/efficiency.md`). Where it is less than this, blocks come out smaller and more of them are made.
+/// deeper reflections is the second. So many divisions are a / b: 190 in case S1, 150 in an office, 130 in a hall, 60 below the published
+/// pendant, 10 in case S2 (`benchmarks/efficiency.md`). Where it is less than this, blocks come out smaller and more of them are made.
 const STRATIFIED: f64 = 120.0;
 /// Blocks that effort is planned for, and that suffice where their error is small enough.
 const PLANNED_BLOCKS: usize = 3 * MIN_BLOCKS;
