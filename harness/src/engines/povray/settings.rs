@@ -13,8 +13,8 @@ pub(super) const MAX_RECURSION: u32 = 20;
 const AUDIT_RAYS: f64 = 200.0;
 /// Relative standard error that the fewest blocks of so many rays about reach at the worst meter (case S1: .13 % in the mean of meters).
 const AUDIT_ERROR: f64 = 0.0015;
-/// Rays a sample at least where less is asked for: the bias of the cache was measured with as few.
-pub(super) const MIN_AUDIT_RAYS: u32 = 50;
+/// Rays a sample at least where less is asked for: the bias of the cache was measured with 50, and grows as they get fewer.
+pub(super) const MIN_AUDIT_RAYS: u32 = 70;
 
 pub(super) const KNOBS: &[Knob] = &[
     Preset::KNOB,
