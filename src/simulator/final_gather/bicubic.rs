@@ -189,7 +189,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
-    use crate::simulator::sampler::mix;
+    use crate::simulator::sampler::{mix, unit};
 
     fn values(f: impl Fn(DVec2) -> f64) -> [f64; NODES] {
         let bicubic = Bicubic::new();
@@ -206,8 +206,7 @@ mod tests {
 
     #[test]
     fn what_is_left_out_is_told_beneath_noise_and_noise_alone_is_not() {
-        let noise =
-            |k: u64| (0..12).map(|j| (mix(12 * k + j + 1) >> 11) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0;
+        let noise = |k: u64| (0..12).map(|j| unit(mix(12 * k + j + 1))).sum::<f64>() - 6.0;
         // Last terms of root mean square .05 each beside noise of 1 at every node, in 16 solutions of 400 rectangles.
         let rectangles = |cubic: f64| -> Vec<Vec<[f64; NODES]>> {
             let one = |k: u64| {

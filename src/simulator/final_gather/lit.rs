@@ -14,7 +14,7 @@ use super::view::{Cast, Left, LitPart, View};
 use crate::scene::Meter;
 use crate::simulator::emission::{Emitter, Precision};
 use crate::simulator::quadrature::Gauss;
-use crate::simulator::sampler::mix;
+use crate::simulator::sampler::{mix, unit};
 use crate::simulator::stop::Stop;
 use crate::simulator::visibility::Occluder;
 
@@ -464,11 +464,10 @@ fn join(bicubic: &Bicubic, parts: &mut [Part]) {
 /// The mean over random places on all walls, bodies left out.
 fn mean_lux(lights: &Lights, relative_error: f64) -> f64 {
     let Some(walls) = lights.surroundings.room.map(|room| Face::walls(&room)) else { return 0.0 };
-    let unit = |k: u64| (mix(k) >> 11) as f64 / (1_u64 << 53) as f64;
     let precision = Precision::relative(relative_error.max(1e-3));
     let one = |k: u64| {
         let wall = &walls[(k % 6) as usize];
-        let at_m = wall.size_m() * DVec2::new(unit(2 * k + 1), unit(2 * k + 2));
+        let at_m = wall.size_m() * DVec2::new(unit(mix(2 * k + 1)), unit(mix(2 * k + 2)));
         let meter = Meter { position_m: wall.off(at_m), normal: wall.normal };
         lights.emitters.iter().map(|e| e.illuminance(&meter, &[], precision).value).sum::<f64>()
     };

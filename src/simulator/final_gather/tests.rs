@@ -15,7 +15,7 @@ use crate::photometry::{LuminousIntensityDistribution, LuminousOpening};
 use crate::scene::{Bounces, Meter, Obstacle, Scene, Shape, Transport};
 use crate::simulator::once_reflected::OnceReflected;
 use crate::simulator::path_tracing::test_scenes::{S2_VALUES, luminaire, s1, s1_meters, s2, s2_meters, up};
-use crate::simulator::sampler::mix;
+use crate::simulator::sampler::{mix, unit};
 use crate::simulator::stop::Stop;
 use crate::simulator::{Accuracy, Bounded, Uncertainty, certified, illuminance};
 
@@ -246,18 +246,24 @@ fn what_bodies_stand_on_lights_nothing() {
     }
 }
 
+/// Random places between two corners, the same for the same number.
+fn places(mut drawn: u64) -> impl FnMut(DVec3, DVec3) -> DVec3 {
+    move |low, high| {
+        let mut next = || {
+            drawn += 1;
+            unit(mix(drawn))
+        };
+        low + (high - low) * DVec3::new(next(), next(), next())
+    }
+}
+
 /// Shadows of luminaires without extent in random rooms of boxes, some of which hover, stand or hang: light reflected once is what the
 /// integral over pieces both lit and seen says, which cuts by other planes and knows no polynomial.
 #[test]
 fn shadows_of_points_are_cut_as_another_cutter_cuts_them() {
     let (mut shaded, mut narrow, mut rooms) = (0, 0, 0);
     for k in 0..10_u64 {
-        let mut drawn = 1000 * k;
-        let mut unit = || {
-            drawn += 1;
-            (mix(drawn) >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        let mut place = |low: DVec3, high: DVec3| low + (high - low) * DVec3::new(unit(), unit(), unit());
+        let mut place = places(1000 * k);
         let size_m = place(DVec3::new(3.0, 3.0, 2.4), DVec3::new(9.0, 7.0, 5.0));
         let reflectance = Reflectances::with_equal_walls(0.3, 0.5, 0.8);
         let mut scene = Scene { room: Some(Room { size_m, reflectance }), ..Scene::default() };
@@ -318,12 +324,7 @@ fn shadows_of_points_are_cut_as_another_cutter_cuts_them() {
 fn what_polynomials_leave_out_of_kinks_has_a_mean_that_is_told() {
     let (mut told, mut all) = (0, 0);
     for k in 0..12_u64 {
-        let mut drawn = 500 * k;
-        let mut unit = || {
-            drawn += 1;
-            (mix(drawn) >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        let mut place = |low: DVec3, high: DVec3| low + (high - low) * DVec3::new(unit(), unit(), unit());
+        let mut place = places(500 * k);
         let size_m = place(DVec3::new(3.0, 3.0, 2.4), DVec3::new(9.0, 7.0, 5.0));
         let reflectance = Reflectances::with_equal_walls(0.3, 0.5, 0.8);
         let gamma = vec![0.0, 25.0, 26.0, 48.0, 50.0, 70.0, 71.0, 110.0, 111.0, 180.0];

@@ -595,11 +595,11 @@ mod tests {
     use super::*;
     use crate::geometry::configuration_factor::element_to_polygon;
     use crate::geometry::{Reflectances, Room};
-    use crate::simulator::sampler::mix;
+    use crate::simulator::sampler::{self, mix};
     use crate::simulator::visibility::{candidates, visible_pieces};
 
     fn unit(k: u64) -> f64 {
-        (mix(k) >> 11) as f64 / (1_u64 << 53) as f64
+        sampler::unit(mix(k))
     }
 
     /// Rectangles behind random boxes: as much shows of them as the cutter of luminaires says, which goes by other planes.
