@@ -8,7 +8,7 @@ use itertools::Itertools;
 use super::Report;
 use super::claims::{Claim, Sentence, low_or_high, upward};
 use super::words::plural;
-use crate::judge::{Bias, Comparison, Verdict};
+use crate::judge::{Basis, Bias, Comparison, Verdict};
 use crate::record::{EngineName, EngineStatus, ProcedureId, Role, Status};
 
 /// A mean deviation is told where chance makes one as large in a run of a thousand.
@@ -52,11 +52,16 @@ fn sentence(report: &Report, engine: &EngineStatus) -> Sentence {
 
 fn claim(report: &Report, engine: &EngineName, procedure: ProcedureId, mine: &[&Comparison]) -> Claim {
     let count = |is: fn(Verdict) -> bool| mine.iter().filter(|c| is(c.verdict)).count();
-    let passing = mine.iter().filter(|c| c.verdict == Verdict::Pass);
-    let within = passing.filter_map(|c| reach(c)).reduce(f64::max);
+    let best = best(mine);
+    let within = best.iter().filter(|c| c.verdict == Verdict::Pass).filter_map(|c| reach(c)).reduce(f64::max);
+    // Of readings that pass: what is on record is told apart.
+    let all_pass = |b: &Bias| {
+        let mut of_mean = best.iter().filter(|c| c.key == b.key && basis(c) == Some(b.basis)).peekable();
+        of_mean.peek().is_some() && of_mean.all(|c| c.verdict == Verdict::Pass)
+    };
     let is_firm = |b: &&Bias| {
         let is_plain = b.p_value.is_some_and(|p| p < UNLIKELY) && b.low.signum() == b.high.signum();
-        b.key.engine == *engine && b.key.procedure == procedure && is_plain
+        b.key.engine == *engine && b.key.procedure == procedure && is_plain && all_pass(b)
     };
     let bias = report.bias.iter().filter(is_firm).map(|b| b.mean).max_by(|a, b| a.abs().total_cmp(&b.abs()));
     Claim {
@@ -69,6 +74,17 @@ fn claim(report: &Report, engine: &EngineName, procedure: ProcedureId, mine: &[&
         missing: count(|v| v == Verdict::Missing),
         bias,
     }
+}
+
+/// The comparisons that tell how near readings are: a printed cell knows no more than its digits, and where there is something better to
+/// hold readings against, that counts.
+fn best<'a>(mine: &[&'a Comparison]) -> Vec<&'a Comparison> {
+    let (printed, better): (Vec<_>, Vec<_>) = mine.iter().partition(|c| basis(c) == Some(Basis::Published));
+    if better.is_empty() { printed } else { better }
+}
+
+fn basis(c: &Comparison) -> Option<Basis> {
+    c.reference.as_ref().map(|reference| reference.basis)
 }
 
 /// How far a reading may lie off its reference, relative: its deviation and the interval about it. Where a tolerance is one of

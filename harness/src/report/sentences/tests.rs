@@ -1,7 +1,7 @@
 use super::*;
 use serde_json::json;
 
-use crate::judge::{Basis, Tolerance};
+use crate::judge::Tolerance;
 use crate::record::{MeterId, Quantity, ReadingKey, Uncertainty};
 
 fn comparison(
@@ -123,4 +123,27 @@ fn a_bias_that_chance_does_not_make_is_told_even_where_everything_passes() {
     let told = |p| said(all.clone(), &[], vec![bias(p)]);
     assert_eq!(told(1e-6), "radiance: direct within 0.41 % (0.41 % high on the whole)");
     assert_eq!(told(0.2), "radiance: direct within 0.41 %");
+}
+
+#[test]
+fn printed_cells_and_what_is_on_record_blur_nothing_that_is_known_better() {
+    let mut printed = comparison(Direct, "a", "point", 0, 0.004, Pass);
+    printed.reference.as_mut().unwrap().basis = Basis::Published;
+    let exact = comparison(Direct, "a", "point", 0, 1e-4, Pass);
+    let known = comparison(Direct, "b", "point", 0, -0.05, KnownDeviation);
+    let bias = Bias {
+        key: known.key.clone(),
+        basis: Basis::Exact,
+        readings: 2,
+        mean: -0.03,
+        low: -0.04,
+        high: -0.02,
+        p_value: Some(1e-9),
+        scatter: None,
+    };
+    assert_eq!(said(vec![printed.clone()], &[], vec![]), "radiance: direct within 0.4 %");
+    assert_eq!(
+        said(vec![printed, exact, known], &[], vec![bias]),
+        "radiance: direct within 0.01 % but for 1 of 3 known to deviate"
+    );
 }
