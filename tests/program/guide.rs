@@ -10,8 +10,8 @@ use std::process::Command;
 
 use crate::support::{Answer, Folder, root};
 
-const PAGES: [&str; 6] =
-    ["first-audit", "writing-a-spec", "reading-a-report", "adding-an-engine", "nightly", "methods"];
+const PAGES: [&str; 7] =
+    ["first-audit", "writing-a-spec", "reading-a-report", "adding-an-engine", "nightly", "cluster", "methods"];
 
 /// A step of the guide.
 #[derive(Debug, PartialEq)]

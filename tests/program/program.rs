@@ -32,3 +32,4 @@ mod suite;
 mod supervision;
 mod support;
 mod untrusted;
+mod workload;

@@ -7,7 +7,7 @@ use super::jobs::{self, Outcome, Running};
 use super::repetition::Examination;
 use super::{AuditError, Options, StatedErrors, repetition, sampling, sequential};
 use crate::judge::{Comparison, Judge, Policy, Published};
-use crate::measure::Reader;
+use crate::measure::{Asked, Reader};
 use crate::plan::{Plan, Skip};
 use crate::procedures::Task;
 use crate::record::{Recording, Status};
@@ -83,18 +83,25 @@ impl Audit<'_> {
         for place in [folder.to_owned(), folder.join("readings")] {
             files::sweep(&place);
         }
-        let reader = Reader { out: Some(folder.to_owned()), ..self.reader.clone() };
+        let asked = Asked::default();
+        let reader = Reader { out: Some(folder.to_owned()), asked: asked.clone(), ..self.reader.clone() };
         let observer = self.options.observer;
         let running = Running { case, plan, folder, reader, observer };
         let mut outcome = running.run()?;
-        if !process::is_interrupted() {
+        // What further looks are worth is known when every first one is there.
+        if !process::is_interrupted() && !asked.leaves_open() {
             let examination = match self.options.stated_errors {
                 StatedErrors::LookedInto => repetition::examine(&running, judge, &mut outcome),
                 StatedErrors::Believed => Examination::default(),
             };
-            sampling::sample_on(&running, judge, &examination.found, &mut outcome)?;
-            examination.examine_looks(&running, judge, &mut outcome);
+            if !asked.leaves_open() {
+                sampling::sample_on(&running, judge, &examination.found, &mut outcome)?;
+            }
+            if !asked.leaves_open() {
+                examination.examine_looks(&running, judge, &mut outcome);
+            }
         }
+        self.reader.asked.join(&case.name, &asked);
         if outcome.from_cache > 0 {
             let count = outcome.from_cache;
             observer.remarked(case, &format!("{count} answer(s) of engines from the cache (--no-cache asks anew)"));

@@ -114,7 +114,9 @@ impl Running<'_> {
         let (measurement, wall_s, failure) = match taken {
             Ok(taken) => (taken.measurement, taken.cost.wall_s, None),
             Err(error) => {
-                tracing::error!(%engine, procedure = %task.procedure, "{error}");
+                if error.kind != FailureKind::Unread {
+                    tracing::error!(%engine, procedure = %task.procedure, "{error}");
+                }
                 (error.rest.map_or_else(Measurement::default, |rest| *rest), wall.as_secs_f64(), Some(error.text))
             }
         };
@@ -163,16 +165,20 @@ struct Answer {
 fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result<Answer, Failure> {
     let failed = |what: String| Failure::from(EngineError::Solver { engine: planned.engine.name(), what });
     let instrument = planned.instrument().ok_or_else(|| failed("it is not there".to_owned()))?;
-    let shortcut = &run.shortcut;
+    let (shortcut, spot_check) = (&run.shortcut, format!("{folder}-spot-check"));
     let rendered = if shortcut.job.stations.is_empty() {
         Taken { measurement: Measurement::default(), cost: Cost::default(), source: Source::Nobody }
     } else {
         let read = reader.read(&Question::new(&instrument, &shortcut.job, folder));
+        if let (Err(Failure { kind: FailureKind::Unread, .. }), Some(job)) = (&read, run.spot_check_job()) {
+            // Whoever takes the one may take the other beside it.
+            reader.read(&Question::new(&instrument, &job, &spot_check)).ok();
+        }
         read.map_err(|failure| failure.with_rest(|rest| Some(shortcut.complete(rest, &run.job))))?
     };
     let mut taken = Taken { measurement: shortcut.complete(rendered.measurement, &run.job), ..rendered };
     if let Some(job) = run.spot_check_job() {
-        let seen = reader.read(&Question::new(&instrument, &job, &format!("{folder}-spot-check")));
+        let seen = reader.read(&Question::new(&instrument, &job, &spot_check));
         let seen = seen.map_err(|failure| failure.with_rest(|_| None))?;
         if let Err(contradiction) = run.hold(&taken.measurement, &seen.measurement) {
             let name = planned.engine.name();

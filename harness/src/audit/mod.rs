@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use itertools::Itertools;
+use itertools::{Itertools, izip};
 use parking_lot::Mutex;
 use sha2::{Digest, Sha256};
 
@@ -37,7 +37,7 @@ use crate::diagnosis::{self, Examined};
 use crate::engines::Site;
 use crate::judge::{Policy, PolicyChoice, Published, PublishedError};
 use crate::measure::cache::Cache;
-use crate::measure::{Machine, Reader};
+use crate::measure::{Asked, Asking, Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
 use crate::procedures::Task;
 use crate::record::Status;
@@ -81,6 +81,12 @@ pub struct Options<'a> {
     /// Whether it is asked why what fails does.
     pub diagnosis: Diagnosis,
     pub stated_errors: StatedErrors,
+    /// Whom it asks for what the cache does not hold.
+    pub asking: Asking,
+    /// What was asked for, where others are to read it.
+    pub asked: Asked,
+    /// The cases that are read and judged, by name, where not all are; the others are planned, since equal jobs are read once.
+    pub only: Option<BTreeSet<String>>,
     pub observer: &'a dyn Observer,
 }
 
@@ -136,6 +142,9 @@ impl Options<'_> {
             calibration: Calibration::Judged,
             diagnosis: Diagnosis::Sought,
             stated_errors: StatedErrors::LookedInto,
+            asking: Asking::Engines,
+            asked: Asked::default(),
+            only: None,
             observer: &Silent,
         }
     }
@@ -145,7 +154,8 @@ impl Options<'_> {
             Skipping::Allowed => Machine::new(self.jobs),
             Skipping::Nothing => Machine::rendering_everything(self.jobs),
         };
-        Reader { cache: self.cache.clone(), ..Reader::bare(&self.site, machine) }
+        let (cache, asking, asked) = (self.cache.clone(), self.asking.clone(), self.asked.clone());
+        Reader { cache, asking, asked, ..Reader::bare(&self.site, machine) }
     }
 }
 
@@ -203,6 +213,10 @@ pub fn run_and_hold(specs: &[PathBuf], options: &Options<'_>) -> Result<(Report,
             let scenes = known.iter().flat_map(|(case, plan)| plan.tasks.iter().map(move |task| (case, task)));
             plans[0].skips.extend(scenes.map(skip));
         }
+    }
+    if let Some(only) = &options.only {
+        let all = izip!(cases, plans, policies);
+        (cases, plans, policies) = all.filter(|(case, ..)| only.contains(&case.name)).multiunzip();
     }
     audited(spec, &cases, plans, &policies, options).map(|report| (report, claim))
 }

@@ -11,12 +11,12 @@ use super::jobs::{Found, Outcome, Running};
 use super::sampling::{seed_of_look, stations_of};
 use crate::engines::{Job, Measurement};
 use crate::judge::{Comparison, Judge, LOOKS, SINGLE_PRECISION, Source, Verdict};
-use crate::measure::Question;
+use crate::measure::{Failure, Question};
 use crate::plan::{Fill, Run};
 use crate::procedures::Task;
 use crate::record::{
-    Doubt, EngineName, Estimate, MeterId, Reading, ReadingKey, Recording, Sheltered, StatedErrors, Tails, Uncertainty,
-    Variation,
+    Doubt, EngineName, Estimate, FailureKind, MeterId, Reading, ReadingKey, Recording, Sheltered, StatedErrors, Tails,
+    Uncertainty, Variation,
 };
 use crate::spec::Budget;
 use crate::system::process;
@@ -385,6 +385,11 @@ fn answer(running: &Running<'_>, run: &Run, job: Job, number: u32, effort: f64) 
     };
     let folder = format!("{}/repetition-{number}", task.procedure);
     let taken = running.reader.read(&Question::new(&planned.instrument()?, &job, &folder));
-    let taken = taken.inspect_err(|error| tracing::warn!("{}: not read again: {error}", planned.engine.name())).ok()?;
+    let told = |error: &Failure| {
+        if error.kind != FailureKind::Unread {
+            tracing::warn!("{}: not read again: {error}", planned.engine.name());
+        }
+    };
+    let taken = taken.inspect_err(told).ok()?;
     Some(taken.measurement)
 }

@@ -54,7 +54,8 @@ const FINER: f64 = 0.4;
 /// Takes further looks wherever a comparison is undecided; the observer hears of each.
 ///
 /// References come first, since no sample of a subject makes up for what its reference does not know, and last, where
-/// what subjects were sampled to lies closer to the tolerance than their first looks did.
+/// what subjects were sampled to lies closer to the tolerance than their first looks did. What follows from readings that are still open
+/// waits for them.
 pub(super) fn sample_on(
     running: &Running<'_>,
     judge: &Judge<'_>,
@@ -63,7 +64,13 @@ pub(super) fn sample_on(
 ) -> Result<(), FileError> {
     let mut refined = BTreeSet::new();
     refine_references(running, judge, outcome, &mut refined)?;
+    if running.reader.asked.leaves_open() {
+        return Ok(());
+    }
     sample_subjects(running, judge, stated, outcome)?;
+    if running.reader.asked.leaves_open() {
+        return Ok(());
+    }
     refine_references(running, judge, outcome, &mut refined)
 }
 

@@ -19,12 +19,12 @@ use crate::report::words::rounded;
 use crate::spec::{Budget, Trust, doubts};
 
 pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
-    let selection = selected.selection();
+    let selection = selected.choice.selection();
     let options = Options {
         selection: selection.clone(),
-        filter: selected.filter.clone(),
+        filter: selected.choice.filter.clone(),
         trust,
-        policy: selected.policy.clone(),
+        policy: selected.choice.policy.clone(),
         ..Options::new(site.clone(), out_folder(selected))
     };
     let (cases, policies) = audit::chosen(&selected.specs, &options).map_err(diagnose)?;
@@ -35,7 +35,7 @@ pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Ex
     let mut out = String::new();
     let mut exit = Exit::Passed;
     let mut planned: BTreeMap<&PolicyRecord, BTreeSet<EngineName>> = BTreeMap::new();
-    let mut planner = Planner::new(&selection, site, selected.skipping());
+    let mut planner = Planner::new(&selection, site, selected.choice.skipping());
     for ((case, policy), published) in cases.iter().zip(&policies).zip(&published) {
         let mut plan = planner.plan(case).map_err(diagnose)?;
         let sampling = policy.profile.sampling.unwrap_or_default();

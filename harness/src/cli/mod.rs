@@ -14,6 +14,7 @@ mod init;
 mod measuring;
 mod open;
 pub(crate) mod photometry;
+mod plan;
 mod progress;
 mod repetitions;
 mod run;
@@ -28,10 +29,10 @@ use std::path::{Path, PathBuf};
 use clap::builder::FalseyValueParser;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use self::photometry::PhotometryArgs;
-use crate::audit::Sampling;
+use crate::audit::{Calibration, Options, Sampling};
 use crate::engines::{ExternalJob, ExternalReadings, Site};
 use crate::judge::{PolicyChoice, ProjectPolicy};
 use crate::plan::{Selection, Skipping};
@@ -72,6 +73,10 @@ enum Command {
     Run(RunArgs),
     /// Validate specs and print the plan: what would run, what is skipped and why
     Check(Selected),
+    /// Print the readings that specs ask for, as jobs that other processes and machines may take
+    Plan(plan::PlanArgs),
+    /// Take readings of a plan into the cache; exits with 0 when they are read, whatever the verdict
+    Read(plan::ReadArgs),
     /// Write an engine's scenes, runnable by hand
     Export(export::ExportArgs),
     /// List, install or examine engines
@@ -81,7 +86,7 @@ enum Command {
     },
     /// What photometric files say: flux, symmetry, lint, polar diagram, conversion
     Photometry(PhotometryArgs),
-    /// View a finished run again
+    /// View a finished run again, or report what has been read of a plan
     Report(views::ReportArgs),
     /// Open a run's page in a browser
     Open(open::OpenArgs),
@@ -122,11 +127,19 @@ enum Command {
     },
 }
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
 struct Selected {
     /// Spec files, folders of them or patterns
     #[arg(required = true, value_name = "SPEC")]
     specs: Vec<PathBuf>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    choice: Choice,
+}
+
+/// What of specs is asked, of whom and by whose rules.
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
+struct Choice {
     /// Engines to run, by name [default: those of the spec, else all that are there]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     engines: Vec<String>,
@@ -144,12 +157,51 @@ struct Selected {
     no_skips: bool,
     /// Folder of the run's files [default: luxproof-out/<spec name>]
     #[arg(long, value_name = "DIR")]
+    #[serde(skip)]
     out: Option<PathBuf>,
     #[command(flatten)]
     policy: PolicyChoice,
 }
 
-impl Selected {
+/// How far an audit goes.
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
+struct Extent {
+    /// When sampling stops [default: as the policy's profile says, else decided]
+    #[arg(long, value_enum, value_name = "WHEN")]
+    sampling: Option<Sampling>,
+    /// Leave out the scenes of known answer, which tell a wrong engine from a difficult room
+    #[arg(long)]
+    no_calibration: bool,
+}
+
+/// What is audited and how: where that is the same, every process asks for the same readings.
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
+struct Audited {
+    #[command(flatten)]
+    #[serde(flatten)]
+    selected: Selected,
+    #[command(flatten)]
+    #[serde(flatten)]
+    extent: Extent,
+}
+
+impl Audited {
+    fn options(&self, site: &Site, trust: Trust, out: PathBuf) -> Options<'static> {
+        let Choice { filter, policy, .. } = &self.selected.choice;
+        Options {
+            selection: self.selected.choice.selection(),
+            filter: filter.clone(),
+            skipping: self.selected.choice.skipping(),
+            trust,
+            policy: policy.clone(),
+            sampling: self.extent.sampling,
+            calibration: if self.extent.no_calibration { Calibration::LeftOut } else { Calibration::Judged },
+            ..Options::new(site.clone(), out)
+        }
+    }
+}
+
+impl Choice {
     fn skipping(&self) -> Skipping {
         if self.no_skips { Skipping::Nothing } else { Skipping::Allowed }
     }
@@ -163,7 +215,7 @@ impl Selected {
 #[allow(clippy::struct_excessive_bools, reason = "switches of a command line")]
 struct RunArgs {
     #[command(flatten)]
-    selected: Selected,
+    audited: Audited,
     /// Install missing engines first
     #[arg(long)]
     install: bool,
@@ -181,12 +233,6 @@ struct RunArgs {
     /// Take every reading anew, and keep none
     #[arg(long)]
     no_cache: bool,
-    /// Leave out the scenes of known answer, which tell a wrong engine from a difficult room
-    #[arg(long)]
-    no_calibration: bool,
-    /// When sampling stops [default: as the policy's profile says, else decided]
-    #[arg(long, value_enum, value_name = "WHEN")]
-    sampling: Option<Sampling>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -233,12 +279,17 @@ impl Cli {
             }
             Command::Cache { action } => cache::manage(action, &cache::folder(self.cache_dir)?),
             Command::Check(args) => check::check(&args, &site, trust),
+            Command::Plan(args) => plan::plan(&args, &site, &cache::folder(self.cache_dir)?, trust),
+            Command::Read(args) => plan::read(&args, &site, &cache::folder(self.cache_dir)?, trust),
             Command::Export(args) => export::export(&args, &site, trust),
             Command::Engines { action } => engines::manage_engines(action, &site, trust),
             Command::Photometry(args) => photometry::run(&args, trust),
             Command::Report(mut args) => {
                 args.views.all |= self.verbose > 0;
-                views::view(&args)
+                match &args.from {
+                    Some(cache) => run::report_from(cache, &args, &site, trust),
+                    None => views::view(&args),
+                }
             }
             Command::Init(args) => init::init(&args),
             Command::Completions(args) => shell::completions(&args, Self::command()),

@@ -7,10 +7,11 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 use super::diagnostic::{diagnose, not_audited};
 use super::engines::report_installation;
 use super::progress::Progress;
-use super::views::{keep_page, print_report};
+use super::views::{ReportArgs, keep_page, print_report};
 use super::{RunArgs, Selected, complain};
-use crate::audit::{self, AfterFailure, Calibration, Options};
+use crate::audit::{self, AfterFailure, Options};
 use crate::engines::{self, Site};
+use crate::measure::Asking;
 use crate::measure::cache::Cache;
 use crate::report::earlier::subject_at;
 use crate::report::{self, BaselineCheck, Exit, Report};
@@ -22,34 +23,28 @@ use crate::trend::baseline::{self, Baseline, Comparability, Entry};
 
 pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> Result<Exit, Diagnostic> {
     let progress = Progress::new();
+    let Selected { specs, choice } = &args.audited.selected;
     let options = Options {
         cache: Some(cache.clone()).filter(|_| !args.no_cache),
         jobs: args.jobs.unwrap_or_else(process::cores),
-        selection: args.selected.selection(),
-        filter: args.selected.filter.clone(),
-        skipping: args.selected.skipping(),
-        trust,
-        policy: args.selected.policy.clone(),
-        sampling: args.sampling,
         after_failure: if args.fail_fast { AfterFailure::Stop } else { AfterFailure::GoOn },
-        calibration: if args.no_calibration { Calibration::LeftOut } else { Calibration::Judged },
         observer: &progress,
-        ..Options::new(site.clone(), out_folder(&args.selected))
+        ..args.audited.options(site, trust, out_folder(&args.audited.selected))
     };
     if args.install {
         // Every spec is read and checked before anything is fetched.
-        let (cases, _) = audit::chosen(&args.selected.specs, &options).map_err(diagnose)?;
+        let (cases, _) = audit::chosen(specs, &options).map_err(diagnose)?;
         Claim::of(&options.out).into_diagnostic()?;
         let _under_way = process::UnderWay::begin();
-        report_installation(site, &args.selected.engines);
+        report_installation(site, &choice.engines);
         let named = cases.iter().flat_map(|case| case.engines.iter().flatten()).map(|(name, _)| name.clone());
         let on_request: Vec<String> = named.filter(|name| engines::is_on_request(name)).collect();
-        if args.selected.engines.is_empty() && !on_request.is_empty() {
+        if choice.engines.is_empty() && !on_request.is_empty() {
             report_installation(site, &on_request);
         }
     }
-    let held = args.baseline.as_deref().map(|path| Held::read(path, &args.selected.specs, &options)).transpose()?;
-    let (mut report, _claim) = audit::run_and_hold(&args.selected.specs, &options).map_err(not_audited)?;
+    let held = args.baseline.as_deref().map(|path| Held::read(path, specs, &options)).transpose()?;
+    let (mut report, _claim) = audit::run_and_hold(specs, &options).map_err(not_audited)?;
     let root = options.out.clone();
     drop(progress);
     if let Some(held) = &held {
@@ -60,6 +55,28 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> R
         keep_page(&report::page(&report, &[]), &root);
     }
     print_report(&report, &root, &args.views)?;
+    Ok(report.exit())
+}
+
+/// The report of what a cache holds: that of a run, for which other processes have read.
+pub(super) fn report_from(cache: &Path, args: &ReportArgs, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
+    let audited = args.audited();
+    let options = Options {
+        cache: Some(Cache::at(cache)),
+        asking: Asking::Nobody,
+        ..audited.options(site, trust, out_folder(&audited.selected))
+    };
+    let (report, _claim) = audit::run_and_hold(&audited.selected.specs, &options).map_err(not_audited)?;
+    let open = options.asked.nodes().iter().filter(|node| !node.is_read).count();
+    if open > 0 {
+        complain(&format!(
+            "{open} job(s) are not read yet: `luxproof plan` names them, `luxproof read` takes them into the cache"
+        ));
+    }
+    if !args.views.has_page() {
+        keep_page(&report::page(&report, &[]), &options.out);
+    }
+    print_report(&report, &options.out, &args.views)?;
     Ok(report.exit())
 }
 
@@ -120,7 +137,7 @@ pub(super) fn out_folder(selected: &Selected) -> PathBuf {
         Some(other) => other,
         None => usual.clone(),
     };
-    selected.out.clone().unwrap_or_else(chosen)
+    selected.choice.out.clone().unwrap_or_else(chosen)
 }
 
 /// Whether a spec of an earlier run is this one; whether one that is gone was is not known.

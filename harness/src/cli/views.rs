@@ -3,11 +3,11 @@
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 use terminal_size::terminal_size_of;
 
-use super::{complain, json, print};
+use super::{Audited, Choice, Extent, Selected, complain, json, print};
 use crate::report::{self, Beside, Detail, Exit, Report, Screen, Style};
 use crate::system::files;
 
@@ -47,14 +47,33 @@ pub(super) enum Format {
 }
 
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("of specs").multiple(true).requires("from").args([
+    "engines", "procedures", "filter", "seed", "no_skips", "out", "file", "profile", "tolerance_class", "sampling", "no_calibration",
+]))]
 pub(super) struct ReportArgs {
-    /// report.json of a run, or the run's folder
-    result: PathBuf,
+    /// report.json of a run, or the run's folder; with --from the specs that were read
+    #[arg(required = true, value_name = "RESULT|SPEC")]
+    results: Vec<PathBuf>,
+    /// Report what this cache holds of the readings that specs ask for, and read nothing
+    #[arg(long, value_name = "CACHE")]
+    pub(super) from: Option<PathBuf>,
+    #[command(flatten)]
+    choice: Choice,
+    #[command(flatten)]
+    extent: Extent,
     /// Print the error budget of every deviation, and nothing else
     #[arg(long)]
     budget: bool,
     #[command(flatten)]
     pub(super) views: Views,
+}
+
+impl ReportArgs {
+    /// What was to be read.
+    pub(super) fn audited(&self) -> Audited {
+        let selected = Selected { specs: self.results.clone(), choice: self.choice.clone() };
+        Audited { selected, extent: self.extent.clone() }
+    }
 }
 
 pub(super) fn print_report(report: &Report, folder: &Path, views: &Views) -> Result<(), Diagnostic> {
@@ -113,8 +132,11 @@ pub(super) fn keep_page(page: &str, folder: &Path) -> Option<PathBuf> {
 }
 
 pub(super) fn view(args: &ReportArgs) -> Result<Exit, Diagnostic> {
-    let file = report_file(&args.result);
-    let report = read_report(&args.result)?;
+    let [result] = &args.results[..] else {
+        return Err(miette::miette!(help = "name one, or the specs with --from CACHE", "a view is one of one run"));
+    };
+    let file = report_file(result);
+    let report = read_report(result)?;
     if args.budget {
         print(&report::budgets(&report))?;
     } else {

@@ -92,8 +92,9 @@ impl ProfileBudget {
 }
 
 /// When sampling stops.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize, JsonSchema, strum::Display)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Sampling {
     /// At the relative error of the spec's budget; beyond it only what is undecided
     Accurate,
@@ -103,10 +104,11 @@ pub enum Sampling {
 }
 
 /// Which project policy judges specs.
-#[derive(Clone, Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args, Serialize, Deserialize)]
 pub struct PolicyChoice {
     /// The project's policy [default: the nearest luxproof.yaml, beside each spec or in a folder above it]
     #[arg(long = "policy", value_name = "FILE")]
+    #[serde(rename = "policy")]
     pub file: Option<PathBuf>,
     /// A profile of the policy
     #[arg(long, value_name = "NAME")]

@@ -1,6 +1,7 @@
 //! The one way to a reading: out of the cache or by the engine, within the machine's slots, in this process or one apart.
 
 mod answer;
+mod asking;
 pub mod cache;
 mod machine;
 mod outcome;
@@ -9,6 +10,7 @@ mod reader;
 mod subprocess;
 
 pub use answer::answer;
+pub use asking::{Asked, Asking, Failures, Needs, Node};
 pub use machine::Machine;
 pub use outcome::{Cost, Failure, Source, Taken};
 pub use question::{Instrument, Question, Trial};

@@ -56,8 +56,7 @@ impl<'a> Question<'a> {
     pub(super) fn is_final(&self, entry: &Entry) -> bool {
         match entry.answer.as_ref().map_err(|failure| failure.kind) {
             Ok(_) | Err(FailureKind::Declined) => true,
-            Err(FailureKind::Interrupted | FailureKind::TimeUp) => false,
-            Err(_) => self.trial.is_some(),
+            Err(kind) => kind.is_an_answer() && self.trial.is_some(),
         }
     }
 }

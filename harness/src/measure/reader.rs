@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::asking::{Asked, Asking};
 use super::cache::{Cache, Entry, Key, Lookup};
 use super::machine::Machine;
 use super::outcome::{Cost, Failure, Source, Taken};
@@ -32,12 +33,17 @@ pub struct Reader {
     pub isolation: Isolation,
     /// No reading starts after this; what is in the cache is still found.
     pub until: Option<Instant>,
+    /// Whom it asks for what the cache does not hold.
+    pub asking: Asking,
+    /// What it was asked for.
+    pub asked: Asked,
 }
 
 impl Reader {
     /// One that reads in this process, and keeps neither readings nor files.
     pub fn bare(site: &Site, machine: Arc<Machine>) -> Self {
-        Self { site: site.clone(), out: None, cache: None, machine, isolation: Isolation::InProcess, until: None }
+        let (isolation, asking, asked) = (Isolation::InProcess, Asking::Engines, Asked::default());
+        Self { site: site.clone(), out: None, cache: None, machine, isolation, until: None, asking, asked }
     }
 
     /// What no plan has asked the engine about: it may say beforehand that it cannot.
@@ -54,11 +60,17 @@ impl Reader {
         let answered = self.machine.answered(&key);
         let mut answered = answered.as_ref().map(|a| a.lock());
         let known = answered.as_ref().and_then(|a| (**a).clone());
-        let (entry, source) = match known.or_else(|| self.find(&key)) {
+        let found = known.or_else(|| self.find(&key));
+        let is_open = found.is_none() && !self.asking.admits(&key);
+        if self.asking.is_shared() {
+            self.asked.note(&key, question, &self.machine.slots, !is_open);
+        }
+        let (entry, source) = match found {
             Some(entry) => {
                 self.lay_out(question, &entry)?;
                 (entry, Source::Cache)
             }
+            None if is_open => return Err(Failure::new(FailureKind::Unread, "nobody has read it yet")),
             None => (self.ask(question)?, Source::Engine),
         };
         if question.is_final(&entry) {
@@ -68,6 +80,10 @@ impl Reader {
             if let Some(answered) = &mut answered {
                 **answered = Some(entry.clone());
             }
+        } else if self.asking.keeps_failures()
+            && entry.answer.as_ref().is_err_and(|failure| failure.kind.is_an_answer())
+        {
+            self.keep(&key.of_failure(), &entry);
         }
         let measurement = checked(&entry.key.engine, question.job, entry.answer?)?;
         Ok(Taken { measurement, cost: entry.cost, source })
@@ -106,7 +122,14 @@ impl Reader {
         Ok(Entry { key, version: instrument.version.text.clone(), cost, answer })
     }
 
+    /// What the cache holds of a key: a reading, or how it failed where nobody is to try again here.
     fn find(&self, key: &Key) -> Option<Entry> {
+        let is_left = self.asking.is_shared() && !self.asking.admits(key);
+        let failed = || is_left.then(|| self.look_up(&key.of_failure())).flatten();
+        self.look_up(key).or_else(failed)
+    }
+
+    fn look_up(&self, key: &Key) -> Option<Entry> {
         match self.cache.as_ref()?.find(key) {
             Lookup::Found(entry) => Some(*entry),
             Lookup::Unknown => None,

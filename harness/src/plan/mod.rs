@@ -1,6 +1,7 @@
 //! The plan: which engine runs which procedure of a case, what is skipped, and why.
 
 mod calibration;
+mod groups;
 mod roster;
 mod shortcut;
 mod spot_check;
@@ -18,6 +19,7 @@ use crate::record::{EngineName, ProcedureId, ReadingKey};
 use crate::spec::{Case, SpecError};
 use luminaire::scene::Transport;
 
+pub use groups::{Group, groups};
 use roster::{Chosen, Roster};
 use shortcut::Repeated;
 pub use shortcut::{Fill, Omission, Shortcut};

@@ -91,4 +91,13 @@ pub enum FailureKind {
     Interrupted,
     /// It was not begun: the time for beginning was over.
     TimeUp,
+    /// It was not asked for here: another process or machine is to read it.
+    Unread,
+}
+
+impl FailureKind {
+    /// Whether the engine was asked and has had its chance.
+    pub const fn is_an_answer(self) -> bool {
+        !matches!(self, Self::Interrupted | Self::TimeUp | Self::Unread)
+    }
 }

@@ -148,7 +148,7 @@ impl OfCase<'_> {
         let failed = recordings
             .find(|r| r.key.is_of(self.case, procedure) && r.key.engine == *engine && r.failure_kind.is_some())?;
         let kind = failed.failure_kind?;
-        let is_ours = matches!(kind, FailureKind::Interrupted | FailureKind::TimeUp | FailureKind::Declined);
+        let is_ours = !kind.is_an_answer() || kind == FailureKind::Declined;
         (!is_ours).then(|| Sighting {
             symptom: Symptom { engine: engine.clone(), procedure, oracle: Oracle::Failure(kind) },
             comparison: None,

@@ -49,7 +49,11 @@ impl Finding {
 
     pub(super) fn failed(failure: &Failure) -> Self {
         let how = match failure.kind {
-            FailureKind::Declined | FailureKind::Refused | FailureKind::Interrupted | FailureKind::TimeUp => None,
+            FailureKind::Declined
+            | FailureKind::Refused
+            | FailureKind::Interrupted
+            | FailureKind::TimeUp
+            | FailureKind::Unread => None,
             FailureKind::Nan => Some(How::Nan),
             FailureKind::Crash => Some(How::Crash),
             FailureKind::Hang => Some(How::Hang),

@@ -1,11 +1,19 @@
 //! The key of a reading: a hash of everything that the reading depends on; pure.
 
+use std::fmt;
+use std::str::FromStr;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::engines::{Engine, EngineError, ExternalJob, Job, Version};
 use crate::system::digest::hexadecimal;
 
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+/// As text it is `engine/digits`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "String", into = "String")]
+#[schemars(with = "String")]
 pub struct Key {
     pub engine: String,
     /// 64 hexadecimal digits.
@@ -13,11 +21,57 @@ pub struct Key {
 }
 
 impl Key {
+    /// Where it is kept that there is no reading, apart from readings: a run of its own tries again.
+    pub(in crate::measure) fn of_failure(&self) -> Self {
+        self.under("failed")
+    }
+
     /// The key of the same where these conditions matter as well.
     #[must_use]
     pub fn under(&self, conditions: &str) -> Self {
         let digits = hexadecimal(&Sha256::digest(format!("{} {conditions}", self.digits)));
         Self { engine: self.engine.clone(), digits }
+    }
+}
+
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.engine, self.digits)
+    }
+}
+
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[error("no id of a job: it is an engine's name, a slash and {DIGITS} hexadecimal digits")]
+pub struct NoKey;
+
+const DIGITS: usize = 64;
+
+impl From<Key> for String {
+    fn from(key: Key) -> Self {
+        key.to_string()
+    }
+}
+
+impl TryFrom<String> for Key {
+    type Error = NoKey;
+
+    fn try_from(text: String) -> Result<Self, NoKey> {
+        text.parse()
+    }
+}
+
+impl FromStr for Key {
+    type Err = NoKey;
+
+    fn from_str(text: &str) -> Result<Self, NoKey> {
+        let (engine, digits) = text.split_once('/').ok_or(NoKey)?;
+        let is_hexadecimal = digits.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f'));
+        // Both become names of files.
+        let is_name = !engine.is_empty() && engine.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_@.".contains(&b));
+        if digits.len() != DIGITS || !is_hexadecimal || !is_name || engine.starts_with('.') {
+            return Err(NoKey);
+        }
+        Ok(Self { engine: engine.to_owned(), digits: digits.to_owned() })
     }
 }
 

@@ -12,6 +12,7 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 
+use super::outcome::{Cost, Failure};
 use crate::system::files;
 
 pub use entry::Entry;
@@ -61,6 +62,15 @@ impl Cache {
             }
             Err(why) => Lookup::Damaged(format!("{} {why}", path.display())),
         }
+    }
+
+    /// What came of a key, be it a failure that was taken for the answer.
+    pub fn outcome(&self, key: &Key) -> Option<Result<Cost, Failure>> {
+        let found = |key: &Key| match self.find(key) {
+            Lookup::Found(entry) => Some(entry.answer.map(|_| entry.cost)),
+            Lookup::Unknown | Lookup::Damaged(_) => None,
+        };
+        found(key).or_else(|| found(&key.of_failure()))
     }
 
     /// Takes away what writers left that were killed.

@@ -15,6 +15,7 @@ use super::rows::{Rows, place};
 use super::{class, glyph, minus, percent};
 use crate::judge::{Comparison, Verdict};
 use crate::record::ProcedureId;
+use crate::system::process::quoted;
 
 /// Rows shown until all are asked for.
 const FIRST: usize = 12;
@@ -107,16 +108,6 @@ fn repeat(report: &Report, c: &Comparison) -> String {
     let filter = if c.key.case.contains('/') { format!(" --filter {}", quoted(&c.key.case)) } else { String::new() };
     let (spec, engine) = (quoted(spec), quoted(&c.key.engine));
     format!("luxproof run {spec}{filter} --engines {engine} --procedures {} --no-cache --out again", c.key.procedure)
-}
-
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./@".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
-    }
 }
 
 /// How much of the tolerance a deviation takes, to either side.
