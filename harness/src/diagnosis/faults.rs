@@ -7,7 +7,7 @@ use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, LuminaireModel, Transport};
 
 use super::fault::{Fault, Parameter};
-use super::tables::{averaged, extrapolated, is_axial, isotropic, remap, replace};
+use super::tables::{averaged, extrapolated, first_plane, is_axial, isotropic, raised, remap, replace, turned_behind};
 use super::wrong::{Law, Order, Readout, Wrong};
 use crate::procedures::Task;
 
@@ -118,6 +118,8 @@ fn laws() -> Vec<Fault> {
     vec![
         law("cosine-missing", "the cosine at the meter is left out", wrong(|l| l.cosine = 0)),
         law("cosine-doubled", "the cosine at the meter is applied twice", wrong(|l| l.cosine = 2)),
+        law("two-sided", "light from behind a meter counts, too", wrong(|l| l.is_two_sided = true)),
+        law("normals-ignored", "the normals of meters are left out", wrong(|l| (l.cosine, l.is_two_sided) = (0, true))),
         law("distance", "light falls with distance, not with its square", wrong(|l| l.distance = 1))
             .as_bright_as_you_like(),
         law("candela-squared", "the candela are squared: the filter is applied to itself", wrong(|l| l.intensity = 2))
@@ -142,10 +144,20 @@ fn of_luminaires() -> Vec<Fault> {
             !is_axial(l) && remap(l, |c, g| (-c, g))
         }),
         of_each("c-mirrored-90", "C 0 and C 180 are exchanged", |l| !is_axial(l) && remap(l, |c, g| (180.0 - c, g))),
+        of_each("c-turned-behind", "beyond a gamma of 90 degrees C is turned by 180 degrees", turned_behind),
         of_each("gamma-flipped", "gamma is counted from the zenith: up and down are exchanged", |l| {
             remap(l, |c, g| (c, 180.0 - g))
         }),
         of_each("isotropic", "the distribution is replaced by the same intensity everywhere", isotropic),
+        of_each("one-plane", "only the plane C 0 is read", first_plane).about("planes"),
+        of_each("nodes-squared", "the candela are squared, each as a part of the largest", |l| raised(l, 2.0))
+            .about(CANDELA),
+        of_each(
+            "one-plane-squared",
+            "only the plane C 0 is read, and the candela are squared, each as a part of the largest",
+            |l| raised(l, 2.0) | first_plane(l),
+        )
+        .about(CANDELA),
         of_each("averaged", "the distribution is averaged over C", |l| !is_axial(l) && averaged(l)),
         of_each("extrapolated", "the table goes on beyond its last angle", extrapolated),
         of_each("unrotated", "the luminaire's rotation is left out", |l| {
@@ -165,6 +177,8 @@ fn of_luminaires() -> Vec<Fault> {
     faults
 }
 
+/// What powers of candela are about.
+pub(super) const CANDELA: &str = "power of candela";
 /// What rotations in C are about.
 pub(super) const TURN: &str = "turn";
 /// What powers of reflectances are about.
@@ -179,7 +193,7 @@ fn of_rooms() -> Vec<Fault> {
         ("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", 2.2),
         ("gamma-encoded", "reflectances are encoded as colours, to the power of 1/2.2", 1.0 / 2.2),
     ] {
-        faults.push(Fault::new(id, what, move |wrong, _| raised(wrong, power)).about(POWER));
+        faults.push(Fault::new(id, what, move |wrong, _| reflectances_raised(wrong, power)).about(POWER));
     }
     faults
 }
@@ -291,7 +305,7 @@ pub(super) fn reflects(wrong: &mut Wrong, surface: Surface, value: f64) -> bool 
 }
 
 /// Every reflectance to a power.
-pub(super) fn raised(wrong: &mut Wrong, power: f64) -> bool {
+pub(super) fn reflectances_raised(wrong: &mut Wrong, power: f64) -> bool {
     each_reflectance(wrong, |r| r.powf(power))
 }
 

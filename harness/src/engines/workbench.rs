@@ -19,6 +19,14 @@ impl SceneFile {
     pub fn text(name: &str, text: impl Into<String>) -> Self {
         Self { name: name.to_owned(), bytes: text.into().into_bytes() }
     }
+
+    /// Writes it below a folder, with the folders that its name names; says where.
+    pub fn write_below(&self, folder: &Path) -> Result<PathBuf, EngineError> {
+        let path = folder.join(&self.name);
+        let above = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+        above.and_then(|()| std::fs::write(&path, &self.bytes)).map_err(|source| EngineError::io(&path, source))?;
+        Ok(path)
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -42,8 +50,7 @@ impl Workbench {
 
     pub fn write(&self, files: &[SceneFile]) -> Result<(), EngineError> {
         for file in files {
-            let path = self.scene_dir.join(&file.name);
-            std::fs::write(&path, &file.bytes).map_err(|source| EngineError::io(&path, source))?;
+            file.write_below(&self.scene_dir)?;
         }
         Ok(())
     }
