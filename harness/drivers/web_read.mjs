@@ -24,7 +24,24 @@ function file(name) {
   return [path.resolve(path.basename(name)), "application/octet-stream"];
 }
 
-const browser = await chromium.launch({ executablePath: program, args: FLAGS });
+/** Chromium now and then ends while it starts, before anything was asked of it. */
+async function launched(triesLeft) {
+  try {
+    return await chromium.launch({ executablePath: program, args: FLAGS });
+  } catch (error) {
+    if (triesLeft === 0) throw error;
+    console.error(`Chromium did not start, once more: ${error.message}`);
+    return launched(triesLeft - 1);
+  }
+}
+
+/** A report tells the first line of a failure: what is wrong, without the page's stack. */
+function failed(error) {
+  console.error(String(error?.message ?? error).split("\n")[0]);
+  process.exitCode = 1;
+}
+
+const browser = await launched(2);
 try {
   const page = await browser.newPage();
   const troubles = [];
@@ -43,6 +60,8 @@ try {
   await page.waitForFunction(() => window.illuminance, null, { timeout: 0 }).catch((error) => { throw troubles[0] ?? error; });
   const answer = await page.evaluate((job) => window.illuminance(job), job);
   process.stdout.write(JSON.stringify({ ...answer, troubles }));
+} catch (error) {
+  failed(error);
 } finally {
   await browser.close();
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
+use itertools::Itertools;
 use serde_json::{Value, json};
 
 use super::{AuditError, Diagnosis, Options, Subjects, examine};
@@ -160,8 +161,11 @@ struct Findings(BTreeMap<Topic, Vec<(Standing, String)>>);
 impl Findings {
     fn add(&mut self, topic: Topic, standing: Standing, text: String) {
         let all = self.0.entry(topic).or_default();
-        if !all.iter().any(|(_, known)| *known == text) {
-            all.push((standing, text));
+        // One thing is told once, by whoever says more of it.
+        match all.iter_mut().find(|(_, known)| known.starts_with(&text) || text.starts_with(known.as_str())) {
+            Some((_, known)) if text.len() > known.len() => *known = text,
+            Some(_) => {}
+            None => all.push((standing, text)),
         }
     }
 
@@ -172,13 +176,27 @@ impl Findings {
         for engine in report.engines.iter().filter(|e| e.id == *ADAPTER && e.status == Status::Absent) {
             self.add(Topic::Protocol, Standing::Wrong, engine.reason.clone().unwrap_or_default());
         }
+        // What is wrong with several scenes alike is told once; the first of their logs is enough.
+        let mut failures: Vec<(Topic, String, Vec<ProcedureId>, &str)> = vec![];
         for recording in recordings {
             let Some(why) = &recording.failure else { continue };
             let topic = match recording.failure_kind {
                 Some(FailureKind::Nan | FailureKind::SilentLoss) => Topic::Meters,
                 _ => Topic::Protocol,
             };
-            self.add(topic, Standing::Wrong, format!("{}: {why}", recording.key.procedure));
+            let alike: String = why.lines().take_while(|line| !line.starts_with("all its messages are in")).collect();
+            match failures.iter_mut().find(|(of, known, ..)| *of == topic && *known == alike) {
+                Some((.., scenes, _)) => scenes.push(recording.key.procedure),
+                None => failures.push((topic, alike, vec![recording.key.procedure], why)),
+            }
+        }
+        if failures.iter().any(|(topic, ..)| *topic == Topic::Protocol) {
+            if let Some(text) = introduction.why_version_one() {
+                self.add(Topic::Protocol, Standing::Wrong, text);
+            }
+        }
+        for (topic, _, scenes, why) in failures {
+            self.add(topic, Standing::Wrong, format!("{}: {why}", scenes.iter().join(", ")));
         }
         let at_once = |r: &&&Recording| r.effort.contains_key("jobs_at_once");
         let answered: Vec<_> = recordings.iter().filter(|r| r.failure.is_none()).collect();
@@ -199,11 +217,9 @@ impl Findings {
             let (failing, undecided) = (count(Verdict::Fail), count(Verdict::Inconclusive));
             let causes = explained.iter().filter(|e| e.key.procedure == procedure).flat_map(|e| &e.causes);
             let causes: Vec<_> = causes.collect();
-            let off = all.iter().filter(|c| c.verdict == Verdict::Fail).filter_map(|c| c.relative_deviation);
-            let worst = off.fold(0.0, |worst: f64, d| if d.abs() > worst.abs() { d } else { worst });
             let of = format!("{failing} of {} meters of the scene `{procedure}` fail", all.len());
             if failing > 0 && causes.is_empty() {
-                let text = format!("{of}, by {:+.2} % at most; nothing that is known explains it", 100.0 * worst);
+                let text = format!("{of}, {}; nothing that is known explains it", worst(&all));
                 self.add(Topic::by_scene(procedure), Standing::Wrong, text);
             }
             for cause in causes {
@@ -239,6 +255,19 @@ impl Findings {
             let text = "readings come without `std_error_lx`, `error_bound_lx` or `exact`: nothing is claimed of them";
             self.add(Topic::Claims, Standing::Sound, text.to_owned());
         }
+    }
+}
+
+/// How far the worst of what fails is off: in parts of what is right, or in lux where that is dark.
+fn worst(comparisons: &[&Comparison]) -> String {
+    let failing = || comparisons.iter().filter(|c| c.verdict == Verdict::Fail);
+    let largest = |of: fn(&Comparison) -> Option<f64>| {
+        failing().filter_map(|c| of(c)).filter(|d| d.is_finite()).max_by(|a, b| a.abs().total_cmp(&b.abs()))
+    };
+    match (largest(|c| c.relative_deviation), largest(|c| c.deviation)) {
+        (Some(relative), _) => format!("by {:+.2} % at most", 100.0 * relative),
+        (None, Some(lux)) => format!("by {lux:+.3} lx at most where there should be none"),
+        (None, None) => "which have no reading".to_owned(),
     }
 }
 

@@ -63,11 +63,13 @@ impl Cause {
             "two" => Aspect::Several,
             "reversed" | "next" | "previous" | "exchanged" | "shifted" | "shifted-here" | "lifted" => Aspect::Meters,
             "turned" | "isotropic" | "averaged" | "extrapolated" | "unrotated" | "rotated-back" | "area-as-point"
-            | "meter-flipped" | "two-sided" | "normals-ignored" | "cosine-missing" | "cosine-doubled" | "place"
-            | "turn" | "tilt" | "one-plane" | "gamma-flipped" | "gamma-off" => Aspect::Orientation,
+            | "meter-flipped" | "meters-up" | "two-sided" | "normals-ignored" | "cosine-missing" | "cosine-doubled"
+            | "place" | "turn" | "tilt" | "nearest" | "one-table" | "one-plane" | "gamma-flipped" | "gamma-off" => {
+                Aspect::Orientation
+            }
             id if id.starts_with("c-") => Aspect::Orientation,
             "upside-down" | "gamma-decoded" | "gamma-encoded" | "bounces-cut" | "bounces-uncut" | "direct-lost"
-            | "direct-added" | "indirect-added" | "surface-lost" | "luminaire-lost" | "reflectances"
+            | "direct-added" | "indirect-added" | "surface-lost" | "luminaire-lost" | "one-lit" | "reflectances"
             | "reflectance" | "power" => Aspect::Light,
             _ => Aspect::Units,
         }

@@ -1,13 +1,15 @@
 //! Faults that renderers and exporters are known to have. The diagnosis looks for them in readings that failed, the
 //! self-test puts them in.
 
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 use itertools::Itertools;
 use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, LuminaireModel, Transport};
 
 use super::fault::{Fault, Parameter};
-use super::tables::{averaged, extrapolated, first_plane, is_axial, isotropic, raised, remap, replace, turned_behind};
+use super::tables::{
+    averaged, extrapolated, first_plane, is_axial, isotropic, nearest, raised, remap, replace, turned_behind,
+};
 use super::wrong::{Law, Order, Readout, Wrong};
 use crate::procedures::Task;
 
@@ -43,6 +45,8 @@ fn factors() -> Vec<Fault> {
         ("factor-1/pi", "factor 1/pi: luminance taken for exitance", 1.0 / PI),
         ("factor-4pi", "factor 4 pi: intensity taken for flux", 4.0 * PI),
         ("factor-1/4pi", "factor 1/(4 pi): flux taken for intensity", 1.0 / (4.0 * PI)),
+        ("factor-2pi", "factor 2 pi: intensity taken for the flux of half a sphere", 2.0 * PI),
+        ("factor-1/2pi", "factor 1/(2 pi): the flux of half a sphere taken for intensity", 0.5 / PI),
         ("factor-2", "factor 2: something counted twice, or half a sphere for a whole one", 2.0),
         ("factor-1/2", "factor 1/2: half of something lost, or a whole sphere for half a one", 0.5),
         ("factor-179", "factor 179: Radiance's lumens a watt applied once too often", 179.0),
@@ -53,6 +57,8 @@ fn factors() -> Vec<Fault> {
         ("factor-1/177.83", "factor 1/177.83: the lumens a watt of equal-energy white left out", 1.0 / 177.83),
         ("feet", "factor 10.764: feet taken for metres, or lux for footcandles", 1.0 / (0.3048 * 0.3048)),
         ("metres", "factor 0.0929: metres taken for feet, or footcandles for lux", 0.3048 * 0.3048),
+        ("millimetres", "factor 1000000: millimetres taken for metres", 1e6),
+        ("centimetres", "factor 10000: centimetres taken for metres, or lux for phot", 1e4),
         ("kilo", "factor 1000: candela a kilolumen taken for candela, or lux for kilolux", 1000.0),
         ("milli", "factor 1/1000: candela taken for candela a kilolumen", 1e-3),
     ];
@@ -69,6 +75,10 @@ fn factors() -> Vec<Fault> {
     let scaled = "the spec's flux_scale is left out";
     faults.push(Fault::new("flux-scale", scaled, |wrong, _| {
         wrong.dimmed(|l| (l.flux_scale > 0.0 && l.flux_scale != 1.0).then(|| 1.0 / l.flux_scale))
+    }));
+    let twice = "the spec's flux_scale is applied twice";
+    faults.push(Fault::new("flux-scale-twice", twice, |wrong, _| {
+        wrong.dimmed(|l| (l.flux_scale > 0.0 && l.flux_scale != 1.0).then_some(l.flux_scale))
     }));
     let lumens = |l: &luminaire::scene::Luminaire| l.photometry.lamp_lumens.filter(|lumens| *lumens > 0.0);
     let per = "factor 1000/lamp lumens: scaled to a kilolumen";
@@ -160,6 +170,7 @@ fn of_luminaires() -> Vec<Fault> {
         .about(CANDELA),
         of_each("averaged", "the distribution is averaged over C", |l| !is_axial(l) && averaged(l)),
         of_each("extrapolated", "the table goes on beyond its last angle", extrapolated),
+        of_each("nearest", "the table's nearest angles are taken, and nothing between them", nearest),
         of_each("unrotated", "the luminaire's rotation is left out", |l| {
             let before = std::mem::replace(&mut l.orientation, DMat3::IDENTITY);
             before != DMat3::IDENTITY
@@ -168,6 +179,20 @@ fn of_luminaires() -> Vec<Fault> {
             let back = l.orientation.transpose();
             let before = std::mem::replace(&mut l.orientation, back);
             before != l.orientation
+        }),
+        Fault::new("one-lit", "of several luminaires the first alone gives light", |wrong, _| {
+            let are_several = wrong.task().scene.luminaires.len() > 1;
+            if are_several {
+                wrong.scene().luminaires.truncate(1);
+            }
+            are_several
+        }),
+        Fault::new("one-table", "all luminaires have the table of the first", |wrong, _| {
+            let Some(first) = wrong.task().scene.luminaires.first().map(|l| l.photometry.clone()) else { return false };
+            wrong.luminaires(|l| {
+                let before = std::mem::replace(&mut l.photometry, first.clone());
+                !std::sync::Arc::ptr_eq(&before, &first)
+            })
         }),
         of_each("area-as-point", "the luminous opening is shrunk to a point", |l| {
             let before = std::mem::replace(&mut l.model, LuminaireModel::Point);
@@ -228,6 +253,10 @@ fn of_light() -> Vec<Fault> {
         .that_reflects(),
         Fault::new("meter-flipped", "meters face the other way", |wrong, _| {
             wrong.meters(|m| m.normal = -m.normal);
+            true
+        }),
+        Fault::new("meters-up", "all meters face up, whatever their normals are", |wrong, _| {
+            wrong.meters(|m| m.normal = DVec3::Z);
             true
         }),
     ]);

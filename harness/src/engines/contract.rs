@@ -240,6 +240,14 @@ impl Job {
         }
     }
 
+    /// What is to be told where an engine's own reader gets the user's files, and some are not of the one format that these readers know.
+    pub(super) fn written_for_its_reader(&self) -> Option<String> {
+        let others = self.scene.luminaires.iter().filter(|l| l.photometry.lm63_file().is_none());
+        let written: Vec<&str> = others.map(|l| l.id.as_str()).collect();
+        let text = format!("its own reader got an LM-63-2002 file that luxproof wrote of {}", written.join(", "));
+        (!written.is_empty()).then_some(text)
+    }
+
     /// The same whatever case and procedure are called.
     pub(super) fn without_names(&self) -> Self {
         Self { case: String::new(), procedure: ProcedureId::DirectIlluminance, ..self.clone() }

@@ -71,8 +71,8 @@ pub(super) struct External {
     stated: Option<Protocol>,
     /// Seconds that it may take before it begins to work.
     start_s: f64,
-    /// What it says of itself, once it was asked; `None` of version 1.
-    said: OnceLock<Option<Box<ExternalProbe>>>,
+    /// What it says of itself, once it was asked; of version 1 why it counts as that.
+    said: OnceLock<Result<Box<ExternalProbe>, String>>,
 }
 
 impl External {

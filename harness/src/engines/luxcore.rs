@@ -8,6 +8,7 @@ pub(super) mod tests;
 use self::map::Map;
 use super::patches::settings::{self, Settings};
 use super::patches::{self, Package};
+use super::settings::Preset;
 use super::{
     Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench,
 };
@@ -43,6 +44,10 @@ const STOCK: &str = "as installed, LuxCore drops the candela of IES files: a poi
                      nadir, where half of either is lost, looks tables up by .7 degrees in C and gamma, and follows few reflections";
 /// What is lost by the first of these.
 const STOCK_LOSS: f64 = 1.0 - 0.25 / std::f64::consts::PI;
+
+/// What is done for its reader of IES files, so that there is something to be judged.
+const OWN_READER: &str = "LuxCore's reader of IES files drops the candela: it was told the flux that luxproof reads in the file, so that \
+                          factors of a whole file cannot show";
 
 pub(super) struct LuxCore;
 
@@ -96,5 +101,9 @@ fn read_files(
     settings: Settings,
     workbench: &Workbench,
 ) -> Result<Measurement, EngineError> {
-    PACKAGE.read(files, job, settings, workbench, Map::of, 0.0)
+    let mut measurement = PACKAGE.read(files, job, settings, workbench, Map::of, 0.0)?;
+    if settings.is_native() && settings.preset != Preset::Default {
+        measurement.notes.push(OWN_READER.to_owned());
+    }
+    Ok(measurement)
 }

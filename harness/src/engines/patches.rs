@@ -131,6 +131,7 @@ impl Package {
         };
         let mut measurement = dialogue.measurement()?;
         measurement.effort.insert("command".into(), run.command_line());
+        measurement.notes.extend(job.written_for_its_reader().filter(|_| settings.is_native()));
         super::checked(&self.engine, job, measurement)
     }
 }

@@ -150,7 +150,7 @@ impl Web {
         Ok(Measurement {
             estimates: answer.lux.into_iter().map(estimate).collect(),
             method: method.into_iter().map(|(k, v)| (k.to_owned(), v)).collect(),
-            notes: notes(job),
+            notes: job.written_for_its_reader().into_iter().collect(),
             ..Measurement::default()
         })
     }
@@ -283,13 +283,4 @@ fn file_name(k: usize) -> String {
 fn native(photometry: &Photometry) -> Vec<u8> {
     let own = photometry.lm63_file().map(|file| file.bytes.to_vec());
     own.unwrap_or_else(|| lm63::write_2002(photometry).text.into_bytes())
-}
-
-fn notes(job: &Job) -> Vec<String> {
-    let written: Vec<&str> =
-        job.scene.luminaires.iter().filter(|l| l.photometry.lm63_file().is_none()).map(|l| l.id.as_str()).collect();
-    if written.is_empty() {
-        return vec![];
-    }
-    vec![format!("its loader read an LM-63-2002 file that luxproof wrote of {}", written.join(", "))]
 }

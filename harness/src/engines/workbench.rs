@@ -69,6 +69,9 @@ pub enum EngineError {
     Io { path: String, source: std::io::Error },
     #[error("{engine} exited without an error, but {what}")]
     Output { engine: EngineName, what: String },
+    /// What it printed is no answer to what it was asked.
+    #[error("{engine} exited without an error, but {what}")]
+    Garbled { engine: EngineName, what: String },
     #[error("{engine} exited without an error, but read {value} lx ({uncertainty:?}) at {meter}")]
     NotFinite { engine: EngineName, meter: MeterId, value: f64, uncertainty: Uncertainty },
     /// At some meters; the readings of the others stand in the rest, what is NaN there is lost.
@@ -104,7 +107,11 @@ impl EngineError {
     /// What should have been JSON, by its start.
     pub(super) fn no_readings(engine: EngineName, answer: &str, error: &serde_json::Error) -> Self {
         let start: String = answer.chars().take(200).collect();
-        Self::output(engine, format!("its answer is no JSON of readings ({error}): `{start}`"))
+        Self::garbled(engine, format!("its answer is no JSON of readings ({error}): `{start}`"))
+    }
+
+    pub(super) fn garbled(engine: EngineName, what: impl Into<String>) -> Self {
+        Self::Garbled { engine, what: printable::lines(&what.into()) }
     }
 
     pub fn output(engine: EngineName, what: impl Into<String>) -> Self {

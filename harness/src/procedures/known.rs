@@ -87,8 +87,8 @@ fn luminaires() -> Task {
     };
     let meters =
         [[-2.0, 1.0, 0.0], [0.0, 0.0, 0.0], [3.0, 1.0, 0.0], [0.5, -3.0, 0.2], [1.5, 1.5, 0.7], [-3.0, -3.0, 0.0]];
-    // The last has all of them behind it.
-    let above = [[1.0, -1.0, 4.0]];
+    // The last two have all of them behind.
+    let above = [[1.0, -1.0, 4.0], [-0.5, 0.8, 4.3]];
     let meters: Vec<(DVec3, DVec3)> =
         meters.iter().chain(&above).map(|p| (DVec3::from(*p), DVec3::new(0.1, -0.2, 1.0).normalize())).collect();
     task(ProcedureId::Luminaires, free_field(vec![turned, narrow, even]), &meters, Transport::Direct)

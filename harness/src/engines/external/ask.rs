@@ -4,9 +4,9 @@ use std::fmt;
 use std::path::Path;
 use std::time::Duration;
 
-use super::json::{Protocol, from_json};
+use super::json::{Protocol, chatter, from_json};
 use super::photometry::Files;
-use super::protocol::{Answer, Capability, ExternalProbe, ExternalRequest};
+use super::protocol::{Answer, Capability, ExternalProbe, ExternalRequest, printed_before};
 use super::readings::{ExternalAnswers, ExternalReadings};
 use super::{External, ExternalJob, FOLDER_VARIABLE};
 use crate::engines::{self, EngineError, Job, Site, Workbench};
@@ -23,19 +23,36 @@ pub(super) type Asked<'a> = (&'a Job, &'a Files, Option<&'a Path>);
 #[derive(Clone, Debug, PartialEq)]
 pub struct Introduction {
     command: String,
-    said: Result<Option<ExternalProbe>, String>,
+    said: Said,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Said {
+    Two(ExternalProbe),
+    /// Why it counts as version 1.
+    One(String),
+    Wrong(String),
 }
 
 impl Introduction {
     pub fn can_batch(&self) -> bool {
-        matches!(&self.said, Ok(Some(said)) if said.can(Capability::Batch))
+        matches!(&self.said, Said::Two(said) if said.can(Capability::Batch))
     }
 
     /// What is wrong with it.
     pub fn remarks(&self) -> Vec<String> {
         match &self.said {
-            Ok(said) => said.iter().filter_map(ExternalProbe::unknown_words).collect(),
-            Err(why) => vec![why.clone()],
+            Said::Two(said) => said.unknown_words().into_iter().collect(),
+            Said::One(_) => vec![],
+            Said::Wrong(why) => vec![why.clone()],
+        }
+    }
+
+    /// Why it counts as version 1, if it does: what is wrong with it, where it reads nothing.
+    pub fn why_version_one(&self) -> Option<String> {
+        match &self.said {
+            Said::One(why) => Some(format!("it counts as version 1, since it does not answer a probe: {why}")),
+            Said::Two(_) | Said::Wrong(_) => None,
         }
     }
 }
@@ -43,9 +60,9 @@ impl Introduction {
 impl fmt::Display for Introduction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.said {
-            Ok(Some(said)) => write!(f, "{} {}, protocol 2 ({})", said.name, said.version, said.words()),
-            Ok(None) => write!(f, "`{}`, version 1: it answers no probe", self.command),
-            Err(_) => write!(f, "`{}`", self.command),
+            Said::Two(said) => write!(f, "{} {}, protocol 2 ({})", said.name, said.version, said.words()),
+            Said::One(_) => write!(f, "`{}`, version 1: it answers no probe", self.command),
+            Said::Wrong(_) => write!(f, "`{}`", self.command),
         }
     }
 }
@@ -53,11 +70,16 @@ impl fmt::Display for Introduction {
 impl External {
     /// What it says of itself, for whoever examines it.
     pub(in crate::engines) fn introduction(&self, site: &Site) -> Introduction {
-        Introduction { command: self.command.join(" "), said: self.introduced(site).map(Option::<&_>::cloned) }
+        let said = match self.introduced(site) {
+            Ok(Some(said)) => Said::Two(said.clone()),
+            Ok(None) => Said::One(self.said.get().and_then(|said| said.as_ref().err()).cloned().unwrap_or_default()),
+            Err(why) => Said::Wrong(why),
+        };
+        Introduction { command: self.command.join(" "), said }
     }
 
     pub(super) fn said(&self) -> Option<&ExternalProbe> {
-        self.said.get()?.as_deref()
+        self.said.get()?.as_deref().ok()
     }
 
     pub(super) fn protocol(&self) -> Protocol {
@@ -67,8 +89,11 @@ impl External {
     /// What it says of itself, asked once; nothing of version 1.
     pub(super) fn introduced(&self, site: &Site) -> Result<Option<&ExternalProbe>, String> {
         if self.said.get().is_none() {
-            let said = if self.stated == Some(Protocol::One) { None } else { self.probed(site)? };
-            if let Some(unknown) = said.as_ref().and_then(|said| said.unknown_words()) {
+            let said = match self.stated {
+                Some(Protocol::One) => Err("`protocol: 1` is stated".to_owned()),
+                _ => self.probed(site)?,
+            };
+            if let Some(unknown) = said.as_ref().ok().and_then(|said| said.unknown_words()) {
                 tracing::warn!("{}: {unknown}", self.id);
             }
             self.said.get_or_init(|| said);
@@ -76,7 +101,8 @@ impl External {
         Ok(self.said())
     }
 
-    fn probed(&self, site: &Site) -> Result<Option<Box<ExternalProbe>>, String> {
+    /// Its answer to a probe; of what gives none, and need not, why.
+    fn probed(&self, site: &Site) -> Result<Result<Box<ExternalProbe>, String>, String> {
         let is_sure = self.stated == Some(Protocol::Two);
         let limit_s = if is_sure { self.start_s } else { UNSURE_S.min(self.start_s) };
         let folder = tempfile::tempdir().map_err(|e| format!("no folder for its probe: {e}"))?;
@@ -95,8 +121,8 @@ impl External {
             Err(error) => Answer::NotOne(without_log(&error)),
         };
         match answer {
-            Answer::Two(said) => Ok(Some(said)),
-            Answer::NotOne(_) if !is_sure => Ok(None),
+            Answer::Two(said) => Ok(Ok(said)),
+            Answer::NotOne(why) if !is_sure => Ok(Err(printable::lines(&why))),
             Answer::NotOne(why) => Err(format!("`protocol: 2` is stated, but it does not answer a probe: {why}")),
             Answer::Wrong(why) => Err(format!("its answer to a probe is wrong: {}", printable::lines(&why))),
         }
@@ -170,12 +196,16 @@ impl External {
         if let (Protocol::One, [(job, _)]) = (self.protocol(), jobs) {
             return Ok(vec![ExternalReadings::measured(&finished.stdout, job, &self.id)]);
         }
-        let no_readings = |e| EngineError::no_readings(self.id.clone(), &String::from_utf8_lossy(&finished.stdout), &e);
+        let no_readings = |e| match chatter(&finished.stdout) {
+            Some(words) => EngineError::garbled(self.id.clone(), printed_before(&words)),
+            None => EngineError::no_readings(self.id.clone(), &String::from_utf8_lossy(&finished.stdout), &e),
+        };
         let mut answers = from_json::<ExternalAnswers>(&finished.stdout).map_err(no_readings)?.answers;
         let mut of = |(k, (job, _)): (usize, &(&Job, &Workbench))| {
             let name = name(job, k);
             let mine = answers.iter().position(|answer| answer.job.as_ref() == Some(&name));
-            let mine = mine.ok_or_else(|| self.output(format!("gave no answer to the job `{name}`")))?;
+            let mine = mine
+                .ok_or_else(|| EngineError::garbled(self.id.clone(), format!("gave no answer to the job `{name}`")))?;
             answers.swap_remove(mine).measurement(job, &self.id, Protocol::Two)
         };
         let read: Vec<engines::Answer> = jobs.iter().enumerate().map(&mut of).collect();
@@ -183,7 +213,8 @@ impl External {
             None => Ok(read),
             Some(other) => {
                 let job = other.job.as_deref().unwrap_or("of no name");
-                Err(self.output(format!("answered a job `{job}` that it was not asked, or twice")))
+                let what = format!("answered a job `{job}` that it was not asked, or twice");
+                Err(EngineError::garbled(self.id.clone(), what))
             }
         }
     }

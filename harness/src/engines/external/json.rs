@@ -18,6 +18,17 @@ pub(super) fn from_json<T: for<'de> Deserialize<'de>>(text: &[u8]) -> Result<T, 
     })
 }
 
+/// What is printed before JSON, if that is all that is wrong with it: messages of the program's, or of a library's.
+pub(super) fn chatter(text: &[u8]) -> Option<String> {
+    let text = String::from_utf8_lossy(text);
+    let starts = text.match_indices(['{', '[']).map(|(at, _)| at).filter(|at| *at > 0).take(MOST_STARTS);
+    let mut answers = starts.filter(|at| from_json::<serde::de::IgnoredAny>(text[*at..].as_bytes()).is_ok());
+    answers.next().map(|at| text[..at].trim().to_owned())
+}
+
+/// Places that are looked at for the beginning of an answer.
+const MOST_STARTS: usize = 20;
+
 /// JSON with `NaN` and infinities, which Python writes and JSON has not, made words in quotes.
 fn quoted(text: &str) -> String {
     let (mut quoted, mut is_string, mut is_escaped) = (String::with_capacity(text.len()), false, false);

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::form::ExternalJob;
-use super::json::from_json;
+use super::json::{chatter, from_json};
 use crate::engines::{Job, recess};
 use crate::system::printable;
 
@@ -75,11 +75,23 @@ pub(super) enum Answer {
     Wrong(String),
 }
 
+/// What is wrong with an answer that begins with other words.
+pub(super) fn printed_before(words: &str) -> String {
+    let words = printable::line(words, MAX_WORD);
+    format!("it prints `{words}` before its answer: what is no JSON belongs on standard error")
+}
+
 impl Answer {
     pub(super) fn of(stdout: &[u8]) -> Self {
         let said: serde_json::Value = match from_json(stdout) {
             Ok(said) => said,
-            Err(error) => return Self::NotOne(format!("it is no JSON ({error})")),
+            Err(error) => {
+                let why = match chatter(stdout) {
+                    Some(words) => printed_before(&words),
+                    None => format!("it is no JSON ({error})"),
+                };
+                return Self::NotOne(why);
+            }
         };
         match said.get("protocol").map(serde_json::Value::as_u64) {
             None => return Self::NotOne("it has no `protocol`".to_owned()),

@@ -22,7 +22,7 @@ fn the_page_gets_the_users_own_bytes_and_else_what_our_writer_makes_of_the_table
     let turned = job.scene.luminaires[0].photometry.distribution.scaled(2.0);
     job.scene.luminaires[0].photometry = job.scene.luminaires[0].photometry.with_distribution(turned).into();
     assert!(String::from_utf8(of(&job)).unwrap().starts_with("IESNA:LM-63-2002"));
-    assert_eq!(notes(&job).len(), 1);
+    assert!(job.written_for_its_reader().is_some());
 }
 
 #[test]
