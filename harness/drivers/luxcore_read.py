@@ -135,7 +135,7 @@ class Bench:
             self.scene.Parse(scene)
         except RuntimeError as error:
             # What is wrong with a file that it reads itself is for the user: no trace.
-            raise SystemExit(f"LuxCore: {error}") from None
+            raise SystemExit(str(error)) from None
         self.lit = set(luminaires)
 
     def light(self, only):

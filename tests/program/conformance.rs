@@ -97,7 +97,10 @@ fn noise_that_is_not_as_stated_and_claims_that_do_not_hold_are_told() {
     let honest = examined(&[SEEDED, (APPEND, &noisy(1.0)), (BOUND, sampled)]);
     assert!(section(&honest, "noise").starts_with("sound"), "{}", honest.stdout);
     is_told(&[SEEDED, (APPEND, &noisy(0.2)), (BOUND, sampled)], &[("noise", "times too small")]);
-    is_told(&[SEEDED, (APPEND, &noisy(1.0)), (BOUND, "\"exact\": True")], &[("claims", "CLAIM")]);
+    is_told(
+        &[SEEDED, (APPEND, &noisy(1.0)), (BOUND, "\"exact\": True")],
+        &[("claims", "claims readings without any scatter")],
+    );
 }
 
 #[test]
@@ -115,5 +118,8 @@ fn a_broken_protocol_is_told() {
         .luxproof(&["engines", "doctor", "--adapter", "./gone"])
         .exits(3)
         .prints("neither beside the spec nor on PATH");
-    folder.luxproof(&["--untrusted", "engines", "doctor", "--adapter", "true"]).exits(2).complains("starts none");
+    folder
+        .luxproof(&["--untrusted", "engines", "doctor", "--adapter", "true"])
+        .exits(2)
+        .complains("--adapter starts a program");
 }

@@ -64,9 +64,8 @@ impl Cause {
             "reversed" | "next" | "previous" | "exchanged" | "shifted" | "shifted-here" | "lifted" => Aspect::Meters,
             "turned" | "isotropic" | "averaged" | "extrapolated" | "unrotated" | "rotated-back" | "area-as-point"
             | "meter-flipped" | "meters-up" | "two-sided" | "normals-ignored" | "cosine-missing" | "cosine-doubled"
-            | "place" | "turn" | "tilt" | "nearest" | "one-table" | "one-plane" | "gamma-flipped" | "gamma-off" => {
-                Aspect::Orientation
-            }
+            | "place" | "turn" | "tilt" | "one-table" | "one-table-scaled" | "one-plane" | "gamma-flipped"
+            | "gamma-off" => Aspect::Orientation,
             id if id.starts_with("c-") => Aspect::Orientation,
             "upside-down" | "gamma-decoded" | "gamma-encoded" | "bounces-cut" | "bounces-uncut" | "direct-lost"
             | "direct-added" | "indirect-added" | "surface-lost" | "luminaire-lost" | "one-lit" | "reflectances"

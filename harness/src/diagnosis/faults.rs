@@ -1,15 +1,15 @@
 //! Faults that renderers and exporters are known to have. The diagnosis looks for them in readings that failed, the
 //! self-test puts them in.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 use itertools::Itertools;
 use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, LuminaireModel, Transport};
 
 use super::fault::{Fault, Parameter};
-use super::tables::{
-    averaged, extrapolated, first_plane, is_axial, isotropic, nearest, raised, remap, replace, turned_behind,
-};
+use super::tables::{averaged, extrapolated, first_plane, is_axial, isotropic, raised, remap, replace, turned_behind};
 use super::wrong::{Law, Order, Readout, Wrong};
 use crate::procedures::Task;
 
@@ -170,7 +170,6 @@ fn of_luminaires() -> Vec<Fault> {
         .about(CANDELA),
         of_each("averaged", "the distribution is averaged over C", |l| !is_axial(l) && averaged(l)),
         of_each("extrapolated", "the table goes on beyond its last angle", extrapolated),
-        of_each("nearest", "the table's nearest angles are taken, and nothing between them", nearest),
         of_each("unrotated", "the luminaire's rotation is left out", |l| {
             let before = std::mem::replace(&mut l.orientation, DMat3::IDENTITY);
             before != DMat3::IDENTITY
@@ -188,11 +187,10 @@ fn of_luminaires() -> Vec<Fault> {
             are_several
         }),
         Fault::new("one-table", "all luminaires have the table of the first", |wrong, _| {
-            let Some(first) = wrong.task().scene.luminaires.first().map(|l| l.photometry.clone()) else { return false };
-            wrong.luminaires(|l| {
-                let before = std::mem::replace(&mut l.photometry, first.clone());
-                !std::sync::Arc::ptr_eq(&before, &first)
-            })
+            table_of_the_first(wrong, false)
+        }),
+        Fault::new("one-table-scaled", "all luminaires have the table and the flux_scale of the first", |wrong, _| {
+            table_of_the_first(wrong, true)
         }),
         of_each("area-as-point", "the luminous opening is shrunk to a point", |l| {
             let before = std::mem::replace(&mut l.model, LuminaireModel::Point);
@@ -200,6 +198,17 @@ fn of_luminaires() -> Vec<Fault> {
         }),
     ]);
     faults
+}
+
+fn table_of_the_first(wrong: &mut Wrong, with_its_scale: bool) -> bool {
+    let Some(first) = wrong.task().scene.luminaires.first().cloned() else { return false };
+    wrong.luminaires(|l| {
+        let before = std::mem::replace(&mut l.photometry, Arc::clone(&first.photometry));
+        if with_its_scale {
+            l.flux_scale = first.flux_scale;
+        }
+        !Arc::ptr_eq(&before, &first.photometry)
+    })
 }
 
 /// What powers of candela are about.

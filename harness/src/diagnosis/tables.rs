@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use itertools::Itertools;
 use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::Luminaire;
 
@@ -62,27 +61,6 @@ pub(super) fn extrapolated(luminaire: &mut Luminaire) -> bool {
     gamma_deg.extend((last < 180.0).then_some(180.0));
     let at_nodes = nodes(table, &gamma_deg, |c, g| table.intensity(c, g.clamp(first, last)).value());
     replace(luminaire, LuminousIntensityDistribution::new(table.c_deg().to_vec(), gamma_deg, at_nodes).ok())
-}
-
-/// What is between angles is what the nearest of them has.
-pub(super) fn nearest(luminaire: &mut Luminaire) -> bool {
-    /// Width of a step, in degrees.
-    const STEP: f64 = 1e-6;
-    let table = luminaire.photometry.distribution.full_circle();
-    let stepped = |angles: &[f64]| -> Vec<(f64, f64)> {
-        // Each place with the angle that is read there.
-        let middles = angles.windows(2).flat_map(|w| {
-            let middle = 0.5 * (w[0] + w[1]);
-            [(middle - STEP, w[0]), (middle + STEP, w[1])]
-        });
-        let all = angles.iter().map(|a| (*a, *a)).chain(middles);
-        all.sorted_by(|a, b| a.0.total_cmp(&b.0)).collect()
-    };
-    let (c, gamma) = (stepped(table.c_deg()), stepped(table.gamma_deg()));
-    let at = |(_, c): &(f64, f64)| gamma.iter().map(|(_, g)| table.intensity(*c, *g).value()).collect::<Vec<_>>();
-    let candela = c.iter().flat_map(at).collect();
-    let places = |stepped: &[(f64, f64)]| stepped.iter().map(|(place, _)| *place).collect();
-    replace(luminaire, LuminousIntensityDistribution::new(places(&c), places(&gamma), candela).ok())
 }
 
 /// Of all planes the first, all round.

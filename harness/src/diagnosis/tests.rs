@@ -216,11 +216,13 @@ fn scenes_of_known_answer_name_what_newcomers_do() {
         }
     };
     of(Aspect::Units, &["factor-pi", "factor-2pi", "feet", "millimetres", "kilo", "flux-scale-twice", "distance"]);
-    let rotated = ["unrotated", "rotated-back", "one-table", "nearest"];
+    let rotated = ["unrotated", "rotated-back", "one-table", "one-table-scaled"];
     let in_c = ["c-mirrored", "c-mirrored-90", "c-turned-90", "c-turned-180", "one-plane", "gamma-flipped"];
     of(Aspect::Orientation, &[&rotated[..], &in_c].concat());
     of(Aspect::Orientation, &["cosine-missing", "two-sided", "normals-ignored", "meter-flipped", "meters-up"]);
     of(Aspect::Light, &["one-lit"]);
+    let offset = causes(&tasks, &with(&tasks, "offset", "", &[0.5]));
+    assert_eq!(offset.iter().map(|c| c.id).collect_vec(), ["offset"], "{offset:?}");
 }
 
 #[test]
