@@ -24,6 +24,7 @@ mod mistakes;
 mod negative_controls;
 mod planning;
 mod policy;
+mod readers;
 mod recessed;
 mod repeatability;
 mod repetitions;

@@ -190,10 +190,10 @@ impl Findings {
                 None => failures.push((topic, alike, vec![recording.key.procedure], why)),
             }
         }
-        if failures.iter().any(|(topic, ..)| *topic == Topic::Protocol) {
-            if let Some(text) = introduction.why_version_one() {
-                self.add(Topic::Protocol, Standing::Wrong, text);
-            }
+        if failures.iter().any(|(topic, ..)| *topic == Topic::Protocol)
+            && let Some(text) = introduction.why_version_one()
+        {
+            self.add(Topic::Protocol, Standing::Wrong, text);
         }
         for (topic, _, scenes, why) in failures {
             self.add(topic, Standing::Wrong, format!("{}: {why}", scenes.iter().join(", ")));
