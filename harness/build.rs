@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Exporters, drivers and read-out of every engine, and the physics behind our own.
-const READ_OUT: [&str; 7] =
-    ["src/engines", "src/system/process", "drivers", "engines.lock", "blender.lock", "luxcore.lock", PHYSICS];
+const READ_OUT: [&str; 8] =
+    ["src/engines", "src/system/process", "drivers", "engines.lock", "blender.lock", "luxcore.lock", "web", PHYSICS];
 
 /// In a checkout; a package has it from the registry, in the one version that its manifest names.
 const PHYSICS: &str = "../src";

@@ -99,8 +99,13 @@ fn every_file_survives_being_written_in_its_own_format() {
         let written = eulumdat::write(&read);
         assert_eq!(written.losses, Vec::<String>::new(), "{}", file.display());
         let again = eulumdat::parse(written.text.as_bytes()).expect("a written file is legal");
-        assert_eq!(Photometry { lints: vec![], ..again }, Photometry { lints: vec![], ..read }, "{}", file.display());
+        assert_eq!(without_lints(again), without_lints(read), "{}", file.display());
     }
+}
+
+/// What a file says, not what its reader says of it or where it lay.
+fn without_lints(photometry: Photometry) -> Photometry {
+    Photometry { lints: vec![], source: vec![], ..photometry }
 }
 
 #[test]

@@ -50,4 +50,10 @@ def answer(job):
     return {"readings": readings, "settings": {"python": sys.version.split()[0]}}
 
 
-json.dump(answer(json.load(sys.stdin)), sys.stdout)
+def reply(request):
+    if request["verb"] == "probe":
+        return {"protocol": 2, "name": "inverse square", "version": "1", "capabilities": ["batch"]}
+    return {"answers": [{"job": job["job"], **answer(job)} for job in request["jobs"]]}
+
+
+json.dump(reply(json.load(sys.stdin)), sys.stdout)

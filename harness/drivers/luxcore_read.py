@@ -131,7 +131,11 @@ class Bench:
 
     def __init__(self, scene, settings, luminaires):
         self.scene, self.settings, self.luminaires = lux.Scene(), settings, luminaires
-        self.scene.Parse(scene)
+        try:
+            self.scene.Parse(scene)
+        except RuntimeError as error:
+            # What is wrong with a file that it reads itself is for the user: no trace.
+            raise SystemExit(str(error)) from None
         self.lit = set(luminaires)
 
     def light(self, only):

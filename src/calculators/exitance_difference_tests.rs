@@ -33,6 +33,7 @@ fn hung(distribution: LuminousIntensityDistribution) -> Luminaire {
         keywords: vec![],
         details: Details::None,
         lints: vec![],
+        source: vec![],
     };
     Luminaire {
         id: "pendant".into(),

@@ -21,6 +21,7 @@ fn luminaire(
         keywords: vec![],
         details: Details::None,
         lints: vec![],
+        source: vec![],
     };
     Luminaire {
         id: "l".into(),

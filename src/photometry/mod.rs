@@ -20,7 +20,10 @@ mod write;
 #[cfg(test)]
 mod round_trip_tests;
 
+use std::cell::RefCell;
+use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -59,6 +62,23 @@ pub struct Photometry {
     pub details: Details,
     /// What the reader tolerated or found doubtful.
     pub lints: Vec<Lint>,
+    /// The files that it was read from, byte for byte; empty where it was made, or is no longer what they say.
+    pub source: Vec<SourceFile>,
+}
+
+/// A file as it lay there: the photometric file itself, or the tilt factors that it names.
+#[derive(Clone, PartialEq, Eq)]
+pub struct SourceFile {
+    /// Its name without a folder.
+    pub name: String,
+    /// All of it.
+    pub bytes: Arc<[u8]>,
+}
+
+impl fmt::Debug for SourceFile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({} bytes)", self.name, self.bytes.len())
+    }
 }
 
 /// Reads a photometric file of any kind: by its content, then by its extension (.ies, .ldt, .xml).
@@ -69,16 +89,24 @@ pub fn read_file(path: &Path) -> Result<Photometry, ReadError> {
 /// The same for whoever decides which files are opened: the file and, of LM-63, the tilt factors that it names beside it.
 pub fn read_by(path: &Path, open: &dyn Fn(&Path) -> std::io::Result<Vec<u8>>) -> Result<Photometry, ReadError> {
     let located = |error: ReadError| ReadError { file: path.to_path_buf(), ..error };
-    let bytes = open(path).map_err(|error| {
+    let source = RefCell::new(vec![]);
+    let open = |path: &Path| {
+        let bytes = open(path)?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        source.borrow_mut().push(SourceFile { name, bytes: bytes.as_slice().into() });
+        Ok(bytes)
+    };
+    let bytes = open(path).map_err(|error: std::io::Error| {
         located(ReadError { file: path.into(), line: 0, column: 0, problem: Problem::Io { reason: error.to_string() } })
     })?;
     let read = match Kind::of(path, &bytes) {
-        Some(Kind::Lm63) => lm63::parse_with(&bytes, lm63::tilt_file_beside(path, open)),
+        Some(Kind::Lm63) => lm63::parse_with(&bytes, lm63::tilt_file_beside(path, &open)),
         Some(Kind::Eulumdat) => eulumdat::parse(&bytes),
         Some(Kind::Tm33) => tm33::parse(&bytes),
         None => Err(Text::new(&bytes).error(0, Problem::Unrecognised)),
     };
-    read.map_err(located)
+    let photometry = read.map_err(located)?;
+    Ok(Photometry { source: source.into_inner(), ..photometry })
 }
 
 /// The kinds of file.
@@ -124,7 +152,19 @@ impl Photometry {
             keywords: vec![],
             details: Details::None,
             lints: vec![],
+            source: vec![],
         }
+    }
+
+    /// The same with another distribution, which no file says.
+    #[must_use]
+    pub fn with_distribution(&self, distribution: LuminousIntensityDistribution) -> Self {
+        Self { distribution, source: vec![], ..self.clone() }
+    }
+
+    /// The file that it was read from, if that is LM-63, the format that renderers read themselves.
+    pub fn lm63_file(&self) -> Option<&SourceFile> {
+        self.source.first().filter(|_| matches!(self.details, Details::Lm63(_)))
     }
 
     /// The value of the first keyword of this name.

@@ -70,6 +70,7 @@ pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
         keywords: keywords(root),
         details: Details::None,
         lints: vec![],
+        source: vec![],
     };
     Ok(photometry.with_lints(lints))
 }

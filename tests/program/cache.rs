@@ -8,15 +8,16 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{Answer, Folder, SKEW_LAMP, SKEW_ROOM, adapter};
+use crate::support::{Answer, Folder, SKEW_LAMP, SKEW_ROOM, adapter_of_version_one};
 
 struct Lab(Folder);
 
 impl Lab {
     /// The example adapter, which first notes that it was started.
     fn new() -> Self {
-        let spec = SKEW_ROOM.to_owned() + "engines:\n  mine: {command: [python3, '-I', '-S', adapter.py]}\n";
-        let adapter = "open('starts', 'a').write('started\\n')\n".to_owned() + &adapter();
+        let spec =
+            SKEW_ROOM.to_owned() + "engines:\n  mine: {command: [python3, '-I', '-S', adapter.py], protocol: 1}\n";
+        let adapter = "open('starts', 'a').write('started\\n')\n".to_owned() + &adapter_of_version_one();
         Self(Folder::new(&[("spec.yaml", &spec), ("lamp.ies", SKEW_LAMP), ("adapter.py", &adapter)]))
     }
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{Answer, Folder, LAMP, MINE, ROOM, TWO_METERS, adapter, among};
+use crate::support::{Answer, Folder, LAMP, MINE_OF_VERSION_ONE, ROOM, TWO_METERS, adapter_of_version_one, among};
 
 const CASES: &str = "procedures:
   direct_illuminance: {meters: plane}
@@ -31,8 +31,12 @@ sys.stdin = io.StringIO(text)
 ";
 
 fn folder() -> Folder {
-    let spec = [ROOM, TWO_METERS, CASES, MINE].concat();
-    Folder::new(&[("spec.yaml", &spec), ("lamp.ies", LAMP), ("adapter.py", &(WATCHED.to_owned() + &adapter()))])
+    let spec = [ROOM, TWO_METERS, CASES, MINE_OF_VERSION_ONE].concat();
+    Folder::new(&[
+        ("spec.yaml", &spec),
+        ("lamp.ies", LAMP),
+        ("adapter.py", &(WATCHED.to_owned() + &adapter_of_version_one())),
+    ])
 }
 
 /// How often the adapter was started for each case of the spec: once, and again for a twentieth of what it claims.

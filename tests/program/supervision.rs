@@ -8,7 +8,7 @@ use luxproof::system::claim::Claim;
 use luxproof::system::process::sandbox_in_words;
 use serde_json::Value;
 
-use crate::support::{Answer, Folder, LAMP, MINE, OWN, ROOM, TWO_METERS, adapter, among};
+use crate::support::{Answer, Folder, LAMP, MINE_OF_VERSION_ONE, OWN, ROOM, TWO_METERS, adapter_of_version_one, among};
 
 /// Nothing here takes nearly as long, on however busy a machine.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -31,8 +31,12 @@ while not os.path.exists('pid'):
 
 /// A spec whose adapter does something before it answers.
 fn folder(before: &str) -> Folder {
-    let spec = [ROOM, TWO_METERS, "procedures:\n  direct_illuminance: {meters: plane}\n", MINE].concat();
-    Folder::new(&[("spec.yaml", &spec), ("lamp.ies", LAMP), ("adapter.py", &(before.to_owned() + &adapter()))])
+    let spec = [ROOM, TWO_METERS, "procedures:\n  direct_illuminance: {meters: plane}\n", MINE_OF_VERSION_ONE].concat();
+    Folder::new(&[
+        ("spec.yaml", &spec),
+        ("lamp.ies", LAMP),
+        ("adapter.py", &(before.to_owned() + &adapter_of_version_one())),
+    ])
 }
 
 #[track_caller]

@@ -242,3 +242,15 @@ TILT=NONE
 pub(crate) fn adapter() -> String {
     fs::read_to_string(root().join("docs/examples/inverse_square.py")).unwrap()
 }
+
+/// The same as it was before protocol 2: one job a process, which is all that standard input holds.
+pub(crate) fn adapter_of_version_one() -> String {
+    let example = adapter();
+    let (answers, _) = example.split_once("\n\ndef reply(").unwrap();
+    format!("{answers}\n\njson.dump(answer(json.load(sys.stdin)), sys.stdout)\n")
+}
+
+/// That one as an engine, which is never probed.
+pub(crate) const MINE_OF_VERSION_ONE: &str = "engines:
+  mine: {command: [python3, adapter.py], protocol: 1}
+";

@@ -58,20 +58,26 @@ impl Running<'_> {
         let threads = self.reader.machine.slots.threads();
         // By place in the plan.
         let kept: Mutex<BTreeMap<usize, Recording>> = Mutex::default();
-        let runs: Vec<(usize, &Run)> = self.plan.runs.iter().enumerate().collect();
-        let one = |&(k, run): &(usize, &Run)| -> Result<Done, FileError> {
-            let done = self.measure(run);
-            if let Done::Recorded { recording, .. } = &done {
+        let one = |places: &Vec<usize>| -> Result<Vec<(usize, Done)>, FileError> {
+            let runs: Vec<&Run> = places.iter().map(|k| &self.plan.runs[*k]).collect();
+            let done: Vec<(usize, Done)> = places.iter().copied().zip(self.measure(&runs)).collect();
+            for (k, done) in &done {
+                let Done::Recorded { recording, .. } = done else { continue };
                 let mut kept = kept.lock();
-                kept.insert(k, (**recording).clone());
+                kept.insert(*k, (**recording).clone());
                 // Written as each job finishes, so that an interruption loses only what was under way.
                 keep(self.folder, &recording.key.engine, kept.values())?;
             }
             Ok(done)
         };
         let (mut recordings, mut skips, mut from_cache, mut contradicted) = (vec![], vec![], 0, BTreeSet::new());
-        for done in side_by_side(threads, &runs, one) {
-            match done? {
+        let mut all = vec![];
+        for done in side_by_side(threads, &self.together(), one) {
+            all.extend(done?);
+        }
+        all.sort_by_key(|(place, _)| *place);
+        for (_, done) in all {
+            match done {
                 Done::Recorded { recording, source, was_contradicted } => {
                     from_cache += usize::from(source == Some(Source::Cache));
                     let ReadingKey { engine, procedure, .. } = &recording.key;
@@ -85,13 +91,50 @@ impl Running<'_> {
         Ok(Outcome { recordings, engines, skips, contradicted, from_cache })
     }
 
-    /// One run of the plan: the one place where a recording is made of what engines answer.
-    fn measure(&self, run: &Run) -> Done {
+    /// The runs of the plan by place: alone, or those of an engine that takes several at once.
+    fn together(&self) -> Vec<Vec<usize>> {
+        let mut units: Vec<Vec<usize>> = vec![];
+        for (k, run) in self.plan.runs.iter().enumerate() {
+            let is_mate = |unit: &&mut Vec<usize>| self.plan.runs[unit[0]].engine == run.engine;
+            match units.iter_mut().find(is_mate).filter(|_| self.plan.engines[run.engine].engine.takes_batches()) {
+                Some(unit) => unit.push(k),
+                None => units.push(vec![k]),
+            }
+        }
+        units
+    }
+
+    /// Runs of the plan, of one engine: the one place where a recording is made of what engines answer.
+    fn measure(&self, runs: &[&Run]) -> Vec<Done> {
+        let of = |run: &Run| (&self.plan.engines[run.engine], self.plan.tasks[run.task].procedure);
+        for run in runs {
+            let (planned, procedure) = of(run);
+            self.observer.started(self.case, planned.engine.as_ref(), procedure.name());
+        }
+        let start = Instant::now();
+        let answers = match runs {
+            [run] => vec![answer(of(run).0, run, &self.reader, of(run).1.name())],
+            _ => self.answers(runs),
+        };
+        runs.iter().zip(answers).map(|(run, answer)| self.done(run, answer, start)).collect()
+    }
+
+    /// What an engine answers that takes several jobs at once, and no shortcut.
+    fn answers(&self, runs: &[&Run]) -> Vec<Result<Answer, Failure>> {
+        let Some(instrument) = runs.first().and_then(|run| self.plan.engines[run.engine].instrument()) else {
+            return vec![];
+        };
+        let folder = |run: &Run| self.plan.tasks[run.task].procedure.name();
+        let questions: Vec<Question<'_>> =
+            runs.iter().map(|run| Question::new(&instrument, &run.job, folder(run))).collect();
+        let taken = self.reader.read_all(&questions).into_iter();
+        taken.map(|taken| taken.map(|taken| Answer { taken, was_contradicted: false })).collect()
+    }
+
+    fn done(&self, run: &Run, answer: Result<Answer, Failure>, start: Instant) -> Done {
         let (planned, task) = (&self.plan.engines[run.engine], &self.plan.tasks[run.task]);
         let engine = planned.engine.as_ref();
-        self.observer.started(self.case, engine, task.procedure.name());
-        let start = Instant::now();
-        let (taken, was_contradicted) = match answer(planned, run, &self.reader, task.procedure.name()) {
+        let (taken, was_contradicted) = match answer {
             Ok(Answer { taken, was_contradicted }) => (Ok(taken), was_contradicted),
             Err(failure) => (Err(failure), false),
         };

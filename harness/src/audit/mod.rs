@@ -17,6 +17,7 @@
 //! ```
 
 mod case;
+mod conformance;
 pub mod jobs;
 mod observer;
 mod preflight;
@@ -51,6 +52,7 @@ use crate::system::slots::side_by_side;
 
 pub use crate::judge::Sampling;
 use case::{Audit, Stop};
+pub use conformance::{Conformance, Section, Standing, Topic, examine_adapter};
 pub use observer::{Observer, Silent};
 pub use preflight::chosen;
 
@@ -221,17 +223,26 @@ pub fn run_and_hold(specs: &[PathBuf], options: &Options<'_>) -> Result<(Report,
     audited(spec, &cases, plans, &policies, options).map(|report| (report, claim))
 }
 
-/// Lets engines, those of a spec too where one is given, read the scenes of known answer, and judges what they read.
-pub fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<Report, AuditError> {
-    let (of, policy) = match spec {
-        Some(path) => {
+/// Whose engines are examined besides ours.
+pub enum Subjects<'a> {
+    /// Nobody's.
+    Ours,
+    /// Those of a spec.
+    OfSpec(&'a Path),
+    /// Those of a case.
+    Of(Box<Case>),
+}
+
+/// Lets engines read the scenes of known answer, and judges what they read.
+pub fn examine(subjects: Subjects<'_>, options: &Options<'_>) -> Result<Report, AuditError> {
+    let own = || options.policy.read(options.policy.file.as_deref(), Trust::Own, &BTreeSet::new()).map(Arc::new);
+    let (of, policy) = match subjects {
+        Subjects::OfSpec(path) => {
             let (cases, policies) = chosen(&[path.to_owned()], options)?;
             (cases, common(&policies)?)
         }
-        None => (
-            vec![Case::default()],
-            Arc::new(options.policy.read(options.policy.file.as_deref(), Trust::Own, &BTreeSet::new())?),
-        ),
+        Subjects::Ours => (vec![Case::default()], own()?),
+        Subjects::Of(case) => (vec![*case], own()?),
     };
     let known = Planner::new(&options.selection, &options.site, options.skipping).examinations(&of)?;
     let (cases, plans): (Vec<_>, Vec<_>) = known.into_iter().unzip();

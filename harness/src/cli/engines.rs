@@ -8,12 +8,12 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 use super::diagnostic::not_audited;
 use super::views::screen;
 use super::{complain, print};
-use crate::audit::{self, Options};
+use crate::audit::{self, Options, Subjects};
 use crate::engines::{self, InstallOutcome, InstallState, Site, Soundness};
 use crate::judge::PolicyChoice;
 use crate::plan::Skipping;
 use crate::record::{EngineName, EngineStatus, Status};
-use crate::report::{Detail, Exit, Style, terminal};
+use crate::report::{Detail, Exit, Report, Style, terminal};
 use crate::spec::{Trust, suggestion};
 use crate::system::process;
 
@@ -23,26 +23,32 @@ pub(super) enum EnginesAction {
     List,
     /// Fetch missing engines into a folder of our own
     Install {
-        /// Engines by name [default: all but cycles and luxcore]
+        /// Engines by name [default: all but those on request: cycles, luxcore, three and babylon]
         names: Vec<String>,
     },
     /// Hold the files of installed engines against the sums that they were installed with
     Verify {
-        /// Engines by name [default: all but cycles and luxcore]
+        /// Engines by name [default: all but those on request: cycles, luxcore, three and babylon]
         names: Vec<String>,
     },
     /// Install anew what is broken or absent
     Repair {
-        /// Engines by name [default: all but cycles and luxcore]
+        /// Engines by name [default: all but those on request: cycles, luxcore, three and babylon]
         names: Vec<String>,
     },
     /// Let engines read scenes of known answer and judge what they read
     Doctor {
-        /// Engines by name [default: all but cycles and luxcore]
+        /// Engines by name [default: all but those on request: cycles, luxcore, three and babylon]
         names: Vec<String>,
         /// The spec whose engines, adapters among them, are examined, too
         #[arg(long, value_name = "FILE")]
         spec: Option<PathBuf>,
+        /// A program to examine before any spec names it: what is wrong with its protocol, units, orientation, noise and claims
+        #[arg(long, value_name = "CMD", num_args = 1.., allow_hyphen_values = true, conflicts_with_all = ["names", "spec"])]
+        adapter: Vec<String>,
+        /// Where scenes, readings and logs stay [default: nowhere, unless a log is named]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
         #[command(flatten)]
         policy: PolicyChoice,
     },
@@ -72,23 +78,53 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site, trust: 
             known_engines(&names)?;
             Ok(told(&engines::repair(site, &wanted(&names), complain)))
         }
-        EnginesAction::Doctor { names, spec, policy } => {
+        EnginesAction::Doctor { names, spec, adapter, out, policy } => {
             let folder = tempfile::tempdir().into_diagnostic()?;
-            let options = Options::new(site.clone(), folder.path().to_owned());
+            let options = Options::new(site.clone(), out.clone().unwrap_or_else(|| folder.path().to_owned()));
             let mut options = Options { skipping: Skipping::Nothing, trust, policy, ..options };
             options.selection.engines = names;
-            examine(spec.as_deref(), &options)
+            let (report, exit) = match &adapter[..] {
+                [] => examine(spec.as_deref(), &options)?,
+                _ if trust == Trust::Stranger => {
+                    return Err(miette::miette!(
+                        "--adapter starts a program, and --untrusted or LUXPROOF_UNTRUSTED starts none"
+                    ));
+                }
+                words => examine_adapter(words, options)?,
+            };
+            // Logs that were named stay where they are.
+            if out.is_none() && report.engines.iter().any(|e| e.status == Status::Failed) {
+                drop(folder.keep());
+            }
+            Ok(exit)
         }
     }
 }
 
-fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<Exit, Diagnostic> {
-    let report = audit::examine(spec, options).map_err(not_audited)?;
+fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<(Report, Exit), Diagnostic> {
+    let subjects = spec.map_or(Subjects::Ours, Subjects::OfSpec);
+    let report = audit::examine(subjects, options).map_err(not_audited)?;
     print(&terminal(&report, screen(Style::Plain, Detail::Brief), None))?;
     print(&format!("sandbox of engines: {}\n", process::sandbox_in_words()))?;
     print(&format!("memory of an engine: {} MiB at most\n", process::limit_mib()))?;
     let is_absent = |e: &EngineStatus| e.status == Status::Absent;
-    Ok(report.exit().max(if report.engines.iter().any(is_absent) { Exit::Engine } else { Exit::Passed }))
+    let exit = report.exit().max(if report.engines.iter().any(is_absent) { Exit::Engine } else { Exit::Passed });
+    Ok((report, exit))
+}
+
+fn examine_adapter(words: &[String], options: Options<'_>) -> Result<(Report, Exit), Diagnostic> {
+    let command = match words {
+        // A command as it is typed.
+        [line] if !Path::new(line).is_file() => shlex::split(line).filter(|words| !words.is_empty()),
+        words => Some(words.to_vec()),
+    };
+    let command = command.ok_or_else(|| miette::miette!("--adapter must be a program and its arguments"))?;
+    let folder = std::env::current_dir().into_diagnostic()?;
+    let (report, conformance) = audit::examine_adapter(&command, &folder, options).map_err(not_audited)?;
+    print(&terminal(&report, screen(Style::Plain, Detail::Brief), None))?;
+    print(&format!("\n{conformance}"))?;
+    let exit = conformance.exit(&report);
+    Ok((report, exit))
 }
 
 pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
+use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::diagnose;
 use super::{complain, print};
@@ -66,8 +66,7 @@ fn export_case(case: &Case, args: &ExportArgs, site: &Site, out: &Path) -> Resul
             let folder = out.join(task.procedure.name());
             std::fs::create_dir_all(&folder).into_diagnostic()?;
             for file in &files {
-                let path = folder.join(&file.name);
-                std::fs::write(&path, &file.bytes).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+                let path = file.write_below(&folder).into_diagnostic()?;
                 print(&format!("{}\n", path.display()))?;
             }
             if let Some(command) = command {

@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 
 use self::photometry::PhotometryArgs;
 use crate::audit::{Calibration, Options, Sampling};
-use crate::engines::{ExternalJob, ExternalReadings, Site};
+use crate::engines::{ExternalAnswers, ExternalJob, ExternalProbe, ExternalReadings, ExternalRequest, Site};
 use crate::judge::{PolicyChoice, ProjectPolicy};
 use crate::plan::{Selection, Skipping};
 use crate::record::ProcedureId;
@@ -247,10 +247,16 @@ enum SchemaOf {
     /// `luxproof.yaml`
     Policy,
     Report,
-    /// What an external adapter reads on its standard input
+    /// What an external adapter of version 1 reads on its standard input
     Job,
-    /// What an external adapter prints on its standard output
+    /// What an external adapter of version 1 prints on its standard output
     Readings,
+    /// What an external adapter of protocol 2 reads on its standard input
+    Request,
+    /// What one of protocol 2 answers to a probe
+    Probe,
+    /// What one of protocol 2 answers to jobs
+    Answers,
 }
 
 impl Cli {
@@ -353,6 +359,9 @@ fn schema(of: SchemaOf) -> Result<Exit, Diagnostic> {
         SchemaOf::Report => schemars::schema_for!(Report),
         SchemaOf::Job => schemars::schema_for!(ExternalJob),
         SchemaOf::Readings => schemars::schema_for!(ExternalReadings),
+        SchemaOf::Request => schemars::schema_for!(ExternalRequest),
+        SchemaOf::Probe => schemars::schema_for!(ExternalProbe),
+        SchemaOf::Answers => schemars::schema_for!(ExternalAnswers),
     };
     print(&json(&schema)?)?;
     Ok(Exit::Passed)

@@ -1,5 +1,20 @@
 //! What explains readings, in words and numbers.
 
+/// What of an engine a cause is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aspect {
+    /// How much a number is.
+    Units,
+    /// Where luminaires and their tables point, and where meters do.
+    Orientation,
+    /// Which reading is whose.
+    Meters,
+    /// How light goes: bodies, surfaces, reflections.
+    Light,
+    /// More than one of these.
+    Several,
+}
+
 /// How well a cause explains readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Evidence {
@@ -40,6 +55,22 @@ impl Cause {
                 "{}: that explains all {readings} readings to {left:.2} %, which are up to {before:.1} % off otherwise",
                 self.what
             ),
+        }
+    }
+
+    pub fn aspect(&self) -> Aspect {
+        match self.id {
+            "two" => Aspect::Several,
+            "reversed" | "next" | "previous" | "exchanged" | "shifted" | "shifted-here" | "lifted" => Aspect::Meters,
+            "turned" | "isotropic" | "averaged" | "extrapolated" | "unrotated" | "rotated-back" | "area-as-point"
+            | "meter-flipped" | "meters-up" | "two-sided" | "normals-ignored" | "cosine-missing" | "cosine-doubled"
+            | "place" | "turn" | "tilt" | "one-table" | "one-table-scaled" | "one-plane" | "gamma-flipped"
+            | "gamma-off" => Aspect::Orientation,
+            id if id.starts_with("c-") => Aspect::Orientation,
+            "upside-down" | "gamma-decoded" | "gamma-encoded" | "bounces-cut" | "bounces-uncut" | "direct-lost"
+            | "direct-added" | "indirect-added" | "surface-lost" | "luminaire-lost" | "one-lit" | "reflectances"
+            | "reflectance" | "power" => Aspect::Light,
+            _ => Aspect::Units,
         }
     }
 

@@ -1,13 +1,15 @@
 //! Faults that renderers and exporters are known to have. The diagnosis looks for them in readings that failed, the
 //! self-test puts them in.
 
-use glam::DMat3;
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
 use itertools::Itertools;
 use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Bounces, LuminaireModel, Transport};
 
 use super::fault::{Fault, Parameter};
-use super::tables::{averaged, extrapolated, is_axial, isotropic, remap, replace};
+use super::tables::{averaged, extrapolated, first_plane, is_axial, isotropic, raised, remap, replace, turned_behind};
 use super::wrong::{Law, Order, Readout, Wrong};
 use crate::procedures::Task;
 
@@ -43,6 +45,8 @@ fn factors() -> Vec<Fault> {
         ("factor-1/pi", "factor 1/pi: luminance taken for exitance", 1.0 / PI),
         ("factor-4pi", "factor 4 pi: intensity taken for flux", 4.0 * PI),
         ("factor-1/4pi", "factor 1/(4 pi): flux taken for intensity", 1.0 / (4.0 * PI)),
+        ("factor-2pi", "factor 2 pi: intensity taken for the flux of half a sphere", 2.0 * PI),
+        ("factor-1/2pi", "factor 1/(2 pi): the flux of half a sphere taken for intensity", 0.5 / PI),
         ("factor-2", "factor 2: something counted twice, or half a sphere for a whole one", 2.0),
         ("factor-1/2", "factor 1/2: half of something lost, or a whole sphere for half a one", 0.5),
         ("factor-179", "factor 179: Radiance's lumens a watt applied once too often", 179.0),
@@ -53,6 +57,8 @@ fn factors() -> Vec<Fault> {
         ("factor-1/177.83", "factor 1/177.83: the lumens a watt of equal-energy white left out", 1.0 / 177.83),
         ("feet", "factor 10.764: feet taken for metres, or lux for footcandles", 1.0 / (0.3048 * 0.3048)),
         ("metres", "factor 0.0929: metres taken for feet, or footcandles for lux", 0.3048 * 0.3048),
+        ("millimetres", "factor 1000000: millimetres taken for metres", 1e6),
+        ("centimetres", "factor 10000: centimetres taken for metres, or lux for phot", 1e4),
         ("kilo", "factor 1000: candela a kilolumen taken for candela, or lux for kilolux", 1000.0),
         ("milli", "factor 1/1000: candela taken for candela a kilolumen", 1e-3),
     ];
@@ -69,6 +75,10 @@ fn factors() -> Vec<Fault> {
     let scaled = "the spec's flux_scale is left out";
     faults.push(Fault::new("flux-scale", scaled, |wrong, _| {
         wrong.dimmed(|l| (l.flux_scale > 0.0 && l.flux_scale != 1.0).then(|| 1.0 / l.flux_scale))
+    }));
+    let twice = "the spec's flux_scale is applied twice";
+    faults.push(Fault::new("flux-scale-twice", twice, |wrong, _| {
+        wrong.dimmed(|l| (l.flux_scale > 0.0 && l.flux_scale != 1.0).then_some(l.flux_scale))
     }));
     let lumens = |l: &luminaire::scene::Luminaire| l.photometry.lamp_lumens.filter(|lumens| *lumens > 0.0);
     let per = "factor 1000/lamp lumens: scaled to a kilolumen";
@@ -118,6 +128,8 @@ fn laws() -> Vec<Fault> {
     vec![
         law("cosine-missing", "the cosine at the meter is left out", wrong(|l| l.cosine = 0)),
         law("cosine-doubled", "the cosine at the meter is applied twice", wrong(|l| l.cosine = 2)),
+        law("two-sided", "light from behind a meter counts, too", wrong(|l| l.is_two_sided = true)),
+        law("normals-ignored", "the normals of meters are left out", wrong(|l| (l.cosine, l.is_two_sided) = (0, true))),
         law("distance", "light falls with distance, not with its square", wrong(|l| l.distance = 1))
             .as_bright_as_you_like(),
         law("candela-squared", "the candela are squared: the filter is applied to itself", wrong(|l| l.intensity = 2))
@@ -142,10 +154,20 @@ fn of_luminaires() -> Vec<Fault> {
             !is_axial(l) && remap(l, |c, g| (-c, g))
         }),
         of_each("c-mirrored-90", "C 0 and C 180 are exchanged", |l| !is_axial(l) && remap(l, |c, g| (180.0 - c, g))),
+        of_each("c-turned-behind", "beyond a gamma of 90 degrees C is turned by 180 degrees", turned_behind),
         of_each("gamma-flipped", "gamma is counted from the zenith: up and down are exchanged", |l| {
             remap(l, |c, g| (c, 180.0 - g))
         }),
         of_each("isotropic", "the distribution is replaced by the same intensity everywhere", isotropic),
+        of_each("one-plane", "only the plane C 0 is read", first_plane).about("planes"),
+        of_each("nodes-squared", "the candela are squared, each as a part of the largest", |l| raised(l, 2.0))
+            .about(CANDELA),
+        of_each(
+            "one-plane-squared",
+            "only the plane C 0 is read, and the candela are squared, each as a part of the largest",
+            |l| raised(l, 2.0) | first_plane(l),
+        )
+        .about(CANDELA),
         of_each("averaged", "the distribution is averaged over C", |l| !is_axial(l) && averaged(l)),
         of_each("extrapolated", "the table goes on beyond its last angle", extrapolated),
         of_each("unrotated", "the luminaire's rotation is left out", |l| {
@@ -157,6 +179,19 @@ fn of_luminaires() -> Vec<Fault> {
             let before = std::mem::replace(&mut l.orientation, back);
             before != l.orientation
         }),
+        Fault::new("one-lit", "of several luminaires the first alone gives light", |wrong, _| {
+            let are_several = wrong.task().scene.luminaires.len() > 1;
+            if are_several {
+                wrong.scene().luminaires.truncate(1);
+            }
+            are_several
+        }),
+        Fault::new("one-table", "all luminaires have the table of the first", |wrong, _| {
+            table_of_the_first(wrong, false)
+        }),
+        Fault::new("one-table-scaled", "all luminaires have the table and the flux_scale of the first", |wrong, _| {
+            table_of_the_first(wrong, true)
+        }),
         of_each("area-as-point", "the luminous opening is shrunk to a point", |l| {
             let before = std::mem::replace(&mut l.model, LuminaireModel::Point);
             before != LuminaireModel::Point
@@ -165,6 +200,19 @@ fn of_luminaires() -> Vec<Fault> {
     faults
 }
 
+fn table_of_the_first(wrong: &mut Wrong, with_its_scale: bool) -> bool {
+    let Some(first) = wrong.task().scene.luminaires.first().cloned() else { return false };
+    wrong.luminaires(|l| {
+        let before = std::mem::replace(&mut l.photometry, Arc::clone(&first.photometry));
+        if with_its_scale {
+            l.flux_scale = first.flux_scale;
+        }
+        !Arc::ptr_eq(&before, &first.photometry)
+    })
+}
+
+/// What powers of candela are about.
+pub(super) const CANDELA: &str = "power of candela";
 /// What rotations in C are about.
 pub(super) const TURN: &str = "turn";
 /// What powers of reflectances are about.
@@ -179,7 +227,7 @@ fn of_rooms() -> Vec<Fault> {
         ("gamma-decoded", "reflectances are decoded as colours, to the power of 2.2", 2.2),
         ("gamma-encoded", "reflectances are encoded as colours, to the power of 1/2.2", 1.0 / 2.2),
     ] {
-        faults.push(Fault::new(id, what, move |wrong, _| raised(wrong, power)).about(POWER));
+        faults.push(Fault::new(id, what, move |wrong, _| reflectances_raised(wrong, power)).about(POWER));
     }
     faults
 }
@@ -214,6 +262,10 @@ fn of_light() -> Vec<Fault> {
         .that_reflects(),
         Fault::new("meter-flipped", "meters face the other way", |wrong, _| {
             wrong.meters(|m| m.normal = -m.normal);
+            true
+        }),
+        Fault::new("meters-up", "all meters face up, whatever their normals are", |wrong, _| {
+            wrong.meters(|m| m.normal = DVec3::Z);
             true
         }),
     ]);
@@ -291,7 +343,7 @@ pub(super) fn reflects(wrong: &mut Wrong, surface: Surface, value: f64) -> bool 
 }
 
 /// Every reflectance to a power.
-pub(super) fn raised(wrong: &mut Wrong, power: f64) -> bool {
+pub(super) fn reflectances_raised(wrong: &mut Wrong, power: f64) -> bool {
     each_reflectance(wrong, |r| r.powf(power))
 }
 

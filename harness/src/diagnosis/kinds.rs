@@ -6,8 +6,10 @@ use luminaire::geometry::Surface;
 use luminaire::scene::{Luminaire, Transport};
 
 use super::fault::{Fault, Parameter};
-use super::faults::{LUMINAIRES, POWER, TURN, each_reflectance, name, names, of_specs, raised, reflects};
-use super::tables::is_axial;
+use super::faults::{
+    CANDELA, LUMINAIRES, POWER, TURN, each_reflectance, name, names, of_specs, reflectances_raised, reflects,
+};
+use super::tables::{first_plane, is_axial, raised, shifted};
 use super::wrong::Wrong;
 use crate::procedures::Task;
 
@@ -19,6 +21,7 @@ const MOST: f64 = 0.995;
 /// Every kind that cases may show.
 pub fn kinds(cases: &[&[Task]]) -> Vec<Fault> {
     let mut all = of_engine();
+    all.extend(of_tables());
     all.extend(of_specs(cases).flat_map(|(case, tasks)| of_case(case, tasks)));
     all
 }
@@ -46,7 +49,7 @@ fn of_engine() -> Vec<Fault> {
         })
         .about(TURN)
         .with([degrees(true)]),
-        Fault::new("power", "reflectances are raised to the power of {0}", |wrong, p| raised(wrong, p[0]))
+        Fault::new("power", "reflectances are raised to the power of {0}", |wrong, p| reflectances_raised(wrong, p[0]))
             .about(POWER)
             .with([Parameter::new("", 1.0, 0.05, (0.1, 10.0))]),
         Fault::new("shifted", "meters are off by {0} in x, {1} in y, {2} in z", shift).with([
@@ -61,6 +64,39 @@ fn of_engine() -> Vec<Fault> {
         })
         .with([metres()]),
     ]
+}
+
+/// What becomes of a table that is kept as a texture: candela to a power, angles off by a part of a texel, planes lost, and all that at once.
+fn of_tables() -> Vec<Fault> {
+    let off = || Parameter::new(" degrees", 0.0, 0.05, (-20.0, 20.0));
+    let power = || Parameter::new("", 1.0, 0.02, (0.1, 10.0));
+    let plane =
+        |is_first: bool, what: String| if is_first { format!("only the plane C 0 is read, {what}") } else { what };
+    let mut all = vec![];
+    for is_first in [false, true] {
+        let lost = move |l: &mut Luminaire| is_first && first_plane(l);
+        let shift = move |wrong: &mut Wrong, p: &[f64]| {
+            let by = p[0];
+            wrong.luminaires(|l| lost(l) | shifted(l, by))
+        };
+        let about = if is_first { "angles of one plane" } else { "angles" };
+        let what = plane(is_first, "gamma is off by {0}".to_owned());
+        all.push(Fault::new("gamma-off", what, shift).about(about).with([off()]));
+        let what =
+            plane(is_first, "the candela are raised to the power of {0}, each as a part of the largest".to_owned());
+        let to_power = move |wrong: &mut Wrong, p: &[f64]| {
+            let power = p[0];
+            wrong.luminaires(|l| raised(l, power) | lost(l))
+        };
+        all.push(Fault::new("candela-power", what, to_power).about(CANDELA).with([power()]));
+        let what = "the candela are squared, each as a part of the largest, and gamma is off by {0}".to_owned();
+        let squared = move |wrong: &mut Wrong, p: &[f64]| {
+            let by = p[0];
+            wrong.luminaires(|l| raised(l, 2.0) | lost(l) | shifted(l, by))
+        };
+        all.push(Fault::new("squared-off", plane(is_first, what), squared).about(CANDELA).with([off()]));
+    }
+    all
 }
 
 fn shift(wrong: &mut Wrong, p: &[f64]) -> bool {

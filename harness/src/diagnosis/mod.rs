@@ -14,6 +14,7 @@ mod fit;
 mod kinds;
 mod rough;
 mod search;
+mod shape;
 mod sheet;
 mod tables;
 mod wrong;
@@ -25,7 +26,7 @@ use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 use crate::system::process;
 
-pub use cause::Cause;
+pub use cause::{Aspect, Cause};
 pub use fault::{Fault, Parameter, shows};
 pub use faults::faults;
 pub use kinds::kinds;
@@ -79,8 +80,19 @@ pub fn diagnose(cases: &mut [Examined<'_>]) {
     explain(cases);
 }
 
-/// The same; gives what explains each failing procedure of an engine in a case.
+/// The same; gives what explains each procedure of an engine in a case.
 pub fn explain(cases: &mut [Examined<'_>]) -> Vec<Vec<Cause>> {
+    explained(cases).into_iter().map(|explained| explained.causes).collect()
+}
+
+/// What explains the readings of an engine in a procedure of a case.
+pub struct Explained {
+    pub key: ReadingKey,
+    pub causes: Vec<Cause>,
+}
+
+/// The same, with what it is of.
+pub fn explained(cases: &mut [Examined<'_>]) -> Vec<Explained> {
     let mut all = vec![];
     let fails = |c: &&Comparison| c.verdict == Verdict::Fail && Examined::is_about(c);
     let of_case = |case: &Examined<'_>| {
@@ -102,7 +114,7 @@ pub fn explain(cases: &mut [Examined<'_>]) -> Vec<Vec<Cause>> {
 }
 
 /// Explains what one engine fails in the cases chosen.
-fn explain_subject(cases: &mut [Examined<'_>], chosen: &[usize], subject: &Subject) -> Vec<Vec<Cause>> {
+fn explain_subject(cases: &mut [Examined<'_>], chosen: &[usize], subject: &Subject) -> Vec<Explained> {
     let mut groups: BTreeMap<Place, Vec<(usize, usize)>> = BTreeMap::new();
     for (place, &case) in chosen.iter().enumerate() {
         for (k, c) in cases[case].comparisons.iter().enumerate() {
@@ -130,6 +142,12 @@ fn explain_subject(cases: &mut [Examined<'_>], chosen: &[usize], subject: &Subje
     }
     let tasks: Vec<&[Task]> = chosen.iter().map(|case| cases[*case].tasks).collect();
     let causes = Bench::new(&tasks, models).causes(&sheets);
+    let key = |group: &Vec<(usize, usize)>| group.first().map(|(case, k)| cases[*case].comparisons[*k].key.clone());
+    let explained = members
+        .iter()
+        .zip(&causes)
+        .filter_map(|(group, causes)| Some(Explained { key: key(group)?, causes: causes.clone() }));
+    let explained = explained.collect();
     for (group, causes) in members.into_iter().zip(&causes).filter(|(_, causes)| !causes.is_empty()) {
         let text = causes.iter().map(Cause::text).collect::<Vec<_>>().join("; or ");
         for (case, k) in group {
@@ -139,7 +157,7 @@ fn explain_subject(cases: &mut [Examined<'_>], chosen: &[usize], subject: &Subje
             }
         }
     }
-    causes
+    explained
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ use super::fault::{Fault, Parameter, shows};
 use super::faults::{FACTOR, faults};
 use super::fit::{Fitted, fit, sum_of_squares};
 use super::kinds::kinds;
+use super::shape;
 use super::sheet::{Sheet, Stand, is_chance};
 use super::wrong::{Fidelity, Model, Work, Wrong};
 use crate::procedures::Task;
@@ -147,7 +148,7 @@ impl Search<'_> {
             self.settle(dark.filter_map(|f| self.of_listed(f)).collect(), &mut open, &mut causes);
             return causes;
         }
-        for stage in [Self::listed, Self::fitted, Self::with_factors, Self::pairs] {
+        for stage in [Self::listed, Self::fitted, Self::with_factors, Self::pairs, Self::shapes] {
             if open.is_empty() {
                 break;
             }
@@ -256,6 +257,16 @@ impl Search<'_> {
             Some(held)
         };
         alone.iter().array_combinations().filter_map(two).collect()
+    }
+
+    /// What readings have in common, whatever else is wrong with them.
+    fn shapes(&self, open: &[usize]) -> Vec<Held> {
+        let of = |k: &usize| {
+            let sheet = &self.sheets[*k];
+            let (cause, count_of_parameters) = shape::axial(&self.bench.models[sheet.model].task, sheet)?;
+            Some(Held { cause, case: None, explained: vec![*k], borne: vec![], count_of_parameters })
+        };
+        open.iter().filter_map(of).collect()
     }
 
     /// What a sheet's task reads with a listed fault: without parameters, or with a free factor that is left out.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use luminaire::photometry::{LuminousIntensityDistribution, Photometry};
+use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::Luminaire;
 
 /// A table of more nodes than this is thinned out where only its reflected light counts.
@@ -13,7 +13,7 @@ const NODES_LEFT: usize = 13;
 /// Leaves the luminaire as it is, and says so, where a table's angles allow no other.
 pub(super) fn replace(luminaire: &mut Luminaire, distribution: Option<LuminousIntensityDistribution>) -> bool {
     let Some(distribution) = distribution else { return false };
-    luminaire.photometry = Arc::new(Photometry { distribution, ..(*luminaire.photometry).clone() });
+    luminaire.photometry = Arc::new(luminaire.photometry.with_distribution(distribution));
     true
 }
 
@@ -27,12 +27,8 @@ pub(super) fn remap(luminaire: &mut Luminaire, source: impl Fn(f64, f64) -> (f64
     let table = luminaire.photometry.distribution.full_circle();
     // Every map is its own inverse: nodes of C go to their mirror images about C 0 or C 90.
     let images = |c: &f64| [*c, (-c).rem_euclid(360.0), (180.0 - c).rem_euclid(360.0)];
-    let mut c_deg: Vec<f64> = table.c_deg().iter().flat_map(images).chain([0.0, 360.0]).collect();
-    let mut gamma_deg: Vec<f64> = table.gamma_deg().iter().flat_map(|g| [*g, source(0.0, *g).1]).collect();
-    for angles in [&mut c_deg, &mut gamma_deg] {
-        angles.sort_by(f64::total_cmp);
-        angles.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
-    }
+    let c_deg = sorted(table.c_deg().iter().flat_map(images).chain([0.0, 360.0]).collect());
+    let gamma_deg = sorted(table.gamma_deg().iter().flat_map(|g| [*g, source(0.0, *g).1]).collect());
     let at = |c: f64| gamma_deg.iter().map(move |g| (c, *g));
     let value = |(c, g): (f64, f64)| {
         let (c, g) = source(c, g);
@@ -65,6 +61,65 @@ pub(super) fn extrapolated(luminaire: &mut Luminaire) -> bool {
     gamma_deg.extend((last < 180.0).then_some(180.0));
     let at_nodes = nodes(table, &gamma_deg, |c, g| table.intensity(c, g.clamp(first, last)).value());
     replace(luminaire, LuminousIntensityDistribution::new(table.c_deg().to_vec(), gamma_deg, at_nodes).ok())
+}
+
+/// Of all planes the first, all round.
+pub(super) fn first_plane(luminaire: &mut Luminaire) -> bool {
+    let table = luminaire.photometry.distribution.full_circle();
+    let axial = LuminousIntensityDistribution::axial(table.gamma_deg().to_vec(), table.plane(0).to_vec());
+    !is_axial(luminaire) && replace(luminaire, axial.ok())
+}
+
+/// The candela of every node to a power, each as a part of the largest.
+pub(super) fn raised(luminaire: &mut Luminaire, power: f64) -> bool {
+    let table = &luminaire.photometry.distribution;
+    let peak = table.max_intensity().value();
+    let at_nodes = nodes(table, table.gamma_deg(), |c, g| peak * (table.intensity(c, g).value() / peak).powf(power));
+    let is_even = at_nodes.iter().all(|candela| *candela == peak);
+    let (c_deg, gamma_deg) = (table.c_deg().to_vec(), table.gamma_deg().to_vec());
+    peak > 0.0 && !is_even && replace(luminaire, LuminousIntensityDistribution::new(c_deg, gamma_deg, at_nodes).ok())
+}
+
+/// What should be read at a gamma is read so many degrees farther from the nadir, as from a texture whose texels' edges are taken for their
+/// centres: half a texel off, so that its last texel ends a whole one before the table.
+pub(super) fn shifted(luminaire: &mut Luminaire, by_deg: f64) -> bool {
+    let table = &luminaire.photometry.distribution;
+    let gamma = table.gamma_deg();
+    let (first, last) = (gamma[0], gamma[gamma.len() - 1]);
+    let (low, high) = (first - 2.0 * by_deg.min(0.0), last - 2.0 * by_deg.max(0.0));
+    if low >= high {
+        return false;
+    }
+    let moved = gamma.iter().chain([&low, &high]).map(|g| g + by_deg).filter(|g| (first..=last).contains(g));
+    let gamma_deg = sorted(moved.chain([first, last]).collect());
+    let at_nodes = nodes(table, &gamma_deg, |c, g| table.intensity(c, (g - by_deg).clamp(low, high)).value());
+    replace(luminaire, LuminousIntensityDistribution::new(table.c_deg().to_vec(), gamma_deg, at_nodes).ok())
+}
+
+/// From a gamma of 90 degrees on C is turned by half a circle: what is behind is projected through the centre.
+pub(super) fn turned_behind(luminaire: &mut Luminaire) -> bool {
+    const BEHIND: f64 = 90.0 + 1e-6;
+    let table = luminaire.photometry.distribution.full_circle();
+    if is_axial(luminaire) || table.gamma_deg().last().is_none_or(|last| *last <= BEHIND) {
+        return false;
+    }
+    let opposite = table.c_deg().iter().map(|c| (c + 180.0).rem_euclid(360.0));
+    let c_deg = sorted(table.c_deg().iter().copied().chain(opposite).chain([0.0, 360.0]).collect());
+    let is_inside = |g: &f64| table.gamma_deg()[0] < *g;
+    let gamma_deg: Vec<f64> =
+        table.gamma_deg().iter().copied().chain([90.0, BEHIND].into_iter().filter(is_inside)).collect();
+    let gamma_deg = sorted(gamma_deg);
+    let turned = |c: f64, g: f64| if g >= BEHIND { (c + 180.0).rem_euclid(360.0) } else { c };
+    let at = |c: &f64| gamma_deg.iter().map(|g| table.intensity(turned(*c, *g), *g).value()).collect::<Vec<_>>();
+    let candela = c_deg.iter().flat_map(at).collect();
+    replace(luminaire, LuminousIntensityDistribution::new(c_deg, gamma_deg, candela).ok())
+}
+
+/// Angles in their order, each once.
+fn sorted(mut angles: Vec<f64>) -> Vec<f64> {
+    angles.sort_by(f64::total_cmp);
+    angles.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+    angles
 }
 
 /// The candela of every node squared, the table's own unit a candela.

@@ -205,6 +205,26 @@ fn what_other_scenes_contradict_is_not_named() {
     assert_eq!(candela[0].id, "candela-squared");
 }
 
+/// What an adapter of a newcomer's does wrong is named by the scenes of known answer alone, as what it is about.
+#[test]
+fn scenes_of_known_answer_name_what_newcomers_do() {
+    let tasks: Vec<Task> = known::tasks().into_iter().filter(|t| t.transport == Transport::Direct).collect();
+    let of = |aspect: Aspect, ids: &[&'static str]| {
+        for id in ids {
+            let named = causes(&tasks, &with(&tasks, id, "", &[]));
+            assert_eq!(named.iter().map(|c| (c.id, c.aspect())).collect_vec(), [(*id, aspect)], "{named:?}");
+        }
+    };
+    of(Aspect::Units, &["factor-pi", "factor-2pi", "feet", "millimetres", "kilo", "flux-scale-twice", "distance"]);
+    let rotated = ["unrotated", "rotated-back", "one-table", "one-table-scaled"];
+    let in_c = ["c-mirrored", "c-mirrored-90", "c-turned-90", "c-turned-180", "one-plane", "gamma-flipped"];
+    of(Aspect::Orientation, &[&rotated[..], &in_c].concat());
+    of(Aspect::Orientation, &["cosine-missing", "two-sided", "normals-ignored", "meter-flipped", "meters-up"]);
+    of(Aspect::Light, &["one-lit"]);
+    let offset = causes(&tasks, &with(&tasks, "offset", "", &[0.5]));
+    assert_eq!(offset.iter().map(|c| c.id).collect_vec(), ["offset"], "{offset:?}");
+}
+
 #[test]
 fn what_no_fault_does_is_left_unsaid() {
     let tasks = BOTH.map(skew);

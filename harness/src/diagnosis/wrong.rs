@@ -42,6 +42,8 @@ pub struct Law {
     pub intensity: i32,
     pub cosine: i32,
     pub distance: i32,
+    /// Whether light from behind counts like light from the front.
+    pub is_two_sided: bool,
 }
 
 /// What is done to readings, one after the other.
@@ -67,7 +69,7 @@ pub enum Order {
 }
 
 impl Law {
-    pub const RIGHT: Self = Self { intensity: 1, cosine: 1, distance: 2 };
+    pub const RIGHT: Self = Self { intensity: 1, cosine: 1, distance: 2, is_two_sided: false };
 }
 
 impl Wrong {
@@ -402,11 +404,11 @@ impl Law {
         let towards: DVec3 = luminaire.position_m - meter.position_m;
         let distance = towards.length();
         let cosine = towards.dot(meter.normal) / distance;
-        if cosine <= 0.0 {
+        if cosine <= 0.0 && !self.is_two_sided {
             return 0.0;
         }
         let intensity = luminaire.intensity_towards(-towards).value();
-        intensity.powi(self.intensity) * cosine.powi(self.cosine) / distance.powi(self.distance)
+        intensity.powi(self.intensity) * cosine.abs().powi(self.cosine) / distance.powi(self.distance)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::borrow::Borrow;
 
 use super::contract::{Engine, Entry};
-use super::{cycles, iesna, luxcore, mitsuba, povray, radiance, simulator};
+use super::{cycles, iesna, luxcore, mitsuba, povray, radiance, simulator, web};
 use crate::record::EngineName;
 
 /// In the order of reports: our own witnesses first.
@@ -15,6 +15,8 @@ pub const ALL: &[&Entry] = &[
     &povray::ENTRY,
     &cycles::ENTRY,
     &luxcore::ENTRY,
+    &web::THREE,
+    &web::BABYLON,
 ];
 
 pub fn all() -> Vec<Box<dyn Engine>> {

@@ -22,6 +22,9 @@ pub const FILE_READER: &str = "luxproof's reader of photometric files";
 /// The component of our own solvers, which look intensities up alike.
 pub(super) const OWN_LOOKUP: &str = "luminaire's interpolation of candela tables";
 
+/// What an engine answers to one of several jobs.
+pub type Answer = Result<Measurement, EngineError>;
+
 pub trait Engine: Send + Sync {
     fn name(&self) -> EngineName;
 
@@ -41,6 +44,11 @@ pub trait Engine: Send + Sync {
     /// Whether its driver is ours, which has seen how its blocks scatter: what others state of their errors is looked into.
     fn is_vouched_for(&self) -> bool {
         true
+    }
+
+    /// Whether its own reader gets the user's files, so that nothing of what our reader says of a table follows for it.
+    fn reads_files(&self, _job: &Job) -> bool {
+        false
     }
 
     fn probe(&self, site: &Site) -> Result<Version, Absent>;
@@ -95,6 +103,26 @@ pub trait Engine: Send + Sync {
 
     /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError>;
+
+    /// Whether it is better asked for several jobs at once.
+    fn takes_batches(&self) -> bool {
+        false
+    }
+
+    /// Runs several jobs, each with a workbench for its files, in one that is of all; one answer a job, in their order, or one error for all.
+    fn read_all(&self, jobs: &[(&Job, &Workbench)], _together: &Workbench) -> Result<Vec<Answer>, EngineError> {
+        Ok(jobs.iter().map(|(job, workbench)| self.read(job, workbench)).collect())
+    }
+
+    /// Threads or processes that it makes use of at most.
+    fn max_threads(&self) -> usize {
+        usize::MAX
+    }
+
+    /// Seconds that it may take before it begins to work, on a busy machine.
+    fn start_s(&self) -> f64 {
+        120.0
+    }
 }
 
 /// What is known of an engine of our own before it is asked anything; `super::catalogue` lists them.
@@ -122,6 +150,10 @@ pub enum Component {
     LibLlvm,
     /// It gives rtrace's random numbers a seed.
     LibFaketime,
+    /// Node.js, the renderers of the web and what drives a browser, as `web/` pins them.
+    WebPackages,
+    /// A browser that runs without a screen.
+    Chromium,
     /// Blender as a Python package, as `blender.lock` pins it, in an environment of its own.
     Blender,
     /// LuxCore as a Python package, as `luxcore.lock` pins it, in an environment of its own.
@@ -148,6 +180,7 @@ pub struct Knob {
 /// readings are as good as the seconds of the budget allow.
 pub fn share(engine: &dyn Engine, job: &Job, slots: &Slots) -> Share {
     let threads = if job.transport == Transport::Direct { 1 } else { slots.threads_a_reading() };
+    let threads = threads.min(engine.max_threads());
     Share { threads, memory_mib: engine.memory_mib(job, threads) }
 }
 
@@ -205,6 +238,14 @@ impl Job {
             seed: 1,
             settings,
         }
+    }
+
+    /// What is to be told where an engine's own reader gets the user's files, and some are not of the one format that these readers know.
+    pub(super) fn written_for_its_reader(&self) -> Option<String> {
+        let others = self.scene.luminaires.iter().filter(|l| l.photometry.lm63_file().is_none());
+        let written: Vec<&str> = others.map(|l| l.id.as_str()).collect();
+        let text = format!("its own reader got an LM-63-2002 file that luxproof wrote of {}", written.join(", "));
+        (!written.is_empty()).then_some(text)
     }
 
     /// The same whatever case and procedure are called.

@@ -10,7 +10,6 @@ pub(super) mod tests;
 use self::ies::LookedUp;
 use super::patches::settings::{self, Settings};
 use super::patches::{self, Package};
-use super::settings::Preset;
 use super::{
     Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench,
 };
@@ -52,13 +51,16 @@ impl Engine for Cycles {
         ID
     }
 
+    fn reads_files(&self, job: &Job) -> bool {
+        Settings::of(job, &ID).is_ok_and(Settings::is_native)
+    }
+
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         PACKAGE.probe(site)
     }
 
     fn supports(&self, job: &Job) -> Support {
-        let is_stock = Settings::of(job, &ID).is_ok_and(|s| s.preset == Preset::Default);
-        patches::supports(&ENTRY, job, is_stock, (STOCK, None))
+        patches::supports(&ENTRY, job, (STOCK, None))
     }
 
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {

@@ -1,21 +1,34 @@
 //! External adapters: any program that reads a job as JSON on its standard input and prints readings as JSON is an engine.
 //!
 //! A spec names it: `engines: {mine: {command: [python3, mine.py]}}`. It runs in the spec's folder, with the time limit, log
-//! and checks of every other engine.
+//! and checks of every other engine. Of protocol 2 is what says so when it is probed; all else is of version 1, one job a process.
 
+mod ask;
 mod code;
 mod command;
 mod form;
 mod imports;
+mod json;
+mod photometry;
+mod protocol;
+mod readings;
 #[cfg(test)]
 mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
-pub use self::form::{ExternalJob, ExternalReadings};
+pub use self::ask::Introduction;
+use self::ask::is_worth_asking_apart;
+use self::json::Protocol;
+use self::protocol::Capability;
+
+pub use self::form::ExternalJob;
+pub use self::protocol::{ExternalProbe, ExternalRequest};
+pub use self::readings::{ExternalAnswers, ExternalReadings};
 use super::{
-    Absent, Engine, EngineError, FILE_READER, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
+    Absent, Answer, Engine, EngineError, FILE_READER, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
     fingerprint,
 };
 use crate::record::{EngineName, ProcedureId, UnknownProcedure};
@@ -28,6 +41,12 @@ const JOB_FILE: &str = "job.json";
 
 /// The setting that names the folder in which it runs and from which its paths count, in place of the spec's.
 pub(crate) const RUN_IN: &str = "run_in";
+
+/// Seconds that it may take before it begins to work, where nobody says.
+const START_S: f64 = 120.0;
+
+/// The settings that are no business of the program's.
+const OWN_SETTINGS: [&str; 5] = ["command", "procedures", RUN_IN, "protocol", "start_seconds"];
 
 /// Folders of programs that have nothing to do with each other.
 const INSTALLED: [&str; 6] = ["/bin", "/sbin", "/usr/bin", "/usr/sbin", "/usr/local/bin", "/usr/local/sbin"];
@@ -48,6 +67,12 @@ pub(super) struct External {
     contents: String,
     /// What makes its readings, by content: who has one of these in common is no other program.
     parts: BTreeSet<String>,
+    /// The protocol that its settings say; `None`: as its probe answers.
+    stated: Option<Protocol>,
+    /// Seconds that it may take before it begins to work.
+    start_s: f64,
+    /// What it says of itself, once it was asked; of version 1 why it counts as that.
+    said: OnceLock<Result<Box<ExternalProbe>, String>>,
 }
 
 impl External {
@@ -90,22 +115,26 @@ impl External {
             Some(list) => list.map_err(|_| error(key, "must be a list of names")),
         };
         let depends_on = list("depends_on")?.into_iter().map(|file| folder.join(file)).collect();
+        let stated = match settings.get("protocol").map(serde_json::Value::as_u64) {
+            None => None,
+            Some(Some(1)) => Some(Protocol::One),
+            Some(Some(2)) => Some(Protocol::Two),
+            Some(_) => return Err(error("protocol", "must be 1 or 2")),
+        };
+        let start_s = match settings.get("start_seconds").map(serde_json::Value::as_f64) {
+            None => START_S,
+            Some(Some(seconds)) if (1.0..=86_400.0).contains(&seconds) => seconds,
+            Some(_) => return Err(error("start_seconds", "must be a number of seconds from 1 to 86400")),
+        };
         let (contents, parts) = (command::contents_of(&command, &folder), command::parts(&command, &folder));
-        Ok(Self { shares: list("shares")?, id: id.clone(), command, procedures, depends_on, folder, contents, parts })
+        let (shares, id, said) = (list("shares")?, id.clone(), OnceLock::new());
+        Ok(Self { id, command, procedures, shares, depends_on, folder, contents, parts, stated, start_s, said })
     }
 
     /// The program: a path is relative to the spec's folder, a bare name is looked up on PATH.
     fn program(&self, site: &Site) -> Option<PathBuf> {
         let is_path = self.command[0].contains('/');
         if is_path { command::file(&self.folder, 0, &self.command[0]) } else { site.program(&self.command[0]) }
-    }
-
-    fn invocation(&self, job: &Job, workbench: &Workbench) -> Result<Invocation, EngineError> {
-        let program = self.program(&workbench.site).ok_or_else(|| self.output(self.absence()))?;
-        let input = ExternalJob::of(job).to_json().map_err(|e| self.output(format!("the job is no JSON: {e}")))?;
-        let run = Invocation::new(program, &self.folder, workbench.limit, &workbench.log).of_user();
-        let run = Invocation { peak: workbench.peak.clone(), ..run };
-        Ok(run.args(&self.command[1..]).env(FOLDER_VARIABLE, &workbench.scene_dir).stdin(input))
     }
 
     /// Where the code of it may lie that no word names: where it runs, and about each of its files, wherever links put them.
@@ -145,22 +174,28 @@ impl Engine for External {
         let remedy = format!("correct engines.{}", self.id);
         let absent = |reason| Absent { reason, remedy: remedy.clone() };
         let program = self.program(site).ok_or_else(|| absent(self.absence()))?;
-        if let Some(gone) = self.depends_on.iter().find(|file| !file.exists()) {
+        let said = self.introduced(site).map_err(absent)?;
+        let listed: Vec<PathBuf> = said.iter().flat_map(|s| &s.depends_on).map(|file| self.folder.join(file)).collect();
+        let depends_on: Vec<&PathBuf> = self.depends_on.iter().chain(&listed).collect();
+        if let Some(gone) = depends_on.iter().find(|file| !file.exists()) {
             return Err(absent(format!("{}, which it depends on, is not there", gone.display())));
         }
         let own = command::own_files(&self.command, &self.folder);
         let code = code::below(&self.folders(&own), site.root());
-        let mut text = self.contents.clone();
+        let mut text = match said {
+            Some(said) => format!("{} {}, {}", said.name, said.version, self.contents),
+            None => self.contents.clone(),
+        };
         if !code.is_all {
             tracing::warn!("{}: more code lies about it than is looked at: it needs a folder of its own", self.id);
             text += " (not all of its code)";
         }
-        if self.depends_on.is_empty() && command::is_unknown(&self.command, &self.folder) {
+        if depends_on.is_empty() && command::is_unknown(&self.command, &self.folder) {
             tracing::warn!("{}: no word of its command names a file of its own: name them in `depends_on`", self.id);
             text += " (its files are not known)";
         }
         let imports = imports::of(&self.command, &own, &self.folder, site);
-        if self.depends_on.is_empty() && !imports.unknown.is_empty() {
+        if depends_on.is_empty() && !imports.unknown.is_empty() {
             let unknown = imports.unknown.join(", ");
             tracing::warn!(
                 "{}: not found, so that a change is not noticed: {unknown}; name its files in `depends_on`",
@@ -169,14 +204,15 @@ impl Engine for External {
             text += " (not all of its imports)";
         }
         let named = fingerprint::listed(std::iter::once(program).chain(own));
-        let others = fingerprint::listed(self.depends_on.iter().cloned().chain(imports.roots));
+        let others = fingerprint::listed(depends_on.into_iter().cloned().chain(imports.roots));
         let files = named.into_iter().chain(code.files).chain(others).collect();
         Ok(Version { text, fingerprint: fingerprint::of_files(&self.id, site, files) })
     }
 
     /// A file that two engines' commands name counts once, whatever the other words, and so does what it says that it shares.
     fn components(&self, _job: &Job) -> Vec<String> {
-        let parts = self.parts.iter().chain(&self.shares);
+        let said = self.said().map_or(&[][..], |said| &said.shares);
+        let parts = self.parts.iter().chain(&self.shares).chain(said);
         std::iter::once(FILE_READER.to_owned()).chain(parts.cloned()).collect()
     }
 
@@ -185,7 +221,8 @@ impl Engine for External {
             Some(mine) if !mine.contains(&job.procedure) => {
                 Support::No(format!("engines.{}.procedures does not name it", self.id))
             }
-            _ => Support::Yes,
+            // Nothing is known of it before it was asked.
+            _ => self.said().and_then(|said| said.objection(job)).map_or(Support::Yes, Support::No),
         }
     }
 
@@ -195,15 +232,35 @@ impl Engine for External {
     }
 
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
-        let bytes = ExternalJob::of(job).to_json().map_err(|e| self.output(format!("the job is no JSON: {e}")))?;
-        Ok(vec![SceneFile { name: JOB_FILE.to_owned(), bytes }])
+        let files = self.photometry(job);
+        let bytes = self.request(&[(job, &files, None)], 1)?;
+        Ok(std::iter::once(SceneFile { name: JOB_FILE.to_owned(), bytes }).chain(files.files).collect())
     }
 
     fn command_by_hand(&self, _job: &Job, _site: &Site) -> Option<String> {
         let nothing = std::time::Duration::ZERO;
         let command = Invocation::new(&self.command[0], &self.folder, nothing, "").args(&self.command[1..]);
         let there = Invocation::new("cd", &self.folder, nothing, "").args([&self.folder]);
-        Some(format!("({} && {}) < {JOB_FILE}", there.command_line(), command.command_line()))
+        // What the job names lies where it does.
+        let scene = if self.protocol() == Protocol::Two {
+            format!("{FOLDER_VARIABLE}=\"$PWD\"; export {FOLDER_VARIABLE}; ")
+        } else {
+            String::new()
+        };
+        Some(format!("({scene}{} && {}) < {JOB_FILE}", there.command_line(), command.command_line()))
+    }
+
+    fn takes_batches(&self) -> bool {
+        self.said().is_some_and(|said| said.can(Capability::Batch))
+    }
+
+    fn max_threads(&self) -> usize {
+        let uses = |said: &ExternalProbe| said.can(Capability::Threads);
+        if self.said().is_none_or(uses) { usize::MAX } else { 1 }
+    }
+
+    fn start_s(&self) -> f64 {
+        self.start_s
     }
 
     /// A program of the user's is told the names of case and procedure, and may heed them.
@@ -212,16 +269,18 @@ impl Engine for External {
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
-        workbench.write(&self.export(job)?)?;
-        let run = self.invocation(job, workbench)?;
-        let finished = run.run()?;
-        let mut measured = ExternalReadings::measured(&finished.stdout, job, &self.id);
-        let effort = match &mut measured {
-            Ok(measurement) => Some(&mut measurement.effort),
-            Err(EngineError::AtMeters { rest, .. }) => Some(&mut rest.effort),
-            Err(_) => None,
-        };
-        effort.map(|effort| effort.insert("command".into(), run.command_line()));
-        measured
+        let answers = self.asked(&[(job, workbench)], workbench)?;
+        answers.into_iter().next().unwrap_or_else(|| Err(self.output("gave nothing".to_owned())))
+    }
+
+    fn read_all(&self, jobs: &[(&Job, &Workbench)], together: &Workbench) -> Result<Vec<Answer>, EngineError> {
+        match self.asked(jobs, together) {
+            // What breaks all at once may be one of them.
+            Err(error) if is_worth_asking_apart(&error) => {
+                tracing::warn!("{}: {error}; its {} jobs are asked one by one", self.id, jobs.len());
+                Ok(jobs.iter().map(|(job, bench)| self.read(job, bench)).collect())
+            }
+            answers => answers,
+        }
     }
 }

@@ -5,6 +5,7 @@
 mod debian;
 mod venv;
 mod verify;
+mod web;
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -82,8 +83,8 @@ pub fn repair(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str
 }
 
 fn components(engines: &[EngineName]) -> Vec<Component> {
-    use Component::{Blender, LibFaketime, LibLlvm, LuxCore, PovRay, PythonPackages};
-    let all = [PythonPackages, PovRay, LibLlvm, LibFaketime, Blender, LuxCore];
+    use Component::{Blender, Chromium, LibFaketime, LibLlvm, LuxCore, PovRay, PythonPackages, WebPackages};
+    let all = [PythonPackages, PovRay, LibLlvm, LibFaketime, Blender, LuxCore, WebPackages, Chromium];
     let named = || ALL.iter().filter(|entry| is_chosen(&entry.name, engines));
     all.into_iter().filter(|c| named().any(|entry| entry.installs.contains(c))).collect()
 }
@@ -107,6 +108,8 @@ type Installer = fn(&Site, &mut dyn FnMut(&str)) -> Result<String, InstallError>
 enum Recipe {
     /// Packages of Python, and the site that they have for themselves.
     Python(Environment, Site),
+    /// Node.js and packages of npm.
+    Npm,
     /// Packages of Debian, the program or library of theirs that engines use, and what installs them.
     Debian { packages: &'static [&'static str], found: fn(&Site) -> Option<PathBuf>, install: Installer },
 }
@@ -116,6 +119,7 @@ impl Recipe {
     fn present(&self, site: &Site) -> Option<PathBuf> {
         match self {
             Self::Python(environment, own) => Some(own.venv()).filter(|_| environment.is_current(own)),
+            Self::Npm => site.web_packages().filter(|_| web::is_current(site)),
             Self::Debian { found, .. } => found(site),
         }
     }
@@ -130,6 +134,8 @@ impl Component {
             Self::LibFaketime => "libfaketime",
             Self::Blender => "Blender",
             Self::LuxCore => "LuxCore",
+            Self::WebPackages => "three.js and Babylon.js",
+            Self::Chromium => "Chromium",
         }
     }
 
@@ -156,6 +162,8 @@ impl Component {
             Self::LuxCore => Recipe::Python(venv::LUXCORE, site.luxcore()),
             Self::PovRay => debian(&debian::POVRAY_PACKAGES, |site| site.program("povray"), debian::install_povray),
             Self::LibLlvm => debian(&debian::LLVM_PACKAGES, Site::llvm, debian::install_llvm),
+            Self::WebPackages => Recipe::Npm,
+            Self::Chromium => debian(&debian::CHROMIUM_PACKAGES, Site::chromium, debian::install_chromium),
             Self::LibFaketime => debian(&debian::LIBFAKETIME_PACKAGES, Site::libfaketime, debian::install_libfaketime),
         }
     }
@@ -163,6 +171,7 @@ impl Component {
     fn soundness(self, site: &Site) -> Soundness {
         match self.recipe(site) {
             Recipe::Python(environment, own) => environment.soundness(&own),
+            Recipe::Npm => web::soundness(site),
             Recipe::Debian { packages, found, .. } => verify::debian(site, found(site), packages),
         }
     }
@@ -170,6 +179,7 @@ impl Component {
     fn install_anew(self, site: &Site, progress: &mut dyn FnMut(&str)) -> InstallOutcome {
         let installed = match self.recipe(site) {
             Recipe::Python(environment, own) => environment.install(&own, progress),
+            Recipe::Npm => web::install(site, progress),
             Recipe::Debian { install, .. } => install(site, progress),
         };
         match installed {
@@ -211,6 +221,9 @@ mod tests {
         assert_eq!(components(&[EngineName::new("mitsuba")]), [PythonPackages, LibLlvm]);
         assert_eq!(components(&[EngineName::new("cycles")]), [Component::Blender]);
         assert_eq!(components(&[EngineName::new("luxcore")]), [Component::LuxCore]);
+        for name in ["three", "babylon"] {
+            assert_eq!(components(&[EngineName::new(name)]), [Component::WebPackages, Component::Chromium]);
+        }
         assert_eq!(components(&[EngineName::new("simulator"), EngineName::new("iesna")]), []);
     }
 

@@ -45,6 +45,10 @@ const STOCK: &str = "as installed, LuxCore drops the candela of IES files: a poi
 /// What is lost by the first of these.
 const STOCK_LOSS: f64 = 1.0 - 0.25 / std::f64::consts::PI;
 
+/// What is done for its reader of IES files, so that there is something to be judged.
+const OWN_READER: &str = "LuxCore's reader of IES files drops the candela: it was told the flux that luxproof reads in the file, so that \
+                          factors of a whole file cannot show";
+
 pub(super) struct LuxCore;
 
 impl Engine for LuxCore {
@@ -52,13 +56,16 @@ impl Engine for LuxCore {
         ID
     }
 
+    fn reads_files(&self, job: &Job) -> bool {
+        Settings::of(job, &ID).is_ok_and(Settings::is_native)
+    }
+
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         PACKAGE.probe(site)
     }
 
     fn supports(&self, job: &Job) -> Support {
-        let is_stock = Settings::of(job, &ID).is_ok_and(|s| s.preset == Preset::Default);
-        patches::supports(&ENTRY, job, is_stock, (STOCK, Some(STOCK_LOSS)))
+        patches::supports(&ENTRY, job, (STOCK, Some(STOCK_LOSS)))
     }
 
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
@@ -94,5 +101,9 @@ fn read_files(
     settings: Settings,
     workbench: &Workbench,
 ) -> Result<Measurement, EngineError> {
-    PACKAGE.read(files, job, settings, workbench, Map::of, 0.0)
+    let mut measurement = PACKAGE.read(files, job, settings, workbench, Map::of, 0.0)?;
+    if settings.is_native() && settings.preset != Preset::Default {
+        measurement.notes.push(OWN_READER.to_owned());
+    }
+    Ok(measurement)
 }

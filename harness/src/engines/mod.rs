@@ -36,6 +36,7 @@ mod shared_tests;
 pub(crate) mod simulator;
 mod site;
 mod tables;
+mod web;
 mod workbench;
 
 use std::collections::BTreeMap;
@@ -45,12 +46,12 @@ pub use crate::spec::Budget;
 pub use blocks::Blocks;
 pub use catalogue::{ALL, all, display_name, entry, is_chosen, is_on_request};
 pub use contract::{
-    Absent, Component, Engine, Entry, FILE_READER, Forgotten, Job, Knob, Measurement, Station, Support, Version,
-    checked, share,
+    Absent, Answer, Component, Engine, Entry, FILE_READER, Forgotten, Job, Knob, Measurement, Station, Support,
+    Version, checked, share,
 };
 use contract::{OWN_LOOKUP, geometry_mib};
 pub(crate) use external::RUN_IN;
-pub use external::{ExternalJob, ExternalReadings};
+pub use external::{ExternalAnswers, ExternalJob, ExternalProbe, ExternalReadings, ExternalRequest, Introduction};
 pub(crate) use iesna::method as method_of_iesna;
 pub use install::{InstallOutcome, InstallState, Soundness, install, repair, verify};
 pub use settings::Coordinates;
@@ -64,6 +65,16 @@ pub fn named(
     folder: &Path,
 ) -> Result<Box<dyn Engine>, EngineError> {
     entry(name).map_or_else(|| external(name, settings, folder), |entry| Ok((entry.make)()))
+}
+
+/// What a program says of itself that would be such an engine.
+pub fn introduction(
+    name: &str,
+    settings: &BTreeMap<String, serde_json::Value>,
+    folder: &Path,
+    site: &Site,
+) -> Result<Introduction, EngineError> {
+    Ok(external::External::new(name, settings, folder)?.introduction(site))
 }
 
 /// A program that a spec names as an engine of its own, `engines: {<name>: {command: [...]}}`; paths are relative to `folder`.

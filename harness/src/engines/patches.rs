@@ -11,7 +11,8 @@ pub(super) mod tests;
 use std::time::Duration;
 
 use glam::DVec3;
-use luminaire::scene::{Bounces, Transport};
+use itertools::Itertools;
+use luminaire::scene::{Bounces, Luminaire, Transport};
 use serde::{Deserialize, Serialize};
 
 use self::opening::Opening;
@@ -109,7 +110,7 @@ impl Package {
         let instrument = Instrument { edge_deg, seat: patch(job, &frame), by_arc_cosine: true };
         let rounding = FloatError::of(job, frame, instrument);
         let tables = Tables::of(job);
-        let resampled = tables.distinct.iter().filter(|_| settings.preset != Preset::Default);
+        let resampled = tables.distinct.iter().filter(|_| !settings.has_plain_tables());
         let looked_up: Vec<R> = resampled.map(|d| look_up(d)).collect();
         let of_tables_lx = |k: usize| -> f64 {
             let off = job.scene.luminaires.iter().zip(&tables.of_luminaire);
@@ -130,16 +131,26 @@ impl Package {
         };
         let mut measurement = dialogue.measurement()?;
         measurement.effort.insert("command".into(), run.command_line());
+        measurement.notes.extend(job.written_for_its_reader().filter(|_| settings.is_native()));
         super::checked(&self.engine, job, measurement)
     }
 }
 
 /// Whether it can do a job, `stock` being what its scene without settings does to it, and by how much.
-pub(super) fn supports(entry: &Entry, job: &Job, is_stock: bool, stock: (&str, Option<f64>)) -> Support {
-    if let Some(why) = entry.objection(job).or_else(|| opening::obstacle(entry.display_name, job, is_stock)) {
+pub(super) fn supports(entry: &Entry, job: &Job, stock: (&str, Option<f64>)) -> Support {
+    // What is wrong with settings is told by who reads them for good.
+    let settings = Settings::of(job, &entry.name).ok();
+    let has_plain_tables = settings.is_some_and(Settings::has_plain_tables);
+    let obstacle = || opening::obstacle(entry.display_name, job, has_plain_tables);
+    if let Some(why) = entry.objection(job).or_else(obstacle) {
         return Support::No(why);
     }
-    if is_stock {
+    if let Some((one, other)) = settings.filter(|s| s.is_native()).and_then(|_| two_files_of_a_table(job)) {
+        return Support::No(format!(
+            "`{one}` and `{other}` have files that differ and say the same table: an exported scene has a file a table"
+        ));
+    }
+    if settings.is_some_and(|s| s.preset == Preset::Default) {
         let (why, size) = stock;
         return Support::Approximate { why: why.into(), size };
     }
@@ -153,6 +164,33 @@ pub(super) fn supports(entry: &Entry, job: &Job, is_stock: bool, stock: (&str, O
         return Support::Approximate { why, size: None };
     }
     Support::Yes
+}
+
+/// Luminaires whose own files differ, and say the same.
+fn two_files_of_a_table(job: &Job) -> Option<(&str, &str)> {
+    let differ = |[a, b]: &[&Luminaire; 2]| {
+        a.photometry.distribution == b.photometry.distribution && a.photometry.source != b.photometry.source
+    };
+    let found = job.scene.luminaires.iter().array_combinations().find(differ);
+    found.map(|[a, b]| (a.id.as_str(), b.id.as_str()))
+}
+
+/// The files of tables for a renderer's own reader: the user's own bytes where those are asked for and are LM-63, else what our writer
+/// makes of the table as it is.
+pub(super) fn plain_files<'a>(
+    job: &'a Job,
+    settings: Settings,
+    tables: &'a Tables<'_>,
+    name: fn(usize) -> String,
+) -> impl Iterator<Item = SceneFile> + 'a {
+    let own = move |k: usize| {
+        let luminaire = tables.of_luminaire.iter().position(|t| *t == k).filter(|_| settings.is_native())?;
+        Some(job.scene.luminaires[luminaire].photometry.lm63_file()?.bytes.to_vec())
+    };
+    tables.distinct.iter().enumerate().map(move |(k, table)| match own(k) {
+        Some(bytes) => SceneFile { name: name(k), bytes },
+        None => SceneFile::text(&name(k), ies_file::of_table(table, "[MORE] the table as it is")),
+    })
 }
 
 /// Diffuse reflections that paths are followed for.

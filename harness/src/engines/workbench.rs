@@ -19,6 +19,14 @@ impl SceneFile {
     pub fn text(name: &str, text: impl Into<String>) -> Self {
         Self { name: name.to_owned(), bytes: text.into().into_bytes() }
     }
+
+    /// Writes it below a folder, with the folders that its name names; says where.
+    pub fn write_below(&self, folder: &Path) -> Result<PathBuf, EngineError> {
+        let path = folder.join(&self.name);
+        let above = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+        above.and_then(|()| std::fs::write(&path, &self.bytes)).map_err(|source| EngineError::io(&path, source))?;
+        Ok(path)
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -42,8 +50,7 @@ impl Workbench {
 
     pub fn write(&self, files: &[SceneFile]) -> Result<(), EngineError> {
         for file in files {
-            let path = self.scene_dir.join(&file.name);
-            std::fs::write(&path, &file.bytes).map_err(|source| EngineError::io(&path, source))?;
+            file.write_below(&self.scene_dir)?;
         }
         Ok(())
     }
@@ -62,6 +69,9 @@ pub enum EngineError {
     Io { path: String, source: std::io::Error },
     #[error("{engine} exited without an error, but {what}")]
     Output { engine: EngineName, what: String },
+    /// What it printed is no answer to what it was asked.
+    #[error("{engine} exited without an error, but {what}")]
+    Garbled { engine: EngineName, what: String },
     #[error("{engine} exited without an error, but read {value} lx ({uncertainty:?}) at {meter}")]
     NotFinite { engine: EngineName, meter: MeterId, value: f64, uncertainty: Uncertainty },
     /// At some meters; the readings of the others stand in the rest, what is NaN there is lost.
@@ -97,7 +107,11 @@ impl EngineError {
     /// What should have been JSON, by its start.
     pub(super) fn no_readings(engine: EngineName, answer: &str, error: &serde_json::Error) -> Self {
         let start: String = answer.chars().take(200).collect();
-        Self::output(engine, format!("its answer is no JSON of readings ({error}): `{start}`"))
+        Self::garbled(engine, format!("its answer is no JSON of readings ({error}): `{start}`"))
+    }
+
+    pub(super) fn garbled(engine: EngineName, what: impl Into<String>) -> Self {
+        Self::Garbled { engine, what: printable::lines(&what.into()) }
     }
 
     pub fn output(engine: EngineName, what: impl Into<String>) -> Self {

@@ -107,7 +107,7 @@ fn retable(
 ) -> Option<()> {
     for luminaire in &mut job.scene.luminaires {
         let distribution = table(&luminaire.photometry.distribution)?;
-        luminaire.photometry = Arc::new(Photometry { distribution, ..Photometry::clone(&luminaire.photometry) });
+        luminaire.photometry = Arc::new(luminaire.photometry.with_distribution(distribution));
     }
     Some(())
 }

@@ -240,7 +240,7 @@ fn turned_luminaire(job: &Job, turn_deg: f64) -> Option<Variant> {
             return None;
         }
         let distribution = luminaire.photometry.distribution.turned(-turn_deg);
-        luminaire.photometry = Arc::new(Photometry { distribution, ..Photometry::clone(&luminaire.photometry) });
+        luminaire.photometry = Arc::new(luminaire.photometry.with_distribution(distribution));
         luminaire.orientation *= DMat3::from_rotation_z(turn_deg.to_radians());
     }
     Some(same(turned))

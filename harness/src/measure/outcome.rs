@@ -63,6 +63,7 @@ impl From<EngineError> for Failure {
             EngineError::Process(_) | EngineError::Io { .. } => FailureKind::Crash,
             EngineError::NotFinite { .. } => FailureKind::Nan,
             EngineError::Output { .. } => FailureKind::SilentLoss,
+            EngineError::Garbled { .. } => FailureKind::Garbled,
             EngineError::Setting { .. } | EngineError::Solver { .. } => FailureKind::Refused,
             EngineError::Declined { why, .. } => return Self::new(FailureKind::Declined, why),
             EngineError::AtMeters { first, rest, .. } => {

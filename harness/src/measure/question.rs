@@ -41,7 +41,8 @@ impl<'a> Question<'a> {
     /// seconds, and a machine may be slow.
     pub fn new(instrument: &'a Instrument, job: &'a Job, folder: &'a str) -> Self {
         let beyond = if instrument.engine.is_vouched_for() { 10.0 } else { 2.0 };
-        let limit = Duration::from_secs_f64((beyond * job.budget.seconds + 120.0).clamp(0.0, 1e9));
+        let limit_s = beyond * job.budget.seconds + instrument.engine.start_s();
+        let limit = Duration::from_secs_f64(limit_s.clamp(0.0, 1e9));
         Self { instrument, job, folder, limit, trial: None }
     }
 

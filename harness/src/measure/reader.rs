@@ -12,9 +12,9 @@ use super::outcome::{Cost, Failure, Source, Taken};
 use super::question::Question;
 use super::subprocess::{self, Isolation, Request};
 use crate::engines::{Engine, EngineError, Job, Measurement, Site, Support, Workbench, checked, share};
-use crate::record::{FailureKind, ReadingKey};
+use crate::record::{EngineName, FailureKind, ReadingKey};
 use crate::system::process::{self, PeakMemory, ProcessError};
-use crate::system::slots::Share;
+use crate::system::slots::{Held, Share};
 
 /// Takes readings: everything that measures goes through [`Reader::read`].
 ///
@@ -89,16 +89,93 @@ impl Reader {
         Ok(Taken { measurement, cost: entry.cost, source })
     }
 
-    fn ask(&self, question: &Question<'_>) -> Result<Entry, Failure> {
-        let Question { instrument, job, trial, .. } = *question;
-        let engine = instrument.engine.as_ref();
-        let name = engine.name();
+    /// Several questions to one engine, which takes those that were never answered at once; one answer a question, in their order.
+    pub fn read_all(&self, questions: &[Question<'_>]) -> Vec<Result<Taken, Failure>> {
+        let [first, _, ..] = questions else { return questions.iter().map(|q| self.read(q)).collect() };
+        if !first.instrument.engine.takes_batches() {
+            return questions.iter().map(|q| self.read(q)).collect();
+        }
+        // Answers to be found are; what is to be asked has no other place that asks it, since its names are of its case alone.
+        let is_known = |q: &Question<'_>| q.key().is_ok_and(|key| self.find(&key).is_some());
+        let open: Vec<usize> = (0..questions.len()).filter(|k| !is_known(&questions[*k])).collect();
+        let mut found = self.ask_together(&open.iter().map(|k| &questions[*k]).collect::<Vec<_>>()).into_iter();
+        let of = |(k, question): (usize, &Question<'_>)| {
+            let asked = if open.contains(&k) { found.next() } else { None };
+            let Some(entry) = asked else { return self.read(question) };
+            let (key, entry) = (question.key()?, entry?);
+            if question.is_final(&entry) {
+                self.keep(&key, &entry);
+                if let Some(answered) = self.machine.answered(&key) {
+                    *answered.lock() = Some(entry.clone());
+                }
+            }
+            let measurement = checked(&entry.key.engine, question.job, entry.answer?)?;
+            Ok(Taken { measurement, cost: entry.cost, source: Source::Engine })
+        };
+        questions.iter().enumerate().map(of).collect()
+    }
+
+    /// What keeps an engine from being asked now.
+    fn hindrance(&self, name: &EngineName) -> Result<(), Failure> {
         if process::is_interrupted() {
             return Err(EngineError::from(ProcessError::Interrupted { program: name.to_string() }).into());
         }
         if self.until.is_some_and(|until| Instant::now() >= until) {
             return Err(Failure::new(FailureKind::TimeUp, "no time was left for it"));
         }
+        Ok(())
+    }
+
+    /// One process for all questions, which share its time evenly; nothing where it cannot even be begun.
+    fn ask_together(&self, questions: &[&Question<'_>]) -> Vec<Result<Entry, Failure>> {
+        let [first, _, ..] = questions else { return questions.iter().map(|q| self.ask(q)).collect() };
+        let engine = first.instrument.engine.as_ref();
+        let prepared = || -> Result<_, Failure> {
+            self.hindrance(&engine.name())?;
+            let places = questions.iter().map(|q| self.place(q)).collect::<Result<Vec<_>, _>>()?;
+            let limit = questions.iter().map(|q| q.limit).sum();
+            let together = self.place(&Question { folder: TOGETHER, limit, ..**first })?;
+            Ok((places, together))
+        };
+        let (places, mut together) = match prepared() {
+            Ok(prepared) => prepared,
+            Err(failure) => return questions.iter().map(|_| Err(failure.clone())).collect(),
+        };
+        let shares = questions.iter().map(|q| share(engine, q.job, &self.machine.slots));
+        let most = shares
+            .reduce(|a, b| Share { threads: a.threads.max(b.threads), memory_mib: a.memory_mib.max(b.memory_mib) });
+        let held = most.map(|share| self.machine.slots.take(share));
+        together.bench.jobs = held.as_ref().map_or(1, Held::threads);
+        let (clock, cpu) = (Instant::now(), process::cpu_time());
+        let jobs: Vec<(&Job, &Workbench)> = questions.iter().zip(&places).map(|(q, p)| (q.job, &p.bench)).collect();
+        let answers = engine.read_all(&jobs, &together.bench);
+        let part = (questions.len() as f64).recip();
+        let cost = Cost {
+            wall_s: part * clock.elapsed().as_secs_f64(),
+            cpu_s: part * process::cpu_time().saturating_sub(cpu).as_secs_f64(),
+            peak_mib: together.bench.peak.mib(),
+        };
+        let entry = |question: &Question<'_>, answer: Result<Measurement, Failure>| {
+            let key = ReadingKey::new(&question.job.case, question.job.procedure, engine.name());
+            Ok(Entry { key, version: question.instrument.version.text.clone(), cost, answer })
+        };
+        match answers {
+            Ok(answers) => {
+                let pairs = questions.iter().zip(answers);
+                pairs.map(|(q, answer)| entry(q, self.with_its_log(answer.map_err(Failure::from), &together))).collect()
+            }
+            Err(error) => {
+                let failure = self.with_its_log(Err(error.into()), &together);
+                questions.iter().map(|q| entry(q, failure.clone())).collect()
+            }
+        }
+    }
+
+    fn ask(&self, question: &Question<'_>) -> Result<Entry, Failure> {
+        let Question { instrument, job, trial, .. } = *question;
+        let engine = instrument.engine.as_ref();
+        let name = engine.name();
+        self.hindrance(&name)?;
         let mut place = self.place(question)?;
         let slots = &self.machine.slots;
         let held = slots.take(match trial {
@@ -116,7 +193,10 @@ impl Reader {
         };
         let (answer, cost) = match answer {
             Ok((measurement, cost)) => (Ok(measurement), cost),
-            Err(failure) => (Err(failure), Cost { wall_s: clock.elapsed().as_secs_f64(), ..Cost::default() }),
+            Err(failure) => (
+                self.with_its_log(Err(failure), &place),
+                Cost { wall_s: clock.elapsed().as_secs_f64(), ..Cost::default() },
+            ),
         };
         let key = ReadingKey::new(&job.case, job.procedure, name);
         Ok(Entry { key, version: instrument.version.text.clone(), cost, answer })
@@ -163,6 +243,24 @@ impl Reader {
         logs.and_then(|()| fs::write(&bench.log, text)).map_err(|e| EngineError::io(&bench.log, e))
     }
 
+    /// A log that a failure names, and that would go with the folder that it lies in, is kept among the engines.
+    fn with_its_log(&self, answer: Result<Measurement, Failure>, place: &WorkPlace) -> Result<Measurement, Failure> {
+        let mut failure = match answer {
+            Err(failure) if self.out.is_none() => failure,
+            other => return other,
+        };
+        let (log, folder) = (&place.bench.log, self.site.root().join("logs"));
+        let named = log.display().to_string();
+        if let Some(name) = log.file_name().filter(|_| failure.text.contains(&named)) {
+            let kept = folder.join(name);
+            let moved = fs::create_dir_all(&folder).and_then(|()| fs::copy(log, &kept));
+            let now =
+                moved.map_or_else(|_| "no log, which could not be kept".to_owned(), |_| kept.display().to_string());
+            failure.text = failure.text.replace(&named, &now);
+        }
+        Err(failure)
+    }
+
     fn place(&self, question: &Question<'_>) -> Result<WorkPlace, EngineError> {
         let temporary = match &self.out {
             Some(_) => None,
@@ -206,6 +304,9 @@ impl Drop for WorkPlace {
         fs::remove_dir(&self.bench.scene_dir).ok();
     }
 }
+
+/// The folder of what an engine is asked at once.
+const TOGETHER: &str = "together";
 
 /// How the names of folders begin that are about to be deleted.
 const OLD: &str = ".old-";

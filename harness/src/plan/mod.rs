@@ -253,7 +253,11 @@ impl<'a> Planner<'a> {
                 match (&absence, offer) {
                     (Some(absent), _) => plan.skips.push(skip(Scope::Engine, absent.clone())),
                     (None, Offer::Skip(scope, reason)) => plan.skips.push(skip(scope, reason).saving("the whole run")),
-                    (None, Offer::Run(run)) => plan.runs.push(Run { engine: e, ..*run }),
+                    // What it says of itself once it is asked may rule out more.
+                    (None, Offer::Run(run)) => match engine.supports(&run.job) {
+                        Support::No(reason) => plan.skips.push(skip(Scope::Procedure, reason).saving("the whole run")),
+                        Support::Yes | Support::Approximate { .. } => plan.runs.push(Run { engine: e, ..*run }),
+                    },
                 }
             }
             plan.engines.push(Planned { engine, found, asked });
@@ -289,8 +293,9 @@ impl<'a> Planner<'a> {
     fn shorten(&mut self, case: &Case, plan: &mut Plan) {
         for run in &mut plan.runs {
             let planned = &plan.engines[run.engine];
-            // A shortcut tells what light does, which is the very thing that a program of a user's is asked.
-            if !planned.engine.is_vouched_for() {
+            // A shortcut tells what light does, which is the very thing that a program of a user's is asked, and by tables as our reader has
+            // them, which is what a reader of files is asked.
+            if !planned.engine.is_vouched_for() || planned.engine.reads_files(&run.job) {
                 continue;
             }
             if planned.asked != Asked::AsReference && !planned.engine.is_witness() {

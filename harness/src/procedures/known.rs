@@ -2,7 +2,7 @@
 //!
 //! - **Point**: one candle power at .5, 1, 2 and 10 m: inverse-square law; shows the bias of a falloff or of a read-out.
 //! - **Asymmetric**: a table without symmetry, turned, over nodes, mid-nodes and both poles; shows mirrored or wrapped tables.
-//! - **Luminaires**: three that differ in table, rotation and flux; shows one that is lost, or takes another's table.
+//! - **Luminaires**: three that differ in table, rotation and flux; shows one that is lost, or takes another's table, and light from behind.
 //! - **Shadow**: a box between luminaire and meters in a black room; shows light that leaks or meters that are missed.
 //! - **Furnace**: a cube that its luminaire lights evenly, so that reflected light is the same everywhere in every direction,
 //!   E = rho / (1 - rho) x flux / area, to 7e-4 but in corners, where the table is straight across a bend; in its middle it shows
@@ -87,7 +87,10 @@ fn luminaires() -> Task {
     };
     let meters =
         [[-2.0, 1.0, 0.0], [0.0, 0.0, 0.0], [3.0, 1.0, 0.0], [0.5, -3.0, 0.2], [1.5, 1.5, 0.7], [-3.0, -3.0, 0.0]];
-    let meters = meters.map(|p| (DVec3::from(p), DVec3::new(0.1, -0.2, 1.0).normalize()));
+    // The last two have all of them behind.
+    let above = [[1.0, -1.0, 4.0], [-0.5, 0.8, 4.3]];
+    let meters: Vec<(DVec3, DVec3)> =
+        meters.iter().chain(&above).map(|p| (DVec3::from(*p), DVec3::new(0.1, -0.2, 1.0).normalize())).collect();
     task(ProcedureId::Luminaires, free_field(vec![turned, narrow, even]), &meters, Transport::Direct)
 }
 

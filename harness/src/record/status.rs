@@ -88,6 +88,8 @@ pub enum FailureKind {
     Hang,
     /// It ended well and readings were missing.
     SilentLoss,
+    /// It ended well, and what it printed is no answer.
+    Garbled,
     Interrupted,
     /// It was not begun: the time for beginning was over.
     TimeUp,

@@ -40,7 +40,7 @@ fn sentence(report: &Report, engine: &EngineStatus) -> Sentence {
         parts.push("scenes of known answer alone were read right".to_owned());
     }
     if parts.is_empty() || matches!(engine.status, Status::Failed | Status::Absent) {
-        let why = engine.reason.as_deref().and_then(|r| r.lines().next()).map(|r| format!(": {r}")).unwrap_or_default();
+        let why = engine.reason.as_deref().map(|r| format!(": {}", in_a_line(r))).unwrap_or_default();
         parts.push(match engine.status {
             Status::Absent => format!("not there{why}"),
             Status::Failed => format!("it failed{why}"),
@@ -48,6 +48,16 @@ fn sentence(report: &Report, engine: &EngineStatus) -> Sentence {
         });
     }
     Sentence { engine: engine.id.clone(), text: format!("{}: {}", engine.id, parts.join("; ")), claims }
+}
+
+/// A reason in one line: of a program that failed its last words, where it says why; of all else the first.
+fn in_a_line(reason: &str) -> String {
+    let mut lines = reason.lines().filter(|line| !line.starts_with("all its messages are in "));
+    let first = lines.next().unwrap_or_default();
+    match (first.split_once(" failed (").and_then(|_| first.split_once("): ")), lines.next_back()) {
+        (Some((program, _)), Some(last)) => format!("{program}): {}", last.trim()),
+        _ => first.to_owned(),
+    }
 }
 
 fn claim(report: &Report, engine: &EngineName, procedure: ProcedureId, mine: &[&Comparison]) -> Claim {

@@ -51,6 +51,7 @@ pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
         keywords: head.keywords,
         details: Details::None,
         lints: vec![],
+        source: vec![],
     };
     declared_ratios(&photometry, &details, &mut lints);
     Ok(Photometry { details: Details::Eulumdat(Box::new(details)), ..photometry }.with_lints(lints))

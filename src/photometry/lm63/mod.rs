@@ -80,6 +80,7 @@ pub fn parse_with(
             tilt,
         }),
         lints: vec![],
+        source: vec![],
     };
     Ok(photometry.with_lints(lints))
 }

@@ -6,7 +6,6 @@ use std::fmt::Write;
 
 use glam::DVec3;
 use luminaire::geometry::Surface;
-use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::{Luminaire, Shape};
 
 use super::ID;
@@ -15,7 +14,6 @@ use crate::engines::comment::Comment;
 use crate::engines::dialogue;
 use crate::engines::frame::{Frame, plain};
 use crate::engines::meshes::Mesh;
-use crate::engines::patches::ies_file;
 use crate::engines::patches::opening::{Opening, Outline};
 use crate::engines::patches::settings::Settings;
 use crate::engines::patches::{self, reflections};
@@ -39,17 +37,14 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
         SceneFile::text("cycles_scene.py", SCENE),
     ];
     files.extend(meshes::files(job, &frame, Mesh::Obj));
-    files.extend(tables.distinct.iter().enumerate().map(|(k, d)| SceneFile::text(&table(k), ies(d, settings))));
-    Ok(files)
-}
-
-fn ies(distribution: &LuminousIntensityDistribution, settings: Settings) -> String {
-    match settings.preset {
-        Preset::Default => ies_file::of_table(distribution, "[MORE] the table as it is"),
-        Preset::Audit | Preset::Fast => {
-            LookedUp::of(distribution).file("[MORE] resampled for the cubic curves of Cycles' IES texture")
-        }
+    if settings.has_plain_tables() {
+        files.extend(patches::plain_files(job, settings, &tables, table));
+    } else {
+        let about = "[MORE] resampled for the cubic curves of Cycles' IES texture";
+        let resampled = |(k, d): (usize, &&_)| SceneFile::text(&table(k), LookedUp::of(d).file(about));
+        files.extend(tables.distinct.iter().enumerate().map(resampled));
     }
+    Ok(files)
 }
 
 fn table(k: usize) -> String {
@@ -102,7 +97,7 @@ fn scene(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -> S
         let scale = luminaire.flux_scale * frame.scale * frame.scale;
         let rows = frame.placed(luminaire.position_m, luminaire.orientation).map(|row| list(&row)).join(", ");
         let common = format!("\"luminaire {k}\", \"{}\", {scale}, [{rows}]", table(*of));
-        let maker = if settings.preset == Preset::Default { "stock" } else { "point" };
+        let maker = if settings.has_plain_tables() { "stock" } else { "point" };
         match Opening::of(luminaire) {
             Opening::Flat(outline, size_m) => {
                 let shape = match outline {

@@ -80,3 +80,8 @@ fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
 fn what_cannot_be_read_well_is_said_beforehand() {
     patches::tests::what_cannot_be_read_well_is_said_beforehand(&Cycles);
 }
+
+#[test]
+fn its_own_reader_gets_the_users_bytes() {
+    patches::tests::its_own_reader_gets_the_users_bytes(&Cycles);
+}

@@ -1,4 +1,4 @@
-//! The two forms that an external adapter reads and writes: a job and its readings, both JSON; pure.
+//! A job as an external adapter reads it, in JSON; pure.
 
 use std::collections::BTreeMap;
 
@@ -7,21 +7,22 @@ use luminaire::geometry::Surface;
 use luminaire::photometry::{HorizontalAxis, LuminousOpening};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport};
 use schemars::JsonSchema;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::Serialize;
 
-use crate::engines::contract::same_meters;
-use crate::engines::{EngineError, Job, Measurement, Station, checked, recess};
-use crate::record::{EngineName, Estimate, ProcedureId, Uncertainty};
+use super::json::Protocol;
+use super::photometry::PhotometryForm;
+use crate::engines::{Job, Station, recess};
+use crate::record::ProcedureId;
 use crate::spec::Budget;
-use crate::system::printable;
-
-const VERSION: u32 = 1;
 
 /// What an adapter reads on its standard input: everything in metres, candela, lux and world coordinates with z up.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ExternalJob {
-    /// Version of the form: 1.
+    /// Version of the form: 1, or 2 in protocol 2.
     luxproof_job: u32,
+    /// Its name among the jobs that are asked at once (protocol 2).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    job: Option<String>,
     /// The case.
     case: String,
     /// The procedure.
@@ -96,6 +97,12 @@ struct LuminaireForm {
     gamma_deg: Vec<f64>,
     /// Intensity, one row a C plane, flux scale applied; bilinear in (C, gamma) between.
     candela: Vec<Vec<f64>>,
+    /// What the table was multiplied by, and the file was not (protocol 2).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    flux_scale: Option<f64>,
+    /// The photometric file that the table was read from, byte for byte (protocol 2).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    photometry: Option<PhotometryForm>,
 }
 
 /// A luminous opening, centred on the photometric centre, extents along the luminaire's own axes.
@@ -119,140 +126,6 @@ struct MeterForm {
     normal: [f64; 3],
 }
 
-/// What an adapter prints on its standard output: one reading a meter in the job's order, or why it declines.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct ExternalReadings {
-    /// One a meter.
-    readings: Vec<ReadingForm>,
-    /// Instead of readings: why it cannot do this job, which is then skipped for this reason.
-    declined: Option<String>,
-    /// What was done, for whoever repeats it: versions, solver, options.
-    settings: BTreeMap<String, String>,
-    /// How much of it: samples, seeds, seconds; a baseline does not ask for the same.
-    effort: BTreeMap<String, String>,
-    /// What the reader of the report should know.
-    notes: Vec<String>,
-}
-
-/// One reading.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct ReadingForm {
-    /// The meter's name.
-    meter: String,
-    /// Illuminance, finite; what is negative is judged like any other. Null or `NaN`: this meter has none, which fails the engine, and those
-    /// of the others are kept.
-    #[serde(deserialize_with = "number")]
-    illuminance_lx: f64,
-    /// Standard error of a Monte Carlo mean.
-    #[serde(default, deserialize_with = "some_number")]
-    std_error_lx: Option<f64>,
-    /// Distance within which the true value lies, for deterministic methods.
-    #[serde(default, deserialize_with = "some_number")]
-    error_bound_lx: Option<f64>,
-    /// Of the standard error: one less than the independent samples that it was estimated from.
-    #[serde(default, deserialize_with = "some_number")]
-    degrees_of_freedom: Option<f64>,
-    /// Whether the value is claimed to be right to its last digit.
-    #[serde(default)]
-    exact: bool,
-}
-
-/// A number, or what programs write in its place that have none.
-#[derive(Deserialize)]
-#[serde(untagged, expecting = "a number")]
-enum Number {
-    Told(f64),
-    Word(NoNumber),
-    Null(()),
-}
-
-/// As Python writes them, in quotes.
-#[derive(Deserialize)]
-enum NoNumber {
-    #[serde(rename = "NaN", alias = "Infinity", alias = "-Infinity")]
-    NotFinite,
-}
-
-impl From<Number> for f64 {
-    fn from(number: Number) -> Self {
-        match number {
-            Number::Told(value) => value,
-            Number::Word(NoNumber::NotFinite) | Number::Null(()) => Self::NAN,
-        }
-    }
-}
-
-fn number<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    Number::deserialize(from).map(f64::from)
-}
-
-fn some_number<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
-    Option::<Number>::deserialize(from).map(|number| number.map(f64::from))
-}
-
-/// JSON with `NaN` and infinities, which Python writes and JSON has not, made words in quotes.
-fn quoted(text: &str) -> String {
-    let (mut quoted, mut is_string, mut is_escaped) = (String::with_capacity(text.len()), false, false);
-    let mut rest = text;
-    while let Some(c) = rest.chars().next() {
-        let word = ["NaN", "Infinity", "-Infinity"].into_iter().find(|word| !is_string && rest.starts_with(word));
-        if let Some(word) = word {
-            quoted.extend(["\"", word, "\""]);
-        } else {
-            quoted.push(c);
-        }
-        is_string ^= c == '"' && !is_escaped;
-        is_escaped = is_string && c == '\\' && !is_escaped;
-        rest = &rest[word.map_or(c.len_utf8(), str::len)..];
-    }
-    quoted
-}
-
-impl ExternalReadings {
-    /// What an adapter printed.
-    pub fn from_json(text: &[u8]) -> Result<Self, serde_json::Error> {
-        serde_json::from_slice(text).or_else(|error| {
-            let quoted = quoted(&String::from_utf8_lossy(text));
-            serde_json::from_str(&quoted).map_err(|_| error)
-        })
-    }
-
-    /// The measurement that an adapter printed for a job, checked like every engine's.
-    pub fn measured(text: &[u8], job: &Job, engine: &EngineName) -> Result<Measurement, EngineError> {
-        checked(engine, job, measurement(text, job, engine)?)
-    }
-}
-
-impl ReadingForm {
-    fn uncertainty(&self) -> Uncertainty {
-        let [error, bound] = [self.std_error_lx, self.error_bound_lx].map(|e| e.map(no_smaller_than_counts));
-        match (self.exact, error, bound) {
-            (true, ..) => Uncertainty::Exact,
-            (_, Some(value), bound) => Uncertainty::StandardError {
-                value,
-                degrees_of_freedom: self.degrees_of_freedom,
-                bound: bound.unwrap_or(0.0),
-            },
-            (_, None, Some(bound)) => Uncertainty::Bound(bound),
-            (_, None, None) => Uncertainty::Unstated,
-        }
-    }
-
-    /// What is wrong with its degrees of freedom, if anything is.
-    fn senseless_freedom(&self) -> Option<String> {
-        let freedom = self.degrees_of_freedom.filter(|f| *f < 1.0)?;
-        let meter = &self.meter;
-        Some(format!("gave `degrees_of_freedom: {freedom}` at {meter}: two samples have one, fewer tell no error"))
-    }
-}
-
-/// An error that is smaller is as good as this one, of which weights and fourth powers are numbers still.
-fn no_smaller_than_counts(error_lx: f64) -> f64 {
-    if error_lx > 0.0 { error_lx.max(1e-30) } else { error_lx }
-}
-
 impl ExternalJob {
     pub fn of(job: &Job) -> Self {
         let job = &*recess::apart(job);
@@ -265,10 +138,10 @@ impl ExternalJob {
             Some(Bounces::AtMost(n)) => Some(n),
             Some(Bounces::Converged) | None => None,
         };
-        let ours = ["command", "procedures", super::RUN_IN];
-        let settings = job.settings.iter().filter(|(k, _)| !ours.contains(&k.as_str()));
+        let settings = job.settings.iter().filter(|(k, _)| !super::OWN_SETTINGS.contains(&k.as_str()));
         Self {
-            luxproof_job: VERSION,
+            luxproof_job: Protocol::One as u32,
+            job: None,
             case: job.case.clone(),
             procedure: job.procedure,
             light,
@@ -280,6 +153,22 @@ impl ExternalJob {
             budget: job.budget,
             seed: job.seed,
             settings: settings.map(|(k, v)| (k.clone(), v.clone())).collect(),
+        }
+    }
+
+    /// The same for protocol 2, under this name; `photometry` says of each luminaire where its file is.
+    pub(super) fn named(self, name: String, job: &Job, photometry: Vec<PhotometryForm>) -> Self {
+        let files = photometry.into_iter().zip(&job.scene.luminaires);
+        let with_file = |(form, (file, luminaire)): (LuminaireForm, (PhotometryForm, &Luminaire))| LuminaireForm {
+            flux_scale: Some(luminaire.flux_scale),
+            photometry: Some(file),
+            ..form
+        };
+        Self {
+            luxproof_job: Protocol::Two as u32,
+            job: Some(name),
+            luminaires: self.luminaires.into_iter().zip(files).map(with_file).collect(),
+            ..self
         }
     }
 
@@ -327,6 +216,8 @@ fn luminaire(luminaire: &Luminaire) -> LuminaireForm {
         c_deg: table.c_deg().to_vec(),
         gamma_deg: table.gamma_deg().to_vec(),
         candela: (0..table.c_deg().len()).map(|c| table.plane(c).to_vec()).collect(),
+        flux_scale: None,
+        photometry: None,
     }
 }
 
@@ -349,39 +240,4 @@ fn meter(station: &Station) -> MeterForm {
         position_m: station.meter.position_m.to_array(),
         normal: station.meter.normal.to_array(),
     }
-}
-
-/// Reads what an adapter printed; every meter must be there once, in order.
-fn measurement(stdout: &[u8], job: &Job, engine: &EngineName) -> Result<Measurement, EngineError> {
-    let answer = ExternalReadings::from_json(stdout)
-        .map_err(|e| EngineError::no_readings(engine.clone(), &String::from_utf8_lossy(stdout), &e))?;
-    let output = |what: &str| EngineError::output(engine.clone(), what);
-    match answer.declined {
-        Some(why) if why.trim().is_empty() => {
-            return Err(output("declined for no reason: `declined` says what it cannot do"));
-        }
-        Some(_) if !answer.readings.is_empty() => {
-            return Err(output("declined and gave readings: give either `declined` or `readings`"));
-        }
-        Some(why) => return Err(EngineError::Declined { engine: engine.clone(), why: printable::lines(&why) }),
-        None => {}
-    }
-    if let Some(what) = answer.readings.iter().find_map(ReadingForm::senseless_freedom) {
-        return Err(output(&what));
-    }
-    same_meters(engine, job, answer.readings.iter().map(|reading| reading.meter.as_str()))?;
-    let estimate = |r: &ReadingForm| Estimate { value: r.illuminance_lx, uncertainty: r.uncertainty() };
-    let mut estimates: Vec<Estimate> = answer.readings.iter().map(estimate).collect();
-    Estimate::mark_agreeing(&mut estimates);
-    Estimate::mark_unseen(&mut estimates);
-    let shown = |said: BTreeMap<String, String>| -> BTreeMap<String, String> {
-        said.into_iter().map(|(key, value)| (printable::lines(&key), printable::lines(&value))).collect()
-    };
-    Ok(Measurement {
-        estimates,
-        method: shown(answer.settings).into_iter().collect(),
-        effort: shown(answer.effort).into_iter().collect(),
-        notes: answer.notes.iter().map(|note| printable::lines(note)).collect(),
-        ..Measurement::default()
-    })
 }

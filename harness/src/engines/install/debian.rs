@@ -13,6 +13,7 @@ use crate::system::files;
 
 pub(super) const POVRAY_PACKAGES: [&str; 1] = ["povray"];
 pub(super) const LIBFAKETIME_PACKAGES: [&str; 1] = ["libfaketime"];
+pub(super) const CHROMIUM_PACKAGES: [&str; 2] = ["chromium", "chromium-browser"];
 /// The libLLVM packages that Mitsuba works with, the best known first.
 pub(super) const LLVM_PACKAGES: [&str; 5] = ["libllvm19", "libllvm20", "libllvm18", "libllvm17t64", "libllvm17"];
 
@@ -36,6 +37,11 @@ pub(super) fn install_llvm(site: &Site, progress: &mut dyn FnMut(&str)) -> Resul
 pub(super) fn install_libfaketime(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install libfaketime, with which rtrace's random numbers can be repeated";
     fetched(site, ("libfaketime", &LIBFAKETIME_PACKAGES), Site::libfaketime, remedy, progress)
+}
+
+pub(super) fn install_chromium(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
+    let remedy = "install Chromium or Chrome so that it is on PATH, or name it in CHROMIUM";
+    fetched(site, ("Chromium", &CHROMIUM_PACKAGES), Site::chromium, remedy, progress)
 }
 
 /// Where the file is that the first of these packages brings.

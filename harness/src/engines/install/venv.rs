@@ -47,6 +47,14 @@ pub(super) const LUXCORE: Environment = Environment {
     remedy: "put a python3.11 on PATH; without root, `pip install uv` and `uv python install 3.11` bring one",
 };
 
+pub(super) const NODE: Environment = Environment {
+    lock: include_str!("../../../web/node.lock"),
+    what: "Node.js, about 60 MB",
+    python: &["python3"],
+    fits: |version| version >= [3, 10],
+    remedy: "put Python 3.10 or later first on PATH",
+};
+
 impl Environment {
     pub(super) fn is_current(&self, site: &Site) -> bool {
         let linked = fs::read_link(site.venv()).is_ok_and(|target| target == Path::new(&self.folder_name()));

@@ -14,7 +14,6 @@ use crate::engines::comment::Comment;
 use crate::engines::dialogue;
 use crate::engines::frame::{Frame, plain};
 use crate::engines::meshes::Mesh;
-use crate::engines::patches::ies_file;
 use crate::engines::patches::opening::{Opening, Outline};
 use crate::engines::patches::settings::Settings;
 use crate::engines::patches::{self, reflections};
@@ -33,7 +32,8 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
     let frame = Frame::of(job, settings.coordinates);
     let job = &*recess::apart(job);
     let tables = Tables::of(job);
-    let maps: Vec<Map> = tables.distinct.iter().map(|d| Map::of(d)).collect();
+    let mapped = tables.distinct.iter().filter(|_| !settings.has_plain_tables());
+    let maps: Vec<Map> = mapped.map(|d| Map::of(d)).collect();
     let scene = Scene { job, settings, frame, tables: &tables, maps: &maps };
     let mut files = vec![
         SceneFile::text("scene.scn", scene.text()),
@@ -43,10 +43,10 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
         SceneFile::text("blocks.py", dialogue::BLOCKS),
     ];
     files.extend(meshes::files(job, &frame, Mesh::Ply));
-    files.extend(maps.iter().zip(&tables.distinct).enumerate().map(|(k, (map, table))| match settings.preset {
-        Preset::Default => SceneFile::text(&ies_name(k), ies_file::of_table(table, "[MORE] the table as it is")),
-        Preset::Audit | Preset::Fast => map.file(&map_name(k)),
-    }));
+    files.extend(maps.iter().enumerate().map(|(k, map)| map.file(&map_name(k))));
+    if settings.has_plain_tables() {
+        files.extend(patches::plain_files(job, settings, &tables, ies_name));
+    }
     Ok(files)
 }
 
@@ -158,16 +158,16 @@ impl Scene<'_> {
     fn point(&self, text: &mut String, k: usize, luminaire: &Luminaire) {
         let (of, light) = (self.tables.of_luminaire[k], format!("scene.lights.luminaire{k}"));
         let scale = luminaire.flux_scale * self.frame.scale * self.frame.scale;
-        let (map, turned_deg, power) = match self.settings.preset {
-            Preset::Default => {
-                let flux = luminaire.photometry.distribution.flux().value();
-                (format!("{light}.iesfile = {}\n{light}.flipz = 1\n", ies_name(of)), 0.0, scale * flux)
-            }
-            Preset::Audit | Preset::Fast => {
-                let map = &self.maps[of];
-                let file = format!("{light}.mapfile = {}\n{light}.gamma = 1\n{light}.wrap = clamp\n", map_name(of));
-                (file, map.turned_deg(), 4.0 * std::f64::consts::PI * scale * map.flux_lm())
-            }
+        let four_pi = 4.0 * std::f64::consts::PI;
+        let (map, turned_deg, power) = if self.settings.has_plain_tables() {
+            let flux = luminaire.photometry.distribution.flux().value();
+            // A user of its defaults takes the power for lumens.
+            let of_lumen = if self.settings.preset == Preset::Default { 1.0 } else { four_pi };
+            (format!("{light}.iesfile = {}\n{light}.flipz = 1\n", ies_name(of)), 0.0, of_lumen * scale * flux)
+        } else {
+            let map = &self.maps[of];
+            let file = format!("{light}.mapfile = {}\n{light}.gamma = 1\n{light}.wrap = clamp\n", map_name(of));
+            (file, map.turned_deg(), four_pi * scale * map.flux_lm())
         };
         let axes = turned(luminaire.orientation, turned_deg);
         let placed = self.frame.placed(luminaire.position_m, axes);

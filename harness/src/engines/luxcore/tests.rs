@@ -88,3 +88,8 @@ fn light_of_openings_past_a_box_is_within_its_error_in_random_rooms() {
 fn what_cannot_be_read_well_is_said_beforehand() {
     patches::tests::what_cannot_be_read_well_is_said_beforehand(&LuxCore);
 }
+
+#[test]
+fn its_own_reader_gets_the_users_bytes() {
+    patches::tests::its_own_reader_gets_the_users_bytes(&LuxCore);
+}

@@ -1,10 +1,14 @@
-//! The engines' settings in a spec: `engines: {cycles: {preset: ..., recentre: ...}}`.
+//! The engines' settings in a spec: `engines: {cycles: {preset: ..., photometry: ..., recentre: ...}}`.
 
 use crate::engines::settings::{Coordinates, Given, Preset};
 use crate::engines::{EngineError, Job, Knob};
 use crate::record::EngineName;
 
-pub(in crate::engines) const KNOBS: &[Knob] = &[Preset::KNOB, Knob { key: "recentre", values: &["true", "false"] }];
+pub(in crate::engines) const KNOBS: &[Knob] = &[
+    Preset::KNOB,
+    Knob { key: "photometry", values: &["exporter", "native"] },
+    Knob { key: "recentre", values: &["true", "false"] },
+];
 
 /// Blocks of the presets whose effort does not follow the budget, and the samples along their side: a stock scene has Blender's own 4096.
 const FIXED_BLOCKS: usize = 8;
@@ -16,12 +20,34 @@ pub(in crate::engines) struct Settings {
     /// `default` leaves the renderer's own settings and what it makes of an IES file as they are.
     pub(in crate::engines) preset: Preset,
     pub(in crate::engines) coordinates: Coordinates,
+    files: Files,
+}
+
+/// Which files its own reader gets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Files {
+    /// Ours, of the table.
+    Exported,
+    /// The user's own, byte for byte, where they are LM-63.
+    Native,
 }
 
 impl Settings {
     pub(in crate::engines) fn of(job: &Job, engine: &EngineName) -> Result<Self, EngineError> {
         let given = Given::of(job, engine.clone(), KNOBS)?;
-        Ok(Self { preset: given.preset()?, coordinates: given.coordinates("recentre")? })
+        let files = given.one_of("photometry", &[("exporter", Files::Exported), ("native", Files::Native)])?;
+        let files = files.unwrap_or(Files::Exported);
+        Ok(Self { preset: given.preset()?, coordinates: given.coordinates("recentre")?, files })
+    }
+
+    /// Whether its own reader gets the user's own bytes.
+    pub(in crate::engines) fn is_native(self) -> bool {
+        self.files == Files::Native
+    }
+
+    /// Whether what becomes of a file is what one wants to know, so that nothing is done for it to be read well.
+    pub(in crate::engines) fn has_plain_tables(self) -> bool {
+        self.preset == Preset::Default || self.is_native()
     }
 
     /// Blocks and the samples along their side, where these do not follow the budget.

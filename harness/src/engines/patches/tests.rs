@@ -92,3 +92,28 @@ pub(in crate::engines) fn a_site_without_its_package_says_what_to_run(engine: &d
     write_program(&own.venv().join("bin/python"), "cat > /dev/null; echo no renderer");
     assert!(absent(&site).contains("answered `no renderer`"), "{}", absent(&site));
 }
+
+/// With `photometry: native` an engine's own reader gets the user's bytes, one file a table, and of other formats a file of ours.
+pub(in crate::engines) fn its_own_reader_gets_the_users_bytes(engine: &dyn Engine) {
+    let bytes: &[u8] = b"IESNA:LM-63-1995\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 0\n0 90\n0\n7 7\n";
+    let read = |bytes: &[u8]| {
+        let source = vec![luminaire::photometry::SourceFile { name: "a.ies".into(), bytes: bytes.into() }];
+        luminaire::photometry::Photometry { source, ..luminaire::photometry::lm63::parse(bytes).unwrap() }
+    };
+    let mut job = s1(Transport::Direct);
+    job.settings.insert("photometry".into(), "native".into());
+    assert!(engine.reads_files(&job) && job.written_for_its_reader().is_some());
+    let file = |job: &Job| {
+        let files = engine.export(job).unwrap();
+        files.into_iter().find(|file| file.name == "table-0.ies").unwrap().bytes
+    };
+    assert!(file(&job).starts_with(b"IESNA:LM-63-2002"));
+    job.scene.luminaires[0].photometry = read(bytes).into();
+    assert_eq!((file(&job), job.written_for_its_reader()), (bytes.to_vec(), None));
+    // The same table, said in other words.
+    let mut other = job.scene.luminaires[0].clone();
+    other.id = "other".into();
+    other.photometry = read(&[bytes, b"\n"].concat()).into();
+    job.scene.luminaires.push(other);
+    assert!(matches!(engine.supports(&job), Support::No(why) if why.contains("files that differ")));
+}

@@ -19,7 +19,7 @@ pub(super) enum Route {
 pub(super) fn route(luminaire: &Luminaire, settings: &Settings) -> Route {
     match (luminaire.model, settings.photometrist) {
         (LuminaireModel::Impostor, _) => Route::Ies2radIllum,
-        (_, Photometrist::Ies2rad) => Route::Ies2radLight,
+        (_, Photometrist::Ies2rad | Photometrist::Native) => Route::Ies2radLight,
         (LuminaireModel::Area, Photometrist::Exporter) if luminaire.photometry.opening != LuminousOpening::Point => {
             Route::Opening
         }

@@ -7,7 +7,7 @@ use crate::engines::{EngineError, Job, Knob};
 pub(super) const KNOBS: &[Knob] = &[
     Preset::KNOB,
     Knob { key: "ambient_divisions", values: &["16384", "1024"] },
-    Knob { key: "photometry", values: &["exporter", "ies2rad"] },
+    Knob { key: "photometry", values: &["exporter", "ies2rad", "native"] },
     Knob { key: "impostor_height_m", values: &["0.057", "0.2"] },
     Knob { key: "rescale", values: &["true", "false"] },
 ];
@@ -28,8 +28,10 @@ pub(super) struct Settings {
 pub(super) enum Photometrist {
     /// We do, at full precision.
     Exporter,
-    /// Radiance's own ies2rad, as its users do.
+    /// Radiance's own ies2rad, of a file that we write: the whole sphere, as edition 2002.
     Ies2rad,
+    /// Radiance's own ies2rad, of the user's own file, as its users do.
+    Native,
 }
 
 /// The box of the published impostor, "lum2" of *Simulation of Luminaires in Radiance: Verification Method*, is 57 mm high.
@@ -38,9 +40,18 @@ const IMPOSTOR_HEIGHT_M: f64 = 0.057;
 const MIN_IMPOSTOR_HEIGHT_M: f64 = 0.002;
 
 impl Settings {
+    /// Whether ies2rad gets the user's own bytes.
+    pub(super) fn is_native(&self) -> bool {
+        self.photometrist == Photometrist::Native
+    }
+
     pub(super) fn of(job: &Job) -> Result<Self, EngineError> {
         let given = Given::of(job, ID, KNOBS)?;
-        let photometrists = [("exporter", Photometrist::Exporter), ("ies2rad", Photometrist::Ies2rad)];
+        let photometrists = [
+            ("exporter", Photometrist::Exporter),
+            ("ies2rad", Photometrist::Ies2rad),
+            ("native", Photometrist::Native),
+        ];
         let height_m = given.number("impostor_height_m", MIN_IMPOSTOR_HEIGHT_M..=10.0)?;
         Ok(Self {
             preset: given.preset()?,

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use luminaire::scene::Luminaire;
 
-use super::route::Route;
+use super::route::{Route, route};
+use super::settings::Settings;
 use super::{ID, export};
 use crate::engines::workbench::by_hand;
 use crate::engines::{Absent, EngineError, SceneFile, Site, Version, Workbench};
@@ -63,14 +64,14 @@ impl Tools {
         workbench: &Workbench,
         k: usize,
         luminaire: &Luminaire,
-        route: Route,
+        settings: &Settings,
     ) -> Result<(), EngineError> {
-        let kind = match route {
+        let kind = match route(luminaire, settings) {
             Route::Point | Route::Opening => return Ok(()),
             Route::Ies2radLight => "' light '",
             Route::Ies2radIllum => "' illum '",
         };
-        let options = export::ies2rad_options(k, luminaire);
+        let options = export::ies2rad_options(k, luminaire, settings);
         self.prepared(workbench.invoke(self.program("ies2rad"))).args(options).run()?;
         let made = workbench.scene_dir.join(format!("ies2rad-{k}.rad"));
         let text = std::fs::read_to_string(&made).map_err(|source| EngineError::io(&made, source))?;

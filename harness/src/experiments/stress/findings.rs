@@ -57,7 +57,7 @@ impl Finding {
             FailureKind::Nan => Some(How::Nan),
             FailureKind::Crash => Some(How::Crash),
             FailureKind::Hang => Some(How::Hang),
-            FailureKind::SilentLoss => Some(How::SilentLoss),
+            FailureKind::SilentLoss | FailureKind::Garbled => Some(How::SilentLoss),
         };
         let text = Some(failure.text.clone());
         let is_refused = matches!(failure.kind, FailureKind::Declined | FailureKind::Refused);

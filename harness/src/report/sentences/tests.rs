@@ -147,3 +147,11 @@ fn printed_cells_and_what_is_on_record_blur_nothing_that_is_known_better() {
         "radiance: direct within 0.01 % but for 1 of 3 known to deviate"
     );
 }
+
+#[test]
+fn of_a_program_that_failed_its_last_words_are_told() {
+    let trace = "python failed (exit code 1): Traceback:\n  line 89\nRuntimeError: invalid file\nall its messages are in /tmp/log";
+    assert_eq!(in_a_line(trace), "python failed (exit code 1): RuntimeError: invalid file");
+    assert_eq!(in_a_line("rtrace failed (exit code 2): no octree"), "rtrace failed (exit code 2): no octree");
+    assert_eq!(in_a_line("no such setting\nhelp: name one"), "no such setting");
+}

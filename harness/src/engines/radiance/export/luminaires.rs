@@ -154,12 +154,19 @@ pub(super) fn rad(job: &Job, settings: &Settings, scale: f64, scene: &[usize]) -
 pub(super) fn files(job: &Job, settings: &Settings) -> Vec<SceneFile> {
     let file = |(k, l): (usize, &Luminaire)| match route(l, settings) {
         Route::Point | Route::Opening => SceneFile::text(&dat_name(k), dat(&l.photometry.distribution)),
-        Route::Ies2radLight => SceneFile::text(&ies_name(k), ies(&l.photometry, l.photometry.opening)),
+        Route::Ies2radLight => match l.photometry.lm63_file().filter(|_| settings.is_native()) {
+            Some(file) => SceneFile { name: ies_name(k), bytes: file.bytes.to_vec() },
+            None => SceneFile::text(&ies_name(k), ies(&l.photometry, l.photometry.opening)),
+        },
         Route::Ies2radIllum => {
             SceneFile::text(&ies_name(k), ies(&l.photometry, with_height(l.photometry.opening, settings)))
         }
     };
-    job.scene.luminaires.iter().enumerate().map(file).collect()
+    // The tilt factors that a file names lie beside it.
+    let beside =
+        job.scene.luminaires.iter().filter(|_| settings.is_native()).flat_map(|l| l.photometry.source.iter().skip(1));
+    let beside = beside.map(|f| SceneFile { name: f.name.clone(), bytes: f.bytes.to_vec() });
+    job.scene.luminaires.iter().enumerate().map(file).chain(beside).collect()
 }
 
 pub(super) fn commands(job: &Job, settings: &Settings) -> String {
@@ -170,16 +177,23 @@ pub(super) fn commands(job: &Job, settings: &Settings) -> String {
             Route::Ies2radLight => "light",
             Route::Ies2radIllum => "illum",
         };
-        text += &format!("ies2rad {}\n", ies2rad_options(k, l).join(" "));
+        text += &format!("ies2rad {}\n", ies2rad_options(k, l, settings).join(" "));
         text += &format!("sed \"s/' light '/' {kind} '/\" ies2rad-{k}.rad > luminaire-{k}.rad\n");
     }
     text
 }
 
-/// Arguments of ies2rad that make `ies2rad-<k>.rad`. -t default: without it the keyword \[LAMP\] may scale everything.
-pub(in crate::engines::radiance) fn ies2rad_options(k: usize, luminaire: &Luminaire) -> Vec<String> {
-    let options = ["-t", "default", "-m", &luminaire.flux_scale.to_string(), "-o", &format!("ies2rad-{k}")];
-    options.into_iter().map(str::to_owned).chain([ies_name(k)]).collect()
+/// Arguments of ies2rad that make `ies2rad-<k>.rad`. -t default: without it the keyword \[LAMP\] may scale everything, which is how its users
+/// call it.
+pub(in crate::engines::radiance) fn ies2rad_options(
+    k: usize,
+    luminaire: &Luminaire,
+    settings: &Settings,
+) -> Vec<String> {
+    let lamp = if settings.is_native() { &[][..] } else { &["-t", "default"] };
+    let (factor, name) = (luminaire.flux_scale.to_string(), format!("ies2rad-{k}"));
+    let options = lamp.iter().copied().chain(["-m", &factor, "-o", &name]);
+    options.map(str::to_owned).chain([ies_name(k)]).collect()
 }
 
 fn by_ies2rad(k: usize, luminaire: &Luminaire, scale: f64) -> String {

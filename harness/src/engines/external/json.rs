@@ -1,0 +1,48 @@
+//! What adapters print, JSON or nearly, and which of two protocols they speak.
+
+use serde::Deserialize;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Protocol {
+    /// One job a process, read as it stands.
+    One = 1,
+    /// Requests with a verb.
+    Two = 2,
+}
+
+/// JSON as programs write it, which may hold what JSON has not.
+pub(super) fn from_json<T: for<'de> Deserialize<'de>>(text: &[u8]) -> Result<T, serde_json::Error> {
+    serde_json::from_slice(text).or_else(|error| {
+        let quoted = quoted(&String::from_utf8_lossy(text));
+        serde_json::from_str(&quoted).map_err(|_| error)
+    })
+}
+
+/// What is printed before JSON, if that is all that is wrong with it: messages of the program's, or of a library's.
+pub(super) fn chatter(text: &[u8]) -> Option<String> {
+    let text = String::from_utf8_lossy(text);
+    let starts = text.match_indices(['{', '[']).map(|(at, _)| at).filter(|at| *at > 0).take(MOST_STARTS);
+    let mut answers = starts.filter(|at| from_json::<serde::de::IgnoredAny>(text[*at..].as_bytes()).is_ok());
+    answers.next().map(|at| text[..at].trim().to_owned())
+}
+
+/// Places that are looked at for the beginning of an answer.
+const MOST_STARTS: usize = 20;
+
+/// JSON with `NaN` and infinities, which Python writes and JSON has not, made words in quotes.
+fn quoted(text: &str) -> String {
+    let (mut quoted, mut is_string, mut is_escaped) = (String::with_capacity(text.len()), false, false);
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        let word = ["NaN", "Infinity", "-Infinity"].into_iter().find(|word| !is_string && rest.starts_with(word));
+        if let Some(word) = word {
+            quoted.extend(["\"", word, "\""]);
+        } else {
+            quoted.push(c);
+        }
+        is_string ^= c == '"' && !is_escaped;
+        is_escaped = is_string && c == '\\' && !is_escaped;
+        rest = &rest[word.map_or(c.len_utf8(), str::len)..];
+    }
+    quoted
+}

@@ -1,0 +1,148 @@
+//! Protocol 2: what an adapter says of itself, and how it is asked; pure.
+
+use luminaire::scene::{LuminaireModel, Transport};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::form::ExternalJob;
+use super::json::{chatter, from_json};
+use crate::engines::{Job, recess};
+use crate::system::printable;
+
+/// What an adapter of protocol 2 reads on its standard input.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[serde(tag = "verb", rename_all = "snake_case")]
+pub enum ExternalRequest {
+    /// What are you?
+    Probe,
+    /// Take the readings of these jobs: one, or several where it can `batch`.
+    Read {
+        /// Each with a name of its own in `job`.
+        jobs: Vec<ExternalJob>,
+        /// Threads or processes that it may use at a time.
+        threads: usize,
+    },
+}
+
+impl ExternalRequest {
+    pub fn to_json(&self) -> Result<Vec<u8>, serde_json::Error> {
+        serde_json::to_vec_pretty(self)
+    }
+}
+
+/// What an adapter answers to `{"verb": "probe"}`.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+pub struct ExternalProbe {
+    /// 2.
+    protocol: u32,
+    /// What it drives, as its makers write it.
+    pub(super) name: String,
+    /// The version of that.
+    pub(super) version: String,
+    /// What it can: `area` (luminous openings), `obstacles`, `bounces` (reflected light), `ies` (it reads the photometric file, not the
+    /// table), `threads` (it uses as many as it is given), `batch` (it takes several jobs at once).
+    #[serde(default)]
+    capabilities: Vec<String>,
+    /// What it has in common with other engines, by name.
+    #[serde(default)]
+    pub(super) shares: Vec<String>,
+    /// Files and folders that make its readings besides those of its command, from the folder in which it runs.
+    #[serde(default)]
+    pub(super) depends_on: Vec<String>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Capability {
+    Area,
+    Obstacles,
+    Bounces,
+    Threads,
+    Batch,
+}
+
+/// All words that are known; `ies` asks for nothing, since every job has the file and the table.
+const WORDS: [&str; 6] = ["area", "obstacles", "bounces", "threads", "batch", "ies"];
+/// What tells a few names from a flood.
+const MAX_WORD: usize = 200;
+
+/// What came of a probe.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Answer {
+    Two(Box<ExternalProbe>),
+    /// It is no answer to a probe: of version 1, perhaps.
+    NotOne(String),
+    /// It is one, and there is something wrong with it.
+    Wrong(String),
+}
+
+/// What is wrong with an answer that begins with other words.
+pub(super) fn printed_before(words: &str) -> String {
+    let words = printable::line(words, MAX_WORD);
+    format!("it prints `{words}` before its answer: what is no JSON belongs on standard error")
+}
+
+impl Answer {
+    pub(super) fn of(stdout: &[u8]) -> Self {
+        let said: serde_json::Value = match from_json(stdout) {
+            Ok(said) => said,
+            Err(error) => {
+                let why = match chatter(stdout) {
+                    Some(words) => printed_before(&words),
+                    None => format!("it is no JSON ({error})"),
+                };
+                return Self::NotOne(why);
+            }
+        };
+        match said.get("protocol").map(serde_json::Value::as_u64) {
+            None => return Self::NotOne("it has no `protocol`".to_owned()),
+            Some(Some(2)) => {}
+            Some(_) => return Self::Wrong(format!("`protocol: {}` is not known; there are 1 and 2", said["protocol"])),
+        }
+        match serde_json::from_value::<ExternalProbe>(said) {
+            Err(error) => Self::Wrong(error.to_string()),
+            Ok(probe) if probe.name.trim().is_empty() || probe.version.trim().is_empty() => {
+                Self::Wrong("`name` and `version` must say something".to_owned())
+            }
+            Ok(probe) => Self::Two(Box::new(probe.printable())),
+        }
+    }
+}
+
+impl ExternalProbe {
+    fn printable(self) -> Self {
+        let line = |text: String| printable::line(&text, MAX_WORD);
+        let lines = |texts: Vec<String>| texts.into_iter().map(line).collect();
+        Self { name: line(self.name), version: line(self.version), shares: lines(self.shares), ..self }
+    }
+
+    /// Its capabilities as a list.
+    pub(super) fn words(&self) -> String {
+        let words = self.capabilities.join(", ");
+        if words.is_empty() { "no capabilities".to_owned() } else { printable::line(&words, MAX_WORD) }
+    }
+
+    pub(super) fn can(&self, capability: Capability) -> bool {
+        self.capabilities.iter().any(|word| word == WORDS[capability as usize])
+    }
+
+    /// Capabilities that nobody knows, with those that there are.
+    pub(super) fn unknown_words(&self) -> Option<String> {
+        let unknown: Vec<&str> = self.capabilities.iter().map(String::as_str).filter(|w| !WORDS.contains(w)).collect();
+        let words = printable::line(&unknown.join(", "), MAX_WORD);
+        (!unknown.is_empty())
+            .then(|| format!("capabilities that are not known: {words}; there are {}", WORDS.join(", ")))
+    }
+
+    /// Why a job is not for it, by what it says that it can.
+    pub(super) fn objection(&self, job: &Job) -> Option<String> {
+        let job = recess::apart(job);
+        let has_openings = job.scene.luminaires.iter().any(|l| l.model != LuminaireModel::Point);
+        let asked = [
+            (Capability::Area, has_openings, "luminous openings"),
+            (Capability::Obstacles, !job.scene.obstacles.is_empty(), "obstacles"),
+            (Capability::Bounces, job.transport != Transport::Direct, "reflected light"),
+        ];
+        let (lacking, _, what) = asked.into_iter().find(|(c, is_asked, _)| *is_asked && !self.can(*c))?;
+        Some(format!("{what}: its capabilities have no `{}`", WORDS[lacking as usize]))
+    }
+}

@@ -1,0 +1,128 @@
+//! The renderers of the web: Node.js in an environment of its own, and npm's packages as the lock pins them, by their hashes.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use super::verify::Soundness;
+use super::{InstallError, step, venv};
+use crate::engines::Site;
+use crate::system::digest::hexadecimal;
+
+const MANIFEST: &str = include_str!("../../../web/package.json");
+const LOCK: &str = include_str!("../../../web/package-lock.json");
+/// What every file had when it was installed, beside `node_modules`.
+const SUMS: &str = "sums.txt";
+
+/// `packages` is a link to this folder; it is made last, so that half an installation is never used.
+fn folder(site: &Site) -> PathBuf {
+    site.web().root().join(format!("packages-{}", &hexadecimal(&Sha256::digest(LOCK))[..16]))
+}
+
+pub(super) fn is_current(site: &Site) -> bool {
+    let is_linked = site.web_packages().and_then(|link| link.canonicalize().ok()) == folder(site).canonicalize().ok();
+    is_linked && venv::NODE.is_current(&site.web()) && matches!(sums_hold(&folder(site)), Soundness::Sound(_))
+}
+
+pub(super) fn soundness(site: &Site) -> Soundness {
+    if site.web_packages().is_none() {
+        return Soundness::Absent;
+    }
+    match (venv::NODE.soundness(&site.web()), sums_hold(&folder(site))) {
+        (Soundness::Sound(a), Soundness::Sound(b)) => Soundness::Sound(a + b),
+        (Soundness::Sound(_), broken) | (broken, _) => broken,
+    }
+}
+
+pub(super) fn install(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
+    let web = site.web();
+    if !venv::NODE.is_current(&web) {
+        venv::NODE.install(&web, progress)?;
+    }
+    let missing = || InstallError::Missing { what: "Node.js is not there".into(), remedy: "see install.log".into() };
+    let node = site.node().ok_or_else(missing)?;
+    let npm = node.with_file_name("../lib/node_modules/npm/bin/npm-cli.js");
+    let folder = folder(site);
+    let fail = |path: &Path| {
+        let path = path.to_owned();
+        move |e| InstallError::io(&path, e)
+    };
+    if folder.exists() {
+        fs::remove_dir_all(&folder).map_err(fail(&folder))?;
+    }
+    fs::create_dir_all(&folder).map_err(fail(&folder))?;
+    for (name, text) in [("package.json", MANIFEST), ("package-lock.json", LOCK)] {
+        let path = folder.join(name);
+        fs::write(&path, text).map_err(fail(&path))?;
+    }
+    progress("downloading and installing three.js and Babylon.js, about 30 MB (160 MB on disk)");
+    // No package runs anything while it is installed, and npm keeps nothing elsewhere.
+    let cache = folder.join("cache");
+    let quiet = ["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--no-update-notifier", "--cache"];
+    step(&web, node).args([npm]).args(quiet).args([&cache]).args(["--prefix".into(), folder.clone()]).run()?;
+    fs::remove_dir_all(&cache).map_err(fail(&cache))?;
+    let sums = folder.join(SUMS);
+    fs::write(&sums, sums_of(&folder)).map_err(fail(&sums))?;
+    let (link, new) = (web.root().join("packages"), web.root().join("packages.new"));
+    fs::remove_file(&new).ok();
+    std::os::unix::fs::symlink(folder.file_name().unwrap_or_default(), &new).map_err(fail(&new))?;
+    fs::rename(&new, &link).map_err(fail(&link))?;
+    Ok(link.display().to_string())
+}
+
+/// A line a file, as sha256sum prints it.
+fn sums_of(folder: &Path) -> String {
+    let files = walkdir::WalkDir::new(folder.join("node_modules")).sort_by_file_name().into_iter().flatten();
+    let files = files.map(walkdir::DirEntry::into_path).filter(|path| path.is_file());
+    let line = |path: PathBuf| {
+        let name = path.strip_prefix(folder).unwrap_or(&path).display().to_string();
+        fs::read(&path)
+            .map_or_else(|e| format!("{e}  {name}\n"), |b| format!("{}  {name}\n", hexadecimal(&Sha256::digest(b))))
+    };
+    files.map(line).collect()
+}
+
+fn sums_hold(folder: &Path) -> Soundness {
+    let Ok(installed) = fs::read_to_string(folder.join(SUMS)) else {
+        return Soundness::Broken(vec![format!("{} has no {SUMS}", folder.display())]);
+    };
+    let now = sums_of(folder);
+    let now: BTreeSet<&str> = now.lines().collect();
+    let faults: Vec<String> = installed
+        .lines()
+        .filter(|line| !now.contains(line))
+        .filter_map(|line| line.split("  ").nth(1))
+        .map(|name| format!("{} is not what was installed", folder.join(name).display()))
+        .collect();
+    if faults.is_empty() { Soundness::Sound(installed.lines().count()) } else { Soundness::Broken(faults) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lock_pins_every_package_with_hashes_and_names_no_host() {
+        let lock: serde_json::Value = serde_json::from_str(LOCK).unwrap();
+        let packages = lock["packages"].as_object().unwrap().iter().filter(|(name, _)| !name.is_empty());
+        let all: Vec<_> = packages.collect();
+        assert!(all.len() >= 4 && all.iter().all(|(_, p)| p["integrity"].as_str().unwrap().starts_with("sha512-")));
+        assert!(!LOCK.contains("http"), "a registry is named");
+    }
+
+    #[test]
+    fn a_file_that_was_changed_is_told_and_half_an_installation_is_none() {
+        let root = tempfile::tempdir().unwrap();
+        let modules = root.path().join("node_modules/three");
+        fs::create_dir_all(&modules).unwrap();
+        fs::write(modules.join("a.js"), "1").unwrap();
+        assert!(matches!(sums_hold(root.path()), Soundness::Broken(_)));
+        fs::write(root.path().join(SUMS), sums_of(root.path())).unwrap();
+        assert_eq!(sums_hold(root.path()), Soundness::Sound(1));
+        fs::write(modules.join("a.js"), "2").unwrap();
+        let Soundness::Broken(faults) = sums_hold(root.path()) else { panic!("it was not noticed") };
+        assert!(faults[0].contains("a.js"), "{faults:?}");
+    }
+}

@@ -1,0 +1,286 @@
+//! three.js and Babylon.js: the IES loaders of the web, with the renderers that use them, in headless Chromium.
+//!
+//! Their own code loads the file and shades: what is audited is what a page of theirs shows, in WebGL 2 by software (`SwiftShader`), which is
+//! the same on every machine. Direct light of points alone: their shadows are maps of so many texels, and reflected light they have none.
+
+mod settings;
+#[cfg(test)]
+pub(super) mod tests;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use luminaire::photometry::{Photometry, lm63};
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Transport};
+use serde::{Deserialize, Serialize};
+
+use self::settings::Settings;
+use super::workbench::by_hand;
+use super::{
+    Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Station, Support, Version,
+    Workbench, checked,
+};
+use crate::record::{EngineName, Estimate, Uncertainty};
+use crate::system::process;
+
+const INSTALLS: &[Component] = &[Component::WebPackages, Component::Chromium];
+
+pub(super) static THREE: Entry = Entry {
+    name: EngineName::new("three"),
+    display_name: "three.js",
+    colour: ("#0a7d74", "#4fd1c5"),
+    installs: INSTALLS,
+    is_on_request: true,
+    models: &[LuminaireModel::Point],
+    fits_coordinates: None,
+    make: || Box::new(Web(Library::Three)),
+};
+
+pub(super) static BABYLON: Entry = Entry {
+    name: EngineName::new("babylon"),
+    display_name: "Babylon.js",
+    colour: ("#a3324f", "#f08ca5"),
+    installs: INSTALLS,
+    is_on_request: true,
+    models: &[LuminaireModel::Point],
+    fits_coordinates: None,
+    make: || Box::new(Web(Library::Babylon)),
+};
+
+const DRIVER: (&str, &str) = ("web_read.mjs", include_str!("../../drivers/web_read.mjs"));
+const JOB_FILE: &str = "job.json";
+
+/// What sums of 32-bit floats in a fragment shader may be off, in parts of a reading: some ten operations, each rounded.
+const FLOATS: f64 = 1e-6;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Library {
+    Three,
+    Babylon,
+}
+
+impl Library {
+    const fn entry(self) -> &'static Entry {
+        match self {
+            Self::Three => &THREE,
+            Self::Babylon => &BABYLON,
+        }
+    }
+
+    /// What runs in the page.
+    const fn page(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Three => ("web_three.js", include_str!("../../drivers/web_three.js")),
+            Self::Babylon => ("web_babylon.js", include_str!("../../drivers/web_babylon.js")),
+        }
+    }
+
+    /// The folder of a release among the packages.
+    fn package(self, release: &str) -> String {
+        match self {
+            Self::Three => format!("three-{release}"),
+            Self::Babylon => "@babylonjs/core".to_owned(),
+        }
+    }
+}
+
+pub(super) struct Web(Library);
+
+/// What the driver reads.
+#[derive(Serialize)]
+struct PageJob<'a> {
+    case: &'a str,
+    procedure: &'a str,
+    page: &'a str,
+    package: String,
+    texture: &'a str,
+    lamps: Vec<Lamp>,
+    meters: Vec<Seat<'a>>,
+}
+
+#[derive(Serialize)]
+struct Lamp {
+    file: String,
+    /// The largest intensity: the loaders keep parts of it.
+    candela: f64,
+    position: [f64; 3],
+    axes: [[f64; 3]; 3],
+}
+
+#[derive(Serialize)]
+struct Seat<'a> {
+    id: &'a str,
+    position: [f64; 3],
+    normal: [f64; 3],
+}
+
+impl<'a> Seat<'a> {
+    fn of(station: &'a Station) -> Self {
+        let Meter { position_m, normal } = station.meter;
+        Self { id: &station.id.0, position: position_m.to_array(), normal: normal.to_array() }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PageAnswer {
+    lux: Vec<Option<f64>>,
+    version: String,
+    backend: String,
+    /// Errors that the page logged.
+    troubles: Vec<String>,
+}
+
+impl Web {
+    fn error(&self, what: impl Into<String>) -> EngineError {
+        EngineError::output(self.name(), what)
+    }
+
+    fn parsed(&self, stdout: &[u8], job: &Job) -> Result<Measurement, EngineError> {
+        let answer: PageAnswer = serde_json::from_slice(stdout)
+            .map_err(|e| EngineError::no_readings(self.name(), &String::from_utf8_lossy(stdout), &e))?;
+        if let Some(trouble) = answer.troubles.first() {
+            return Err(self.error(format!("its page says: {trouble}")));
+        }
+        let estimate = |lux: Option<f64>| {
+            let value = lux.unwrap_or(f64::NAN);
+            Estimate { value, uncertainty: Uncertainty::Bound(FLOATS * value.abs()) }
+        };
+        let method = BTreeMap::from([("version", answer.version), ("backend", answer.backend)]);
+        Ok(Measurement {
+            estimates: answer.lux.into_iter().map(estimate).collect(),
+            method: method.into_iter().map(|(k, v)| (k.to_owned(), v)).collect(),
+            notes: job.written_for_its_reader().into_iter().collect(),
+            ..Measurement::default()
+        })
+    }
+}
+
+impl Engine for Web {
+    fn name(&self) -> EngineName {
+        self.0.entry().name.clone()
+    }
+
+    fn reads_files(&self, _job: &Job) -> bool {
+        true
+    }
+
+    fn probe(&self, site: &Site) -> Result<Version, Absent> {
+        let remedy = format!("run `luxproof engines install {}`", self.name());
+        let absent = |reason: &str| Absent { reason: reason.to_owned(), remedy: remedy.clone() };
+        let node = site.node().ok_or_else(|| absent("there is no Node.js for it"))?;
+        let packages = site.web_packages().ok_or_else(|| absent("its packages of npm are not there"))?;
+        let chromium = site.chromium().ok_or_else(|| absent("there is no Chromium to run it in"))?;
+        let told = process::ask(chromium.clone(), "--version", |run| run).map_err(|e| absent(&e.to_string()))?;
+        let chromium_version = String::from_utf8_lossy(&told.stdout).trim().to_owned();
+        let modules = packages.join("node_modules");
+        let releases: Vec<PathBuf> = match self.0 {
+            Library::Three => settings::RELEASES.iter().map(|release| modules.join(self.0.package(release))).collect(),
+            Library::Babylon => vec![modules.join(self.0.package(""))],
+        };
+        if let Some(gone) = releases.iter().find(|folder| !folder.is_dir()) {
+            return Err(absent(&format!("{} is missing", gone.display())));
+        }
+        let text = match self.0 {
+            Library::Three => format!("{} in {chromium_version}", settings::RELEASES.join(" and ")),
+            Library::Babylon => format!("9.35.0 in {chromium_version}"),
+        };
+        let files = [node, chromium, modules.join("playwright-core")].into_iter().chain(releases);
+        Ok(Version::of(&self.name(), text, site, files))
+    }
+
+    fn supports(&self, job: &Job) -> Support {
+        if job.transport != Transport::Direct {
+            return Support::No("renderers of the web have no reflected light".to_owned());
+        }
+        if !job.scene.obstacles.is_empty() {
+            return Support::No("its shadows are maps of so many texels, which are not audited".to_owned());
+        }
+        self.0.entry().objection(job).map_or(Support::Yes, Support::No)
+    }
+
+    fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
+        let settings = Settings::of(job, self.0)?;
+        let (page, source) = self.0.page();
+        let lamp = |(k, l): (usize, &Luminaire)| Lamp {
+            file: file_name(k),
+            candela: l.photometry.distribution.max_intensity().value() * l.flux_scale,
+            position: l.position_m.to_array(),
+            axes: l.orientation.to_cols_array_2d(),
+        };
+        let asked = PageJob {
+            case: &job.case,
+            procedure: job.procedure.name(),
+            page,
+            package: self.0.package(settings.release),
+            texture: settings.texture,
+            lamps: job.scene.luminaires.iter().enumerate().map(lamp).collect(),
+            meters: job.stations.iter().map(Seat::of).collect(),
+        };
+        let bytes = serde_json::to_vec_pretty(&asked).map_err(|e| self.error(format!("the job is no JSON: {e}")))?;
+        let files = job.scene.luminaires.iter().enumerate();
+        let files = files.map(|(k, l)| SceneFile { name: file_name(k), bytes: native(&l.photometry) });
+        let ours = [
+            SceneFile { name: JOB_FILE.to_owned(), bytes },
+            SceneFile::text(page, source),
+            SceneFile::text(DRIVER.0, DRIVER.1),
+        ];
+        Ok(ours.into_iter().chain(files).collect())
+    }
+
+    fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
+        let node = site.node().unwrap_or_else(|| "node".into());
+        let packages = site.web_packages().unwrap_or_else(|| "packages".into());
+        let chromium = site.chromium().unwrap_or_else(|| "chromium".into());
+        let words = [DRIVER.0.into(), JOB_FILE.into(), packages, chromium];
+        Some(by_hand(node).args(words).command_line_with_env())
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        match self.0 {
+            Library::Three => settings::THREE_KNOBS,
+            Library::Babylon => &[],
+        }
+    }
+
+    fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
+        Settings::of(job, self.0).map(drop)
+    }
+
+    /// Chromium's processes together.
+    fn memory_mib(&self, job: &Job, _threads: usize) -> u64 {
+        1536 + super::geometry_mib(job)
+    }
+
+    fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
+        workbench.write(&self.export(job)?)?;
+        let gone = || self.error("is no longer there");
+        let site = &workbench.site;
+        let (node, packages) = (site.node().ok_or_else(gone)?, site.web_packages().ok_or_else(gone)?);
+        let chromium = site.chromium().ok_or_else(gone)?;
+        // What a browser keeps lies with the job: profiles, caches, locks.
+        let home = workbench.scene_dir.join(HOME);
+        std::fs::create_dir_all(&home).map_err(|e| EngineError::io(&home, e))?;
+        let run = workbench.invoke(node).args([DRIVER.0.into(), JOB_FILE.into(), packages, chromium]);
+        let run =
+            ["HOME", "TMPDIR", "XDG_CONFIG_HOME", "XDG_CACHE_HOME"].iter().fold(run, |run, key| run.env(key, &home));
+        let finished = run.run();
+        std::fs::remove_dir_all(&home).ok();
+        let mut measurement = self.parsed(&finished?.stdout, job)?;
+        measurement.effort.insert("command".into(), run.command_line());
+        checked(&self.name(), job, measurement)
+    }
+}
+
+/// Where the browser keeps what it keeps while it runs.
+const HOME: &str = "browser";
+
+fn file_name(k: usize) -> String {
+    format!("luminaire-{k}.ies")
+}
+
+/// The bytes of the user's own file where it is LM-63, which is all that the loaders read; else what our writer makes of the table.
+fn native(photometry: &Photometry) -> Vec<u8> {
+    let own = photometry.lm63_file().map(|file| file.bytes.to_vec());
+    own.unwrap_or_else(|| lm63::write_2002(photometry).text.into_bytes())
+}

@@ -1,0 +1,125 @@
+//! `luxproof engines doctor --adapter`: adapters that are wrong on purpose, each told what is wrong with it in one run.
+
+use crate::support::{Answer, Folder, adapter};
+
+/// What is found of the example adapter with some of its text replaced.
+fn examined(changes: &[(&str, &str)]) -> Answer {
+    let text = changes.iter().fold(adapter(), |text, (from, to)| {
+        assert!(text.contains(from), "no `{from}` in the example");
+        text.replace(from, to)
+    });
+    let folder = Folder::new(&[("adapter.py", &text)]);
+    folder.luxproof(&["engines", "doctor", "--adapter", "python3 adapter.py"])
+}
+
+/// The line of a topic and what is indented below it.
+fn section(answer: &Answer, topic: &str) -> String {
+    let lines = answer.stdout.lines().skip_while(|line| !line.starts_with("conformance: ")).skip(1);
+    let mut mine = lines.skip_while(|line| !line.starts_with(&format!("  {topic} ")));
+    let first = mine.next().unwrap_or_else(|| panic!("no {topic} in {}\n{}", answer.stdout, answer.stderr));
+    let rest = mine.take_while(|line| line.starts_with("        ")).collect::<Vec<_>>().join(" ");
+    format!("{} {rest}", &first[19..])
+}
+
+const TOPICS: [&str; 8] =
+    ["protocol", "meters", "units", "orientation", "shadows", "reflected light", "noise", "claims"];
+
+/// Exactly these topics are wrong, each for this reason.
+#[track_caller]
+fn is_told(changes: &[(&str, &str)], wrong: &[(&str, &str)]) {
+    let answer = examined(changes);
+    assert!(matches!(answer.code, Some(1 | 3)), "{:?}\n{}\n{}", answer.code, answer.stdout, answer.stderr);
+    for topic in TOPICS {
+        let found = section(&answer, topic);
+        let reason = wrong.iter().find(|(of, _)| *of == topic).map(|(_, reason)| *reason);
+        assert_eq!(found.starts_with("WRONG"), reason.is_some(), "{topic}: {found}\n{}", answer.stdout);
+        assert!(found.contains(reason.unwrap_or_default()), "{topic}: {found}");
+    }
+}
+
+const LUX: &str = "lux = illuminance_lx(";
+const BOUND: &str = "\"error_bound_lx\": 1e-12 * lux";
+const APPEND: &str = "        readings.append";
+const SEEDED: (&str, &str) = ("def answer(job):", "import random\n\n\ndef answer(job):");
+
+#[test]
+fn a_right_adapter_is_sound_in_all_that_it_says_that_it_can() {
+    let answer = examined(&[]);
+    assert_eq!(answer.code, Some(0), "{}\n{}", answer.stdout, answer.stderr);
+    assert!(answer.stdout.contains("conformance: inverse square 1, protocol 2 (batch)"), "{}", answer.stdout);
+    for topic in ["protocol", "meters", "units", "orientation", "noise", "claims"] {
+        assert!(section(&answer, topic).starts_with("sound"), "{}", answer.stdout);
+    }
+    for (topic, why) in [("shadows", "no `obstacles`"), ("reflected light", "no `bounces`")] {
+        let found = section(&answer, topic);
+        assert!(found.starts_with("not examined") && found.contains(why), "{found}");
+    }
+}
+
+/// Which number stands for which fault is told in `diagnosis::tests`, without a program.
+#[test]
+fn wrong_units_are_named() {
+    is_told(&[(LUX, "lux = 4 * math.pi * illuminance_lx(")], &[("units", "factor 4 pi")]);
+    is_told(&[(LUX, "lux = 1.03 * illuminance_lx(")], &[("units", "factor 1.0300, none of those known")]);
+}
+
+#[test]
+fn tables_luminaires_and_meters_that_point_elsewhere_are_named() {
+    for (from, to, says) in [
+        ("math.atan2(y, x)) % 360.0", "math.atan2(-y, x)) % 360.0", "C runs the other way round"),
+        ("for axis in lamp[\"axes\"])", "for axis in zip(*lamp[\"axes\"]))", "rotation is applied the wrong way round"),
+        ("max(cosine, 0.0)", "abs(cosine)", "light from behind a meter counts, too"),
+    ] {
+        is_told(&[(from, to)], &[("orientation", says)]);
+    }
+}
+
+#[test]
+fn missing_meters_and_numbers_that_are_none_are_told() {
+    let last = "    return {\"readings\": readings,";
+    for (from, to, says) in [
+        (last, "    return {\"readings\": readings[:-1],", "readings for"),
+        (LUX, "lux = float(\"nan\") if meter[\"id\"].endswith(\"[2]\") else illuminance_lx(", "read NaN lx"),
+    ] {
+        is_told(&[(from, to)], &[("meters", says)]);
+    }
+}
+
+#[test]
+fn noise_that_is_not_as_stated_and_claims_that_do_not_hold_are_told() {
+    let noisy = |stated: f64| {
+        format!(
+            "        error = 1e-3 * lux\n        lux += error * random.Random(f\"{{job['seed']}} {{meter['id']}}\").gauss(0, 1)\n        \
+             error *= {stated}\n{APPEND}"
+        )
+    };
+    let sampled = "\"std_error_lx\": error, \"degrees_of_freedom\": 60";
+    let honest = examined(&[SEEDED, (APPEND, &noisy(1.0)), (BOUND, sampled)]);
+    assert!(section(&honest, "noise").starts_with("sound"), "{}", honest.stdout);
+    is_told(&[SEEDED, (APPEND, &noisy(0.2)), (BOUND, sampled)], &[("noise", "times too small")]);
+    is_told(
+        &[SEEDED, (APPEND, &noisy(1.0)), (BOUND, "\"exact\": True")],
+        &[("claims", "claims readings without any scatter")],
+    );
+}
+
+#[test]
+fn a_broken_protocol_is_told() {
+    let probe = "    if request[\"verb\"] == \"probe\":\n";
+    is_told(&[(probe, &format!("{probe}        return {{\"protocol\": 7}}\n"))], &[("protocol", "there are 1 and 2")]);
+    is_told(&[("[\"batch\"]", "[\"batch\", \"shadow\"]")], &[("protocol", "capabilities that are not known: shadow")]);
+    let one = "    assert request[\"verb\"] == \"probe\" or len(request[\"jobs\"]) == 1, \"one job at a time\"\n";
+    is_told(&[(probe, &format!("{one}{probe}"))], &[("protocol", "its capabilities have `batch`, but")]);
+    // One scene alone ends it: that of several luminaires.
+    let crash = "def answer(job):\n    assert len(job[\"luminaires\"]) == 1, \"one lamp at a time\"\n";
+    is_told(&[("def answer(job):\n", crash)], &[("protocol", "one lamp at a time")]);
+    let folder = Folder::new(&[]);
+    folder
+        .luxproof(&["engines", "doctor", "--adapter", "./gone"])
+        .exits(3)
+        .prints("neither beside the spec nor on PATH");
+    folder
+        .luxproof(&["--untrusted", "engines", "doctor", "--adapter", "true"])
+        .exits(2)
+        .complains("--adapter starts a program");
+}
