@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Folder, MINE, SKEW_LAMP, SKEW_ROOM, adapter, among};
+use crate::support::{Folder, MINE, SKEW_LAMP, SKEW_ROOM, adapter, among, is_night};
 
 /// The example adapter, its illuminance times `factor` of a generator of each meter and seed, with these statements about it.
 fn run(factor: &str, stated: &str, seed: u64) -> Value {
@@ -34,6 +34,11 @@ fn verdicts(report: &Value) -> (usize, usize, Vec<&Value>) {
 }
 
 const SEEDS: std::ops::Range<u64> = 100..110;
+
+/// Where every seed is many runs: some, and at night all.
+fn seeds() -> std::ops::Range<u64> {
+    if is_night() { SEEDS } else { 100..104 }
+}
 
 #[test]
 fn errors_three_times_too_small_are_told_and_fail_nothing_that_is_right() {
@@ -69,7 +74,7 @@ fn a_heavy_tail_fails_nothing_and_names_nothing() {
             "{RANDOM}blocks = [lux * {sample} for _ in range(8)]; lux = sum(blocks) / 8; \
              stated = math.sqrt(sum((b - lux) ** 2 for b in blocks) / 56)"
         );
-        for seed in SEEDS {
+        for seed in seeds() {
             let report = run(&noise, SAMPLED, seed);
             for comparison in among(&report, "comparisons", &[("engine", "mine")]) {
                 assert_eq!(comparison["verdict"], "inconclusive", "{sample}: {comparison}");
@@ -83,7 +88,7 @@ fn a_heavy_tail_fails_nothing_and_names_nothing() {
 #[test]
 fn what_is_claimed_to_be_determined_is_read_again_and_its_scatter_counts() {
     let mut failed = 0;
-    for seed in SEEDS {
+    for seed in seeds() {
         for claim in ["\"exact\": True", "\"std_error_lx\": 0.0", "\"error_bound_lx\": 1e-9"] {
             let report = run(&noise(0.006, 0.004, 0.0), claim, seed);
             let (_, fails, doubts) = verdicts(&report);
@@ -91,7 +96,8 @@ fn what_is_claimed_to_be_determined_is_read_again_and_its_scatter_counts() {
             failed += usize::from(fails > 0);
         }
     }
-    assert!(failed <= 3, "{failed}");
+    // One run in ten.
+    assert!(10 * failed <= 3 * seeds().count(), "{failed}");
     let report = run("pass", "\"exact\": True", 1);
     assert_eq!(verdicts(&report), (23, 0, vec![]));
 }

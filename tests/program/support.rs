@@ -17,6 +17,11 @@ pub(crate) const ENGINES: [&str; 5] = ["simulator", "iesna", "mitsuba", "povray"
 pub(crate) const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
 pub(crate) const S1_INDIRECT_LX: [f64; 4] = [0.94314714, 1.15551735, 1.15551735, 1.42062868];
 
+/// Whether studies take their long form, as `ci/nightly` asks.
+pub(crate) fn is_night() -> bool {
+    std::env::var_os("LUXPROOF_NIGHTLY").is_some()
+}
+
 /// A temporary folder that luxproof is run in, with a cache of its own.
 pub(crate) struct Folder {
     kept: tempfile::TempDir,

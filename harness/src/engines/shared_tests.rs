@@ -50,25 +50,29 @@ fn direct_light_follows_the_inverse_square_law_within_its_small_bound() {
 #[test]
 fn indirect_light_is_the_converged_value_within_its_standard_error() {
     for (Renderer { read, .. }, relative_error, stated) in
-        [(MITSUBA, 1e-3, 1.05e-3), (RADIANCE, 2e-3, 2.01e-3), (CYCLES, 2e-3, 2.1e-3), (LUXCORE, 2e-3, 2.1e-3)]
+        [(MITSUBA, 1e-3, 1.05), (RADIANCE, 2e-3, 1.005), (CYCLES, 2e-3, 1.05), (LUXCORE, 2e-3, 1.05)]
     {
+        let relative_error = by_night(1.0, 2.0) * relative_error;
         let found = read(&within(relative_error, s1(CONVERGED)));
         let off = worst_relative(&found, &S1_INDIRECT_LX);
         assert!(off < 4.0 * relative_error && worst_z(&found, &S1_INDIRECT_LX) < 4.0, "{found:?}");
-        let is_small = |e: &Estimate| e.uncertainty.standard_error().unwrap() < stated * e.value;
+        let is_small = |e: &Estimate| e.uncertainty.standard_error().unwrap() < stated * relative_error * e.value;
         assert!(found.estimates.iter().all(is_small), "{found:?}");
     }
 }
 
-/// The difference to the converged value, .6 %, is seen as many standard errors.
+/// A limit that is off by one shows in the first reflection. The difference of seven to the converged value, .6 %, takes long to see.
 #[test]
 fn n_bounces_are_n_diffuse_reflections() {
     for (Renderer { read, .. }, relative_error, z) in
         [(MITSUBA, 5e-4, 8.0), (RADIANCE, 8e-4, 5.0), (CYCLES, 8e-4, 5.0), (LUXCORE, 8e-4, 5.0)]
     {
-        let found = read(&within(relative_error, s1(Transport::Indirect(Bounces::AtMost(7)))));
-        assert!(worst_z(&found, &S1_SEVEN_LX) < 4.0, "{found:?}");
-        assert!(worst_z(&found, &S1_INDIRECT_LX) > z, "{found:?}");
+        let limits = [(1, S1_FIRST_LX, 1e-2, 20.0), (7, S1_SEVEN_LX, relative_error, z)];
+        for (n, exact, relative_error, z) in &limits[..by_night(2, 1)] {
+            let found = read(&within(*relative_error, s1(Transport::Indirect(Bounces::AtMost(*n)))));
+            assert!(worst_z(&found, exact) < 4.0, "{n}: {found:?}");
+            assert!(worst_z(&found, &S1_INDIRECT_LX) > *z, "{n}: {found:?}");
+        }
         let none = read(&s1(Transport::Indirect(Bounces::AtMost(0))));
         assert!(none.estimates.iter().all(|e| e.value == 0.0), "{none:?}");
     }
@@ -83,7 +87,7 @@ fn total_is_direct_plus_indirect() {
     }
     for (Renderer { read, .. }, relative_error) in [(MITSUBA, 1e-3), (RADIANCE, 2e-3), (CYCLES, 2e-3), (LUXCORE, 2e-3)]
     {
-        let total = within(relative_error, total.clone());
+        let total = within(by_night(1.0, 2.5) * relative_error, total.clone());
         let indirect = read(&Job { transport: CONVERGED, ..total.clone() });
         let parts = indirect.estimates.iter().zip(exact_direct_lx(&total));
         for (total, (indirect, direct)) in read(&total).estimates.iter().zip(parts) {
@@ -135,7 +139,8 @@ fn far_and_tiny_scenes_are_read_in_coordinates_of_their_own() {
 
         // S1 a thousand times smaller: a million times the lux, direct and reflected.
         let expected = S1_INDIRECT_LX.map(|lx| 1e6 * lx);
-        assert!(worst_z(&read(&scaled(s1(CONVERGED), 1e-3, 1.0)), &expected) < 4.5);
+        let tiny = within(by_night(1e-3, 4e-3), scaled(s1(CONVERGED), 1e-3, 1.0));
+        assert!(worst_z(&read(&tiny), &expected) < 4.5);
     }
 }
 
@@ -274,10 +279,10 @@ pub(super) fn furnished() -> Job {
 
 /// Readings of random rooms are no farther from the simulator's than both bounds allow, and bounds are small enough to decide: below the
 /// verification tolerance of direct light, 1 % or .001 lx.
-pub(super) fn bounds_hold_and_decide(read: impl Fn(&Job) -> Measurement, openings: bool) {
+pub(super) fn bounds_hold_and_decide(read: impl Fn(&Job) -> Measurement, openings: bool, rooms: usize) {
     let mut random = fastrand::Rng::with_seed(18);
     let (mut wide, mut all) = (0, 0);
-    for _ in 0..6 {
+    for _ in 0..rooms {
         let job = random_room(&mut random, openings);
         let meters: Vec<Meter> = job.stations.iter().map(|s| s.meter).collect();
         let accuracy = Accuracy { relative_error: 1e-4, seed: 1 };

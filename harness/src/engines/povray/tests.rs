@@ -203,9 +203,8 @@ fn tilt(seed: u32) -> f64 {
 #[test]
 fn indirect_light_of_s1_is_exact_within_its_errors_and_the_named_bias_and_cut_where_it_is_asked_for() {
     let at_most = |n| Transport::Indirect(Bounces::AtMost(n));
-    let first = [0.4827964416, 0.6295558520, 0.6295558520, 0.8360829517];
     for (light, count, exact) in
-        [(INDIRECT, 100, S1_INDIRECT_LX), (at_most(7), 100, S1_SEVEN_LX), (at_most(1), 200, first)]
+        [(INDIRECT, 100, S1_INDIRECT_LX), (at_most(7), 100, S1_SEVEN_LX), (at_most(1), 200, S1_FIRST_LX)]
     {
         let measured = read(&in_eight_blocks(s1(light), count));
         within_errors_and_named_bias(&measured, &exact);
@@ -239,14 +238,14 @@ fn uneven(transport: Transport) -> Job {
 
 #[test]
 fn all_light_of_an_uneven_room_agrees_with_the_simulator() {
-    let job = in_eight_blocks(uneven(Transport::Total(Bounces::Converged)), 200);
+    let job = in_eight_blocks(uneven(Transport::Total(Bounces::Converged)), by_night(200, 50));
     within_errors_and_named_bias(&read(&job), &simulated_lx(&job, 1e-4));
 }
 
 #[test]
 fn out_of_the_box_povray_is_far_off_and_says_so() {
-    let mut job = s1(INDIRECT);
-    job.settings.insert("preset".into(), "default".into());
+    // As few blocks as there may be: it is off by more than they scatter.
+    let job = within(0.5, with_preset(s1(INDIRECT), "default"));
     let Support::Approximate { size: Some(size), .. } = PovRay.supports(&job) else { panic!("taken for exact") };
     let off = worst_relative(&read(&job), &S1_INDIRECT_LX);
     assert!(off > 0.05 && off < size, "off by {off}, said to be within {size}");
@@ -366,8 +365,8 @@ fn wrong_exports_are_seen_in_the_readings() {
 
 #[test]
 fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
-    shared_tests::bounds_hold_and_decide(read, false);
-    shared_tests::bounds_hold_and_decide(read, true);
+    shared_tests::bounds_hold_and_decide(read, false, 6);
+    shared_tests::bounds_hold_and_decide(read, true, 6);
 }
 
 #[test]

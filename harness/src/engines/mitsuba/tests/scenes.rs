@@ -38,7 +38,7 @@ fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
 #[test]
 fn bright_rooms_keep_all_their_light() {
     // In a closed room of one reflectance the area-mean indirect illuminance is Phi rho / (A (1 - rho)).
-    let rho = 0.97;
+    let rho = by_night(0.97, 0.9);
     let isotropic = LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![100.0, 100.0]).unwrap();
     let scene = Scene {
         room: Some(room(DVec3::splat(4.0), rho, rho, rho)),
@@ -109,5 +109,5 @@ fn what_cannot_be_read_well_is_said_beforehand() {
 
 #[test]
 fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
-    crate::engines::shared_tests::bounds_hold_and_decide(read, false);
+    crate::engines::shared_tests::bounds_hold_and_decide(read, false, 6);
 }

@@ -287,8 +287,9 @@ mod tests {
 
     #[test]
     fn bounds_hold_in_a_few_random_rooms_and_a_miss_would_be_told() {
-        let mut found = coverage(4, 0.1, 20);
-        assert!(found.is_good() && found.readings == 4 * METERS, "{found}");
+        // The nightly has more of them.
+        let mut found = coverage(2, 0.1, 20);
+        assert!(found.is_good() && found.readings == 2 * METERS, "{found}");
         let mut room = Room::of(7, 1, 0.1).unwrap();
         // What is certified wrongly is cleared; a wrong reading is not.
         room.truth[5] = Certified::sampled(2.0 * room.truth[5].lux, 1e-9);
