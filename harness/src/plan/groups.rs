@@ -35,21 +35,67 @@ pub fn groups(nodes: &[Node], seconds: f64) -> Vec<Group> {
     let mut groups: Vec<Group> = vec![];
     for node in open {
         let takes_s = if node.is_at_most && node.threads == 1 { node.seconds.min(QUICK_S) } else { node.seconds };
-        let fits = |group: &&mut Group| group.threads == node.threads && group.seconds + takes_s <= seconds;
-        let number = groups.len() + 1;
-        let group = match groups.last_mut().filter(fits) {
-            Some(group) => group,
-            None => {
-                let (id, threads) = (format!("g{number:05}"), node.threads);
-                groups.push(Group { id, threads, memory_mib: 0, seconds: 0.0, at_most_s: 0.0, jobs: vec![] });
-                let Some(last) = groups.last_mut() else { continue };
-                last
-            }
-        };
+        let fits = |group: &Group| group.threads == node.threads && group.seconds + takes_s <= seconds;
+        let mut group = groups.pop_if(|last| fits(last)).unwrap_or_else(|| Group {
+            id: format!("g{:05}", groups.len() + 1),
+            threads: node.threads,
+            memory_mib: 0,
+            seconds: 0.0,
+            at_most_s: 0.0,
+            jobs: vec![],
+        });
         group.memory_mib = group.memory_mib.max(node.memory_mib);
         group.seconds += takes_s;
         group.at_most_s += 2.0 * node.seconds + PATIENCE_S;
         group.jobs.push(node.id.clone());
+        groups.push(group);
     }
     groups
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::measure::Needs;
+    use crate::record::{EngineName, ProcedureId};
+
+    fn node(number: usize, threads: usize, seconds: f64, is_at_most: bool) -> Node {
+        Node {
+            id: format!("mine/{number:064x}").parse().unwrap(),
+            engine: EngineName::from("mine"),
+            procedure: ProcedureId::DirectIlluminance,
+            cases: BTreeSet::new(),
+            part: "direct_illuminance".to_owned(),
+            meters: 1,
+            threads,
+            memory_mib: 100 + number as u64,
+            seconds,
+            is_at_most,
+            needs: Needs { version: "1".to_owned(), fingerprint: String::new() },
+            is_read: number == 0,
+        }
+    }
+
+    #[test]
+    fn every_open_job_is_in_one_group_of_its_threads_and_short_ones_share() {
+        let mut nodes: Vec<Node> = (0..20).map(|k| node(k, 1, 60.0, true)).collect();
+        nodes.extend([node(20, 2, 45.0, true), node(21, 2, 10.0, false), node(22, 2, 40.0, true)]);
+        let groups = groups(&nodes, 30.0);
+        let jobs: Vec<&Key> = groups.iter().flat_map(|group| &group.jobs).collect();
+        assert_eq!(jobs, nodes[1..].iter().map(|node| &node.id).collect::<Vec<_>>());
+        let told: Vec<_> = groups.iter().map(|g| (g.id.as_str(), g.threads, g.jobs.len(), g.memory_mib)).collect();
+        assert_eq!(
+            told,
+            [
+                ("g00001", 1, 15, 115),
+                ("g00002", 1, 4, 119),
+                ("g00003", 2, 1, 120),
+                ("g00004", 2, 1, 121),
+                ("g00005", 2, 1, 122)
+            ]
+        );
+        assert_eq!(groups[0].at_most_s, 15.0 * (2.0 * 60.0 + PATIENCE_S));
+    }
 }
