@@ -10,8 +10,9 @@ use crate::cli::{Audited, Choice, Extent};
 use crate::system::files::{self, FileError};
 use crate::system::process::quoted;
 
-const FILES: [(&str, &str); 3] = [
+const FILES: [(&str, &str); 4] = [
     ("Snakefile", include_str!("snakemake/Snakefile")),
+    ("envs/luxproof.yaml", include_str!("snakemake/environment.yaml")),
     ("profiles/local/config.yaml", include_str!("snakemake/profiles/local.yaml")),
     ("profiles/slurm/config.yaml", include_str!("snakemake/profiles/slurm.yaml")),
 ];
