@@ -76,12 +76,12 @@ impl Lab {
     }
 }
 
-/// A report less its times.
+/// A report less its times, and with how many others a job had them.
 fn timeless(mut report: Value) -> Value {
     fn strip(value: &mut Value) {
         match value {
             Value::Object(fields) => {
-                for name in ["started", "wall_s", "cpu_s", "checksum"] {
+                for name in ["started", "wall_s", "cpu_s", "jobs_at_once", "checksum"] {
                     fields.remove(name);
                 }
                 fields.values_mut().for_each(strip);
@@ -92,6 +92,25 @@ fn timeless(mut report: Value) -> Value {
     }
     strip(&mut report);
     report
+}
+
+/// Where two values differ, and by what.
+fn differences(a: &Value, b: &Value) -> Vec<String> {
+    fn compare(at: &str, a: &Value, b: &Value, found: &mut Vec<String>) {
+        match (a, b) {
+            (Value::Object(x), Value::Object(y)) if x.len() == y.len() => {
+                x.iter().for_each(|(name, v)| compare(&format!("{at}/{name}"), v, y.get(name).unwrap_or(&Value::Null), found));
+            }
+            (Value::Array(x), Value::Array(y)) if x.len() == y.len() => {
+                (0..x.len()).for_each(|k| compare(&format!("{at}/{k}"), &x[k], &y[k], found));
+            }
+            _ if a == b => {}
+            _ => found.push(format!("{at}: {a:.200} and {b:.200}")),
+        }
+    }
+    let mut found = Vec::new();
+    compare("", a, b, &mut found);
+    found
 }
 
 fn ids(plan: &Value, are_read: bool) -> Vec<String> {
@@ -122,7 +141,28 @@ fn what_others_read_in_rounds_makes_the_report_of_one_run() {
     let looks = |report: &Value| report["readings"].to_string();
     let (run, joined) = (lab.0.json("out/report.json"), lab.0.json("joined/report.json"));
     assert_eq!(looks(&run), looks(&joined));
-    assert_eq!(timeless(run), timeless(joined));
+    assert_eq!(differences(&timeless(run), &timeless(joined)), [""; 0]);
+}
+
+/// What is read together is planned one by one, and asked for nowhere else.
+#[test]
+fn plans_and_reports_from_a_cache_start_nobody_who_reads_in_batches() {
+    let asked = "def reply(request):\n    with open('asked', 'a') as log:\n        log.write(request['verb'] + '\\n')\n";
+    let lab = Lab::new(&adapter().replace("def reply(request):\n", asked));
+    let reads = || lab.0.read("asked").lines().filter(|verb| *verb == "read").count();
+    // Those of the calibration are read together, and planned each.
+    let plan = lab.plan("plan.json");
+    let is_open = |job: &&Value| job["engine"] == "mine" && job["cases"] == serde_json::json!(["calibration"]);
+    let open = plan["jobs"].as_array().unwrap().iter().filter(is_open).filter(|job| job["is_read"] == false);
+    assert_eq!(open.count(), 3);
+    assert_eq!(lab.report_from_cache().0, Some(3));
+    assert_eq!(reads(), 0);
+    lab.read_all();
+    assert!(reads() > 0);
+    lab.0.write("asked", "");
+    assert_eq!(ids(&lab.plan("whole.json"), false), [""; 0]);
+    assert_eq!(lab.report_from_cache().0, Some(0));
+    assert_eq!(reads(), 0);
 }
 
 #[test]

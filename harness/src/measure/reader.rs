@@ -55,16 +55,17 @@ impl Reader {
     }
 
     pub fn read(&self, question: &Question<'_>) -> Result<Taken, Failure> {
-        let key = question.key()?;
+        self.read_under(&question.key()?, question)
+    }
+
+    fn read_under(&self, key: &Key, question: &Question<'_>) -> Result<Taken, Failure> {
         // Whoever asks the same at the same time waits for this answer.
-        let answered = self.machine.answered(&key);
+        let answered = self.machine.answered(key);
         let mut answered = answered.as_ref().map(|a| a.lock());
         let known = answered.as_ref().and_then(|a| (**a).clone());
-        let found = known.or_else(|| self.find(&key));
-        let is_open = found.is_none() && !self.asking.admits(&key);
-        if self.asking.is_shared() {
-            self.asked.note(&key, question, &self.machine.slots, !is_open);
-        }
+        let found = known.or_else(|| self.find(key));
+        let is_open = found.is_none() && !self.asking.admits(key);
+        self.note(key, question, !is_open);
         let (entry, source) = match found {
             Some(entry) => {
                 self.lay_out(question, &entry)?;
@@ -73,14 +74,35 @@ impl Reader {
             None if is_open => return Err(Failure::new(FailureKind::Unread, "nobody has read it yet")),
             None => (self.ask(question)?, Source::Engine),
         };
+        self.settle(key, question, entry, source, answered.as_deref_mut())
+    }
+
+    /// For whoever plans what others read.
+    fn note(&self, key: &Key, question: &Question<'_>, is_read: bool) {
+        if self.asking.is_shared() {
+            self.asked.note(key, question, &self.machine.slots, is_read);
+        }
+    }
+
+    /// Keeps what is final where it is found again, and takes the reading from it.
+    fn settle(
+        &self,
+        key: &Key,
+        question: &Question<'_>,
+        entry: Entry,
+        source: Source,
+        answered: Option<&mut Option<Entry>>,
+    ) -> Result<Taken, Failure> {
+        let is_new = source == Source::Engine;
         if question.is_final(&entry) {
-            if source == Source::Engine {
-                self.keep(&key, &entry);
+            if is_new {
+                self.keep(key, &entry);
             }
-            if let Some(answered) = &mut answered {
-                **answered = Some(entry.clone());
+            if let Some(answered) = answered {
+                *answered = Some(entry.clone());
             }
-        } else if self.asking.keeps_failures()
+        } else if is_new
+            && self.asking.keeps_failures()
             && entry.answer.as_ref().is_err_and(|failure| failure.kind.is_an_answer())
         {
             self.keep(&key.of_failure(), &entry);
@@ -95,24 +117,29 @@ impl Reader {
         if !first.instrument.engine.takes_batches() {
             return questions.iter().map(|q| self.read(q)).collect();
         }
-        // Answers to be found are; what is to be asked has no other place that asks it, since its names are of its case alone.
-        let is_known = |q: &Question<'_>| q.key().is_ok_and(|key| self.find(&key).is_some());
-        let open: Vec<usize> = (0..questions.len()).filter(|k| !is_known(&questions[*k])).collect();
-        let mut found = self.ask_together(&open.iter().map(|k| &questions[*k]).collect::<Vec<_>>()).into_iter();
-        let of = |(k, question): (usize, &Question<'_>)| {
-            let asked = if open.contains(&k) { found.next() } else { None };
-            let Some(entry) = asked else { return self.read(question) };
-            let (key, entry) = (question.key()?, entry?);
-            if question.is_final(&entry) {
-                self.keep(&key, &entry);
-                if let Some(answered) = self.machine.answered(&key) {
-                    *answered.lock() = Some(entry.clone());
+        // Of each its key, and whether it is to be asked: no other place asks for that, since its names are of its case alone.
+        let keyed = |question: &Question<'_>| -> Result<(Key, bool), Failure> {
+            let key = question.key()?;
+            let is_to_ask = self.asking.admits(&key) && self.find(&key).is_none();
+            Ok((key, is_to_ask))
+        };
+        let keyed: Vec<_> = questions.iter().map(keyed).collect();
+        let pairs = questions.iter().zip(&keyed);
+        let together: Vec<_> = pairs.filter(|(_, keyed)| matches!(keyed, Ok((_, true)))).map(|(q, _)| q).collect();
+        let mut answers = self.ask_together(&together).into_iter();
+        let of = |(question, keyed): (&Question<'_>, Result<(Key, bool), Failure>)| {
+            let (key, is_to_ask) = keyed?;
+            match is_to_ask.then(|| answers.next()).flatten() {
+                None => self.read_under(&key, question),
+                Some(entry) => {
+                    self.note(&key, question, true);
+                    let answered = self.machine.answered(&key);
+                    let mut answered = answered.as_ref().map(|a| a.lock());
+                    self.settle(&key, question, entry?, Source::Engine, answered.as_deref_mut())
                 }
             }
-            let measurement = checked(&entry.key.engine, question.job, entry.answer?)?;
-            Ok(Taken { measurement, cost: entry.cost, source: Source::Engine })
         };
-        questions.iter().enumerate().map(of).collect()
+        questions.iter().zip(keyed).map(of).collect()
     }
 
     /// What keeps an engine from being asked now.
