@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{Answer, Folder, LAMP, MINE_OF_VERSION_ONE, ROOM, TWO_METERS, adapter_of_version_one, among};
+use crate::support::{Answer, Folder, LAMP, MINE_OF_VERSION_ONE, OWN, ROOM, TWO_METERS, adapter_of_version_one, among};
 
 const CASES: &str = "procedures:
   direct_illuminance: {meters: plane}
@@ -111,4 +111,25 @@ fn an_interrupted_run_reports_what_was_done_and_what_was_not() {
     folder.run(&["--jobs", "1"]).exits(0);
     assert_eq!(starts(&folder), [2, 3, 2]);
     assert!(!folder.report()["skips"].as_array().unwrap().iter().any(is_not_run));
+}
+
+/// Reflected light in a furnished room, finely: our simulator may be stopped long before it is done, and says what it knows by then.
+#[test]
+fn what_was_known_when_it_was_stopped_answers_no_other_run() {
+    let table = "obstacles:\n  - box: {min_m: [2, 1, 0], max_m: [4, 2, 0.7], reflectance: 0.4}\n";
+    let asked = "procedures:\n  total_illuminance: {meters: plane}\nbudget: {relative_error: 0.002, seconds: 600}\n";
+    let folder = Folder::new(&[("spec.yaml", &[ROOM, table, TWO_METERS, asked].concat()), ("lamp.ies", LAMP)]);
+    let own = ["--engines", OWN];
+    let began = Instant::now();
+    folder.run(&[&own[..], &["--no-cache"]].concat()).exits(0);
+    let (whole, whole_s) = (folder.report(), began.elapsed());
+    for tenths in [2, 4, 6, 8, 9] {
+        let mut program = folder.command(&["run", "spec.yaml", "--out", "out", "--no-calibration", "--engines", OWN]);
+        let mut child = program.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(whole_s * tenths / 10);
+        assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+        child.wait().unwrap();
+    }
+    folder.run(&own).exits(0);
+    assert_eq!(folder.report()["readings"], whole["readings"]);
 }

@@ -99,13 +99,15 @@ fn differences(a: &Value, b: &Value) -> Vec<String> {
     fn compare(at: &str, a: &Value, b: &Value, found: &mut Vec<String>) {
         match (a, b) {
             (Value::Object(x), Value::Object(y)) if x.len() == y.len() => {
-                x.iter().for_each(|(name, v)| compare(&format!("{at}/{name}"), v, y.get(name).unwrap_or(&Value::Null), found));
+                x.iter().for_each(|(name, v)| {
+                    compare(&format!("{at}/{name}"), v, y.get(name).unwrap_or(&Value::Null), found);
+                });
             }
             (Value::Array(x), Value::Array(y)) if x.len() == y.len() => {
                 (0..x.len()).for_each(|k| compare(&format!("{at}/{k}"), &x[k], &y[k], found));
             }
             _ if a == b => {}
-            _ => found.push(format!("{at}: {a:.200} and {b:.200}")),
+            _ => found.push(format!("{at}: {:.200} and {:.200}", a.to_string(), b.to_string())),
         }
     }
     let mut found = Vec::new();
@@ -147,7 +149,8 @@ fn what_others_read_in_rounds_makes_the_report_of_one_run() {
 /// What is read together is planned one by one, and asked for nowhere else.
 #[test]
 fn plans_and_reports_from_a_cache_start_nobody_who_reads_in_batches() {
-    let asked = "def reply(request):\n    with open('asked', 'a') as log:\n        log.write(request['verb'] + '\\n')\n";
+    let asked =
+        "def reply(request):\n    with open('asked', 'a') as log:\n        log.write(request['verb'] + '\\n')\n";
     let lab = Lab::new(&adapter().replace("def reply(request):\n", asked));
     let reads = || lab.0.read("asked").lines().filter(|verb| *verb == "read").count();
     // Those of the calibration are read together, and planned each.

@@ -3,6 +3,7 @@
 //! As root, Debian packages are installed system-wide; otherwise they are downloaded and unpacked into the site.
 
 mod debian;
+mod linked;
 mod venv;
 mod verify;
 mod web;

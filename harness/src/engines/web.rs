@@ -8,7 +8,8 @@ mod settings;
 pub(super) mod tests;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use luminaire::photometry::{Photometry, lm63};
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Transport};
@@ -156,6 +157,12 @@ impl Web {
     }
 }
 
+/// What a package of npm says of itself.
+fn packaged_version(folder: &Path) -> Option<String> {
+    let told: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("package.json")).ok()?).ok()?;
+    Some(told["version"].as_str()?.to_owned())
+}
+
 impl Engine for Web {
     fn name(&self) -> EngineName {
         self.0.entry().name.clone()
@@ -178,13 +185,11 @@ impl Engine for Web {
             Library::Three => settings::RELEASES.iter().map(|release| modules.join(self.0.package(release))).collect(),
             Library::Babylon => vec![modules.join(self.0.package(""))],
         };
-        if let Some(gone) = releases.iter().find(|folder| !folder.is_dir()) {
-            return Err(absent(&format!("{} is missing", gone.display())));
-        }
-        let text = match self.0 {
-            Library::Three => format!("{} in {chromium_version}", settings::RELEASES.join(" and ")),
-            Library::Babylon => format!("9.35.0 in {chromium_version}"),
+        let version = |folder: &PathBuf| {
+            packaged_version(folder).ok_or_else(|| absent(&format!("{} is missing or of no version", folder.display())))
         };
+        let versions = releases.iter().map(version).collect::<Result<Vec<_>, _>>()?;
+        let text = format!("{} in {chromium_version}", versions.join(" and "));
         let files = [node, chromium, modules.join("playwright-core")].into_iter().chain(releases);
         Ok(Version::of(&self.name(), text, site, files))
     }

@@ -94,7 +94,10 @@ impl Reader {
         answered: Option<&mut Option<Entry>>,
     ) -> Result<Taken, Failure> {
         let is_new = source == Source::Engine;
-        if question.is_final(&entry) {
+        if is_new && process::is_interrupted() {
+            // What nobody waited for is what was known by then, and no answer for another time.
+            self.note(key, question, false);
+        } else if question.is_final(&entry) {
             if is_new {
                 self.keep(key, &entry);
             }

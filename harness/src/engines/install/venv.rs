@@ -1,16 +1,11 @@
-//! The virtual environment of the pinned Python packages: made beside the old one, then put in its place by one rename.
-//!
-//! `venv` is a link to `venv-<hash of the lock>`; the link is made last, so a half-made environment is never used.
+//! The virtual environments of the pinned Python packages.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use sha2::{Digest, Sha256};
-
 use super::verify::{self, Soundness};
-use super::{InstallError, step};
+use super::{InstallError, linked, step};
 use crate::engines::Site;
-use crate::system::digest::hexadecimal;
 
 /// What an environment holds, and which Python it takes.
 #[derive(Clone, Copy)]
@@ -73,13 +68,13 @@ impl Environment {
     }
 
     fn folder_name(&self) -> String {
-        format!("venv-{}", &hexadecimal(&Sha256::digest(self.lock))[..16])
+        linked::folder_name("venv", self.lock)
     }
 
     pub(super) fn install(&self, site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
         fs::create_dir_all(site.root()).map_err(|e| InstallError::io(site.root(), e))?;
         let folder = site.root().join(self.folder_name());
-        remove(&folder)?;
+        linked::remove(&folder)?;
         progress("making a Python environment");
         self.make(site, &folder)?;
         progress(&format!("downloading and installing {}", self.what));
@@ -89,7 +84,7 @@ impl Environment {
         // The lock is whole: what a package asks for besides is left out on purpose.
         let pinned = ["--require-hashes", "--no-deps", "--only-binary", ":all:", "--requirement"];
         step(site, folder.join("bin/python")).args(pip).args(pinned).args([lock]).run()?;
-        put_in_place(site, &folder)?;
+        linked::put_in_place(&site.venv(), &folder)?;
         Ok(site.venv().display().to_string())
     }
 
@@ -120,39 +115,6 @@ impl Environment {
     }
 }
 
-/// Points the link `venv` at the folder in one rename, then removes environments of earlier locks.
-fn put_in_place(site: &Site, folder: &Path) -> Result<(), InstallError> {
-    let link = site.root().join("venv.new");
-    remove(&link)?;
-    let Some(target) = folder.file_name() else { return Ok(()) };
-    std::os::unix::fs::symlink(target, &link).map_err(|e| InstallError::io(&link, e))?;
-    let venv = site.venv();
-    if venv.symlink_metadata().is_ok_and(|m| m.is_dir()) {
-        remove(&venv)?;
-    }
-    fs::rename(&link, &venv).map_err(|e| InstallError::io(&venv, e))?;
-    for old in earlier(site, folder) {
-        remove(&old)?;
-    }
-    Ok(())
-}
-
-fn earlier(site: &Site, current: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(site.root()).into_iter().flatten().flatten().map(|e| e.path());
-    let is_ours = |p: &PathBuf| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with("venv-"));
-    entries.filter(|p| is_ours(p) && p != current).collect()
-}
-
-/// Removes a file, a link (never what it points to) or a folder; fine if there is none.
-fn remove(path: &Path) -> Result<(), InstallError> {
-    let removed = match path.symlink_metadata() {
-        Err(_) => return Ok(()),
-        Ok(m) if m.is_dir() => fs::remove_dir_all(path),
-        Ok(_) => fs::remove_file(path),
-    };
-    removed.map_err(|e| InstallError::io(path, e))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -168,7 +130,7 @@ mod tests {
             fs::write(named.join("RECORD"), "").unwrap();
         }
         let site = Site::at(root);
-        put_in_place(&site, &folder).unwrap();
+        linked::put_in_place(&site.venv(), &folder).unwrap();
         site
     }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 use super::verify::Soundness;
-use super::{InstallError, step, venv};
+use super::{InstallError, linked, step, venv};
 use crate::engines::Site;
 use crate::system::digest::hexadecimal;
 
@@ -16,9 +16,9 @@ const LOCK: &str = include_str!("../../../web/package-lock.json");
 /// What every file had when it was installed, beside `node_modules`.
 const SUMS: &str = "sums.txt";
 
-/// `packages` is a link to this folder; it is made last, so that half an installation is never used.
+/// `packages` is a link to this folder.
 fn folder(site: &Site) -> PathBuf {
-    site.web().root().join(format!("packages-{}", &hexadecimal(&Sha256::digest(LOCK))[..16]))
+    site.web().root().join(linked::folder_name("packages", LOCK))
 }
 
 pub(super) fn is_current(site: &Site) -> bool {
@@ -49,9 +49,7 @@ pub(super) fn install(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<Str
         let path = path.to_owned();
         move |e| InstallError::io(&path, e)
     };
-    if folder.exists() {
-        fs::remove_dir_all(&folder).map_err(fail(&folder))?;
-    }
+    linked::remove(&folder)?;
     fs::create_dir_all(&folder).map_err(fail(&folder))?;
     for (name, text) in [("package.json", MANIFEST), ("package-lock.json", LOCK)] {
         let path = folder.join(name);
@@ -62,13 +60,11 @@ pub(super) fn install(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<Str
     let cache = folder.join("cache");
     let quiet = ["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--no-update-notifier", "--cache"];
     step(&web, node).args([npm]).args(quiet).args([&cache]).args(["--prefix".into(), folder.clone()]).run()?;
-    fs::remove_dir_all(&cache).map_err(fail(&cache))?;
+    linked::remove(&cache)?;
     let sums = folder.join(SUMS);
     fs::write(&sums, sums_of(&folder)).map_err(fail(&sums))?;
-    let (link, new) = (web.root().join("packages"), web.root().join("packages.new"));
-    fs::remove_file(&new).ok();
-    std::os::unix::fs::symlink(folder.file_name().unwrap_or_default(), &new).map_err(fail(&new))?;
-    fs::rename(&new, &link).map_err(fail(&link))?;
+    let link = web.root().join("packages");
+    linked::put_in_place(&link, &folder)?;
     Ok(link.display().to_string())
 }
 
