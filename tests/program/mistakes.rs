@@ -232,6 +232,10 @@ fn what_is_hardly_meant_is_a_warning_at_its_place_and_no_error() {
     folder.edit("spec.yaml", "[6, 4, 3]", "[20, 13, 9]");
     folder.edit("spec.yaml", "at_m: [3, 2, 2.5]", "at_m: [3, 2, 8.5]");
     folder.luxproof(&["check", "spec.yaml"]).complains("are these feet?");
+    // What many cases have is told once.
+    folder.edit("spec.yaml", "procedures:", "cases: [{name: a}, {name: b}, {name: c}]\nprocedures:");
+    let told = folder.luxproof(&["check", "spec.yaml"]).complains("(in spec/a and 2 more)").stderr;
+    assert_eq!(told.matches("are these feet?").count(), 1, "{told}");
     // The same where it is run.
     let out = ["run", "spec.yaml", "--engines", "simulator,iesna", "--no-calibration"];
     std::fs::remove_file(folder.path("luxproof.yaml")).unwrap();

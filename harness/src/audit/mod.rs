@@ -190,9 +190,7 @@ pub fn run(specs: &[PathBuf], options: &Options<'_>) -> Result<Report, AuditErro
 /// The same; as long as the claim is kept the folder is the caller's.
 pub fn run_and_hold(specs: &[PathBuf], options: &Options<'_>) -> Result<(Report, Claim), AuditError> {
     let (mut cases, mut policies) = chosen(specs, options)?;
-    for case in &cases {
-        options.observer.doubted(&doubts(case));
-    }
+    options.observer.doubted(&doubts(&cases));
     let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
     let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
     let spec = subject(specs, &cases);

@@ -28,9 +28,7 @@ pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Ex
         ..Options::new(site.clone(), out_folder(selected))
     };
     let (cases, policies) = audit::chosen(&selected.specs, &options).map_err(diagnose)?;
-    for case in &cases {
-        warn(&doubts(case));
-    }
+    warn(&doubts(&cases));
     let published = audit::published(&cases).map_err(diagnose)?;
     let mut out = String::new();
     let mut exit = Exit::Passed;

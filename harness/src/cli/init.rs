@@ -104,9 +104,7 @@ pub(super) fn init(args: &InitArgs) -> Result<Exit, Diagnostic> {
     }
     write(&args.spec, text.as_bytes())?;
     let cases: Vec<Case> = suite(std::slice::from_ref(&args.spec), Trust::Own).map_err(diagnose)?;
-    for case in &cases {
-        warn(&doubts(case));
-    }
+    warn(&doubts(&cases));
     print(&format!("{}\n{}\n", args.spec.display(), lamp.display()))?;
     complain(&format!("next: luxproof run {}", args.spec.display()));
     Ok(Exit::Passed)

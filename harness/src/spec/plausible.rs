@@ -1,10 +1,13 @@
 //! What is allowed in a spec and hardly meant: told before anything runs, and no error.
 
+use std::collections::HashMap;
 use std::f64::consts::PI;
+use std::path::Path;
 
 use glam::DVec3;
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Shape, Transport};
 
+use super::faults::MAX_FAULTS;
 use super::{Case, SpecError};
 use crate::procedures::{Asked, Task};
 
@@ -24,9 +27,45 @@ const MAX_LOOKS: usize = 1_000_000;
 /// How far from its centre an opening may reach, in metres; beyond that it is asked for light as if it were a point.
 const OPENING_M: f64 = 2.0;
 
-/// What is hardly meant in a sound case, each at its place.
-pub fn doubts(case: &Case) -> Vec<SpecError> {
-    let mut found: Vec<SpecError> = size(case).into_iter().collect();
+/// What is hardly meant, and where in the spec.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Doubt {
+    at: String,
+    message: String,
+    help: String,
+}
+
+impl Doubt {
+    fn new(at: impl Into<String>, message: String, help: impl Into<String>) -> Self {
+        Self { at: at.into(), message, help: help.into() }
+    }
+}
+
+/// What is hardly meant in sound cases, each at its place: once, where many cases of a spec have it.
+pub fn doubts(cases: &[Case]) -> Vec<SpecError> {
+    let mut found: Vec<(Doubt, &Case, usize)> = vec![];
+    let mut places: HashMap<(&Path, Doubt), usize> = HashMap::new();
+    for case in cases {
+        for doubt in of_case(case) {
+            let place = *places.entry((&case.path, doubt.clone())).or_insert(found.len());
+            match found.get_mut(place) {
+                Some((.., others)) => *others += 1,
+                None => found.push((doubt, case, 0)),
+            }
+        }
+    }
+    let told = found.into_iter().take(MAX_FAULTS).map(|(doubt, case, others)| {
+        let message = match others {
+            0 => doubt.message,
+            n => format!("{} (in {} and {n} more)", doubt.message, case.name),
+        };
+        case.source.error_at(&doubt.at, message, doubt.help)
+    });
+    told.collect()
+}
+
+fn of_case(case: &Case) -> Vec<Doubt> {
+    let mut found: Vec<Doubt> = size(case).into_iter().collect();
     found.extend(enclosed(case));
     found.extend(wide_tolerances(case));
     found.extend(facing_out(case));
@@ -35,10 +74,10 @@ pub fn doubts(case: &Case) -> Vec<SpecError> {
 }
 
 /// Sizes that are metres in no building, but would be usual in another unit.
-fn size(case: &Case) -> Option<SpecError> {
+fn size(case: &Case) -> Option<Doubt> {
     let room = case.scene.room.as_ref()?;
     let [x, y, z] = room.size_m.to_array();
-    let fault = |message: String, help: &str| Some(case.source.error_at("room.size_m", message, help));
+    let fault = |message: String, help: &str| Some(Doubt::new("room.size_m", message, help));
     let help = "all lengths of a spec are metres";
     if z > HIGHEST_M || x.max(y) > LONGEST_M {
         let units = [("millimetres", 1e-3), ("centimetres", 1e-2), ("inches", FOOT_M / 12.0)];
@@ -58,14 +97,14 @@ fn size(case: &Case) -> Option<SpecError> {
 }
 
 /// Luminaires inside opaque bodies, which no light leaves.
-fn enclosed(case: &Case) -> Vec<SpecError> {
+fn enclosed(case: &Case) -> Vec<Doubt> {
     let scene = &case.scene;
     let faults = scene.luminaires.iter().enumerate().filter_map(|(k, luminaire)| {
         let body =
             scene.obstacles.iter().position(|o| is_inside(&o.shape, luminaire.position_m, scene.luminaires.len()))?;
         let message = format!("`{}` hangs inside obstacles[{body}], which no light leaves", luminaire.id);
         let help = "move one of them, or leave the body out: its light is in the photometric file";
-        Some(case.source.error_at(&format!("luminaires[{k}].at_m"), message, help))
+        Some(Doubt::new(format!("luminaires[{k}].at_m"), message, help))
     });
     faults.collect()
 }
@@ -87,7 +126,7 @@ fn is_inside(shape: &Shape, point: DVec3, luminaires: usize) -> bool {
     }
 }
 
-fn wide_tolerances(case: &Case) -> Vec<SpecError> {
+fn wide_tolerances(case: &Case) -> Vec<Doubt> {
     let wide = case.tolerances.iter().filter(|(_, t)| t.relative >= WIDE);
     let fault = |(procedure, tolerance): (&_, &super::ToleranceOverride)| {
         let message = format!("a tolerance of {} % lets nearly everything pass", 100.0 * tolerance.relative);
@@ -96,13 +135,13 @@ fn wide_tolerances(case: &Case) -> Vec<SpecError> {
             tolerance.relative,
             tolerance.relative / 100.0
         );
-        case.source.error_at(&format!("tolerances.{procedure}.relative"), message, help)
+        Doubt::new(format!("tolerances.{procedure}.relative"), message, help)
     };
     wide.map(fault).collect()
 }
 
 /// Meters that look at the next surface from nearby, their backs to the room.
-fn facing_out(case: &Case) -> Vec<SpecError> {
+fn facing_out(case: &Case) -> Vec<Doubt> {
     let Some(room) = &case.scene.room else { return vec![] };
     let faults = case.meters.iter().filter_map(|(name, meters)| {
         let faces = |meter: &Meter| {
@@ -126,13 +165,13 @@ fn facing_out(case: &Case) -> Vec<SpecError> {
         };
         let message = format!("{name}[{k}] turns its back to the room and faces a surface {distance:.4} m away ({of})");
         let help = "the normal points to where light comes from: [0, 0, 1] for a meter that lies on a desk";
-        Some(case.source.error_at(&format!("meters.{name}.normal"), message, help))
+        Some(Doubt::new(format!("meters.{name}.normal"), message, help))
     });
     faults.collect()
 }
 
 /// A task of direct light that no luminaire sends any of to any of its meters, whatever stands in between.
-fn dark(case: &Case, task: &Task) -> Option<SpecError> {
+fn dark(case: &Case, task: &Task) -> Option<Doubt> {
     if task.transport != Transport::Direct || task.scene.room.is_none() {
         return None;
     }
@@ -145,7 +184,7 @@ fn dark(case: &Case, task: &Task) -> Option<SpecError> {
     let sets: Vec<&str> = asked.meters.iter().collect();
     let message = format!("no luminaire sends light to any meter of {}: every reading is 0", sets.join(", "));
     let help = "look at the normals of the meters, the rotation of the luminaires, and flux_scale";
-    Some(case.source.error_at(&format!("procedures.{}", task.procedure), message, help))
+    Some(Doubt::new(format!("procedures.{}", task.procedure), message, help))
 }
 
 fn may_light(luminaire: &Luminaire, meter: &Meter) -> bool {
