@@ -13,6 +13,7 @@ use super::question::Question;
 use super::subprocess::{self, Isolation, Request};
 use crate::engines::{Engine, EngineError, Job, Measurement, Site, Support, Workbench, checked, share};
 use crate::record::{EngineName, FailureKind, ReadingKey};
+use crate::system::files::remedy;
 use crate::system::process::{self, PeakMemory, ProcessError};
 use crate::system::slots::{Held, Share};
 
@@ -244,7 +245,9 @@ impl Reader {
             Lookup::Found(entry) => Some(*entry),
             Lookup::Unknown => None,
             Lookup::Damaged(what) => {
-                tracing::warn!("{}: the cache's {what}; the reading is taken anew", key.engine);
+                let outcome =
+                    if self.asking.admits(key) { "the reading is taken anew" } else { "it counts as not read" };
+                tracing::warn!("{}: the cache's {what}; {outcome}", key.engine);
                 None
             }
         }
@@ -254,8 +257,8 @@ impl Reader {
         if let Some(cache) = &self.cache
             && let Err(error) = cache.keep(key, entry)
         {
-            let path = cache.path(key);
-            tracing::warn!("{}: a reading could not be kept in {}: {error}", entry.key.engine, path.display());
+            let (engine, path, remedy) = (&entry.key.engine, cache.path(key), remedy(&error));
+            tracing::warn!("{engine}: a reading could not be kept in {}: {error}{remedy}", path.display());
         }
     }
 
