@@ -8,6 +8,7 @@ mod ies;
 pub(super) mod tests;
 
 use self::ies::LookedUp;
+use super::cost::DirectCost;
 use super::patches::settings::{self, Settings};
 use super::patches::{self, Package};
 use super::{
@@ -69,6 +70,10 @@ impl Engine for Cycles {
 
     fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
         Some(PACKAGE.command_by_hand(site))
+    }
+
+    fn expected_s(&self, job: &Job) -> Option<f64> {
+        DirectCost { start_s: 0.75, point_s: 6e-4, opening_s: None }.of(job)
     }
 
     fn knobs(&self) -> &'static [Knob] {

@@ -6,6 +6,7 @@ mod map;
 pub(super) mod tests;
 
 use self::map::Map;
+use super::cost::DirectCost;
 use super::patches::settings::{self, Settings};
 use super::patches::{self, Package};
 use super::settings::Preset;
@@ -74,6 +75,10 @@ impl Engine for LuxCore {
 
     fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
         Some(PACKAGE.command_by_hand(site))
+    }
+
+    fn expected_s(&self, job: &Job) -> Option<f64> {
+        DirectCost { start_s: 0.2, point_s: 6.5e-3, opening_s: None }.of(job)
     }
 
     fn knobs(&self) -> &'static [Knob] {

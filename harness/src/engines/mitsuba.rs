@@ -13,6 +13,7 @@ use parking_lot::Mutex;
 
 use self::backend::Backend;
 use self::settings::Settings;
+use super::cost::DirectCost;
 use super::dialogue::{Cost, Dialogue};
 use super::float_error::{FloatError, Instrument};
 use super::frame::Frame;
@@ -88,6 +89,10 @@ impl Engine for Mitsuba {
     fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
         let plain = "python3 mitsuba_read.py job.json".to_owned();
         Some(self.backend(site).map_or(plain, |backend| backend.command_by_hand()))
+    }
+
+    fn expected_s(&self, job: &Job) -> Option<f64> {
+        DirectCost { start_s: 0.45, point_s: 1e-4, opening_s: Some(2e-3) }.of(job)
     }
 
     fn knobs(&self) -> &'static [Knob] {

@@ -9,6 +9,7 @@ mod catalogue;
 mod cells;
 mod comment;
 mod contract;
+mod cost;
 mod cycles;
 mod dialogue;
 mod effort;

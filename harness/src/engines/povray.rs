@@ -25,6 +25,7 @@ use itertools::Itertools;
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 use rayon::prelude::*;
 
+use super::cost::DirectCost;
 use super::effort;
 use super::settings::{Coordinates, Preset};
 use super::workbench::by_hand;
@@ -96,6 +97,10 @@ impl Engine for PovRay {
                 [command(Light::Direct, "direct.ppm"), command(Light::Indirect, "indirect.ppm")].join("; ")
             }
         })
+    }
+
+    fn expected_s(&self, job: &Job) -> Option<f64> {
+        DirectCost { start_s: 0.06, point_s: 1e-4, opening_s: Some(6e-4) }.of(job)
     }
 
     fn knobs(&self) -> &'static [Knob] {

@@ -24,6 +24,7 @@ use self::options::{Options, Sources};
 use self::sampling::Sampler;
 use self::settings::{Photometrist, Settings};
 use self::tools::Tools;
+use super::cost::DirectCost;
 use super::settings::Preset;
 use super::{
     Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Station, Support, Version,
@@ -107,6 +108,10 @@ impl Engine for Radiance {
         Some(
             Tools::find(site).map_or_else(|_| "sh run.sh".to_owned(), |tools| tools.command_by_hand(seed(&[job.seed]))),
         )
+    }
+
+    fn expected_s(&self, job: &Job) -> Option<f64> {
+        DirectCost { start_s: 0.01, point_s: 2e-5, opening_s: Some(6e-4) }.of(job)
     }
 
     fn knobs(&self) -> &'static [Knob] {

@@ -1,0 +1,30 @@
+//! What renderers take for direct light: by measurement, since each light and meter is looked at once, or so many times as the error needs.
+
+use luminaire::scene::{LuminaireModel, Transport};
+
+use super::Job;
+
+/// Processor seconds of one core (`benchmarks/planning.md`).
+pub(super) struct DirectCost {
+    /// To start, and to read a scene.
+    pub(super) start_s: f64,
+    /// For each meter and luminaire that is a point.
+    pub(super) point_s: f64,
+    /// For each that is an opening; `None` where it is sampled until its error is small enough.
+    pub(super) opening_s: Option<f64>,
+}
+
+impl DirectCost {
+    /// Nothing where light is reflected: nobody knows how soon its error is small.
+    pub(super) fn of(&self, job: &Job) -> Option<f64> {
+        if job.transport != Transport::Direct {
+            return None;
+        }
+        let luminaires = job.scene.luminaires.iter().map(|luminaire| match luminaire.model {
+            LuminaireModel::Point => Some(self.point_s),
+            LuminaireModel::Area | LuminaireModel::Impostor => self.opening_s,
+        });
+        let a_meter: f64 = luminaires.sum::<Option<f64>>()?;
+        Some(self.start_s + job.stations.len() as f64 * a_meter)
+    }
+}
