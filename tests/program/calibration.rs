@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{Answer, Folder, MINE, SKEW_LAMP, SKEW_ROOM, adapter, among};
+use crate::support::{Answer, Folder, LAMP, MINE, ROOM, SKEW_LAMP, SKEW_ROOM, TWO_METERS, adapter, among};
 
 const PROCEDURES: [&str; 5] = ["luminous_intensity", "direct_illuminance", "point", "asymmetric", "luminaires"];
 
@@ -123,6 +123,31 @@ fn copies_of_an_adapter_do_not_outvote_the_reference() {
             assert!(independent.as_u64().unwrap() as usize <= all - 2, "{consensus}");
         }
     }
+}
+
+/// What is kept of our simulator is made wrong, as if it had read so: the renderers share nothing with it but our reader of files.
+#[test]
+fn a_fault_in_our_own_simulator_is_named_by_the_renderers() {
+    let procedure =
+        "  indirect_illuminance: {meters: plane, bounces: 2}\nbudget: {relative_error: 0.005, seconds: 60}\n";
+    // Zonal cavity knows no bodies.
+    let table = "obstacles:\n  - box: {min_m: [2, 1, 0], max_m: [4, 2, 0.7], reflectance: 0.4}\n";
+    let spec = [ROOM, table, TWO_METERS, "procedures:\n", procedure].concat();
+    let folder = Folder::for_renderers(&[("spec.yaml", &spec), ("lamp.ies", LAMP)]);
+    let asked = ["--engines", "simulator,mitsuba,povray,radiance", "--format", "json"];
+    let right = folder.run(&asked).exits(0).json();
+    assert!(right["consensus"][0]["departs"].as_array().unwrap().is_empty(), "{}", right["consensus"]);
+    for kept in std::fs::read_dir(folder.path("cache/simulator")).unwrap() {
+        let name = format!("cache/simulator/{}", kept.unwrap().file_name().to_string_lossy());
+        let answer: Value = folder.json(&name)["body"]["answer"]["Ok"]["estimates"].clone();
+        for estimate in answer.as_array().unwrap() {
+            let value = estimate["value"].as_f64().unwrap();
+            folder.forge(&name, &format!("\"value\":{value}"), &format!("\"value\":{}", 1.08 * value));
+        }
+    }
+    let wrong = folder.run(&asked).json();
+    assert_eq!(wrong["consensus"][0]["departs"], serde_json::json!(["simulator"]), "{}", wrong["consensus"]);
+    assert!(wrong["consensus"][0]["odds"].as_f64().unwrap() > 19.0, "{}", wrong["consensus"]);
 }
 
 #[test]

@@ -195,8 +195,10 @@ fn witnesses(judge: &Judge<'_>, task: &Task, recordings: &[&Recording]) -> Vec<W
             ..WitnessReadings::new(&recording.key.engine, recording.components.clone(), readings, allowed)
         }
     };
+    // A method that claims nothing here departs as it may, and would stand for the one component that is wrong.
+    let claims = |r: &&&Recording| judge.tolerances.not_claimed(task.procedure, basis, &r.key.engine).is_none();
     let mut witnesses: Vec<WitnessReadings> =
-        recordings.iter().filter(|r| !r.readings.is_empty()).map(of_engine).collect();
+        recordings.iter().filter(|r| !r.readings.is_empty()).filter(claims).map(of_engine).collect();
     witnesses.extend(derived(judge, task));
     witnesses
 }
