@@ -197,9 +197,9 @@ impl Workload {
                 None => drop(ids.insert(name.parse::<Key>().into_diagnostic().wrap_err_with(|| name.clone())?)),
             }
         }
+        let jobs: BTreeMap<&Key, &Node> = self.jobs.iter().map(|node| (&node.id, node)).collect();
         let find = |id: Key| {
-            let node = self.jobs.iter().find(|node| node.id == id);
-            node.ok_or_else(|| {
+            jobs.get(&id).copied().ok_or_else(|| {
                 miette!(help = "`luxproof plan --json` prints the ids of jobs and groups", "the plan has no job {id}")
             })
         };
