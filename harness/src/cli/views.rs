@@ -165,8 +165,7 @@ pub(super) fn read_report(of: &Path) -> Result<Report, Diagnostic> {
             report::FILE
         ));
     }
-    let text = read_text(file)?;
-    let read = Report::from_json(&text).map_err(|why| miette::miette!("{} {why}", file.display()))?;
+    let read = Report::read(file).into_diagnostic()?;
     if let Some(doubt) = read.doubt {
         complain(&format!("{} {doubt}", file.display()));
     }

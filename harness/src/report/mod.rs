@@ -45,7 +45,7 @@ pub(crate) use html::table;
 pub use html::{Beside, BesideError, page};
 pub use junit::junit;
 pub use markdown::markdown;
-pub use read::{ReadReport, ReportError};
+pub use read::{ReadError, ReadReport, ReportError};
 pub use statistics::Statistics;
 pub use terminal::{Detail, Screen, Style, terminal};
 
@@ -248,10 +248,14 @@ impl Report {
         let fail = |e| FileError::of(path, e);
         self.sentences = sentences::sentences(self);
         self.statistics = statistics::statistics(&self.readings);
-        self.seal().map_err(|e| fail(e.into()))?;
-        let is_long = self.comparisons.len().max(self.readings.len()) > LONG;
-        let kept = if is_long { files::replace_rows(path, self, care) } else { files::replace_json(path, self, care) };
+        self.seal().map_err(fail)?;
+        let kept =
+            if self.is_long() { files::replace_rows(path, self, care) } else { files::replace_json(path, self, care) };
         kept.map_err(fail)
+    }
+
+    fn is_long(&self) -> bool {
+        self.comparisons.len().max(self.readings.len()) > LONG
     }
 
     /// How many cases specs ask for.

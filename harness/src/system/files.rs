@@ -1,7 +1,7 @@
 //! Files that are seen whole or not at all, whoever reads or is killed meanwhile.
 
 use std::fs::{File, Metadata, Permissions};
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, BufReader, BufWriter, Read, Take, Write};
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 use std::time::Duration;
@@ -53,8 +53,9 @@ pub(crate) const MAX_BYTES: u64 = 256 << 20;
 /// The most bytes of a file that tells no size.
 const MAX_UNTOLD_BYTES: u64 = 1 << 20;
 
-/// The bytes of a regular file of at most so many: nothing else is opened, since a pipe waits for ever and a device never ends.
-pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+/// A regular file of at most so many bytes, and no more than one byte beyond them of it: nothing else is opened, since a pipe waits for ever and
+/// a device never ends.
+fn open_bounded(path: &Path, most: u64) -> io::Result<(Take<File>, u64)> {
     let refused = |why: String| io::Error::new(io::ErrorKind::InvalidInput, why);
     let regular = |metadata: Metadata| {
         if metadata.is_file() { Ok(metadata) } else { Err(refused("it is no regular file".to_owned())) }
@@ -67,20 +68,35 @@ pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let metadata = file.metadata().and_then(regular)?;
     // Some files tell no size: what is read counts. Those of the system have no end, so that little is read of them.
     let most = if metadata.len() == 0 { most.min(MAX_UNTOLD_BYTES) } else { most };
-    let mut bytes = vec![];
-    if metadata.len() <= most {
-        file.take(most + 1).read_to_end(&mut bytes)?;
+    if metadata.len() > most {
+        return Err(too_large(most));
     }
-    let is_whole = bytes.len().max(metadata.len() as usize) as u64 <= most;
-    is_whole.then_some(bytes).ok_or_else(|| refused(format!("it has more than {} MB", most >> 20)))
+    Ok((file.take(most + 1), most))
 }
 
-/// The most bytes of what luxproof wrote itself: a report of a million meters has 1 GB.
+fn too_large(most: u64) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, format!("it has more than {} MB", most >> 20))
+}
+
+/// The bytes of a regular file of at most so many.
+pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let (mut file, most) = open_bounded(path, most)?;
+    let mut bytes = vec![];
+    file.read_to_end(&mut bytes)?;
+    if bytes.len() as u64 <= most { Ok(bytes) } else { Err(too_large(most)) }
+}
+
+/// The most bytes of what luxproof wrote itself: a report of a million comparisons has 1.2 GB.
 const MAX_KEPT_BYTES: u64 = 2 << 30;
 
 /// What luxproof keeps for its user, or shows with it: reports, histories, baselines.
 pub(crate) fn read_kept(path: &Path) -> Result<Vec<u8>, FileError> {
     read_bounded(path, MAX_KEPT_BYTES).map_err(|source| FileError::of(path, source))
+}
+
+/// The same, read as it is used: of a long report the text alone is a GB.
+pub(crate) fn open_kept(path: &Path) -> io::Result<BufReader<Take<File>>> {
+    Ok(BufReader::with_capacity(BUFFER, open_bounded(path, MAX_KEPT_BYTES)?.0))
 }
 
 /// Reads what a path stands for, wherever links lead, if that lies below a folder.
