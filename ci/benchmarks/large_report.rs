@@ -34,12 +34,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let clock = Instant::now();
     let mut report = synthetic(cases, procedures, meters)?;
     let made_s = clock.elapsed().as_secs_f64();
-    report.keep(&folder.join("report.json"))?;
+    report.keep_anew(folder)?;
     let kept_s = clock.elapsed().as_secs_f64() - made_s;
-    std::fs::write(folder.join("report.html"), report::page(&report, &[]))?;
+    report::keep_page(&report, &report::page(&report, &[]), folder)?;
     let page_s = clock.elapsed().as_secs_f64() - made_s - kept_s;
     println!(
-        "{} comparisons made in {made_s:.1} s, report.json written in {kept_s:.1} s, its page in {page_s:.1} s",
+        "{} comparisons made in {made_s:.1} s, report.json and comparisons.jsonl written in {kept_s:.1} s, its pages in {page_s:.1} s",
         report.comparisons.len()
     );
     Ok(())

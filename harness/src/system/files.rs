@@ -175,14 +175,35 @@ fn replace_by(
     Ok(())
 }
 
-/// Takes away what killed writers left in a folder: files that nobody has locked any more.
+/// Puts a folder that is filled by this into the place of what is there. One that is there is moved away first, so that a writer that is killed
+/// may leave none, but never a part.
+pub(crate) fn replace_folder(path: &Path, fill: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(parent)?;
+    let mut shared = tempfile::Builder::new();
+    shared.prefix(UNFINISHED).permissions(Permissions::from_mode(0o777));
+    let new = shared.tempdir_in(parent)?;
+    let lock = File::open(new.path())?;
+    lock.try_lock().ok();
+    fill(new.path())?;
+    let old = shared.tempdir_in(parent)?;
+    match std::fs::rename(path, old.path().join("old")) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    std::fs::rename(new.keep(), path)
+}
+
+/// Takes away what killed writers left in a folder: files and folders that nobody has locked any more.
 pub(crate) fn sweep(folder: &Path) {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(UNFINISHED)) {
         let is_left = File::open(entry.path()).is_ok_and(|file| is_old(&file) && file.try_lock().is_ok());
-        if is_left && entry.file_type().is_ok_and(|kind| kind.is_file()) {
-            std::fs::remove_file(entry.path()).ok();
-        }
+        match entry.file_type() {
+            Ok(kind) if is_left && kind.is_file() => std::fs::remove_file(entry.path()).ok(),
+            Ok(kind) if is_left && kind.is_dir() => std::fs::remove_dir_all(entry.path()).ok(),
+            _ => None,
+        };
     }
 }
 
@@ -190,6 +211,15 @@ pub(crate) fn sweep(folder: &Path) {
 fn is_old(file: &File) -> bool {
     let age = file.metadata().and_then(|metadata| metadata.created().or_else(|_| metadata.modified()));
     age.is_ok_and(|then| then.elapsed().is_ok_and(|age| age >= UNTIL_LOCKED))
+}
+
+/// The same by a writer that may go back in the file.
+pub(crate) fn replace_through(
+    path: &Path,
+    care: Care,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> io::Result<()> {
+    replace_by(&mut tempfile::Builder::new(), path, care, |file| write(file.as_file_mut()))
 }
 
 /// The same with a value as JSON for people, a line feed at its end.

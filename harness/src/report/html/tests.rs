@@ -49,6 +49,13 @@ fn report(procedures: &[ProcedureId], case: &str, title: &str) -> Report {
     .unwrap()
 }
 
+/// Of so many comparisons.
+pub(crate) fn long(comparisons: usize) -> Report {
+    let mut report = report(&[ProcedureId::DirectIlluminance, ProcedureId::IndirectIlluminance], "room", "a room");
+    report.comparisons = report.comparisons.into_iter().cycle().take(comparisons).collect();
+    report
+}
+
 #[test]
 fn two_procedures_of_192_meters_and_five_engines_stay_below_three_megabytes() {
     let page =
