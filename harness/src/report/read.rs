@@ -74,14 +74,16 @@ impl Report {
 
     /// `again` gives the same text, from which it is told what was wrong.
     fn from_text<R: BufRead>(text: R, again: impl FnOnce() -> io::Result<R>) -> Result<ReadReport, ReportError> {
-        let mut lines = BufReader::new(Lines { text, said: Said::default(), shown: vec![], at: 0 });
-        let mut report: Self = match serde_json::from_reader(&mut lines) {
+        let mut said = Said::default();
+        let lines = Lines { text, said: &mut said, shown: vec![], at: 0 };
+        // By value: read through a reference, every byte costs a call.
+        let mut report: Self = match serde_json::from_reader(BufReader::new(lines)) {
             Ok(report) => report,
             Err(source) if source.is_io() => return Err(ReportError::Damaged(source)),
             Err(source) => return Err(Self::refusal(again, source)),
         };
         let found = report.luxproof;
-        if found == VERSION && lines.into_inner().said.sum.finish() != report.checksum {
+        if found == VERSION && said.sum.finish() != report.checksum {
             return Err(ReportError::Edited);
         }
         report.summary = Summary::of(&report.comparisons, &report.skips);
@@ -110,15 +112,15 @@ impl Report {
 }
 
 /// The lines of a text as they may be shown, summed up as they stand there. No line ends within a string of JSON.
-struct Lines<R> {
+struct Lines<'a, R> {
     text: R,
-    said: Said,
+    said: &'a mut Said,
     shown: Vec<u8>,
     /// What of them was given out.
     at: usize,
 }
 
-impl<R: BufRead> Read for Lines<R> {
+impl<R: BufRead> Read for Lines<'_, R> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         if self.at == self.shown.len() {
             self.shown.clear();

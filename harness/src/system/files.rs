@@ -266,6 +266,33 @@ mod tests {
     }
 
     #[test]
+    fn a_folder_is_put_in_place_whole_or_not_at_all() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("pages/new");
+        let fill = |text: &'static str| move |folder: &Path| std::fs::write(folder.join(text), text);
+        replace_folder(&path, fill("a")).unwrap();
+        let broken = replace_folder(&path, |folder| {
+            fill("b")(folder)?;
+            Err(io::Error::other("the disk is full"))
+        });
+        assert_eq!(broken.unwrap_err().to_string(), "the disk is full");
+        let names = |folder: &Path| {
+            let names = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+            names.collect::<Vec<_>>()
+        };
+        assert_eq!(names(&path), ["a"]);
+        replace_folder(&path, fill("c")).unwrap();
+        assert_eq!((names(&path), names(path.parent().unwrap())), (vec!["c".to_owned()], vec!["new".to_owned()]));
+        // What a writer left that was killed.
+        let left = path.with_file_name(format!("{UNFINISHED}left"));
+        std::fs::create_dir(&left).unwrap();
+        fill("d")(&left).unwrap();
+        std::thread::sleep(2 * UNTIL_LOCKED);
+        sweep(path.parent().unwrap());
+        assert_eq!(names(path.parent().unwrap()), ["new"]);
+    }
+
+    #[test]
     fn what_is_no_file_or_too_large_is_refused_and_not_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("large");

@@ -12,6 +12,7 @@ mod plot;
 mod procedure;
 mod provenance;
 mod rows;
+mod sheets;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -24,7 +25,7 @@ use palette::Palette;
 use plot::Marks;
 use rows::Rows;
 
-pub use pages::keep;
+pub use sheets::keep;
 
 pub use beside::{Beside, BesideError};
 
