@@ -103,6 +103,7 @@ fn synthetic(cases: usize, procedures: &[ProcedureId], meters: usize) -> Result<
                 }
                 if relative > 0.0103 {
                     c.verdict = Verdict::Fail;
+                    report.summary.fail += 1;
                     c.diagnosis = Some("its flux is 1 % too large".into());
                 }
                 let reading = Reading {
@@ -116,5 +117,6 @@ fn synthetic(cases: usize, procedures: &[ProcedureId], meters: usize) -> Result<
             }
         }
     }
+    report.summary.pass = report.comparisons.len() - report.summary.fail;
     Ok(report)
 }

@@ -31,7 +31,7 @@ pub(super) enum Cell {
         of: usize,
         /// The largest relative deviation, signed.
         deviation: Option<f64>,
-        /// The place of the first of them among all comparisons of the report.
+        /// The place of the first that has it among all comparisons of the report.
         first: usize,
     },
 }
@@ -139,7 +139,7 @@ fn cell(unread: &Unread<'_>, key: &ReadingKey, of_row: &[(usize, &Comparison)]) 
         having: mine().filter(|(_, c)| c.verdict == verdict).count(),
         of: mine().count(),
         deviation: largest(mine().filter_map(|(_, c)| c.relative_deviation)),
-        first: mine().map(|(k, _)| *k).next().unwrap_or_default(),
+        first: mine().find(|(_, c)| c.verdict == verdict).map_or(0, |(k, _)| *k),
     }
 }
 

@@ -209,7 +209,9 @@ mod tests {
     fn what_a_checksum_leaves_out_is_left_out_wherever_the_text_is_cut() {
         let sum = |pieces: &[&str]| {
             let mut said = Said::default();
-            pieces.iter().for_each(|piece| said.write_all(piece.as_bytes()).unwrap());
+            for piece in pieces {
+                said.write_all(piece.as_bytes()).unwrap();
+            }
             said.sum.finish()
         };
         let text = r#"{"checksum":"ab","a":[{"wall_s":1.5,"b":"started"}], "started" : "x","wall_s":2}"#;

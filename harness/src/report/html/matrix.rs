@@ -17,7 +17,7 @@ pub(super) fn section(report: &Report, palette: &Palette, pages: Option<&Pages<'
         h2 id="matrix-title" { "Verdicts" }
         p.lead {
             "Each cell is the worst verdict of its readings, how many of them it holds for, and the largest deviation. "
-            @if pages.is_some() { "A cell leads to the page of its first reading." } @else { "A cell opens its readings." }
+            @if pages.is_some() { "A cell leads to the first of these on the pages of all readings." } @else { "A cell opens its readings." }
         }
         (table(report, &drawn, palette, &|cell, key| match pages {
             Some(pages) => linked(cell, key, &pages.link_to(cell.first)),

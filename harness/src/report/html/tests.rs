@@ -137,7 +137,9 @@ fn the_pages_of_a_long_report_hold_every_comparison_once_and_every_link_leads_th
         }
     };
     leads("report.html", &page);
-    files.iter().for_each(|(name, html)| leads(name, html));
+    for (name, html) in &files {
+        leads(name, html);
+    }
     // 30 pages, and two rows of the matrix on one.
     assert_eq!(files.len(), 31);
     let worst: Vec<&str> = attributes(&page, "href").into_iter().filter(|link| link.contains("#r")).collect();
@@ -158,6 +160,8 @@ fn what_a_long_report_has_no_room_for_is_counted() {
     assert!(page.contains("The worst 3 of 14 rows; all are on 5 pages, from"));
     assert!(page.contains("The worst 100 of each engine, 500 of 960 readings;"));
     assert!(page.contains("Every one of 1920 comparisons, in the order of report.json, on 30 pages of 64 at most."));
+    // Its cell leads to it, and not to what passes before it.
+    assert!(page.contains("/readings-0005.html#r301\"><span class=\"unseen\">"));
     let matrix = page.split("id=\"matrix-title\"").nth(1).unwrap().split("</section>").next().unwrap();
     assert!(matrix.contains(&format!(">{place}</th>")), "what fails is shown");
 }

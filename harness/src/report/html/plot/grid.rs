@@ -22,7 +22,7 @@ const BAR: f64 = 52.0;
 /// Fewer meters to a side than this are no map.
 const LEAST: usize = 3;
 /// More cells than this are finer than what a page shows.
-const MOST_CELLS: usize = 4096;
+const MOST_CELLS: u32 = 4096;
 
 pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette, marks: Marks) -> Vec<Markup> {
     let Some(basis) = group.basis() else { return vec![] };
@@ -123,8 +123,8 @@ impl Lattice {
 
     /// How many meters to a side a cell stands for, so that cells are not too many.
     fn coarseness(&self) -> usize {
-        let meters = self.counts[0] * self.counts[1];
-        (1..).find(|side| meters <= MOST_CELLS * side * side).unwrap_or(1)
+        let cells_of_one = (self.counts[0] * self.counts[1]) as f64 / f64::from(MOST_CELLS);
+        cells_of_one.sqrt().ceil().max(1.0) as usize
     }
 
     /// The lattice of blocks of so many meters to a side, and the meter of each that is picked.
