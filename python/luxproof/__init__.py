@@ -7,8 +7,9 @@ Everything is asked of the program that lies beside this package; nothing is com
 >>> luxproof.photometry("lamp.ies").loc[0, "flux_lm"]
 """
 
+from luxproof._lines import each_comparison
 from luxproof._photometry import photometry
 from luxproof._program import LuxproofError, program, version
 from luxproof._report import Report, load, run
 
-__all__ = ["LuxproofError", "Report", "load", "photometry", "program", "run", "version"]
+__all__ = ["LuxproofError", "Report", "each_comparison", "load", "photometry", "program", "run", "version"]

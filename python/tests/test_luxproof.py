@@ -48,6 +48,34 @@ def test_statistics_are_those_of_the_readings(report: luxproof.Report) -> None:
         assert row["mean.value"] == pytest.approx(mean[row["procedure"], row["engine"], row["set"]], rel=1e-12)
 
 
+def test_comparisons_come_one_at_a_time_and_lines_that_are_missing_are_told(report: luxproof.Report, tmp_path: Path) -> None:
+    assert report.folder is not None
+    assert list(luxproof.each_comparison(report.folder)) == report.data["comparisons"]
+    spec = tmp_path / "spec.yaml"
+    (tmp_path / "lamp.ies").write_bytes((REFERENCE / "luminaires" / "isotropic.ies").read_bytes())
+    spec.write_text("""luxproof: 1
+room: {size_m: [50, 20, 5], reflectance: {floor: 0.2, walls: 0.5, ceiling: 0.7}}
+luminaires:
+  - {id: lamp, photometry: lamp.ies, at_m: [24.3, 9.1, 4.5]}
+meters:
+  plane: {grid: {origin_m: [0.05, 0.05, 0.8], u_m: [0.45, 0, 0], v_m: [0, 0.19, 0], counts: [110, 100]}, normal: [0, 0, 1]}
+procedures:
+  direct_illuminance: {meters: plane}
+""")
+    long = luxproof.run(spec, engines=["simulator", "iesna"], out=tmp_path / "out", options=["--no-calibration", "--no-cache"])
+    lines = tmp_path / "out" / "comparisons.jsonl"
+    assert list(luxproof.each_comparison(tmp_path / "out")) == list(luxproof.each_comparison(lines)) == long.data["comparisons"]
+    sound = lines.read_bytes()
+    for damaged, says in [
+        (sound[:-1], "ends early"), (sound[: len(sound) // 2], "ends early"), (sound + b"{}\n", "11001 comparisons of 11000"),
+        (sound.replace(b'"verdict":"pass"', b'"verdict":"fail"', 1), "damaged"), (sound.split(b"\n", 1)[1], "does not begin"),
+        (b"", "does not begin"), (sound.replace(b'"report":"', b'"report":"0', 1), "of another report"),
+    ]:
+        lines.write_bytes(damaged)
+        with pytest.raises(ValueError, match=says):
+            list(luxproof.each_comparison(lines))
+
+
 def test_photometry_is_one_row_a_file() -> None:
     lamps = [REFERENCE / "luminaires" / name for name in ("isotropic.ies", "lambertian-point.ies")]
     table = luxproof.photometry(*lamps)

@@ -17,6 +17,7 @@ mod faults;
 mod furnished_office;
 mod guide;
 mod hunt;
+mod long_report;
 mod main_job;
 mod measuring;
 mod mesh_files;

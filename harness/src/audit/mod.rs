@@ -42,7 +42,7 @@ use crate::measure::{Asked, Asking, Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
 use crate::procedures::Task;
 use crate::record::Status;
-use crate::report::{self, Exit, Report, SpecRecord};
+use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, Faults, SpecError, Trust, doubts};
 use crate::system::claim::{Claim, ClaimError};
 use crate::system::digest::hexadecimal;
@@ -315,7 +315,7 @@ fn audited(
     for (case, report) in cases.iter().zip(&mut reports) {
         let folder = folder_of(case);
         if folder != options.out && report.comparisons.iter().any(|c| c.diagnosis.is_some()) {
-            report.keep_with(Care::Usual, &folder.join(report::FILE))?;
+            report.keep_again(&folder, Care::Usual)?;
         }
     }
     let mut report = Report::joined(spec, reports);

@@ -49,10 +49,10 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> R
     drop(progress);
     if let Some(held) = &held {
         report.baseline = Some(held.hold(&report, &root)?);
-        report.keep(&root.join(report::FILE)).into_diagnostic()?;
+        report.keep_anew(&root).into_diagnostic()?;
     }
     if !args.views.has_page() {
-        keep_page(&report::page(&report, &[]), &root);
+        keep_page(&report, &report::page(&report, &[]), &root);
     }
     print_report(&report, &root, &args.views)?;
     Ok(report.exit())
@@ -74,7 +74,7 @@ pub(super) fn report_from(cache: &Path, args: &ReportArgs, site: &Site, trust: T
         ));
     }
     if !args.views.has_page() {
-        keep_page(&report::page(&report, &[]), &options.out);
+        keep_page(&report, &report::page(&report, &[]), &options.out);
     }
     print_report(&report, &options.out, &args.views)?;
     // A repetition that is missing shows nowhere else.

@@ -113,19 +113,18 @@ pub(super) fn screen(style: Style, detail: Detail) -> Screen {
 /// The page, which lies in the run's folder, too; on a terminal only its place is printed.
 fn page(report: &Report, folder: &Path, beside: &[Beside]) -> String {
     let page = report::page(report, beside);
-    match keep_page(&page, folder) {
+    match keep_page(report, &page, folder) {
         Some(file) if std::io::stdout().is_terminal() => file.display().to_string(),
         _ => page,
     }
 }
 
 /// Keeps a page in a run's folder; where that fails it is told, since the report itself is kept already.
-pub(super) fn keep_page(page: &str, folder: &Path) -> Option<PathBuf> {
-    let file = folder.join(report::PAGE);
-    match files::keep_shared(&file, page.as_bytes()) {
-        Ok(()) => Some(file),
+pub(super) fn keep_page(report: &Report, page: &str, folder: &Path) -> Option<PathBuf> {
+    match report::keep_page(report, page, folder) {
+        Ok(file) => Some(file),
         Err(error) => {
-            tracing::warn!(file = %file.display(), %error, "the page is not kept");
+            tracing::warn!(folder = %folder.display(), %error, "the page is not kept");
             None
         }
     }
@@ -165,8 +164,7 @@ pub(super) fn read_report(of: &Path) -> Result<Report, Diagnostic> {
             report::FILE
         ));
     }
-    let text = read_text(file)?;
-    let read = Report::from_json(&text).map_err(|why| miette::miette!("{} {why}", file.display()))?;
+    let read = Report::read(file).into_diagnostic()?;
     if let Some(doubt) = read.doubt {
         complain(&format!("{} {doubt}", file.display()));
     }

@@ -146,7 +146,8 @@ impl Judge<'_> {
         let misfits = self.published.map_or_else(Vec::new, |p| p.misfits(task));
         let mut comparisons = vec![];
         for recording in recordings {
-            let mut family = vec![];
+            // In place: a million comparisons are not moved about.
+            let family = comparisons.len();
             let largest = largest_portion(recording);
             for (k, target) in task.targets.iter().enumerate() {
                 let reading = recording.reading(k, &target.id);
@@ -158,13 +159,12 @@ impl Judge<'_> {
                     reference_of_task(task, recordings, k, engine).into_iter().chain(printed).collect();
                 if references.is_empty() && (reading.is_none() || recording.role == Role::Renderer) {
                     // Nothing to hold it against, or nothing to hold: that is said, never passed over.
-                    family.push(self.comparison(task, (recording, k), largest, None));
+                    comparisons.push(self.comparison(task, (recording, k), largest, None));
                 }
                 let compared = |held| self.comparison(task, (recording, k), largest, Some(held));
-                family.extend(references.into_iter().map(compared));
+                comparisons.extend(references.into_iter().map(compared));
             }
-            self.decide(&mut family, &recording.content_sha256);
-            comparisons.extend(family);
+            self.decide(&mut comparisons[family..], &recording.content_sha256);
         }
         comparisons
     }

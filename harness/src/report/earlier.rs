@@ -38,7 +38,7 @@ struct Read {
 
 /// What lies at a path, if it is a report at all.
 fn read<T: DeserializeOwned>(path: &Path) -> Option<T> {
-    serde_json::from_slice(&files::read_kept(path).ok()?).ok()
+    serde_json::from_reader(files::open_kept(path).ok()?).ok()
 }
 
 /// The spec, or the specs, that an earlier report is about.

@@ -9,6 +9,7 @@ pub(crate) mod earlier;
 mod exit;
 mod html;
 mod junit;
+mod lines;
 mod markdown;
 mod matrix;
 mod notes;
@@ -42,14 +43,15 @@ pub use csv::csv;
 pub use curve::{Curve, curves};
 pub use exit::{Exit, Summary};
 pub(crate) use html::table;
-pub use html::{Beside, BesideError, page};
+pub use html::{Beside, BesideError, keep as keep_page, page};
 pub use junit::junit;
 pub use markdown::markdown;
-pub use read::{ReadReport, ReportError};
+pub use read::{ReadError, ReadReport, ReportError};
 pub use statistics::Statistics;
 pub use terminal::{Detail, Screen, Style, terminal};
 
-/// A report of more comparisons than this is laid out in rows.
+/// A report of more comparisons than this is laid out in rows, and has them line by line and page by page beside it: a page of all would take seconds
+/// to open.
 const LONG: usize = 10_000;
 /// What it is called in the folder of a run, and its page.
 pub(crate) const FILE: &str = "report.json";
@@ -239,19 +241,33 @@ impl Report {
     pub(crate) fn keep_in(&mut self, folder: &Path, care: Care) -> Result<Option<PathBuf>, FileError> {
         let path = folder.join(FILE);
         let aside = earlier::put_aside(self, &path).map_err(|e| FileError::of(&path, e))?;
-        self.keep_with(care, &path)?;
+        self.keep_again(folder, care)?;
         Ok(aside)
     }
 
+    /// Writes it into the folder of its run, in place of the report there.
+    pub fn keep_anew(&mut self, folder: &Path) -> Result<(), FileError> {
+        self.keep_again(folder, Care::Lasting)
+    }
+
     /// The same with so much care.
-    pub(crate) fn keep_with(&mut self, care: Care, path: &Path) -> Result<(), FileError> {
+    pub(crate) fn keep_again(&mut self, folder: &Path, care: Care) -> Result<(), FileError> {
+        self.keep_with(care, &folder.join(FILE))?;
+        lines::keep(self, folder, care)
+    }
+
+    fn keep_with(&mut self, care: Care, path: &Path) -> Result<(), FileError> {
         let fail = |e| FileError::of(path, e);
         self.sentences = sentences::sentences(self);
         self.statistics = statistics::statistics(&self.readings);
-        self.seal().map_err(|e| fail(e.into()))?;
-        let is_long = self.comparisons.len().max(self.readings.len()) > LONG;
-        let kept = if is_long { files::replace_rows(path, self, care) } else { files::replace_json(path, self, care) };
+        self.seal().map_err(fail)?;
+        let kept =
+            if self.is_long() { files::replace_rows(path, self, care) } else { files::replace_json(path, self, care) };
         kept.map_err(fail)
+    }
+
+    fn is_long(&self) -> bool {
+        self.comparisons.len().max(self.readings.len()) > LONG
     }
 
     /// How many cases specs ask for.

@@ -167,9 +167,10 @@ pub(super) fn diagnoses(report: &Report) -> Vec<String> {
 /// The widest split of each case, procedure and engine, in their order: where it was read, and what it says.
 pub(super) fn splits(report: &Report) -> Vec<(String, &str)> {
     let mut widest: Vec<&Split> = vec![];
+    let mut places = BTreeMap::new();
     for split in &report.splits {
-        let alike = |s: &Split| (&s.case, s.procedure, &s.engine) == (&split.case, split.procedure, &split.engine);
-        match widest.iter_mut().find(|s| alike(s)) {
+        let at = *places.entry((&split.case, split.procedure, &split.engine)).or_insert(widest.len());
+        match widest.get_mut(at) {
             Some(found) if found.whole.abs() < split.whole.abs() => *found = split,
             Some(_) => {}
             None => widest.push(split),

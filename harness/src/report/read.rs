@@ -1,8 +1,13 @@
 //! Reading a report back: its version is looked at, whatever else it holds, and its checksum.
 
+use std::borrow::Cow;
+use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
+use std::path::Path;
+
 use serde::Deserialize;
 
 use super::{Report, Summary};
+use crate::system::files::{self, FileError};
 use crate::system::{envelope, printable};
 
 /// The version of the format that this program writes.
@@ -14,6 +19,15 @@ pub struct ReadReport {
     pub report: Report,
     /// What the user should know of it: another version, of which only what both have is seen.
     pub doubt: Option<String>,
+}
+
+/// Why a file gives no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error("{file} {source}")]
+    Report { file: String, source: ReportError },
 }
 
 /// Why a text is no report; continues a sentence that starts with the file's name.
@@ -45,10 +59,31 @@ struct Head {
 
 impl Report {
     pub fn from_json(text: &str) -> Result<ReadReport, ReportError> {
-        let mut report: Self =
-            serde_json::from_str(&printable::json(text)).map_err(|source| Self::refusal(text, source))?;
+        Self::from_text(text.as_bytes(), || Ok(text.as_bytes()))
+    }
+
+    /// That of a file, which is never held as a text: of a million comparisons that is a GB.
+    pub fn read(path: &Path) -> Result<ReadReport, ReadError> {
+        let fail = |error: io::Error| FileError::of(path, error);
+        let file = files::open_kept(path).map_err(fail)?;
+        Self::from_text(file, || files::open_kept(path)).map_err(|source| match source {
+            ReportError::Foreign(error) | ReportError::Damaged(error) if error.is_io() => fail(error.into()).into(),
+            source => ReadError::Report { file: path.display().to_string(), source },
+        })
+    }
+
+    /// `again` gives the same text, from which it is told what was wrong.
+    fn from_text<R: BufRead>(text: R, again: impl FnOnce() -> io::Result<R>) -> Result<ReadReport, ReportError> {
+        let mut said = Said::default();
+        let lines = Lines { text, said: &mut said, shown: vec![], at: 0 };
+        // By value: read through a reference, every byte costs a call.
+        let mut report: Self = match serde_json::from_reader(BufReader::new(lines)) {
+            Ok(report) => report,
+            Err(source) if source.is_io() => return Err(ReportError::Damaged(source)),
+            Err(source) => return Err(Self::refusal(again, source)),
+        };
         let found = report.luxproof;
-        if found == VERSION && checksum(text) != report.checksum {
+        if found == VERSION && said.sum.finish() != report.checksum {
             return Err(ReportError::Edited);
         }
         report.summary = Summary::of(&report.comparisons, &report.skips);
@@ -59,14 +94,16 @@ impl Report {
     }
 
     /// Gives it the checksum of what it says now.
-    pub(super) fn seal(&mut self) -> serde_json::Result<()> {
+    pub(super) fn seal(&mut self) -> io::Result<()> {
         self.checksum.clear();
-        self.checksum = checksum(&serde_json::to_string(self)?);
+        let mut said = BufWriter::new(Said::default());
+        serde_json::to_writer(&mut said, self)?;
+        self.checksum = said.into_inner().map_err(io::IntoInnerError::into_error)?.sum.finish();
         Ok(())
     }
 
-    fn refusal(text: &str, source: serde_json::Error) -> ReportError {
-        match serde_json::from_str(text) {
+    fn refusal<R: BufRead>(again: impl FnOnce() -> io::Result<R>, source: serde_json::Error) -> ReportError {
+        match again().map_err(serde_json::Error::io).and_then(serde_json::from_reader) {
             Err(foreign) => ReportError::Foreign(foreign),
             Ok(Head { luxproof: VERSION, .. }) => ReportError::Damaged(source),
             Ok(Head { luxproof: found, tool_version: by }) => ReportError::Version { found, by, source },
@@ -74,15 +111,80 @@ impl Report {
     }
 }
 
-/// That of a report's text but for times and the checksum that it names: the same run says the same tomorrow.
-fn checksum(text: &str) -> String {
-    const LEFT_OUT: [&str; 3] = ["\"checksum\"", "\"started\"", "\"wall_s\""];
-    let without = |text: String, name: &&str| -> String {
-        let mut parts = text.split(name);
-        let first = parts.next().unwrap_or_default().to_owned();
-        parts.fold(first, |kept, part| kept + name + &part[part.find([',', '}']).unwrap_or(part.len())..])
-    };
-    envelope::checksum(&LEFT_OUT.iter().fold(text.to_owned(), without))
+/// The lines of a text as they may be shown, summed up as they stand there. No line ends within a string of JSON.
+struct Lines<'a, R> {
+    text: R,
+    said: &'a mut Said,
+    shown: Vec<u8>,
+    /// What of them was given out.
+    at: usize,
+}
+
+impl<R: BufRead> Read for Lines<'_, R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        if self.at == self.shown.len() {
+            self.shown.clear();
+            self.at = 0;
+            self.text.read_until(b'\n', &mut self.shown)?;
+            self.said.write_all(&self.shown)?;
+            let line = str::from_utf8(&self.shown).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))?;
+            if let Cow::Owned(line) = printable::json(line) {
+                self.shown = line.into_bytes();
+            }
+        }
+        let read = (&self.shown[self.at..]).read(into)?;
+        self.at += read;
+        Ok(read)
+    }
+}
+
+/// What no checksum of a report is about: the same run says the same tomorrow.
+const LEFT_OUT: [&[u8]; 3] = [b"checksum", b"started", b"wall_s"];
+/// As long as the longest of them.
+const LONGEST: usize = 8;
+
+/// The checksum of a report's text but for times and the checksum that it names.
+#[derive(Default)]
+struct Said {
+    sum: envelope::Checksum,
+    /// What stands since the last quotation mark, as far as it may be one of those names.
+    word: Vec<u8>,
+    is_quoted: bool,
+    /// Whether a value of such a name is under way.
+    is_left_out: bool,
+}
+
+impl Write for Said {
+    fn write(&mut self, text: &[u8]) -> io::Result<usize> {
+        let mut start = 0;
+        for (at, byte) in text.iter().enumerate() {
+            match byte {
+                b',' | b'}' if self.is_left_out => {
+                    self.is_left_out = false;
+                    start = at;
+                }
+                _ if self.is_left_out => {}
+                b'"' => {
+                    if self.is_quoted && LEFT_OUT.contains(&&*self.word) {
+                        self.sum.update(&text[start..=at]);
+                        self.is_left_out = true;
+                    }
+                    self.is_quoted = !self.is_left_out;
+                    self.word.clear();
+                }
+                _ if self.word.len() <= LONGEST => self.word.push(*byte),
+                _ => {}
+            }
+        }
+        if !self.is_left_out {
+            self.sum.update(&text[start..]);
+        }
+        Ok(text.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -101,6 +203,23 @@ mod tests {
         assert_eq!((read.report.luxproof, read.doubt), (VERSION, None));
         let doubt = Report::from_json(&text(2)).unwrap().doubt.unwrap();
         assert!(doubt.starts_with("is a report of version 2 where this luxproof reads version 1"), "{doubt}");
+    }
+
+    #[test]
+    fn what_a_checksum_leaves_out_is_left_out_wherever_the_text_is_cut() {
+        let sum = |pieces: &[&str]| {
+            let mut said = Said::default();
+            for piece in pieces {
+                said.write_all(piece.as_bytes()).unwrap();
+            }
+            said.sum.finish()
+        };
+        let text = r#"{"checksum":"ab","a":[{"wall_s":1.5,"b":"started"}], "started" : "x","wall_s":2}"#;
+        let kept = envelope::checksum(r#"{"checksum","a":[{"wall_s","b":"started"}],"started","wall_s"}"#);
+        for at in 0..text.len() {
+            assert_eq!(sum(&[&text[..at], &text[at..]]), kept, "cut at {at}");
+        }
+        assert_ne!(sum(&[&text.replace("\"b\"", "\"c\"")]), kept);
     }
 
     #[test]

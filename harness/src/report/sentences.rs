@@ -1,7 +1,7 @@
 //! What a run says that each renderer can be trusted for, a sentence each: how near its readings lie to what they are judged by where
 //! they pass, and what is wrong where they do not. Everything follows from comparisons and biases; nothing is taken for granted.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use itertools::Itertools;
 
@@ -16,17 +16,25 @@ const UNLIKELY: f64 = 1e-3;
 
 /// One for each renderer of a report.
 pub(super) fn sentences(report: &Report) -> Vec<Sentence> {
-    report.engines.iter().filter(|e| e.role == Role::Renderer).map(|engine| sentence(report, engine)).collect()
+    let mut judged = Judged::new();
+    for c in &report.comparisons {
+        judged.entry(&c.key.engine).or_default().entry(c.key.procedure).or_default().push(c);
+    }
+    report.engines.iter().filter(|e| e.role == Role::Renderer).map(|engine| sentence(report, engine, &judged)).collect()
 }
 
 /// What sentences rest on, as a heading.
 pub(super) const HEADING: &str = "What each renderer can be trusted for, by this run";
 
-fn sentence(report: &Report, engine: &EngineStatus) -> Sentence {
-    let mine =
-        |p: ProcedureId| report.comparisons.iter().filter(move |c| c.key.engine == engine.id && c.key.procedure == p);
-    let procedures = || report.procedures().into_iter().filter(|p| mine(*p).next().is_some());
-    let claims: Vec<Claim> = procedures().map(|p| claim(report, &engine.id, p, &mine(p).collect_vec())).collect();
+/// Each engine's comparisons, procedure by procedure.
+type Judged<'a> = BTreeMap<&'a EngineName, BTreeMap<ProcedureId, Vec<&'a Comparison>>>;
+
+fn sentence(report: &Report, engine: &EngineStatus, judged: &Judged<'_>) -> Sentence {
+    let nothing = BTreeMap::new();
+    let mine = judged.get(&engine.id).unwrap_or(&nothing);
+    let told = report.procedures();
+    let claims: Vec<Claim> =
+        mine.iter().filter(|(p, _)| told.contains(p)).map(|(p, mine)| claim(report, &engine.id, *p, mine)).collect();
     let (known, asked): (Vec<&Claim>, Vec<&Claim>) = claims.iter().partition(|c| c.procedure.is_known());
     let mut parts: Vec<String> = vec![];
     let trusted = asked.iter().filter(|c| c.is_sound()).map(|c| c.trusted()).collect_vec();
@@ -34,7 +42,7 @@ fn sentence(report: &Report, engine: &EngineStatus) -> Sentence {
         parts.push(trusted.join(", "));
     }
     for claim in asked.iter().copied().chain(known.iter().copied()).filter(|c| !c.is_sound()) {
-        parts.push(doubted(claim, report, &mine(claim.procedure).collect_vec()));
+        parts.push(doubted(claim, report, &mine[&claim.procedure]));
     }
     if asked.is_empty() && known.iter().any(|c| c.is_sound()) {
         parts.push("scenes of known answer alone were read right".to_owned());
@@ -65,10 +73,11 @@ fn claim(report: &Report, engine: &EngineName, procedure: ProcedureId, mine: &[&
     let best = best(mine);
     let within = best.iter().filter(|c| c.verdict == Verdict::Pass).filter_map(|c| reach(c)).reduce(f64::max);
     // Of readings that pass: what is on record is told apart.
-    let all_pass = |b: &Bias| {
-        let mut of_mean = best.iter().filter(|c| c.key == b.key && basis(c) == Some(b.basis)).peekable();
-        of_mean.peek().is_some() && of_mean.all(|c| c.verdict == Verdict::Pass)
-    };
+    let mut passing: HashMap<(&str, Option<Basis>), bool> = HashMap::new();
+    for c in &best {
+        *passing.entry((&c.key.case, basis(c))).or_insert(true) &= c.verdict == Verdict::Pass;
+    }
+    let all_pass = |b: &Bias| passing.get(&(b.key.case.as_str(), Some(b.basis))) == Some(&true);
     let is_firm = |b: &&Bias| {
         let is_plain = b.p_value.is_some_and(|p| p < UNLIKELY) && b.low.signum() == b.high.signum();
         b.key.engine == *engine && b.key.procedure == procedure && is_plain && all_pass(b)
@@ -133,7 +142,8 @@ fn doubted(claim: &Claim, report: &Report, mine: &[&Comparison]) -> String {
 /// What is common to readings that fail and to none that pass: a model of luminaires, bodies in the room, a case, a meter.
 fn place(report: &Report, failing: &[&Comparison], all: &[&Comparison]) -> String {
     let passing = all.iter().copied().filter(|c| c.verdict == Verdict::Pass).collect_vec();
-    let has_bodies = |c: &Comparison| report.cases.iter().any(|case| case.name == c.key.case && case.has_bodies);
+    let bodies: BTreeSet<&str> = report.cases.iter().filter(|case| case.has_bodies).map(|case| &*case.name).collect();
+    let has_bodies = |c: &Comparison| bodies.contains(&*c.key.case);
     let mut words = String::new();
     if failing.iter().all(|c| has_bodies(c))
         && passing.iter().any(|c| !has_bodies(c))

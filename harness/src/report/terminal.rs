@@ -119,7 +119,8 @@ pub fn terminal(report: &Report, screen: Screen, folder: Option<&str>) -> String
     }
     writeln!(text, "\n{}", wrapped(&format!("{} in {:.1} s", report.summary, report.wall_s), screen.width, "  ")).ok();
     if let Some(folder) = folder {
-        writeln!(text, "files: {folder}/report.html, report.json, readings/, scenes/<engine>/, logs/").ok();
+        let more = if report.is_long() { ", comparisons.jsonl, report-pages/" } else { "" };
+        writeln!(text, "files: {folder}/report.html, report.json{more}, readings/, scenes/<engine>/, logs/").ok();
     }
     text
 }

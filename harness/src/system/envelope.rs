@@ -111,18 +111,36 @@ pub(crate) fn open<'a, T: Deserialize<'a>>(schema: Schema, text: &'a [u8]) -> Re
 
 /// SHA-256 over JSON less the white space outside its strings.
 pub(crate) fn checksum(json: &str) -> String {
-    let mut hash = Sha256::new();
-    let (mut is_string, mut is_escaped, mut start) = (false, false, 0);
-    for (at, byte) in json.bytes().enumerate() {
-        if !is_string && byte.is_ascii_whitespace() {
-            hash.update(&json.as_bytes()[start..at]);
-            start = at + 1;
+    let mut sum = Checksum::default();
+    sum.update(json.as_bytes());
+    sum.finish()
+}
+
+/// The same of a text that comes in pieces.
+#[derive(Default)]
+pub(crate) struct Checksum {
+    hash: Sha256,
+    is_string: bool,
+    is_escaped: bool,
+}
+
+impl Checksum {
+    pub(crate) fn update(&mut self, json: &[u8]) {
+        let mut start = 0;
+        for (at, byte) in json.iter().enumerate() {
+            if !self.is_string && byte.is_ascii_whitespace() {
+                self.hash.update(&json[start..at]);
+                start = at + 1;
+            }
+            self.is_string ^= *byte == b'"' && !self.is_escaped;
+            self.is_escaped = self.is_string && *byte == b'\\' && !self.is_escaped;
         }
-        is_string ^= byte == b'"' && !is_escaped;
-        is_escaped = is_string && byte == b'\\' && !is_escaped;
+        self.hash.update(&json[start..]);
     }
-    hash.update(&json.as_bytes()[start..]);
-    hexadecimal(&hash.finalize())
+
+    pub(crate) fn finish(self) -> String {
+        hexadecimal(&self.hash.finalize())
+    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Files that are seen whole or not at all, whoever reads or is killed meanwhile.
 
 use std::fs::{File, Metadata, Permissions};
-use std::io::{self, BufWriter, Read, Write};
+use std::io::{self, BufReader, BufWriter, Read, Take, Write};
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 use std::time::Duration;
@@ -53,8 +53,9 @@ pub(crate) const MAX_BYTES: u64 = 256 << 20;
 /// The most bytes of a file that tells no size.
 const MAX_UNTOLD_BYTES: u64 = 1 << 20;
 
-/// The bytes of a regular file of at most so many: nothing else is opened, since a pipe waits for ever and a device never ends.
-pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+/// A regular file of at most so many bytes, and no more than one byte beyond them of it: nothing else is opened, since a pipe waits for ever and
+/// a device never ends.
+fn open_bounded(path: &Path, most: u64) -> io::Result<(Take<File>, u64)> {
     let refused = |why: String| io::Error::new(io::ErrorKind::InvalidInput, why);
     let regular = |metadata: Metadata| {
         if metadata.is_file() { Ok(metadata) } else { Err(refused("it is no regular file".to_owned())) }
@@ -67,20 +68,35 @@ pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let metadata = file.metadata().and_then(regular)?;
     // Some files tell no size: what is read counts. Those of the system have no end, so that little is read of them.
     let most = if metadata.len() == 0 { most.min(MAX_UNTOLD_BYTES) } else { most };
-    let mut bytes = vec![];
-    if metadata.len() <= most {
-        file.take(most + 1).read_to_end(&mut bytes)?;
+    if metadata.len() > most {
+        return Err(too_large(most));
     }
-    let is_whole = bytes.len().max(metadata.len() as usize) as u64 <= most;
-    is_whole.then_some(bytes).ok_or_else(|| refused(format!("it has more than {} MB", most >> 20)))
+    Ok((file.take(most + 1), most))
 }
 
-/// The most bytes of what luxproof wrote itself: a report of a million meters has 1 GB.
+fn too_large(most: u64) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, format!("it has more than {} MB", most >> 20))
+}
+
+/// The bytes of a regular file of at most so many.
+pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let (mut file, most) = open_bounded(path, most)?;
+    let mut bytes = vec![];
+    file.read_to_end(&mut bytes)?;
+    if bytes.len() as u64 <= most { Ok(bytes) } else { Err(too_large(most)) }
+}
+
+/// The most bytes of what luxproof wrote itself: a report of a million comparisons has 1.2 GB.
 const MAX_KEPT_BYTES: u64 = 2 << 30;
 
 /// What luxproof keeps for its user, or shows with it: reports, histories, baselines.
 pub(crate) fn read_kept(path: &Path) -> Result<Vec<u8>, FileError> {
     read_bounded(path, MAX_KEPT_BYTES).map_err(|source| FileError::of(path, source))
+}
+
+/// The same, read as it is used: of a long report the text alone is a GB.
+pub(crate) fn open_kept(path: &Path) -> io::Result<BufReader<Take<File>>> {
+    Ok(BufReader::with_capacity(BUFFER, open_bounded(path, MAX_KEPT_BYTES)?.0))
 }
 
 /// Reads what a path stands for, wherever links lead, if that lies below a folder.
@@ -159,14 +175,35 @@ fn replace_by(
     Ok(())
 }
 
-/// Takes away what killed writers left in a folder: files that nobody has locked any more.
+/// Puts a folder that is filled by this into the place of what is there. One that is there is moved away first, so that a writer that is killed
+/// may leave none, but never a part.
+pub(crate) fn replace_folder(path: &Path, fill: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(parent)?;
+    let mut shared = tempfile::Builder::new();
+    shared.prefix(UNFINISHED).permissions(Permissions::from_mode(0o777));
+    let new = shared.tempdir_in(parent)?;
+    let lock = File::open(new.path())?;
+    lock.try_lock().ok();
+    fill(new.path())?;
+    let old = shared.tempdir_in(parent)?;
+    match std::fs::rename(path, old.path().join("old")) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    std::fs::rename(new.keep(), path)
+}
+
+/// Takes away what killed writers left in a folder: files and folders that nobody has locked any more.
 pub(crate) fn sweep(folder: &Path) {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(UNFINISHED)) {
         let is_left = File::open(entry.path()).is_ok_and(|file| is_old(&file) && file.try_lock().is_ok());
-        if is_left && entry.file_type().is_ok_and(|kind| kind.is_file()) {
-            std::fs::remove_file(entry.path()).ok();
-        }
+        match entry.file_type() {
+            Ok(kind) if is_left && kind.is_file() => std::fs::remove_file(entry.path()).ok(),
+            Ok(kind) if is_left && kind.is_dir() => std::fs::remove_dir_all(entry.path()).ok(),
+            _ => None,
+        };
     }
 }
 
@@ -174,6 +211,15 @@ pub(crate) fn sweep(folder: &Path) {
 fn is_old(file: &File) -> bool {
     let age = file.metadata().and_then(|metadata| metadata.created().or_else(|_| metadata.modified()));
     age.is_ok_and(|then| then.elapsed().is_ok_and(|age| age >= UNTIL_LOCKED))
+}
+
+/// The same by a writer that may go back in the file.
+pub(crate) fn replace_through(
+    path: &Path,
+    care: Care,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> io::Result<()> {
+    replace_by(&mut tempfile::Builder::new(), path, care, |file| write(file.as_file_mut()))
 }
 
 /// The same with a value as JSON for people, a line feed at its end.
@@ -217,6 +263,33 @@ mod tests {
         std::thread::sleep(2 * UNTIL_LOCKED);
         sweep(folder.path());
         assert_eq!([&left, &held, &other].map(|path| path.exists()), [false, true, true]);
+    }
+
+    #[test]
+    fn a_folder_is_put_in_place_whole_or_not_at_all() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("pages/new");
+        let fill = |text: &'static str| move |folder: &Path| std::fs::write(folder.join(text), text);
+        replace_folder(&path, fill("a")).unwrap();
+        let broken = replace_folder(&path, |folder| {
+            fill("b")(folder)?;
+            Err(io::Error::other("the disk is full"))
+        });
+        assert_eq!(broken.unwrap_err().to_string(), "the disk is full");
+        let names = |folder: &Path| {
+            let names = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+            names.collect::<Vec<_>>()
+        };
+        assert_eq!(names(&path), ["a"]);
+        replace_folder(&path, fill("c")).unwrap();
+        assert_eq!((names(&path), names(path.parent().unwrap())), (vec!["c".to_owned()], vec!["new".to_owned()]));
+        // What a writer left that was killed.
+        let left = path.with_file_name(format!("{UNFINISHED}left"));
+        std::fs::create_dir(&left).unwrap();
+        fill("d")(&left).unwrap();
+        std::thread::sleep(2 * UNTIL_LOCKED);
+        sweep(path.parent().unwrap());
+        assert_eq!(names(path.parent().unwrap()), ["new"]);
     }
 
     #[test]

@@ -2,15 +2,20 @@
 
 use maud::{Markup, html};
 
-use super::super::BaselineCheck;
-use super::{minus, table};
+use super::super::{BaselineCheck, BaselineLine};
+use super::{Pages, minus, rest, shown, table};
 
-pub(super) fn section(check: &BaselineCheck) -> Markup {
+pub(super) fn section(check: &BaselineCheck, pages: Option<&Pages<'_>>) -> Markup {
+    let mut entries: Vec<&BaselineLine> = check.entries.iter().collect();
+    if pages.is_some() {
+        // What departs is what there must be room for.
+        entries.sort_by_key(|entry| entry.is_as_accepted);
+    }
     html! {
         h2 id="baseline-title" { "Baseline" }
         p.lead { "Against the readings accepted in " code { (check.file) } ": " (check.counts()) "." }
         (table("Against the baseline", &["case", "procedure", "engine", "state", "what moved"], &html! {
-            @for entry in &check.entries {
+            @for entry in shown(&entries, pages) {
                 @let (class, glyph) = if entry.is_as_accepted { ("v-pass", "✓") } else { ("v-fail", "✕") };
                 tr {
                     th scope="row" { (entry.key.case) } td { (entry.key.procedure.row().title) } td { (entry.key.engine) }
@@ -19,5 +24,6 @@ pub(super) fn section(check: &BaselineCheck) -> Markup {
                 }
             }
         }))
+        (rest(&entries, pages, "baseline"))
     }
 }

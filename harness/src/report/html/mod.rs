@@ -6,11 +6,13 @@ mod accepted;
 mod beside;
 mod matrix;
 mod notes;
+mod pages;
 mod palette;
 mod plot;
 mod procedure;
 mod provenance;
 mod rows;
+mod sheets;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -18,8 +20,12 @@ use super::Report;
 use super::sentences::{HEADING, sentences};
 use super::words::{self, plural};
 use crate::judge::Verdict;
+use pages::{Layout, Pages, rest, shown};
 use palette::Palette;
+use plot::Marks;
 use rows::Rows;
+
+pub use sheets::keep;
 
 pub use beside::{Beside, BesideError};
 
@@ -29,11 +35,15 @@ const SCRIPT: &str = include_str!("page.js");
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
 
-/// The report as one HTML file; `beside` are further measurements to show with it.
+/// The report as one HTML file; `beside` are further measurements to show with it. That of a long report leads to pages beside it.
 pub fn page(report: &Report, beside: &[Beside]) -> String {
+    written(report, beside, Pages::of(report, Layout::USUAL).as_ref())
+}
+
+fn written(report: &Report, beside: &[Beside], pages: Option<&Pages<'_>>) -> String {
     let palette = Palette::of(report);
     let mut rows = Rows::default();
-    let sections: Vec<(String, String, Markup)> = sections(report, beside, &palette, &mut rows);
+    let sections: Vec<(String, String, Markup)> = sections(report, beside, &palette, &mut rows, pages);
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -43,7 +53,7 @@ pub fn page(report: &Report, beside: &[Beside]) -> String {
                 meta http-equiv="Content-Security-Policy" content=(POLICY);
                 meta name="generator" content=(format!("luxproof {}", report.tool_version));
                 title { (report.spec.title) " · luxproof" }
-                style { (PreEscaped(STYLE)) (PreEscaped(Palette::style())) }
+                style { (PreEscaped(STYLE)) (PreEscaped(Palette::style())) @if pages.is_some() { (PreEscaped(pages::STYLE)) } }
                 noscript { style { "tr[hidden]{display:table-row}.filters,.theme,.all,.more{display:none}" } }
             }
             body {
@@ -62,6 +72,7 @@ pub fn page(report: &Report, beside: &[Beside]) -> String {
                 }
                 footer {
                     "Written by luxproof " (report.tool_version) ". Everything here is a view of report.json, which holds all digits."
+                    @if let Some(pages) = pages { " The folder " code { (pages.folder()) } " belongs to this file: move them together." }
                 }
                 dialog id="budget" aria-labelledby="budget-title" {
                     form method="dialog" { button.close aria-label="Close" { "×" } }
@@ -77,21 +88,31 @@ pub fn page(report: &Report, beside: &[Beside]) -> String {
 }
 
 /// Every section with its id and its name in the navigation.
-fn sections(report: &Report, beside: &[Beside], palette: &Palette, rows: &mut Rows) -> Vec<(String, String, Markup)> {
-    let mut sections = vec![("matrix".to_owned(), "Verdicts".to_owned(), matrix::section(report, palette))];
+fn sections(
+    report: &Report,
+    beside: &[Beside],
+    palette: &Palette,
+    rows: &mut Rows,
+    pages: Option<&Pages<'_>>,
+) -> Vec<(String, String, Markup)> {
+    let marks = if pages.is_some() { Marks::Seen } else { Marks::Every };
+    let mut sections = vec![("matrix".to_owned(), "Verdicts".to_owned(), matrix::section(report, palette, pages))];
     if let Some(check) = &report.baseline {
-        sections.push(("baseline".to_owned(), "Baseline".to_owned(), accepted::section(check)));
+        sections.push(("baseline".to_owned(), "Baseline".to_owned(), accepted::section(check, pages)));
     }
     for name in report.procedures() {
-        let section = procedure::section(report, name, palette, rows);
+        let section = procedure::section(report, name, palette, rows, pages);
         sections.push((name.to_string(), name.row().short.to_owned(), section));
     }
-    sections.push(("time".to_owned(), "Run time".to_owned(), plot::times::section(report, beside, palette)));
+    if let Some(pages) = pages {
+        sections.push(("pages".to_owned(), "All readings".to_owned(), pages.section()));
+    }
+    sections.push(("time".to_owned(), "Run time".to_owned(), plot::times::section(report, beside, palette, marks)));
     if let Some(stress) = beside::stress_section(beside, palette) {
         sections.push(("stress".to_owned(), "Stress".to_owned(), stress));
     }
-    sections.push(("notes".to_owned(), "Notes".to_owned(), notes::section(report)));
-    sections.push(("provenance".to_owned(), "Provenance".to_owned(), provenance::section(report, palette)));
+    sections.push(("notes".to_owned(), "Notes".to_owned(), notes::section(report, pages)));
+    sections.push(("provenance".to_owned(), "Provenance".to_owned(), provenance::section(report, palette, pages)));
     sections
 }
 
@@ -213,4 +234,4 @@ fn power(exponent: i32) -> String {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

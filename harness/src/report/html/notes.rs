@@ -7,9 +7,9 @@ use maud::{Markup, html};
 use super::super::Report;
 use super::super::notes::{Kind, Note, departures, notes, splits, tables};
 use super::super::words::plural;
-use super::{minus, table};
+use super::{Pages, minus, rest, shown, table};
 
-pub(super) fn section(report: &Report) -> Markup {
+pub(super) fn section(report: &Report, pages: Option<&Pages<'_>>) -> Markup {
     let (notes, splits, departures, tables) = (notes(report), splits(report), departures(report), tables(report));
     html! {
         h2 id="notes-title" { "Skipped, approximated, noted" }
@@ -18,11 +18,13 @@ pub(super) fn section(report: &Report) -> Markup {
         }
         @if !notes.is_empty() {
             p.lead { "A shortcut is a reading with less work: meters that follow from others, light paths that carry nothing." }
-            (table("Notes", &["what", "engine", "procedures", "cases", "why"], &html! { @for note in &notes { (row(note)) } }))
+            (table("Notes", &["what", "engine", "procedures", "cases", "why"], &html! { @for note in shown(&notes, pages) { (row(note)) } }))
+            (rest(&notes, pages, "recordings"))
         }
         @if !departures.is_empty() {
             h3 { "Who departs from the other witnesses, the reference included" }
-            ul.notes { @for line in &departures { li { (minus(line)) } } }
+            ul.notes { @for line in shown(&departures, pages) { li { (minus(line)) } } }
+            (rest(&departures, pages, "consensus"))
         }
         @if !tables.is_empty() {
             h3 { "What does not fit in published tables" }
@@ -31,7 +33,8 @@ pub(super) fn section(report: &Report) -> Markup {
         @if !splits.is_empty() {
             h3 { "Methods apart from renderers" }
             p.lead { "Where an approximate method differs from a renderer, what of it is the method's and what the renderer's; the widest of each." }
-            ul.notes { @for (place, split) in &splits { li { span.where { (place) } " " (minus(split)) } } }
+            ul.notes { @for (place, split) in shown(&splits, pages) { li { span.where { (place) } " " (minus(split)) } } }
+            (rest(&splits, pages, "splits"))
         }
     }
 }

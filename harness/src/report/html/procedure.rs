@@ -1,6 +1,6 @@
 //! One procedure: what it asks, plots where people would rather look, and every reading in a table that can be filtered.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use itertools::Itertools;
 use maud::{Markup, html};
@@ -10,23 +10,41 @@ use super::super::notes::biases;
 use super::super::words::significant;
 use super::super::{Report, papers};
 use super::palette::Palette;
-use super::plot;
+use super::plot::{self, Marks};
 use super::rows::{Rows, place};
-use super::{class, glyph, minus, percent};
+use super::{Pages, class, glyph, minus, percent, rest, shown};
 use crate::judge::{Comparison, Verdict};
-use crate::record::ProcedureId;
+use crate::record::{EngineName, ProcedureId};
 use crate::system::process::quoted;
 
 /// Rows shown until all are asked for.
 const FIRST: usize = 12;
 /// More rows than this a procedure stay in report.json: the file must open on a telephone.
 const MOST: usize = 3000;
+/// So many of each engine where the others have pages of their own.
+const MOST_OF_ENGINE: usize = 100;
 
-pub(super) fn section(report: &Report, procedure: ProcedureId, palette: &Palette, rows: &mut Rows) -> Markup {
-    let mut mine: Vec<&Comparison> = report.comparisons.iter().filter(|c| c.key.procedure == procedure).collect();
-    let plots = plot::panels(report, &plot::groups(report, procedure), palette);
-    sort_worst_first(&mut mine);
+pub(super) fn section(
+    report: &Report,
+    procedure: ProcedureId,
+    palette: &Palette,
+    rows: &mut Rows,
+    pages: Option<&Pages<'_>>,
+) -> Markup {
+    let numbered = report.comparisons.iter().enumerate();
+    let mut mine: Vec<(usize, &Comparison)> = numbered.filter(|(_, c)| c.key.procedure == procedure).collect();
+    let marks = if pages.is_some() { Marks::Seen } else { Marks::Every };
+    let plots = plot::panels(report, &plot::groups(report, procedure), palette, marks);
+    sort_worst_first(&mut mine, |(_, c)| *c);
     let all = mine.len();
+    if pages.is_some() {
+        let mut of_engine: BTreeMap<&EngineName, usize> = BTreeMap::new();
+        mine.retain(|(_, c)| {
+            let count = of_engine.entry(&c.key.engine).or_default();
+            *count += 1;
+            *count <= MOST_OF_ENGINE
+        });
+    }
     mine.truncate(MOST);
     html! {
         h2 id={ (procedure) "-title" } { (procedure.row().title) }
@@ -36,24 +54,34 @@ pub(super) fn section(report: &Report, procedure: ProcedureId, palette: &Palette
         @let biases = biases(report, procedure);
         @if !biases.is_empty() {
             details { summary { "Bias: mean deviation, its interval, p of none" }
-                ul.notes { @for line in &biases { li { (minus(line)) } } }
+                ul.notes { @for line in shown(&biases, pages) { li { (minus(line)) } } }
+                (rest(&biases, pages, "bias"))
             }
         }
         @if all == 0 {
             p { "Nothing was compared." }
         } @else {
-            (table(report, procedure, &mine, palette, rows))
-            @if all > MOST { p.quiet { "The worst " (MOST) " of " (all) " readings; all are in report.json." } }
+            (table(report, procedure, &mine, palette, rows, pages))
+            @if pages.is_some() {
+                p.quiet { "The worst " (MOST_OF_ENGINE) " of each engine, " (mine.len()) " of " (all) " readings; every reading is on the " a href="#pages" { "pages" } "." }
+            } @else if all > MOST { p.quiet { "The worst " (MOST) " of " (all) " readings; all are in report.json." } }
         }
     }
 }
 
-fn table(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palette: &Palette, rows: &mut Rows) -> Markup {
+fn table(
+    report: &Report,
+    procedure: ProcedureId,
+    mine: &[(usize, &Comparison)],
+    palette: &Palette,
+    rows: &mut Rows,
+    pages: Option<&Pages<'_>>,
+) -> Markup {
     let suite = report.is_suite();
     html! {
         h3 { "Readings" }
         div.readings data-procedure=(procedure) data-first=(FIRST) {
-            (filters(report, procedure, mine, palette))
+            (filters(report, procedure, &mine.iter().map(|(_, c)| *c).collect_vec(), palette))
             div.scroll tabindex="0" role="region" aria-label={ "Readings of " (procedure.row().title) } {
                 table {
                     thead { tr {
@@ -62,7 +90,10 @@ fn table(report: &Report, procedure: ProcedureId, mine: &[&Comparison], palette:
                         th scope="col" { span.unseen { "error budget" } }
                     } }
                     tbody {
-                        @for (k, c) in mine.iter().enumerate() { (row(report, c, rows.add(c, palette), k >= FIRST, palette)) }
+                        @for (k, (place, c)) in mine.iter().enumerate() {
+                            @let link = pages.map(|pages| pages.link_to(*place));
+                            (row(report, c, rows.add(c, palette), k >= FIRST, palette, link.as_deref()))
+                        }
                     }
                 }
             }
@@ -76,7 +107,7 @@ fn head(name: &str, key: &str, class: &str) -> Markup {
     html! { th scope="col" class={ "c-" (key) " " (class) } { button.sort type="button" data-key=(key) { (name) } } }
 }
 
-fn row(report: &Report, c: &Comparison, number: usize, hidden: bool, palette: &Palette) -> Markup {
+fn row(report: &Report, c: &Comparison, number: usize, hidden: bool, palette: &Palette, link: Option<&str>) -> Markup {
     let suite = report.is_suite();
     let unit = c.quantity.unit();
     let value = |v: Option<f64>| v.map_or("–".to_owned(), significant);
@@ -84,7 +115,10 @@ fn row(report: &Report, c: &Comparison, number: usize, hidden: bool, palette: &P
         tr data-row=(number) hidden[hidden] {
             td { (palette.label(&c.key.engine)) }
             @if suite { td.c-c { (c.key.case) } }
-            td { (c.meter) " " span.place { (place(c)) } }
+            td {
+                @if let Some(link) = link { a href=(link) { (c.meter) } } @else { (c.meter) }
+                " " span.place { (place(c)) }
+            }
             td.number.c-v { (value(c.value)) " " span.unit { (unit) } }
             td.number.c-r { (value(c.reference.as_ref().map(|r| r.value))) " " span.unit { (unit) } }
             td.c-b { (c.basis_name()) }

@@ -5,10 +5,10 @@ use maud::{Markup, html};
 use super::super::Report;
 use super::super::words::plural;
 use super::palette::Palette;
-use super::{duration, table};
+use super::{Pages, duration, rest, shown, table};
 use crate::record::{Recording, Status};
 
-pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
+pub(super) fn section(report: &Report, palette: &Palette, pages: Option<&Pages<'_>>) -> Markup {
     html! {
         h2 id="provenance-title" { "Provenance" }
         p.lead { "To repeat the run, then one engine's part by hand:" }
@@ -21,8 +21,9 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
         }))
         h3 { "Inputs" }
         (table("Inputs", &["case", "spec", "SHA-256 of the spec and all it names"], &html! {
-            @for c in &report.cases { tr { th scope="row" { (c.name) } td { code { (c.spec.path) } } td { code.hash { (c.spec.sha256) } } } }
+            @for c in shown(&report.cases, pages) { tr { th scope="row" { (c.name) } td { code { (c.spec.path) } } td { code.hash { (c.spec.sha256) } } } }
         }))
+        (rest(&report.cases, pages, "cases"))
         @for policy in report.policies() {
             p { "Judged by the policy " code { (policy.file) } @if let Some(name) = &policy.profile { ", profile " code { (name) } }
                 ", SHA-256 " code.hash { (policy.sha256) } }
@@ -32,7 +33,8 @@ pub(super) fn section(report: &Report, palette: &Palette) -> Markup {
             @let mine: Vec<&Recording> = report.recordings.iter().filter(|r| r.key.engine == engine.id).collect();
             @if !mine.is_empty() {
                 details { summary { (palette.label(&engine.id)) " " span.quiet { (plural(mine.len(), "run")) } }
-                    (settings(&format!("Settings of {}", engine.id), &mine))
+                    (settings(&format!("Settings of {}", engine.id), shown(&mine, pages)))
+                    (rest(&mine, pages, "recordings"))
                 }
             }
         }

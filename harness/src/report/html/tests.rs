@@ -1,9 +1,14 @@
 //! What must hold of the page whatever the report says: it is whole, small, the same every time, and no text becomes markup.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
 use serde_json::{Value, json};
 
 use super::*;
-use crate::record::ProcedureId;
+use crate::judge::Comparison;
+use crate::record::{MeterId, ProcedureId};
+use crate::report::CaseRecord;
 
 const ENGINES: [&str; 5] = ["simulator", "iesna", "mitsuba", "radiance", "povray"];
 
@@ -49,6 +54,13 @@ fn report(procedures: &[ProcedureId], case: &str, title: &str) -> Report {
     .unwrap()
 }
 
+/// Of so many comparisons.
+pub(crate) fn long(comparisons: usize) -> Report {
+    let mut report = report(&[ProcedureId::DirectIlluminance, ProcedureId::IndirectIlluminance], "room", "a room");
+    report.comparisons = report.comparisons.into_iter().cycle().take(comparisons).collect();
+    report
+}
+
 #[test]
 fn two_procedures_of_192_meters_and_five_engines_stay_below_three_megabytes() {
     let page =
@@ -81,6 +93,137 @@ fn the_page_names_no_other_place_and_is_the_same_every_time() {
     assert_eq!(page, super::page(&report, &[]));
     let own = page.replace("http://www.w3.org/2000/svg", "");
     assert!(!own.contains("http:") && !own.contains("https:"), "a page that loads nothing names no address");
+}
+
+/// Small pages of 1920 comparisons.
+const SMALL: Layout = Layout { least: 100, comparisons: 64, rows: 3 };
+
+/// Where a page leads, and what it has names for.
+fn attributes<'a>(html: &'a str, name: &str) -> Vec<&'a str> {
+    html.split(&format!(" {name}=\"")).skip(1).map(|rest| rest.split('"').next().unwrap()).collect()
+}
+
+/// The pages that lie in a run's folder below `report-pages`, by their names.
+fn kept(run: &Path) -> BTreeMap<String, String> {
+    let folders = std::fs::read_dir(run.join("report-pages")).into_iter().flatten().map(|e| e.unwrap().path());
+    let files = folders.flat_map(|folder| std::fs::read_dir(folder).unwrap()).map(|e| e.unwrap().path());
+    let name = |path: &Path| path.strip_prefix(run).unwrap().display().to_string();
+    files.map(|path| (name(&path), std::fs::read_to_string(&path).unwrap())).collect()
+}
+
+#[test]
+fn the_pages_of_a_long_report_hold_every_comparison_once_and_every_link_leads_there() {
+    let run = tempfile::tempdir().unwrap();
+    let mut long = long(1920);
+    long.keep_anew(run.path()).unwrap();
+    let page = written(&long, &[], Pages::of(&long, SMALL).as_ref());
+    sheets::keep_as(&long, &page, run.path(), SMALL).unwrap();
+    let files = kept(run.path());
+    let rows = |html: &str| html.split("<tr id=\"r").skip(1).map(str::to_owned).collect::<Vec<_>>();
+    let rows: Vec<String> =
+        files.iter().filter(|(name, _)| name.contains("readings")).flat_map(|f| rows(f.1)).collect();
+    assert_eq!(rows.len(), 1920);
+    for (k, (row, c)) in rows.iter().zip(&long.comparisons).enumerate() {
+        let says = [format!("{}\">", k + 1), format!("<td>{}</td><td>{} ", c.key.engine, c.meter)];
+        assert!(row.starts_with(&says[0]) && row.contains(&says[1]), "{k}: {row}");
+    }
+    // Whatever leads anywhere leads to a file and to a name in it, wherever the folder was moved to.
+    let leads = |from: &str, html: &str| {
+        for link in attributes(html, "href").into_iter().filter(|link| !link.starts_with('#')) {
+            let (file, name) = link.split_once('#').unwrap_or((link, ""));
+            let to = run.path().join(from).parent().unwrap().join(file);
+            let text = std::fs::read_to_string(&to).unwrap_or_else(|e| panic!("{from} leads to {link}: {e}"));
+            assert!(name.is_empty() || text.contains(&format!(" id=\"{name}\"")), "{from} leads to {link}");
+        }
+    };
+    leads("report.html", &page);
+    for (name, html) in &files {
+        leads(name, html);
+    }
+    // 30 pages, and two rows of the matrix on one.
+    assert_eq!(files.len(), 31);
+    let worst: Vec<&str> = attributes(&page, "href").into_iter().filter(|link| link.contains("#r")).collect();
+    assert_eq!(worst.len(), 2 * 5 + 2 * 5 * 100, "every cell of the matrix, and the worst of each engine");
+}
+
+#[test]
+fn what_a_long_report_has_no_room_for_is_counted() {
+    let mut long = long(1920);
+    long.cases = (0..7).map(|k| CaseRecord { name: format!("case {k}"), ..long.cases[0].clone() }).collect();
+    for (k, c) in long.comparisons.iter_mut().enumerate() {
+        c.key.case = format!("case {}", k % 7);
+    }
+    let failing = &mut long.comparisons[300];
+    failing.verdict = Verdict::Fail;
+    let place = failing.key.case.clone();
+    let page = written(&long, &[], Pages::of(&long, SMALL).as_ref());
+    assert!(page.contains("The worst 3 of 14 rows; all are on 5 pages, from"));
+    assert!(page.contains("The worst 100 of each engine, 500 of 960 readings;"));
+    assert!(page.contains("Every one of 1920 comparisons, in the order of report.json, on 30 pages of 64 at most."));
+    // Its cell leads to it, and not to what passes before it.
+    assert!(page.contains("/readings-0005.html#r301\"><span class=\"unseen\">"));
+    let matrix = page.split("id=\"matrix-title\"").nth(1).unwrap().split("</section>").next().unwrap();
+    assert!(matrix.contains(&format!(">{place}</th>")), "what fails is shown");
+}
+
+#[test]
+fn no_name_becomes_markup_on_a_page_either() {
+    let evil = "\"><script>alert(1)</script><img src=x onerror=alert(2)>'&";
+    let run = tempfile::tempdir().unwrap();
+    let mut long = report(&[ProcedureId::DirectIlluminance], evil, evil);
+    for c in &mut long.comparisons {
+        c.key.engine = evil.into();
+        c.meter.0 = evil.into();
+        c.diagnosis = Some(evil.into());
+        c.verdict = Verdict::Fail;
+    }
+    // A report of another version may say so, and is shown with a doubt.
+    long.checksum = "../../\"><script>".into();
+    let page = written(&long, &[], Pages::of(&long, SMALL).as_ref());
+    assert_eq!(page.matches("</script>").count(), 2, "only the page's own two scripts end");
+    sheets::keep_as(&long, &page, run.path(), SMALL).unwrap();
+    let files = kept(run.path());
+    assert!(files.len() > 10);
+    for (name, html) in &files {
+        assert!(!html.contains("<script") && !html.contains("<img"), "markup on {name}");
+        assert!(html.contains("default-src 'none'"), "{name} may load");
+    }
+}
+
+#[test]
+fn pages_of_an_earlier_report_go_and_what_is_not_ours_stays() {
+    let run = tempfile::tempdir().unwrap();
+    let keep = |comparisons: usize| {
+        let mut report = long(comparisons);
+        report.keep_anew(run.path()).unwrap();
+        let page = written(&report, &[], Pages::of(&report, SMALL).as_ref());
+        sheets::keep_as(&report, &page, run.path(), SMALL).unwrap();
+        kept(run.path()).len()
+    };
+    assert_eq!([keep(1920), keep(640), keep(640), keep(3)], [31, 11, 11, 0]);
+    assert!(!run.path().join("report-pages").exists());
+    keep(640);
+    let theirs = run.path().join("report-pages/mine");
+    std::fs::create_dir(&theirs).unwrap();
+    std::fs::write(theirs.join("readings-0001.html"), "").unwrap();
+    assert_eq!(keep(3), 1);
+}
+
+#[test]
+fn a_grid_of_many_meters_is_drawn_in_blocks_of_which_the_worst_is_seen() {
+    let mut long = report(&[ProcedureId::DirectIlluminance], "room", "a room");
+    let first = long.comparisons[0].clone();
+    long.comparisons = (0..20_000)
+        .map(|k| {
+            let at_m = [(k % 200) as f64, (k / 200) as f64, 0.8];
+            let relative_deviation = Some(if k == 7777 { -0.0456 } else { 0.001 });
+            Comparison { meter: MeterId::new("plane", k), at_m, relative_deviation, ..first.clone() }
+        })
+        .collect();
+    let page = page(&long, &[]);
+    assert!(page.contains("Each cell is the worst of 3 × 3 meters."));
+    assert_eq!(page.matches("plane[7777]: −4.").count(), 1);
+    assert!(page.len() < 3_000_000, "{} bytes", page.len());
 }
 
 #[test]

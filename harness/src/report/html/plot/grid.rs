@@ -9,7 +9,7 @@ use super::super::palette::Palette;
 use super::super::percent;
 use super::axis::ticks;
 use super::contour::contour;
-use super::{Group, WIDTH, colours, figure};
+use super::{Group, Marks, WIDTH, colours, figure};
 use crate::judge::{Basis, Comparison};
 use crate::report::Report;
 use crate::report::svg::{label, line, number, text};
@@ -21,8 +21,10 @@ const RIGHT: f64 = 10.0;
 const BAR: f64 = 52.0;
 /// Fewer meters to a side than this are no map.
 const LEAST: usize = 3;
+/// More cells than this are finer than what a page shows.
+const MOST_CELLS: u32 = 4096;
 
-pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette) -> Vec<Markup> {
+pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette, marks: Marks) -> Vec<Markup> {
     let Some(basis) = group.basis() else { return vec![] };
     let firm: Vec<&Comparison> =
         group.comparisons.iter().copied().filter(|c| c.gamma_deg.is_none() && c.basis() == Some(basis)).collect();
@@ -38,11 +40,12 @@ pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette) -> V
         };
         let alike = Alike::of(report, group, basis, name);
         let title = group.title(report, &format!("{name}, reference ({})", basis.name()));
-        panels.push(isolux(&title, &first, &lattice, &alike));
+        let coarse = if marks == Marks::Seen { lattice.coarseness() } else { 1 };
+        panels.push(isolux(&title, &first, &lattice, &alike, coarse));
         let maps: Vec<(&str, Vec<&Comparison>)> =
             engines.iter().map(|e| (*e, of_set(e))).filter(|(_, m)| m.len() == first.len()).collect();
         for (engine, mine) in &maps {
-            panels.push(map(&group.title(report, &format!("{name}, {engine}")), mine, &lattice, &alike));
+            panels.push(map(&group.title(report, &format!("{name}, {engine}")), mine, &lattice, &alike, coarse));
         }
     }
     panels
@@ -59,7 +62,6 @@ struct Alike {
 
 impl Alike {
     fn of(report: &Report, group: &Group<'_>, basis: Basis, name: &str) -> Self {
-        let spec = |case: &str| case.split('/').next().map(str::to_owned);
         let is_alike = |c: &&Comparison| {
             let is_of_spec = c.key.procedure == group.procedure && spec(&c.key.case) == spec(group.case);
             is_of_spec && c.basis() == Some(basis) && c.gamma_deg.is_none() && set(c) == name
@@ -73,6 +75,11 @@ impl Alike {
             if has_cases { "one scale for all engines and all cases of the spec" } else { "one scale for all engines" };
         Self { low, high, most: round_step(most.clamp(1e-4, 100.0)), whose }
     }
+}
+
+/// The spec that a case is of.
+fn spec(case: &str) -> Option<&str> {
+    case.split('/').next()
 }
 
 fn set(c: &Comparison) -> &str {
@@ -114,6 +121,34 @@ impl Lattice {
         })
     }
 
+    /// How many meters to a side a cell stands for, so that cells are not too many.
+    fn coarseness(&self) -> usize {
+        let cells_of_one = (self.counts[0] * self.counts[1]) as f64 / f64::from(MOST_CELLS);
+        cells_of_one.sqrt().ceil().max(1.0) as usize
+    }
+
+    /// The lattice of blocks of so many meters to a side, and the meter of each that is picked.
+    fn blocks<'a>(
+        &self,
+        mine: &[&'a Comparison],
+        side: usize,
+        pick: impl Fn(&[&'a Comparison]) -> Option<&'a Comparison>,
+    ) -> (Self, Vec<&'a Comparison>) {
+        let counts = self.counts.map(|count| count.div_ceil(side));
+        let block = |k: usize| {
+            let [from_u, from_v] = [side * (k % counts[0]), side * (k / counts[0])];
+            let row = |v: usize| {
+                let to_u = (from_u + side).min(self.counts[0]);
+                mine[v * self.counts[0] + from_u..v * self.counts[0] + to_u].iter().copied()
+            };
+            pick(&(from_v..(from_v + side).min(self.counts[1])).flat_map(row).collect_vec())
+        };
+        let picked = (0..counts[0] * counts[1]).filter_map(block).collect();
+        let middle = 0.5 * (side - 1) as f64;
+        let axes = [0, 1].map(|k| (self.axes[k].0 + middle * self.step_m[k], self.axes[k].1.clone()));
+        (Self { counts, step_m: self.step_m.map(|step| step * side as f64), axes }, picked)
+    }
+
     fn frame(&self) -> Frame {
         let cells = [0, 1].map(|k| self.counts[k] as f64 * self.step_m[k]);
         let scale = ((WIDTH - LEFT - RIGHT) / cells[0]).min(300.0 / cells[1]);
@@ -140,7 +175,8 @@ impl Frame {
     }
 }
 
-fn isolux(title: &str, mine: &[&Comparison], lattice: &Lattice, alike: &Alike) -> Markup {
+fn isolux(title: &str, mine: &[&Comparison], lattice: &Lattice, alike: &Alike, coarse: usize) -> Markup {
+    let (lattice, mine) = &lattice.blocks(mine, coarse, |block| block.get(block.len() / 2).copied());
     let values: Vec<f64> = mine.iter().map(|c| c.reference.as_ref().map_or(f64::NAN, |r| r.value)).collect();
     let Alike { low, high, .. } = *alike;
     let frame = lattice.frame();
@@ -155,7 +191,9 @@ fn isolux(title: &str, mine: &[&Comparison], lattice: &Lattice, alike: &Alike) -
         (coordinates(lattice, &frame))
         (colour_bar(&frame, colours::amount, &[(0.0, end(low)), (1.0, end(high))], &format!("illuminance [{unit}]")))
     };
-    let caption = html! { "Cells: the reference at each meter; lines: isolux, in " (unit) "." };
+    let caption = html! { "Cells: the reference at each meter; lines: isolux, in " (unit) "."
+        @if coarse > 1 { " One of " (coarse) " × " (coarse) " meters is drawn." }
+    };
     figure(title, frame.size[1] + 46.0 + BAR, &drawing, &caption)
 }
 
@@ -178,13 +216,16 @@ fn isoline(values: &[f64], lattice: &Lattice, frame: &Frame, level: f64) -> Mark
     }
 }
 
-fn map(title: &str, mine: &[&Comparison], lattice: &Lattice, alike: &Alike) -> Markup {
+fn map(title: &str, mine: &[&Comparison], lattice: &Lattice, alike: &Alike, coarse: usize) -> Markup {
     let most = alike.most;
+    let inside: Vec<f64> = mine.iter().filter_map(|c| c.relative_deviation).map(|d| 100.0 * d).collect();
+    let amount = |c: &Comparison| c.relative_deviation.map_or(f64::INFINITY, f64::abs);
+    let (lattice, mine) =
+        &lattice.blocks(mine, coarse, |block| block.iter().copied().max_by(|a, b| amount(a).total_cmp(&amount(b))));
     let frame = lattice.frame();
     let in_percent = |k: usize| mine[k].relative_deviation.map(|d| 100.0 * d);
     let colour = |k: usize| in_percent(k).map_or("none".to_owned(), |p| colours::deviation(p / most));
     let words = |k: usize| mine[k].relative_deviation.map_or("no reading".to_owned(), percent);
-    let inside: Vec<f64> = (0..mine.len()).filter_map(in_percent).collect();
     let mean = inside.iter().sum::<f64>() / inside.len().max(1) as f64;
     let worst = largest(inside.iter().copied()).unwrap_or(0.0);
     let ends = [(0.0, format!("−{}", label(most))), (0.5, "0".to_owned()), (1.0, format!("+{}", label(most)))];
@@ -193,7 +234,9 @@ fn map(title: &str, mine: &[&Comparison], lattice: &Lattice, alike: &Alike) -> M
         (coordinates(lattice, &frame))
         (colour_bar(&frame, |t| colours::deviation(2.0 * t - 1.0), &ends, "deviation from the reference [%]"))
     };
-    let caption = html! { "Mean " (percent(mean / 100.0)) ", worst " (percent(worst / 100.0)) "; " (alike.whose) "." };
+    let caption = html! { "Mean " (percent(mean / 100.0)) ", worst " (percent(worst / 100.0)) "; " (alike.whose) "."
+        @if coarse > 1 { " Each cell is the worst of " (coarse) " × " (coarse) " meters." }
+    };
     figure(title, frame.size[1] + 46.0 + BAR, &drawing, &caption)
 }
 

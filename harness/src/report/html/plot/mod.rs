@@ -8,6 +8,8 @@ mod polar;
 mod strip;
 pub(super) mod times;
 
+use std::collections::HashMap;
+
 use maud::{Markup, html};
 
 use super::super::Report;
@@ -21,6 +23,14 @@ pub(super) const WIDTH: f64 = 350.0;
 /// More cases than this a procedure are left to the table.
 const MAX_CASES: usize = 9;
 
+/// How much of what is read has a mark of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Marks {
+    Every,
+    /// Of those that would lie upon one another one is drawn: nobody sees more, and a page of a million opens.
+    Seen,
+}
+
 pub(super) struct Group<'a> {
     pub(super) case: &'a str,
     pub(super) procedure: ProcedureId,
@@ -29,14 +39,15 @@ pub(super) struct Group<'a> {
 
 /// One group a case, in the cases' order, those without comparisons left out.
 pub(super) fn groups<'a>(report: &'a Report, procedure: ProcedureId) -> Vec<Group<'a>> {
-    let of_case = |case: &'a str| {
-        let comparisons = report.comparisons.iter().filter(|c| c.key.is_of(case, procedure)).collect();
-        Group { case, procedure, comparisons }
-    };
-    report.cases.iter().map(|c| of_case(&c.name)).filter(|g| !g.comparisons.is_empty()).collect()
+    let mut of_case: HashMap<&str, Vec<&Comparison>> = HashMap::new();
+    for c in report.comparisons.iter().filter(|c| c.key.procedure == procedure) {
+        of_case.entry(&c.key.case).or_default().push(c);
+    }
+    let group = |case: &'a str| Some(Group { case, procedure, comparisons: of_case.remove(case)? });
+    report.cases.iter().map(|c| &*c.name).filter_map(group).collect()
 }
 
-pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -> Vec<Markup> {
+pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette, marks: Marks) -> Vec<Markup> {
     let mut shown: Vec<&Group<'_>> = groups.iter().collect();
     if shown.len() > MAX_CASES {
         // Of many cases those are drawn that ask for attention most.
@@ -46,8 +57,8 @@ pub(super) fn panels(report: &Report, groups: &[Group<'_>], palette: &Palette) -
     let mut panels: Vec<Markup> = vec![];
     // Panels of a kind side by side, so that cases compare along a row.
     panels.extend(shown.iter().filter_map(|group| polar::panel(report, group, palette)));
-    panels.extend(shown.iter().flat_map(|group| grid::panels(report, group, palette)));
-    panels.extend(shown.iter().map(|group| strip::panel(report, group, palette)));
+    panels.extend(shown.iter().flat_map(|group| grid::panels(report, group, palette, marks)));
+    panels.extend(shown.iter().map(|group| strip::panel(report, group, palette, marks)));
     if shown.len() < groups.len() {
         panels.push(html! { p.quiet { "Drawn: " (shown.len()) " of " (groups.len()) " cases, those that ask for attention most." } });
     }

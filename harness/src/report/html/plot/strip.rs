@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::super::palette::Palette;
 use super::axis::Deviations;
-use super::{Group, WIDTH, figure};
+use super::{Group, Marks, WIDTH, figure};
 use crate::judge::{Basis, Comparison};
 use crate::report::Report;
 use crate::report::svg::{label, line, number, text};
@@ -15,7 +15,7 @@ const LEFT: f64 = 82.0;
 const ROW: f64 = 24.0;
 const HEAD: f64 = 22.0;
 
-pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Markup {
+pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette, marks: Marks) -> Markup {
     let with_deviation: Vec<&Comparison> =
         group.comparisons.iter().copied().filter(|c| c.relative_deviation.is_some()).collect();
     let tolerances = with_deviation.iter().filter_map(|c| allowed_percent(c)).filter(|a| *a < 100.0);
@@ -30,7 +30,7 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Ma
             let is_mine = |c: &&Comparison| c.key.engine == engine && c.basis() == Some(basis);
             let mine: Vec<&Comparison> = with_deviation.iter().copied().filter(is_mine).collect();
             if !mine.is_empty() {
-                blocks.push(row(&mine, engine, y, &scale, palette));
+                blocks.push(row(&mine, engine, y, &scale, palette, marks));
                 y += ROW;
             }
         }
@@ -44,7 +44,9 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Ma
         (text("axis", "middle", [LEFT + 0.5 * (WIDTH - LEFT - 12.0), bottom + 30.0], "deviation from the reference [%]"))
         @for block in blocks { (block) }
     };
-    let caption = html! { "One mark a meter; bars: expanded uncertainty; shaded: the tolerance. Straight scale within ± 0.01 %, logarithmic beyond." };
+    let caption = html! { "One mark a meter; bars: expanded uncertainty; shaded: the tolerance. Straight scale within ± 0.01 %, logarithmic beyond."
+        @if marks == Marks::Seen { " Of marks that would lie upon one another one is drawn." }
+    };
     figure(&group.title(report, "deviations"), bottom + 36.0, &drawing, &caption)
 }
 
@@ -52,7 +54,7 @@ fn allowed_percent(c: &Comparison) -> Option<f64> {
     Some(100.0 * c.allowed() / c.reference.as_ref()?.value).filter(|a| a.is_finite())
 }
 
-fn row(mine: &[&Comparison], engine: &str, y: f64, scale: &Deviations, palette: &Palette) -> Markup {
+fn row(mine: &[&Comparison], engine: &str, y: f64, scale: &Deviations, palette: &Palette, marks: Marks) -> Markup {
     let middle = y + 0.5 * ROW;
     // Where an absolute tolerance makes it differ from meter to meter, the narrowest is drawn.
     let allowed = mine.iter().filter_map(|c| allowed_percent(c)).fold(f64::INFINITY, f64::min);
@@ -66,12 +68,16 @@ fn row(mine: &[&Comparison], engine: &str, y: f64, scale: &Deviations, palette: 
         let ends = [100.0 * (d - u) / reference, 100.0 * (d + u) / reference].map(|p| scale.x(p));
         (ends[1] - ends[0] > 3.0).then(|| line(&class, [ends[0], lane(k)], [ends[1], lane(k)]))
     };
+    let mut taken = BTreeSet::new();
+    let x = |c: &Comparison| c.relative_deviation.map(|d| scale.x(100.0 * d).round() as i64);
+    let shown: Vec<(usize, &Comparison)> =
+        mine.iter().copied().enumerate().filter(|(_, c)| marks == Marks::Every || taken.insert(x(c))).collect();
     html! {
         rect.band x=(number(from)) y=(number(y + 2.0)) width=(number((to - from).max(1.0))) height=(number(ROW - 4.0)) rx="2" {}
         (text("name", "end", [LEFT - 8.0, middle + 4.0], engine))
-        @for (k, c) in mine.iter().enumerate() { @if let Some(bar) = interval(k, c) { (bar) } }
-        @for (k, c) in mine.iter().enumerate() {
-            @if let Some(d) = c.relative_deviation { (palette.mark(engine, [scale.x(100.0 * d), lane(k)], 3.2)) }
+        @for (k, c) in &shown { @if let Some(bar) = interval(*k, c) { (bar) } }
+        @for (k, c) in &shown {
+            @if let Some(d) = c.relative_deviation { (palette.mark(engine, [scale.x(100.0 * d), lane(*k)], 3.2)) }
         }
     }
 }

@@ -1,14 +1,16 @@
 //! Run time against error: what each engine's agreement costs, one panel a procedure.
 
+use std::collections::{BTreeSet, HashMap};
+
 use itertools::Itertools;
 use maud::{Markup, html};
 
 use super::super::beside::{BenchCurve, Beside};
 use super::super::palette::Palette;
 use super::super::{duration, percent};
-use super::{WIDTH, figure, groups, legend};
+use super::{Marks, WIDTH, figure, groups, legend};
 use crate::judge::Comparison;
-use crate::record::ProcedureId;
+use crate::record::{ProcedureId, Recording};
 use crate::report::Report;
 use crate::report::svg::{label, line, number, text};
 use crate::report::words::largest;
@@ -29,8 +31,8 @@ struct Point {
     error: f64,
 }
 
-pub(in super::super) fn section(report: &Report, beside: &[Beside], palette: &Palette) -> Markup {
-    let of = |procedure| panel(report, procedure, &curves(beside, procedure), palette);
+pub(in super::super) fn section(report: &Report, beside: &[Beside], palette: &Palette, marks: Marks) -> Markup {
+    let of = |procedure| panel(report, procedure, &curves(beside, procedure), palette, marks);
     let panels: Vec<Markup> = report.procedures().into_iter().filter_map(of).collect();
     html! {
         h2 id="time-title" { "Run time against error" }
@@ -48,9 +50,13 @@ fn curves<'a>(beside: &'a [Beside], procedure: ProcedureId) -> Vec<&'a BenchCurv
 
 fn points(report: &Report, procedure: ProcedureId) -> Vec<Point> {
     let mut points = vec![];
+    let mut of_case: HashMap<&str, Vec<&Recording>> = HashMap::new();
+    for recording in report.recordings.iter().filter(|r| r.key.procedure == procedure) {
+        of_case.entry(&recording.key.case).or_default().push(recording);
+    }
     for group in groups(report, procedure) {
         let Some(basis) = group.basis() else { continue };
-        for recording in report.recordings.iter().filter(|r| r.key.is_of(group.case, procedure)) {
+        for recording in of_case.remove(group.case).unwrap_or_default() {
             let mine = |c: &&&Comparison| c.key.engine == recording.key.engine && c.basis() == Some(basis);
             let errors = group.comparisons.iter().filter(mine).filter_map(|c| c.relative_deviation);
             if let Some(error) = largest(errors).map(f64::abs) {
@@ -63,7 +69,13 @@ fn points(report: &Report, procedure: ProcedureId) -> Vec<Point> {
     points
 }
 
-fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palette: &Palette) -> Option<Markup> {
+fn panel(
+    report: &Report,
+    procedure: ProcedureId,
+    curves: &[&BenchCurve],
+    palette: &Palette,
+    marks: Marks,
+) -> Option<Markup> {
     let points = points(report, procedure);
     let rungs = curves.iter().flat_map(|c| &c.points).filter_map(|p| Some((p.wall_s, p.relative_error?)));
     let all: Vec<(f64, f64)> = points.iter().map(|p| (p.wall_s, p.error)).chain(rungs).collect();
@@ -82,6 +94,9 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
     let of_curves = curves.iter().map(|c| c.engine.as_str());
     let engines = palette.sorted(points.iter().map(|p| p.engine.as_str()).chain(of_curves));
     let labels = labels(&points, &engines, &place);
+    let mut taken = BTreeSet::new();
+    let at = |point: &Point| place(point.wall_s, point.error).map(|x| x.round() as i64);
+    let seen = points.iter().filter(|p| marks == Marks::Every || taken.insert((&*p.engine, at(p)))).collect_vec();
     let drawing = html! {
         @for decade in time.low..=time.high {
             @let [x, _] = place(10f64.powi(decade), 1.0);
@@ -95,11 +110,12 @@ fn panel(report: &Report, procedure: ProcedureId, curves: &[&BenchCurve], palett
         text.axis text-anchor="middle" transform={ "translate(11 " (TOP + 0.5 * PLOT) ") rotate(-90)" } { "largest deviation [%]" }
         @for curve in curves { (drawn(curve, palette, &place)) }
         @for (engine, [x, y]) in &labels { (text("direct halo", if *x > LEFT + 0.7 * width { "end" } else { "start" }, [if *x > LEFT + 0.7 * width { x - 8.0 } else { x + 8.0 }, y + 4.0], engine)) }
-        @for point in &points { g.ring { title { (point.words) } (palette.mark(&point.engine, place(point.wall_s, point.error), 4.4)) } }
+        @for point in &seen { g.ring { title { (point.words) } (palette.mark(&point.engine, place(point.wall_s, point.error), 4.4)) } }
     };
     let floor = points.iter().any(|p| p.error < MIN_ERROR);
     let caption = html! {
         (legend(&engines, palette)) @if floor { " At the lower edge: 10⁻⁶ % or less." } @if !curves.is_empty() { " Lines: the ladder of luxproof bench." }
+        @if seen.len() < points.len() { " Drawn: " (seen.len()) " of " (points.len()) " runs; the others lie upon these." }
     };
     Some(figure(procedure.row().title, TOP + PLOT + 38.0, &drawing, &caption))
 }
