@@ -7,11 +7,11 @@ use super::Job;
 /// Processor seconds of one core (`benchmarks/planning.md`).
 pub(super) struct DirectCost {
     /// To start, and to read a scene.
-    pub(super) start_s: f64,
+    pub(super) start: f64,
     /// For each meter and luminaire that is a point.
-    pub(super) point_s: f64,
+    pub(super) a_point: f64,
     /// For each that is an opening; `None` where it is sampled until its error is small enough.
-    pub(super) opening_s: Option<f64>,
+    pub(super) an_opening: Option<f64>,
 }
 
 impl DirectCost {
@@ -21,10 +21,10 @@ impl DirectCost {
             return None;
         }
         let luminaires = job.scene.luminaires.iter().map(|luminaire| match luminaire.model {
-            LuminaireModel::Point => Some(self.point_s),
-            LuminaireModel::Area | LuminaireModel::Impostor => self.opening_s,
+            LuminaireModel::Point => Some(self.a_point),
+            LuminaireModel::Area | LuminaireModel::Impostor => self.an_opening,
         });
         let a_meter: f64 = luminaires.sum::<Option<f64>>()?;
-        Some(self.start_s + job.stations.len() as f64 * a_meter)
+        Some(self.start + job.stations.len() as f64 * a_meter)
     }
 }

@@ -73,7 +73,7 @@ impl Engine for Cycles {
     }
 
     fn expected_s(&self, job: &Job) -> Option<f64> {
-        DirectCost { start_s: 0.75, point_s: 6e-4, opening_s: None }.of(job)
+        DirectCost { start: 0.75, a_point: 6e-4, an_opening: None }.of(job)
     }
 
     fn knobs(&self) -> &'static [Knob] {

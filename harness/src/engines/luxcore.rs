@@ -78,7 +78,7 @@ impl Engine for LuxCore {
     }
 
     fn expected_s(&self, job: &Job) -> Option<f64> {
-        DirectCost { start_s: 0.2, point_s: 6.5e-3, opening_s: None }.of(job)
+        DirectCost { start: 0.2, a_point: 6.5e-3, an_opening: None }.of(job)
     }
 
     fn knobs(&self) -> &'static [Knob] {

@@ -92,7 +92,7 @@ impl Engine for Mitsuba {
     }
 
     fn expected_s(&self, job: &Job) -> Option<f64> {
-        DirectCost { start_s: 0.45, point_s: 1e-4, opening_s: Some(2e-3) }.of(job)
+        DirectCost { start: 0.45, a_point: 1e-4, an_opening: Some(2e-3) }.of(job)
     }
 
     fn knobs(&self) -> &'static [Knob] {

@@ -100,7 +100,7 @@ impl Engine for PovRay {
     }
 
     fn expected_s(&self, job: &Job) -> Option<f64> {
-        DirectCost { start_s: 0.06, point_s: 1e-4, opening_s: Some(6e-4) }.of(job)
+        DirectCost { start: 0.06, a_point: 1e-4, an_opening: Some(6e-4) }.of(job)
     }
 
     fn knobs(&self) -> &'static [Knob] {

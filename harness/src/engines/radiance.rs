@@ -111,7 +111,7 @@ impl Engine for Radiance {
     }
 
     fn expected_s(&self, job: &Job) -> Option<f64> {
-        DirectCost { start_s: 0.01, point_s: 2e-5, opening_s: Some(6e-4) }.of(job)
+        DirectCost { start: 0.01, a_point: 2e-5, an_opening: Some(6e-4) }.of(job)
     }
 
     fn knobs(&self) -> &'static [Knob] {
