@@ -14,7 +14,7 @@ use crate::judge::PolicyChoice;
 use crate::plan::Skipping;
 use crate::record::{EngineName, EngineStatus, Status};
 use crate::report::{Detail, Exit, Report, Style, terminal};
-use crate::spec::{Trust, suggestion};
+use crate::spec::Trust;
 use crate::system::process;
 
 #[derive(Clone, Debug, Subcommand)]
@@ -128,10 +128,7 @@ fn examine_adapter(words: &[String], options: Options<'_>) -> Result<(Report, Ex
 }
 
 pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
-    let known: Vec<EngineName> = engines::all().iter().map(|e| e.name()).collect();
-    let Some(name) = names.iter().find(|name| !known.iter().any(|k| k == *name)) else { return Ok(()) };
-    let help = suggestion(name, known.iter().map(EngineName::as_str));
-    Err(miette::miette!(help = help, "there is no engine `{name}`"))
+    engines::all_built_in(names).map_err(|unknown| miette::miette!(help = unknown.help, "{}", unknown.message))
 }
 
 /// What is broken fails; what is absent was not asked for.
@@ -154,6 +151,9 @@ fn verify(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
 
 /// The engines that are named, or all but those that want to be named.
 fn wanted(names: &[String]) -> Vec<EngineName> {
+    if !names.is_empty() {
+        return names.iter().map(EngineName::from).collect();
+    }
     engines::all().into_iter().map(|e| e.name()).filter(|e| engines::is_chosen(e, names)).collect()
 }
 
