@@ -21,9 +21,14 @@ use crate::system::process;
 pub(super) enum EnginesAction {
     /// Which engines there are, and their versions
     List,
+    /// Which releases can be had side by side, a line each, with what is there of them
+    Releases {
+        /// Engines by name [default: all]
+        names: Vec<String>,
+    },
     /// Fetch missing engines into a folder of our own
     Install {
-        /// Engines by name [default: all but those on request: cycles, luxcore, three and babylon]
+        /// Engines by name, or releases of them as mitsuba@3.5.2 [default: all but those on request: cycles, luxcore, three and babylon]
         names: Vec<String>,
     },
     /// Hold the files of installed engines against the sums that they were installed with
@@ -66,6 +71,13 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site, trust: 
             print(&format!("engines are kept in {}\n", site.root().display()))?;
             Ok(Exit::Passed)
         }
+        EnginesAction::Releases { names } => {
+            known_engines(&names)?;
+            for engine in engines::ALL.iter().filter(|e| names.is_empty() || names.iter().any(|n| e.name == *n)) {
+                releases(&engine.name, site)?;
+            }
+            Ok(Exit::Passed)
+        }
         EnginesAction::Install { names } => {
             known_engines(&names)?;
             Ok(report_installation(site, &names))
@@ -99,6 +111,18 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site, trust: 
             Ok(exit)
         }
     }
+}
+
+fn releases(engine: &EngineName, site: &Site) -> Result<(), Diagnostic> {
+    for release in engines::releases_of(engine) {
+        let name = format!("{engine}@{release}");
+        let Ok(Some(built_in)) = engines::built_in(&name) else { continue };
+        print(&match built_in.probe(site) {
+            Ok(version) => format!("{name:<18} {}\n", version.text),
+            Err(absent) => format!("{name:<18} absent: {absent}\n"),
+        })?;
+    }
+    Ok(())
 }
 
 fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<(Report, Exit), Diagnostic> {

@@ -57,7 +57,7 @@ pub(crate) use external::{RUN_IN, of_release, releases as releases_of_program};
 pub(crate) use iesna::method as method_of_iesna;
 pub use install::{InstallOutcome, InstallState, Soundness, install, repair, verify};
 pub use released::{Unknown, all_built_in, built_in};
-pub use releases::Known;
+pub use releases::{Known, releases_of};
 pub use settings::Coordinates;
 pub use site::{Site, SiteError};
 pub use workbench::{EngineError, Rest, SceneFile, Workbench};

@@ -3,10 +3,12 @@
 
 use std::cmp::Reverse;
 
+use luminaire::scene::{LuminaireModel, Transport};
+
 use super::Site;
 use super::catalogue::ALL;
 use super::contract::{Absent, Answer, Engine, Entry, Job, Knob, Measurement, Support, Version};
-use super::releases::{self, Known};
+use super::releases::{self, Cannot, Known};
 use super::workbench::{EngineError, SceneFile, Workbench};
 use crate::record::{EngineName, Release, Role, family};
 use crate::spec::suggestion;
@@ -33,7 +35,7 @@ pub fn built_in(name: &str) -> Result<Option<Box<dyn Engine>>, Unknown> {
 
 fn unknown(entry: &Entry, name: &str) -> Unknown {
     let engine = entry.name.as_str();
-    let mut releases: Vec<Release> = releases::of(engine).filter_map(Known::release).collect();
+    let mut releases: Vec<Release> = releases::releases_of(engine);
     if releases.is_empty() {
         let help = format!("there is only the one that is installed: name it `{engine}`");
         return Unknown { message: format!("{} has no releases here", entry.display_name), help };
@@ -87,6 +89,12 @@ impl Released {
     }
 }
 
+/// Whether any of the light is read by samples; direct light of points is not.
+fn is_sampled(job: &Job) -> bool {
+    let is_open = job.scene.luminaires.iter().any(|l| l.model != LuminaireModel::Point);
+    is_open || job.transport != Transport::Direct
+}
+
 impl Engine for Released {
     fn name(&self) -> EngineName {
         EngineName::new(self.known.name)
@@ -121,7 +129,15 @@ impl Engine for Released {
     }
 
     fn supports(&self, job: &Job) -> Support {
-        self.inner.supports(job)
+        match self.known.cannot {
+            Some(Cannot::HaveASeed) if is_sampled(job) => {
+                let package = self.known.package;
+                let why =
+                    format!("the rtrace of {package} is linked statically: nothing gives its random numbers a seed");
+                Support::No(why)
+            }
+            _ => self.inner.supports(job),
+        }
     }
 
     /// It is the engine that it is a release of, too: witnesses of one program count once.
@@ -209,6 +225,16 @@ mod tests {
         assert!(refused("povray@3.8").contains("name it `povray`"));
         assert!(built_in("mine@1.0").unwrap().is_none());
         assert!(all_built_in(&["radiance@1.0.0".into(), "mine".into()]).is_err());
+    }
+
+    #[test]
+    fn what_a_release_cannot_do_is_declined_and_the_rest_is_not() {
+        let (old, new) = (built_in("radiance@1.0.0").unwrap().unwrap(), built_in("radiance@1.1.5").unwrap().unwrap());
+        let sampled = crate::engines::fixtures::s1(crate::engines::fixtures::CONVERGED);
+        let direct = Job { transport: Transport::Direct, ..sampled.clone() };
+        assert!(matches!(old.supports(&sampled), Support::No(why) if why.contains("pyradiance-1.0.0")));
+        assert_eq!(old.supports(&direct), new.supports(&direct));
+        assert!(!matches!(new.supports(&sampled), Support::No(_)));
     }
 
     #[test]

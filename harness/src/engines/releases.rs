@@ -12,6 +12,15 @@ pub struct Known {
     /// The package that is of this release.
     pub(super) package: &'static str,
     home: Home,
+    /// What it cannot do that its engine can, as running it showed.
+    pub(super) cannot: Option<Cannot>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cannot {
+    /// Light that rtrace samples: its program is linked statically, so that libfaketime does not reach the clock that seeds it. Blocks of one
+    /// second are then one block, whose scatter says nothing.
+    HaveASeed,
 }
 
 #[derive(Debug, PartialEq, Eq)]
@@ -24,16 +33,20 @@ enum Home {
 
 macro_rules! own {
     ($engine:literal, $release:literal, $package:literal) => {
+        own!($engine, $release, $package, None)
+    };
+    ($engine:literal, $release:literal, $package:literal, $cannot:expr) => {
         Known {
             name: concat!($engine, "@", $release),
             package: concat!($package, "-", $release),
             home: Home::Own { lock: include_str!(concat!("../../releases/", $engine, "-", $release, ".lock")) },
+            cannot: $cannot,
         }
     };
 }
 
 const fn shared(name: &'static str, package: &'static str) -> Known {
-    Known { name, package, home: Home::Shared }
+    Known { name, package, home: Home::Shared, cannot: None }
 }
 
 /// By engine, oldest first. Locks are made by `ci/releases`; each was installed and run (`docs/releases.md`).
@@ -45,8 +58,8 @@ static KNOWN: &[Known] = &[
     own!("mitsuba", "3.9.0", "mitsuba"),
     shared("mitsuba@3.9.1", "mitsuba-3.9.1"),
     own!("radiance", "0.5.3", "pyradiance"),
-    own!("radiance", "1.0.0", "pyradiance"),
-    own!("radiance", "1.0.4", "pyradiance"),
+    own!("radiance", "1.0.0", "pyradiance", Some(Cannot::HaveASeed)),
+    own!("radiance", "1.0.4", "pyradiance", Some(Cannot::HaveASeed)),
     own!("radiance", "1.1.5", "pyradiance"),
     own!("radiance", "1.2.0", "pyradiance"),
     own!("radiance", "1.2.5", "pyradiance"),
@@ -63,7 +76,7 @@ static KNOWN: &[Known] = &[
 ];
 
 impl Known {
-    pub fn release(&self) -> Option<Release> {
+    fn release(&self) -> Option<Release> {
         EngineName::new(self.name).release()
     }
 
@@ -93,6 +106,11 @@ impl Known {
 /// The releases of an engine of ours that can be installed, oldest first; none where nobody knows any.
 pub(super) fn of(engine: &str) -> impl Iterator<Item = &'static Known> {
     KNOWN.iter().filter(move |known| family(known.name) == engine)
+}
+
+/// Their numbers.
+pub fn releases_of(engine: &str) -> Vec<Release> {
+    of(engine).filter_map(Known::release).collect()
 }
 
 /// A release by its name.

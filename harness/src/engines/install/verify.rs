@@ -159,7 +159,9 @@ mod tests {
         fs::write(root.join("venv/bin/python"), "").unwrap();
         fs::write(packages.join("lamp.py"), "lux").unwrap();
         let digest = BASE64_URL_SAFE_NO_PAD.encode(Sha256::digest("lux"));
-        let record = format!("lamp.py,sha256={digest},3\n__pycache__/lamp.pyc,,\n__pycache__/old.pyc,sha256={digest},3\nlamp-1.0.dist-info/RECORD,,\n");
+        let record = format!(
+            "lamp.py,sha256={digest},3\n__pycache__/lamp.pyc,,\n__pycache__/old.pyc,sha256={digest},3\nlamp-1.0.dist-info/RECORD,,\n"
+        );
         fs::write(packages.join("lamp-1.0.dist-info/RECORD"), record).unwrap();
         Site::at(root)
     }
