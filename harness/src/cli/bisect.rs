@@ -16,7 +16,7 @@ use crate::measure::cache::Cache;
 use crate::plan::Selection;
 use crate::record::{ProcedureId, Release};
 use crate::report::Exit;
-use crate::spec::{Case, Trust, suggestion};
+use crate::spec::{Case, Trust};
 use crate::system::claim::Claim;
 use crate::system::process;
 
@@ -93,9 +93,12 @@ pub(super) fn run(args: &BisectArgs, site: &Site, cache: &Cache, trust: Trust) -
         diagnosis: Diagnosis::LeftOut,
         ..Options::new(site.clone(), out.join(release.as_str()))
     };
+    let ours = known_of_ours(&args.engine)?;
+    // Names are told before specs are read where they can be.
+    let ours = ours.map(|known| range(args, &known)).transpose()?;
     let (cases, _) = audit::chosen(&args.specs, &options(&args.good)).map_err(diagnose)?;
-    let releases = range(args, &known(&args.engine, &cases)?)?;
-    let is_ours = engines::entry(&args.engine).is_some();
+    let is_ours = ours.is_some();
+    let releases = ours.map_or_else(|| range(args, &known_of_program(&args.engine, &cases)?), Ok)?;
     let absent = |release: &Release| {
         let engine = engines::built_in(&named(&args.engine, release)).ok()?;
         engine.filter(|_| !args.install)?.probe(site).err().map(|absent| absent.to_string())
@@ -149,27 +152,30 @@ fn named(engine: &str, release: &Release) -> String {
     format!("{engine}@{release}")
 }
 
-/// The releases of an engine, oldest first: those of ours that can be installed, or those that a program's settings name.
-fn known(engine: &str, cases: &[Case]) -> Result<Vec<Release>, Diagnostic> {
-    let ours = engines::releases_of(engine);
-    if !ours.is_empty() {
-        return Ok(ours);
+/// The releases of an engine of ours, oldest first; `None` where it is none.
+fn known_of_ours(engine: &str) -> Result<Option<Vec<Release>>, Diagnostic> {
+    match engines::releases_of(engine) {
+        none if none.is_empty() && engines::entry(engine).is_some() => Err(unknown(engine)),
+        none if none.is_empty() => Ok(None),
+        all => Ok(Some(all)),
     }
+}
+
+/// The releases that the settings of a program name, oldest first.
+fn known_of_program(engine: &str, cases: &[Case]) -> Result<Vec<Release>, Diagnostic> {
     let settings = cases.iter().map(|case| case.settings_of(engine)).find(|settings| !settings.is_empty());
     let theirs = settings.map(|s| engines::releases_of_program(engine, &s)).transpose().into_diagnostic()?;
-    let theirs = theirs.unwrap_or_default();
-    if !theirs.is_empty() {
-        return Ok(theirs);
-    }
-    let have =
-        engines::ALL.iter().map(|entry| entry.name.as_str()).filter(|name| !engines::releases_of(name).is_empty());
-    let have: Vec<&str> = have.collect();
+    theirs.filter(|known| !known.is_empty()).ok_or_else(|| unknown(engine))
+}
+
+fn unknown(engine: &str) -> Diagnostic {
+    let has_some = |name: &&str| !engines::releases_of(name).is_empty();
+    let have: Vec<&str> = engines::ALL.iter().map(|entry| entry.name.as_str()).filter(has_some).collect();
     let help = format!(
-        "{}; releases are known of {}; a program of your own names them in the spec, `releases: {{\"1.0\": [program, arguments...]}}`",
-        suggestion(engine, have.iter().copied()),
+        "they are known of {}; a program of your own names them in the spec, `releases: {{\"1.0\": [program, arguments...]}}`",
         have.join(", ")
     );
-    Err(miette::miette!(help = help, "no releases are known of `{engine}`"))
+    miette::miette!(help = help, "no releases are known of `{engine}`")
 }
 
 /// From the good end to the bad one.

@@ -176,7 +176,12 @@ impl Engine for Released {
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
-        self.inner.read(job, &self.bench(workbench)).map_err(|error| self.own(error))
+        let mut measurement = self.inner.read(job, &self.bench(workbench)).map_err(|error| self.own(error))?;
+        if self.known.cannot == Some(Cannot::LookUpAsBefore) {
+            let note = "beyond the ends of a table it looks up otherwise than the release that the bound was made for";
+            measurement.notes.push(note.to_owned());
+        }
+        Ok(measurement)
     }
 
     fn takes_batches(&self) -> bool {

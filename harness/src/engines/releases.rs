@@ -21,6 +21,9 @@ pub(super) enum Cannot {
     /// Light that rtrace samples: its program is linked statically, so that libfaketime does not reach the clock that seeds it. Blocks of one
     /// second are then one block, whose scatter says nothing.
     HaveASeed,
+    /// Look a table up as the release that our bound of its look-up was made for (`engines/cycles/ies.rs`): from 5.0 on a neighbour that is
+    /// missing has the value of the one beside it, where it was dark.
+    LookUpAsBefore,
 }
 
 #[derive(Debug, PartialEq, Eq)]
@@ -67,7 +70,7 @@ static KNOWN: &[Known] = &[
     own!("cycles", "4.2.0", "bpy"),
     own!("cycles", "4.4.0", "bpy"),
     shared("cycles@4.5.15", "bpy-4.5.15"),
-    own!("cycles", "5.0.1", "bpy"),
+    own!("cycles", "5.0.1", "bpy", Some(Cannot::LookUpAsBefore)),
     own!("luxcore", "2.10.0", "pyluxcore"),
     own!("luxcore", "2.10.1", "pyluxcore"),
     own!("luxcore", "2.11.0", "pyluxcore"),
