@@ -165,7 +165,8 @@ fn verify(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
             Soundness::Unknown(why) => format!("not known: {why}"),
             Soundness::Broken(faults) => {
                 exit = Exit::Engine;
-                format!("broken; run `luxproof engines repair`\n    {}", faults.join("\n    "))
+                let repair = [&["luxproof engines repair".to_owned()], names].concat().join(" ");
+                format!("broken; run `{repair}`\n    {}", faults.join("\n    "))
             }
         };
         print(&format!("{component}: {text}\n"))?;

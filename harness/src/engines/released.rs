@@ -35,7 +35,7 @@ pub fn built_in(name: &str) -> Result<Option<Box<dyn Engine>>, Unknown> {
 
 fn unknown(entry: &Entry, name: &str) -> Unknown {
     let engine = entry.name.as_str();
-    let mut releases: Vec<Release> = releases::releases_of(engine);
+    let (releases, mut nearest) = (releases::releases_of(engine), None);
     if releases.is_empty() {
         let help = format!("there is only the one that is installed: name it `{engine}`");
         return Unknown { message: format!("{} has no releases here", entry.display_name), help };
@@ -43,16 +43,18 @@ fn unknown(entry: &Entry, name: &str) -> Unknown {
     let asked = name.split_once('@').map_or("", |(_, release)| release);
     let message = match asked.parse::<Release>() {
         Ok(release) => {
-            // What shares most of its beginning is the nearest.
+            // Of its two neighbours the one that shares more of its beginning, the older where they are alike.
             let alike =
                 |r: &Release| r.as_str().bytes().zip(release.as_str().bytes()).take_while(|(a, b)| a == b).count();
-            releases.sort_by_key(|r| Reverse(alike(r)));
+            let older = releases.iter().rfind(|r| **r < release);
+            let newer = releases.iter().find(|r| **r > release);
+            nearest = older.into_iter().chain(newer).min_by_key(|r| Reverse(alike(r))).cloned();
             format!("there is no release `{release}` of {engine} here")
         }
         Err(why) => format!("`{}` names no release: {why}", short(asked)),
     };
     let listed: Vec<String> = releases::of(engine).map(|known| known.name.to_owned()).collect();
-    let nearest = releases.first().map_or_else(String::new, |r| format!("the nearest is `{engine}@{r}`; "));
+    let nearest = nearest.map_or_else(String::new, |r| format!("the nearest is `{engine}@{r}`; "));
     Unknown { message, help: format!("{nearest}known: {}", listed.join(", ")) }
 }
 
@@ -227,6 +229,7 @@ mod tests {
             let told = refused(name);
             assert!(told.contains("names no release") && told.len() < 300, "{told}");
         }
+        assert!(refused("radiance@9.9").contains("nearest is `radiance@1.3.1`"));
         assert!(refused("povray@3.8").contains("name it `povray`"));
         assert!(built_in("mine@1.0").unwrap().is_none());
         assert!(all_built_in(&["radiance@1.0.0".into(), "mine".into()]).is_err());

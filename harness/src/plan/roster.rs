@@ -21,12 +21,19 @@ pub(super) struct Roster {
     ours: Vec<Arc<dyn Engine>>,
     /// Releases of ours that were named.
     releases: Vec<Arc<dyn Engine>>,
-    externals: Vec<(Named, Arc<dyn Engine>)>,
+    externals: Vec<(Program, Arc<dyn Engine>)>,
     probed: Vec<(Arc<dyn Engine>, Result<Version, Absent>)>,
 }
 
+/// Where an engine is named.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Named {
+    InSpec,
+    OnTheCommandLine,
+}
+
 /// A program of a user's: name, settings and the folder that its paths count from.
-type Named = (String, EngineSettings, PathBuf);
+type Program = (String, EngineSettings, PathBuf);
 
 impl Roster {
     pub(super) fn new() -> Self {
@@ -47,52 +54,48 @@ impl Roster {
         let (mut all, mut faults) = (self.ours.clone(), vec![]);
         let built_in = names(&all);
         let none = EngineSettings::default();
-        let in_spec = case.engines.iter().flatten().map(|(name, settings)| (name, settings, true));
+        let in_spec = case.engines.iter().flatten().map(|(name, settings)| (name, settings, Named::InSpec));
         // Others that the command line names have to be releases: what else there is, is ours or stands in the spec.
-        let is_in_spec = |name: &String| case.engines.as_ref().is_some_and(|engines| engines.contains_key(name));
-        let besides = selection.engines.iter().filter(|name| name.contains('@') && !is_in_spec(name)).unique();
-        let named = in_spec.chain(besides.map(|name| (name, &none, false)));
-        for (name, settings, stands) in named.filter(|(name, ..)| !built_in.contains(*name)) {
-            let at = format!("engines.{name}");
+        let besides = selection.engines.iter().filter(|name| name.contains('@') && !stands_in(case, name)).unique();
+        let named = in_spec.chain(besides.map(|name| (name, &none, Named::OnTheCommandLine)));
+        for (name, settings, by) in named.filter(|(name, ..)| !built_in.contains(*name)) {
             match self.release(name) {
-                Ok(Some(release)) => {
-                    all.push(release);
-                    continue;
+                Ok(Some(release)) => all.push(release),
+                Ok(None) => match self.program(case, name, settings, by, &built_in) {
+                    Ok(program) => all.extend(program),
+                    Err(fault) => faults.push(fault),
+                },
+                Err(Unknown { message, help }) if by == Named::InSpec => {
+                    faults.push(case.source.error_at_spot(Spot::Key, &format!("engines.{name}"), message, help));
                 }
-                Ok(None) => {}
-                Err(Unknown { message, help }) => {
-                    let fault = match stands {
-                        true => case.source.error_at_spot(Spot::Key, &at, message, help),
-                        false => SpecError::of("--engines", message, help),
-                    };
-                    faults.push(fault);
-                    continue;
-                }
-            }
-            let settings = &match program(case, name, settings) {
-                Ok(settings) if !stands && !settings.0.contains_key("command") => continue,
-                Ok(settings) => settings,
-                Err(error) => {
-                    let help =
-                        || "give `releases: {\"1.0\": [program, arguments...]}`, oldest or newest first".to_owned();
-                    faults.push(misset(case, family(name), error, help));
-                    continue;
-                }
-            };
-            if !settings.0.contains_key("command") {
-                let (message, known) = unknown(name, &built_in);
-                let help = format!("{known} A program of your own needs `command: [...]`");
-                faults.push(case.source.error_at_spot(Spot::Key, &at, message, help));
-                continue;
-            }
-            let folder = case.path.parent().unwrap_or(Path::new(""));
-            let help = || "give `command: [program, arguments...]`, paths relative to the spec".to_owned();
-            match self.external(name, settings, folder) {
-                Ok(engine) => all.push(engine),
-                Err(error) => faults.push(misset(case, name, error, help)),
+                Err(Unknown { message, help }) => faults.push(SpecError::of("--engines", message, help)),
             }
         }
         (all, faults)
+    }
+
+    /// A program of a case's; `None` where the command line names what this case knows nothing of.
+    fn program(
+        &mut self,
+        case: &Case,
+        name: &str,
+        settings: &EngineSettings,
+        by: Named,
+        built_in: &[String],
+    ) -> Result<Option<Arc<dyn Engine>>, SpecError> {
+        let help = || "give `releases: {\"1.0\": [program, arguments...]}`".to_owned();
+        let settings = settings_of_program(case, name, settings).map_err(|e| misset(case, family(name), e, help))?;
+        if !settings.0.contains_key("command") {
+            if by == Named::OnTheCommandLine {
+                return Ok(None);
+            }
+            let (message, known) = unknown(name, built_in);
+            let help = format!("{known} A program of your own needs `command: [...]`");
+            return Err(case.source.error_at_spot(Spot::Key, &format!("engines.{name}"), message, help));
+        }
+        let folder = case.path.parent().unwrap_or(Path::new(""));
+        let help = || "give `command: [program, arguments...]`, paths relative to the spec".to_owned();
+        self.external(name, &settings, folder).map(Some).map_err(|error| misset(case, name, error, help))
     }
 
     /// The engines of a case, in the order of reports.
@@ -130,7 +133,7 @@ impl Roster {
         let mut faults = vec![];
         for engine in self.ours.iter().chain(&self.releases) {
             let name = engine.name();
-            if name.release().is_some() && !case.engines.as_ref().is_some_and(|engines| engines.contains_key(&*name)) {
+            if name.release().is_some() && !stands_in(case, &name) {
                 continue;
             }
             let settings = case.settings_of(name.as_str());
@@ -229,8 +232,13 @@ impl Roster {
     }
 }
 
+/// Whether the spec names an engine.
+fn stands_in(case: &Case, name: &str) -> bool {
+    case.engines.as_ref().is_some_and(|engines| engines.contains_key(name))
+}
+
 /// The settings of a program of a user's: its own, or those that the program of which it is a release has for it.
-fn program(case: &Case, name: &str, settings: &EngineSettings) -> Result<EngineSettings, EngineError> {
+fn settings_of_program(case: &Case, name: &str, settings: &EngineSettings) -> Result<EngineSettings, EngineError> {
     let of_family = case.engines.as_ref().and_then(|all| all.get(family(name))).filter(|_| family(name) != name);
     let of_family = of_family.filter(|_| !settings.0.contains_key("command"));
     let made = of_family.map(|of| engines::of_release(name, &of.0, &settings.0)).transpose()?.flatten();

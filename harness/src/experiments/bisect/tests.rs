@@ -16,9 +16,9 @@ fn number(release: &Release) -> usize {
 }
 
 /// The verdict on a meter of a procedure, at a release.
-fn judged(at: impl Fn(ProcedureId, usize) -> Verdict) -> Look {
+fn judged(at: impl Fn(ProcedureId, usize) -> Verdict) -> BTreeMap<Place, Verdict> {
     let places = [DIRECT, INDIRECT].into_iter().flat_map(|p| (0..2).map(move |k| (p, k)));
-    Ok(places.map(|(p, k)| (place(p, k), at(p, k))).collect())
+    places.map(|(p, k)| (place(p, k), at(p, k))).collect()
 }
 
 fn found(n: usize, mut look: impl FnMut(usize) -> Look) -> Result<Found, Refused> {
@@ -32,7 +32,7 @@ fn from(first: usize) -> impl Fn(usize) -> Verdict {
 #[test]
 fn a_regression_among_sixteen_releases_takes_four_runs_besides_the_ends_at_most() {
     for first in 2..=16 {
-        let found = found(16, |r| judged(|p, _| if p == DIRECT { from(first)(r) } else { Verdict::Pass })).unwrap();
+        let found = found(16, |r| Ok(judged(|p, _| if p == DIRECT { from(first)(r) } else { Verdict::Pass }))).unwrap();
         assert_eq!((found.good, found.bad), (format!("1.{}", first - 1), format!("1.{first}")));
         assert!(found.runs <= 6, "{}", found.runs);
         assert_eq!(found.changed.len(), 1);
@@ -43,7 +43,7 @@ fn a_regression_among_sixteen_releases_takes_four_runs_besides_the_ends_at_most(
 
 #[test]
 fn of_two_changes_the_first_is_found_and_the_other_is_said_to_come_later() {
-    let found = found(16, |r| judged(|p, _| if p == DIRECT { from(12)(r) } else { from(5)(r) })).unwrap();
+    let found = found(16, |r| Ok(judged(|p, _| if p == DIRECT { from(12)(r) } else { from(5)(r) }))).unwrap();
     assert_eq!((found.good.as_str(), found.bad.as_str()), ("1.4", "1.5"));
     assert_eq!((found.changed[0].procedure, found.later[0].procedure), (INDIRECT, DIRECT));
     let told = found.to_string();
@@ -52,21 +52,21 @@ fn of_two_changes_the_first_is_found_and_the_other_is_said_to_come_later() {
 
 #[test]
 fn ends_that_are_alike_swapped_or_silent_are_refused() {
-    let alike = found(8, |_| judged(|_, _| Verdict::Pass)).unwrap_err();
+    let alike = found(8, |_| Ok(judged(|_, _| Verdict::Pass))).unwrap_err();
     assert!(matches!(alike, Refused::Alike { compared: 4, .. }), "{alike}");
-    let swapped = found(8, |r| judged(|_, _| if r < 3 { Verdict::Fail } else { Verdict::Pass })).unwrap_err();
+    let swapped = found(8, |r| Ok(judged(|_, _| if r < 3 { Verdict::Fail } else { Verdict::Pass }))).unwrap_err();
     assert!(matches!(swapped, Refused::Swapped { count: 4, .. }), "{swapped}");
-    let open = found(8, |r| judged(|_, _| if r == 8 { Verdict::Inconclusive } else { Verdict::Pass })).unwrap_err();
+    let open = found(8, |r| Ok(judged(|_, _| if r == 8 { Verdict::Inconclusive } else { Verdict::Pass }))).unwrap_err();
     assert!(open.to_string().contains("4 are not decided"), "{open}");
     let silent =
-        found(8, |r| if r == 8 { Err("it crashed".into()) } else { judged(|_, _| Verdict::Pass) }).unwrap_err();
+        found(8, |r| if r == 8 { Err("it crashed".into()) } else { Ok(judged(|_, _| Verdict::Pass)) }).unwrap_err();
     assert_eq!(silent.to_string(), "1.8 says nothing: it crashed");
 }
 
 #[test]
 fn what_crashes_or_is_undecided_is_skipped_and_named_where_it_hides_the_change() {
     let crashes = |silent: &'static [usize]| {
-        found(16, move |r| if silent.contains(&r) { Err("it crashed".into()) } else { judged(|_, _| from(9)(r)) })
+        found(16, move |r| if silent.contains(&r) { Err("it crashed".into()) } else { Ok(judged(|_, _| from(9)(r))) })
             .unwrap()
     };
     let beside = crashes(&[6, 7]);
@@ -76,7 +76,7 @@ fn what_crashes_or_is_undecided_is_skipped_and_named_where_it_hides_the_change()
     assert_eq!(hidden.unclear[0].why, "it crashed");
     assert!(hidden.to_string().contains("skipped  mine@1.8: it crashed"));
     let undecided =
-        found(4, |r| judged(|_, k| if r == 2 && k == 1 { Verdict::Inconclusive } else { from(3)(r) })).unwrap();
+        found(4, |r| Ok(judged(|_, k| if r == 2 && k == 1 { Verdict::Inconclusive } else { from(3)(r) }))).unwrap();
     assert!(undecided.unclear[0].why.contains("2 of 4 comparisons are undecided"), "{undecided:?}");
 }
 
@@ -86,7 +86,7 @@ fn what_is_not_there_costs_no_run() {
     let absent = |r: &Release| (number(r) == 3).then(|| "it is not installed".to_owned());
     let found = bisect("mine", &releases(4), absent, |r| {
         runs += 1;
-        Ok::<_, Refused>(judged(|_, _| from(2)(number(r))))
+        Ok::<_, Refused>(Ok(judged(|_, _| from(2)(number(r)))))
     });
     let found = found.unwrap();
     assert_eq!((found.runs, runs, found.bad.as_str()), (3, 3, "1.2"));
@@ -100,7 +100,7 @@ fn what_goes_back_and_forth_is_told() {
         (INDIRECT, ..) => Verdict::Pass,
         _ => from(3)(r),
     };
-    let found = found(9, |r| judged(|p, k| verdict(p, k, r))).unwrap();
+    let found = found(9, |r| Ok(judged(|p, k| verdict(p, k, r)))).unwrap();
     assert_eq!(found.bad, "1.3");
     assert_eq!(found.remarks.len(), 1, "{:?}", found.remarks);
     assert!(found.remarks[0].contains("passes at 1.1, fails at 1.5, passes at 1.9"), "{:?}", found.remarks);
