@@ -61,10 +61,10 @@ class Goniometric(mi.Emitter):
         ds.d = to_light / ds.dist
         ds.emitter = mi.EmitterPtr(self) if is_jit() else self
         share = self.opening.share(area, self.to_own(-ds.d))
-        return ds, mi.Spectrum(share * self.intensity(-ds.d, active) / dr.square(ds.dist))
+        return ds, mi.Spectrum(share * self.intensity(-ds.d, active) / (ds.dist * ds.dist))
 
     def eval_direction(self, it, ds, active=True):
-        return mi.Spectrum(self.intensity(-ds.d, active) / dr.square(ds.dist))
+        return mi.Spectrum(self.intensity(-ds.d, active) / (ds.dist * ds.dist))
 
     def pdf_direction(self, it, ds, active=True):
         return mi.Float(0)
@@ -103,7 +103,9 @@ class Table:
     @classmethod
     def load(cls, name):
         """The table of a file named relative to the scene; luminaires of one kind share it."""
-        path = str(mi.file_resolver().resolve(name))
+        # Older Mitsubas have a resolver a thread.
+        resolver = mi.file_resolver() if hasattr(mi, "file_resolver") else mi.Thread.thread().file_resolver()
+        path = str(resolver.resolve(name))
         if (mi.variant(), path) not in cls.cache:
             cls.cache[mi.variant(), path] = cls(path)
         return cls.cache[mi.variant(), path]

@@ -21,7 +21,6 @@ import blocks
 
 CLEAR = 1e-6  # of coordinates: how far off a meter its shadow rays start
 SHADOW_EPSILON = 9e-4  # of distances: how far before an emitter they end, as Mitsuba's own do
-VERSIONS = {"mitsuba": mi.__version__, "drjit": dr.__version__}
 
 
 def main():
@@ -38,13 +37,24 @@ def instrument(job, folder, options):
         dr.set_thread_count(options.threads)
     import mitsuba_goniometric  # registers the emitters, for the variant just set
 
-    # Without optimize=False two luminaires of one kind may be merged into one.
-    return Instrument(mi.load_file(os.path.join(folder, job["scene"]), optimize=False), job)
+    return Instrument(load(os.path.join(folder, job["scene"])), job)
+
+
+def load(scene):
+    """A scene in which luminaires of one kind are not merged into one; older Mitsubas merge nothing, and refuse the option."""
+    try:
+        return mi.load_file(scene, optimize=False)
+    except RuntimeError as error:
+        if 'Unused parameter "optimize"' not in str(error):
+            raise
+        # Loading side by side crashed one process in eight there.
+        return mi.load_file(scene, parallel=False)
 
 
 class Instrument(blocks.Instrument):
     def __init__(self, scene, job):
-        super().__init__(job, VERSIONS, mi.variant())
+        # Before a variant is set, older ones tell no version.
+        super().__init__(job, {"mitsuba": mi.__version__, "drjit": dr.__version__}, mi.variant())
         meters = Meters(job["stations"])
         emitters = len(scene.emitters())
         if emitters != job["emitters"]:
@@ -118,7 +128,8 @@ def sample_emitters(scene, p, n, u, v):
         it.p = mi.Point3f(*columns(p))
         ds, weight = scene.sample_emitter_direction(it, mi.Point2f(floats(u), floats(v)), False)
         hidden = scene.ray_test(shadow_ray(mi.Point3f(*columns(clear(p, n))), ds))
-        return np.array(ds.d, np.float64).T, np.where(np.array(hidden), 0, np.array(weight[0], np.float64))
+        directions = np.stack([np.array(x, np.float64) for x in (ds.d.x, ds.d.y, ds.d.z)], 1)
+        return directions, np.where(np.array(hidden), 0, np.array(weight[0], np.float64))
     directions, weights = np.zeros_like(p), np.zeros(len(p))
     for k, start in enumerate(clear(p, n)):
         it = mi.SurfaceInteraction3f()
@@ -167,7 +178,10 @@ def trace(scene, p, d, seed):
     sampler = mi.load_dict({"type": "independent"})
     integrator = scene.integrator()
     if is_jit():
-        sampler.seed(mi.UInt32(seed), len(p))
+        try:
+            sampler.seed(mi.UInt32(seed), len(p))
+        except TypeError:  # Mitsuba before 3.6 takes plain numbers alone.
+            sampler.seed(seed, len(p))
         ray = mi.RayDifferential3f(mi.Point3f(*columns(p)), mi.Vector3f(*columns(d)))
         radiance, _, _ = integrator.sample(scene, sampler, ray)
         return np.array(radiance[0], np.float64)

@@ -27,6 +27,7 @@ mod planning;
 mod policy;
 mod readers;
 mod recessed;
+mod releases;
 mod repeatability;
 mod repetitions;
 mod stated_errors;

@@ -14,16 +14,21 @@ use crate::judge::PolicyChoice;
 use crate::plan::Skipping;
 use crate::record::{EngineName, EngineStatus, Status};
 use crate::report::{Detail, Exit, Report, Style, terminal};
-use crate::spec::{Trust, suggestion};
+use crate::spec::Trust;
 use crate::system::process;
 
 #[derive(Clone, Debug, Subcommand)]
 pub(super) enum EnginesAction {
     /// Which engines there are, and their versions
     List,
+    /// Which releases can be had side by side, a line each, with what is there of them
+    Releases {
+        /// Engines by name [default: all]
+        names: Vec<String>,
+    },
     /// Fetch missing engines into a folder of our own
     Install {
-        /// Engines by name [default: all but those on request: cycles, luxcore, three and babylon]
+        /// Engines by name, or releases of them as mitsuba@3.5.2 [default: all but those on request: cycles, luxcore, three and babylon]
         names: Vec<String>,
     },
     /// Hold the files of installed engines against the sums that they were installed with
@@ -66,6 +71,13 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site, trust: 
             print(&format!("engines are kept in {}\n", site.root().display()))?;
             Ok(Exit::Passed)
         }
+        EnginesAction::Releases { names } => {
+            known_engines(&names)?;
+            for engine in engines::ALL.iter().filter(|e| names.is_empty() || names.iter().any(|n| e.name == *n)) {
+                releases(&engine.name, site)?;
+            }
+            Ok(Exit::Passed)
+        }
         EnginesAction::Install { names } => {
             known_engines(&names)?;
             Ok(report_installation(site, &names))
@@ -101,6 +113,18 @@ pub(super) fn manage_engines(action: Option<EnginesAction>, site: &Site, trust: 
     }
 }
 
+fn releases(engine: &EngineName, site: &Site) -> Result<(), Diagnostic> {
+    for release in engines::releases_of(engine) {
+        let name = format!("{engine}@{release}");
+        let Ok(Some(built_in)) = engines::built_in(&name) else { continue };
+        print(&match built_in.probe(site) {
+            Ok(version) => format!("{name:<18} {}\n", version.text),
+            Err(absent) => format!("{name:<18} absent: {absent}\n"),
+        })?;
+    }
+    Ok(())
+}
+
 fn examine(spec: Option<&Path>, options: &Options<'_>) -> Result<(Report, Exit), Diagnostic> {
     let subjects = spec.map_or(Subjects::Ours, Subjects::OfSpec);
     let report = audit::examine(subjects, options).map_err(not_audited)?;
@@ -128,10 +152,7 @@ fn examine_adapter(words: &[String], options: Options<'_>) -> Result<(Report, Ex
 }
 
 pub(super) fn known_engines(names: &[String]) -> Result<(), Diagnostic> {
-    let known: Vec<EngineName> = engines::all().iter().map(|e| e.name()).collect();
-    let Some(name) = names.iter().find(|name| !known.iter().any(|k| k == *name)) else { return Ok(()) };
-    let help = suggestion(name, known.iter().map(EngineName::as_str));
-    Err(miette::miette!(help = help, "there is no engine `{name}`"))
+    engines::all_built_in(names).map_err(|unknown| miette::miette!(help = unknown.help, "{}", unknown.message))
 }
 
 /// What is broken fails; what is absent was not asked for.
@@ -144,7 +165,8 @@ fn verify(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
             Soundness::Unknown(why) => format!("not known: {why}"),
             Soundness::Broken(faults) => {
                 exit = Exit::Engine;
-                format!("broken; run `luxproof engines repair`\n    {}", faults.join("\n    "))
+                let repair = [&["luxproof engines repair".to_owned()], names].concat().join(" ");
+                format!("broken; run `{repair}`\n    {}", faults.join("\n    "))
             }
         };
         print(&format!("{component}: {text}\n"))?;
@@ -154,6 +176,9 @@ fn verify(site: &Site, names: &[String]) -> Result<Exit, Diagnostic> {
 
 /// The engines that are named, or all but those that want to be named.
 fn wanted(names: &[String]) -> Vec<EngineName> {
+    if !names.is_empty() {
+        return names.iter().map(EngineName::from).collect();
+    }
     engines::all().into_iter().map(|e| e.name()).filter(|e| engines::is_chosen(e, names)).collect()
 }
 

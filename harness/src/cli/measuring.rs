@@ -41,10 +41,10 @@ impl MeasuringArgs {
     pub(super) fn subjects(&self, site: &Site) -> Result<Vec<Instrument>, Diagnostic> {
         known_engines(&self.engines)?;
         let mut present = vec![];
-        for engine in engines::all() {
-            if !engines::is_chosen(&engine.name(), &self.engines) {
-                continue;
-            }
+        let by_default = engines::all().into_iter().filter(|e| engines::is_chosen(&e.name(), &self.engines));
+        let releases = self.engines.iter().filter(|name| name.contains('@'));
+        let releases = releases.filter_map(|name| engines::built_in(name).ok().flatten());
+        for engine in by_default.chain(releases) {
             match engine.probe(site) {
                 Ok(version) => present.push(Instrument { engine: engine.into(), version }),
                 Err(absent) if !self.engines.is_empty() => return Err(miette::miette!("{}: {absent}", engine.name())),

@@ -2,6 +2,7 @@
 
 mod accept;
 mod bench;
+mod bisect;
 mod cache;
 mod check;
 pub(crate) mod diagnostic;
@@ -95,6 +96,8 @@ enum Command {
     History(history::Action),
     /// What changed between two runs, a mean shift told apart from noise
     Diff(diff::DiffArgs),
+    /// Find the release of an engine at which a verdict changed
+    Bisect(bisect::BisectArgs),
     /// Make the readings of a run a baseline, under review and for a reason
     Accept(accept::AcceptArgs),
     /// Put known faults into right readings and see whether the harness catches and names them
@@ -272,6 +275,7 @@ impl Cli {
             self.command,
             Command::Selftest(_)
                 | Command::Bench(_)
+                | Command::Bisect(_)
                 | Command::Hunt(_)
                 | Command::Shrink(_)
                 | Command::Stress(_)
@@ -303,6 +307,7 @@ impl Cli {
             Command::Open(args) => open::open(&args),
             Command::History(action) => history::history(&action),
             Command::Diff(args) => diff::diff(&args),
+            Command::Bisect(args) => bisect::run(&args, &site, &cache::folder(self.cache_dir)?, trust),
             Command::Accept(args) => accept::accept(&args),
             Command::Selftest(_) | Command::Hunt(_) | Command::Shrink(_) if trust == Trust::Stranger => {
                 Err(miette::miette!(

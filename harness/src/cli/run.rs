@@ -38,7 +38,9 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> R
         let _under_way = process::UnderWay::begin();
         report_installation(site, &choice.engines);
         let named = cases.iter().flat_map(|case| case.engines.iter().flatten()).map(|(name, _)| name.clone());
-        let on_request: Vec<String> = named.filter(|name| engines::is_on_request(name)).collect();
+        // A stranger's spec may not fill the disk with releases.
+        let may = |name: &String| trust == Trust::Own || !name.contains('@');
+        let on_request: Vec<String> = named.filter(|name| engines::is_on_request(name) && may(name)).collect();
         if choice.engines.is_empty() && !on_request.is_empty() {
             report_installation(site, &on_request);
         }

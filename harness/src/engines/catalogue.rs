@@ -1,10 +1,10 @@
 //! The engines that everybody has, one line each.
 
-use std::borrow::Borrow;
+use std::borrow::{Borrow, Cow};
 
 use super::contract::{Engine, Entry};
 use super::{cycles, iesna, luxcore, mitsuba, povray, radiance, simulator, web};
-use crate::record::EngineName;
+use crate::record::{EngineName, Release, family};
 
 /// In the order of reports: our own witnesses first.
 pub const ALL: &[&Entry] = &[
@@ -23,13 +23,20 @@ pub fn all() -> Vec<Box<dyn Engine>> {
     ALL.iter().map(|entry| (entry.make)()).collect()
 }
 
+/// What an engine is, or the one of which it is a release.
 pub fn entry(name: &str) -> Option<&'static Entry> {
-    ALL.iter().copied().find(|entry| entry.name == *name)
+    ALL.iter().copied().find(|entry| entry.name == *family(name))
 }
 
-/// Whether an engine takes part, and is installed, only where it is named.
+/// Whether an engine takes part, and is installed, only where it is named; releases do.
 pub fn is_on_request(name: &str) -> bool {
-    entry(name).is_some_and(|entry| entry.is_on_request)
+    entry(name).is_some_and(|entry| entry.is_on_request || entry.name != *name)
+}
+
+/// Where an engine stands among the others in reports: releases behind the engine that they are of, oldest first. Programs of the
+/// user's come first.
+pub fn place(name: &EngineName) -> (Option<usize>, Option<Release>) {
+    (ALL.iter().position(|entry| entry.name == *name.family()), name.release())
 }
 
 /// Whether an engine is among those that are named; where none is, whether it takes part all the same.
@@ -37,9 +44,13 @@ pub fn is_chosen(name: &EngineName, named: &[impl Borrow<str>]) -> bool {
     if named.is_empty() { !is_on_request(name.as_str()) } else { named.iter().any(|n| name.as_str() == n.borrow()) }
 }
 
-/// An engine as its makers write it; one of the user's by its name.
-pub fn display_name(name: &str) -> &str {
-    entry(name).map_or(name, |entry| entry.display_name)
+/// An engine as its makers write it, with its release where that is named; one of the user's by its name.
+pub fn display_name(name: &str) -> Cow<'_, str> {
+    let Some(entry) = entry(name) else { return name.into() };
+    match name.split_once('@') {
+        Some((_, release)) => format!("{} {release}", entry.display_name).into(),
+        None => entry.display_name.into(),
+    }
 }
 
 #[cfg(test)]
@@ -54,6 +65,7 @@ mod tests {
             let is_setting = |key: &&str| engine.knobs().iter().any(|k| k.key == *key);
             assert!(entry.fits_coordinates.as_ref().is_none_or(is_setting), "{}", entry.name);
         }
-        assert_eq!((display_name("povray"), display_name("mine")), ("POV-Ray", "mine"));
+        let told = ["povray", "mine", "mitsuba@3.5.2", "mine@2"].map(display_name);
+        assert_eq!(told, ["POV-Ray", "mine", "Mitsuba 3.5.2", "mine@2"]);
     }
 }

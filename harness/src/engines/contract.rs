@@ -9,6 +9,7 @@ use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Scene, Shape, T
 use serde::{Deserialize, Serialize};
 
 use super::blocks::{Blocks, Sampled};
+use super::releases::Known;
 use super::workbench::{EngineError, Rest, SceneFile, Workbench};
 use super::{Site, fingerprint};
 use crate::procedures::{Target, Task};
@@ -158,6 +159,15 @@ pub enum Component {
     Blender,
     /// LuxCore as a Python package, as `luxcore.lock` pins it, in an environment of its own.
     LuxCore,
+    /// The Python packages of a release, in an environment of its own.
+    Release(&'static Known),
+}
+
+impl Component {
+    /// Whether it is the environment that an engine's Python packages are in.
+    pub(super) const fn is_python(self) -> bool {
+        matches!(self, Self::PythonPackages | Self::Blender | Self::LuxCore)
+    }
 }
 
 impl Entry {

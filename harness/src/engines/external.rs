@@ -12,6 +12,7 @@ mod json;
 mod photometry;
 mod protocol;
 mod readings;
+mod releases;
 #[cfg(test)]
 mod tests;
 
@@ -27,6 +28,7 @@ use self::protocol::Capability;
 pub use self::form::ExternalJob;
 pub use self::protocol::{ExternalProbe, ExternalRequest};
 pub use self::readings::{ExternalAnswers, ExternalReadings};
+pub(crate) use self::releases::{named as releases, of_release};
 use super::{
     Absent, Answer, Engine, EngineError, FILE_READER, Job, Measurement, SceneFile, Site, Support, Version, Workbench,
     fingerprint,
@@ -46,7 +48,7 @@ pub(crate) const RUN_IN: &str = "run_in";
 const START_S: f64 = 120.0;
 
 /// The settings that are no business of the program's.
-const OWN_SETTINGS: [&str; 5] = ["command", "procedures", RUN_IN, "protocol", "start_seconds"];
+const OWN_SETTINGS: [&str; 6] = ["command", "procedures", RUN_IN, "protocol", "start_seconds", releases::KEY];
 
 /// Folders of programs that have nothing to do with each other.
 const INSTALLED: [&str; 6] = ["/bin", "/sbin", "/usr/bin", "/usr/sbin", "/usr/local/bin", "/usr/local/sbin"];
@@ -99,9 +101,15 @@ impl External {
             |names: Vec<String>| names.iter().map(|name| name.parse()).collect::<Result<_, UnknownProcedure>>();
         let procedures = procedures.map(parsed).transpose().map_err(|unknown| wrong(&unknown.to_string()))?;
         // The name becomes a folder of the run.
-        if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
-            return Err(error("command", "an engine's name holds letters, digits, - and _ only"));
+        let is_plain =
+            |name: &str| !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+        if !is_plain(id.family()) || (name.contains('@') && id.release().is_none()) {
+            return Err(error(
+                "command",
+                "an engine's name holds letters, digits, - and _ only, and behind an @ its release",
+            ));
         }
+        releases::all(name, settings)?;
         // The folder of a spec that is named without one is the working directory.
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let folder = match settings.get(RUN_IN).map(serde_json::Value::as_str) {

@@ -15,8 +15,9 @@ use std::time::Duration;
 use crate::system::process::{Invocation, ProcessError};
 
 use super::Site;
-use super::catalogue::{ALL, is_chosen};
-use super::contract::Component;
+use super::catalogue::{ALL, entry, is_chosen};
+use super::contract::{Component, Entry};
+use super::releases::{self, Known};
 use crate::record::EngineName;
 use venv::Environment;
 pub use verify::Soundness;
@@ -86,8 +87,18 @@ pub fn repair(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str
 fn components(engines: &[EngineName]) -> Vec<Component> {
     use Component::{Blender, Chromium, LibFaketime, LibLlvm, LuxCore, PovRay, PythonPackages, WebPackages};
     let all = [PythonPackages, PovRay, LibLlvm, LibFaketime, Blender, LuxCore, WebPackages, Chromium];
-    let named = || ALL.iter().filter(|entry| is_chosen(&entry.name, engines));
-    all.into_iter().filter(|c| named().any(|entry| entry.installs.contains(c))).collect()
+    let named = ALL.iter().filter(|entry| is_chosen(&entry.name, engines));
+    let of_release = |known: &'static Known| Some(of_release(known, entry(known.name)?));
+    let releases = || engines.iter().filter_map(|name| releases::known(name)).filter_map(of_release).flatten();
+    let wanted: Vec<Component> = named.flat_map(|entry| entry.installs.iter().copied()).chain(releases()).collect();
+    let own = releases().filter(|c| matches!(c, Component::Release(_)));
+    all.into_iter().filter(|c| wanted.contains(c)).chain(own).collect()
+}
+
+/// What a release needs: where it has packages of its own, these in place of its engine's.
+fn of_release(known: &'static Known, entry: &Entry) -> impl Iterator<Item = Component> {
+    let has_own = known.lock().is_some();
+    entry.installs.iter().map(move |c| if has_own && c.is_python() { Component::Release(known) } else { *c })
 }
 
 fn lock(site: &Site) -> Result<File, InstallError> {
@@ -137,6 +148,7 @@ impl Component {
             Self::LuxCore => "LuxCore",
             Self::WebPackages => "three.js and Babylon.js",
             Self::Chromium => "Chromium",
+            Self::Release(known) => known.name,
         }
     }
 
@@ -161,6 +173,10 @@ impl Component {
             Self::PythonPackages => Recipe::Python(venv::SHARED, site.clone()),
             Self::Blender => Recipe::Python(venv::BLENDER, site.blender()),
             Self::LuxCore => Recipe::Python(venv::LUXCORE, site.luxcore()),
+            Self::Release(known) => {
+                let (environment, own) = venv::of_release(known, site);
+                Recipe::Python(environment, own)
+            }
             Self::PovRay => debian(&debian::POVRAY_PACKAGES, |site| site.program("povray"), debian::install_povray),
             Self::LibLlvm => debian(&debian::LLVM_PACKAGES, Site::llvm, debian::install_llvm),
             Self::WebPackages => Recipe::Npm,
@@ -225,6 +241,10 @@ mod tests {
         for name in ["three", "babylon"] {
             assert_eq!(components(&[EngineName::new(name)]), [Component::WebPackages, Component::Chromium]);
         }
+        let release = releases::known("mitsuba@3.5.2").unwrap();
+        assert_eq!(components(&[EngineName::new("mitsuba@3.5.2")]), [LibLlvm, Component::Release(release)]);
+        // The release that the engine is, is where it is.
+        assert_eq!(components(&[EngineName::new("mitsuba@3.9.1")]), [PythonPackages, LibLlvm]);
         assert_eq!(components(&[EngineName::new("simulator"), EngineName::new("iesna")]), []);
     }
 

@@ -29,6 +29,8 @@ mod patches;
 mod povray;
 mod radiance;
 mod recess;
+mod released;
+mod releases;
 #[cfg(test)]
 mod repetition_tests;
 mod settings;
@@ -45,16 +47,18 @@ use std::path::Path;
 
 pub use crate::spec::Budget;
 pub use blocks::Blocks;
-pub use catalogue::{ALL, all, display_name, entry, is_chosen, is_on_request};
+pub use catalogue::{ALL, all, display_name, entry, is_chosen, is_on_request, place};
 pub use contract::{
     Absent, Answer, Component, Engine, Entry, FILE_READER, Forgotten, Job, Knob, Measurement, Station, Support,
     Version, checked, share,
 };
 use contract::{OWN_LOOKUP, geometry_mib};
-pub(crate) use external::RUN_IN;
 pub use external::{ExternalAnswers, ExternalJob, ExternalProbe, ExternalReadings, ExternalRequest, Introduction};
+pub(crate) use external::{RUN_IN, of_release, releases as releases_of_program};
 pub(crate) use iesna::method as method_of_iesna;
 pub use install::{InstallOutcome, InstallState, Soundness, install, repair, verify};
+pub use released::{Unknown, all_built_in, built_in};
+pub use releases::{Known, releases_of};
 pub use settings::Coordinates;
 pub use site::{Site, SiteError};
 pub use workbench::{EngineError, Rest, SceneFile, Workbench};
@@ -65,7 +69,8 @@ pub fn named(
     settings: &BTreeMap<String, serde_json::Value>,
     folder: &Path,
 ) -> Result<Box<dyn Engine>, EngineError> {
-    entry(name).map_or_else(|| external(name, settings, folder), |entry| Ok((entry.make)()))
+    let unknown = |unknown: Unknown| EngineError::Solver { engine: name.into(), what: unknown.to_string() };
+    built_in(name).map_err(unknown)?.map_or_else(|| external(name, settings, folder), Ok)
 }
 
 /// What a program says of itself that would be such an engine.

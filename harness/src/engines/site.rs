@@ -9,10 +9,11 @@ use etcetera::BaseStrategy;
 /// Where engines are found. Layout of the folder: `venv/` (Python packages), `debian/` (unpacked Debian packages),
 /// `kernels/` (compiled by Dr.Jit),
 /// `blender/` and `luxcore/` (folders like this one, with the packages of Blender and of LuxCore), `web/` (another with Node.js, and
-/// beside it `packages/` of npm).
+/// beside it `packages/` of npm), `releases/<engine>-<release>/` (another each, which shares the Debian packages).
 #[derive(Clone, Debug)]
 pub struct Site {
     root: PathBuf,
+    debian: PathBuf,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -21,7 +22,8 @@ pub struct SiteError(String);
 
 impl Site {
     pub fn at(root: impl Into<PathBuf>) -> Self {
-        Self { root: root.into() }
+        let root = root.into();
+        Self { debian: root.join("debian"), root }
     }
 
     /// The site in the user's data folder, e.g. `~/.local/share/luxproof/engines`.
@@ -85,7 +87,13 @@ impl Site {
     }
 
     pub fn debian(&self) -> PathBuf {
-        self.root.join("debian")
+        self.debian.clone()
+    }
+
+    /// Where a release has its packages, which takes libraries and programs from here.
+    #[must_use]
+    pub fn release(&self, folder: &str) -> Self {
+        Self { root: self.root.join("releases").join(folder), debian: self.debian.clone() }
     }
 
     /// What Dr.Jit keeps of the kernels that it compiles.

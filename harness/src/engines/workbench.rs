@@ -110,6 +110,23 @@ impl EngineError {
         Self::garbled(engine, format!("its answer is no JSON of readings ({error}): `{start}`"))
     }
 
+    /// The same, told by this engine.
+    pub(super) fn of_engine(self, name: &EngineName) -> Self {
+        let engine = name.clone();
+        match self {
+            Self::Output { what, .. } => Self::Output { engine, what },
+            Self::Garbled { what, .. } => Self::Garbled { engine, what },
+            Self::NotFinite { meter, value, uncertainty, .. } => Self::NotFinite { engine, meter, value, uncertainty },
+            Self::AtMeters { first, others, rest } => {
+                Self::AtMeters { first: Box::new(first.of_engine(name)), others, rest }
+            }
+            Self::Setting { key, what, .. } => Self::Setting { engine, key, what },
+            Self::Declined { why, .. } => Self::Declined { engine, why },
+            Self::Solver { what, .. } => Self::Solver { engine, what },
+            Self::Process(_) | Self::Io { .. } => self,
+        }
+    }
+
     pub(super) fn garbled(engine: EngineName, what: impl Into<String>) -> Self {
         Self::Garbled { engine, what: printable::lines(&what.into()) }
     }

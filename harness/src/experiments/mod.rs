@@ -1,6 +1,7 @@
 //! Experiments on engines and on this program itself: laws under stress, run time against error, faults put in on purpose.
 
 pub mod bench;
+pub mod bisect;
 mod deviation;
 mod draw;
 pub mod hunt;

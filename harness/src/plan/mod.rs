@@ -269,7 +269,8 @@ impl<'a> Planner<'a> {
     fn offers(&self, case: &Case, engine: &dyn Engine, tasks: &[Task]) -> Vec<Offer> {
         let id = engine.name();
         let is_left_out =
-            case.only_engines.as_ref().is_some_and(|own| !own.iter().any(|o| o == id.as_str())) && !engine.is_witness();
+            case.only_engines.as_ref().is_some_and(|own| !own.iter().any(|o| *o == *id || *o == *id.family()))
+                && !engine.is_witness();
         let offer = |(t, task): (usize, &Task)| {
             if is_left_out {
                 return Offer::Skip(Scope::Engine, "the case is not for this engine".into());

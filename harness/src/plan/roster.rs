@@ -7,8 +7,9 @@ use std::sync::Arc;
 use itertools::Itertools;
 
 use super::{Asked, Selection};
-use crate::engines::{self, Absent, Engine, EngineError, Job, Site, Version};
+use crate::engines::{self, Absent, Engine, EngineError, Job, Site, Unknown, Version};
 use crate::procedures::Task;
+use crate::record::family;
 use crate::spec::{Case, EngineSettings, SpecError, Spot, suggestion};
 use crate::system::slots::side_by_side;
 
@@ -18,52 +19,88 @@ pub(super) type Chosen = (Arc<dyn Engine>, Asked);
 /// Engines, each shared by all cases that it takes part in, and what they say of their version.
 pub(super) struct Roster {
     ours: Vec<Arc<dyn Engine>>,
-    externals: Vec<(Named, Arc<dyn Engine>)>,
+    /// Releases of ours that were named.
+    releases: Vec<Arc<dyn Engine>>,
+    externals: Vec<(Program, Arc<dyn Engine>)>,
     probed: Vec<(Arc<dyn Engine>, Result<Version, Absent>)>,
 }
 
+/// Where an engine is named.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Named {
+    InSpec,
+    OnTheCommandLine,
+}
+
 /// A program of a user's: name, settings and the folder that its paths count from.
-type Named = (String, EngineSettings, PathBuf);
+type Program = (String, EngineSettings, PathBuf);
 
 impl Roster {
     pub(super) fn new() -> Self {
         let ours = engines::all().into_iter().map(Arc::from).collect();
-        Self { ours, externals: vec![], probed: vec![] }
+        Self { ours, releases: vec![], externals: vec![], probed: vec![] }
     }
 
     /// All that is wrong with what a case says of engines, and with the names of engines that were chosen; nothing is started.
     pub(super) fn faults(&mut self, case: &Case, selection: &Selection) -> Vec<SpecError> {
-        let (all, mut faults) = self.of_case(case);
+        let (all, mut faults) = self.of_case(case, selection);
         faults.extend(self.faults_of_settings(case));
         faults.extend(unknown_choices(&all, selection));
         faults
     }
 
-    /// Ours and those of a case, and what is wrong with the latter.
-    fn of_case(&mut self, case: &Case) -> (Vec<Arc<dyn Engine>>, Vec<SpecError>) {
+    /// Ours, releases that a case or the command line names, and programs of the case's, and what is wrong with these.
+    fn of_case(&mut self, case: &Case, selection: &Selection) -> (Vec<Arc<dyn Engine>>, Vec<SpecError>) {
         let (mut all, mut faults) = (self.ours.clone(), vec![]);
         let built_in = names(&all);
-        for (name, settings) in case.engines.iter().flatten().filter(|(name, _)| !built_in.contains(*name)) {
-            let at = format!("engines.{name}");
-            if !settings.0.contains_key("command") {
-                let (message, known) = unknown(name, &built_in);
-                let help = format!("{known} A program of your own needs `command: [...]`");
-                faults.push(case.source.error_at_spot(Spot::Key, &at, message, help));
-                continue;
-            }
-            let folder = case.path.parent().unwrap_or(Path::new(""));
-            let help = || "give `command: [program, arguments...]`, paths relative to the spec".to_owned();
-            match self.external(name, settings, folder) {
-                Ok(engine) => all.push(engine),
-                Err(error) => faults.push(misset(case, name, error, help)),
+        let none = EngineSettings::default();
+        let in_spec = case.engines.iter().flatten().map(|(name, settings)| (name, settings, Named::InSpec));
+        // Others that the command line names have to be releases: what else there is, is ours or stands in the spec.
+        let besides = selection.engines.iter().filter(|name| name.contains('@') && !stands_in(case, name)).unique();
+        let named = in_spec.chain(besides.map(|name| (name, &none, Named::OnTheCommandLine)));
+        for (name, settings, by) in named.filter(|(name, ..)| !built_in.contains(*name)) {
+            match self.release(name) {
+                Ok(Some(release)) => all.push(release),
+                Ok(None) => match self.program(case, name, settings, by, &built_in) {
+                    Ok(program) => all.extend(program),
+                    Err(fault) => faults.push(fault),
+                },
+                Err(Unknown { message, help }) if by == Named::InSpec => {
+                    faults.push(case.source.error_at_spot(Spot::Key, &format!("engines.{name}"), message, help));
+                }
+                Err(Unknown { message, help }) => faults.push(SpecError::of("--engines", message, help)),
             }
         }
         (all, faults)
     }
 
+    /// A program of a case's; `None` where the command line names what this case knows nothing of.
+    fn program(
+        &mut self,
+        case: &Case,
+        name: &str,
+        settings: &EngineSettings,
+        by: Named,
+        built_in: &[String],
+    ) -> Result<Option<Arc<dyn Engine>>, SpecError> {
+        let help = || "give `releases: {\"1.0\": [program, arguments...]}`".to_owned();
+        let settings = settings_of_program(case, name, settings).map_err(|e| misset(case, family(name), e, help))?;
+        if !settings.0.contains_key("command") {
+            if by == Named::OnTheCommandLine {
+                return Ok(None);
+            }
+            let (message, known) = unknown(name, built_in);
+            let help = format!("{known} A program of your own needs `command: [...]`");
+            return Err(case.source.error_at_spot(Spot::Key, &format!("engines.{name}"), message, help));
+        }
+        let folder = case.path.parent().unwrap_or(Path::new(""));
+        let help = || "give `command: [program, arguments...]`, paths relative to the spec".to_owned();
+        self.external(name, &settings, folder).map(Some).map_err(|error| misset(case, name, error, help))
+    }
+
     /// The engines of a case, in the order of reports.
     pub(super) fn chosen(&mut self, case: &Case, selection: &Selection) -> Result<Vec<Chosen>, SpecError> {
-        let (all, mut faults) = self.of_case(case);
+        let (all, mut faults) = self.of_case(case, selection);
         faults.extend(unknown_choices(&all, selection));
         if let Some(fault) = faults.into_iter().next() {
             return Err(fault);
@@ -94,8 +131,11 @@ impl Roster {
     /// Settings tell their faults one by one: each key is looked at as if it stood there alone, and all of them together.
     fn faults_of_settings(&self, case: &Case) -> Vec<SpecError> {
         let mut faults = vec![];
-        for engine in &self.ours {
+        for engine in self.ours.iter().chain(&self.releases) {
             let name = engine.name();
+            if name.release().is_some() && !stands_in(case, &name) {
+                continue;
+            }
             let settings = case.settings_of(name.as_str());
             let is_program = settings.contains_key("command");
             let keys: Vec<&str> = engine.knobs().iter().map(|k| k.key).collect();
@@ -150,6 +190,17 @@ impl Roster {
         told
     }
 
+    /// A release of ours by its name, one for all cases.
+    fn release(&mut self, name: &str) -> Result<Option<Arc<dyn Engine>>, Unknown> {
+        if let Some(known) = self.releases.iter().find(|engine| engine.name() == *name) {
+            return Ok(Some(Arc::clone(known)));
+        }
+        let Some(engine) = engines::built_in(name)? else { return Ok(None) };
+        let engine: Arc<dyn Engine> = Arc::from(engine);
+        self.releases.push(Arc::clone(&engine));
+        Ok(Some(engine))
+    }
+
     fn external(
         &mut self,
         name: &str,
@@ -181,10 +232,25 @@ impl Roster {
     }
 }
 
+/// Whether the spec names an engine.
+fn stands_in(case: &Case, name: &str) -> bool {
+    case.engines.as_ref().is_some_and(|engines| engines.contains_key(name))
+}
+
+/// The settings of a program of a user's: its own, or those that the program of which it is a release has for it.
+fn settings_of_program(case: &Case, name: &str, settings: &EngineSettings) -> Result<EngineSettings, EngineError> {
+    let of_family = case.engines.as_ref().and_then(|all| all.get(family(name))).filter(|_| family(name) != name);
+    let of_family = of_family.filter(|_| !settings.0.contains_key("command"));
+    let made = of_family.map(|of| engines::of_release(name, &of.0, &settings.0)).transpose()?.flatten();
+    Ok(made.map_or_else(|| settings.clone(), EngineSettings))
+}
+
 /// Names of engines on the command line that no engine has.
 fn unknown_choices(all: &[Arc<dyn Engine>], selection: &Selection) -> Vec<SpecError> {
     let ids = names(all);
-    let strange = selection.engines.iter().filter(|name| !ids.contains(*name));
+    // A release of ours that is none was told already.
+    let is_told = |name: &String| engines::built_in(name).is_err();
+    let strange = selection.engines.iter().filter(|name| !ids.contains(*name) && !is_told(name));
     let fault = |name: &String| {
         let (message, known) = unknown(name, &ids);
         SpecError::of("--engines", message, known)

@@ -9,6 +9,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray, VariantNames};
 
+use super::Release;
+
 /// What a recording is of: one engine on one procedure of one case.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct ReadingKey {
@@ -110,6 +112,21 @@ impl EngineName {
     pub fn as_str(&self) -> &str {
         &self.0
     }
+
+    /// The engine of which this is a release; itself where it is none.
+    pub fn family(&self) -> &str {
+        family(&self.0)
+    }
+
+    /// The release that it names, where it names a sound one.
+    pub fn release(&self) -> Option<Release> {
+        self.0.split_once('@').and_then(|(_, release)| release.parse().ok())
+    }
+}
+
+/// What stands before the `@` of an engine's name, or all of it.
+pub fn family(name: &str) -> &str {
+    name.split_once('@').map_or(name, |(family, _)| family)
 }
 
 impl<T: Into<String>> From<T> for EngineName {

@@ -226,7 +226,7 @@ impl Report {
         });
         let Some(mut joined) = joined else { unreachable!("a suite without cases is refused") };
         let summary = Summary::of(&joined.comparisons, &joined.skips);
-        joined.engines.sort_by_key(|e| crate::engines::all().iter().position(|known| known.name() == e.id));
+        joined.engines.sort_by_key(|e| crate::engines::place(&e.id));
         let joined = Self { spec, summary, ..joined };
         Self { paper_splits: papers::splits(&joined), ..joined }
     }

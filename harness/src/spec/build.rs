@@ -16,7 +16,7 @@ use super::tree::tree;
 use super::trust::Limits;
 use super::{Faults, Source, SpecError, Trust};
 use crate::procedures::{Procedures, Task};
-use crate::record::ProcedureId;
+use crate::record::{ProcedureId, family};
 use crate::system::digest::hexadecimal;
 use crate::system::printable;
 
@@ -61,9 +61,9 @@ pub struct Case {
 }
 
 impl Case {
-    /// The settings that the spec gives an engine; none where it names none.
+    /// The settings that the spec gives an engine; a release that it does not name has those of the engine that it is of.
     pub fn settings_of(&self, engine: &str) -> BTreeMap<String, serde_json::Value> {
-        let of_engine = self.engines.as_ref().and_then(|all| all.get(engine));
+        let of_engine = self.engines.as_ref().and_then(|all| all.get(engine).or_else(|| all.get(family(engine))));
         of_engine.map(|EngineSettings(settings)| settings.clone()).unwrap_or_default()
     }
 
@@ -240,10 +240,12 @@ impl<'a> Builder<'a> {
     /// Refuses programs that a stranger would have us run.
     fn programs(&mut self, spec: &Spec) {
         let mut engines = spec.engines.iter().flatten();
-        let Some((name, _)) = engines.find(|(_, settings)| settings.0.contains_key("command")) else { return };
+        let starts =
+            |settings: &EngineSettings| ["command", "releases"].into_iter().find(|key| settings.0.contains_key(*key));
+        let Some((name, key)) = engines.find_map(|(name, settings)| Some((name, starts(settings)?))) else { return };
         let message = "it would run a program, and the spec is not trusted";
         let help = "run it without --untrusted if it is yours";
-        self.check(self.source.trust == Trust::Own, &format!("engines.{name}.command"), message, help);
+        self.check(self.source.trust == Trust::Own, &format!("engines.{name}.{key}"), message, help);
     }
 
     /// `None` where its size is not known: nothing lies in it or out of it.

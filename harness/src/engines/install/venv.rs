@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use super::verify::{self, Soundness};
 use super::{InstallError, linked, step};
 use crate::engines::Site;
+use crate::engines::releases::Known;
+use crate::record::family;
 
 /// What an environment holds, and which Python it takes.
 #[derive(Clone, Copy)]
@@ -49,6 +51,19 @@ pub(super) const NODE: Environment = Environment {
     fits: |version| version >= [3, 10],
     remedy: "put Python 3.10 or later first on PATH",
 };
+
+/// The environment of a release, and the site that it has for itself.
+pub(super) fn of_release(known: &Known, site: &Site) -> (Environment, Site) {
+    let (own, like) = match family(known.name) {
+        "cycles" => (known.site(site).blender(), BLENDER),
+        "luxcore" => (known.site(site).luxcore(), LUXCORE),
+        _ => (
+            known.site(site),
+            Environment { python: LUXCORE.python, fits: LUXCORE.fits, remedy: LUXCORE.remedy, ..SHARED },
+        ),
+    };
+    (Environment { lock: known.lock().unwrap_or(like.lock), what: known.name, ..like }, own)
+}
 
 impl Environment {
     pub(super) fn is_current(&self, site: &Site) -> bool {

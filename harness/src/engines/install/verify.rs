@@ -94,7 +94,7 @@ fn is_of(record: &Path, package: &str) -> bool {
     })
 }
 
-/// What a record says of files; what Python compiled has no hash.
+/// What a record says of files, less what Python compiles: that has no hash, or one that does not last.
 fn recorded(record: &Path) -> Result<Vec<Entry>, String> {
     let unreadable = |why: String| format!("{}: {why}", record.display());
     let mut rows =
@@ -103,7 +103,7 @@ fn recorded(record: &Path) -> Result<Vec<Entry>, String> {
     let mut entries = vec![];
     for row in rows.records() {
         let row = row.map_err(|e| unreadable(e.to_string()))?;
-        let hash = row.get(1).unwrap_or_default();
+        let hash = row.get(1).filter(|_| !row[0].contains("__pycache__/")).unwrap_or_default();
         if let Some(hash) = hash.strip_prefix("sha256=") {
             let digest = BASE64_URL_SAFE_NO_PAD.decode(hash).map_err(|e| unreadable(format!("`{hash}`: {e}")))?;
             entries.push(Entry { path: packages.join(&row[0]), digest: Expected::Sha256(digest) });
@@ -159,7 +159,9 @@ mod tests {
         fs::write(root.join("venv/bin/python"), "").unwrap();
         fs::write(packages.join("lamp.py"), "lux").unwrap();
         let digest = BASE64_URL_SAFE_NO_PAD.encode(Sha256::digest("lux"));
-        let record = format!("lamp.py,sha256={digest},3\n__pycache__/lamp.pyc,,\nlamp-1.0.dist-info/RECORD,,\n");
+        let record = format!(
+            "lamp.py,sha256={digest},3\n__pycache__/lamp.pyc,,\n__pycache__/old.pyc,sha256={digest},3\nlamp-1.0.dist-info/RECORD,,\n"
+        );
         fs::write(packages.join("lamp-1.0.dist-info/RECORD"), record).unwrap();
         Site::at(root)
     }

@@ -13,6 +13,8 @@ use crate::system::process::Invocation;
 
 const PROBE: &str = include_str!("../../../drivers/mitsuba_probe.py");
 const REMEDY: &str = "run `luxproof engines install mitsuba`";
+/// The compiled variants, the best first; wheels before 3.6 have no mono.
+const COMPILED: &str = "llvm_ad_mono,llvm_ad_rgb";
 /// A probe takes about a second; a machine under load may need many.
 const PROBE_LIMIT: Duration = Duration::from_secs(60);
 
@@ -30,6 +32,8 @@ struct Versions {
     mitsuba: String,
     drjit: String,
     llvm: Option<String>,
+    /// The variant that was tried.
+    variant: String,
 }
 
 impl Backend {
@@ -42,7 +46,7 @@ impl Backend {
         }
         let backend = |llvm, versions| Self { root: site.root().to_owned(), python: python.clone(), llvm, versions };
         for library in site.llvms() {
-            match probe(site, &python, "llvm_ad_mono", Some(&library)) {
+            match probe(site, &python, COMPILED, Some(&library)) {
                 Ok(versions) => return Ok(backend(Some(library), versions)),
                 Err(reason) => tracing::debug!(library = %library.display(), reason, "unusable libLLVM"),
             }
@@ -60,7 +64,7 @@ impl Backend {
     }
 
     pub(super) fn version(&self, site: &Site) -> Version {
-        let Versions { mitsuba, drjit, llvm } = &self.versions;
+        let Versions { mitsuba, drjit, llvm, .. } = &self.versions;
         let llvm = llvm.as_ref().map_or("no usable LLVM".to_owned(), |v| format!("LLVM {v}"));
         let packages = ["mitsuba", "drjit", "numpy"].iter().filter_map(|name| site.python_package(name));
         let files = packages.chain(self.llvm.clone()).chain(self.python.canonicalize());
@@ -70,6 +74,9 @@ impl Backend {
     pub(super) fn command_by_hand(&self) -> String {
         let run = by_hand(&self.python).args(["mitsuba_read.py", "job.json"]);
         match &self.llvm {
+            Some(library) if self.versions.variant == "llvm_ad_rgb" => {
+                run.args(["--variant", "llvm_ad_rgb"]).env("DRJIT_LIBLLVM_PATH", library)
+            }
             Some(library) => run.env("DRJIT_LIBLLVM_PATH", library),
             None => run.args(["--variant", "scalar_rgb"]),
         }
@@ -84,7 +91,16 @@ impl Backend {
         let run = isolated.args(["mitsuba_read.py", "job.json", "--serve", "--threads", &threads]);
         let run = with_kernels(run, &workbench.site);
         match &self.llvm {
-            Some(library) => (run.env("DRJIT_LIBLLVM_PATH", library), None),
+            Some(library) => {
+                let run = run.env("DRJIT_LIBLLVM_PATH", library);
+                let tried = &self.versions.variant;
+                if settings.variant == "llvm_ad_mono" && tried != settings.variant {
+                    let remark =
+                        format!("it has no {}, so {tried} ran, which is the same in grey scenes", settings.variant);
+                    return (run.args(["--variant", tried]), Some(remark));
+                }
+                (run, None)
+            }
             None if settings.variant.starts_with("llvm") => {
                 let remark = format!(
                     "no libLLVM of version 17 or later works here, so scalar_rgb ran instead of {}, about 500 times slower",

@@ -298,7 +298,7 @@ impl Issue<'_> {
             text += &format!("| {} | {value:.9} {unit} | {uncertainty} |\n", markdown(who));
         };
         if let Some(value) = value {
-            row(display_name(&self.finding.symptom.engine), *value, &format!("{uncertainty:?}"));
+            row(&display_name(&self.finding.symptom.engine), *value, &format!("{uncertainty:?}"));
         }
         if let Some(reference) = reference {
             row(&reference.source, reference.value, &format!("standard {:.3e}", reference.uncertainty));
