@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{among, root, run_reference};
+use crate::support::{Folder, among, root, run_reference};
 
 fn run(spec: &str) -> Value {
     let (report, code) = run_reference(&[root().join("reference/web").join(spec).to_str().unwrap()]);
@@ -46,4 +46,14 @@ fn babylon_js_reads_one_plane() {
     let (said, worst) = told(&report, "babylon", "luminous_intensity");
     assert!(said.contains("light is the same in every C plane"), "{said}");
     assert!(worst > 0.3, "{worst}");
+}
+
+/// What is theirs is on record, with its size at each meter: a release that reads otherwise fails, a right one is an unexpected pass.
+#[test]
+fn the_doctor_finds_them_as_they_are_on_record() {
+    let folder = Folder::for_renderers(&[]);
+    let answer = folder.luxproof(&["engines", "doctor", "three", "babylon"]).exits(0);
+    let told = answer.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains("127 passed, 0 failed, 0 undecided, 82 known deviations, 0 unexpected passes"), "{told}");
+    assert!(told.contains("babylon: calibration: asymmetric only as is on record"), "{told}");
 }

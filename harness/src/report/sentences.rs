@@ -44,8 +44,12 @@ fn sentence(report: &Report, engine: &EngineStatus, judged: &Judged<'_>) -> Sent
     for claim in asked.iter().copied().chain(known.iter().copied()).filter(|c| !c.is_sound()) {
         parts.push(doubted(claim, report, &mine[&claim.procedure]));
     }
-    if asked.is_empty() && known.iter().any(|c| c.is_sound()) {
-        parts.push("scenes of known answer alone were read right".to_owned());
+    let (right, on_record): (Vec<&&Claim>, Vec<&&Claim>) =
+        known.iter().filter(|c| c.is_sound()).partition(|c| c.known_deviations == 0);
+    parts.extend(on_record.iter().map(|c| c.trusted()));
+    if asked.is_empty() && !right.is_empty() {
+        let which = if parts.is_empty() { "scenes of known answer alone" } else { "other scenes of known answer" };
+        parts.push(format!("{which} were read right"));
     }
     if parts.is_empty() || matches!(engine.status, Status::Failed | Status::Absent) {
         let why = engine.reason.as_deref().map(|r| format!(": {}", in_a_line(r))).unwrap_or_default();
