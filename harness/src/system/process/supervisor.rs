@@ -111,6 +111,10 @@ impl Supervisor {
 fn start(charge: &Charge, temporary: Option<&Path>) -> std::io::Result<Pid> {
     let mut command = Command::new(&charge.command[0]);
     command.args(&charge.command[1..]).process_group(0);
+    if charge.confined {
+        // Its threads spin from the start and are given nothing to do by any of our drivers.
+        command.env("OPENBLAS_NUM_THREADS", "1");
+    }
     command.envs(charge.set.iter().filter_map(|variable| variable_of(variable)));
     let mut writable = charge.writable.clone();
     if let Some(folder) = temporary {

@@ -7,7 +7,7 @@ fn read_with(script: &str, limit_s: f64) -> EngineError {
     let folder = tempfile::tempdir().unwrap();
     let site = Site::at(folder.path().join("site"));
     std::fs::create_dir_all(site.venv().join("lib/python3/site-packages/mitsuba")).unwrap();
-    let probe = r#"echo '{"mitsuba": "3.9.1", "drjit": "1.5.0", "llvm": null}'"#;
+    let probe = r#"echo '{"mitsuba": "3.9.1", "drjit": "1.5.0", "llvm": null, "variant": "llvm_ad_mono"}'"#;
     let script = format!("if [ \"$1 $2\" = \"-I -\" ]; then cat > /dev/null; {probe}; exit 0; fi\n{script}");
     write_program(&site.venv().join("bin/python"), &script);
     let bench = Workbench { limit: Duration::from_secs_f64(limit_s), ..workbench(site, folder.path()) };
