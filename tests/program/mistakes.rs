@@ -203,6 +203,17 @@ fn every_bad_spec_of_a_folder_is_told_and_so_are_policy_and_options() {
 }
 
 #[test]
+fn of_many_things_that_are_hardly_meant_some_are_told_and_the_rest_are_counted() {
+    let lamps: String =
+        (0..25).map(|k| format!("  - {{id: l{k}, photometry: lamp.ies, at_m: [3, 2, 2.{k:02}5]}}\n")).collect();
+    let around = "obstacles:\n  - box: {min_m: [2, 1, 1.9], max_m: [4, 3, 2.9], reflectance: 0.5}\n";
+    let folder = folder();
+    folder.edit("spec.yaml", "luminaires:\n", &format!("{around}luminaires:\n{lamps}"));
+    let told = folder.luxproof(&["check", "spec.yaml"]).complains("6 more things are hardly meant").stderr;
+    assert_eq!(told.matches("no light").count(), 20, "{told}");
+}
+
+#[test]
 fn what_is_hardly_meant_is_a_warning_at_its_place_and_no_error() {
     let box_around = "obstacles:\n  - box: {min_m: [2, 1, 2], max_m: [4, 3, 2.9], reflectance: 0.5}\n";
     for (mistake, place, says) in [

@@ -26,8 +26,8 @@ pub struct ReadReport {
 pub enum ReadError {
     #[error(transparent)]
     File(#[from] FileError),
-    #[error("{file} {source}")]
-    Report { file: String, source: ReportError },
+    #[error("{file} {why}")]
+    Report { file: String, why: ReportError },
 }
 
 /// Why a text is no report; continues a sentence that starts with the file's name.
@@ -68,7 +68,7 @@ impl Report {
         let file = files::open_kept(path).map_err(fail)?;
         Self::from_text(file, || files::open_kept(path)).map_err(|source| match source {
             ReportError::Foreign(error) | ReportError::Damaged(error) if error.is_io() => fail(error.into()).into(),
-            source => ReadError::Report { file: path.display().to_string(), source },
+            why => ReadError::Report { file: path.display().to_string(), why },
         })
     }
 

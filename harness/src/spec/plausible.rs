@@ -7,7 +7,6 @@ use std::path::Path;
 use glam::DVec3;
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Shape, Transport};
 
-use super::faults::MAX_FAULTS;
 use super::{Case, SpecError};
 use crate::procedures::{Asked, Task};
 
@@ -26,6 +25,9 @@ const BEFORE_A_SURFACE_M: f64 = 0.05;
 const MAX_LOOKS: usize = 1_000_000;
 /// How far from its centre an opening may reach, in metres; beyond that it is asked for light as if it were a point.
 const OPENING_M: f64 = 2.0;
+
+/// Each takes a look at the whole text for its place.
+const MAX_DOUBTS: usize = 20;
 
 /// What is hardly meant, and where in the spec.
 #[derive(Clone, PartialEq, Eq, Hash)]
@@ -54,14 +56,17 @@ pub fn doubts(cases: &[Case]) -> Vec<SpecError> {
             }
         }
     }
-    let told = found.into_iter().take(MAX_FAULTS).map(|(doubt, case, others)| {
+    let more = found.get(MAX_DOUBTS..).and_then(|more| Some((more.len(), &more.first()?.1.path)));
+    let more =
+        more.map(|(n, path)| SpecError::of(path, format!("{n} more things are hardly meant"), "mend these first"));
+    let told = found.into_iter().take(MAX_DOUBTS).map(|(doubt, case, others)| {
         let message = match others {
             0 => doubt.message,
             n => format!("{} (in {} and {n} more)", doubt.message, case.name),
         };
         case.source.error_at(&doubt.at, message, doubt.help)
     });
-    told.collect()
+    told.chain(more).collect()
 }
 
 fn of_case(case: &Case) -> Vec<Doubt> {
