@@ -204,8 +204,8 @@ fn every_bad_spec_of_a_folder_is_told_and_so_are_policy_and_options() {
 
 #[test]
 fn of_many_things_that_are_hardly_meant_some_are_told_and_the_rest_are_counted() {
-    let lamps: String =
-        (0..25).map(|k| format!("  - {{id: l{k}, photometry: lamp.ies, at_m: [3, 2, 2.{k:02}5]}}\n")).collect();
+    let lamp = |k: usize| format!("  - {{id: l{k}, photometry: lamp.ies, at_m: [3, 2, 2.{k:02}5]}}\n");
+    let lamps = (0..25).map(lamp).collect::<Vec<_>>().concat();
     let around = "obstacles:\n  - box: {min_m: [2, 1, 1.9], max_m: [4, 3, 2.9], reflectance: 0.5}\n";
     let folder = folder();
     folder.edit("spec.yaml", "luminaires:\n", &format!("{around}luminaires:\n{lamps}"));
