@@ -55,11 +55,7 @@ impl Audit<'_> {
             outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure).collect()
         };
         let tasks = || plan.tasks.iter();
-        let joined = |mut all: Vec<Comparison>, more: Vec<Comparison>| {
-            all.extend(more);
-            all
-        };
-        let mut comparisons = tasks().map(|task| judge.compare(task, &of(task))).reduce(joined).unwrap_or_default();
+        let mut comparisons: Vec<Comparison> = tasks().flat_map(|task| judge.compare(task, &of(task))).collect();
         let known = tasks().flat_map(|task| judge.on_record(&comparisons, &of(task))).collect();
         sequential::estimate_remaining_cost(&mut comparisons);
         // What follows from other readings follows from nothing where the case was never begun, or where it does not.
