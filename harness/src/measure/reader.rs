@@ -13,7 +13,7 @@ use super::question::Question;
 use super::subprocess::{self, Isolation, Request};
 use crate::engines::{Engine, EngineError, Job, Measurement, Site, Support, Workbench, checked, share};
 use crate::record::{EngineName, FailureKind, ReadingKey};
-use crate::system::files::remedy;
+use crate::system::files::{ignore_absence, remedy};
 use crate::system::process::{self, PeakMemory, ProcessError};
 use crate::system::slots::{Held, Share};
 
@@ -40,6 +40,9 @@ pub struct Reader {
     pub asked: Asked,
 }
 
+/// Of a question its key, and what the cache holds under it.
+type Keyed = Result<(Key, Option<Entry>), Failure>;
+
 impl Reader {
     /// One that reads in this process, and keeps neither readings nor files.
     pub fn bare(site: &Site, machine: Arc<Machine>) -> Self {
@@ -56,15 +59,16 @@ impl Reader {
     }
 
     pub fn read(&self, question: &Question<'_>) -> Result<Taken, Failure> {
-        self.read_under(&question.key()?, question)
+        self.read_under(&question.key()?, question, None)
     }
 
-    fn read_under(&self, key: &Key, question: &Question<'_>) -> Result<Taken, Failure> {
+    /// `found` is what the cache is known to hold.
+    fn read_under(&self, key: &Key, question: &Question<'_>, found: Option<Entry>) -> Result<Taken, Failure> {
         // Whoever asks the same at the same time waits for this answer.
         let answered = self.machine.answered(key);
         let mut answered = answered.as_ref().map(|a| a.lock());
         let known = answered.as_ref().and_then(|a| (**a).clone());
-        let found = known.or_else(|| self.find(key));
+        let found = known.or(found).or_else(|| self.find(key));
         let is_open = found.is_none() && !self.asking.admits(key);
         self.note(key, question, !is_open);
         let (entry, source) = match found {
@@ -121,20 +125,24 @@ impl Reader {
         if !first.instrument.engine.takes_batches() {
             return questions.iter().map(|q| self.read(q)).collect();
         }
-        // Of each its key, and whether it is to be asked: no other place asks for that, since its names are of its case alone.
-        let keyed = |question: &Question<'_>| -> Result<(Key, bool), Failure> {
+        let keyed = |question: &Question<'_>| -> Keyed {
             let key = question.key()?;
-            let is_to_ask = self.asking.admits(&key) && self.find(&key).is_none();
-            Ok((key, is_to_ask))
+            let found = self.find(&key);
+            Ok((key, found))
         };
-        let keyed: Vec<_> = questions.iter().map(keyed).collect();
+        let keyed: Vec<Keyed> = questions.iter().map(keyed).collect();
+        // No other place asks for these, since their names are of their case alone.
+        let is_to_ask = |key: &Key, found: &Option<Entry>| found.is_none() && self.asking.admits(key);
         let pairs = questions.iter().zip(&keyed);
-        let together: Vec<_> = pairs.filter(|(_, keyed)| matches!(keyed, Ok((_, true)))).map(|(q, _)| q).collect();
+        let together: Vec<_> = pairs
+            .filter(|(_, keyed)| keyed.as_ref().is_ok_and(|(key, found)| is_to_ask(key, found)))
+            .map(|(q, _)| q)
+            .collect();
         let mut answers = self.ask_together(&together).into_iter();
-        let of = |(question, keyed): (&Question<'_>, Result<(Key, bool), Failure>)| {
-            let (key, is_to_ask) = keyed?;
-            match is_to_ask.then(|| answers.next()).flatten() {
-                None => self.read_under(&key, question),
+        let of = |(question, keyed): (&Question<'_>, Keyed)| {
+            let (key, found) = keyed?;
+            match is_to_ask(&key, &found).then(|| answers.next()).flatten() {
+                None => self.read_under(&key, question, found),
                 Some(entry) => {
                     self.note(&key, question, true);
                     let answered = self.machine.answered(&key);
@@ -371,8 +379,4 @@ fn fresh(folder: &Path) -> Result<PathBuf, EngineError> {
 
 fn absolute(path: &Path) -> Result<PathBuf, EngineError> {
     std::path::absolute(path).map_err(|e| EngineError::io(path, e))
-}
-
-fn ignore_absence(error: std::io::Error) -> std::io::Result<()> {
-    if error.kind() == std::io::ErrorKind::NotFound { Ok(()) } else { Err(error) }
 }

@@ -34,7 +34,7 @@ pub(super) fn keep(report: &Report, folder: &Path, care: Care) -> Result<(), Fil
     let kept = if report.is_long() {
         files::replace_through(&path, care, |file| write(report, file))
     } else {
-        std::fs::remove_file(&path).or_else(|e| if e.kind() == io::ErrorKind::NotFound { Ok(()) } else { Err(e) })
+        std::fs::remove_file(&path).or_else(files::ignore_absence)
     };
     kept.map_err(|source| FileError::of(&path, source))
 }

@@ -187,11 +187,13 @@ pub(crate) fn replace_folder(path: &Path, fill: impl FnOnce(&Path) -> io::Result
     lock.try_lock().ok();
     fill(new.path())?;
     let old = shared.tempdir_in(parent)?;
-    match std::fs::rename(path, old.path().join("old")) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-        _ => {}
-    }
+    std::fs::rename(path, old.path().join("old")).or_else(ignore_absence)?;
     std::fs::rename(new.keep(), path)
+}
+
+/// What is not there need not go.
+pub(crate) fn ignore_absence(error: io::Error) -> io::Result<()> {
+    if error.kind() == io::ErrorKind::NotFound { Ok(()) } else { Err(error) }
 }
 
 /// Takes away what killed writers left in a folder: files and folders that nobody has locked any more.
