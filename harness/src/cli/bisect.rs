@@ -7,14 +7,13 @@ use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::{diagnose, not_audited};
 use super::engines::report_installation;
-use super::{TextOrJson, complain, json, print};
+use super::{Narrowed, TextOrJson, complain, json, print};
 use crate::audit::{self, AuditError, Calibration, Diagnosis, Options};
 use crate::engines::{self, Site};
 use crate::experiments::bisect::{self, Found, Look, Refused};
 use crate::judge::{PolicyChoice, Verdict};
 use crate::measure::cache::Cache;
-use crate::plan::Selection;
-use crate::record::{ProcedureId, Release};
+use crate::record::Release;
 use crate::report::Exit;
 use crate::spec::{Case, Trust};
 use crate::system::claim::Claim;
@@ -40,15 +39,8 @@ pub(super) struct BisectArgs {
     /// Install releases that are looked at and not there; without it they are skipped
     #[arg(long)]
     install: bool,
-    /// Procedures to run, by name [default: all of the spec]
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
-    procedures: Vec<ProcedureId>,
-    /// Only cases whose name matches: a glob, or a part of the name; may be given several times [default: all]
-    #[arg(long, value_name = "PATTERN")]
-    filter: Vec<String>,
-    /// Seed of every random choice
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    #[command(flatten)]
+    narrowed: Narrowed,
     /// Folder of the runs' files, one a release [default: luxproof-out/bisect/<spec name>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -81,12 +73,8 @@ pub(super) fn run(args: &BisectArgs, site: &Site, cache: &Cache, trust: Trust) -
     let options = |release: &Release| Options {
         cache: Some(cache.clone()),
         jobs: args.jobs.unwrap_or_else(process::cores),
-        selection: Selection {
-            engines: vec![named(&args.engine, release)],
-            procedures: args.procedures.clone(),
-            seed: args.seed,
-        },
-        filter: args.filter.clone(),
+        selection: args.narrowed.selection(&[named(&args.engine, release)]),
+        filter: args.narrowed.filter.clone(),
         trust,
         policy: args.policy.clone(),
         calibration: Calibration::LeftOut,

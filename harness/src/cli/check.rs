@@ -22,7 +22,7 @@ pub(super) fn check(selected: &Selected, site: &Site, trust: Trust) -> Result<Ex
     let selection = selected.choice.selection();
     let options = Options {
         selection: selection.clone(),
-        filter: selected.choice.filter.clone(),
+        filter: selected.choice.narrowed.filter.clone(),
         trust,
         policy: selected.choice.policy.clone(),
         ..Options::new(site.clone(), out_folder(selected))

@@ -140,12 +140,9 @@ struct Selected {
     choice: Choice,
 }
 
-/// What of specs is asked, of whom and by whose rules.
+/// What of specs is asked, whoever is.
 #[derive(Clone, Debug, Args, Serialize, Deserialize)]
-struct Choice {
-    /// Engines to run, by name [default: those of the spec, else all that are there]
-    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
-    engines: Vec<String>,
+struct Narrowed {
     /// Procedures to run, by name [default: all of the spec]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     procedures: Vec<ProcedureId>,
@@ -155,6 +152,23 @@ struct Choice {
     /// Seed of every random choice
     #[arg(long, default_value_t = 1)]
     seed: u64,
+}
+
+impl Narrowed {
+    fn selection(&self, engines: &[String]) -> Selection {
+        Selection { engines: engines.to_vec(), procedures: self.procedures.clone(), seed: self.seed }
+    }
+}
+
+/// What of specs is asked, of whom and by whose rules.
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
+struct Choice {
+    /// Engines to run, by name [default: those of the spec, else all that are there]
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    engines: Vec<String>,
+    #[command(flatten)]
+    #[serde(flatten)]
+    narrowed: Narrowed,
     /// Render everything, also what follows from other readings
     #[arg(long)]
     no_skips: bool,
@@ -190,7 +204,7 @@ struct Audited {
 
 impl Audited {
     fn options(&self, site: &Site, trust: Trust, out: PathBuf) -> Options<'static> {
-        let Choice { filter, policy, .. } = &self.selected.choice;
+        let Choice { narrowed: Narrowed { filter, .. }, policy, .. } = &self.selected.choice;
         Options {
             selection: self.selected.choice.selection(),
             filter: filter.clone(),
@@ -210,7 +224,7 @@ impl Choice {
     }
 
     fn selection(&self) -> Selection {
-        Selection { engines: self.engines.clone(), procedures: self.procedures.clone(), seed: self.seed }
+        self.narrowed.selection(&self.engines)
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::cli::{Audited, Choice, Extent};
+use crate::cli::{Audited, Choice, Extent, Narrowed};
 use crate::system::files::{self, FileError};
 use crate::system::process::quoted;
 
@@ -47,7 +47,8 @@ pub(super) fn emit(audited: &Audited, threads: usize, group_seconds: f64, folder
 
 /// The arguments that ask the same, as a shell reads them in a folder.
 fn arguments(audited: &Audited, folder: &Path) -> io::Result<String> {
-    let Choice { engines, procedures, filter, seed, no_skips, policy, out: _ } = &audited.selected.choice;
+    let Choice { engines, narrowed, no_skips, policy, out: _ } = &audited.selected.choice;
+    let Narrowed { procedures, filter, seed } = narrowed;
     let Extent { sampling, no_calibration } = &audited.extent;
     let mut words: Vec<String> = vec![];
     for spec in &audited.selected.specs {
