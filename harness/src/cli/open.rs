@@ -25,7 +25,7 @@ pub(super) fn open(args: &OpenArgs) -> Result<Exit, Diagnostic> {
     if written(&page).is_none_or(|page| written(&file).is_none_or(|report| page < report)) {
         let report = read_report(&args.run)?;
         let folder = file.parent().unwrap_or(&file);
-        if keep_page(&report, &report::page(&report, &[]), folder).is_none() {
+        if keep_page(&report, folder).is_none() {
             return Err(miette::miette!("{} cannot be written", page.display()));
         }
     }

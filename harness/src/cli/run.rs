@@ -54,7 +54,7 @@ pub(super) fn run(args: &RunArgs, site: &Site, cache: &Cache, trust: Trust) -> R
         report.keep_anew(&root).into_diagnostic()?;
     }
     if !args.views.has_page() {
-        keep_page(&report, &report::page(&report, &[]), &root);
+        keep_page(&report, &root);
     }
     print_report(&report, &root, &args.views)?;
     Ok(report.exit())
@@ -76,7 +76,7 @@ pub(super) fn report_from(cache: &Path, args: &ReportArgs, site: &Site, trust: T
         ));
     }
     if !args.views.has_page() {
-        keep_page(&report, &report::page(&report, &[]), &options.out);
+        keep_page(&report, &options.out);
     }
     print_report(&report, &options.out, &args.views)?;
     // A repetition that is missing shows nowhere else.

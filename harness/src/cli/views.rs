@@ -113,14 +113,19 @@ pub(super) fn screen(style: Style, detail: Detail) -> Screen {
 /// The page, which lies in the run's folder, too; on a terminal only its place is printed.
 fn page(report: &Report, folder: &Path, beside: &[Beside]) -> String {
     let page = report::page(report, beside);
-    match keep_page(report, &page, folder) {
+    match kept(report, &page, folder) {
         Some(file) if std::io::stdout().is_terminal() => file.display().to_string(),
         _ => page,
     }
 }
 
-/// Keeps a page in a run's folder; where that fails it is told, since the report itself is kept already.
-pub(super) fn keep_page(report: &Report, page: &str, folder: &Path) -> Option<PathBuf> {
+/// Keeps the page of a report in its run's folder.
+pub(super) fn keep_page(report: &Report, folder: &Path) -> Option<PathBuf> {
+    kept(report, &report::page(report, &[]), folder)
+}
+
+/// Where a page is kept; that it cannot be is told, since the report itself is kept already.
+fn kept(report: &Report, page: &str, folder: &Path) -> Option<PathBuf> {
     match report::keep_page(report, page, folder) {
         Ok(file) => Some(file),
         Err(error) => {
