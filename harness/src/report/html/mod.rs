@@ -40,6 +40,16 @@ pub fn page(report: &Report, beside: &[Beside]) -> String {
     written(report, beside, Pages::of(report, Layout::USUAL).as_ref())
 }
 
+/// How every page is read, what it may load, and who wrote it.
+fn metadata(report: &Report, policy: &str) -> Markup {
+    html! {
+        meta charset="utf-8";
+        meta name="viewport" content="width=device-width, initial-scale=1";
+        meta http-equiv="Content-Security-Policy" content=(policy);
+        meta name="generator" content=(format!("luxproof {}", report.tool_version));
+    }
+}
+
 fn written(report: &Report, beside: &[Beside], pages: Option<&Pages<'_>>) -> String {
     let palette = Palette::of(report);
     let mut rows = Rows::default();
@@ -48,10 +58,7 @@ fn written(report: &Report, beside: &[Beside], pages: Option<&Pages<'_>>) -> Str
         (DOCTYPE)
         html lang="en" {
             head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                meta name="generator" content=(format!("luxproof {}", report.tool_version));
+                (metadata(report, POLICY))
                 title { (report.spec.title) " · luxproof" }
                 style { (PreEscaped(STYLE)) (PreEscaped(Palette::style())) @if pages.is_some() { (PreEscaped(pages::STYLE)) } }
                 noscript { style { "tr[hidden]{display:table-row}.filters,.theme,.all,.more{display:none}" } }

@@ -14,7 +14,7 @@ use super::super::{PAGE, Report};
 use super::pages::{DIGITS, FOLDER, Layout, Pages, STYLE, matrices, readings};
 use super::palette::Palette;
 use super::rows::place;
-use super::{class, glyph, matrix as verdicts, minus, percent};
+use super::{class, glyph, matrix as verdicts, metadata, minus, percent};
 use crate::judge::Comparison;
 use crate::system::files::{self, FileError};
 
@@ -112,10 +112,7 @@ impl Pages<'_> {
             (DOCTYPE)
             html lang="en" {
                 head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    meta http-equiv="Content-Security-Policy" content=(POLICY);
-                    meta name="generator" content=(format!("luxproof {}", self.report.tool_version));
+                    (metadata(self.report, POLICY))
                     title { (title) " · " (self.report.spec.title) " · luxproof" }
                     style { (PreEscaped(super::STYLE)) (PreEscaped(Palette::style())) (PreEscaped(STYLE)) }
                 }
