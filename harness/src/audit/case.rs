@@ -13,7 +13,8 @@ use crate::procedures::Task;
 use crate::record::{Recording, Status};
 use crate::report::{self, Report};
 use crate::spec::Case;
-use crate::system::{files, process};
+use crate::system::files::{self, FileError};
+use crate::system::process;
 
 /// What all cases of an audit share.
 pub(super) struct Audit<'a> {
@@ -49,7 +50,7 @@ impl Audit<'_> {
         let judge = policy.judge(case, published);
         let outcome = match stop {
             Some(stop) => jobs::not_run(case, plan, stop.status, &stop.why),
-            None => self.readings(case, plan, &judge, folder)?,
+            None => self.readings(case, plan, &judge, Some(folder))?,
         };
         let of = |task: &Task| -> Vec<&Recording> {
             outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure).collect()
@@ -78,13 +79,20 @@ impl Audit<'_> {
         })
     }
 
-    fn readings(&self, case: &Case, plan: &Plan, judge: &Judge<'_>, folder: &Path) -> Result<Outcome, AuditError> {
+    /// Takes the readings of a case; their files stay in the folder, where there is one.
+    pub(super) fn readings(
+        &self,
+        case: &Case,
+        plan: &Plan,
+        judge: &Judge<'_>,
+        folder: Option<&Path>,
+    ) -> Result<Outcome, FileError> {
         // What a run that was killed left.
-        for place in [folder.to_owned(), folder.join("readings")] {
+        for place in folder.into_iter().flat_map(|folder| [folder.to_owned(), folder.join("readings")]) {
             files::sweep(&place);
         }
         let asked = Asked::default();
-        let reader = Reader { out: Some(folder.to_owned()), asked: asked.clone(), ..self.reader.clone() };
+        let reader = Reader { out: folder.map(Path::to_owned), asked: asked.clone(), ..self.reader.clone() };
         let observer = self.options.observer;
         let running = Running { case, plan, folder, reader, observer };
         let mut outcome = running.run()?;

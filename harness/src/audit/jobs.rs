@@ -22,8 +22,8 @@ use crate::system::slots::side_by_side;
 pub struct Running<'a> {
     pub case: &'a Case,
     pub plan: &'a Plan,
-    /// The folder of the case's files, which is the reader's, too.
-    pub folder: &'a Path,
+    /// The folder of the case's files, which is the reader's, too; `None`: nothing stays but what the cache keeps.
+    pub folder: Option<&'a Path>,
     /// Who takes readings; cases that run side by side share its machine.
     pub reader: Reader,
     pub observer: &'a dyn Observer,
@@ -66,7 +66,7 @@ impl Running<'_> {
                 let mut kept = kept.lock();
                 kept.insert(*k, (**recording).clone());
                 // Written as each job finishes, so that an interruption loses only what was under way.
-                keep(self.folder, &recording.key.engine, kept.values())?;
+                self.keep(&recording.key.engine, kept.values())?;
             }
             Ok(done)
         };
@@ -89,6 +89,17 @@ impl Running<'_> {
         }
         let engines = self.plan.engines.iter().map(|planned| status(planned, &recordings)).collect();
         Ok(Outcome { recordings, engines, skips, contradicted, from_cache })
+    }
+
+    /// Writes the file of an engine's readings, those among all that are its own, where files stay.
+    pub(super) fn keep<'r>(
+        &self,
+        engine: &EngineName,
+        all: impl IntoIterator<Item = &'r Recording>,
+    ) -> Result<(), FileError> {
+        let Some(folder) = self.folder else { return Ok(()) };
+        let mine: Vec<&Recording> = all.into_iter().filter(|r| r.key.engine == *engine).collect();
+        files::keep_json(&folder.join("readings").join(format!("{engine}.json")), &mine)
     }
 
     /// The runs of the plan by place: alone, or those of an engine that takes several at once.
@@ -246,16 +257,6 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
         }
     }
     Ok(Answer { taken, was_contradicted: false })
-}
-
-/// Writes the file of an engine's readings, those among all that are its own.
-pub(super) fn keep<'a>(
-    folder: &Path,
-    engine: &EngineName,
-    all: impl IntoIterator<Item = &'a Recording>,
-) -> Result<(), FileError> {
-    let mine: Vec<&Recording> = all.into_iter().filter(|r| r.key.engine == *engine).collect();
-    files::keep_json(&folder.join("readings").join(format!("{engine}.json")), &mine)
 }
 
 /// What a case gives that is not run at all: a skip for every run of its plan, and engines of the given status.

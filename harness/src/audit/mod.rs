@@ -41,7 +41,7 @@ use crate::measure::cache::Cache;
 use crate::measure::{Asked, Asking, Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
 use crate::procedures::Task;
-use crate::record::Status;
+use crate::record::{EngineStatus, Status};
 use crate::report::{Exit, Report, SpecRecord};
 use crate::spec::{Case, Faults, SpecError, Trust, doubts};
 use crate::system::claim::{Claim, ClaimError};
@@ -189,36 +189,137 @@ pub fn run(specs: &[PathBuf], options: &Options<'_>) -> Result<Report, AuditErro
 
 /// The same; as long as the claim is kept the folder is the caller's.
 pub fn run_and_hold(specs: &[PathBuf], options: &Options<'_>) -> Result<(Report, Claim), AuditError> {
-    let (mut cases, mut policies) = chosen(specs, options)?;
-    options.observer.doubted(&doubts(&cases));
-    let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
-    let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
-    let spec = subject(specs, &cases);
-    let known = planner.calibrations(&cases, &plans)?;
+    let prepared = Prepared::of(specs, options)?;
     // What is refused leaves nothing behind.
     let claim = Claim::of(&options.out)?;
-    options.cache.iter().for_each(Cache::sweep);
-    match options.calibration {
-        Calibration::Judged => {
-            let policy = common(&policies)?;
-            for (case, plan) in known {
-                cases.push(case);
-                plans.push(plan);
-                policies.push(Arc::clone(&policy));
+    prepared.audited(options).map(|report| (report, claim))
+}
+
+/// Takes what readings of a run [`Options::asking`] admits, notes in [`Options::asked`] all that the run asks for by now, and keeps nothing but
+/// the cache: how its engines fared.
+pub fn survey(specs: &[PathBuf], options: &Options<'_>) -> Result<Vec<EngineStatus>, AuditError> {
+    let mut prepared = Prepared::of(specs, options)?;
+    let (_under_way, published) = (process::UnderWay::begin(), published(&prepared.cases)?);
+    prepared.grant(&published, options);
+    let Prepared { cases, plans, policies, .. } = &prepared;
+    let audit = Audit { options, reader: options.reader() };
+    let one = |&k: &usize| -> Result<Vec<EngineStatus>, AuditError> {
+        if process::is_interrupted() {
+            return Ok(vec![]);
+        }
+        let judge = policies[k].judge(&cases[k], published[k].as_ref());
+        Ok(audit.readings(&cases[k], &plans[k], &judge, None)?.engines)
+    };
+    let side = options.jobs.clamp(1, MAX_CASES_AT_A_TIME);
+    side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one).into_iter().flatten_ok().collect()
+}
+
+/// What is asked of engines, and by which policies it is judged; each of the lists has one entry a case.
+struct Prepared {
+    spec: SpecRecord,
+    cases: Vec<Case>,
+    plans: Vec<Plan>,
+    policies: Vec<Arc<Policy>>,
+}
+
+impl Prepared {
+    /// The cases that specs, folders and patterns name, and the scenes of known answer besides.
+    fn of(specs: &[PathBuf], options: &Options<'_>) -> Result<Self, AuditError> {
+        let (mut cases, mut policies) = chosen(specs, options)?;
+        options.observer.doubted(&doubts(&cases));
+        let mut planner = Planner::new(&options.selection, &options.site, options.skipping);
+        let mut plans = cases.iter().map(|case| planner.plan(case)).collect::<Result<Vec<Plan>, _>>()?;
+        let spec = subject(specs, &cases);
+        let known = planner.calibrations(&cases, &plans)?;
+        match options.calibration {
+            Calibration::Judged => {
+                let policy = common(&policies)?;
+                for (case, plan) in known {
+                    cases.push(case);
+                    plans.push(plan);
+                    policies.push(Arc::clone(&policy));
+                }
+            }
+            Calibration::LeftOut => {
+                let why = "no engine reads this scene of known answer: --no-calibration";
+                let skip = |(case, task)| Skip::of(case, task, EVERYONE, Scope::Procedure, why);
+                let scenes = known.iter().flat_map(|(case, plan)| plan.tasks.iter().map(move |task| (case, task)));
+                plans[0].skips.extend(scenes.map(skip));
             }
         }
-        Calibration::LeftOut => {
-            let why = "no engine reads this scene of known answer: --no-calibration";
-            let skip = |(case, task)| Skip::of(case, task, EVERYONE, Scope::Procedure, why);
-            let scenes = known.iter().flat_map(|(case, plan)| plan.tasks.iter().map(move |task| (case, task)));
-            plans[0].skips.extend(scenes.map(skip));
+        if let Some(only) = &options.only {
+            let all = izip!(cases, plans, policies);
+            (cases, plans, policies) = all.filter(|(case, ..)| only.contains(&case.name)).multiunzip();
+        }
+        Ok(Self { spec, cases, plans, policies })
+    }
+
+    /// Gives the jobs of all plans the budget of their first look.
+    fn grant(&mut self, published: &[Option<Published>], options: &Options<'_>) {
+        for (case, plan, published, policy) in izip!(&self.cases, &mut self.plans, published, &self.policies) {
+            let sampling = options.sampling.or(policy.profile.sampling).unwrap_or_default();
+            grant(sampling, policy, case, published.as_ref(), plan);
         }
     }
-    if let Some(only) = &options.only {
-        let all = izip!(cases, plans, policies);
-        (cases, plans, policies) = all.filter(|(case, ..)| only.contains(&case.name)).multiunzip();
+
+    /// One report of what is planned for cases.
+    fn audited(mut self, options: &Options<'_>) -> Result<Report, AuditError> {
+        let (clock, _under_way) = (Instant::now(), process::UnderWay::begin());
+        options.cache.iter().for_each(Cache::sweep);
+        let published = published(&self.cases)?;
+        self.grant(&published, options);
+        let Self { spec, cases, plans, policies } = self;
+        options.observer.planned(&cases, &plans);
+        let audit = Audit { options, reader: options.reader() };
+        let is_alone = cases.iter().filter(|case| !case.is_known()).count() == 1;
+        // Planning many meters takes its time, too.
+        let stop: Mutex<Option<Stop>> = Mutex::new(process::is_interrupted().then(Stop::interrupted));
+        let folder_of = |case: &Case| match case.is_known() {
+            true => options.out.join(&case.name),
+            false if is_alone => options.out.clone(),
+            false => options.out.join(within(&options.out, case)),
+        };
+        let one = |&k: &usize| -> Result<Report, AuditError> {
+            let (case, plan) = (&cases[k], &plans[k]);
+            let folder = folder_of(case);
+            let stopped = stop.lock().clone();
+            let mut report = audit.case(case, plan, &policies[k], published[k].as_ref(), stopped.as_ref(), &folder)?;
+            if folder != options.out {
+                keep(&mut report, &folder, Care::Usual)?;
+            }
+            let mut stop = stop.lock();
+            if process::is_interrupted() {
+                *stop = Some(Stop::interrupted());
+            } else if options.after_failure == AfterFailure::Stop
+                && stop.is_none()
+                && matches!(report.worst(), Exit::Failed | Exit::Engine)
+            {
+                let why = format!("not run: {} failed, and --fail-fast was asked for", case.name);
+                *stop = Some(Stop { why, status: Status::Skipped });
+            }
+            Ok(report)
+        };
+        // What comes after a failure must not have begun before it.
+        let side =
+            if options.after_failure == AfterFailure::Stop { 1 } else { options.jobs.clamp(1, MAX_CASES_AT_A_TIME) };
+        let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
+        let mut reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
+        if options.diagnosis == Diagnosis::Sought {
+            diagnose(&plans, &mut reports);
+        }
+        for (case, report) in cases.iter().zip(&mut reports) {
+            let folder = folder_of(case);
+            if folder != options.out && report.comparisons.iter().any(|c| c.diagnosis.is_some()) {
+                report.keep_again(&folder, Care::Usual)?;
+            }
+        }
+        let mut report = Report::joined(spec, reports);
+        report.published_findings = published_findings(&cases, &plans, &published);
+        // Cases ran side by side: their seconds do not add up.
+        report.wall_s = clock.elapsed().as_secs_f64();
+        keep(&mut report, &options.out, Care::Lasting)?;
+        Ok(report)
     }
-    audited(spec, &cases, plans, &policies, options).map(|report| (report, claim))
 }
 
 /// Whose engines are examined besides ours.
@@ -244,8 +345,8 @@ pub fn examine(subjects: Subjects<'_>, options: &Options<'_>) -> Result<Report, 
     };
     let known = Planner::new(&options.selection, &options.site, options.skipping).examinations(&of)?;
     let (cases, plans): (Vec<_>, Vec<_>) = known.into_iter().unzip();
-    let policies = vec![policy; cases.len()];
-    audited(cases.first().map(SpecRecord::of).unwrap_or_default(), &cases, plans, &policies, options)
+    let (spec, policies) = (cases.first().map(SpecRecord::of).unwrap_or_default(), vec![policy; cases.len()]);
+    Prepared { spec, cases, plans, policies }.audited(options)
 }
 
 /// The policy of the scenes of known answer: that of the specs where they have one in common, else ours alone.
@@ -259,71 +360,6 @@ fn common(policies: &[Arc<Policy>]) -> Result<Arc<Policy>, SpecError> {
 /// Gives the jobs of a case's plan the budget of their first look.
 pub fn grant(sampling: Sampling, policy: &Policy, case: &Case, published: Option<&Published>, plan: &mut Plan) {
     sampling::grant(sampling, &policy.judge(case, published), plan);
-}
-
-/// One report of what is planned for cases.
-fn audited(
-    spec: SpecRecord,
-    cases: &[Case],
-    mut plans: Vec<Plan>,
-    policies: &[Arc<Policy>],
-    options: &Options<'_>,
-) -> Result<Report, AuditError> {
-    let (clock, _under_way) = (Instant::now(), process::UnderWay::begin());
-    let published = published(cases)?;
-    for (((case, plan), published), policy) in cases.iter().zip(&mut plans).zip(&published).zip(policies) {
-        let sampling = options.sampling.or(policy.profile.sampling).unwrap_or_default();
-        grant(sampling, policy, case, published.as_ref(), plan);
-    }
-    options.observer.planned(cases, &plans);
-    let audit = Audit { options, reader: options.reader() };
-    let is_alone = cases.iter().filter(|case| !case.is_known()).count() == 1;
-    // Planning many meters takes its time, too.
-    let stop: Mutex<Option<Stop>> = Mutex::new(process::is_interrupted().then(Stop::interrupted));
-    let folder_of = |case: &Case| match case.is_known() {
-        true => options.out.join(&case.name),
-        false if is_alone => options.out.clone(),
-        false => options.out.join(within(&options.out, case)),
-    };
-    let one = |&k: &usize| -> Result<Report, AuditError> {
-        let (case, plan) = (&cases[k], &plans[k]);
-        let folder = folder_of(case);
-        let stopped = stop.lock().clone();
-        let mut report = audit.case(case, plan, &policies[k], published[k].as_ref(), stopped.as_ref(), &folder)?;
-        if folder != options.out {
-            keep(&mut report, &folder, Care::Usual)?;
-        }
-        let mut stop = stop.lock();
-        if process::is_interrupted() {
-            *stop = Some(Stop::interrupted());
-        } else if options.after_failure == AfterFailure::Stop
-            && stop.is_none()
-            && matches!(report.worst(), Exit::Failed | Exit::Engine)
-        {
-            let why = format!("not run: {} failed, and --fail-fast was asked for", case.name);
-            *stop = Some(Stop { why, status: Status::Skipped });
-        }
-        Ok(report)
-    };
-    // What comes after a failure must not have begun before it.
-    let side = if options.after_failure == AfterFailure::Stop { 1 } else { options.jobs.clamp(1, MAX_CASES_AT_A_TIME) };
-    let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
-    let mut reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
-    if options.diagnosis == Diagnosis::Sought {
-        diagnose(&plans, &mut reports);
-    }
-    for (case, report) in cases.iter().zip(&mut reports) {
-        let folder = folder_of(case);
-        if folder != options.out && report.comparisons.iter().any(|c| c.diagnosis.is_some()) {
-            report.keep_again(&folder, Care::Usual)?;
-        }
-    }
-    let mut report = Report::joined(spec, reports);
-    report.published_findings = published_findings(cases, &plans, &published);
-    // Cases ran side by side: their seconds do not add up.
-    report.wall_s = clock.elapsed().as_secs_f64();
-    keep(&mut report, &options.out, Care::Lasting)?;
-    Ok(report)
 }
 
 fn keep(report: &mut Report, folder: &Path, care: Care) -> Result<(), FileError> {

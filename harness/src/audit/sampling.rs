@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::jobs::{self, Found, Outcome, Running};
+use super::jobs::{Found, Outcome, Running};
 use super::sequential::{self, Ask};
 use crate::engines::{Job, Measurement, Station};
 use crate::judge::{Judge, Sampling};
@@ -109,7 +109,7 @@ fn refine_references(
                 recording.notes.push(format!("reading {} meters more finely gave nothing: {why}", ask.targets.len()));
             }
         }
-        jobs::keep(running.folder, &engine, &outcome.recordings)?;
+        running.keep(&engine, &outcome.recordings)?;
     }
     Ok(())
 }
@@ -180,7 +180,7 @@ fn sample_subjects(
             status.wall_s += subject.wall_s - before_s;
         }
         outcome.recordings[mine] = subject;
-        jobs::keep(running.folder, &engine, &outcome.recordings)?;
+        running.keep(&engine, &outcome.recordings)?;
     }
     Ok(())
 }

@@ -17,7 +17,7 @@ pub struct Group {
     pub memory_mib: u64,
     /// Seconds that it is expected to take, most of its jobs far less than they may.
     pub seconds: f64,
-    /// Seconds that it takes at most.
+    /// Seconds after which a queue may end it: one job that hangs, and all others far slower than expected.
     pub at_most_s: f64,
     /// Its jobs.
     pub jobs: Vec<Key>,
@@ -27,6 +27,8 @@ pub struct Group {
 const QUICK_S: f64 = 2.0;
 /// Past its budget an engine is ended after so long; see [`crate::measure::Question::new`].
 const PATIENCE_S: f64 = 120.0;
+/// How many times what is expected of it a job may take on a slow and busy node.
+const SLOWER: f64 = 10.0;
 
 /// The jobs that nobody has read, packed by threads until a group takes so many seconds.
 pub fn groups(nodes: &[Node], seconds: f64) -> Vec<Group> {
@@ -41,12 +43,12 @@ pub fn groups(nodes: &[Node], seconds: f64) -> Vec<Group> {
             threads: node.threads,
             memory_mib: 0,
             seconds: 0.0,
-            at_most_s: 0.0,
+            at_most_s: PATIENCE_S,
             jobs: vec![],
         });
         group.memory_mib = group.memory_mib.max(node.memory_mib);
         group.seconds += takes_s;
-        group.at_most_s += 2.0 * node.seconds + PATIENCE_S;
+        group.at_most_s += if node.is_at_most { 2.0 * node.seconds + PATIENCE_S } else { SLOWER * node.seconds + 1.0 };
         group.jobs.push(node.id.clone());
         groups.push(group);
     }
@@ -96,6 +98,7 @@ mod tests {
                 ("g00005", 2, 1, 122)
             ]
         );
-        assert_eq!(groups[0].at_most_s, 15.0 * (2.0 * 60.0 + PATIENCE_S));
+        assert_eq!(groups[0].at_most_s, PATIENCE_S + 15.0 * (2.0 * 60.0 + PATIENCE_S));
+        assert_eq!(groups[3].at_most_s, PATIENCE_S + SLOWER * 10.0 + 1.0);
     }
 }

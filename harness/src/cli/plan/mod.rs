@@ -13,13 +13,13 @@ use serde::{Deserialize, Serialize};
 
 use super::diagnostic::{diagnose, not_audited};
 use super::{Audited, at_least_one, json, print};
-use crate::audit::{self, Diagnosis, Options};
+use crate::audit::{self, Options};
 use crate::engines::Site;
 use crate::measure::cache::{Cache, Key};
 use crate::measure::{Asking, Failures, Node};
 use crate::plan::{Group, groups};
-use crate::record::{EngineName, Status};
-use crate::report::{Exit, Report};
+use crate::record::{EngineName, EngineStatus, Status};
+use crate::report::Exit;
 use crate::spec::Trust;
 use crate::system::{files, process};
 
@@ -88,13 +88,13 @@ pub(super) fn plan(args: &PlanArgs, site: &Site, cache: &Cache, trust: Trust) ->
         ))?;
         return Ok(Exit::Passed);
     }
-    let (jobs, report) = audited(&args.audited, site, cache, trust, |options| Options {
+    let (jobs, engines) = surveyed(&args.audited, site, cache, trust, |options| Options {
         asking: Asking::Nobody,
         jobs: threads,
         ..options
     })?;
     let groups = groups(&jobs, args.group_seconds);
-    let is_missing = report.engines.iter().any(|engine| engine.is_required && engine.status == Status::Absent);
+    let is_missing = engines.iter().any(|engine| engine.is_required && engine.status == Status::Absent);
     if args.json {
         print(&json(&Workload { luxproof: FORM, asked: args.audited.clone(), jobs, groups })?)?;
     } else {
@@ -103,22 +103,17 @@ pub(super) fn plan(args: &PlanArgs, site: &Site, cache: &Cache, trust: Trust) ->
     Ok(if is_missing { Exit::Engine } else { Exit::Passed })
 }
 
-/// An audit for what it asks: nothing of it is kept but readings.
-fn audited(
+/// What a run asks for, and how its engines fared.
+fn surveyed(
     audited: &Audited,
     site: &Site,
     cache: &Cache,
     trust: Trust,
     with: impl FnOnce(Options<'static>) -> Options<'static>,
-) -> Result<(Vec<Node>, Report), Diagnostic> {
-    let folder = tempfile::tempdir().into_diagnostic()?;
-    let options = with(Options {
-        cache: Some(cache.clone()),
-        diagnosis: Diagnosis::LeftOut,
-        ..audited.options(site, trust, folder.path().join("run"))
-    });
-    let report = audit::run(&audited.selected.specs, &options).map_err(not_audited)?;
-    Ok((options.asked.nodes(), report))
+) -> Result<(Vec<Node>, Vec<EngineStatus>), Diagnostic> {
+    let options = with(Options { cache: Some(cache.clone()), ..audited.options(site, trust, PathBuf::new()) });
+    let engines = audit::survey(&audited.selected.specs, &options).map_err(not_audited)?;
+    Ok((options.asked.nodes(), engines))
 }
 
 fn summary(jobs: &[Node], groups: &[Group]) -> Result<String, std::fmt::Error> {
@@ -148,7 +143,7 @@ pub(super) fn read(args: &ReadArgs, site: &Site, cache: &Cache, trust: Trust) ->
     let failures = if args.give_up { Failures::Kept } else { Failures::TriedAgain };
     let asking = Asking::Only { wanted, failures };
     let threads = nodes.iter().map(|node| node.threads).max().unwrap_or(1);
-    let (asked, _) = audited(&workload.asked, site, cache, trust, |options| Options {
+    let (asked, _) = surveyed(&workload.asked, site, cache, trust, |options| Options {
         asking,
         jobs: threads,
         only: Some(cases),
