@@ -29,7 +29,7 @@ fn recordings(case: &Case, engine: &str) -> Vec<Recording> {
     let plan = plan(case, &selection(engine), &site).unwrap();
     let folder = out.path("");
     let reader = Reader { out: Some(folder.clone()), ..Reader::bare(&site, Machine::new(2)) };
-    let running = Running { case, plan: &plan, folder: &folder, reader, observer: &Silent };
+    let running = Running { case, plan: &plan, folder: Some(&folder), reader, observer: &Silent };
     let outcome = running.run().unwrap();
     let mine: Vec<Recording> = outcome.recordings.into_iter().filter(|r| r.key.engine == engine).collect();
     assert!(!mine.is_empty(), "{engine} did not run; run `luxproof engines install`");

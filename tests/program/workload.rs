@@ -10,7 +10,7 @@ const METERS: &str = "meters:
   plane: {points_m: [[1, 1, 0.8], [3, 2, 0.8], [5, 3.5, 0.1]], normal: [0, 0, 1]}
 procedures:
   direct_illuminance: {meters: plane}
-budget: {relative_error: 0.004, seconds: 20}
+budget: {relative_error: 0.004, seconds: 200}
 cases:
   - {name: bright}
   - {name: again}
@@ -219,4 +219,34 @@ fn a_plan_of_other_specs_and_ids_that_are_none_are_refused() {
     let id = of_bright(&lab.plan("plan.json"));
     lab.0.write("adapter.py", &(adapter() + "# changed\n"));
     lab.read("plan.json", &id, &[]).exits(2).prints("it needs mine");
+}
+
+#[test]
+fn a_node_without_the_engine_gives_nothing_up_and_another_goes_on() {
+    let lab = Lab::new(&adapter());
+    let plan = lab.plan("plan.json");
+    let open: Vec<String> = ids(&plan, false).into_iter().filter(|id| id.starts_with("mine/")).collect();
+    let (there, gone) = (lab.0.path("adapter.py"), lab.0.path("gone.py"));
+    fs::rename(&there, &gone).unwrap();
+    for id in &open {
+        lab.read("plan.json", id, &["--give-up"]).exits(2).prints(&format!("not asked for {id}"));
+    }
+    fs::rename(&gone, &there).unwrap();
+    assert!(open.iter().all(|id| ids(&lab.plan("again.json"), false).contains(id)));
+    lab.read_all();
+    assert_eq!(lab.report_from_cache().0, Some(0));
+}
+
+#[test]
+fn what_finds_the_disk_full_stays_open_and_is_read_when_there_is_room() {
+    let lab = Lab::new(&adapter());
+    let id = of_bright(&lab.plan("plan.json"));
+    // Nothing can be written below a file.
+    fs::create_dir_all(lab.0.path("shared")).unwrap();
+    lab.0.write("shared/mine", "");
+    lab.read("plan.json", &id, &["--give-up"]).exits(3).complains("could not be kept").prints(&format!("failed {id}"));
+    fs::remove_file(lab.0.path("shared/mine")).unwrap();
+    lab.read("plan.json", &id, &[]).exits(0).prints(&format!("read {id}"));
+    lab.read_all();
+    assert_eq!(lab.report_from_cache().0, Some(0));
 }

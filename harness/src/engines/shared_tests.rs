@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{BVec3, DVec3};
 use luminaire::geometry::Reflectances;
+use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::{Bounces, Meter, Obstacle, Shape, Transport, orientation};
 use luminaire::simulator::{self, Accuracy};
 
@@ -111,6 +112,24 @@ fn asymmetric_and_turned_luminaires_read_their_own_table() {
             let bound = estimate.uncertainty.bound();
             assert!((estimate.value - exact).abs() <= off[0] * exact + off[1] * scale, "{estimate:?} for {exact}");
             assert!((estimate.value - exact).abs() <= bound, "{estimate:?} for {exact}");
+        }
+    }
+}
+
+#[test]
+fn where_a_table_begins_to_shine_bounds_hold_within_a_tenth_of_a_degree() {
+    let candela = vec![0.0, 0.0, 4.5, 35.7, 664.4, 664.4, 0.0];
+    let edges =
+        LuminousIntensityDistribution::new(vec![0.0], vec![0.0, 89.9, 90.0, 95.0, 140.0, 141.0, 141.3], candela);
+    let gamma = [
+        0.0, 80.0, 89.2, 89.6, 89.85, 89.92, 89.95, 90.0, 90.05, 90.4, 92.0, 140.9, 141.05, 141.2, 141.29, 141.5, 180.0,
+    ];
+    for Renderer { read, .. } in [MITSUBA, RADIANCE, POVRAY, CYCLES, LUXCORE] {
+        let job = goniometer(&luminaire("lamp", DVec3::ZERO, edges.clone().unwrap()), 10.0, &[0.0, 70.0], &gamma);
+        let found = read(&job);
+        for ((estimate, exact), station) in found.estimates.iter().zip(exact_direct_lx(&job)).zip(&job.stations) {
+            let bound = estimate.uncertainty.bound();
+            assert!((estimate.value - exact).abs() <= bound, "{}: {estimate:?} for {exact}", station.id);
         }
     }
 }

@@ -3,6 +3,10 @@
 //! An emission map spans azimuth and polar angle (`slg/core/sphericalfunction/sphericalfunction.cpp`). Columns lie at whole multiples of
 //! their width, for which its axes are turned by half a column, so that planes of most files keep their place. What texels bend, first at
 //! kinks and at the ends of a table, is computed and stated, never taken off.
+//!
+//! Directions are drawn from a grid of cells, each as likely as its middle is bright, and what is never drawn is dark for meters, too
+//! (`funcPdf == 0` in `MapPointLight::Illuminate`, 2.11: a cell of .7 degrees that begins to shine past its middle reads 0). So texels
+//! beside light are never quite dark.
 
 use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
 
@@ -15,8 +19,10 @@ const HEIGHTS: [usize; 4] = [512, 1024, 2048, 4096];
 const WIDTHS: [usize; 3] = [360, 720, 1440];
 /// Columns of an axial table.
 const AXIAL: usize = 8;
-/// The grid that LuxCore takes a map's mean over.
-const MEAN_OVER: [usize; 2] = [512, 256];
+/// The grid that LuxCore takes a map's mean over, and draws directions from.
+const CELLS: [usize; 2] = [512, 256];
+/// What dark texels beside light get, in parts of the largest intensity.
+const FAINT: f64 = 1e-9;
 /// What its 131,072 sums in 32-bit floats leave of that mean that is not foreseen here.
 const MEAN_OFF: f64 = 5e-6;
 /// So many degrees are directions of 32-bit floats off, for what is steep.
@@ -49,7 +55,31 @@ impl Map {
         let (c_deg, gamma_deg) = (360.0 / width as f64, 180.0 / height as f64);
         let texel = |y: usize, x: usize| distribution.intensity(x as f64 * c_deg, 180.0 - (y as f64 + 0.5) * gamma_deg);
         let texels = (0..height).flat_map(|y| (0..width).map(move |x| texel(y, x).value() as f32)).collect();
-        Self { of: distribution.clone(), width, height, texels }
+        let mut map = Self { of: distribution.clone(), width, height, texels };
+        map.light_up((FAINT * largest) as f32);
+        map
+    }
+
+    /// Dark texels as far from light as one of LuxCore's cells reaches become faint.
+    fn light_up(&mut self, faint: f32) {
+        let (width, height) = (self.width, self.height);
+        let reach = [width.div_ceil(CELLS[0]) + 1, height.div_ceil(CELLS[1]) + 1];
+        let lit: Vec<bool> = self.texels.iter().map(|texel| *texel > 0.0).collect();
+        if lit.iter().all(|is| *is) {
+            return;
+        }
+        // Along columns from row to row, then along rows, which close.
+        let mut near = lit;
+        for (count, step, along, closes) in [(width, 1, [width, height], false), (height, width, [1, width], true)] {
+            let lit = near.clone();
+            let reach = if closes { reach[0] } else { reach[1] };
+            for line in 0..count {
+                spread(&lit, &mut near, line * step, along, reach, closes);
+            }
+        }
+        for (texel, _) in self.texels.iter_mut().zip(near).filter(|(texel, is_near)| **texel == 0.0 && *is_near) {
+            *texel = faint;
+        }
     }
 
     /// How far its axes are turned about the luminaire's own, so that a column lies in C 0.
@@ -68,7 +98,7 @@ impl Map {
 
     /// The flux that LuxCore divides intensities by: 4 pi times its own mean of the map, a sum in 32-bit floats, one after the other.
     pub(super) fn flux_lm(&self) -> f64 {
-        let [columns, rows] = MEAN_OVER;
+        let [columns, rows] = CELLS;
         let (mut sum, mut weights) = (0.0_f32, 0.0_f32);
         for y in 0..rows {
             let v = (y as f32 + 0.5) / rows as f32;
@@ -112,7 +142,8 @@ impl Resampled for Map {
 
     fn off_cd(&self, c_deg: f64, gamma_deg: f64) -> f64 {
         let right = self.of.intensity(c_deg, gamma_deg).value();
-        let off = (self.intensity_cd(c_deg, gamma_deg) - right).abs() + MEAN_OFF * right;
+        let read = self.intensity_cd(c_deg, gamma_deg);
+        let off = (read - right).abs() + MEAN_OFF * read.max(right);
         // Where a table ends with light short of a pole, a texel is a ramp of it, on which no direction is known well enough.
         let angles = self.of.gamma_deg();
         let is_at = |end: f64| end > 0.0 && end < 180.0 && (gamma_deg - end).abs() < 1.5 * self.texel_deg();
@@ -120,6 +151,21 @@ impl Resampled for Map {
             off + self.of.max_intensity().value() * ANGLE_DEG / self.texel_deg()
         } else {
             off
+        }
+    }
+}
+
+/// What lies on one line of texels within reach of a lit one is near, too; `along` is the step from one to the next, and how many there are.
+fn spread(lit: &[bool], near: &mut [bool], first: usize, along: [usize; 2], reach: usize, closes: bool) {
+    let [step, count] = along;
+    let at = |k: usize| first + step * (k % count);
+    let rounds = if closes { count + reach } else { count };
+    for order in [false, true] {
+        let mut since = usize::MAX;
+        for k in 0..rounds {
+            let place = at(if order { rounds - 1 - k } else { k });
+            since = if lit[place] { 0 } else { since.saturating_add(1) };
+            near[place] |= since <= reach;
         }
     }
 }
@@ -174,6 +220,22 @@ mod tests {
             assert!(map.misled_share() < 1e-4, "{}", map.misled_share());
             let flux = distribution.flux().value();
             assert!((map.flux_lm() / flux - 1.0).abs() < 1e-4, "{} {flux}", map.flux_lm());
+        }
+    }
+
+    #[test]
+    fn dark_texels_are_faint_as_far_as_a_cell_reaches_and_dark_beyond() {
+        let (c, gamma) = (vec![0.0, 10.0, 20.0, 180.0, 340.0, 350.0, 360.0], vec![0.0, 89.0, 90.0, 91.0, 180.0]);
+        let lit = |c: usize, g: usize| if [0, 6].contains(&c) && g == 2 { 1000.0 } else { 0.0 };
+        let candela = (0..c.len()).flat_map(|c| (0..gamma.len()).map(move |g| lit(c, g))).collect();
+        let map = Map::of(&LuminousIntensityDistribution::new(c, gamma, candela).unwrap());
+        let at = |c: f64, gamma: f64| map.intensity_cd(c, gamma);
+        let faint = |cd: f64| cd > 0.0 && cd < 1e-5;
+        for (c, gamma) in [(0.0, 91.3), (0.0, 88.6), (10.5, 90.0), (349.3, 90.0), (5.0, 91.4), (10.6, 91.4)] {
+            assert!(faint(at(c, gamma)), "{} at {c}, {gamma}", at(c, gamma));
+        }
+        for (c, gamma) in [(0.0, 93.0), (0.0, 87.0), (14.0, 90.0), (346.0, 90.0), (180.0, 90.0)] {
+            assert_eq!(at(c, gamma), 0.0, "{c}, {gamma}");
         }
     }
 
