@@ -42,7 +42,7 @@ use crate::measure::{Asked, Asking, Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
 use crate::procedures::Task;
 use crate::record::Status;
-use crate::report::{Exit, Report, SpecRecord};
+use crate::report::{Exit, Report, Request, SpecRecord};
 use crate::spec::{Case, Faults, SpecError, Trust, doubts};
 use crate::system::claim::{Claim, ClaimError};
 use crate::system::digest::hexadecimal;
@@ -148,6 +148,41 @@ impl Options<'_> {
             asked: Asked::default(),
             only: None,
             observer: &Silent,
+        }
+    }
+
+    /// What readings and verdicts depend on.
+    fn request(&self) -> Request {
+        let Selection { engines, procedures, seed } = self.selection.clone();
+        let PolicyChoice { file, profile, tolerance_class } = self.policy.clone();
+        Request {
+            engines,
+            procedures,
+            filter: self.filter.clone(),
+            seed,
+            no_skips: self.skipping == Skipping::Nothing,
+            sampling: self.sampling,
+            no_calibration: self.calibration == Calibration::LeftOut,
+            fail_fast: self.after_failure == AfterFailure::Stop,
+            policy: file,
+            profile,
+            tolerance_class,
+        }
+    }
+
+    /// Has the same asked.
+    #[must_use]
+    pub fn asking(self, request: &Request) -> Self {
+        let Request { engines, procedures, filter, seed, policy, profile, tolerance_class, .. } = request.clone();
+        Self {
+            selection: Selection { engines, procedures, seed },
+            filter,
+            skipping: if request.no_skips { Skipping::Nothing } else { Skipping::Allowed },
+            policy: PolicyChoice { file: policy, profile, tolerance_class },
+            sampling: request.sampling,
+            calibration: if request.no_calibration { Calibration::LeftOut } else { Calibration::Judged },
+            after_failure: if request.fail_fast { AfterFailure::Stop } else { AfterFailure::GoOn },
+            ..self
         }
     }
 
@@ -319,6 +354,7 @@ fn audited(
         }
     }
     let mut report = Report::joined(spec, reports);
+    report.request = Some(options.request());
     report.published_findings = published_findings(cases, &plans, &published);
     // Cases ran side by side: their seconds do not add up.
     report.wall_s = clock.elapsed().as_secs_f64();
