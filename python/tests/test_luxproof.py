@@ -111,7 +111,7 @@ tables:
     name: Table 1
     quantity: illuminance_lx
     columns: {inverse_square: {reference: true, engine: iesna, model: point, meaning: by hand}}
-    rows: [{at_m: [2, 2, 0], normal: [0, 0, 1], cells: {inverse_square: "VALUE"}}]
+    rows: [{at_m: [2, 2, 0.5], normal: [0, 0, 1], cells: {inverse_square: "VALUE"}}]
 """
 
 
@@ -120,8 +120,8 @@ def test_a_papers_cells_and_a_bundles_rows_are_tables(tmp_path: Path) -> None:
     (tmp_path / "lamp.ies").write_bytes(lamp.read_bytes())
     (tmp_path / "spec.yaml").write_text(
         "luxproof: 1\nroom: {size_m: [4, 4, 3], reflectance: {floor: 0, walls: 0, ceiling: 0}}\n"
-        "luminaires: [{id: lamp, photometry: lamp.ies, at_m: [2, 2, 2]}]\n"
-        "meters: {floor: {points_m: [[2, 2, 0]], normal: [0, 0, 1]}}\n"
+        "luminaires: [{id: lamp, photometry: lamp.ies, at_m: [2, 2, 2.5]}]\n"
+        "meters: {floor: {points_m: [[2, 2, 0.5]], normal: [0, 0, 1]}}\n"
         "procedures: {direct_illuminance: {meters: floor}}\npublished: table.yaml\n"
     )
     candela = float(luxproof.photometry(lamp).loc[0, "max_cd"])

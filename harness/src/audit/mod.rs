@@ -36,7 +36,7 @@ use sha2::{Digest, Sha256};
 
 use crate::diagnosis::{self, Examined};
 use crate::engines::Site;
-use crate::judge::{Policy, PolicyChoice, Published, PublishedError};
+use crate::judge::{Policy, PolicyChoice, ProfileBudget, Published, PublishedError};
 use crate::measure::cache::Cache;
 use crate::measure::{Asked, Asking, Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
@@ -76,6 +76,8 @@ pub struct Options<'a> {
     pub policy: PolicyChoice,
     /// When sampling stops; `None`: as the profile says.
     pub sampling: Option<Sampling>,
+    /// In place of what specs and profile say of budgets.
+    pub budget: ProfileBudget,
     /// What a failed case means to those after it.
     pub after_failure: AfterFailure,
     /// Whether engines read scenes of known answer besides.
@@ -140,6 +142,7 @@ impl Options<'_> {
             trust: Trust::Own,
             policy: PolicyChoice::default(),
             sampling: None,
+            budget: ProfileBudget::default(),
             after_failure: AfterFailure::GoOn,
             calibration: Calibration::Judged,
             diagnosis: Diagnosis::Sought,
@@ -167,6 +170,7 @@ impl Options<'_> {
             policy: file,
             profile,
             tolerance_class,
+            relative_error: self.budget.relative_error,
         }
     }
 
@@ -180,6 +184,7 @@ impl Options<'_> {
             skipping: if request.no_skips { Skipping::Nothing } else { Skipping::Allowed },
             policy: PolicyChoice { file: policy, profile, tolerance_class },
             sampling: request.sampling,
+            budget: ProfileBudget { relative_error: request.relative_error, seconds: None },
             calibration: if request.no_calibration { Calibration::LeftOut } else { Calibration::Judged },
             after_failure: if request.fail_fast { AfterFailure::Stop } else { AfterFailure::GoOn },
             ..self

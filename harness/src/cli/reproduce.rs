@@ -14,7 +14,7 @@ use super::{TextOrJson, at_least_one, complain, json, print};
 use crate::audit::{self, Calibration, Options};
 use crate::bundle::{self, Difference, EngineThen, Opened, Outcome, Reproduction, Row};
 use crate::engines::Site;
-use crate::judge::{Published, Tolerances};
+use crate::judge::{Published, Sampling, Tolerances};
 use crate::measure::cache::Cache;
 use crate::record::ProcedureId;
 use crate::report::{self, Cell, Exit, Report, Standing, words};
@@ -34,6 +34,9 @@ pub(super) struct ReproduceArgs {
     /// Of a paper, only the tables of these procedures [default: all]
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     procedures: Vec<ProcedureId>,
+    /// Of a paper, sample until standard errors are so small, relative [default: as the spec says]
+    #[arg(long, value_name = "ERROR", value_parser = positive)]
+    relative_error: Option<f64>,
     /// Folder of the new run's files [default: luxproof-out/<name>-again, of a paper luxproof-out/<name>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -62,8 +65,8 @@ pub(super) fn reproduce(
 
 /// A bundle's run, made again without any reading that is kept.
 fn again(args: &ReproduceArgs, site: &Site, trust: Trust) -> Result<Exit, Diagnostic> {
-    if !args.procedures.is_empty() {
-        return Err(miette!("--procedures is of papers: a bundle's run is made again whole"));
+    if !args.procedures.is_empty() || args.relative_error.is_some() {
+        return Err(miette!("--procedures and --relative-error are of papers: a bundle's run is made again as it was"));
     }
     if args.trusted && trust != Trust::Own {
         return Err(miette!("--trusted and --untrusted (or LUXPROOF_UNTRUSTED) contradict each other"));
@@ -164,6 +167,15 @@ fn row_told(row: &Row) -> String {
     text
 }
 
+fn positive(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    if number.is_finite() && number > 0.0 {
+        Ok(number)
+    } else {
+        Err("give a number above 0, such as 0.0005".to_owned())
+    }
+}
+
 /// A paper's tables: the spec that they name is run, and every printed cell held against what is read now.
 fn paper(args: &ReproduceArgs, site: &Site, cache: Cache, trust: Trust) -> Result<Exit, Diagnostic> {
     let published = Published::read(&args.what).into_diagnostic()?;
@@ -190,6 +202,10 @@ fn paper(args: &ReproduceArgs, site: &Site, cache: Cache, trust: Trust) -> Resul
     let progress = Progress::new();
     let calibration = Calibration::LeftOut;
     let mut options = Options { cache: Some(cache), calibration, ..options(args, site, trust, "", &progress) };
+    if args.relative_error.is_some() {
+        options.sampling = Some(Sampling::Accurate);
+        options.budget.relative_error = args.relative_error;
+    }
     // Nobody else has a cell.
     options.selection.engines = published.engines().into_iter().map(str::to_owned).collect();
     options.selection.procedures.clone_from(&args.procedures);

@@ -37,7 +37,7 @@ pub use papers::{
     Misfit, PHOTOMETRY, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable,
 };
 pub use papers::{PaperSplit, Share, Stages, shares};
-pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicyRecord, Profile, ProjectPolicy, Sampling};
+pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicyRecord, Profile, ProfileBudget, ProjectPolicy, Sampling};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
 pub use tolerance::{Rule, Tolerance, ToleranceClass, Tolerances};

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::judge::{Sampling, ToleranceClass};
 use crate::record::ProcedureId;
 
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct Request {
     /// By name; empty for those of the specs, else all that are there.
@@ -30,6 +30,9 @@ pub struct Request {
     pub policy: Option<PathBuf>,
     pub profile: Option<String>,
     pub tolerance_class: Option<ToleranceClass>,
+    /// In place of the budgets'; of a paper's tables made again, which no option of `run` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative_error: Option<f64>,
 }
 
 impl Request {
@@ -58,7 +61,8 @@ impl Request {
             [(self.no_skips, "--no-skips"), (self.no_calibration, "--no-calibration"), (self.fail_fast, "--fail-fast")];
         words.extend(switches.into_iter().filter(|(is_on, _)| *is_on).map(|(_, name)| name.to_owned()));
         // What holds a zero byte no command line can say, and no spec's name or option held one.
-        shlex::try_join(words.iter().map(String::as_str)).unwrap_or_default()
+        let command = shlex::try_join(words.iter().map(String::as_str)).unwrap_or_default();
+        self.relative_error.map_or(command.clone(), |error| format!("{command} # until a relative error of {error}"))
     }
 }
 
