@@ -10,17 +10,13 @@ use crate::support::{
 
 const ALL: &str = "luminous_intensity,direct_illuminance,indirect_illuminance,total_illuminance";
 
-/// Lines of a view without their layout, and numbers of as many digits as one.
+/// Lines of a view without their layout and without numbers: how many comparisons there are stands where there is room.
 fn lines(view: &str) -> BTreeSet<String> {
-    let plain = |line: &str| {
-        let mut digits =
-            line.split_whitespace().collect::<Vec<_>>().join(" ").replace(|c: char| c.is_ascii_digit(), "0");
-        while digits.contains("00") {
-            digits = digits.replace("00", "0");
-        }
-        digits
+    let is_number = |word: &str| {
+        word.contains(|c: char| c.is_ascii_digit()) && word.chars().all(|c| c.is_ascii_digit() || "+-./e".contains(c))
     };
-    view.lines().map(plain).filter(|line| !line.is_empty()).collect()
+    let line = |line: &str| line.split_whitespace().filter(|word| !is_number(word)).collect::<Vec<_>>().join(" ");
+    view.lines().map(line).filter(|line| !line.is_empty()).collect()
 }
 
 /// The view that the README shows is that of a run now, but for what a run without scenes of known answer lacks.
@@ -35,7 +31,7 @@ fn is_as_the_readme_shows(folder: &Folder) {
     assert!(title.starts_with("luxproof "), "{title}");
     let (shown, now) = (lines(&format!("{head}\nWho departs{departs}")), lines(&now));
     let missing: Vec<&String> = shown.difference(&now).collect();
-    assert!(shown.len() > 30 && missing.is_empty(), "the README shows what no run does now: {missing:#?}");
+    assert!(shown.len() > 20 && missing.is_empty(), "the README shows what no run does now: {missing:#?}");
 }
 
 fn readings<'a>(report: &'a Value, procedure: &str, engine: &str) -> Vec<&'a Value> {
