@@ -15,8 +15,10 @@ fn lines(view: &str) -> BTreeSet<String> {
     let is_number = |word: &str| {
         word.contains(|c: char| c.is_ascii_digit()) && word.chars().all(|c| c.is_ascii_digit() || "+-./e".contains(c))
     };
-    let line = |line: &str| line.split_whitespace().filter(|word| !is_number(word)).collect::<Vec<_>>().join(" ");
-    view.lines().map(line).filter(|line| !line.is_empty()).collect()
+    let words = |line: &str| line.split_whitespace().filter(|word| !is_number(word)).collect::<Vec<_>>().join(" ");
+    // Who is named and not of a case is skipped there, and the test names all.
+    let words = |line: &str| words(line).replace("skipped", "-");
+    view.lines().map(words).filter(|line| !line.is_empty()).collect()
 }
 
 /// The view that the README shows is that of a run now, but for what a run without scenes of known answer lacks.
