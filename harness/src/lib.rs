@@ -9,6 +9,7 @@
 pub struct AddingAnEngine;
 
 pub mod audit;
+pub mod bundle;
 pub mod cli;
 pub mod diagnosis;
 pub mod engines;

@@ -11,5 +11,6 @@ from luxproof._lines import each_comparison
 from luxproof._photometry import photometry
 from luxproof._program import LuxproofError, program, version
 from luxproof._report import Report, load, run
+from luxproof._reproduce import reproduce
 
-__all__ = ["LuxproofError", "Report", "each_comparison", "load", "photometry", "program", "run", "version"]
+__all__ = ["LuxproofError", "Report", "each_comparison", "load", "photometry", "program", "reproduce", "run", "version"]

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import importlib.resources
+import subprocess
 from pathlib import Path
 
 import luxproof
+import nbformat
 import pytest
+from nbclient import NotebookClient
 
 REFERENCE = Path(__file__).parents[2] / "reference"
 
@@ -97,3 +100,55 @@ def test_what_the_program_refuses_is_raised_with_its_place(tmp_path: Path) -> No
 def test_the_package_is_typed() -> None:
     assert importlib.resources.files(luxproof).joinpath("py.typed").is_file()
     assert luxproof.version()[0].isdigit()
+
+
+TABLE = """luxproof_published: 1
+citation: {title: A paper}
+spec: spec.yaml
+rounding: {units_in_last_digit: 1}
+tables:
+  direct_illuminance:
+    name: Table 1
+    quantity: illuminance_lx
+    columns: {inverse_square: {reference: true, engine: iesna, model: point, meaning: by hand}}
+    rows: [{at_m: [2, 2, 0.5], normal: [0, 0, 1], cells: {inverse_square: "VALUE"}}]
+"""
+
+
+def test_a_papers_cells_and_a_bundles_rows_are_tables(tmp_path: Path) -> None:
+    lamp = REFERENCE / "luminaires" / "lambertian-point.ies"
+    (tmp_path / "lamp.ies").write_bytes(lamp.read_bytes())
+    (tmp_path / "spec.yaml").write_text(
+        "luxproof: 1\nroom: {size_m: [4, 4, 3], reflectance: {floor: 0, walls: 0, ceiling: 0}}\n"
+        "luminaires: [{id: lamp, photometry: lamp.ies, at_m: [2, 2, 2.5]}]\n"
+        "meters: {floor: {points_m: [[2, 2, 0.5]], normal: [0, 0, 1]}}\n"
+        "procedures: {direct_illuminance: {meters: floor}}\npublished: table.yaml\n"
+    )
+    candela = float(luxproof.photometry(lamp).loc[0, "max_cd"])
+    for shift, standing in [(0.0, "reproduced"), (1.0, "not_reproduced")]:
+        (tmp_path / "table.yaml").write_text(TABLE.replace("VALUE", f"{candela / 4 + shift:.2f}"))
+        cells = luxproof.reproduce(tmp_path / "table.yaml", out=tmp_path / "out")
+        assert list(cells.standing) == [standing]
+    subprocess.run([luxproof.program(), "bundle", str(tmp_path / "out"), "--out", str(tmp_path / "bundle")], check=True, capture_output=True)
+    rows = luxproof.reproduce(tmp_path / "bundle", out=tmp_path / "again")
+    assert len(rows) == 2 and set(rows.outcome) == {"same_bytes"}
+    (tmp_path / "bundle" / "added").touch()
+    with pytest.raises(luxproof.LuxproofError, match="added was added"):
+        luxproof.reproduce(tmp_path / "bundle", out=tmp_path / "again")
+
+
+NOTEBOOKS = sorted((REFERENCE.parent / "docs" / "notebooks").glob("*.ipynb"))
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_of_the_guide_runs_and_keeps_no_output(path: Path, tmp_path: Path) -> None:
+    notebook = nbformat.read(path, as_version=4)
+    nbformat.validate(notebook)
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert all(cell.outputs == [] and cell.execution_count is None for cell in cells), f"{path} keeps outputs: strip them"
+    client = NotebookClient(notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(path.parent)}})
+    client.execute()
+    images = [output for cell in cells for output in cell.outputs if "image/png" in output.get("data", {})]
+    assert images, "it plots nothing"
+    texts = "".join(output.get("text", "") for cell in cells for output in cell.outputs)
+    assert "12 printed cells" in texts, texts

@@ -10,13 +10,22 @@ use std::process::Command;
 
 use crate::support::{Answer, Folder, root};
 
-const PAGES: [&str; 7] =
-    ["first-audit", "writing-a-spec", "reading-a-report", "adding-an-engine", "nightly", "cluster", "methods"];
+const PAGES: [&str; 8] = [
+    "first-audit",
+    "writing-a-spec",
+    "reading-a-report",
+    "adding-an-engine",
+    "nightly",
+    "cluster",
+    "methods",
+    "bundles",
+];
 
 /// A step of the guide.
 #[derive(Debug, PartialEq)]
 enum Step {
-    Run(String),
+    /// A command, and the lines that stand below it.
+    Run(String, Vec<String>),
     Write(String, String),
 }
 
@@ -29,7 +38,10 @@ fn steps(page: &str) -> Vec<Step> {
         let block: Vec<&str> = lines.by_ref().take_while(|l| *l != "```").collect();
         match info.split_once(' ') {
             None if info == "console" => {
-                steps.extend(block.iter().filter_map(|l| l.strip_prefix("$ ")).map(|c| Step::Run(c.to_owned())));
+                let mut commands =
+                    block.split(|l| l.starts_with("$ ")).skip(1).map(|of| of.iter().map(|l| (*l).to_owned()).collect());
+                let shown = block.iter().filter_map(|l| l.strip_prefix("$ ")).map(str::to_owned);
+                steps.extend(shown.map(|command| Step::Run(command, commands.next().unwrap_or_default())));
             }
             Some(("yaml", name)) => steps.push(Step::Write(name.to_owned(), block.join("\n") + "\n")),
             _ => (),
@@ -41,8 +53,9 @@ fn steps(page: &str) -> Vec<Step> {
 #[test]
 fn steps_are_the_commands_and_files_of_a_page() {
     let page = "text\n```console\n$ one two\noutput\n$ three\n```\n```yaml a.yaml\nb: 1\n```\n```text\n$ no\n```\n";
-    let (run, write) = (|c: &str| Step::Run(c.to_owned()), Step::Write("a.yaml".to_owned(), "b: 1\n".to_owned()));
-    assert_eq!(steps(page), [run("one two"), run("three"), write]);
+    let run = |c: &str, shown: &[&str]| Step::Run(c.to_owned(), shown.iter().map(|l| (*l).to_owned()).collect());
+    let write = Step::Write("a.yaml".to_owned(), "b: 1\n".to_owned());
+    assert_eq!(steps(page), [run("one two", &["output"]), run("three", &[]), write]);
 }
 
 /// A folder like the root of a checkout, with `luxproof` and `cargo` on its own path.
@@ -75,12 +88,21 @@ fn every_command_of_the_guide_runs() {
         for step in steps(&page) {
             match step {
                 Step::Write(file, text) => folder.write(&file, &text),
-                Step::Run(command) => {
+                Step::Run(command, shown) => {
                     let mut shell = Command::new("sh");
                     shell.args(["-c", &command]).current_dir(folder.path("")).env("PATH", &path);
                     shell.env("LUXPROOF", env!("CARGO_BIN_EXE_luxproof")).env("LUXPROOF_CACHE", folder.path("cache"));
                     let Answer { code, stdout, stderr } = Answer::of(&mut shell);
                     assert_eq!(code, Some(0), "docs/{name}.md: `{command}`\n{stdout}\n{stderr}");
+                    for line in shown {
+                        let is_it = |printed: &str| {
+                            let (head, tail) = line.split_once("...").unwrap_or((&line, ""));
+                            printed.starts_with(head)
+                                && printed.ends_with(tail)
+                                && (line.contains("...") || printed == line)
+                        };
+                        assert!(stdout.lines().any(is_it), "docs/{name}.md: `{command}` prints no `{line}`\n{stdout}");
+                    }
                     count += 1;
                 }
             }

@@ -6,6 +6,7 @@ mod action;
 mod any_bytes;
 mod at_home;
 mod baselines;
+mod bundle;
 mod by_hand;
 mod cache;
 mod calibration;

@@ -164,6 +164,12 @@ impl From<std::process::Output> for Answer {
 
 /// Audits specs of this repository with the user's renderers, from its root.
 pub(crate) fn run_reference(args: &[&str]) -> (Value, Option<i32>) {
+    let (_, report, code) = run_reference_in_folder(args);
+    (report, code)
+}
+
+/// The same, and the folder with its `out`.
+pub(crate) fn run_reference_in_folder(args: &[&str]) -> (Folder, Value, Option<i32>) {
     let folder = Folder::for_renderers(&[]);
     let out = folder.path("out");
     let args =
@@ -171,7 +177,7 @@ pub(crate) fn run_reference(args: &[&str]) -> (Value, Option<i32>) {
             .concat();
     let (printed, code) = Answer::of(folder.command(&args).current_dir(root())).report();
     assert_eq!(printed, folder.report());
-    (printed, code)
+    (folder, printed, code)
 }
 
 /// The root of this repository.

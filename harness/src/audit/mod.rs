@@ -36,13 +36,13 @@ use sha2::{Digest, Sha256};
 
 use crate::diagnosis::{self, Examined};
 use crate::engines::Site;
-use crate::judge::{Policy, PolicyChoice, Published, PublishedError};
+use crate::judge::{Policy, PolicyChoice, ProfileBudget, Published, PublishedError};
 use crate::measure::cache::Cache;
 use crate::measure::{Asked, Asking, Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
 use crate::procedures::Task;
 use crate::record::{EngineStatus, Status};
-use crate::report::{Exit, Report, SpecRecord};
+use crate::report::{Exit, Report, Request, SpecRecord};
 use crate::spec::{Case, Faults, SpecError, Trust, doubts};
 use crate::system::claim::{Claim, ClaimError};
 use crate::system::digest::hexadecimal;
@@ -76,6 +76,8 @@ pub struct Options<'a> {
     pub policy: PolicyChoice,
     /// When sampling stops; `None`: as the profile says.
     pub sampling: Option<Sampling>,
+    /// In place of what specs and profile say of budgets.
+    pub budget: ProfileBudget,
     /// What a failed case means to those after it.
     pub after_failure: AfterFailure,
     /// Whether engines read scenes of known answer besides.
@@ -140,6 +142,7 @@ impl Options<'_> {
             trust: Trust::Own,
             policy: PolicyChoice::default(),
             sampling: None,
+            budget: ProfileBudget::default(),
             after_failure: AfterFailure::GoOn,
             calibration: Calibration::Judged,
             diagnosis: Diagnosis::Sought,
@@ -148,6 +151,43 @@ impl Options<'_> {
             asked: Asked::default(),
             only: None,
             observer: &Silent,
+        }
+    }
+
+    /// What readings and verdicts depend on.
+    fn request(&self) -> Request {
+        let Selection { engines, procedures, seed } = self.selection.clone();
+        let PolicyChoice { file, profile, tolerance_class } = self.policy.clone();
+        Request {
+            engines,
+            procedures,
+            filter: self.filter.clone(),
+            seed,
+            no_skips: self.skipping == Skipping::Nothing,
+            sampling: self.sampling,
+            no_calibration: self.calibration == Calibration::LeftOut,
+            fail_fast: self.after_failure == AfterFailure::Stop,
+            policy: file,
+            profile,
+            tolerance_class,
+            relative_error: self.budget.relative_error,
+        }
+    }
+
+    /// Has the same asked.
+    #[must_use]
+    pub fn asking(self, request: &Request) -> Self {
+        let Request { engines, procedures, filter, seed, policy, profile, tolerance_class, .. } = request.clone();
+        Self {
+            selection: Selection { engines, procedures, seed },
+            filter,
+            skipping: if request.no_skips { Skipping::Nothing } else { Skipping::Allowed },
+            policy: PolicyChoice { file: policy, profile, tolerance_class },
+            sampling: request.sampling,
+            budget: ProfileBudget { relative_error: request.relative_error, seconds: None },
+            calibration: if request.no_calibration { Calibration::LeftOut } else { Calibration::Judged },
+            after_failure: if request.fail_fast { AfterFailure::Stop } else { AfterFailure::GoOn },
+            ..self
         }
     }
 
@@ -314,6 +354,7 @@ impl Prepared {
             }
         }
         let mut report = Report::joined(spec, reports);
+        report.request = Some(options.request());
         report.published_findings = published_findings(&cases, &plans, &published);
         // Cases ran side by side: their seconds do not add up.
         report.wall_s = clock.elapsed().as_secs_f64();

@@ -43,7 +43,7 @@ pub fn chosen(specs: &[PathBuf], options: &Options<'_>) -> Result<(Vec<Case>, Ve
         return Err(faults);
     }
     for (case, policy) in cases.iter_mut().zip(&policies) {
-        case.budget = policy.profile.budget.over(case.budget);
+        case.budget = options.budget.over(policy.profile.budget.over(case.budget));
     }
     Ok((cases, policies))
 }

@@ -3,6 +3,7 @@
 mod accept;
 mod bench;
 mod bisect;
+mod bundle;
 mod cache;
 mod check;
 pub(crate) mod diagnostic;
@@ -18,6 +19,7 @@ pub(crate) mod photometry;
 mod plan;
 mod progress;
 mod repetitions;
+mod reproduce;
 mod run;
 mod selftest;
 mod shell;
@@ -91,6 +93,10 @@ enum Command {
     Report(views::ReportArgs),
     /// Open a run's page in a browser
     Open(open::OpenArgs),
+    /// Pack a finished run with all that it takes to make it again
+    Bundle(bundle::BundleArgs),
+    /// Verify a bundle and make its run again, or a paper's tables, and say what comes out the same
+    Reproduce(reproduce::ReproduceArgs),
     /// Keep a history of nightly runs and draw it
     #[command(subcommand)]
     History(history::Action),
@@ -319,6 +325,8 @@ impl Cli {
             Command::Completions(args) => shell::completions(&args, Self::command()),
             Command::Man(args) => shell::man(&args, Self::command()),
             Command::Open(args) => open::open(&args),
+            Command::Bundle(args) => bundle::bundle(&args),
+            Command::Reproduce(args) => reproduce::reproduce(&args, &site, || cache::folder(self.cache_dir), trust),
             Command::History(action) => history::history(&action),
             Command::Diff(args) => diff::diff(&args),
             Command::Bisect(args) => bisect::run(&args, &site, &cache::folder(self.cache_dir)?, trust),

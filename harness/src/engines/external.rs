@@ -139,6 +139,13 @@ impl External {
         Ok(Self { id, command, procedures, shares, depends_on, folder, contents, parts, stated, start_s, said })
     }
 
+    /// Its files in the folder that its paths count from, or that lead on from there: not what is installed elsewhere.
+    pub(super) fn own_files(&self) -> Vec<PathBuf> {
+        let named = command::files(&self.command, &self.folder).into_iter().map(|(path, _)| path);
+        let all = named.chain(self.depends_on.iter().filter(|path| path.is_file()).cloned());
+        all.filter(|path| path.starts_with(&self.folder)).collect()
+    }
+
     /// The program: a path is relative to the spec's folder, a bare name is looked up on PATH.
     fn program(&self, site: &Site) -> Option<PathBuf> {
         let is_path = self.command[0].contains('/');

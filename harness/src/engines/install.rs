@@ -39,6 +39,16 @@ pub enum InstallState {
     Failed,
 }
 
+/// The locks of the Python packages that engines are installed from, by name.
+pub const fn locks() -> [(&'static str, &'static str); 4] {
+    [
+        ("engines.lock", venv::SHARED.lock()),
+        ("blender.lock", venv::BLENDER.lock()),
+        ("luxcore.lock", venv::LUXCORE.lock()),
+        ("node.lock", venv::NODE.lock()),
+    ]
+}
+
 #[derive(Debug, thiserror::Error)]
 pub(super) enum InstallError {
     #[error(transparent)]

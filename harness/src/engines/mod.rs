@@ -43,7 +43,7 @@ mod web;
 mod workbench;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub use crate::spec::Budget;
 pub use blocks::Blocks;
@@ -56,7 +56,7 @@ use contract::{OWN_LOOKUP, geometry_mib};
 pub use external::{ExternalAnswers, ExternalJob, ExternalProbe, ExternalReadings, ExternalRequest, Introduction};
 pub(crate) use external::{RUN_IN, of_release, releases as releases_of_program};
 pub(crate) use iesna::method as method_of_iesna;
-pub use install::{InstallOutcome, InstallState, Soundness, install, repair, verify};
+pub use install::{InstallOutcome, InstallState, Soundness, install, locks, repair, verify};
 pub use released::{Unknown, all_built_in, built_in};
 pub use releases::{Known, releases_of};
 pub use settings::Coordinates;
@@ -81,6 +81,15 @@ pub fn introduction(
     site: &Site,
 ) -> Result<Introduction, EngineError> {
     Ok(external::External::new(name, settings, folder)?.introduction(site))
+}
+
+/// The files of a program that a spec names, its interpreter and what is installed left out.
+pub fn files_of_program(
+    name: &str,
+    settings: &BTreeMap<String, serde_json::Value>,
+    folder: &Path,
+) -> Result<Vec<PathBuf>, EngineError> {
+    Ok(external::External::new(name, settings, folder)?.own_files())
 }
 
 /// A program that a spec names as an engine of its own, `engines: {<name>: {command: [...]}}`; paths are relative to `folder`.

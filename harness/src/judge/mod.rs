@@ -33,12 +33,14 @@ pub use bias::{Bias, SINGLE_PRECISION, WeightedMean, two_sided};
 pub use consensus::{Consensus, Witness};
 pub use family::rejected;
 pub use known::{Glob, How, KnownBreak, KnownDeviation, KnownDeviations, OnRecord, State};
-pub use papers::{Misfit, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
+pub use papers::{
+    Misfit, PHOTOMETRY, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable,
+};
 pub use papers::{PaperSplit, Share, Stages, shares};
-pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicyRecord, Profile, ProjectPolicy, Sampling};
+pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicyRecord, Profile, ProfileBudget, ProjectPolicy, Sampling};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
-pub use tolerance::{Rule, Tolerance, Tolerances};
+pub use tolerance::{Rule, Tolerance, ToleranceClass, Tolerances};
 pub use uncertainty::{Component, ErrorBudget, Shape, Source};
 pub use verdict::{Verdict, judge};
 

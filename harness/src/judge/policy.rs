@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
+use itertools::Itertools;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -15,7 +16,7 @@ use super::tolerance::{Rule, ToleranceClass};
 use super::{Judge, KnownDeviation, KnownDeviations, Published, Tolerances, known, tolerance};
 use crate::engines;
 use crate::record::EngineName;
-use crate::spec::{Budget, Case, Faults, Source, SpecError, Trust, misspelt, suggestion};
+use crate::spec::{BUNDLE_FILE, Budget, Case, Faults, Source, SpecError, Trust, misspelt, suggestion};
 use crate::system::digest::hexadecimal;
 
 /// The name of a project's policy, beside a spec or in a folder above it.
@@ -198,10 +199,11 @@ impl PolicyChoice {
     }
 }
 
-/// The policy beside a spec or in the nearest folder above it, up to the root of the file system.
+/// The policy beside a spec or in the nearest folder above it, up to the root of its bundle or of the file system.
 fn nearest(spec: &Path) -> Option<PathBuf> {
     let spec = std::path::absolute(spec).ok()?;
-    let found = spec.ancestors().skip(1).map(|folder| folder.join(POLICY_FILE)).find(|file| file.is_file())?;
+    let folders = spec.ancestors().skip(1).take_while_inclusive(|folder| !folder.join(BUNDLE_FILE).is_file());
+    let found = folders.map(|folder| folder.join(POLICY_FILE)).find(|file| file.is_file())?;
     // As a person would name it from here.
     let here = std::env::current_dir().unwrap_or_default();
     Some(found.strip_prefix(here).map(Path::to_owned).unwrap_or(found))

@@ -112,6 +112,13 @@ impl ErrorBudget {
         }
     }
 
+    /// The half width of the interval without what comes from one source; an error beyond it has the probability of `coverage` standard
+    /// deviations of a normal distribution.
+    pub fn expanded_without(&self, source: Source, coverage: f64) -> f64 {
+        let others = self.components.iter().filter(|c| c.source != source).copied().collect();
+        Self::new(others, upper_tail_of_normal(coverage)).expanded
+    }
+
     /// The probability of a deviation at least this far from nothing, were the truth just `allowed` away: the largest over all
     /// truths within the tolerance.
     pub fn p_value(&self, deviation: f64, allowed: f64) -> f64 {

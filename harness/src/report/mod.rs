@@ -15,6 +15,7 @@ mod matrix;
 mod notes;
 mod papers;
 mod read;
+mod request;
 mod sentences;
 mod statistics;
 pub(crate) mod svg;
@@ -46,7 +47,9 @@ pub(crate) use html::table;
 pub use html::{Beside, BesideError, keep as keep_page, page};
 pub use junit::junit;
 pub use markdown::markdown;
+pub use papers::{Cell, Standing, cells};
 pub use read::{ReadError, ReadReport, ReportError};
+pub use request::Request;
 pub use statistics::Statistics;
 pub use terminal::{Detail, Screen, Style, terminal};
 
@@ -72,6 +75,9 @@ pub struct Report {
     pub started: String,
     pub wall_s: f64,
     pub spec: SpecRecord,
+    /// What was asked besides the specs; null in reports of before it was noted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub request: Option<Request>,
     /// What each renderer can be trusted for, by what follows.
     #[serde(default)]
     pub sentences: Vec<Sentence>,

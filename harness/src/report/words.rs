@@ -35,8 +35,19 @@ pub(super) fn wrapped(text: &str, width: usize, indent: &str) -> String {
     lines.join("\n")
 }
 
+/// A value with the half width of its interval in two digits, `2.0123 +- 0.0021`; six significant digits where that is below them.
+pub(crate) fn interval(value: f64, half_width: f64) -> String {
+    let digits = (1.0 - half_width.log10().floor()).clamp(0.0, 9.0);
+    if half_width.is_finite() && half_width > 1e-6 * value.abs() {
+        let decimals = digits as usize;
+        format!("{value:.decimals$} +- {half_width:.decimals$}")
+    } else {
+        significant(value)
+    }
+}
+
 /// Six significant digits.
-pub(super) fn significant(value: f64) -> String {
+pub(crate) fn significant(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

@@ -1,6 +1,8 @@
 //! Spec -> Case: reads the files that a spec names, checks what the shape alone cannot, and builds the scene.
 
-use std::collections::BTreeMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -26,6 +28,9 @@ mod meters;
 
 /// More meters than this are a slip of the pen.
 const MAX_METERS: usize = 1_000_000;
+
+/// What to do about a spec that is not trusted.
+const IF_YOURS: &str = "run it without --untrusted if it is yours, or with --trusted if your bundle holds it";
 
 /// The longest name, and the longest title, in characters.
 const MAX_NAME: usize = 100;
@@ -54,6 +59,8 @@ pub struct Case {
     pub budget: Budget,
     /// The published tables, absolute or relative to the working directory.
     pub published: Option<PathBuf>,
+    /// The files that the spec names, and those that they name, each once; the published tables, too.
+    pub files: BTreeSet<PathBuf>,
     /// Overrides of the default tolerances, by procedure.
     pub tolerances: BTreeMap<ProcedureId, ToleranceOverride>,
     /// The text, for the places of later errors.
@@ -147,6 +154,8 @@ struct Builder<'a> {
     source: &'a Source,
     folder: &'a Path,
     hash: Sha256,
+    /// Those that were read.
+    files: RefCell<BTreeSet<PathBuf>>,
     /// What the cases of the file may still ask for.
     left: &'a mut Limits,
     /// What nobody wrote is not judged.
@@ -159,7 +168,8 @@ impl<'a> Builder<'a> {
     fn new(source: &'a Source, mended: &'a Mended, left: &'a mut Limits) -> Self {
         let folder = source.path.parent().unwrap_or(Path::new(""));
         let most = Trials::of(&source.text).faults();
-        Self { source, folder, hash: Sha256::new(), left, mended, faults: vec![], most }
+        let (hash, files) = (Sha256::new(), RefCell::default());
+        Self { source, folder, hash, files, left, mended, faults: vec![], most }
     }
 
     /// Notes what is wrong at a place, unless nobody wrote what stands there.
@@ -183,7 +193,7 @@ impl<'a> Builder<'a> {
         let (all, enough) = (*left, count <= *left);
         *left = left.saturating_sub(count);
         let message = format!("{count} {what} are more than the {all} that are left to a spec that is not trusted");
-        self.check(enough, at, message, "make several of it, or run it without --untrusted if it is yours")
+        self.check(enough, at, message, format!("make several of it, or {IF_YOURS}"))
     }
 
     fn build(mut self, spec: Spec) -> Built {
@@ -231,6 +241,7 @@ impl<'a> Builder<'a> {
             only_engines: None,
             budget: spec.budget,
             published,
+            files: self.files.take(),
             tolerances,
             source: self.source.clone(),
         };
@@ -244,8 +255,7 @@ impl<'a> Builder<'a> {
             |settings: &EngineSettings| ["command", "releases"].into_iter().find(|key| settings.0.contains_key(*key));
         let Some((name, key)) = engines.find_map(|(name, settings)| Some((name, starts(settings)?))) else { return };
         let message = "it would run a program, and the spec is not trusted";
-        let help = "run it without --untrusted if it is yours";
-        self.check(self.source.trust == Trust::Own, &format!("engines.{name}.{key}"), message, help);
+        self.check(self.source.trust == Trust::Own, &format!("engines.{name}.{key}"), message, IF_YOURS);
     }
 
     /// `None` where its size is not known: nothing lies in it or out of it.
@@ -271,9 +281,15 @@ impl<'a> Builder<'a> {
         self.folder.join(file)
     }
 
+    /// The bytes of a file that the spec names, or that such a file does.
+    fn read(&self, path: &Path) -> io::Result<Vec<u8>> {
+        self.files.borrow_mut().insert(path.to_owned());
+        self.source.trust.read_named(self.folder, path)
+    }
+
     /// The bytes of a file that the spec names, which are part of what it is.
     fn take_in(&mut self, at: &str, path: &Path) -> Option<Vec<u8>> {
-        match self.source.trust.read_named(self.folder, path) {
+        match self.read(path) {
             Ok(bytes) => {
                 let is_few = self.take(at, "bytes of files", bytes.len(), |left| &mut left.bytes);
                 self.hash.update(&bytes);

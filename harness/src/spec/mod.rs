@@ -30,7 +30,7 @@ pub(crate) use locate::Spot;
 pub use model::{Budget, EngineSettings, Spec, ToleranceOverride};
 pub use plausible::doubts;
 pub use suite::{Suite, filtered, specs, suite};
-pub use trust::Trust;
+pub use trust::{BUNDLE_FILE, Trust};
 pub use write::yaml;
 
 /// What is wrong with a spec, where, and what to do.

@@ -6,6 +6,9 @@ use std::path::Path;
 use super::MAX_SPEC_BYTES;
 use crate::system::files::{MAX_BYTES, read_below, read_bounded};
 
+/// The file at the root of a bundle, a world of its own: what lies above it counts for nothing in it.
+pub const BUNDLE_FILE: &str = "ro-crate-metadata.json";
+
 /// Whose specs are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Trust {
@@ -14,6 +17,8 @@ pub enum Trust {
     Own,
     /// A stranger's: they name files below their own folder alone, start nothing, and are bounded in size (SECURITY.md has the numbers).
     Stranger,
+    /// A stranger's in a bundle: likewise, but that they name files anywhere in it.
+    Bundled,
 }
 
 /// How much specs may ask for, all cases of a file together.
@@ -49,7 +54,7 @@ impl Trust {
                 triangles: usize::MAX,
                 sights: usize::MAX,
             },
-            Self::Stranger => Limits {
+            Self::Stranger | Self::Bundled => Limits {
                 spec_bytes: 1 << 20,
                 file_bytes: 2 << 20,
                 bytes: 2 << 20,
@@ -65,7 +70,7 @@ impl Trust {
 
     /// The bytes of a spec or policy; a stranger's is no link to somewhere else.
     pub(super) fn read_spec(self, path: &Path) -> io::Result<Vec<u8>> {
-        if self == Self::Stranger && std::fs::symlink_metadata(path)?.is_symlink() {
+        if self != Self::Own && std::fs::symlink_metadata(path)?.is_symlink() {
             return Err(io::Error::new(io::ErrorKind::PermissionDenied, "it is a link"));
         }
         read_bounded(path, self.limits().spec_bytes)
@@ -77,6 +82,12 @@ impl Trust {
         match self {
             Self::Own => read_bounded(path, most),
             Self::Stranger => read_below(folder, path, most),
+            Self::Bundled => read_below(bundle_of(folder).unwrap_or(folder), path, most),
         }
     }
+}
+
+/// The root of the bundle that a folder lies in.
+fn bundle_of(folder: &Path) -> Option<&Path> {
+    folder.ancestors().find(|above| above.join(BUNDLE_FILE).is_file())
 }

@@ -87,7 +87,7 @@ pub(crate) fn read_bounded(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 }
 
 /// The most bytes of what luxproof wrote itself: a report of a million comparisons has 1.2 GB.
-const MAX_KEPT_BYTES: u64 = 2 << 30;
+pub(crate) const MAX_KEPT_BYTES: u64 = 2 << 30;
 
 /// What luxproof keeps for its user, or shows with it: reports, histories, baselines.
 pub(crate) fn read_kept(path: &Path) -> Result<Vec<u8>, FileError> {

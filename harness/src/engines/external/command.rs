@@ -84,19 +84,7 @@ pub(super) fn is_unknown(command: &[String], folder: &Path) -> bool {
 /// What makes its readings, by content, whatever it is called and however it is started: one name a file, program or text. What
 /// its files import from beside them counts as they do.
 pub(super) fn parts(command: &[String], folder: &Path) -> BTreeSet<String> {
-    let mut files = own_files(command, folder);
-    let (mut parts, mut next) = (BTreeSet::new(), 0);
-    while let Some(path) = files.get(next) {
-        next += 1;
-        // Two empty files have nothing in common.
-        let Some(bytes) = std::fs::read(path).ok().filter(|bytes| !bytes.is_empty()) else { continue };
-        parts.insert(hash(&bytes));
-        for path in imports(path, &bytes) {
-            if !files.contains(&path) {
-                files.push(path);
-            }
-        }
-    }
+    let mut parts: BTreeSet<String> = files(command, folder).iter().map(|(_, bytes)| hash(bytes)).collect();
     if !command[0].contains('/') && !is_runner(&command[0]) {
         parts.insert(command[0].clone());
     }
@@ -104,6 +92,24 @@ pub(super) fn parts(command: &[String], folder: &Path) -> BTreeSet<String> {
         parts.insert(inline(command).map_or_else(|| contents_of(command, folder), |text| hash(text.as_bytes())));
     }
     parts.into_iter().map(|part| format!("the program {part}")).collect()
+}
+
+/// The files that a command names, and those that they import from beside them, with what is in them.
+pub(super) fn files(command: &[String], folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let (mut paths, mut found) = (own_files(command, folder), vec![]);
+    let mut next = 0;
+    while let Some(path) = paths.get(next).cloned() {
+        next += 1;
+        // Two empty files have nothing in common.
+        let Some(bytes) = std::fs::read(&path).ok().filter(|bytes| !bytes.is_empty()) else { continue };
+        for path in imports(&path, &bytes) {
+            if !paths.contains(&path) {
+                paths.push(path);
+            }
+        }
+        found.push((path, bytes));
+    }
+    found
 }
 
 /// Files beside a source, or in folders beside it, that a line of it imports, loads or names: of whatever language.

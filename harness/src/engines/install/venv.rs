@@ -66,6 +66,10 @@ pub(super) fn of_release(known: &Known, site: &Site) -> (Environment, Site) {
 }
 
 impl Environment {
+    pub(super) const fn lock(&self) -> &'static str {
+        self.lock
+    }
+
     pub(super) fn is_current(&self, site: &Site) -> bool {
         let linked = fs::read_link(site.venv()).is_ok_and(|target| target == Path::new(&self.folder_name()));
         linked && matches!(self.soundness(site), Soundness::Sound(_))

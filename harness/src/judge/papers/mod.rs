@@ -8,4 +8,4 @@ mod tables;
 pub use fit::Misfit;
 pub(super) use input::Input;
 pub use shares::{PaperSplit, Share, Stages, shares};
-pub use tables::{Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};
+pub use tables::{PHOTOMETRY, Published, PublishedColumn, PublishedError, PublishedFlux, PublishedRow, PublishedTable};

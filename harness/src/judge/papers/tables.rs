@@ -3,7 +3,7 @@
 //! The format is described at the top of `reference/published/cachet.yaml`.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use itertools::Itertools;
@@ -20,6 +20,8 @@ use crate::system::files::{MAX_BYTES, read_bounded};
 
 /// Places within so many metres, and directions within so many degrees, are the same, as the format says.
 const SAME: f64 = 1e-6;
+/// The engine of a column that a paper takes from the photometric file itself.
+pub const PHOTOMETRY: &str = "photometry";
 /// Sums of printed decimals differ by less than this, relative to their total or 1.
 const ROUNDING_OF_SUMS: f64 = 1e-9;
 
@@ -29,6 +31,8 @@ pub struct Published {
     #[serde(rename = "luxproof_published")]
     version: u32,
     citation: Citation,
+    /// The spec that has the geometry, relative to the file.
+    spec: Option<PathBuf>,
     rounding: Rounding,
     /// What is known of the luminaire's flux beyond our file.
     flux: Option<PublishedFlux>,
@@ -187,6 +191,18 @@ impl Published {
             return Err(fail(format!("the cell \"{bad}\" is no number")));
         }
         Ok(published)
+    }
+
+    /// The spec that makes its tables again.
+    pub fn spec(&self) -> Option<PathBuf> {
+        let folder = self.source.path.parent().unwrap_or(Path::new(""));
+        self.spec.as_ref().map(|spec| folder.join(spec))
+    }
+
+    /// The engines whose readings stand beside its columns; what it takes from the photometric file is none's.
+    pub fn engines(&self) -> BTreeSet<&str> {
+        let columns = self.tables.values().flat_map(|table| table.columns.values());
+        columns.map(|column| column.engine.as_str()).filter(|engine| *engine != PHOTOMETRY).collect()
     }
 
     /// What of its tables stands for nothing in the tasks that are held against it, or not for what was copied: rows at no meter,

@@ -1,5 +1,6 @@
 //! A paper's tables with our readings beside them: one row a column of the paper or an engine of ours, one column a place.
 
+mod cells;
 mod shares;
 
 use std::collections::BTreeMap;
@@ -11,6 +12,7 @@ use super::words::{largest, percent, published_column, value};
 use crate::judge::{Basis, Misfit, PublishedTable};
 use crate::record::{EngineName, MeterId, Quantity, Reading, ReadingKey, Recording};
 
+pub use cells::{Cell, Standing, cells};
 pub(super) use shares::splits;
 
 /// A drawn table: a heading, and rows of as many cells.

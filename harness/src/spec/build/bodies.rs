@@ -148,8 +148,7 @@ impl Builder<'_> {
             return None;
         }
         self.take_in(at, path)?;
-        let (trust, folder) = (self.source.trust, self.folder);
-        match photometry::read_by(path, &|path| trust.read_named(folder, path)) {
+        match photometry::read_by(path, &|path| self.read(path)) {
             Ok(read) => Some(Arc::new(read)),
             Err(error) => {
                 self.fault(at, |_| SpecError {

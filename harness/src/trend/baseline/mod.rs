@@ -97,9 +97,14 @@ impl Entry {
 impl Baseline {
     pub fn candidate(report: &Report) -> Self {
         // Scenes of known answer need nobody's acceptance.
-        let asked = report.recordings.iter().filter(|r| !r.key.procedure.is_known());
-        let entries = asked.map(|r| Entry::of(report, r)).sorted_by(|a, b| a.key.cmp(&b.key)).collect();
+        let entries = Self::whole(report).entries.into_iter().filter(|e| !e.key.procedure.is_known()).collect();
         Self { entries }
+    }
+
+    /// The same with scenes of known answer.
+    pub fn whole(report: &Report) -> Self {
+        let all = report.recordings.iter().map(|r| Entry::of(report, r));
+        Self { entries: all.sorted_by(|a, b| a.key.cmp(&b.key)).collect() }
     }
 
     pub fn read(path: &Path) -> Result<Self, BaselineError> {

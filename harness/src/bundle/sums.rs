@@ -1,0 +1,71 @@
+//! `SHA256SUMS`: a line a file, as `sha256sum` writes and checks it, sorted; no other bytes make the same list.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+
+use crate::system::digest::hexadecimal;
+
+/// Files by their places in the bundle, with their hashes.
+pub(super) type Sums = BTreeMap<String, String>;
+
+const DIGITS: usize = 64;
+
+pub(super) fn text(sums: &Sums) -> String {
+    sums.iter().fold(String::new(), |text, (name, hash)| text + &format!("{hash}  {name}\n"))
+}
+
+/// What a text lists; `None` where it is not as it is written.
+pub(super) fn parse(written: &str) -> Option<Sums> {
+    let line = |line: &str| {
+        let (hash, name) = line.split_once("  ")?;
+        let is_hash = hash.len() == DIGITS && hash.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b));
+        is_hash.then(|| (name.to_owned(), hash.to_owned()))
+    };
+    let sums: Sums = written.lines().map(line).collect::<Option<_>>()?;
+    (text(&sums) == written).then_some(sums)
+}
+
+pub(super) fn of_file(path: &Path) -> io::Result<String> {
+    copy(&mut File::open(path)?, &mut io::sink()).map(|(hash, _)| hash)
+}
+
+/// Copies bytes and tells their hash and how many they are.
+pub(super) fn copy(from: &mut impl Read, to: &mut impl Write) -> io::Result<(String, u64)> {
+    let (mut hash, mut buffer, mut length) = (Sha256::new(), vec![0; 1 << 16], 0);
+    loop {
+        let n = from.read(&mut buffer)?;
+        if n == 0 {
+            return Ok((hexadecimal(&hash.finalize()), length));
+        }
+        hash.update(&buffer[..n]);
+        to.write_all(&buffer[..n])?;
+        length += n as u64;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_reads_back_and_no_other_bytes_make_it() {
+        let sums = Sums::from([("a b".to_owned(), "0".repeat(DIGITS)), ("c/d".to_owned(), "f".repeat(DIGITS))]);
+        let written = text(&sums);
+        assert_eq!(parse(&written), Some(sums));
+        for other in [
+            written.replace('f', "F"),
+            written.replace("  ", " "),
+            written.trim_end().to_owned(),
+            written.clone() + &written,
+            written.lines().rev().fold(String::new(), |text, line| text + line + "\n"),
+            format!("{written}\n"),
+            written.replace('\n', "\r\n"),
+        ] {
+            assert_eq!(parse(&other), None, "{other}");
+        }
+    }
+}
