@@ -74,6 +74,56 @@ fn tables_luminaires_and_meters_that_point_elsewhere_are_named() {
     }
 }
 
+/// What a program that is written anew gets wrong beside the list of known faults.
+#[test]
+fn slips_of_axes_tables_and_luminaires_are_named() {
+    let interpolated = "    (g, v), (c, u) = gamma, plane\n";
+    let coarse = format!("{interpolated}    u, v = round(u), round(v)\n");
+    let rotation = "    x, y, z = (sum(a * r for a, r in zip(axis, ray)) for axis in lamp[\"axes\"])\n";
+    let untilted = "    a = math.atan2(lamp[\"axes\"][2][1], lamp[\"axes\"][2][0])\n    roll = math.atan2(lamp[\"axes\"][1][2], -lamp[\"axes\"][0][2])\n    \
+                    a += roll\n    axes = [[math.cos(a), math.sin(a), 0], [-math.sin(a), math.cos(a), 0], [0, 0, 1]]\n    \
+                    x, y, z = (sum(p * r for p, r in zip(axis, ray)) for axis in axes)\n";
+    let meter = "illuminance_lx(job[\"luminaires\"], meter)";
+    let exchanged = "illuminance_lx(job[\"luminaires\"], {key: [meter[key][k] for k in (0, 2, 1)] for key in (\"position_m\", \"normal\")})";
+    for (from, to, topic, says) in [
+        (interpolated, coarse.as_str(), "orientation", "the table is not interpolated"),
+        (rotation, untilted, "orientation", "tilt of luminaires is left out"),
+        (meter, exchanged, "orientation", "x, y, z of meters and their normals are taken as x, z, y"),
+        ("/ square\n", "/ square ** 1.5\n", "units", "the third power of distance"),
+    ] {
+        let answer = examined(&[(from, to)]);
+        let found = section(&answer, topic);
+        assert!(found.starts_with("WRONG") && found.contains(says), "{says}: {}", answer.stdout);
+    }
+    let last = "illuminance_lx(job[\"luminaires\"][-1:], meter)";
+    let answer = examined(&[(meter, last)]);
+    assert!(section(&answer, "orientation").contains("the last alone gives light"), "{}", answer.stdout);
+}
+
+#[test]
+fn readings_that_are_right_elsewhere_are_told_by_whose_they_are() {
+    let answers = "    return {\"answers\": [{\"job\": job[\"job\"], **answer(job)} for job in request[\"jobs\"]]}";
+    let shifted = "    done = [answer(job) for job in request[\"jobs\"]]
+    all = [r[\"illuminance_lx\"] for one in done for r in one.get(\"readings\", [])]
+    all = all[1:] + all[:1]
+    for one in done:
+        for reading in one.get(\"readings\", []):
+            reading[\"illuminance_lx\"] = all.pop(0)
+    return {\"answers\": [{\"job\": job[\"job\"], **one} for job, one in zip(request[\"jobs\"], done)]}";
+    let readings = "    return {\"readings\": readings,";
+    let swapped = "    if len(readings) > 2:\n        one, other = readings[1], readings[2]\n        \
+                   one[\"illuminance_lx\"], other[\"illuminance_lx\"] = other[\"illuminance_lx\"], one[\"illuminance_lx\"]\n    \
+                   return {\"readings\": readings,";
+    for (from, to, topic, says) in [
+        (answers, shifted, "claims", "its readings depend on what else it is asked"),
+        (readings, swapped, "meters", "[1] reads what [2] should, [2] reads what [1] should"),
+    ] {
+        let answer = examined(&[(from, to)]);
+        let found = section(&answer, topic);
+        assert!(found.starts_with("WRONG") && found.contains(says), "{says}: {}", answer.stdout);
+    }
+}
+
 #[test]
 fn missing_meters_and_numbers_that_are_none_are_told() {
     let last = "    return {\"readings\": readings,";
@@ -97,6 +147,9 @@ fn noise_that_is_not_as_stated_and_claims_that_do_not_hold_are_told() {
     let honest = examined(&[SEEDED, (APPEND, &noisy(1.0)), (BOUND, sampled)]);
     assert!(section(&honest, "noise").starts_with("sound"), "{}", honest.stdout);
     is_told(&[SEEDED, (APPEND, &noisy(0.2)), (BOUND, sampled)], &[("noise", "times too small")]);
+    // At some meters none is stated, and they scatter like the others.
+    let some = "\"std_error_lx\": 0 if meter[\"id\"].endswith(\"2]\") else error, \"degrees_of_freedom\": 60";
+    is_told(&[SEEDED, (APPEND, &noisy(1.0)), (BOUND, some)], &[("claims", "an error of zero at")]);
     is_told(
         &[SEEDED, (APPEND, &noisy(1.0)), (BOUND, "\"exact\": True")],
         &[("claims", "claims readings without any scatter")],
@@ -108,6 +161,10 @@ fn a_broken_protocol_is_told() {
     let probe = "    if request[\"verb\"] == \"probe\":\n";
     is_told(&[(probe, &format!("{probe}        return {{\"protocol\": 7}}\n"))], &[("protocol", "there are 1 and 2")]);
     is_told(&[("[\"batch\"]", "[\"batch\", \"shadow\"]")], &[("protocol", "capabilities that are not known: shadow")]);
+    let after = ("sys.stdout)", "sys.stdout)\nprint(\"done\")");
+    is_told(&[after], &[("protocol", "it prints `done` after its answer")]);
+    let quoted = ("\"illuminance_lx\": lux,", "\"illuminance_lx\": str(lux),");
+    is_told(&[quoted], &[("protocol", "illuminance_lx`: no number, where one belongs")]);
     let one = "    assert request[\"verb\"] == \"probe\" or len(request[\"jobs\"]) == 1, \"one job at a time\"\n";
     is_told(&[(probe, &format!("{one}{probe}"))], &[("protocol", "its capabilities have `batch`, but")]);
     // One scene alone ends it: that of several luminaires.

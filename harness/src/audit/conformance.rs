@@ -78,6 +78,7 @@ pub fn examine_adapter(
     let mut report = examine(Subjects::Of(case.into()), &options)?;
     let tasks = known::tasks();
     let mut examined = Examined::new(&tasks, &mut report.comparisons);
+    examined.is_lenient = true;
     examined.silent =
         report.recordings.iter().filter(|r| r.states_heavy_tail()).map(|r| r.key.engine.clone()).collect();
     let explained = diagnosis::explained(&mut [examined]);
@@ -92,7 +93,10 @@ impl Conformance {
         let comparisons: Vec<&Comparison> = report.comparisons.iter().filter(|c| is_its(&c.key.engine)).collect();
         let mut findings = Findings::default();
         findings.of_protocol(introduction, report, &recordings);
-        findings.of_readings(&comparisons, explained);
+        let explains = |p: ProcedureId| explained.iter().any(|e| e.key.procedure == p && !e.causes.is_empty());
+        let mut exchanged = diagnosis::exchanges(&known::tasks(), &comparisons);
+        exchanged.retain(|(procedure, _)| !explains(*procedure));
+        findings.of_readings(&comparisons, explained, &exchanged);
         findings.of_errors(&recordings, &comparisons);
         let examined = |topic: Topic| comparisons.iter().any(|c| c.value.is_some() && topic.is_of(c.key.procedure));
         let skipped = |topic: Topic| {
@@ -207,20 +211,34 @@ impl Findings {
         }
     }
 
-    fn of_readings(&mut self, comparisons: &[&Comparison], explained: &[Explained]) {
+    fn of_readings(
+        &mut self,
+        comparisons: &[&Comparison],
+        explained: &[Explained],
+        exchanged: &[(ProcedureId, String)],
+    ) {
         let mut by_procedure: BTreeMap<ProcedureId, Vec<&Comparison>> = BTreeMap::new();
         for comparison in comparisons {
             by_procedure.entry(comparison.key.procedure).or_default().push(comparison);
         }
+        let is_any_named = !exchanged.is_empty() || explained.iter().any(|e| !e.causes.is_empty());
         for (procedure, all) in by_procedure {
             let count = |verdict: Verdict| all.iter().filter(|c| c.verdict == verdict).count();
             let (failing, undecided) = (count(Verdict::Fail), count(Verdict::Inconclusive));
             let causes = explained.iter().filter(|e| e.key.procedure == procedure).flat_map(|e| &e.causes);
             let causes: Vec<_> = causes.collect();
+            let exchanged = exchanged.iter().find(|(of, _)| *of == procedure);
             let of = format!("{failing} of {} meters of the scene `{procedure}` fail", all.len());
-            if failing > 0 && causes.is_empty() {
-                let text = format!("{of}, {}; nothing that is known explains it", worst(&all));
-                self.add(Topic::by_scene(procedure), Standing::Wrong, text);
+            if let Some((_, what)) = exchanged {
+                self.add(Topic::Meters, Standing::Wrong, what.clone());
+                self.add(Topic::by_scene(procedure), Standing::Undecided, format!("{of}, for that reason"));
+            } else if failing > 0 && causes.is_empty() {
+                let (standing, why) = if is_any_named {
+                    (Standing::Undecided, "what is named of another scene may be why, or something else that it hides")
+                } else {
+                    (Standing::Wrong, "nothing that is known explains it")
+                };
+                self.add(Topic::by_scene(procedure), standing, format!("{of}, {}; {why}", worst(&all)));
             }
             for cause in causes {
                 let topic = match cause.aspect() {
@@ -234,7 +252,7 @@ impl Findings {
                     self.add(Topic::by_scene(procedure), Standing::Undecided, format!("{of}, for that reason"));
                 }
             }
-            if undecided > 0 {
+            if undecided > 0 && exchanged.is_none() {
                 let text = format!("{undecided} of {} meters of the scene `{procedure}` are undecided", all.len());
                 self.add(Topic::by_scene(procedure), Standing::Undecided, text);
             }

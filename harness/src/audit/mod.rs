@@ -428,7 +428,14 @@ fn diagnose(plans: &[Plan], reports: &mut [Report]) {
         let silent = heavy.map(|r| r.key.engine.clone()).collect();
         let design_effects = report.recordings.iter().filter_map(|r| Some((r.key.clone(), r.design_effect?))).collect();
         let comparisons = &mut report.comparisons;
-        cases.push(Examined { tasks: &plan.tasks, settings: settings(plan), silent, design_effects, comparisons });
+        cases.push(Examined {
+            tasks: &plan.tasks,
+            settings: settings(plan),
+            silent,
+            is_lenient: false,
+            design_effects,
+            comparisons,
+        });
     }
     diagnosis::diagnose(&mut cases);
 }

@@ -119,6 +119,12 @@ impl Again<'_> {
         Some(meters.map(|(_, readings)| readings.clone()).collect())
     }
 
+    /// The readings of sampled targets with their meters.
+    fn named(&self, meters: &[Vec<Estimate>]) -> Vec<(MeterId, Vec<Estimate>)> {
+        let id = |k: &usize| self.task.targets[*k].id.clone();
+        self.targets.iter().map(id).zip(meters.iter().cloned()).collect()
+    }
+
     fn doubts(&self, of_engine: &Variation, compared: &[Comparison]) -> Vec<StatedErrors> {
         let (sampled, rendered) = (self.sampled.as_deref(), self.rendered());
         let of_sampled = rendered.as_deref().and_then(|meters| StatedErrors::of_sampled(meters, of_engine));
@@ -135,6 +141,7 @@ impl Again<'_> {
         [
             of_sampled.map(|found| StatedErrors { falls_with_effort, ..found }),
             self.claims.as_deref().and_then(StatedErrors::of_claims),
+            sampled.and_then(|meters| StatedErrors::of_unstated(&self.named(meters))),
             (self.was_asked && (is_refused || self.claims.is_none()))
                 .then(|| not_read_again.unwrap_or_else(|| StatedErrors::doubted(Doubt::NotReadAgain))),
             beyond_tolerance(compared),

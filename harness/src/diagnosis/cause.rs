@@ -61,15 +61,40 @@ impl Cause {
     pub fn aspect(&self) -> Aspect {
         match self.id {
             "two" => Aspect::Several,
-            "reversed" | "next" | "previous" | "exchanged" | "shifted" | "shifted-here" | "lifted" => Aspect::Meters,
+            "scene-of" | "reversed" | "next" | "previous" | "exchanged" | "shifted" | "shifted-here" | "lifted" => {
+                Aspect::Meters
+            }
             "turned" | "isotropic" | "averaged" | "extrapolated" | "unrotated" | "rotated-back" | "area-as-point"
             | "meter-flipped" | "meters-up" | "two-sided" | "normals-ignored" | "cosine-missing" | "cosine-doubled"
             | "place" | "turn" | "tilt" | "one-table" | "one-table-scaled" | "one-plane" | "gamma-flipped"
-            | "gamma-off" => Aspect::Orientation,
+            | "gamma-off" | "frame" | "axes" | "coordinates" | "normals" | "places" | "angles" | "lookup" | "nodes"
+            | "emission" => Aspect::Orientation,
             id if id.starts_with("c-") => Aspect::Orientation,
-            "upside-down" | "gamma-decoded" | "gamma-encoded" | "bounces-cut" | "bounces-uncut" | "direct-lost"
-            | "direct-added" | "indirect-added" | "surface-lost" | "luminaire-lost" | "one-lit" | "reflectances"
-            | "reflectance" | "power" => Aspect::Light,
+            "upside-down"
+            | "gamma-decoded"
+            | "gamma-encoded"
+            | "bounces-cut"
+            | "bounces-uncut"
+            | "direct-lost"
+            | "direct-added"
+            | "indirect-added"
+            | "surface-lost"
+            | "luminaire-lost"
+            | "one-lit"
+            | "reflectances"
+            | "reflectance"
+            | "power"
+            | "mixed-up"
+            | "some-lit"
+            | "mean"
+            | "brightest"
+            | "bodies-lost"
+            | "box-size"
+            | "box-centre"
+            | "reflected"
+            | "first-reflection-lost"
+            | "surfaces"
+            | "same" => Aspect::Light,
             _ => Aspect::Units,
         }
     }

@@ -129,7 +129,8 @@ impl Fault {
         for (k, (value, error)) in fitted.iter().enumerate() {
             let unit = self.parameters.get(k).map_or("", |p| p.unit);
             text = text.replace(&format!("{{{k}}}"), &format!("{value:.4} ± {error:.4}{unit}"));
-            text = text.replace(&format!("{{{k}:}}"), &format!("{value:.4}"));
+            let digits = if value.abs() < 0.01 { format!("{value:.3e}") } else { format!("{value:.4}") };
+            text = text.replace(&format!("{{{k}:}}"), &digits);
         }
         text
     }

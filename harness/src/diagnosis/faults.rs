@@ -59,6 +59,10 @@ fn factors() -> Vec<Fault> {
         ("metres", "factor 0.0929: metres taken for feet, or footcandles for lux", 0.3048 * 0.3048),
         ("millimetres", "factor 1000000: millimetres taken for metres", 1e6),
         ("centimetres", "factor 10000: centimetres taken for metres, or lux for phot", 1e4),
+        ("to-centimetres", "factor 1/10000: metres taken for centimetres, or phot for lux", 1e-4),
+        ("to-millimetres", "factor 1/1000000: metres taken for millimetres", 1e-6),
+        ("inches", "factor 1550: inches taken for metres", 1.0 / (0.0254 * 0.0254)),
+        ("to-inches", "factor 1/1550: metres taken for inches", 0.0254 * 0.0254),
         ("kilo", "factor 1000: candela a kilolumen taken for candela, or lux for kilolux", 1000.0),
         ("milli", "factor 1/1000: candela taken for candela a kilolumen", 1e-3),
     ];
@@ -331,7 +335,7 @@ pub(super) fn names(tasks: &[Task]) -> Vec<String> {
     tasks.iter().flat_map(|t| &t.scene.luminaires).map(|l| l.id.clone()).unique().collect()
 }
 
-fn in_room(wrong: &mut Wrong, change: impl Fn(&mut Room)) -> bool {
+pub(super) fn in_room(wrong: &mut Wrong, change: impl Fn(&mut Room)) -> bool {
     if wrong.task().transport == Transport::Direct || wrong.task().scene.room.is_none() {
         return false;
     }

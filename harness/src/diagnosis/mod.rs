@@ -8,6 +8,7 @@
 //! be runs out before all of a kind are tried.
 
 mod cause;
+mod exchange;
 mod fault;
 mod faults;
 mod fit;
@@ -16,6 +17,7 @@ mod rough;
 mod search;
 mod shape;
 mod sheet;
+mod slips;
 mod tables;
 mod wrong;
 
@@ -27,6 +29,7 @@ use crate::record::{EngineName, ProcedureId, ReadingKey};
 use crate::system::process;
 
 pub use cause::{Aspect, Cause};
+pub use exchange::exchanges;
 pub use fault::{Fault, Parameter, shows};
 pub use faults::faults;
 pub use kinds::kinds;
@@ -46,6 +49,9 @@ pub struct Examined<'a> {
     pub settings: BTreeMap<EngineName, String>,
     /// Engines of which nothing is explained: noise with a heavy tail looks like any fault.
     pub silent: BTreeSet<EngineName>,
+    /// Whether reflected light is no finer than it must be: what is left of an explanation may be as much as half of what is allowed, whatever
+    /// is stated.
+    pub is_lenient: bool,
     /// How much of their noise the readings of an engine share, where that is known.
     pub design_effects: BTreeMap<ReadingKey, f64>,
     pub comparisons: &'a mut [Comparison],
@@ -60,7 +66,7 @@ impl<'a> Examined<'a> {
     /// Of engines that are all set alike, of which nothing more is known.
     pub fn new(tasks: &'a [Task], comparisons: &'a mut [Comparison]) -> Self {
         let (settings, silent, design_effects) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());
-        Self { tasks, settings, silent, design_effects, comparisons }
+        Self { tasks, settings, silent, is_lenient: false, design_effects, comparisons }
     }
 
     fn subject(&self, comparison: &Comparison) -> Subject {
@@ -135,6 +141,7 @@ fn explain_subject(cases: &mut [Examined<'_>], chosen: &[usize], subject: &Subje
         if let Some(sheet) = Sheet::of(models.len(), &model, &readings).filter(|s| s.right.len() == task.targets.len())
         {
             let sheet = sheet.sharing(shared);
+            let sheet = if case.is_lenient { sheet.leniently() } else { sheet };
             models.push(model);
             sheets.push(sheet);
             members.push(group);

@@ -1,5 +1,5 @@
-//! The search for what explains failures: known faults first, each alone; then kinds with free parameters; then two
-//! known faults.
+//! The search for what explains failures: known faults first, each alone; then kinds with free parameters and slips of
+//! programs that are written anew; then two known faults.
 //!
 //! An explanation is held against everything that its engine read. It is admissible where it leaves no more than
 //! chance in one failing sheet at least, and in every other sheet that it changes no more than an engine may be off.
@@ -20,6 +20,7 @@ use super::fit::{Fitted, fit, sum_of_squares};
 use super::kinds::kinds;
 use super::shape;
 use super::sheet::{Sheet, Stand, is_chance};
+use super::slips::slips;
 use super::wrong::{Fidelity, Model, Work, Wrong};
 use crate::procedures::Task;
 use crate::system::process;
@@ -46,6 +47,7 @@ pub struct Bench {
     pub models: Vec<Model>,
     pub listed: Vec<Fault>,
     kinds: Vec<Fault>,
+    slips: Vec<Fault>,
     /// By listed fault and model, with what it cost.
     predicted: Mutex<HashMap<OfListed, (Work, Predicted)>>,
 }
@@ -58,7 +60,7 @@ type OfKind = (usize, bool, bool, Vec<u64>);
 
 impl Bench {
     pub fn new(cases: &[&[Task]], models: Vec<Model>) -> Self {
-        Self { models, listed: faults(cases), kinds: kinds(cases), predicted: Mutex::default() }
+        Self { models, listed: faults(cases), kinds: kinds(cases), slips: slips(cases), predicted: Mutex::default() }
     }
 
     /// What explains the failing sheets of one engine, the best first, sheet by sheet.
@@ -205,7 +207,11 @@ impl Search<'_> {
 
     fn fitted(&self, open: &[usize]) -> Vec<Held> {
         let concerns = |fault: &&Fault| fault.case.is_none_or(|case| open.iter().any(|k| self.sheets[*k].case == case));
-        self.bench.kinds.iter().filter(concerns).filter_map(|fault| self.of_kind(fault, self.few)).collect()
+        let kinds = self.bench.kinds.iter().filter(concerns).filter_map(|fault| self.of_kind(fault, self.few));
+        // What has no parameter may explain the same, and then better.
+        let slip =
+            |fault: &Fault| self.weighed(fault, &|sheet, fidelity| self.anew(self.all, fault, &[], sheet, fidelity));
+        kinds.chain(self.bench.slips.iter().filter_map(slip)).collect()
     }
 
     /// A known fault that is as bright as it may be besides.
@@ -263,7 +269,9 @@ impl Search<'_> {
     fn shapes(&self, open: &[usize]) -> Vec<Held> {
         let of = |k: &usize| {
             let sheet = &self.sheets[*k];
-            let (cause, count_of_parameters) = shape::axial(&self.bench.models[sheet.model].task, sheet)?;
+            let task = &self.bench.models[sheet.model].task;
+            let found = shape::axial(task, sheet).or_else(|| shape::of_nodes(task, sheet));
+            let (cause, count_of_parameters) = found.or_else(|| shape::same_everywhere(sheet))?;
             Some(Held { cause, case: None, explained: vec![*k], borne: vec![], count_of_parameters })
         };
         open.iter().filter_map(of).collect()

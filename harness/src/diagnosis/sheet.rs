@@ -10,8 +10,10 @@ const SLACK: f64 = 5e-4;
 const THINNED: f64 = 2e-3;
 /// The same of rough predictions, and as a share of the change that they predict.
 const ROUGH: (f64, f64) = (1e-2, 0.25);
-/// Likewise, as a share of the largest reading.
+/// Likewise, as a share of the largest reading, or of the largest that is right where that is less.
 const FLOOR: f64 = 1e-6;
+/// The part of what is allowed that may be left.
+const LENIENT: f64 = 0.5;
 /// Standard deviations that count as a reading's own scatter.
 const SCATTER: f64 = 3.0;
 
@@ -80,7 +82,9 @@ impl Sheet {
             };
             sheet.uncertainty.push(told.hypot(reference.uncertainty));
         }
-        sheet.floor = FLOOR * sheet.right.iter().chain(&sheet.read).copied().fold(0.0, f64::max);
+        // Light that is a millionth of what it should be is no rounding.
+        let brightest = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
+        sheet.floor = FLOOR * brightest(&sheet.right).min(brightest(&sheet.read));
         Some(sheet)
     }
 
@@ -97,6 +101,14 @@ impl Sheet {
     #[must_use]
     pub fn roughly(&self) -> Self {
         Self { slack: ROUGH.0, is_rough: true, ..self.clone() }
+    }
+
+    /// The same readings of reflected light as one reads them who is right within half of what is allowed.
+    #[must_use]
+    pub fn leniently(self) -> Self {
+        let relative = self.allowed.iter().zip(&self.right).map(|(allowed, right)| LENIENT * allowed / right);
+        let slack = relative.fold(f64::INFINITY, f64::min);
+        if self.is_cheap || !slack.is_finite() { self } else { Self { slack: slack.max(self.slack), ..self } }
     }
 
     /// Some of the readings, of another model.

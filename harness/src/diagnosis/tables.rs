@@ -115,6 +115,58 @@ pub(super) fn turned_behind(luminaire: &mut Luminaire) -> bool {
     replace(luminaire, LuminousIntensityDistribution::new(c_deg, gamma_deg, candela).ok())
 }
 
+/// The same candela at angles that are taken to be evenly spaced, of C, of gamma, or of both.
+pub(super) fn even_angles(luminaire: &mut Luminaire, in_c: bool, in_gamma: bool) -> bool {
+    let table = luminaire.photometry.distribution.full_circle();
+    let even = |angles: &[f64], is_wanted: bool| -> Vec<f64> {
+        let (first, last, steps) = (angles[0], angles[angles.len() - 1], (angles.len() - 1) as f64);
+        let at = |k: usize| first + (last - first) * k as f64 / steps;
+        if is_wanted { (0..angles.len()).map(at).collect() } else { angles.to_vec() }
+    };
+    let (c_deg, gamma_deg) = (even(table.c_deg(), in_c), even(table.gamma_deg(), in_gamma));
+    let is_other = c_deg != table.c_deg() || gamma_deg != table.gamma_deg();
+    let candela = (0..c_deg.len()).flat_map(|k| table.plane(k).to_vec()).collect();
+    is_other && replace(luminaire, LuminousIntensityDistribution::new(c_deg, gamma_deg, candela).ok())
+}
+
+/// Angles between those of a table, by which a curve is drawn.
+const BETWEEN: u32 = 16;
+
+/// Between the table's angles another curve than a straight line, from 0 to 1.
+pub(super) fn rounded_off(luminaire: &mut Luminaire, [in_c, in_gamma]: [bool; 2], curve: fn(f64) -> f64) -> bool {
+    let table = luminaire.photometry.distribution.full_circle();
+    let finer = |angles: &[f64], is_wanted: bool| -> Vec<(f64, f64)> {
+        if !is_wanted {
+            return angles.iter().map(|a| (*a, *a)).collect();
+        }
+        let between = |pair: &[f64]| {
+            let (from, by) = (pair[0], pair[1] - pair[0]);
+            (0..BETWEEN).map(move |k| {
+                let v = f64::from(k) / f64::from(BETWEEN);
+                (from + by * v, from + by * curve(v))
+            })
+        };
+        let last = angles[angles.len() - 1];
+        angles.windows(2).flat_map(between).chain([(last, last)]).collect()
+    };
+    let (c, gamma) = (finer(table.c_deg(), in_c), finer(table.gamma_deg(), in_gamma));
+    let of_plane = |(_, c): &(f64, f64)| gamma.iter().map(|(_, g)| table.intensity(*c, *g).value()).collect::<Vec<_>>();
+    let candela = c.iter().flat_map(of_plane).collect();
+    let nodes = |of: &[(f64, f64)]| of.iter().map(|(node, _)| *node).collect();
+    replace(luminaire, LuminousIntensityDistribution::new(nodes(&c), nodes(&gamma), candela).ok())
+}
+
+/// What is found by angles in radians among those in degrees.
+pub(super) fn in_radians(luminaire: &mut Luminaire) -> bool {
+    let table = luminaire.photometry.distribution.full_circle();
+    let steps = |end: u32| (0..=end).map(f64::from).collect::<Vec<f64>>();
+    let (c_deg, gamma_deg) = (steps(360), steps(180));
+    let at = |c: &f64, g: &f64| table.intensity(c.to_radians(), g.to_radians()).value();
+    // C 360 is C 0.
+    let candela = c_deg.iter().flat_map(|c| gamma_deg.iter().map(|g| at(&c.rem_euclid(360.0), g))).collect();
+    replace(luminaire, LuminousIntensityDistribution::new(c_deg, gamma_deg, candela).ok())
+}
+
 /// Angles in their order, each once.
 fn sorted(mut angles: Vec<f64>) -> Vec<f64> {
     angles.sort_by(f64::total_cmp);

@@ -30,6 +30,8 @@ pub struct Wrong {
     is_relit: bool,
     /// Whether that is so of the meters.
     are_moved: bool,
+    /// Whether light counts from its second reflection on.
+    is_without_first: bool,
     pub law: Law,
     /// On every reading.
     pub factor: f64,
@@ -42,6 +44,10 @@ pub struct Law {
     pub intensity: i32,
     pub cosine: i32,
     pub distance: i32,
+    /// Of the cosine at the luminaire, on which nothing depends.
+    pub emission: i32,
+    /// Whether of several luminaires the brightest alone counts.
+    pub is_of_brightest: bool,
     /// Whether light from behind counts like light from the front.
     pub is_two_sided: bool,
 }
@@ -69,14 +75,23 @@ pub enum Order {
 }
 
 impl Law {
-    pub const RIGHT: Self = Self { intensity: 1, cosine: 1, distance: 2, is_two_sided: false };
+    pub const RIGHT: Self =
+        Self { intensity: 1, cosine: 1, distance: 2, emission: 0, is_of_brightest: false, is_two_sided: false };
 }
 
 impl Wrong {
     /// Nothing is wrong yet.
     pub fn new(task: &Task) -> Self {
-        let (is_relit, are_moved) = (false, false);
-        Self { task: task.clone(), is_relit, are_moved, law: Law::RIGHT, factor: 1.0, readouts: vec![] }
+        let (is_relit, are_moved, is_without_first) = (false, false, false);
+        Self {
+            task: task.clone(),
+            is_relit,
+            are_moved,
+            is_without_first,
+            law: Law::RIGHT,
+            factor: 1.0,
+            readouts: vec![],
+        }
     }
 
     pub const fn task(&self) -> &Task {
@@ -112,6 +127,11 @@ impl Wrong {
     pub fn transport(&mut self, transport: Transport) {
         self.is_relit = true;
         self.task.transport = transport;
+    }
+
+    /// Leaves light out that is reflected once.
+    pub fn without_first(&mut self) {
+        (self.is_relit, self.is_without_first) = (true, true);
     }
 
     pub fn meters(&mut self, change: impl Fn(&mut Meter)) {
@@ -234,7 +254,13 @@ impl Model {
     pub fn readings(&self, wrong: &Wrong, fidelity: Fidelity) -> Option<Vec<f64>> {
         let lux = if Self::is_other_light(wrong) {
             let (_, corrections) = self.light(fidelity)?;
-            self.corrected(&self.solved(&wrong.task, wrong.law, fidelity)?, corrections)
+            let mut light = self.solved(&wrong.task, wrong.law, fidelity)?;
+            if wrong.is_without_first {
+                let once = Task { transport: Transport::Indirect(Bounces::AtMost(1)), ..wrong.task.clone() };
+                let first = self.solved(&once, wrong.law, fidelity)?.reflected;
+                light.reflected.iter_mut().zip(first).for_each(|(all, first)| *all -= first);
+            }
+            self.corrected(&light, corrections)
         } else if self.is_one_each() {
             self.evenly()
         } else {
@@ -338,8 +364,7 @@ fn light(task: &Task, law: Law, rough: Option<&Rough>) -> Option<Light> {
 fn straight(scene: &Scene, meters: &[Meter], law: Law) -> Option<Vec<f64>> {
     // The simulator bounds its error by a table's peak, which it looks for at every meter.
     if is_bare(scene) {
-        let lux = |meter: &Meter| scene.luminaires.iter().map(|l| law.illuminance(l, meter)).sum();
-        return is_sound(scene, meters).then(|| meters.iter().map(lux).collect());
+        return is_sound(scene, meters).then(|| meters.iter().map(|m| law.of_all(&scene.luminaires, m)).collect());
     }
     let right = solved(scene, meters, Transport::Direct);
     if law == Law::RIGHT {
@@ -350,7 +375,7 @@ fn straight(scene: &Scene, meters: &[Meter], law: Law) -> Option<Vec<f64>> {
     }
     let of_meter = |(meter, right): (&Meter, f64)| {
         // What hides a single luminaire hides all.
-        if right == 0.0 { 0.0 } else { scene.luminaires.iter().map(|l| law.illuminance(l, meter)).sum() }
+        if right == 0.0 { 0.0 } else { law.of_all(&scene.luminaires, meter) }
     };
     Some(meters.iter().zip(right?).map(of_meter).collect())
 }
@@ -408,7 +433,14 @@ impl Law {
             return 0.0;
         }
         let intensity = luminaire.intensity_towards(-towards).value();
-        intensity.powi(self.intensity) * cosine.abs().powi(self.cosine) / distance.powi(self.distance)
+        let emission = (luminaire.orientation.z_axis.dot(towards) / distance).abs().powi(self.emission);
+        intensity.powi(self.intensity) * emission * cosine.abs().powi(self.cosine) / distance.powi(self.distance)
+    }
+
+    /// Of all luminaires.
+    fn of_all(self, luminaires: &[Luminaire], meter: &Meter) -> f64 {
+        let each = luminaires.iter().map(|l| self.illuminance(l, meter));
+        if self.is_of_brightest { each.fold(0.0, f64::max) } else { each.sum() }
     }
 }
 

@@ -522,7 +522,8 @@ fn unsound(engine: &EngineName, estimate: &Estimate, station: &Station) -> Optio
     }
     let told = || format!("read {value:e} lx ({uncertainty:?}) at {meter}");
     if !uncertainty.is_sound() {
-        return Some(EngineError::Output { what: told(), engine });
+        let what = format!("{}: an error below zero is none", told());
+        return Some(EngineError::Output { what, engine });
     }
     let all = [value.abs(), uncertainty.standard_error().unwrap_or(0.0), uncertainty.bound()];
     let what = || format!("{}: beyond {BRIGHTEST_LX:e} lx nothing is light", told());

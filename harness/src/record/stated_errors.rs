@@ -26,6 +26,8 @@ const NORMAL: f64 = 3.0;
 const FEWEST: f64 = 0.5;
 /// A procedure's standard errors vary less than the engine's others where it is less probable than this that they vary alike.
 const STEADIER: f64 = 0.003;
+/// How many times too small a stated error is that is none but for rounding: digits tell nothing then.
+const FAR_TOO_SMALL: f64 = 1e4;
 /// How many times too large a stated error is before that is told: some care is nobody's fault.
 const MIN_EXCESS: f64 = 3.0;
 
@@ -49,6 +51,9 @@ pub struct StatedErrors {
     /// How its standard errors fall with effort: 1 where their squares do in inverse proportion, 0 where they stay.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub falls_with_effort: Option<f64>,
+    /// Whether all that scatters of a claim is its first reading: those of other seeds, asked by themselves, are one.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_first_alone: bool,
     /// The largest part of the light of a meter that one sample holds, where some do that lie far from all others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_portion: Option<f64>,
@@ -123,6 +128,7 @@ impl StatedErrors {
             p_value: None,
             of_claims: None,
             falls_with_effort: None,
+            is_first_alone: false,
             largest_portion: None,
             at: BTreeMap::new(),
             doubt: Some(doubt),
@@ -176,6 +182,28 @@ impl StatedErrors {
     pub fn to_come(found: &[Self], value: f64, truth: f64) -> Option<f64> {
         let portion = found.iter().filter_map(|f| f.largest_portion).reduce(f64::max)?;
         (value < truth).then(|| (portion * truth * (truth - value)).sqrt())
+    }
+
+    /// Of sampled meters whose readings state no error with any seed, and are other ones with every seed: what is known for certain does not
+    /// scatter, and what no sample met reads the same.
+    pub fn of_unstated(meters: &[(MeterId, Vec<Estimate>)]) -> Option<Self> {
+        let claims =
+            |e: &Estimate| e.uncertainty == Uncertainty::NotSeen || e.uncertainty.standard_error() == Some(0.0);
+        let scatter = |(meter, readings): &(MeterId, Vec<Estimate>)| {
+            let mean = readings.iter().map(|e| e.value).sum::<f64>() / readings.len() as f64;
+            let is_other = |(k, e): (usize, &Estimate)| {
+                readings[..k].iter().all(|before| (before.value - e.value).abs() > ROUNDING * mean.abs())
+            };
+            let are_others = readings.len() > 2 && readings.iter().enumerate().all(is_other);
+            let square =
+                readings.iter().map(|e| (e.value / mean - 1.0).powi(2)).sum::<f64>() / (readings.len() as f64 - 1.0);
+            (are_others && readings.iter().all(claims)).then(|| (meter.clone(), square.sqrt()))
+        };
+        let at: BTreeMap<MeterId, f64> = meters.iter().filter_map(scatter).collect();
+        let relative = at.values().copied().fold(0.0, f64::max);
+        let freedom = meters.iter().map(|(_, readings)| readings.len() as f64 - 1.0).fold(f64::INFINITY, f64::min);
+        let found = Self::doubted_at(Doubt::Scatters, at)?;
+        Some(Self { of_claims: Some(relative), degrees_of_freedom: freedom, ..found })
     }
 
     /// Whether it is about how readings scatter at single meters.
@@ -244,7 +272,13 @@ impl StatedErrors {
         // Where meters scatter unlike one another, what they scatter by together says little of any one.
         let across = Variation::across(&of_meters).with(&Variation::default()).0.unwrap_or(freedom);
         let degrees_of_freedom = freedom.min(across.max(FEWEST));
-        let found = Self { degrees_of_freedom, of_claims: Some(relative), ..Self::doubted(Doubt::Scatters) };
+        let others_agree = |readings: &Vec<Estimate>| {
+            let others = &readings[..readings.len().saturating_sub(1)];
+            others.len() > 1 && others.iter().all(|e| (e.value - others[0].value).abs() <= ROUNDING * brightest)
+        };
+        let is_first_alone = meters.iter().all(others_agree);
+        let of_claims = Some(relative);
+        let found = Self { degrees_of_freedom, of_claims, is_first_alone, ..Self::doubted(Doubt::Scatters) };
         (relative > 0.0 && relative.is_finite()).then_some(found)
     }
 
@@ -276,6 +310,9 @@ impl StatedErrors {
                 Uncertainty::StandardError { value: most, degrees_of_freedom: Some(self.degrees_of_freedom), bound }
             }
             (None, Uncertainty::NotSeen) => Uncertainty::sampled(most, Some(self.degrees_of_freedom)),
+            (Some(Doubt::Scatters), stated) if !stated.is_sampled() || stated == Uncertainty::NotSeen => {
+                Uncertainty::sampled(most, Some(self.degrees_of_freedom))
+            }
             (Some(Doubt::SameForEverySeed), Uncertainty::NotSeen) => Uncertainty::Exact,
             (_, stated) => stated,
         }
@@ -467,8 +504,9 @@ impl fmt::Display for StatedErrors {
             ),
             Some(Doubt::TooSmall) => write!(
                 f,
-                "its standard errors are {ratio:.1} times too small: that is how its readings of other seeds scatter ({freedom:.0} \
-                 degrees of freedom); verdicts go by the scatter"
+                "its standard errors are {} times too small: that is how its readings of other seeds scatter ({freedom:.0} \
+                 degrees of freedom); verdicts go by the scatter",
+                if ratio < FAR_TOO_SMALL { format!("{ratio:.1}") } else { format!("{ratio:.0e}") }
             ),
             Some(Doubt::TooLarge) => write!(
                 f,
@@ -498,6 +536,18 @@ impl fmt::Display for StatedErrors {
                 "its standard errors vary less from seed to seed than those of as few degrees of freedom as it states: as those of {:.3e}; \
                  verdicts go by these",
                 self.degrees_of_freedom_seen.unwrap_or(MANY)
+            ),
+            Some(Doubt::Scatters) if !at.is_empty() => write!(
+                f,
+                "it states an error of zero {at} with every seed, and other readings: they scatter by up to {:.2e}; verdicts go by the \
+                 scatter",
+                self.of_claims.unwrap_or(0.0)
+            ),
+            Some(Doubt::Scatters) if self.is_first_alone => write!(
+                f,
+                "asked again, each job by itself, it reads the same with every seed, and otherwise than at first, by {:.2e}: its readings \
+                 depend on what else it is asked, as where jobs of a batch are mixed up; verdicts go by the scatter",
+                self.of_claims.unwrap_or(0.0)
             ),
             Some(Doubt::Scatters) => write!(
                 f,

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::json::{Protocol, chatter, from_json};
 use super::photometry::Files;
-use super::protocol::{Answer, Capability, ExternalProbe, ExternalRequest, printed_before};
+use super::protocol::{Answer, Capability, ExternalProbe, ExternalRequest};
 use super::readings::{ExternalAnswers, ExternalReadings};
 use super::{External, ExternalJob, FOLDER_VARIABLE};
 use crate::engines::{self, EngineError, Job, Site, Workbench};
@@ -197,7 +197,7 @@ impl External {
             return Ok(vec![ExternalReadings::measured(&finished.stdout, job, &self.id)]);
         }
         let no_readings = |e| match chatter(&finished.stdout) {
-            Some(words) => EngineError::garbled(self.id.clone(), printed_before(&words)),
+            Some(why) => EngineError::garbled(self.id.clone(), why),
             None => EngineError::no_readings(self.id.clone(), &String::from_utf8_lossy(&finished.stdout), &e),
         };
         let mut answers = from_json::<ExternalAnswers>(&finished.stdout).map_err(no_readings)?.answers;

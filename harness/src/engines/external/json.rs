@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::system::printable;
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Protocol {
     /// One job a process, read as it stands.
@@ -14,18 +16,41 @@ pub(super) enum Protocol {
 pub(super) fn from_json<T: for<'de> Deserialize<'de>>(text: &[u8]) -> Result<T, serde_json::Error> {
     serde_json::from_slice(text).or_else(|error| {
         let quoted = quoted(&String::from_utf8_lossy(text));
-        serde_json::from_str(&quoted).map_err(|_| error)
+        let mut document = serde_json::Deserializer::from_str(&quoted);
+        match serde_path_to_error::deserialize(&mut document) {
+            Ok(read) => document.end().map(|()| read),
+            Err(at) if at.path().iter().len() == 0 => Err(error),
+            Err(at) => Err(serde::de::Error::custom(format!("`{}`: {error}", at.path()))),
+        }
     })
 }
 
-/// What is printed before JSON, if that is all that is wrong with it: messages of the program's, or of a library's.
+/// What is printed besides JSON, if that is all that is wrong with it: messages of the program's, or of a library's.
 pub(super) fn chatter(text: &[u8]) -> Option<String> {
+    let told = |words: &str, place: &str| {
+        let words = printable::line(words.trim(), MAX_WORDS);
+        format!("it prints `{words}` {place} its answer: what is no JSON belongs on standard error")
+    };
+    printed_before(text).map(|words| told(&words, "before")).or_else(|| Some(told(&printed_after(text)?, "after")))
+}
+
+fn printed_after(text: &[u8]) -> Option<String> {
+    let text = quoted(&String::from_utf8_lossy(text));
+    let mut documents = serde_json::Deserializer::from_str(&text).into_iter::<serde::de::IgnoredAny>();
+    let is_read = documents.next().is_some_and(|first| first.is_ok());
+    let rest = text[documents.byte_offset()..].trim();
+    (is_read && text.trim_start().starts_with(['{', '[']) && !rest.is_empty()).then(|| rest.to_owned())
+}
+
+fn printed_before(text: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(text);
     let starts = text.match_indices(['{', '[']).map(|(at, _)| at).filter(|at| *at > 0).take(MOST_STARTS);
     let mut answers = starts.filter(|at| from_json::<serde::de::IgnoredAny>(text[*at..].as_bytes()).is_ok());
     answers.next().map(|at| text[..at].trim().to_owned())
 }
 
+/// As much as is shown of them.
+const MAX_WORDS: usize = 60;
 /// Places that are looked at for the beginning of an answer.
 const MOST_STARTS: usize = 20;
 

@@ -75,22 +75,12 @@ pub(super) enum Answer {
     Wrong(String),
 }
 
-/// What is wrong with an answer that begins with other words.
-pub(super) fn printed_before(words: &str) -> String {
-    let words = printable::line(words, MAX_WORD);
-    format!("it prints `{words}` before its answer: what is no JSON belongs on standard error")
-}
-
 impl Answer {
     pub(super) fn of(stdout: &[u8]) -> Self {
         let said: serde_json::Value = match from_json(stdout) {
             Ok(said) => said,
             Err(error) => {
-                let why = match chatter(stdout) {
-                    Some(words) => printed_before(&words),
-                    None => format!("it is no JSON ({error})"),
-                };
-                return Self::NotOne(why);
+                return Self::NotOne(chatter(stdout).unwrap_or_else(|| format!("it is no JSON ({error})")));
             }
         };
         match said.get("protocol").map(serde_json::Value::as_u64) {
@@ -98,7 +88,7 @@ impl Answer {
             Some(Some(2)) => {}
             Some(_) => return Self::Wrong(format!("`protocol: {}` is not known; there are 1 and 2", said["protocol"])),
         }
-        match serde_json::from_value::<ExternalProbe>(said) {
+        match serde_path_to_error::deserialize::<_, ExternalProbe>(said) {
             Err(error) => Self::Wrong(error.to_string()),
             Ok(probe) if probe.name.trim().is_empty() || probe.version.trim().is_empty() => {
                 Self::Wrong("`name` and `version` must say something".to_owned())

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::json::{Protocol, from_json};
+use super::json::{Protocol, chatter, from_json};
 use crate::engines::contract::same_meters;
 use crate::engines::{Blocks, EngineError, Job, Measurement, checked};
 use crate::record::{EngineName, Estimate, Uncertainty};
@@ -75,7 +75,7 @@ struct ReadingForm {
 
 /// A number, or what programs write in its place that have none.
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "a number")]
+#[serde(untagged, expecting = "no number, where one belongs")]
 enum Number {
     Told(f64),
     Word(NoNumber),
@@ -118,8 +118,11 @@ impl ExternalReadings {
 
     /// The measurement that an adapter printed for a job, checked like every engine's.
     pub fn measured(text: &[u8], job: &Job, engine: &EngineName) -> Result<Measurement, EngineError> {
-        let answer = Self::from_json(text)
-            .map_err(|e| EngineError::no_readings(engine.clone(), &String::from_utf8_lossy(text), &e))?;
+        let no_readings = |e| match chatter(text) {
+            Some(why) => EngineError::garbled(engine.clone(), why),
+            None => EngineError::no_readings(engine.clone(), &String::from_utf8_lossy(text), &e),
+        };
+        let answer = Self::from_json(text).map_err(no_readings)?;
         answer.measurement(job, engine, Protocol::One)
     }
 
