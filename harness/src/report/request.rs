@@ -81,7 +81,7 @@ mod tests {
             ..Request::default()
         };
         let command =
-            "luxproof run a.yaml --engines radiance,mitsuba --filter 'a b' --seed 7 --sampling accurate --no-skips";
+            "luxproof run a.yaml --engines 'radiance,mitsuba' --filter 'a b' --seed 7 --sampling accurate --no-skips";
         assert_eq!(request.command(&["a.yaml".to_owned()]), command);
     }
 }
