@@ -239,7 +239,7 @@ fn what_looks_like_a_fault_in_few_coarse_readings_and_not_in_most_is_left_unsaid
     let (most, few) = (light.map(skew), light.map(task));
     // As if all surfaces reflected more, but for a part of a percent that only fine readings tell.
     let brighter = |m: &Model| -> Vec<f64> {
-        let uneven = |k: usize| if k % 2 == 0 { 1.083 } else { 1.077 };
+        let uneven = |k: usize| if k.is_multiple_of(2) { 1.083 } else { 1.077 };
         let factor = |k| if m.task.transport == Transport::Direct { 1.0 } else { uneven(k) };
         m.right.iter().enumerate().map(|(k, r)| factor(k) * r).collect()
     };

@@ -1,6 +1,7 @@
 //! How far a renderer's 32-bit floats may leave the direct illuminance of points from the exact value.
 
 use glam::DVec3;
+use luminaire::scene::LuminaireModel;
 
 use super::Job;
 use super::cells::{Cells, LookUp};
@@ -49,10 +50,18 @@ impl<'a> FloatError<'a> {
         // Both points are rounded before they are subtracted.
         let largest = at.abs().max(lamp.abs()).max_element();
         let angle_rad = ROUNDINGS * EPSILON + (4.0 * EPSILON * largest + self.instrument.seat) / at.distance(lamp);
-        let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
-        if cosine < -angle_rad {
+        let to_middle = -ray_m.normalize_or_zero().dot(meter.normal);
+        // Of an opening whose middle is at the meter's horizon a part is before it.
+        let reach = match luminaire.model {
+            LuminaireModel::Area => {
+                0.5 * DVec3::from(luminaire.photometry.opening.bounding_box_m()).length() / ray_m.length()
+            }
+            LuminaireModel::Point | LuminaireModel::Impostor => 0.0,
+        };
+        if to_middle < -(angle_rad + reach) {
             return 0.0;
         }
+        let cosine = if to_middle < reach { to_middle + reach } else { to_middle };
         let own = luminaire.orientation.transpose() * ray_m;
         // Near a pole a direction turns by far in C.
         let from_axis = (own.x.hypot(own.y) / own.length()).max(angle_rad);
