@@ -102,10 +102,11 @@ pub(super) struct Dialogue<'a> {
     pub(super) fixed: Option<(usize, usize)>,
     /// What a ray of a variant costs.
     pub(super) cost: &'a dyn Fn(&str) -> Cost,
-    /// Bound of the direct light of points at a station.
+    /// Bound of direct light at a station.
     pub(super) bound_lx: &'a dyn Fn(usize) -> f64,
-    /// Bound of what is sampled, in parts of the reading.
+    /// Bound of what is sampled, in parts of the reading, and of what is reflected besides.
     pub(super) relative_bound: f64,
+    pub(super) misled: f64,
 }
 
 impl Dialogue<'_> {
@@ -152,9 +153,13 @@ impl Dialogue<'_> {
         let samples = side * side * part.rays / self.job.stations.len().max(1);
         let of_part = [("blocks", read.blocks.count()), ("samples_a_meter_and_block", samples)];
         found.effort.extend(of_part.map(|(key, value)| (format!("{}_{key}", part.name), value.to_string())));
+        let bound_lx = |k: usize, value: f64| match stream {
+            Stream::Direct => (self.bound_lx)(k) + self.relative_bound * value,
+            Stream::Reflected | Stream::Trial => (self.relative_bound + self.misled) * value,
+        };
         let within =
-            |e: Estimate| Estimate { uncertainty: e.uncertainty.within(self.relative_bound * e.value.abs()), ..e };
-        Ok(found.take(read).into_iter().map(within).collect())
+            |(k, e): (usize, Estimate)| Estimate { uncertainty: e.uncertainty.within(bound_lx(k, e.value.abs())), ..e };
+        Ok(found.take(read).into_iter().enumerate().map(within).collect())
     }
 
     /// Samples along a side of a block so that a block fills the rays in flight at most, and enough blocks about reach the

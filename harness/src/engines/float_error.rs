@@ -1,11 +1,11 @@
-//! How far a renderer's 32-bit floats may leave the direct illuminance of points from the exact value.
+//! How far a renderer's 32-bit floats may leave direct illuminance from the exact value.
 
 use glam::DVec3;
-use luminaire::scene::LuminaireModel;
 
 use super::Job;
 use super::cells::{Cells, LookUp};
 use super::frame::Frame;
+use super::openings::places_m;
 
 /// Half the spacing of 32-bit floats at 1.
 pub(super) const EPSILON: f64 = 5.960_464_477_539_063e-8;
@@ -23,7 +23,7 @@ pub(super) struct Instrument {
     pub(super) by_arc_cosine: bool,
 }
 
-/// What rounding may do to light that comes straight from points.
+/// What rounding may do to light that comes straight from points and openings.
 pub(super) struct FloatError<'a> {
     job: &'a Job,
     frame: Frame,
@@ -43,25 +43,23 @@ impl<'a> FloatError<'a> {
     }
 
     fn of_one_lx(&self, luminaire: usize, k: usize) -> f64 {
+        let places = places_m(&self.job.scene.luminaires[luminaire]);
+        places.iter().map(|place| self.of_place_lx(luminaire, *place, k)).sum::<f64>() / places.len() as f64
+    }
+
+    /// All of a luminaire's light as from one place.
+    fn of_place_lx(&self, luminaire: usize, place_m: DVec3, k: usize) -> f64 {
         let (meter, table) = (self.job.stations[k].meter, &self.tables[luminaire]);
         let luminaire = &self.job.scene.luminaires[luminaire];
-        let ray_m = meter.position_m - luminaire.position_m;
-        let (at, lamp) = (self.frame.to_scene(meter.position_m), self.frame.to_scene(luminaire.position_m));
+        let ray_m = meter.position_m - place_m;
+        let (at, lamp) = (self.frame.to_scene(meter.position_m), self.frame.to_scene(place_m));
         // Both points are rounded before they are subtracted.
         let largest = at.abs().max(lamp.abs()).max_element();
         let angle_rad = ROUNDINGS * EPSILON + (4.0 * EPSILON * largest + self.instrument.seat) / at.distance(lamp);
-        let to_middle = -ray_m.normalize_or_zero().dot(meter.normal);
-        // Of an opening whose middle is at the meter's horizon a part is before it.
-        let reach = match luminaire.model {
-            LuminaireModel::Area => {
-                0.5 * DVec3::from(luminaire.photometry.opening.bounding_box_m()).length() / ray_m.length()
-            }
-            LuminaireModel::Point | LuminaireModel::Impostor => 0.0,
-        };
-        if to_middle < -(angle_rad + reach) {
+        let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
+        if cosine < -angle_rad {
             return 0.0;
         }
-        let cosine = if to_middle < reach { to_middle + reach } else { to_middle };
         let own = luminaire.orientation.transpose() * ray_m;
         // Near a pole a direction turns by far in C.
         let from_axis = (own.x.hypot(own.y) / own.length()).max(angle_rad);

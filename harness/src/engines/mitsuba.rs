@@ -135,6 +135,7 @@ impl Mitsuba {
             cost: &cost,
             bound_lx: &|k| error.at_lx(k),
             relative_bound: 0.0,
+            misled: 0.0,
         };
         let mut measurement = dialogue.measurement()?;
         measurement.notes.extend(fallback);

@@ -25,6 +25,7 @@ mod install;
 mod luxcore;
 mod meshes;
 mod mitsuba;
+mod openings;
 mod patches;
 mod povray;
 mod radiance;

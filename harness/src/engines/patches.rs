@@ -127,7 +127,8 @@ impl Package {
             fixed: settings.fixed(),
             cost: &|_| Cost { ray_s: self.ray_s, trial_side: None },
             bound_lx: &bound_lx,
-            relative_bound: FILM + misled,
+            relative_bound: FILM,
+            misled,
         };
         let mut measurement = dialogue.measurement()?;
         measurement.effort.insert("command".into(), run.command_line());

@@ -1,7 +1,10 @@
 //! A candela table as a renderer looks it up, and what that leaves off.
 
+use glam::DVec3;
 use luminaire::photometry::{LuminousIntensityDistribution, angles_deg};
 use luminaire::scene::{Luminaire, Meter};
+
+use crate::engines::openings::places_m;
 
 pub(in crate::engines) trait Resampled {
     /// The table itself.
@@ -17,10 +20,14 @@ pub(in crate::engines) trait Resampled {
 
     /// How far its look-up leaves the light of a luminaire at a meter from the table's own, in lux.
     fn off_lx(&self, luminaire: &Luminaire, meter: &Meter) -> f64 {
-        let ray_m = meter.position_m - luminaire.position_m;
-        let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
-        let (c, gamma) = angles_deg(luminaire.orientation.transpose() * ray_m);
-        luminaire.flux_scale * self.off_cd(c, gamma) * cosine.max(0.0) / ray_m.length_squared()
+        let places = places_m(luminaire);
+        let of_place = |place_m: &DVec3| {
+            let ray_m = meter.position_m - *place_m;
+            let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
+            let (c, gamma) = angles_deg(luminaire.orientation.transpose() * ray_m);
+            self.off_cd(c, gamma) * cosine.max(0.0) / ray_m.length_squared()
+        };
+        luminaire.flux_scale * places.iter().map(of_place).sum::<f64>() / places.len() as f64
     }
 
     /// The share of the flux that its look-up sends elsewhere, adds or loses.
