@@ -240,6 +240,7 @@ pub fn run_and_hold(specs: &[PathBuf], options: &Options<'_>) -> Result<(Report,
 pub fn survey(specs: &[PathBuf], options: &Options<'_>) -> Result<Vec<EngineStatus>, AuditError> {
     let mut prepared = Prepared::of(specs, options)?;
     let (_under_way, published) = (process::UnderWay::begin(), published(&prepared.cases)?);
+    options.cache.iter().for_each(Cache::sweep);
     prepared.grant(&published, options);
     let Prepared { cases, plans, policies, .. } = &prepared;
     let audit = Audit { options, reader: options.reader() };
