@@ -17,7 +17,7 @@ use super::{BundleError, LOCK, Lock, PythonLock, RUN, SUMS};
 use crate::engines;
 use crate::report::{FILE, Report, Request};
 use crate::spec::{BUNDLE_FILE, Case, Trust};
-use crate::system::digest::hexadecimal;
+use crate::system::digest::{self, hexadecimal};
 use crate::system::files::{self, FileError};
 
 const README: &str = "README.md";
@@ -87,7 +87,7 @@ fn sources(report: &Report, run: &str) -> Result<Vec<Sources>, BundleError> {
             sources.files.extend(programs(case));
             if let Some(policy) = &record.policy {
                 let file = PathBuf::from(&policy.file);
-                let hash = sums::of_file(&file).map_err(|e| FileError::of(&file, e))?;
+                let hash = digest::of_file(&file).map_err(|e| FileError::of(&file, e))?;
                 if hash != policy.sha256 {
                     return Err(changed(&policy.file));
                 }
@@ -178,7 +178,7 @@ fn fill(
 
 fn copy(from: &Path, to: &Path) -> io::Result<(String, u64)> {
     to.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-    sums::copy(&mut File::open(from)?, &mut File::create(to)?)
+    digest::copy(&mut File::open(from)?, &mut File::create(to)?)
 }
 
 /// Reads the specs again where they lie in the bundle: they are what was run, and name nothing out of it.

@@ -16,6 +16,7 @@ use super::sums::{self, Sums};
 use super::{BundleError, LOCK, Lock, RUN, SUMS};
 use crate::report::{FILE, Report};
 use crate::spec::BUNDLE_FILE;
+use crate::system::digest;
 use crate::system::files::{FileError, MAX_KEPT_BYTES, read_bounded};
 use crate::system::printable;
 
@@ -171,7 +172,7 @@ impl Copy<'_> {
         let to = self.stage.join(name);
         to.parent().map_or(Ok(()), fs::create_dir_all)?;
         let mut file = File::options().write(true).create_new(true).open(to)?;
-        let (hash, bytes) = sums::copy(&mut from.take(MAX_BYTES - self.bytes + 1), &mut file)?;
+        let (hash, bytes) = digest::copy(&mut from.take(MAX_BYTES - self.bytes + 1), &mut file)?;
         self.bytes += bytes;
         if self.bytes > MAX_BYTES {
             return refused("a bundle does not hold so many bytes");
@@ -214,7 +215,7 @@ fn described(stage: &Path) -> Option<Sums> {
 
 /// Whether an archive is what its files make.
 fn is_as_packed(archive: &Path, stage: &Path, sums: &Sums) -> Result<bool, BundleError> {
-    let of = |file: &mut File| -> io::Result<String> { sums::copy(file, &mut io::sink()).map(|(hash, _)| hash) };
+    let of = |file: &mut File| -> io::Result<String> { digest::copy(file, &mut io::sink()).map(|(hash, _)| hash) };
     let failed = |e: io::Error| FileError::of(archive, e);
     let mut again = tempfile::tempfile().map_err(failed)?;
     pack(stage, sums, &mut again).map_err(|e| BundleError::Zip(archive.display().to_string(), e))?;

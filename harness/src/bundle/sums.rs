@@ -1,13 +1,6 @@
 //! `SHA256SUMS`: a line a file, as `sha256sum` writes and checks it, sorted; no other bytes make the same list.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{self, Read, Write};
-use std::path::Path;
-
-use sha2::{Digest, Sha256};
-
-use crate::system::digest::hexadecimal;
 
 /// Files by their places in the bundle, with their hashes.
 pub(super) type Sums = BTreeMap<String, String>;
@@ -27,24 +20,6 @@ pub(super) fn parse(written: &str) -> Option<Sums> {
     };
     let sums: Sums = written.lines().map(line).collect::<Option<_>>()?;
     (text(&sums) == written).then_some(sums)
-}
-
-pub(super) fn of_file(path: &Path) -> io::Result<String> {
-    copy(&mut File::open(path)?, &mut io::sink()).map(|(hash, _)| hash)
-}
-
-/// Copies bytes and tells their hash and how many they are.
-pub(super) fn copy(from: &mut impl Read, to: &mut impl Write) -> io::Result<(String, u64)> {
-    let (mut hash, mut buffer, mut length) = (Sha256::new(), vec![0; 1 << 16], 0);
-    loop {
-        let n = from.read(&mut buffer)?;
-        if n == 0 {
-            return Ok((hexadecimal(&hash.finalize()), length));
-        }
-        hash.update(&buffer[..n]);
-        to.write_all(&buffer[..n])?;
-        length += n as u64;
-    }
 }
 
 #[cfg(test)]

@@ -104,8 +104,9 @@ pub(super) struct Dialogue<'a> {
     pub(super) cost: &'a dyn Fn(&str) -> Cost,
     /// Bound of direct light at a station.
     pub(super) bound_lx: &'a dyn Fn(usize) -> f64,
-    /// Bound of what is sampled, in parts of the reading, and of what is reflected besides.
+    /// Bound of what is sampled, in parts of the reading.
     pub(super) relative_bound: f64,
+    /// Bound of reflected light besides: the share of the flux that goes elsewhere.
     pub(super) misled: f64,
 }
 

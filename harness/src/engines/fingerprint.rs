@@ -1,8 +1,7 @@
 //! What really runs: a hash of the files of an engine, whatever version it tells.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
-use std::io::{self, BufRead, BufReader};
+use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -13,7 +12,7 @@ use walkdir::WalkDir;
 
 use super::Site;
 use crate::record::EngineName;
-use crate::system::digest::hexadecimal;
+use crate::system::digest::{self, hexadecimal};
 use crate::system::envelope::{self, Schema};
 use crate::system::files;
 
@@ -116,21 +115,7 @@ fn seen(path: &Path, earlier: Option<&Known>) -> io::Result<Known> {
     let state = State::of(path)?;
     match earlier.filter(|known| known.state == state) {
         Some(known) => Ok(known.clone()),
-        None => Ok(Known { is_settled: state.is_settled(), state, sha256: sha256(path)? }),
-    }
-}
-
-/// By pieces: libraries may be larger than what memory is left.
-fn sha256(path: &Path) -> io::Result<String> {
-    let (mut file, mut hash) = (BufReader::with_capacity(1 << 16, File::open(path)?), Sha256::new());
-    loop {
-        let piece = file.fill_buf()?;
-        let read = piece.len();
-        if read == 0 {
-            return Ok(hexadecimal(&hash.finalize()));
-        }
-        hash.update(piece);
-        file.consume(read);
+        None => Ok(Known { is_settled: state.is_settled(), state, sha256: digest::of_file(path)? }),
     }
 }
 
@@ -148,6 +133,8 @@ fn below(root: &Path) -> impl Iterator<Item = (PathBuf, PathBuf)> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
+
     use super::*;
 
     #[test]

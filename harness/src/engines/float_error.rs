@@ -29,12 +29,15 @@ pub(super) struct FloatError<'a> {
     frame: Frame,
     instrument: Instrument,
     tables: Vec<Cells>,
+    /// Where the light of each luminaire comes from.
+    places_m: Vec<Vec<DVec3>>,
 }
 
 impl<'a> FloatError<'a> {
     pub(super) fn of(job: &'a Job, frame: Frame, instrument: Instrument) -> Self {
         let tables = job.scene.luminaires.iter().map(|l| Cells::of(&l.photometry.distribution)).collect();
-        Self { job, frame, instrument, tables }
+        let places_m = job.scene.luminaires.iter().map(places_m).collect();
+        Self { job, frame, instrument, tables, places_m }
     }
 
     /// Bound in lux at station `k`.
@@ -43,7 +46,7 @@ impl<'a> FloatError<'a> {
     }
 
     fn of_one_lx(&self, luminaire: usize, k: usize) -> f64 {
-        let places = places_m(&self.job.scene.luminaires[luminaire]);
+        let places = &self.places_m[luminaire];
         places.iter().map(|place| self.of_place_lx(luminaire, *place, k)).sum::<f64>() / places.len() as f64
     }
 

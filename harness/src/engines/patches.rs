@@ -11,7 +11,7 @@ pub(super) mod tests;
 use std::time::Duration;
 
 use glam::DVec3;
-use itertools::Itertools;
+use itertools::{Itertools, izip};
 use luminaire::scene::{Bounces, Luminaire, Transport};
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +21,7 @@ use self::settings::Settings;
 use super::dialogue::{self, Cost, Dialogue, Seat};
 use super::float_error::{FloatError, Instrument};
 use super::frame::Frame;
+use super::openings::places_m;
 use super::settings::Preset;
 use super::tables::Tables;
 use super::workbench::by_hand;
@@ -112,10 +113,11 @@ impl Package {
         let tables = Tables::of(job);
         let resampled = tables.distinct.iter().filter(|_| !settings.has_plain_tables());
         let looked_up: Vec<R> = resampled.map(|d| look_up(d)).collect();
+        let places: Vec<_> = job.scene.luminaires.iter().map(places_m).collect();
         let of_tables_lx = |k: usize| -> f64 {
-            let off = job.scene.luminaires.iter().zip(&tables.of_luminaire);
-            off.filter_map(|(luminaire, k_th)| Some((luminaire, looked_up.get(*k_th)?)))
-                .map(|(luminaire, table)| table.off_lx(luminaire, &job.stations[k].meter))
+            izip!(&job.scene.luminaires, &places, &tables.of_luminaire)
+                .filter_map(|(luminaire, places, k_th)| Some((luminaire, places, looked_up.get(*k_th)?)))
+                .map(|(luminaire, places, table)| table.off_lx(luminaire, places, &job.stations[k].meter))
                 .sum()
         };
         let misled = looked_up.iter().map(Resampled::misled_share).fold(0.0, f64::max);

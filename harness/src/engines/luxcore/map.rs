@@ -63,19 +63,18 @@ impl Map {
     /// Dark texels as far from light as one of LuxCore's cells reaches become faint.
     fn light_up(&mut self, faint: f32) {
         let (width, height) = (self.width, self.height);
-        let reach = [width.div_ceil(CELLS[0]) + 1, height.div_ceil(CELLS[1]) + 1];
+        let [across, along] = [width.div_ceil(CELLS[0]) + 1, height.div_ceil(CELLS[1]) + 1];
         let lit: Vec<bool> = self.texels.iter().map(|texel| *texel > 0.0).collect();
         if lit.iter().all(|is| *is) {
             return;
         }
-        // Along columns from row to row, then along rows, which close.
-        let mut near = lit;
-        for (count, step, along, closes) in [(width, 1, [width, height], false), (height, width, [1, width], true)] {
-            let lit = near.clone();
-            let reach = if closes { reach[0] } else { reach[1] };
-            for line in 0..count {
-                spread(&lit, &mut near, line * step, along, reach, closes);
-            }
+        let mut near = lit.clone();
+        for x in 0..width {
+            spread(&lit, &mut near, x, [width, height], along, false);
+        }
+        let lit = near.clone();
+        for y in 0..height {
+            spread(&lit, &mut near, y * width, [1, width], across, true);
         }
         for (texel, _) in self.texels.iter_mut().zip(near).filter(|(texel, is_near)| **texel == 0.0 && *is_near) {
             *texel = faint;

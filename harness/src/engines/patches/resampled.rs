@@ -4,8 +4,6 @@ use glam::DVec3;
 use luminaire::photometry::{LuminousIntensityDistribution, angles_deg};
 use luminaire::scene::{Luminaire, Meter};
 
-use crate::engines::openings::places_m;
-
 pub(in crate::engines) trait Resampled {
     /// The table itself.
     fn table(&self) -> &LuminousIntensityDistribution;
@@ -18,9 +16,8 @@ pub(in crate::engines) trait Resampled {
         (self.intensity_cd(c_deg, gamma_deg) - self.table().intensity(c_deg, gamma_deg).value()).abs()
     }
 
-    /// How far its look-up leaves the light of a luminaire at a meter from the table's own, in lux.
-    fn off_lx(&self, luminaire: &Luminaire, meter: &Meter) -> f64 {
-        let places = places_m(luminaire);
+    /// How far its look-up leaves the light of a luminaire at a meter from the table's own, in lux, where equal parts of it come from these places.
+    fn off_lx(&self, luminaire: &Luminaire, places: &[DVec3], meter: &Meter) -> f64 {
         let of_place = |place_m: &DVec3| {
             let ray_m = meter.position_m - *place_m;
             let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
