@@ -9,6 +9,7 @@ use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Scene, Shape, T
 use serde::{Deserialize, Serialize};
 
 use super::blocks::{Blocks, Sampled};
+use super::libraries::Libraries;
 use super::releases::Known;
 use super::workbench::{EngineError, Rest, SceneFile, Workbench};
 use super::{Site, fingerprint};
@@ -149,6 +150,8 @@ pub enum Component {
     PythonPackages,
     PovRay,
     LibLlvm,
+    /// Of the system, which Python packages take for granted.
+    Libraries(&'static Libraries),
     /// It gives rtrace's random numbers a seed.
     LibFaketime,
     /// Node.js, the renderers of the web and what drives a browser, as `web/` pins them.

@@ -9,6 +9,7 @@ pub(super) mod tests;
 
 use self::ies::LookedUp;
 use super::cost::DirectCost;
+use super::libraries::X11;
 use super::patches::settings::{self, Settings};
 use super::patches::{self, Package};
 use super::{
@@ -22,7 +23,7 @@ pub(super) static ENTRY: Entry = Entry {
     name: ID,
     display_name: "Cycles",
     colour: ("#b4540a", "#f0995a"),
-    installs: &[Component::Blender],
+    installs: &[Component::Blender, Component::Libraries(&X11)],
     is_on_request: true,
     models: &[luminaire::scene::LuminaireModel::Point, luminaire::scene::LuminaireModel::Area],
     fits_coordinates: Some("recentre"),
@@ -34,6 +35,7 @@ const PACKAGE: Package = Package {
     name: "Blender",
     module: "bpy",
     site: Site::blender,
+    libraries: &X11,
     probe: include_str!("../../drivers/cycles_probe.py"),
     driver: "cycles_read.py",
     remedy: "run `luxproof engines install cycles`",

@@ -17,6 +17,7 @@ use crate::system::process::{Invocation, ProcessError};
 use super::Site;
 use super::catalogue::{ALL, entry, is_chosen};
 use super::contract::{Component, Entry};
+use super::libraries::{self, Libraries};
 use super::releases::{self, Known};
 use crate::record::EngineName;
 use venv::Environment;
@@ -96,13 +97,14 @@ pub fn repair(site: &Site, engines: &[EngineName], mut progress: impl FnMut(&str
 
 fn components(engines: &[EngineName]) -> Vec<Component> {
     use Component::{Blender, Chromium, LibFaketime, LibLlvm, LuxCore, PovRay, PythonPackages, WebPackages};
-    let all = [PythonPackages, PovRay, LibLlvm, LibFaketime, Blender, LuxCore, WebPackages, Chromium];
+    let small = [PythonPackages, PovRay, LibLlvm, LibFaketime, Component::Libraries(&libraries::ATOMIC)];
+    let large = [Component::Libraries(&libraries::X11), Blender, LuxCore, WebPackages, Chromium];
     let named = ALL.iter().filter(|entry| is_chosen(&entry.name, engines));
     let of_release = |known: &'static Known| Some(of_release(known, entry(known.name)?));
     let releases = || engines.iter().filter_map(|name| releases::known(name)).filter_map(of_release).flatten();
     let wanted: Vec<Component> = named.flat_map(|entry| entry.installs.iter().copied()).chain(releases()).collect();
     let own = releases().filter(|c| matches!(c, Component::Release(_)));
-    all.into_iter().filter(|c| wanted.contains(c)).chain(own).collect()
+    small.into_iter().chain(large).filter(|c| wanted.contains(c)).chain(own).collect()
 }
 
 /// What a release needs: where it has packages of its own, these in place of its engine's.
@@ -134,6 +136,8 @@ enum Recipe {
     Npm,
     /// Packages of Debian, the program or library of theirs that engines use, and what installs them.
     Debian { packages: &'static [&'static str], found: fn(&Site) -> Option<PathBuf>, install: Installer },
+    /// Libraries of the system.
+    Libraries(&'static Libraries),
 }
 
 impl Recipe {
@@ -143,6 +147,7 @@ impl Recipe {
             Self::Python(environment, own) => Some(own.venv()).filter(|_| environment.is_current(own)),
             Self::Npm => site.web_packages().filter(|_| web::is_current(site)),
             Self::Debian { found, .. } => found(site),
+            Self::Libraries(libraries) => libraries.found(site),
         }
     }
 }
@@ -154,6 +159,7 @@ impl Component {
             Self::PovRay => "POV-Ray",
             Self::LibLlvm => "libLLVM",
             Self::LibFaketime => "libfaketime",
+            Self::Libraries(libraries) => libraries.name,
             Self::Blender => "Blender",
             Self::LuxCore => "LuxCore",
             Self::WebPackages => "three.js and Babylon.js",
@@ -191,6 +197,7 @@ impl Component {
             Self::LibLlvm => debian(&debian::LLVM_PACKAGES, Site::llvm, debian::install_llvm),
             Self::WebPackages => Recipe::Npm,
             Self::Chromium => debian(&debian::CHROMIUM_PACKAGES, Site::chromium, debian::install_chromium),
+            Self::Libraries(libraries) => Recipe::Libraries(libraries),
             Self::LibFaketime => debian(&debian::LIBFAKETIME_PACKAGES, Site::libfaketime, debian::install_libfaketime),
         }
     }
@@ -200,6 +207,7 @@ impl Component {
             Recipe::Python(environment, own) => environment.soundness(&own),
             Recipe::Npm => web::soundness(site),
             Recipe::Debian { packages, found, .. } => verify::debian(site, found(site), packages),
+            Recipe::Libraries(libraries) => verify::debian(site, libraries.found(site), &libraries.packages()),
         }
     }
 
@@ -208,12 +216,17 @@ impl Component {
             Recipe::Python(environment, own) => environment.install(&own, progress),
             Recipe::Npm => web::install(site, progress),
             Recipe::Debian { install, .. } => install(site, progress),
+            Recipe::Libraries(libraries) => debian::install_libraries(libraries, site, progress),
         };
         match installed {
             Ok(detail) => self.outcome(InstallState::Installed, detail),
             Err(error) if self == Self::LibLlvm => {
                 let detail = format!("Mitsuba will run its scalar_rgb variant, about 10x slower: {error}");
                 self.outcome(InstallState::Optional, detail)
+            }
+            // They may lie where the system knows and we do not; an engine that lacks them says so itself.
+            Err(error) if matches!(self, Self::Libraries(_)) => {
+                self.outcome(InstallState::Optional, format!("programs that want them will not start: {error}"))
             }
             Err(error) => self.failed(&error),
         }
@@ -238,23 +251,26 @@ impl InstallError {
 mod tests {
     use super::*;
 
+    const ATOMIC: Component = Component::Libraries(&libraries::ATOMIC);
+    const X11: Component = Component::Libraries(&libraries::X11);
+
     #[test]
     fn every_engine_gets_what_it_needs_and_no_more() {
         use Component::{LibFaketime, LibLlvm, PovRay, PythonPackages};
-        assert_eq!(components(&[]), [PythonPackages, PovRay, LibLlvm, LibFaketime]);
+        assert_eq!(components(&[]), [PythonPackages, PovRay, LibLlvm, LibFaketime, ATOMIC]);
         assert_eq!(components(&[EngineName::new("radiance")]), [PythonPackages, LibFaketime]);
         let two = [EngineName::new("povray"), EngineName::new("radiance")];
         assert_eq!(components(&two), [PythonPackages, PovRay, LibFaketime]);
-        assert_eq!(components(&[EngineName::new("mitsuba")]), [PythonPackages, LibLlvm]);
-        assert_eq!(components(&[EngineName::new("cycles")]), [Component::Blender]);
-        assert_eq!(components(&[EngineName::new("luxcore")]), [Component::LuxCore]);
+        assert_eq!(components(&[EngineName::new("mitsuba")]), [PythonPackages, LibLlvm, ATOMIC]);
+        assert_eq!(components(&[EngineName::new("cycles")]), [X11, Component::Blender]);
+        assert_eq!(components(&[EngineName::new("luxcore")]), [ATOMIC, Component::LuxCore]);
         for name in ["three", "babylon"] {
             assert_eq!(components(&[EngineName::new(name)]), [Component::WebPackages, Component::Chromium]);
         }
         let release = releases::known("mitsuba@3.5.2").unwrap();
-        assert_eq!(components(&[EngineName::new("mitsuba@3.5.2")]), [LibLlvm, Component::Release(release)]);
+        assert_eq!(components(&[EngineName::new("mitsuba@3.5.2")]), [LibLlvm, ATOMIC, Component::Release(release)]);
         // The release that the engine is, is where it is.
-        assert_eq!(components(&[EngineName::new("mitsuba@3.9.1")]), [PythonPackages, LibLlvm]);
+        assert_eq!(components(&[EngineName::new("mitsuba@3.9.1")]), [PythonPackages, LibLlvm, ATOMIC]);
         assert_eq!(components(&[EngineName::new("simulator"), EngineName::new("iesna")]), []);
     }
 

@@ -7,6 +7,7 @@ pub(super) mod tests;
 
 use self::map::Map;
 use super::cost::DirectCost;
+use super::libraries::ATOMIC;
 use super::patches::settings::{self, Settings};
 use super::patches::{self, Package};
 use super::settings::Preset;
@@ -21,7 +22,7 @@ pub(super) static ENTRY: Entry = Entry {
     name: ID,
     display_name: "LuxCore",
     colour: ("#5b4bb5", "#a89cf0"),
-    installs: &[Component::LuxCore],
+    installs: &[Component::LuxCore, Component::Libraries(&ATOMIC)],
     is_on_request: true,
     models: &[luminaire::scene::LuminaireModel::Point, luminaire::scene::LuminaireModel::Area],
     fits_coordinates: Some("recentre"),
@@ -33,6 +34,7 @@ const PACKAGE: Package = Package {
     name: "LuxCore",
     module: "pyluxcore",
     site: Site::luxcore,
+    libraries: &ATOMIC,
     probe: include_str!("../../drivers/luxcore_probe.py"),
     driver: "luxcore_read.py",
     remedy: "run `luxproof engines install luxcore`",

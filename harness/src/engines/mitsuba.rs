@@ -17,6 +17,7 @@ use super::cost::DirectCost;
 use super::dialogue::{Cost, Dialogue};
 use super::float_error::{FloatError, Instrument};
 use super::frame::Frame;
+use super::libraries::ATOMIC;
 use super::settings::Preset;
 use super::{
     Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Support, Version, Workbench,
@@ -29,7 +30,7 @@ pub(super) static ENTRY: Entry = Entry {
     name: ID,
     display_name: "Mitsuba",
     colour: ("#0067a8", "#62b5ea"),
-    installs: &[Component::PythonPackages, Component::LibLlvm],
+    installs: &[Component::PythonPackages, Component::LibLlvm, Component::Libraries(&ATOMIC)],
     is_on_request: false,
     models: &[LuminaireModel::Point, LuminaireModel::Area],
     fits_coordinates: Some("recentre"),
@@ -88,7 +89,7 @@ impl Engine for Mitsuba {
 
     fn command_by_hand(&self, _job: &Job, site: &Site) -> Option<String> {
         let plain = "python3 mitsuba_read.py job.json".to_owned();
-        Some(self.backend(site).map_or(plain, |backend| backend.command_by_hand()))
+        Some(self.backend(site).map_or(plain, |backend| backend.command_by_hand(site)))
     }
 
     fn expected_s(&self, job: &Job) -> Option<f64> {

@@ -21,6 +21,7 @@ use self::settings::Settings;
 use super::dialogue::{self, Cost, Dialogue, Seat};
 use super::float_error::{FloatError, Instrument};
 use super::frame::Frame;
+use super::libraries::Libraries;
 use super::openings::places_m;
 use super::settings::Preset;
 use super::tables::Tables;
@@ -46,6 +47,8 @@ pub(super) struct Package {
     /// What Python imports.
     pub(super) module: &'static str,
     pub(super) site: fn(&Site) -> Site,
+    /// Of the system, that it is linked with.
+    pub(super) libraries: &'static Libraries,
     pub(super) probe: &'static str,
     pub(super) driver: &'static str,
     /// What has it installed.
@@ -71,6 +74,7 @@ impl Package {
             .ok_or_else(|| absent(format!("the Python package `{}` is missing", self.module)))?;
         let folder = tempfile::tempdir().map_err(|e| absent(format!("no temporary folder: {e}")))?;
         let run = Invocation::new(&python, folder.path(), PROBE_LIMIT, folder.path().join("log"));
+        let run = self.libraries.beside(run, site);
         let probe = self.probe.as_bytes().to_vec();
         let finished = run.args(["-I", "-B", "-"]).stdin(probe).run().map_err(|e| absent(e.to_string()))?;
         // It may greet first: the answer is the last line.
@@ -86,7 +90,7 @@ impl Package {
 
     pub(super) fn command_by_hand(&self, site: &Site) -> String {
         let python = (self.site)(site).python().unwrap_or_else(|| self.python.into());
-        by_hand(python).args([self.driver, "job.json"]).command_line_with_env()
+        self.libraries.beside(by_hand(python), site).args([self.driver, "job.json"]).command_line_with_env()
     }
 
     /// What it reads of a job's files; `tables` are those that it looks up in a way of its own, none where that is what one wants to know.
@@ -105,8 +109,8 @@ impl Package {
             .ok_or_else(|| EngineError::output(self.engine.clone(), format!("has no Python; {}", self.remedy)))?;
         let threads = workbench.jobs.max(1).to_string();
         // Neither the user's Python nor its packages; scene folders stay as exported.
-        let run =
-            workbench.invoke(python).args(["-I", "-B", self.driver, "job.json", "--serve", "--threads", &threads]);
+        let run = self.libraries.beside(workbench.invoke(python), &workbench.site);
+        let run = run.args(["-I", "-B", self.driver, "job.json", "--serve", "--threads", &threads]);
         let frame = Frame::of(job, settings.coordinates);
         let instrument = Instrument { edge_deg, seat: patch(job, &frame), by_arc_cosine: true };
         let rounding = FloatError::of(job, frame, instrument);

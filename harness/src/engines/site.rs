@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use etcetera::BaseStrategy;
+use itertools::Itertools;
 
 /// Where engines are found. Layout of the folder: `venv/` (Python packages), `debian/` (unpacked Debian packages),
 /// `kernels/` (compiled by Dr.Jit),
@@ -114,9 +115,14 @@ impl Site {
         files.map(|f| f.path()).filter(|p| file_name_starts_with(p, prefix)).collect()
     }
 
+    /// A shared library by the name of its file: ours first, then the system's.
+    pub fn library(&self, name: &str) -> Option<PathBuf> {
+        self.library_folders().map(|f| f.join(name)).find(|p| p.is_file())
+    }
+
     /// The library that can hold a program's clock, which Debian keeps in a folder of its own.
     pub fn libfaketime(&self) -> Option<PathBuf> {
-        self.library_folders().map(|f| f.join("faketime/libfaketime.so.1")).find(|p| p.is_file())
+        self.library("faketime/libfaketime.so.1")
     }
 
     fn library_folders(&self) -> impl Iterator<Item = PathBuf> {
@@ -126,13 +132,21 @@ impl Site {
         roots.flat_map(move |r| [r.join(&triple), r])
     }
 
-    /// What `LD_LIBRARY_PATH` must hold for programs of our unpacked packages; `None` if there are none.
+    /// What `LD_LIBRARY_PATH` must hold for programs of our unpacked packages; `None` if there are none. Some packages keep libraries for one
+    /// another in a folder of their own.
     pub fn library_path(&self) -> Option<OsString> {
         let triple = format!("{}-linux-gnu", env::consts::ARCH);
         let folders = ["usr/lib", "lib"].map(|l| self.debian().join(l));
-        let folders = folders.into_iter().flat_map(|r| [r.join(&triple), r]);
-        let present: Vec<PathBuf> = folders.filter(|f| f.is_dir()).collect();
-        env::join_paths(present).ok().filter(|p| !p.is_empty())
+        let folders = folders.into_iter().flat_map(|r| [r.join(&triple), r]).filter(|f| f.is_dir());
+        let inner = |folder: &PathBuf| {
+            let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path());
+            entries.filter(|f| f.is_dir() && holds_libraries(f)).sorted().collect::<Vec<_>>()
+        };
+        let all = folders.flat_map(|f| {
+            let inner = inner(&f);
+            std::iter::once(f).chain(inner)
+        });
+        env::join_paths(all.unique()).ok().filter(|p| !p.is_empty())
     }
 
     /// The libLLVMs that Mitsuba may work with, best first: 19 is proven, newer ones come next; Mitsuba refuses 14, and 15
@@ -144,6 +158,11 @@ impl Site {
     pub fn llvm(&self) -> Option<PathBuf> {
         self.llvms().into_iter().next()
     }
+}
+
+fn holds_libraries(folder: &Path) -> bool {
+    let names = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.file_name());
+    names.into_iter().any(|name| name.to_str().is_some_and(|n| n.starts_with("lib") && n.contains(".so")))
 }
 
 fn llvms(libraries: Vec<PathBuf>) -> Vec<PathBuf> {

@@ -1,4 +1,4 @@
-//! POV-Ray, libLLVM and libfaketime from Debian or Ubuntu: installed as root, otherwise downloaded by apt and unpacked into the site.
+//! POV-Ray, libLLVM, libfaketime and libraries of the system from Debian or Ubuntu: installed as root, otherwise downloaded by apt and unpacked into the site.
 //!
 //! Without root, apt works on lists and caches of our own below the site; what the system already has is not fetched.
 
@@ -9,6 +9,7 @@ use itertools::Itertools;
 
 use super::{InstallError, step};
 use crate::engines::Site;
+use crate::engines::libraries::Libraries;
 use crate::system::files;
 
 pub(super) const POVRAY_PACKAGES: [&str; 1] = ["povray"];
@@ -37,6 +38,22 @@ pub(super) fn install_llvm(site: &Site, progress: &mut dyn FnMut(&str)) -> Resul
 pub(super) fn install_libfaketime(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {
     let remedy = "install libfaketime, with which rtrace's random numbers can be repeated";
     fetched(site, ("libfaketime", &LIBFAKETIME_PACKAGES), Site::libfaketime, remedy, progress)
+}
+
+pub(super) fn install_libraries(
+    libraries: &Libraries,
+    site: &Site,
+    progress: &mut dyn FnMut(&str),
+) -> Result<String, InstallError> {
+    let all: Vec<_> = libraries.missing(site).collect();
+    for (file, package) in all {
+        // One may have come with another.
+        if site.library(file).is_none() {
+            let remedy = format!("install the package that has {file}");
+            fetched(site, (file, &[*package]), |site| site.library(file), &remedy, progress)?;
+        }
+    }
+    Ok(libraries.found(site).ok_or_else(|| not_there(libraries.name, "see install.log"))?.display().to_string())
 }
 
 pub(super) fn install_chromium(site: &Site, progress: &mut dyn FnMut(&str)) -> Result<String, InstallError> {

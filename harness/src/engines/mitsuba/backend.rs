@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::ID;
 use super::settings::Settings;
+use crate::engines::libraries::ATOMIC;
 use crate::engines::workbench::by_hand;
 use crate::engines::{Absent, Site, Version, Workbench};
 use crate::system::process::Invocation;
@@ -71,8 +72,8 @@ impl Backend {
         Version::of(&ID, format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"), site, files)
     }
 
-    pub(super) fn command_by_hand(&self) -> String {
-        let run = by_hand(&self.python).args(["mitsuba_read.py", "job.json"]);
+    pub(super) fn command_by_hand(&self, site: &Site) -> String {
+        let run = ATOMIC.beside(by_hand(&self.python), site).args(["mitsuba_read.py", "job.json"]);
         match &self.llvm {
             Some(library) if self.versions.variant == "llvm_ad_rgb" => {
                 run.args(["--variant", "llvm_ad_rgb"]).env("DRJIT_LIBLLVM_PATH", library)
@@ -115,6 +116,7 @@ impl Backend {
 
 /// With a place for the kernels that Dr.Jit compiles, so that each is compiled once.
 fn with_kernels(run: Invocation, site: &Site) -> Invocation {
+    let run = ATOMIC.beside(run, site);
     let folder = site.kernels();
     // Where it cannot be made they are compiled each time, and Dr.Jit says so in the log.
     std::fs::create_dir_all(&folder).ok();

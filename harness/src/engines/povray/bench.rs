@@ -47,7 +47,7 @@ pub(super) struct Bench<'a> {
 }
 
 pub(super) fn program(site: &Site) -> Result<PathBuf, EngineError> {
-    let what = "povray is not installed; run `luxproof engines install`".to_owned();
+    let what = "povray is not installed".to_owned();
     site.program("povray").ok_or(EngineError::Solver { engine: ID, what })
 }
 
