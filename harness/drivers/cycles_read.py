@@ -20,7 +20,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import blocks
 import cycles_scene
 
-EXACT_SIDE = 4  # samples along a side of what is not sampled: they differ by where in its patch a meter is alone
+EXACT_SIDE = 16  # samples along a side of what is not sampled: they differ by where in its patch a meter is alone
 UNREADABLE_CD = 100 * cycles_scene.POINT_W / (4 * math.pi)  # what Cycles lights a scene with in place of a file that it cannot read
 
 

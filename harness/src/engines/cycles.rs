@@ -103,5 +103,5 @@ fn read_files(
     settings: Settings,
     workbench: &Workbench,
 ) -> Result<Measurement, EngineError> {
-    PACKAGE.read(files, job, settings, workbench, LookedUp::of, 2.0 * ies::EDGE_DEG)
+    PACKAGE.read(files, job, settings, workbench, LookedUp::of, ies::EDGE_DEG)
 }

@@ -1,6 +1,7 @@
 //! How far a renderer's 32-bit floats may leave direct illuminance from the exact value.
 
 use glam::DVec3;
+use luminaire::scene::Luminaire;
 
 use super::Job;
 use super::cells::{Cells, LookUp};
@@ -55,28 +56,40 @@ impl<'a> FloatError<'a> {
         let (meter, table) = (self.job.stations[k].meter, &self.tables[luminaire]);
         let luminaire = &self.job.scene.luminaires[luminaire];
         let ray_m = meter.position_m - place_m;
-        let (at, lamp) = (self.frame.to_scene(meter.position_m), self.frame.to_scene(place_m));
-        // Both points are rounded before they are subtracted.
-        let largest = at.abs().max(lamp.abs()).max_element();
-        let angle_rad = ROUNDINGS * EPSILON + (4.0 * EPSILON * largest + self.instrument.seat) / at.distance(lamp);
+        let angle_rad = self.angle_rad(place_m, k);
         let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
         if cosine < -angle_rad {
             return 0.0;
         }
         let own = luminaire.orientation.transpose() * ray_m;
-        // Near a pole a direction turns by far in C.
-        let from_axis = (own.x.hypot(own.y) / own.length()).max(angle_rad);
-        let look_up = LookUp {
-            gamma_deg: (angle_rad + self.of_arc_cosine_rad(own)).to_degrees(),
-            c_deg: (2.0 * angle_rad / from_axis).to_degrees() + 360.0 * EPSILON,
-            edge_deg: self.instrument.edge_deg,
-            relative: ROUNDINGS * EPSILON,
-        };
+        let [c_deg, gamma_deg] = self.of_angles_deg(own, angle_rad);
+        let look_up = LookUp { gamma_deg, c_deg, edge_deg: self.instrument.edge_deg, relative: ROUNDINGS * EPSILON };
         let error_cd = table.error_cd(own, look_up);
         let intensity_cd = luminaire.photometry.distribution.intensity_towards(own).value();
         let towards =
             error_cd * (cosine.max(0.0) + angle_rad) + intensity_cd * angle_rad * (1.0 + 2.0 * cosine.max(0.0));
         luminaire.flux_scale * towards / ray_m.length_squared()
+    }
+
+    /// How far the direction from a place of a luminaire to station `k` may be off in C and gamma, in degrees.
+    pub(super) fn spread_deg(&self, luminaire: &Luminaire, place_m: DVec3, k: usize) -> [f64; 2] {
+        let ray_m = self.job.stations[k].meter.position_m - place_m;
+        self.of_angles_deg(luminaire.orientation.transpose() * ray_m, self.angle_rad(place_m, k))
+    }
+
+    /// By how much a direction may be turned.
+    fn angle_rad(&self, place_m: DVec3, k: usize) -> f64 {
+        let (at, lamp) = (self.frame.to_scene(self.job.stations[k].meter.position_m), self.frame.to_scene(place_m));
+        // Both points are rounded before they are subtracted.
+        let largest = at.abs().max(lamp.abs()).max_element();
+        ROUNDINGS * EPSILON + (4.0 * EPSILON * largest + self.instrument.seat) / at.distance(lamp)
+    }
+
+    fn of_angles_deg(&self, own: DVec3, angle_rad: f64) -> [f64; 2] {
+        // Near a pole a direction turns by far in C.
+        let from_axis = (own.x.hypot(own.y) / own.length()).max(angle_rad);
+        let c = (2.0 * angle_rad / from_axis).to_degrees() + 360.0 * EPSILON;
+        [c, (angle_rad + self.of_arc_cosine_rad(own)).to_degrees()]
     }
 
     fn of_arc_cosine_rad(&self, own: DVec3) -> f64 {

@@ -121,7 +121,10 @@ impl Package {
         let of_tables_lx = |k: usize| -> f64 {
             izip!(&job.scene.luminaires, &places, &tables.of_luminaire)
                 .filter_map(|(luminaire, places, k_th)| Some((luminaire, places, looked_up.get(*k_th)?)))
-                .map(|(luminaire, places, table)| table.off_lx(luminaire, places, &job.stations[k].meter))
+                .map(|(luminaire, places, table)| {
+                    let spread_deg = |place_m| rounding.spread_deg(luminaire, place_m, k);
+                    table.off_lx(luminaire, places, &job.stations[k].meter, spread_deg)
+                })
                 .sum()
         };
         let misled = looked_up.iter().map(Resampled::misled_share).fold(0.0, f64::max);

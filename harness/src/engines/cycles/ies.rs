@@ -1,49 +1,72 @@
-//! Tables as Cycles' IES texture looks them up: resampled so finely that its cubic curves follow our straight lines.
+//! Tables as Cycles' IES texture looks them up: with values between the table's cells where nobody looks, so that its cubic curves are our straight lines.
 //!
-//! Between angles Cycles 4.5 lays a cubic through four neighbours by their numbers (`kernel/util/ies.h`), whatever the angles between
-//! them: straight where neighbours are equally far apart and in line, bent at every kink. It takes the neighbour before the first plane and
-//! behind the last one for dark, and is dark at the last angle itself. So kinks get close neighbours, planes begin and end with cells of
-//! a hair's breadth, turned away from C 0, and a row lies behind gamma 180; values where nobody looks make straight lines of
-//! the curves beside them. What is left is computed and stated, never taken off.
+//! Between angles Cycles lays a cubic through four neighbours by their numbers (`kernel/util/ies.h`), whatever the angles between them: straight
+//! where the neighbours' values are in line. So every cell of a table has neighbours of its own, in line with its ends, and where two cells meet those lie
+//! within a hair's breadth, a hair beside the angle itself. Beyond the first plane and the last one Cycles takes all for dark, and it is dark at the last
+//! angle itself: planes begin and end with cells of a hair's breadth, turned away from C 0, and a row lies behind gamma 180. What is left
+//! is computed and stated, never taken off.
 
-use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
+use luminaire::photometry::LuminousIntensityDistribution;
 
 use crate::engines::patches::ies_file;
 use crate::engines::patches::resampled::Resampled;
 
-/// Width of the cells that keep a jump, a begin or an end to itself.
-pub(super) const EDGE_DEG: f64 = 1e-3;
-/// Width of the first and the last cell of planes, where Cycles is up to 7 % off: as narrow as 32-bit floats tell apart.
+/// Between neighbours where two cells meet, in degrees: as narrow as 32-bit floats tell apart.
 const HAIR_DEG: f64 = 1e-4;
+/// So far beyond its end a row of cells goes on, in degrees: further than a patch is wide, seen from a luminaire.
+const ROW_BESIDE_DEG: f64 = 2e-3;
+/// And a plane, which near the poles is wider.
+const PLANE_BESIDE_DEG: f64 = SEAM_DEG - 3.0 * HAIR_DEG;
+/// Beyond a table's range a direction that is so near counts as its last angle.
+pub(super) const EDGE_DEG: f64 = ROW_BESIDE_DEG + 3.0 * HAIR_DEG;
 /// How far planes are turned (`SEAM_DEG` of `cycles_scene.py`), so that no direction that anyone asks for lies where they begin.
-const SEAM_DEG: f64 = 0.01;
-/// The row behind gamma 180, and those beside nadir. Nothing is looked up between the latter: an arc cosine of 32-bit floats is 0 or
+const SEAM_DEG: f64 = 0.005;
+/// The row behind gamma 180, and the one beside nadir. Nothing is looked up between the latter and nadir: an arc cosine of 32-bit floats is 0 or
 /// .0198 degrees at least.
 const BEHIND_DEG: f64 = 180.5;
-const BESIDE_NADIR_DEG: [f64; 2] = [5e-3, 1e-2];
-/// What a cubic is off at most beside a kink, in parts of what steps change there: x (1 - x)^2 / 2 at x = 1/3.
-const KINK: f64 = 2.0 / 27.0;
-/// What is left of it, in parts of the largest intensity, and the most steps that this may take.
-const WANTED: f64 = 1e-4;
-const MOST_GAMMAS: usize = 1500;
-const MOST_PLANES: usize = 730;
-const MOST_VALUES: usize = 250_000;
+const NADIR_DEG: f64 = 1e-2;
+/// Over so many points of its patch a meter is read (`EXACT_SIDE` of `cycles_read.py`, squared).
+const POINTS: f64 = 256.0;
 
-/// A row or a plane.
+/// A straight piece of a table along one of its angles, and up to where it is handed over.
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    /// Where the table knows it, in degrees.
+    own: [f64; 2],
+    /// Whether it is the darkness below or above a table's range.
+    is_dark: bool,
+    handed: [f64; 2],
+}
+
+/// A row or a plane: part of the value at one end of a cell, and of that at the other.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     deg: f64,
-    /// Where its values are not its own but what a straight line has one step before the first of two angles.
-    between: Option<(f64, f64)>,
+    cell: Cell,
+    weights: [f64; 2],
+}
+
+impl Cell {
+    /// The nodes of its ends, and their neighbours in line with them.
+    fn nodes(self, [before, after]: [f64; 2]) -> [Node; 4] {
+        let [low, high] = self.handed;
+        let width = high - low;
+        // Neighbours count one step, wherever they lie.
+        [(before, low - width), (low, low), (high, high), (after, high + width)].map(|(deg, at)| self.node(deg, at))
+    }
+
+    /// With the value that its line has at an angle.
+    fn node(self, deg: f64, at: f64) -> Node {
+        let part = (at - self.own[0]) / (self.own[1] - self.own[0]);
+        Node { deg, cell: self, weights: if self.is_dark { [0.0; 2] } else { [1.0 - part, part] } }
+    }
 }
 
 impl Node {
-    const fn at(deg: f64) -> Self {
-        Self { deg, between: None }
-    }
-
     fn value(&self, of: impl Fn(f64) -> f64) -> f64 {
-        self.between.map_or_else(|| of(self.deg), |(first, next)| 2.0 * of(first) - of(next))
+        // Angles where nothing is taken may lie outside the table.
+        let part = |k: usize| if self.weights[k] == 0.0 { 0.0 } else { self.weights[k] * of(self.cell.own[k]) };
+        part(0) + part(1)
     }
 }
 
@@ -55,50 +78,42 @@ pub(super) struct LookedUp {
     v_deg: Vec<f64>,
     /// Plane by plane.
     candela: Vec<Vec<f64>>,
+    /// Between the angles of either table, of which most are straight.
+    pieces: [Pieces; 2],
+}
+
+/// Intervals of an angle, in order.
+struct Pieces(Vec<[f64; 2]>);
+
+impl Pieces {
+    fn between(nodes: &[f64], own: impl Iterator<Item = f64>, last: f64) -> Self {
+        let mut all: Vec<f64> = nodes.iter().copied().chain(own).filter(|a| (0.0..=last).contains(a)).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        Self(all.windows(2).map(|ends| [ends[0], ends[1]]).collect())
+    }
+
+    /// The middles of those parts of a window that lie in one piece each, and which share of it each is.
+    fn within(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
+        let first = self.0.partition_point(move |[_, end]| *end <= low);
+        let inside = self.0[first..].iter().take_while(move |[begin, _]| *begin < high);
+        let clipped = inside.map(move |[begin, end]| [begin.max(low), end.min(high)]);
+        clipped.map(move |[begin, end]| (0.5 * (begin + end), (end - begin) / (high - low)))
+    }
 }
 
 impl LookedUp {
     pub(super) fn of(distribution: &LuminousIntensityDistribution) -> Self {
-        let table = distribution.padded(EDGE_DEG);
-        let full = table.full_circle();
-        let planes: Vec<&[f64]> = (0..full.c_deg().len()).map(|c| full.plane(c)).collect();
-        let rows: Vec<Vec<f64>> =
-            (0..full.gamma_deg().len()).map(|g| planes.iter().map(|plane| plane[g]).collect()).collect();
-        let is_axial = table.symmetry() == Symmetry::Axial;
-        let largest = distribution.max_intensity().value();
-        let mut steps = [
-            steps(full.gamma_deg(), &planes, largest, MOST_GAMMAS),
-            if is_axial { 1 } else { steps(full.c_deg(), &rows, largest, MOST_PLANES) },
-        ];
-        while (steps[0] * planes.len().max(1)) * steps[1] * rows.len() > MOST_VALUES && steps.iter().any(|s| *s > 1) {
-            let larger = usize::from(steps[1] > steps[0]);
-            steps[larger] = (steps[larger] / 2).max(1);
-        }
-        // What lies at the place of another's, seen from the cells beside it, so that the cubic there is straight.
-        let gamma = divided(&with_ends(full.gamma_deg(), distribution), steps[0]);
-        let [beside, nadir] = BESIDE_NADIR_DEG;
-        let first = *gamma.iter().find(|g| **g > nadir).unwrap_or(&180.0);
-        let inner: Vec<f64> = gamma.into_iter().filter(|g| *g > nadir).collect();
-        let last = inner.iter().rev().find(|g| **g < 180.0).copied().unwrap_or(nadir);
-        let rows = [Node::at(0.0), Node { deg: beside, between: Some((nadir, first)) }, Node::at(nadir)];
-        let behind = Node { deg: BEHIND_DEG, between: Some((180.0, last)) };
-        let v: Vec<Node> = rows.into_iter().chain(inner.into_iter().map(Node::at)).chain([behind]).collect();
-
-        let c = if is_axial { vec![0.0, 180.0] } else { divided(full.c_deg(), steps[1]) };
-        let end = 360.0 - 5.0 * EDGE_DEG;
-        let inner: Vec<f64> = c.iter().map(|c| c + SEAM_DEG).filter(|h| *h < end - EDGE_DEG).collect();
-        let next = inner.get(1).copied().unwrap_or(end);
-        let before = inner.last().copied().unwrap_or(0.0);
-        let begins = [Node::at(0.0), Node::at(HAIR_DEG), Node { deg: SEAM_DEG / 2.0, between: Some((SEAM_DEG, next)) }];
-        let ends = [Node::at(end), Node { deg: end + EDGE_DEG, between: Some((end, before)) }];
-        let ends = ends.into_iter().chain([360.0 - HAIR_DEG, 360.0].map(Node::at));
-        let h: Vec<Node> = begins.into_iter().chain(inner.into_iter().map(Node::at)).chain(ends).collect();
-
-        let exact = |h: f64, v: f64| table.intensity(h - SEAM_DEG, v.min(180.0)).value();
-        let at = |h: f64, v: &Node| v.value(|v| exact(h, v));
-        let candela = h.iter().map(|h| v.iter().map(|v| h.value(|h| at(h, v))).collect()).collect();
-        let degrees = |nodes: Vec<Node>| nodes.into_iter().map(|n| n.deg).collect();
-        Self { of: distribution.clone(), h_deg: degrees(h), v_deg: degrees(v), candela }
+        let v = rows(distribution.gamma_deg());
+        let h = planes(&planes_deg(distribution));
+        let along_gamma = |c: f64, v: &Node| v.value(|gamma| distribution.intensity(c, gamma).value());
+        let candela = h.iter().map(|h| v.iter().map(|v| h.value(|c| along_gamma(c, v))).collect()).collect();
+        let degrees = |nodes: Vec<Node>| nodes.into_iter().map(|n| n.deg).collect::<Vec<f64>>();
+        let (h_deg, v_deg) = (degrees(h), degrees(v));
+        let turned = planes_deg(distribution).into_iter().map(|c| c + SEAM_DEG);
+        let along_c = Pieces::between(&h_deg, turned, 360.0);
+        let along_gamma = Pieces::between(&v_deg, distribution.gamma_deg().iter().copied(), 180.0);
+        Self { of: distribution.clone(), h_deg, v_deg, candela, pieces: [along_c, along_gamma] }
     }
 
     /// As an LM-63 file.
@@ -124,47 +139,95 @@ impl Resampled for LookedUp {
         let of = |k: Option<usize>| k.and_then(|k| self.candela.get(k)).map_or(0.0, along_gamma);
         cubic([of(k.checked_sub(1)), of(Some(k)), of(Some(k + 1)), of(Some(k + 2))], x).max(0.0)
     }
+
+    fn off_about_cd(&self, c_deg: f64, gamma_deg: f64, spread_deg: [f64; 2]) -> f64 {
+        let [by_c, by_gamma] = [spread_deg[0].clamp(1e-9, 180.0), spread_deg[1].max(1e-9)];
+        let h = (c_deg + SEAM_DEG).rem_euclid(360.0);
+        let (rows, columns) = (
+            [(gamma_deg - by_gamma).max(NADIR_DEG), (gamma_deg + by_gamma).clamp(2.0 * NADIR_DEG, 180.0)],
+            [h - by_c, h + by_c],
+        );
+        let (mut mean, mut worst) = (0.0, 0.0_f64);
+        // A window over the seam is two.
+        for turn in [-360.0, 0.0, 360.0] {
+            for (h, wide) in self.pieces[0].within(columns.map(|h| h + turn)) {
+                for (gamma, high) in self.pieces[1].within(rows) {
+                    let off = self.off_cd(h - SEAM_DEG, gamma);
+                    mean += wide * high * off;
+                    worst = worst.max(off);
+                }
+            }
+        }
+        // Twice what evenly spread points would see, and one point more; in the middle of a piece it is half of the worst at least.
+        2.0 * (mean + worst / POINTS)
+    }
+
+    /// From the middle of every piece: those where cells meet are too narrow for any grid.
+    fn misled_share(&self) -> f64 {
+        let (mut off, mut all) = (0.0, f64::MIN_POSITIVE);
+        for (gamma, high) in self.pieces[1].within([0.0, 180.0]) {
+            for (h, wide) in self.pieces[0].within([0.0, 360.0]) {
+                let weight = wide * high * gamma.to_radians().sin();
+                off += weight * self.off_cd(h - SEAM_DEG, gamma);
+                all += weight * self.of.intensity(h - SEAM_DEG, gamma).value();
+            }
+        }
+        off / all
+    }
 }
 
-/// Into how many steps every cell is divided, so that cubics keep to what is wanted.
-fn steps<R: AsRef<[f64]>>(angles: &[f64], tables: &[R], largest: f64, most: usize) -> usize {
-    let cells = angles.len().saturating_sub(1).max(1);
-    let is_wide = |k: usize| k + 1 < angles.len() && angles[k + 1] - angles[k] > 2.0 * EDGE_DEG;
-    let mut kink = 0.0_f64;
-    for table in tables {
-        let table = table.as_ref();
-        let change = |k: usize| if is_wide(k) { table[k + 1] - table[k] } else { 0.0 };
-        kink = (0..cells.saturating_sub(1)).fold(kink, |kink, k| kink.max((change(k + 1) - change(k)).abs()));
-    }
-    let wanted = KINK * kink / (WANTED * largest).max(f64::MIN_POSITIVE);
-    (wanted.ceil() as usize).clamp(1, (most / cells).max(1))
+/// The table's planes over the full circle, but for those that lie where planes end.
+fn planes_deg(distribution: &LuminousIntensityDistribution) -> Vec<f64> {
+    let at_end = 360.0 - 10.0 * SEAM_DEG;
+    distribution.full_circle().c_deg().iter().copied().filter(|c| *c <= at_end || *c == 360.0).collect()
 }
 
-/// The angles with others a hair inside a table's ends, where it jumps, and a hair behind the jump.
-fn with_ends(angles: &[f64], distribution: &LuminousIntensityDistribution) -> Vec<f64> {
-    let own = distribution.gamma_deg();
-    let (first, last) = (own[0], own[own.len() - 1]);
-    let mut all = angles.to_vec();
-    if first > 0.0 {
-        all.extend([first + EDGE_DEG, first - 2.0 * EDGE_DEG]);
-    }
-    if last < 180.0 {
-        all.extend([last - EDGE_DEG, last + 2.0 * EDGE_DEG]);
-    }
-    all.retain(|g| (0.0..=180.0).contains(g));
-    all.sort_by(f64::total_cmp);
-    all.dedup();
-    all
+/// Rows from nadir to what lies behind the zenith.
+fn rows(gamma_deg: &[f64]) -> Vec<Node> {
+    let ends = [gamma_deg[0], gamma_deg[gamma_deg.len() - 1]];
+    let mut cells = cells(gamma_deg);
+    let dark = |own: [f64; 2]| (own[0] < own[1]).then_some(Cell { own, is_dark: true, handed: own });
+    cells.splice(0..0, dark([0.0, ends[0]]));
+    cells.extend(dark([ends[1], 180.0]));
+    let nadir = NADIR_DEG.min(cells[0].own[1] / 8.0);
+    cells[0].handed[0] = nadir;
+    let nodes = joined(cells, ROW_BESIDE_DEG, [nadir / 2.0, BEHIND_DEG]);
+    [nodes[0].cell.node(0.0, 0.0)].into_iter().chain(nodes).collect()
 }
 
-/// The angles with every wide cell in so many equal steps.
-fn divided(angles: &[f64], steps: usize) -> Vec<f64> {
-    let cell = |ends: &[f64]| {
-        let (low, high) = (ends[0], ends[1]);
-        let steps = if high - low > 2.0 * EDGE_DEG { steps } else { 1 };
-        (0..steps).map(move |k| low + (high - low) * k as f64 / steps as f64).collect::<Vec<_>>()
-    };
-    angles.windows(2).flat_map(cell).chain(angles.last().copied()).collect()
+/// Planes of the full circle, turned.
+fn planes(c_deg: &[f64]) -> Vec<Node> {
+    let mut cells = cells(c_deg);
+    let last = cells.len() - 1;
+    let (begin, end) = (-SEAM_DEG, 360.0 - SEAM_DEG);
+    (cells[0].handed[0], cells[last].handed[1]) = (begin + 3.0 * HAIR_DEG, end - 3.0 * HAIR_DEG);
+    let nodes = joined(cells, PLANE_BESIDE_DEG, [begin + 2.0 * HAIR_DEG, end - 2.0 * HAIR_DEG]);
+    let (first, behind) = (nodes[0].cell, nodes[nodes.len() - 1].cell);
+    let begins = [begin, begin + HAIR_DEG].map(|c| first.node(c, first.handed[0]));
+    let ends = [end - HAIR_DEG, end].map(|c| behind.node(c, behind.handed[1]));
+    let turned = |node: Node| Node { deg: node.deg + SEAM_DEG, ..node };
+    begins.into_iter().chain(nodes).chain(ends).map(turned).collect()
+}
+
+fn cells(angles: &[f64]) -> Vec<Cell> {
+    angles.windows(2).map(|ends| Cell { own: [ends[0], ends[1]], is_dark: false, handed: [ends[0], ends[1]] }).collect()
+}
+
+/// The nodes of cells of which each begins where the one before ends, between neighbours at two angles.
+fn joined(mut cells: Vec<Cell>, beside_deg: f64, ends: [f64; 2]) -> Vec<Node> {
+    let mut neighbours = vec![ends; cells.len()];
+    for k in 1..cells.len() {
+        let at = cells[k].own[0];
+        // Beside light the dark side gives way, else the one behind; a narrow cell gives no more than a quarter.
+        let into_before = cells[k - 1].is_dark;
+        let gives = cells[if into_before { k - 1 } else { k }].own;
+        let scale = ((gives[1] - gives[0]) / (4.0 * (beside_deg + 3.0 * HAIR_DEG))).min(1.0);
+        let step = |n: f64| (beside_deg + n * HAIR_DEG) * scale;
+        let place = |n: f64| if into_before { at - step(3.0 - n) } else { at + step(n) };
+        (cells[k - 1].handed[1], neighbours[k - 1][1]) = (place(0.0), place(1.0));
+        (neighbours[k][0], cells[k].handed[0]) = (place(2.0), place(3.0));
+    }
+    cells.into_iter().zip(neighbours).flat_map(|(cell, beside)| cell.nodes(beside)).collect()
 }
 
 /// The cell that an angle lies in, and where in it; the last angle lies in none.
@@ -185,29 +248,39 @@ mod tests {
     use crate::engines::fixtures::{axial_uplight, lambertian, lopsided, quadrant, random_table};
 
     #[test]
-    fn what_cycles_looks_up_is_the_table_but_for_little() {
-        for distribution in [axial_uplight(), lopsided(), quadrant(), lambertian()] {
+    fn what_cycles_looks_up_is_the_table_but_where_cells_meet() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let known = [axial_uplight(), lopsided(), quadrant(), lambertian()];
+        for distribution in known.into_iter().chain((0..8).map(|_| random_table(&mut random))) {
             let table = LookedUp::of(&distribution);
             let largest = distribution.max_intensity().value();
-            let mut worst = 0.0_f64;
-            for k in 0..360 {
-                for j in 0..=360 {
-                    let (c, gamma) = (f64::from(k), 0.5 * f64::from(j));
-                    worst = worst.max((table.intensity_cd(c, gamma) - distribution.intensity(c, gamma).value()).abs());
+            let at = |c, gamma| (table.intensity_cd(c, gamma) - distribution.intensity(c, gamma).value()).abs();
+            for k in (0..360).step_by(5) {
+                for j in 0..=180 {
+                    // At the table's own angles, and as far beside them as 32-bit floats may miss them.
+                    for beside in [0.0, 1e-5, -1e-5] {
+                        let (c, gamma) = (f64::from(k) + beside, (f64::from(j) + beside).clamp(0.0, 180.0));
+                        let meet = |angles: &[f64], at: f64| angles.iter().any(|a| a + 1e-4 < at && at < a + 0.01);
+                        let at_end = distribution.gamma_deg().iter().any(|g| (g - gamma).abs() < 1e-4);
+                        let (off, edge) = (at(c, gamma), largest * beside.abs());
+                        let is_known =
+                            at_end || meet(distribution.gamma_deg(), gamma) || meet(&planes_deg(&distribution), c);
+                        assert!(off < 1e-12 * largest + edge || is_known, "{off} of {largest} at C {c}, gamma {gamma}");
+                    }
                 }
             }
-            assert!(worst < 5e-4 * largest, "{worst} of {largest}");
             assert!(table.misled_share() < 3e-4, "{}", table.misled_share());
         }
     }
 
     #[test]
-    fn any_table_is_a_file_of_bounded_size_that_keeps_most_of_its_flux() {
+    fn any_table_is_a_file_of_bounded_size() {
         let mut random = fastrand::Rng::with_seed(4);
         for _ in 0..20 {
             let table = LookedUp::of(&random_table(&mut random));
-            assert!(table.h_deg.len() * table.v_deg.len() < 2 * MOST_VALUES);
-            assert!(table.h_deg.is_sorted() && table.v_deg.is_sorted() && table.misled_share() < 0.01);
+            let (c, gamma) = (planes_deg(&table.of).len(), table.of.gamma_deg().len());
+            assert!(table.h_deg.len() <= 4 * c + 4 && table.v_deg.len() <= 4 * gamma + 8);
+            assert!(table.h_deg.windows(2).chain(table.v_deg.windows(2)).all(|ends| ends[0] < ends[1]));
             assert_eq!((table.h_deg[0], table.v_deg[0], table.h_deg.last()), (0.0, 0.0, Some(&360.0)));
         }
     }

@@ -16,13 +16,28 @@ pub(in crate::engines) trait Resampled {
         (self.intensity_cd(c_deg, gamma_deg) - self.table().intensity(c_deg, gamma_deg).value()).abs()
     }
 
-    /// How far its look-up leaves the light of a luminaire at a meter from the table's own, in lux, where equal parts of it come from these places.
-    fn off_lx(&self, luminaire: &Luminaire, places: &[DVec3], meter: &Meter) -> f64 {
+    /// The same about a direction, up to so far to either side in C and gamma.
+    fn off_about_cd(&self, c_deg: f64, gamma_deg: f64, _spread_deg: [f64; 2]) -> f64 {
+        self.off_cd(c_deg, gamma_deg)
+    }
+
+    /// How far its look-up leaves the light of a luminaire at a meter from the table's own, in lux, where equal parts of it come from these places;
+    /// how far directions from a place are spread, in degrees of C and gamma, is asked for.
+    fn off_lx(
+        &self,
+        luminaire: &Luminaire,
+        places: &[DVec3],
+        meter: &Meter,
+        spread_deg: impl Fn(DVec3) -> [f64; 2],
+    ) -> f64
+    where
+        Self: Sized,
+    {
         let of_place = |place_m: &DVec3| {
             let ray_m = meter.position_m - *place_m;
             let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
             let (c, gamma) = angles_deg(luminaire.orientation.transpose() * ray_m);
-            self.off_cd(c, gamma) * cosine.max(0.0) / ray_m.length_squared()
+            self.off_about_cd(c, gamma, spread_deg(*place_m)) * cosine.max(0.0) / ray_m.length_squared()
         };
         luminaire.flux_scale * places.iter().map(of_place).sum::<f64>() / places.len() as f64
     }
