@@ -30,8 +30,11 @@ const TEST_S: f64 = 1.1e-7;
 const FIRST_REFLECTION: f64 = 1.35;
 /// The part of the time that the fewest blocks may take.
 const FIRST_BLOCKS: f64 = 0.9;
-/// Processes for each thread: one that is started alone sleeps most of .7 s, waiting for its own threads in steps of 50 ms.
-pub(super) const SIDE_BY_SIDE: usize = 3;
+/// Processes for each thread at most: one that is started alone sleeps most of .7 s, waiting for its own threads in steps of 50 ms.
+pub(super) const SIDE_BY_SIDE: usize = 12;
+/// What a process sleeps, and what it computes before its rays, in seconds.
+const SLEEP_S: f64 = 0.6;
+const START_S: f64 = 0.05;
 /// Looks at direct light at most: each narrows a reading by 1e3 at least.
 const MAX_LOOKS: usize = 10;
 /// Below this share of its upper bound a reading is darkness.
@@ -222,7 +225,9 @@ impl<'a> Bench<'a> {
         // The pilot is the first of the sequence of seeds.
         let parts = |k| self.parts(Run { seed: self.seed(k + 1), ..run }).into_iter().map(move |part| (k, part));
         let all: Vec<(usize, (f64, Run))> = numbers.clone().flat_map(parts).collect();
-        let side = SIDE_BY_SIDE * self.workbench.jobs.max(1);
+        // As many as compute while others sleep.
+        let for_each_thread = (1.0 + SLEEP_S / (START_S + pilot.work_s)).ceil() as usize;
+        let side = for_each_thread.min(SIDE_BY_SIDE) * self.workbench.jobs.max(1);
         let read = side_by_side(side, &all, |(_, (_, run))| self.values(*run, pilot));
         let mut blocks = vec![vec![0.0; self.job.stations.len()]; numbers.len()];
         for ((k, (sign, _)), values) in all.into_iter().zip(read) {
