@@ -35,12 +35,14 @@ impl Cells {
             return 0.0;
         }
         let rows = about(angles, gamma, reach);
-        let is_at_the_end = (first > 0.0 && gamma < first + reach) || (last < 180.0 && gamma > last - reach);
+        // Where a table ends short of a pole, it falls from what its last row has.
+        let begins = (first > 0.0 && gamma < first + reach).then_some(0);
+        let ends_here = (last < 180.0 && gamma > last - reach).then_some(angles.len() - 1);
         // Between planes an intensity changes by what is linear in gamma from row to row.
         let ends = [gamma - reach, gamma + reach].map(|g| g.clamp(first, last));
         let inner = angles.iter().copied().filter(|g| (ends[0]..=ends[1]).contains(g));
         let about_gamma: Vec<f64> = ends.into_iter().chain(inner).collect();
-        let (mut largest, mut along_gamma, mut along_c) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let (mut largest, mut fall, mut along_gamma, mut along_c) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
         let planes = self.0.c_deg();
         for k in 0..planes.len() - 1 {
             let is_near = |c: f64| planes[k] <= c + look_up.c_deg && planes[k + 1] >= c - look_up.c_deg;
@@ -48,6 +50,9 @@ impl Cells {
                 continue;
             }
             let (low, high) = (self.0.plane(k), self.0.plane(k + 1));
+            for g in begins.into_iter().chain(ends_here) {
+                fall = fall.max(low[g]).max(high[g]);
+            }
             for g in rows.clone() {
                 largest = largest.max(low[g]).max(high[g]);
                 if g > *rows.start() {
@@ -61,7 +66,7 @@ impl Cells {
             }
         }
         let turned = (along_gamma * reach).min(largest) + (along_c * look_up.c_deg).min(largest);
-        turned + look_up.relative * largest + if is_at_the_end { largest } else { 0.0 }
+        turned + look_up.relative * largest + fall
     }
 }
 
@@ -99,6 +104,18 @@ mod tests {
         }
         // A bound that says nothing would pass, too.
         assert!(dark > 2_000 && tight > 1_000, "{dark} {tight}");
+    }
+
+    #[test]
+    fn a_table_that_ends_dark_falls_from_nothing() {
+        let table = |end: f64| {
+            let cosine = (0..=9).map(|k| 1000.0 * (1.0 - f64::from(k) / 9.0) + end).collect();
+            LuminousIntensityDistribution::new(vec![0.0], (0..=9).map(|k| 10.0 * f64::from(k)).collect(), cosine)
+                .unwrap()
+        };
+        let look_up = LookUp { gamma_deg: 1e-4, c_deg: 1e-4, edge_deg: 1e-3, relative: 1e-6 };
+        let error = |end: f64| Cells::of(&table(end)).error_cd(direction(0.0, 90.0), look_up);
+        assert!(error(0.0) < 0.01 && (error(50.0) - 50.0).abs() < 0.01, "{} {}", error(0.0), error(50.0));
     }
 
     #[test]
