@@ -107,7 +107,7 @@ def area_luminaire(name, table, scale, placed, shape, size, upwards):
     tree.links.new(luminance.outputs["Value"], emission.inputs["Strength"])
 
 
-SEAM_DEG = 0.005  # the files' planes are turned so far: Cycles is dark in the plane where its table begins and ends
+SEAM_DEG = 0.03  # the files' planes are turned so far: Cycles is dark in the plane where its table begins and ends
 
 
 def file_planes(tree, direction, upwards):

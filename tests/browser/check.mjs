@@ -16,6 +16,21 @@ async function accessible(page, place) {
   check(place, passes.length > 10, "axe found next to nothing to check");
 }
 
+// What of the page's text the screen cuts off; a closed part shows none.
+async function cut(page, width, place) {
+  const found = await page.evaluate((width) => {
+    const says = [];
+    for (const element of document.querySelectorAll("nav *, main *")) {
+      const own = [...element.childNodes].some((n) => n.nodeType === Node.TEXT_NODE && n.textContent.trim());
+      if (!own || element.closest(".unseen, script, dialog:not([open])") || !element.checkVisibility({ visibilityProperty: true })) continue;
+      const box = element.getBoundingClientRect();
+      if (box.width > 0 && (box.right > width + 1 || box.left < -1)) says.push(`${element.tagName} "${element.textContent.trim().slice(0, 40)}" to ${Math.round(box.right)}`);
+    }
+    return says;
+  }, width);
+  check(place, found.length === 0, `${found.length} texts are cut off: ${found.slice(0, 3).join("; ")}`);
+}
+
 async function filters(page, place) {
   const box = page.locator(".readings").first();
   const visible = () => box.locator("tbody tr:not([hidden])").count();
@@ -97,6 +112,7 @@ for (const file of process.argv.slice(2)) {
       const wide = await page.evaluate(() => document.documentElement.scrollWidth);
       check(place, wide <= width, `it is ${wide} wide`);
       check(place, (await page.locator("figure svg").count()) > 0, "no plot is drawn");
+      await cut(page, width, place);
       await accessible(page, place);
       await theme(page, place);
       if (colorScheme === "light") {

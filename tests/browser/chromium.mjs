@@ -18,7 +18,7 @@ function program() {
   throw new Error("no Chromium: install Debian's package `chromium`, or name the program in CHROMIUM");
 }
 
-/** A browser; `open` gives a page of a report and what went wrong in it. */
+/** A browser; `open` gives a page of a report and what went wrong in it, `blank` an empty page. */
 export async function start() {
   const browser = await chromium.launch({ executablePath: program(), args: FLAGS });
   const open = async (file, { width, colorScheme = "light", scale = 1, height = 900 }) => {
@@ -31,5 +31,6 @@ export async function start() {
     await page.goto(pathToFileURL(file).href);
     return { page, troubles };
   };
-  return { open, close: () => browser.close() };
+  const blank = async (viewport) => ({ page: await (await browser.newContext({ viewport })).newPage() });
+  return { open, blank, close: () => browser.close() };
 }

@@ -62,6 +62,11 @@ impl Screen {
         line.chars().take(most - 1).chain(['…']).collect()
     }
 
+    /// A line on as many as it takes.
+    fn whole(self, line: &str) -> String {
+        wrapped(line, self.width, "  ")
+    }
+
     /// A table whose columns of engines stand side by side as far as there is room, and below one another beyond.
     fn fitted(self, engines: usize, draw: impl Fn(Range<usize>, Style) -> String) -> String {
         let fits = |range| draw(range, Style::Plain).lines().all(|line| line.chars().count() <= self.width);
@@ -87,9 +92,9 @@ const fn colour(verdict: Verdict) -> Color {
 pub fn terminal(report: &Report, screen: Screen, folder: Option<&str>) -> String {
     let mut text = String::new();
     let tool = if report.tool.version.is_empty() { report.tool_version.clone() } else { report.tool.to_string() };
-    writeln!(text, "\nluxproof {tool}: {}\n", report.spec.title).ok();
-    let said = sentences(report).into_iter().map(|s| wrapped(&s.text, screen.width - 2, "    "));
-    section(&mut text, HEADING, said);
+    writeln!(text, "\n{}\n", screen.whole(&format!("luxproof {tool}: {}", report.spec.title))).ok();
+    let indented = |line: String| wrapped(&line, screen.width - 2, "    ");
+    section(&mut text, HEADING, sentences(report).into_iter().map(|s| indented(s.text)));
     for line in lacking(report) {
         writeln!(text, "{line}\n").ok();
     }
@@ -104,23 +109,24 @@ pub fn terminal(report: &Report, screen: Screen, folder: Option<&str>) -> String
     let most = if screen.detail == Detail::All { usize::MAX } else { BRIEF };
     // In full: without who is independent of whom a claim says nothing.
     let departures = departures(report).into_iter().take(most);
-    section(&mut text, "Who departs from the other witnesses, the reference included", departures);
+    section(&mut text, "Who departs from the other witnesses, the reference included", departures.map(indented));
     let diagnoses = diagnoses(report).into_iter().take(most).map(|line| screen.shortened(&line));
     section(&mut text, "What explains failures", diagnoses);
     let line = |c: &Comparison| format!("{}{}", report.of_suite(&c.key.case, ": "), deviation_line(c));
     let worst = worst(report, 5).into_iter().map(|c| screen.shortened(&line(c)));
     section(&mut text, "Worst deviations (by verdict, then deviation over tolerance)", worst);
-    section(&mut text, "What does not fit in published tables", notes::tables(report).into_iter());
+    section(&mut text, "What does not fit in published tables", notes::tables(report).into_iter().map(indented));
     baseline(report, screen, &mut text);
     told(report, screen, &mut text);
     let engines = std::iter::once(engines_line(report)).chain(policies(report));
     for line in engines.chain(decision_rules(report).into_iter().map(str::to_owned)) {
-        writeln!(text, "{}", wrapped(&line, screen.width, "  ")).ok();
+        writeln!(text, "{}", screen.whole(&line)).ok();
     }
-    writeln!(text, "\n{}", wrapped(&format!("{} in {:.1} s", report.summary, report.wall_s), screen.width, "  ")).ok();
+    writeln!(text, "\n{}", screen.whole(&format!("{} in {:.1} s", report.summary, report.wall_s))).ok();
     if let Some(folder) = folder {
         let more = if report.is_long() { ", comparisons.jsonl, report-pages/" } else { "" };
-        writeln!(text, "files: {folder}/report.html, report.json{more}, readings/, scenes/<engine>/, logs/").ok();
+        let files = format!("files: {folder}/report.html, report.json{more}, readings/, scenes/<engine>/, logs/");
+        writeln!(text, "{}", screen.whole(&files)).ok();
     }
     text
 }
@@ -161,7 +167,8 @@ fn tables(report: &Report, screen: Screen, text: &mut String) {
             writeln!(text, "{table}\n").ok();
         }
     }
-    let splits = splits(report).into_iter().map(|(place, split)| format!("{place}: {split}"));
+    let split = |(place, split)| wrapped(&format!("{place}: {split}"), screen.width - 2, "    ");
+    let splits = splits(report).into_iter().map(split);
     section(text, "Methods apart from renderers (where they differ most)", splits);
 }
 
@@ -241,22 +248,22 @@ fn of_sets(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<St
     }
     let figures: [(&str, Figure); 3] =
         [("mean [lx]", |s| Some(s.mean)), ("minimum [lx]", |s| Some(s.minimum)), ("uniformity", |s| s.uniformity)];
-    let rows = |range: &Range<usize>| {
-        let of_set = |(set, meters): &(&str, usize)| {
+    let of_set = |(set, meters): &(&str, usize)| {
+        let rows = |range: &Range<usize>| {
             figures.map(|(name, figure)| {
                 let of = |engine: &&str| mine.iter().find(|s| s.set == *set && s.key.engine == **engine);
                 let cell = |e| of(e).and_then(|s| figure(s)).map_or("-".to_owned(), |x| estimate(&x));
-                let head = format!("  {set} ({meters} meters): {name}");
+                let head = format!("  {name}");
                 std::iter::once(head).chain(engines[range.clone()].iter().map(cell)).collect::<Vec<String>>()
             })
         };
-        sets.iter().flat_map(of_set).collect::<Vec<_>>()
+        let table = screen.fitted(engines.len(), |range, style| {
+            let heads = std::iter::once("").chain(engines[range.clone()].iter().copied());
+            drawn(heads, rows(&range), 1..usize::MAX, style)
+        });
+        format!(" {}\n{table}", screen.whole(&format!("{procedure}, {set} ({meters} meters)")))
     };
-    Some(screen.fitted(engines.len(), |range, style| {
-        let heads =
-            std::iter::once(procedure.to_string()).chain(engines[range.clone()].iter().map(ToString::to_string));
-        drawn(heads, rows(&range), 1..usize::MAX, style)
-    }))
+    Some(sets.iter().map(of_set).join("\n\n"))
 }
 
 /// The readings of one procedure, engines side by side; `None` where the meters are too many to list.

@@ -19,10 +19,11 @@ pub(super) fn estimate(of: &Estimate) -> String {
     }
 }
 
-/// A text in lines of so many letters, but for words that are longer; lines after the first are indented.
+/// A text in lines of so many letters, but for words that are longer; lines after the first are indented, and no number loses its `%`.
 pub(super) fn wrapped(text: &str, width: usize, indent: &str) -> String {
     let mut lines = vec![String::new()];
-    for word in text.split(' ') {
+    let whole = text.replace(" %", "\u{a0}%");
+    for word in whole.split(' ') {
         let mut last = lines.pop().unwrap_or_default();
         let is_first = last.trim().is_empty();
         if !is_first && last.chars().count() + 1 + word.chars().count() > width {
@@ -32,7 +33,7 @@ pub(super) fn wrapped(text: &str, width: usize, indent: &str) -> String {
         }
         lines.push(last);
     }
-    lines.join("\n")
+    lines.join("\n").replace('\u{a0}', " ")
 }
 
 /// A value with the half width of its interval in two digits, `2.0123 +- 0.0021`; six significant digits where that is below them.

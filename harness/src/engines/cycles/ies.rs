@@ -14,13 +14,13 @@ use crate::engines::patches::resampled::Resampled;
 /// Between neighbours where two cells meet, in degrees: as narrow as 32-bit floats tell apart.
 const HAIR_DEG: f64 = 1e-4;
 /// So far beyond its end a row of cells goes on, in degrees: further than a patch is wide, seen from a luminaire.
-const ROW_BESIDE_DEG: f64 = 2e-3;
+const ROW_BESIDE_DEG: f64 = 5e-3;
 /// And a plane, which near the poles is wider.
 const PLANE_BESIDE_DEG: f64 = SEAM_DEG - 3.0 * HAIR_DEG;
 /// Beyond a table's range a direction that is so near counts as its last angle.
 pub(super) const EDGE_DEG: f64 = ROW_BESIDE_DEG + 3.0 * HAIR_DEG;
 /// How far planes are turned (`SEAM_DEG` of `cycles_scene.py`), so that no direction that anyone asks for lies where they begin.
-const SEAM_DEG: f64 = 0.005;
+const SEAM_DEG: f64 = 0.03;
 /// The row behind gamma 180, and the one beside nadir. Nothing is looked up between the latter and nadir: an arc cosine of 32-bit floats is 0 or
 /// .0198 degrees at least.
 const BEHIND_DEG: f64 = 180.5;
@@ -260,7 +260,7 @@ mod tests {
                     // At the table's own angles, and as far beside them as 32-bit floats may miss them.
                     for beside in [0.0, 1e-5, -1e-5] {
                         let (c, gamma) = (f64::from(k) + beside, (f64::from(j) + beside).clamp(0.0, 180.0));
-                        let meet = |angles: &[f64], at: f64| angles.iter().any(|a| a + 1e-4 < at && at < a + 0.01);
+                        let meet = |angles: &[f64], at: f64| angles.iter().any(|a| a + 1e-4 < at && at < a + 0.04);
                         let at_end = distribution.gamma_deg().iter().any(|g| (g - gamma).abs() < 1e-4);
                         let (off, edge) = (at(c, gamma), largest * beside.abs());
                         let is_known =

@@ -145,12 +145,10 @@ impl Resampled for Map {
         let off = (read - right).abs() + MEAN_OFF * read.max(right);
         // Where a table ends with light short of a pole, a texel is a ramp of it, on which no direction is known well enough.
         let angles = self.of.gamma_deg();
-        let is_at = |end: f64| end > 0.0 && end < 180.0 && (gamma_deg - end).abs() < 1.5 * self.texel_deg();
-        if is_at(angles[0]) || is_at(angles[angles.len() - 1]) {
-            off + self.of.max_intensity().value() * ANGLE_DEG / self.texel_deg()
-        } else {
-            off
-        }
+        let is_at = |end: &f64| *end > 0.0 && *end < 180.0 && (gamma_deg - end).abs() < 1.5 * self.texel_deg();
+        let ends = [angles[0], angles[angles.len() - 1]].into_iter().filter(is_at);
+        let ramp = ends.map(|end| self.of.intensity(c_deg, end).value()).fold(0.0, f64::max);
+        off + ramp * ANGLE_DEG / self.texel_deg()
     }
 }
 

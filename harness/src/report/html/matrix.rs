@@ -84,9 +84,9 @@ fn drawn(
     judged: &dyn Fn(&Judged<'_>, [&str; 3]) -> Markup,
 ) -> Markup {
     match cell {
-        Cell::IsReference => html! { td.quiet { "reference" } },
-        Cell::Skipped => html! { td.quiet { a href="#notes" { "skipped" } } },
-        Cell::Empty => html! { td.quiet { "–" } },
+        Cell::IsReference => html! { td.quiet data-engine=(key[2]) { "reference" } },
+        Cell::Skipped => html! { td.quiet data-engine=(key[2]) { a href="#notes" { "skipped" } } },
+        Cell::Empty => html! { td.quiet.empty { "–" } },
         Cell::Judged { verdict, having, of, deviation, first } => {
             let [_, basis, engine] = key;
             let words = &html! {
@@ -102,12 +102,12 @@ fn drawn(
 
 fn opening(cell: &Judged<'_>, [case, basis, engine]: [&str; 3]) -> Markup {
     html! {
-        td class={ "v-" (class(cell.verdict)) } {
+        td class={ "v-" (class(cell.verdict)) } data-engine=(engine) {
             button.open type="button" data-case=(case) data-procedure=(cell.procedure) data-basis=(basis) data-engine=(engine){ (cell.words) }
         }
     }
 }
 
-pub(super) fn linked(cell: &Judged<'_>, _: [&str; 3], to: &str) -> Markup {
-    html! { td class={ "v-" (class(cell.verdict)) } { a.to href=(to) { (cell.words) } } }
+pub(super) fn linked(cell: &Judged<'_>, [.., engine]: [&str; 3], to: &str) -> Markup {
+    html! { td class={ "v-" (class(cell.verdict)) } data-engine=(engine) { a.to href=(to) { (cell.words) } } }
 }

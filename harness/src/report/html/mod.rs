@@ -14,6 +14,7 @@ mod provenance;
 mod rows;
 mod sheets;
 
+use itertools::Itertools;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::Report;
@@ -69,7 +70,7 @@ fn written(report: &Report, beside: &[Beside], pages: Option<&Pages<'_>>) -> Str
                 nav aria-label="Sections" {
                     div.bar {
                         a.brand href="#top" { "luxproof" }
-                        ul { @for (id, name, _) in &sections { li { a href={ "#" (id) } { (name) } } } }
+                        ul { @for (id, name) in in_navigation(&sections) { li { a href={ "#" (id) } { (name) } } } }
                         button.theme type="button" { "Dark" }
                     }
                 }
@@ -92,6 +93,12 @@ fn written(report: &Report, beside: &[Beside], pages: Option<&Pages<'_>>) -> Str
         }
     };
     page.into_string()
+}
+
+/// Sections of one kind, as `Calibration: point`, have one entry: the first's.
+fn in_navigation(sections: &[(String, String, Markup)]) -> impl Iterator<Item = (&str, &str)> {
+    let kinds = sections.iter().map(|(id, name, _)| (&**id, name.split(": ").next().unwrap_or(name)));
+    kinds.unique_by(|(_, kind)| *kind)
 }
 
 /// Every section with its id and its name in the navigation.
@@ -142,8 +149,6 @@ fn head(report: &Report) -> Markup {
             }
             h1 { (report.spec.title) }
             p.spec { code { (report.spec.path) } }
-            @for line in super::notes::decision_rules(report) { p.spec { (line) } }
-            @for line in super::notes::policies(report).into_iter().chain(super::notes::lacking(report)) { p.spec { (line) } }
             @let sentences = sentences(report);
             @if !sentences.is_empty() {
                 h2.trust { (HEADING) }
@@ -162,6 +167,8 @@ fn head(report: &Report) -> Markup {
                 } }
                 div { dt { "skipped" } dd { (s.skipped) } }
             }
+            @for line in super::notes::decision_rules(report) { p.ruled { (line) } }
+            @for line in super::notes::policies(report).into_iter().chain(super::notes::lacking(report)) { p.ruled { (line) } }
         }
     }
 }
