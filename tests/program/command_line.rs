@@ -46,6 +46,25 @@ fn refused_files(spec: &str, lamp: &str, place: &str, says: &str) {
 }
 
 #[test]
+fn a_report_keeps_to_the_width_of_its_terminal() {
+    let long = "a-plane-of-meters-at-the-height-of-a-desk";
+    let grid =
+        "{grid: {origin_m: [0.5, 0.5, 0.75], u_m: [1, 0, 0], v_m: [0, 1, 0], counts: [5, 3]}, normal: [0, 0, 1]}";
+    let procedures =
+        ["direct", "indirect", "total"].map(|of| format!("  {of}_illuminance: {{meters: {long}}}\n")).concat();
+    let title = "title: a title that does not fit where a line has eighty letters, and meters whose name hardly does";
+    let room = ROOM.replace("title: a test room", title);
+    let spec = format!("{room}meters:\n  {long}: {grid}\nprocedures:\n{procedures}");
+    let room = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", LAMP)]);
+    room.run(&["--engines", OWN]);
+    for columns in [80, 100, 160] {
+        let view = Answer::of(room.command(&["report", "out"]).env("COLUMNS", columns.to_string())).stdout;
+        let widest = view.lines().max_by_key(|line| line.chars().count()).unwrap();
+        assert!(view.contains(long) && widest.chars().count() <= columns, "{columns}: {widest}");
+    }
+}
+
+#[test]
 fn an_unknown_key_is_answered_with_the_nearest_one() {
     refused("size_m", "sise_m", "spec.yaml:4:3", "did you mean `size_m`?");
 }
