@@ -203,33 +203,55 @@ pub(super) fn drawn<R: Into<Row>>(
     table.to_string().lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }
 
+/// What a cell says, at length or in brief.
+type Said = fn(&Cell) -> String;
+
+/// Where the name of a case stands.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Named {
+    InFront,
+    Above,
+}
+
 fn verdicts(report: &Report, screen: Screen) -> String {
-    let engines = report.engines.len();
-    let whole = verdicts_of(report, &(0..engines), Cell::text, Style::Plain);
-    let is_wide = whole.lines().any(|line| line.chars().count() > screen.width);
-    let text = if is_wide { Cell::brief } else { Cell::text };
-    screen.fitted(engines, |range, style| verdicts_of(report, &range, text, style))
+    let all = 0..report.engines.len();
+    let fits = |named, text: Said| {
+        let lines = verdicts_of(report, &all, named, text, Style::Plain);
+        lines.lines().all(|line| line.chars().count() <= screen.width)
+    };
+    let ways: [(Named, Said); 2] = [(Named::InFront, Cell::text), (Named::InFront, Cell::brief)];
+    let (named, text) = ways.into_iter().find(|(n, t)| fits(*n, *t)).unwrap_or((Named::Above, Cell::brief));
+    screen.fitted(all.len(), |range, style| verdicts_of(report, &range, named, text, style))
 }
 
 /// The verdicts of some of the engines.
-fn verdicts_of(report: &Report, engines: &Range<usize>, text: fn(&Cell) -> String, style: Style) -> String {
-    let heads = if report.is_suite() { &["Verdicts", "procedure", "against"][..] } else { &["Verdicts", "against"] };
-    let mut case = String::new();
-    let rows = matrix(report).into_iter().map(|row| {
-        // A case is named once, in front of its first row.
-        let name = if row.case == case { "" } else { row.case.as_str() };
-        let name = report.is_suite().then(|| TableCell::new(name).add_attribute(Attribute::Bold));
+fn verdicts_of(report: &Report, engines: &Range<usize>, named: Named, text: Said, style: Style) -> String {
+    let is_in_front = report.is_suite() && named == Named::InFront;
+    let heads = if is_in_front { &["Verdicts", "procedure", "against"][..] } else { &["Verdicts", "against"] };
+    let rows = matrix(report);
+    // A case is named once, at its first row.
+    let first_of = |k: usize| (k == 0 || rows[k - 1].case != rows[k].case).then_some(rows[k].case.as_str());
+    let cells = rows.iter().enumerate().map(|(k, row)| {
         let cells = row.cells[engines.clone()].iter().map(|cell| match cell {
             Cell::Judged { verdict, .. } => TableCell::new(text(cell)).fg(colour(*verdict)),
             _ => TableCell::new(text(cell)),
         });
-        let heads = [TableCell::new(row.label), TableCell::new(row.basis)];
-        let cells: Vec<TableCell> = name.into_iter().chain(heads).chain(cells).collect();
-        case = row.case;
-        cells
+        let name = || TableCell::new(first_of(k).unwrap_or_default()).add_attribute(Attribute::Bold);
+        let heads = [TableCell::new(&row.label), TableCell::new(row.basis)];
+        is_in_front.then(name).into_iter().chain(heads).chain(cells).collect::<Vec<TableCell>>()
     });
     let names = report.engines[engines.clone()].iter().map(|e| e.id.as_str());
-    drawn(heads.iter().copied().chain(names), rows, 0..0, style)
+    let table = drawn(heads.iter().copied().chain(names), cells, 0..0, style);
+    if is_in_front || !report.is_suite() {
+        return table;
+    }
+    let mut lines = vec![];
+    for (k, line) in table.lines().enumerate() {
+        let case = k.checked_sub(1).and_then(first_of);
+        lines.extend(case.map(|case| drawn([case], Vec::<Vec<TableCell>>::new(), 0..0, style)));
+        lines.push(format!(" {line}"));
+    }
+    lines.join("\n")
 }
 
 /// One figure of a set of meters.

@@ -48,7 +48,7 @@ pub(super) fn panel(report: &Report, group: &Group<'_>, palette: &Palette) -> Op
     let across = plane(first + 90.0)
         .map_or(String::new(), |_| format!(", dashed: C {}–{}", label(first + 90.0), label(first + 270.0)));
     let caption = html! {
-        "Line: the photometric file, C " (label(first)) "–" (label(first + 180.0)) (across) "; marks: read back by " (legend(&engines, palette)) ". Rings in candela."
+        "Line: the photometric file, C " (label(first)) "–" (label(first + 180.0)) (across) "; rings in candela; marks: read back by " (legend(&engines, palette))
     };
     Some(figure(&group.title(report, "luminous intensity [cd]"), height, &drawing, &caption))
 }
