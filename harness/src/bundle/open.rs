@@ -193,6 +193,9 @@ fn differences(listed: &Sums, found: &Sums, stage: &Path) -> Vec<String> {
         Some(now) if now == hash => None,
         // Its description says what the file has: then it is the list that does not.
         Some(now) if described.get(name) == Some(now) => Some(format!("{SUMS} has changed where it lists {name}")),
+        Some(now) if name == BUNDLE_FILE => {
+            Some(format!("{name} has changed, or its line in {SUMS}: its SHA-256 is {now}, in place of {hash}"))
+        }
         Some(now) => Some(format!("{name} has changed: its SHA-256 is {now}, in place of {hash}")),
     });
     let added =

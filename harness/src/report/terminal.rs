@@ -6,12 +6,13 @@ use std::ops::Range;
 
 use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArrangement, Row, Table, presets};
 use itertools::Itertools;
+use unicode_width::UnicodeWidthStr as _;
 
 use super::matrix::{Cell, matrix, worst};
 use super::notes::{self, Kind, Note, biases, decision_rules, departures, diagnoses, lacking, notes, policies, splits};
 use super::sentences::{HEADING, sentences};
 use super::statistics::{Statistics, statistics};
-use super::words::{estimate, mark, percent, plural, significant, value, wrapped};
+use super::words::{abridged, cut, estimate, mark, percent, plural, significant, value, wrapped};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
 use crate::record::{EngineStatus, Estimate, MeterId, ProcedureId, Status};
@@ -55,11 +56,12 @@ impl Screen {
     /// A line of a brief report ends at the screen's edge.
     fn shortened(self, line: &str) -> String {
         // Headings indent what is below them.
-        let most = self.width - 2;
-        if self.detail == Detail::All || line.chars().count() <= most {
-            return line.to_owned();
-        }
-        line.chars().take(most - 1).chain(['…']).collect()
+        if self.detail == Detail::All { wrapped(line, self.width - 2, "    ") } else { cut(line, self.width - 2) }
+    }
+
+    /// A name that leaves room for what is said of it.
+    fn name(self, name: &str) -> String {
+        abridged(name, self.width / 3)
     }
 
     /// A line on as many as it takes.
@@ -69,7 +71,7 @@ impl Screen {
 
     /// A table whose columns of engines stand side by side as far as there is room, and below one another beyond.
     fn fitted(self, engines: usize, draw: impl Fn(Range<usize>, Style) -> String) -> String {
-        let fits = |range| draw(range, Style::Plain).lines().all(|line| line.chars().count() <= self.width);
+        let fits = |range| draw(range, Style::Plain).lines().all(|line| line.width() <= self.width);
         let (mut blocks, mut from) = (vec![], 0);
         while from < engines || blocks.is_empty() {
             let to = (from + 1..=engines).rev().find(|to| fits(from..*to)).unwrap_or((from + 1).min(engines));
@@ -104,7 +106,7 @@ pub fn terminal(report: &Report, screen: Screen, folder: Option<&str>) -> String
     }
     for procedure in report.procedures().into_iter().filter(|_| screen.detail == Detail::All) {
         let heading = format!("Bias of {procedure}: mean deviation, its interval, p of none");
-        section(&mut text, &heading, biases(report, procedure).into_iter());
+        section(&mut text, &heading, biases(report, procedure).into_iter().map(indented));
     }
     let most = if screen.detail == Detail::All { usize::MAX } else { BRIEF };
     // In full: without who is independent of whom a claim says nothing.
@@ -112,7 +114,8 @@ pub fn terminal(report: &Report, screen: Screen, folder: Option<&str>) -> String
     section(&mut text, "Who departs from the other witnesses, the reference included", departures.map(indented));
     let diagnoses = diagnoses(report).into_iter().take(most).map(|line| screen.shortened(&line));
     section(&mut text, "What explains failures", diagnoses);
-    let line = |c: &Comparison| format!("{}{}", report.of_suite(&c.key.case, ": "), deviation_line(c));
+    let line =
+        |c: &Comparison| format!("{}{}", report.of_suite(&screen.name(&c.key.case), ": "), deviation_line(c, screen));
     let worst = worst(report, 5).into_iter().map(|c| screen.shortened(&line(c)));
     section(&mut text, "Worst deviations (by verdict, then deviation over tolerance)", worst);
     section(&mut text, "What does not fit in published tables", notes::tables(report).into_iter().map(indented));
@@ -216,16 +219,22 @@ enum Named {
 fn verdicts(report: &Report, screen: Screen) -> String {
     let all = 0..report.engines.len();
     let fits = |named, text: Said| {
-        let lines = verdicts_of(report, &all, named, text, Style::Plain);
-        lines.lines().all(|line| line.chars().count() <= screen.width)
+        let lines = verdicts_of(report, &all, named, text, (Style::Plain, screen.width));
+        lines.lines().all(|line| line.width() <= screen.width)
     };
     let ways: [(Named, Said); 2] = [(Named::InFront, Cell::text), (Named::InFront, Cell::brief)];
     let (named, text) = ways.into_iter().find(|(n, t)| fits(*n, *t)).unwrap_or((Named::Above, Cell::brief));
-    screen.fitted(all.len(), |range, style| verdicts_of(report, &range, named, text, style))
+    screen.fitted(all.len(), |range, style| verdicts_of(report, &range, named, text, (style, screen.width)))
 }
 
 /// The verdicts of some of the engines.
-fn verdicts_of(report: &Report, engines: &Range<usize>, named: Named, text: Said, style: Style) -> String {
+fn verdicts_of(
+    report: &Report,
+    engines: &Range<usize>,
+    named: Named,
+    text: Said,
+    (style, width): (Style, usize),
+) -> String {
     let is_in_front = report.is_suite() && named == Named::InFront;
     let heads = if is_in_front { &["Verdicts", "procedure", "against"][..] } else { &["Verdicts", "against"] };
     let rows = matrix(report);
@@ -248,7 +257,8 @@ fn verdicts_of(report: &Report, engines: &Range<usize>, named: Named, text: Said
     let mut lines = vec![];
     for (k, line) in table.lines().enumerate() {
         let case = k.checked_sub(1).and_then(first_of);
-        lines.extend(case.map(|case| drawn([case], Vec::<Vec<TableCell>>::new(), 0..0, style)));
+        let name = |case: &str| drawn([abridged(case, width - 1)], Vec::<Vec<TableCell>>::new(), 0..0, style);
+        lines.extend(case.map(name));
         lines.push(format!(" {line}"));
     }
     lines.join("\n")
@@ -302,7 +312,7 @@ fn readings(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<S
         let row = |meter: &&MeterId| {
             let of = |engine: &&str| records.iter().find(|r| r.reading.meter == **meter && r.key.engine == **engine);
             let values = engines[range.clone()].iter().map(|e| of(e).map_or("-".to_owned(), |r| value(&r.reading)));
-            [place(report, procedure, &meter.0)].into_iter().chain(values).collect::<Vec<String>>()
+            [place(report, procedure, &meter.0, screen)].into_iter().chain(values).collect::<Vec<String>>()
         };
         meters.iter().map(row).collect::<Vec<_>>()
     };
@@ -312,15 +322,18 @@ fn readings(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<S
     }))
 }
 
-fn place(report: &Report, procedure: ProcedureId, meter: &str) -> String {
+fn place(report: &Report, procedure: ProcedureId, meter: &str, screen: Screen) -> String {
     let c = report.comparisons.iter().find(|c| c.key.procedure == procedure && c.meter.0 == meter);
     match c.and_then(|c| c.gamma_deg.zip(c.c_deg)) {
         Some((gamma, plane)) => format!("  C {plane} gamma {gamma}"),
-        None => c.map_or(format!("  {meter}"), |c| format!("  {meter} ({}, {}, {})", c.at_m[0], c.at_m[1], c.at_m[2])),
+        None => {
+            let name = screen.name(meter);
+            c.map_or(format!("  {name}"), |c| format!("  {name} ({}, {}, {})", c.at_m[0], c.at_m[1], c.at_m[2]))
+        }
     }
 }
 
-fn deviation_line(c: &Comparison) -> String {
+fn deviation_line(c: &Comparison, screen: Screen) -> String {
     let number = |v: Option<f64>| v.map_or("nothing".to_owned(), significant);
     let against = c.reference.as_ref().map_or("no reference".to_owned(), |r| {
         format!("{} {} ({})", significant(r.value), c.quantity.unit(), r.basis.name())
@@ -332,7 +345,7 @@ fn deviation_line(c: &Comparison) -> String {
         mark(c.verdict),
         c.key.engine,
         c.key.procedure,
-        c.meter,
+        screen.name(&c.meter.0),
         number(c.value)
     )
 }

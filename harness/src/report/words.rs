@@ -1,5 +1,7 @@
 //! Numbers and words as every view writes them.
 
+use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
+
 use crate::judge::Verdict;
 use crate::record::{Estimate, Reading};
 
@@ -19,21 +21,58 @@ pub(super) fn estimate(of: &Estimate) -> String {
     }
 }
 
-/// A text in lines of so many letters, but for words that are longer; lines after the first are indented, and no number loses its `%`.
+/// A text in lines of so many columns; lines after the first are indented, no number loses its `%`, and a word that is longer goes on below.
 pub(super) fn wrapped(text: &str, width: usize, indent: &str) -> String {
     let mut lines = vec![String::new()];
     let whole = text.replace(" %", "\u{a0}%");
-    for word in whole.split(' ') {
+    for mut word in whole.split(' ') {
         let mut last = lines.pop().unwrap_or_default();
         let is_first = last.trim().is_empty();
-        if !is_first && last.chars().count() + 1 + word.chars().count() > width {
-            lines.push(std::mem::replace(&mut last, format!("{indent}{word}")));
-        } else {
-            last = if is_first { last + word } else { last + " " + word };
+        if !is_first && last.width() + 1 + word.width() > width {
+            lines.push(std::mem::replace(&mut last, indent.to_owned()));
+        } else if !is_first {
+            last.push(' ');
         }
-        lines.push(last);
+        while last.width() + word.width() > width && last.width() < width {
+            let (head, rest) = word.split_at(fitting(word, width - last.width()));
+            if head.is_empty() {
+                break;
+            }
+            lines.push(last + head);
+            (last, word) = (indent.to_owned(), rest);
+        }
+        lines.push(last + word);
     }
     lines.join("\n").replace('\u{a0}', " ")
+}
+
+/// How many bytes of a text have so many columns.
+fn fitting(text: &str, columns: usize) -> usize {
+    let mut used = 0;
+    let mut outside = |letter: char| {
+        used += letter.width().unwrap_or(0);
+        used > columns
+    };
+    text.char_indices().find_map(|(k, letter)| outside(letter).then_some(k)).unwrap_or(text.len())
+}
+
+/// A text of so many columns at most, its end left out.
+pub(super) fn cut(text: &str, columns: usize) -> String {
+    if text.width() <= columns {
+        return text.to_owned();
+    }
+    format!("{}…", &text[..fitting(text, columns.saturating_sub(1))])
+}
+
+/// A name of so many columns at most: its middle is left out, for names of a kind begin alike and end with their number.
+pub(super) fn abridged(name: &str, columns: usize) -> String {
+    if name.width() <= columns {
+        return name.to_owned();
+    }
+    let head = cut(name, columns / 2);
+    let tail: String = name.chars().rev().collect();
+    let tail = &tail[..fitting(&tail, columns - head.width())];
+    head + &tail.chars().rev().collect::<String>()
 }
 
 /// A value with the half width of its interval in two digits, `2.0123 +- 0.0021`; six significant digits where that is below them.
