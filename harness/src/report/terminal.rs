@@ -324,13 +324,11 @@ fn readings(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<S
 
 fn place(report: &Report, procedure: ProcedureId, meter: &str, screen: Screen) -> String {
     let c = report.comparisons.iter().find(|c| c.key.procedure == procedure && c.meter.0 == meter);
-    match c.and_then(|c| c.gamma_deg.zip(c.c_deg)) {
-        Some((gamma, plane)) => format!("  C {plane} gamma {gamma}"),
-        None => {
-            let name = screen.name(meter);
-            c.map_or(format!("  {name}"), |c| format!("  {name} ({}, {}, {})", c.at_m[0], c.at_m[1], c.at_m[2]))
-        }
+    if let Some((gamma, plane)) = c.and_then(|c| c.gamma_deg.zip(c.c_deg)) {
+        return format!("  C {plane} gamma {gamma}");
     }
+    let name = screen.name(meter);
+    c.map_or(format!("  {name}"), |c| format!("  {name} ({}, {}, {})", c.at_m[0], c.at_m[1], c.at_m[2]))
 }
 
 fn deviation_line(c: &Comparison, screen: Screen) -> String {
