@@ -160,8 +160,8 @@ pub fn undecided_by_reference(judge: &Judge<'_>, task: &Task, recordings: &[&Rec
     targets_of(task, compared.iter().filter(is_open))
 }
 
-/// How many times the samples an undecided comparison needs, at its present deviation; infinite where no number would do, and
-/// `None` where it is decided or not sampled.
+/// How many times the samples an undecided comparison needs, at its present deviation or, where none would do there, at the nearest one that
+/// its samples allow, too; infinite where no number would do, and `None` where it is decided or not sampled.
 fn effort(comparison: &Comparison) -> Option<f64> {
     if comparison.verdict != Verdict::Inconclusive {
         return None;
@@ -179,8 +179,12 @@ fn effort(comparison: &Comparison) -> Option<f64> {
         return None;
     }
     let allowed = comparison.tolerance.around(comparison.reference.as_ref()?.value);
-    let needed = ((allowed - deviation.abs()).abs() / budget.coverage_factor).powi(2) - fixed;
-    Some(if needed > 0.0 { (sampled / needed).max(1.0) } else { f64::INFINITY })
+    let needed = |way: f64| (way / budget.coverage_factor).powi(2) - fixed;
+    let (now, reach) = (allowed - deviation.abs(), budget.coverage_factor * sampled.sqrt());
+    // The deviation moves with further samples, as far as its own error reaches, and to no less than none.
+    let ways = [now.abs(), (now + reach).min(allowed), reach - now];
+    let needed = ways.into_iter().filter(|way| *way > 0.0).map(needed).find(|needed| *needed > 0.0);
+    Some(needed.map_or(f64::INFINITY, |needed| (sampled / needed).max(1.0)))
 }
 
 /// Tells of each undecided comparison what would decide it.
@@ -390,6 +394,20 @@ mod tests {
         let (verdicts, asked, _) = run(&[0.0185, 0.0], 1.2, 16, 6);
         assert_eq!(verdicts, [Verdict::Inconclusive, Verdict::Pass]);
         assert!(asked.is_empty());
+    }
+
+    #[test]
+    fn what_chance_may_have_put_near_the_tolerance_is_asked_for_more_and_what_is_there_for_good_is_not() {
+        let wanted = |deviation: f64, error: f64, of_reference: f64| {
+            let reference = Estimate { value: 1.0, uncertainty: Uncertainty::Bound(of_reference) };
+            let all =
+                [recording("simulator", &[reference]), recording("radiance", &[estimate(1.0 + deviation, error)])];
+            let compared = built_in().compare(&task(1), &all.iter().collect::<Vec<_>>());
+            compared.iter().find(|c| c.key.engine == "radiance").and_then(effort)
+        };
+        // .1 % are left to the tolerance, and the reference takes .3.
+        assert!(wanted(0.019, 0.006, 0.003).is_some_and(f64::is_finite), "{:?}", wanted(0.019, 0.006, 0.003));
+        assert_eq!(wanted(0.019, 0.0002, 0.003), Some(f64::INFINITY));
     }
 
     #[test]
