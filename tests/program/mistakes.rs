@@ -76,6 +76,20 @@ const MISTAKES: &[(&str, Mistake)] = &[
         ),
     ),
     ("a normal without direction", In("normal: [0, 0, 1]", "normal: [0, 0, 0]")),
+    (
+        "a grid of points in one place",
+        In(
+            "points_m: [[1, 1, 0.8], [3, 2, 0.8]]",
+            "grid: {origin_m: [0.5, 0.5, 0.8], u_m: [0, 0, 0], v_m: [0, 1, 0], counts: [4, 3]}",
+        ),
+    ),
+    (
+        "a grid that is a line",
+        In(
+            "points_m: [[1, 1, 0.8], [3, 2, 0.8]]",
+            "grid: {origin_m: [0.5, 0.5, 0.8], u_m: [0.5, 0, 0], v_m: [1, 0, 0], counts: [2, 3]}",
+        ),
+    ),
     ("neither points nor grid", In("points_m: [[1, 1, 0.8], [3, 2, 0.8]], ", "")),
     ("a misspelt procedure", In("direct_illuminance:", "direct_iluminance:")),
     ("a meter set that is not there", In("direct_illuminance: {meters: plane}", "direct_illuminance: {meters: plain}")),

@@ -73,8 +73,10 @@ pub(super) fn variants(source: &Source, tree: &Tree, of_base: &[SpecError]) -> V
                 let message = format!("two cases are named `{}`", variant.name);
                 let is_new = names.insert(variant.name.clone());
                 let help = "give every case a name of its own";
-                found.faults.extend(source.require(is_new, &overrides[0].place, message, help).err());
-                found.all.push(variant);
+                match source.require(is_new, &overrides[0].place, message, help) {
+                    Ok(()) => found.all.push(variant),
+                    Err(fault) => found.faults.push(fault),
+                }
             }
             Ok(None) => {}
             Err(fault) => found.faults.push(fault),

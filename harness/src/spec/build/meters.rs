@@ -11,6 +11,9 @@ use super::{Builder, MAX_METERS, within};
 /// On the surface itself a renderer's answer depends on rounding, and so would ours.
 const SURFACE_MARGIN: f64 = 1e-9;
 
+/// Below this sine two steps of a grid have one direction.
+const FLAT: f64 = 1e-9;
+
 impl Builder<'_> {
     pub(super) fn meter_set(&mut self, name: &str, set: &MeterSet, scene: &Scene) -> Option<Vec<Meter>> {
         let at = format!("meters.{name}");
@@ -63,6 +66,17 @@ impl Builder<'_> {
         let count = nu.checked_mul(nv).filter(|n| (1..=MAX_METERS).contains(n));
         let help = format!("give counts whose product lies between 1 and {MAX_METERS}");
         self.check(count.is_some(), &format!("{at}.grid.counts"), format!("{nu} x {nv} points"), help);
+        let (u, v) = (DVec3::from(grid.u_m), DVec3::from(grid.v_m));
+        for (name, step, count) in [("u_m", u, nu), ("v_m", v, nv)] {
+            let help = "give the step from one point to the next, in metres";
+            let is_step = count < 2 || step != DVec3::ZERO;
+            self.check(is_step, &format!("{at}.grid.{name}"), "no step: points of the grid lie in one place", help);
+        }
+        // What is too short to tell is told above.
+        let (sine, whole) = (u.cross(v).length(), u.length() * v.length());
+        let is_plane = nu < 2 || nv < 2 || whole == 0.0 || sine > FLAT * whole;
+        let help = "give two directions that span a plane, or one count of 1 for a line";
+        self.check(is_plane, &format!("{at}.grid.v_m"), "it runs along u_m: the grid is a line", help);
         count
     }
 }
