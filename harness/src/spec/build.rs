@@ -198,8 +198,6 @@ impl<'a> Builder<'a> {
 
     fn build(mut self, spec: Spec) -> Built {
         self.hash.update(&self.source.text);
-        let message = format!("format version {} is not known", spec.luxproof);
-        self.check(spec.luxproof == 1, "luxproof", message, "this program reads version 1");
         self.programs(&spec);
         let is_few = self.take("luminaires", "luminaires", spec.luminaires.len(), |left| &mut left.luminaires);
         let room = self.room(&spec);

@@ -11,11 +11,20 @@ use serde::{Deserialize, Serialize};
 use crate::procedures::Procedures;
 use crate::procedures::shapes::{Found, Shapes};
 
+/// The version of a format that this program reads, told with all else that is of the wrong form.
+fn known_version<'de, D: serde::Deserializer<'de>>(of: D) -> Result<u32, D::Error> {
+    let found = u32::deserialize(of)?;
+    let unknown =
+        || serde::de::Error::custom(format!("format version {found} is not known: this program reads version 1"));
+    if found == 1 { Ok(found) } else { Err(unknown()) }
+}
+
 /// A luxproof spec: a room, luminaires, measuring points and the procedures to run on them.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Spec {
     /// Version of the format: 1.
+    #[serde(deserialize_with = "known_version")]
     pub luxproof: u32,
     /// What the case is, in a line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
