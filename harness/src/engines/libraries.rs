@@ -12,7 +12,7 @@ pub struct Libraries {
     files: &'static [(&'static str, &'static str)],
 }
 
-/// Of Mitsuba, LuxCore and Node.js.
+/// Of Mitsuba and LuxCore.
 pub(super) const ATOMIC: Libraries = Libraries { name: "libatomic", files: &[("libatomic.so.1", "libatomic1")] };
 
 /// Of Blender, which is linked with them and opens no window.
@@ -49,10 +49,15 @@ impl Libraries {
     /// An invocation that finds those that were unpacked into the site.
     pub(super) fn beside(&self, invocation: Invocation, site: &Site) -> Invocation {
         let is_ours = |file: &str| site.library(file).is_some_and(|path| path.starts_with(site.debian()));
-        match site.library_path().filter(|_| self.files.iter().any(|(file, _)| is_ours(file))) {
-            Some(path) => invocation.env("LD_LIBRARY_PATH", path),
-            None => invocation,
-        }
+        if self.files.iter().any(|(file, _)| is_ours(file)) { with_unpacked(invocation, site) } else { invocation }
+    }
+}
+
+/// An invocation that finds all libraries that were unpacked into the site.
+pub(super) fn with_unpacked(invocation: Invocation, site: &Site) -> Invocation {
+    match site.library_path() {
+        Some(path) => invocation.env("LD_LIBRARY_PATH", path),
+        None => invocation,
     }
 }
 

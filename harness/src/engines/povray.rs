@@ -111,9 +111,8 @@ impl Engine for PovRay {
         Settings::of(job).map(drop)
     }
 
-    /// Several processes a thread, of some 60 MiB each.
     fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
-        (threads * bench::SIDE_BY_SIDE) as u64 * (86 + super::geometry_mib(job))
+        (threads * bench::side_by_side_at_most(job)) as u64 * bench::process_mib(job)
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {

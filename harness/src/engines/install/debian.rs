@@ -9,7 +9,7 @@ use itertools::Itertools;
 
 use super::{InstallError, step};
 use crate::engines::Site;
-use crate::engines::libraries::Libraries;
+use crate::engines::libraries::{Libraries, with_unpacked};
 use crate::system::files;
 
 pub(super) const POVRAY_PACKAGES: [&str; 1] = ["povray"];
@@ -22,11 +22,7 @@ pub(super) fn install_povray(site: &Site, progress: &mut dyn FnMut(&str)) -> Res
     let remedy = "install POV-Ray 3.7 so that `povray` is on PATH (macOS: `brew install povray`)";
     let found = fetched(site, ("POV-Ray", &POVRAY_PACKAGES), |site| site.program("povray"), remedy, progress)?;
     // Seen to start, with the libraries that were unpacked beside it.
-    let mut check = step(site, &found).args(["--version"]);
-    if let Some(path) = site.library_path() {
-        check = check.env("LD_LIBRARY_PATH", path);
-    }
-    check.run()?;
+    with_unpacked(step(site, &found).args(["--version"]), site).run()?;
     Ok(found)
 }
 

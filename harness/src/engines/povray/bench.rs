@@ -7,8 +7,9 @@ use luminaire::scene::{Bounces, Transport};
 
 use crate::engines::blocks::{MIN_BLOCKS, Sampling};
 use crate::engines::image::read_rgb;
+use crate::engines::libraries::with_unpacked;
 use crate::engines::settings::Preset;
-use crate::engines::{EngineError, Job, Measurement, SceneFile, Site, Workbench, recess};
+use crate::engines::{EngineError, Job, Measurement, SceneFile, Site, Workbench, geometry_mib, recess};
 use crate::record::{Effort, Estimate, Method, Uncertainty};
 use crate::system::process::Invocation;
 use crate::system::random::seed;
@@ -30,8 +31,12 @@ const TEST_S: f64 = 1.1e-7;
 const FIRST_REFLECTION: f64 = 1.35;
 /// The part of the time that the fewest blocks may take.
 const FIRST_BLOCKS: f64 = 0.9;
-/// Processes for each thread at most: one that is started alone sleeps most of .7 s, waiting for its own threads in steps of 50 ms.
-pub(super) const SIDE_BY_SIDE: usize = 12;
+/// Processes for each thread at most: one that is started alone sleeps most of .7 s, waiting for its own threads in steps of 50 ms. Of those that
+/// hold large meshes, no more than take as much memory as so many without, and as many as sleep little all the same.
+const SIDE_BY_SIDE: u64 = 12;
+const LARGE_SIDE_BY_SIDE: u64 = 3;
+/// Of some 60 MiB without bodies.
+const PROCESS_MIB: u64 = 86;
 /// What a process sleeps, and what it computes before its rays, in seconds.
 const SLEEP_S: f64 = 0.6;
 const START_S: f64 = 0.05;
@@ -56,10 +61,17 @@ pub(super) fn program(site: &Site) -> Result<PathBuf, EngineError> {
 
 /// An invocation that finds the libraries of an unpacked Debian package.
 pub(super) fn hermetic(invocation: Invocation, site: &Site) -> Invocation {
-    match site.library_path().filter(|_| invocation.program.starts_with(site.debian())) {
-        Some(path) => invocation.env("LD_LIBRARY_PATH", path),
-        None => invocation,
-    }
+    if invocation.program.starts_with(site.debian()) { with_unpacked(invocation, site) } else { invocation }
+}
+
+/// What a process takes at most.
+pub(super) fn process_mib(job: &Job) -> u64 {
+    PROCESS_MIB + geometry_mib(job)
+}
+
+/// Processes for each thread at most.
+pub(super) fn side_by_side_at_most(job: &Job) -> usize {
+    (SIDE_BY_SIDE * PROCESS_MIB / process_mib(job)).max(LARGE_SIDE_BY_SIDE) as usize
 }
 
 #[derive(Clone, Copy)]
@@ -227,7 +239,7 @@ impl<'a> Bench<'a> {
         let all: Vec<(usize, (f64, Run))> = numbers.clone().flat_map(parts).collect();
         // As many as compute while others sleep.
         let for_each_thread = (1.0 + SLEEP_S / (START_S + pilot.work_s)).ceil() as usize;
-        let side = for_each_thread.min(SIDE_BY_SIDE) * self.workbench.jobs.max(1);
+        let side = for_each_thread.min(side_by_side_at_most(self.job)) * self.workbench.jobs.max(1);
         let read = side_by_side(side, &all, |(_, (_, run))| self.values(*run, pilot));
         let mut blocks = vec![vec![0.0; self.job.stations.len()]; numbers.len()];
         for ((k, (sign, _)), values) in all.into_iter().zip(read) {
