@@ -8,7 +8,7 @@ use comfy_table::{Attribute, Cell as TableCell, CellAlignment, Color, ContentArr
 use itertools::Itertools;
 use unicode_width::UnicodeWidthStr as _;
 
-use super::matrix::{Cell, matrix, worst};
+use super::matrix::{Cell, Row as MatrixRow, matrix, worst};
 use super::notes::{self, Kind, Note, biases, decision_rules, departures, diagnoses, lacking, notes, policies, splits};
 use super::sentences::{HEADING, sentences};
 use super::statistics::{Statistics, statistics};
@@ -217,27 +217,26 @@ enum Named {
 }
 
 fn verdicts(report: &Report, screen: Screen) -> String {
-    let all = 0..report.engines.len();
+    let (all, rows) = (0..report.engines.len(), matrix(report));
     let fits = |named, text: Said| {
-        let lines = verdicts_of(report, &all, named, text, (Style::Plain, screen.width));
+        let lines = verdicts_of(report, &rows, &all, (named, text), (Style::Plain, screen.width));
         lines.lines().all(|line| line.width() <= screen.width)
     };
     let ways: [(Named, Said); 2] = [(Named::InFront, Cell::text), (Named::InFront, Cell::brief)];
     let (named, text) = ways.into_iter().find(|(n, t)| fits(*n, *t)).unwrap_or((Named::Above, Cell::brief));
-    screen.fitted(all.len(), |range, style| verdicts_of(report, &range, named, text, (style, screen.width)))
+    screen.fitted(all.len(), |range, style| verdicts_of(report, &rows, &range, (named, text), (style, screen.width)))
 }
 
 /// The verdicts of some of the engines.
 fn verdicts_of(
     report: &Report,
+    rows: &[MatrixRow],
     engines: &Range<usize>,
-    named: Named,
-    text: Said,
+    (named, text): (Named, Said),
     (style, width): (Style, usize),
 ) -> String {
     let is_in_front = report.is_suite() && named == Named::InFront;
     let heads = if is_in_front { &["Verdicts", "procedure", "against"][..] } else { &["Verdicts", "against"] };
-    let rows = matrix(report);
     // A case is named once, at its first row.
     let first_of = |k: usize| (k == 0 || rows[k - 1].case != rows[k].case).then_some(rows[k].case.as_str());
     let cells = rows.iter().enumerate().map(|(k, row)| {
@@ -293,7 +292,7 @@ fn of_sets(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<St
             let heads = std::iter::once("").chain(engines[range.clone()].iter().copied());
             drawn(heads, rows(&range), 1..usize::MAX, style)
         });
-        format!(" {}\n{table}", screen.whole(&format!("{procedure}, {set} ({meters} meters)")))
+        format!(" {}\n{table}", wrapped(&format!("{procedure}, {set} ({meters} meters)"), screen.width - 1, "  "))
     };
     Some(sets.iter().map(of_set).join("\n\n"))
 }
