@@ -40,7 +40,7 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
     if settings.has_plain_tables() {
         files.extend(patches::plain_files(job, settings, &tables, table));
     } else {
-        let about = "[MORE] resampled for the cubic curves of Cycles' IES texture";
+        let about = "[MORE] angles beside the table's own make straight lines of Cycles' cubic curves";
         let resampled = |(k, d): (usize, &&_)| SceneFile::text(&table(k), LookedUp::of(d).file(about));
         files.extend(tables.distinct.iter().enumerate().map(resampled));
     }
