@@ -156,6 +156,17 @@ fn noise_that_is_not_as_stated_and_claims_that_do_not_hold_are_told() {
     );
 }
 
+/// Within the tolerance nothing fails, and nothing scatters: yet what is claimed does not hold.
+#[test]
+fn bounds_that_known_values_lie_outside_of_are_told() {
+    let off = (LUX, "lux = 1.004 * illuminance_lx(");
+    for claim in ["\"error_bound_lx\": 1e-3 * lux", "\"exact\": True"] {
+        let says = "readings that it calls exact or bounded are off by more than that, by 4.0e-3";
+        is_told(&[off, (BOUND, claim)], &[("claims", says)]);
+    }
+    assert_eq!(examined(&[off, (BOUND, "\"error_bound_lx\": 5e-3 * lux")]).code, Some(0));
+}
+
 #[test]
 fn a_broken_protocol_is_told() {
     let probe = "    if request[\"verb\"] == \"probe\":\n";

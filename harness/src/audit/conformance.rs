@@ -19,6 +19,10 @@ use crate::spec::{Case, EngineSettings, SpecError};
 /// The adapter's name while it is examined.
 const ADAPTER: &str = "adapter";
 
+/// To so many parts a reading of 32-bit floats may be off that is called exact, and any that was added up in 64 bits.
+const IN_FLOATS: f64 = 1e-5;
+const IN_DOUBLES: f64 = 1e-9;
+
 /// What an adapter is examined for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Topic {
@@ -269,11 +273,44 @@ impl Findings {
                 self.add(topic, Standing::Wrong, format!("{}: {stated}", recording.key.procedure));
             }
         }
+        // What fails has its reason told elsewhere, and whoever mends that mends its claims.
+        if !comparisons.iter().any(|c| c.verdict == Verdict::Fail)
+            && let Some(text) = beyond_bounds(comparisons)
+        {
+            self.add(Topic::Claims, Standing::Wrong, text);
+        }
         if comparisons.iter().any(|c| c.value.is_some() && c.uncertainty == Uncertainty::Unstated) {
             let text = "readings come without `std_error_lx`, `error_bound_lx` or `exact`: nothing is claimed of them";
             self.add(Topic::Claims, Standing::Sound, text.to_owned());
         }
     }
+}
+
+/// Readings within the tolerance whose known values do not lie within what is claimed of them.
+fn beyond_bounds(comparisons: &[&Comparison]) -> Option<String> {
+    let beyond = |c: &Comparison| {
+        let reference = c.reference.as_ref()?;
+        let claimed = match c.uncertainty {
+            Uncertainty::Exact => IN_FLOATS * reference.value.abs(),
+            Uncertainty::Bound(bound) => bound,
+            _ => return None,
+        };
+        let known =
+            reference.coverage_factor.unwrap_or(1.0) * reference.uncertainty + IN_DOUBLES * reference.value.abs();
+        let deviation = c.deviation?.abs();
+        (deviation > claimed + known).then(|| deviation / reference.value.abs())
+    };
+    let all: Vec<f64> = comparisons.iter().filter_map(|c| beyond(c)).collect();
+    let largest = all.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);
+    let claimed = comparisons.iter().filter(|c| matches!(c.uncertainty, Uncertainty::Exact | Uncertainty::Bound(_)));
+    (!all.is_empty()).then(|| {
+        format!(
+            "{} of {} readings that it calls exact or bounded are off by more than that, by {largest:.1e} of the known value at most, \
+             although within the tolerance",
+            all.len(),
+            claimed.count()
+        )
+    })
 }
 
 /// How far the worst of what fails is off: in parts of what is right, or in lux where that is dark.

@@ -16,7 +16,7 @@ use luminaire::scene::{Bounces, Luminaire, Transport};
 use serde::{Deserialize, Serialize};
 
 use self::opening::Opening;
-use self::resampled::Resampled;
+use self::resampled::{Resampled, Spread};
 use self::settings::Settings;
 use super::dialogue::{self, Cost, Dialogue, Seat};
 use super::float_error::{FloatError, Instrument};
@@ -112,7 +112,9 @@ impl Package {
         let run = self.libraries.beside(workbench.invoke(python), &workbench.site);
         let run = run.args(["-I", "-B", self.driver, "job.json", "--serve", "--threads", &threads]);
         let frame = Frame::of(job, settings.coordinates);
-        let instrument = Instrument { edge_deg, seat: patch(job, &frame), by_arc_cosine: true };
+        let side = patch(job, &frame);
+        let side_m = side / frame.scale;
+        let instrument = Instrument { edge_deg, seat: side, by_arc_cosine: true };
         let rounding = FloatError::of(job, frame, instrument);
         let tables = Tables::of(job);
         let resampled = tables.distinct.iter().filter(|_| !settings.has_plain_tables());
@@ -122,8 +124,13 @@ impl Package {
             izip!(&job.scene.luminaires, &places, &tables.of_luminaire)
                 .filter_map(|(luminaire, places, k_th)| Some((luminaire, places, looked_up.get(*k_th)?)))
                 .map(|(luminaire, places, table)| {
-                    let spread_deg = |place_m| rounding.spread_deg(luminaire, place_m, k);
-                    table.off_lx(luminaire, places, &job.stations[k].meter, spread_deg)
+                    let meter = &job.stations[k].meter;
+                    let own = |world: DVec3| luminaire.orientation.transpose() * world;
+                    let spread = |place_m| {
+                        let reach_deg = rounding.spread_deg(luminaire, place_m, k);
+                        Spread::of(reach_deg, own(meter.position_m - place_m), side_m, sides(meter.normal).map(own))
+                    };
+                    table.off_lx(luminaire, places, meter, spread)
                 })
                 .sum()
         };
@@ -222,6 +229,13 @@ pub(super) fn patch(job: &Job, frame: &Frame) -> f64 {
     let points = points.chain(job.stations.iter().map(|s| s.meter.position_m));
     let largest = points.map(|p| frame.to_scene(p).abs().max_element()).fold(0.0, f64::max);
     PATCH * if largest > 0.0 { largest } else { 1.0 }
+}
+
+/// Along which directions the sides of a patch lie, as in `Patches` of `cycles_read.py`.
+fn sides(normal: DVec3) -> [DVec3; 2] {
+    let aside = if normal.x.abs() > 0.5 { DVec3::Y } else { DVec3::X };
+    let along = aside.cross(normal).normalize_or_zero();
+    [along, normal.cross(along)]
 }
 
 #[derive(Serialize)]

@@ -1,15 +1,16 @@
 //! Tables as Cycles' IES texture looks them up: with values between the table's cells where nobody looks, so that its cubic curves are our straight lines.
 //!
 //! Between angles Cycles lays a cubic through four neighbours by their numbers (`kernel/util/ies.h`), whatever the angles between them: straight
-//! where the neighbours' values are in line. So every cell of a table has neighbours of its own, in line with its ends, and where two cells meet those lie
+//! where the neighbours' values are in line. So every cell of a table is divided into steps and has neighbours of its own, in line with its ends, and where two cells meet those lie
 //! within a hair's breadth, a hair beside the angle itself. Beyond the first plane and the last one Cycles takes all for dark, and it is dark at the last
 //! angle itself: planes begin and end with cells of a hair's breadth, turned away from C 0, and a row lies behind gamma 180. What is left
 //! is computed and stated, never taken off.
 
+use itertools::Itertools;
 use luminaire::photometry::LuminousIntensityDistribution;
 
 use crate::engines::patches::ies_file;
-use crate::engines::patches::resampled::Resampled;
+use crate::engines::patches::resampled::{Resampled, Spread};
 
 /// Between neighbours where two cells meet, in degrees: as narrow as 32-bit floats tell apart.
 const HAIR_DEG: f64 = 1e-4;
@@ -25,8 +26,17 @@ const SEAM_DEG: f64 = 0.03;
 /// .0198 degrees at least.
 const BEHIND_DEG: f64 = 180.5;
 const NADIR_DEG: f64 = 1e-2;
+/// Into so many steps a cell is divided, as many as make a file of no more than so many values: what is off where cells meet is a few
+/// of these, not of cells.
+const STEPS: [usize; 2] = [4, 16];
+const VALUES: usize = 40_000;
 /// Over so many points of its patch a meter is read (`EXACT_SIDE` of `cycles_read.py`, squared).
 const POINTS: f64 = 256.0;
+/// On so many lines of 32-bit coordinates across the patch they lie, at least (`PATCH`).
+const LINES: f64 = 40.0;
+
+/// Where in a piece it is looked at for what is off most.
+const PARTS: [f64; 4] = [0.05, 0.35, 0.65, 0.95];
 
 /// A straight piece of a table along one of its angles, and up to where it is handed over.
 #[derive(Clone, Copy, Debug)]
@@ -47,12 +57,14 @@ struct Node {
 }
 
 impl Cell {
-    /// The nodes of its ends, and their neighbours in line with them.
-    fn nodes(self, [before, after]: [f64; 2]) -> [Node; 4] {
+    /// The nodes of its steps, and their neighbours in line with them.
+    fn nodes(self, count: usize, [before, after]: [f64; 2]) -> impl Iterator<Item = Node> {
         let [low, high] = self.handed;
-        let width = high - low;
+        let step = (high - low) / count as f64;
+        let steps = (0..count).map(move |k| low + step * k as f64).chain([high]).map(|at| (at, at));
         // Neighbours count one step, wherever they lie.
-        [(before, low - width), (low, low), (high, high), (after, high + width)].map(|(deg, at)| self.node(deg, at))
+        let all = [(before, low - step)].into_iter().chain(steps).chain([(after, high + step)]);
+        all.map(move |(deg, at)| self.node(deg, at))
     }
 
     /// With the value that its line has at an angle.
@@ -93,19 +105,19 @@ impl Pieces {
         Self(all.windows(2).map(|ends| [ends[0], ends[1]]).collect())
     }
 
-    /// The middles of those parts of a window that lie in one piece each, and which share of it each is.
-    fn within(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
+    /// Those parts of a window that lie in one piece each.
+    fn within(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
         let first = self.0.partition_point(move |[_, end]| *end <= low);
         let inside = self.0[first..].iter().take_while(move |[begin, _]| *begin < high);
-        let clipped = inside.map(move |[begin, end]| [begin.max(low), end.min(high)]);
-        clipped.map(move |[begin, end]| (0.5 * (begin + end), (end - begin) / (high - low)))
+        inside.map(move |[begin, end]| [begin.max(low), end.min(high)])
     }
 }
 
 impl LookedUp {
     pub(super) fn of(distribution: &LuminousIntensityDistribution) -> Self {
         let c_deg = planes_deg(distribution);
-        let (v, h) = (rows(distribution.gamma_deg()), planes(&c_deg));
+        let steps = steps(c_deg.len() * distribution.gamma_deg().len());
+        let (v, h) = (rows(distribution.gamma_deg(), steps), planes(&c_deg, steps));
         let along_gamma = |c: f64, v: &Node| v.value(|gamma| distribution.intensity(c, gamma).value());
         let candela = h.iter().map(|h| v.iter().map(|v| h.value(|c| along_gamma(c, v))).collect()).collect();
         let degrees = |nodes: Vec<Node>| nodes.into_iter().map(|n| n.deg).collect::<Vec<f64>>();
@@ -139,8 +151,18 @@ impl Resampled for LookedUp {
         cubic([of(k.checked_sub(1)), of(Some(k)), of(Some(k + 1)), of(Some(k + 2))], x).max(0.0)
     }
 
-    fn off_about_cd(&self, c_deg: f64, gamma_deg: f64, spread_deg: [f64; 2]) -> f64 {
-        let [by_c, by_gamma] = [spread_deg[0].clamp(1e-9, 180.0), spread_deg[1].max(1e-9)];
+    fn off_about_cd(&self, c_deg: f64, gamma_deg: f64, spread: Spread) -> f64 {
+        let [by_c, by_gamma] = [spread.reach_deg[0].clamp(1e-9, 180.0), spread.reach_deg[1].max(1e-9)];
+        // No more of a patch than this sees a piece so wide, wherever the patch lies: one line of points more than its width holds.
+        let share = |of: usize, [begin, end]: [f64; 2]| {
+            let patch = spread.patch_deg[of];
+            if end - begin < patch { ((end - begin) / patch + 1.0 / LINES).min(1.0) } else { 1.0 }
+        };
+        let largest_cd = |columns: [f64; 2], rows: [f64; 2]| {
+            let at = |[begin, end]: [f64; 2], part: f64| begin + part * (end - begin);
+            let all = PARTS.into_iter().cartesian_product(PARTS);
+            all.map(|(x, y)| self.off_cd(at(columns, x) - SEAM_DEG, at(rows, y))).fold(0.0, f64::max)
+        };
         let h = (c_deg + SEAM_DEG).rem_euclid(360.0);
         let (rows, columns) = (
             [(gamma_deg - by_gamma).max(NADIR_DEG), (gamma_deg + by_gamma).clamp(2.0 * NADIR_DEG, 180.0)],
@@ -149,23 +171,24 @@ impl Resampled for LookedUp {
         let (mut mean, mut worst) = (0.0, 0.0_f64);
         // A window over the seam is two.
         for turn in [-360.0, 0.0, 360.0] {
-            for (h, wide) in self.pieces[0].within(columns.map(|h| h + turn)) {
-                for (gamma, high) in self.pieces[1].within(rows) {
-                    let off = self.off_cd(h - SEAM_DEG, gamma);
-                    mean += wide * high * off;
+            for columns in self.pieces[0].within(columns.map(|h| h + turn)) {
+                for rows in self.pieces[1].within(rows) {
+                    let off = largest_cd(columns, rows);
+                    mean += share(0, columns).min(share(1, rows)) * off;
                     worst = worst.max(off);
                 }
             }
         }
-        // Twice what evenly spread points would see, and one point more; in the middle of a piece it is half of the worst at least.
+        // What evenly spread points would see, and one point more; twice, for angles are rounded and points are not spread evenly.
         2.0 * (mean + worst / POINTS)
     }
 
     /// From the middle of every piece: those where cells meet are too narrow for any grid.
     fn misled_share(&self) -> f64 {
         let (mut off, mut all) = (0.0, f64::MIN_POSITIVE);
-        for (gamma, high) in self.pieces[1].within([0.0, 180.0]) {
-            for (h, wide) in self.pieces[0].within([0.0, 360.0]) {
+        let middle = |[begin, end]: [f64; 2]| (0.5 * (begin + end), end - begin);
+        for (gamma, high) in self.pieces[1].within([0.0, 180.0]).map(middle) {
+            for (h, wide) in self.pieces[0].within([0.0, 360.0]).map(middle) {
                 let weight = wide * high * gamma.to_radians().sin();
                 off += weight * self.off_cd(h - SEAM_DEG, gamma);
                 all += weight * self.of.intensity(h - SEAM_DEG, gamma).value();
@@ -175,6 +198,13 @@ impl Resampled for LookedUp {
     }
 }
 
+/// Into how many steps cells are divided, of so many.
+fn steps(cells: usize) -> usize {
+    let most = (VALUES as f64 / cells as f64).sqrt() as usize;
+    // A cell has three nodes more.
+    most.saturating_sub(3).clamp(STEPS[0], STEPS[1])
+}
+
 /// The table's planes over the full circle, but for those that lie where planes end.
 fn planes_deg(distribution: &LuminousIntensityDistribution) -> Vec<f64> {
     let at_end = 360.0 - 10.0 * SEAM_DEG;
@@ -182,7 +212,7 @@ fn planes_deg(distribution: &LuminousIntensityDistribution) -> Vec<f64> {
 }
 
 /// Rows from nadir to what lies behind the zenith.
-fn rows(gamma_deg: &[f64]) -> Vec<Node> {
+fn rows(gamma_deg: &[f64], steps: usize) -> Vec<Node> {
     let ends = [gamma_deg[0], gamma_deg[gamma_deg.len() - 1]];
     let mut cells = cells(gamma_deg);
     let dark = |own: [f64; 2]| (own[0] < own[1]).then_some(Cell { own, is_dark: true, handed: own });
@@ -190,17 +220,17 @@ fn rows(gamma_deg: &[f64]) -> Vec<Node> {
     cells.extend(dark([ends[1], 180.0]));
     let nadir = NADIR_DEG.min(cells[0].own[1] / 8.0);
     cells[0].handed[0] = nadir;
-    let nodes = joined(cells, ROW_BESIDE_DEG, [nadir / 2.0, BEHIND_DEG]);
+    let nodes = joined(cells, steps, ROW_BESIDE_DEG, [nadir / 2.0, BEHIND_DEG]);
     [nodes[0].cell.node(0.0, 0.0)].into_iter().chain(nodes).collect()
 }
 
 /// Planes of the full circle, turned.
-fn planes(c_deg: &[f64]) -> Vec<Node> {
+fn planes(c_deg: &[f64], steps: usize) -> Vec<Node> {
     let mut cells = cells(c_deg);
     let last = cells.len() - 1;
     let (begin, end) = (-SEAM_DEG, 360.0 - SEAM_DEG);
     (cells[0].handed[0], cells[last].handed[1]) = (begin + 3.0 * HAIR_DEG, end - 3.0 * HAIR_DEG);
-    let nodes = joined(cells, PLANE_BESIDE_DEG, [begin + 2.0 * HAIR_DEG, end - 2.0 * HAIR_DEG]);
+    let nodes = joined(cells, steps, PLANE_BESIDE_DEG, [begin + 2.0 * HAIR_DEG, end - 2.0 * HAIR_DEG]);
     let (first, behind) = (nodes[0].cell, nodes[nodes.len() - 1].cell);
     let begins = [begin, begin + HAIR_DEG].map(|c| first.node(c, first.handed[0]));
     let ends = [end - HAIR_DEG, end].map(|c| behind.node(c, behind.handed[1]));
@@ -213,7 +243,7 @@ fn cells(angles: &[f64]) -> Vec<Cell> {
 }
 
 /// The nodes of cells of which each begins where the one before ends, between neighbours at two angles.
-fn joined(mut cells: Vec<Cell>, beside_deg: f64, ends: [f64; 2]) -> Vec<Node> {
+fn joined(mut cells: Vec<Cell>, steps: usize, beside_deg: f64, ends: [f64; 2]) -> Vec<Node> {
     let mut neighbours = vec![ends; cells.len()];
     for k in 1..cells.len() {
         let at = cells[k].own[0];
@@ -226,7 +256,7 @@ fn joined(mut cells: Vec<Cell>, beside_deg: f64, ends: [f64; 2]) -> Vec<Node> {
         (cells[k - 1].handed[1], neighbours[k - 1][1]) = (place(0.0), place(1.0));
         (neighbours[k][0], cells[k].handed[0]) = (place(2.0), place(3.0));
     }
-    cells.into_iter().zip(neighbours).flat_map(|(cell, beside)| cell.nodes(beside)).collect()
+    cells.into_iter().zip(neighbours).flat_map(|(cell, beside)| cell.nodes(steps, beside)).collect()
 }
 
 /// The cell that an angle lies in, and where in it; the last angle lies in none.
@@ -302,7 +332,8 @@ mod tests {
         for _ in 0..20 {
             let table = LookedUp::of(&random_table(&mut random));
             let (c, gamma) = (planes_deg(&table.of).len(), table.of.gamma_deg().len());
-            assert!(table.h_deg.len() <= 4 * c + 4 && table.v_deg.len() <= 4 * gamma + 8);
+            let nodes = steps(c * gamma) + 3;
+            assert!(table.h_deg.len() <= nodes * c + 4 && table.v_deg.len() <= nodes * (gamma + 1) + 1);
             assert!(table.misled_share() < 0.01);
             assert!(table.h_deg.windows(2).chain(table.v_deg.windows(2)).all(|ends| ends[0] < ends[1]));
             assert_eq!((table.h_deg[0], table.v_deg[0], table.h_deg.last()), (0.0, 0.0, Some(&360.0)));

@@ -25,8 +25,6 @@ const CELLS: [usize; 2] = [512, 256];
 const FAINT: f64 = 1e-9;
 /// What its 131,072 sums in 32-bit floats leave of that mean that is not foreseen here.
 const MEAN_OFF: f64 = 5e-6;
-/// So many degrees are directions of 32-bit floats off, for what is steep.
-const ANGLE_DEG: f64 = 1e-3;
 
 pub(super) struct Map {
     of: LuminousIntensityDistribution,
@@ -123,10 +121,6 @@ impl Map {
             + ds * idt * at(above, left + 1.0)
             + ds * dt * at(above + 1.0, left + 1.0)
     }
-
-    fn texel_deg(&self) -> f64 {
-        180.0 / self.height as f64
-    }
 }
 
 impl Resampled for Map {
@@ -142,13 +136,7 @@ impl Resampled for Map {
     fn off_cd(&self, c_deg: f64, gamma_deg: f64) -> f64 {
         let right = self.of.intensity(c_deg, gamma_deg).value();
         let read = self.intensity_cd(c_deg, gamma_deg);
-        let off = (read - right).abs() + MEAN_OFF * read.max(right);
-        // Where a table ends with light short of a pole, a texel is a ramp of it, on which no direction is known well enough.
-        let angles = self.of.gamma_deg();
-        let is_at = |end: &f64| *end > 0.0 && *end < 180.0 && (gamma_deg - end).abs() < 1.5 * self.texel_deg();
-        let ends = [angles[0], angles[angles.len() - 1]].into_iter().filter(is_at);
-        let ramp = ends.map(|end| self.of.intensity(c_deg, end).value()).fold(0.0, f64::max);
-        off + ramp * ANGLE_DEG / self.texel_deg()
+        (read - right).abs() + MEAN_OFF * read.max(right)
     }
 }
 

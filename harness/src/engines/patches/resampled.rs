@@ -1,8 +1,33 @@
 //! A candela table as a renderer looks it up, and what that leaves off.
 
 use glam::DVec3;
+use itertools::Itertools;
 use luminaire::photometry::{LuminousIntensityDistribution, angles_deg};
 use luminaire::scene::{Luminaire, Meter};
+
+/// The directions in which a luminaire may lie from a meter's patch, in degrees of C and gamma.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::engines) struct Spread {
+    /// So far to either side, patch and rounding together.
+    pub(in crate::engines) reach_deg: [f64; 2],
+    /// The longer side of the patch: it is no narrower.
+    pub(in crate::engines) patch_deg: [f64; 2],
+}
+
+impl Spread {
+    /// Of a square patch of such a side as far from a place as this ray is long, along these directions of its frame.
+    pub(in crate::engines) fn of(reach_deg: [f64; 2], ray: DVec3, side: f64, [along, across]: [DVec3; 2]) -> Self {
+        let from_axis = ray.x.hypot(ray.y);
+        if from_axis == 0.0 {
+            return Self { reach_deg, patch_deg: [0.0; 2] };
+        }
+        let by_c = DVec3::new(-ray.y, ray.x, 0.0) / from_axis;
+        let by_gamma = by_c.cross(ray.normalize_or_zero());
+        let seen =
+            |by: DVec3, distance: f64| (side / distance * along.dot(by).abs().max(across.dot(by).abs())).to_degrees();
+        Self { reach_deg, patch_deg: [seen(by_c, from_axis), seen(by_gamma, ray.length())] }
+    }
+}
 
 pub(in crate::engines) trait Resampled {
     /// The table itself.
@@ -16,20 +41,17 @@ pub(in crate::engines) trait Resampled {
         (self.intensity_cd(c_deg, gamma_deg) - self.table().intensity(c_deg, gamma_deg).value()).abs()
     }
 
-    /// The same about a direction, up to so far to either side in C and gamma.
-    fn off_about_cd(&self, c_deg: f64, gamma_deg: f64, _spread_deg: [f64; 2]) -> f64 {
-        self.off_cd(c_deg, gamma_deg)
+    /// The same of all that a patch may see about a direction: where a look-up is straight between few angles, the largest of a grid and a margin.
+    fn off_about_cd(&self, c_deg: f64, gamma_deg: f64, spread: Spread) -> f64 {
+        let [by_c, by_gamma] = [spread.reach_deg[0].min(180.0), spread.reach_deg[1]];
+        let parts = [-1.0, -0.5, 0.0, 0.5, 1.0];
+        let off = |(x, y): (f64, f64)| self.off_cd(c_deg + x * by_c, (gamma_deg + y * by_gamma).clamp(0.0, 180.0));
+        1.25 * parts.into_iter().cartesian_product(parts).map(off).fold(0.0, f64::max)
     }
 
     /// How far its look-up leaves the light of a luminaire at a meter from the table's own, in lux, where equal parts of it come from these places;
-    /// how far directions from a place are spread, in degrees of C and gamma, is asked for.
-    fn off_lx(
-        &self,
-        luminaire: &Luminaire,
-        places: &[DVec3],
-        meter: &Meter,
-        spread_deg: impl Fn(DVec3) -> [f64; 2],
-    ) -> f64
+    /// in which directions it may lie from there is asked for.
+    fn off_lx(&self, luminaire: &Luminaire, places: &[DVec3], meter: &Meter, spread: impl Fn(DVec3) -> Spread) -> f64
     where
         Self: Sized,
     {
@@ -37,7 +59,7 @@ pub(in crate::engines) trait Resampled {
             let ray_m = meter.position_m - *place_m;
             let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
             let (c, gamma) = angles_deg(luminaire.orientation.transpose() * ray_m);
-            self.off_about_cd(c, gamma, spread_deg(*place_m)) * cosine.max(0.0) / ray_m.length_squared()
+            self.off_about_cd(c, gamma, spread(*place_m)) * cosine.max(0.0) / ray_m.length_squared()
         };
         luminaire.flux_scale * places.iter().map(of_place).sum::<f64>() / places.len() as f64
     }
