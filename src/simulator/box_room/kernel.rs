@@ -239,6 +239,7 @@ impl Panel<'_> {
             (6, 8) => self.add_part_of((6, 8), u, v, block, stride),
             (8, 8) => self.add_part_of((8, 8), u, v, block, stride),
             (10, 10) => self.add_part_of((10, 10), u, v, block, stride),
+            (12, 12) => self.add_part_of((12, 12), u, v, block, stride),
             sizes => self.add_part_of(sizes, u, v, block, stride),
         }
     }

@@ -55,7 +55,7 @@ const FEW: usize = 8;
 const FEW_LUMINAIRES: [usize; 2] = [256, 32];
 const PROJECTION_REACHES: f64 = 1e-3;
 /// The largest relative error that each effort is the first choice for.
-const FIRST_EFFORT: [f64; 5] = [f64::INFINITY, 2e-2, 2e-5, 5e-6, 5e-7];
+const FIRST_EFFORT: [f64; 6] = [f64::INFINITY, 2e-2, 2e-5, 5e-6, 3e-6, 2e-6];
 /// The ladder of efforts; the rules of the first bounce grow with the order, or neighbours would share their errors.
 pub(super) const EFFORTS: [Effort; 8] = [
     Effort {
@@ -110,9 +110,9 @@ pub(super) const EFFORTS: [Effort; 8] = [
         order: 12,
         elements_per_half: 1,
         near_points: 12,
-        source_points: 12,
-        source_reach: 2.0,
-        source_tolerance: 1e-11,
+        source_points: 10,
+        source_reach: 1.5,
+        source_tolerance: 1e-10,
     },
     Effort {
         order: 12,
@@ -292,21 +292,23 @@ impl BoxField {
                 (light.representatives.iter().map(|node| lux[*node]).collect(), crowd::MISPLACED)
             }
         };
-        // Where the light is symmetrical enough, its orbits are the unknowns, and their matrix is no larger.
-        let irradiance = if light.images.len().pow(2) >= operator.orbits.images.len() {
-            let rows = operator.folded(&light);
-            let rho: Vec<f64> = light.representatives.iter().map(|node| rho[*node]).collect();
-            let step = |u: &[f64]| {
-                let exitance = exitance(u, &rho);
-                let lux = |row: &Vec<f64>| gmres::dot(row, &exitance);
-                // Sums that take microseconds are not worth a second thread.
-                let few = rows.len() < 500;
-                if few { rows.iter().map(lux).collect() } else { rows.par_iter().map(lux).collect() }
+        // Where the light is symmetrical enough, the matrix of its orbits is no larger.
+        let folded = (light.images.len().pow(2) >= operator.orbits.images.len()).then(|| operator.folded(&light));
+        let rho_of_light: Vec<f64> = light.representatives.iter().map(|node| rho[*node]).collect();
+        let reflected = |u: &[f64]| -> Vec<f64> {
+            let Some(rows) = &folded else {
+                let lux = operator.apply(&exitance(&light.unfold(u), &rho));
+                return light.representatives.iter().map(|node| lux[*node]).collect();
             };
-            light.unfold(&interreflect(step, &known, bounces, stop))
-        } else {
-            interreflect(|u| operator.apply(&exitance(u, &rho)), &light.unfold(&known), bounces, stop)
+            let exitance = exitance(u, &rho_of_light);
+            let lux = |row: &Vec<f64>| gmres::dot(row, &exitance);
+            // Sums that take microseconds are not worth a second thread.
+            let few = rows.len() < 500;
+            if few { rows.iter().map(lux).collect() } else { rows.par_iter().map(lux).collect() }
         };
+        let area_m2 = light.representatives.iter().zip(&light.sizes).map(|(node, n)| grid.node(*node).1 * n);
+        let closed = Closed(area_m2.zip(rho_of_light.iter().copied()).collect());
+        let irradiance = light.unfold(&interreflect(reflected, &known, &closed, bounces, stop));
         let exitance = exitance(&irradiance, &rho);
         let field = Self { exitance, grid, first, gathers, probes: OnceLock::new(), imbalance };
         (!stop.is_due()).then_some(field)
@@ -353,19 +355,54 @@ impl BoxField {
     }
 }
 
+/// A room that loses no light: area in m² and reflectance by orbit.
+///
+/// Without it, the corners' singularities cost the whole room a few parts in 1e8 at any order, and more where hardly any
+/// light is absorbed. Scaling what each node sends by itself moves more light than it saves.
+struct Closed(Vec<(f64, f64)>);
+
+impl Closed {
+    /// What is reflected more than once, scaled so that as much is absorbed in all as fell on the surfaces first.
+    fn converged(&self, known: &[f64], u: &[f64]) -> Vec<f64> {
+        let each = self.0.iter().zip(known).zip(u);
+        let (reflected, absorbed) = each.fold((0.0, 0.0), |(reflected, absorbed), (((area, rho), g), u)| {
+            (reflected + area * rho * g, absorbed + area * (1.0 - rho) * (u - g))
+        });
+        let scale = if absorbed > 0.0 { reflected / absorbed } else { 1.0 };
+        known.iter().zip(u).map(|(g, u)| g + scale * (u - g)).collect()
+    }
+
+    /// What one reflection more brings, scaled so that as much falls on the surfaces as left them.
+    fn reflected(&self, u: &[f64], further: &[f64]) -> Vec<f64> {
+        let each = self.0.iter().zip(u).zip(further);
+        let (left, landed) =
+            each.fold((0.0, 0.0), |(left, landed), (((area, rho), u), k)| (left + area * rho * u, landed + area * k));
+        let scale = if landed > 0.0 { left / landed } else { 1.0 };
+        further.iter().map(|k| scale * k).collect()
+    }
+}
+
 /// Irradiance after all the reflections that count, from that after one and what a further one makes of it.
-fn interreflect(step: impl Fn(&[f64]) -> Vec<f64>, known: &[f64], bounces: Bounces, stop: &Stop) -> Vec<f64> {
+fn interreflect(
+    step: impl Fn(&[f64]) -> Vec<f64>,
+    known: &[f64],
+    closed: &Closed,
+    bounces: Bounces,
+    stop: &Stop,
+) -> Vec<f64> {
     match bounces {
-        Bounces::Converged => gmres::solve(step, known, known.to_vec(), 1e-14),
+        Bounces::Converged => closed.converged(known, &gmres::solve(step, known, known.to_vec(), 1e-14)),
         Bounces::AtMost(count) => {
             let mut u = known.to_vec();
             for _ in 2..count {
-                let further: Vec<f64> = known.iter().zip(&step(&u)).map(|(g, k)| g + k).collect();
-                // What another reflection no longer changes, no further one does.
-                if further == u || stop.is_due() {
+                let further = closed.reflected(&u, &step(&u));
+                let further: Vec<f64> = known.iter().zip(&further).map(|(g, k)| g + k).collect();
+                // What another reflection changes by rounding alone, no further one does.
+                let is_settled = further.iter().zip(&u).all(|(f, u)| (f - u).abs() <= 4.0 * f64::EPSILON * f.abs());
+                u = further;
+                if is_settled || stop.is_due() {
                     break;
                 }
-                u = further;
             }
             u
         }
@@ -426,32 +463,7 @@ impl Operator {
     fn new(grid: &Grid, orbits: Orbits, stop: &Stop) -> Option<Self> {
         let row = |&node: &usize| (!stop.is_due()).then(|| balanced_row(grid, &receiver_at(grid, node)));
         let rows = orbits.representatives.par_iter().map(row).collect::<Option<_>>()?;
-        let mut operator = Self { orbits, rows };
-        operator.balance_columns(grid);
-        operator.rows.par_iter_mut().for_each(|row| balance(row));
-        operator.balance_columns(grid);
-        Some(operator)
-    }
-
-    /// Scales columns so that every node's light falls somewhere in full: no flux is lost or made.
-    ///
-    /// Without it, the corners' singularities cost the whole room a few parts in 1e8 at any order. All nodes of an orbit
-    /// get the same scale.
-    fn balance_columns(&mut self, grid: &Grid) {
-        let Orbits { representatives, orbit, sizes, .. } = &self.orbits;
-        let areas: Vec<f64> = representatives.iter().zip(sizes).map(|(node, n)| grid.node(*node).1 * n).collect();
-        let mut landed = vec![0.0; areas.len()];
-        for (area, row) in areas.iter().zip(&self.rows) {
-            for (value, j) in row.iter().zip(orbit) {
-                landed[*j as usize] += area * value;
-            }
-        }
-        let scales: Vec<f64> = areas.iter().zip(&landed).map(|(area, landed)| area / landed).collect();
-        self.rows.par_iter_mut().for_each(|row| {
-            for (value, j) in row.iter_mut().zip(orbit) {
-                *value *= scales[*j as usize];
-            }
-        });
+        Some(Self { orbits, rows })
     }
 
     /// Irradiance at one node an orbit from exitance by orbit.

@@ -272,6 +272,18 @@ fn interreflection_in_a_cube_is_phi_rho_over_area_times_absorption() {
     }
 }
 
+/// Corners lose light at any order; three elements a half side, which no effort has, know it ten times more closely.
+#[test]
+fn light_lost_in_corners_is_given_back_where_it_belongs() {
+    let (scene, meters) = s1();
+    let finer = Effort { elements_per_half: 3, ..EFFORTS[7] };
+    let [finest, finer] =
+        [&EFFORTS[7], &finer].map(|effort| solve(&scene, effort).illuminance(&meters, &Stop::NEVER).unwrap());
+    for (value, truth) in finest.iter().zip(&finer) {
+        assert_relative_eq!(value, truth, max_relative = 2e-8);
+    }
+}
+
 /// CIE 171 case 5.4: what a black room collects is what is emitted in it.
 #[test]
 fn a_black_room_collects_the_flux_that_is_emitted_in_it() {
