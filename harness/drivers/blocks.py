@@ -41,6 +41,7 @@ class Instrument:
     """The parts of a job's light: for each a function from (m, seeds) to a block a seed, and the rays of a block with m = 1."""
 
     lanes = 1 << 17  # rays in flight
+    normals_off = []  # how far each meter's unit normal is from that which it should have, where the renderer rounds it more than its numbers
 
     def __init__(self, job, versions, variant):
         self.job, self.versions, self.variant, self.parts = job, versions, variant, {}
@@ -60,7 +61,7 @@ class Instrument:
     def served(self, requests):
         parts = [{"name": p, "rays": self.parts[p][1], "sampled": self.is_sampled(p)} for p in self.parts]
         about = {"versions": self.versions, "variant": self.variant}
-        yield {**about, "lanes": self.lanes, "stations": self.stations, "parts": parts}
+        yield {**about, "lanes": self.lanes, "stations": self.stations, "normals_off": self.normals_off, "parts": parts}
         for request in map(json.loads, requests):
             yield self.blocks(request["part"], request["side"], request["seeds"]).tolist()
 

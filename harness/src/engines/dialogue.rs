@@ -67,7 +67,16 @@ struct Greeting {
     /// Rays in flight at most.
     lanes: usize,
     stations: Vec<String>,
+    /// How far each meter's unit normal is from its own; nothing where that is a matter of rounding alone.
+    #[serde(default)]
+    normals_off: Vec<f64>,
     parts: Vec<Part>,
+}
+
+impl Greeting {
+    fn normal_off(&self, station: usize) -> f64 {
+        self.normals_off.get(station).copied().unwrap_or(0.0)
+    }
 }
 
 #[derive(Deserialize)]
@@ -102,8 +111,8 @@ pub(super) struct Dialogue<'a> {
     pub(super) fixed: Option<(usize, usize)>,
     /// What a ray of a variant costs.
     pub(super) cost: &'a dyn Fn(&str) -> Cost,
-    /// Bound of direct light at a station.
-    pub(super) bound_lx: &'a dyn Fn(usize) -> f64,
+    /// Bound of direct light at a station whose unit normal is so far off.
+    pub(super) bound_lx: &'a dyn Fn(usize, f64) -> f64,
     /// Bound of what is sampled, in parts of the reading.
     pub(super) relative_bound: f64,
     /// Bound of reflected light besides: the share of the flux that goes elsewhere.
@@ -120,8 +129,11 @@ impl Dialogue<'_> {
         found.effort = [("seed", self.job.seed)].into();
         found.method = versions.chain([("variant".to_owned(), greeting.variant.clone())]).collect();
         for part in &greeting.parts {
-            let of_part =
-                if part.sampled { self.sampled(part, &greeting, &mut found)? } else { self.determined(part)? };
+            let of_part = if part.sampled {
+                self.sampled(part, &greeting, &mut found)?
+            } else {
+                self.determined(part, &greeting)?
+            };
             found.estimates.iter_mut().zip(of_part).for_each(|(sum, part)| *sum = sum.plus(&part));
         }
         self.conversation.end()?;
@@ -129,9 +141,9 @@ impl Dialogue<'_> {
     }
 
     /// Direct light of points: what is left is the rounding of 32-bit floats.
-    fn determined(&mut self, part: &Part) -> Result<Vec<Estimate>, EngineError> {
+    fn determined(&mut self, part: &Part, greeting: &Greeting) -> Result<Vec<Estimate>, EngineError> {
         let block = self.ask(&Request { part: &part.name, side: 1, seeds: vec![None] })?.concat();
-        let bound = |k| Uncertainty::Bound((self.bound_lx)(k));
+        let bound = |k| Uncertainty::Bound((self.bound_lx)(k, greeting.normal_off(k)));
         Ok(block.into_iter().enumerate().map(|(k, value)| Estimate { value, uncertainty: bound(k) }).collect())
     }
 
@@ -155,8 +167,11 @@ impl Dialogue<'_> {
         let of_part = [("blocks", read.blocks.count()), ("samples_a_meter_and_block", samples)];
         found.effort.extend(of_part.map(|(key, value)| (format!("{}_{key}", part.name), value.to_string())));
         let bound_lx = |k: usize, value: f64| match stream {
-            Stream::Direct => (self.bound_lx)(k) + self.relative_bound * value,
-            Stream::Reflected | Stream::Trial => (self.relative_bound + self.misled) * value,
+            Stream::Direct => (self.bound_lx)(k, greeting.normal_off(k)) + self.relative_bound * value,
+            // Of light from all about, a turned meter gains on one side what it loses on the other.
+            Stream::Reflected | Stream::Trial => {
+                (self.relative_bound + self.misled + 2.0 * greeting.normal_off(k)) * value
+            }
         };
         let within =
             |(k, e): (usize, Estimate)| Estimate { uncertainty: e.uncertainty.within(bound_lx(k, e.value.abs())), ..e };

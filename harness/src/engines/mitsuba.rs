@@ -134,7 +134,7 @@ impl Mitsuba {
             conversation: run.converse()?,
             fixed: (settings.preset != Preset::Audit).then_some((settings::FIXED_BLOCKS, settings::FIXED_SIDE)),
             cost: &cost,
-            bound_lx: &|k| error.at_lx(k),
+            bound_lx: &|k, _| error.at_lx(k),
             relative_bound: 0.0,
             misled: 0.0,
         };

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use glam::DVec3;
 use itertools::{Itertools, izip};
-use luminaire::scene::{Bounces, Luminaire, Transport};
+use luminaire::scene::{Bounces, Luminaire, Meter, Transport};
 use serde::{Deserialize, Serialize};
 
 use self::opening::Opening;
@@ -135,7 +135,9 @@ impl Package {
                 .sum()
         };
         let misled = looked_up.iter().map(Resampled::misled_share).fold(0.0, f64::max);
-        let bound_lx = |k: usize| rounding.at_lx(k) + of_tables_lx(k);
+        let bound_lx = |k: usize, normal_off: f64| {
+            rounding.at_lx(k) + of_tables_lx(k) + normal_off * facing_lx(job, &places, &job.stations[k].meter)
+        };
         let dialogue = Dialogue {
             engine: self.engine.clone(),
             job,
@@ -229,6 +231,18 @@ pub(super) fn patch(job: &Job, frame: &Frame) -> f64 {
     let points = points.chain(job.stations.iter().map(|s| s.meter.position_m));
     let largest = points.map(|p| frame.to_scene(p).abs().max_element()).fold(0.0, f64::max);
     PATCH * if largest > 0.0 { largest } else { 1.0 }
+}
+
+/// Illuminance that a meter would have that faced each part of all luminaires, in lux.
+fn facing_lx(job: &Job, places: &[Vec<DVec3>], meter: &Meter) -> f64 {
+    let of_place = |luminaire: &Luminaire, place_m: &DVec3| {
+        let ray_m = meter.position_m - *place_m;
+        luminaire.intensity_towards(ray_m).value() / ray_m.length_squared()
+    };
+    let of = |(luminaire, places): (&Luminaire, &Vec<DVec3>)| {
+        places.iter().map(|place_m| of_place(luminaire, place_m)).sum::<f64>() / places.len() as f64
+    };
+    job.scene.luminaires.iter().zip(places).map(of).sum()
 }
 
 /// Along which directions the sides of a patch lie, as in `Patches` of `cycles_read.py`.

@@ -1,5 +1,6 @@
 //! What holds for Cycles and LuxCore alike: the real renderers, and every way in which one fails.
 
+use approx::assert_relative_eq;
 use glam::DVec3;
 use luminaire::photometry::LuminousOpening;
 use luminaire::scene::{LuminaireModel, Scene, Transport, orientation};
@@ -50,18 +51,38 @@ pub(in crate::engines) fn what_cannot_be_read_well_is_said_beforehand(engine: &d
     assert!(matches!(engine.supports(&job), Support::No(_)));
 }
 
-/// Reads S1 through an interpreter that runs `script`.
+/// Reads S1 through an interpreter that runs `script`, which goes wrong.
 pub(in crate::engines) fn read_with(
     engine: &dyn Engine,
     own: fn(&Site) -> Site,
     script: &str,
     limit_s: f64,
 ) -> EngineError {
+    played(engine, own, script, limit_s).unwrap_err()
+}
+
+fn played(engine: &dyn Engine, own: fn(&Site) -> Site, script: &str, limit_s: f64) -> Result<Measurement, EngineError> {
     let folder = tempfile::tempdir().unwrap();
     let site = Site::at(folder.path().join("site"));
     write_program(&own(&site).venv().join("bin/python"), script);
     let bench = Workbench { limit: Duration::from_secs_f64(limit_s), ..workbench(site, folder.path()) };
-    engine.read(&s1(Transport::Direct), &bench).unwrap_err()
+    engine.read(&s1(Transport::Direct), &bench)
+}
+
+/// A driver whose renderer rounds normals says by how much, and its bounds are wider by what a meter may gain by a turn.
+pub(in crate::engines) fn normals_that_are_off_widen_bounds(engine: &dyn Engine, own: fn(&Site) -> Site) {
+    let driver = shared_tests::driver("CPU", &[0, 1, 2, 3], "[[1, 2, 2, 13]]");
+    let off = driver.replace("\"parts\"", "\"normals_off\": [0.0, 1e-3, 0.0, 1e-3], \"parts\"");
+    let [right, off] = [driver, off]
+        .map(|script| played(engine, own, &script, 30.0).unwrap())
+        .map(|found| found.estimates.iter().map(|e| e.uncertainty.bound()).collect::<Vec<_>>());
+    let job = s1(Transport::Direct);
+    for (k, (right, off)) in right.into_iter().zip(off).enumerate() {
+        let (meter, lamp) = (&job.stations[k].meter, &job.scene.luminaires[0]);
+        let ray_m = meter.position_m - lamp.position_m;
+        let facing = lamp.intensity_towards(ray_m).value() / ray_m.length_squared();
+        assert_relative_eq!(off - right, [0.0, 1e-3][k % 2] * facing, epsilon = 1e-12, max_relative = 1e-6);
+    }
 }
 
 pub(in crate::engines) fn answers_that_are_no_readings_are_errors(read_with: impl Fn(&str, f64) -> EngineError) {

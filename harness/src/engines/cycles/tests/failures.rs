@@ -12,6 +12,11 @@ fn a_crash_a_hang_and_an_out_of_memory_kill_are_told_apart() {
 }
 
 #[test]
+fn normals_that_are_off_widen_bounds() {
+    patches::tests::normals_that_are_off_widen_bounds(&Cycles, Site::blender);
+}
+
+#[test]
 fn answers_that_are_no_readings_are_errors() {
     patches::tests::answers_that_are_no_readings_are_errors(read_with);
 }
