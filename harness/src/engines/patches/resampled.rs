@@ -1,9 +1,17 @@
 //! A candela table as a renderer looks it up, and what that leaves off.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 use itertools::Itertools;
 use luminaire::photometry::{LuminousIntensityDistribution, angles_deg};
 use luminaire::scene::{Luminaire, Meter};
+
+/// What a patch is wide in C, for the largest part of it that lies within some degrees: with a pole at its corner, and where it is wider
+/// than so many degrees by its distance from that, at its centre.
+const BESIDE_POLE_DEG: f64 = 57.0;
+const NEAR_POLE_DEG: f64 = 600.0;
+const AT_POLE_DEG: f64 = 150.0;
 
 /// The directions in which a luminaire may lie from a meter's patch, in degrees of C and gamma.
 #[derive(Clone, Copy, Debug, Default)]
@@ -18,14 +26,19 @@ impl Spread {
     /// Of a square patch of such a side as far from a place as this ray is long, along these directions of its frame.
     pub(in crate::engines) fn of(reach_deg: [f64; 2], ray: DVec3, side: f64, [along, across]: [DVec3; 2]) -> Self {
         let from_axis = ray.x.hypot(ray.y);
-        if from_axis == 0.0 {
-            return Self { reach_deg, patch_deg: [0.0; 2] };
-        }
-        let by_c = DVec3::new(-ray.y, ray.x, 0.0) / from_axis;
+        let by_c = if from_axis > 0.0 { DVec3::new(-ray.y, ray.x, 0.0) / from_axis } else { DVec3::X };
         let by_gamma = by_c.cross(ray.normalize_or_zero());
-        let seen =
-            |by: DVec3, distance: f64| (side / distance * along.dot(by).abs().max(across.dot(by).abs())).to_degrees();
-        Self { reach_deg, patch_deg: [seen(by_c, from_axis), seen(by_gamma, ray.length())] }
+        let seen = |by: DVec3, distance: f64| {
+            (side * along.dot(by).abs().max(across.dot(by).abs()) / distance.max(f64::MIN_POSITIVE)).to_degrees()
+        };
+        let (c_deg, gamma_deg) = (seen(by_c, from_axis), seen(by_gamma, ray.length()));
+        // About a pole in the patch all of C lies, and what is as wide in gamma everywhere is a ring.
+        let patch_deg = match c_deg {
+            ..BESIDE_POLE_DEG => [c_deg, gamma_deg],
+            ..NEAR_POLE_DEG => [BESIDE_POLE_DEG, gamma_deg / PI],
+            _ => [AT_POLE_DEG, gamma_deg / PI],
+        };
+        Self { reach_deg, patch_deg }
     }
 }
 
