@@ -153,10 +153,10 @@ impl Resampled for LookedUp {
 
     fn off_about_cd(&self, c_deg: f64, gamma_deg: f64, spread: Spread) -> f64 {
         let [by_c, by_gamma] = [spread.reach_deg[0].clamp(1e-9, 180.0), spread.reach_deg[1].max(1e-9)];
-        // No more of a patch than this sees a piece so wide, wherever the patch lies: one line of points more than its width holds.
+        // No more of a patch than this sees a piece so wide, wherever the patch lies.
         let share = |of: usize, [begin, end]: [f64; 2]| {
             let patch = spread.patch_deg[of];
-            if end - begin < patch { ((end - begin) / patch + 1.0 / LINES).min(1.0) } else { 1.0 }
+            if end - begin < patch { (end - begin) / patch } else { 1.0 }
         };
         let largest_cd = |columns: [f64; 2], rows: [f64; 2]| {
             let at = |[begin, end]: [f64; 2], part: f64| begin + part * (end - begin);
@@ -168,19 +168,26 @@ impl Resampled for LookedUp {
             [(gamma_deg - by_gamma).max(NADIR_DEG), (gamma_deg + by_gamma).clamp(2.0 * NADIR_DEG, 180.0)],
             [h - by_c, h + by_c],
         );
-        let (mut mean, mut worst) = (0.0, 0.0_f64);
         // A window over the seam is two.
-        for turn in [-360.0, 0.0, 360.0] {
-            for columns in self.pieces[0].within(columns.map(|h| h + turn)) {
-                for rows in self.pieces[1].within(rows) {
-                    let off = largest_cd(columns, rows);
-                    mean += share(0, columns).min(share(1, rows)) * off;
-                    worst = worst.max(off);
-                }
-            }
-        }
-        // What evenly spread points would see, and one point more; twice, for angles are rounded and points are not spread evenly.
-        2.0 * (mean + worst / POINTS)
+        let columns = [-360.0, 0.0, 360.0].map(|turn| columns.map(|h| h + turn));
+        let columns: Vec<_> = columns.into_iter().flat_map(|window| self.pieces[0].within(window)).collect();
+        let rows: Vec<_> = self.pieces[1].within(rows).collect();
+        let off: Vec<Vec<f64>> =
+            columns.iter().map(|c| rows.iter().map(|gamma| largest_cd(*c, *gamma)).collect()).collect();
+        let largest = |off: &mut dyn Iterator<Item = f64>| off.fold(0.0, f64::max);
+        // All that a patch sees of a column is no more than its share, nor of a row, nor of where they cross than that of either.
+        let of_columns: f64 =
+            columns.iter().zip(&off).map(|(c, off)| share(0, *c) * largest(&mut off.iter().copied())).sum();
+        let of_row = |k: usize| largest(&mut off.iter().map(|column| column[k]));
+        let of_rows: f64 = rows.iter().enumerate().map(|(k, gamma)| share(1, *gamma) * of_row(k)).sum();
+        let both =
+            columns.iter().zip(&off).flat_map(|(c, off)| rows.iter().zip(off).map(move |(gamma, off)| (c, gamma, off)));
+        let of_both: f64 = both.map(|(c, gamma, off)| share(0, *c).min(share(1, *gamma)) * off).sum();
+        let worst = largest(&mut off.iter().flatten().copied());
+        // One line of points may lie in what is narrow; about a pole, where that is no straight line, one point.
+        let one = if by_c < 180.0 { LINES } else { POINTS };
+        // What evenly spread points would see, and that; twice, for angles are rounded and points are not spread evenly.
+        2.0 * (of_columns.min(of_rows).min(of_both) + worst / one)
     }
 
     /// From the middle of every piece: those where cells meet are too narrow for any grid.

@@ -59,7 +59,7 @@ pub(in crate::engines) trait Resampled {
         let [by_c, by_gamma] = [spread.reach_deg[0].min(180.0), spread.reach_deg[1]];
         let parts = [-1.0, -0.5, 0.0, 0.5, 1.0];
         let off = |(x, y): (f64, f64)| self.off_cd(c_deg + x * by_c, (gamma_deg + y * by_gamma).clamp(0.0, 180.0));
-        1.25 * parts.into_iter().cartesian_product(parts).map(off).fold(0.0, f64::max)
+        1.1 * parts.into_iter().cartesian_product(parts).map(off).fold(0.0, f64::max)
     }
 
     /// How far its look-up leaves the light of a luminaire at a meter from the table's own, in lux, where equal parts of it come from these places;
