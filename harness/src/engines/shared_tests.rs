@@ -31,7 +31,7 @@ struct Renderer {
 }
 
 const MITSUBA: Renderer = Renderer { read: mitsuba::read, direct: [1e-5, 1e-4], turned: [1e-4, 1e-5], unshaded: 1e-5 };
-const CYCLES: Renderer = Renderer { read: cycles::read, direct: [1e-4, 5e-3], turned: [1e-3, 2e-4], unshaded: 1e-3 };
+const CYCLES: Renderer = Renderer { read: cycles::read, direct: [1e-4, 2e-3], turned: [1e-3, 2e-4], unshaded: 1e-3 };
 const LUXCORE: Renderer = Renderer { read: luxcore::read, direct: [1e-4, 1e-3], turned: [1e-3, 2e-4], unshaded: 1e-4 };
 const RADIANCE: Renderer = Renderer { read: radiance::read, direct: [1e-6; 2], turned: [1e-4, 1e-5], unshaded: 1e-5 };
 const POVRAY: Renderer = Renderer { read: povray::read, direct: [1e-6, 1e-4], turned: [0.0, 1e-6], unshaded: 1e-6 };

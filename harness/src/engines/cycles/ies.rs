@@ -185,7 +185,7 @@ impl Resampled for LookedUp {
         let of_both: f64 = both.map(|(c, gamma, off)| share(0, *c).min(share(1, *gamma)) * off).sum();
         let worst = largest(&mut off.iter().flatten().copied());
         // One line of points may lie in what is narrow; about a pole, where that is no straight line, one point.
-        let one = if by_c < 180.0 { LINES } else { POINTS };
+        let one = if by_c < 90.0 { LINES } else { POINTS };
         // What evenly spread points would see, and that; twice, for angles are rounded and points are not spread evenly.
         2.0 * (of_columns.min(of_rows).min(of_both) + worst / one)
     }
