@@ -186,8 +186,8 @@ impl Resampled for LookedUp {
         let worst = largest(&mut off.iter().flatten().copied());
         // One line of points may lie in what is narrow; about a pole, where that is no straight line, one point.
         let one = if by_c < 90.0 { LINES } else { POINTS };
-        // What evenly spread points would see, and that; twice, for angles are rounded and points are not spread evenly.
-        2.0 * (of_columns.min(of_rows).min(of_both) + worst / one)
+        // What evenly spread points would see, and that; three times, for angles are rounded and points are not spread evenly.
+        3.0 * (of_columns.min(of_rows).min(of_both) + worst / one)
     }
 
     /// From the middle of every piece: those where cells meet are too narrow for any grid.
