@@ -165,6 +165,8 @@ fn bounds_that_known_values_lie_outside_of_are_told() {
         is_told(&[off, (BOUND, claim)], &[("claims", says)]);
     }
     assert_eq!(examined(&[off, (BOUND, "\"error_bound_lx\": 5e-3 * lux")]).code, Some(0));
+    // What rounding leaves of a right angle is no light.
+    assert_eq!(examined(&[("max(cosine, 0.0)", "max(cosine, 1e-17)")]).code, Some(0));
 }
 
 #[test]

@@ -288,17 +288,22 @@ impl Findings {
 
 /// Readings within the tolerance whose known values do not lie within what is claimed of them.
 fn beyond_bounds(comparisons: &[&Comparison]) -> Option<String> {
+    let brightest = |procedure: ProcedureId| {
+        let of_scene = comparisons.iter().filter(|c| c.key.procedure == procedure);
+        of_scene.filter_map(|c| c.reference.as_ref()).map(|r| r.value.abs()).fold(0.0, f64::max)
+    };
     let beyond = |c: &Comparison| {
         let reference = c.reference.as_ref()?;
+        // Where it is dark, what is left of sums is rounded as the scene's other readings are.
+        let of = if reference.value == 0.0 { brightest(c.key.procedure) } else { reference.value.abs() };
         let claimed = match c.uncertainty {
-            Uncertainty::Exact => IN_FLOATS * reference.value.abs(),
+            Uncertainty::Exact => IN_FLOATS * of,
             Uncertainty::Bound(bound) => bound,
             _ => return None,
         };
-        let known =
-            reference.coverage_factor.unwrap_or(1.0) * reference.uncertainty + IN_DOUBLES * reference.value.abs();
+        let known = reference.coverage_factor.unwrap_or(1.0) * reference.uncertainty + IN_DOUBLES * of;
         let deviation = c.deviation?.abs();
-        (deviation > claimed + known).then(|| deviation / reference.value.abs())
+        (deviation > claimed + known).then(|| deviation / of)
     };
     let all: Vec<f64> = comparisons.iter().filter_map(|c| beyond(c)).collect();
     let largest = all.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);

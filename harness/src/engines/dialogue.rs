@@ -123,6 +123,10 @@ impl Dialogue<'_> {
     pub(super) fn measurement(mut self) -> Result<Measurement, EngineError> {
         let greeting: Greeting = parse(&self.engine, &self.conversation.listen()?)?;
         same_meters(&self.engine, self.job, greeting.stations.iter().map(String::as_str))?;
+        let (found, wanted) = (greeting.normals_off.len(), greeting.stations.len());
+        if found != 0 && found != wanted {
+            return Err(EngineError::output(self.engine.clone(), format!("gave {found} normals for {wanted} meters")));
+        }
         let mut found =
             Measurement { estimates: vec![Estimate::DARK; self.job.stations.len()], ..Measurement::default() };
         let versions = greeting.versions.iter().map(|(k, v)| (format!("version_{k}"), v.clone()));

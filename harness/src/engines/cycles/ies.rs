@@ -1,10 +1,10 @@
 //! Tables as Cycles' IES texture looks them up: with values between the table's cells where nobody looks, so that its cubic curves are our straight lines.
 //!
 //! Between angles Cycles lays a cubic through four neighbours by their numbers (`kernel/util/ies.h`), whatever the angles between them: straight
-//! where the neighbours' values are in line. So every cell of a table is divided into steps and has neighbours of its own, in line with its ends, and where two cells meet those lie
-//! within a hair's breadth, a hair beside the angle itself. Beyond the first plane and the last one Cycles takes all for dark, and it is dark at the last
-//! angle itself: planes begin and end with cells of a hair's breadth, turned away from C 0, and a row lies behind gamma 180. What is left
-//! is computed and stated, never taken off.
+//! where the neighbours' values are in line. So every cell of a table is divided into steps and has neighbours of its own, in line with its ends,
+//! and where two cells meet those lie within a hair's breadth, a hair beside the angle itself. Beyond the first plane and the last one Cycles takes
+//! all for dark, and it is dark at the last angle itself: planes begin and end with cells of a hair's breadth, turned away from C 0, and a row lies
+//! behind gamma 180. What is left is computed and stated, never taken off.
 
 use itertools::Itertools;
 use luminaire::photometry::LuminousIntensityDistribution;
@@ -168,22 +168,23 @@ impl Resampled for LookedUp {
             [(gamma_deg - by_gamma).max(NADIR_DEG), (gamma_deg + by_gamma).clamp(2.0 * NADIR_DEG, 180.0)],
             [h - by_c, h + by_c],
         );
-        // A window over the seam is two.
-        let columns = [-360.0, 0.0, 360.0].map(|turn| columns.map(|h| h + turn));
-        let columns: Vec<_> = columns.into_iter().flat_map(|window| self.pieces[0].within(window)).collect();
         let rows: Vec<_> = self.pieces[1].within(rows).collect();
-        let off: Vec<Vec<f64>> =
-            columns.iter().map(|c| rows.iter().map(|gamma| largest_cd(*c, *gamma)).collect()).collect();
-        let largest = |off: &mut dyn Iterator<Item = f64>| off.fold(0.0, f64::max);
         // All that a patch sees of a column is no more than its share, nor of a row, nor of where they cross than that of either.
-        let of_columns: f64 =
-            columns.iter().zip(&off).map(|(c, off)| share(0, *c) * largest(&mut off.iter().copied())).sum();
-        let of_row = |k: usize| largest(&mut off.iter().map(|column| column[k]));
-        let of_rows: f64 = rows.iter().enumerate().map(|(k, gamma)| share(1, *gamma) * of_row(k)).sum();
-        let both =
-            columns.iter().zip(&off).flat_map(|(c, off)| rows.iter().zip(off).map(move |(gamma, off)| (c, gamma, off)));
-        let of_both: f64 = both.map(|(c, gamma, off)| share(0, *c).min(share(1, *gamma)) * off).sum();
-        let worst = largest(&mut off.iter().flatten().copied());
+        let (mut of_columns, mut of_both, mut of_row) = (0.0, 0.0, vec![0.0_f64; rows.len()]);
+        // A window over the seam is two.
+        for columns in [-360.0, 0.0, 360.0].map(|turn| columns.map(|h| h + turn)) {
+            for column in self.pieces[0].within(columns) {
+                let mut of_column = 0.0_f64;
+                for (row, of_row) in rows.iter().zip(&mut of_row) {
+                    let off = largest_cd(column, *row);
+                    (of_column, *of_row) = (of_column.max(off), of_row.max(off));
+                    of_both += share(0, column).min(share(1, *row)) * off;
+                }
+                of_columns += share(0, column) * of_column;
+            }
+        }
+        let of_rows: f64 = rows.iter().zip(&of_row).map(|(row, off)| share(1, *row) * off).sum();
+        let worst = of_row.into_iter().fold(0.0, f64::max);
         // One line of points may lie in what is narrow; about a pole, where that is no straight line, one point.
         let one = if by_c < 90.0 { LINES } else { POINTS };
         // What evenly spread points would see, and that; three times, for angles are rounded and points are not spread evenly.
@@ -282,6 +283,7 @@ fn cubic([a, b, c, d]: [f64; 4], x: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::engines::fixtures::{axial_uplight, lambertian, lopsided, quadrant, random_table};
+    use crate::engines::patches::tests::is_the_table_but_for_little;
 
     #[test]
     fn the_drivers_turn_planes_and_sample_patches_as_is_counted_on() {
@@ -294,16 +296,7 @@ mod tests {
     #[test]
     fn what_cycles_looks_up_is_the_table_but_for_little() {
         for distribution in [axial_uplight(), lopsided(), quadrant(), lambertian()] {
-            let table = LookedUp::of(&distribution);
-            let largest = distribution.max_intensity().value();
-            let mut worst = 0.0_f64;
-            for k in 0..360 {
-                for j in 0..=360 {
-                    let (c, gamma) = (f64::from(k), 0.5 * f64::from(j));
-                    worst = worst.max((table.intensity_cd(c, gamma) - distribution.intensity(c, gamma).value()).abs());
-                }
-            }
-            assert!(worst < 5e-4 * largest, "{worst} of {largest}");
+            is_the_table_but_for_little(&LookedUp::of(&distribution));
         }
     }
 

@@ -188,20 +188,13 @@ fn slopes(angles: &[f64], values: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::engines::fixtures::{axial_uplight, lambertian, lopsided, quadrant, random_table};
+    use crate::engines::patches::tests::is_the_table_but_for_little;
 
     #[test]
     fn what_luxcore_looks_up_is_the_table_but_for_little() {
         for distribution in [axial_uplight(), lopsided(), quadrant(), lambertian()] {
             let map = Map::of(&distribution);
-            let largest = distribution.max_intensity().value();
-            let mut worst = 0.0_f64;
-            for k in 0..360 {
-                for j in 0..=360 {
-                    let (c, gamma) = (f64::from(k), 0.5 * f64::from(j));
-                    worst = worst.max((map.intensity_cd(c, gamma) - distribution.intensity(c, gamma).value()).abs());
-                }
-            }
-            assert!(worst < 5e-4 * largest, "{worst} of {largest}");
+            is_the_table_but_for_little(&map);
             assert!(map.misled_share() < 1e-4, "{}", map.misled_share());
             let flux = distribution.flux().value();
             assert!((map.flux_lm() / flux - 1.0).abs() < 1e-4, "{} {flux}", map.flux_lm());

@@ -14,7 +14,7 @@ const NEAR_POLE_DEG: f64 = 600.0;
 const AT_POLE_DEG: f64 = 150.0;
 
 /// The directions in which a luminaire may lie from a meter's patch, in degrees of C and gamma.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(in crate::engines) struct Spread {
     /// So far to either side, patch and rounding together.
     pub(in crate::engines) reach_deg: [f64; 2],

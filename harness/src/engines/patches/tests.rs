@@ -51,6 +51,20 @@ pub(in crate::engines) fn what_cannot_be_read_well_is_said_beforehand(engine: &d
     assert!(matches!(engine.supports(&job), Support::No(_)));
 }
 
+/// At every degree of C and every half of gamma.
+pub(in crate::engines) fn is_the_table_but_for_little(looked_up: &impl Resampled) {
+    let table = looked_up.table();
+    let largest = table.max_intensity().value();
+    let mut worst = 0.0_f64;
+    for k in 0..360 {
+        for j in 0..=360 {
+            let (c, gamma) = (f64::from(k), 0.5 * f64::from(j));
+            worst = worst.max((looked_up.intensity_cd(c, gamma) - table.intensity(c, gamma).value()).abs());
+        }
+    }
+    assert!(worst < 5e-4 * largest, "{worst} of {largest}");
+}
+
 /// Reads S1 through an interpreter that runs `script`, which goes wrong.
 pub(in crate::engines) fn read_with(
     engine: &dyn Engine,
