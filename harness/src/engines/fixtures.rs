@@ -219,7 +219,7 @@ pub(super) fn scaled(mut job: Job, size: f64, flux: f64) -> Job {
 
 /// What a study that renders for long takes in every test run, and what it takes where `LUXPROOF_NIGHTLY` is set, as `ci/nightly` does:
 /// the same assertions on more or finer samples.
-pub(super) fn by_night<T>(night: T, day: T) -> T {
+pub(crate) fn by_night<T>(night: T, day: T) -> T {
     if std::env::var_os("LUXPROOF_NIGHTLY").is_some() { night } else { day }
 }
 

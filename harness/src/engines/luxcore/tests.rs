@@ -76,7 +76,7 @@ fn one_seed_gives_the_same_readings_on_any_number_of_threads() {
 
 #[test]
 fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
-    shared_tests::bounds_hold_and_decide(read, false, 6);
+    shared_tests::bounds_hold_and_decide(read, false, by_night(6, 3));
 }
 
 #[test]
