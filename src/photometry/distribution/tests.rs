@@ -44,6 +44,20 @@ fn s1_flux_is_the_converged_value() {
 }
 
 #[test]
+fn many_intensities_at_once_are_those_of_each() {
+    let gamma = vec![10.0, 30.0, 90.0];
+    let angles: Vec<f64> = (0..=720).map(|k| 0.5 * f64::from(k)).collect();
+    for c in
+        [vec![0.0], vec![0.0, 45.0, 90.0], vec![0.0, 60.0, 180.0], vec![90.0, 180.0, 270.0], vec![0.0, 120.0, 360.0]]
+    {
+        let candela = c.iter().flat_map(|c| [7.0 + c % 360.0, 31.5, 2.0 + c % 360.0]).collect();
+        let table = LuminousIntensityDistribution::new(c, gamma.clone(), candela).unwrap();
+        let each = angles.iter().flat_map(|g| angles.iter().map(|c| table.intensity(*c, *g).value()));
+        assert!(table.intensities(&angles, &angles).into_iter().eq(each));
+    }
+}
+
+#[test]
 fn symmetry_folds_every_direction_onto_the_stored_planes() {
     let planes = |c: Vec<f64>| {
         let candela = c.iter().flat_map(|c| [100.0 + c, 200.0 + c]).collect();

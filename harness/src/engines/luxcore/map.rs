@@ -13,8 +13,10 @@ use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
 use crate::engines::SceneFile;
 use crate::engines::patches::resampled::Resampled;
 
-/// What a straight line across a kink may be off, in parts of the largest intensity, as far as texels go.
-const WANTED: f64 = 1e-4;
+/// What a straight line across a kink may be off, in parts of the intensity there, as far as texels go.
+const WANTED: f64 = 5e-5;
+/// Where it is darker than this part of the largest intensity, in parts of so much.
+const DIM: f64 = 1e-2;
 const HEIGHTS: [usize; 4] = [512, 1024, 2048, 4096];
 const WIDTHS: [usize; 3] = [360, 720, 1440];
 /// Columns of an axial table.
@@ -42,17 +44,19 @@ impl Map {
         let rows: Vec<Vec<f64>> =
             (0..full.gamma_deg().len()).map(|g| planes.iter().map(|plane| plane[g]).collect()).collect();
         // Across a kink a straight line a texel long is off by a quarter of it.
-        let is_fine = |kink: f64, texel_deg: f64| 0.25 * kink * texel_deg <= WANTED * largest;
-        let gamma = planes.iter().map(|plane| kink(full.gamma_deg(), plane)).fold(0.0, f64::max);
+        let is_fine = |kink: f64, texel_deg: f64| 0.25 * kink * texel_deg <= WANTED;
+        let dim = DIM * largest;
+        let gamma = planes.iter().map(|plane| kink(full.gamma_deg(), plane, dim)).fold(0.0, f64::max);
         let height = finest(&HEIGHTS, |h| is_fine(gamma, 180.0 / h as f64));
-        let c = rows.iter().map(|row| steepest(full.c_deg(), row)).fold(0.0, f64::max);
+        let c = rows.iter().map(|row| steepest(full.c_deg(), row, dim)).fold(0.0, f64::max);
         let width = match distribution.symmetry() {
             Symmetry::Axial => AXIAL,
             _ => finest(&WIDTHS, |w| is_fine(2.0 * c, 360.0 / w as f64)),
         };
         let (c_deg, gamma_deg) = (360.0 / width as f64, 180.0 / height as f64);
-        let texel = |y: usize, x: usize| distribution.intensity(x as f64 * c_deg, 180.0 - (y as f64 + 0.5) * gamma_deg);
-        let texels = (0..height).flat_map(|y| (0..width).map(move |x| texel(y, x).value() as f32)).collect();
+        let columns: Vec<f64> = (0..width).map(|x| x as f64 * c_deg).collect();
+        let rows: Vec<f64> = (0..height).map(|y| 180.0 - (y as f64 + 0.5) * gamma_deg).collect();
+        let texels = distribution.intensities(&columns, &rows).into_iter().map(|cd| cd as f32).collect();
         let mut map = Self { of: distribution.clone(), width, height, texels };
         map.light_up((FAINT * largest) as f32);
         map
@@ -159,8 +163,8 @@ fn finest(sizes: &[usize], is_fine: impl Fn(usize) -> bool) -> usize {
     sizes.iter().copied().find(|size| is_fine(*size)).unwrap_or(sizes[sizes.len() - 1])
 }
 
-/// The largest change of slope along gamma, a degree; beyond a table's ends it is dark.
-fn kink(angles: &[f64], values: &[f64]) -> f64 {
+/// The largest change of slope along gamma, a degree, in parts of the intensity there; beyond a table's ends it is dark.
+fn kink(angles: &[f64], values: &[f64], dim: f64) -> f64 {
     let (first, last) = (angles[0], angles[angles.len() - 1]);
     let (mut angles, mut values) = (angles.to_vec(), values.to_vec());
     if first > 0.0 {
@@ -171,12 +175,15 @@ fn kink(angles: &[f64], values: &[f64]) -> f64 {
         angles.extend([last + 1.0, last + 2.0]);
         values.extend([0.0, 0.0]);
     }
-    slopes(&angles, &values).windows(2).map(|s| (s[1] - s[0]).abs()).fold(0.0, f64::max)
+    let slopes = slopes(&angles, &values);
+    let kinks = slopes.windows(2).zip(&values[1..]).map(|(s, value)| (s[1] - s[0]).abs() / value.max(dim));
+    kinks.fold(0.0, f64::max)
 }
 
-/// The largest slope, a degree.
-fn steepest(angles: &[f64], values: &[f64]) -> f64 {
-    slopes(angles, values).into_iter().map(f64::abs).fold(0.0, f64::max)
+/// The largest slope, a degree, in parts of the lower intensity at its ends.
+fn steepest(angles: &[f64], values: &[f64], dim: f64) -> f64 {
+    let relative = |(slope, ends): (f64, &[f64])| slope.abs() / ends[0].min(ends[1]).max(dim);
+    slopes(angles, values).into_iter().zip(values.windows(2)).map(relative).fold(0.0, f64::max)
 }
 
 fn slopes(angles: &[f64], values: &[f64]) -> Vec<f64> {
