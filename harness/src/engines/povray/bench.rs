@@ -27,6 +27,7 @@ const MIN_RAYS: f64 = 25.0;
 /// Seconds that are counted for the test of a ray against a shape: on two cores of a usual server, half as much again as was
 /// measured there.
 const TEST_S: f64 = 1.1e-7;
+const COUNTED: f64 = 1.5;
 /// What a block takes with its runs of the first reflection, against one without.
 const FIRST_REFLECTION: f64 = 1.35;
 /// The part of the time that the fewest blocks may take.
@@ -40,6 +41,8 @@ const PROCESS_MIB: u64 = 86;
 /// What a process sleeps, and what it computes before its rays, in seconds.
 const SLEEP_S: f64 = 0.6;
 const START_S: f64 = 0.05;
+/// So many times as many processes as would compute on the mean: runs of a block are of three lengths, and the last ones of a wave run alone.
+const SPARE: f64 = 2.0;
 /// Looks at direct light at most: each narrows a reading by 1e3 at least.
 const MAX_LOOKS: usize = 10;
 /// Below this share of its upper bound a reading is darkness.
@@ -238,7 +241,8 @@ impl<'a> Bench<'a> {
         let parts = |k| self.parts(Run { seed: self.seed(k + 1), ..run }).into_iter().map(move |part| (k, part));
         let all: Vec<(usize, (f64, Run))> = numbers.clone().flat_map(parts).collect();
         // As many as compute while others sleep.
-        let for_each_thread = (1.0 + SLEEP_S / (START_S + pilot.work_s)).ceil() as usize;
+        let run_s = FIRST_REFLECTION * pilot.work_s / COUNTED * numbers.len() as f64 / all.len() as f64;
+        let for_each_thread = (1.0 + SPARE * SLEEP_S / (START_S + run_s)).ceil() as usize;
         let side = for_each_thread.min(side_by_side_at_most(self.job)) * self.workbench.jobs.max(1);
         let read = side_by_side(side, &all, |(_, (_, run))| self.values(*run, pilot));
         let mut blocks = vec![vec![0.0; self.job.stations.len()]; numbers.len()];
