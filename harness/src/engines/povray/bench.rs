@@ -24,8 +24,7 @@ use super::settings::{FIRST_REFLECTION_RAYS, LONG_POOL, POOL, Settings};
 
 /// Rays a sample at least, where the budget is short.
 const MIN_RAYS: f64 = 25.0;
-/// Seconds that are counted for the test of a ray against a shape: on two cores of a usual server, half as much again as was
-/// measured there.
+/// Seconds that are counted for the test of a ray against a shape, and how many times what was measured on two cores of a usual server they are.
 const TEST_S: f64 = 1.1e-7;
 const COUNTED: f64 = 1.5;
 /// What a block takes with its runs of the first reflection, against one without.

@@ -416,7 +416,7 @@ mod tests {
             steps += usize::from(found.iter().any(is_step) && !found.iter().any(is_drift));
         }
         println!("{ended} drifts with both dates, {steps} steps told as steps alone, of {}", all());
-        assert!(ended + 1 >= all() && steps + 1 >= all(), "{ended} {steps}");
+        assert!(12 * ended >= 11 * all() && 12 * steps >= 11 * all(), "{ended} {steps}");
     }
 
     #[test]
@@ -436,7 +436,8 @@ mod tests {
 
     #[test]
     fn a_shift_of_one_reading_among_two_thousand_is_noticed_half_the_time_within_five_nights_and_soon_otherwise() {
-        // One reading in each of five cases, so that no group shows them; how many nights each took, if three weeks at most.
+        // One reading in each of five cases, so that no group shows them; how many nights each took, if three weeks at most. Of fewer
+        // readings parts would say nothing.
         let mut delays: Vec<Option<usize>> = vec![];
         for seed in 0..12 {
             let shift = Shift { night: 60 + 23 * seed as usize, meters: 1, ..SEEN };
