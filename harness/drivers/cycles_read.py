@@ -40,7 +40,7 @@ def check(table):
     cycles_scene.start()
     cycles_scene.stock_luminaire("probe", table, 1, np.eye(4).tolist())
     directions = np.array([[0.36, 0.48, -0.8], [-0.48, 0.6, -0.64], [0.6, -0.48, 0.64], [-0.36, -0.8, 0.48]])
-    patches = Patches([{"position": d.tolist(), "normal": (-d).tolist()} for d in directions], 1e-4, 1)
+    patches = Patches([{"position": d.tolist(), "normal": (-d).tolist(), "free": True} for d in directions], 1e-4, 1)
     if np.allclose(patches.bake({"DIRECT"}, 1, 0), UNREADABLE_CD, rtol=1e-3):
         raise RuntimeError(f"Cycles cannot read {os.path.basename(table)}, and would shine evenly in its place")
 
@@ -98,8 +98,9 @@ class Patches:
         along = np.cross(aside, normals)
         along /= np.linalg.norm(along, axis=1, keepdims=True)
         across = np.cross(normals, along)
-        # Half a side before a surface that the meter lies on.
-        corners = [positions + side / 2 * (normals + x * along + y * across) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        # Half a side before a surface beside the meter.
+        clear = np.where(np.array([s["free"] for s in stations], bool).reshape(-1, 1), 0.0, normals)
+        corners = [positions + side / 2 * (clear + x * along + y * across) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         texel = np.arange(self.count)
         uv = [np.stack([(texel + u) / self.count, np.full(self.count, v)], 1) for u, v in ((0, 0), (1, 0), (1, 1), (0, 1))]
         mesh = bpy.data.meshes.new("meters")

@@ -137,6 +137,9 @@ class Bench:
             # What is wrong with a file that it reads itself is for the user: no trace.
             raise SystemExit(str(error)) from None
         self.lit = set(luminaires)
+        # So far along its normal rays start off a surface.
+        clear = "scene.epsilon.min"
+        self.clear = settings.Get(clear).GetFloat() if settings.IsDefined(clear) else 0.0
 
     def light(self, only):
         wanted = set(self.luminaires) if only is None else {list(self.luminaires)[only]}
@@ -151,7 +154,7 @@ class Bench:
 
     def read(self, channel, station, side, turned, m, first, count):
         name = f"meter{next(self.numbers)}"
-        self.scene.Parse(properties(meter(name, station, side, turned)))
+        self.scene.Parse(properties(meter(name, station, side, turned, self.clear)))
         try:
             return math.pi * self.film(channel, m, first, count)
         finally:
@@ -182,17 +185,17 @@ class Bench:
         return light.reshape(-1, 3)[first : first + count, 0].astype(np.float64)
 
 
-def meter(name, station, side, turned):
-    """A white square a quarter of a side before a surface that the meter lies on, and a camera a side before that."""
+def meter(name, station, side, turned, clear):
+    """A white square whose rays start at the meter, or a quarter of a side before a surface beside it, and a camera a side before that."""
     at, normal = (np.array(station[key], np.float64) for key in ("position", "normal"))
     aside = np.array([0.0, 1.0, 0.0] if abs(normal[0]) > 0.5 else [1.0, 0.0, 0.0])
     across = np.cross(normal, aside)
     across /= np.linalg.norm(across)
     along = math.cos(turned) * np.cross(across, normal) + math.sin(turned) * across
     across = np.cross(normal, along)
-    seat = at + side / 4 * normal
+    seat = at + (-clear if station["free"] else side / 4) * normal
     corners = [seat + side / 2 * (x * along + y * across) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    window = side / 8
+    window = side / 1000
     return (
         f"scene.materials.meter.type = matte\nscene.materials.meter.kd = 1 1 1\n"
         f"scene.objects.{name}.material = meter\n"

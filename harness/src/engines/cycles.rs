@@ -41,6 +41,7 @@ const PACKAGE: Package = Package {
     remedy: "run `luxproof engines install cycles`",
     python: "python3.11",
     ray_s: 1e-6,
+    seat: 0.25,
 };
 
 /// What becomes of light in a scene without settings.

@@ -41,13 +41,13 @@ pub(super) struct Seat<'a> {
     normal: [f64; 3],
 }
 
-pub(super) fn seats<'a>(job: &'a Job, frame: &Frame) -> Vec<Seat<'a>> {
-    let seat = |s: &'a super::Station| Seat {
+pub(super) fn seats<'a>(job: &'a Job, frame: &Frame) -> impl Iterator<Item = Seat<'a>> {
+    let seat = move |s: &'a super::Station| Seat {
         id: &s.id.0,
         position: frame.to_scene(s.meter.position_m).to_array(),
         normal: s.meter.normal.to_array(),
     };
-    job.stations.iter().map(seat).collect()
+    job.stations.iter().map(seat)
 }
 
 /// Which light a driver is asked for.

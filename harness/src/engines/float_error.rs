@@ -14,12 +14,12 @@ pub(super) const EPSILON: f64 = 5.960_464_477_539_063e-8;
 const ROUNDINGS: f64 = 16.0;
 
 /// How a renderer reads, beyond the rounding of its numbers.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Instrument {
     /// So far outside a table's range a direction counts as its last angle.
     pub(super) edge_deg: f64,
-    /// Where in its meter it reads, in scene units off the point.
-    pub(super) seat: f64,
+    /// How far off each meter's point it reads, in scene units; none where it reads at the points.
+    pub(super) seats: Vec<f64>,
     /// Whether gamma is the arc cosine of a rounded number, which resolves little at the poles.
     pub(super) by_arc_cosine: bool,
 }
@@ -80,9 +80,10 @@ impl<'a> FloatError<'a> {
     /// By how much a direction may be turned.
     fn angle_rad(&self, place_m: DVec3, k: usize) -> f64 {
         let (at, lamp) = (self.frame.to_scene(self.job.stations[k].meter.position_m), self.frame.to_scene(place_m));
+        let seat = self.instrument.seats.get(k).copied().unwrap_or_default();
         // Both points are rounded before they are subtracted.
         let largest = at.abs().max(lamp.abs()).max_element();
-        ROUNDINGS * EPSILON + (4.0 * EPSILON * largest + self.instrument.seat) / at.distance(lamp)
+        ROUNDINGS * EPSILON + (4.0 * EPSILON * largest + seat) / at.distance(lamp)
     }
 
     fn of_angles_deg(&self, own: DVec3, angle_rad: f64) -> [f64; 2] {

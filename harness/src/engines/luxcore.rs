@@ -40,6 +40,7 @@ const PACKAGE: Package = Package {
     remedy: "run `luxproof engines install luxcore`",
     python: "python3.11",
     ray_s: 1e-6,
+    seat: 0.1,
 };
 
 /// What becomes of light in a scene without settings.

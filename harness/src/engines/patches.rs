@@ -4,6 +4,7 @@
 pub(super) mod ies_file;
 pub(super) mod opening;
 pub(super) mod resampled;
+pub(super) mod seats;
 pub(super) mod settings;
 #[cfg(test)]
 pub(super) mod tests;
@@ -17,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use self::opening::Opening;
 use self::resampled::{Resampled, Spread};
+use self::seats::{beside_a_surface, patch, sides};
 use self::settings::Settings;
 use super::dialogue::{self, Cost, Dialogue, Seat};
 use super::float_error::{FloatError, Instrument};
@@ -32,8 +34,6 @@ use crate::system::process::Invocation;
 
 /// More reflections Blender does not let anyone ask for; LuxCore's random numbers would do for twice as many.
 const MOST_REFLECTIONS: i64 = 1024;
-/// Side of a meter's patch, in parts of the largest coordinate: forty times what 32-bit floats resolve there at least.
-const PATCH: f64 = 5e-6;
 /// What sums of 32-bit floats may be off, in parts of a reading: a film adds up to 65,536 samples, each sum rounded.
 const FILM: f64 = 1e-4;
 /// Importing a renderer takes two seconds; a machine under load may need many.
@@ -57,6 +57,8 @@ pub(super) struct Package {
     pub(super) python: &'static str,
     /// Seconds that are counted for a ray.
     pub(super) ray_s: f64,
+    /// How far off a meter's point it reads where no surface is beside it, in parts of a patch's side.
+    pub(super) seat: f64,
 }
 
 #[derive(Deserialize)]
@@ -114,7 +116,9 @@ impl Package {
         let frame = Frame::of(job, settings.coordinates);
         let side = patch(job, &frame);
         let side_m = side / frame.scale;
-        let instrument = Instrument { edge_deg, seat: side, by_arc_cosine: true };
+        let seats =
+            beside_a_surface(job, side_m).into_iter().map(|is| if is { side } else { self.seat * side }).collect();
+        let instrument = Instrument { edge_deg, seats, by_arc_cosine: true };
         let rounding = FloatError::of(job, frame, instrument);
         let tables = Tables::of(job);
         let resampled = tables.distinct.iter().filter(|_| !settings.has_plain_tables());
@@ -224,15 +228,6 @@ pub(super) fn reflections(job: &Job) -> i64 {
     }
 }
 
-/// Side of a meter's patch in scene units.
-pub(super) fn patch(job: &Job, frame: &Frame) -> f64 {
-    let room = job.scene.room.iter().flat_map(|r| [DVec3::ZERO, r.size_m]);
-    let points = room.chain(job.scene.luminaires.iter().map(|l| l.position_m));
-    let points = points.chain(job.stations.iter().map(|s| s.meter.position_m));
-    let largest = points.map(|p| frame.to_scene(p).abs().max_element()).fold(0.0, f64::max);
-    PATCH * if largest > 0.0 { largest } else { 1.0 }
-}
-
 /// Illuminance that a meter would have that faced each part of all luminaires, in lux.
 fn facing_lx(job: &Job, places: &[Vec<DVec3>], meter: &Meter) -> f64 {
     let of_place = |luminaire: &Luminaire, place_m: &DVec3| {
@@ -243,13 +238,6 @@ fn facing_lx(job: &Job, places: &[Vec<DVec3>], meter: &Meter) -> f64 {
         places.iter().map(|place_m| of_place(luminaire, place_m)).sum::<f64>() / places.len() as f64
     };
     job.scene.luminaires.iter().zip(places).map(of).sum()
-}
-
-/// Along which directions the sides of a patch lie, as in `Patches` of `cycles_read.py`.
-fn sides(normal: DVec3) -> [DVec3; 2] {
-    let aside = if normal.x.abs() > 0.5 { DVec3::Y } else { DVec3::X };
-    let along = aside.cross(normal).normalize_or_zero();
-    [along, normal.cross(along)]
 }
 
 #[derive(Serialize)]
@@ -269,7 +257,15 @@ struct DriverJob<'a> {
     blocks: usize,
     side: usize,
     seed: u64,
-    stations: Vec<Seat<'a>>,
+    stations: Vec<PatchSeat<'a>>,
+}
+
+#[derive(Serialize)]
+struct PatchSeat<'a> {
+    #[serde(flatten)]
+    seat: Seat<'a>,
+    /// Whether no surface is beside it, so that it may be read at its very point.
+    free: bool,
 }
 
 /// `job.json` of a scene with so many lights and these tables.
@@ -282,6 +278,8 @@ pub(super) fn job_json(
     tables: Vec<String>,
 ) -> Result<SceneFile, EngineError> {
     let (blocks, side) = settings.by_itself();
+    let patch = patch(job, frame);
+    let beside = beside_a_surface(job, patch / frame.scale);
     let driver_job = DriverJob {
         case: &job.case,
         procedure: job.procedure.name(),
@@ -291,11 +289,14 @@ pub(super) fn job_json(
         extended: job.scene.luminaires.iter().any(|l| Opening::of(l) != Opening::None),
         apart: settings.preset != Preset::Default,
         tables,
-        patch: patch(job, frame),
+        patch,
         blocks,
         side,
         seed: job.seed,
-        stations: dialogue::seats(job, frame),
+        stations: dialogue::seats(job, frame)
+            .zip(beside)
+            .map(|(seat, beside)| PatchSeat { seat, free: !beside })
+            .collect(),
     };
     let text = serde_json::to_string_pretty(&driver_job)
         .map_err(|e| EngineError::output(engine, format!("the job cannot be written: {e}")))?;

@@ -311,9 +311,14 @@ pub(super) fn bounds_hold_and_decide(read: impl Fn(&Job) -> Measurement, opening
                 simulator::Uncertainty::Bound(bound) => bound,
                 simulator::Uncertainty::StandardError { value, .. } => 5.0 * value,
             };
+            let of_chance = found.uncertainty.standard_error().map_or(0.0, |error| 5.0 * error);
             let (bound, right) = (found.uncertainty.bound(), right.illuminance.value());
             let off = (found.value - right).abs();
-            assert!(off <= bound + of_reference, "{}: {found:?} for {right} within {of_reference}", station.id);
+            assert!(
+                off <= bound + of_reference + of_chance,
+                "{}: {found:?} for {right} within {of_reference}",
+                station.id
+            );
             wide += usize::from(bound > (0.01 * right).max(1e-3));
             all += 1;
         }

@@ -67,6 +67,11 @@ fn the_stock_scene_shows_what_cycles_makes_of_an_ies_file() {
 }
 
 #[test]
+fn meters_in_free_space_are_read_at_their_very_points() {
+    patches::tests::meters_in_free_space_are_read_at_their_very_points(read);
+}
+
+#[test]
 fn one_seed_gives_the_same_readings_on_any_number_of_threads() {
     patches::tests::one_seed_gives_the_same_readings_on_any_number_of_threads(&Cycles);
 }

@@ -8,17 +8,22 @@
 //! (`funcPdf == 0` in `MapPointLight::Illuminate`, 2.11: a cell of .7 degrees that begins to shine past its middle reads 0). So texels
 //! beside light are never quite dark.
 
+use itertools::Itertools;
 use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
 
 use crate::engines::SceneFile;
 use crate::engines::patches::resampled::Resampled;
 
-/// What a straight line across a kink may be off, in parts of the intensity there, as far as texels go.
+/// What straight lines between texels may be off, in parts of the intensity there.
 const WANTED: f64 = 5e-5;
 /// Where it is darker than this part of the largest intensity, in parts of so much.
 const DIM: f64 = 1e-2;
-const HEIGHTS: [usize; 4] = [512, 1024, 2048, 4096];
-const WIDTHS: [usize; 3] = [360, 720, 1440];
+/// The share of directions in which they may be off by more.
+const LOST: f64 = 1e-4;
+const HEIGHTS: [usize; 6] = [512, 1024, 2048, 4096, 8192, 16384];
+const WIDTHS: [usize; 5] = [360, 720, 1440, 2880, 5760];
+/// Texels at most, 24 MB of them.
+const TEXELS: usize = 1440 * 4096;
 /// Columns of an axial table.
 const AXIAL: usize = 8;
 /// The grid that LuxCore takes a map's mean over, and draws directions from.
@@ -32,32 +37,23 @@ pub(super) struct Map {
     of: LuminousIntensityDistribution,
     width: usize,
     height: usize,
+    /// Where its columns begin, in degrees of C: behind that it is not closed.
+    first_deg: f64,
     /// Row by row, the zenith's first.
     texels: Vec<f32>,
 }
 
 impl Map {
     pub(super) fn of(distribution: &LuminousIntensityDistribution) -> Self {
-        let full = distribution.full_circle();
         let largest = distribution.max_intensity().value();
-        let planes: Vec<&[f64]> = (0..full.c_deg().len()).map(|c| full.plane(c)).collect();
-        let rows: Vec<Vec<f64>> =
-            (0..full.gamma_deg().len()).map(|g| planes.iter().map(|plane| plane[g]).collect()).collect();
-        // Across a kink a straight line a texel long is off by a quarter of it.
-        let is_fine = |kink: f64, texel_deg: f64| 0.25 * kink * texel_deg <= WANTED;
-        let dim = DIM * largest;
-        let gamma = planes.iter().map(|plane| kink(full.gamma_deg(), plane, dim)).fold(0.0, f64::max);
-        let height = finest(&HEIGHTS, |h| is_fine(gamma, 180.0 / h as f64));
-        let c = rows.iter().map(|row| steepest(full.c_deg(), row, dim)).fold(0.0, f64::max);
-        let width = match distribution.symmetry() {
-            Symmetry::Axial => AXIAL,
-            _ => finest(&WIDTHS, |w| is_fine(2.0 * c, 360.0 / w as f64)),
-        };
+        let kinks = Kinks::of(distribution);
+        let [width, height] = kinks.size(distribution.symmetry());
         let (c_deg, gamma_deg) = (360.0 / width as f64, 180.0 / height as f64);
-        let columns: Vec<f64> = (0..width).map(|x| x as f64 * c_deg).collect();
+        let first_deg = (kinks.flattest_deg / c_deg).ceil() * c_deg;
+        let columns: Vec<f64> = (0..width).map(|x| (first_deg + x as f64 * c_deg).rem_euclid(360.0)).collect();
         let rows: Vec<f64> = (0..height).map(|y| 180.0 - (y as f64 + 0.5) * gamma_deg).collect();
         let texels = distribution.intensities(&columns, &rows).into_iter().map(|cd| cd as f32).collect();
-        let mut map = Self { of: distribution.clone(), width, height, texels };
+        let mut map = Self { of: distribution.clone(), width, height, first_deg, texels };
         map.light_up((FAINT * largest) as f32);
         map
     }
@@ -83,9 +79,9 @@ impl Map {
         }
     }
 
-    /// How far its axes are turned about the luminaire's own, so that a column lies in C 0.
+    /// How far its axes are turned about the luminaire's own, so that columns lie in planes.
     pub(super) fn turned_deg(&self) -> f64 {
-        -180.0 / self.width as f64
+        self.first_deg - 180.0 / self.width as f64
     }
 
     /// As a portable float map, the lowest row first.
@@ -159,12 +155,72 @@ fn spread(lit: &[bool], near: &mut [bool], first: usize, along: [usize; 2], reac
     }
 }
 
-fn finest(sizes: &[usize], is_fine: impl Fn(usize) -> bool) -> usize {
-    sizes.iter().copied().find(|size| is_fine(*size)).unwrap_or(sizes[sizes.len() - 1])
+/// Where a table bends, a degree, in parts of the intensity there.
+struct Kinks {
+    /// Along gamma, of all planes alike.
+    gamma: Vec<f64>,
+    planes: usize,
+    /// Across planes, gamma by gamma, and where these lie.
+    c: Vec<(f64, Vec<f64>)>,
+    /// Slopes between the two planes between which it is flattest, gamma by gamma.
+    flattest: Vec<f64>,
+    /// The middle between them.
+    flattest_deg: f64,
 }
 
-/// The largest change of slope along gamma, a degree, in parts of the intensity there; beyond a table's ends it is dark.
-fn kink(angles: &[f64], values: &[f64], dim: f64) -> f64 {
+impl Kinks {
+    fn of(distribution: &LuminousIntensityDistribution) -> Self {
+        let full = distribution.full_circle();
+        let (c_deg, gamma_deg) = (full.c_deg(), full.gamma_deg());
+        let dim = DIM * distribution.max_intensity().value();
+        let planes: Vec<&[f64]> = (0..c_deg.len()).map(|c| full.plane(c)).collect();
+        let rows: Vec<Vec<f64>> = (0..gamma_deg.len()).map(|g| planes.iter().map(|plane| plane[g]).collect()).collect();
+        let slopes: Vec<Vec<f64>> = rows.iter().map(|row| slopes(c_deg, row)).collect();
+        let between = |c: usize| -> Vec<f64> {
+            slopes.iter().zip(&rows).map(|(s, row)| s[c].abs() / row[c].min(row[c + 1]).max(dim)).collect()
+        };
+        let between: Vec<Vec<f64>> = (0..c_deg.len().saturating_sub(1)).map(between).collect();
+        let largest = |c: &usize| between[*c].iter().copied().fold(0.0, f64::max);
+        let flattest = (0..between.len()).min_by(|a, b| largest(a).total_cmp(&largest(b)));
+        let at = |c: usize| -> (f64, Vec<f64>) {
+            let bends = slopes.iter().zip(&rows).map(|(s, row)| (s[c] - s[c - 1]).abs() / row[c].max(dim));
+            (c_deg[c], bends.collect())
+        };
+        Self {
+            gamma: planes.iter().flat_map(|plane| bends(gamma_deg, plane, dim)).collect(),
+            planes: planes.len(),
+            c: (1..between.len()).map(at).collect(),
+            flattest_deg: flattest.map_or(0.0, |c| f64::midpoint(c_deg[c], c_deg[c + 1])),
+            flattest: flattest.map(|c| between[c].clone()).unwrap_or_default(),
+        }
+    }
+
+    /// Columns and rows of the smallest map that is off in few directions, else of that which is so in the fewest.
+    fn size(&self, symmetry: Symmetry) -> [usize; 2] {
+        let widths: &[usize] = if symmetry == Symmetry::Axial { &[AXIAL] } else { &WIDTHS };
+        let sizes = widths.iter().flat_map(|w| HEIGHTS.map(|h| [*w, h]));
+        let sizes = sizes.filter(|[w, h]| w * h <= TEXELS).sorted_by_key(|[w, h]| w * h);
+        let lost = |size: &[usize; 2]| (self.lost(*size) / LOST).max(1.0);
+        sizes.min_by(|a, b| lost(a).total_cmp(&lost(b))).unwrap_or([WIDTHS[0], HEIGHTS[0]])
+    }
+
+    /// The share of directions in which straight lines between texels are off by more than is wanted: across bends, but for those in a
+    /// column, and for half a column on either side of the seam.
+    fn lost(&self, [width, height]: [usize; 2]) -> f64 {
+        let rows = self.flattest.len().max(1) as f64;
+        let (c_deg, gamma_deg) = (360.0 / width as f64, 180.0 / height as f64);
+        // Across a bend a straight line a texel long is off by a quarter of it.
+        let beyond = |bend: f64, texel_deg: f64| 1.0 - (WANTED / (0.25 * bend * texel_deg)).min(1.0);
+        let along = self.gamma.iter().map(|bend| beyond(*bend, gamma_deg)).sum::<f64>() / self.planes as f64;
+        let outside = self.c.iter().filter(|(at, _)| (at / c_deg).fract() != 0.0).flat_map(|(_, bends)| bends);
+        let seam = self.flattest.iter().map(|slope| beyond(2.0 * slope, c_deg)).sum::<f64>();
+        let across = outside.map(|bend| beyond(*bend, c_deg)).sum::<f64>() + seam;
+        along / height as f64 + across / rows / width as f64
+    }
+}
+
+/// Changes of slope along gamma, a degree, in parts of the intensity there; beyond a table's ends it is dark.
+fn bends(angles: &[f64], values: &[f64], dim: f64) -> Vec<f64> {
     let (first, last) = (angles[0], angles[angles.len() - 1]);
     let (mut angles, mut values) = (angles.to_vec(), values.to_vec());
     if first > 0.0 {
@@ -176,14 +232,7 @@ fn kink(angles: &[f64], values: &[f64], dim: f64) -> f64 {
         values.extend([0.0, 0.0]);
     }
     let slopes = slopes(&angles, &values);
-    let kinks = slopes.windows(2).zip(&values[1..]).map(|(s, value)| (s[1] - s[0]).abs() / value.max(dim));
-    kinks.fold(0.0, f64::max)
-}
-
-/// The largest slope, a degree, in parts of the lower intensity at its ends.
-fn steepest(angles: &[f64], values: &[f64], dim: f64) -> f64 {
-    let relative = |(slope, ends): (f64, &[f64])| slope.abs() / ends[0].min(ends[1]).max(dim);
-    slopes(angles, values).into_iter().zip(values.windows(2)).map(relative).fold(0.0, f64::max)
+    slopes.windows(2).zip(&values[1..]).map(|(s, value)| (s[1] - s[0]).abs() / value.max(dim)).collect()
 }
 
 fn slopes(angles: &[f64], values: &[f64]) -> Vec<f64> {
@@ -230,7 +279,7 @@ mod tests {
         for _ in 0..10 {
             let distribution = random_table(&mut random);
             let map = Map::of(&distribution);
-            assert!(map.texels.len() <= 1440 * 4096 && map.misled_share() < 0.01);
+            assert!(map.texels.len() <= TEXELS && map.misled_share() < 0.01);
             let file = map.file("a");
             assert_eq!(
                 file.bytes.len(),

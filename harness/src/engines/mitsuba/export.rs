@@ -97,7 +97,7 @@ fn job_json(job: &Job, settings: &Settings, frame: &Frame) -> Result<String, Eng
         side,
         film,
         seed: job.seed,
-        stations: dialogue::seats(job, frame),
+        stations: dialogue::seats(job, frame).collect(),
     };
     serde_json::to_string_pretty(&driver_job)
         .map_err(|e| EngineError::output(ID, format!("the job cannot be written: {e}")))

@@ -3,12 +3,12 @@
 use approx::assert_relative_eq;
 use glam::DVec3;
 use luminaire::photometry::LuminousOpening;
-use luminaire::scene::{LuminaireModel, Scene, Transport, orientation};
+use luminaire::scene::{LuminaireModel, Obstacle, Scene, Shape, Transport, orientation};
 
 use super::*;
 use crate::engines::Engine;
 use crate::engines::fixtures::*;
-use crate::engines::shared_tests;
+use crate::engines::shared_tests::{self, furnished};
 
 pub(in crate::engines) fn flat_openings_send_out_their_table_on_both_sides(read: fn(&Job) -> Measurement) {
     let (x_m, y_m) = (0.6, 0.3);
@@ -24,6 +24,59 @@ pub(in crate::engines) fn flat_openings_send_out_their_table_on_both_sides(read:
         let deviations = relative_deviations(&read(&far), &exact_direct_lx(&far));
         assert!(worst(&deviations) < 3e-3, "{opening:?} {deviations:?}");
     }
+}
+
+/// Two centimetres from a luminaire in a large room a hundred thousandth of its size is seen.
+pub(in crate::engines) fn meters_in_free_space_are_read_at_their_very_points(read: fn(&Job) -> Measurement) {
+    let lamp = luminaire("near", DVec3::new(8.0, 8.0, 8.0), lambertian());
+    let mut job = goniometer(&lamp, 0.02, &[0.0, 120.0, 240.0], &[5.0, 40.0, 70.0]);
+    let deviations = relative_deviations(&read(&job), &exact_direct_lx(&job));
+    assert!(worst(&deviations) < 2e-4, "{deviations:?}");
+    // The same where a mesh is about them, near none.
+    let at = |x: f64, y: f64, z: f64| DVec3::new(7.0 + x, 7.0 + y, 7.0 + z);
+    let vertices_m = vec![at(0.0, 0.0, 0.0), at(2.0, 0.0, 0.0), at(0.0, 2.0, 0.0)];
+    let shape = Shape::Mesh { vertices_m, triangles: vec![[0, 1, 2]] };
+    job.scene.obstacles = vec![Obstacle { shape, reflectance: 0.5 }];
+    let deviations = relative_deviations(&read(&job), &exact_direct_lx(&job));
+    assert!(worst(&deviations) < 2e-4, "{deviations:?}");
+}
+
+#[test]
+fn a_patch_stands_off_surfaces_beside_it_alone() {
+    let mut job = furnished();
+    let room_m = job.scene.room.unwrap().size_m;
+    job.scene.luminaires[0] =
+        with_opening(job.scene.luminaires[0].clone(), LuminousOpening::Box { x_m: 0.6, y_m: 0.3, height_m: 0.0 });
+    let opening_m = job.scene.luminaires[0].position_m;
+    let station = job.stations[0].clone();
+    let mut are_beside = |places: &[DVec3]| {
+        let placed = |at: &DVec3| {
+            let mut station = station.clone();
+            station.meter.position_m = *at;
+            station
+        };
+        job.stations = places.iter().map(placed).collect();
+        beside_a_surface(&job, 1e-4)
+    };
+    let beside = [
+        DVec3::new(3.0, 3.0, 0.0),
+        DVec3::new(3.0, 3.0, 3e-4),
+        DVec3::new(3.0, room_m.y, 1.0),
+        DVec3::new(1.5, 1.5, 0.75),
+        DVec3::new(1.5, 1.5, 0.7503),
+        DVec3::new(1.0003, 1.5, 0.4),
+        DVec3::new(5.5, 1.0002, 0.5),
+        opening_m + DVec3::new(0.1, 0.0, 0.0),
+    ];
+    let free = [
+        DVec3::new(3.0, 3.0, 6e-4),
+        DVec3::new(1.5, 1.5, 0.7506),
+        DVec3::new(1.5, 1.5, 0.4),
+        DVec3::new(5.5, 1.0006, 0.5),
+        opening_m + DVec3::new(0.5, 0.0, 0.0),
+    ];
+    assert_eq!(are_beside(&beside), [true; 8]);
+    assert_eq!(are_beside(&free), [false; 5]);
 }
 
 pub(in crate::engines) fn one_seed_gives_the_same_readings_on_any_number_of_threads(engine: &dyn Engine) {

@@ -18,7 +18,7 @@ fn answers_that_are_no_readings_are_errors() {
 }
 
 /// Between meters and the camera that looks at them.
-const VEIL: &str = "scene.objects.veil.material = floor\nscene.objects.veil.vertices = 0 0 16.9999 20 0 16.9999 20 20 16.9999 0 20 16.9999\n\
+const VEIL: &str = "scene.objects.veil.material = floor\nscene.objects.veil.vertices = 0 0 16.99995 20 0 16.99995 20 20 16.99995 0 20 16.99995\n\
                     scene.objects.veil.faces = 0 1 2 0 2 3\n";
 
 #[test]

@@ -1,0 +1,76 @@
+//! Where a meter's patch sits.
+
+use glam::DVec3;
+use itertools::Itertools;
+use luminaire::geometry::Surface;
+use luminaire::scene::{LuminaireModel, Shape};
+
+use crate::engines::Job;
+use crate::engines::frame::Frame;
+
+/// Side of a meter's patch, in parts of the largest coordinate: forty times what 32-bit floats resolve there at least.
+const PATCH: f64 = 5e-6;
+/// A surface so many sides from a meter is beside it.
+const BESIDE: f64 = 4.0;
+
+/// Side of a meter's patch in scene units.
+pub(in crate::engines) fn patch(job: &Job, frame: &Frame) -> f64 {
+    let room = job.scene.room.iter().flat_map(|r| [DVec3::ZERO, r.size_m]);
+    let points = room.chain(job.scene.luminaires.iter().map(|l| l.position_m));
+    let points = points.chain(job.stations.iter().map(|s| s.meter.position_m));
+    let largest = points.map(|p| frame.to_scene(p).abs().max_element()).fold(0.0, f64::max);
+    PATCH * if largest > 0.0 { largest } else { 1.0 }
+}
+
+/// Along which directions the sides of a patch lie, as in `Patches` of `cycles_read.py`.
+pub(super) fn sides(normal: DVec3) -> [DVec3; 2] {
+    let aside = if normal.x.abs() > 0.5 { DVec3::Y } else { DVec3::X };
+    let along = aside.cross(normal).normalize_or_zero();
+    [along, normal.cross(along)]
+}
+
+/// Which meters' patches of such a side must stand off a surface: of the room, of a body, or of an opening that may be there.
+pub(super) fn beside_a_surface(job: &Job, side_m: f64) -> Vec<bool> {
+    let (scene, reach_m) = (&job.scene, BESIDE * side_m);
+    let by_the_room = |at: DVec3| {
+        scene.room.is_some_and(|room| {
+            Surface::ALL.iter().any(|s| (at - room.corners(*s)[0]).dot(s.inward_normal()).abs() < reach_m)
+        })
+    };
+    let by_a_box = |at: DVec3| {
+        scene.obstacles.iter().any(|o| match o.shape {
+            Shape::Box { min_m, max_m } => {
+                is_within(at, min_m, max_m, reach_m) && !is_within(at, min_m, max_m, -reach_m)
+            }
+            Shape::Mesh { .. } => false,
+        })
+    };
+    let by_an_opening = |at: DVec3| {
+        scene.luminaires.iter().filter(|l| l.model != LuminaireModel::Point).any(|l| {
+            let half_m = DVec3::from(l.photometry.opening.bounding_box_m()).length() / 2.0;
+            l.position_m.distance(at) < half_m + reach_m
+        })
+    };
+    let at = |k: usize| job.stations[k].meter.position_m;
+    let mut beside: Vec<bool> =
+        (0..job.stations.len()).map(|k| by_the_room(at(k)) || by_a_box(at(k)) || by_an_opening(at(k))).collect();
+    // There may be a million triangles and many meters: those within a triangle's reach along x are looked up.
+    let along_x: Vec<usize> = (0..beside.len()).sorted_by(|a, b| at(*a).x.total_cmp(&at(*b).x)).collect();
+    for obstacle in &scene.obstacles {
+        let Shape::Mesh { vertices_m, triangles } = &obstacle.shape else { continue };
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|v| vertices_m[v as usize]);
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            let first = along_x.partition_point(|k| at(*k).x < low.x - reach_m);
+            let near = along_x[first..].iter().take_while(|k| at(**k).x <= high.x + reach_m);
+            for k in near {
+                beside[*k] |= is_within(at(*k), low, high, reach_m);
+            }
+        }
+    }
+    beside
+}
+
+fn is_within(at: DVec3, low: DVec3, high: DVec3, margin: f64) -> bool {
+    at.cmpge(low - margin).all() && at.cmple(high + margin).all()
+}
