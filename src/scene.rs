@@ -151,6 +151,12 @@ impl Luminaire {
     pub fn intensity_towards(&self, direction: DVec3) -> Candela {
         self.photometry.distribution.intensity_towards(self.orientation.transpose() * direction) * self.flux_scale
     }
+
+    /// How far apart the intensities are between which rounding decides towards a direction in the room:
+    /// [`LuminousIntensityDistribution::jump_towards`](crate::photometry::LuminousIntensityDistribution::jump_towards).
+    pub fn jump_towards(&self, direction: DVec3) -> Candela {
+        self.photometry.distribution.jump_towards(self.orientation.transpose() * direction) * self.flux_scale
+    }
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use super::{Calculated, NotApplicable, Validity};
 use crate::geometry::configuration_factor::element_to_polygon;
 use crate::photometry::LuminousOpening;
 use crate::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape};
-use crate::units::Lux;
+use crate::units::{Candela, Lux};
 
 /// Direct illuminance of a meter: the sum over luminaires that no obstacle hides, 0 behind the meter's plane.
 ///
@@ -47,10 +47,21 @@ pub fn direct_illuminance(scene: &Scene, meter: &Meter) -> Result<Calculated, No
 
 /// What one luminaire gives a meter when nothing stands between.
 pub fn from_luminaire(luminaire: &Luminaire, meter: &Meter) -> Lux {
+    by_distance(luminaire, meter, Luminaire::intensity_towards)
+}
+
+/// How far apart the illuminances of a meter are between which rounding decides, where it lies in the direction of a jump of a point's
+/// table; of all points, hidden ones, too.
+pub fn jump(scene: &Scene, meter: &Meter) -> Lux {
+    let points = scene.luminaires.iter().filter(|l| l.model == LuminaireModel::Point);
+    Lux(points.map(|l| by_distance(l, meter, Luminaire::jump_towards).value()).sum())
+}
+
+fn by_distance(luminaire: &Luminaire, meter: &Meter, towards: fn(&Luminaire, DVec3) -> Candela) -> Lux {
     let towards_meter = meter.position_m - luminaire.position_m;
     let cos_xi = -towards_meter.normalize().dot(meter.normal);
     if cos_xi > 0.0 {
-        Lux(luminaire.intensity_towards(towards_meter).value() * cos_xi / towards_meter.length_squared())
+        Lux(towards(luminaire, towards_meter).value() * cos_xi / towards_meter.length_squared())
     } else {
         Lux(0.0)
     }

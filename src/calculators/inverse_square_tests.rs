@@ -173,3 +173,30 @@ fn cylindrical_illuminance_is_the_mean_over_vertical_directions() {
         assert_relative_eq!(cylindrical_illuminance(&scene, position_m).value(), mean, max_relative = 1e-9);
     }
 }
+
+#[test]
+fn where_rounding_decides_between_two_values_the_jump_is_their_distance() {
+    let ends_bright = LuminousIntensityDistribution::axial(vec![10.0, 90.0], vec![200.0, 300.0]).unwrap();
+    let torn = LuminousIntensityDistribution::new(
+        vec![0.0, 90.0],
+        vec![0.0, 90.0, 180.0],
+        vec![100.0, 40.0, 0.0, 160.0, 40.0, 0.0],
+    )
+    .unwrap();
+    let jump_cd = |distribution: &LuminousIntensityDistribution, at: DVec3| {
+        let mut of = luminaire(distribution.clone(), LuminousOpening::Point, LuminaireModel::Point);
+        of.flux_scale = 0.5;
+        let meter = Meter { position_m: at, normal: -at.normalize() };
+        let scene = Scene { luminaires: vec![of], ..Scene::default() };
+        jump(&scene, &meter).value() * at.length_squared()
+    };
+    let (below, level) = (DVec3::new(0.0, 0.0, -2.0), DVec3::new(0.0, 2.0, 0.0));
+    let at_the_first = DVec3::new(0.0, 10f64.to_radians().sin(), -10f64.to_radians().cos());
+    assert_relative_eq!(jump_cd(&ends_bright, level), 150.0, max_relative = 1e-12);
+    assert_relative_eq!(jump_cd(&ends_bright, at_the_first), 100.0, max_relative = 1e-6);
+    for at in [below, DVec3::new(0.0, 2.0, 1e-6), DVec3::new(0.0, 2.0, -1e-6)] {
+        assert_eq!(jump_cd(&ends_bright, at), 0.0, "{at}");
+    }
+    assert_relative_eq!(jump_cd(&torn, below), 30.0, max_relative = 1e-12);
+    assert_eq!([jump_cd(&torn, -below), jump_cd(&torn, level)], [0.0; 2]);
+}

@@ -161,6 +161,26 @@ impl LuminousIntensityDistribution {
         self.intensity(c, gamma)
     }
 
+    /// How far apart the intensities are between which rounding in `f64` decides towards `direction`, in the luminaire's own frame: where
+    /// the table ends with light short of a pole, and at a pole that its planes do not agree on. Nothing elsewhere.
+    pub fn jump_towards(&self, direction: DVec3) -> Candela {
+        let (c, gamma) = angles_deg(direction);
+        let (first, last) = (self.gamma_deg[0], self.gamma_deg[self.gamma_deg.len() - 1]);
+        let is_at = |edge: f64| (gamma - edge).abs() <= ROUNDED_DEG;
+        let jump = |edge: f64, pole: f64| {
+            if !is_at(edge) {
+                return 0.0;
+            }
+            if edge != pole {
+                return self.intensity(c, edge).value();
+            }
+            let values = self.c_deg.iter().map(|c| self.intensity(*c, pole).value());
+            let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
+            high - low
+        };
+        Candela(jump(first, 0.0).max(jump(last, 180.0)))
+    }
+
     /// Total flux, exact for the bilinear interpolation (closed form per cell).
     pub fn flux(&self) -> Lumen {
         self.flux_between(0.0, 180.0)
@@ -354,6 +374,9 @@ pub fn direction(c_deg: f64, gamma_deg: f64) -> DVec3 {
     let (sin_g, cos_g) = gamma_deg.to_radians().sin_cos();
     DVec3::new(sin_g * cos_c, sin_g * sin_c, -cos_g)
 }
+
+/// No way to reckon an angle in `f64` is further off, in degrees.
+const ROUNDED_DEG: f64 = 1e-9;
 
 /// The interval of `nodes` that holds `x` and the fraction of it that `x` lies along.
 fn bracket(nodes: &[f64], x: f64) -> (usize, f64) {

@@ -17,10 +17,12 @@ mod verdict;
 
 use std::collections::BTreeMap;
 
+use luminaire::calculators::inverse_square;
+use luminaire::scene::Transport;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::procedures::{self, Target, Task};
+use crate::procedures::{self, Aspect, Target, Task};
 use crate::record::{
     EngineName, MeterId, ProcedureId, Quantity, Reading, ReadingKey, Recording, Role, StatedErrors, Uncertainty,
 };
@@ -264,7 +266,8 @@ impl Judge<'_> {
         comparison.verdict = judge(deviation, budget.expanded, allowed);
         let p_value = budget.p_value(deviation, allowed);
         let is_heavy_tailed = is_heavy_tailed(recording, &comparison, deviation, p_value);
-        let waits = unbelievable(comparison.uncertainty, value, is_heavy_tailed);
+        let waits = unbelievable(comparison.uncertainty, value, is_heavy_tailed)
+            .or_else(|| is_within_a_jump(task, k, deviation, allowed).then_some(AT_A_JUMP));
         if let Some(why) = waits.filter(|_| comparison.verdict == Verdict::Fail) {
             comparison.verdict = Verdict::Inconclusive;
             comparison.diagnosis = Some(why.to_owned());
@@ -310,6 +313,17 @@ fn unbelievable(uncertainty: Uncertainty, value: f64, is_heavy_tailed: bool) -> 
         }
         _ => None,
     }
+}
+
+/// Why a reading fails nothing that another rounding would have passed.
+pub(crate) const AT_A_JUMP: &str =
+    "at the edge of a jump: the table ends here with light, or its planes disagree at a pole, and rounding decides";
+
+/// Whether a target lies in the direction of a jump of a point's table, and its reading between the values on either side.
+fn is_within_a_jump(task: &Task, k: usize, deviation: f64, allowed: f64) -> bool {
+    let jump = |aspect: &Aspect| aspect.weight * inverse_square::jump(&task.scene, &aspect.meter).value();
+    let jump: f64 = task.targets[k].aspects.iter().map(jump).sum();
+    jump > 0.0 && !matches!(task.transport, Transport::Indirect(_)) && deviation.abs() <= jump + allowed
 }
 
 /// Where a sample is met that rarely, it may carry so many times the light of those elsewhere. Sampled alike, portions differ as cosines

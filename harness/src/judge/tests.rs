@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use glam::DVec3;
+use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::{Bounces, Meter, Scene, Transport};
 
 use super::*;
+use crate::engines::fixtures::luminaire;
 use crate::record::{Estimate, Light};
 use crate::system::random::normal;
 
@@ -135,4 +137,30 @@ fn a_budget_names_what_it_is_made_of() {
     assert!((of(Source::Reference).uncertainty - 0.0003 / 3f64.sqrt()).abs() < 1e-15);
     assert!(budget.components.iter().all(|c| !matches!(c.source, Source::Rounding | Source::Input)));
     assert!((budget.combined - 0.004_f64.hypot(0.002 / 3f64.sqrt()).hypot(0.0003 / 3f64.sqrt())).abs() < 1e-12);
+}
+
+#[test]
+fn at_the_edge_of_a_jump_both_values_stand_and_nothing_between_fails() {
+    let ends_bright = LuminousIntensityDistribution::axial(vec![0.0, 90.0], vec![400.0, 400.0]).unwrap();
+    let mut lamp = luminaire("lamp", DVec3::new(1.0, 1.0, 1.0), ends_bright);
+    lamp.flux_scale = 0.5;
+    let mut task = task(2);
+    task.transport = Transport::Direct;
+    task.scene.luminaires = vec![lamp];
+    // Level with the luminaire, and a hair lower.
+    for (target, z) in task.targets.iter_mut().zip([1.0, 1.0 - 1e-6]) {
+        let meter = Meter { position_m: DVec3::new(3.0, 1.0, z), normal: DVec3::NEG_X };
+        *target = Target::of_one(target.id.clone(), meter, 1.0);
+    }
+    let exact = recording("simulator", &[Estimate::exact(50.0); 2]);
+    let verdicts = |lx: f64| {
+        let subject = recording("radiance", &[Estimate::exact(lx); 2]);
+        let comparisons = built_in().compare(&task, &[&exact, &subject]);
+        let of_subject = comparisons.iter().filter(|c| c.key.engine == EngineName::new("radiance"));
+        of_subject.map(|c| c.verdict).collect::<Vec<_>>()
+    };
+    assert_eq!(verdicts(50.0), [Verdict::Pass, Verdict::Pass]);
+    assert_eq!(verdicts(0.0), [Verdict::Inconclusive, Verdict::Fail]);
+    assert_eq!(verdicts(25.0), [Verdict::Inconclusive, Verdict::Fail]);
+    assert_eq!(verdicts(110.0), [Verdict::Fail, Verdict::Fail]);
 }

@@ -43,6 +43,7 @@ pub enum Feature {
     Roll,
     UpsideDown,
     LuminaireNearSurface,
+    LowLuminaire,
     Recessed,
     FlatOpening,
     BoxOpening,
@@ -76,6 +77,8 @@ pub enum Feature {
     Grazing,
     LooksAway,
     NearBody,
+    BodyBehindLuminaire,
+    BodyBehindMeter,
     NearSurface,
     NearLuminaire,
     OnAxis,
@@ -203,6 +206,7 @@ fn of_luminaires(draft: &Draft, case: &Case, add: Add<'_>) {
             let near_m = p.min(room.size_m - p).min_element();
             add(Feature::LuminaireNearSurface, near_m < NEAR_M);
             add(Feature::Recessed, near_m == 0.0);
+            add(Feature::LowLuminaire, p.z < 0.5 * room.size_m.z);
         }
         if luminaire.model == LuminaireModel::Point {
             continue;
@@ -307,7 +311,19 @@ fn of_meter(meter: &Meter, scene: &Scene, add: Add<'_>) {
         add(Feature::OnAxis, gamma.min(180.0 - gamma) < 1e-6);
         let off = (c.rem_euclid(90.0)).min(90.0 - c.rem_euclid(90.0));
         add(Feature::OnPlaneOfTable, off < 1e-6);
+        let stretches: Vec<[f64; 2]> = scene.obstacles.iter().filter_map(|o| within(o, p, -ray)).collect();
+        let is_clear = stretches.iter().all(|[enter, leave]| *leave < 0.0 || *enter > 1.0);
+        add(Feature::BodyBehindLuminaire, is_clear && stretches.iter().any(|[enter, _]| *enter > 1.0));
+        add(Feature::BodyBehindMeter, is_clear && stretches.iter().any(|[_, leave]| *leave < 0.0));
     }
+}
+
+/// Between which parts of a way, counted from its start, the line that it lies on is in a box.
+fn within(body: &Obstacle, from_m: DVec3, way: DVec3) -> Option<[f64; 2]> {
+    let Shape::Box { min_m, max_m } = body.shape else { return None };
+    let (a, b) = ((min_m - from_m) / way, (max_m - from_m) / way);
+    let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
+    (enter < leave).then_some([enter, leave])
 }
 
 /// How much of the grammar specs have held, and together with what else.

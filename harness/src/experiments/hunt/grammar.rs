@@ -216,13 +216,23 @@ impl One<'_> {
     fn body(&mut self) -> BoxSpec {
         let mut low = self.point(0.05, 0.65);
         let extent = DVec3::from(self.point(0.05, 0.3));
-        if self.has(Feature::BodyOnSurface, 2) {
-            low[self.draw.0.usize(0..3)] = 0.0;
-        }
         let mut high = (DVec3::from(low) + extent).to_array().map(rounded);
+        if self.has(Feature::BodyOnSurface, 2) {
+            let axis = self.draw.0.usize(0..3);
+            [low[axis], high[axis]] = if self.draw.one_in(2) {
+                [0.0, rounded(extent[axis])]
+            } else {
+                [rounded(self.size_m[axis] - extent[axis]), self.size_m[axis]]
+            };
+        }
         if self.has(Feature::ThinBody, 3) {
             let axis = self.draw.0.usize(0..3);
-            high[axis] = low[axis] + rounded(self.size_m[axis] * self.draw.magnitude(1e-4, 2e-3));
+            let thick = rounded(self.size_m[axis] * self.draw.magnitude(1e-4, 2e-3));
+            if high[axis] == self.size_m[axis] {
+                low[axis] = high[axis] - thick;
+            } else {
+                high[axis] = low[axis] + thick;
+            }
         }
         BoxSpec { min_m: low, max_m: high, reflectance: Fraction((self.draw.within(0.0, 0.8) * 100.0).round() / 100.0) }
     }
@@ -242,7 +252,8 @@ impl One<'_> {
                 _ => self.photometric_file(k),
             };
             let mut at_m = self.point(0.15, 0.85);
-            at_m[2] = rounded(self.size_m.z * self.draw.within(0.55, 0.9));
+            let [low, high] = if self.has(Feature::LowLuminaire, 4) { [0.05, 0.5] } else { [0.55, 0.9] };
+            at_m[2] = rounded(self.size_m.z * self.draw.within(low, high));
             let axis = self.draw.0.usize(0..3);
             if self.has(Feature::Recessed, 5) {
                 at_m[2] = self.size_m.z;
@@ -393,7 +404,9 @@ impl One<'_> {
         let written = |p: DVec3| p.to_array().map(|x| (x * 1e6).round() / 1e6);
         let unit = |p: DVec3| p.to_array().map(|x| (x * 1e4).round() / 1e4 + 0.0);
         let close = self.draw.close_m() * self.size_m.min_element().min(1.0);
-        match self.draw.0.usize(0..8) {
+        let body = bodies.iter().find_map(|b| b.cuboid.as_ref());
+        let middle = |body: &BoxSpec| 0.5 * (DVec3::from(body.min_m) + DVec3::from(body.max_m));
+        match self.draw.0.usize(0..9) {
             0 if self.allowed.contains(&Feature::OnAxis) => {
                 let p = along(0.0, 0.0, self.draw.within(0.3, 1.0) * reach_m);
                 (vec![written(p)], unit((at - p).normalize()))
@@ -415,11 +428,10 @@ impl One<'_> {
                 (vec![p], unit((DVec3::from(p) - at).normalize()))
             }
             4 if self.allowed.contains(&Feature::NearBody) => {
-                let cuboid = bodies.iter().find_map(|b| b.cuboid.as_ref());
-                let Some(BoxSpec { min_m, max_m, .. }) = cuboid else {
+                let Some(body) = body else {
                     return (vec![self.point(0.1, 0.9)], [0.0, 0.0, 1.0]);
                 };
-                let middle = 0.5 * (DVec3::from(*min_m) + DVec3::from(*max_m));
+                let (max_m, middle) = (body.max_m, middle(body));
                 let beside = DVec3::new(max_m[0] + close, middle.y, middle.z);
                 (vec![written(beside), written(DVec3::new(middle.x, middle.y, max_m[2] + close))], [0.0, 0.0, 1.0])
             }
@@ -438,6 +450,19 @@ impl One<'_> {
                     self.draw.within(0.0, 90.0),
                     self.draw.magnitude(1e-3, 0.2) * reach_m,
                 );
+                (vec![written(p)], unit((at - p).normalize()))
+            }
+            7 if self.allowed.contains(&Feature::BodyBehindLuminaire)
+                || self.allowed.contains(&Feature::BodyBehindMeter) =>
+            {
+                let Some(body) = body else {
+                    return (vec![self.point(0.1, 0.9)], [0.0, 0.0, 1.0]);
+                };
+                let away = (at - middle(body)).normalize_or(DVec3::Z);
+                let beyond = at + self.draw.within(0.3, 1.0) * reach_m * away;
+                let between = at - self.draw.within(0.2, 0.4) * (at - middle(body));
+                let behind_luminaire = self.allowed.contains(&Feature::BodyBehindLuminaire);
+                let p = if behind_luminaire { beyond } else { between };
                 (vec![written(p)], unit((at - p).normalize()))
             }
             _ => {

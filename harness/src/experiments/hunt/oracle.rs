@@ -15,7 +15,7 @@ use crate::audit::{self, AuditError, Calibration, Diagnosis, Options, StatedErro
 use crate::engines::{self, Coordinates, Site};
 use crate::experiments::Progress;
 use crate::experiments::stress::{self, Magnitudes};
-use crate::judge::{Comparison, How, KnownDeviations, Sampling, Verdict};
+use crate::judge::{AT_A_JUMP, Comparison, How, KnownDeviations, Sampling, Verdict};
 use crate::measure::{Instrument, Machine, Reader};
 use crate::plan::Selection;
 use crate::record::{EngineName, FailureKind, ProcedureId};
@@ -159,10 +159,12 @@ impl OfCase<'_> {
     }
 
     /// What claims no chance and is undecided all the same is so for its bound or that of its reference. A program of a user's may
-    /// state what bounds it likes.
+    /// state what bounds it likes; at the edge of a jump there are two answers, and nobody fails.
     fn undecided(&self, engine: &EngineName, procedure: ProcedureId) -> Option<Sighting> {
         engines::entry(engine)?;
-        let needless = |c: &&Comparison| c.verdict == Verdict::Inconclusive && !c.uncertainty.is_sampled();
+        let has_one_answer = |c: &&Comparison| c.diagnosis.as_deref() != Some(AT_A_JUMP);
+        let undecided = |c: &&Comparison| c.verdict == Verdict::Inconclusive && !c.uncertainty.is_sampled();
+        let needless = |c: &&Comparison| undecided(c) && has_one_answer(c);
         let worst = Self::worst(self.comparisons(engine, procedure).filter(needless))?;
         Some(Self::sighting(engine, procedure, Oracle::Undecided, worst))
     }

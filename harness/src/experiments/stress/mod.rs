@@ -8,6 +8,7 @@ mod tests;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use luminaire::calculators::inverse_square;
 use luminaire::scene::LuminaireModel;
 use parking_lot::Mutex;
 
@@ -114,8 +115,11 @@ fn points(case: &Case, subjects: &[Instrument], options: &Options<'_>) -> Vec<Po
             // Intensities are direct light in free field, whose laws direct illuminance keeps as well.
             let tasks = case.tasks().filter(|task| task.procedure != ProcedureId::LuminousIntensity);
             for task in tasks.filter(|t| law.light.concerns(t.transport)) {
-                let base = Job::of_task(case, &task);
-                let says = |step: &usize| (law.variant)(&base, law.magnitudes[*step]).is_some();
+                let mut base = Job::of_task(case, &task);
+                // Where rounding decides between two values, a changed scene may read the other.
+                base.stations.retain(|s| inverse_square::jump(&base.scene, &s.meter).value() == 0.0);
+                let says =
+                    |step: &usize| !base.stations.is_empty() && (law.variant)(&base, law.magnitudes[*step]).is_some();
                 let tried = |step: &usize| options.magnitudes == Magnitudes::All || *step == law.mild();
                 let steps = (0..law.magnitudes.len()).filter(tried).filter(says);
                 let point = |step| Point { subject, law, step, procedure: task.procedure, base: base.clone() };
