@@ -20,7 +20,9 @@ const WANTED: f64 = 5e-5;
 const DIM: f64 = 1e-2;
 /// The share of directions in which they may be off by more.
 const LOST: f64 = 1e-4;
-const HEIGHTS: [usize; 6] = [512, 1024, 2048, 4096, 8192, 16384];
+/// So much of all directions a table's own angles count as: intensities are read there, too.
+const OWN: f64 = 0.01;
+const HEIGHTS: [usize; 7] = [512, 1024, 2048, 4096, 8192, 16384, 32768];
 const WIDTHS: [usize; 5] = [360, 720, 1440, 2880, 5760];
 /// Texels at most, 24 MB of them.
 const TEXELS: usize = 1440 * 4096;
@@ -211,11 +213,13 @@ impl Kinks {
         let (c_deg, gamma_deg) = (360.0 / width as f64, 180.0 / height as f64);
         // Across a bend a straight line a texel long is off by a quarter of it.
         let beyond = |bend: f64, texel_deg: f64| 1.0 - (WANTED / (0.25 * bend * texel_deg)).min(1.0);
-        let along = self.gamma.iter().map(|bend| beyond(*bend, gamma_deg)).sum::<f64>() / self.planes as f64;
+        let along = self.gamma.iter().map(|bend| beyond(*bend, gamma_deg)).sum::<f64>();
+        let own = OWN * along / self.gamma.len().max(1) as f64;
+        let along = along / self.planes as f64;
         let outside = self.c.iter().filter(|(at, _)| (at / c_deg).fract() != 0.0).flat_map(|(_, bends)| bends);
         let seam = self.flattest.iter().map(|slope| beyond(2.0 * slope, c_deg)).sum::<f64>();
         let across = outside.map(|bend| beyond(*bend, c_deg)).sum::<f64>() + seam;
-        along / height as f64 + across / rows / width as f64
+        own + along / height as f64 + across / rows / width as f64
     }
 }
 
