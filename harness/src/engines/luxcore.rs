@@ -41,6 +41,7 @@ const PACKAGE: Package = Package {
     python: "python3.11",
     ray_s: 1e-6,
     seat: 0.1,
+    apart: 2.0,
 };
 
 /// What becomes of light in a scene without settings.

@@ -28,7 +28,9 @@ use super::openings::places_m;
 use super::settings::Preset;
 use super::tables::Tables;
 use super::workbench::by_hand;
-use super::{Absent, EngineError, Entry, Job, Measurement, SceneFile, Site, Support, Version, Workbench, effort};
+use super::{
+    Absent, EngineError, Entry, Job, Measurement, SceneFile, Site, Support, Version, Workbench, effort, recess,
+};
 use crate::record::EngineName;
 use crate::system::process::Invocation;
 
@@ -59,6 +61,8 @@ pub(super) struct Package {
     pub(super) ray_s: f64,
     /// How far off a meter's point it reads where no surface is beside it, in parts of a patch's side.
     pub(super) seat: f64,
+    /// How far points come off surfaces that they are on, in parts of what plates do.
+    pub(super) apart: f64,
 }
 
 #[derive(Deserialize)]
@@ -116,8 +120,11 @@ impl Package {
         let frame = Frame::of(job, settings.coordinates);
         let side = patch(job, &frame);
         let side_m = side / frame.scale;
-        let seats =
-            beside_a_surface(job, side_m).into_iter().map(|is| if is { side } else { self.seat * side }).collect();
+        // Points that come off surfaces do so for every meter.
+        let off_m = job.scene.luminaires.iter().map(|l| recess::off_surfaces_m(job, l).length()).fold(0.0, f64::max);
+        let off = self.apart * frame.scale * off_m;
+        let seat = |is_beside: bool| (if is_beside { side } else { self.seat * side }) + off;
+        let seats = beside_a_surface(job, side_m).into_iter().map(seat).collect();
         let instrument = Instrument { edge_deg, seats, by_arc_cosine: true };
         let rounding = FloatError::of(job, frame, instrument);
         let tables = Tables::of(job);
@@ -182,11 +189,24 @@ pub(super) fn supports(entry: &Entry, job: &Job, stock: (&str, Option<f64>)) -> 
         let why = format!("paths seldom find the bright spot that `{id}` throws on a surface close by");
         return Support::Approximate { why, size: None };
     }
+    if let (Some(id), Transport::Indirect(_) | Transport::Total(_)) = (shines_into_its_surface(job), job.transport) {
+        let why = format!("what `{id}` sends into the surface that it is on is lost, and here reflected");
+        return Support::Approximate { why, size: None };
+    }
     if reflections(job) == MOST_REFLECTIONS && job.reflections() != Some(Bounces::AtMost(0)) {
         let why = format!("{} follows {MOST_REFLECTIONS} reflections at most", entry.display_name);
         return Support::Approximate { why, size: None };
     }
     Support::Yes
+}
+
+/// A point that comes off a surface for the export, and lights it then.
+fn shines_into_its_surface(job: &Job) -> Option<&str> {
+    let does = |l: &&Luminaire| {
+        let off_m = recess::off_surfaces_m(job, l);
+        off_m != DVec3::ZERO && l.intensity_towards(-off_m).value() > 0.0
+    };
+    job.scene.luminaires.iter().find(does).map(|l| l.id.as_str())
 }
 
 /// Luminaires whose own files differ, and say the same.

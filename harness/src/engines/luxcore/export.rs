@@ -30,7 +30,7 @@ const CORNERS: usize = 64;
 
 pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.coordinates);
-    let job = &*recess::apart(job);
+    let job = &*recess::with_points_apart(job, super::PACKAGE.apart);
     let tables = Tables::of(job);
     let mapped = tables.distinct.iter().filter(|_| !settings.has_plain_tables());
     let maps: Vec<Map> = mapped.map(|d| Map::of(d)).collect();
@@ -179,6 +179,10 @@ impl Scene<'_> {
             matrix.join(" ")
         )
         .ok();
+        // Without power it takes the map as it is.
+        if power == 0.0 {
+            writeln!(text, "{light}.gain = 0 0 0").ok();
+        }
     }
 
     /// An opening whose every point sends out its part of the map's intensities on both sides: LuxCore divides them by the flux of the

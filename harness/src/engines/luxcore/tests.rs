@@ -75,6 +75,16 @@ fn meters_in_free_space_are_read_at_their_very_points() {
 }
 
 #[test]
+fn points_on_surfaces_light_their_room() {
+    patches::tests::points_on_surfaces_light_their_room(read);
+}
+
+#[test]
+fn what_is_off_is_dark() {
+    patches::tests::what_is_off_is_dark(read);
+}
+
+#[test]
 fn one_seed_gives_the_same_readings_on_any_number_of_threads() {
     patches::tests::one_seed_gives_the_same_readings_on_any_number_of_threads(&LuxCore);
 }

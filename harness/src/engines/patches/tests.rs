@@ -41,6 +41,42 @@ pub(in crate::engines) fn meters_in_free_space_are_read_at_their_very_points(rea
     assert!(worst(&deviations) < 2e-4, "{deviations:?}");
 }
 
+pub(in crate::engines) fn points_on_surfaces_light_their_room(read: fn(&Job) -> Measurement) {
+    let mut job = furnished();
+    job.scene.room =
+        job.scene.room.map(|room| luminaire::geometry::Room { size_m: DVec3::new(5.6229, 5.1221, 4.7706), ..room });
+    job.scene.obstacles.truncate(1);
+    job.transport = Transport::Direct;
+    for (station, at) in job.stations.iter_mut().zip([DVec3::new(2.8, 2.2, 2.0), DVec3::new(4.1, 3.7, 2.9)]) {
+        station.meter.position_m = at;
+    }
+    for (at, normal) in [
+        (DVec3::new(1.6234, 3.2518, 4.7706), DVec3::Z),
+        (DVec3::new(5.6229, 2.1, 3.3), DVec3::X),
+        (DVec3::new(0.0, 5.1221, 3.3), DVec3::Y),
+        (DVec3::new(1.7, 1.3, 0.75), DVec3::NEG_Z),
+    ] {
+        job.scene.luminaires = vec![luminaire("on it", at, lambertian())];
+        job.scene.luminaires[0].orientation = glam::DMat3::from_quat(glam::DQuat::from_rotation_arc(DVec3::Z, normal));
+        for station in &mut job.stations {
+            station.meter.normal = (at - station.meter.position_m).normalize();
+        }
+        let exact = simulated_lx(&job, 1e-6);
+        assert!(exact.iter().any(|lx| *lx > 1.0), "{exact:?}");
+        let deviations = relative_deviations(&read(&job), &exact);
+        assert!(worst(&deviations) < 3e-4, "{at} {deviations:?}");
+    }
+}
+
+pub(in crate::engines) fn what_is_off_is_dark(read: fn(&Job) -> Measurement) {
+    let mut job = s1(Transport::Direct);
+    job.scene.luminaires[0].flux_scale = 0.0;
+    assert!(read(&job).estimates.iter().all(|e| e.value == 0.0));
+    let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+    job.scene.luminaires[0] = with_opening(job.scene.luminaires[0].clone(), opening);
+    assert!(read(&job).estimates.iter().all(|e| e.value == 0.0));
+}
+
 #[test]
 fn a_patch_stands_off_surfaces_beside_it_alone() {
     let mut job = furnished();

@@ -503,13 +503,13 @@ impl One<'_> {
         Procedures(all)
     }
 
-    /// The hunted engines, with a preset of theirs now and then.
+    /// The hunted engines, now and then with a preset of theirs where their settings name none.
     fn engines(&mut self, hunted: &Engines) -> BTreeMap<String, EngineSettings> {
         let with_preset = |one: &mut Self, name: &EngineName, settings: &EngineSettings| {
             let mut settings = settings.clone();
             let made = engines::entry(name).map(|entry| (entry.make)());
             let knob = made.and_then(|engine| engine.knobs().iter().find(|k| k.key == "preset"));
-            if let Some(knob) = knob
+            if let Some(knob) = knob.filter(|knob| !settings.0.contains_key(knob.key))
                 && one.has(Feature::Preset, 2)
             {
                 settings.0.insert(knob.key.to_owned(), one.draw.one_of(knob.values).into());
