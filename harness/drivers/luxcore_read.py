@@ -23,6 +23,7 @@ import blocks
 
 FILM = 1 << 16  # pixels side by side: LuxCore's tiles draw by a pixel's place, whatever `renderengine.seed` says
 AHEAD = 1 << 12  # pixels that the blocks of one seed have for themselves
+WIDE = 64  # times as wide a patch may be that has space about it: what its corners are rounded by tilts it less
 METER_ID = 7  # what the camera must see
 POLL_S = 5e-4
 
@@ -194,7 +195,8 @@ def meter(name, station, side, turned, clear):
     along = math.cos(turned) * np.cross(across, normal) + math.sin(turned) * across
     across = np.cross(normal, along)
     seat = at + (-clear if station["free"] else side / 4) * normal
-    corners = [seat + side / 2 * (x * along + y * across) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    half = (WIDE if station["wide"] else 1) * side / 2
+    corners = [seat + half * (x * along + y * across) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     window = side / 1000
     return (
         f"scene.materials.meter.type = matte\nscene.materials.meter.kd = 1 1 1\n"

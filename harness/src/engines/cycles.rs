@@ -42,6 +42,7 @@ const PACKAGE: Package = Package {
     python: "python3.11",
     ray_s: 1e-6,
     seat: 0.25,
+    is_cut_by_its_plane: false,
     apart: 10.0,
 };
 

@@ -41,6 +41,7 @@ const PACKAGE: Package = Package {
     python: "python3.11",
     ray_s: 1e-6,
     seat: 0.1,
+    is_cut_by_its_plane: true,
     apart: 2.0,
 };
 

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use self::opening::Opening;
 use self::resampled::{Resampled, Spread};
-use self::seats::{beside_a_surface, patch, sides};
+use self::seats::{TILT, WIDE, beside_a_surface, patch, sides};
 use self::settings::Settings;
 use super::dialogue::{self, Cost, Dialogue, Seat};
 use super::float_error::{FloatError, Instrument};
@@ -61,6 +61,8 @@ pub(super) struct Package {
     pub(super) ray_s: f64,
     /// How far off a meter's point it reads where no surface is beside it, in parts of a patch's side.
     pub(super) seat: f64,
+    /// Whether light below a patch's own plane is lost, which its rounded corners tilt.
+    pub(super) is_cut_by_its_plane: bool,
     /// How far points come off surfaces that they are on, in parts of what plates do.
     pub(super) apart: f64,
 }
@@ -146,8 +148,15 @@ impl Package {
                 .sum()
         };
         let misled = looked_up.iter().map(Resampled::misled_share).fold(0.0, f64::max);
+        let tight = beside_a_surface(job, WIDE * side_m);
+        let of_plane_lx = |k: usize| {
+            let tilt = if tight[k] { TILT } else { TILT / WIDE };
+            let is_lost = |cosine: f64| self.is_cut_by_its_plane && cosine > 0.0 && cosine < tilt;
+            facing_lx(job, &places, &job.stations[k].meter, |cosine| if is_lost(cosine) { cosine } else { 0.0 })
+        };
         let bound_lx = |k: usize, normal_off: f64| {
-            rounding.at_lx(k) + of_tables_lx(k) + normal_off * facing_lx(job, &places, &job.stations[k].meter)
+            let of_normals = normal_off * facing_lx(job, &places, &job.stations[k].meter, |_| 1.0);
+            rounding.at_lx(k) + of_tables_lx(k) + of_plane_lx(k) + of_normals
         };
         let dialogue = Dialogue {
             engine: self.engine.clone(),
@@ -248,11 +257,12 @@ pub(super) fn reflections(job: &Job) -> i64 {
     }
 }
 
-/// Illuminance that a meter would have that faced each part of all luminaires, in lux.
-fn facing_lx(job: &Job, places: &[Vec<DVec3>], meter: &Meter) -> f64 {
+/// Illuminance of a meter by all parts of all luminaires, in lux, that each has by its cosine; 1 where the meter faced it.
+fn facing_lx(job: &Job, places: &[Vec<DVec3>], meter: &Meter, by_cosine: impl Fn(f64) -> f64) -> f64 {
     let of_place = |luminaire: &Luminaire, place_m: &DVec3| {
         let ray_m = meter.position_m - *place_m;
-        luminaire.intensity_towards(ray_m).value() / ray_m.length_squared()
+        let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
+        by_cosine(cosine) * luminaire.intensity_towards(ray_m).value() / ray_m.length_squared()
     };
     let of = |(luminaire, places): (&Luminaire, &Vec<DVec3>)| {
         places.iter().map(|place_m| of_place(luminaire, place_m)).sum::<f64>() / places.len() as f64
@@ -286,6 +296,8 @@ struct PatchSeat<'a> {
     seat: Seat<'a>,
     /// Whether no surface is beside it, so that it may be read at its very point.
     free: bool,
+    /// Whether there is space for a wide patch.
+    wide: bool,
 }
 
 /// `job.json` of a scene with so many lights and these tables.
@@ -299,7 +311,7 @@ pub(super) fn job_json(
 ) -> Result<SceneFile, EngineError> {
     let (blocks, side) = settings.by_itself();
     let patch = patch(job, frame);
-    let beside = beside_a_surface(job, patch / frame.scale);
+    let [beside, tight] = [1.0, WIDE].map(|times| beside_a_surface(job, times * patch / frame.scale));
     let driver_job = DriverJob {
         case: &job.case,
         procedure: job.procedure.name(),
@@ -313,9 +325,8 @@ pub(super) fn job_json(
         blocks,
         side,
         seed: job.seed,
-        stations: dialogue::seats(job, frame)
-            .zip(beside)
-            .map(|(seat, beside)| PatchSeat { seat, free: !beside })
+        stations: izip!(dialogue::seats(job, frame), beside, tight)
+            .map(|(seat, beside, tight)| PatchSeat { seat, free: !beside, wide: !tight })
             .collect(),
     };
     let text = serde_json::to_string_pretty(&driver_job)

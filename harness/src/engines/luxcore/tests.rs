@@ -85,6 +85,11 @@ fn what_is_off_is_dark() {
 }
 
 #[test]
+fn grazing_light_is_not_lost() {
+    patches::tests::grazing_light_is_not_lost(read);
+}
+
+#[test]
 fn one_seed_gives_the_same_readings_on_any_number_of_threads() {
     patches::tests::one_seed_gives_the_same_readings_on_any_number_of_threads(&LuxCore);
 }

@@ -6,12 +6,17 @@ use luminaire::geometry::Surface;
 use luminaire::scene::{LuminaireModel, Shape};
 
 use crate::engines::Job;
+use crate::engines::float_error::EPSILON;
 use crate::engines::frame::Frame;
 
 /// Side of a meter's patch, in parts of the largest coordinate: forty times what 32-bit floats resolve there at least.
 const PATCH: f64 = 5e-6;
 /// A surface so many sides from a meter is beside it.
 const BESIDE: f64 = 4.0;
+/// So many times as wide a patch may be that has more space about it, as in `luxcore_read.py`: what its corners are rounded by tilts it less.
+pub(super) const WIDE: f64 = 64.0;
+/// How far the corners of a patch that is not wide may be rounded, in parts of its side: its plane's sine to its normal.
+pub(super) const TILT: f64 = 4.0 * EPSILON / PATCH;
 
 /// Side of a meter's patch in scene units.
 pub(in crate::engines) fn patch(job: &Job, frame: &Frame) -> f64 {

@@ -41,6 +41,30 @@ pub(in crate::engines) fn meters_in_free_space_are_read_at_their_very_points(rea
     assert!(worst(&deviations) < 2e-4, "{deviations:?}");
 }
 
+/// A meter to which light comes nearly along its plane.
+pub(in crate::engines) fn grazing_light_is_not_lost(read: fn(&Job) -> Measurement) {
+    let mut job = s1(Transport::Direct);
+    job.scene.room = None;
+    job.scene.luminaires = vec![luminaire("lamp", DVec3::new(3.1725, 1.4533, 1.6187), lambertian())];
+    let at = DVec3::new(3.870818, 1.268589, 1.489488);
+    let ray = (job.scene.luminaires[0].position_m - at).normalize();
+    let stations = job.stations.clone();
+    job.stations = stations
+        .into_iter()
+        .cycle()
+        .take(24)
+        .enumerate()
+        .map(|(k, mut station)| {
+            let across = glam::DMat3::from_axis_angle(ray, k as f64) * ray.any_orthonormal_vector();
+            station.meter = Meter { position_m: at, normal: (across + 1e-3 * ray).normalize() };
+            station.id = crate::record::MeterId::new("grazing", k);
+            station
+        })
+        .collect();
+    let deviations = relative_deviations(&read(&job), &exact_direct_lx(&job));
+    assert!(worst(&deviations) < 2e-3, "{deviations:?}");
+}
+
 pub(in crate::engines) fn points_on_surfaces_light_their_room(read: fn(&Job) -> Measurement) {
     let mut job = furnished();
     job.scene.room =
