@@ -63,7 +63,7 @@ pub(super) struct Package {
     pub(super) seat: f64,
     /// Whether light below a patch's own plane is lost, which its rounded corners tilt.
     pub(super) is_cut_by_its_plane: bool,
-    /// How far points come off surfaces that they are on, in parts of what plates do.
+    /// How far surfaces step back from points on them, in parts of what plates come forward.
     pub(super) apart: f64,
 }
 
@@ -122,10 +122,7 @@ impl Package {
         let frame = Frame::of(job, settings.coordinates);
         let side = patch(job, &frame);
         let side_m = side / frame.scale;
-        // Points that come off surfaces do so for every meter.
-        let off_m = job.scene.luminaires.iter().map(|l| recess::off_surfaces_m(job, l).length()).fold(0.0, f64::max);
-        let off = self.apart * frame.scale * off_m;
-        let seat = |is_beside: bool| (if is_beside { side } else { self.seat * side }) + off;
+        let seat = |is_beside: bool| if is_beside { side } else { self.seat * side };
         let seats = beside_a_surface(job, side_m).into_iter().map(seat).collect();
         let instrument = Instrument { edge_deg, seats, by_arc_cosine: true };
         let rounding = FloatError::of(job, frame, instrument);
@@ -198,7 +195,8 @@ pub(super) fn supports(entry: &Entry, job: &Job, stock: (&str, Option<f64>)) -> 
         let why = format!("paths seldom find the bright spot that `{id}` throws on a surface close by");
         return Support::Approximate { why, size: None };
     }
-    if let (Some(id), Transport::Indirect(_) | Transport::Total(_)) = (shines_into_its_surface(job), job.transport) {
+    let behind = job.scene.luminaires.iter().find(|l| recess::shines_behind(job, l));
+    if let (Some(Luminaire { id, .. }), Transport::Indirect(_) | Transport::Total(_)) = (behind, job.transport) {
         let why = format!("what `{id}` sends into the surface that it is on is lost, and here reflected");
         return Support::Approximate { why, size: None };
     }
@@ -207,15 +205,6 @@ pub(super) fn supports(entry: &Entry, job: &Job, stock: (&str, Option<f64>)) -> 
         return Support::Approximate { why, size: None };
     }
     Support::Yes
-}
-
-/// A point that comes off a surface for the export, and lights it then.
-fn shines_into_its_surface(job: &Job) -> Option<&str> {
-    let does = |l: &&Luminaire| {
-        let off_m = recess::off_surfaces_m(job, l);
-        off_m != DVec3::ZERO && l.intensity_towards(-off_m).value() > 0.0
-    };
-    job.scene.luminaires.iter().find(does).map(|l| l.id.as_str())
 }
 
 /// Luminaires whose own files differ, and say the same.

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use glam::DVec3;
-use luminaire::geometry::Surface;
+use luminaire::geometry::{Room, Surface};
 use luminaire::scene::{Luminaire, LuminaireModel, Shape, flush};
 
 use super::Job;
@@ -37,41 +37,80 @@ pub(super) fn apart(job: &Job) -> Cow<'_, Job> {
     Cow::Owned(moved)
 }
 
-/// The same for renderers whose shadow rays meet a surface and a point in its plane at once: points in planes of surfaces come off them,
-/// too, so many times as far as plates.
-pub(super) fn with_points_apart(job: &Job, times: f64) -> Cow<'_, Job> {
-    let moves_m: Vec<DVec3> = job.scene.luminaires.iter().map(|l| times * off_surfaces_m(job, l)).collect();
+/// The same for renderers whose shadow rays meet a face of a box and a point on it at once: faces step back from points, so many times
+/// as far as plates come forward.
+pub(super) fn behind_points(job: &Job, times: f64) -> Cow<'_, Job> {
     let moved = apart(job);
-    if moves_m.iter().all(|m| *m == DVec3::ZERO) {
+    if !job.scene.luminaires.iter().any(|l| surfaces_of(job, l).next().is_some()) {
         return moved;
     }
-    let mut moved = moved.into_owned();
-    for (luminaire, move_m) in moved.scene.luminaires.iter_mut().zip(moves_m) {
-        luminaire.position_m += move_m;
+    let (mut moved, back_m) = (moved.into_owned(), times * back_m(job));
+    for luminaire in &job.scene.luminaires {
+        for (face, inwards) in surfaces_of(job, luminaire) {
+            let Face::OfBox(k) = face else { continue };
+            if let Shape::Box { min_m, max_m } = &mut moved.scene.obstacles[k].shape {
+                let thick_m = (*max_m - *min_m).dot(inwards.abs());
+                let step_m = back_m.min(0.25 * thick_m) * inwards;
+                *min_m -= step_m.min(DVec3::ZERO);
+                *max_m -= step_m.max(DVec3::ZERO);
+            }
+        }
     }
     Cow::Owned(moved)
 }
 
-/// The way that a point goes off the surfaces of the room and of boxes that it is on, as far as a plate.
-pub(super) fn off_surfaces_m(job: &Job, luminaire: &Luminaire) -> DVec3 {
-    let Some(room) = job.scene.room.filter(|_| luminaire.model == LuminaireModel::Point) else { return DVec3::ZERO };
-    let largest_m = room.size_m.max_element();
-    let (at, near_m) = (luminaire.position_m, flush::IN_PLANE * largest_m);
-    let is_on = |depth_m: f64| depth_m.abs() <= near_m;
-    let of_room = Surface::ALL
-        .into_iter()
-        .filter(|s| is_on((at - room.corners(*s)[0]).dot(s.inward_normal())))
-        .map(Surface::inward_normal);
-    let of_bodies = job.scene.obstacles.iter().filter_map(|o| match o.shape {
-        Shape::Box { min_m, max_m } => Some([min_m, max_m]),
-        Shape::Mesh { .. } => None,
-    });
-    let of_bodies = of_bodies
-        .filter(|[low, high]| at.cmpge(low - near_m).all() && at.cmple(high + near_m).all())
-        .flat_map(|[low, high]| DVec3::AXES.into_iter().flat_map(move |axis| [(low, -axis), (high, axis)]))
-        .filter(|(face, outward)| is_on((at - face).dot(*outward)))
-        .map(|(_, outward)| outward);
-    APART * largest_m * of_room.chain(of_bodies).sum::<DVec3>()
+/// The corners of a surface of the room, whose surfaces step back from points in them likewise.
+pub(super) fn corners_m(job: &Job, room: &Room, surface: Surface, times: f64) -> [DVec3; 4] {
+    let (mut low_m, mut high_m) = (DVec3::ZERO, room.size_m);
+    for luminaire in &job.scene.luminaires {
+        for (face, inwards) in surfaces_of(job, luminaire) {
+            if face == Face::OfRoom {
+                let step_m = -times * back_m(job) * inwards;
+                low_m = low_m.min(step_m);
+                high_m = high_m.max(room.size_m + step_m);
+            }
+        }
+    }
+    room.corners(surface).map(|c| DVec3::select(c.cmpgt(DVec3::ZERO), high_m, low_m))
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Face {
+    OfRoom,
+    OfBox(usize),
+}
+
+fn back_m(job: &Job) -> f64 {
+    job.scene.room.map_or(0.0, |room| APART * room.size_m.max_element())
+}
+
+/// The surfaces that a point is on, and where each lets its light go.
+fn surfaces_of(job: &Job, luminaire: &Luminaire) -> impl Iterator<Item = (Face, DVec3)> {
+    let room = job.scene.room.filter(|_| luminaire.model == LuminaireModel::Point);
+    let at = luminaire.position_m;
+    room.into_iter().flat_map(move |room| {
+        let near_m = flush::IN_PLANE * room.size_m.max_element();
+        let is_on = move |face_m: DVec3, normal: DVec3| (at - face_m).dot(normal).abs() <= near_m;
+        let of_room = Surface::ALL.into_iter().filter(move |s| is_on(room.corners(*s)[0], s.inward_normal()));
+        let of_boxes = job.scene.obstacles.iter().enumerate().filter_map(move |(k, o)| match o.shape {
+            Shape::Box { min_m, max_m } => {
+                let is_at = at.cmpge(min_m - near_m).all() && at.cmple(max_m + near_m).all();
+                is_at.then_some((k, min_m, max_m))
+            }
+            Shape::Mesh { .. } => None,
+        });
+        let of_boxes = of_boxes.flat_map(move |(k, low_m, high_m)| {
+            let faces = DVec3::AXES.into_iter().flat_map(move |axis| [(low_m, -axis), (high_m, axis)]);
+            let on = faces.filter(move |(face_m, normal)| is_on(*face_m, *normal));
+            on.map(move |(_, normal)| (Face::OfBox(k), normal))
+        });
+        of_room.map(|s| (Face::OfRoom, s.inward_normal())).chain(of_boxes)
+    })
+}
+
+/// Whether a point on a surface lights it where that steps back.
+pub(super) fn shines_behind(job: &Job, luminaire: &Luminaire) -> bool {
+    surfaces_of(job, luminaire).any(|(_, inwards)| luminaire.intensity_towards(-inwards).value() > 0.0)
 }
 
 #[cfg(test)]
@@ -108,26 +147,34 @@ mod tests {
     }
 
     #[test]
-    fn points_come_off_the_surfaces_that_they_are_on() {
+    fn surfaces_step_back_from_points_on_them() {
         let mut job = office();
-        job.scene.obstacles.push(fixtures::cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 0.75], 0.5));
-        let mut moved_from = |at: [f64; 3]| {
+        job.scene.obstacles = vec![fixtures::cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 0.75], 0.5)];
+        let room = job.scene.room.unwrap();
+        let mut bounds_from = |at: [f64; 3]| {
             job.scene.luminaires[1].position_m = DVec3::from(at);
-            let moved = with_points_apart(&job, 1.0);
-            (moved.scene.luminaires[1].position_m - DVec3::from(at)) / (APART * 6.0)
+            let ends = [Surface::Floor, Surface::Ceiling].map(|s| corners_m(&job, &room, s, 2.0));
+            let low = ends.as_flattened().iter().copied().reduce(DVec3::min).unwrap();
+            let high = ends.as_flattened().iter().copied().reduce(DVec3::max).unwrap();
+            let Shape::Box { min_m, max_m } = behind_points(&job, 2.0).scene.obstacles[0].shape else {
+                panic!("no box")
+            };
+            let back = 2.0 * APART * 6.0;
+            let steps =
+                [low, high - room.size_m, min_m - DVec3::new(1.0, 1.0, 0.0), max_m - DVec3::new(2.0, 2.0, 0.75)];
+            steps.map(|step| (step / back).round().to_array())
         };
-        for (at, by) in [
-            ([4.0, 2.0, 3.0], [0.0, 0.0, -1.0]),
-            ([0.0, 4.0, 1.0], [1.0, -1.0, 0.0]),
-            ([1.5, 1.5, 0.75], [0.0, 0.0, 1.0]),
-            ([2.0, 1.5, 0.3], [1.0, 0.0, 0.0]),
-            ([4.0, 2.0, 2.999], [0.0; 3]),
-            ([2.1, 1.5, 0.75], [0.0; 3]),
+        let none = [0.0; 3];
+        for (at, steps) in [
+            ([4.0, 2.0, 3.0], [none, [0.0, 0.0, 1.0], none, none]),
+            ([0.0, 4.0, 1.0], [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], none, none]),
+            ([1.5, 1.5, 0.75], [none, none, none, [0.0, 0.0, -1.0]]),
+            ([1.0, 1.5, 0.3], [none, none, [1.0, 0.0, 0.0], none]),
+            ([4.0, 2.0, 2.999], [none; 4]),
+            ([2.1, 1.5, 0.75], [none; 4]),
         ] {
-            let moved = moved_from(at);
-            assert!(moved.distance(DVec3::from(by)) < 1e-6, "{at:?} {moved}");
+            assert_eq!(bounds_from(at), steps, "{at:?}");
         }
-        assert_eq!(with_points_apart(&job, 1.0).scene.luminaires[0].position_m.z, 2.99994);
     }
 
     #[test]

@@ -26,7 +26,7 @@ const SCENE: &str = include_str!("../../../drivers/cycles_scene.py");
 
 pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.coordinates);
-    let job = &*recess::with_points_apart(job, super::PACKAGE.apart);
+    let job = &*recess::behind_points(job, super::PACKAGE.apart);
     let tables = Tables::of(job);
     let names = (0..tables.distinct.len()).map(table).collect();
     let mut files = vec![
@@ -119,7 +119,8 @@ fn scene(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -> S
 
 fn surfaces(text: &mut String, job: &Job, frame: &Frame) {
     for (room, surface) in job.scene.room.iter().flat_map(|room| Surface::ALL.map(|s| (room, s))) {
-        let corners: Vec<String> = room.corners(surface).map(|c| point(frame.to_scene(c))).to_vec();
+        let corners: Vec<String> =
+            recess::corners_m(job, room, surface, super::PACKAGE.apart).map(|c| point(frame.to_scene(c))).to_vec();
         let (name, reflectance) = (surface.name(), room.reflectance.of(surface));
         let corners = corners.join(", ");
         writeln!(text, "cycles.surface(\"{name}\", {reflectance}, [{corners}], [[0, 1, 2, 3]])").ok();

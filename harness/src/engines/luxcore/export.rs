@@ -30,7 +30,7 @@ const CORNERS: usize = 64;
 
 pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.coordinates);
-    let job = &*recess::with_points_apart(job, super::PACKAGE.apart);
+    let job = &*recess::behind_points(job, super::PACKAGE.apart);
     let tables = Tables::of(job);
     let mapped = tables.distinct.iter().filter(|_| !settings.has_plain_tables());
     let maps: Vec<Map> = mapped.map(|d| Map::of(d)).collect();
@@ -115,7 +115,8 @@ impl Scene<'_> {
         }
         text += &self.camera();
         for (room, surface) in self.job.scene.room.iter().flat_map(|room| Surface::ALL.map(|s| (room, s))) {
-            let corners = room.corners(surface).map(|c| self.frame.to_scene(c));
+            let corners =
+                recess::corners_m(self.job, room, surface, super::PACKAGE.apart).map(|c| self.frame.to_scene(c));
             let name = surface.name().replace(' ', "_").replace('-', "_min").replace('+', "_max");
             quads(&mut text, &name, room.reflectance.of(surface), &[corners]);
         }

@@ -88,7 +88,7 @@ pub(in crate::engines) fn points_on_surfaces_light_their_room(read: fn(&Job) -> 
         let exact = simulated_lx(&job, 1e-6);
         assert!(exact.iter().any(|lx| *lx > 1.0), "{exact:?}");
         let deviations = relative_deviations(&read(&job), &exact);
-        assert!(worst(&deviations) < 3e-4, "{at} {deviations:?}");
+        assert!(worst(&deviations) < 1e-4, "{at} {deviations:?}");
     }
 }
 
