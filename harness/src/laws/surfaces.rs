@@ -3,7 +3,7 @@
 use glam::DVec3;
 use luminaire::calculators::inverse_square;
 use luminaire::geometry::{Reflectances, Room, Surface};
-use luminaire::scene::{LuminaireModel, Meter, Obstacle, Shape, Transport};
+use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Shape, Transport};
 use luminaire::simulator::quadrature::Gauss;
 
 use super::{Against, Law, Light, Variant};
@@ -103,14 +103,18 @@ const QUADRATURE: f64 = 4.5e-3;
 
 /// The job in its room painted alike all over, read on all six surfaces.
 ///
-/// All that is emitted is absorbed in the end: the mean over the area of reflected light is flux x rho / (area x (1 - rho)).
+/// All that is emitted is absorbed in the end: the mean over the area of reflected light is flux x rho / (area x (1 - rho)), of n reflections
+/// the first n terms of that series.
 pub(super) fn furnace(mut job: Job, rho: f64) -> Option<Variant> {
     let size_m = job.scene.room?.size_m;
     let room = Room { size_m, reflectance: Reflectances::with_equal_walls(rho, rho, rho) };
     job.scene.room = Some(room);
-    if !matches!(job.transport, Transport::Indirect(_)) {
-        return None;
-    }
+    let Transport::Indirect(bounces) = job.transport else { return None };
+    // Of all reflections, so much by those that count.
+    let counted = match bounces {
+        Bounces::Converged => 1.0,
+        Bounces::AtMost(n) => 1.0 - rho.powf(f64::from(n)),
+    };
     let area_m2: f64 = Surface::ALL.iter().map(|s| room.area_m2(*s)).sum();
     let (rule, mut stations, mut weights) = (Gauss::new(6), vec![], vec![]);
     for surface in Surface::ALL {
@@ -128,8 +132,9 @@ pub(super) fn furnace(mut job: Job, rho: f64) -> Option<Variant> {
     let flux = |l: &luminaire::scene::Luminaire| l.photometry.distribution.flux().value() * l.flux_scale;
     let flux_lm: f64 = job.scene.luminaires.iter().map(flux).sum();
     job.stations = stations;
-    let value_lx = flux_lm * rho / (area_m2 * (1.0 - rho));
-    Some(Variant { job, against: Against::Mean { weights, value_lx, quadrature: QUADRATURE * (1.0 - rho) } })
+    let value_lx = flux_lm * rho / (area_m2 * (1.0 - rho)) * counted;
+    let quadrature = if counted > 0.0 { QUADRATURE * (1.0 - rho) / counted } else { 0.0 };
+    Some(Variant { job, against: Against::Mean { weights, value_lx, quadrature } })
 }
 
 /// A node moved towards the nearer edge, where reflected light is least smooth: x becomes 3 x^2 - 2 x^3.

@@ -1,4 +1,4 @@
-use luminaire::scene::Transport;
+use luminaire::scene::{Bounces, Transport};
 
 use super::{Against, all, find};
 use crate::engines::Job;
@@ -69,20 +69,25 @@ fn similar_scenes_read_alike_whatever_the_luminaire_and_the_walls() {
 
 #[test]
 fn a_furnace_gives_back_all_light_to_the_quadrature_stated() {
-    for (law, magnitude) in [
-        ("reflectance", 0.5),
-        ("reflectance", 0.9),
-        ("reflectance", 0.999),
-        ("near_ceiling", 1e-3),
-        ("needle_beam", 1.0),
-        ("one_gamma", 1.0),
-        ("many_luminaires", 1.0),
+    let few = |n| Transport::Indirect(Bounces::AtMost(n));
+    for (law, magnitude, transport) in [
+        ("reflectance", 0.5, CONVERGED),
+        ("reflectance", 0.5, few(1)),
+        ("reflectance", 0.5, few(2)),
+        ("reflectance", 0.9, CONVERGED),
+        ("reflectance", 0.9, few(3)),
+        ("reflectance", 0.999, CONVERGED),
+        ("near_ceiling", 1e-3, CONVERGED),
+        ("near_ceiling", 1e-3, few(2)),
+        ("needle_beam", 1.0, CONVERGED),
+        ("one_gamma", 1.0, CONVERGED),
+        ("many_luminaires", 1.0, CONVERGED),
     ] {
-        let variant = (find(law).unwrap().variant)(&s1(CONVERGED), magnitude).unwrap();
+        let variant = (find(law).unwrap().variant)(&s1(transport), magnitude).unwrap();
         let Against::Mean { weights, value_lx, quadrature } = variant.against else { panic!("{law}") };
         assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
         let mean: f64 = exact(&variant.job).iter().zip(&weights).map(|(x, w)| x * w).sum();
-        println!("{law} {magnitude}: {:e}", mean / value_lx - 1.0);
+        println!("{law} {magnitude} {transport:?}: {:e}", mean / value_lx - 1.0);
         assert!((mean / value_lx - 1.0).abs() < quadrature, "{law} {magnitude}: {mean} for {value_lx}");
     }
 }
