@@ -45,15 +45,14 @@ pub(super) fn behind_points(job: &Job, times: f64) -> Cow<'_, Job> {
         return moved;
     }
     let (mut moved, back_m) = (moved.into_owned(), times * back_m(job));
-    for luminaire in &job.scene.luminaires {
-        for (face, inwards) in surfaces_of(job, luminaire) {
-            let Face::OfBox(k) = face else { continue };
-            if let Shape::Box { min_m, max_m } = &mut moved.scene.obstacles[k].shape {
-                let thick_m = (*max_m - *min_m).dot(inwards.abs());
-                let step_m = back_m.min(0.25 * thick_m) * inwards;
-                *min_m -= step_m.min(DVec3::ZERO);
-                *max_m -= step_m.max(DVec3::ZERO);
-            }
+    for (face, inwards) in job.scene.luminaires.iter().flat_map(|l| surfaces_of(job, l)) {
+        let Face::OfBox(k) = face else { continue };
+        // From where it was, whoever else is on it.
+        let Shape::Box { min_m: low_m, max_m: high_m } = job.scene.obstacles[k].shape else { continue };
+        let step_m = back_m.min(0.25 * (high_m - low_m).dot(inwards.abs())) * inwards;
+        if let Shape::Box { min_m, max_m } = &mut moved.scene.obstacles[k].shape {
+            *min_m = min_m.max(low_m - step_m);
+            *max_m = max_m.min(high_m - step_m);
         }
     }
     Cow::Owned(moved)
@@ -175,6 +174,21 @@ mod tests {
         ] {
             assert_eq!(bounds_from(at), steps, "{at:?}");
         }
+    }
+
+    #[test]
+    fn a_face_steps_back_once_however_many_points_are_on_it() {
+        let mut job = office();
+        job.scene.obstacles = vec![fixtures::cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 0.75], 0.5)];
+        let lamp = |x| fixtures::luminaire("on it", DVec3::new(x, 1.5, 0.75), fixtures::lambertian());
+        let top = |job: &Job| match behind_points(job, 2.0).scene.obstacles[0].shape {
+            Shape::Box { max_m, .. } => max_m.z,
+            Shape::Mesh { .. } => f64::NAN,
+        };
+        job.scene.luminaires = vec![lamp(1.2)];
+        let by_one = top(&job);
+        job.scene.luminaires.extend([1.4, 1.6, 1.8].map(lamp));
+        assert!(by_one < 0.75 && top(&job) == by_one, "{by_one} {}", top(&job));
     }
 
     #[test]
