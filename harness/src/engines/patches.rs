@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use self::opening::Opening;
 use self::resampled::{Resampled, Spread};
-use self::seats::{TILT, WIDE, beside_a_surface, patch, sides};
+use self::seats::{Space, patch, sides};
 use self::settings::Settings;
 use super::dialogue::{self, Cost, Dialogue, Seat};
 use super::float_error::{FloatError, Instrument};
@@ -122,8 +122,9 @@ impl Package {
         let frame = Frame::of(job, settings.coordinates);
         let side = patch(job, &frame);
         let side_m = side / frame.scale;
-        let seat = |is_beside: bool| if is_beside { side } else { self.seat * side };
-        let seats = beside_a_surface(job, side_m).into_iter().map(seat).collect();
+        let spaces = Space::of(&recess::behind_points(job, self.apart), side_m);
+        let seat = |space: &Space| if *space == Space::Tight { side } else { self.seat * side };
+        let seats = spaces.iter().map(seat).collect();
         let instrument = Instrument { edge_deg, seats, by_arc_cosine: true };
         let rounding = FloatError::of(job, frame, instrument);
         let tables = Tables::of(job);
@@ -145,10 +146,8 @@ impl Package {
                 .sum()
         };
         let misled = looked_up.iter().map(Resampled::misled_share).fold(0.0, f64::max);
-        let tight = beside_a_surface(job, WIDE * side_m);
         let of_plane_lx = |k: usize| {
-            let tilt = if tight[k] { TILT } else { TILT / WIDE };
-            let is_lost = |cosine: f64| self.is_cut_by_its_plane && cosine > 0.0 && cosine < tilt;
+            let is_lost = |cosine: f64| self.is_cut_by_its_plane && cosine > 0.0 && cosine < spaces[k].tilt();
             facing_lx(job, &places, &job.stations[k].meter, |cosine| if is_lost(cosine) { cosine } else { 0.0 })
         };
         let bound_lx = |k: usize, normal_off: f64| {
@@ -300,7 +299,7 @@ pub(super) fn job_json(
 ) -> Result<SceneFile, EngineError> {
     let (blocks, side) = settings.by_itself();
     let patch = patch(job, frame);
-    let [beside, tight] = [1.0, WIDE].map(|times| beside_a_surface(job, times * patch / frame.scale));
+    let spaces = Space::of(job, patch / frame.scale);
     let driver_job = DriverJob {
         case: &job.case,
         procedure: job.procedure.name(),
@@ -314,8 +313,9 @@ pub(super) fn job_json(
         blocks,
         side,
         seed: job.seed,
-        stations: izip!(dialogue::seats(job, frame), beside, tight)
-            .map(|(seat, beside, tight)| PatchSeat { seat, free: !beside, wide: !tight })
+        stations: dialogue::seats(job, frame)
+            .zip(spaces)
+            .map(|(seat, space)| PatchSeat { seat, free: space != Space::Tight, wide: space == Space::Wide })
             .collect(),
     };
     let text = serde_json::to_string_pretty(&driver_job)

@@ -14,9 +14,41 @@ const PATCH: f64 = 5e-6;
 /// A surface so many sides from a meter is beside it.
 const BESIDE: f64 = 4.0;
 /// So many times as wide a patch may be that has more space about it, as in `luxcore_read.py`: what its corners are rounded by tilts it less.
-pub(super) const WIDE: f64 = 64.0;
+const WIDE: f64 = 64.0;
 /// How far the corners of a patch that is not wide may be rounded, in parts of its side: its plane's sine to its normal.
-pub(super) const TILT: f64 = 4.0 * EPSILON / PATCH;
+const TILT: f64 = 4.0 * EPSILON / PATCH;
+
+/// What a meter's patch has about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Space {
+    /// A surface beside it, off which it must stand.
+    Tight,
+    /// Enough to lie at the meter's very point.
+    Free,
+    /// Enough for a wide patch.
+    Wide,
+}
+
+impl Space {
+    /// Of each meter of a job as exported, whose patches have such a side in metres.
+    pub(super) fn of(job: &Job, side_m: f64) -> Vec<Self> {
+        let [tight, narrow] = [1.0, WIDE].map(|times| beside_a_surface(job, times * side_m));
+        let space = |(tight, narrow)| match (tight, narrow) {
+            (true, _) => Self::Tight,
+            (false, true) => Self::Free,
+            (false, false) => Self::Wide,
+        };
+        tight.into_iter().zip(narrow).map(space).collect()
+    }
+
+    /// By how much the rounding of its corners may tilt a patch.
+    pub(super) const fn tilt(self) -> f64 {
+        match self {
+            Self::Tight | Self::Free => TILT,
+            Self::Wide => TILT / WIDE,
+        }
+    }
+}
 
 /// Side of a meter's patch in scene units.
 pub(in crate::engines) fn patch(job: &Job, frame: &Frame) -> f64 {
@@ -35,7 +67,7 @@ pub(super) fn sides(normal: DVec3) -> [DVec3; 2] {
 }
 
 /// Which meters' patches of such a side must stand off a surface: of the room, of a body, or of an opening that may be there.
-pub(super) fn beside_a_surface(job: &Job, side_m: f64) -> Vec<bool> {
+fn beside_a_surface(job: &Job, side_m: f64) -> Vec<bool> {
     let (scene, reach_m) = (&job.scene, BESIDE * side_m);
     let by_the_room = |at: DVec3| {
         scene.room.is_some_and(|room| {
@@ -78,4 +110,51 @@ pub(super) fn beside_a_surface(job: &Job, side_m: f64) -> Vec<bool> {
 
 fn is_within(at: DVec3, low: DVec3, high: DVec3, margin: f64) -> bool {
     at.cmpge(low - margin).all() && at.cmple(high + margin).all()
+}
+
+#[cfg(test)]
+mod tests {
+    use luminaire::photometry::LuminousOpening;
+
+    use super::*;
+    use crate::engines::fixtures::with_opening;
+    use crate::engines::shared_tests::furnished;
+
+    #[test]
+    fn a_patch_stands_off_surfaces_beside_it_alone() {
+        let mut job = furnished();
+        let room_m = job.scene.room.unwrap().size_m;
+        job.scene.luminaires[0] =
+            with_opening(job.scene.luminaires[0].clone(), LuminousOpening::Box { x_m: 0.6, y_m: 0.3, height_m: 0.0 });
+        let opening_m = job.scene.luminaires[0].position_m;
+        let station = job.stations[0].clone();
+        let mut are_beside = |places: &[DVec3]| {
+            let placed = |at: &DVec3| {
+                let mut station = station.clone();
+                station.meter.position_m = *at;
+                station
+            };
+            job.stations = places.iter().map(placed).collect();
+            beside_a_surface(&job, 1e-4)
+        };
+        let beside = [
+            DVec3::new(3.0, 3.0, 0.0),
+            DVec3::new(3.0, 3.0, 3e-4),
+            DVec3::new(3.0, room_m.y, 1.0),
+            DVec3::new(1.5, 1.5, 0.75),
+            DVec3::new(1.5, 1.5, 0.7503),
+            DVec3::new(1.0003, 1.5, 0.4),
+            DVec3::new(5.5, 1.0002, 0.5),
+            opening_m + DVec3::new(0.1, 0.0, 0.0),
+        ];
+        let free = [
+            DVec3::new(3.0, 3.0, 6e-4),
+            DVec3::new(1.5, 1.5, 0.7506),
+            DVec3::new(1.5, 1.5, 0.4),
+            DVec3::new(5.5, 1.0006, 0.5),
+            opening_m + DVec3::new(0.5, 0.0, 0.0),
+        ];
+        assert_eq!(are_beside(&beside), [true; 8]);
+        assert_eq!(are_beside(&free), [false; 5]);
+    }
 }

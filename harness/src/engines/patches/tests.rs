@@ -101,44 +101,6 @@ pub(in crate::engines) fn what_is_off_is_dark(read: fn(&Job) -> Measurement) {
     assert!(read(&job).estimates.iter().all(|e| e.value == 0.0));
 }
 
-#[test]
-fn a_patch_stands_off_surfaces_beside_it_alone() {
-    let mut job = furnished();
-    let room_m = job.scene.room.unwrap().size_m;
-    job.scene.luminaires[0] =
-        with_opening(job.scene.luminaires[0].clone(), LuminousOpening::Box { x_m: 0.6, y_m: 0.3, height_m: 0.0 });
-    let opening_m = job.scene.luminaires[0].position_m;
-    let station = job.stations[0].clone();
-    let mut are_beside = |places: &[DVec3]| {
-        let placed = |at: &DVec3| {
-            let mut station = station.clone();
-            station.meter.position_m = *at;
-            station
-        };
-        job.stations = places.iter().map(placed).collect();
-        beside_a_surface(&job, 1e-4)
-    };
-    let beside = [
-        DVec3::new(3.0, 3.0, 0.0),
-        DVec3::new(3.0, 3.0, 3e-4),
-        DVec3::new(3.0, room_m.y, 1.0),
-        DVec3::new(1.5, 1.5, 0.75),
-        DVec3::new(1.5, 1.5, 0.7503),
-        DVec3::new(1.0003, 1.5, 0.4),
-        DVec3::new(5.5, 1.0002, 0.5),
-        opening_m + DVec3::new(0.1, 0.0, 0.0),
-    ];
-    let free = [
-        DVec3::new(3.0, 3.0, 6e-4),
-        DVec3::new(1.5, 1.5, 0.7506),
-        DVec3::new(1.5, 1.5, 0.4),
-        DVec3::new(5.5, 1.0006, 0.5),
-        opening_m + DVec3::new(0.5, 0.0, 0.0),
-    ];
-    assert_eq!(are_beside(&beside), [true; 8]);
-    assert_eq!(are_beside(&free), [false; 5]);
-}
-
 pub(in crate::engines) fn one_seed_gives_the_same_readings_on_any_number_of_threads(engine: &dyn Engine) {
     let job = with_preset(s1(CONVERGED), "fast");
     let with_jobs = |jobs: usize| {
