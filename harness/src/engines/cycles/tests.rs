@@ -48,10 +48,7 @@ fn a_stock_table_is_the_files_own() {
     insta::assert_snapshot!(String::from_utf8_lossy(&table.bytes));
 }
 
-#[test]
-fn flat_openings_send_out_their_table_on_both_sides() {
-    patches::tests::flat_openings_send_out_their_table_on_both_sides(read);
-}
+patches::tests::hold_for_patches!(Cycles, read);
 
 /// What users get who change nothing: planes mirrored, up to an eighth too much between the only two planes of an axial table.
 #[test]
@@ -67,41 +64,6 @@ fn the_stock_scene_shows_what_cycles_makes_of_an_ies_file() {
 }
 
 #[test]
-fn meters_in_free_space_are_read_at_their_very_points() {
-    patches::tests::meters_in_free_space_are_read_at_their_very_points(read);
-}
-
-#[test]
-fn points_on_surfaces_light_their_room() {
-    patches::tests::points_on_surfaces_light_their_room(read);
-}
-
-#[test]
-fn what_is_off_is_dark() {
-    patches::tests::what_is_off_is_dark(read);
-}
-
-#[test]
-fn grazing_light_is_not_lost() {
-    patches::tests::grazing_light_is_not_lost(read);
-}
-
-#[test]
-fn one_seed_gives_the_same_readings_on_any_number_of_threads() {
-    patches::tests::one_seed_gives_the_same_readings_on_any_number_of_threads(&Cycles);
-}
-
-#[test]
 fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
     shared_tests::bounds_hold_and_decide(read, false, 6);
-}
-
-#[test]
-fn what_cannot_be_read_well_is_said_beforehand() {
-    patches::tests::what_cannot_be_read_well_is_said_beforehand(&Cycles);
-}
-
-#[test]
-fn its_own_reader_gets_the_users_bytes() {
-    patches::tests::its_own_reader_gets_the_users_bytes(&Cycles);
 }

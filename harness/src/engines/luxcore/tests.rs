@@ -46,10 +46,7 @@ fn exported_files_are_these() {
     insta::assert_snapshot!(shared_tests::golden(&files, &["luxcore_", "blocks.py", "table-"]));
 }
 
-#[test]
-fn flat_openings_send_out_their_table_on_both_sides() {
-    patches::tests::flat_openings_send_out_their_table_on_both_sides(read);
-}
+patches::tests::hold_for_patches!(LuxCore, read);
 
 /// What users get who change nothing: the candela are dropped and power is taken for 4 pi times what it is; on the axis upwards there is
 /// half of what goes down.
@@ -70,31 +67,6 @@ fn the_stock_scene_shows_what_luxcore_makes_of_an_ies_file() {
 }
 
 #[test]
-fn meters_in_free_space_are_read_at_their_very_points() {
-    patches::tests::meters_in_free_space_are_read_at_their_very_points(read);
-}
-
-#[test]
-fn points_on_surfaces_light_their_room() {
-    patches::tests::points_on_surfaces_light_their_room(read);
-}
-
-#[test]
-fn what_is_off_is_dark() {
-    patches::tests::what_is_off_is_dark(read);
-}
-
-#[test]
-fn grazing_light_is_not_lost() {
-    patches::tests::grazing_light_is_not_lost(read);
-}
-
-#[test]
-fn one_seed_gives_the_same_readings_on_any_number_of_threads() {
-    patches::tests::one_seed_gives_the_same_readings_on_any_number_of_threads(&LuxCore);
-}
-
-#[test]
 fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
     shared_tests::bounds_hold_and_decide(read, false, by_night(6, 3));
 }
@@ -103,14 +75,4 @@ fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
 fn light_of_openings_past_a_box_is_within_its_error_in_random_rooms() {
     // A room with openings is a quarter of a minute.
     shared_tests::bounds_hold_and_decide(read, true, by_night(6, 2));
-}
-
-#[test]
-fn what_cannot_be_read_well_is_said_beforehand() {
-    patches::tests::what_cannot_be_read_well_is_said_beforehand(&LuxCore);
-}
-
-#[test]
-fn its_own_reader_gets_the_users_bytes() {
-    patches::tests::its_own_reader_gets_the_users_bytes(&LuxCore);
 }

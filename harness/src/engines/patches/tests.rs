@@ -10,6 +10,33 @@ use crate::engines::Engine;
 use crate::engines::fixtures::*;
 use crate::engines::shared_tests::{self, furnished};
 
+/// The tests of an engine that hold for both alike.
+macro_rules! hold_for_patches {
+    ($engine:expr, $read:expr) => {
+        $crate::engines::patches::tests::hold_for_patches!(@ $read;
+            flat_openings_send_out_their_table_on_both_sides
+            meters_in_free_space_are_read_at_their_very_points
+            points_on_surfaces_light_their_room
+            what_is_off_is_dark
+            grazing_light_is_not_lost
+        );
+        $crate::engines::patches::tests::hold_for_patches!(@ &$engine;
+            one_seed_gives_the_same_readings_on_any_number_of_threads
+            what_cannot_be_read_well_is_said_beforehand
+            its_own_reader_gets_the_users_bytes
+        );
+    };
+    (@ $with:expr; $($test:ident)+) => {
+        $(
+            #[test]
+            fn $test() {
+                $crate::engines::patches::tests::$test($with);
+            }
+        )+
+    };
+}
+pub(in crate::engines) use hold_for_patches;
+
 pub(in crate::engines) fn flat_openings_send_out_their_table_on_both_sides(read: fn(&Job) -> Measurement) {
     let (x_m, y_m) = (0.6, 0.3);
     for opening in
