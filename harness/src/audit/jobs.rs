@@ -197,6 +197,7 @@ impl Running<'_> {
             effort: measurement.effort,
             role: planned.engine.role(),
             approximation: run.approximation.clone(),
+            declared_error: Some(run.declared).filter(|error| *error > 0.0),
             notes: measurement.notes,
             wall_s,
             components: planned.engine.components(&run.job),

@@ -419,6 +419,11 @@ fn diagnose(plans: &[Plan], reports: &mut [Report]) {
     if process::is_interrupted() {
         return;
     }
+    diagnose_together(plans, reports);
+    reports.iter_mut().for_each(Report::tell_declared);
+}
+
+fn diagnose_together(plans: &[Plan], reports: &mut [Report]) {
     let settings = |plan: &Plan| {
         let of_run = |run: &Run| (plan.engines[run.engine].engine.name(), format!("{:?}", run.job.settings));
         plan.runs.iter().map(of_run).collect()

@@ -173,6 +173,9 @@ pub struct Recording {
     pub effort: Effort,
     /// Where the engine only approximates what was asked.
     pub approximation: Option<String>,
+    /// How far off it says that leaves its readings, relative to them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub declared_error: Option<f64>,
     /// What the reader of a report should know.
     pub notes: Vec<String>,
     /// Wall-clock seconds.
@@ -232,6 +235,7 @@ impl Recording {
             method: Method::default(),
             effort: Effort::default(),
             approximation: None,
+            declared_error: None,
             notes: vec![],
             wall_s: 0.0,
             work_s: None,

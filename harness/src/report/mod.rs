@@ -30,7 +30,9 @@ use luminaire::scene::flush;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::judge::{Bias, Comparison, Consensus, OnRecord, PaperSplit, Policy, PolicyRecord, PublishedTable, Split};
+use crate::judge::{
+    Bias, Comparison, Consensus, OnRecord, PaperSplit, Policy, PolicyRecord, PublishedTable, Split, Verdict,
+};
 use crate::plan::Skip;
 use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Role, Status};
 use crate::spec::Case;
@@ -199,6 +201,25 @@ impl Report {
             comparisons,
             skips,
             ..Self::default()
+        }
+    }
+
+    /// What an engine says of itself, where that is why a reading of it fails: no more than that is missing.
+    pub fn declared(&self, comparison: &Comparison) -> Option<&str> {
+        let recording = self.recordings.iter().find(|r| r.key == comparison.key)?;
+        let (reference, budget) = (comparison.reference.as_ref()?.value, comparison.budget.as_ref()?);
+        let margin = comparison.tolerance.around(reference) + budget.expanded;
+        let is_within = comparison.deviation?.abs() <= recording.declared_error? * reference.abs() + margin;
+        recording.approximation.as_deref().filter(|_| is_within)
+    }
+
+    /// Says so of each that nothing else explains.
+    pub(crate) fn tell_declared(&mut self) {
+        let is_open = |c: &Comparison| c.verdict == Verdict::Fail && c.diagnosis.is_none();
+        let open = (0..self.comparisons.len()).filter(|k| is_open(&self.comparisons[*k]));
+        let told = |k: usize| Some((k, self.declared(&self.comparisons[k])?.to_owned()));
+        for (k, why) in open.filter_map(told).collect::<Vec<_>>() {
+            self.comparisons[k].diagnosis = Some(format!("as it declares: {why}"));
         }
     }
 

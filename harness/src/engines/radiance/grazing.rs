@@ -2,7 +2,7 @@
 //! more than 1e-4 (`nextssamp` of `srcsamp.c`), and so the finer it divides the source, the more of what comes from near its plane.
 
 use glam::DVec3;
-use luminaire::photometry::{LuminousOpening, angles_deg};
+use luminaire::photometry::{HorizontalAxis, LuminousOpening, angles_deg};
 use luminaire::scene::{Luminaire, LuminaireModel, Meter};
 
 use super::route::{Route, route};
@@ -67,7 +67,9 @@ fn is_whole(luminaire: &Luminaire, meter: &Meter, ratio: f64) -> bool {
     let axes = match opening {
         LuminousOpening::Box { height_m, .. } if height_m > 0.0 => 0..3,
         LuminousOpening::Box { .. } | LuminousOpening::Ellipse { .. } => 2..3,
-        LuminousOpening::Point | LuminousOpening::Ellipsoid { .. } | LuminousOpening::LyingCylinder { .. } => 0..0,
+        LuminousOpening::LyingCylinder { axis: HorizontalAxis::X, .. } => 0..1,
+        LuminousOpening::LyingCylinder { axis: HorizontalAxis::Y, .. } => 1..2,
+        LuminousOpening::Point | LuminousOpening::Ellipsoid { .. } => 0..0,
     };
     axes.into_iter().all(|axis| {
         let above = from[axis].abs() - 0.5 * size[axis];

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use luminaire::geometry::configuration_factor::element_to_polygon;
-use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, read_file};
+use luminaire::photometry::{HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, read_file};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
 use luminaire::simulator::{self, Accuracy, Uncertainty};
 
@@ -106,25 +106,33 @@ fn a_lambertian_disc_and_a_sphere_follow_their_closed_forms() {
 }
 
 #[test]
-fn a_turned_box_of_light_reads_as_the_path_tracer_has_it() {
-    let opening = LuminousOpening::Box { x_m: 0.8, y_m: 0.3, height_m: 0.2 };
-    let mut lamp = with_opening(luminaire("turned", DVec3::new(0.1, 0.2, 0.3), lopsided()), opening);
-    lamp.orientation = orientation(30.0, 20.0, 10.0);
-    lamp.flux_scale = 0.7;
-    for normal in [DVec3::Z, DVec3::NEG_Z] {
-        let z = -1.5 * normal.z;
-        let job = free_field(lamp.clone(), &[[0.0, 0.0, z], [1.0, -1.0, z], [-2.0, 0.5, z]], normal);
-        let meters: Vec<Meter> = job.stations.iter().map(|s| s.meter).collect();
-        let accuracy = Accuracy { relative_error: 1e-3, seed: 1 };
-        let exact = simulator::illuminance(&job.scene, &meters, Transport::Direct, &accuracy).unwrap();
-        for (estimate, exact) in read(&job).estimates.iter().zip(&exact.estimates) {
-            let theirs = match exact.uncertainty {
-                Uncertainty::Bound(bound) => bound,
-                Uncertainty::StandardError { value, .. } => value,
-            };
-            let error = estimate.uncertainty.standard_error().unwrap().hypot(theirs);
-            let off = (estimate.value - exact.illuminance.value()).abs();
-            assert!(off < 4.0 * error + 2e-3 * estimate.value, "{estimate:?} for {exact:?}");
+fn turned_bodies_of_light_read_as_the_simulator_has_them() {
+    let bodies = [
+        LuminousOpening::Box { x_m: 0.8, y_m: 0.3, height_m: 0.2 },
+        LuminousOpening::Ellipse { x_m: 0.1, y_m: 0.1, height_m: 0.4 },
+        LuminousOpening::Ellipse { x_m: 0.3, y_m: 0.3, height_m: 0.3 },
+        LuminousOpening::LyingCylinder { axis: HorizontalAxis::X, length_m: 0.6, diameter_m: 0.15 },
+        LuminousOpening::LyingCylinder { axis: HorizontalAxis::Y, length_m: 0.3, diameter_m: 0.2 },
+    ];
+    for opening in bodies {
+        let mut lamp = with_opening(luminaire("turned", DVec3::new(0.1, 0.2, 0.3), lopsided()), opening);
+        lamp.orientation = orientation(30.0, 20.0, 10.0);
+        lamp.flux_scale = 0.7;
+        for normal in [DVec3::Z, DVec3::NEG_Z] {
+            let z = -1.5 * normal.z;
+            let job = free_field(lamp.clone(), &[[0.0, 0.0, z], [1.0, -1.0, z], [-2.0, 0.5, z]], normal);
+            let meters: Vec<Meter> = job.stations.iter().map(|s| s.meter).collect();
+            let accuracy = Accuracy { relative_error: 1e-3, seed: 1 };
+            let exact = simulator::illuminance(&job.scene, &meters, Transport::Direct, &accuracy).unwrap();
+            for (estimate, exact) in read(&job).estimates.iter().zip(&exact.estimates) {
+                let theirs = match exact.uncertainty {
+                    Uncertainty::Bound(bound) => bound,
+                    Uncertainty::StandardError { value, .. } => value,
+                };
+                let error = estimate.uncertainty.standard_error().unwrap().hypot(theirs);
+                let off = (estimate.value - exact.illuminance.value()).abs();
+                assert!(off < 4.0 * error + 2e-3 * estimate.value, "{opening:?}: {estimate:?} for {exact:?}");
+            }
         }
     }
 }

@@ -126,8 +126,10 @@ impl OfCase<'_> {
         all.max_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
+    /// What an engine of ours declares of its method where it reads is no news.
     fn verdict(&self, engine: &EngineName, procedure: ProcedureId) -> Option<Sighting> {
-        let failing = self.comparisons(engine, procedure).filter(|c| c.verdict == Verdict::Fail);
+        let is_news = |c: &&Comparison| c.verdict == Verdict::Fail && self.report.declared(c).is_none();
+        let failing = self.comparisons(engine, procedure).filter(is_news);
         let worst = Self::worst(failing)?;
         let sign = if worst.deviation? > 0.0 { Sign::TooMuch } else { Sign::TooLittle };
         Some(Self::sighting(engine, procedure, Oracle::Verdict(sign), worst))

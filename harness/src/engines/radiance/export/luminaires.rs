@@ -1,14 +1,16 @@
 //! Luminaires as Radiance's light sources: points, luminous openings, and what ies2rad makes of a file.
 //!
 //! A part of an opening sends out its share of the intensity in every direction, L = I(C, gamma) / projected area, as
-//! `flatcorr`, `boxcorr` and `cylcorr` of Radiance's source.cal have it.
+//! `flatcorr` and `boxcorr` of Radiance's source.cal have it, and for cylinders `prism.cal`.
 
 use std::f64::consts::PI;
 use std::fmt::Write;
 
 use glam::{DMat3, DVec3};
 use luminaire::geometry::Surface;
-use luminaire::photometry::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, lm63};
+use luminaire::photometry::{
+    Details, HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, lm63,
+};
 use luminaire::scene::{Luminaire, Meter, Transport, flush};
 
 use super::{EFFICACY, box_faces, polygon};
@@ -26,19 +28,19 @@ const FACE_OFFSET: f64 = 1e-5;
 /// Radius of the sphere that stands for a point luminaire, in Radiance's units; 1e-6 and less are refused by Radiance.
 const POINT_RADIUS: f64 = 1e-3;
 const MIN_RADIUS: f64 = 2e-6;
-/// Diameter over length above which Radiance warns that its sampling of a cylinder is poor.
-const SLENDER: f64 = 0.4;
+/// Faces that stand for a cylinder's side, a multiple of four: rays that rtrace aims at a cylinder of its own miss it where they enter through an
+/// end, 10 % of them seen obliquely (`nextssamp` of srcsamp.c takes points of a box about the axis).
+const SIDES: usize = 32;
+/// What the side and the ends of such a prism send out, for a light's pattern: `prism_x`, `prism_y` and `prism_z` along each axis.
+const PRISM_CAL: &str = include_str!("prism.cal");
+const PRISM_NAME: &str = "prism.cal";
 
 /// Why a luminaire's opening cannot be said to Radiance, if it cannot.
 pub(in crate::engines::radiance) fn unsupported(luminaire: &Luminaire, settings: &Settings) -> Option<String> {
     let exported = route(luminaire, settings) == Route::Opening;
     let what = match luminaire.photometry.opening {
         LuminousOpening::Ellipse { x_m, y_m, .. } if x_m != y_m => "an elliptic opening",
-        LuminousOpening::Ellipse { x_m, height_m, .. } if height_m > 0.0 && x_m > SLENDER * height_m => {
-            "an upright cylinder as thick as this, which Radiance samples badly"
-        }
         LuminousOpening::Ellipsoid { x_m, y_m, z_m } if x_m != y_m || y_m != z_m => "an ellipsoid",
-        LuminousOpening::LyingCylinder { .. } => "a lying cylinder",
         _ => return None,
     };
     exported.then(|| format!("`{}` has {what}, which Radiance's source.cal does not know", luminaire.id))
@@ -49,20 +51,17 @@ pub(in crate::engines::radiance) fn unsupported(luminaire: &Luminaire, settings:
 /// rtrace takes the parts of a square to a disc by u sqrt(1 - v^2/2), v sqrt(1 - u^2/2) and counts them alike (`nextssamp` of its srcsamp.c),
 /// though they are denser towards the diagonals' ends: the mean of r^2 is 5/9 of the disc's R^2 for 1/2, on axis one diameter away -2.4 %.
 pub(in crate::engines::radiance) fn disc_error(job: &Job, settings: &Settings) -> Option<f64> {
-    let diameter_m = |l: &Luminaire| match l.photometry.opening {
-        LuminousOpening::Ellipse { x_m, .. } if route(l, settings) == Route::Opening => Some(x_m),
-        _ => None,
-    };
-    job.scene.luminaires.iter().find_map(diameter_m)?;
+    let disc = |l: &Luminaire| Cylinder::of(l.photometry.opening).filter(|_| route(l, settings) == Route::Opening);
+    job.scene.luminaires.iter().find_map(disc)?;
     let at = |meter: &Meter| {
         let (mut off_lx, mut all_lx) = (0.0, 0.0);
         for l in &job.scene.luminaires {
-            let Some(diameter_m) = diameter_m(l) else {
+            let Some(disc) = disc(l) else {
                 all_lx += from_part(l, DVec3::ZERO, meter);
                 continue;
             };
-            let (mapped_lx, even_lx) = over_disc(l, 0.5 * diameter_m, meter);
-            off_lx += (mapped_lx - even_lx).abs();
+            let (mapped_lx, even_lx) = over_disc(l, &disc, meter);
+            off_lx += disc.part_of_ends(l, meter) * (mapped_lx - even_lx).abs();
             all_lx += even_lx;
         }
         if all_lx > 0.0 { off_lx / all_lx } else { 0.0 }
@@ -71,22 +70,24 @@ pub(in crate::engines::radiance) fn disc_error(job: &Job, settings: &Settings) -
 }
 
 /// Points along the side of a square that stand for a disc's parts.
-const DISC_POINTS: usize = 8;
+const DISC_POINTS: usize = 16;
 /// Diameters from which on a disc is taken for a point.
 const FAR: f64 = 30.0;
 
-/// What a disc gives a meter where its parts are as dense as rtrace's, and where they are even.
-fn over_disc(luminaire: &Luminaire, radius_m: f64, meter: &Meter) -> (f64, f64) {
+/// What a disc, or the end of a cylinder that a meter sees, gives it where its parts are as dense as rtrace's, and where they are even.
+fn over_disc(luminaire: &Luminaire, disc: &Cylinder, meter: &Meter) -> (f64, f64) {
+    let radius_m = disc.radius_m;
     if meter.position_m.distance(luminaire.position_m) > 2.0 * FAR * radius_m {
         let lx = from_part(luminaire, DVec3::ZERO, meter);
         return (lx, lx);
     }
+    let centre_m = disc.end_facing(luminaire, meter);
     let middle = |k: usize| (2.0 * k as f64 + 1.0) / DISC_POINTS as f64 - 1.0;
     let square = (0..DISC_POINTS).flat_map(|j| (0..DISC_POINTS).map(move |k| (middle(j), middle(k))));
     let (mut mapped_lx, mut even_lx, mut area) = (0.0, 0.0, 0.0);
     for (u, v) in square {
         let (a, b) = ((1.0 - 0.5 * v * v).sqrt(), (1.0 - 0.5 * u * u).sqrt());
-        let lx = from_part(luminaire, radius_m * DVec3::new(u * a, v * b, 0.0), meter);
+        let lx = from_part(luminaire, centre_m + radius_m * (u * a * disc.across[0] + v * b * disc.across[1]), meter);
         // What a part covers of the disc.
         let covered = a * b - (0.5 * u * v).powi(2) / (a * b);
         mapped_lx += lx / (DISC_POINTS * DISC_POINTS) as f64;
@@ -166,7 +167,11 @@ pub(super) fn files(job: &Job, settings: &Settings) -> Vec<SceneFile> {
     let beside =
         job.scene.luminaires.iter().filter(|_| settings.is_native()).flat_map(|l| l.photometry.source.iter().skip(1));
     let beside = beside.map(|f| SceneFile { name: f.name.clone(), bytes: f.bytes.to_vec() });
-    job.scene.luminaires.iter().enumerate().map(file).chain(beside).collect()
+    let has_side = |l: &Luminaire| {
+        route(l, settings) == Route::Opening && Cylinder::of(l.photometry.opening).is_some_and(|c| c.length_m > 0.0)
+    };
+    let prism = job.scene.luminaires.iter().any(has_side).then(|| SceneFile::text(PRISM_NAME, PRISM_CAL.to_owned()));
+    job.scene.luminaires.iter().enumerate().map(file).chain(beside).chain(prism).collect()
 }
 
 pub(super) fn commands(job: &Job, settings: &Settings) -> String {
@@ -243,14 +248,8 @@ fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
         LuminousOpening::Ellipse { x_m, height_m: 0.0, .. } => {
             text += &light(k, luminaire, Source::SeenThrough, "flatcorr", &[factor / (0.25 * PI * x_m * x_m)]);
             for (z, turn) in body.lit_faces() {
-                text += &body.disc(if turn > 0.0 { "up" } else { "down" }, z, turn, 0.5 * x_m);
+                text += &body.disc(if turn > 0.0 { "up" } else { "down" }, z * DVec3::Z, turn * DVec3::Z, 0.5 * x_m);
             }
-        }
-        LuminousOpening::Ellipse { x_m, height_m, .. } => {
-            text += &light(k, luminaire, Source::SeenThrough, "cylcorr", &[factor, x_m, height_m]);
-            text += &body.disc("up", 0.5 * height_m, 1.0, 0.5 * x_m);
-            text += &body.disc("down", -0.5 * height_m, -1.0, 0.5 * x_m);
-            text += &body.side(height_m, 0.5 * x_m);
         }
         LuminousOpening::Ellipsoid { x_m, .. } => {
             text += &light(k, luminaire, Source::SeenThrough, "corr", &[factor / (0.25 * PI * x_m * x_m)]);
@@ -258,10 +257,67 @@ fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
             let radius = 0.5 * x_m * scale;
             text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
         }
-        // Refused before by `unsupported`, or a point, which has its own way.
-        LuminousOpening::LyingCylinder { .. } | LuminousOpening::Point => {}
+        round @ (LuminousOpening::Ellipse { .. } | LuminousOpening::LyingCylinder { .. }) => {
+            text += &Cylinder::of(round).map(|c| body.cylinder(&c, factor)).unwrap_or_default();
+        }
+        // It has its own way.
+        LuminousOpening::Point => {}
     }
     text
+}
+
+/// A round opening: a disc, with a side where it has a length.
+struct Cylinder {
+    /// Along z, x or y, and the two after it.
+    axis: DVec3,
+    across: [DVec3; 2],
+    radius_m: f64,
+    length_m: f64,
+}
+
+impl Cylinder {
+    fn of(opening: LuminousOpening) -> Option<Self> {
+        let (axis, diameter_m, length_m) = match opening {
+            LuminousOpening::Ellipse { x_m, height_m, .. } => (DVec3::Z, x_m, height_m),
+            LuminousOpening::LyingCylinder { axis: HorizontalAxis::X, length_m, diameter_m } => {
+                (DVec3::X, diameter_m, length_m)
+            }
+            LuminousOpening::LyingCylinder { axis: HorizontalAxis::Y, length_m, diameter_m } => {
+                (DVec3::Y, diameter_m, length_m)
+            }
+            _ => return None,
+        };
+        let next = |a: DVec3| DVec3::new(a.z, a.x, a.y);
+        Some(Self { axis, across: [next(axis), next(next(axis))], radius_m: 0.5 * diameter_m, length_m })
+    }
+
+    /// Which of the functions of `prism.cal` it goes by.
+    fn function(&self) -> &'static str {
+        match self.axis.to_array() {
+            [1.0, _, _] => "prism_x",
+            [_, 1.0, _] => "prism_y",
+            _ => "prism_z",
+        }
+    }
+
+    /// The middle of the end that a meter sees, in the luminaire's own frame.
+    fn end_facing(&self, luminaire: &Luminaire, meter: &Meter) -> DVec3 {
+        let own = luminaire.orientation.transpose() * (meter.position_m - luminaire.position_m);
+        (0.5 * self.length_m * own.dot(self.axis).signum()) * self.axis
+    }
+
+    /// How much of its projected area towards a meter, taken for far off, is that of its ends; all of it where the meter's own plane cuts it.
+    fn part_of_ends(&self, luminaire: &Luminaire, meter: &Meter) -> f64 {
+        let above_m = (luminaire.position_m - meter.position_m).dot(meter.normal);
+        if above_m.abs() < luminaire.photometry.opening.reach_m(luminaire.orientation.transpose() * meter.normal) {
+            return 1.0;
+        }
+        let own = luminaire.orientation.transpose() * (meter.position_m - luminaire.position_m);
+        let along = own.normalize_or_zero().dot(self.axis).abs().min(1.0);
+        let ends = PI * self.radius_m * along;
+        let side = 2.0 * self.length_m * (1.0 - along * along).sqrt();
+        if ends + side > 0.0 { ends / (ends + side) } else { 1.0 }
+    }
 }
 
 struct Body<'a> {
@@ -289,9 +345,8 @@ impl Body<'_> {
         polygon(&name, &format!("{name}-{part}"), &corners)
     }
 
-    fn disc(&self, part: &str, z_m: f64, turn: f64, radius_m: f64) -> String {
-        let p = self.placed(DVec3::new(0.0, 0.0, z_m));
-        let n = self.luminaire.orientation * DVec3::new(0.0, 0.0, turn);
+    fn disc(&self, part: &str, centre_m: DVec3, normal: DVec3, radius_m: f64) -> String {
+        let (p, n) = (self.placed(centre_m), self.luminaire.orientation * normal);
         let (k, r) = (self.k, radius_m * self.scale);
         format!(
             "luminaire-{k} ring luminaire-{k}-{part}\n0\n0\n8\n    {} {} {}\n    {} {} {}\n    0 {r}\n",
@@ -299,13 +354,25 @@ impl Body<'_> {
         )
     }
 
-    fn side(&self, height_m: f64, radius_m: f64) -> String {
-        let [a, b] = [-0.5, 0.5].map(|z| self.placed(DVec3::new(0.0, 0.0, z * height_m)));
-        let (k, r) = (self.k, radius_m * self.scale);
-        format!(
-            "luminaire-{k} cylinder luminaire-{k}-side\n0\n0\n7\n    {} {} {}\n    {} {} {}\n    {r}\n",
-            a.x, a.y, a.z, b.x, b.y, b.z
-        )
+    /// A prism whose mean silhouette is the cylinder's, and discs that it holds for its ends.
+    fn cylinder(&self, cylinder: &Cylinder, factor: f64) -> String {
+        let step = 2.0 * PI / SIDES as f64;
+        let corner_m = cylinder.radius_m * (0.5 * step) / (0.5 * step).sin();
+        let end_m = corner_m * (0.5 * step).cos();
+        let factors = [factor, SIDES as f64, 2.0 * corner_m, cylinder.length_m, PI * end_m * end_m];
+        let half = 0.5 * cylinder.length_m * cylinder.axis;
+        let mut text = light(self.k, self.luminaire, Source::SeenThrough, cylinder.function(), &factors);
+        text += &self.disc("end-0", half, cylinder.axis, end_m);
+        text += &self.disc("end-1", -half, -cylinder.axis, end_m);
+        let corner = |k: usize| {
+            let (sin, cos) = (step * k as f64).sin_cos();
+            corner_m * (cos * cylinder.across[0] + sin * cylinder.across[1])
+        };
+        for k in 0..SIDES {
+            let (a, b) = (corner(k), corner(k + 1));
+            text += &self.polygon(&format!("side-{k}"), &[a - half, b - half, b + half, a + half]);
+        }
+        text
     }
 }
 
@@ -324,7 +391,8 @@ fn light(k: usize, luminaire: &Luminaire, source: Source, correction: &str, fact
         Symmetry::Axial => "src_theta",
         _ => "src_phi src_theta",
     };
-    let mut words = format!("{correction} {} source.cal {coordinates}", dat_name(k));
+    let functions = if correction.starts_with("prism") { PRISM_NAME } else { "source.cal" };
+    let mut words = format!("{correction} {} {functions} {coordinates}", dat_name(k));
     for (axis, angle_deg) in euler_deg(luminaire.orientation) {
         // Writing to a string cannot fail.
         write!(words, " -r{axis} {angle_deg}").ok();
