@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use luminaire::photometry::{self, Photometry, lm63};
+use luminaire::photometry::lm63::{self, Lm63Details};
+use luminaire::photometry::{self, Details, Goniometer, Photometry};
 
 use crate::spec::model::LuminaireSpec;
 use crate::spec::{Case, Spec, SpecError, specs, yaml};
@@ -28,8 +29,25 @@ pub(super) struct File {
 impl File {
     /// A photometric file as LM-63-2002, as it is read back.
     pub(super) fn lm63(photometry: &Photometry) -> Self {
-        let bytes = lm63::write_2002(photometry).text.into_bytes();
+        Self::of_lm63(lm63::write_2002(photometry).text.into_bytes())
+    }
+
+    pub(super) fn of_lm63(bytes: Vec<u8>) -> Self {
         Self { photometry: lm63::parse(&bytes).ok(), bytes }
+    }
+
+    /// Columns and rows of its table: C planes and gamma angles, or of type A or B the horizontal and vertical angles.
+    fn table(&self) -> Option<[usize; 2]> {
+        let photometry = self.photometry.as_ref()?;
+        let own = [photometry.distribution.c_deg().len(), photometry.distribution.gamma_deg().len()];
+        let Details::Lm63(Lm63Details { goniometer: Goniometer::A | Goniometer::B, .. }) = photometry.details else {
+            return Some(own);
+        };
+        // After what may be said of the tilt: lamps, lumens, multiplier, and how many angles there are.
+        let text = String::from_utf8_lossy(&self.bytes);
+        let mut words = text.lines().skip_while(|l| !l.starts_with("TILT=")).skip(1).flat_map(str::split_whitespace);
+        let vertical = words.nth(3)?.parse().ok()?;
+        Some([words.next()?.parse().ok()?, vertical])
     }
 }
 
@@ -115,9 +133,9 @@ impl Draft {
         yaml(&self.spec).lines().count()
     }
 
-    /// C planes and gamma angles of the largest table.
+    /// Columns and rows of the largest table.
     pub(super) fn table(&self) -> [usize; 2] {
-        let size = |p: &Photometry| [p.distribution.c_deg().len(), p.distribution.gamma_deg().len()];
-        self.tables().map(size).max_by_key(|[c, gamma]| c * gamma).unwrap_or_default()
+        let files = self.spec.luminaires.iter().filter_map(|l| self.files.get(&l.photometry));
+        files.filter_map(File::table).max_by_key(|[c, gamma]| c * gamma).unwrap_or_default()
     }
 }

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use fastrand::Rng;
 use glam::DVec3;
 use luminaire::photometry::{
-    HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Photometry, direction, eulumdat, lm63,
+    Goniometer, HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Photometry, direction, eulumdat, lm63,
 };
 use luminaire::scene::{Bounces, orientation};
 use strum::VariantArray;
@@ -302,13 +302,11 @@ impl One<'_> {
     fn photometric_file(&mut self, k: usize) -> (PathBuf, ModelSpec) {
         let opening = self.opening();
         let model = if opening == LuminousOpening::Point { ModelSpec::Point } else { ModelSpec::Area };
-        if model == ModelSpec::Point && self.allowed.contains(&Feature::TypeA) && self.draw.one_in(8) {
-            let text = table::of_type(&mut self.draw, table::OtherType::A);
-            return (self.keep_lm63(format!("l{k}.ies"), text), model);
-        }
-        if model == ModelSpec::Point && self.allowed.contains(&Feature::TypeB) && self.draw.one_in(8) {
-            let text = table::of_type(&mut self.draw, table::OtherType::B);
-            return (self.keep_lm63(format!("l{k}.ies"), text), model);
+        for (feature, kind) in [(Feature::TypeA, Goniometer::A), (Feature::TypeB, Goniometer::B)] {
+            if model == ModelSpec::Point && self.allowed.contains(&feature) && self.draw.one_in(8) {
+                let text = table::of_type(&mut self.draw, kind);
+                return (self.keep_lm63(format!("l{k}.ies"), text), model);
+            }
         }
         let distribution = table::distribution(&mut self.draw, self.allowed);
         let photometry = Photometry { opening, ..Photometry::of(distribution) };
@@ -326,8 +324,7 @@ impl One<'_> {
     }
 
     fn keep_lm63(&mut self, name: String, text: String) -> PathBuf {
-        let bytes = text.into_bytes();
-        self.files.insert(name.clone().into(), File { photometry: lm63::parse(&bytes).ok(), bytes });
+        self.files.insert(name.clone().into(), File::of_lm63(text.into_bytes()));
         name.into()
     }
 

@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry};
+use luminaire::photometry::{
+    Details, Goniometer, LuminousIntensityDistribution, LuminousOpening, Photometry, lm63::Lm63Details,
+};
 
 use super::draft::{Draft, File};
 use super::grammar::constant;
 use super::oracle::Sighting;
-use super::table::{is_single_valued, to_digits};
+use super::table::{is_single_valued, smallest, smallest_of_type, to_digits};
 use crate::engines;
 use crate::procedures::{AngleLists, Angles, Asked, Names};
 use crate::spec::model::{Fraction, LuminaireSpec, MeterSet, ModelSpec, ReflectanceSpec, RotationSpec, Walls};
@@ -340,10 +342,14 @@ fn tables(draft: &Draft) -> Vec<(PathBuf, Photometry)> {
 
 /// The draft with another photometric file in the place of one.
 fn refiled(draft: &Draft, name: &Path, photometry: &Photometry) -> Draft {
+    filed(draft, name, File::lm63(photometry))
+}
+
+fn filed(draft: &Draft, name: &Path, file: File) -> Draft {
     let new = name.with_extension("ies");
     with(draft, |d| {
         d.files.remove(name);
-        d.files.insert(new.clone(), File::lm63(photometry));
+        d.files.insert(new.clone(), file);
         for luminaire in d.spec.luminaires.iter_mut().filter(|l| l.photometry == name) {
             luminaire.photometry.clone_from(&new);
         }
@@ -370,6 +376,12 @@ fn plainer_files(draft: &Draft) -> Vec<Draft> {
         let plain = [([0.0, 90.0], 100.0), ([0.0, 180.0], 100.0), ([0.0, 90.0], bright), ([0.0, 180.0], bright)];
         all.extend(plain.into_iter().filter_map(|(gamma, cd)| retabled(draft, &name, &old, constant(gamma, cd))));
         all.extend(retabled(draft, &name, &old, Some(old.distribution.clone())));
+        all.extend(smallest().into_iter().filter_map(|table| retabled(draft, &name, &old, Some(table))));
+        // What fails for its type alone keeps it.
+        if let Details::Lm63(Lm63Details { goniometer: kind @ (Goniometer::A | Goniometer::B), .. }) = old.details {
+            let files = smallest_of_type(kind).into_iter().map(|text| File::of_lm63(text.into_bytes()));
+            all.extend(files.map(|file| filed(draft, &name, file)));
+        }
     }
     all
 }

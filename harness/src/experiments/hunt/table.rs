@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use luminaire::photometry::LuminousIntensityDistribution;
+use itertools::Itertools as _;
+use luminaire::photometry::{Goniometer, LuminousIntensityDistribution};
 
 use super::feature::Feature;
 use crate::experiments::draw::Draw;
@@ -133,31 +134,52 @@ fn planes(draw: &mut Draw, allowed: &BTreeSet<Feature>, has: &impl Fn(&mut Draw,
     even
 }
 
-/// A table that is not of type C.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum OtherType {
-    A,
-    B,
-}
-
 /// A file of LM-63-2002 of type A or B, for which there is no writer: nobody but a goniometer makes them.
-pub(super) fn of_type(draw: &mut Draw, kind: OtherType) -> String {
+pub(super) fn of_type(draw: &mut Draw, kind: Goniometer) -> String {
     let vertical: &[f64] = if draw.one_in(2) { &[-90.0, -45.0, 0.0, 45.0, 90.0] } else { &[0.0, 30.0, 60.0, 90.0] };
     let horizontal: &[f64] = if draw.one_in(2) { &[-90.0, -30.0, 0.0, 60.0, 90.0] } else { &[0.0, 30.0, 90.0] };
-    let number = match kind {
-        OtherType::A => 3,
-        OtherType::B => 2,
-    };
-    let words = |all: &[f64]| all.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
     // Where all planes of a type meet, they say the same: at V = -90 and 90 of type A, at H = -90 and 90 of type B.
     let at_pole = to_digits(draw.within(10.0, 1000.0), 3);
     let is_pole = |h: f64, v: f64| match kind {
-        OtherType::A => v.abs() == 90.0,
-        OtherType::B => h.abs() == 90.0,
+        Goniometer::A => v.abs() == 90.0,
+        Goniometer::B => h.abs() == 90.0,
+        Goniometer::C => is_pole(v),
     };
-    let mut value = |h: f64, v: f64| if is_pole(h, v) { at_pole } else { to_digits(draw.within(10.0, 1000.0), 3) };
-    let row = |h: &f64| words(&vertical.iter().map(|v| value(*h, *v)).collect::<Vec<_>>());
-    let rows: Vec<String> = horizontal.iter().map(row).collect();
+    let value = |h: f64, v: f64| if is_pole(h, v) { at_pole } else { to_digits(draw.within(10.0, 1000.0), 3) };
+    lm63_of_type(kind, [vertical, horizontal], value)
+}
+
+/// The smallest files of a type: even light, and light that is another in one direction.
+pub(super) fn smallest_of_type(kind: Goniometer) -> Vec<String> {
+    let quarter: &[f64] = &[0.0, 90.0];
+    let half: &[f64] = &[-90.0, 90.0];
+    let even = |_: f64, _: f64| 100.0;
+    let fading = |h: f64, v: f64| if h == 0.0 && v == 0.0 { 200.0 } else { 100.0 };
+    let turned = |h: f64, v: f64| if h > 0.0 && v > 0.0 { 200.0 } else { 100.0 };
+    let mut all = vec![];
+    for angles in [[quarter, quarter], [half, quarter], [quarter, half], [half, half]] {
+        all.extend([lm63_of_type(kind, angles, even), lm63_of_type(kind, angles, fading)]);
+    }
+    let three: &[f64] = &[-90.0, 0.0, 90.0];
+    for angles in [[quarter, three], [three, quarter], [half, three], [three, half]] {
+        all.extend([lm63_of_type(kind, angles, fading), lm63_of_type(kind, angles, turned)]);
+    }
+    all
+}
+
+fn lm63_of_type(
+    kind: Goniometer,
+    [vertical, horizontal]: [&[f64]; 2],
+    mut candela: impl FnMut(f64, f64) -> f64,
+) -> String {
+    let number = match kind {
+        Goniometer::A => 3,
+        Goniometer::B => 2,
+        Goniometer::C => 1,
+    };
+    let words = |all: &[f64]| all.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    let mut row = |h: &f64| words(&vertical.iter().map(|v| candela(*h, *v)).collect::<Vec<_>>());
+    let rows: Vec<String> = horizontal.iter().map(&mut row).collect();
     format!(
         "IESNA:LM-63-2002\r\nTILT=NONE\r\n1 -1 1 {} {} {number} 2 0 0 0\r\n1 1 0\r\n{}\r\n{}\r\n{}\r\n",
         vertical.len(),
@@ -166,4 +188,25 @@ pub(super) fn of_type(draw: &mut Draw, kind: OtherType) -> String {
         words(horizontal),
         rows.join("\r\n")
     )
+}
+
+/// The smallest tables of type C whose light is not even: one that fades, and one that differs in one plane alone.
+pub(super) fn smallest() -> Vec<LuminousIntensityDistribution> {
+    let planes: [&[f64]; 6] =
+        [&[0.0], &[0.0, 90.0], &[0.0, 180.0], &[90.0, 270.0], &[0.0, 180.0, 360.0], &[0.0, 90.0, 180.0, 270.0, 360.0]];
+    let gammas: [&[f64]; 4] = [&[0.0, 90.0], &[0.0, 180.0], &[90.0, 180.0], &[0.0, 90.0, 180.0]];
+    let mut all = vec![];
+    for (c, gamma) in planes.into_iter().cartesian_product(gammas) {
+        let ends = [0, c.len() - 1];
+        for odd in (0..c.len()).filter(|k| c.len() <= 2 || !ends.contains(k)) {
+            for level in [0.0, 100.0] {
+                let dark = |k: usize, g: f64| k == odd && if is_pole(g) { g > 0.0 && c.len() == 1 } else { true };
+                let value = |k: usize, g: f64| if dark(k, g) { level } else { 100.0 - level };
+                let candela =
+                    (0..c.len()).flat_map(|k| gamma.iter().map(move |g| (k, *g))).map(|(k, g)| value(k, g)).collect();
+                all.extend(LuminousIntensityDistribution::new(c.to_vec(), gamma.to_vec(), candela));
+            }
+        }
+    }
+    all
 }
