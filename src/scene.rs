@@ -1,5 +1,6 @@
 //! What is simulated and exported: a room (or none), obstacles, luminaires; and the meters that read it.
 
+pub mod enclosure;
 pub mod flush;
 
 use std::sync::Arc;

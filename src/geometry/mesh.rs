@@ -59,27 +59,50 @@ impl Mesh {
 
     /// The same from a reader; `path` stands in messages only.
     pub fn parse_obj(reader: &mut impl BufRead, path: &Path) -> Result<Self, MeshError> {
+        let mut whole = Self::default();
+        Self::groups_of_obj(reader, path)?.into_iter().for_each(|(_, group)| whole.append(group));
+        Ok(whole)
+    }
+
+    /// The faces of an OBJ file by the name of their group (`g`) or object (`o`), each name once.
+    pub fn groups_of_obj(reader: &mut impl BufRead, path: &Path) -> Result<Vec<(String, Self)>, MeshError> {
         let options =
             tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
         // A material library that is not there must not keep the shape from being read.
         let (models, _) = tobj::load_obj_buf(reader, &options, |_| Ok(Default::default()))
             .map_err(|e| MeshError::Unreadable { path: path.into(), reason: e.to_string() })?;
-        let mut mesh = Self::default();
-        for model in &models {
-            let first = mesh.vertices_m.len() as u32;
-            mesh.vertices_m.extend(model.mesh.positions.as_chunks().0.iter().copied().map(DVec3::from_array));
-            let corners = model.mesh.indices.as_chunks().0;
-            mesh.triangles.extend(corners.iter().map(|t: &[u32; 3]| t.map(|v| first + v)));
+        let (mut groups, mut before): (Vec<(String, Self)>, usize) = (vec![], 0);
+        for model in models {
+            let vertices_m: Vec<DVec3> =
+                model.mesh.positions.as_chunks().0.iter().copied().map(DVec3::from_array).collect();
+            let triangles = model.mesh.indices.as_chunks().0.to_vec();
+            let far = |v: &DVec3| v.is_nan() || v.abs().max_element() > FAR_M;
+            if let Some((k, &at)) = vertices_m.iter().enumerate().find(|(_, v)| far(v)) {
+                return Err(MeshError::NotFinite { path: path.into(), vertex: before + k, at });
+            }
+            before += vertices_m.len();
+            let mesh = Self { vertices_m, triangles };
+            match groups.iter_mut().find(|(name, _)| *name == model.name) {
+                Some((_, known)) => known.append(mesh),
+                None => groups.push((model.name, mesh)),
+            }
         }
-        if let Some((vertex, &at)) =
-            mesh.vertices_m.iter().enumerate().find(|(_, v)| v.is_nan() || v.abs().max_element() > FAR_M)
-        {
-            return Err(MeshError::NotFinite { path: path.into(), vertex, at });
-        }
-        if mesh.triangles.is_empty() {
-            return Err(MeshError::Empty { path: path.into() });
-        }
-        Ok(mesh)
+        groups.retain(|(_, mesh)| !mesh.triangles.is_empty());
+        if groups.is_empty() { Err(MeshError::Empty { path: path.into() }) } else { Ok(groups) }
+    }
+
+    /// Adds all of another.
+    pub fn append(&mut self, other: Self) {
+        let first = self.vertices_m.len() as u32;
+        self.vertices_m.extend(other.vertices_m);
+        self.triangles.extend(other.triangles.into_iter().map(|t| t.map(|v| first + v)));
+    }
+
+    /// Adds a triangle, with corners of its own.
+    pub fn push(&mut self, corners_m: [DVec3; 3]) {
+        let first = self.vertices_m.len() as u32;
+        self.vertices_m.extend(corners_m);
+        self.triangles.push([first, first + 1, first + 2]);
     }
 
     /// The same mesh moved by `offset_m`.

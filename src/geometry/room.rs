@@ -89,6 +89,18 @@ impl Reflectances {
         Self { floor, ceiling, wall_x_min: walls, wall_x_max: walls, wall_y_min: walls, wall_y_max: walls }
     }
 
+    /// The reflectance of one surface, to be changed.
+    pub const fn of_mut(&mut self, surface: Surface) -> &mut f64 {
+        match surface {
+            Surface::Floor => &mut self.floor,
+            Surface::Ceiling => &mut self.ceiling,
+            Surface::WallXMin => &mut self.wall_x_min,
+            Surface::WallXMax => &mut self.wall_x_max,
+            Surface::WallYMin => &mut self.wall_y_min,
+            Surface::WallYMax => &mut self.wall_y_max,
+        }
+    }
+
     /// The reflectance of one surface.
     pub const fn of(&self, surface: Surface) -> f64 {
         match surface {

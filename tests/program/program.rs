@@ -31,6 +31,7 @@ mod recessed;
 mod releases;
 mod repeatability;
 mod repetitions;
+mod rooms;
 mod stated_errors;
 mod stops;
 mod suite;

@@ -5,14 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
 use luminaire::geometry::Room;
 use luminaire::scene::{Meter, Scene};
 use sha2::{Digest, Sha256};
 
 use super::cases::{Variants, variants};
 use super::faults::MAX_FAULTS;
-use super::model::{Budget, EngineSettings, Spec, ToleranceOverride};
+use super::model::{Budget, EngineSettings, LuminaireSpec, Spec, ToleranceOverride};
 use super::shape::{Mended, Shaped, Trials, shaped};
 use super::tree::tree;
 use super::trust::Limits;
@@ -25,6 +24,7 @@ use crate::system::printable;
 mod asked;
 mod bodies;
 mod meters;
+mod room;
 
 /// More meters than this are a slip of the pen.
 const MAX_METERS: usize = 1_000_000;
@@ -199,22 +199,26 @@ impl<'a> Builder<'a> {
     fn build(mut self, spec: Spec) -> Built {
         self.hash.update(&self.source.text);
         self.programs(&spec);
-        let is_few = self.take("luminaires", "luminaires", spec.luminaires.len(), |left| &mut left.luminaires);
-        let room = self.room(&spec);
-        let mut obstacles = self.obstacles(&spec.obstacles, room.as_ref());
+        let count = spec.luminaires.iter().map(LuminaireSpec::len).fold(0, usize::saturating_add);
+        let is_few = self.take("luminaires", "luminaires", count, |left| &mut left.luminaires);
+        let enclosure = self.room(&spec.room);
+        let mut obstacles = self.obstacles(&spec.obstacles, enclosure.as_ref().map(|e| &e.room));
         let mut luminaires = vec![];
         if is_few {
-            luminaires = self.luminaires(&spec.luminaires, room.as_ref());
-            obstacles.extend(room.iter().flat_map(|room| self.recesses(&luminaires, room)));
+            luminaires = self.luminaires(&spec.luminaires, enclosure.as_ref());
+            obstacles.extend(enclosure.iter().flat_map(|e| self.recesses(&luminaires, &e.room)));
         }
         let luminaires = luminaires.into_iter().map(|(_, luminaire)| luminaire).collect();
+        obstacles.extend(enclosure.iter().flat_map(|e| e.walls.clone()));
+        let room = enclosure.as_ref().map(|e| e.room);
         let scene = Scene { room, obstacles, luminaires };
         let mut meters = BTreeMap::new();
         for (name, set) in &spec.meters {
             self.name("meters", name);
-            meters.extend(self.meter_set(name, set, &scene).map(|set| (name.clone(), set)));
+            let set = self.meter_set(name, set, &scene, enclosure.as_ref());
+            meters.extend(set.map(|set| (name.clone(), set)));
         }
-        let seen = meters.values().map(Vec::len).sum::<usize>().saturating_mul(spec.luminaires.len().pow(2));
+        let seen = meters.values().map(Vec::len).sum::<usize>().saturating_mul(count.saturating_mul(count));
         self.take("luminaires", "pairs of luminaires as meters see them", seen, |left| &mut left.sights);
         self.procedures(&spec);
         self.budget(spec.budget);
@@ -254,17 +258,6 @@ impl<'a> Builder<'a> {
         let Some((name, key)) = engines.find_map(|(name, settings)| Some((name, starts(settings)?))) else { return };
         let message = "it would run a program, and the spec is not trusted";
         self.check(self.source.trust == Trust::Own, &format!("engines.{name}.{key}"), message, IF_YOURS);
-    }
-
-    /// `None` where its size is not known: nothing lies in it or out of it.
-    fn room(&mut self, spec: &Spec) -> Option<Room> {
-        let mut is_sized = !self.mended.touches("room.size_m");
-        for (k, size) in spec.room.size_m.iter().enumerate() {
-            let (at, message) = (format!("room.size_m[{k}]"), format!("{size} m is no extent"));
-            let sound = size.is_finite() && *size > 0.0;
-            is_sized &= self.check(sound, &at, message, "give a positive number of metres");
-        }
-        is_sized.then(|| Room { size_m: DVec3::from(spec.room.size_m), reflectance: spec.room.reflectance.build() })
     }
 
     /// Refuses what is no name: names stand in scenes, logs and views, where a line break begins something else.
@@ -312,6 +305,9 @@ pub(super) fn name_of(path: &Path) -> String {
 fn is_line(text: &str, most: usize) -> bool {
     text.chars().count() <= most && !text.chars().any(printable::is_unprintable)
 }
+
+/// What to do about what lies within the box around a room and not in the room.
+const BEYOND: &str = "move it between the walls; faces of a mesh must close the room, all turned to one side";
 
 fn within(room: &Room) -> String {
     let [x, y, z] = room.size_m.to_array();

@@ -242,7 +242,7 @@ mod tests {
             cases[1].spec.luminaires.iter().map(|l| l.model).collect::<Vec<_>>(),
             [ModelSpec::Point, ModelSpec::Area]
         );
-        let reflectance = cases[1].spec.room.reflectance.build();
+        let reflectance = cases[1].spec.room.reflectance.as_ref().unwrap().build().unwrap();
         assert_eq!((reflectance.floor, reflectance.wall_x_min), (0.2, 0.1));
         assert_eq!((cases[0].engines.clone(), cases[1].engines.clone()), (None, Some(vec!["radiance".to_owned()])));
     }

@@ -228,12 +228,19 @@ fn meant_key(message: &str) -> Option<&str> {
     nearest(unknown, known.into_iter())
 }
 
+/// As many names are told of what there is.
+const MAX_TOLD: usize = 20;
+
 /// A help text for an unknown name: the known one most like it, or else all of them.
 pub fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
     match nearest(word, known.clone()) {
         Some(name) => format!("did you mean `{name}`?"),
         None if known.clone().next().is_none() => "there is none".to_owned(),
-        None => format!("known: {}", known.collect::<Vec<_>>().join(", ")),
+        None => {
+            let more = known.clone().count().saturating_sub(MAX_TOLD);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            format!("known: {}{more}", known.take(MAX_TOLD).collect::<Vec<_>>().join(", "))
+        }
     }
 }
 
@@ -289,12 +296,12 @@ procedures:
     #[test]
     fn a_minimal_spec_is_read_and_walls_may_differ_and_meter_sets_be_listed() {
         let spec = parse(MINIMAL).unwrap();
-        assert_eq!(spec.room.size_m, [20.0, 20.0, 20.0]);
+        assert_eq!(spec.room.size_m, Some([20.0, 20.0, 20.0]));
         assert!(spec.procedures.0.contains_key(&ProcedureId::DirectIlluminance));
         let text = MINIMAL
             .replace("walls: 0.5", "walls: {x-: 0.1, x+: 0.2, y-: 0.3, y+: 0.4}")
             .replace("meters: plane}", "meters: [plane]}");
-        let reflectances = parse(&text).unwrap().room.reflectance.build();
+        let reflectances = parse(&text).unwrap().room.reflectance.unwrap().build().unwrap();
         assert_eq!((reflectances.wall_x_max, reflectances.wall_y_min), (0.2, 0.3));
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use luminaire::geometry::Reflectances;
+use luminaire::geometry::{Reflectances, Surface};
 use schemars::JsonSchema;
 use serde::de::{Deserializer, IgnoredAny};
 use serde::{Deserialize, Serialize};
@@ -70,14 +70,35 @@ enum CasesSchema {
     Matrix(BTreeMap<String, BTreeMap<String, Option<BTreeMap<String, serde_json::Value>>>>),
 }
 
-/// A closed box room with one corner at the origin, z up.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+/// A closed room, z up: exactly one of a box (`size_m`), upright walls over a polygon (`floor_m` and `height_m`) and a `mesh`.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomSpec {
-    /// Extents along x, y, z in metres.
-    pub size_m: [f64; 3],
-    /// Diffuse reflectances.
-    pub reflectance: ReflectanceSpec,
+    /// Extents of a box along x, y, z in metres, one corner at the origin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size_m: Option<[f64; 3]>,
+    /// Corners of the floor in metres, in order; none of their coordinates is negative.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor_m: Option<Vec<[f64; 2]>>,
+    /// Height over such a floor in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f64>,
+    /// A Wavefront OBJ file whose faces close the room, in metres, relative to the spec.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<PathBuf>,
+    /// Diffuse reflectance of each group (`g` or `o`) of the mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub groups: Option<BTreeMap<String, Fraction>>,
+    /// Diffuse reflectances of a box, or of a room over a polygon.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reflectance: Option<ReflectanceSpec>,
+}
+
+impl RoomSpec {
+    /// A box.
+    pub fn cuboid(size_m: [f64; 3], reflectance: ReflectanceSpec) -> Self {
+        Self { size_m: Some(size_m), reflectance: Some(reflectance), ..Self::default() }
+    }
 }
 
 /// Diffuse reflectances of the surfaces, each 0 to 1.
@@ -93,19 +114,29 @@ pub struct ReflectanceSpec {
 }
 
 impl ReflectanceSpec {
-    /// The six reflectances.
-    pub fn build(&self) -> Reflectances {
+    /// The six reflectances of a box; `None` where its walls are listed as those over a polygon are.
+    pub fn build(&self) -> Option<Reflectances> {
         let (floor, ceiling) = (self.floor.0, self.ceiling.0);
         match &self.walls {
-            Walls::All(rho) => Reflectances::with_equal_walls(floor, rho.0, ceiling),
-            Walls::Each(walls) => Reflectances {
+            Walls::All(rho) => Some(Reflectances::with_equal_walls(floor, rho.0, ceiling)),
+            Walls::Each(walls) => Some(Reflectances {
                 floor,
                 ceiling,
                 wall_x_min: walls.x_min.0,
                 wall_x_max: walls.x_max.0,
                 wall_y_min: walls.y_min.0,
                 wall_y_max: walls.y_max.0,
-            },
+            }),
+            Walls::Listed(_) => None,
+        }
+    }
+
+    /// Those of so many walls over a polygon; `None` where they are those of a box.
+    pub fn of_walls(&self, walls: usize) -> Option<Vec<f64>> {
+        match &self.walls {
+            Walls::All(rho) => Some(vec![rho.0; walls]),
+            Walls::Listed(listed) => Some(listed.iter().map(|rho| rho.0).collect()),
+            Walls::Each(_) => None,
         }
     }
 }
@@ -135,8 +166,10 @@ impl Fraction {
 pub enum Walls {
     /// All four alike.
     All(Fraction),
-    /// One a wall.
+    /// One a wall of a box.
     Each(FourWalls),
+    /// One a wall over a polygon: the first runs from its first corner to the second.
+    Listed(Vec<Fraction>),
 }
 
 /// Reflectance of each wall.
@@ -159,9 +192,10 @@ pub struct FourWalls {
 
 impl<'de> Deserialize<'de> for Walls {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let expected = "one number for all walls, or {x-: , x+: , y-: , y+: }";
-        let read = |found: Found<'_, IgnoredAny, FourWalls>| match found {
+        let expected = "one number for all walls, {x-: , x+: , y-: , y+: } of a box, or a list over a polygon";
+        let read = |found: Found<'_, Vec<Fraction>, FourWalls>| match found {
             Found::Keys(walls) => Some(Ok(Self::Each(walls))),
+            Found::List(walls) => Some(Ok(Self::Listed(walls))),
             _ => found.number().map(|rho| Fraction::checked(rho).map(Self::All)),
         };
         deserializer.deserialize_any(Shapes { expected, read })
@@ -213,8 +247,12 @@ pub struct LuminaireSpec {
     pub id: String,
     /// Photometric file, relative to the spec: .ies, .ldt or .xml (TM-33).
     pub photometry: PathBuf,
-    /// Photometric centre in metres.
-    pub at_m: [f64; 3],
+    /// Photometric centre in metres; or else it is an array.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_m: Option<[f64; 3]>,
+    /// Many like it in rows: `bay` is then `bay[0,0]`, `bay[1,0]` and so on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub array: Option<ArraySpec>,
     /// Azimuth about z, then tilt about the turned y axis, then roll about the luminaire's own axis.
     #[serde(default, skip_serializing_if = "is_default")]
     pub rotate_deg: RotationSpec,
@@ -224,6 +262,50 @@ pub struct LuminaireSpec {
     /// How its extent is modelled.
     #[serde(default, skip_serializing_if = "is_default")]
     pub model: ModelSpec,
+}
+
+/// Luminaires in rows: origin + (i dx, j dy), i fastest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ArraySpec {
+    /// Luminaires along x and y.
+    pub counts: [usize; 2],
+    /// Photometric centre of the first, in metres.
+    pub origin_m: [f64; 3],
+    /// From one to the next along x and y, in metres.
+    pub step_m: [f64; 2],
+}
+
+impl ArraySpec {
+    /// Which of the array, and where.
+    pub(crate) fn places(&self) -> impl Iterator<Item = ([usize; 2], [f64; 3])> + '_ {
+        let ([nx, ny], [x, y, z], [dx, dy]) = (self.counts, self.origin_m, self.step_m);
+        (0..ny).flat_map(move |j| (0..nx).map(move |i| ([i, j], [x + dx * i as f64, y + dy * j as f64, z])))
+    }
+
+    fn len(&self) -> usize {
+        self.counts[0].saturating_mul(self.counts[1])
+    }
+}
+
+impl LuminaireSpec {
+    /// How many it stands for.
+    pub(crate) fn len(&self) -> usize {
+        self.array.map_or(1, |array| array.len())
+    }
+
+    /// The names and places of all that it stands for.
+    pub(crate) fn each(&self) -> Vec<(String, [f64; 3])> {
+        let one = self.at_m.map(|at_m| (self.id.clone(), at_m));
+        let of_array = self.array.iter().flat_map(ArraySpec::places);
+        one.into_iter().chain(of_array.map(|([i, j], at_m)| (format!("{}[{i},{j}]", self.id), at_m))).collect()
+    }
+
+    /// The same, each as a luminaire of its own.
+    pub(crate) fn apart(&self) -> Vec<Self> {
+        let of = |(id, at_m)| Self { id, at_m: Some(at_m), array: None, ..self.clone() };
+        self.each().into_iter().map(of).collect()
+    }
 }
 
 fn one() -> f64 {
@@ -267,8 +349,8 @@ pub enum ModelSpec {
     Impostor,
 }
 
-/// A named set of measuring points: exactly one of `points_m` and `grid`.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+/// A named set of measuring points: exactly one of `points_m`, `grid`, `line` and `surface`, facing `normal` or all `around`.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeterSet {
     /// Points in metres.
@@ -277,8 +359,101 @@ pub struct MeterSet {
     /// A regular grid of points.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<GridSpec>,
-    /// The normal of all of them, any length.
-    pub normal: [f64; 3],
+    /// Points along a line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub line: Option<LineSpec>,
+    /// A grid over a surface of the room, by itself as fine as EN 12464-1 asks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface: Option<SurfaceGridSpec>,
+    /// The normal of all of them, any length; of a surface's grid the surface's own where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f64; 3]>,
+    /// Meters in many directions about an axis at each point, in place of a normal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub around: Option<AroundSpec>,
+}
+
+/// Points along a line, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LineSpec {
+    /// First point in metres.
+    pub from_m: [f64; 3],
+    /// Last point in metres.
+    pub to_m: [f64; 3],
+    /// How many, two at least.
+    pub count: usize,
+}
+
+/// Points in the middles of equal cells over a surface of the room, less a margin at its edges.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceGridSpec {
+    /// Which surface.
+    pub of: SurfaceName,
+    /// How far off the surface, into the room, in metres: .75 over a floor is a working plane.
+    pub distance_m: f64,
+    /// What is left out along the surface's edges, in metres; EN 12464-1 leaves out .5.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub margin_m: f64,
+    /// Cells along the surface's two axes (x and y; along a wall and z); by EN 12464-1 where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counts: Option<[usize; 2]>,
+}
+
+/// A surface of the room.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum SurfaceName {
+    /// z = 0.
+    #[serde(rename = "floor")]
+    Floor,
+    /// z = height.
+    #[serde(rename = "ceiling")]
+    Ceiling,
+    /// The wall at x = 0.
+    #[serde(rename = "x-")]
+    XMin,
+    /// The wall at x = length.
+    #[serde(rename = "x+")]
+    XMax,
+    /// The wall at y = 0.
+    #[serde(rename = "y-")]
+    YMin,
+    /// The wall at y = width.
+    #[serde(rename = "y+")]
+    YMax,
+}
+
+impl From<SurfaceName> for Surface {
+    fn from(name: SurfaceName) -> Self {
+        match name {
+            SurfaceName::Floor => Self::Floor,
+            SurfaceName::Ceiling => Self::Ceiling,
+            SurfaceName::XMin => Self::WallXMin,
+            SurfaceName::XMax => Self::WallXMax,
+            SurfaceName::YMin => Self::WallYMin,
+            SurfaceName::YMax => Self::WallYMax,
+        }
+    }
+}
+
+/// Normals perpendicular to an axis, at even steps about it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AroundSpec {
+    /// Of any length; upright where it is left out.
+    #[serde(default = "upright", skip_serializing_if = "is_upright")]
+    pub axis: [f64; 3],
+    /// How many directions.
+    pub count: usize,
+}
+
+fn upright() -> [f64; 3] {
+    [0.0, 0.0, 1.0]
+}
+
+fn is_upright(axis: &[f64; 3]) -> bool {
+    *axis == upright()
 }
 
 /// A regular grid: origin + i u + j v, i fastest.

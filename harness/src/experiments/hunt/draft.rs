@@ -79,6 +79,7 @@ impl Draft {
             names.insert(path, name);
             Ok(())
         };
+        spec.luminaires = spec.luminaires.iter().flat_map(LuminaireSpec::apart).collect();
         for luminaire in &mut spec.luminaires {
             take_in(&mut luminaire.photometry)?;
         }

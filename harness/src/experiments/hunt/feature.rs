@@ -281,8 +281,8 @@ fn has_odd_value(table: &LuminousIntensityDistribution) -> bool {
 fn of_meters(draft: &Draft, case: &Case, add: Add<'_>) {
     add(Feature::Grid, draft.spec.meters.values().any(|set| set.grid.is_some()));
     add(Feature::ManyMeters, case.meters.values().map(Vec::len).sum::<usize>() > 16);
-    for set in draft.spec.meters.values() {
-        let normal = DVec3::from(set.normal);
+    for normal in draft.spec.meters.values().filter_map(|set| set.normal) {
+        let normal = DVec3::from(normal);
         add(Feature::SkewNormal, normal.to_array().iter().filter(|x| **x != 0.0).count() > 1);
         add(Feature::LongNormal, (normal.length() - 1.0).abs() > 1e-3);
     }

@@ -274,9 +274,10 @@ impl Issue<'_> {
 
     fn scene_in_words(&self) -> String {
         let spec = &self.draft.spec;
-        let [x, y, z] = spec.room.size_m;
+        let room =
+            spec.room.size_m.map_or_else(|| "A room".to_owned(), |[x, y, z]| format!("A room of {x} x {y} x {z} m"));
         let (lamps, bodies) = (spec.luminaires.len(), spec.obstacles.len());
-        let mut text = format!("A room of {x} x {y} x {z} m with {lamps} luminaire(s) and {bodies} further bodies.");
+        let mut text = format!("{room} with {lamps} luminaire(s) and {bodies} further bodies.");
         if let Some(said) = &self.sighting.text {
             write!(text, " {}.", markdown(said)).ok();
         }

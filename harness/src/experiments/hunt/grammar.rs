@@ -176,7 +176,7 @@ impl One<'_> {
         } else {
             Walls::All(all)
         };
-        RoomSpec { size_m: size, reflectance: ReflectanceSpec { floor, walls, ceiling } }
+        RoomSpec::cuboid(size, ReflectanceSpec { floor, walls, ceiling })
     }
 
     fn obstacles(&mut self) -> Vec<ObstacleSpec> {
@@ -263,7 +263,7 @@ impl One<'_> {
             } else if let Some(last) = all.last().filter(|_| self.allowed.contains(&Feature::SameSpot)).cloned()
                 && self.draw.one_in(6)
             {
-                at_m = last.at_m;
+                at_m = last.at_m.unwrap_or(at_m);
             }
             let is_recessed = at_m[2] == self.size_m.z;
             let flux_scale = if self.has(Feature::Off, 8) {
@@ -274,7 +274,15 @@ impl One<'_> {
                 1.0
             };
             let rotate_deg = self.rotation(is_recessed);
-            all.push(LuminaireSpec { id: format!("l{k}"), photometry, at_m, rotate_deg, flux_scale, model });
+            all.push(LuminaireSpec {
+                id: format!("l{k}"),
+                photometry,
+                at_m: Some(at_m),
+                array: None,
+                rotate_deg,
+                flux_scale,
+                model,
+            });
         }
         all
     }
@@ -358,7 +366,10 @@ impl One<'_> {
         sets.insert("m0".to_owned(), plane);
         for k in 1..=self.draw.0.usize(1..4) {
             let (points, normal) = self.special(luminaires, bodies);
-            sets.insert(format!("m{k}"), MeterSet { points_m: Some(points), grid: None, normal });
+            sets.insert(
+                format!("m{k}"),
+                MeterSet { points_m: Some(points), normal: Some(normal), ..MeterSet::default() },
+            );
         }
         sets
     }
@@ -372,10 +383,10 @@ impl One<'_> {
             let (u, v) = (step(self.size_m.x, counts[0]), step(self.size_m.y, counts[1]));
             let origin_m = [rounded(x), rounded(y), rounded(z * self.draw.within(0.5, 4.0))];
             let grid = GridSpec { origin_m, u_m: [u, 0.0, 0.0], v_m: [0.0, v, 0.0], counts };
-            return MeterSet { points_m: None, grid: Some(grid), normal };
+            return MeterSet { grid: Some(grid), normal: Some(normal), ..MeterSet::default() };
         }
         let points = (0..self.draw.0.usize(2..6)).map(|_| self.point(0.03, 0.97)).collect();
-        MeterSet { points_m: Some(points), grid: None, normal }
+        MeterSet { points_m: Some(points), normal: Some(normal), ..MeterSet::default() }
     }
 
     fn normal(&mut self) -> [f64; 3] {
@@ -394,7 +405,7 @@ impl One<'_> {
     /// A point or two where something may go wrong.
     fn special(&mut self, luminaires: &[LuminaireSpec], bodies: &[ObstacleSpec]) -> (Vec<[f64; 3]>, [f64; 3]) {
         let lamp = &luminaires[self.draw.0.usize(0..luminaires.len())];
-        let (at, RotationSpec { azimuth, tilt, roll }) = (DVec3::from(lamp.at_m), lamp.rotate_deg);
+        let (at, RotationSpec { azimuth, tilt, roll }) = (DVec3::from(lamp.at_m.unwrap_or_default()), lamp.rotate_deg);
         let turn = orientation(azimuth, tilt, roll);
         let reach_m = 0.3 * self.size_m.min_element();
         let along = |c: f64, gamma: f64, m: f64| at + m * (turn * direction(c, gamma));

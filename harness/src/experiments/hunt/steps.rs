@@ -59,7 +59,8 @@ pub(super) fn focused(draft: &Draft, sighting: &Sighting) -> Vec<Draft> {
         match asked {
             Asked::Meters(asked) => {
                 asked.meters = Names::One("m".to_owned());
-                let set = MeterSet { points_m: Some(vec![worst.at_m]), grid: None, normal: worst.normal };
+                let set =
+                    MeterSet { points_m: Some(vec![worst.at_m]), normal: Some(worst.normal), ..MeterSet::default() };
                 d.spec.meters = BTreeMap::from([("m".to_owned(), set)]);
             }
             Asked::Angles(asked) => {
@@ -245,27 +246,32 @@ fn rounder_points(point: [f64; 3]) -> Vec<[f64; 3]> {
     all
 }
 
+/// Of a room that is a box.
 fn plainer_room(draft: &Draft) -> Vec<Draft> {
+    let Some((now, size)) = draft.spec.room.reflectance.clone().zip(draft.spec.room.size_m) else { return vec![] };
     let black = ReflectanceSpec { floor: Fraction(0.0), walls: Walls::All(Fraction(0.0)), ceiling: Fraction(0.0) };
-    let mut all = vec![with(draft, |d| d.spec.room.reflectance = black)];
-    let part = |change: &dyn Fn(&mut ReflectanceSpec)| with(draft, |d| change(&mut d.spec.room.reflectance));
-    let now = &draft.spec.room.reflectance;
+    let mut all = vec![with(draft, |d| d.spec.room.reflectance = Some(black))];
+    let part = |change: &dyn Fn(&mut ReflectanceSpec)| {
+        let mut reflectance = now.clone();
+        change(&mut reflectance);
+        with(draft, |d| d.spec.room.reflectance = Some(reflectance))
+    };
     let wall = match &now.walls {
         Walls::All(rho) => *rho,
         Walls::Each(walls) => walls.x_min,
+        Walls::Listed(walls) => walls.first().copied().unwrap_or(Fraction(0.0)),
     };
     all.push(part(&|r| r.walls = Walls::All(Fraction(0.0))));
     all.push(part(&|r| r.walls = Walls::All(wall)));
     all.extend(rounder(wall.0).into_iter().map(|x| part(&|r| r.walls = Walls::All(Fraction(x)))));
     all.extend(rounder(now.floor.0).into_iter().map(|x| part(&|r| r.floor = Fraction(x))));
     all.extend(rounder(now.ceiling.0).into_iter().map(|x| part(&|r| r.ceiling = Fraction(x))));
-    let size = draft.spec.room.size_m;
     let whole = size.map(f64::ceil);
     all.extend(
         [[whole.into_iter().fold(1.0, f64::max); 3], whole]
             .into_iter()
             .chain(rounder_points(size))
-            .map(|size_m| with(draft, |d| d.spec.room.size_m = size_m)),
+            .map(|size_m| with(draft, |d| d.spec.room.size_m = Some(size_m))),
     );
     all
 }
@@ -300,8 +306,8 @@ fn plainer_luminaires(draft: &Draft) -> Vec<Draft> {
 fn rounder_places(draft: &Draft) -> Vec<Draft> {
     let mut all = vec![];
     for (k, luminaire) in draft.spec.luminaires.iter().enumerate() {
-        let places = rounder_points(luminaire.at_m).into_iter();
-        all.extend(places.map(|at_m| with(draft, |d| d.spec.luminaires[k].at_m = at_m)));
+        let places = luminaire.at_m.into_iter().flat_map(rounder_points);
+        all.extend(places.map(|at_m| with(draft, |d| d.spec.luminaires[k].at_m = Some(at_m))));
     }
     for (k, body) in draft.spec.obstacles.iter().enumerate() {
         if let Some(cuboid) = &body.cuboid {
@@ -317,11 +323,12 @@ fn rounder_places(draft: &Draft) -> Vec<Draft> {
         }
     }
     for (name, set) in &draft.spec.meters {
-        let normal = DVec3::from(set.normal);
+        let Some(own) = set.normal else { continue };
+        let normal = DVec3::from(own);
         let longest = normal.abs().max_element();
         let axis = normal.to_array().map(|x| if x.abs() == longest { x.signum() } else { 0.0 });
-        let normals = [axis, normal.normalize().to_array()].into_iter().chain(rounder_points(set.normal));
-        all.extend(normals.map(|normal| edit_set(draft, name, |set| set.normal = normal)));
+        let normals = [axis, normal.normalize().to_array()].into_iter().chain(rounder_points(own));
+        all.extend(normals.map(|normal| edit_set(draft, name, |set| set.normal = Some(normal))));
         for (k, point) in set.points_m.iter().flatten().enumerate() {
             all.extend(rounder_points(*point).into_iter().map(|p| {
                 edit_set(draft, name, |set| {

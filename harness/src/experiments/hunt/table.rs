@@ -192,9 +192,17 @@ fn lm63_of_type(
 
 /// The smallest tables of type C whose light is not even: one that fades, and one that differs in one plane alone.
 pub(super) fn smallest() -> Vec<LuminousIntensityDistribution> {
-    let planes: [&[f64]; 6] =
-        [&[0.0], &[0.0, 90.0], &[0.0, 180.0], &[90.0, 270.0], &[0.0, 180.0, 360.0], &[0.0, 90.0, 180.0, 270.0, 360.0]];
-    let gammas: [&[f64]; 4] = [&[0.0, 90.0], &[0.0, 180.0], &[90.0, 180.0], &[0.0, 90.0, 180.0]];
+    let planes: [&[f64]; 8] = [
+        &[0.0],
+        &[0.0, 90.0],
+        &[0.0, 180.0],
+        &[90.0, 270.0],
+        &[0.0, 30.0, 90.0],
+        &[0.0, 30.0, 180.0],
+        &[0.0, 180.0, 360.0],
+        &[0.0, 90.0, 180.0, 270.0, 360.0],
+    ];
+    let gammas: [&[f64]; 5] = [&[0.0, 90.0], &[0.0, 180.0], &[90.0, 180.0], &[0.0, 30.0, 90.0], &[0.0, 90.0, 180.0]];
     let mut all = vec![];
     for (c, gamma) in planes.into_iter().cartesian_product(gammas) {
         let ends = [0, c.len() - 1];

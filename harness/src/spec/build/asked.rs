@@ -2,11 +2,16 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use super::super::model::{Budget, Spec, ToleranceOverride};
+use super::super::model::{Budget, LuminaireSpec, Spec, ToleranceOverride};
 use super::{Builder, MAX_METERS};
 use crate::procedures::{Angles, Asked, AtAngles, Names};
 use crate::record::ProcedureId;
 use crate::spec::{Spot, suggestion};
+
+/// Of luminaires that an array is refused for, the first ones.
+fn ids_of(spec: &LuminaireSpec) -> Vec<String> {
+    if spec.len() > MAX_METERS { vec![spec.id.clone()] } else { spec.each().into_iter().map(|(id, _)| id).collect() }
+}
 
 impl Builder<'_> {
     pub(super) fn procedures(&mut self, spec: &Spec) {
@@ -33,7 +38,8 @@ impl Builder<'_> {
 
     fn angles(&mut self, procedure: ProcedureId, intensity: &AtAngles, spec: &Spec) {
         let at = |field: &str| format!("procedures.{procedure}.{field}");
-        let ids = || spec.luminaires.iter().map(|l| l.id.as_str());
+        let all: Vec<String> = spec.luminaires.iter().flat_map(ids_of).collect();
+        let ids = || all.iter().map(String::as_str);
         let message = format!("there is no luminaire `{}`", intensity.luminaire);
         let help = suggestion(&intensity.luminaire, ids());
         let is_there = ids().any(|id| id == intensity.luminaire) || self.mended.holds("luminaires");

@@ -7,17 +7,21 @@ use std::sync::Arc;
 use glam::DVec3;
 use luminaire::geometry::{Mesh, Room};
 use luminaire::photometry::{self, Photometry};
+use luminaire::scene::enclosure::Enclosure;
 use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, flush, orientation};
 
 use super::super::model::{LuminaireSpec, ModelSpec, ObstacleSpec};
 use super::super::mounting::unmountable;
-use super::{Builder, within};
+use super::{BEYOND, Builder, within};
 use crate::spec::SpecError;
 
 /// No luminaire is so bright: the sun itself has some 3e27 cd. What is made of it stays a number below this.
 const BRIGHTEST_CD: f64 = 1e30;
 
 const TRIANGLES_OF_A_BOX: usize = 12;
+
+/// More luminaires than this in an array are a slip of the pen.
+const MAX_LUMINAIRES: usize = 100_000;
 
 impl Builder<'_> {
     pub(super) fn obstacles(&mut self, specs: &[ObstacleSpec], room: Option<&Room>) -> Vec<Obstacle> {
@@ -75,7 +79,11 @@ impl Builder<'_> {
     }
 
     /// Each with its place in the spec.
-    pub(super) fn luminaires(&mut self, specs: &[LuminaireSpec], room: Option<&Room>) -> Vec<(usize, Luminaire)> {
+    pub(super) fn luminaires(
+        &mut self,
+        specs: &[LuminaireSpec],
+        enclosure: Option<&Enclosure>,
+    ) -> Vec<(usize, Luminaire)> {
         self.check(!specs.is_empty(), "luminaires", "there are none", "give at least one luminaire");
         let mut ids = HashSet::new();
         let mut files: BTreeMap<PathBuf, Option<Arc<Photometry>>> = BTreeMap::new();
@@ -83,29 +91,73 @@ impl Builder<'_> {
         for (k, spec) in specs.iter().enumerate() {
             let at = format!("luminaires[{k}].id");
             self.name(&at, &spec.id);
-            let message = format!("`{}` is no unique name", spec.id);
-            self.check(ids.insert(&spec.id), &at, message, "give every luminaire an id of its own");
-            luminaires.extend(self.luminaire(k, spec, room, &mut files).map(|luminaire| (k, luminaire)));
+            if !self.is_placed(k, spec) {
+                continue;
+            }
+            for (id, at_m) in spec.each() {
+                let message = format!("`{id}` is no unique name");
+                if !self.check(ids.insert(id.clone()), &at, message, "give every luminaire an id of its own") {
+                    break;
+                }
+                let luminaire = self.luminaire(k, &LuminaireSpec { id, ..spec.clone() }, at_m, enclosure, &mut files);
+                // Of an array the others would say the same.
+                let Some(luminaire) = luminaire else { break };
+                luminaires.push((k, luminaire));
+            }
         }
         luminaires
+    }
+
+    /// Whether it is told where it is, and if it is many, that they lie apart.
+    fn is_placed(&mut self, k: usize, spec: &LuminaireSpec) -> bool {
+        let at = format!("luminaires[{k}]");
+        let Some(array) = spec.array else {
+            let help = "give `at_m`, or an `array` of many";
+            return self.check(spec.at_m.is_some(), &at, "missing field `at_m`: it is nowhere", help);
+        };
+        let message = "it is in one place and an array at once";
+        self.check(spec.at_m.is_none(), &at, message, "give exactly one of `at_m` and `array`");
+        let count = (1..=MAX_LUMINAIRES).contains(&spec.len());
+        let help = format!("give counts whose product lies between 1 and {MAX_LUMINAIRES}");
+        let [nx, ny] = array.counts;
+        let is_few = self.check(count, &format!("{at}.array.counts"), format!("{nx} x {ny} luminaires"), help);
+        let apart = |n: usize, step: f64| step.is_finite() && (n < 2 || step != 0.0);
+        let [dx, dy] = array.step_m;
+        let help = "give the steps from one to the next along x and y, in metres";
+        let is_apart = self.check(
+            apart(nx, dx) && apart(ny, dy),
+            &format!("{at}.array.step_m"),
+            "no step: luminaires of the array lie in one place",
+            help,
+        );
+        is_few && is_apart && spec.at_m.is_none()
     }
 
     fn luminaire(
         &mut self,
         k: usize,
         spec: &LuminaireSpec,
-        room: Option<&Room>,
+        at_m: [f64; 3],
+        enclosure: Option<&Enclosure>,
         files: &mut BTreeMap<PathBuf, Option<Arc<Photometry>>>,
     ) -> Option<Luminaire> {
         let at = |field: &str| format!("luminaires[{k}].{field}");
-        let mut position_m = DVec3::from(spec.at_m);
+        let (place, which) = match spec.array {
+            Some(_) => (at("array"), format!("`{}`: ", spec.id)),
+            None => (at("at_m"), String::new()),
+        };
+        let mut position_m = DVec3::from(at_m);
+        let room = enclosure.map(|e| &e.room);
         if let Some(room) = room {
             // What is nearly in the plane of a surface is meant to be recessed in it.
             position_m = flush::snapped(room, position_m);
             let inside = position_m.is_finite() && room.contains(position_m, 0.0);
-            let message = format!("{position_m} lies outside the room");
-            self.check(inside, &at("at_m"), message, within(room));
+            let message = format!("{which}{position_m} lies outside the room");
+            self.check(inside, &place, message, within(room));
         }
+        let is_within = enclosure.is_none_or(|e| e.contains(position_m, 0.0));
+        let message = format!("{which}{position_m} lies outside the room's walls");
+        self.check(is_within, &place, message, BEYOND);
         let is_factor = spec.flux_scale.is_finite() && spec.flux_scale >= 0.0;
         let message = format!("{} is no factor", spec.flux_scale);
         self.check(is_factor, &at("flux_scale"), message, "give a number from 0");
@@ -137,7 +189,7 @@ impl Builder<'_> {
         self.check(!is_factor || brightest_cd <= BRIGHTEST_CD, &at("flux_scale"), message, help);
         let room = room.filter(|room| finite && position_m.is_finite() && room.contains(position_m, 0.0))?;
         if let Some((message, help)) = unmountable(&luminaire, room) {
-            self.check(false, &at("at_m"), message, help);
+            self.check(false, &place, which + &message, help);
             return None;
         }
         Some(luminaire)

@@ -1,0 +1,483 @@
+//! Rooms that are no boxes: a box around them, and bodies or sheets where their walls stand within it. What lies beyond the walls is dark,
+//! and nobody looks at it.
+
+use glam::{DVec2, DVec3};
+
+use super::{Obstacle, Shape};
+use crate::geometry::{Mesh, Reflectances, Room, Surface};
+
+/// Nearer to a plane of the box around it than this, in parts of its largest extent, a wall lies in it.
+const IN_PLANE: f64 = 1e-9;
+/// Of faces in one plane of that box those of the largest reflectance's area are the box's own; others come so far before it, in the same parts.
+const BEFORE: f64 = 1e-6;
+/// The winding number of a closed surface about a point within it is one, as exactly as angles add up.
+const CLOSED: f64 = 1e-6;
+
+/// A closed room of any shape: the box around it and what stands in that.
+#[derive(Clone, Debug)]
+pub struct Enclosure {
+    /// From the origin to the farthest corner.
+    pub room: Room,
+    /// Walls that are not the box's own.
+    pub walls: Vec<Obstacle>,
+    outline: Outline,
+}
+
+#[derive(Clone, Debug)]
+enum Outline {
+    Box,
+    /// Upright walls over a simple polygon, counter-clockwise seen from above.
+    Prism(Vec<DVec2>),
+    /// Triangles whose front is the inside, or all of them the outside.
+    Mesh(Vec<[DVec3; 3]>),
+}
+
+/// Why there is no room in what was given.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoRoom {
+    /// Fewer corners than a triangle has.
+    #[error("a floor has three corners at least")]
+    TooFewCorners,
+    /// As many reflectances as walls are wanted.
+    #[error("{given} reflectances for {walls} walls")]
+    Reflectances {
+        /// How many there are.
+        given: usize,
+        /// How many it has.
+        walls: usize,
+    },
+    /// The box around it begins at the origin.
+    #[error("it reaches to {at}, below the origin; move it so that no coordinate is negative")]
+    Negative {
+        /// The lowest corner.
+        at: DVec3,
+    },
+    /// A corner that is no number, or nothing between its corners.
+    #[error("it holds nothing")]
+    Empty,
+    /// Two walls meet elsewhere than at a common corner.
+    #[error("wall {0} crosses or touches wall {1} (counted from 0)")]
+    Crossing(usize, usize),
+}
+
+/// A face of a room of any shape.
+#[derive(Clone, Debug)]
+pub struct Face {
+    /// In metres.
+    pub corners_m: [DVec3; 3],
+    /// Diffuse.
+    pub reflectance: f64,
+}
+
+impl Enclosure {
+    /// A room that is its own box.
+    pub fn cuboid(room: Room) -> Self {
+        Self { room, walls: vec![], outline: Outline::Box }
+    }
+
+    /// Upright walls over a polygon, whose `k`-th wall runs from corner `k` to the next; turned either way.
+    ///
+    /// Where all walls run along x and y, and those within the box around them are alike, boxes stand beyond them; else sheets of no thickness.
+    pub fn prism(floor_m: &[DVec2], height_m: f64, [floor, ceiling]: [f64; 2], walls: &[f64]) -> Result<Self, NoRoom> {
+        if floor_m.len() < 3 {
+            return Err(NoRoom::TooFewCorners);
+        }
+        if walls.len() != floor_m.len() {
+            return Err(NoRoom::Reflectances { given: walls.len(), walls: floor_m.len() });
+        }
+        let high = floor_m.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max).extend(height_m);
+        let low = floor_m.iter().copied().fold(DVec2::INFINITY, DVec2::min).extend(0.0);
+        check_extent(low, high)?;
+        let near_m = IN_PLANE * high.max_element();
+        let snapped = |x: f64, size: f64| {
+            if x <= near_m {
+                0.0
+            } else if x >= size - near_m {
+                size
+            } else {
+                x
+            }
+        };
+        let corners: Vec<DVec2> =
+            floor_m.iter().map(|p| DVec2::new(snapped(p.x, high.x), snapped(p.y, high.y))).collect();
+        crossing(&corners).map_or(Ok(()), Err)?;
+        let turned = area_m2(&corners) < 0.0;
+        let (outline, walls) = if turned { reversed(&corners, walls) } else { (corners, walls.to_vec()) };
+        let mut faces = vec![];
+        let edges: Vec<Edge> = edges(&outline).zip(&walls).map(|((a, b), rho)| Edge { a, b, rho: *rho }).collect();
+        let size = high.truncate();
+        let reflectances = Reflectances { floor, ceiling, ..Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+        let mut room = Room { size_m: high, reflectance: reflectances };
+        let (within, bounding): (Vec<&Edge>, Vec<&Edge>) = edges.iter().partition(|e| e.plane(size).is_none());
+        let alike = within.windows(2).all(|w| w[0].rho == w[1].rho);
+        let is_straight = edges.iter().all(|e| e.a.x == e.b.x || e.a.y == e.b.y);
+        let mut solid = vec![];
+        if let Some(first) = within.first().filter(|_| alike && is_straight) {
+            solid = beyond(&outline, size, height_m, first.rho);
+        } else {
+            faces.extend(within.iter().flat_map(|e| e.faces(height_m)));
+        }
+        faces.extend(bounding.iter().flat_map(|e| e.faces(height_m)));
+        let mut walls = solid;
+        walls.extend(sheets(faces, &mut room));
+        Ok(Self { room, walls, outline: Outline::Prism(outline) })
+    }
+
+    /// A room of faces that close it, all turned to the same side.
+    pub fn of_faces(faces: Vec<Face>) -> Result<Self, NoRoom> {
+        let corners = || faces.iter().flat_map(|f| f.corners_m);
+        let (low, high) =
+            (corners().fold(DVec3::INFINITY, DVec3::min), corners().fold(DVec3::NEG_INFINITY, DVec3::max));
+        check_extent(low, high)?;
+        let outline = Outline::Mesh(faces.iter().map(|f| f.corners_m).collect());
+        let mut room = Room { size_m: high, reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+        let walls = sheets(faces, &mut room);
+        Ok(Self { room, walls, outline })
+    }
+
+    /// Whether a point of the box around it lies within its walls, at least `margin_m` from each that is not the box's own.
+    ///
+    /// Of a mesh the margin is none: whether it closes about the point is what is told.
+    pub fn contains(&self, point_m: DVec3, margin_m: f64) -> bool {
+        match &self.outline {
+            Outline::Box => true,
+            Outline::Prism(corners) => {
+                let p = point_m.truncate();
+                is_within(corners, p) && edges(corners).all(|(a, b)| distance_m(p, a, b) >= margin_m)
+            }
+            Outline::Mesh(faces) => (winding(faces, point_m).abs() - 1.0).abs() < CLOSED,
+        }
+    }
+
+    /// Triangles that each look at what [`Self::contains`] goes through.
+    pub fn faces(&self) -> usize {
+        match &self.outline {
+            Outline::Box => 0,
+            Outline::Prism(corners) => corners.len(),
+            Outline::Mesh(faces) => faces.len(),
+        }
+    }
+}
+
+fn check_extent(low: DVec3, high: DVec3) -> Result<(), NoRoom> {
+    if !low.is_finite() || !high.is_finite() {
+        return Err(NoRoom::Empty);
+    }
+    if low.min_element() < -IN_PLANE * high.abs().max_element() {
+        return Err(NoRoom::Negative { at: low });
+    }
+    if (high - low).min_element() > 0.0 { Ok(()) } else { Err(NoRoom::Empty) }
+}
+
+/// A wall over the floor, the room at its left.
+struct Edge {
+    a: DVec2,
+    b: DVec2,
+    rho: f64,
+}
+
+impl Edge {
+    /// The surface of the box in whose plane it stands.
+    fn plane(&self, size: DVec2) -> Option<Surface> {
+        let both = |k: usize, at: f64| self.a[k] == at && self.b[k] == at;
+        let planes = [
+            (both(0, 0.0), Surface::WallXMin),
+            (both(0, size.x), Surface::WallXMax),
+            (both(1, 0.0), Surface::WallYMin),
+            (both(1, size.y), Surface::WallYMax),
+        ];
+        planes.into_iter().find(|(is_in, _)| *is_in).map(|(_, surface)| surface)
+    }
+
+    /// Its front faces the room.
+    fn faces(&self, height_m: f64) -> [Face; 2] {
+        let [a, b, c, d] = [self.b.extend(0.0), self.a.extend(0.0), self.a.extend(height_m), self.b.extend(height_m)];
+        [[a, b, c], [a, c, d]].map(|corners_m| Face { corners_m, reflectance: self.rho })
+    }
+}
+
+fn edges(corners: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
+    corners.iter().copied().zip(corners.iter().copied().cycle().skip(1))
+}
+
+fn area_m2(corners: &[DVec2]) -> f64 {
+    edges(corners).map(|(a, b)| 0.5 * a.perp_dot(b)).sum()
+}
+
+/// The same polygon the other way round, with its walls.
+fn reversed(corners: &[DVec2], walls: &[f64]) -> (Vec<DVec2>, Vec<f64>) {
+    let corners = corners.iter().rev().copied().collect();
+    // The wall from corner n - 2 to n - 1 comes first now, that from n - 1 to 0 last.
+    let mut walls: Vec<f64> = walls.iter().rev().copied().collect();
+    walls.rotate_left(1);
+    (corners, walls)
+}
+
+/// The first two walls that meet but at a corner which they share.
+fn crossing(corners: &[DVec2]) -> Option<NoRoom> {
+    let all: Vec<(DVec2, DVec2)> = edges(corners).collect();
+    let n = all.len();
+    if let Some(k) = all.iter().position(|(a, b)| a == b) {
+        return Some(NoRoom::Crossing(k, (k + 1) % n));
+    }
+    let side = |a: DVec2, b: DVec2, p: DVec2| (b - a).perp_dot(p - a);
+    let is_on = |a: DVec2, b: DVec2, p: DVec2| side(a, b, p) == 0.0 && (p - a).dot(p - b) <= 0.0;
+    for j in 0..n {
+        for k in j + 1..n {
+            let ((a, b), (c, d)) = (all[j], all[k]);
+            let follows = k == j + 1 || (j == 0 && k == n - 1);
+            let meet = if follows {
+                // They share a corner; more than that is a wall folded back on itself.
+                let (shared, one, other) = if k == j + 1 { (b, a, d) } else { (a, b, c) };
+                side(one, shared, other) == 0.0 && (one - shared).dot(other - shared) > 0.0
+            } else {
+                let apart = |a: DVec2, b: DVec2, c: DVec2, d: DVec2| side(a, b, c) * side(a, b, d) < 0.0;
+                apart(a, b, c, d) && apart(c, d, a, b)
+                    || is_on(a, b, c)
+                    || is_on(a, b, d)
+                    || is_on(c, d, a)
+                    || is_on(c, d, b)
+            };
+            if meet {
+                return Some(NoRoom::Crossing(j, k));
+            }
+        }
+    }
+    None
+}
+
+/// Whether a point lies within a polygon, by how often a ray leaves it.
+fn is_within(corners: &[DVec2], p: DVec2) -> bool {
+    let crosses =
+        |(a, b): (DVec2, DVec2)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y);
+    edges(corners).filter(|edge| crosses(*edge)).count() % 2 == 1
+}
+
+fn distance_m(p: DVec2, a: DVec2, b: DVec2) -> f64 {
+    let along = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+    p.distance(a.lerp(b, along))
+}
+
+/// How often faces go round a point: their solid angles over that of a sphere.
+fn winding(faces: &[[DVec3; 3]], point_m: DVec3) -> f64 {
+    // A. van Oosterom, J. Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125.
+    let solid_angle = |corners: &[DVec3; 3]| {
+        let [a, b, c] = corners.map(|p| p - point_m);
+        let [la, lb, lc] = [a, b, c].map(DVec3::length);
+        let above = a.dot(b.cross(c));
+        2.0 * above.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
+    };
+    faces.iter().map(solid_angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
+
+/// Boxes over all of a rectangle that a polygon of edges along x and y leaves out.
+fn beyond(outline: &[DVec2], size: DVec2, height_m: f64, reflectance: f64) -> Vec<Obstacle> {
+    let stops = |of: fn(&DVec2) -> f64, size: f64| {
+        let mut all: Vec<f64> = outline.iter().map(of).chain([0.0, size]).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
+    };
+    let (xs, ys) = (stops(|p| p.x, size.x), stops(|p| p.y, size.y));
+    // Runs of cells along x, each grown over the rows above that have the same.
+    let mut open: Vec<[f64; 4]> = vec![];
+    let mut done: Vec<[f64; 4]> = vec![];
+    for y in ys.windows(2) {
+        let is_out = |x: &[f64]| !is_within(outline, DVec2::new(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1])));
+        let mut row: Vec<[f64; 2]> = vec![];
+        for x in xs.windows(2).filter(|x| is_out(x)) {
+            match row.last_mut().filter(|run| run[1] == x[0]) {
+                Some(run) => run[1] = x[1],
+                None => row.push([x[0], x[1]]),
+            }
+        }
+        let mut next = vec![];
+        for run in row {
+            let below = open.iter().position(|o| o[0] == run[0] && o[1] == run[1]).map(|k| open.swap_remove(k));
+            next.push([run[0], run[1], below.map_or(y[0], |o| o[2]), y[1]]);
+        }
+        done.append(&mut open);
+        open = next;
+    }
+    done.append(&mut open);
+    let solid = |[x0, x1, y0, y1]: [f64; 4]| Obstacle {
+        shape: Shape::Box { min_m: DVec3::new(x0, y0, 0.0), max_m: DVec3::new(x1, y1, height_m) },
+        reflectance,
+    };
+    done.into_iter().map(solid).collect()
+}
+
+/// Faces as sheets, one of each reflectance, but for those in a plane of the box around them, whose surface takes the reflectance of most.
+fn sheets(faces: Vec<Face>, room: &mut Room) -> Vec<Obstacle> {
+    let near_m = IN_PLANE * room.size_m.max_element();
+    let before_m = BEFORE * room.size_m.max_element();
+    let mut left = faces;
+    let mut sheets: Vec<Face> = vec![];
+    for surface in Surface::ALL {
+        let plane_m = if surface.is_far() { room.size_m[surface.axis()] } else { 0.0 };
+        let lies_in = |f: &Face| f.corners_m.iter().all(|p| (p[surface.axis()] - plane_m).abs() <= near_m);
+        let (within, others): (Vec<Face>, Vec<Face>) = left.into_iter().partition(lies_in);
+        left = others;
+        let Some(own) = most_of(&within) else { continue };
+        *room.reflectance.of_mut(surface) = own;
+        let offset = before_m * surface.inward_normal();
+        let moved = |f: Face| Face { corners_m: f.corners_m.map(|p| p + offset), ..f };
+        sheets.extend(within.into_iter().filter(|f| f.reflectance != own).map(moved));
+    }
+    sheets.extend(left);
+    let mut obstacles: Vec<(f64, Mesh)> = vec![];
+    for face in sheets {
+        let known = obstacles.iter().position(|(rho, _)| *rho == face.reflectance);
+        let k = known.unwrap_or(obstacles.len());
+        if known.is_none() {
+            obstacles.push((face.reflectance, Mesh::default()));
+        }
+        obstacles[k].1.push(face.corners_m);
+    }
+    let shape = |mesh: Mesh| Shape::Mesh { vertices_m: mesh.vertices_m, triangles: mesh.triangles };
+    obstacles.into_iter().map(|(reflectance, mesh)| Obstacle { shape: shape(mesh), reflectance }).collect()
+}
+
+/// The reflectance that most of the area has.
+fn most_of(faces: &[Face]) -> Option<f64> {
+    let area = |f: &Face| (f.corners_m[1] - f.corners_m[0]).cross(f.corners_m[2] - f.corners_m[0]).length();
+    let with = |rho: f64| faces.iter().filter(|f| f.reflectance == rho).map(area).sum::<f64>();
+    faces.iter().map(|f| f.reflectance).max_by(|a, b| with(*a).total_cmp(&with(*b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corners(all: &[[f64; 2]]) -> Vec<DVec2> {
+        all.iter().map(|p| DVec2::from(*p)).collect()
+    }
+
+    const L: [[f64; 2]; 6] = [[0.0, 0.0], [6.0, 0.0], [6.0, 2.0], [3.0, 2.0], [3.0, 5.0], [0.0, 5.0]];
+
+    #[test]
+    fn an_l_is_a_box_with_a_box_in_its_corner_whichever_way_round() {
+        let mut walls = [0.5; 6];
+        walls[0] = 0.4;
+        let one = Enclosure::prism(&corners(&L), 3.0, [0.2, 0.7], &walls).unwrap();
+        let [Obstacle { shape: Shape::Box { min_m, max_m }, reflectance }] = &one.walls[..] else { panic!("{one:?}") };
+        assert_eq!((*min_m, *max_m), (DVec3::new(3.0, 2.0, 0.0), DVec3::new(6.0, 5.0, 3.0)));
+        assert_eq!((*reflectance, one.room.size_m), (0.5, DVec3::new(6.0, 5.0, 3.0)));
+        assert_eq!((one.room.reflectance.wall_y_min, one.room.reflectance.wall_x_max), (0.4, 0.5));
+        let mut back = corners(&L);
+        back.reverse();
+        walls = [0.5; 6];
+        walls[4] = 0.4;
+        let other = Enclosure::prism(&back, 3.0, [0.2, 0.7], &walls).unwrap();
+        assert_eq!(other.room, one.room);
+        for (point, is_in) in [([1.0, 1.0, 1.0], true), ([5.0, 4.0, 1.0], false), ([2.999, 4.0, 1.0], true)] {
+            assert_eq!(one.contains(DVec3::from(point), 1e-6), is_in, "{point:?}");
+        }
+        assert!(!one.contains(DVec3::new(2.999, 4.0, 1.0), 0.01));
+    }
+
+    #[test]
+    fn a_floor_is_covered_but_for_the_room_whatever_its_shape() {
+        // A corridor with niches, a plus, a spiral.
+        let niches = [
+            [0., 0.],
+            [9., 0.],
+            [9., 1.],
+            [7., 1.],
+            [7., 3.],
+            [6., 3.],
+            [6., 1.],
+            [3., 1.],
+            [3., 2.],
+            [1., 2.],
+            [1., 1.],
+            [0., 1.],
+        ];
+        let plus = [
+            [2., 0.],
+            [4., 0.],
+            [4., 2.],
+            [6., 2.],
+            [6., 4.],
+            [4., 4.],
+            [4., 6.],
+            [2., 6.],
+            [2., 4.],
+            [0., 4.],
+            [0., 2.],
+            [2., 2.],
+        ];
+        let spiral = [
+            [0., 0.],
+            [6., 0.],
+            [6., 6.],
+            [1., 6.],
+            [1., 2.],
+            [4., 2.],
+            [4., 4.],
+            [3., 4.],
+            [3., 3.],
+            [2., 3.],
+            [2., 5.],
+            [5., 5.],
+            [5., 1.],
+            [0., 1.],
+        ];
+        for floor in [&niches[..], &plus, &spiral] {
+            let floor = corners(floor);
+            let room = Enclosure::prism(&floor, 2.0, [0.2, 0.7], &vec![0.5; floor.len()]).unwrap();
+            let volume = |o: &Obstacle| match o.shape {
+                Shape::Box { min_m, max_m } => (max_m - min_m).element_product(),
+                Shape::Mesh { .. } => panic!("no sheets"),
+            };
+            let out: f64 = room.walls.iter().map(volume).sum();
+            let whole = room.room.size_m.element_product();
+            assert!((whole - out - 2.0 * area_m2(&floor).abs()).abs() < 1e-9, "{out} of {whole}");
+        }
+    }
+
+    #[test]
+    fn walls_that_are_not_alike_or_not_straight_are_sheets_that_face_the_room() {
+        let triangle = corners(&[[0.0, 0.0], [4.0, 0.0], [0.0, 3.0]]);
+        let room = Enclosure::prism(&triangle, 2.0, [0.2, 0.7], &[0.1, 0.2, 0.3]).unwrap();
+        let [Obstacle { shape: Shape::Mesh { vertices_m, triangles }, reflectance: 0.2 }] = &room.walls[..] else {
+            panic!("{room:?}")
+        };
+        let [a, b, c] = triangles[0].map(|k| vertices_m[k as usize]);
+        assert!((b - a).cross(c - a).dot(DVec3::new(-1.0, -1.0, 0.0)) > 0.0);
+        let r = room.room.reflectance;
+        assert_eq!((r.wall_y_min, r.wall_x_min, r.wall_x_max), (0.1, 0.3, 0.0));
+    }
+
+    #[test]
+    fn faces_that_close_a_room_tell_what_is_in_it() {
+        let mesh = Mesh::cuboid(DVec3::ZERO, DVec3::new(4.0, 3.0, 2.0));
+        let mut faces: Vec<Face> = mesh
+            .triangles
+            .iter()
+            .map(|t| Face { corners_m: t.map(|k| mesh.vertices_m[k as usize]), reflectance: 0.5 })
+            .collect();
+        faces[0].reflectance = 0.25;
+        let room = Enclosure::of_faces(faces.clone()).unwrap();
+        assert!(room.contains(DVec3::ONE, 0.0) && !room.contains(DVec3::splat(2.5), 0.0));
+        // Half of one of its faces is a sheet before the box's.
+        assert_eq!((room.walls.len(), room.room.reflectance.ceiling), (1, 0.5));
+        faces.pop();
+        assert!(!Enclosure::of_faces(faces).unwrap().contains(DVec3::ONE, 0.0), "it is open");
+    }
+
+    #[test]
+    fn what_is_no_room_is_refused() {
+        let rho = |n: usize| vec![0.5; n];
+        let of = |all: &[[f64; 2]]| Enclosure::prism(&corners(all), 2.0, [0.5, 0.5], &rho(all.len())).unwrap_err();
+        assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0]]), NoRoom::TooFewCorners);
+        assert_eq!(of(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]), NoRoom::Crossing(0, 2));
+        assert_eq!(of(&[[0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), NoRoom::Crossing(0, 1));
+        assert_eq!(of(&[[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), NoRoom::Crossing(0, 1));
+        assert!(matches!(of(&[[-1.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), NoRoom::Negative { .. }));
+        assert_eq!(of(&[[0.0, 0.0], [f64::NAN, 0.0], [1.0, 1.0]]), NoRoom::Empty);
+        assert_eq!(of(&[[0.0, 0.0], [2.0, 0.0], [1.0, 0.0]]), NoRoom::Empty);
+        let few = Enclosure::prism(&corners(&L), 2.0, [0.5, 0.5], &[0.5]).unwrap_err();
+        assert_eq!(few, NoRoom::Reflectances { given: 1, walls: 6 });
+    }
+}
