@@ -107,6 +107,11 @@ fn surfaces_of(job: &Job, luminaire: &Luminaire) -> impl Iterator<Item = (Face, 
     })
 }
 
+/// The sides to which the surfaces that a point is on let its light go.
+pub(super) fn inwards(job: &Job, luminaire: &Luminaire) -> DVec3 {
+    surfaces_of(job, luminaire).map(|(_, inwards)| inwards).sum()
+}
+
 /// Whether a point on a surface lights it where that steps back.
 pub(super) fn shines_behind(job: &Job, luminaire: &Luminaire) -> bool {
     surfaces_of(job, luminaire).any(|(_, inwards)| luminaire.intensity_towards(-inwards).value() > 0.0)

@@ -86,6 +86,21 @@ fn light_of_others_passes_through_an_opening() {
 }
 
 #[test]
+fn a_point_on_a_surface_keeps_all_its_light_beside_an_opening() {
+    let dark = panel(DVec3::new(4.0, 4.0, 3.0), LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 });
+    let dark = Luminaire { flux_scale: 0.0, ..dark };
+    let room = fixtures::room(DVec3::splat(9.0), 0.0, 0.0, 0.0);
+    for at_m in [DVec3::new(3.0, 0.0, 5.0), DVec3::new(9.0, 2.0, 5.0), DVec3::new(0.0, 0.0, 9.0)] {
+        let luminaires = vec![luminaire("point", at_m, lambertian()), dark.clone()];
+        let scene = Scene { room: Some(room), luminaires, ..Scene::default() };
+        let towards = (at_m - DVec3::new(1.8, 1.0, 2.7)).normalize();
+        let job = within(1e-3, job(scene, stations(&[[1.8, 1.0, 2.7]], towards), Transport::Direct));
+        let off = relative_deviations(&read(&job), &exact_direct_lx(&job));
+        assert!(worst(&off) < 1e-4, "{at_m}: {off:?}");
+    }
+}
+
+#[test]
 fn a_lambertian_disc_and_a_sphere_follow_their_closed_forms() {
     let disc = LuminousOpening::Ellipse { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
     let job = free_field(panel(DVec3::ZERO, disc), &[[0.0, 0.0, -1.0], [0.0, 0.0, -3.0]], DVec3::Z);

@@ -17,7 +17,7 @@ use super::{EFFICACY, box_faces, polygon};
 use crate::engines::comment::Comment;
 use crate::engines::radiance::route::{Route, route};
 use crate::engines::radiance::settings::Settings;
-use crate::engines::{Job, SceneFile};
+use crate::engines::{Job, SceneFile, recess};
 
 /// A table that stops with light at its edge falls to zero within this angle; Radiance would extrapolate it.
 pub(in crate::engines::radiance) const EDGE_DEG: f64 = 1e-4;
@@ -28,6 +28,9 @@ const FACE_OFFSET: f64 = 1e-5;
 /// Radius of the sphere that stands for a point luminaire, in Radiance's units; 1e-6 and less are refused by Radiance.
 const POINT_RADIUS: f64 = 1e-3;
 const MIN_RADIUS: f64 = 2e-6;
+/// The same of one on a surface, before which it comes by so many radii: rays to all of it, where sources are sampled, must not end on that.
+const ON_SURFACE_RADIUS: f64 = 1e-5;
+const CLEAR: f64 = 1.5;
 /// Faces that stand for a cylinder's side, a multiple of four: rays that rtrace aims at a cylinder of its own miss it where they enter through an
 /// end, 10 % of them seen obliquely (`nextssamp` of srcsamp.c takes points of a box about the axis).
 const SIDES: usize = 32;
@@ -143,7 +146,12 @@ pub(super) fn rad(job: &Job, settings: &Settings, scale: f64, scene: &[usize]) -
     let mut text = String::new();
     for (k, l) in scene.iter().map(|k| (*k, &job.scene.luminaires[*k])) {
         text += &match route(l, settings) {
-            Route::Point => point(k, l, point_radius(job, l, scale), scale),
+            Route::Point => {
+                let off = recess::inwards(job, l);
+                let radius = point_radius(job, l, scale);
+                let radius = if off == DVec3::ZERO { radius } else { radius.min(ON_SURFACE_RADIUS) };
+                point(k, l, radius, CLEAR * radius * off, scale)
+            }
             Route::Opening => opening(k, l, scale),
             Route::Ies2radLight | Route::Ies2radIllum => by_ies2rad(k, l, scale),
         };
@@ -212,9 +220,9 @@ fn by_ies2rad(k: usize, luminaire: &Luminaire, scale: f64) -> String {
 }
 
 /// A sphere so small that only its centre matters: radiance I / (179 pi r^2) towards each direction.
-fn point(k: usize, luminaire: &Luminaire, radius: f64, scale: f64) -> String {
+fn point(k: usize, luminaire: &Luminaire, radius: f64, off: DVec3, scale: f64) -> String {
     let factor = luminaire.flux_scale * scale * scale / (EFFICACY * PI * radius * radius);
-    let p = luminaire.position_m * scale;
+    let p = luminaire.position_m * scale + off;
     let mut text = format!(
         "\n# Luminaire {}: a point, as a sphere of radius {radius}; its table is in candela.\n",
         Comment(&luminaire.id)
