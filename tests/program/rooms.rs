@@ -94,7 +94,7 @@ fn a_hall_of_two_hundred_luminaires_is_a_few_lines() {
     assert!(hall.lines().count() <= 15);
     let folder = Folder::new(&[("hall.yaml", hall), ("lamp.ies", LAMP)]);
     let (report, _) = folder.luxproof(&["run", "hall.yaml", "--engines", "simulator", "--format", "json"]).report();
-    let comparisons = among(&report, "comparisons", &[("engine", "iesna"), ("procedure", "direct_illuminance")]);
+    let comparisons = among(&report, "comparisons", &[("engine", "simulator"), ("procedure", "direct_illuminance")]);
     let of = |set: &str| comparisons.iter().filter(|c| c["meter"].as_str().unwrap().starts_with(set)).count();
     // 59 by 29 m: d = 29, since 59 is twice that; p = .2 x 5^log10(29) = 2.1 m; 29 and 14 cells.
     assert_eq!([of("floor"), of("wall"), of("eye")], [29 * 14, 6, 4]);

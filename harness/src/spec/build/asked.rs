@@ -8,9 +8,11 @@ use crate::procedures::{Angles, Asked, AtAngles, Names};
 use crate::record::ProcedureId;
 use crate::spec::{Spot, suggestion};
 
-/// Of luminaires that an array is refused for, the first ones.
+/// Of what is refused, its own.
 fn ids_of(spec: &LuminaireSpec) -> Vec<String> {
-    if spec.len() > MAX_METERS { vec![spec.id.clone()] } else { spec.each().into_iter().map(|(id, _)| id).collect() }
+    let ids: Vec<String> =
+        if spec.len() > MAX_METERS { vec![] } else { spec.each().into_iter().map(|(id, _)| id).collect() };
+    if ids.is_empty() { vec![spec.id.clone()] } else { ids }
 }
 
 impl Builder<'_> {

@@ -15,6 +15,7 @@ use luminaire::scene::{Luminaire, Meter, Transport, flush};
 
 use super::{EFFICACY, box_faces, polygon};
 use crate::engines::comment::Comment;
+use crate::engines::radiance::options::Sources;
 use crate::engines::radiance::route::{Route, route};
 use crate::engines::radiance::settings::Settings;
 use crate::engines::{Job, SceneFile, recess};
@@ -28,8 +29,7 @@ const FACE_OFFSET: f64 = 1e-5;
 /// Radius of the sphere that stands for a point luminaire, in Radiance's units; 1e-6 and less are refused by Radiance.
 const POINT_RADIUS: f64 = 1e-3;
 const MIN_RADIUS: f64 = 2e-6;
-/// The same of one on a surface, before which it comes by so many radii: rays to all of it, where sources are sampled, must not end on that.
-const ON_SURFACE_RADIUS: f64 = 1e-5;
+/// One on a surface comes before it by so many radii where sources are sampled: rays to all of it must not end on that.
 const CLEAR: f64 = 1.5;
 /// Faces that stand for a cylinder's side, a multiple of four: rays that rtrace aims at a cylinder of its own miss it where they enter through an
 /// end, 10 % of them seen obliquely (`nextssamp` of srcsamp.c takes points of a box about the axis).
@@ -147,9 +147,9 @@ pub(super) fn rad(job: &Job, settings: &Settings, scale: f64, scene: &[usize]) -
     for (k, l) in scene.iter().map(|k| (*k, &job.scene.luminaires[*k])) {
         text += &match route(l, settings) {
             Route::Point => {
-                let off = recess::inwards(job, l);
-                let radius = point_radius(job, l, scale);
-                let radius = if off == DVec3::ZERO { radius } else { radius.min(ON_SURFACE_RADIUS) };
+                let is_sampled = Sources::of(job, settings) == Sources::Openings;
+                let off = if is_sampled { recess::inwards(job, l) } else { DVec3::ZERO };
+                let radius = if off == DVec3::ZERO { point_radius(job, l, scale) } else { MIN_RADIUS };
                 point(k, l, radius, CLEAR * radius * off, scale)
             }
             Route::Opening => opening(k, l, scale),
