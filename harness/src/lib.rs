@@ -14,6 +14,7 @@ pub mod cli;
 pub mod diagnosis;
 pub mod engines;
 pub mod experiments;
+pub mod import;
 pub mod judge;
 pub mod laws;
 pub mod measure;

@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
+use super::obj::{Face, Obj};
+use super::polygon::Triangulator;
+
 /// A triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
@@ -18,12 +21,22 @@ pub struct Mesh {
 /// Why a file gave no mesh.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshError {
-    /// The file cannot be opened or is no OBJ file.
-    #[error("{path}: {reason}; check the path and that it is a Wavefront OBJ file", path = path.display())]
+    /// The file cannot be opened.
+    #[error("{path}: {reason}; check the path", path = path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
         /// What the reader says.
+        reason: String,
+    },
+    /// A line that no OBJ file has, or a polygon that is none.
+    #[error("{path}:{line}: {reason}; repair the file, or export it again as Wavefront OBJ", path = path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong there.
         reason: String,
     },
     /// A vertex with a coordinate that is no number to reckon with.
@@ -48,7 +61,7 @@ pub enum MeshError {
 const FAR_M: f64 = 1e90;
 
 impl Mesh {
-    /// Reads the faces of every object of an OBJ file, one unit a metre, polygons split into fans of triangles.
+    /// Reads the faces of every object of an OBJ file, one unit a metre, polygons cut into triangles, concave ones too.
     ///
     /// Axes are taken as they stand, x, y, z with z up. Materials, normals, texture, points and lines are passed over.
     pub fn read_obj(path: &Path) -> Result<Self, MeshError> {
@@ -66,25 +79,32 @@ impl Mesh {
 
     /// The faces of an OBJ file by the name of their group (`g`) or object (`o`), each name once.
     pub fn groups_of_obj(reader: &mut impl BufRead, path: &Path) -> Result<Vec<(String, Self)>, MeshError> {
-        let options =
-            tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
-        // A material library that is not there must not keep the shape from being read.
-        let (models, _) = tobj::load_obj_buf(reader, &options, |_| Ok(Default::default()))
-            .map_err(|e| MeshError::Unreadable { path: path.into(), reason: e.to_string() })?;
-        let (mut groups, mut before): (Vec<(String, Self)>, usize) = (vec![], 0);
-        for model in models {
-            let vertices_m: Vec<DVec3> =
-                model.mesh.positions.as_chunks().0.iter().copied().map(DVec3::from_array).collect();
-            let triangles = model.mesh.indices.as_chunks().0.to_vec();
-            let far = |v: &DVec3| v.is_nan() || v.abs().max_element() > FAR_M;
-            if let Some((k, &at)) = vertices_m.iter().enumerate().find(|(_, v)| far(v)) {
-                return Err(MeshError::NotFinite { path: path.into(), vertex: before + k, at });
+        let malformed = |line, reason: String| MeshError::Malformed { path: path.into(), line, reason };
+        let obj = Obj::read(reader).map_err(|fault| malformed(fault.line, fault.message))?;
+        let mut groups: Vec<(String, Self)> = obj.groups.iter().map(|name| (name.clone(), Self::default())).collect();
+        let mut faces: Vec<&Face> = obj.faces.iter().collect();
+        faces.sort_by_key(|face| face.group);
+        // Of each vertex the group that had it last, and its place there: what no face has is no part of a mesh, nor of its extent.
+        let mut places = vec![(usize::MAX, 0); obj.vertices.len()];
+        let mut triangulator = Triangulator::default();
+        for face in faces {
+            let corners = obj.corners_of(face);
+            let at: Vec<DVec3> = corners.iter().map(|v| obj.vertices[*v as usize]).collect();
+            if let Some((k, &at)) = at.iter().enumerate().find(|(_, v)| v.is_nan() || v.abs().max_element() > FAR_M) {
+                return Err(MeshError::NotFinite { path: path.into(), vertex: corners[k] as usize, at });
             }
-            before += vertices_m.len();
-            let mesh = Self { vertices_m, triangles };
-            match groups.iter_mut().find(|(name, _)| *name == model.name) {
-                Some((_, known)) => known.append(mesh),
-                None => groups.push((model.name, mesh)),
+            let cut = triangulator.triangles(&at).map_err(|why| malformed(face.line, why.to_string()))?;
+            let mesh = &mut groups[face.group].1;
+            for triangle in cut {
+                let vertices = triangle.map(|k| {
+                    let v = corners[k] as usize;
+                    if places[v].0 != face.group {
+                        places[v] = (face.group, mesh.vertices_m.len() as u32);
+                        mesh.vertices_m.push(obj.vertices[v]);
+                    }
+                    places[v].1
+                });
+                mesh.triangles.push(vertices);
             }
         }
         groups.retain(|(_, mesh)| !mesh.triangles.is_empty());
@@ -164,8 +184,9 @@ mod tests {
             ("v 0 0 0\n", "holds no face"),
             ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
             ("v 0 0 1e308\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "[0.0, 0.0, 1e308], which is not finite or beyond 1e90 m"),
-            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "check the path"),
-            ("v 0 0 x\n", "check the path"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "desk.obj:4: there is no vertex 9: the file has 3; repair the file"),
+            ("v 0 0 x\n", "desk.obj:1: `x` is no number"),
+            ("v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 1 0\nf 1 2 3 4\n", "desk.obj:5: its edges cross"),
         ] {
             let message = parse(text).unwrap_err().to_string();
             assert!(message.contains(expected) && message.contains("desk.obj"), "{text}: {message}");

@@ -3,6 +3,8 @@
 pub mod bvh;
 pub mod configuration_factor;
 mod mesh;
+pub mod obj;
+pub mod polygon;
 mod room;
 
 pub use mesh::{Mesh, MeshError};

@@ -5,17 +5,25 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
+use glam::DVec3;
 use luminaire::photometry;
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::diagnostic::{diagnose, warn};
+use super::first::{First, downlight, walls};
 use super::photometry::spec_error;
 use super::{complain, print};
 use crate::report::Exit;
+use crate::report::words::trimmed;
 use crate::spec::{Case, Trust, doubts, suite};
 
-/// The spec, its values in braces.
-const SPEC: &str = include_str!("first.yaml");
+const ABOUT: &str = "A first spec of luxproof: a room, a luminaire, a plane of meters, and what is measured.";
+
+const OBSTACLES: &str = "
+# Bodies are opaque and diffuse: boxes, or meshes of Wavefront OBJ files.
+# obstacles:
+#   - box: {min_m: [1, 1, 0], max_m: [2.6, 1.8, 0.75], reflectance: 0.5}
+";
 
 #[derive(Debug, Args)]
 pub(super) struct InitArgs {
@@ -79,7 +87,7 @@ pub(super) fn init(args: &InitArgs) -> Result<Exit, Diagnostic> {
             let bytes = std::fs::read(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
             (path.file_name().map(PathBuf::from).unwrap_or_default(), bytes)
         }
-        None => (PathBuf::from("downlight.ies"), downlight().into_bytes()),
+        None => (PathBuf::from(super::first::DOWNLIGHT), downlight().into_bytes()),
     };
     let text = spec(&args.spec, &title, size.0, reflectance.0, &lamp)?;
     let lamp = folder.join(lamp);
@@ -138,66 +146,29 @@ fn answer<T: FromStr<Err: std::fmt::Display>>(
     }
 }
 
-/// The spec's text: one luminaire below the middle of the ceiling, desks of half a metre and more to a step.
+/// The spec's text: one luminaire below the middle of the ceiling.
 fn spec(
     path: &Path,
     title: &str,
     [x, y, z]: [f64; 3],
-    [floor, walls, ceiling]: [f64; 3],
+    [floor, each_wall, ceiling]: [f64; 3],
     lamp: &Path,
 ) -> Result<String, Diagnostic> {
-    if x.min(y).min(z) <= 0.0 || floor.max(walls).max(ceiling) > 1.0 {
+    if x.min(y).min(z) <= 0.0 || floor.max(each_wall).max(ceiling) > 1.0 {
         return Err(miette::miette!("a room has an extent along every axis, and reflectances lie between 0 and 1"));
     }
-    let counts = [x, y].map(|extent| extent.floor().clamp(3.0, 20.0));
-    let step = [x / counts[0], y / counts[1]];
-    let number = |value: f64| crate::report::words::trimmed(value, 4);
-    let height = z - (0.2 * z).min(0.3);
-    let desk = 0.75_f64.min(0.4 * z);
-    let quoted = |text: &str| serde_json::to_string(text).unwrap_or_default();
-    let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let values = [
-        ("file", file),
-        ("title", quoted(title)),
-        ("photometry", quoted(&lamp.to_string_lossy())),
-        ("x", number(x)),
-        ("y", number(y)),
-        ("z", number(z)),
-        ("floor", number(floor)),
-        ("walls", number(walls)),
-        ("ceiling", number(ceiling)),
-        ("cx", number(x / 2.0)),
-        ("cy", number(y / 2.0)),
-        ("cz", number(height)),
-        ("ox", number(step[0] / 2.0)),
-        ("oy", number(step[1] / 2.0)),
-        ("dx", number(step[0])),
-        ("dy", number(step[1])),
-        ("nx", number(counts[0])),
-        ("ny", number(counts[1])),
-        ("desk", number(desk)),
-        ("distance", "10".to_owned()),
-    ];
-    Ok(values.iter().fold(SPEC.to_owned(), |text, (name, value)| text.replace(&format!("{{{name}}}"), value)))
-}
-
-/// A Lambertian downlight of 1000 cd straight down: 3141.6 lm in an opening of 0.6 m by 0.6 m.
-fn downlight() -> String {
-    let gammas: Vec<f64> = (0..=36).map(|k| 2.5 * f64::from(k)).collect();
-    let list = |values: &mut dyn Iterator<Item = f64>| {
-        values
-            .map(|v| crate::report::words::trimmed(v, 4))
-            .collect::<Vec<_>>()
-            .chunks(10)
-            .map(|c| c.join(" "))
-            .collect::<Vec<_>>()
-            .join("\n")
+    let size_m = DVec3::new(x, y, z);
+    let first = First {
+        about: ABOUT,
+        file: path,
+        title,
+        size: size_m.to_array().map(|extent| trimmed(extent, 4)),
+        reflectance: [trimmed(floor, 4), walls([each_wall; 4], |rho| trimmed(rho, 4)), trimmed(ceiling, 4)],
+        obstacles: OBSTACLES,
+        photometry: lamp,
+        lamp_m: DVec3::new(x / 2.0, y / 2.0, z - (0.2 * z).min(0.3)),
+        low_m: DVec3::ZERO,
+        high_m: size_m,
     };
-    let candela = list(&mut gammas.iter().map(|gamma| 1000.0 * gamma.to_radians().cos()));
-    format!(
-        "IESNA:LM-63-2002\n[TEST] none: made by luxproof init\n[MANUFAC] nobody\n[LUMINAIRE] Lambertian downlight, 1000 cd\nTILT=NONE\n\
-         1 -1 1 {} 1 1 2 0.6 0.6 0\n1 1 0\n{}\n0\n{candela}\n",
-        gammas.len(),
-        list(&mut gammas.iter().copied())
-    )
+    Ok(first.text())
 }

@@ -10,8 +10,10 @@ pub(crate) mod diagnostic;
 mod diff;
 mod engines;
 mod export;
+mod first;
 mod history;
 mod hunt;
+mod import;
 mod init;
 mod measuring;
 mod open;
@@ -72,6 +74,8 @@ pub struct Cli {
 enum Command {
     /// Write a first spec that runs, with a photometric file beside it
     Init(init::InitArgs),
+    /// Make a spec folder of a scene's geometry: Radiance, Wavefront OBJ or glTF
+    Import(import::ImportArgs),
     /// Run every procedure of a spec on every engine, compare and report
     Run(RunArgs),
     /// Validate specs and print the plan: what would run, what is skipped and why
@@ -322,6 +326,7 @@ impl Cli {
                 }
             }
             Command::Init(args) => init::init(&args),
+            Command::Import(args) => import::run(&args, trust),
             Command::Completions(args) => shell::completions(&args, Self::command()),
             Command::Man(args) => shell::man(&args, Self::command()),
             Command::Open(args) => open::open(&args),

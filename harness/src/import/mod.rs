@@ -1,0 +1,360 @@
+//! Scenes of other programs -> the geometry of a spec: a box room and a mesh a reflectance.
+//!
+//! Surfaces are opaque and diffuse in a spec; what is not is refused or left out, and told. Luminaires are the spec's own.
+
+mod gltf;
+mod obj;
+mod place;
+mod radiance;
+mod raw;
+mod shell;
+mod soup;
+mod told;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::DVec3;
+use luminaire::geometry::{Mesh, Reflectances, Room};
+
+pub use told::{LeftOut, MeshTold, RoomTold, Taken, Told};
+
+use crate::spec::{Faults, SpecError, Trust, suggestion};
+use raw::{Kind, Raw, Scene, luminous};
+use soup::{Corners, Soup};
+
+/// The black box stands so far off everything, as a part of the largest extent: farther than any renderer's rounding.
+const MARGIN: f64 = 0.05;
+
+/// The farthest that a corner may be off the scene's origin, in metres.
+const FAR_M: f64 = 1e6;
+
+/// Which axis of a scene is up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Up {
+    /// y
+    Y,
+    /// z
+    Z,
+}
+
+/// What a user says of a scene.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Which axis is up; as usual in its format where that is not said.
+    pub up: Option<Up>,
+    /// Metres a unit.
+    pub unit_m: f64,
+    /// Reflectances of materials by name, whatever the scene says of them.
+    pub reflectances: BTreeMap<String, f64>,
+    /// Whether surfaces that are not opaque, diffuse and plain are left out; else they are refused.
+    pub leaves_out: bool,
+    pub trust: Trust,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { up: None, unit_m: 1.0, reflectances: BTreeMap::new(), leaves_out: false, trust: Trust::Own }
+    }
+}
+
+/// A scene's geometry as a spec has it.
+#[derive(Debug)]
+pub struct Imported {
+    pub room: Room,
+    /// Where the scene's origin is in the room.
+    pub origin_m: DVec3,
+    /// Those that the room is not, in the scene's place; files by name.
+    pub meshes: Vec<Part>,
+    /// The box around everything that was taken, in the room.
+    pub low_m: DVec3,
+    pub high_m: DVec3,
+    pub told: Told,
+}
+
+impl Imported {
+    /// Where a luminaire may hang: below the highest surface that has room below it, near the middle, in the room.
+    pub fn lamp_m(&self) -> DVec3 {
+        place::lamp(self)
+    }
+}
+
+/// The triangles of one reflectance.
+#[derive(Debug)]
+pub struct Part {
+    /// The name of its file.
+    pub file: String,
+    pub reflectance: f64,
+    pub mesh: Mesh,
+}
+
+impl Part {
+    /// Its file: a Wavefront OBJ that reads back as the same numbers.
+    pub fn obj(&self) -> String {
+        let mut text = format!("# luxproof import: metres, z up; reflectance {}\n", self.reflectance);
+        for [x, y, z] in self.mesh.vertices_m.iter().map(DVec3::to_array) {
+            text.push_str(&format!("v {x} {y} {z}\n"));
+        }
+        for [a, b, c] in self.mesh.triangles.iter().map(|t| t.map(|v| v + 1)) {
+            text.push_str(&format!("f {a} {b} {c}\n"));
+        }
+        text
+    }
+}
+
+/// Formats by the ends of file names.
+#[derive(Clone, Copy)]
+enum Format {
+    Radiance,
+    Obj,
+    Gltf,
+}
+
+impl Format {
+    fn of(path: &Path) -> Option<Self> {
+        let end = path.extension()?.to_string_lossy().to_lowercase();
+        match end.as_str() {
+            "rad" => Some(Self::Radiance),
+            "obj" => Some(Self::Obj),
+            "gltf" | "glb" => Some(Self::Gltf),
+            _ => None,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Radiance => "radiance",
+            Self::Obj => "obj",
+            Self::Gltf => "gltf",
+        }
+    }
+
+    /// glTF says that y is up; in OBJ files, as specs name them, and in Radiance's, z is.
+    fn up(self) -> Up {
+        if matches!(self, Self::Gltf) { Up::Y } else { Up::Z }
+    }
+}
+
+/// Reads a scene and makes a spec's geometry of it.
+pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
+    let scene = Scene { path, trust: options.trust };
+    let format = Format::of(path).ok_or_else(|| {
+        let help = "give a Radiance source (.rad), a Wavefront file (.obj) or glTF 2.0 (.gltf, .glb)";
+        scene.fault(None, "this is no scene by its name", help)
+    })?;
+    let mut raw = match format {
+        Format::Radiance => radiance::read(&scene)?,
+        Format::Obj => obj::read(&scene)?,
+        Format::Gltf => gltf::read(&scene)?,
+    };
+    let chosen = chosen(&raw, options)?;
+    let up = options.up.unwrap_or(format.up());
+    let triangles = placed(&raw, &chosen, up, options.unit_m)?;
+    let soup = Soup::of(&triangles, raw.precision);
+    if soup.facets.is_empty() {
+        let help = "look at what was left out; --reflectance NAME=0.5 takes a material in";
+        return Err(scene.fault(None, "no surface of it was taken", help).into());
+    }
+    doubtful(&mut raw, &soup);
+    let (low, high) = soup.extent();
+    let shell = shell::shell(&soup, low, high);
+    let (room_low, room_high) = match &shell {
+        Ok(_) => (low, high),
+        Err(_) => {
+            let margin = DVec3::splat(margin(low, high));
+            (low - margin, high + margin)
+        }
+    };
+    let black = Reflectances::with_equal_walls(0.0, 0.0, 0.0);
+    let reflectance = shell.as_ref().map_or(black, |shell| shell.reflectances);
+    let is_part = shell.as_ref().map_or_else(|_| vec![false; soup.facets.len()], |shell| shell.is_part.clone());
+    if let Some(loose) = shell.as_ref().ok().map(|shell| shell.loose).filter(|loose| *loose > 0) {
+        raw.note(format!(
+            "{loose} triangles lie free in the plane of a surface of the room: renderers differ in which of both they see; lift them"
+        ));
+    }
+    let meshes = parts(&soup, &is_part);
+    let told = Told {
+        scene: path.display().to_string(),
+        format: format.name(),
+        up: if up == Up::Y { "y" } else { "z" },
+        unit_m: options.unit_m,
+        triangles: soup.facets.len(),
+        materials: taken(&raw, &chosen, &soup, options),
+        min_m: low.to_array(),
+        max_m: high.to_array(),
+        room: RoomTold {
+            size_m: (room_high - room_low).to_array(),
+            is_of_scene: shell.is_ok(),
+            margin_m: if shell.is_ok() { 0.0 } else { margin(low, high) },
+            why: shell.err(),
+        },
+        meshes: meshes
+            .iter()
+            .map(|part| MeshTold {
+                file: part.file.clone(),
+                reflectance: part.reflectance,
+                triangles: part.mesh.triangles.len(),
+                vertices: part.mesh.vertices_m.len(),
+            })
+            .collect(),
+        left_out: left_out(&raw, &chosen),
+        notes: raw.notes,
+    };
+    Ok(Imported {
+        room: Room { size_m: room_high - room_low, reflectance },
+        origin_m: DVec3::ZERO - room_low,
+        meshes,
+        low_m: low - room_low,
+        high_m: high - room_low,
+        told,
+    })
+}
+
+fn margin(low: DVec3, high: DVec3) -> f64 {
+    let margin = MARGIN * (high - low).max_element();
+    // Two digits: nobody reads more.
+    let digits = 10_f64.powf(1.0 - margin.log10().floor());
+    (margin * digits).ceil() / digits
+}
+
+/// The reflectance of each material that is taken; all that is wrong with the others at once.
+fn chosen(raw: &Raw<'_>, options: &Options) -> Result<Vec<Option<f64>>, Faults> {
+    let names = || raw.materials.iter().filter(|m| m.surfaces > 0).map(|m| m.name.as_str());
+    let mut faults: Vec<SpecError> = vec![];
+    for name in options.reflectances.keys().filter(|name| !names().any(|known| known == *name)) {
+        let message = format!("--reflectance {name}: no surface is of that material");
+        faults.push(SpecError::of(raw.scene.path, message, suggestion(name, names())));
+    }
+    let reflectance = |m: &raw::Material| {
+        if m.surfaces == 0 {
+            return Ok(None);
+        }
+        let given = options.reflectances.get(&m.name).copied();
+        let (what, help) = match (&m.kind, given) {
+            (_, Some(rho)) => return Ok(Some(rho)),
+            (Kind::Diffuse { rgb }, None) => return Ok(Some(luminous(*rgb))),
+            (Kind::Light(_), None) => return Ok(None),
+            (Kind::Other(_) | Kind::Unknown, None) if options.leaves_out => return Ok(None),
+            (Kind::Other(what), None) => (what.as_str(), "have it diffuse by --reflectance NAME=0.5, or leave all such surfaces out by --leave-out"),
+            (Kind::Unknown, None) => ("of a reflectance that nothing says", "give it by --reflectance NAME=0.5, or leave such surfaces out by --leave-out"),
+        };
+        let name: String = m.name.chars().take(80).collect();
+        let message = format!("`{name}` is {what}, and {} surfaces are of it{}", m.surfaces, first(raw, m));
+        Err(SpecError { line: m.line, ..SpecError::of(&m.file, message, help) })
+    };
+    let mut all = vec![];
+    for material in &raw.materials {
+        match reflectance(material) {
+            Ok(rho) => all.push(rho),
+            Err(fault) if faults.len() < MAX_FAULTS => faults.push(fault),
+            Err(_) => break,
+        }
+    }
+    Faults::of(faults).map_or(Ok(all), Err)
+}
+
+/// So many are told at once.
+const MAX_FAULTS: usize = 50;
+
+/// Where the first surface of a material stands.
+fn first(raw: &Raw<'_>, material: &raw::Material) -> String {
+    material.first.map(|line| format!(", the first at {}:{line}", raw.scene.path.display())).unwrap_or_default()
+}
+
+/// The triangles of the materials that are taken, in metres, z up.
+fn placed(raw: &Raw<'_>, chosen: &[Option<f64>], up: Up, unit_m: f64) -> Result<Vec<Corners>, SpecError> {
+    let place = |p: DVec3| unit_m * if up == Up::Y { DVec3::new(p.x, -p.z, p.y) } else { p };
+    let taken = raw.triangles.iter().filter_map(|t| {
+        let rho = chosen[t.material as usize]?;
+        Some((t.corners.map(place), t.material, rho))
+    });
+    let taken: Vec<Corners> = taken.collect();
+    let is_near = |p: &DVec3| p.is_finite() && p.abs().max_element() <= FAR_M;
+    match taken.iter().flat_map(|(corners, ..)| corners).find(|p| !is_near(p)) {
+        Some(far) => {
+            let message = format!("a corner is at {far} m, and none lies beyond {FAR_M:e} m");
+            Err(raw.scene.fault(None, message, "correct the scene, or give its unit by --unit 0.001"))
+        }
+        None => Ok(taken),
+    }
+}
+
+/// Notes what of the triangles is hardly meant.
+fn doubtful(raw: &mut Raw<'_>, soup: &Soup) {
+    if soup.flat > 0 {
+        raw.note(format!("{} triangles of no area are left out", soup.flat));
+    }
+    if soup.twice > 0 {
+        raw.note(format!("{} triangles that were there twice are taken once", soup.twice));
+    }
+    if soup.contrary > 0 {
+        raw.note(format!(
+            "{} triangles lie on others of another reflectance: renderers differ in which of both they see",
+            soup.contrary
+        ));
+    }
+}
+
+/// A mesh a reflectance, the least first, of what is no part of the room.
+fn parts(soup: &Soup, is_of_room: &[bool]) -> Vec<Part> {
+    let mut meshes: BTreeMap<u64, (f64, Vec<[u32; 3]>)> = BTreeMap::new();
+    for (facet, _) in soup.facets.iter().zip(is_of_room).filter(|(_, is_of_room)| !**is_of_room) {
+        // Bits of numbers from 0 are in the order of the numbers.
+        let of = meshes.entry(facet.reflectance.to_bits()).or_insert((facet.reflectance, vec![]));
+        of.1.push(facet.vertices);
+    }
+    let part = |(reflectance, mut triangles): (f64, Vec<[u32; 3]>)| {
+        let mut places = BTreeMap::new();
+        let mut vertices_m = vec![];
+        for v in triangles.iter_mut().flatten() {
+            *v = *places.entry(*v).or_insert_with(|| {
+                vertices_m.push(soup.vertices[*v as usize]);
+                vertices_m.len() as u32 - 1
+            });
+        }
+        Part { file: format!("reflectance-{reflectance}.obj"), reflectance, mesh: Mesh { vertices_m, triangles } }
+    };
+    meshes.into_values().map(part).collect()
+}
+
+fn taken(raw: &Raw<'_>, chosen: &[Option<f64>], soup: &Soup, options: &Options) -> Vec<Taken> {
+    let mut sums = vec![(0, 0.0); raw.materials.len()];
+    for facet in &soup.facets {
+        let (triangles, area) = &mut sums[facet.material as usize];
+        *triangles += 1;
+        *area += soup.area(facet);
+    }
+    let row = |((m, rho), (triangles, area)): ((&raw::Material, &Option<f64>), &(usize, f64))| {
+        let is_given = options.reflectances.contains_key(&m.name);
+        Some(Taken {
+            name: m.name.clone(),
+            triangles: *triangles,
+            area_m2: *area,
+            reflectance: (*rho)?,
+            rgb: if let Kind::Diffuse { rgb } = m.kind { Some(rgb).filter(|_| !is_given) } else { None },
+            is_given,
+        })
+    };
+    raw.materials.iter().zip(chosen).zip(&sums).filter_map(row).collect()
+}
+
+fn left_out(raw: &Raw<'_>, chosen: &[Option<f64>]) -> Vec<LeftOut> {
+    let materials = raw.materials.iter().zip(chosen).filter(|(m, rho)| rho.is_none() && m.surfaces > 0);
+    let of_material = materials.map(|(m, _)| {
+        let what = match &m.kind {
+            Kind::Light(what) => format!("surfaces of `{}`, which shines ({what}): luminaires are the spec's own", m.name),
+            Kind::Other(what) => format!("surfaces of `{}`, {what}", m.name),
+            Kind::Unknown | Kind::Diffuse { .. } => format!("surfaces of `{}`, of no known reflectance", m.name),
+        };
+        let line = m.line.map(|line| format!("{}:{line}", m.file.display()));
+        let first = m.first.map(|line| format!("{}:{line}", raw.scene.path.display()));
+        LeftOut { what, count: m.surfaces, place: line.or(first) }
+    });
+    let others = raw.others.iter().map(|(what, (count, line))| LeftOut {
+        what: (*what).to_owned(),
+        count: *count,
+        place: line.map(|line| format!("{}:{line}", raw.scene.path.display())),
+    });
+    of_material.chain(others).collect()
+}

@@ -1,0 +1,115 @@
+//! What an import took and what it left out, for people and for programs.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// All that is told.
+#[derive(Debug, Serialize)]
+pub struct Told {
+    pub scene: String,
+    /// `radiance`, `obj` or `gltf`.
+    pub format: &'static str,
+    /// Which of the scene's axes is up.
+    pub up: &'static str,
+    /// Metres a unit of the scene.
+    pub unit_m: f64,
+    pub triangles: usize,
+    pub materials: Vec<Taken>,
+    /// Around what was taken, in metres, in the scene's own place.
+    pub min_m: [f64; 3],
+    pub max_m: [f64; 3],
+    pub room: RoomTold,
+    pub meshes: Vec<MeshTold>,
+    pub left_out: Vec<LeftOut>,
+    pub notes: Vec<String>,
+}
+
+/// A material that was taken.
+#[derive(Debug, Serialize)]
+pub struct Taken {
+    pub name: String,
+    pub triangles: usize,
+    /// Of one side.
+    pub area_m2: f64,
+    pub reflectance: f64,
+    /// Red, green and blue, where the reflectance is made of them.
+    pub rgb: Option<[f64; 3]>,
+    /// Whether the command line gave it.
+    pub is_given: bool,
+}
+
+/// The room.
+#[derive(Debug, Serialize)]
+pub struct RoomTold {
+    pub size_m: [f64; 3],
+    /// Whether it is the scene's own surfaces; else it is black and lies around them.
+    pub is_of_scene: bool,
+    /// Why it is not.
+    pub why: Option<String>,
+    /// How far it stands off them, in metres.
+    pub margin_m: f64,
+}
+
+/// A file of triangles.
+#[derive(Debug, Serialize)]
+pub struct MeshTold {
+    pub file: String,
+    pub reflectance: f64,
+    pub triangles: usize,
+    pub vertices: usize,
+}
+
+/// Surfaces or other things that were not taken.
+#[derive(Debug, Serialize)]
+pub struct LeftOut {
+    pub what: String,
+    pub count: usize,
+    /// Where the scene says what it is, or where the first stands.
+    pub place: Option<String>,
+}
+
+/// So many lines of a kind; the JSON has them all.
+const MAX_LINES: usize = 40;
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { scene, format, up, unit_m, triangles, .. } = self;
+        let unit = if *unit_m == 1.0 { "in metres".to_owned() } else { format!("a unit is {unit_m} m") };
+        writeln!(f, "{scene} ({format}, {up} up, {unit}): {triangles} triangles taken")?;
+        let width = self.materials.iter().map(|m| m.name.chars().count()).max().unwrap_or(0).clamp(8, 40);
+        writeln!(f, "  {:width$} {:>9} {:>10} {:>11}", "material", "triangles", "area m2", "reflectance")?;
+        for m in self.materials.iter().take(MAX_LINES) {
+            let colour = |[r, g, b]: [f64; 3]| format!("  of {r} {g} {b}");
+            let from = match m.rgb {
+                _ if m.is_given => "  by --reflectance".to_owned(),
+                Some(rgb) if rgb.iter().any(|part| *part != rgb[0]) => colour(rgb),
+                _ => String::new(),
+            };
+            writeln!(f, "  {:width$} {:>9} {:>10.4} {:>11}{from}", m.name, m.triangles, m.area_m2, m.reflectance)?;
+        }
+        more(f, self.materials.len())?;
+        let box_of = |[x, y, z]: [f64; 3]| format!("[{x}, {y}, {z}]");
+        writeln!(f, "bounding box: {} to {} m in the scene", box_of(self.min_m), box_of(self.max_m))?;
+        let size = box_of(self.room.size_m);
+        match &self.room.why {
+            None => writeln!(f, "room: {size} m, the scene's outermost surfaces, which are a box")?,
+            Some(why) => writeln!(f, "room: {size} m, black, {} m around everything: {why}", self.room.margin_m)?,
+        }
+        for m in self.meshes.iter().take(MAX_LINES) {
+            let MeshTold { file, reflectance, triangles, vertices } = m;
+            writeln!(f, "mesh: {file}, reflectance {reflectance}, {triangles} triangles, {vertices} vertices")?;
+        }
+        more(f, self.meshes.len())?;
+        for l in self.left_out.iter().take(MAX_LINES) {
+            let place = l.place.as_ref().map(|place| format!(" ({place})")).unwrap_or_default();
+            writeln!(f, "left out: {} {}{place}", l.count, l.what)?;
+        }
+        more(f, self.left_out.len())?;
+        self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
+    }
+}
+
+fn more(f: &mut fmt::Formatter<'_>, count: usize) -> fmt::Result {
+    if count > MAX_LINES { writeln!(f, "  and {} more: --format json", count - MAX_LINES) } else { Ok(()) }
+}
