@@ -4,10 +4,12 @@
 use std::fs;
 use std::path::Path;
 
+use glam::DVec3;
 use luminaire::geometry::Mesh;
 use luminaire::photometry::{eulumdat, lm63, tm33};
 use luminaire::scene::{Meter, Scene, Transport};
 use luxproof::engines::{ExternalReadings, Job, Station};
+use luxproof::import::{Options, import};
 use luxproof::record::{EngineName, MeterId, ProcedureId};
 use luxproof::report::{Detail, Report, Screen, Style, csv, junit, markdown, page, terminal};
 use luxproof::spec::{Budget, Case, Trust};
@@ -17,7 +19,7 @@ use luxproof::trend::history::{History, changes, site};
 pub(crate) type Target = fn(&[u8]);
 
 /// All of them, by the names of their folders of seeds.
-pub(crate) const ALL: [(&str, Target); 9] = [
+pub(crate) const ALL: [(&str, Target); 12] = [
     ("lm63", lm63),
     ("eulumdat", eulumdat),
     ("tm33", tm33),
@@ -27,6 +29,9 @@ pub(crate) const ALL: [(&str, Target); 9] = [
     ("history", history),
     ("baseline", baseline),
     ("answer", answer),
+    ("radiance_scene", radiance_scene),
+    ("obj_scene", obj_scene),
+    ("gltf_scene", gltf_scene),
 ];
 
 /// What was read survives being written.
@@ -126,9 +131,43 @@ pub(crate) fn baseline(bytes: &[u8]) {
     }
 }
 
+/// Commands of it are not run.
+pub(crate) fn radiance_scene(bytes: &[u8]) {
+    scene("any.rad", bytes);
+}
+
+/// It may name itself as its material library.
+pub(crate) fn obj_scene(bytes: &[u8]) {
+    scene("any.obj", bytes);
+}
+
+pub(crate) fn gltf_scene(bytes: &[u8]) {
+    scene("any.gltf", bytes);
+    scene("any.glb", bytes);
+}
+
+/// What is taken of a scene lies in its room and is written as it is; what is refused is refused with the file named.
+fn scene(name: &str, bytes: &[u8]) {
+    let options = Options { leaves_out: true, trust: Trust::Stranger, ..Options::default() };
+    match kept(name, bytes, |path| import(path, &options)) {
+        Ok(imported) => {
+            let inside = |at: DVec3| at.cmpge(DVec3::ZERO).all() && at.cmple(imported.room.size_m).all();
+            assert!(imported.room.size_m.is_finite() && inside(imported.lamp_m()));
+            for part in &imported.meshes {
+                assert!((0.0..=1.0).contains(&part.reflectance) && !part.mesh.triangles.is_empty());
+                assert!(part.mesh.vertices_m.iter().all(|v| inside(*v + imported.origin_m)));
+                let again = Mesh::parse_obj(&mut part.obj().as_bytes(), Path::new("again.obj"));
+                assert_eq!(again.expect("it is a mesh").triangles.len(), part.mesh.triangles.len());
+            }
+            assert!(imported.told.to_string().contains(name));
+        }
+        Err(faults) => assert!(faults.to_string().contains("any."), "{faults}"),
+    }
+}
+
 /// What an adapter prints that was asked for two meters: readings of both, or an error.
 pub(crate) fn answer(bytes: &[u8]) {
-    let meter = Meter { position_m: glam::DVec3::ONE, normal: glam::DVec3::Z };
+    let meter = Meter { position_m: DVec3::ONE, normal: DVec3::Z };
     let job = Job {
         case: "any".to_owned(),
         procedure: ProcedureId::DirectIlluminance,

@@ -184,7 +184,10 @@ mod tests {
             ("v 0 0 0\n", "holds no face"),
             ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "not finite"),
             ("v 0 0 1e308\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "[0.0, 0.0, 1e308], which is not finite or beyond 1e90 m"),
-            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "desk.obj:4: there is no vertex 9: the file has 3; repair the file"),
+            (
+                "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n",
+                "desk.obj:4: there is no vertex 9: the file has 3; repair the file",
+            ),
             ("v 0 0 x\n", "desk.obj:1: `x` is no number"),
             ("v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 1 0\nf 1 2 3 4\n", "desk.obj:5: its edges cross"),
         ] {

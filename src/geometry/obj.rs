@@ -176,7 +176,11 @@ fn vertex(rest: &str) -> Result<DVec3, String> {
 fn corner(word: &str, vertices: usize) -> Result<u32, String> {
     let none = || format!("`{}` names no vertex", shortened(word));
     let number: i64 = word.split('/').next().and_then(|first| first.parse().ok()).ok_or_else(none)?;
-    let index = if number < 0 { i64::try_from(vertices).ok().and_then(|n| n.checked_add(number)) } else { number.checked_sub(1) };
+    let index = if number < 0 {
+        i64::try_from(vertices).ok().and_then(|n| n.checked_add(number))
+    } else {
+        number.checked_sub(1)
+    };
     index.and_then(|index| u32::try_from(index).ok()).filter(|index| *index < u32::MAX).ok_or_else(none)
 }
 

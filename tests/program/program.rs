@@ -18,6 +18,7 @@ mod faults;
 mod furnished_office;
 mod guide;
 mod hunt;
+mod import;
 mod long_report;
 mod main_job;
 mod measuring;

@@ -81,13 +81,7 @@ pub(super) fn walls(rho: [f64; 4], number: impl Fn(f64) -> String) -> String {
 pub(super) fn downlight() -> String {
     let gammas: Vec<f64> = (0..=36).map(|k| 2.5 * f64::from(k)).collect();
     let list = |values: &mut dyn Iterator<Item = f64>| {
-        values
-            .map(|v| trimmed(v, 4))
-            .collect::<Vec<_>>()
-            .chunks(10)
-            .map(|c| c.join(" "))
-            .collect::<Vec<_>>()
-            .join("\n")
+        values.map(|v| trimmed(v, 4)).collect::<Vec<_>>().chunks(10).map(|c| c.join(" ")).collect::<Vec<_>>().join("\n")
     };
     let candela = list(&mut gammas.iter().map(|gamma| 1000.0 * gamma.to_radians().cos()));
     format!(

@@ -116,7 +116,9 @@ fn text(scene: &Path, spec: &Path, imported: &Imported) -> String {
     let meshes: String = imported.meshes.iter().map(mesh).collect();
     let obstacles = if meshes.is_empty() { meshes } else { format!("\nobstacles:\n{meshes}") };
     let first = First {
-        about: &format!("The geometry of {name}, by luxproof import; its luminaire and meters are placeholders: put yours there."),
+        about: &format!(
+            "The geometry of {name}, by luxproof import; its luminaire and meters are placeholders: put yours there."
+        ),
         file: spec,
         title: &name,
         size: imported.room.size_m.to_array().map(shown),

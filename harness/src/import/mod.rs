@@ -162,9 +162,11 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
         Ok(_) => (low, high),
         Err(_) => {
             let margin = DVec3::splat(margin(low, high));
-            (low - margin, high + margin)
+            ((low - margin).map(short), (high + margin).map(short))
         }
     };
+    // Of the room that is the scene's own this is what its farthest corner is at.
+    let size_m = if shell.is_ok() { room_high - room_low } else { (room_high - room_low).map(short) };
     let black = Reflectances::with_equal_walls(0.0, 0.0, 0.0);
     let reflectance = shell.as_ref().map_or(black, |shell| shell.reflectances);
     let is_part = shell.as_ref().map_or_else(|_| vec![false; soup.facets.len()], |shell| shell.is_part.clone());
@@ -184,7 +186,7 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
         min_m: low.to_array(),
         max_m: high.to_array(),
         room: RoomTold {
-            size_m: (room_high - room_low).to_array(),
+            size_m: size_m.to_array(),
             is_of_scene: shell.is_ok(),
             margin_m: if shell.is_ok() { 0.0 } else { margin(low, high) },
             why: shell.err(),
@@ -202,7 +204,7 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
         notes: raw.notes,
     };
     Ok(Imported {
-        room: Room { size_m: room_high - room_low, reflectance },
+        room: Room { size_m, reflectance },
         origin_m: DVec3::ZERO - room_low,
         meshes,
         low_m: low - room_low,
@@ -211,11 +213,16 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
     })
 }
 
+/// To a nanometre: the box stands wherever it likes.
+fn short(length_m: f64) -> f64 {
+    (length_m * 1e9).round() / 1e9
+}
+
 fn margin(low: DVec3, high: DVec3) -> f64 {
     let margin = MARGIN * (high - low).max_element();
     // Two digits: nobody reads more.
     let digits = 10_f64.powf(1.0 - margin.log10().floor());
-    (margin * digits).ceil() / digits
+    (margin * digits).round() / digits
 }
 
 /// The reflectance of each material that is taken; all that is wrong with the others at once.
@@ -236,8 +243,14 @@ fn chosen(raw: &Raw<'_>, options: &Options) -> Result<Vec<Option<f64>>, Faults> 
             (Kind::Diffuse { rgb }, None) => return Ok(Some(luminous(*rgb))),
             (Kind::Light(_), None) => return Ok(None),
             (Kind::Other(_) | Kind::Unknown, None) if options.leaves_out => return Ok(None),
-            (Kind::Other(what), None) => (what.as_str(), "have it diffuse by --reflectance NAME=0.5, or leave all such surfaces out by --leave-out"),
-            (Kind::Unknown, None) => ("of a reflectance that nothing says", "give it by --reflectance NAME=0.5, or leave such surfaces out by --leave-out"),
+            (Kind::Other(what), None) => (
+                what.as_str(),
+                "have it diffuse by --reflectance NAME=0.5, or leave all such surfaces out by --leave-out",
+            ),
+            (Kind::Unknown, None) => (
+                "of a reflectance that nothing says",
+                "give it by --reflectance NAME=0.5, or leave such surfaces out by --leave-out",
+            ),
         };
         let name: String = m.name.chars().take(80).collect();
         let message = format!("`{name}` is {what}, and {} surfaces are of it{}", m.surfaces, first(raw, m));
@@ -343,7 +356,9 @@ fn left_out(raw: &Raw<'_>, chosen: &[Option<f64>]) -> Vec<LeftOut> {
     let materials = raw.materials.iter().zip(chosen).filter(|(m, rho)| rho.is_none() && m.surfaces > 0);
     let of_material = materials.map(|(m, _)| {
         let what = match &m.kind {
-            Kind::Light(what) => format!("surfaces of `{}`, which shines ({what}): luminaires are the spec's own", m.name),
+            Kind::Light(what) => {
+                format!("surfaces of `{}`, which shines ({what}): luminaires are the spec's own", m.name)
+            }
             Kind::Other(what) => format!("surfaces of `{}`, {what}", m.name),
             Kind::Unknown | Kind::Diffuse { .. } => format!("surfaces of `{}`, of no known reflectance", m.name),
         };
@@ -358,3 +373,6 @@ fn left_out(raw: &Raw<'_>, chosen: &[Option<f64>]) -> Vec<LeftOut> {
     });
     of_material.chain(others).collect()
 }
+
+#[cfg(test)]
+mod tests;

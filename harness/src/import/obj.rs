@@ -59,12 +59,7 @@ pub(super) fn read<'a>(scene: &'a Scene<'a>) -> Result<Raw<'a>, SpecError> {
 }
 
 /// Reads what an `mtllib` names: a file whose name may have blanks, or several files.
-fn libraries(
-    raw: &mut Raw<'_>,
-    names: &str,
-    line: usize,
-    known: &mut HashMap<String, u32>,
-) -> Result<(), SpecError> {
+fn libraries(raw: &mut Raw<'_>, names: &str, line: usize, known: &mut HashMap<String, u32>) -> Result<(), SpecError> {
     let scene = raw.scene;
     let whole = scene.beside(names);
     let each: Vec<&str> = if whole.is_file() { vec![names] } else { names.split_whitespace().collect() };
@@ -112,7 +107,10 @@ fn library(raw: &mut Raw<'_>, path: &Path, text: &str, known: &mut HashMap<Strin
     }
     keep(raw, entry)?;
     if glossy > 0 {
-        raw.note(format!("gloss (Ks) of {glossy} materials of {} is left out: every surface is diffuse", path.display()));
+        raw.note(format!(
+            "gloss (Ks) of {glossy} materials of {} is left out: every surface is diffuse",
+            path.display()
+        ));
     }
     Ok(())
 }

@@ -159,7 +159,12 @@ impl<'a> Raw<'a> {
         }
     }
 
-    pub(super) fn triangle(&mut self, material: u32, line: Option<usize>, corners: [DVec3; 3]) -> Result<(), SpecError> {
+    pub(super) fn triangle(
+        &mut self,
+        material: u32,
+        line: Option<usize>,
+        corners: [DVec3; 3],
+    ) -> Result<(), SpecError> {
         if self.triangles.len() >= MAX_TRIANGLES {
             let message = format!("the scene has more than {MAX_TRIANGLES} triangles");
             return Err(self.scene.fault(line, message, "import a part of it, or have its meshes simplified first"));

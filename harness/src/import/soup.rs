@@ -115,6 +115,9 @@ mod tests {
             1e-6,
         );
         assert_eq!((soup.facets.len(), soup.flat, soup.twice, soup.contrary), (3, 1, 1, 1));
-        assert_eq!(soup.vertices[..4], [[0.1, 0.2, 0.0], [5.3, 0.2, 0.0], [5.3, 3.3, 0.0], [0.1, 3.3, 0.0]].map(DVec3::from));
+        assert_eq!(
+            soup.vertices[..4],
+            [[0.1, 0.2, 0.0], [5.3, 0.2, 0.0], [5.3, 3.3, 0.0], [0.1, 3.3, 0.0]].map(DVec3::from)
+        );
     }
 }

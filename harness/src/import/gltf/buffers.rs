@@ -86,9 +86,7 @@ impl<'a> Buffers<'a> {
             _ => |b, _| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         };
         let size = component(of.component_type).unwrap_or(4);
-        let point = |element: &[u8]| {
-            DVec3::from_array([0, 1, 2].map(|k| decode(&element[k * size..], of.normalized)))
-        };
+        let point = |element: &[u8]| DVec3::from_array([0, 1, 2].map(|k| decode(&element[k * size..], of.normalized)));
         let points: Vec<DVec3> = self.elements(accessor, of, 3)?.map(point).collect();
         match points.iter().position(|p| !p.is_finite()) {
             Some(k) => Err(self.fault(accessor, &format!("point {k} is not finite"))),
@@ -138,7 +136,11 @@ impl<'a> Buffers<'a> {
         let view = of.buffer_view.and_then(|view| views.get(view)).ok_or_else(|| fault("it has no buffer view"))?;
         if view.extensions.as_ref().is_some_and(|all| all.meshopt.is_some()) {
             let help = "export it without compression, or run `gltf-transform copy` on it";
-            return Err(self.scene.fault(None, format!("accessors[{k}] is compressed (EXT_meshopt_compression)"), help));
+            return Err(self.scene.fault(
+                None,
+                format!("accessors[{k}] is compressed (EXT_meshopt_compression)"),
+                help,
+            ));
         }
         let buffer = self.bytes.get(view.buffer).ok_or_else(|| fault("its buffer is not there"))?;
         let end = view.byte_offset.checked_add(view.byte_length);
@@ -182,7 +184,10 @@ fn uri_bytes(scene: &Scene<'_>, uri: &str) -> Result<Vec<u8>, (String, &'static 
         return STANDARD.decode(encoded).map_err(|e| (format!("its data URI: {e}"), BROKEN));
     }
     if uri.contains("://") {
-        return Err((format!("{} is on a network", uri.chars().take(80).collect::<String>()), "fetch it, and name the file"));
+        return Err((
+            format!("{} is on a network", uri.chars().take(80).collect::<String>()),
+            "fetch it, and name the file",
+        ));
     }
     let path = scene.beside(&unescaped(uri));
     scene.read(&path).map_err(|e| (format!("{} cannot be read: {e}", path.display()), "give it beside the .gltf"))

@@ -27,20 +27,15 @@ const KNOWN: [&str; 6] = [
 /// Extensions that change where geometry is, and that are read nowhere here; where one is used it must not be passed over.
 const REFUSED: [&str; 3] = ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "EXT_mesh_gpu_instancing"];
 
-const UNPACK: &str = "export it without that extension, or undo it first: `gltf-transform` and Blender read and write such files";
+const UNPACK: &str =
+    "export it without that extension, or undo it first: `gltf-transform` and Blender read and write such files";
 
 /// Reads a scene.
 pub(super) fn read<'a>(scene: &'a Scene<'a>) -> Result<Raw<'a>, SpecError> {
     let bytes = scene.bytes()?;
     let (json, binary) = buffers::chunks(scene, &bytes)?;
-    let document: Document = serde_json::from_slice(json).map_err(|error| SpecError {
-        column: Some(error.column()).filter(|column| *column > 0 && binary.is_none()),
-        ..scene.fault(
-            Some(error.line()).filter(|line| *line > 0 && binary.is_none()),
-            format!("this is no glTF: {error}"),
-            "export it again as glTF 2.0",
-        )
-    })?;
+    let document: Document =
+        serde_json::from_slice(json).map_err(|error| no_document(scene, &error, binary.is_some()))?;
     if !document.asset.version.starts_with("2.") {
         let version: String = document.asset.version.chars().take(20).collect();
         return Err(scene.fault(None, format!("asset.version is `{version}`"), "export it as glTF 2.0"));
@@ -57,6 +52,16 @@ pub(super) fn read<'a>(scene: &'a Scene<'a>) -> Result<Raw<'a>, SpecError> {
         raw.note("animations are left out: nodes are where they are without them");
     }
     Ok(raw)
+}
+
+/// What is wrong with a document, at its place where that is one of the file.
+fn no_document(scene: &Scene<'_>, error: &serde_json::Error, is_binary: bool) -> SpecError {
+    let message = error.to_string();
+    // The message ends with the place.
+    let message = message.split(" at line ").next().unwrap_or(&message);
+    let place = |number: usize| Some(number).filter(|number| *number > 0 && !is_binary);
+    let fault = scene.fault(place(error.line()), format!("this is no glTF: {message}"), "export it again as glTF 2.0");
+    SpecError { column: place(error.column()), ..fault }
 }
 
 /// Refuses extensions without which the scene is another one, and tells of the others.
@@ -190,7 +195,11 @@ impl Reader<'_, '_> {
         }
         let Some(mesh) = node.mesh else { return Ok(()) };
         let document = self.document;
-        let of = document.meshes.0.get(mesh).ok_or_else(|| self.fault(&format!("nodes[{k}]: there is no meshes[{mesh}]")))?;
+        let of = document
+            .meshes
+            .0
+            .get(mesh)
+            .ok_or_else(|| self.fault(&format!("nodes[{k}]: there is no meshes[{mesh}]")))?;
         let is_bent = |weights: &Option<document::List<f64>>| weights.iter().flat_map(|w| &w.0).any(|w| *w != 0.0);
         if node.skin.is_some() || is_bent(&node.weights) || is_bent(&of.weights) {
             let help = "apply skins and shape keys before exporting it";
@@ -242,9 +251,10 @@ impl Reader<'_, '_> {
         };
         match mode {
             4 => indices.as_chunks().0.iter().try_for_each(|t: &[u32; 3]| add(*t)),
-            5 => indices.windows(3).enumerate().try_for_each(|(k, w)| {
-                add(if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] })
-            }),
+            5 => indices
+                .windows(3)
+                .enumerate()
+                .try_for_each(|(k, w)| add(if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] })),
             6 => indices.windows(2).skip(1).try_for_each(|w| add([indices[0], w[0], w[1]])),
             _ => Err(self.fault(&format!("{at}: mode {mode} is none"))),
         }

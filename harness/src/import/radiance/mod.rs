@@ -25,13 +25,50 @@ const ELSEWHERE: [(&str, &str); 2] = [
 ];
 const LIGHTS: [&str; 4] = ["light", "illum", "glow", "spotlight"];
 const MATERIALS: [&str; 31] = [
-    "plastic", "metal", "trans", "plastic2", "metal2", "trans2", "ashik2", "mirror", "prism1", "prism2", "mist", "glass",
-    "dielectric", "interface", "plasfunc", "metfunc", "transfunc", "BRTDfunc", "plasdata", "metdata", "transdata", "BSDF",
-    "aBSDF", "WGMDfunc", "antimatter", "texfunc", "texdata", "mixfunc", "mixdata", "mixpict", "mixtext",
+    "plastic",
+    "metal",
+    "trans",
+    "plastic2",
+    "metal2",
+    "trans2",
+    "ashik2",
+    "mirror",
+    "prism1",
+    "prism2",
+    "mist",
+    "glass",
+    "dielectric",
+    "interface",
+    "plasfunc",
+    "metfunc",
+    "transfunc",
+    "BRTDfunc",
+    "plasdata",
+    "metdata",
+    "transdata",
+    "BSDF",
+    "aBSDF",
+    "WGMDfunc",
+    "antimatter",
+    "texfunc",
+    "texdata",
+    "mixfunc",
+    "mixdata",
+    "mixpict",
+    "mixtext",
 ];
 const PATTERNS: [&str; 11] = [
-    "colorfunc", "brightfunc", "colordata", "brightdata", "colorpict", "colortext", "brighttext", "spectrum", "specfile",
-    "specfunc", "specdata",
+    "colorfunc",
+    "brightfunc",
+    "colordata",
+    "brightdata",
+    "colorpict",
+    "colortext",
+    "brighttext",
+    "spectrum",
+    "specfile",
+    "specfunc",
+    "specdata",
 ];
 
 /// Reads a scene.
@@ -48,7 +85,10 @@ pub(super) fn read<'a>(scene: &'a Scene<'a>) -> Result<Raw<'a>, SpecError> {
     }
     let Reader { mut raw, curved, .. } = reader;
     if curved > 0 {
-        raw.note(format!("{curved} curved surfaces are flat faces, {} around, their corners on the surface", solids::AROUND));
+        raw.note(format!(
+            "{curved} curved surfaces are flat faces, {} around, their corners on the surface",
+            solids::AROUND
+        ));
     }
     Ok(raw)
 }
@@ -86,7 +126,8 @@ impl Reader<'_> {
         let made = if LIGHTS.contains(&kind) {
             Kind::Light(kind.to_owned())
         } else if kind == "plastic" {
-            let plain = plastic(&arguments).map_err(|why| self.raw.scene.fault(Some(line), why, "correct the numbers"))?;
+            let plain =
+                plastic(&arguments).map_err(|why| self.raw.scene.fault(Some(line), why, "correct the numbers"))?;
             self.modified(modifier, plain, line)?
         } else if MATERIALS.contains(&kind) || PATTERNS.contains(&kind) {
             Kind::Other(kind.to_owned())
@@ -137,7 +178,8 @@ impl Reader<'_> {
             }
             return self.raw.polygon(material, at, &corners);
         }
-        self.curved += 1;
+        let shines = matches!(self.raw.materials[material as usize].kind, Kind::Light(_));
+        self.curved += usize::from(!shines);
         self.raw.surface(material, at);
         let solid = solids::triangles(kind, numbers)
             .map_err(|why| self.raw.scene.fault(at, format!("{kind}: {why}"), "correct the numbers"))?;

@@ -68,7 +68,10 @@ impl<'a> Words<'a> {
             Some(quote @ ('"' | '\'')) => {
                 let line = self.line;
                 self.take(1);
-                let end = self.rest.find(quote).ok_or_else(|| self.scene.fault(Some(line), "a quote is not closed", CUT_SHORT))?;
+                let end = self
+                    .rest
+                    .find(quote)
+                    .ok_or_else(|| self.scene.fault(Some(line), "a quote is not closed", CUT_SHORT))?;
                 let word = self.take(end);
                 self.take(1);
                 Ok(word)
