@@ -34,7 +34,9 @@ fn polygons(at: [f64; 3]) -> Vec<(usize, Vec<[f64; 3]>)> {
     let corner = [[1.0, 1.0], [2.2, 1.0], [2.2, 1.6], [1.6, 1.6], [1.6, 2.8], [1.0, 2.8]];
     all.push((4, corner.map(|[x, y]| [x, y, 0.7]).to_vec()));
     for (_, polygon) in &mut all {
-        polygon.iter_mut().for_each(|p| *p = [0, 1, 2].map(|k| p[k] + at[k]));
+        for p in polygon {
+            *p = [0, 1, 2].map(|k| p[k] + at[k]);
+        }
     }
     all
 }
@@ -50,7 +52,7 @@ fn radiance(polygons: &[(usize, Vec<[f64; 3]>)]) -> String {
 
 /// In millimetres, y up.
 fn wavefront(polygons: &[(usize, Vec<[f64; 3]>)]) -> (String, String) {
-    let library = MATERIALS.iter().map(|(name, rho)| format!("newmtl {name}\nKd {rho} {rho} {rho}\n")).collect();
+    let library = MATERIALS.map(|(name, rho)| format!("newmtl {name}\nKd {rho} {rho} {rho}\n")).concat();
     let mut text = "mtllib room.mtl\n".to_owned();
     for (material, corners) in polygons {
         for [x, y, z] in corners.iter().map(|p| p.map(|c| 1000.0 * c)) {

@@ -158,13 +158,9 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
     doubtful(&mut raw, &soup);
     let (low, high) = soup.extent();
     let shell = shell::shell(&soup, low, high);
-    let (room_low, room_high) = match &shell {
-        Ok(_) => (low, high),
-        Err(_) => {
-            let margin = DVec3::splat(margin(low, high));
-            ((low - margin).map(short), (high + margin).map(short))
-        }
-    };
+    let off = DVec3::splat(margin(low, high));
+    let around = ((low - off).map(short), (high + off).map(short));
+    let (room_low, room_high) = if shell.is_ok() { (low, high) } else { around };
     // Of the room that is the scene's own this is what its farthest corner is at.
     let size_m = if shell.is_ok() { room_high - room_low } else { (room_high - room_low).map(short) };
     let black = Reflectances::with_equal_walls(0.0, 0.0, 0.0);
@@ -286,7 +282,8 @@ fn placed(raw: &Raw<'_>, chosen: &[Option<f64>], up: Up, unit_m: f64) -> Result<
     let is_near = |p: &DVec3| p.is_finite() && p.abs().max_element() <= FAR_M;
     match taken.iter().flat_map(|(corners, ..)| corners).find(|p| !is_near(p)) {
         Some(far) => {
-            let message = format!("a corner is at {far} m, and none lies beyond {FAR_M:e} m");
+            let [x, y, z] = far.to_array();
+            let message = format!("a corner is at [{x:e}, {y:e}, {z:e}] m, and none lies beyond {FAR_M:e} m");
             Err(raw.scene.fault(None, message, "correct the scene, or give its unit by --unit 0.001"))
         }
         None => Ok(taken),

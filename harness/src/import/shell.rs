@@ -48,7 +48,9 @@ pub(super) fn shell(soup: &Soup, low: DVec3, high: DVec3) -> Result<Shell, Strin
                 return Err(format!("the {name} has several reflectances, from {least} to {most}"));
             }
             rho[axis][side] = least;
-            chosen.iter().for_each(|k| is_part[*k] = true);
+            for k in &chosen {
+                is_part[*k] = true;
+            }
             beside.extend(tiles.iter().map(|tile| tile.facet));
         }
     }
@@ -129,8 +131,9 @@ impl Face {
         if tiles.len() > MAX_TILES {
             return format!("the {name} has more than {MAX_TILES} triangles");
         }
-        let covered: f64 = tiles.iter().map(|tile| tile.area).sum();
-        format!("the {name} is not covered once ({:.1} % of triangles lie in its plane)", 100.0 * covered / self.area())
+        // An empty sum of floats is -0.
+        let percent = 100.0 * tiles.iter().fold(0.0, |sum, tile| sum + tile.area) / self.area();
+        format!("the {name} is not covered once: what lies in its plane has {percent:.1} % of its area")
     }
 }
 
@@ -156,7 +159,9 @@ fn loose(soup: &Soup, is_part: &[bool], among: &[usize]) -> usize {
     };
     let mut count: HashMap<(u32, u32), usize> = HashMap::new();
     for (facet, _) in soup.facets.iter().zip(is_part).filter(|(_, is_part)| !**is_part) {
-        edges(facet).iter().for_each(|edge| *count.entry(*edge).or_default() += 1);
+        for edge in edges(facet) {
+            *count.entry(edge).or_default() += 1;
+        }
     }
     among.iter().filter(|k| edges(&soup.facets[**k]).iter().any(|edge| count.get(edge) == Some(&1))).count()
 }

@@ -148,18 +148,7 @@ impl Reader<'_, '_> {
     fn nodes(&mut self) -> Result<(), SpecError> {
         let document = self.document;
         let all = &document.nodes.0;
-        let roots: Vec<usize> = match document.scene.or((!document.scenes.0.is_empty()).then_some(0)) {
-            Some(k) => match document.scenes.0.get(k) {
-                Some(scene) => scene.nodes.0.clone(),
-                None => return Err(self.fault(&format!("scene: there is no scenes[{k}]"))),
-            },
-            None => {
-                let mut is_child = vec![false; all.len()];
-                let children = all.iter().flat_map(|node| &node.children.0);
-                children.for_each(|k| is_child.get_mut(*k).into_iter().for_each(|is| *is = true));
-                (0..all.len()).filter(|k| !is_child[*k]).collect()
-            }
-        };
+        let roots = self.roots()?;
         if document.scenes.0.len() > 1 {
             let k = document.scene.unwrap_or(0);
             self.raw.note(format!("of {} scenes scenes[{k}] is taken", document.scenes.0.len()));
@@ -179,6 +168,20 @@ impl Reader<'_, '_> {
             left.extend(node.children.0.iter().rev().map(|child| (*child, whole)));
         }
         Ok(())
+    }
+
+    /// The nodes of the scene, or those of no other node.
+    fn roots(&self) -> Result<Vec<usize>, SpecError> {
+        let (scenes, all) = (&self.document.scenes.0, &self.document.nodes.0);
+        if let Some(k) = self.document.scene.or((!scenes.is_empty()).then_some(0)) {
+            let scene = scenes.get(k).ok_or_else(|| self.fault(&format!("scene: there is no scenes[{k}]")))?;
+            return Ok(scene.nodes.0.clone());
+        }
+        let mut is_child = vec![false; all.len()];
+        for k in all.iter().flat_map(|node| &node.children.0).filter(|k| **k < all.len()) {
+            is_child[*k] = true;
+        }
+        Ok((0..all.len()).filter(|k| !is_child[*k]).collect())
     }
 
     fn fault(&self, message: &str) -> SpecError {
@@ -232,14 +235,13 @@ impl Reader<'_, '_> {
             Some(indices) => self.buffers.indices(indices, points.len())?,
             None => (0..points.len() as u32).collect(),
         };
-        let material = match of.material {
-            Some(k) => {
-                *self.materials.get(k).ok_or_else(|| self.fault(&format!("{at}: there is no materials[{k}]")))?
-            }
-            None => {
-                let raw = &mut self.raw;
-                *self.nameless.get_or_insert_with(|| raw.material(NO_MATERIAL, Kind::Unknown, raw.scene.path, None))
-            }
+        let raw = &mut self.raw;
+        let nameless = || raw.material(NO_MATERIAL, Kind::Unknown, raw.scene.path, None);
+        let material = of.material.map(|k| (k, self.materials.get(k)));
+        let material = match material {
+            Some((_, Some(place))) => *place,
+            Some((k, None)) => return Err(self.fault(&format!("{at}: there is no materials[{k}]"))),
+            None => *self.nameless.get_or_insert_with(nameless),
         };
         self.raw.surface(material, None);
         // A transform that mirrors turns faces inside out.

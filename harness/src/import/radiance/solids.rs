@@ -35,7 +35,9 @@ pub(super) fn triangles(kind: &str, numbers: &[f64]) -> Result<Triangles, String
         }
     };
     if is_inwards {
-        made.iter_mut().for_each(|t| t.swap(1, 2));
+        for triangle in &mut made {
+            triangle.swap(1, 2);
+        }
     }
     Ok(made)
 }
