@@ -40,7 +40,8 @@ impl Default for Triangulator {
 impl Triangulator {
     /// The triangles of a polygon by the indices of its corners, which turn as it does.
     ///
-    /// A corner may occur twice, as at the seam by which a hole is written; a polygon that is not flat is cut as seen along its mean normal (Newell's).
+    /// A corner may occur twice, as at the seam by which a hole is written; a polygon that is not flat is cut as seen
+    /// along its mean normal (Newell's).
     pub fn triangles(&mut self, corners: &[DVec3]) -> Result<Vec<[usize; 3]>, NotCut> {
         let fan = || (2..corners.len()).map(|k| [0, k - 1, k]).collect();
         let normal = newell(corners);
@@ -88,7 +89,8 @@ impl Triangulator {
                     break;
                 }
             }
-            // Where there is no ear, a corner in line with its neighbours, or one that goes there and back, holds no area.
+            // Where there is no ear, a corner in line with its neighbours, or one that goes there and back, holds no
+            // area.
             let idle = || (0..n).find(|k| turn(*k).abs() <= flat).map(|k| (k, false));
             let (place, is_ear) = found.or_else(idle).ok_or(NotCut::Crossing)?;
             if is_ear {
@@ -104,7 +106,8 @@ impl Triangulator {
     }
 }
 
-/// Whether none of these corners lies in a triangle that turns to the left; a corner at the very place of one of its own does not.
+/// Whether none of these corners lies in a triangle that turns to the left; a corner at the very place of one of its
+/// own does not.
 fn is_empty([a, b, c]: [usize; 3], corners: &[usize], at: &[DVec2]) -> bool {
     let triangle = [at[a], at[b], at[c]];
     let is_inside = |p: DVec2| (0..3).all(|k| twice(triangle[k], triangle[(k + 1) % 3], p) >= 0.0);

@@ -1,4 +1,5 @@
-//! Scenes of other programs as specs: one room in three formats is one spec, and reads what the same room reads that was written by hand.
+//! Scenes of other programs as specs: one room in three formats is one spec, and reads what the same room reads that
+//! was written by hand.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +22,8 @@ fn faces([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> [Quad; 6] {
     ]
 }
 
-/// A room from an origin, with a crate on its floor, and a table's plate of an L: polygons of materials by number, in their order.
+/// A room from an origin, with a crate on its floor, and a table's plate of an L: polygons of materials by number, in
+/// their order.
 fn polygons(at: [f64; 3]) -> Vec<(usize, Vec<[f64; 3]>)> {
     let [floor, ceiling, walls @ ..] = faces([0.0; 3], [6.1, 4.3, 3.1]).map(|mut face| {
         face.reverse();
@@ -64,7 +66,8 @@ fn wavefront(polygons: &[(usize, Vec<[f64; 3]>)]) -> (String, String) {
     (text, library)
 }
 
-/// A document and its buffer: a node and a mesh a material, the nodes moved by what their meshes are off. Triangles are those of the meshes
+/// A document and its buffer: a node and a mesh a material, the nodes moved by what their meshes are off. Triangles
+/// are those of the meshes
 /// that an import wrote, of the table, and fans elsewhere.
 fn gltf(polygons: &[(usize, Vec<[f64; 3]>)], table: &[[usize; 3]]) -> (String, Vec<u8>) {
     let (mut bytes, mut nodes, mut meshes, mut accessors, mut views) = (vec![], vec![], vec![], vec![], vec![]);

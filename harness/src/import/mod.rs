@@ -1,6 +1,7 @@
 //! Scenes of other programs -> the geometry of a spec: a box room and a mesh a reflectance.
 //!
-//! Surfaces are opaque and diffuse in a spec; what is not is refused or left out, and told. Luminaires are the spec's own.
+//! Surfaces are opaque and diffuse in a spec; what is not is refused or left out, and told. Luminaires are the spec's
+//! own.
 
 mod gltf;
 mod obj;

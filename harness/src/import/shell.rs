@@ -104,7 +104,8 @@ impl Face {
         soup.facets.iter().enumerate().filter_map(tile).collect()
     }
 
-    /// Triangles that cover the face once, the largest taken first, and before them those that look inwards if sides are to count; `None`
+    /// Triangles that cover the face once, the largest taken first, and before them those that look inwards if sides
+    /// are to count; `None`
     /// where they do not. The bottoms of what stands on a floor lie in its plane, and are left.
     fn tiling(&self, tiles: &[Tile], by_side: bool) -> Option<Vec<usize>> {
         if tiles.len() > MAX_TILES {

@@ -24,7 +24,8 @@ const KNOWN: [&str; 6] = [
     "KHR_materials_unlit",
 ];
 
-/// Extensions that change where geometry is, and that are read nowhere here; where one is used it must not be passed over.
+/// Extensions that change where geometry is, and that are read nowhere here; where one is used it must not be passed
+/// over.
 const REFUSED: [&str; 3] = ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "EXT_mesh_gpu_instancing"];
 
 const UNPACK: &str =

@@ -1,6 +1,8 @@
-//! Radiance scenes (.rad): primitives of a modifier, a type, a name and three lists of arguments; no command is run but plain `genbox`.
+//! Radiance scenes (.rad): primitives of a modifier, a type, a name and three lists of arguments; no command is run
+//! but plain `genbox`.
 //!
-//! Format: G. Ward, *The Radiance 5 Synthetic Imaging System*, "Scene Description"; how words are read is `fgetword.c`'s.
+//! Format: G. Ward, *The Radiance 5 Synthetic Imaging System*, "Scene Description"; how words are read is
+//! `fgetword.c`'s.
 
 mod solids;
 mod words;
@@ -75,7 +77,7 @@ const PATTERNS: [&str; 11] = [
 pub(super) fn read<'a>(scene: &'a Scene<'a>) -> Result<Raw<'a>, SpecError> {
     let bytes = scene.bytes()?;
     let text = String::from_utf8_lossy(&bytes);
-    let mut reader = Reader { raw: Raw::new(scene, PRECISION), named: HashMap::new(), curved: 0 };
+    let mut reader = Reader { raw: Raw::new(scene, PRECISION), named: HashMap::new(), has_curves: false };
     let mut words = Words::new(scene, &text);
     while let Some(next) = words.next()? {
         match next {
@@ -83,12 +85,10 @@ pub(super) fn read<'a>(scene: &'a Scene<'a>) -> Result<Raw<'a>, SpecError> {
             Next::Primitive { modifier, line } => reader.primitive(modifier, line, &mut words)?,
         }
     }
-    let Reader { mut raw, curved, .. } = reader;
-    if curved > 0 {
-        raw.note(format!(
-            "{curved} curved surfaces are flat faces, {} around, their corners on the surface",
-            solids::AROUND
-        ));
+    let Reader { mut raw, has_curves, .. } = reader;
+    if has_curves {
+        let around = solids::AROUND;
+        raw.note(format!("curved surfaces are flat faces, {around} around, their corners on the surface"));
     }
     Ok(raw)
 }
@@ -97,7 +97,8 @@ struct Reader<'a> {
     raw: Raw<'a>,
     /// The places of materials, patterns and textures by their names; of one that is defined again the latest.
     named: HashMap<String, u32>,
-    curved: usize,
+    /// Whether one of them may be taken.
+    has_curves: bool,
 }
 
 impl Reader<'_> {
@@ -179,7 +180,7 @@ impl Reader<'_> {
             return self.raw.polygon(material, at, &corners);
         }
         let shines = matches!(self.raw.materials[material as usize].kind, Kind::Light(_));
-        self.curved += usize::from(!shines);
+        self.has_curves |= !shines;
         self.raw.surface(material, at);
         let solid = solids::triangles(kind, numbers)
             .map_err(|why| self.raw.scene.fault(at, format!("{kind}: {why}"), "correct the numbers"))?;

@@ -1,4 +1,5 @@
-//! Curved surfaces of Radiance as flat faces, their corners on the surface: what is drawn never sticks out of what was meant.
+//! Curved surfaces of Radiance as flat faces, their corners on the surface: what is drawn never sticks out of what
+//! was meant.
 
 use std::f64::consts::{PI, TAU};
 
@@ -52,7 +53,8 @@ fn around(centre: DVec3, axis: DVec3, radius: f64, k: usize) -> DVec3 {
     centre + radius * (cos * u + turn * sin * v)
 }
 
-/// What lies between two circles about an axis, looking outwards where the first is the one ahead, along the axis where it is the inner one.
+/// What lies between two circles about an axis, looking outwards where the first is the one ahead, along the axis
+/// where it is the inner one.
 fn band(circles: [(DVec3, f64); 2], axis: DVec3, radii: &[f64]) -> Result<Triangles, String> {
     let axis = axis.try_normalize().ok_or("it has no direction")?;
     if radii.iter().any(|r| *r < 0.0) || radii.iter().all(|r| *r == 0.0) {
