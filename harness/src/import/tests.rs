@@ -150,7 +150,9 @@ fn surfaces_that_are_not_plain_are_refused_left_out_or_given_a_reflectance() {
     let given = Options { reflectances: given.into(), ..Options::default() };
     let taken = read_with(&files, &given).unwrap();
     assert_eq!(taken.meshes.iter().map(|part| part.reflectance).collect::<Vec<_>>(), [0.3, 0.4]);
-    assert!(taken.told.left_out.is_empty() && taken.told.notes[0].contains("curved surfaces are flat faces, 32 around"));
+    assert!(
+        taken.told.left_out.is_empty() && taken.told.notes[0].contains("curved surfaces are flat faces, 32 around")
+    );
     let given = Options { reflectances: [("chrom".to_owned(), 0.3)].into(), ..Options::default() };
     let wrong = read_with(&files, &given).unwrap_err();
     assert!(wrong.contains("did you mean `chrome`?"), "{wrong}");
