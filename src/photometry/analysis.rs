@@ -83,7 +83,7 @@ impl LuminousIntensityDistribution {
 /// The first angle, from 0 outwards, at which a function falls below `least`; linear between its nodes.
 ///
 /// 180 where it never does, `None` where it starts below.
-fn first_below(mut nodes: Vec<f64>, least: f64, at: impl Fn(f64) -> f64) -> Option<f64> {
+pub(super) fn first_below(mut nodes: Vec<f64>, least: f64, at: impl Fn(f64) -> f64) -> Option<f64> {
     nodes.push(0.0);
     nodes.sort_by(f64::total_cmp);
     nodes.dedup();

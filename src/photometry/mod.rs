@@ -1,21 +1,28 @@
 //! Luminous intensity distributions and the files that carry them.
 
 mod analysis;
+mod beam;
+mod bug;
 mod details;
+mod difference;
 mod distribution;
 mod error;
 pub mod eulumdat;
 mod goniometer;
 mod lint;
 pub mod lm63;
+mod luminance;
+mod orientation;
 mod outdoor;
 mod outline;
 mod planes;
 mod resample;
 mod sampler;
+mod spacing;
 mod text;
 pub mod tm33;
 mod write;
+mod zonal;
 
 #[cfg(test)]
 mod round_trip_tests;
@@ -27,16 +34,23 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+pub use beam::{Beam, BeamPlane, BeamWidth, NoBeam, PeakShape, nema_type};
+pub use bug::{BugRating, NoBug};
 pub use details::Details;
+pub use difference::{Departure, Difference, Likeness};
 pub use distribution::{DistributionError, LuminousIntensityDistribution, Symmetry, angles_deg, direction};
 pub use error::{Problem, ReadError};
 pub use goniometer::Goniometer;
 pub use lint::{Lint, Severity};
+pub use luminance::NoLuminance;
+pub use orientation::{Convention, Lean};
 pub use outdoor::ClassificationZones;
 pub use resample::Resampled;
 pub use sampler::{DirectionSampler, SampledDirection};
+pub use spacing::{NoSpacing, SpacingCriteria};
 pub use text::is_unprintable;
 pub use write::Written;
+pub use zonal::{MidZoneFlux, NoMidZones};
 
 use lint::Lints;
 use text::Text;

@@ -36,6 +36,11 @@ impl LuminousIntensityDistribution {
         }
     }
 
+    /// Flux in the half of all directions around a plane, from 90 degrees before it to 90 after.
+    pub(super) fn flux_of_half(&self, c_deg: f64) -> Lumen {
+        0.5 * self.sector_average(c_deg - 90.0, c_deg + 90.0).flux()
+    }
+
     /// The axial distribution of the mean intensity between two C angles, exact for the bilinear interpolation.
     fn sector_average(&self, from_c_deg: f64, to_c_deg: f64) -> Self {
         let full = self.full_circle();

@@ -1,0 +1,305 @@
+//! The beam of any distribution: its axis, the direction of the largest intensity, and its widths in planes through that.
+//!
+//! CIE 121-1996 and ANSI/IES LM-35-02: beam angle to 50 % and field angle to 10 % of the largest intensity, each counted
+//! outwards from the axis to where the intensity first falls below. NEMA floodlight types: ANSI/NEMA FA 1-1973, as the IES
+//! Lighting Handbook prints them.
+
+use glam::DVec3;
+
+use super::{LuminousIntensityDistribution, angles_deg, direction};
+use crate::units::Candela;
+
+/// Intensities that differ by less than this fraction are one peak's.
+const SAME: f64 = 1e-9;
+/// An axis within so many degrees of a pole has planes through C 0 and C 90; any other a vertical plane of its own.
+const NEAR_POLE_DEG: f64 = 10.0;
+/// Steps in degrees in which the intensity is looked up outwards: half a table's finest angle within these.
+const STEPS_DEG: [f64; 2] = [0.02, 0.25];
+
+/// Where the largest intensity is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beam {
+    /// C of the axis.
+    pub c_deg: f64,
+    /// Gamma of the axis.
+    pub gamma_deg: f64,
+    /// The largest intensity.
+    pub peak: Candela,
+    /// Whether other directions have it too.
+    pub shape: PeakShape,
+}
+
+/// In how many directions a table has its largest intensity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PeakShape {
+    /// In one, or in a plateau whose middle is the axis.
+    One,
+    /// In so many apart from each other; the axis is the one nearest the nadir, then of the smallest C.
+    Several(usize),
+    /// All around the vertical; the axis is that of C 0.
+    Ring,
+}
+
+/// A plane through the beam's axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BeamPlane {
+    /// Through the vertical; for an axis within 10 degrees of a pole the one through C 0.
+    Vertical,
+    /// Perpendicular to that.
+    Across,
+}
+
+/// How far a beam reaches on either side of its axis, in degrees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BeamWidth {
+    /// Upwards, or towards C 0, of the vertical plane; towards C 90 of the plane across.
+    pub one_side_deg: f64,
+    /// On the other side.
+    pub other_side_deg: f64,
+}
+
+impl BeamWidth {
+    /// The full angle.
+    pub fn full_deg(self) -> f64 {
+        self.one_side_deg + self.other_side_deg
+    }
+}
+
+/// Why there is no beam, no angle of it or no type.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoBeam {
+    /// No light.
+    #[error("every intensity is zero")]
+    Dark,
+    /// Nothing bounds it.
+    #[error("all around this plane the intensity stays at {percent:.0} % of the largest or above")]
+    Unbounded {
+        /// The share of the largest intensity that was looked for.
+        percent: f64,
+    },
+    /// Narrower than the narrowest type.
+    #[error("a field angle of {field_deg:.1} degrees is below the 10 degrees at which NEMA types begin")]
+    BelowTypes {
+        /// The field angle.
+        field_deg: f64,
+    },
+}
+
+impl LuminousIntensityDistribution {
+    /// The axis of the beam.
+    pub fn beam(&self) -> Result<Beam, NoBeam> {
+        let peak = self.max_intensity();
+        if peak.value() <= 0.0 {
+            return Err(NoBeam::Dark);
+        }
+        let tied = self.largest((1.0 - SAME) * peak.value());
+        let beam = |(c_deg, gamma_deg), shape| Beam { c_deg, gamma_deg, peak, shape };
+        let weigh = |(c, g): &(f64, f64)| direction(*c, *g) * g.to_radians().sin();
+        let mean: DVec3 = tied.iter().map(weigh).sum();
+        let at_pole = tied.iter().find(|(_, g)| *g == 0.0 || *g == 180.0);
+        let middle = match at_pole {
+            Some((_, g)) if mean.truncate().length() <= SAME * tied.len() as f64 => Some((0.0, *g)),
+            _ => mean.try_normalize().map(upright),
+        };
+        if let Some((c, g)) = middle
+            && self.intensity(c, g).value() >= (1.0 - SAME) * peak.value()
+        {
+            return Ok(beam((c, g), PeakShape::One));
+        }
+        // `largest` found the peak itself, so that there is a first one.
+        let first = tied.first().copied().unwrap_or((0.0, 0.0));
+        let on_ring = self
+            .full_circle()
+            .c_deg()
+            .iter()
+            .all(|c| self.intensity(*c, first.1).value() >= (1.0 - SAME) * peak.value());
+        let shape = if on_ring { PeakShape::Ring } else { PeakShape::Several(tied.len()) };
+        Ok(beam(if on_ring { (0.0, first.1) } else { first }, shape))
+    }
+
+    /// Nodes (C, gamma) of the full circle at which the intensity reaches `least`: by gamma, then by C; a pole is one.
+    fn largest(&self, least: f64) -> Vec<(f64, f64)> {
+        let full = self.full_circle();
+        // One plane stands for all: those that a mean direction needs.
+        let around = if self.c_deg().len() == 1 { vec![0.0, 90.0, 180.0, 270.0] } else { full.c_deg().to_vec() };
+        let planes = around.iter().filter(|c| **c < 360.0);
+        let nodes = planes.flat_map(|c| full.gamma_deg().iter().map(move |g| (*c, *g)));
+        let pole = |(c, g): (f64, f64)| if g == 0.0 || g == 180.0 { (0.0, g) } else { (c, g) };
+        let mut tied: Vec<(f64, f64)> =
+            nodes.filter(|(c, g)| full.intensity(*c, *g).value() >= least).map(pole).collect();
+        tied.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));
+        tied.dedup();
+        tied
+    }
+
+    /// How far the beam reaches in a plane through its axis before it falls below a fraction of its largest intensity.
+    pub fn beam_width(&self, beam: &Beam, plane: BeamPlane, fraction: f64) -> Result<BeamWidth, NoBeam> {
+        let [axis, aside] = beam.frame(plane);
+        let least = fraction * beam.peak.value();
+        let step = self.finest_deg().clamp(STEPS_DEG[0], STEPS_DEG[1]);
+        let side = |sign: f64| {
+            let at = |t: f64| {
+                let (sin, cos) = t.to_radians().sin_cos();
+                self.intensity_towards(axis * cos + aside * (sign * sin)).value()
+            };
+            let steps = (1..=(180.0 / step).ceil() as u32).map(|k| (step * f64::from(k)).min(180.0));
+            let beyond = steps.into_iter().find(|t| at(*t) < least);
+            beyond.map(|t| bisect((t - step).max(0.0), t, |t| at(t) >= least))
+        };
+        let unbounded = NoBeam::Unbounded { percent: 100.0 * fraction };
+        let (one_side_deg, other_side_deg) = (side(1.0).ok_or(unbounded)?, side(-1.0).ok_or(unbounded)?);
+        Ok(BeamWidth { one_side_deg, other_side_deg })
+    }
+
+    /// Half the smallest distance between angles of the table, in degrees.
+    fn finest_deg(&self) -> f64 {
+        let steps = |angles: &[f64]| angles.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
+        0.5 * steps(self.gamma_deg()).min(steps(self.c_deg()))
+    }
+}
+
+impl Beam {
+    /// The axis, and the direction at right angles to it in which a plane goes on.
+    pub fn frame(&self, plane: BeamPlane) -> [DVec3; 2] {
+        let axis = direction(self.c_deg, self.gamma_deg);
+        let from_pole = self.gamma_deg.min(180.0 - self.gamma_deg);
+        let along = if from_pole <= NEAR_POLE_DEG { DVec3::X } else { DVec3::Z };
+        let vertical = (along - axis * axis.dot(along)).normalize();
+        match plane {
+            BeamPlane::Vertical => [axis, vertical],
+            BeamPlane::Across => [axis, vertical.cross(axis)],
+        }
+    }
+}
+
+/// The NEMA type of a field angle in degrees: 1 to 7.
+pub fn nema_type(field_deg: f64) -> Result<u8, NoBeam> {
+    /// Where types 2 to 7 begin; an angle at a limit belongs to the narrower type.
+    const ABOVE_DEG: [f64; 6] = [18.0, 29.0, 46.0, 70.0, 100.0, 130.0];
+    if field_deg < 10.0 {
+        return Err(NoBeam::BelowTypes { field_deg });
+    }
+    Ok(1 + ABOVE_DEG.iter().filter(|limit| field_deg > **limit).count() as u8)
+}
+
+/// (C, gamma) of a direction; C 0 where it is vertical but for rounding.
+fn upright(towards: DVec3) -> (f64, f64) {
+    let (c, gamma) = angles_deg(towards);
+    if towards.truncate().length() < SAME { (0.0, if towards.z < 0.0 { 0.0 } else { 180.0 }) } else { (c, gamma) }
+}
+
+/// Where between `inside` and `outside` a condition ceases to hold.
+fn bisect(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..50 {
+        let middle = f64::midpoint(inside, outside);
+        if holds(middle) {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    inside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use glam::DMat3;
+
+    fn angles(last: u32, step: f64) -> Vec<f64> {
+        (0..=(f64::from(last) / step) as u32).map(|k| step * f64::from(k)).collect()
+    }
+
+    fn table(c: &[f64], gamma: &[f64], of: impl Fn(DVec3) -> f64) -> LuminousIntensityDistribution {
+        let candela = c.iter().flat_map(|c| gamma.iter().map(|g| of(direction(*c % 360.0, *g)))).collect();
+        LuminousIntensityDistribution::new(c.to_vec(), gamma.to_vec(), candela).unwrap()
+    }
+
+    fn widths(of: &LuminousIntensityDistribution, fraction: f64) -> [Result<f64, NoBeam>; 2] {
+        let beam = of.beam().unwrap();
+        [BeamPlane::Vertical, BeamPlane::Across]
+            .map(|plane| of.beam_width(&beam, plane, fraction).map(BeamWidth::full_deg))
+    }
+
+    #[test]
+    fn a_round_beam_has_one_width_wherever_it_points() {
+        let half = 2.0 * 0.5f64.powf(0.1).acos().to_degrees();
+        for (c, g) in [(0.0, 0.0), (45.0, 60.0), (200.0, 90.0), (310.0, 5.0), (0.0, 180.0)] {
+            let axis = direction(c, g);
+            let lobe = table(&angles(360, 5.0), &angles(180, 1.0), |d| 700.0 * d.dot(axis).max(0.0).powi(10));
+            let beam = lobe.beam().unwrap();
+            assert!(direction(beam.c_deg, beam.gamma_deg).dot(axis) > 1.0 - 1e-9, "{beam:?}");
+            assert_eq!(beam.shape, PeakShape::One);
+            for width in widths(&lobe, 0.5) {
+                assert!((width.unwrap() - half).abs() < 0.2, "{c} {g}: {width:?} {half}");
+            }
+        }
+    }
+
+    #[test]
+    fn vertical_and_across_are_told_apart_when_a_floodlight_is_tilted() {
+        // Wide in y (C 90), narrow in x, then tilted up towards C 0 and towards C 90.
+        let lobe =
+            |d: DVec3| if d.z >= 0.0 { 0.0 } else { (-(d.x / d.z / 0.2).powi(2) - (d.y / d.z / 1.0).powi(2)).exp() };
+        let (narrow, wide) = (0.2 * 2f64.ln().sqrt(), 2f64.ln().sqrt());
+        let full = |tan: f64| 2.0 * tan.atan().to_degrees();
+        for (turn, expected) in [
+            (DMat3::IDENTITY, [narrow, wide]),
+            (DMat3::from_rotation_y(-60f64.to_radians()), [narrow, wide]),
+            (DMat3::from_rotation_x(60f64.to_radians()), [wide, narrow]),
+        ] {
+            let flood = table(&angles(360, 2.0), &angles(180, 1.0), |d| 1000.0 * lobe(turn.transpose() * d));
+            for (found, expected) in widths(&flood, 0.5).into_iter().zip(expected) {
+                assert!((found.unwrap() - full(expected)).abs() < 0.3, "{found:?} {}", full(expected));
+            }
+        }
+    }
+
+    #[test]
+    fn peaks_apart_are_counted_and_the_first_has_its_own_width() {
+        let bat = |gamma: f64| if gamma <= 90.0 { (2.0 * gamma - 60.0).to_radians().cos().max(0.0) } else { 0.0 };
+        let gamma = angles(90, 1.0);
+        let ring =
+            LuminousIntensityDistribution::axial(gamma.clone(), gamma.iter().map(|g| bat(*g)).collect()).unwrap();
+        let beam = ring.beam().unwrap();
+        assert_eq!((beam.c_deg, beam.gamma_deg, beam.shape), (0.0, 30.0, PeakShape::Ring));
+        // It falls to cos 60 = .5 at gamma 60 and, beyond the nadir, not before 60 on the far side's flank.
+        let width = ring.beam_width(&beam, BeamPlane::Vertical, 0.49).unwrap();
+        assert!((width.one_side_deg - 30.3).abs() < 0.2 && (width.other_side_deg - 90.3).abs() < 0.2, "{width:?}");
+        let two = table(&[0.0, 90.0], &gamma, |d| d.x.abs());
+        assert_eq!(two.beam().unwrap().shape, PeakShape::Several(2));
+    }
+
+    #[test]
+    fn a_flat_top_has_its_axis_in_its_middle() {
+        let flat = LuminousIntensityDistribution::axial(vec![0.0, 10.0, 20.0, 90.0], vec![5.0, 5.0, 0.0, 0.0]).unwrap();
+        let beam = flat.beam().unwrap();
+        assert_eq!((beam.gamma_deg, beam.shape), (0.0, PeakShape::One));
+        assert_relative_eq!(widths(&flat, 0.5)[0].unwrap(), 30.0, max_relative = 1e-9);
+        let up = LuminousIntensityDistribution::axial(vec![90.0, 170.0, 180.0], vec![0.0, 5.0, 5.0]).unwrap();
+        assert_eq!(up.beam().unwrap().gamma_deg, 180.0);
+    }
+
+    #[test]
+    fn without_light_or_without_end_there_is_a_reason() {
+        let even = |candela: f64| LuminousIntensityDistribution::axial(vec![0.0, 180.0], vec![candela; 2]).unwrap();
+        assert_eq!(even(0.0).beam(), Err(NoBeam::Dark));
+        let beam = even(3.0).beam().unwrap();
+        let width = even(3.0).beam_width(&beam, BeamPlane::Across, 0.5);
+        assert_eq!(width, Err(NoBeam::Unbounded { percent: 50.0 }));
+        // A table that ends with light ends the beam there.
+        let half = LuminousIntensityDistribution::axial(vec![0.0, 90.0], vec![3.0; 2]).unwrap();
+        assert_relative_eq!(widths(&half, 0.1)[1].unwrap(), 180.0, max_relative = 1e-9);
+    }
+
+    #[test]
+    fn nema_types_are_those_of_the_table() {
+        for (field, expected) in
+            [(10.0, 1), (18.0, 1), (18.1, 2), (29.0, 2), (46.0, 3), (70.0, 4), (100.0, 5), (130.0, 6), (131.0, 7)]
+        {
+            assert_eq!(nema_type(field), Ok(expected), "{field}");
+        }
+        assert_eq!(nema_type(9.0), Err(NoBeam::BelowTypes { field_deg: 9.0 }));
+    }
+}
