@@ -1,0 +1,253 @@
+//! Tables of the unified glare rating (UGR) of a luminaire in standard rooms.
+//!
+//! CIE 117-1995 (the rating, equation 1) and CIE 190:2010 (the table): UGR = 8 lg (.25 / L_b sum L^2 w / p^2), observer at
+//! the middle of a wall, looking along the room, luminaires in an even grid at the height H above the eye. CIE 190 spaces
+//! them by H; the tables of catalogues, as EN 12464-1 has them read, by H / 4. Values are *corrected*: of the luminaire's
+//! own flux, not of 1000 lm.
+
+mod background;
+mod position;
+
+#[cfg(test)]
+mod tests;
+
+pub use position::position_index;
+
+use self::background::FirstFlux;
+use crate::photometry::{NoLuminance, Photometry, Symmetry};
+
+/// Width across the line of sight and depth along it, in units of H.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// Across the line of sight.
+    pub x: u32,
+    /// Along it.
+    pub y: u32,
+}
+
+impl Room {
+    /// The room index k = X Y / (H (X + Y)).
+    fn index(self) -> f64 {
+        let (x, y) = (f64::from(self.x), f64::from(self.y));
+        x * y / (x + y)
+    }
+}
+
+/// The rooms of a table, in its order.
+pub const ROOMS: [Room; 19] = {
+    const fn room(x: u32, y: u32) -> Room {
+        Room { x, y }
+    }
+    [
+        room(2, 2),
+        room(2, 3),
+        room(2, 4),
+        room(2, 6),
+        room(2, 8),
+        room(2, 12),
+        room(4, 2),
+        room(4, 3),
+        room(4, 4),
+        room(4, 6),
+        room(4, 8),
+        room(4, 12),
+        room(8, 4),
+        room(8, 6),
+        room(8, 8),
+        room(8, 12),
+        room(12, 4),
+        room(12, 6),
+        room(12, 8),
+    ]
+};
+
+/// Reflectances of a column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reflectances {
+    /// Ceiling.
+    pub ceiling: f64,
+    /// Walls.
+    pub walls: f64,
+    /// Reference plane.
+    pub plane: f64,
+}
+
+/// The columns of a table, in its order.
+pub const REFLECTANCES: [Reflectances; 5] = {
+    const fn of(ceiling: f64, walls: f64) -> Reflectances {
+        Reflectances { ceiling, walls, plane: 0.2 }
+    }
+    [of(0.7, 0.5), of(0.7, 0.3), of(0.5, 0.5), of(0.5, 0.3), of(0.3, 0.3)]
+};
+
+/// How far luminaires are apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spacing {
+    /// H / 4: tables of catalogues.
+    Quarter,
+    /// H: the examples of CIE 190.
+    Whole,
+}
+
+impl Spacing {
+    /// Luminaires along a length H.
+    const fn per_height(self) -> u32 {
+        match self {
+            Self::Quarter => 4,
+            Self::Whole => 1,
+        }
+    }
+
+    /// In units of H.
+    pub fn over_height(self) -> f64 {
+        1.0 / f64::from(self.per_height())
+    }
+}
+
+/// Which side of the luminaire the observer looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum View {
+    /// The long side.
+    Crosswise,
+    /// The end.
+    Endwise,
+}
+
+/// One room of a table: a rating for each of [`REFLECTANCES`], `None` where no luminance reaches the observer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UgrRow {
+    /// The room.
+    pub room: Room,
+    /// Luminaires across the line of sight.
+    pub crosswise: [Option<f64>; 5],
+    /// Luminaires along it.
+    pub endwise: [Option<f64>; 5],
+}
+
+/// The table of a luminaire.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UgrTable {
+    /// The plane from which the observer looks at it crosswise; endwise it is 90 degrees on.
+    pub crosswise_c_deg: f64,
+    /// How far luminaires are apart.
+    pub spacing: Spacing,
+    /// A row for each of [`ROOMS`].
+    pub rows: Vec<UgrRow>,
+}
+
+/// Why a luminaire has no table.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoUgr {
+    /// Nothing goes down.
+    #[error("no light goes below the horizon, where the observer is")]
+    NothingBelow,
+    /// No luminous area.
+    #[error(transparent)]
+    Luminance(#[from] NoLuminance),
+    /// The table is of luminaires with two planes of symmetry.
+    #[error(
+        "the table is of luminaires that are alike on both sides of C 0 and of C 90, and this one is not within {percent:.0} % of its largest intensity"
+    )]
+    Lopsided {
+        /// What was allowed.
+        percent: f64,
+    },
+}
+
+/// The most that the four quarters of a luminaire may differ, as a fraction of the largest intensity; their mean is taken.
+const LOPSIDED: f64 = 0.05;
+/// H of the standard room in metres. Ratings do not depend on it: numerator and background fall alike with its square.
+const HEIGHT_M: f64 = 2.0;
+
+impl UgrTable {
+    /// The table of a luminaire.
+    pub fn of(photometry: &Photometry, spacing: Spacing) -> Result<Self, NoUgr> {
+        let distribution = &photometry.distribution;
+        // What has no luminous area has none in any direction.
+        if let Err(NoLuminance::Point) = photometry.luminance_cd_per_m2(0.0, 45.0) {
+            return Err(NoLuminance::Point.into());
+        }
+        if !matches!(distribution.detected_symmetry(LOPSIDED), Symmetry::Axial | Symmetry::Quadrant) {
+            return Err(NoUgr::Lopsided { percent: 100.0 * LOPSIDED });
+        }
+        let crosswise_c_deg = crosswise_c_deg(photometry);
+        let views = [View::Crosswise, View::Endwise]
+            .map(|view| Glare::towards(photometry, view.c_deg(crosswise_c_deg), spacing));
+        let row = |room: Room| {
+            let first = FirstFlux::of(distribution, room).ok_or(NoUgr::NothingBelow)?;
+            let per_height = spacing.per_height();
+            let count = f64::from(room.x * room.y * per_height * per_height);
+            let ratings = |glare: &Glare| {
+                REFLECTANCES.map(|reflectances| {
+                    let behind = background::luminance(room, reflectances, first, count, HEIGHT_M);
+                    let inner = 0.25 / behind * glare.within(room);
+                    (inner > 0.0 && inner.is_finite()).then(|| 8.0 * inner.log10())
+                })
+            };
+            Ok(UgrRow { room, crosswise: ratings(&views[0]), endwise: ratings(&views[1]) })
+        };
+        Ok(Self { crosswise_c_deg, spacing, rows: ROOMS.into_iter().map(row).collect::<Result<_, NoUgr>>()? })
+    }
+}
+
+impl View {
+    fn c_deg(self, crosswise_c_deg: f64) -> f64 {
+        match self {
+            Self::Crosswise => crosswise_c_deg,
+            Self::Endwise => crosswise_c_deg + 90.0,
+        }
+    }
+}
+
+/// The plane that looks at the long side: of the opening where it has one, else by the file's format.
+fn crosswise_c_deg(photometry: &Photometry) -> f64 {
+    let [width, length, _] = photometry.opening.bounding_box_m();
+    let axis_c_deg = if length > width {
+        0.0
+    } else if width > length {
+        90.0
+    } else {
+        photometry.convention().lamp_axis_c_deg
+    };
+    (axis_c_deg + 90.0) % 180.0
+}
+
+/// L^2 w / p^2 of every luminaire of the largest room, both sides of the line of sight together.
+struct Glare {
+    per_height: u32,
+    /// `terms[sideways][along]`.
+    terms: Vec<Vec<f64>>,
+}
+
+impl Glare {
+    /// Seen by an observer in a plane of the luminaire, below and before it.
+    fn towards(photometry: &Photometry, c_deg: f64, spacing: Spacing) -> Self {
+        let per_height = spacing.per_height();
+        let largest = |of: fn(&Room) -> u32| ROOMS.iter().map(of).max().unwrap_or(0) * per_height;
+        let place = |k: u32| (f64::from(k) + 0.5) * spacing.over_height();
+        let along = 0..largest(|room| room.y);
+        let column = |t: u32| along.clone().map(|r| 2.0 * term(photometry, c_deg, place(t), place(r))).collect();
+        Self { per_height, terms: (0..largest(|room| room.x).div_ceil(2)).map(column).collect() }
+    }
+
+    /// The sum over a room.
+    fn within(&self, room: Room) -> f64 {
+        let (half, deep) = ((room.x * self.per_height / 2) as usize, (room.y * self.per_height) as usize);
+        self.terms[..half].iter().flat_map(|column| &column[..deep]).sum()
+    }
+}
+
+/// L^2 w / p^2 = I^2 / (A r^2 p^2) of a luminaire so far aside and ahead, in units of H; nothing beyond the position table.
+fn term(photometry: &Photometry, c_deg: f64, sideways: f64, ahead: f64) -> f64 {
+    let Some(index) = position_index(sideways / ahead, 1.0 / ahead) else { return 0.0 };
+    let turned = sideways.atan2(ahead).to_degrees();
+    let square = sideways * sideways + ahead * ahead;
+    let gamma_deg = square.sqrt().atan().to_degrees();
+    // The four quarters of a luminaire that is nearly symmetric.
+    let images = [c_deg + turned, c_deg - turned, c_deg + 180.0 + turned, c_deg + 180.0 - turned];
+    let mean = |of: &dyn Fn(f64) -> f64| images.iter().map(|c| of(*c)).sum::<f64>() / images.len() as f64;
+    let candela = mean(&|c| photometry.distribution.intensity(c, gamma_deg).value());
+    let area_m2 = mean(&|c| photometry.projected_area_m2(c, gamma_deg));
+    let distance_m = HEIGHT_M * (square + 1.0).sqrt();
+    if area_m2 > 0.0 { (candela / (distance_m * index)).powi(2) / area_m2 } else { 0.0 }
+}

@@ -1,0 +1,240 @@
+//! UGR against a room built luminaire by luminaire, and against what CIE 190 prints.
+
+use std::f64::consts::PI;
+
+use approx::assert_relative_eq;
+use glam::{DMat3, DVec3};
+
+use super::background::{FirstFlux, transfer};
+use super::*;
+use crate::photometry::{LuminousIntensityDistribution, LuminousOpening};
+
+fn panel(x_m: f64, y_m: f64, of: impl Fn(f64, f64) -> f64) -> Photometry {
+    let c: Vec<f64> = (0..=18).map(|k| 5.0 * f64::from(k)).collect();
+    let gamma: Vec<f64> = (0..=90).map(f64::from).collect();
+    let candela = c.iter().flat_map(|c| gamma.iter().map(|g| of(*c, *g).max(0.0))).collect();
+    let distribution = LuminousIntensityDistribution::new(c, gamma, candela).unwrap();
+    Photometry { opening: LuminousOpening::Box { x_m, y_m, height_m: 0.0 }, ..Photometry::of(distribution) }
+}
+
+/// A diffuse panel, a louvre that cuts off and a batwing, small against the height.
+fn luminaires() -> [Photometry; 3] {
+    let cos = |deg: f64| deg.to_radians().cos();
+    [
+        panel(0.3, 0.1, |_, g| 900.0 * cos(g)),
+        panel(0.1, 0.25, |c, g| 700.0 * cos(g).powf(1.0 + 2.0 * cos(c).powi(2))),
+        panel(0.15, 0.15, |c, g| 400.0 * (1.0 + (2.0 + cos(2.0 * c)) * (1.5 * g).to_radians().sin().powi(2)) * cos(g)),
+    ]
+}
+
+/// What is needed of a room, of metres and vectors alone.
+struct Built {
+    /// Of the room: across (x) and along (y) the line of sight, the eye at the origin, the wall behind it.
+    width_m: f64,
+    depth_m: f64,
+    height_m: f64,
+    /// Where luminaires are.
+    places_m: Vec<DVec3>,
+}
+
+impl Built {
+    fn new(room: Room, spacing: Spacing) -> Self {
+        let height_m = 1.9;
+        let (width_m, depth_m) = (f64::from(room.x) * height_m, f64::from(room.y) * height_m);
+        let step = height_m * spacing.over_height();
+        let count = |length: f64| (length / step).round() as u32;
+        let at = |k: u32| (f64::from(k) + 0.5) * step;
+        let row = |i: u32| (0..count(depth_m)).map(move |j| DVec3::new(at(i) - 0.5 * width_m, at(j), height_m));
+        Self { width_m, depth_m, height_m, places_m: (0..count(width_m)).flat_map(row).collect() }
+    }
+
+    /// Sum of L^2 w / p^2; `axes` are the luminaire's x and y in the room.
+    fn glare(&self, luminaire: &Photometry, axes: [DVec3; 2]) -> f64 {
+        let [width, length, _] = luminaire.opening.bounding_box_m();
+        let frame = DMat3::from_cols(axes[0], axes[1], DVec3::Z);
+        let one = |place: &DVec3| {
+            let (ahead, aside, above) = (place.y, place.x.abs(), place.z);
+            let Some(index) = position_index(aside / ahead, above / ahead) else { return 0.0 };
+            // The opening in patches: each its solid angle and its luminance towards the eye.
+            let (mut angle, mut bright) = (0.0, 0.0);
+            let patches = 4;
+            for (i, j) in (0..patches).flat_map(|i| (0..patches).map(move |j| (i, j))) {
+                let along = |k: i32, size: f64| ((f64::from(k) + 0.5) / f64::from(patches) - 0.5) * size;
+                let patch = *place + axes[0] * along(i, length) + axes[1] * along(j, width);
+                let to_eye = -patch;
+                let cosine = -to_eye.normalize().z;
+                let area = length * width / f64::from(patches * patches);
+                let candela = luminaire.distribution.intensity_towards(frame.transpose() * to_eye).value();
+                let solid = area * cosine / to_eye.length_squared();
+                angle += solid;
+                bright += solid * candela / (length * width * cosine);
+            }
+            (bright / angle).powi(2) * angle / (index * index)
+        };
+        self.places_m.iter().map(one).sum()
+    }
+
+    /// Part of the downward flux that falls on the reference plane within the room, ray by ray from every luminaire.
+    fn direct_part(&self, luminaire: &Photometry, axes: [DVec3; 2]) -> f64 {
+        let frame = DMat3::from_cols(axes[0], axes[1], DVec3::Z);
+        let (mut inside, mut all) = (0.0, 0.0);
+        for g in (0..90).map(|k| f64::from(k) + 0.5) {
+            for c in (0..72).map(|k| 5.0 * (f64::from(k) + 0.5)) {
+                let weight = luminaire.distribution.intensity(c, g).value() * g.to_radians().sin();
+                let away = frame * crate::photometry::direction(c, g);
+                let foot = away / -away.z * self.height_m;
+                let lands = |place: &&DVec3| {
+                    let hit = **place + foot;
+                    hit.x.abs() <= 0.5 * self.width_m && (0.0..=self.depth_m).contains(&hit.y)
+                };
+                inside += weight * self.places_m.iter().filter(lands).count() as f64;
+                all += weight * self.places_m.len() as f64;
+            }
+        }
+        inside / all
+    }
+
+    /// Indirect luminance of the walls in cd/m2 for flux that first falls on the plane and on the walls, in lumens: by
+    /// following it from reflection to reflection, with a view factor integrated over distances between points.
+    fn background(&self, on_plane: f64, on_walls: f64, reflectances: Reflectances) -> f64 {
+        let (x, y, h) = (self.width_m, self.depth_m, self.height_m);
+        let cells = 400;
+        let mut facing = 0.0;
+        for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
+            let (u, v) = ((f64::from(i) + 0.5) / f64::from(cells) * x, (f64::from(j) + 0.5) / f64::from(cells) * y);
+            let cell = x * y / f64::from(cells * cells);
+            facing += 4.0 * cell * (x - u) * (y - v) * h * h / (PI * (u * u + v * v + h * h).powi(2));
+        }
+        facing /= x * y;
+        let walls = 2.0 * h * (x + y);
+        let wall_to_plane = (1.0 - facing) * x * y / walls;
+        let (mut plane, mut ceiling, mut wall, mut indirect) = (on_plane, 0.0, on_walls, 0.0);
+        for _ in 0..200 {
+            let (p, c, w) = (plane * reflectances.plane, ceiling * reflectances.ceiling, wall * reflectances.walls);
+            plane = c * facing + w * wall_to_plane;
+            ceiling = p * facing + w * wall_to_plane;
+            wall = (p + c) * (1.0 - facing) + w * (1.0 - 2.0 * wall_to_plane);
+            indirect += wall;
+        }
+        indirect / walls / PI
+    }
+
+    fn rating(&self, luminaire: &Photometry, axes: [DVec3; 2], part: f64, reflectances: Reflectances) -> f64 {
+        let down = luminaire.distribution.flux().value() * self.places_m.len() as f64;
+        let behind = self.background(part * down, (1.0 - part) * down, reflectances);
+        8.0 * (0.25 / behind * self.glare(luminaire, axes)).log10()
+    }
+}
+
+/// The luminaire's x and y in the room for an observer who looks at its long side and at its end.
+fn axes(luminaire: &Photometry) -> [[DVec3; 2]; 2] {
+    let [width, length, _] = luminaire.opening.bounding_box_m();
+    let (x_across, x_along) = ([DVec3::X, DVec3::Y], [DVec3::Y, -DVec3::X]);
+    if length >= width { [x_across, x_along] } else { [x_along, x_across] }
+}
+
+fn cells(row: &UgrRow) -> impl Iterator<Item = (usize, usize, f64)> {
+    let side = |view: usize, ratings: [Option<f64>; 5]| {
+        ratings.into_iter().enumerate().map(move |(k, rating)| (view, k, rating.unwrap()))
+    };
+    side(0, row.crosswise).chain(side(1, row.endwise))
+}
+
+/// The furthest that a table is from built rooms.
+fn furthest(luminaire: &Photometry) -> f64 {
+    let mut worst: f64 = 0.0;
+    let table = UgrTable::of(luminaire, Spacing::Quarter).unwrap();
+    for row in &table.rows {
+        let (built, sparse) = (Built::new(row.room, Spacing::Quarter), Built::new(row.room, Spacing::Whole));
+        let sides = axes(luminaire);
+        let parts = sides.map(|side| sparse.direct_part(luminaire, side));
+        let part = 0.5 * (parts[0] + parts[1]);
+        for (view, column, rating) in cells(row) {
+            let expected = built.rating(luminaire, sides[view], part, REFLECTANCES[column]);
+            worst = worst.max((rating - expected).abs());
+        }
+    }
+    worst
+}
+
+/// CIE 190's geometric multipliers are of luminaires spaced by H: that arrangement lights the background in both.
+#[test]
+fn ratings_are_those_of_rooms_built_luminaire_by_luminaire() {
+    for luminaire in luminaires() {
+        let worst = furthest(&luminaire);
+        assert!(worst < 0.03, "{worst}");
+    }
+    // What is no longer small against the height is still so to the printed digit.
+    let long = panel(1.2, 0.3, |c, g| 3000.0 * g.to_radians().cos().powf(1.0 + 0.5 * c.to_radians().sin()));
+    let worst = furthest(&long);
+    assert!(worst < 0.1, "{worst}");
+}
+
+#[test]
+fn transfer_factors_are_the_printed_ones_of_table_5() {
+    // CIE 190:2010, table 5: F_T,FW, F_T,WW - 1, F_T,CW for 70/50/20 and 30/30/20.
+    for (x, y, bright, dark) in [
+        (2, 2, [0.220, 0.422, 0.646], [0.157, 0.181, 0.227]),
+        (2, 12, [0.160, 0.290, 0.443], [0.113, 0.124, 0.161]),
+        (4, 8, [0.115, 0.211, 0.307], [0.081, 0.092, 0.114]),
+        (8, 8, [0.083, 0.155, 0.215], [0.058, 0.069, 0.081]),
+        (12, 8, [0.071, 0.133, 0.183], [0.049, 0.059, 0.069]),
+    ] {
+        for (printed, reflectances) in [(bright, REFLECTANCES[0]), (dark, REFLECTANCES[4])] {
+            for (found, printed) in transfer(Room { x, y }, reflectances).into_iter().zip(printed) {
+                assert!((found - printed).abs() < 6e-4, "{x} {y} {reflectances:?}: {found} {printed}");
+            }
+        }
+    }
+}
+
+#[test]
+fn geometric_multipliers_give_the_part_that_rays_of_spaced_luminaires_give() {
+    for luminaire in luminaires() {
+        for room in ROOMS {
+            let built = Built::new(room, Spacing::Whole);
+            let parts = axes(&luminaire).map(|side| built.direct_part(&luminaire, side));
+            let first = FirstFlux::of(&luminaire.distribution, room).unwrap();
+            let found = first.plane / (first.plane + first.walls);
+            assert!((found - 0.5 * (parts[0] + parts[1])).abs() < 0.008, "{room:?} {found} {parts:?}");
+        }
+    }
+}
+
+#[test]
+fn ratings_follow_the_logarithm_of_flux_and_area() {
+    let [panel, ..] = luminaires();
+    let table =
+        |photometry: &Photometry| UgrTable::of(photometry, Spacing::Quarter).unwrap().rows[10].crosswise[0].unwrap();
+    let bright = Photometry { distribution: panel.distribution.scaled(3.0), ..panel.clone() };
+    assert_relative_eq!(table(&bright) - table(&panel), 8.0 * 3f64.log10(), max_relative = 1e-9);
+    let wide = Photometry { opening: LuminousOpening::Box { x_m: 0.6, y_m: 0.2, height_m: 0.0 }, ..panel.clone() };
+    assert_relative_eq!(table(&wide) - table(&panel), -8.0 * 4f64.log10(), max_relative = 1e-9);
+}
+
+#[test]
+fn crosswise_is_across_the_long_side_in_either_format() {
+    let [lying_x, lying_y, square] = luminaires();
+    let plane = |p: &Photometry| UgrTable::of(p, Spacing::Whole).unwrap().crosswise_c_deg;
+    assert_eq!([plane(&lying_x), plane(&lying_y)], [90.0, 0.0]);
+    // Of a square one the format says where its lamps lie.
+    assert_eq!(plane(&square), 90.0);
+    let ldt = crate::photometry::eulumdat::parse(crate::photometry::eulumdat::write(&square).text.as_bytes()).unwrap();
+    assert_eq!(plane(&ldt), 0.0);
+}
+
+#[test]
+fn there_is_a_reason_where_there_is_no_table() {
+    let [panel, ..] = luminaires();
+    let point = Photometry { opening: LuminousOpening::Point, ..panel.clone() };
+    assert_eq!(UgrTable::of(&point, Spacing::Quarter), Err(NoLuminance::Point.into()));
+    let up = LuminousIntensityDistribution::axial(vec![95.0, 180.0], vec![0.0, 100.0]).unwrap();
+    assert_eq!(
+        UgrTable::of(&Photometry { distribution: up, ..panel.clone() }, Spacing::Quarter),
+        Err(NoUgr::NothingBelow)
+    );
+    let lopsided =
+        LuminousIntensityDistribution::new(vec![0.0, 180.0], vec![0.0, 90.0], vec![9.0, 9.0, 9.0, 0.0]).unwrap();
+    let table = UgrTable::of(&Photometry { distribution: lopsided, ..panel }, Spacing::Quarter);
+    assert!(matches!(table, Err(NoUgr::Lopsided { .. })), "{table:?}");
+}
