@@ -16,17 +16,21 @@ const NEAR_POLE_DEG: f64 = 10.0;
 /// Steps in degrees in which the intensity is looked up outwards: half a table's finest angle within these.
 const STEPS_DEG: [f64; 2] = [0.02, 0.25];
 
-/// Where the largest intensity is.
+/// Where the largest intensity is, and the axis that angles count from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
-    /// C of the axis.
+    /// C of the axis: the direction of the peak or, of several as high, their middle where it lies within their common beam.
     pub c_deg: f64,
     /// Gamma of the axis.
     pub gamma_deg: f64,
     /// The largest intensity.
     pub peak: Candela,
+    /// C and gamma of it; of several the one nearest the nadir, then of the smallest C.
+    pub peak_deg: [f64; 2],
     /// Whether other directions have it too.
     pub shape: PeakShape,
+    /// Whether the peaks, if there are several, belong to one beam: their middle has half the largest intensity.
+    pub is_one_beam: bool,
 }
 
 /// In how many directions a table has its largest intensity.
@@ -34,9 +38,9 @@ pub struct Beam {
 pub enum PeakShape {
     /// In one, or in a plateau whose middle is the axis.
     One,
-    /// In so many apart from each other; the axis is the one nearest the nadir, then of the smallest C.
+    /// At so many angles of the table, apart from each other.
     Several(usize),
-    /// All around the vertical; the axis is that of C 0.
+    /// All around the vertical.
     Ring,
 }
 
@@ -77,6 +81,9 @@ pub enum NoBeam {
         /// The share of the largest intensity that was looked for.
         percent: f64,
     },
+    /// No one beam to have a type.
+    #[error("the largest intensity is that of several beams, and NEMA types are of one")]
+    SeveralBeams,
     /// Narrower than the narrowest type.
     #[error("a field angle of {field_deg:.1} degrees is below the 10 degrees at which NEMA types begin")]
     BelowTypes {
@@ -93,7 +100,6 @@ impl LuminousIntensityDistribution {
             return Err(NoBeam::Dark);
         }
         let tied = self.largest((1.0 - SAME) * peak.value());
-        let beam = |(c_deg, gamma_deg), shape| Beam { c_deg, gamma_deg, peak, shape };
         let weigh = |(c, g): &(f64, f64)| direction(*c, *g) * g.to_radians().sin();
         let mean: DVec3 = tied.iter().map(weigh).sum();
         let at_pole = tied.iter().find(|(_, g)| *g == 0.0 || *g == 180.0);
@@ -101,20 +107,21 @@ impl LuminousIntensityDistribution {
             Some((_, g)) if mean.truncate().length() <= SAME * tied.len() as f64 => Some((0.0, *g)),
             _ => mean.try_normalize().map(upright),
         };
-        if let Some((c, g)) = middle
-            && self.intensity(c, g).value() >= (1.0 - SAME) * peak.value()
-        {
-            return Ok(beam((c, g), PeakShape::One));
-        }
+        let share = |(c, g): (f64, f64)| self.intensity(c, g).value() / peak.value();
         // `largest` found the peak itself, so that there is a first one.
         let first = tied.first().copied().unwrap_or((0.0, 0.0));
-        let on_ring = self
-            .full_circle()
-            .c_deg()
-            .iter()
-            .all(|c| self.intensity(*c, first.1).value() >= (1.0 - SAME) * peak.value());
-        let shape = if on_ring { PeakShape::Ring } else { PeakShape::Several(tied.len()) };
-        Ok(beam(if on_ring { (0.0, first.1) } else { first }, shape))
+        let is_plateau = middle.is_some_and(|m| share(m) >= 1.0 - SAME);
+        let shape = if is_plateau {
+            PeakShape::One
+        } else if self.full_circle().c_deg().iter().all(|c| share((*c, first.1)) >= 1.0 - SAME) {
+            PeakShape::Ring
+        } else {
+            PeakShape::Several(tied.len())
+        };
+        let within = middle.filter(|m| share(*m) >= 0.5);
+        let (c_deg, gamma_deg) = within.unwrap_or(first);
+        let peak_deg = if is_plateau { [c_deg, gamma_deg] } else { [first.0, first.1] };
+        Ok(Beam { c_deg, gamma_deg, peak, peak_deg, shape, is_one_beam: within.is_some() })
     }
 
     /// Nodes (C, gamma) of the full circle at which the intensity reaches `least`: by gamma, then by C; a pole is one.
@@ -151,6 +158,15 @@ impl LuminousIntensityDistribution {
         Ok(BeamWidth { one_side_deg, other_side_deg })
     }
 
+    /// NEMA types, horizontal (across) and vertical, by the beam's field angles.
+    pub fn nema_types(&self, beam: &Beam) -> Result<[u8; 2], NoBeam> {
+        if !beam.is_one_beam {
+            return Err(NoBeam::SeveralBeams);
+        }
+        let of = |plane| nema_type(self.beam_width(beam, plane, 0.1)?.full_deg());
+        Ok([of(BeamPlane::Across)?, of(BeamPlane::Vertical)?])
+    }
+
     /// Half the smallest distance between angles of the table, in degrees.
     fn finest_deg(&self) -> f64 {
         let steps = |angles: &[f64]| angles.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
@@ -173,7 +189,7 @@ impl Beam {
 }
 
 /// The NEMA type of a field angle in degrees: 1 to 7.
-pub fn nema_type(field_deg: f64) -> Result<u8, NoBeam> {
+fn nema_type(field_deg: f64) -> Result<u8, NoBeam> {
     /// Where types 2 to 7 begin; an angle at a limit belongs to the narrower type.
     const ABOVE_DEG: [f64; 6] = [18.0, 29.0, 46.0, 70.0, 100.0, 130.0];
     if field_deg < 10.0 {
@@ -257,18 +273,27 @@ mod tests {
     }
 
     #[test]
-    fn peaks_apart_are_counted_and_the_first_has_its_own_width() {
+    fn peaks_of_one_beam_have_their_middle_for_its_axis_and_others_their_own() {
         let bat = |gamma: f64| if gamma <= 90.0 { (2.0 * gamma - 60.0).to_radians().cos().max(0.0) } else { 0.0 };
         let gamma = angles(90, 1.0);
         let ring =
             LuminousIntensityDistribution::axial(gamma.clone(), gamma.iter().map(|g| bat(*g)).collect()).unwrap();
         let beam = ring.beam().unwrap();
-        assert_eq!((beam.c_deg, beam.gamma_deg, beam.shape), (0.0, 30.0, PeakShape::Ring));
-        // It falls to cos 60 = .5 at gamma 60 and, beyond the nadir, not before 60 on the far side's flank.
-        let width = ring.beam_width(&beam, BeamPlane::Vertical, 0.49).unwrap();
-        assert!((width.one_side_deg - 30.3).abs() < 0.2 && (width.other_side_deg - 90.3).abs() < 0.2, "{width:?}");
+        // Half the peak straight down: one beam about the nadir.
+        assert_eq!((beam.gamma_deg, beam.peak_deg, beam.shape), (0.0, [0.0, 30.0], PeakShape::Ring));
+        assert_relative_eq!(
+            ring.beam_width(&beam, BeamPlane::Across, 0.4).unwrap().full_deg(),
+            126.4,
+            max_relative = 1e-3
+        );
+        assert!(ring.nema_types(&beam).is_ok());
         let two = table(&[0.0, 90.0], &gamma, |d| d.x.abs());
-        assert_eq!(two.beam().unwrap().shape, PeakShape::Several(2));
+        let beam = two.beam().unwrap();
+        assert_eq!((beam.shape, beam.is_one_beam, beam.peak_deg), (PeakShape::Several(2), false, [0.0, 90.0]));
+        assert_eq!(two.nema_types(&beam), Err(NoBeam::SeveralBeams));
+        // The first beam's own width: to cos 60 either side, below; the table ends at its axis above.
+        let width = two.beam_width(&beam, BeamPlane::Vertical, 0.5).unwrap();
+        assert!(width.one_side_deg < 1e-6 && (width.other_side_deg - 60.0).abs() < 0.1, "{width:?}");
     }
 
     #[test]

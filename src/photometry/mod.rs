@@ -34,7 +34,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-pub use beam::{Beam, BeamPlane, BeamWidth, NoBeam, PeakShape, nema_type};
+pub use beam::{Beam, BeamPlane, BeamWidth, NoBeam, PeakShape};
 pub use bug::{BugRating, NoBug};
 pub use details::Details;
 pub use difference::{Departure, Difference, Likeness};

@@ -36,7 +36,7 @@ impl MidZoneFlux {
 impl LuminousIntensityDistribution {
     /// Zonal flux by the zonal constants of LM-41, exact for none but what the laboratory prints.
     ///
-    /// Beyond the table's range there is no light; within it every middle must be tabulated.
+    /// Every middle of a zone with light must be tabulated.
     pub fn mid_zone_flux(&self) -> Result<MidZoneFlux, NoMidZones> {
         self.in_zones_of(5.0).or_else(|_| self.in_zones_of(10.0))
     }
@@ -47,7 +47,8 @@ impl LuminousIntensityDistribution {
         let flux = |zone: u32| {
             let (low, high) = (width_deg * f64::from(zone), width_deg * f64::from(zone + 1));
             let middle = f64::midpoint(low, high);
-            if middle < first - SAME_DEG || middle > last + SAME_DEG {
+            // A zone without light needs no angle.
+            if middle < first - SAME_DEG || middle > last + SAME_DEG || self.flux_between(low, high).value() == 0.0 {
                 return Ok(0.0);
             }
             let near = gamma_deg.partition_point(|g| *g < middle - SAME_DEG);
@@ -112,6 +113,11 @@ mod tests {
 
     #[test]
     fn a_table_without_the_middles_says_which_is_missing() {
+        let dark_above = LuminousIntensityDistribution::axial(
+            vec![0.0, 5.0, 15.0, 20.0, 90.0, 180.0],
+            vec![9.0, 9.0, 9.0, 0.0, 0.0, 0.0],
+        );
+        assert!(dark_above.unwrap().mid_zone_flux().is_ok());
         assert_eq!(cosine(10.0, 90.0).mid_zone_flux(), Err(NoMidZones { missing_deg: 5.0 }));
         let gamma = vec![0.0, 5.0, 15.0, 30.0];
         let odd = LuminousIntensityDistribution::axial(gamma, vec![1.0; 4]).unwrap();

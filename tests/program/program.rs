@@ -24,6 +24,7 @@ mod measuring;
 mod mesh_files;
 mod mistakes;
 mod negative_controls;
+mod photometric_figures;
 mod planning;
 mod policy;
 mod readers;

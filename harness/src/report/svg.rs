@@ -10,16 +10,16 @@ pub(crate) fn text(class: &str, anchor: &str, [x, y]: [f64; 2], words: &str) -> 
     html! { text class=(class) text-anchor=(anchor) x=(number(x)) y=(number(y)) { (words) } }
 }
 
-pub(super) fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Markup {
+pub(crate) fn line(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Markup {
     html! { path class=(class) d={ "M" (number(x1)) " " (number(y1)) "L" (number(x2)) " " (number(y2)) } {} }
 }
 
-pub(super) fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     trimmed(value, 1)
 }
 
 /// A value at an axis, with a real minus.
-pub(super) fn label(value: f64) -> String {
+pub(crate) fn label(value: f64) -> String {
     let decimals = (3.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 6.0) as usize;
     trimmed(value, decimals).replace('-', "−")
 }

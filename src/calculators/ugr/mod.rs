@@ -138,8 +138,8 @@ pub struct UgrTable {
 /// Why a luminaire has no table.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoUgr {
-    /// Nothing goes down.
-    #[error("no light goes below the horizon, where the observer is")]
+    /// Nothing goes down to where it could be seen.
+    #[error("no light goes below the horizon towards the observer")]
     NothingBelow,
     /// No luminous area.
     #[error(transparent)]
@@ -173,6 +173,9 @@ impl UgrTable {
         let crosswise_c_deg = crosswise_c_deg(photometry);
         let views = [View::Crosswise, View::Endwise]
             .map(|view| Glare::towards(photometry, view.c_deg(crosswise_c_deg), spacing));
+        if views.iter().all(Glare::is_none) {
+            return Err(NoUgr::NothingBelow);
+        }
         let row = |room: Room| {
             let first = FirstFlux::of(distribution, room).ok_or(NoUgr::NothingBelow)?;
             let per_height = spacing.per_height();
@@ -228,6 +231,10 @@ impl Glare {
         let along = 0..largest(|room| room.y);
         let column = |t: u32| along.clone().map(|r| 2.0 * term(photometry, c_deg, place(t), place(r))).collect();
         Self { per_height, terms: (0..largest(|room| room.x).div_ceil(2)).map(column).collect() }
+    }
+
+    fn is_none(&self) -> bool {
+        self.terms.iter().flatten().all(|term| *term == 0.0)
     }
 
     /// The sum over a room.

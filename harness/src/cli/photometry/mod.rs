@@ -1,8 +1,14 @@
-//! `luxproof photometry FILE...`: what a photometric file says, what is doubtful in it, its diagram, its conversion.
+//! `luxproof photometry FILE...`: what a photometric file says, what is doubtful in it, its diagram, its conversion; and
+//! `luxproof photometry report | diff | orient`: all its figures, how two files differ, which way a luminaire faces.
 
+mod diff;
+mod figures;
+mod orient;
 mod polar;
+mod report;
 mod sarif;
 mod summary;
+mod web;
 
 #[cfg(test)]
 mod tests;
@@ -10,7 +16,7 @@ mod tests;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::{Args, Subcommand, ValueEnum};
 use luminaire::calculators::zonal_cavity::{UtilizationTable, ZonalFlux};
 use luminaire::photometry::{self, Lint, Photometry, ReadError, Severity, Written, eulumdat, lm63};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr, miette};
@@ -24,7 +30,10 @@ use summary::Summary;
 
 /// Arguments of `luxproof photometry`.
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct PhotometryArgs {
+    #[command(subcommand)]
+    action: Option<Action>,
     /// Photometric files: LM-63 (.ies), EULUMDAT (.ldt), TM-33 (.xml)
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
@@ -51,6 +60,16 @@ pub(crate) struct PhotometryArgs {
     convert: Option<PathBuf>,
 }
 
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Every figure of a luminaire: zonal lumens, beam, NEMA, BUG, flux code, spacing, luminances, UGR; diagrams
+    Report(report::ReportArgs),
+    /// How two files differ, direction by direction; exits with 1 where rounding does not explain it
+    Diff(diff::DiffArgs),
+    /// Which way a luminaire faces, by its format and by its light; writes it turned
+    Orient(orient::OrientArgs),
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Format {
     Terminal,
@@ -73,6 +92,12 @@ struct Reading {
 
 /// Reads the files, prints to stdout, writes what was asked for; a refused file makes the exit code 2.
 pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnostic> {
+    match &args.action {
+        Some(Action::Report(args)) => return report::run(args, trust),
+        Some(Action::Diff(args)) => return diff::run(args, trust),
+        Some(Action::Orient(args)) => return orient::run(args, trust),
+        None => {}
+    }
     let format = if args.json { Format::Json } else { args.format };
     if format == Format::Sarif && !args.lint {
         return Err(miette!(help = "add --lint", "--format sarif prints lints only"));
@@ -80,10 +105,7 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
     if args.files.len() > 1 && (args.polar.is_some() || args.convert.is_some()) {
         return Err(miette!(help = "give one FILE", "--polar and --convert write one file"));
     }
-    let open = |file: &Path, path: &Path| trust.read_named(file.parent().unwrap_or(Path::new("")), path);
-    let read = |file: &PathBuf| photometry::read_by(file, &|path| open(file, path));
-    let read = |file: &PathBuf| Reading { file: file.clone(), read: read(file) };
-    let readings: Vec<Reading> = args.files.iter().map(read).collect();
+    let readings: Vec<Reading> = args.files.iter().map(|file| Reading::of(file, trust)).collect();
     let text = match format {
         Format::Json => json(&readings)?,
         Format::Sarif => sarif::log(&readings)?,
@@ -97,17 +119,9 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
             write_files(args, &reading.file, photometry)?;
         }
     }
-    let is_warning = |lint: &Lint| lint.severity == Severity::Warning;
-    let is_doubtful = |r: &Reading| r.read.as_ref().is_ok_and(|photometry| photometry.lints.iter().any(is_warning));
-    let denied = args.deny == Some(Deny::Warnings) && readings.iter().any(is_doubtful);
-    let mut exit = if denied { Exit::Failed } else { Exit::Passed };
-    for reading in readings {
-        if let Err(error) = reading.read {
-            exit = Exit::Usage;
-            super::complain(&format!("{:?}", diagnose(spec_error(&error))));
-        }
-    }
-    Ok(exit)
+    let denied = args.deny == Some(Deny::Warnings) && readings.iter().any(Reading::is_doubtful);
+    let exit = if denied { Exit::Failed } else { Exit::Passed };
+    Ok(if Reading::all_sound(readings).is_some() { exit } else { Exit::Usage })
 }
 
 fn json(readings: &[Reading]) -> Result<String, Diagnostic> {
@@ -116,6 +130,24 @@ fn json(readings: &[Reading]) -> Result<String, Diagnostic> {
 }
 
 impl Reading {
+    fn of(file: &Path, trust: Trust) -> Self {
+        let open = |path: &Path| trust.read_named(file.parent().unwrap_or(Path::new("")), path);
+        Self { file: file.to_path_buf(), read: photometry::read_by(file, &open) }
+    }
+
+    /// Whether it has warnings.
+    fn is_doubtful(&self) -> bool {
+        let is_warning = |lint: &Lint| lint.severity == Severity::Warning;
+        self.read.as_ref().is_ok_and(|photometry| photometry.lints.iter().any(is_warning))
+    }
+
+    /// What was read, in order; `None`, and every refusal told on standard error, where anything was refused.
+    fn all_sound(readings: Vec<Self>) -> Option<Vec<Photometry>> {
+        let told = |error: &ReadError| super::complain(&format!("{:?}", diagnose(spec_error(error))));
+        let sound: Vec<Option<Photometry>> = readings.into_iter().map(|r| r.read.inspect_err(told).ok()).collect();
+        sound.into_iter().collect()
+    }
+
     fn record(&self) -> Result<serde_json::Value, Diagnostic> {
         match &self.read {
             Ok(photometry) => serde_json::to_value(Summary::of(&self.file, photometry)).into_diagnostic(),
@@ -125,6 +157,18 @@ impl Reading {
             })),
         }
     }
+}
+
+/// Reads the files of a subcommand; `None` where one was refused. What is denied is told on standard error.
+fn read_all<const N: usize>(files: [&Path; N], deny: Option<Deny>, trust: Trust) -> Option<([Photometry; N], Exit)> {
+    let readings = files.map(|file| Reading::of(file, trust));
+    let denied = deny == Some(Deny::Warnings) && readings.iter().any(Reading::is_doubtful);
+    if denied {
+        super::complain(lints(&readings).trim_end());
+    }
+    let sound: Vec<Photometry> = Reading::all_sound(readings.into())?;
+    let exit = if denied { Exit::Failed } else { Exit::Passed };
+    sound.try_into().ok().map(|sound| (sound, exit))
 }
 
 /// One line a lint, as compilers print them.

@@ -1,0 +1,186 @@
+//! `luxproof photometry orient FILE`: which way a luminaire faces, by its format and by its light; the file turned.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use luminaire::photometry::{Lean, Photometry};
+use miette::{Report as Diagnostic, miette};
+use serde::Serialize;
+
+use super::figures::Figure;
+use super::{Deny, convert, read_all, save};
+use crate::cli;
+use crate::report::Exit;
+use crate::report::words::trimmed;
+use crate::spec::Trust;
+
+#[derive(Debug, Args)]
+pub(super) struct OrientArgs {
+    /// A photometric file
+    file: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    /// Turn it so that what this file's format calls forward points to that plane
+    #[arg(long, value_enum, value_name = "WHERE", requires = "out", conflicts_with = "turn")]
+    to: Option<To>,
+    /// Turn it by so many degrees about its vertical axis, C 0 towards C 90
+    #[arg(long, value_name = "DEG", requires = "out", allow_negative_numbers = true, value_parser = degrees)]
+    turn: Option<f64>,
+    /// Write the turned luminaire, by extension: .ldt is EULUMDAT, .ies is LM-63-2019
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Exit with 1 where the file has warnings, and print them
+    #[arg(long, value_enum, value_name = "WHAT")]
+    deny: Option<Deny>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum To {
+    /// As LM-63 has roadway luminaires
+    ForwardC0,
+    /// As EULUMDAT has them
+    ForwardC90,
+    ForwardC180,
+    ForwardC270,
+}
+
+impl To {
+    const fn c_deg(self) -> f64 {
+        match self {
+            Self::ForwardC0 => 0.0,
+            Self::ForwardC90 => 90.0,
+            Self::ForwardC180 => 180.0,
+            Self::ForwardC270 => 270.0,
+        }
+    }
+}
+
+/// Any angle up to a full turn.
+fn degrees(text: &str) -> Result<f64, String> {
+    let degrees: f64 = text.parse().map_err(|_| "it must be a number of degrees".to_owned())?;
+    if degrees.abs() <= 360.0 { Ok(degrees) } else { Err("it must lie within -360 and 360".to_owned()) }
+}
+
+/// Changes when a key changes its meaning or goes.
+const SCHEMA: &str = "luxproof-photometric-orientation/1";
+
+#[derive(Debug, Serialize)]
+struct Record {
+    schema: &'static str,
+    file: String,
+    format: String,
+    forward_c_deg: f64,
+    lamp_axis_c_deg: f64,
+    source: &'static str,
+    lean: Figure<LeanRecord>,
+    turned_deg: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct LeanRecord {
+    /// Of the flux-weighted mean direction; `null` where that is vertical.
+    c_deg: Option<f64>,
+    gamma_deg: f64,
+    /// 1 for a ray, 0 for light that goes all ways alike.
+    strength: f64,
+    flux_about_c0_percent: f64,
+    flux_about_c90_percent: f64,
+    flux_about_c180_percent: f64,
+    flux_about_c270_percent: f64,
+    flux_up_percent: f64,
+}
+
+impl From<Lean> for LeanRecord {
+    fn from(lean: Lean) -> Self {
+        let [c0, c90, c180, c270] = lean.halves.map(|part| 100.0 * part);
+        Self {
+            c_deg: lean.c_deg,
+            gamma_deg: lean.gamma_deg,
+            strength: lean.strength,
+            flux_about_c0_percent: c0,
+            flux_about_c90_percent: c90,
+            flux_about_c180_percent: c180,
+            flux_about_c270_percent: c270,
+            flux_up_percent: 100.0 * lean.up,
+        }
+    }
+}
+
+pub(super) fn run(args: &OrientArgs, trust: Trust) -> Result<Exit, Diagnostic> {
+    let Some(([photometry], exit)) = read_all([&args.file], args.deny, trust) else { return Ok(Exit::Usage) };
+    let forward_c_deg = photometry.convention().forward_c_deg;
+    let turn_deg = args.to.map(|to| to.c_deg() - forward_c_deg).or(args.turn);
+    if args.out.is_some() && turn_deg.is_none() {
+        return Err(miette!(
+            help = "add --to forward-c0, --to forward-c90 or --turn DEG",
+            "--out does not say how to turn"
+        ));
+    }
+    // What cannot be written is refused before anything is printed.
+    let written = match (&args.out, turn_deg) {
+        (Some(out), Some(turn_deg)) => {
+            let (turned, kept) = photometry.turned(turn_deg);
+            Some((out, convert(out, &turned)?, kept))
+        }
+        _ => None,
+    };
+    let record = Record::of(args, &photometry, turn_deg);
+    cli::print(&if args.json { cli::json(&record)? } else { record.text() })?;
+    if let Some((out, written, kept)) = written {
+        save(out, &written.text)?;
+        for loss in kept.iter().chain(&written.losses) {
+            cli::complain(&format!("{}: {loss}", out.display()));
+        }
+    }
+    Ok(exit)
+}
+
+impl Record {
+    fn of(args: &OrientArgs, photometry: &Photometry, turned_deg: Option<f64>) -> Self {
+        let convention = photometry.convention();
+        let lean = photometry.distribution.lean().ok_or("every intensity is zero");
+        Self {
+            schema: SCHEMA,
+            file: args.file.display().to_string(),
+            format: photometry.format.clone(),
+            forward_c_deg: convention.forward_c_deg,
+            lamp_axis_c_deg: convention.lamp_axis_c_deg,
+            source: convention.source,
+            lean: lean.map(LeanRecord::from).into(),
+            turned_deg,
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = format!("{}\n", self.file);
+        let mut row = |name: &str, value: String| text.push_str(&format!("  {name:<20} {value}\n"));
+        row("format", self.format.clone());
+        row("forward", format!("C {}°, across the street and away from houses", self.forward_c_deg));
+        row("lamp axis", format!("C {}°", self.lamp_axis_c_deg));
+        row("source", self.source.to_owned());
+        row("light leans to", self.lean.told(lean));
+        row(
+            "flux about a plane",
+            self.lean.told(|l| {
+                let [c0, c90] = [l.flux_about_c0_percent, l.flux_about_c90_percent].map(|p| format!("{p:.1}"));
+                let [c180, c270] = [l.flux_about_c180_percent, l.flux_about_c270_percent].map(|p| format!("{p:.1}"));
+                format!("C0 {c0} %, C180 {c180} %; C90 {c90} %, C270 {c270} %; up {:.1} %", l.flux_up_percent)
+            }),
+        );
+        if let Some(turn) = self.turned_deg {
+            row("turned by", format!("{turn}°, C 0 towards C 90"));
+        }
+        text
+    }
+}
+
+fn lean(lean: &LeanRecord) -> String {
+    let (gamma, strength) = (trimmed(lean.gamma_deg, 1), trimmed(lean.strength, 3));
+    match lean.c_deg {
+        Some(c) => format!("C {}° gamma {gamma}° (mean direction, {strength} of a ray)", trimmed(c, 1)),
+        None if lean.strength < 1e-6 => "nowhere: it goes all ways alike".to_owned(),
+        None if lean.gamma_deg > 90.0 => format!("straight up (mean direction, {strength} of a ray)"),
+        None => format!("straight down (mean direction, {strength} of a ray)"),
+    }
+}
