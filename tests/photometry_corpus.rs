@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use luminaire::photometry::{self, Details, Photometry, eulumdat, lm63};
+use luminaire::calculators::ugr::{Spacing, UgrTable};
+use luminaire::photometry::{self, Details, Difference, Likeness, Photometry, eulumdat, lm63};
 
 /// The corpus, or `None` where it is absent.
 fn corpus() -> Option<PathBuf> {
@@ -123,6 +124,48 @@ fn conversion_keeps_every_intensity_to_the_last_bit_or_two() {
                     assert!((a - b).value().abs() <= 1e-15 * scale.value(), "{}: {a} {b}", file.display());
                 }
             }
+        }
+    }
+}
+
+/// No file of the corpus carries printed UGR values: what holds of every sound figure is asked.
+#[test]
+fn figures_of_every_file_hold_together() {
+    let Some(corpus) = corpus() else { return };
+    for file in files(&corpus, "") {
+        let Ok(read) = photometry::read_file(&file) else { continue };
+        let (table, name) = (&read.distribution, file.display());
+        let beam = table.beam().expect("every file of the corpus has light");
+        assert!(
+            table.intensity(beam.peak_deg[0], beam.peak_deg[1]).value() >= (1.0 - 1e-9) * beam.peak.value(),
+            "{name}"
+        );
+        if let Ok(flux) = table.mid_zone_flux() {
+            let (lab, exact) = (flux.between(0.0, 180.0).value(), table.flux().value());
+            // Narrow beams are where middles of 10 degrees say least.
+            assert!((lab / exact - 1.0).abs() < 0.25, "{name}: {lab} {exact}");
+        }
+        for spacing in [Spacing::Quarter, Spacing::Whole] {
+            let Ok(ugr) = UgrTable::of(&read, spacing) else { continue };
+            for row in &ugr.rows {
+                for side in [row.crosswise, row.endwise].map(|side| side.map(|rating| rating.expect("it is seen"))) {
+                    assert!(side.iter().all(|rating| rating.is_finite()), "{name}: {row:?}");
+                    // Darker walls, ceilings: a darker background, more glare.
+                    assert!(
+                        side[0] < side[1] && side[2] < side[3] && side[0] < side[2] && side[3] < side[4],
+                        "{name}: {row:?}"
+                    );
+                }
+            }
+        }
+        let again = [lm63::write_2019(&read).text, eulumdat::write(&read).text];
+        let again = [lm63::parse(again[0].as_bytes()), eulumdat::parse(again[1].as_bytes())];
+        for same in again.into_iter().flatten() {
+            let difference = Difference::between(&read, &same);
+            assert_ne!(difference.likeness, Likeness::Different, "{name}: {difference:?}");
+            let (turned, _) = same.turned(90.0);
+            let (back, _) = turned.turned(-90.0);
+            assert_eq!(Difference::between(&same, &back).likeness, Likeness::Equal, "{name}");
         }
     }
 }

@@ -131,7 +131,11 @@ impl LuminousIntensityDistribution {
         let around = if self.c_deg().len() == 1 { vec![0.0, 90.0, 180.0, 270.0] } else { full.c_deg().to_vec() };
         let planes = around.iter().filter(|c| **c < 360.0);
         let nodes = planes.flat_map(|c| full.gamma_deg().iter().map(move |g| (*c, *g)));
-        let pole = |(c, g): (f64, f64)| if g == 0.0 || g == 180.0 { (0.0, g) } else { (c, g) };
+        // At a pole every C is the same direction; the planes of some tables disagree there.
+        let pole = |(c, g): (f64, f64)| {
+            let is_one = (g == 0.0 || g == 180.0) && full.intensity(0.0, g).value() >= least;
+            if is_one { (0.0, g) } else { (c, g) }
+        };
         let mut tied: Vec<(f64, f64)> =
             nodes.filter(|(c, g)| full.intensity(*c, *g).value() >= least).map(pole).collect();
         tied.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));

@@ -19,6 +19,8 @@ const VERY_HIGH: Limits = [10.0, 100.0, 225.0, 500.0, 750.0];
 /// Table A-3: forward light of 60-80 degrees and, of quadrilaterally symmetric luminaires, back light there.
 const FORWARD_HIGH: Limits = [660.0, 1800.0, 5000.0, 7500.0, 12000.0];
 
+/// Less than this fraction of the luminaire's flux, or of its largest intensity, is rounding and no light.
+const NOTHING: f64 = 1e-9;
 /// How far values may differ, as a fraction of the largest, in a luminaire that is called symmetric.
 const ALIKE: f64 = 0.05;
 
@@ -68,10 +70,12 @@ impl LuminousIntensityDistribution {
             return Err(NoBug::Dark);
         }
         let gamma_deg = self.gamma_deg()[self.gamma_deg().len() - 1];
-        if gamma_deg < 180.0 && self.c_deg().iter().any(|c| self.intensity(*c, gamma_deg).value() > 0.0) {
+        if gamma_deg < 180.0 && self.c_deg().iter().any(|c| self.intensity(*c, gamma_deg).value() > NOTHING * largest) {
             return Err(NoBug::CutShort { gamma_deg });
         }
         let zones = self.classification_zones(forward_c_deg);
+        let nothing = NOTHING * self.flux();
+        let highest = |zones: &[(Lumen, Limits)]| highest(zones, nothing);
         let ([_, _, forward_high, forward_very_high], [low, medium, high, very_high]) = (zones.forward, zones.back);
         let backlight = highest(&[(low, BACK_LOW_AND_HIGH), (medium, BACK_MEDIUM), (high, BACK_LOW_AND_HIGH)]);
         let glare = |back_high: Limits| {
@@ -100,8 +104,9 @@ impl LuminousIntensityDistribution {
 }
 
 /// The highest rating of several zones.
-fn highest(zones: &[(Lumen, Limits)]) -> u8 {
-    let rating = |(flux, limits): &(Lumen, Limits)| limits.iter().filter(|most| flux.value() > **most).count() as u8;
+fn highest(zones: &[(Lumen, Limits)], nothing: Lumen) -> u8 {
+    let rating =
+        |(flux, limits): &(Lumen, Limits)| limits.iter().filter(|most| *flux > Lumen(**most) + nothing).count() as u8;
     zones.iter().map(rating).max().unwrap_or(0)
 }
 

@@ -120,7 +120,8 @@ impl LuminousIntensityDistribution {
         let (c, gamma) = super::angles_deg(mean);
         let half = |c: f64| self.flux_of_half(c) / flux;
         Some(Lean {
-            c_deg: (mean.truncate().length() > NO_LEAN).then_some(c),
+            // A hair below C 0 is rounding.
+            c_deg: (mean.truncate().length() > NO_LEAN).then_some(if c > 360.0 - NO_LEAN { 0.0 } else { c }),
             gamma_deg: gamma,
             strength: mean.length(),
             halves: [0.0, 90.0, 180.0, 270.0].map(half),

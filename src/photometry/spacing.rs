@@ -1,6 +1,6 @@
 //! Luminaire spacing criteria along both axes and on the diagonal.
 //!
-//! IES Lighting Handbook (9th ed., chapter 9; T. K. McGowan and D. F. Steffy, spacing criterion, 1977): along an axis the
+//! IES Lighting Handbook (9th ed., chapter 9, luminaire spacing criterion): along an axis the
 //! spacing over mounting height at which midway between two luminaires the horizontal illuminance is that below one of
 //! them alone, on the diagonal the same in the middle of four. Direct light only, each luminaire's own.
 

@@ -10,7 +10,7 @@ use std::process::Command;
 
 use crate::support::{Answer, Folder, root};
 
-const PAGES: [&str; 8] = [
+const PAGES: [&str; 9] = [
     "first-audit",
     "writing-a-spec",
     "reading-a-report",
@@ -18,6 +18,7 @@ const PAGES: [&str; 8] = [
     "nightly",
     "cluster",
     "methods",
+    "photometry",
     "bundles",
 ];
 

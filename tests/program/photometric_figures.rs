@@ -32,30 +32,49 @@ fn a_difference_has_a_verdict_a_place_a_map_and_an_exit_code() {
         ("other.ies", &STREET.replace("50 40 0 0", "50 43 0 0")),
         ("bad.ies", "IESNA:LM-63-2002\nTILT=NONE\nx\n"),
     ]);
-    let diff = |b: &str, code: i32| folder.luxproof(&["photometry", "diff", "a.ies", b, "--svg", "map.svg"]).exits(code);
+    let diff =
+        |b: &str, code: i32| folder.luxproof(&["photometry", "diff", "a.ies", b, "--svg", "map.svg"]).exits(code);
     diff("a.ies", 0).prints("a.ies and a.ies: equal\n");
     diff("rounded.ies", 0).prints("equal within rounding");
-    diff("other.ies", 1).prints("different").prints("40.0000 -> 43.0000 cd at C 90.000° gamma 45.000°, +3.3333 % of the peak");
+    diff("other.ies", 1)
+        .prints("different")
+        .prints("40.0000 -> 43.0000 cd at C 90.000° gamma 45.000°, +3.3333 % of the peak");
     assert!(folder.read("map.svg").contains("full colour 3.00000 cd"));
     folder.luxproof(&["photometry", "diff", "a.ies", "bad.ies"]).exits(2).complains("bad.ies:3");
     let json = folder.luxproof(&["photometry", "diff", "a.ies", "other.ies", "--json"]).exits(1).stdout;
     let record: serde_json::Value = serde_json::from_str(&json).unwrap();
-    assert_eq!((record["verdict"].as_str(), record["largest_difference"]["difference_cd"].as_f64()), (Some("different"), Some(3.0)));
+    assert_eq!(
+        (record["verdict"].as_str(), record["largest_difference"]["difference_cd"].as_f64()),
+        (Some("different"), Some(3.0))
+    );
 }
 
 #[test]
 fn a_luminaire_is_turned_into_the_other_formats_forward() {
     let folder = Folder::new(&[("a.ies", STREET)]);
-    folder.luxproof(&["photometry", "orient", "a.ies"]).exits(0).prints("C 0°, across the street").prints("light leans to       C 0°");
+    folder
+        .luxproof(&["photometry", "orient", "a.ies"])
+        .exits(0)
+        .prints("C 0°, across the street")
+        .prints("light leans to       C 0°");
     let to = ["photometry", "orient", "a.ies", "--to", "forward-c90", "--out", "a.ldt"];
     folder.luxproof(&to).exits(0).prints("turned by");
-    folder.luxproof(&["photometry", "orient", "a.ldt"]).exits(0).prints("C 90°, across the street").prints("light leans to       C 90°");
+    folder
+        .luxproof(&["photometry", "orient", "a.ldt"])
+        .exits(0)
+        .prints("C 90°, across the street")
+        .prints("light leans to       C 90°");
     // There and back it is what it was; what differs are words that formats keep.
     folder.luxproof(&["photometry", "orient", "a.ldt", "--turn", "-90", "--out", "back.ies"]).exits(0);
     folder.luxproof(&["photometry", "diff", "a.ies", "back.ies"]).exits(0).prints("equal\n");
     let slanted = ["photometry", "orient", "a.ies", "--turn", "30", "--out", "b.ies"];
     folder.luxproof(&slanted).exits(0).complains("stays along the axes");
-    for wrong in [&["--to", "forward-c0"][..], &["--out", "x.ies"], &["--turn", "nan", "--out", "x.ies"], &["--turn", "9", "--out", "x.doc"]] {
+    for wrong in [
+        &["--to", "forward-c0"][..],
+        &["--out", "x.ies"],
+        &["--turn", "nan", "--out", "x.ies"],
+        &["--turn", "9", "--out", "x.doc"],
+    ] {
         folder.luxproof(&[&["photometry", "orient", "a.ies"], wrong].concat()).exits(2);
     }
 }

@@ -1,8 +1,8 @@
 //! Background luminance of the standard room: what the walls, indirectly lit, show the observer.
 //!
-//! CIE 190:2010 clause 4.2, equations 7 to 12: E_WID = B F_UWID, L_b = E_WID / pi. Of a luminaire's flux F_DF reaches the
-//! reference plane directly, by geometric multipliers (table 4) of the flux within the cones of CIE 52, F_DW the walls and
-//! F_DC the ceiling; transfer factors (table 5) say how much of each arrives on the walls indirectly. Those are the balance
+//! CIE 190:2010 clause 4.2, equations 7 to 12: `E_WID = B F_UWID`, `L_b = E_WID / pi`. Of a luminaire's flux `F_DF` reaches the
+//! reference plane directly, by geometric multipliers (table 4) of the flux within the cones of CIE 52, `F_DW` the walls and
+//! `F_DC` the ceiling; transfer factors (table 5) say how much of each arrives on the walls indirectly. Those are the balance
 //! of the three surfaces, from which they are computed here: the printed ones are its values to three decimals.
 
 use glam::{DMat3, DVec3};
@@ -52,7 +52,7 @@ impl FirstFlux {
     }
 }
 
-/// Indirect flux on the walls per lumen that first arrives on the plane (F_T,FW), the walls (F_T,WW - 1) and the ceiling (F_T,CW).
+/// Indirect flux on the walls per lumen that first arrives on the plane (`F_T,FW`), the walls (`F_T,WW - 1`) and the ceiling (`F_T,CW`).
 pub(super) fn transfer(room: Room, reflectances: Reflectances) -> [f64; 3] {
     let (x, y) = (f64::from(room.x), f64::from(room.y));
     let across = opposed_rectangles(x, y, 1.0);

@@ -1,6 +1,6 @@
 //! Tables of the unified glare rating (UGR) of a luminaire in standard rooms.
 //!
-//! CIE 117-1995 (the rating, equation 1) and CIE 190:2010 (the table): UGR = 8 lg (.25 / L_b sum L^2 w / p^2), observer at
+//! CIE 117-1995 (the rating, equation 1) and CIE 190:2010 (the table): `UGR = 8 lg (.25 / L_b sum L^2 w / p^2)`, observer at
 //! the middle of a wall, looking along the room, luminaires in an even grid at the height H above the eye. CIE 190 spaces
 //! them by H; the tables of catalogues, as EN 12464-1 has them read, by H / 4. Values are *corrected*: of the luminaire's
 //! own flux, not of 1000 lm.

@@ -29,12 +29,9 @@ fn luminaires() -> [Photometry; 3] {
 
 /// What is needed of a room, of metres and vectors alone.
 struct Built {
-    /// Of the room: across (x) and along (y) the line of sight, the eye at the origin, the wall behind it.
-    width_m: f64,
-    depth_m: f64,
-    height_m: f64,
-    /// Where luminaires are.
-    places_m: Vec<DVec3>,
+    /// Across the line of sight, along it, and from the eye to the luminaires; the eye is the origin, the wall behind it.
+    size_m: DVec3,
+    luminaires_m: Vec<DVec3>,
 }
 
 impl Built {
@@ -45,7 +42,10 @@ impl Built {
         let count = |length: f64| (length / step).round() as u32;
         let at = |k: u32| (f64::from(k) + 0.5) * step;
         let row = |i: u32| (0..count(depth_m)).map(move |j| DVec3::new(at(i) - 0.5 * width_m, at(j), height_m));
-        Self { width_m, depth_m, height_m, places_m: (0..count(width_m)).flat_map(row).collect() }
+        Self {
+            size_m: DVec3::new(width_m, depth_m, height_m),
+            luminaires_m: (0..count(width_m)).flat_map(row).collect(),
+        }
     }
 
     /// Sum of L^2 w / p^2; `axes` are the luminaire's x and y in the room.
@@ -71,7 +71,7 @@ impl Built {
             }
             (bright / angle).powi(2) * angle / (index * index)
         };
-        self.places_m.iter().map(one).sum()
+        self.luminaires_m.iter().map(one).sum()
     }
 
     /// Part of the downward flux that falls on the reference plane within the room, ray by ray from every luminaire.
@@ -82,13 +82,13 @@ impl Built {
             for c in (0..72).map(|k| 5.0 * (f64::from(k) + 0.5)) {
                 let weight = luminaire.distribution.intensity(c, g).value() * g.to_radians().sin();
                 let away = frame * crate::photometry::direction(c, g);
-                let foot = away / -away.z * self.height_m;
+                let foot = away / -away.z * self.size_m.z;
                 let lands = |place: &&DVec3| {
                     let hit = **place + foot;
-                    hit.x.abs() <= 0.5 * self.width_m && (0.0..=self.depth_m).contains(&hit.y)
+                    hit.x.abs() <= 0.5 * self.size_m.x && (0.0..=self.size_m.y).contains(&hit.y)
                 };
-                inside += weight * self.places_m.iter().filter(lands).count() as f64;
-                all += weight * self.places_m.len() as f64;
+                inside += weight * self.luminaires_m.iter().filter(lands).count() as f64;
+                all += weight * self.luminaires_m.len() as f64;
             }
         }
         inside / all
@@ -97,7 +97,7 @@ impl Built {
     /// Indirect luminance of the walls in cd/m2 for flux that first falls on the plane and on the walls, in lumens: by
     /// following it from reflection to reflection, with a view factor integrated over distances between points.
     fn background(&self, on_plane: f64, on_walls: f64, reflectances: Reflectances) -> f64 {
-        let (x, y, h) = (self.width_m, self.depth_m, self.height_m);
+        let (x, y, h) = (self.size_m.x, self.size_m.y, self.size_m.z);
         let cells = 400;
         let mut facing = 0.0;
         for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
@@ -120,7 +120,7 @@ impl Built {
     }
 
     fn rating(&self, luminaire: &Photometry, axes: [DVec3; 2], part: f64, reflectances: Reflectances) -> f64 {
-        let down = luminaire.distribution.flux().value() * self.places_m.len() as f64;
+        let down = luminaire.distribution.flux().value() * self.luminaires_m.len() as f64;
         let behind = self.background(part * down, (1.0 - part) * down, reflectances);
         8.0 * (0.25 / behind * self.glare(luminaire, axes)).log10()
     }

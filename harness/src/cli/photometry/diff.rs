@@ -45,7 +45,7 @@ struct Record {
     verdict: &'static str,
     flux_lm: [f64; 2],
     flux_difference_lm: f64,
-    peaks: [Figure<Peak>; 2],
+    peaks: [Figure<Highest>; 2],
     largest_difference: Place,
     rms_difference_cd: f64,
     /// Of the larger of both largest intensities.
@@ -57,7 +57,7 @@ struct Record {
 }
 
 #[derive(Debug, Serialize)]
-struct Peak {
+struct Highest {
     c_deg: f64,
     gamma_deg: f64,
     peak_cd: f64,
@@ -98,7 +98,11 @@ impl Record {
         let flux_lm = pair.each_ref().map(|p| p.distribution.flux().value());
         let peak = |p: &Photometry| {
             let beam = p.distribution.beam();
-            Figure::from(beam.map(|b| Peak { c_deg: b.peak_deg[0], gamma_deg: b.peak_deg[1], peak_cd: b.peak.value() }))
+            Figure::from(beam.map(|b| Highest {
+                c_deg: b.peak_deg[0],
+                gamma_deg: b.peak_deg[1],
+                peak_cd: b.peak.value(),
+            }))
         };
         let percent = |cd: f64| (difference.peak_cd > 0.0).then(|| 100.0 * cd / difference.peak_cd);
         let at: Departure = difference.largest;
@@ -133,7 +137,7 @@ impl Record {
         };
         let [a, b] = self.flux_lm;
         row("flux", format!("{a:.2} and {b:.2} lm{}", relative(b - a, a)));
-        let peak = |peak: &Figure<Peak>| {
+        let peak = |peak: &Figure<Highest>| {
             peak.told(|p| format!("{} cd at C {:.2}° gamma {:.2}°", significant(p.peak_cd), p.c_deg, p.gamma_deg))
         };
         row("largest intensity", format!("{}; {}", peak(&self.peaks[0]), peak(&self.peaks[1])));

@@ -64,7 +64,7 @@ pub(super) struct Figures {
     pub(super) luminaire: Option<String>,
     pub(super) lamp_lumens: Option<f64>,
     pub(super) flux_lm: f64,
-    pub(super) zonal_lumens: Zones,
+    pub(super) zonal_lumens: ZonalLumens,
     pub(super) beam: Figure<BeamRecord>,
     pub(super) nema_type: Figure<Nema>,
     pub(super) bug: Figure<Bug>,
@@ -75,7 +75,7 @@ pub(super) struct Figures {
 }
 
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Zones {
+pub(super) struct ZonalLumens {
     /// Width of the zones whose constants were used.
     pub(super) mid_zone_width_deg: Figure<f64>,
     /// Of 10 degrees.
@@ -119,6 +119,7 @@ pub(super) struct Widths {
 }
 
 #[derive(Clone, Copy, Debug, Serialize)]
+#[allow(clippy::struct_field_names, reason = "units stand in the keys")]
 pub(super) struct Width {
     pub(super) full_deg: f64,
     /// Upwards or towards C 0; across: towards C 90.
@@ -216,7 +217,7 @@ impl Figures {
             luminaire: photometry.keyword("LUMINAIRE").or(photometry.keyword("LUMCAT")).map(str::to_owned),
             lamp_lumens: photometry.lamp_lumens,
             flux_lm: flux.value(),
-            zonal_lumens: Zones::of(photometry),
+            zonal_lumens: ZonalLumens::of(photometry),
             nema_type: beam.and_then(|beam| distribution.nema_types(&beam)).map(Nema::from).into(),
             beam: beam.as_ref().map(record).into(),
             bug: distribution.bug_rating(forward_c_deg).map(|rating| Bug::of(&rating, forward_c_deg)).into(),
@@ -228,7 +229,7 @@ impl Figures {
     }
 }
 
-impl Zones {
+impl ZonalLumens {
     fn of(photometry: &Photometry) -> Self {
         let distribution = &photometry.distribution;
         let (by_constants, flux_lm) = (distribution.mid_zone_flux(), distribution.flux().value());

@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use super::super::figures::{Bug, Figure, Figures, Luminances, Ugr, UgrRoom, Widths, Zone, Zones};
+use super::super::figures::{
+    BeamRecord, Bug, Figure, Figures, Luminances, Surfaces, Ugr, UgrRoom, Width, Widths, ZonalLumens, Zone,
+};
 use crate::report::words::trimmed;
 
 impl fmt::Display for Figures {
@@ -14,7 +16,7 @@ impl fmt::Display for Figures {
             row("luminaire", luminaire.lines().next().unwrap_or_default().to_owned())?;
         }
         row("flux", format!("{:.1} lm", self.flux_lm))?;
-        let axis = |b: &super::super::figures::BeamRecord| {
+        let axis = |b: &BeamRecord| {
             let at = |[c, gamma]: [f64; 2]| format!("C {}° gamma {}°", trimmed(c, 2), trimmed(gamma, 2));
             let (axis, peak) = ([b.axis_c_deg, b.axis_gamma_deg], [b.peak_c_deg, b.peak_gamma_deg]);
             let whose = match (b.peaks, b.is_one_beam) {
@@ -50,7 +52,7 @@ impl fmt::Display for Figures {
 }
 
 fn widths(widths: &Widths) -> String {
-    let angle = |figure: &Figure<super::super::figures::Width>| {
+    let angle = |figure: &Figure<Width>| {
         figure.told(|w| format!("{:.1}° ({:.1} + {:.1})", w.full_deg, w.one_side_deg, w.other_side_deg))
     };
     format!("beam angle (50 %) {}; field angle (10 %) {}", angle(&widths.beam_angle), angle(&widths.field_angle))
@@ -75,7 +77,7 @@ fn bug(bug: &Bug) -> String {
     )
 }
 
-fn zones(f: &mut fmt::Formatter<'_>, zones: &Zones) -> fmt::Result {
+fn zones(f: &mut fmt::Formatter<'_>, zones: &ZonalLumens) -> fmt::Result {
     let method = match &zones.mid_zone_width_deg {
         Figure::Is(width) => format!("zonal constants of {width}° zones"),
         Figure::No { not_available } => format!("by zonal constants not available: {not_available}"),
@@ -88,7 +90,8 @@ fn zones(f: &mut fmt::Formatter<'_>, zones: &Zones) -> fmt::Result {
     let line = |f: &mut fmt::Formatter<'_>, zone: &Zone| {
         let optional =
             |value: Option<f64>, decimals: usize| value.map_or("-".to_owned(), |v| format!("{v:.decimals$}"));
-        let difference = zone.difference_lm.map_or("-".to_owned(), |lm| format!("{lm:+.1}"));
+        let signed = |lm: f64| if lm.abs() < 0.05 { "0.0".to_owned() } else { format!("{lm:+.1}") };
+        let difference = zone.difference_lm.map_or("-".to_owned(), signed);
         writeln!(
             f,
             "  {:>9} {:>11} {:>11.1} {difference:>10} {:>7}",
@@ -123,14 +126,14 @@ fn luminances(f: &mut fmt::Formatter<'_>, table: &Luminances) -> fmt::Result {
 }
 
 fn ugr(f: &mut fmt::Formatter<'_>, table: &Ugr) -> fmt::Result {
-    let (crosswise, endwise) = (table.crosswise_c_deg, table.crosswise_c_deg + 90.0);
+    let (crosswise, endwise) = (table.crosswise_c_deg, (table.crosswise_c_deg + 90.0) % 180.0);
     writeln!(
         f,
         "\nUGR, corrected, S/H {} (CIE 190); seen crosswise from C {crosswise}°, endwise from C {endwise}°",
         table.spacing_over_height
     )?;
-    let percent = |of: fn(&super::super::figures::Surfaces) -> f64| {
-        table.reflectances.iter().map(|r| format!("{:>5.0}", 100.0 * of(r))).collect::<String>()
+    let percent = |of: fn(&Surfaces) -> f64| {
+        table.reflectances.iter().map(|r| format!("{:>5.0}", 100.0 * of(r))).collect::<Vec<_>>().concat()
     };
     for (name, values) in
         [("ceiling", percent(|r| r.ceiling)), ("walls", percent(|r| r.walls)), ("plane", percent(|r| r.plane))]
@@ -138,7 +141,7 @@ fn ugr(f: &mut fmt::Formatter<'_>, table: &Ugr) -> fmt::Result {
         writeln!(f, "  {name:<9}{values}  {values}")?;
     }
     let rating = |rating: &Option<f64>| rating.map_or(format!("{:>5}", "-"), |ugr| format!("{ugr:>5.1}"));
-    let side = |ratings: &[Option<f64>; 5]| ratings.iter().map(rating).collect::<String>();
+    let side = |ratings: &[Option<f64>; 5]| ratings.each_ref().map(rating).concat();
     let line = |f: &mut fmt::Formatter<'_>, room: &UgrRoom| {
         let name = format!("{}H x {}H", room.x_over_height, room.y_over_height);
         writeln!(f, "  {name:<9}{}  {}", side(&room.crosswise), side(&room.endwise))
