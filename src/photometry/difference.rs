@@ -77,7 +77,7 @@ impl Difference {
         } else {
             Likeness::Different
         };
-        Self { largest, peak_cd, rms_cd: rms(pair), steps_cd, is_exhaustive, likeness }
+        Self { largest, peak_cd, rms_cd: rms(pair, peak_cd), steps_cd, is_exhaustive, likeness }
     }
 }
 
@@ -124,19 +124,22 @@ fn middles(count: u32) -> Vec<f64> {
     (0..count).map(|k| f64::from(k) + 0.5).collect()
 }
 
-/// Root mean square of the difference over the sphere, in candela.
-fn rms([a, b]: [&LuminousIntensityDistribution; 2]) -> f64 {
+/// Root mean square of the difference over the sphere, in candela; squares are of parts of the peak, which never overflow.
+fn rms([a, b]: [&LuminousIntensityDistribution; 2], peak_cd: f64) -> f64 {
+    if peak_cd <= 0.0 {
+        return 0.0;
+    }
     let (c_deg, gamma_deg) = (middles(360), middles(180));
     let (mut sum, mut total) = (0.0, 0.0);
     let [first, second] = [a, b].map(|d| d.intensities(&c_deg, &gamma_deg));
     for (row, gamma) in gamma_deg.iter().enumerate() {
         let cells = row * c_deg.len()..(row + 1) * c_deg.len();
-        let squares: f64 = cells.map(|k| (second[k] - first[k]).powi(2)).sum();
+        let squares: f64 = cells.map(|k| ((second[k] - first[k]) / peak_cd).powi(2)).sum();
         let weight = gamma.to_radians().sin();
         sum += weight * squares;
         total += weight * c_deg.len() as f64;
     }
-    (sum / total).sqrt()
+    peak_cd * (sum / total).sqrt()
 }
 
 /// The last printed digit of a file's table in candela: the largest power of ten, one at most, of which all its numbers, before
@@ -228,6 +231,8 @@ mod tests {
         // Half the sphere differs by 6: 6 / sqrt 2, but for the row of cells that holds the edge.
         let rms = Difference::between(&dark, &light).rms_cd;
         assert!((rms - 6.0 / 2f64.sqrt()).abs() < 1e-3, "{rms}");
+        let huge = Photometry { distribution: light.distribution.scaled(1e299), ..light };
+        assert!(Difference::between(&dark, &huge).rms_cd.is_finite());
     }
 
     #[test]

@@ -183,9 +183,13 @@ fn map(pair: &[Photometry; 2], difference: &Difference) -> String {
     let most = difference.largest.change_cd().abs();
     let shade = |k: usize| {
         let part = if most > 0.0 { ((b[k] - a[k]) / most).clamp(-1.0, 1.0) } else { 0.0 };
-        let faded = (235.0 * (1.0 - part.abs())) as u8;
+        let (full, faded) = ((255.0 - 25.0 * part.abs()) as u8, (255.0 * (1.0 - part.abs())) as u8);
         (part.abs() > WHITE).then(|| {
-            if part > 0.0 { format!("#e6{faded:02x}{faded:02x}") } else { format!("#{faded:02x}{faded:02x}e6") }
+            if part > 0.0 {
+                format!("#{full:02x}{faded:02x}{faded:02x}")
+            } else {
+                format!("#{faded:02x}{faded:02x}{full:02x}")
+            }
         })
     };
     let [width, height] = web.size(30.0);

@@ -4,7 +4,6 @@ use luminaire::photometry::{BeamPlane, BeamWidth, Photometry};
 use maud::{Markup, html};
 
 use crate::report::svg::{label, line, number, text};
-use crate::report::words::significant;
 
 /// Distances along the axis in metres.
 const DISTANCES_M: [f64; 5] = [1.0, 2.0, 3.0, 4.0, 5.0];
@@ -43,7 +42,7 @@ pub(super) fn diagram(file: &str, photometry: &Photometry) -> Result<String, Str
             @for distance in DISTANCES_M {
                 @let y = TOP + DEEP * distance / DISTANCES_M[4];
                 @let lux = on_axis / (distance * distance);
-                (text("tick", "end", [wide - 14.0, y + 4.0], &format!("{distance} m: {} lx", significant(lux))))
+                (text("tick", "end", [wide - 14.0, y + 4.0], &format!("{distance} m: {} lx", label(lux))))
             }
         }
     };

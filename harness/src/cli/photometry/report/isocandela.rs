@@ -4,8 +4,7 @@ use luminaire::photometry::Photometry;
 use maud::html;
 
 use super::super::web::{STYLE, Web};
-use crate::report::svg::{number, text};
-use crate::report::words::significant;
+use crate::report::svg::{label, number, text};
 
 /// Lines in percent of the largest intensity, with their colours.
 const LEVELS: [(f64, &str); 6] =
@@ -29,14 +28,14 @@ pub(super) fn diagram(file: &str, photometry: &Photometry) -> Result<String, &'s
         svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (width) " " (height) } font-family="sans-serif" font-size="11" {
             style { (STYLE) ".iso{fill:none;stroke-width:1.4;stroke-linecap:round}" }
             rect width=(width) height=(height) fill="#ffffff" {}
-            (text("title", "middle", [width / 2.0, 20.0], &format!("{title}: isocandela, largest {} cd", significant(most))))
+            (text("title", "middle", [width / 2.0, 20.0], &format!("{title}: isocandela, largest {} cd", label(most))))
             (web.grid())
             @for (_, colour, path) in &lines { path class="iso" stroke=(colour) d=(path) {} }
             @for (k, (percent, colour, _)) in lines.iter().enumerate() {
                 @let x = 52.0 + 92.0 * k as f64;
                 @let y = height - 14.0;
                 path class="iso" stroke=(colour) d={ "M" (x) " " (y) "h16" } {}
-                (text("tick", "start", [x + 20.0, y + 4.0], &format!("{} ({percent} %)", significant(percent / 100.0 * most))))
+                (text("tick", "start", [x + 20.0, y + 4.0], &format!("{} ({percent} %)", label(percent / 100.0 * most))))
             }
         }
     };

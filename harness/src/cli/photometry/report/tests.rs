@@ -64,7 +64,7 @@ fn a_cone_is_as_wide_as_its_beam_and_a_wide_beam_has_none() {
     let spot = LuminousIntensityDistribution::axial(vec![0.0, 30.0, 60.0], vec![900.0, 450.0, 0.0]).unwrap();
     let svg = cone::diagram("a.ies", &Photometry::of(spot)).unwrap();
     // 2 tan 30 per metre; 900 cd / 9.
-    assert!(svg.contains(">3.46 m<") && svg.contains(">3 m: 100.000 lx<") && svg.contains("60.0°"), "{svg}");
+    assert!(svg.contains(">3.46 m<") && svg.contains(">3 m: 100 lx<") && svg.contains("60.0°"), "{svg}");
     let even = LuminousIntensityDistribution::axial(vec![0.0, 90.0], vec![1.0; 2]).unwrap();
     assert!(cone::diagram("a.ies", &Photometry::of(even.clone())).unwrap_err().contains("90.0 degrees"));
     assert!(isocandela::diagram("a.ies", &Photometry::of(even.scaled(0.0))).is_err());
