@@ -78,15 +78,21 @@ fn same_light(a: &Photometry, b: &Photometry) -> bool {
 
 proptest! {
     #[test]
-    fn lm63_holds_every_photometry(x in photometry()) {
-        for written in [lm63::write_2002(&x), lm63::write_2019(&x)] {
+    fn every_edition_of_lm63_holds_every_photometry(x in photometry()) {
+        for edition in lm63::Edition::ALL {
+            let written = lm63::write(&x, edition);
             prop_assert_eq!(&written.losses, &Vec::<String>::new());
             let again = lm63::parse(written.text.as_bytes()).unwrap();
             prop_assert!(same_light(&again, &x));
-            prop_assert!(written.text.lines().all(|line| line.len() <= 254 || line.starts_with('[') || !line.contains(' ')));
+            prop_assert_eq!(&again.format, edition.name());
+            let most = if edition < lm63::Edition::Lm63_2002 { 130 } else { 254 };
+            prop_assert!(written.text.lines().all(|line| line.chars().count() <= most || !line.contains(' ')));
             let twice = lm63::parse(lm63::write_2019(&again).text.as_bytes()).unwrap();
             let details = |p: &Photometry| match &p.details {
-                Details::Lm63(d) => lm63::Lm63Details { edition: lm63::Edition::Lm63_2019, ..d.clone() },
+                Details::Lm63(d) => {
+                    let (edition, third_number) = (lm63::Edition::Lm63_2019, lm63::ThirdNumber::FileGeneration(1.0));
+                    lm63::Lm63Details { edition, third_number, ..d.clone() }
+                }
                 other => panic!("{other:?}"),
             };
             prop_assert_eq!(details(&twice), details(&again));
@@ -122,8 +128,11 @@ proptest! {
         cut in any::<prop::sample::Index>(),
     ) {
         type Reader = fn(&[u8]) -> Result<Photometry, ReadError>;
-        let files: [(String, Reader); 2] =
-            [(lm63::write_2002(&x).text, lm63::parse), (eulumdat::write(&x).text, eulumdat::parse)];
+        let files: [(String, Reader); 3] = [
+            (lm63::write_2002(&x).text, lm63::parse),
+            (lm63::write(&x, lm63::Edition::Lm63_1986).text, lm63::parse),
+            (eulumdat::write(&x).text, eulumdat::parse),
+        ];
         for (text, read) in files {
             let mut bytes = text.into_bytes();
             for (at, patch) in &damage {

@@ -4,6 +4,7 @@
 //! One value a line. Intensities stand in cd/klm: each is multiplied by the lamp flux in kilolumens and by the
 //! conversion factor. The length of a luminaire lies along C90-C270, since C0 looks at its long side.
 
+mod direct_ratios;
 mod fields;
 mod planes;
 mod write;

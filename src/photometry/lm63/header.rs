@@ -148,15 +148,11 @@ fn tilt_line(line: &Line, lints: &mut Lints) -> TiltLine {
     }
 }
 
-/// LM-63-1995 and later ask for these keywords.
+/// LM-63-1995 and later ask for some keywords.
 fn required_keywords(head: &Head, lints: &mut Lints) {
-    let required: &[&str] = match head.edition {
-        Edition::Lm63_1986 | Edition::Lm63_1991 => &[],
-        Edition::Lm63_1995 => &["TEST", "MANUFAC"],
-        Edition::Lm63_2002 | Edition::Lm63_2019 => &["TEST", "TESTLAB", "ISSUEDATE", "MANUFAC"],
-    };
     let has = |word: &str| head.keywords.iter().any(|(key, _)| key == word);
-    let missing: Vec<String> = required.iter().filter(|word| !has(word)).map(|word| format!("[{word}]")).collect();
+    let required = head.edition.required_keywords().iter();
+    let missing: Vec<String> = required.filter(|word| !has(word)).map(|word| format!("[{word}]")).collect();
     if !missing.is_empty() {
         let message = format!("{} asks for the keywords {}", head.edition.name(), missing.join(" "));
         lints.note("lm63/keywords", 0, message);

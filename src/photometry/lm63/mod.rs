@@ -24,8 +24,8 @@ use super::{Details, Photometry};
 mod tests;
 
 pub(crate) use self::header::{is_edition_line, is_tilt_line};
-pub use self::write::{write_2002, write_2019};
-pub use super::details::{Edition, Lm63Details, Tilt};
+pub use self::write::{write, write_2002, write_2019};
+pub use super::details::{Edition, Lm63Details, ThirdNumber, Tilt};
 
 /// Metres in a foot, exactly.
 const METRES_PER_FOOT: f64 = 0.3048;
@@ -76,7 +76,7 @@ pub fn parse_with(
             goniometer: lamps.goniometer,
             lamps: lamps.count,
             lumens_per_lamp: lamps.lumens_per_lamp,
-            file_generation_type: lamps.file_generation_type,
+            third_number: lamps.third_number,
             tilt,
         }),
         lints: vec![],
@@ -97,7 +97,7 @@ struct Lamps {
     /// Width, length, height, signed.
     dimensions_m: (f64, f64, f64),
     opening_line: usize,
-    file_generation_type: f64,
+    third_number: ThirdNumber,
     input_watts: f64,
 }
 
@@ -137,7 +137,8 @@ fn read_lamps(numbers: &mut Numbers, edition: Edition) -> Result<Lamps, ReadErro
     let ballast = numbers.checked(format_args!("the ballast factor"), "positive", |n| n > 0.0)?;
     let third = numbers.number(format_args!("the number behind the ballast factor"))?;
     let watts = numbers.checked(format_args!("the input watts"), "zero or more", |n| n >= 0.0)?;
-    let ballast_lamp = ballast_lamp_factor(numbers, edition, third)?;
+    let third_number = third_number(numbers, edition, third)?;
+    let ballast_lamp = if let ThirdNumber::BallastLampFactor(factor) = third_number { factor } else { 1.0 };
     let factor = multiplier.value * ballast.value * ballast_lamp;
     if !factor.is_finite() || factor <= 0.0 {
         let (what, found) = ("the product of the multipliers".into(), factor);
@@ -152,17 +153,17 @@ fn read_lamps(numbers: &mut Numbers, edition: Edition) -> Result<Lamps, ReadErro
         goniometer,
         dimensions_m: (width.value * metres, length.value * metres, height.value * metres),
         opening_line: text.line_of(width.at),
-        file_generation_type: if edition <= Edition::Lm63_1991 { 1.0 } else { third.value },
+        third_number,
         input_watts: watts.value,
     })
 }
 
-/// The factor that the number behind the ballast factor stands for in this edition.
-fn ballast_lamp_factor(numbers: &mut Numbers, edition: Edition, third: Number) -> Result<f64, ReadError> {
+/// What the number behind the ballast factor means in this edition.
+fn third_number(numbers: &mut Numbers, edition: Edition, third: Number) -> Result<ThirdNumber, ReadError> {
     let line = numbers.text.line_of(third.at);
     let value = third.value;
     match edition {
-        Edition::Lm63_1986 | Edition::Lm63_1991 if value > 0.0 => Ok(value),
+        Edition::Lm63_1986 | Edition::Lm63_1991 if value > 0.0 => Ok(ThirdNumber::BallastLampFactor(value)),
         Edition::Lm63_1986 | Edition::Lm63_1991 => {
             let (what, expected) = ("the ballast-lamp photometric factor".into(), "positive");
             Err(numbers.text.error(third.at, Problem::OutOfRange { what, found: value, expected }))
@@ -175,16 +176,17 @@ fn ballast_lamp_factor(numbers: &mut Numbers, edition: Edition, third: Number) -
                 );
                 numbers.lints.warn("lm63/ballast-lamp-factor", line, message);
             }
-            Ok(value)
+            Ok(ThirdNumber::BallastLampFactor(value))
         }
-        _ => {
-            if value != 1.0 && edition != Edition::Lm63_2019 {
+        Edition::Lm63_1995 | Edition::Lm63_2002 => {
+            if value != 1.0 {
                 let message =
                     format!("the number behind the ballast factor is reserved and must be 1; {value} was ignored");
                 numbers.lints.warn("lm63/ballast-lamp-factor", line, message);
             }
-            Ok(1.0)
+            Ok(ThirdNumber::Reserved(value))
         }
+        Edition::Lm63_2019 => Ok(ThirdNumber::FileGeneration(value)),
     }
 }
 

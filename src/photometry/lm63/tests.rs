@@ -271,3 +271,66 @@ fn the_reference_file_of_case_s1_gives_its_converged_flux() {
     let read = crate::photometry::read_file(&path).unwrap();
     approx::assert_relative_eq!(read.distribution.flux().value(), 1817.2814559, max_relative = 1e-9);
 }
+
+/// What a file of one edition becomes in another: the third of its three numbers, the nadir's intensity, the losses.
+fn converted(first: &str, three: &str, to: Edition) -> (String, f64, Vec<String>) {
+    let read = parse(file(first, "1 -1 1 3 1 1 2 0 0 0", three, AXIAL).as_bytes()).unwrap();
+    let written = write(&read, to);
+    let three = written.text.lines().find(|line| line.ends_with(" 10")).unwrap().to_string();
+    let again = parse(written.text.as_bytes()).unwrap();
+    (three, again.distribution.plane(0)[0], written.losses)
+}
+
+#[test]
+fn the_third_number_means_in_each_edition_what_it_meant_in_the_file() {
+    const FACTOR: f64 = 100.0 * 0.9;
+    for to in Edition::ALL {
+        // A factor is in the intensities and multiplies once.
+        for first in ["a label", "IESNA91", "IESNA:LM-63-1995"] {
+            let (three, intensity, losses) = converted(first, "1 0.9 10", to);
+            assert_eq!((three.as_str(), intensity), ("1 1 10", FACTOR), "{first} {to:?}");
+            assert!(losses.iter().all(|loss| !loss.contains("ballast")), "{losses:?}");
+        }
+        // What is reserved means nothing.
+        let (three, intensity, losses) = converted("IESNA:LM-63-2002", "1 0.9 10", to);
+        assert_eq!((three.as_str(), intensity), ("1 1 10", 100.0), "{to:?}");
+        let stated = losses.join("\n");
+        assert!(stated.contains("0.9 behind the ballast factor was dropped: LM-63-2002 reserves"), "{stated}");
+        // A file generation type is one in 2019 alone.
+        let (three, intensity, losses) = converted("IES:LM-63-2019", "1 1.1 10", to);
+        assert_eq!(intensity, 100.0);
+        if to == Edition::Lm63_2019 {
+            assert_eq!((three.as_str(), losses), ("1 1.1 10", vec![]));
+        } else {
+            assert_eq!(three, "1 1 10");
+            assert!(losses.join("\n").contains("file generation type 1.1 was dropped"), "{losses:?}");
+        }
+    }
+    let (three, intensity, losses) = converted("IESNA:LM-63-1995", "1 0 10", Edition::Lm63_1995);
+    assert_eq!((three.as_str(), intensity), ("1 1 10", 100.0));
+    assert!(losses.join("\n").contains("LM-63-1995 reserves"), "{losses:?}");
+}
+
+#[test]
+fn editions_before_2002_have_other_keywords_and_shorter_lines() {
+    let long = "word ".repeat(60);
+    let text = file("IES:LM-63-2019", "1 -1 1 3 1 1 2 -0.1 -0.2 0.3", "1 1 10", AXIAL);
+    let read = parse(text.replacen("[TEST] 1", &format!("[TEST] 1\n[OTHER] {long}"), 1).as_bytes()).unwrap();
+    let old = write(&read, Edition::Lm63_1995);
+    assert!(old.text.starts_with("IESNA:LM-63-1995\r\n"), "{}", old.text);
+    assert!(old.text.lines().all(|line| line.len() <= 130), "{}", old.text);
+    assert!(old.text.contains("\n[DATE] 2024-01-02\r") && old.text.contains("\n[_TESTLAB] Lab\r"), "{}", old.text);
+    let stated = old.losses.join("\n");
+    for said in [
+        "[OTHER] broken into lines of at most 130 characters",
+        "[TESTLAB] written as [_TESTLAB]: LM-63-1995 does not define it",
+        "[ISSUEDATE] written as [DATE]",
+    ] {
+        assert!(stated.contains(said), "{stated}");
+    }
+    let again = parse(old.text.as_bytes()).unwrap();
+    assert_eq!((again.format.as_str(), again.opening), ("LM-63-1995", read.opening));
+    assert_eq!(again.lints.iter().map(|l| l.code).collect::<Vec<_>>(), ["lm63/more"]);
+    // Two lines of the limit of 2002.
+    assert_eq!(write(&read, Edition::Lm63_2002).text.matches("[MORE]").count(), 1);
+}

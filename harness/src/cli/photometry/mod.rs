@@ -1,5 +1,6 @@
 //! `luxproof photometry FILE...`: what a photometric file says, what is doubtful in it, its diagram, its conversion.
 
+mod convert;
 mod polar;
 mod sarif;
 mod summary;
@@ -12,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use luminaire::calculators::zonal_cavity::{UtilizationTable, ZonalFlux};
-use luminaire::photometry::{self, Lint, Photometry, ReadError, Severity, Written, eulumdat, lm63};
+use luminaire::photometry::{self, Lint, Photometry, ReadError, Severity};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr, miette};
 
 use crate::cli::diagnostic::diagnose;
@@ -46,9 +47,8 @@ pub(crate) struct PhotometryArgs {
     /// Draw the polar intensity diagram of the one FILE
     #[arg(long, value_name = "SVG")]
     polar: Option<PathBuf>,
-    /// Write the one FILE in another format, by extension: .ldt is EULUMDAT, .ies is LM-63-2019
-    #[arg(long, value_name = "OUT")]
-    convert: Option<PathBuf>,
+    #[command(flatten)]
+    conversion: convert::ConversionArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -77,7 +77,7 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
     if format == Format::Sarif && !args.lint {
         return Err(miette!(help = "add --lint", "--format sarif prints lints only"));
     }
-    if args.files.len() > 1 && (args.polar.is_some() || args.convert.is_some()) {
+    if args.files.len() > 1 && (args.polar.is_some() || args.conversion.is_asked()) {
         return Err(miette!(help = "give one FILE", "--polar and --convert write one file"));
     }
     let open = |file: &Path, path: &Path| trust.read_named(file.parent().unwrap_or(Path::new("")), path);
@@ -170,23 +170,7 @@ fn write_files(args: &PhotometryArgs, file: &Path, photometry: &Photometry) -> R
         let name = file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         save(out, &polar::diagram(&name, photometry))?;
     }
-    if let Some(out) = &args.convert {
-        let written = convert(out, photometry)?;
-        save(out, &written.text)?;
-        for loss in &written.losses {
-            super::complain(&format!("{}: {loss}", out.display()));
-        }
-    }
-    Ok(())
-}
-
-fn convert(out: &Path, photometry: &Photometry) -> Result<Written, Diagnostic> {
-    let extension = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    match extension.as_deref() {
-        Some("ldt") => Ok(eulumdat::write(photometry)),
-        Some("ies") => Ok(lm63::write_2019(photometry)),
-        _ => Err(miette!(help = "name a .ldt or .ies file", "{} names no format to write", out.display())),
-    }
+    args.conversion.run(photometry)
 }
 
 fn save(path: &Path, text: &str) -> Result<(), Diagnostic> {

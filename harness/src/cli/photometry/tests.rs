@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use clap::Parser;
-use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening};
+use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, lm63};
 
 use super::*;
 
