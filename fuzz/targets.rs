@@ -59,7 +59,7 @@ pub(crate) fn eulumdat(bytes: &[u8]) {
     }
 }
 
-/// What was read can be written as LM-63.
+/// What was read survives being written, and can be written as LM-63.
 pub(crate) fn tm33(bytes: &[u8]) {
     match tm33::parse(bytes) {
         Ok(read) => {
@@ -67,6 +67,8 @@ pub(crate) fn tm33(bytes: &[u8]) {
             let written = lm63::write_2019(&read);
             let again = lm63::parse(written.text.as_bytes()).expect("a written file is legal");
             assert_eq!(again.distribution, read.distribution);
+            let again = tm33::parse(tm33::write(&read).text.as_bytes()).expect("a written file is legal");
+            assert_eq!((again.distribution, again.lamp_lumens), (read.distribution, read.lamp_lumens));
         }
         Err(error) => assert!(error.line >= 1 && error.column >= 1),
     }

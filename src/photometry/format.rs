@@ -1,7 +1,7 @@
 //! The formats that photometry is written in, and what they differ in.
 
 use super::details::Edition;
-use super::{Photometry, Written, eulumdat, lm63};
+use super::{Photometry, Written, eulumdat, lm63, tm33};
 
 /// A format to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,6 +10,8 @@ pub enum FileFormat {
     Lm63(Edition),
     /// EULUMDAT.
     Eulumdat,
+    /// TM-33-23.
+    Tm33,
 }
 
 impl FileFormat {
@@ -18,6 +20,7 @@ impl FileFormat {
         match self {
             Self::Lm63(edition) => edition.name(),
             Self::Eulumdat => "EULUMDAT",
+            Self::Tm33 => "TM-33-23",
         }
     }
 
@@ -26,6 +29,7 @@ impl FileFormat {
         match self {
             Self::Lm63(edition) => lm63::write(photometry, edition),
             Self::Eulumdat => eulumdat::write(photometry),
+            Self::Tm33 => tm33::write(photometry),
         }
     }
 }

@@ -74,6 +74,7 @@ fn opening_loss(before: &LuminousOpening, after: &LuminousOpening, format: FileF
         _ if rounded => format!("its dimensions are rounded in the units of {name}"),
         FileFormat::Eulumdat => "EULUMDAT has boxes of some width and upright round openings alone".to_owned(),
         FileFormat::Lm63(_) => format!("{name} has no signs for such a shape"),
+        FileFormat::Tm33 => format!("{name} has the dimensions of the luminaire alone, not of its opening"),
     };
     format!("the luminous opening, {}, became {}: {cause}", words(before), words(after))
 }
@@ -105,7 +106,9 @@ fn fate(key: &str, value: &str, again: &Photometry, format: FileFormat) -> Strin
             FileFormat::Lm63(edition) if text.contains('\n') => {
                 format!("broken into lines of at most {} characters, as {name} has it", edition.line_limit())
             }
-            FileFormat::Lm63(_) => format!("blanks between its words or lines are not kept in {name}"),
+            FileFormat::Lm63(_) | FileFormat::Tm33 => {
+                format!("blanks between its words or lines are not kept in {name}")
+            }
         },
         (Some(_), _, FileFormat::Eulumdat) if again.keywords.iter().any(|(other, _)| other == key) => {
             "given more than once, and EULUMDAT has one line for it".into()
@@ -115,7 +118,7 @@ fn fate(key: &str, value: &str, again: &Photometry, format: FileFormat) -> Strin
         }
         (_, Some((other, _)), _) => format!("written as [{other}]: {name} does not define it"),
         (_, None, FileFormat::Eulumdat) => "dropped: EULUMDAT has no line for it".into(),
-        (_, None, FileFormat::Lm63(_)) => format!("changed: {name} has no such name or text"),
+        (_, None, FileFormat::Lm63(_) | FileFormat::Tm33) => format!("changed: {name} has no such name or text"),
     }
 }
 
@@ -177,6 +180,10 @@ fn lm63_losses(before: &Lm63Details, again: &Photometry, format: FileFormat, los
         && (before.lamps, before.lumens_per_lamp) != (after.lamps, after.lumens_per_lamp)
     {
         losses.push(format!("{} lamps became {}", before.lamps, after.lamps));
+    }
+    if after.is_none() && format == FileFormat::Tm33 && before.lamps != 1 {
+        losses
+            .push(format!("that there are {} lamps was dropped: {name} was given their lumens together", before.lamps));
     }
     match (&before.tilt, after.map(|after| &after.tilt)) {
         (Some(_), None) => losses.push(format!("the tilt factors were dropped: {name} has none")),

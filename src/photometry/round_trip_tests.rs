@@ -116,9 +116,50 @@ proptest! {
     }
 
     #[test]
+    fn tm33_holds_everything_but_openings_to_the_last_digit(x in photometry()) {
+        let written = tm33::write(&x);
+        let again = tm33::parse(written.text.as_bytes()).map_err(|e| TestCaseError::fail(e.to_string()))?;
+        prop_assert_eq!(&again.distribution, &x.distribution);
+        prop_assert_eq!((again.lamp_lumens, again.input_watts), (x.lamp_lumens, x.input_watts));
+        let sorted = |p: &Photometry| {
+            let mut keywords = p.keywords.clone();
+            keywords.sort();
+            keywords
+        };
+        prop_assert_eq!(sorted(&again), sorted(&x));
+        let is_known = |loss: &String| loss.contains("opening") || loss.contains("stand in the order of");
+        prop_assert!(written.losses.iter().all(is_known), "{:?}", written.losses);
+        prop_assert!(x.opening == again.opening || written.losses.iter().any(|loss| loss.contains("opening")));
+        prop_assert_eq!(tm33::write(&again).losses, Vec::<String>::new());
+        prop_assert_eq!(tm33::write(&again).text, written.text);
+    }
+
+    #[test]
+    fn a_conversion_by_way_of_any_formats_keeps_the_light_or_says_so(x in photometry()) {
+        let formats = [FileFormat::Tm33, FileFormat::Eulumdat, FileFormat::Lm63(lm63::Edition::Lm63_1995)];
+        for (first, second) in formats.iter().flat_map(|first| formats.iter().map(move |second| (first, second))) {
+            let read = |format: FileFormat, text: &str| match format {
+                FileFormat::Lm63(_) => lm63::parse(text.as_bytes()),
+                FileFormat::Eulumdat => eulumdat::parse(text.as_bytes()),
+                FileFormat::Tm33 => tm33::parse(text.as_bytes()),
+            };
+            let middle = read(*first, &first.write(&x).text).unwrap();
+            for policy in [ForwardPolicy::KeepAngles, ForwardPolicy::KeepForward] {
+                let aimed = middle.aimed_for(*second, policy);
+                let written = second.write(&aimed.photometry);
+                let last = read(*second, &written.text).unwrap();
+                let (flux, now) = (x.distribution.flux().value(), last.distribution.flux().value());
+                prop_assert!((flux - now).abs() <= 1e-9 * flux, "{:?} {:?} {} {}", first, second, flux, now);
+                let same = aimed.photometry.distribution == last.distribution;
+                prop_assert!(same || !written.losses.is_empty());
+            }
+        }
+    }
+
+    #[test]
     fn no_bytes_make_a_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
-        let refused = [lm63::parse(&bytes).is_err(), eulumdat::parse(&bytes).is_err()];
-        prop_assert_eq!(refused, [true; 2]);
+        let refused = [lm63::parse(&bytes).is_err(), eulumdat::parse(&bytes).is_err(), tm33::parse(&bytes).is_err()];
+        prop_assert_eq!(refused, [true; 3]);
     }
 
     #[test]
@@ -128,10 +169,11 @@ proptest! {
         cut in any::<prop::sample::Index>(),
     ) {
         type Reader = fn(&[u8]) -> Result<Photometry, ReadError>;
-        let files: [(String, Reader); 3] = [
+        let files: [(String, Reader); 4] = [
             (lm63::write_2002(&x).text, lm63::parse),
             (lm63::write(&x, lm63::Edition::Lm63_1986).text, lm63::parse),
             (eulumdat::write(&x).text, eulumdat::parse),
+            (tm33::write(&x).text, tm33::parse),
         ];
         for (text, read) in files {
             let mut bytes = text.into_bytes();

@@ -5,6 +5,8 @@
 //! `IntData h= v=` a direction. The primary text could not be read; the element names are those of published
 //! schemas and files. The variant spelling `IntensityData horz= vert=`, directly in `LuminousData`, is read too.
 
+mod write;
+
 #[cfg(test)]
 mod tests;
 
@@ -18,6 +20,8 @@ use super::lint::Lints;
 use super::planes;
 use super::text::{Text, decode, harmless};
 use super::{Details, LuminousOpening, Photometry};
+
+pub use self::write::write;
 
 /// Header elements and the LM-63 keywords that say the same.
 const KEYWORDS: [(&str, &str); 6] = [
@@ -176,9 +180,9 @@ impl Reader<'_> {
     fn goniometer(&self, data: Node) -> Result<Goniometer, ReadError> {
         let Some(node) = child(data, "PhotometryType") else { return Ok(Goniometer::C) };
         match node.text().unwrap_or_default().trim() {
-            "C" | "CIE-C" | "CIE _ C" | "TypeC" | "CIE C" => Ok(Goniometer::C),
-            "B" | "CIE-B" | "CIE _ B" | "TypeB" | "CIE B" => Ok(Goniometer::B),
-            "A" | "CIE-A" | "CIE _ A" | "TypeA" | "CIE A" => Ok(Goniometer::A),
+            "C" | "CIE-C" | "CIE_C" | "CIE _ C" | "TypeC" | "CIE C" => Ok(Goniometer::C),
+            "B" | "CIE-B" | "CIE_B" | "CIE _ B" | "TypeB" | "CIE B" => Ok(Goniometer::B),
+            "A" | "CIE-A" | "CIE_A" | "CIE _ A" | "TypeA" | "CIE A" => Ok(Goniometer::A),
             other => Err(self.error(node, Problem::Unsupported { what: format!("the photometry type `{other}`") })),
         }
     }
@@ -327,6 +331,9 @@ fn keywords(root: Node) -> Vec<(String, String)> {
         let value = node.text().unwrap_or_default().trim().replace('\r', " ");
         let value = harmless(&value);
         let name = node.tag_name().name();
+        if name == "Comments" && !value.is_empty() {
+            return Some(write::keyword_of(&value));
+        }
         let known = KEYWORDS.iter().find(|(element, _)| *element == name).map(|(_, key)| (*key).to_string());
         (!value.is_empty()).then(|| (known.unwrap_or_else(|| format!("_{name}")), value.to_string()))
     };

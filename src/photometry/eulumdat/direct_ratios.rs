@@ -2,7 +2,7 @@
 //!
 //! The format names them "direct ratios for room indices k = 0.6 ... 5, for determination of luminaire numbers according to
 //! the utilization factor method" (A. W. Stockmar, Licht '90): the part of a luminaire's flux that reaches the working plane
-//! without a reflection, as LiTG publication 3.5 (1988) and CIE 52-1982 have it. Neither says in public how luminaires are
+//! without a reflection, as `LiTG` publication 3.5 (1988) and CIE 52-1982 have it. Neither says in public how luminaires are
 //! arranged, and makers' files differ by some hundredths. Here they hang evenly spread in a square room, of index
 //! k = a b / (h (a + b)) = a / 2 h: light that leaves at gamma runs h tan gamma sideways, and lands inside from the part
 //! (1 - h tan gamma |cos C| / a) (1 - h tan gamma |sin C| / a) of all places.

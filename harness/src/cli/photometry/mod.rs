@@ -92,14 +92,15 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
         Format::Terminal => summaries(&readings),
     };
     super::print(&text)?;
+    let mut turns = vec![];
     for reading in &readings {
         if let Ok(photometry) = &reading.read {
-            write_files(args, &reading.file, photometry)?;
+            turns.extend(write_files(args, &reading.file, photometry)?);
         }
     }
-    let is_warning = |lint: &Lint| lint.severity == Severity::Warning;
-    let is_doubtful = |r: &Reading| r.read.as_ref().is_ok_and(|photometry| photometry.lints.iter().any(is_warning));
-    let denied = args.deny == Some(Deny::Warnings) && readings.iter().any(is_doubtful);
+    let read = readings.iter().filter_map(|reading| reading.read.as_ref().ok());
+    let mut lints = read.flat_map(|photometry| &photometry.lints).chain(&turns);
+    let denied = args.deny == Some(Deny::Warnings) && lints.any(|lint| lint.severity == Severity::Warning);
     let mut exit = if denied { Exit::Failed } else { Exit::Passed };
     for reading in readings {
         if let Err(error) = reading.read {
@@ -133,13 +134,17 @@ fn lints(readings: &[Reading]) -> String {
     for reading in readings {
         let file = reading.file.display();
         for lint in reading.read.iter().flat_map(|photometry| &photometry.lints) {
-            let place = if lint.line > 0 { format!("{file}:{}", lint.line) } else { file.to_string() };
-            let severity = if lint.severity == Severity::Warning { "warning" } else { "note" };
             // Writing to a string cannot fail.
-            writeln!(text, "{place}: {severity}: {} [{}]", lint.message, lint.code).ok();
+            writeln!(text, "{}", told(&file.to_string(), lint)).ok();
         }
     }
     text
+}
+
+fn told(file: &str, lint: &Lint) -> String {
+    let place = if lint.line > 0 { format!("{file}:{}", lint.line) } else { file.to_owned() };
+    let severity = if lint.severity == Severity::Warning { "warning" } else { "note" };
+    format!("{place}: {severity}: {} [{}]", lint.message, lint.code)
 }
 
 fn summaries(readings: &[Reading]) -> String {
@@ -165,7 +170,7 @@ fn utilization(readings: &[Reading]) -> Result<String, Diagnostic> {
     Ok(tables.join("\n"))
 }
 
-fn write_files(args: &PhotometryArgs, file: &Path, photometry: &Photometry) -> Result<(), Diagnostic> {
+fn write_files(args: &PhotometryArgs, file: &Path, photometry: &Photometry) -> Result<Option<Lint>, Diagnostic> {
     if let Some(out) = &args.polar {
         let name = file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         save(out, &polar::diagram(&name, photometry))?;

@@ -94,10 +94,8 @@ impl Summary {
 }
 
 impl BugZones {
-    /// C = 0 runs across the street in LM-63 and along it in EULUMDAT.
     fn of(photometry: &Photometry) -> Self {
-        let forward_c_deg = if photometry.format.starts_with("EULUMDAT") { 90.0 } else { 0.0 };
-        let zones = photometry.distribution.classification_zones(forward_c_deg);
+        let zones = photometry.distribution.classification_zones(photometry.forward_c_deg());
         let [back, forward] = [zones.back, zones.forward].map(|zones| zones.map(Lumen::value));
         Self { back, up: zones.up.map(Lumen::value), forward }
     }
