@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use luminaire::geometry::Mesh;
-use luminaire::photometry::{eulumdat, lm63, tm33};
+use luminaire::photometry::{self, Tolerance, eulumdat, lm63, tm33};
 use luminaire::scene::{Meter, Scene, Transport};
 use luxproof::engines::{ExternalReadings, Job, Station};
 use luxproof::record::{EngineName, MeterId, ProcedureId};
@@ -17,10 +17,11 @@ use luxproof::trend::history::{History, changes, site};
 pub(crate) type Target = fn(&[u8]);
 
 /// All of them, by the names of their folders of seeds.
-pub(crate) const ALL: [(&str, Target); 9] = [
+pub(crate) const ALL: [(&str, Target); 10] = [
     ("lm63", lm63),
     ("eulumdat", eulumdat),
     ("tm33", tm33),
+    ("gldf", gldf),
     ("obj", obj),
     ("spec", spec),
     ("report", report),
@@ -71,6 +72,28 @@ pub(crate) fn tm33(bytes: &[u8]) {
             assert_eq!((again.distribution, again.lamp_lumens), (read.distribution, read.lamp_lumens));
         }
         Err(error) => assert!(error.line >= 1 && error.column >= 1),
+    }
+}
+
+/// Of any kind, whatever is let pass: what is read without tolerance is read with it, and is the same.
+pub(crate) fn gldf(bytes: &[u8]) {
+    for name in ["any.gldf", "any.gldf#b", "any.xml#1", "any.ldt", "any.ies"] {
+        let read = |tolerance| photometry::read_tolerantly_by(Path::new(name), &|_| Ok(bytes.to_vec()), tolerance);
+        match (read(Tolerance::Strict), read(Tolerance::Harmless)) {
+            (Ok(strict), tolerant) => {
+                assert!(strict.distribution.flux().value() >= 0.0);
+                assert_eq!(tolerant.map(|read| read.distribution), Ok(strict.distribution));
+            }
+            (Err(error), Ok(tolerant)) => {
+                let is_told = tolerant.lints.iter().any(|lint| lint.code.starts_with(photometry::FORGIVEN));
+                assert!(is_told, "{error}");
+                assert_eq!(
+                    lm63::write_2019(&tolerant).losses.iter().filter(|loss| loss.contains("intensit")).count(),
+                    0
+                );
+            }
+            (Err(error), Err(_)) => assert!(!error.message().is_empty() && !error.help().is_empty()),
+        }
     }
 }
 

@@ -204,3 +204,38 @@ fn what_another_format_cannot_hold_is_named_where_the_file_says_it() {
         lost(&tilted)
     );
 }
+
+#[test]
+fn harmless_damage_is_forgiven_where_that_is_asked_and_told() {
+    let tolerant = |lines: &[String]| super::read(lines.join("\n").as_bytes(), Tolerance::Harmless);
+    let strict = |lines: &[String]| parse(lines.join("\n").as_bytes());
+    let sound = strict(&axial()).unwrap();
+    let codes = |read: &Photometry| read.lints.iter().map(|lint| lint.code).collect::<Vec<_>>();
+    // The luminaire's width, and its lamps' watts.
+    for (line, value) in [(13, "-50"), (31, "-1")] {
+        let mut damaged = axial();
+        damaged[line] = value.into();
+        let found = tolerant(&damaged).unwrap();
+        assert!(strict(&damaged).is_err() && codes(&found).contains(&"forgiven/negative-field"), "{:?}", found.lints);
+        assert_eq!(found.distribution, sound.distribution);
+    }
+    let with = |rest: &[&str]| axial().into_iter().chain(rest.iter().map(ToString::to_string)).collect::<Vec<_>>();
+    for rest in [&["0", "0"][..], &["7", "1", "7"], &["7", "1", "7", "7", "1", "7", ""]] {
+        let found = tolerant(&with(rest)).unwrap();
+        assert!(strict(&with(rest)).is_err() && codes(&found).contains(&"forgiven/surplus"), "{:?}", found.lints);
+        assert_eq!(found.distribution, sound.distribution);
+    }
+    // Another plane than the one that there is, and a factor that multiplies everything.
+    assert!(tolerant(&with(&["7", "2", "7"])).is_err());
+    let mut damaged = axial();
+    damaged[23] = "-1".into();
+    assert!(tolerant(&damaged).is_err());
+}
+
+#[test]
+fn a_file_in_utf16_is_the_same_file() {
+    let text = axial().join("\r\n");
+    let bytes: Vec<u8> = [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    let (read, plain) = (parse(&bytes).unwrap(), parse(text.as_bytes()).unwrap());
+    assert_eq!((read.distribution, read.keywords, read.details), (plain.distribution, plain.keywords, plain.details));
+}

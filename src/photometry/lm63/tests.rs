@@ -334,3 +334,64 @@ fn editions_before_2002_have_other_keywords_and_shorter_lines() {
     // Two lines of the limit of 2002.
     assert_eq!(write(&read, Edition::Lm63_2002).text.matches("[MORE]").count(), 1);
 }
+
+/// What a file of these parts is read as by whoever forgives, which nobody else reads.
+fn forgiven(ten: &str, three: &str, table: &str) -> Result<(Vec<&'static str>, Photometry), ReadError> {
+    let text = file("IESNA:LM-63-2002", ten, three, table);
+    let strict = parse(text.as_bytes());
+    let read = read(text.as_bytes(), |_| Err(String::new()), Tolerance::Harmless)?;
+    assert_eq!(strict.is_err(), read.lints.iter().any(|lint| lint.code.starts_with("forgiven/")), "{strict:?}");
+    Ok((read.lints.iter().map(|lint| lint.code).collect(), read))
+}
+
+#[test]
+fn harmless_damage_is_forgiven_where_that_is_asked_and_told() {
+    let ten = "1 -1 1 3 1 1 2 0 0 0";
+    let (codes, read) = forgiven(ten, "1 1 -1", AXIAL).unwrap();
+    assert_eq!((codes, read.input_watts), (vec!["forgiven/watts"], None));
+    assert_eq!((read.lints[0].line, read.lints[0].severity), (8, crate::photometry::Severity::Warning));
+    assert_eq!(forgiven("0 -1 1 3 1 1 2 0 0 0", "1 1 0", AXIAL).unwrap().0, ["forgiven/lamps"]);
+    let (codes, read) = forgiven("1 0 1 3 1 1 2 0 0 0", "1 1 0", AXIAL).unwrap();
+    assert_eq!((codes, read.lamp_lumens), (vec!["forgiven/lumens"], None));
+    assert_eq!(forgiven(ten, "1 1 0", "0 90 180\n0\n100 50 25 0 0").unwrap().0, ["forgiven/surplus"]);
+    let (codes, read) = forgiven(ten, "1 1 0", "0 90 180\n0\n100 50 -0.1").unwrap();
+    assert_eq!((codes, read.distribution.plane(0)), (vec!["forgiven/negative"], &[100.0, 50.0, 0.0][..]));
+    // The last plane is the first: what is missing of it is known.
+    let circle =
+        |last: &str| format!("0 90 180\n0 120 240 360\n9.00 1.00 2.00\n9.00 3.00 2.00\n9.00 4.00 2.00\n{last}");
+    let ten = "1 -1 1 3 4 1 2 0 0 0";
+    for last in ["9 1", "9", ""] {
+        let (codes, read) = forgiven(ten, "1 1 0", &circle(last)).unwrap();
+        assert_eq!((codes, read.distribution.plane(3)), (vec!["forgiven/cut"], &[9.0, 1.0, 2.0][..]));
+    }
+    assert_eq!(forgiven(ten, "1 1 0", &circle("9 1 2")).unwrap().0, Vec::<&str>::new());
+}
+
+#[test]
+fn what_changes_light_or_cannot_be_told_is_not_forgiven() {
+    let (ten, circle) = ("1 -1 1 3 1 1 2 0 0 0", "1 -1 1 3 4 1 2 0 0 0");
+    for (ten, three, table, word) in [
+        (ten, "1 1 0", "0 90 180\n0\n100 50 25 1 2 3", "more numbers"),
+        (ten, "1 1 0", "0 90 180\n0\n100 50", "ends where"),
+        (ten, "1 1 0", "0 90 180\n0\n100 50 -5", "-5"),
+        (ten, "0 1 0", AXIAL, "ballast factor"),
+        ("1.5 -1 1 3 1 1 2 0 0 0", "1 1 0", AXIAL, "number of lamps"),
+        (circle, "1 1 0", "0 90 180\n0 120 240 360\n9.00 1.00 2.00\n9.00 3.00 2.00\n9.00 4.00 2.00\n9 3", "ends where"),
+        (circle, "1 1 0", "0 90 180\n0 120 240 360\n9.00 1.00 2.00\n9.00 3.00 2.00\n9.00 4.00", "ends where"),
+    ] {
+        let error = forgiven(ten, three, table).expect_err(word);
+        assert!(error.message().contains(word), "{word}: {error}");
+    }
+}
+
+#[test]
+fn a_file_in_utf16_is_the_same_file_and_its_places_are_its_own() {
+    let text = file("IESNA:LM-63-2002", "1 -1 1 3 1 1 2 0 0 0", "1 1 10", AXIAL).replace("Maker", "M\u{fc}ller");
+    let bytes =
+        |text: &str| [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_be_bytes).collect::<Vec<u8>>();
+    let read = parse(&bytes(&text)).unwrap();
+    assert_eq!((read.keyword("MANUFAC"), read.lints[0].code), (Some("M\u{fc}ller"), "lm63/utf-16"));
+    assert_eq!(read.distribution, parse(text.as_bytes()).unwrap().distribution);
+    let error = parse(&bytes(&text.replace("50 25", "50 x"))).unwrap_err();
+    assert_eq!((error.line, error.column), (11, 8));
+}

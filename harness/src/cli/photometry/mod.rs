@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use luminaire::calculators::zonal_cavity::{UtilizationTable, ZonalFlux};
-use luminaire::photometry::{self, Lint, Photometry, ReadError, Severity};
+use luminaire::photometry::{self, FORGIVEN, Lint, Photometry, ReadError, Severity, Tolerance};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr, miette};
 
 use crate::cli::diagnostic::diagnose;
@@ -26,7 +26,7 @@ use summary::Summary;
 /// Arguments of `luxproof photometry`.
 #[derive(Debug, Args)]
 pub(crate) struct PhotometryArgs {
-    /// Photometric files: LM-63 (.ies), EULUMDAT (.ldt), TM-33 (.xml)
+    /// Photometric files: LM-63 (.ies), EULUMDAT (.ldt), TM-33 (.xml), GLDF (.gldf). Of several in one file, name one: lamp.gldf#NAME
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Print JSON, short for --format json
@@ -47,6 +47,10 @@ pub(crate) struct PhotometryArgs {
     /// Draw the polar intensity diagram of the one FILE
     #[arg(long, value_name = "SVG")]
     polar: Option<PathBuf>,
+    /// Read files with harmless damage, too: watts of -1, negative fields that nothing depends on, numbers too many or too few where the
+    /// rest tells which. What was forgiven is told
+    #[arg(long)]
+    tolerant: bool,
     #[command(flatten)]
     conversion: convert::ConversionArgs,
 }
@@ -81,7 +85,8 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
         return Err(miette!(help = "give one FILE", "--polar and --convert write one file"));
     }
     let open = |file: &Path, path: &Path| trust.read_named(file.parent().unwrap_or(Path::new("")), path);
-    let read = |file: &PathBuf| photometry::read_by(file, &|path| open(file, path));
+    let tolerance = if args.tolerant { Tolerance::Harmless } else { Tolerance::Strict };
+    let read = |file: &PathBuf| photometry::read_tolerantly_by(file, &|path| open(file, path), tolerance);
     let read = |file: &PathBuf| Reading { file: file.clone(), read: read(file) };
     let readings: Vec<Reading> = args.files.iter().map(read).collect();
     let text = match format {
@@ -92,6 +97,14 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
         Format::Terminal => summaries(&readings),
     };
     super::print(&text)?;
+    // Where lints are printed they say it themselves.
+    let forgiven = |reading: &&Reading| !args.lint && args.deny.is_none() && reading.read.is_ok();
+    for reading in readings.iter().filter(forgiven) {
+        let lints = reading.read.iter().flat_map(|photometry| &photometry.lints);
+        for lint in lints.filter(|lint| lint.code.starts_with(FORGIVEN)) {
+            super::complain(&told(&reading.file.display().to_string(), lint));
+        }
+    }
     let mut turns = vec![];
     for reading in &readings {
         if let Ok(photometry) = &reading.read {
