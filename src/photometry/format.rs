@@ -1,7 +1,6 @@
 //! The formats that photometry is written in, and what they differ in.
 
 use super::details::Edition;
-use super::{Photometry, Written, eulumdat, lm63, tm33};
 
 /// A format to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,15 +20,6 @@ impl FileFormat {
             Self::Lm63(edition) => edition.name(),
             Self::Eulumdat => "EULUMDAT",
             Self::Tm33 => "TM-33-23",
-        }
-    }
-
-    /// Writes a photometry in this format.
-    pub fn write(self, photometry: &Photometry) -> Written {
-        match self {
-            Self::Lm63(edition) => lm63::write(photometry, edition),
-            Self::Eulumdat => eulumdat::write(photometry),
-            Self::Tm33 => tm33::write(photometry),
         }
     }
 }

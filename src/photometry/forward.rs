@@ -32,6 +32,9 @@ pub struct Aimed {
 /// Differences of less than this part of the largest intensity are none.
 const SAME_LIGHT: f64 = 1e-9;
 
+/// Fluxes of zones that differ by less than this part of all flux are one.
+const SAME_ZONE: f64 = 1e-4;
+
 impl FileFormat {
     /// The C plane that points forward, in degrees.
     pub const fn forward_c_deg(self) -> f64 {
@@ -67,7 +70,7 @@ impl Photometry {
             _ if same_light && same_opening => {
                 "nothing turns: the light is the same a quarter turn further round".into()
             }
-            ForwardPolicy::KeepAngles => self.told_of_kept_angles(same_light, to_deg),
+            ForwardPolicy::KeepAngles => self.told_of_kept_angles(to_deg),
             ForwardPolicy::KeepForward => format!(
                 "the table and its opening were turned by {turn_deg} degrees, C 0 towards C 90, so that BUG zones stay; every C \
                  angle is another, and in a room that places luminaires by C angles its wash turns with them"
@@ -78,18 +81,20 @@ impl Photometry {
         Aimed { photometry, lint: Some(lint) }
     }
 
-    fn told_of_kept_angles(&self, same_light: bool, to_deg: f64) -> String {
+    fn told_of_kept_angles(&self, to_deg: f64) -> String {
         let zones = |forward_c_deg: f64| {
             let zones = self.distribution.classification_zones(forward_c_deg);
-            [zones.forward, zones.back].map(|zones| zones.into_iter().map(Lumen::value).sum::<f64>())
+            [zones.forward, zones.back].map(|zones| zones.map(Lumen::value))
         };
-        let ([forward, back], [forward_now, back_now]) = (zones(self.forward_c_deg()), zones(to_deg));
-        let bug = if same_light {
-            "BUG zones stay, for the light is the same".to_owned()
+        let (before, after) = (zones(self.forward_c_deg()), zones(to_deg));
+        let allowed = SAME_ZONE * self.distribution.flux().value();
+        let same = before.iter().flatten().zip(after.iter().flatten()).all(|(a, b)| (a - b).abs() <= allowed);
+        let bug = if same {
+            "BUG zones happen to be the same either way".to_owned()
         } else {
-            format!(
-                "BUG zones turn: of {forward:.0} lm forward and {back:.0} lm back become {forward_now:.0} lm and {back_now:.0} lm"
-            )
+            let list = |zones: &[f64; 4]| zones.map(|lumens| format!("{lumens:.0}")).join(" ");
+            let [forward, back, now, back_now] = [&before[0], &before[1], &after[0], &after[1]].map(list);
+            format!("BUG zones turn: forward {forward}, back {back} lm become forward {now}, back {back_now} lm")
         };
         format!(
             "C angles were kept, and what rests on forward turns by a quarter: {bug}, and who aims by the format's forward \
@@ -224,7 +229,10 @@ mod tests {
         assert!(lint.severity == Severity::Note && lint.message.contains("nothing turns"), "{lint:?}");
         let long = ldt(table(&[0.0]), LuminousOpening::Box { x_m: 0.3, y_m: 1.2, height_m: 0.0 });
         let lint = long.aimed_for(IES, ForwardPolicy::KeepAngles).lint.unwrap();
-        assert!(lint.severity == Severity::Warning && lint.message.contains("BUG zones stay"), "{lint:?}");
+        assert!(
+            lint.severity == Severity::Warning && lint.message.contains("BUG zones happen to be the same"),
+            "{lint:?}"
+        );
         let aimed = long.aimed_for(FileFormat::Eulumdat, ForwardPolicy::KeepForward);
         assert_eq!((aimed.photometry, aimed.lint), (long, None));
     }

@@ -35,13 +35,17 @@ struct Listed {
     aliases: Vec<String>,
 }
 
+/// What lists the files of a product.
+pub(super) const PRODUCT: &str = "product.xml";
+
 /// The photometric file that a product has, or that is meant by its name or the id of file or photometry.
 pub(super) fn part(bytes: &[u8], which: Option<&str>) -> Result<Part, ReadError> {
-    let error = |problem| Text::new(&[]).error(0, problem);
+    // What is wrong with an archive has no line.
+    let error = |problem| ReadError { line: 0, column: 0, ..Text::new(&[]).error(0, problem) };
     let refused = |message: String| error(Problem::Archive { message });
     let mut archive =
         ZipArchive::new(Cursor::new(bytes)).map_err(|e| refused(format!("the archive cannot be opened: {e}")))?;
-    let product = unpacked(&mut archive, "product.xml", MOST_OF_PRODUCT).map_err(refused)?;
+    let product = unpacked(&mut archive, PRODUCT, MOST_OF_PRODUCT).map_err(refused)?;
     let product = without_utf16(&product);
     let decoded = decode(Text::new(&product).bytes);
     let listed = listed(&Text::new(decoded.as_bytes()), &decoded)?;
@@ -84,12 +88,11 @@ fn listed(text: &Text, decoded: &str) -> Result<Vec<Listed>, ReadError> {
             continue;
         }
         let own = photometry.attribute("id").map(str::to_owned);
-        match files.iter_mut().find(|known| known.name == name) {
-            Some(known) => known.aliases.extend(own),
-            None => {
-                let aliases = [name, id].map(str::to_owned).into_iter().chain(own).collect();
-                files.push(Listed { name: name.into(), aliases });
-            }
+        if let Some(known) = files.iter_mut().find(|known| known.name == name) {
+            known.aliases.extend(own);
+        } else {
+            let aliases = [name, id].map(str::to_owned).into_iter().chain(own).collect();
+            files.push(Listed { name: name.into(), aliases });
         }
     }
     Ok(files)
@@ -194,6 +197,9 @@ mod tests {
         ] {
             let error = read("lamp.gldf", &bytes).unwrap_err();
             assert!(error.message().contains(word), "{word}: {error}");
+            // Lines are those of the list of files; an archive has none.
+            let is_listed = error.file == Path::new("there/lamp.gldf#product.xml");
+            assert_eq!(is_listed, error.line > 0, "{error}");
         }
         let broken = product(FILES, SECOND);
         let error = read("lamp.gldf", &zipped(&[("product.xml", broken.as_bytes()), ("ldc/b.ies", b"TILT=NONE\n1 x")]));

@@ -1,6 +1,6 @@
 //! What a written file does not give back, and why: each difference between what was written and what is read again.
 
-use super::details::{Details, EulumdatDetails, Lm63Details, ThirdNumber};
+use super::details::{Details, Edition, EulumdatDetails, Lm63Details, ThirdNumber};
 use super::{FileFormat, Goniometer, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry};
 
 /// Every difference between what was written and what was read back, a sentence each.
@@ -88,7 +88,8 @@ fn words(opening: &LuminousOpening) -> String {
         LuminousOpening::Ellipsoid { .. } => "an ellipsoid",
         LuminousOpening::LyingCylinder { .. } => "a lying cylinder",
     };
-    let [width, length, height] = opening.bounding_box_m();
+    // To a micrometre: feet leave more digits than anyone reads.
+    let [width, length, height] = opening.bounding_box_m().map(|m| (m * 1e6).round() / 1e6);
     format!("{shape} of {length} m along C0, {width} m along C90 and {height} m high")
 }
 
@@ -112,6 +113,9 @@ fn fate(key: &str, value: &str, again: &Photometry, format: FileFormat) -> Strin
         },
         (Some(_), _, FileFormat::Eulumdat) if again.keywords.iter().any(|(other, _)| other == key) => {
             "given more than once, and EULUMDAT has one line for it".into()
+        }
+        (_, Some((other, _)), FileFormat::Lm63(Edition::Lm63_1986)) if key.is_empty() => {
+            format!("written as [{other}]: as it stands it would be read otherwise")
         }
         (_, Some((other, _)), _) if key.is_empty() => {
             format!("written as [{other}]: {name} has no lines without keyword")

@@ -20,6 +20,7 @@ mod sampler;
 mod text;
 pub mod tm33;
 mod write;
+mod writers;
 mod xml;
 
 #[cfg(test)]
@@ -133,9 +134,13 @@ pub fn read_tolerantly_by(
         located(ReadError { file: path.into(), line: 0, column: 0, problem: Problem::Io { reason: error.to_string() } })
     })?;
     if gldf::looks_like(&bytes) {
-        let part = gldf::part(&bytes, part).map_err(located)?;
+        let within = |name: &str| named.with_file_name(format!("{}#{name}", name_of(path)));
+        let part = gldf::part(&bytes, part).map_err(|error| {
+            let file = if error.line > 0 { within(gldf::PRODUCT) } else { path.to_path_buf() };
+            ReadError { file, ..error }
+        })?;
         // The photometric file is the one within: nothing else is handed on, and what it names beside it is not there.
-        let own = named.with_file_name(format!("{}#{}", name_of(path), part.name));
+        let own = within(&part.name);
         let absent = |_: &Path| Err(std::io::ErrorKind::NotFound.into());
         let read = read_bytes(Path::new(&part.name), &part.bytes, None, &absent, tolerance);
         let photometry = read.map_err(|error| ReadError { file: own, ..error })?;

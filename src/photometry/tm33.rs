@@ -6,6 +6,7 @@
 //! schemas and files. The variant spelling `IntensityData horz= vert=`, directly in `LuminousData`, is read too.
 
 mod emitters;
+mod header;
 mod write;
 
 #[cfg(test)]
@@ -20,21 +21,11 @@ use super::error::{Problem, ReadError, in_candela};
 use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
 use super::planes;
-use super::text::{Text, decode, harmless, without_utf16};
-use super::xml::{self, child, content, is};
+use super::text::{Text, decode, without_utf16};
+use super::xml::{self, child, content};
 use super::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry, Tolerance};
 
 pub use self::write::write;
-
-/// Header elements and the LM-63 keywords that say the same.
-const KEYWORDS: [(&str, &str); 6] = [
-    ("Manufacturer", "MANUFAC"),
-    ("CatalogNumber", "LUMCAT"),
-    ("Description", "LUMINAIRE"),
-    ("Laboratory", "TESTLAB"),
-    ("ReportNumber", "TEST"),
-    ("ReportDate", "ISSUEDATE"),
-];
 
 /// Reads a TM-33 file.
 pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
@@ -77,7 +68,7 @@ pub(super) fn read(bytes: &[u8], which: Option<&str>, tolerance: Tolerance) -> R
         lamp_lumens: light.lamp_lumens,
         opening: LuminousOpening::Point,
         input_watts: light.input_watts,
-        keywords: keywords(root),
+        keywords: header::keywords(root),
         details: Details::None,
         lints: vec![],
         source: vec![],
@@ -284,21 +275,4 @@ impl Reader<'_> {
         }
         Ok(())
     }
-}
-
-/// The header's texts in file order.
-fn keywords(root: Node) -> Vec<(String, String)> {
-    let Some(header) = child(root, "Header") else { return vec![] };
-    let keyword = |node: Node| {
-        // A reference such as `&#13;` says what no line of a file can.
-        let value = node.text().unwrap_or_default().trim().replace('\r', " ");
-        let value = harmless(&value);
-        let name = node.tag_name().name();
-        if name == "Comments" && !value.is_empty() {
-            return Some(write::keyword_of(&value));
-        }
-        let known = KEYWORDS.iter().find(|(element, _)| *element == name).map(|(_, key)| (*key).to_string());
-        (!value.is_empty()).then(|| (known.unwrap_or_else(|| format!("_{name}")), value.to_string()))
-    };
-    header.children().filter(Node::is_element).filter_map(keyword).collect()
 }

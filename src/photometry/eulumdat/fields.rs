@@ -259,7 +259,7 @@ impl<'a, 'l> Fields<'a, 'l> {
                     Some("planes behind the only one of Isym 1 repeat it; they were ignored".to_owned())
                 }
                 _ if surplus.len() < gammas => {
-                    Some(format!("{} numbers behind the last intensity were ignored", surplus.len()))
+                    Some(format!("surplus numbers behind the last intensity were ignored: {}", surplus.len()))
                 }
                 _ => None,
             };

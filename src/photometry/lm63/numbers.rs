@@ -150,7 +150,7 @@ impl Numbers<'_, '_> {
             {
                 surplus += 1;
             }
-            let message = format!("{surplus} numbers behind the last of the {counted} were ignored");
+            let message = format!("surplus numbers behind the last of the {counted} were ignored: {surplus}");
             if surplus < tellable && self.lints.forgives("forgiven/surplus", text.line_of(at), message) {
                 return Ok(());
             }

@@ -331,6 +331,9 @@ fn editions_before_2002_have_other_keywords_and_shorter_lines() {
     let again = parse(old.text.as_bytes()).unwrap();
     assert_eq!((again.format.as_str(), again.opening), ("LM-63-1995", read.opening));
     assert_eq!(again.lints.iter().map(|l| l.code).collect::<Vec<_>>(), ["lm63/more"]);
+    assert_eq!(old.notes, Vec::<String>::new());
+    let unsaid = write(&Photometry { keywords: vec![], ..read.clone() }, Edition::Lm63_1995).notes;
+    assert_eq!(unsaid, ["LM-63-1995 asks for the keywords [TEST] [MANUFAC], of which nothing is known"]);
     // Two lines of the limit of 2002.
     assert_eq!(write(&read, Edition::Lm63_2002).text.matches("[MORE]").count(), 1);
 }
@@ -394,4 +397,21 @@ fn a_file_in_utf16_is_the_same_file_and_its_places_are_its_own() {
     assert_eq!(read.distribution, parse(text.as_bytes()).unwrap().distribution);
     let error = parse(&bytes(&text.replace("50 25", "50 x"))).unwrap_err();
     assert_eq!((error.line, error.column), (11, 8));
+}
+
+#[test]
+fn labels_stay_labels_in_1986_and_become_other_later() {
+    let text = file("a lamp", "1 -1 1 3 1 1 2 0 0 0", "1 1 10", AXIAL).replacen("[TEST] 1", "of ours", 1);
+    let read = parse(text.as_bytes()).unwrap();
+    let old = write(&read, Edition::Lm63_1986);
+    let told = old.losses.iter().filter(|loss| loss.contains("label")).count();
+    assert!(told == 0 && old.text.starts_with("a lamp\r\nof ours\r\n"), "{old:?}");
+    let new = write(&read, Edition::Lm63_1991);
+    assert!(new.losses[0].contains("a label line, a label line written as [OTHER]"), "{:?}", new.losses);
+    // What would be read as something else is kept as a keyword.
+    for label in ["TILT=NONE", "[x] y", "two\nlines", "IESNA91"] {
+        let odd = Photometry { keywords: vec![(String::new(), label.into())], ..read.clone() };
+        let again = parse(write(&odd, Edition::Lm63_1986).text.as_bytes()).unwrap();
+        assert_eq!(again.keywords, [("OTHER".to_string(), label.to_string())]);
+    }
 }

@@ -1,7 +1,8 @@
 //! Writer of LM-63 files of any edition: type C, metres, all multipliers one.
 
+use super::header::missing_keywords;
 use super::opening::to_dimensions;
-use super::{Edition, Lm63Details, ThirdNumber, Tilt, parse};
+use super::{Edition, Lm63Details, ThirdNumber, Tilt, is_edition_line, is_tilt_line, parse};
 use crate::photometry::write::{lines, number, one_line};
 use crate::photometry::{Details, FileFormat, Photometry, Written};
 
@@ -47,32 +48,46 @@ pub fn write(photometry: &Photometry, edition: Edition) -> Written {
     for plane in 0..c_deg.len() {
         text.push_str(&lines(distribution.plane(plane).iter().copied()));
     }
-    Written::checked(photometry, text, FileFormat::Lm63(edition), parse)
+    let mut written = Written::checked(photometry, text, FileFormat::Lm63(edition), parse);
+    if let Some(missing) = missing_keywords(edition, &photometry.keywords) {
+        written.notes.push(format!("{missing}, of which nothing is known"));
+    }
+    written
 }
 
 fn keywords(photometry: &Photometry, edition: Edition, text: &mut String) {
-    let mut line = |key: &str, value: &str| {
-        let key = one_line(key).replace(['[', ']'], "");
-        let mut key = if key.is_empty() { "OTHER" } else { &key };
-        for part in value
-            .split('\n')
-            .flat_map(|part| broken(&one_line(part), edition.line_limit().saturating_sub(key.len() + 3).max(1)))
-        {
-            text.push_str(format!("[{key}] {part}").trim_end());
-            text.push_str("\r\n");
-            key = "MORE";
-        }
-    };
     for (key, value) in &photometry.keywords {
-        line(&name_in(edition, key, photometry), value);
+        if edition == Edition::Lm63_1986 && key.is_empty() && is_label(value) {
+            text.push_str(&format!("{value}\r\n"));
+        } else {
+            keyword(&name_in(edition, key, photometry), value, edition, text);
+        }
     }
     if let Details::Eulumdat(details) = &photometry.details
         && let Some(set) = details.lamp_sets.first()
         && !set.kind.is_empty()
         && photometry.keyword("LAMP").is_none()
     {
-        line("LAMP", &set.kind);
+        keyword("LAMP", &set.kind, edition, text);
     }
+}
+
+/// A keyword with its text, whose further lines are [MORE].
+fn keyword(key: &str, value: &str, edition: Edition, text: &mut String) {
+    let key = one_line(key).replace(['[', ']'], "");
+    let mut key = if key.is_empty() { "OTHER" } else { &key };
+    let room = edition.line_limit().saturating_sub(key.len() + 3).max(1);
+    for part in value.split('\n').flat_map(|part| broken(&one_line(part), room)) {
+        text.push_str(format!("[{key}] {part}").trim_end());
+        text.push_str("\r\n");
+        key = "MORE";
+    }
+}
+
+/// Whether a line of LM-63-1986 is read as the label that it is.
+fn is_label(line: &str) -> bool {
+    let is_other = is_edition_line(line.as_bytes()) || is_tilt_line(line.as_bytes()) || line.starts_with('[');
+    !is_other && !line.is_empty() && line == one_line(line) && line.chars().count() <= Edition::Lm63_1986.line_limit()
 }
 
 /// Keywords that came with LM-63-2002 and 2019; before, what the standard does not define begins with an underscore.

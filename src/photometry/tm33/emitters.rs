@@ -5,9 +5,10 @@
 
 use roxmltree::Node;
 
-use super::{Light, Reader, child, content, is};
+use super::{Light, Reader};
 use crate::photometry::LuminousIntensityDistribution;
 use crate::photometry::error::{Problem, ReadError};
+use crate::photometry::xml::{child, content, is};
 
 /// Parts of the names of elements that place an emitter or turn it.
 const PLACING: [&str; 7] = ["Center", "Centre", "Position", "Location", "Orientation", "Rotation", "Offset"];

@@ -4,7 +4,8 @@
 
 use std::fmt::Write as _;
 
-use super::{KEYWORDS, parse};
+use super::header::{COMMENTS, KEYWORDS};
+use super::parse;
 use crate::photometry::text::harmless;
 use crate::photometry::write::number;
 use crate::photometry::{FileFormat, Photometry, Symmetry, Written};
@@ -63,18 +64,6 @@ fn header(photometry: &Photometry, text: &mut String) {
         text.push_str(&format!("<Comments>{}</Comments>\r\n", escaped(comment.trim())));
     }
     text.push_str("</Header>\r\n");
-}
-
-/// The keyword of a comment that names none.
-pub(super) const COMMENTS: &str = "_Comments";
-
-/// The keyword and text of a comment as this writer has it.
-pub(super) fn keyword_of(comment: &str) -> (String, String) {
-    let bracketed = comment.strip_prefix('[').and_then(|rest| rest.split_once(']'));
-    match bracketed {
-        Some((key, value)) => (key.to_string(), value.strip_prefix(' ').unwrap_or(value).to_string()),
-        None => (COMMENTS.into(), comment.to_string()),
-    }
 }
 
 /// A text for XML, without characters that it cannot hold.

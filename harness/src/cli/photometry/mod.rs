@@ -47,12 +47,25 @@ pub(crate) struct PhotometryArgs {
     /// Draw the polar intensity diagram of the one FILE
     #[arg(long, value_name = "SVG")]
     polar: Option<PathBuf>,
+    #[command(flatten)]
+    reading: ReadingArgs,
+    #[command(flatten)]
+    conversion: convert::ConversionArgs,
+}
+
+/// How files are read.
+#[derive(Debug, Args)]
+struct ReadingArgs {
     /// Read files with harmless damage, too: watts of -1, negative fields that nothing depends on, numbers too many or too few where the
     /// rest tells which. What was forgiven is told
     #[arg(long)]
     tolerant: bool,
-    #[command(flatten)]
-    conversion: convert::ConversionArgs,
+}
+
+impl ReadingArgs {
+    fn tolerance(&self) -> Tolerance {
+        if self.tolerant { Tolerance::Harmless } else { Tolerance::Strict }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -85,8 +98,8 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
         return Err(miette!(help = "give one FILE", "--polar and --convert write one file"));
     }
     let open = |file: &Path, path: &Path| trust.read_named(file.parent().unwrap_or(Path::new("")), path);
-    let tolerance = if args.tolerant { Tolerance::Harmless } else { Tolerance::Strict };
-    let read = |file: &PathBuf| photometry::read_tolerantly_by(file, &|path| open(file, path), tolerance);
+    let read =
+        |file: &PathBuf| photometry::read_tolerantly_by(file, &|path| open(file, path), args.reading.tolerance());
     let read = |file: &PathBuf| Reading { file: file.clone(), read: read(file) };
     let readings: Vec<Reading> = args.files.iter().map(read).collect();
     let text = match format {
