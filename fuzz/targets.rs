@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use luminaire::geometry::Mesh;
-use luminaire::photometry::{eulumdat, lm63, tm33};
+use luminaire::photometry::{self, Tolerance, eulumdat, lm63, tm33};
 use luminaire::scene::{Meter, Scene, Transport};
 use luxproof::engines::{ExternalReadings, Job, Station};
 use luxproof::import::{Options, import};
@@ -19,10 +19,11 @@ use luxproof::trend::history::{History, changes, site};
 pub(crate) type Target = fn(&[u8]);
 
 /// All of them, by the names of their folders of seeds.
-pub(crate) const ALL: [(&str, Target); 12] = [
+pub(crate) const ALL: [(&str, Target); 13] = [
     ("lm63", lm63),
     ("eulumdat", eulumdat),
     ("tm33", tm33),
+    ("gldf", gldf),
     ("obj", obj),
     ("spec", spec),
     ("report", report),
@@ -64,7 +65,7 @@ pub(crate) fn eulumdat(bytes: &[u8]) {
     }
 }
 
-/// What was read can be written as LM-63.
+/// What was read survives being written, and can be written as LM-63.
 pub(crate) fn tm33(bytes: &[u8]) {
     match tm33::parse(bytes) {
         Ok(read) => {
@@ -72,8 +73,32 @@ pub(crate) fn tm33(bytes: &[u8]) {
             let written = lm63::write_2019(&read);
             let again = lm63::parse(written.text.as_bytes()).expect("a written file is legal");
             assert_eq!(again.distribution, read.distribution);
+            let again = tm33::parse(tm33::write(&read).text.as_bytes()).expect("a written file is legal");
+            assert_eq!((again.distribution, again.lamp_lumens), (read.distribution, read.lamp_lumens));
         }
         Err(error) => assert!(error.line >= 1 && error.column >= 1),
+    }
+}
+
+/// Of any kind, whatever is let pass: what is read without tolerance is read with it, and is the same.
+pub(crate) fn gldf(bytes: &[u8]) {
+    for name in ["any.gldf", "any.gldf#b", "any.xml#1", "any.ldt", "any.ies"] {
+        let read = |tolerance| photometry::read_tolerantly_by(Path::new(name), &|_| Ok(bytes.to_vec()), tolerance);
+        match (read(Tolerance::Strict), read(Tolerance::Harmless)) {
+            (Ok(strict), tolerant) => {
+                assert!(strict.distribution.flux().value() >= 0.0);
+                assert_eq!(tolerant.map(|read| read.distribution), Ok(strict.distribution));
+            }
+            (Err(error), Ok(tolerant)) => {
+                let is_told = tolerant.lints.iter().any(|lint| lint.code.starts_with(photometry::FORGIVEN));
+                assert!(is_told, "{error}");
+                assert_eq!(
+                    lm63::write_2019(&tolerant).losses.iter().filter(|loss| loss.contains("intensit")).count(),
+                    0
+                );
+            }
+            (Err(error), Err(_)) => assert!(!error.message().is_empty() && !error.help().is_empty()),
+        }
     }
 }
 

@@ -25,10 +25,40 @@ pub struct Lm63Details {
     pub lamps: u32,
     /// Rated lumens of one lamp, -1 for absolute photometry.
     pub lumens_per_lamp: f64,
-    /// "Future use" of 1995 and 2002 or "file generation type" of 2019; 1 in earlier editions.
-    pub file_generation_type: f64,
+    /// The number behind the ballast factor.
+    pub third_number: ThirdNumber,
     /// How the lamp's flux depends on the luminaire's tilt; kept, never applied.
     pub tilt: Option<Tilt>,
+}
+
+/// The number between ballast factor and input watts, whose meaning changed with the editions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ThirdNumber {
+    /// The ballast-lamp photometric factor of the editions up to 1995: every intensity has been multiplied by it.
+    BallastLampFactor(f64),
+    /// "Future use", which must be 1: any other number means nothing and multiplies nothing.
+    Reserved(f64),
+    /// The file generation type of 2019; 1 where that is not known.
+    FileGeneration(f64),
+}
+
+impl ThirdNumber {
+    /// What a file of this edition has there for the same photometry, whose intensities have every factor in them.
+    #[must_use]
+    pub fn in_edition(self, edition: Edition) -> Self {
+        match (edition, self) {
+            (Edition::Lm63_2019, Self::FileGeneration(_)) => self,
+            (Edition::Lm63_2019, _) => Self::FileGeneration(1.0),
+            (Edition::Lm63_2002, _) => Self::Reserved(1.0),
+            (Edition::Lm63_1986 | Edition::Lm63_1991 | Edition::Lm63_1995, _) => Self::BallastLampFactor(1.0),
+        }
+    }
+
+    /// The number itself.
+    pub fn value(self) -> f64 {
+        let (Self::BallastLampFactor(value) | Self::Reserved(value) | Self::FileGeneration(value)) = self;
+        value
+    }
 }
 
 /// An edition of LM-63.
@@ -69,6 +99,23 @@ impl Edition {
             Self::Lm63_1995 => Some("IESNA:LM-63-1995"),
             Self::Lm63_2002 => Some("IESNA:LM-63-2002"),
             Self::Lm63_2019 => Some("IES:LM-63-2019"),
+        }
+    }
+
+    /// The most characters of a line, less CR LF: LM-63-2002 has 256 with them, the editions before 132.
+    pub(super) const fn line_limit(self) -> usize {
+        match self {
+            Self::Lm63_1986 | Self::Lm63_1991 | Self::Lm63_1995 => 130,
+            Self::Lm63_2002 | Self::Lm63_2019 => 254,
+        }
+    }
+
+    /// The keywords without which a file of the edition is not complete.
+    pub(super) const fn required_keywords(self) -> &'static [&'static str] {
+        match self {
+            Self::Lm63_1986 | Self::Lm63_1991 => &[],
+            Self::Lm63_1995 => &["TEST", "MANUFAC"],
+            Self::Lm63_2002 | Self::Lm63_2019 => &["TEST", "TESTLAB", "ISSUEDATE", "MANUFAC"],
         }
     }
 

@@ -38,8 +38,8 @@ pub enum Problem {
         /// The system's words.
         reason: String,
     },
-    /// Neither LM-63 nor EULUMDAT nor TM-33.
-    #[error("this is no photometric file: neither LM-63 (no TILT= line), EULUMDAT nor TM-33 XML")]
+    /// Neither LM-63 nor EULUMDAT nor TM-33 nor GLDF.
+    #[error("this is no photometric file: neither LM-63 (no TILT= line), EULUMDAT, TM-33 XML nor GLDF")]
     Unrecognised,
     /// The file ends too early.
     #[error("the file ends where {expected} should follow")]
@@ -133,6 +133,26 @@ pub enum Problem {
         /// What the XML reader or the schema says.
         message: String,
     },
+    /// A file with more than one photometry, of which none is named.
+    #[error("the file holds several photometries: {}", names.join(", "))]
+    Several {
+        /// What each may be named by.
+        names: Vec<String>,
+    },
+    /// A photometry that is named and is not there.
+    #[error("the file holds no photometry `{name}`; it holds {}", names.join(", "))]
+    NoSuchPart {
+        /// What was named.
+        name: String,
+        /// What may be named.
+        names: Vec<String>,
+    },
+    /// An archive that cannot be opened, or lacks what it lists.
+    #[error("{message}")]
+    Archive {
+        /// What is wrong with it.
+        message: String,
+    },
     /// A legal file that says nothing of luminous intensity in a form that can be used.
     #[error("{what} is not supported")]
     Unsupported {
@@ -151,7 +171,7 @@ impl ReadError {
     pub fn help(&self) -> &'static str {
         match &self.problem {
             Problem::Io { .. } => "check the path and its permissions",
-            Problem::Unrecognised => "name a .ies (LM-63), .ldt (EULUMDAT) or .xml (TM-33) file",
+            Problem::Unrecognised => "name a .ies (LM-63), .ldt (EULUMDAT), .xml (TM-33) or .gldf file",
             Problem::UnexpectedEnd { .. } => {
                 "the file is cut short or one of its counts is too large; fetch it again or correct the count"
             }
@@ -170,6 +190,10 @@ impl ReadError {
             Problem::AngleRange { .. } => "add the missing planes or angles, or correct the count of angles",
             Problem::Distribution(_) => "correct the table",
             Problem::Xml { .. } => "correct the XML; TM-33 asks for LuminaireOpticalData with Emitter and LuminousData",
+            Problem::Several { .. } | Problem::NoSuchPart { .. } => {
+                "name one of them behind the file, as in lamp.gldf#NAME (quoted in a shell)"
+            }
+            Problem::Archive { .. } => "export the product again, or unpack it and name its .ldt or .ies file",
             Problem::Unsupported { .. } => "export the luminous intensities as LM-63 type C or EULUMDAT",
         }
     }

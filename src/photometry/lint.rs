@@ -24,13 +24,44 @@ pub enum Severity {
     Warning,
 }
 
+/// What a reader lets pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tolerance {
+    /// What its standard can be read to allow.
+    #[default]
+    Strict,
+    /// Damage, too, that no intensity depends on or that the rest of the file tells how to mend. Each is a warning whose code
+    /// begins with [`FORGIVEN`].
+    Harmless,
+}
+
+/// How codes of lints begin that say what was forgiven.
+pub const FORGIVEN: &str = "forgiven/";
+
 /// Collects lints, one a code: the first place is kept, repetitions are counted.
 #[derive(Debug, Default)]
 pub(crate) struct Lints {
     found: Vec<(Lint, usize)>,
+    tolerance: Tolerance,
 }
 
 impl Lints {
+    pub(crate) fn new(tolerance: Tolerance) -> Self {
+        Self { found: vec![], tolerance }
+    }
+
+    pub(crate) fn is_tolerant(&self) -> bool {
+        self.tolerance == Tolerance::Harmless
+    }
+
+    /// Says that damage was forgiven; `false` where it may not be.
+    pub(crate) fn forgives(&mut self, code: &'static str, line: usize, message: impl Into<Cow<'static, str>>) -> bool {
+        if self.is_tolerant() {
+            self.warn(code, line, message);
+        }
+        self.is_tolerant()
+    }
+
     pub(crate) fn note(&mut self, code: &'static str, line: usize, message: impl Into<Cow<'static, str>>) {
         self.add(code, Severity::Note, line, message.into());
     }

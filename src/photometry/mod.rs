@@ -8,9 +8,13 @@ mod difference;
 mod distribution;
 mod error;
 pub mod eulumdat;
+mod format;
+mod forward;
+mod gldf;
 mod goniometer;
 mod lint;
 pub mod lm63;
+mod losses;
 mod luminance;
 mod orientation;
 mod outdoor;
@@ -22,6 +26,8 @@ mod spacing;
 mod text;
 pub mod tm33;
 mod write;
+mod writers;
+mod xml;
 mod zonal;
 
 #[cfg(test)]
@@ -29,7 +35,7 @@ mod round_trip_tests;
 
 use std::cell::RefCell;
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -40,8 +46,10 @@ pub use details::Details;
 pub use difference::{Departure, Difference, Likeness};
 pub use distribution::{DistributionError, LuminousIntensityDistribution, Symmetry, angles_deg, direction};
 pub use error::{Problem, ReadError};
+pub use format::FileFormat;
+pub use forward::{Aimed, ForwardPolicy};
 pub use goniometer::Goniometer;
-pub use lint::{Lint, Severity};
+pub use lint::{FORGIVEN, Lint, Severity, Tolerance};
 pub use luminance::NoLuminance;
 pub use orientation::{Convention, Lean};
 pub use outdoor::ClassificationZones;
@@ -53,7 +61,7 @@ pub use write::Written;
 pub use zonal::{MidZoneFlux, NoMidZones};
 
 use lint::Lints;
-use text::Text;
+use text::{Text, without_utf16};
 
 /// What a photometric file says of a luminaire: its distribution and the few numbers that go with it.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,32 +103,86 @@ impl fmt::Debug for SourceFile {
     }
 }
 
-/// Reads a photometric file of any kind: by its content, then by its extension (.ies, .ldt, .xml).
+/// Reads a photometric file of any kind: by its content, then by its extension (.ies, .ldt, .xml), or that of a GLDF container (.gldf).
 pub fn read_file(path: &Path) -> Result<Photometry, ReadError> {
     read_by(path, &|path| std::fs::read(path))
 }
 
 /// The same for whoever decides which files are opened: the file and, of LM-63, the tilt factors that it names beside it.
 pub fn read_by(path: &Path, open: &dyn Fn(&Path) -> std::io::Result<Vec<u8>>) -> Result<Photometry, ReadError> {
+    read_tolerantly_by(path, open, Tolerance::Strict)
+}
+
+/// A path of a file in a file, `lamp.gldf#a.ldt`, as the file's own and the name within it.
+///
+/// Files of which one part may be named are GLDF containers and TM-33 files.
+pub fn file_and_part(path: &Path) -> (PathBuf, Option<String>) {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let parted = name.split_once('#').filter(|(file, _)| {
+        let file = file.to_ascii_lowercase();
+        [".gldf", ".xml"].iter().any(|ending| file.ends_with(ending))
+    });
+    match parted {
+        Some((file, part)) => (path.with_file_name(file), Some(part.into())),
+        None => (path.to_path_buf(), None),
+    }
+}
+
+/// The same with what is let pass.
+pub fn read_tolerantly_by(
+    path: &Path,
+    open: &dyn Fn(&Path) -> std::io::Result<Vec<u8>>,
+    tolerance: Tolerance,
+) -> Result<Photometry, ReadError> {
+    let named = path;
+    let (path, part) = file_and_part(path);
+    let (path, part) = (path.as_path(), part.as_deref());
     let located = |error: ReadError| ReadError { file: path.to_path_buf(), ..error };
     let source = RefCell::new(vec![]);
     let open = |path: &Path| {
         let bytes = open(path)?;
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        source.borrow_mut().push(SourceFile { name, bytes: bytes.as_slice().into() });
+        source.borrow_mut().push(SourceFile { name: name_of(path), bytes: bytes.as_slice().into() });
         Ok(bytes)
     };
     let bytes = open(path).map_err(|error: std::io::Error| {
         located(ReadError { file: path.into(), line: 0, column: 0, problem: Problem::Io { reason: error.to_string() } })
     })?;
-    let read = match Kind::of(path, &bytes) {
-        Some(Kind::Lm63) => lm63::parse_with(&bytes, lm63::tilt_file_beside(path, &open)),
-        Some(Kind::Eulumdat) => eulumdat::parse(&bytes),
-        Some(Kind::Tm33) => tm33::parse(&bytes),
-        None => Err(Text::new(&bytes).error(0, Problem::Unrecognised)),
-    };
-    let photometry = read.map_err(located)?;
+    if gldf::looks_like(&bytes) {
+        let within = |name: &str| named.with_file_name(format!("{}#{name}", name_of(path)));
+        let part = gldf::part(&bytes, part).map_err(|error| {
+            let file = if error.line > 0 { within(gldf::PRODUCT) } else { path.to_path_buf() };
+            ReadError { file, ..error }
+        })?;
+        // The photometric file is the one within: nothing else is handed on, and what it names beside it is not there.
+        let own = within(&part.name);
+        let absent = |_: &Path| Err(std::io::ErrorKind::NotFound.into());
+        let read = read_bytes(Path::new(&part.name), &part.bytes, None, &absent, tolerance);
+        let photometry = read.map_err(|error| ReadError { file: own, ..error })?;
+        let file = SourceFile { name: part.name, bytes: part.bytes.into() };
+        return Ok(Photometry { source: vec![file], ..photometry });
+    }
+    let photometry = read_bytes(path, &bytes, part, &open, tolerance).map_err(located)?;
     Ok(Photometry { source: source.into_inner(), ..photometry })
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Reads the bytes of a photometric file, of which a part may be named.
+fn read_bytes(
+    path: &Path,
+    bytes: &[u8],
+    part: Option<&str>,
+    open: &dyn Fn(&Path) -> std::io::Result<Vec<u8>>,
+    tolerance: Tolerance,
+) -> Result<Photometry, ReadError> {
+    match Kind::of(path, bytes) {
+        Some(Kind::Lm63) => lm63::read(bytes, lm63::tilt_file_beside(path, open), tolerance),
+        Some(Kind::Eulumdat) => eulumdat::read(bytes, tolerance),
+        Some(Kind::Tm33) => tm33::read(bytes, part, tolerance),
+        None => Err(Text::new(bytes).error(0, Problem::Unrecognised)),
+    }
 }
 
 /// The kinds of file.
@@ -133,7 +195,8 @@ enum Kind {
 
 impl Kind {
     fn of(path: &Path, bytes: &[u8]) -> Option<Self> {
-        let text = Text::new(bytes);
+        let unicode = without_utf16(bytes);
+        let text = Text::new(&unicode);
         let named = text.lines().next().is_some_and(|line| lm63::is_edition_line(line.bytes));
         if named || text.lines().any(|line| lm63::is_tilt_line(line.bytes)) {
             return Some(Self::Lm63);

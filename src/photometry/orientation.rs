@@ -2,7 +2,10 @@
 
 use glam::DVec3;
 
-use super::{Details, HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, direction};
+use super::{
+    Details, FileFormat, HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry,
+    direction,
+};
 
 /// What a format means by its planes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +20,7 @@ pub struct Convention {
 
 /// LM-63, and TM-33, which takes over its coordinates.
 const LM63: Convention = Convention {
-    forward_c_deg: 0.0,
+    forward_c_deg: FileFormat::Tm33.forward_c_deg(),
     lamp_axis_c_deg: 0.0,
     source: "ANSI/IES LM-63-19 (photometric horizontal) with LM-31-95: roadway luminaires have C 0 across the street, on the \
              street side; linear ones have C 0 along the lamps, LM-41-14",
@@ -25,7 +28,7 @@ const LM63: Convention = Convention {
 
 /// EULUMDAT.
 const EULUMDAT: Convention = Convention {
-    forward_c_deg: 90.0,
+    forward_c_deg: FileFormat::Eulumdat.forward_c_deg(),
     lamp_axis_c_deg: 90.0,
     source: "EULUMDAT (Stockmar 1990) with CIE 121-1996 and EN 13032-1: roadway luminaires have C 0 along the street and C 90 \
              towards the road; C 0 looks at a linear luminaire's long side, its lamps lie along C 90",

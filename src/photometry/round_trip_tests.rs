@@ -78,15 +78,21 @@ fn same_light(a: &Photometry, b: &Photometry) -> bool {
 
 proptest! {
     #[test]
-    fn lm63_holds_every_photometry(x in photometry()) {
-        for written in [lm63::write_2002(&x), lm63::write_2019(&x)] {
+    fn every_edition_of_lm63_holds_every_photometry(x in photometry()) {
+        for edition in lm63::Edition::ALL {
+            let written = lm63::write(&x, edition);
             prop_assert_eq!(&written.losses, &Vec::<String>::new());
             let again = lm63::parse(written.text.as_bytes()).unwrap();
             prop_assert!(same_light(&again, &x));
-            prop_assert!(written.text.lines().all(|line| line.len() <= 254 || line.starts_with('[') || !line.contains(' ')));
+            prop_assert_eq!(&again.format, edition.name());
+            let most = if edition < lm63::Edition::Lm63_2002 { 130 } else { 254 };
+            prop_assert!(written.text.lines().all(|line| line.chars().count() <= most || !line.contains(' ')));
             let twice = lm63::parse(lm63::write_2019(&again).text.as_bytes()).unwrap();
             let details = |p: &Photometry| match &p.details {
-                Details::Lm63(d) => lm63::Lm63Details { edition: lm63::Edition::Lm63_2019, ..d.clone() },
+                Details::Lm63(d) => {
+                    let (edition, third_number) = (lm63::Edition::Lm63_2019, lm63::ThirdNumber::FileGeneration(1.0));
+                    lm63::Lm63Details { edition, third_number, ..d.clone() }
+                }
                 other => panic!("{other:?}"),
             };
             prop_assert_eq!(details(&twice), details(&again));
@@ -110,9 +116,28 @@ proptest! {
     }
 
     #[test]
+    fn tm33_holds_everything_but_openings_to_the_last_digit(x in photometry()) {
+        let written = tm33::write(&x);
+        let again = tm33::parse(written.text.as_bytes()).map_err(|e| TestCaseError::fail(e.to_string()))?;
+        prop_assert_eq!(&again.distribution, &x.distribution);
+        prop_assert_eq!((again.lamp_lumens, again.input_watts), (x.lamp_lumens, x.input_watts));
+        let sorted = |p: &Photometry| {
+            let mut keywords = p.keywords.clone();
+            keywords.sort();
+            keywords
+        };
+        prop_assert_eq!(sorted(&again), sorted(&x));
+        let is_known = |loss: &String| loss.contains("opening") || loss.contains("stand in the order of");
+        prop_assert!(written.losses.iter().all(is_known), "{:?}", written.losses);
+        prop_assert!(x.opening == again.opening || written.losses.iter().any(|loss| loss.contains("opening")));
+        prop_assert_eq!(tm33::write(&again).losses, Vec::<String>::new());
+        prop_assert_eq!(tm33::write(&again).text, written.text);
+    }
+
+    #[test]
     fn no_bytes_make_a_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
-        let refused = [lm63::parse(&bytes).is_err(), eulumdat::parse(&bytes).is_err()];
-        prop_assert_eq!(refused, [true; 2]);
+        let refused = [lm63::parse(&bytes).is_err(), eulumdat::parse(&bytes).is_err(), tm33::parse(&bytes).is_err()];
+        prop_assert_eq!(refused, [true; 3]);
     }
 
     #[test]
@@ -122,8 +147,12 @@ proptest! {
         cut in any::<prop::sample::Index>(),
     ) {
         type Reader = fn(&[u8]) -> Result<Photometry, ReadError>;
-        let files: [(String, Reader); 2] =
-            [(lm63::write_2002(&x).text, lm63::parse), (eulumdat::write(&x).text, eulumdat::parse)];
+        let files: [(String, Reader); 4] = [
+            (lm63::write_2002(&x).text, lm63::parse),
+            (lm63::write(&x, lm63::Edition::Lm63_1986).text, lm63::parse),
+            (eulumdat::write(&x).text, eulumdat::parse),
+            (tm33::write(&x).text, tm33::parse),
+        ];
         for (text, read) in files {
             let mut bytes = text.into_bytes();
             for (at, patch) in &damage {
@@ -135,6 +164,32 @@ proptest! {
                     Ok(read) => prop_assert!(read.distribution.flux().value() >= 0.0),
                     Err(error) => prop_assert!(error.line >= 1 && error.column >= 1 && !error.help().is_empty()),
                 }
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn a_conversion_by_way_of_any_formats_keeps_the_light_or_says_so(x in photometry()) {
+        let formats = [FileFormat::Tm33, FileFormat::Eulumdat, FileFormat::Lm63(lm63::Edition::Lm63_1995)];
+        for (first, second) in formats.iter().flat_map(|first| formats.iter().map(move |second| (first, second))) {
+            let read = |format: FileFormat, text: &str| match format {
+                FileFormat::Lm63(_) => lm63::parse(text.as_bytes()),
+                FileFormat::Eulumdat => eulumdat::parse(text.as_bytes()),
+                FileFormat::Tm33 => tm33::parse(text.as_bytes()),
+            };
+            let middle = read(*first, &first.write(&x).text).unwrap();
+            for policy in [ForwardPolicy::KeepAngles, ForwardPolicy::KeepForward] {
+                let aimed = middle.aimed_for(*second, policy);
+                let written = second.write(&aimed.photometry);
+                let last = read(*second, &written.text).unwrap();
+                let (flux, now) = (x.distribution.flux().value(), last.distribution.flux().value());
+                prop_assert!((flux - now).abs() <= 1e-9 * flux, "{:?} {:?} {} {}", first, second, flux, now);
+                let same = aimed.photometry.distribution == last.distribution;
+                prop_assert!(same || !written.losses.is_empty());
             }
         }
     }

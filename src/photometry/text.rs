@@ -97,6 +97,18 @@ fn replaced(c: char) -> char {
     if is_unprintable(c) && !matches!(c, '\t' | '\n' | '\r') { char::REPLACEMENT_CHARACTER } else { c }
 }
 
+/// Bytes of UTF-16, which begins with its byte order mark, as UTF-8; all else as it is. Halves of pairs become U+FFFD.
+pub(crate) fn without_utf16(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let (rest, number): (_, fn([u8; 2]) -> u16) = match bytes {
+        [0xff, 0xfe, rest @ ..] => (rest, u16::from_le_bytes),
+        [0xfe, 0xff, rest @ ..] => (rest, u16::from_be_bytes),
+        _ => return bytes.into(),
+    };
+    let units = rest.chunks_exact(2).map(|pair| number([pair[0], pair[1]]));
+    let text: String = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect();
+    text.into_bytes().into()
+}
+
 /// A short quotation of bytes for a message.
 pub(crate) fn quote(bytes: &[u8]) -> String {
     let text = decode(bytes);
@@ -121,6 +133,16 @@ mod tests {
         for (k, (number, words, place)) in lines.iter().enumerate() {
             assert_eq!((*number, words.as_str(), *place), (k + 1, expected[k], (k + 1, 1)));
         }
+    }
+
+    #[test]
+    fn utf16_of_either_order_is_the_same_text() {
+        let text = "f\u{fc}r \u{1f4a1}\r\n1";
+        let little: Vec<u8> = [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+        let big: Vec<u8> = [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_be_bytes).collect();
+        assert_eq!((&*without_utf16(&little), &*without_utf16(&big)), (text.as_bytes(), text.as_bytes()));
+        assert_eq!(&*without_utf16(b"\xff\xfe\x00\xd8a"), "\u{fffd}".as_bytes());
+        assert!(matches!(without_utf16(b"\xef\xbb\xbfa"), Cow::Borrowed(b"\xef\xbb\xbfa")));
     }
 
     #[test]

@@ -5,69 +5,70 @@
 //! `IntData h= v=` a direction. The primary text could not be read; the element names are those of published
 //! schemas and files. The variant spelling `IntensityData horz= vert=`, directly in `LuminousData`, is read too.
 
+mod emitters;
+mod header;
+mod write;
+
 #[cfg(test)]
 mod tests;
 
-use std::collections::{HashMap, HashSet};
+use std::borrow::Cow;
+use std::collections::HashMap;
 
-use roxmltree::{Document, Node, ParsingOptions};
+use roxmltree::Node;
 
 use super::error::{Problem, ReadError, in_candela};
 use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
 use super::planes;
-use super::text::{Text, decode, harmless};
-use super::{Details, LuminousOpening, Photometry};
+use super::text::{Text, decode, without_utf16};
+use super::xml::{self, child, content};
+use super::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry, Tolerance};
 
-/// Header elements and the LM-63 keywords that say the same.
-const KEYWORDS: [(&str, &str); 6] = [
-    ("Manufacturer", "MANUFAC"),
-    ("CatalogNumber", "LUMCAT"),
-    ("Description", "LUMINAIRE"),
-    ("Laboratory", "TESTLAB"),
-    ("ReportNumber", "TEST"),
-    ("ReportDate", "ISSUEDATE"),
-];
+pub use self::write::write;
 
 /// Reads a TM-33 file.
 pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
-    let decoded = decode(Text::new(bytes).bytes);
+    read(bytes, None, Tolerance::Strict)
+}
+
+/// Reads the emitter of this name or number or, where none is named, the luminaire.
+pub(super) fn read(bytes: &[u8], which: Option<&str>, tolerance: Tolerance) -> Result<Photometry, ReadError> {
+    let unicode = without_utf16(bytes);
+    let decoded = decode(Text::new(&unicode).bytes);
     let text = Text::new(decoded.as_bytes());
-    // Every node costs the reader memory; none is shorter than `<a/>`.
-    let nodes_limit = u32::try_from(decoded.len()).unwrap_or(u32::MAX).max(16);
-    let options = ParsingOptions { allow_dtd: false, nodes_limit, ..ParsingOptions::default() };
-    if let Some(at) = crowded(&decoded) {
-        let message =
-            format!("a tag of more than {MAX_ATTRIBUTES} attributes, or more than {MAX_NAMESPACES} namespaces");
-        return Err(text.error(at, Problem::Xml { message }));
-    }
-    let document = Document::parse_with_options(&decoded, options).map_err(|error| {
-        let position = error.pos();
-        let (line, column) = (position.row as usize, position.col as usize);
-        ReadError { line, column, ..text.error(0, Problem::Xml { message: error.to_string() }) }
-    })?;
+    let document = xml::document(&text, &decoded)?;
     let reader = Reader { text: &text };
     let root = document.root_element();
-    let mut lints = Lints::default();
+    let mut lints = Lints::new(tolerance);
+    if matches!(unicode, Cow::Owned(_)) {
+        lints.note("tm33/utf-16", 1, "the file is UTF-16");
+    }
     let format = reader.format(root)?;
-    let emitter = reader.emitter(root)?;
-    let data = reader.required(emitter, "LuminousData")?;
-    let intensity = child(data, "LuminousIntensity").unwrap_or(data);
-    let goniometer = reader.goniometer(data)?;
-    let table = reader.table(intensity, data)?;
-    let distribution = planes::distribution(&text, goniometer, table, &mut lints)?;
-    reader.remarks(root, emitter, &mut lints)?;
-    let rated = reader.rated_lumens(emitter)?;
-    let absolute = [intensity, data].into_iter().find_map(|node| content(node, "AbsolutePhotometry"));
-    let relative = absolute.is_some_and(|value| matches!(value.as_str(), "false" | "0"));
-    let watts = reader.number(emitter, "InputWattage")?.or(reader.number(emitter, "InputWatts")?);
+    let emitters = reader.emitters(root, which)?;
+    let lights = emitters.iter().map(|emitter| reader.light(*emitter, &mut lints)).collect::<Result<Vec<_>, _>>()?;
+    if let Some(dimensions) = child(root, "Luminaire") {
+        let line = text.line_of(dimensions.range().start);
+        lints.note("tm33/opening", line, "the luminaire's dimensions say nothing of its luminous opening: a point");
+    }
+    let light = match &lights[..] {
+        [one] => one.clone(),
+        several => {
+            let line = text.line_of(emitters[1].range().start);
+            let count = several.len();
+            let message =
+                format!("the intensities of {count} emitters, which share one centre and orientation, were added up");
+            lints.note("tm33/emitters", line, message);
+            emitters::sum(several).map_err(|problem| text.error(emitters[1].range().start, problem))?
+        }
+    };
     let photometry = Photometry {
         format: format.into(),
-        distribution,
-        lamp_lumens: rated.filter(|_| relative),
+        distribution: light.distribution,
+        lamp_lumens: light.lamp_lumens,
         opening: LuminousOpening::Point,
-        input_watts: watts.filter(|watts| *watts > 0.0),
-        keywords: keywords(root),
+        input_watts: light.input_watts,
+        keywords: header::keywords(root),
         details: Details::None,
         lints: vec![],
         source: vec![],
@@ -75,58 +76,17 @@ pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
     Ok(photometry.with_lints(lints))
 }
 
-/// The most attributes of a tag, and different declarations of namespaces in a file: the reader holds each against all others. An angle
-/// has two attributes.
-const MAX_ATTRIBUTES: usize = 64;
-const MAX_NAMESPACES: usize = 64;
-
-/// Where a tag has too many attributes, or namespaces become too many.
-fn crowded(text: &str) -> Option<usize> {
-    let mut known = HashSet::new();
-    let mut is_one_more = |at: usize| {
-        known.insert(text[at..].split(|c: char| c.is_whitespace() || c == '>').next());
-        known.len() > MAX_NAMESPACES
-    };
-    let namespace = text.match_indices("xmlns").map(|(at, _)| at).find(|at| is_one_more(*at));
-    namespace.or_else(|| {
-        let mut rest = 0;
-        while let Some(start) = text[rest..].find('<').map(|at| rest + at) {
-            let tag = &text[start..];
-            // What is no tag has an end of its own.
-            let other = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")]
-                .into_iter()
-                .find(|(begin, _)| tag.starts_with(begin));
-            let (length, attributes) = match other {
-                Some((_, end)) => (tag.find(end).map_or(tag.len(), |at| at + end.len()), 0),
-                None => tag_of(tag),
-            };
-            if attributes > MAX_ATTRIBUTES {
-                return Some(start);
-            }
-            rest = start + length;
-        }
-        None
-    })
-}
-
-/// The length of the tag that a text begins with, and how many attributes it has: what stands in quotes is a value.
-fn tag_of(text: &str) -> (usize, usize) {
-    let (mut quote, mut attributes) = (None, 0);
-    for (at, byte) in text.bytes().enumerate() {
-        match (quote, byte) {
-            (Some(open), _) if open == byte => quote = None,
-            (None, b'"' | b'\'') => quote = Some(byte),
-            (None, b'=') => attributes += 1,
-            (None, b'>') => return (at + 1, attributes),
-            _ => {}
-        }
-    }
-    (text.len(), attributes)
-}
-
 /// Whether the bytes begin as XML.
 pub(crate) fn looks_like(text: &Text) -> bool {
     text.bytes.trim_ascii_start().starts_with(b"<")
+}
+
+/// What an emitter, or all of them together, gives.
+#[derive(Clone)]
+struct Light {
+    distribution: LuminousIntensityDistribution,
+    lamp_lumens: Option<f64>,
+    input_watts: Option<f64>,
 }
 
 struct Reader<'a> {
@@ -156,29 +116,31 @@ impl Reader<'_> {
         })
     }
 
-    /// The one emitter with luminous data.
-    fn emitter<'d>(&self, root: Node<'d, 'd>) -> Result<Node<'d, 'd>, ReadError> {
-        let emitters = || root.children().filter(|node| is(*node, "Emitter"));
-        let mut luminous = emitters().filter(|node| child(*node, "LuminousData").is_some());
-        match (luminous.next(), luminous.next()) {
-            (Some(emitter), None) => Ok(emitter),
-            (Some(_), Some(second)) => {
-                let what = "a luminaire of several emitters with an intensity distribution each".into();
-                Err(self.error(second, Problem::Unsupported { what }))
-            }
-            (None, _) => {
-                let message = "no <Emitter> holds <LuminousData>".into();
-                Err(self.error(root, Problem::Xml { message }))
-            }
+    /// What one emitter says of its light.
+    fn light(&self, emitter: Node, lints: &mut Lints) -> Result<Light, ReadError> {
+        let data = self.required(emitter, "LuminousData")?;
+        let intensity = child(data, "LuminousIntensity").unwrap_or(data);
+        let goniometer = self.goniometer(data)?;
+        let table = self.table(intensity, data, lints)?;
+        let distribution = planes::distribution(self.text, goniometer, table, lints)?;
+        self.remarks(emitter, lints)?;
+        let rated = self.rated_lumens(emitter, lints)?;
+        let absolute = [intensity, data].into_iter().find_map(|node| content(node, "AbsolutePhotometry"));
+        let relative = absolute.is_some_and(|value| matches!(value.as_str(), "false" | "0"));
+        let mut watts = None;
+        for name in ["InputWattage", "InputWatts"] {
+            watts = watts.or(self.unused_number(emitter, name, lints)?);
         }
+        let input_watts = watts.filter(|watts| *watts > 0.0);
+        Ok(Light { distribution, lamp_lumens: rated.filter(|_| relative), input_watts })
     }
 
     fn goniometer(&self, data: Node) -> Result<Goniometer, ReadError> {
         let Some(node) = child(data, "PhotometryType") else { return Ok(Goniometer::C) };
         match node.text().unwrap_or_default().trim() {
-            "C" | "CIE-C" | "CIE _ C" | "TypeC" | "CIE C" => Ok(Goniometer::C),
-            "B" | "CIE-B" | "CIE _ B" | "TypeB" | "CIE B" => Ok(Goniometer::B),
-            "A" | "CIE-A" | "CIE _ A" | "TypeA" | "CIE A" => Ok(Goniometer::A),
+            "C" | "CIE-C" | "CIE_C" | "CIE _ C" | "TypeC" | "CIE C" => Ok(Goniometer::C),
+            "B" | "CIE-B" | "CIE_B" | "CIE _ B" | "TypeB" | "CIE B" => Ok(Goniometer::B),
+            "A" | "CIE-A" | "CIE_A" | "CIE _ A" | "TypeA" | "CIE A" => Ok(Goniometer::A),
             other => Err(self.error(node, Problem::Unsupported { what: format!("the photometry type `{other}`") })),
         }
     }
@@ -195,10 +157,21 @@ impl Reader<'_> {
         Err(self.error(node, problem))
     }
 
+    /// The same where no intensity depends on it: a negative one may be none.
+    fn unused_number(&self, parent: Node, name: &str, lints: &mut Lints) -> Result<Option<f64>, ReadError> {
+        let result = self.number(parent, name);
+        if let Err(ReadError { line, problem: Problem::OutOfRange { found, .. }, .. }) = &result
+            && lints.forgives("forgiven/negative-field", *line, format!("<{name}> is {found}; it was left out"))
+        {
+            return Ok(None);
+        }
+        result
+    }
+
     /// Rated lumens of all emitters of this kind together; zero counts as unknown.
-    fn rated_lumens(&self, emitter: Node) -> Result<Option<f64>, ReadError> {
+    fn rated_lumens(&self, emitter: Node, lints: &mut Lints) -> Result<Option<f64>, ReadError> {
         let quantity = self.number(emitter, "Quantity")?.unwrap_or(1.0);
-        let lumens = quantity * self.number(emitter, "RatedLumens")?.unwrap_or(0.0);
+        let lumens = quantity * self.unused_number(emitter, "RatedLumens", lints)?.unwrap_or(0.0);
         if quantity >= 1.0 && lumens.is_finite() {
             return Ok((lumens > 0.0).then_some(lumens));
         }
@@ -219,7 +192,7 @@ impl Reader<'_> {
     }
 
     /// The intensities, each multiplied by the multiplier, in a full grid of their angles.
-    fn table(&self, intensity: Node, data: Node) -> Result<Table, ReadError> {
+    fn table(&self, intensity: Node, data: Node, lints: &mut Lints) -> Result<Table, ReadError> {
         let multiplier = match self.number(intensity, "Multiplier")? {
             Some(multiplier) => multiplier,
             None => self.number(data, "Multiplier")?.unwrap_or(1.0),
@@ -251,7 +224,7 @@ impl Reader<'_> {
             angles.sort_by(f64::total_cmp);
             angles.dedup();
         }
-        self.counted(intensity, horizontal_deg.len(), vertical_deg.len())?;
+        self.counted(intensity, horizontal_deg.len(), vertical_deg.len(), lints)?;
         let mut candela = Vec::with_capacity(values.len());
         for h in &horizontal_deg {
             for v in &vertical_deg {
@@ -267,12 +240,16 @@ impl Reader<'_> {
     }
 
     /// The declared counts of angles, where given, must be those found.
-    fn counted(&self, intensity: Node, horizontal: usize, vertical: usize) -> Result<(), ReadError> {
+    fn counted(&self, intensity: Node, horizontal: usize, vertical: usize, lints: &mut Lints) -> Result<(), ReadError> {
         for (name, found) in [("NumberHorz", horizontal), ("NumberVert", vertical)] {
             if let Some(declared) = self.number(intensity, name)?
                 && declared != found as f64
             {
                 let message = format!("<{name}> says {declared}, but there are {found} different angles");
+                // Every direction names its angles: the grid is whole or it is refused.
+                if lints.forgives("forgiven/count", self.text.line_of(intensity.range().start), message.clone()) {
+                    continue;
+                }
                 return Err(self.error(intensity, Problem::Xml { message }));
             }
         }
@@ -284,7 +261,7 @@ impl Reader<'_> {
     }
 
     /// What the file says and this reader does not use.
-    fn remarks(&self, root: Node, emitter: Node, lints: &mut Lints) -> Result<(), ReadError> {
+    fn remarks(&self, emitter: Node, lints: &mut Lints) -> Result<(), ReadError> {
         for (name, consequence) in [
             ("Quantity", "the intensities were taken for the whole luminaire"),
             ("BallastFactor", "the intensities were not multiplied by it"),
@@ -296,39 +273,6 @@ impl Reader<'_> {
                 lints.warn("tm33/emitter", line, format!("<{name}> is {value}; {consequence}"));
             }
         }
-        if let Some(dimensions) = child(root, "Luminaire") {
-            let line = self.text.line_of(dimensions.range().start);
-            lints.note("tm33/opening", line, "the luminaire's dimensions say nothing of its luminous opening: a point");
-        }
         Ok(())
     }
-}
-
-/// Whether a node is an element of this name, whatever its namespace.
-fn is(node: Node, name: &str) -> bool {
-    node.is_element() && node.tag_name().name() == name
-}
-
-fn child<'d>(parent: Node<'d, 'd>, name: &str) -> Option<Node<'d, 'd>> {
-    parent.children().find(|node| is(*node, name))
-}
-
-/// Text of a child element, trimmed; `None` where it is absent or empty.
-fn content(parent: Node, name: &str) -> Option<String> {
-    let text = child(parent, name)?.text().unwrap_or_default().trim();
-    (!text.is_empty()).then(|| text.to_string())
-}
-
-/// The header's texts in file order.
-fn keywords(root: Node) -> Vec<(String, String)> {
-    let Some(header) = child(root, "Header") else { return vec![] };
-    let keyword = |node: Node| {
-        // A reference such as `&#13;` says what no line of a file can.
-        let value = node.text().unwrap_or_default().trim().replace('\r', " ");
-        let value = harmless(&value);
-        let name = node.tag_name().name();
-        let known = KEYWORDS.iter().find(|(element, _)| *element == name).map(|(_, key)| (*key).to_string());
-        (!value.is_empty()).then(|| (known.unwrap_or_else(|| format!("_{name}")), value.to_string()))
-    };
-    header.children().filter(Node::is_element).filter_map(keyword).collect()
 }

@@ -108,13 +108,17 @@ impl<'a, 'l> Fields<'a, 'l> {
         self.error_here(Problem::OutOfRange { what: what.into(), found, expected })
     }
 
-    /// Numbers that are zero or more; blank counts as zero.
-    pub(super) fn not_negative<const N: usize>(&mut self, what: [&str; N]) -> Result<[f64; N], ReadError> {
+    /// Numbers that are zero or more, and that no intensity depends on; blank counts as zero, and so may what is negative.
+    pub(super) fn zero_if_negative<const N: usize>(&mut self, what: [&str; N]) -> Result<[f64; N], ReadError> {
         let mut numbers = [0.0; N];
         for (number, what) in numbers.iter_mut().zip(what) {
             *number = self.number_or(what, 0.0)?;
             if *number < 0.0 {
-                return Err(self.out_of_range(what, *number, "zero or more"));
+                let message = format!("{what} is {number}; it was read as 0");
+                if !self.lints.forgives("forgiven/negative-field", self.last.number, message) {
+                    return Err(self.out_of_range(what, *number, "zero or more"));
+                }
+                *number = 0.0;
             }
         }
         Ok(numbers)
@@ -149,7 +153,11 @@ impl<'a, 'l> Fields<'a, 'l> {
 
     /// The conversion factor for intensities; blank or zero counts as one.
     pub(super) fn conversion_factor(&mut self) -> Result<f64, ReadError> {
-        let [factor] = self.not_negative(["the conversion factor for luminous intensities"])?;
+        let what = "the conversion factor for luminous intensities";
+        let factor = self.number_or(what, 0.0)?;
+        if factor < 0.0 {
+            return Err(self.out_of_range(what, factor, "zero or more"));
+        }
         if factor == 0.0 {
             self.warn("ldt/conversion-factor", "the conversion factor is 0 or blank and was read as 1".into());
             return Ok(1.0);
@@ -228,12 +236,38 @@ impl<'a, 'l> Fields<'a, 'l> {
     }
 
     /// Refuses further numbers, remarks on further text.
-    pub(super) fn finish(&mut self) -> Result<(), ReadError> {
+    ///
+    /// Fewer numbers than a plane has may be forgiven, and planes that repeat the only one, in candela, there is.
+    pub(super) fn finish(&mut self, gammas: usize, only: Option<&[f64]>, scale: f64) -> Result<(), ReadError> {
         let is_blank = |bytes: &[u8]| bytes.iter().all(|b| b.is_ascii_whitespace() || matches!(b, 0 | 0x1a));
         let Some(line) = self.lines.find(|line| !is_blank(line.bytes)) else { return Ok(()) };
         self.last = line;
         let value = decode(unquoted(line.bytes));
         if value.parse::<f64>().is_ok() {
+            let number = |line: Line| decode(unquoted(line.bytes)).parse::<f64>().ok();
+            let rest = std::iter::once(line).chain(self.lines.by_ref().filter(|line| !is_blank(line.bytes)));
+            let surplus: Vec<f64> = rest.map_while(number).collect();
+            let repeats = |only: &[f64]| {
+                let planes = surplus.chunks(gammas);
+                surplus.len().is_multiple_of(gammas)
+                    && planes
+                        .into_iter()
+                        .all(|plane| plane.iter().zip(only).all(|(value, candela)| value * scale == *candela))
+            };
+            let message = match only {
+                Some(only) if repeats(only) => {
+                    Some("planes behind the only one of Isym 1 repeat it; they were ignored".to_owned())
+                }
+                _ if surplus.len() < gammas => {
+                    Some(format!("surplus numbers behind the last intensity were ignored: {}", surplus.len()))
+                }
+                _ => None,
+            };
+            if let Some(message) = message
+                && self.lints.forgives("forgiven/surplus", line.number, message)
+            {
+                return Ok(());
+            }
             let problem = Problem::TooMany { what: "lines".into(), expected: line.number - 1 };
             return Err(self.error_here(problem));
         }

@@ -4,6 +4,7 @@
 //! One value a line. Intensities stand in cd/klm: each is multiplied by the lamp flux in kilolumens and by the
 //! conversion factor. The length of a luminaire lies along C90-C270, since C0 looks at its long side.
 
+mod direct_ratios;
 mod fields;
 mod planes;
 mod write;
@@ -11,11 +12,13 @@ mod write;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
+
 use self::fields::Fields;
 use super::error::{Problem, ReadError};
 use super::lint::Lints;
-use super::text::Text;
-use super::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry};
+use super::text::{Text, without_utf16};
+use super::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry, Tolerance};
 
 pub(crate) use self::fields::looks_like;
 pub use self::write::write;
@@ -31,8 +34,16 @@ pub(super) const DATE: &str = "ISSUEDATE";
 
 /// Reads a EULUMDAT file.
 pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
-    let text = Text::new(bytes);
-    let mut lints = Lints::default();
+    read(bytes, Tolerance::Strict)
+}
+
+pub(super) fn read(bytes: &[u8], tolerance: Tolerance) -> Result<Photometry, ReadError> {
+    let unicode = without_utf16(bytes);
+    let text = Text::new(&unicode);
+    let mut lints = Lints::new(tolerance);
+    if matches!(unicode, Cow::Owned(_)) {
+        lints.note("ldt/utf-16", 1, "the file is UTF-16");
+    }
     if text.has_byte_order_mark {
         lints.note("ldt/byte-order-mark", 1, "the file begins with a byte order mark");
     }
@@ -40,7 +51,8 @@ pub fn parse(bytes: &[u8]) -> Result<Photometry, ReadError> {
     let (head, details) = read_head(&mut fields)?;
     let scale = intensity_scale(&details);
     let distribution = read_table(&mut fields, &head, scale)?;
-    fields.finish()?;
+    let repeated = (head.symmetry == 1).then(|| distribution.plane(0));
+    fields.finish(head.gammas, repeated, scale)?;
     let set = &details.lamp_sets[0];
     let photometry = Photometry {
         format: "EULUMDAT".into(),
@@ -104,20 +116,20 @@ fn read_head(fields: &mut Fields) -> Result<(Head, EulumdatDetails), ReadError> 
     keyword(NUMBER, fields.text("the luminaire number")?);
     keyword(FILE, fields.text("the file name")?);
     keyword(DATE, fields.text("the date")?);
-    let luminaire_mm = fields.not_negative([
+    let luminaire_mm = fields.zero_if_negative([
         "the length of the luminaire",
         "the width of the luminaire",
         "the height of the luminaire",
     ])?;
-    let opening_mm = fields.not_negative(["the length of the luminous area", "the width of the luminous area"])?;
-    let luminous_heights_mm = fields.not_negative([
+    let opening_mm = fields.zero_if_negative(["the length of the luminous area", "the width of the luminous area"])?;
+    let luminous_heights_mm = fields.zero_if_negative([
         "the height of the luminous area at C0",
         "the height of the luminous area at C90",
         "the height of the luminous area at C180",
         "the height of the luminous area at C270",
     ])?;
     let [downward_flux_percent, output_ratio_percent] =
-        fields.not_negative(["the downward flux fraction DFF", "the light output ratio LORL"])?;
+        fields.zero_if_negative(["the downward flux fraction DFF", "the light output ratio LORL"])?;
     let conversion_factor = fields.conversion_factor()?;
     let measured_tilt_deg = fields.number_or("the tilt during measurement", 0.0)?;
     let lamp_sets = read_lamp_sets(fields)?;
@@ -159,7 +171,7 @@ fn read_lamp_set(fields: &mut Fields) -> Result<LampSet, ReadError> {
         lumens: fields.positive("the total flux of the lamps")?,
         colour: fields.text("the colour of the lamps")?,
         rendering: fields.text("the colour rendering of the lamps")?,
-        watts: fields.not_negative(["the watts of the lamps"])?[0],
+        watts: fields.zero_if_negative(["the watts of the lamps"])?[0],
     })
 }
 

@@ -137,3 +137,105 @@ fn refusals_name_the_line() {
     let error = read(&lines(4, &[0.0, 60.0, 120.0, 180.0], &[0.0, 60.0])).unwrap_err();
     assert!(error.message().contains("must be 90"), "{error}");
 }
+
+#[test]
+fn each_loss_has_its_own_cause() {
+    // The last plane is not the first: EULUMDAT has no plane 360.
+    let c_deg = vec![0.0, 90.0, 180.0, 270.0, 360.0];
+    let candela = [100.0, 50.0, 100.0, 40.0, 100.0, 30.0, 100.0, 20.0, 100.0, 48.0].to_vec();
+    let open = LuminousIntensityDistribution::new(c_deg, vec![0.0, 90.0], candela).unwrap();
+    let ring = LuminousOpening::Ellipse { x_m: 0.2, y_m: 0.1, height_m: 0.0 };
+    let keywords = [("LUMCAT", "a b"), ("LUMCAT", "c"), ("NAME", "d"), ("LUMINAIRE", "e\nf"), ("LAMP", "LED")];
+    let keywords = keywords.map(|(key, value)| (key.to_string(), value.to_string())).to_vec();
+    // In kilolumens of 1 nothing is rounded.
+    let written = write(&Photometry { lamp_lumens: Some(1000.0), opening: ring, keywords, ..Photometry::of(open) });
+    let expected = [
+        "the plane C 360 was dropped: EULUMDAT closes the circle with C 0, which differs from it by up to 2e0 cd",
+        "the luminous opening, an ellipse of 0.2 m along C0, 0.1 m along C90 and 0 m high, became a box of 0.2 m along C0, 0.1 m \
+         along C90 and 0 m high: EULUMDAT has boxes of some width and upright round openings alone",
+        "[LUMCAT] given more than once, and EULUMDAT has one line for it",
+        "[NAME] dropped: EULUMDAT has no line for it",
+        "[LUMINAIRE] its lines were joined: EULUMDAT has one",
+    ];
+    assert_eq!(written.losses, expected);
+}
+
+#[test]
+fn planes_that_cannot_be_listed_are_written_out_and_that_is_no_loss_of_light() {
+    let half = LuminousIntensityDistribution::new(
+        vec![90.0, 130.0, 270.0],
+        vec![0.0, 90.0],
+        vec![9.0, 1.0, 9.0, 2.0, 9.0, 3.0],
+    );
+    let written = write(&Photometry::of(half.unwrap()));
+    assert!(
+        written.losses[0].contains("the light is the same") && !written.losses[0].contains("rounding"),
+        "{written:?}"
+    );
+}
+
+#[test]
+fn what_another_format_cannot_hold_is_named_where_the_file_says_it() {
+    let axial = LuminousIntensityDistribution::axial(vec![0.0, 90.0], vec![100.0, 0.0]).unwrap();
+    let plain =
+        parse(write(&Photometry { lamp_lumens: Some(500.0), ..Photometry::of(axial) }).text.as_bytes()).unwrap();
+    let lost = |change: &dyn Fn(&mut EulumdatDetails)| {
+        let Details::Eulumdat(details) = &plain.details else { panic!("{:?}", plain.details) };
+        let mut details = details.clone();
+        change(&mut details);
+        let details = Details::Eulumdat(details);
+        crate::photometry::lm63::write_2019(&Photometry { details, ..plain.clone() }).losses.join("\n")
+    };
+    let without_ratios = |details: &mut EulumdatDetails| {
+        (details.downward_flux_percent, details.output_ratio_percent, details.direct_ratios) = (0.0, 0.0, [0.0; 10]);
+    };
+    assert_eq!(lost(&without_ratios), "");
+    assert!(
+        lost(&|_| ()).ends_with("the declared downward flux fraction, the declared light output ratio, direct ratios")
+    );
+    let tilted = |details: &mut EulumdatDetails| {
+        without_ratios(details);
+        details.measured_tilt_deg = 15.0;
+        details.lamp_sets.push(details.lamp_sets[0].clone());
+    };
+    assert!(
+        lost(&tilted).ends_with("fields for them: the tilt during measurement, 1 of 2 lamp sets"),
+        "{}",
+        lost(&tilted)
+    );
+}
+
+#[test]
+fn harmless_damage_is_forgiven_where_that_is_asked_and_told() {
+    let tolerant = |lines: &[String]| super::read(lines.join("\n").as_bytes(), Tolerance::Harmless);
+    let strict = |lines: &[String]| parse(lines.join("\n").as_bytes());
+    let sound = strict(&axial()).unwrap();
+    let codes = |read: &Photometry| read.lints.iter().map(|lint| lint.code).collect::<Vec<_>>();
+    // The luminaire's width, and its lamps' watts.
+    for (line, value) in [(13, "-50"), (31, "-1")] {
+        let mut damaged = axial();
+        damaged[line] = value.into();
+        let found = tolerant(&damaged).unwrap();
+        assert!(strict(&damaged).is_err() && codes(&found).contains(&"forgiven/negative-field"), "{:?}", found.lints);
+        assert_eq!(found.distribution, sound.distribution);
+    }
+    let with = |rest: &[&str]| axial().into_iter().chain(rest.iter().map(ToString::to_string)).collect::<Vec<_>>();
+    for rest in [&["0", "0"][..], &["7", "1", "7"], &["7", "1", "7", "7", "1", "7", ""]] {
+        let found = tolerant(&with(rest)).unwrap();
+        assert!(strict(&with(rest)).is_err() && codes(&found).contains(&"forgiven/surplus"), "{:?}", found.lints);
+        assert_eq!(found.distribution, sound.distribution);
+    }
+    // Another plane than the one that there is, and a factor that multiplies everything.
+    assert!(tolerant(&with(&["7", "2", "7"])).is_err());
+    let mut damaged = axial();
+    damaged[23] = "-1".into();
+    assert!(tolerant(&damaged).is_err());
+}
+
+#[test]
+fn a_file_in_utf16_is_the_same_file() {
+    let text = axial().join("\r\n");
+    let bytes: Vec<u8> = [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    let (read, plain) = (parse(&bytes).unwrap(), parse(text.as_bytes()).unwrap());
+    assert_eq!((read.distribution, read.keywords, read.details), (plain.distribution, plain.keywords, plain.details));
+}

@@ -1,8 +1,11 @@
 //! Writer of EULUMDAT files.
 
+use super::direct_ratios::direct_ratios;
 use super::{COMPANY, DATE, EulumdatDetails, FILE, LampSet, NAME, NUMBER, REPORT, intensity_scale, parse, planes};
 use crate::photometry::write::{inverse, number, one_line};
-use crate::photometry::{Details, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, Written};
+use crate::photometry::{
+    Details, FileFormat, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, Written,
+};
 
 /// Writes EULUMDAT.
 ///
@@ -38,7 +41,11 @@ pub fn write(photometry: &Photometry) -> Written {
     }
     let mut text = lines.join("\r\n");
     text.push_str("\r\n");
-    Written::checked(photometry, text, parse)
+    let mut written = Written::checked(photometry, text, FileFormat::Eulumdat, parse);
+    if !matches!(photometry.details, Details::Eulumdat(_)) {
+        written.notes.extend(notes(photometry));
+    }
+    written
 }
 
 /// The planes as EULUMDAT stores them.
@@ -157,6 +164,19 @@ fn plain_details(photometry: &Photometry) -> EulumdatDetails {
         conversion_factor: 1.0,
         measured_tilt_deg: 0.0,
         lamp_sets: vec![],
-        direct_ratios: [0.0; 10],
+        direct_ratios: direct_ratios(distribution).unwrap_or_default(),
     }
+}
+
+/// What the format asks for and photometry from elsewhere does not say.
+fn notes(photometry: &Photometry) -> Vec<String> {
+    let ratios = if photometry.distribution.flux().value() > 0.0 {
+        "downward flux fraction, light output ratio and direct ratios were computed from the table, the last for luminaires \
+         evenly spread over a square room"
+    } else {
+        "downward flux fraction, light output ratio and direct ratios are 0: without light there are none"
+    };
+    let unknown = "the luminaire's own dimensions are not known (those of its opening were written), nor are its lamps' colour \
+                   and colour rendering (left blank)";
+    vec![ratios.into(), unknown.into()]
 }

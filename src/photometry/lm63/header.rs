@@ -57,7 +57,9 @@ pub(super) fn read(text: &Text, lints: &mut Lints) -> Result<Head, ReadError> {
     };
     head.numbers_at = lines.next().map_or(text.bytes.len(), |next| next.at);
     head.tilt = tilt_line(&tilt, lints);
-    required_keywords(&head, lints);
+    if let Some(message) = missing_keywords(head.edition, &head.keywords) {
+        lints.note("lm63/keywords", 0, message);
+    }
     Ok(head)
 }
 
@@ -148,17 +150,10 @@ fn tilt_line(line: &Line, lints: &mut Lints) -> TiltLine {
     }
 }
 
-/// LM-63-1995 and later ask for these keywords.
-fn required_keywords(head: &Head, lints: &mut Lints) {
-    let required: &[&str] = match head.edition {
-        Edition::Lm63_1986 | Edition::Lm63_1991 => &[],
-        Edition::Lm63_1995 => &["TEST", "MANUFAC"],
-        Edition::Lm63_2002 | Edition::Lm63_2019 => &["TEST", "TESTLAB", "ISSUEDATE", "MANUFAC"],
-    };
-    let has = |word: &str| head.keywords.iter().any(|(key, _)| key == word);
-    let missing: Vec<String> = required.iter().filter(|word| !has(word)).map(|word| format!("[{word}]")).collect();
-    if !missing.is_empty() {
-        let message = format!("{} asks for the keywords {}", head.edition.name(), missing.join(" "));
-        lints.note("lm63/keywords", 0, message);
-    }
+/// LM-63-1995 and later ask for some keywords: in words, those that are missing.
+pub(super) fn missing_keywords(edition: Edition, keywords: &[(String, String)]) -> Option<String> {
+    let has = |word: &str| keywords.iter().any(|(key, _)| key == word);
+    let required = edition.required_keywords().iter();
+    let missing: Vec<String> = required.filter(|word| !has(word)).map(|word| format!("[{word}]")).collect();
+    (!missing.is_empty()).then(|| format!("{} asks for the keywords {}", edition.name(), missing.join(" ")))
 }

@@ -9,6 +9,7 @@ mod numbers;
 mod opening;
 mod write;
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use self::header::TiltLine;
@@ -17,15 +18,15 @@ use super::error::{Problem, ReadError, in_candela};
 use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
 use super::planes;
-use super::text::Text;
-use super::{Details, Photometry};
+use super::text::{Text, without_utf16};
+use super::{Details, Photometry, Tolerance};
 
 #[cfg(test)]
 mod tests;
 
 pub(crate) use self::header::{is_edition_line, is_tilt_line};
-pub use self::write::{write_2002, write_2019};
-pub use super::details::{Edition, Lm63Details, Tilt};
+pub use self::write::{write, write_2002, write_2019};
+pub use super::details::{Edition, Lm63Details, ThirdNumber, Tilt};
 
 /// Metres in a foot, exactly.
 const METRES_PER_FOOT: f64 = 0.3048;
@@ -40,8 +41,20 @@ pub fn parse_with(
     bytes: &[u8],
     tilt_file: impl FnOnce(&str) -> Result<Vec<u8>, String>,
 ) -> Result<Photometry, ReadError> {
-    let text = Text::new(bytes);
-    let mut lints = Lints::default();
+    read(bytes, tilt_file, Tolerance::Strict)
+}
+
+pub(super) fn read(
+    bytes: &[u8],
+    tilt_file: impl FnOnce(&str) -> Result<Vec<u8>, String>,
+    tolerance: Tolerance,
+) -> Result<Photometry, ReadError> {
+    let unicode = without_utf16(bytes);
+    let text = Text::new(&unicode);
+    let mut lints = Lints::new(tolerance);
+    if matches!(unicode, Cow::Owned(_)) {
+        lints.note("lm63/utf-16", 1, "the file is UTF-16; the standard has ASCII");
+    }
     if text.has_byte_order_mark {
         lints.note("lm63/byte-order-mark", 1, "the file begins with a byte order mark");
     }
@@ -76,7 +89,7 @@ pub fn parse_with(
             goniometer: lamps.goniometer,
             lamps: lamps.count,
             lumens_per_lamp: lamps.lumens_per_lamp,
-            file_generation_type: lamps.file_generation_type,
+            third_number: lamps.third_number,
             tilt,
         }),
         lints: vec![],
@@ -97,18 +110,18 @@ struct Lamps {
     /// Width, length, height, signed.
     dimensions_m: (f64, f64, f64),
     opening_line: usize,
-    file_generation_type: f64,
+    third_number: ThirdNumber,
     input_watts: f64,
 }
 
 fn read_lamps(numbers: &mut Numbers, edition: Edition) -> Result<Lamps, ReadError> {
     let text = numbers.text;
     let whole = |n: f64| n.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&n);
-    let first = numbers.checked(format_args!("the number of lamps"), "a whole number, one at least", whole)?;
-    let lumens =
-        numbers.checked(format_args!("the lumens per lamp"), "positive, or -1 for absolute photometry", |n| {
-            n > 0.0 || n == -1.0
-        })?;
+    let (what, expected) = (format_args!("the number of lamps"), "a whole number, one at least");
+    let first = numbers.checked_or(what, expected, whole, ("forgiven/lamps", 1.0, |n| n <= 0.0))?;
+    let (what, expected) = (format_args!("the lumens per lamp"), "positive, or -1 for absolute photometry");
+    let is_lumens = |n| n > 0.0 || n == -1.0;
+    let lumens = numbers.checked_or(what, expected, is_lumens, ("forgiven/lumens", -1.0, |n| n <= 0.0))?;
     if !(first.value * lumens.value).is_finite() {
         let (what, found) = ("the lumens of all lamps together".into(), f64::INFINITY);
         return Err(text.error(lumens.at, Problem::OutOfRange { what, found, expected: "finite" }));
@@ -136,8 +149,10 @@ fn read_lamps(numbers: &mut Numbers, edition: Edition) -> Result<Lamps, ReadErro
     }
     let ballast = numbers.checked(format_args!("the ballast factor"), "positive", |n| n > 0.0)?;
     let third = numbers.number(format_args!("the number behind the ballast factor"))?;
-    let watts = numbers.checked(format_args!("the input watts"), "zero or more", |n| n >= 0.0)?;
-    let ballast_lamp = ballast_lamp_factor(numbers, edition, third)?;
+    let what = format_args!("the input watts");
+    let watts = numbers.checked_or(what, "zero or more", |n| n >= 0.0, ("forgiven/watts", 0.0, |n| n < 0.0))?;
+    let third_number = third_number(numbers, edition, third)?;
+    let ballast_lamp = if let ThirdNumber::BallastLampFactor(factor) = third_number { factor } else { 1.0 };
     let factor = multiplier.value * ballast.value * ballast_lamp;
     if !factor.is_finite() || factor <= 0.0 {
         let (what, found) = ("the product of the multipliers".into(), factor);
@@ -152,17 +167,17 @@ fn read_lamps(numbers: &mut Numbers, edition: Edition) -> Result<Lamps, ReadErro
         goniometer,
         dimensions_m: (width.value * metres, length.value * metres, height.value * metres),
         opening_line: text.line_of(width.at),
-        file_generation_type: if edition <= Edition::Lm63_1991 { 1.0 } else { third.value },
+        third_number,
         input_watts: watts.value,
     })
 }
 
-/// The factor that the number behind the ballast factor stands for in this edition.
-fn ballast_lamp_factor(numbers: &mut Numbers, edition: Edition, third: Number) -> Result<f64, ReadError> {
+/// What the number behind the ballast factor means in this edition.
+fn third_number(numbers: &mut Numbers, edition: Edition, third: Number) -> Result<ThirdNumber, ReadError> {
     let line = numbers.text.line_of(third.at);
     let value = third.value;
     match edition {
-        Edition::Lm63_1986 | Edition::Lm63_1991 if value > 0.0 => Ok(value),
+        Edition::Lm63_1986 | Edition::Lm63_1991 if value > 0.0 => Ok(ThirdNumber::BallastLampFactor(value)),
         Edition::Lm63_1986 | Edition::Lm63_1991 => {
             let (what, expected) = ("the ballast-lamp photometric factor".into(), "positive");
             Err(numbers.text.error(third.at, Problem::OutOfRange { what, found: value, expected }))
@@ -175,16 +190,17 @@ fn ballast_lamp_factor(numbers: &mut Numbers, edition: Edition, third: Number) -
                 );
                 numbers.lints.warn("lm63/ballast-lamp-factor", line, message);
             }
-            Ok(value)
+            Ok(ThirdNumber::BallastLampFactor(value))
         }
-        _ => {
-            if value != 1.0 && edition != Edition::Lm63_2019 {
+        Edition::Lm63_1995 | Edition::Lm63_2002 => {
+            if value != 1.0 {
                 let message =
                     format!("the number behind the ballast factor is reserved and must be 1; {value} was ignored");
                 numbers.lints.warn("lm63/ballast-lamp-factor", line, message);
             }
-            Ok(1.0)
+            Ok(ThirdNumber::Reserved(value))
         }
+        Edition::Lm63_2019 => Ok(ThirdNumber::FileGeneration(value)),
     }
 }
 
@@ -194,24 +210,65 @@ fn read_table(mut numbers: Numbers, lamps: &Lamps) -> Result<Table, ReadError> {
     let (vertical, expected) = (vertical_deg.len(), vertical_deg.len() * horizontal_deg.len());
     let claimed = Number { value: expected as f64, at: lamps.vertical.at };
     numbers.fits(format_args!("the number of candela values"), claimed)?;
-    let mut candela = Vec::with_capacity(expected);
+    let mut candela: Vec<f64> = Vec::with_capacity(expected);
     let candela_at = numbers.at;
+    let mut least = Number { value: 0.0, at: candela_at };
+    let closes = (horizontal_deg[0], horizontal_deg[horizontal_deg.len() - 1]) == (0.0, 360.0);
     for (h, &angle) in horizontal_deg.iter().enumerate() {
         let before = numbers.at;
         for v in 0..vertical {
             let what = format_args!("candela value {} of {vertical} at horizontal angle {angle}", v + 1);
-            let number = numbers.checked(what, "zero or more", |n| n >= 0.0)?;
+            let is_last = h + 1 == horizontal_deg.len();
+            let number = match numbers.number(what) {
+                Err(error) if is_last && closes && is_cut(&error, &candela, vertical) => {
+                    let line = numbers.text.line_of(numbers.text.bytes.len());
+                    let message =
+                        format!("the last plane ends after {v} values; it was completed from plane 0, which it is");
+                    if !numbers.lints.forgives("forgiven/cut", line, message) {
+                        return Err(error);
+                    }
+                    candela.extend_from_within(v..vertical);
+                    break;
+                }
+                number => number?,
+            };
+            if number.value < 0.0 && !numbers.lints.is_tolerant() {
+                return Err(negative(numbers.text, number));
+            }
+            if number.value < least.value {
+                least = number;
+            }
             let begins_line = || numbers.text.bytes[before..number.at].iter().any(|b| matches!(b, b'\n' | b'\r'));
             if v == 0 && h > 0 && !begins_line() && !numbers.lints.again("lm63/broken-record") {
                 let line = numbers.text.line_of(number.at);
                 numbers.lints.note("lm63/broken-record", line, "the values of a horizontal angle do not begin a line");
             }
             let scaled = in_candela(what, number.value, lamps.factor);
-            candela.push(scaled.map_err(|problem| numbers.text.error(number.at, problem))?);
+            candela.push(scaled.map_err(|problem| numbers.text.error(number.at, problem))?.max(0.0));
         }
     }
-    numbers.finish("candela values", expected)?;
+    let most = candela.iter().copied().fold(0.0, f64::max);
+    if least.value < 0.0 {
+        let message = format!("negative intensities, of {} at least, were read as zero", least.value);
+        // What a photometer reads in the dark is a thousandth of its largest reading at most.
+        let is_noise = -least.value * lamps.factor <= 1e-3 * most;
+        if !is_noise || !numbers.lints.forgives("forgiven/negative", numbers.text.line_of(least.at), message) {
+            return Err(negative(numbers.text, least));
+        }
+    }
+    numbers.finish("candela values", expected, vertical)?;
     Ok(Table { vertical_deg, vertical_at, horizontal_deg, horizontal_at, candela, candela_at })
+}
+
+fn negative(text: &Text, candela: Number) -> ReadError {
+    let (what, found, expected) = ("a candela value".into(), candela.value, "zero or more");
+    text.error(candela.at, Problem::OutOfRange { what, found, expected })
+}
+
+/// Whether a file ends within its last plane, whose values so far are those of its first.
+fn is_cut(error: &ReadError, candela: &[f64], vertical: usize) -> bool {
+    let last = candela.chunks(vertical).next_back().filter(|last| last.len() < vertical).unwrap_or_default();
+    matches!(error.problem, Problem::UnexpectedEnd { .. }) && candela.len() > vertical && candela.starts_with(last)
 }
 
 fn read_tilt(numbers: &mut Numbers) -> Result<Tilt, ReadError> {
@@ -232,11 +289,12 @@ fn read_tilt(numbers: &mut Numbers) -> Result<Tilt, ReadError> {
 
 /// A file of tilt factors: the four records of TILT=INCLUDE.
 fn parse_tilt(bytes: &[u8]) -> Result<Tilt, String> {
-    let text = Text::new(bytes);
+    let unicode = without_utf16(bytes);
+    let text = Text::new(&unicode);
     let mut lints = Lints::default();
     let mut numbers = Numbers { text: &text, at: 0, lints: &mut lints };
     let tilt =
-        read_tilt(&mut numbers).and_then(|tilt| numbers.finish("tilt factors", tilt.factors.len()).map(|()| tilt));
+        read_tilt(&mut numbers).and_then(|tilt| numbers.finish("tilt factors", tilt.factors.len(), 0).map(|()| tilt));
     tilt.map_err(|error| format!("in it, {error}"))
 }
 

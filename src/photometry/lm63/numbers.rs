@@ -75,6 +75,26 @@ impl Numbers<'_, '_> {
         Err(self.text.error(number.at, problem))
     }
 
+    /// The next number or, in its place, another one where that harms nothing: the lint's code, the other number, and of which
+    /// numbers it may take the place.
+    pub(super) fn checked_or(
+        &mut self,
+        what: fmt::Arguments,
+        expected: &'static str,
+        legal: impl FnOnce(f64) -> bool,
+        (code, instead, harmless): (&'static str, f64, impl FnOnce(f64) -> bool),
+    ) -> Result<Number, ReadError> {
+        let Number { value, at } = self.number(what)?;
+        if legal(value) {
+            return Ok(Number { value, at });
+        }
+        let message = format!("{what} is {value}, and must be {expected}; it was read as {instead}");
+        if harmless(value) && self.lints.forgives(code, self.text.line_of(at), message) {
+            return Ok(Number { value: instead, at });
+        }
+        Err(self.text.error(at, Problem::OutOfRange { what: what.to_string(), found: value, expected }))
+    }
+
     /// A count of numbers that follow; refused where the rest of the file has no room for them.
     pub(super) fn count(&mut self, what: fmt::Arguments, least: f64) -> Result<Number, ReadError> {
         let number = self.checked(what, "a whole number, one at least", |n| n.fract() == 0.0 && n >= 1.0)?;
@@ -117,12 +137,23 @@ impl Numbers<'_, '_> {
         Ok((angles, first_at))
     }
 
-    /// Refuses further numbers, remarks on further text.
-    pub(super) fn finish(mut self, counted: &str, expected: usize) -> Result<(), ReadError> {
+    /// Refuses further numbers, remarks on further text. Fewer than `tellable` numbers may be forgiven: counts that are wrong leave more.
+    pub(super) fn finish(mut self, counted: &str, expected: usize, tellable: usize) -> Result<(), ReadError> {
         let text = self.text;
         let Some((at, token)) = self.token() else { return Ok(()) };
-        let is_number = std::str::from_utf8(token).is_ok_and(|t| t.parse::<f64>().is_ok());
-        if is_number {
+        let is_number = |token: &[u8]| std::str::from_utf8(token).is_ok_and(|t| t.parse::<f64>().is_ok());
+        if is_number(token) {
+            let mut surplus = 1;
+            while surplus < tellable
+                && let Some((_, token)) = self.token()
+                && is_number(token)
+            {
+                surplus += 1;
+            }
+            let message = format!("surplus numbers behind the last of the {counted} were ignored: {surplus}");
+            if surplus < tellable && self.lints.forgives("forgiven/surplus", text.line_of(at), message) {
+                return Ok(());
+            }
             return Err(text.error(at, Problem::TooMany { what: counted.into(), expected }));
         }
         let message = format!("text behind the last number was ignored: `{}`", quote(token));

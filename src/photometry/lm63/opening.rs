@@ -77,11 +77,38 @@ fn from_2002(w: f64, l: f64, h: f64) -> Option<LuminousOpening> {
     }
 }
 
-/// The dimensions (width, length, height in metres) that mean an opening in LM-63-2002 and 2019.
-///
-/// `None` where that edition has no such shape.
-pub(super) fn to_dimensions(opening: &LuminousOpening) -> Option<[f64; 3]> {
-    let dimensions = match *opening {
+/// The dimensions (width, length, height in metres) that mean an opening in an edition; `None` where it has no such shape.
+pub(super) fn to_dimensions(edition: Edition, opening: &LuminousOpening) -> Option<[f64; 3]> {
+    let (dimensions, means): (_, fn(f64, f64, f64) -> _) = if edition <= Edition::Lm63_1995 {
+        (dimensions_up_to_1995(opening), up_to_1995)
+    } else {
+        (dimensions_from_2002(opening), from_2002)
+    };
+    // A minus sign on zero would be lost on the way.
+    let dimensions = dimensions.map(|d| if d == 0.0 { 0.0 } else { d });
+    let [w, l, h] = dimensions;
+    (means(w, l, h) == Some(*opening)).then_some(dimensions)
+}
+
+fn dimensions_up_to_1995(opening: &LuminousOpening) -> [f64; 3] {
+    match *opening {
+        LuminousOpening::Point => [0.0; 3],
+        LuminousOpening::Box { x_m, y_m, height_m } => [y_m, x_m, height_m],
+        LuminousOpening::Ellipse { x_m, y_m, height_m } if x_m == y_m => [-y_m, 0.0, height_m],
+        LuminousOpening::Ellipse { x_m, y_m, height_m } => [-y_m, x_m, height_m],
+        LuminousOpening::Ellipsoid { x_m, y_m, z_m } if x_m == y_m && y_m == z_m => [-y_m, 0.0, -z_m],
+        LuminousOpening::Ellipsoid { x_m, y_m, z_m } => [-y_m, x_m, -z_m],
+        LuminousOpening::LyingCylinder { axis: HorizontalAxis::X, length_m, diameter_m } => {
+            [0.0, length_m, -diameter_m]
+        }
+        LuminousOpening::LyingCylinder { axis: HorizontalAxis::Y, length_m, diameter_m } => {
+            [length_m, 0.0, -diameter_m]
+        }
+    }
+}
+
+fn dimensions_from_2002(opening: &LuminousOpening) -> [f64; 3] {
+    match *opening {
         LuminousOpening::Point => [0.0; 3],
         LuminousOpening::Box { x_m, y_m, height_m } => [y_m, x_m, height_m],
         LuminousOpening::Ellipse { x_m, y_m, height_m } => [-y_m, -x_m, height_m],
@@ -92,11 +119,7 @@ pub(super) fn to_dimensions(opening: &LuminousOpening) -> Option<[f64; 3]> {
         LuminousOpening::LyingCylinder { axis: HorizontalAxis::Y, length_m, diameter_m } => {
             [length_m, -diameter_m, -diameter_m]
         }
-    };
-    // A minus sign on zero would be lost on the way.
-    let dimensions = dimensions.map(|d| if d == 0.0 { 0.0 } else { d });
-    let [w, l, h] = dimensions;
-    (from_2002(w, l, h) == Some(*opening)).then_some(dimensions)
+    }
 }
 
 /// A lying cylinder; an elliptical one is given the diameter of the same cross-section.
@@ -138,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn the_1995_table_of_shapes() {
+    fn the_1995_table_of_shapes_and_its_inverse() {
         use HorizontalAxis::{X, Y};
         use LuminousOpening::{Box, Ellipse, Ellipsoid, LyingCylinder, Point};
         let (d, l, h) = (0.12, 0.34, 0.56);
@@ -158,7 +181,12 @@ mod tests {
         ] {
             let [w, l, h] = dimensions;
             assert_eq!(from_dimensions(Edition::Lm63_1995, w, l, h), (expected, None), "{dimensions:?}");
+            // Two ways to write an ellipse and an ellipsoid mean the same.
+            let written = to_dimensions(Edition::Lm63_1995, &expected).unwrap();
+            assert_eq!(from_dimensions(Edition::Lm63_1995, written[0], written[1], written[2]), (expected, None));
         }
+        assert_eq!(to_dimensions(Edition::Lm63_1995, &Ellipse { x_m: d, y_m: d, height_m: h }), Some([-d, 0.0, h]));
+        assert_eq!(to_dimensions(Edition::Lm63_1995, &Ellipsoid { x_m: 0.0, y_m: d, z_m: h }), None);
     }
 
     #[test]
@@ -182,7 +210,7 @@ mod tests {
         ] {
             let [w, l, h] = dimensions;
             assert_eq!(from_dimensions(Edition::Lm63_2002, w, l, h), (expected, None), "{dimensions:?}");
-            assert_eq!(to_dimensions(&expected), Some(dimensions), "{expected:?}");
+            assert_eq!(to_dimensions(Edition::Lm63_2002, &expected), Some(dimensions), "{expected:?}");
         }
     }
 

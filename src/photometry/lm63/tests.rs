@@ -271,3 +271,147 @@ fn the_reference_file_of_case_s1_gives_its_converged_flux() {
     let read = crate::photometry::read_file(&path).unwrap();
     approx::assert_relative_eq!(read.distribution.flux().value(), 1817.2814559, max_relative = 1e-9);
 }
+
+/// What a file of one edition becomes in another: the third of its three numbers, the nadir's intensity, the losses.
+fn converted(first: &str, three: &str, to: Edition) -> (String, f64, Vec<String>) {
+    let read = parse(file(first, "1 -1 1 3 1 1 2 0 0 0", three, AXIAL).as_bytes()).unwrap();
+    let written = write(&read, to);
+    let three = written.text.lines().find(|line| line.ends_with(" 10")).unwrap().to_string();
+    let again = parse(written.text.as_bytes()).unwrap();
+    (three, again.distribution.plane(0)[0], written.losses)
+}
+
+#[test]
+fn the_third_number_means_in_each_edition_what_it_meant_in_the_file() {
+    const FACTOR: f64 = 100.0 * 0.9;
+    for to in Edition::ALL {
+        // A factor is in the intensities and multiplies once.
+        for first in ["a label", "IESNA91", "IESNA:LM-63-1995"] {
+            let (three, intensity, losses) = converted(first, "1 0.9 10", to);
+            assert_eq!((three.as_str(), intensity), ("1 1 10", FACTOR), "{first} {to:?}");
+            assert!(losses.iter().all(|loss| !loss.contains("ballast")), "{losses:?}");
+        }
+        // What is reserved means nothing.
+        let (three, intensity, losses) = converted("IESNA:LM-63-2002", "1 0.9 10", to);
+        assert_eq!((three.as_str(), intensity), ("1 1 10", 100.0), "{to:?}");
+        let stated = losses.join("\n");
+        assert!(stated.contains("0.9 behind the ballast factor was dropped: LM-63-2002 reserves"), "{stated}");
+        // A file generation type is one in 2019 alone.
+        let (three, intensity, losses) = converted("IES:LM-63-2019", "1 1.1 10", to);
+        assert_eq!(intensity, 100.0);
+        if to == Edition::Lm63_2019 {
+            assert_eq!((three.as_str(), losses), ("1 1.1 10", vec![]));
+        } else {
+            assert_eq!(three, "1 1 10");
+            assert!(losses.join("\n").contains("file generation type 1.1 was dropped"), "{losses:?}");
+        }
+    }
+    let (three, intensity, losses) = converted("IESNA:LM-63-1995", "1 0 10", Edition::Lm63_1995);
+    assert_eq!((three.as_str(), intensity), ("1 1 10", 100.0));
+    assert!(losses.join("\n").contains("LM-63-1995 reserves"), "{losses:?}");
+}
+
+#[test]
+fn editions_before_2002_have_other_keywords_and_shorter_lines() {
+    let long = "word ".repeat(60);
+    let text = file("IES:LM-63-2019", "1 -1 1 3 1 1 2 -0.1 -0.2 0.3", "1 1 10", AXIAL);
+    let read = parse(text.replacen("[TEST] 1", &format!("[TEST] 1\n[OTHER] {long}"), 1).as_bytes()).unwrap();
+    let old = write(&read, Edition::Lm63_1995);
+    assert!(old.text.starts_with("IESNA:LM-63-1995\r\n"), "{}", old.text);
+    assert!(old.text.lines().all(|line| line.len() <= 130), "{}", old.text);
+    assert!(old.text.contains("\n[DATE] 2024-01-02\r") && old.text.contains("\n[_TESTLAB] Lab\r"), "{}", old.text);
+    let stated = old.losses.join("\n");
+    for said in [
+        "[OTHER] broken into lines of at most 130 characters",
+        "[TESTLAB] written as [_TESTLAB]: LM-63-1995 does not define it",
+        "[ISSUEDATE] written as [DATE]",
+    ] {
+        assert!(stated.contains(said), "{stated}");
+    }
+    let again = parse(old.text.as_bytes()).unwrap();
+    assert_eq!((again.format.as_str(), again.opening), ("LM-63-1995", read.opening));
+    assert_eq!(again.lints.iter().map(|l| l.code).collect::<Vec<_>>(), ["lm63/more"]);
+    assert_eq!(old.notes, Vec::<String>::new());
+    let unsaid = write(&Photometry { keywords: vec![], ..read.clone() }, Edition::Lm63_1995).notes;
+    assert_eq!(unsaid, ["LM-63-1995 asks for the keywords [TEST] [MANUFAC], of which nothing is known"]);
+    // Two lines of the limit of 2002.
+    assert_eq!(write(&read, Edition::Lm63_2002).text.matches("[MORE]").count(), 1);
+}
+
+/// What a file of these parts is read as by whoever forgives, which nobody else reads.
+fn forgiven(ten: &str, three: &str, table: &str) -> Result<(Vec<&'static str>, Photometry), ReadError> {
+    let text = file("IESNA:LM-63-2002", ten, three, table);
+    let strict = parse(text.as_bytes());
+    let read = read(text.as_bytes(), |_| Err(String::new()), Tolerance::Harmless)?;
+    assert_eq!(strict.is_err(), read.lints.iter().any(|lint| lint.code.starts_with("forgiven/")), "{strict:?}");
+    Ok((read.lints.iter().map(|lint| lint.code).collect(), read))
+}
+
+#[test]
+fn harmless_damage_is_forgiven_where_that_is_asked_and_told() {
+    let ten = "1 -1 1 3 1 1 2 0 0 0";
+    let (codes, read) = forgiven(ten, "1 1 -1", AXIAL).unwrap();
+    assert_eq!((codes, read.input_watts), (vec!["forgiven/watts"], None));
+    assert_eq!((read.lints[0].line, read.lints[0].severity), (8, crate::photometry::Severity::Warning));
+    assert_eq!(forgiven("0 -1 1 3 1 1 2 0 0 0", "1 1 0", AXIAL).unwrap().0, ["forgiven/lamps"]);
+    let (codes, read) = forgiven("1 0 1 3 1 1 2 0 0 0", "1 1 0", AXIAL).unwrap();
+    assert_eq!((codes, read.lamp_lumens), (vec!["forgiven/lumens"], None));
+    assert_eq!(forgiven(ten, "1 1 0", "0 90 180\n0\n100 50 25 0 0").unwrap().0, ["forgiven/surplus"]);
+    let (codes, read) = forgiven(ten, "1 1 0", "0 90 180\n0\n100 50 -0.1").unwrap();
+    assert_eq!((codes, read.distribution.plane(0)), (vec!["forgiven/negative"], &[100.0, 50.0, 0.0][..]));
+    // The last plane is the first: what is missing of it is known.
+    let circle =
+        |last: &str| format!("0 90 180\n0 120 240 360\n9.00 1.00 2.00\n9.00 3.00 2.00\n9.00 4.00 2.00\n{last}");
+    let ten = "1 -1 1 3 4 1 2 0 0 0";
+    for last in ["9 1", "9", ""] {
+        let (codes, read) = forgiven(ten, "1 1 0", &circle(last)).unwrap();
+        assert_eq!((codes, read.distribution.plane(3)), (vec!["forgiven/cut"], &[9.0, 1.0, 2.0][..]));
+    }
+    assert_eq!(forgiven(ten, "1 1 0", &circle("9 1 2")).unwrap().0, Vec::<&str>::new());
+}
+
+#[test]
+fn what_changes_light_or_cannot_be_told_is_not_forgiven() {
+    let (ten, circle) = ("1 -1 1 3 1 1 2 0 0 0", "1 -1 1 3 4 1 2 0 0 0");
+    for (ten, three, table, word) in [
+        (ten, "1 1 0", "0 90 180\n0\n100 50 25 1 2 3", "more numbers"),
+        (ten, "1 1 0", "0 90 180\n0\n100 50", "ends where"),
+        (ten, "1 1 0", "0 90 180\n0\n100 50 -5", "-5"),
+        (ten, "0 1 0", AXIAL, "ballast factor"),
+        ("1.5 -1 1 3 1 1 2 0 0 0", "1 1 0", AXIAL, "number of lamps"),
+        (circle, "1 1 0", "0 90 180\n0 120 240 360\n9.00 1.00 2.00\n9.00 3.00 2.00\n9.00 4.00 2.00\n9 3", "ends where"),
+        (circle, "1 1 0", "0 90 180\n0 120 240 360\n9.00 1.00 2.00\n9.00 3.00 2.00\n9.00 4.00", "ends where"),
+    ] {
+        let error = forgiven(ten, three, table).expect_err(word);
+        assert!(error.message().contains(word), "{word}: {error}");
+    }
+}
+
+#[test]
+fn a_file_in_utf16_is_the_same_file_and_its_places_are_its_own() {
+    let text = file("IESNA:LM-63-2002", "1 -1 1 3 1 1 2 0 0 0", "1 1 10", AXIAL).replace("Maker", "M\u{fc}ller");
+    let bytes =
+        |text: &str| [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_be_bytes).collect::<Vec<u8>>();
+    let read = parse(&bytes(&text)).unwrap();
+    assert_eq!((read.keyword("MANUFAC"), read.lints[0].code), (Some("M\u{fc}ller"), "lm63/utf-16"));
+    assert_eq!(read.distribution, parse(text.as_bytes()).unwrap().distribution);
+    let error = parse(&bytes(&text.replace("50 25", "50 x"))).unwrap_err();
+    assert_eq!((error.line, error.column), (11, 8));
+}
+
+#[test]
+fn labels_stay_labels_in_1986_and_become_other_later() {
+    let text = file("a lamp", "1 -1 1 3 1 1 2 0 0 0", "1 1 10", AXIAL).replacen("[TEST] 1", "of ours", 1);
+    let read = parse(text.as_bytes()).unwrap();
+    let old = write(&read, Edition::Lm63_1986);
+    let told = old.losses.iter().filter(|loss| loss.contains("label")).count();
+    assert!(told == 0 && old.text.starts_with("a lamp\r\nof ours\r\n"), "{old:?}");
+    let new = write(&read, Edition::Lm63_1991);
+    assert!(new.losses[0].contains("a label line, a label line written as [OTHER]"), "{:?}", new.losses);
+    // What would be read as something else is kept as a keyword.
+    for label in ["TILT=NONE", "[x] y", "two\nlines", "IESNA91"] {
+        let odd = Photometry { keywords: vec![(String::new(), label.into())], ..read.clone() };
+        let again = parse(write(&odd, Edition::Lm63_1986).text.as_bytes()).unwrap();
+        assert_eq!(again.keywords, [("OTHER".to_string(), label.to_string())]);
+    }
+}

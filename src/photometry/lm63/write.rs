@@ -1,9 +1,10 @@
-//! Writer of LM-63-2002 and LM-63-2019 files: type C, metres, all multipliers one.
+//! Writer of LM-63 files of any edition: type C, metres, all multipliers one.
 
+use super::header::missing_keywords;
 use super::opening::to_dimensions;
-use super::{Edition, Lm63Details, Tilt, parse};
+use super::{Edition, Lm63Details, ThirdNumber, Tilt, is_edition_line, is_tilt_line, parse};
 use crate::photometry::write::{lines, number, one_line};
-use crate::photometry::{Details, Photometry, Written};
+use crate::photometry::{Details, FileFormat, Photometry, Written};
 
 /// Writes ANSI/IESNA LM-63-02.
 pub fn write_2002(photometry: &Photometry) -> Written {
@@ -15,13 +16,16 @@ pub fn write_2019(photometry: &Photometry) -> Written {
     write(photometry, Edition::Lm63_2019)
 }
 
-fn write(photometry: &Photometry, edition: Edition) -> Written {
+/// Writes LM-63 of an edition.
+///
+/// Of the ballast factor and what multiplies beside it nothing is left: every intensity has them in it.
+pub fn write(photometry: &Photometry, edition: Edition) -> Written {
     let mut text = String::new();
     if let Some(first) = edition.first_line() {
         text.push_str(first);
         text.push_str("\r\n");
     }
-    keywords(photometry, &mut text);
+    keywords(photometry, edition, &mut text);
     let details = details(photometry, edition);
     match &details.tilt {
         None => text.push_str("TILT=NONE\r\n"),
@@ -29,46 +33,86 @@ fn write(photometry: &Photometry, edition: Edition) -> Written {
     }
     let distribution = &photometry.distribution;
     let (c_deg, gamma_deg) = (distribution.c_deg(), distribution.gamma_deg());
-    // A shape that the format lacks becomes its bounding box; the check below says so.
+    // A shape that the edition lacks becomes its bounding box; the check below says so.
     let [width, length, height] =
-        to_dimensions(&photometry.opening).unwrap_or_else(|| photometry.opening.bounding_box_m()).map(number);
+        to_dimensions(edition, &photometry.opening).unwrap_or_else(|| photometry.opening.bounding_box_m()).map(number);
     let (lamps, lumens) = (details.lamps.to_string(), number(details.lumens_per_lamp));
     let (gammas, planes) = (gamma_deg.len().to_string(), c_deg.len().to_string());
     // Multiplier, type C, metres.
     let (multiplier, kind, units) = ("1".into(), "1".into(), "2".into());
     text.push_str(&[lamps, lumens, multiplier, gammas, planes, kind, units, width, length, height].join(" "));
     text.push_str("\r\n");
-    text.push_str(&lines([1.0, details.file_generation_type, photometry.input_watts.unwrap_or(0.0)]));
+    text.push_str(&lines([1.0, details.third_number.value(), photometry.input_watts.unwrap_or(0.0)]));
     text.push_str(&lines(gamma_deg.iter().copied()));
     text.push_str(&lines(c_deg.iter().copied()));
     for plane in 0..c_deg.len() {
         text.push_str(&lines(distribution.plane(plane).iter().copied()));
     }
-    Written::checked(photometry, text, parse)
+    let mut written = Written::checked(photometry, text, FileFormat::Lm63(edition), parse);
+    if let Some(missing) = missing_keywords(edition, &photometry.keywords) {
+        written.notes.push(format!("{missing}, of which nothing is known"));
+    }
+    written
 }
 
-fn keywords(photometry: &Photometry, text: &mut String) {
-    let mut line = |key: &str, value: &str| {
-        let mut values = value.split('\n').map(one_line);
-        let key = one_line(key).replace(['[', ']'], "");
-        let first = values.next().unwrap_or_default();
-        text.push_str(format!("[{}] {first}", if key.is_empty() { "OTHER" } else { &key }).trim_end());
-        text.push_str("\r\n");
-        for more in values {
-            text.push_str(format!("[MORE] {more}").trim_end());
-            text.push_str("\r\n");
-        }
-    };
+fn keywords(photometry: &Photometry, edition: Edition, text: &mut String) {
     for (key, value) in &photometry.keywords {
-        line(key, value);
+        if edition == Edition::Lm63_1986 && key.is_empty() && is_label(value) {
+            text.push_str(&format!("{value}\r\n"));
+        } else {
+            keyword(&name_in(edition, key, photometry), value, edition, text);
+        }
     }
     if let Details::Eulumdat(details) = &photometry.details
         && let Some(set) = details.lamp_sets.first()
         && !set.kind.is_empty()
         && photometry.keyword("LAMP").is_none()
     {
-        line("LAMP", &set.kind);
+        keyword("LAMP", &set.kind, edition, text);
     }
+}
+
+/// A keyword with its text, whose further lines are [MORE].
+fn keyword(key: &str, value: &str, edition: Edition, text: &mut String) {
+    let key = one_line(key).replace(['[', ']'], "");
+    let mut key = if key.is_empty() { "OTHER" } else { &key };
+    let room = edition.line_limit().saturating_sub(key.len() + 3).max(1);
+    for part in value.split('\n').flat_map(|part| broken(&one_line(part), room)) {
+        text.push_str(format!("[{key}] {part}").trim_end());
+        text.push_str("\r\n");
+        key = "MORE";
+    }
+}
+
+/// Whether a line of LM-63-1986 is read as the label that it is.
+fn is_label(line: &str) -> bool {
+    let is_other = is_edition_line(line.as_bytes()) || is_tilt_line(line.as_bytes()) || line.starts_with('[');
+    !is_other && !line.is_empty() && line == one_line(line) && line.chars().count() <= Edition::Lm63_1986.line_limit()
+}
+
+/// Keywords that came with LM-63-2002 and 2019; before, what the standard does not define begins with an underscore.
+const SINCE_2002: [&str; 4] = ["TESTLAB", "ISSUEDATE", "NEARFIELD", "FILEGENINFO"];
+
+/// What an edition calls a keyword.
+fn name_in(edition: Edition, key: &str, photometry: &Photometry) -> String {
+    if edition > Edition::Lm63_1995 || !SINCE_2002.contains(&key) {
+        return key.into();
+    }
+    // The editions before have one date, without saying of what.
+    if key == "ISSUEDATE" && photometry.keyword("DATE").is_none() { "DATE".into() } else { format!("_{key}") }
+}
+
+/// A text in parts of at most so many characters, parted at blanks where there are any.
+fn broken(text: &str, most: usize) -> Vec<String> {
+    let mut parts = vec![];
+    let mut rest = text;
+    while let Some((limit, _)) = rest.char_indices().nth(most) {
+        let at = rest[..limit].rfind(' ').filter(|at| *at > 0).unwrap_or(limit);
+        parts.push(rest[..at].trim_end().to_string());
+        rest = rest[at..].trim_start();
+    }
+    parts.push(rest.to_string());
+    parts
 }
 
 /// The file's own details where they still agree with the rest, else the plainest ones.
@@ -78,7 +122,7 @@ fn details(photometry: &Photometry, edition: Edition) -> Lm63Details {
         goniometer: super::Goniometer::C,
         lamps: 1,
         lumens_per_lamp: photometry.lamp_lumens.unwrap_or(-1.0),
-        file_generation_type: 1.0,
+        third_number: ThirdNumber::FileGeneration(1.0).in_edition(edition),
         tilt: None,
     };
     match &photometry.details {
@@ -88,13 +132,12 @@ fn details(photometry: &Photometry, edition: Edition) -> Lm63Details {
                 Some(lamp_lumens) => lumens == lamp_lumens,
                 None => details.lumens_per_lamp < 0.0,
             };
-            // 2002 reserves the field and wants 1 there.
-            let file_generation_type = if edition == Edition::Lm63_2019 { details.file_generation_type } else { 1.0 };
+            let third_number = details.third_number.in_edition(edition);
             let tilt = details.tilt.clone();
             if agrees {
-                Lm63Details { edition, file_generation_type, ..details.clone() }
+                Lm63Details { edition, third_number, ..details.clone() }
             } else {
-                Lm63Details { file_generation_type, tilt, ..plain }
+                Lm63Details { third_number, tilt, ..plain }
             }
         }
         Details::Eulumdat(details) => {

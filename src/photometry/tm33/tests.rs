@@ -81,9 +81,104 @@ fn refusals_name_the_place() {
         assert!(error.message().contains(word), "{to}: {error}");
         assert_eq!((error.line, error.column), (line, column), "{to}: {error}");
     }
-    let second = PLAIN[PLAIN.find("  <Emitter>").unwrap()..PLAIN.find("</IES").unwrap()].to_string();
-    let two = PLAIN.replace("</IESTM33-22>", &(second + "</IESTM33-22>"));
-    assert!(parse(two.as_bytes()).unwrap_err().message().contains("several emitters"));
+}
+
+/// The emitter of the plain file, with what is changed in it.
+fn emitter(changes: &[(&str, &str)]) -> String {
+    let plain = PLAIN[PLAIN.find("  <Emitter>").unwrap()..PLAIN.find("</IES").unwrap()].to_string();
+    changes.iter().fold(plain, |text, (from, to)| text.replace(from, to))
+}
+
+fn with_emitters(emitters: &[String]) -> String {
+    let (head, tail) = (PLAIN.find("  <Emitter>").unwrap(), PLAIN.find("</IES").unwrap());
+    format!("{}{}{}", &PLAIN[..head], emitters.concat(), &PLAIN[tail..])
+}
+
+#[test]
+fn emitters_in_one_place_add_up() {
+    let one = parse(PLAIN.as_bytes()).unwrap();
+    let two = parse(with_emitters(&[emitter(&[]), emitter(&[])]).as_bytes()).unwrap();
+    assert_eq!((two.lamp_lumens, two.input_watts, two.lints[0].code), (Some(1800.0), Some(25.0), "tm33/emitters"));
+    let (flux, twice) = (one.distribution.flux().value(), two.distribution.flux().value());
+    assert!((twice - 2.0 * flux).abs() < 1e-8 * flux, "{flux} {twice}");
+    // An uplight, axial, that ends with light at its edge, and says neither lumens nor watts.
+    let up = r#"<Emitter><LuminousData><IntData h="0" v="100">8</IntData><IntData h="0" v="180">8</IntData></LuminousData></Emitter>"#;
+    let both = parse(with_emitters(&[emitter(&[]), up.into()]).as_bytes()).unwrap();
+    assert_eq!((both.lamp_lumens, both.input_watts), (None, None));
+    let at = |gamma: f64| both.distribution.intensity(30.0, gamma).value();
+    assert_eq!((at(95.0), at(150.0)), (0.0, 8.0));
+    assert!((at(60.0) - one.distribution.intensity(30.0, 60.0).value()).abs() < 1e-9);
+    // The same place, said twice.
+    let placed = emitter(&[("<Emitter>", "<Emitter><EmitterCenter x='1' y='0' z='0'/>")]);
+    assert!(parse(with_emitters(&[placed.clone(), placed]).as_bytes()).is_ok());
+}
+
+#[test]
+fn emitters_apart_are_listed_and_one_can_be_named() {
+    let left = emitter(&[("<Emitter>", "<Emitter><ID>left</ID><EmitterCenter x='-1' y='0' z='0'/>")]);
+    let right =
+        emitter(&[("<Emitter>", "<Emitter><Description>right</Description><EmitterCenter x='1' y='0' z='0'/>")]);
+    let right = right.replace(">20<", ">30<");
+    let text = with_emitters(&[left, right]);
+    let error = parse(text.as_bytes()).unwrap_err();
+    assert_eq!(error.problem, Problem::Several { names: vec!["left".into(), "2".into()] });
+    assert!(error.help().contains('#') && error.line > 9);
+    let middle = |which| read(text.as_bytes(), Some(which), Tolerance::Strict).map(|p| p.distribution.plane(1)[1]);
+    assert_eq!([middle("left"), middle("1"), middle("2"), middle("right")], [Ok(40.0), Ok(40.0), Ok(60.0), Ok(60.0)]);
+    assert!(middle("top").unwrap_err().message().contains("no photometry `top`; it holds left, 2"));
+}
+
+#[test]
+fn a_sum_of_emitters_is_no_larger_than_makes_sense() {
+    // Each has angles of its own: a grid of all of them together has the square of their number.
+    let own = |k: usize| {
+        let table = format!("<IntData h='0' v='1.{k:05}'>1</IntData><IntData h='0' v='2.{k:05}'>1</IntData>");
+        let far = format!("<IntData h='90' v='1.{k:05}'>1</IntData><IntData h='90' v='2.{k:05}'>1</IntData>");
+        let middle =
+            format!("<IntData h='8.{k:05}' v='1.{k:05}'>1</IntData><IntData h='8.{k:05}' v='2.{k:05}'>1</IntData>");
+        format!("<Emitter><LuminousData>{table}{middle}{far}</LuminousData></Emitter>")
+    };
+    let emitters: Vec<String> = (0..3000).map(own).collect();
+    let error = parse(with_emitters(&emitters).as_bytes()).unwrap_err();
+    assert!(error.message().contains("the sum of 3000 emitters"), "{error}");
+}
+
+#[test]
+fn harmless_damage_is_forgiven_where_that_is_asked_and_told() {
+    let expected = parse(PLAIN.as_bytes()).unwrap().distribution;
+    for (from, to, code) in [
+        ("<InputWattage>12.5", "<InputWattage>-1", "forgiven/negative-field"),
+        ("<RatedLumens>900", "<RatedLumens>-1", "forgiven/negative-field"),
+        ("<NumberVert>3", "<NumberVert>4", "forgiven/count"),
+    ] {
+        let text = PLAIN.replace(from, to);
+        assert!(parse(text.as_bytes()).is_err());
+        let found = read(text.as_bytes(), None, Tolerance::Harmless).unwrap();
+        assert_eq!((found.lints[0].code, &found.distribution), (code, &expected));
+    }
+    assert!(read(PLAIN.replace(">20<", ">-20<").as_bytes(), None, Tolerance::Harmless).is_err());
+}
+
+#[test]
+fn a_file_in_utf16_is_the_same_file_whatever_it_declares() {
+    for text in [PLAIN.to_string(), PLAIN.replace("UTF-8", "UTF-16")] {
+        let bytes: Vec<u8> = [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+        let read = parse(&bytes).unwrap();
+        assert_eq!((read.lints[0].code, read.keyword("MANUFAC")), ("tm33/utf-16", Some("Maker & Sons")));
+    }
+}
+
+#[test]
+fn what_has_no_element_of_its_own_is_a_comment_that_is_read_back() {
+    let keywords =
+        [("MANUFAC", "a < b & c"), ("LAMP", "LED\nboard"), ("MANUFAC", "other"), ("_Comments", "no key"), ("TEST", "")];
+    let keywords = keywords.map(|(key, value)| (key.to_string(), value.to_string())).to_vec();
+    let photometry = Photometry { keywords: keywords.clone(), ..parse(PLAIN.as_bytes()).unwrap() };
+    let written = write(&photometry);
+    assert_eq!(written.losses, Vec::<String>::new(), "{}", written.text);
+    assert!(written.text.contains("<Manufacturer>a &lt; b &amp; c</Manufacturer>"), "{}", written.text);
+    assert!(written.text.contains("<Comments>[LAMP] LED\nboard</Comments>"), "{}", written.text);
+    assert_eq!(parse(written.text.as_bytes()).unwrap().keywords, keywords);
 }
 
 #[test]

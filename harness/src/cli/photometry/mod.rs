@@ -1,6 +1,7 @@
 //! `luxproof photometry FILE...`: what a photometric file says, what is doubtful in it, its diagram, its conversion; and
 //! `luxproof photometry report | diff | orient`: all its figures, how two files differ, which way a luminaire faces.
 
+mod convert;
 mod diff;
 mod figures;
 mod orient;
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use luminaire::calculators::zonal_cavity::{UtilizationTable, ZonalFlux};
-use luminaire::photometry::{self, Lint, Photometry, ReadError, Severity, Written, eulumdat, lm63};
+use luminaire::photometry::{self, FORGIVEN, Lint, Photometry, ReadError, Severity, Tolerance};
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr, miette};
 
 use crate::cli::diagnostic::diagnose;
@@ -34,7 +35,7 @@ use summary::Summary;
 pub(crate) struct PhotometryArgs {
     #[command(subcommand)]
     action: Option<Action>,
-    /// Photometric files: LM-63 (.ies), EULUMDAT (.ldt), TM-33 (.xml)
+    /// Photometric files: LM-63 (.ies), EULUMDAT (.ldt), TM-33 (.xml), GLDF (.gldf). Of several in one file, name one: lamp.gldf#NAME
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Print JSON, short for --format json
@@ -55,9 +56,25 @@ pub(crate) struct PhotometryArgs {
     /// Draw the polar intensity diagram of the one FILE
     #[arg(long, value_name = "SVG")]
     polar: Option<PathBuf>,
-    /// Write the one FILE in another format, by extension: .ldt is EULUMDAT, .ies is LM-63-2019
-    #[arg(long, value_name = "OUT")]
-    convert: Option<PathBuf>,
+    #[command(flatten)]
+    reading: ReadingArgs,
+    #[command(flatten)]
+    conversion: convert::ConversionArgs,
+}
+
+/// How files are read.
+#[derive(Debug, Args)]
+struct ReadingArgs {
+    /// Read files with harmless damage, too: watts of -1, negative fields that nothing depends on, numbers too many or too few where the
+    /// rest tells which. What was forgiven is told
+    #[arg(long)]
+    tolerant: bool,
+}
+
+impl ReadingArgs {
+    fn tolerance(&self) -> Tolerance {
+        if self.tolerant { Tolerance::Harmless } else { Tolerance::Strict }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -102,10 +119,11 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
     if format == Format::Sarif && !args.lint {
         return Err(miette!(help = "add --lint", "--format sarif prints lints only"));
     }
-    if args.files.len() > 1 && (args.polar.is_some() || args.convert.is_some()) {
+    if args.files.len() > 1 && (args.polar.is_some() || args.conversion.is_asked()) {
         return Err(miette!(help = "give one FILE", "--polar and --convert write one file"));
     }
-    let readings: Vec<Reading> = args.files.iter().map(|file| Reading::of(file, trust)).collect();
+    let tolerance = args.reading.tolerance();
+    let readings: Vec<Reading> = args.files.iter().map(|file| Reading::of(file, trust, tolerance)).collect();
     let text = match format {
         Format::Json => json(&readings)?,
         Format::Sarif => sarif::log(&readings)?,
@@ -114,12 +132,23 @@ pub(crate) fn run(args: &PhotometryArgs, trust: Trust) -> Result<Exit, Diagnosti
         Format::Terminal => summaries(&readings),
     };
     super::print(&text)?;
-    for reading in &readings {
-        if let Ok(photometry) = &reading.read {
-            write_files(args, &reading.file, photometry)?;
+    // Where lints are printed they say it themselves.
+    let forgiven = |reading: &&Reading| !args.lint && args.deny.is_none() && reading.read.is_ok();
+    for reading in readings.iter().filter(forgiven) {
+        let lints = reading.read.iter().flat_map(|photometry| &photometry.lints);
+        for lint in lints.filter(|lint| lint.code.starts_with(FORGIVEN)) {
+            super::complain(&told(&reading.file.display().to_string(), lint));
         }
     }
-    let denied = args.deny == Some(Deny::Warnings) && readings.iter().any(Reading::is_doubtful);
+    let mut turns = vec![];
+    for reading in &readings {
+        if let Ok(photometry) = &reading.read {
+            turns.extend(write_files(args, &reading.file, photometry)?);
+        }
+    }
+    let is_warning = |lint: &Lint| lint.severity == Severity::Warning;
+    let is_doubtful = readings.iter().any(Reading::is_doubtful) || turns.iter().any(is_warning);
+    let denied = args.deny == Some(Deny::Warnings) && is_doubtful;
     let exit = if denied { Exit::Failed } else { Exit::Passed };
     Ok(if Reading::all_sound(readings).is_some() { exit } else { Exit::Usage })
 }
@@ -130,9 +159,9 @@ fn json(readings: &[Reading]) -> Result<String, Diagnostic> {
 }
 
 impl Reading {
-    fn of(file: &Path, trust: Trust) -> Self {
+    fn of(file: &Path, trust: Trust, tolerance: Tolerance) -> Self {
         let open = |path: &Path| trust.read_named(file.parent().unwrap_or(Path::new("")), path);
-        Self { file: file.to_path_buf(), read: photometry::read_by(file, &open) }
+        Self { file: file.to_path_buf(), read: photometry::read_tolerantly_by(file, &open, tolerance) }
     }
 
     /// Whether it has warnings.
@@ -161,7 +190,7 @@ impl Reading {
 
 /// Reads the files of a subcommand; `None` where one was refused. What is denied is told on standard error.
 fn read_all<const N: usize>(files: [&Path; N], deny: Option<Deny>, trust: Trust) -> Option<([Photometry; N], Exit)> {
-    let readings = files.map(|file| Reading::of(file, trust));
+    let readings = files.map(|file| Reading::of(file, trust, Tolerance::Strict));
     let denied = deny == Some(Deny::Warnings) && readings.iter().any(Reading::is_doubtful);
     if denied {
         super::complain(lints(&readings).trim_end());
@@ -177,13 +206,17 @@ fn lints(readings: &[Reading]) -> String {
     for reading in readings {
         let file = reading.file.display();
         for lint in reading.read.iter().flat_map(|photometry| &photometry.lints) {
-            let place = if lint.line > 0 { format!("{file}:{}", lint.line) } else { file.to_string() };
-            let severity = if lint.severity == Severity::Warning { "warning" } else { "note" };
             // Writing to a string cannot fail.
-            writeln!(text, "{place}: {severity}: {} [{}]", lint.message, lint.code).ok();
+            writeln!(text, "{}", told(&file.to_string(), lint)).ok();
         }
     }
     text
+}
+
+fn told(file: &str, lint: &Lint) -> String {
+    let place = if lint.line > 0 { format!("{file}:{}", lint.line) } else { file.to_owned() };
+    let severity = if lint.severity == Severity::Warning { "warning" } else { "note" };
+    format!("{place}: {severity}: {} [{}]", lint.message, lint.code)
 }
 
 fn summaries(readings: &[Reading]) -> String {
@@ -209,28 +242,12 @@ fn utilization(readings: &[Reading]) -> Result<String, Diagnostic> {
     Ok(tables.join("\n"))
 }
 
-fn write_files(args: &PhotometryArgs, file: &Path, photometry: &Photometry) -> Result<(), Diagnostic> {
+fn write_files(args: &PhotometryArgs, file: &Path, photometry: &Photometry) -> Result<Option<Lint>, Diagnostic> {
     if let Some(out) = &args.polar {
         let name = file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         save(out, &polar::diagram(&name, photometry))?;
     }
-    if let Some(out) = &args.convert {
-        let written = convert(out, photometry)?;
-        save(out, &written.text)?;
-        for loss in &written.losses {
-            super::complain(&format!("{}: {loss}", out.display()));
-        }
-    }
-    Ok(())
-}
-
-fn convert(out: &Path, photometry: &Photometry) -> Result<Written, Diagnostic> {
-    let extension = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    match extension.as_deref() {
-        Some("ldt") => Ok(eulumdat::write(photometry)),
-        Some("ies") => Ok(lm63::write_2019(photometry)),
-        _ => Err(miette!(help = "name a .ldt or .ies file", "{} names no format to write", out.display())),
-    }
+    args.conversion.run(photometry)
 }
 
 fn save(path: &Path, text: &str) -> Result<(), Diagnostic> {

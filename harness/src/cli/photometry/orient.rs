@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use luminaire::photometry::lm63::Edition;
 use luminaire::photometry::{Lean, Photometry};
 use miette::{Report as Diagnostic, miette};
 use serde::Serialize;
 
+use super::convert::format_of;
 use super::figures::Figure;
-use super::{Deny, convert, read_all, save};
+use super::{Deny, read_all, save};
 use crate::cli;
 use crate::report::Exit;
 use crate::report::words::trimmed;
@@ -121,7 +123,7 @@ pub(super) fn run(args: &OrientArgs, trust: Trust) -> Result<Exit, Diagnostic> {
     let written = match (&args.out, turn_deg) {
         (Some(out), Some(turn_deg)) => {
             let (turned, kept) = photometry.turned(turn_deg);
-            Some((out, convert(out, &turned)?, kept))
+            Some((out, format_of(out, Edition::Lm63_2019)?.write(&turned), kept))
         }
         _ => None,
     };

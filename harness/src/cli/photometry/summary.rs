@@ -95,8 +95,7 @@ impl Summary {
 
 impl BugZones {
     fn of(photometry: &Photometry) -> Self {
-        let forward_c_deg = photometry.convention().forward_c_deg;
-        let zones = photometry.distribution.classification_zones(forward_c_deg);
+        let zones = photometry.distribution.classification_zones(photometry.forward_c_deg());
         let [back, forward] = [zones.back, zones.forward].map(|zones| zones.map(Lumen::value));
         Self { back, up: zones.up.map(Lumen::value), forward }
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use clap::Parser;
-use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening};
+use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, lm63};
 
 use super::*;
 
@@ -160,4 +160,37 @@ fn a_diagram_of_next_to_nothing_or_of_more_than_all_has_few_rings_and_finite_pla
         let curve = svg.split("class=\"curve\"").nth(1).unwrap().split('>').next().unwrap();
         assert!(svg.len() < 20_000 && !curve.contains("inf") && !curve.contains("NaN"), "{candela:e}: {svg}");
     }
+}
+
+#[test]
+fn a_conversion_takes_edition_and_policy_and_a_turn_is_denied_with_warnings() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    std::fs::write(at("a.ies"), lm63::write_2002(&pendant()).text).unwrap();
+    let converted = |line: &[&str]| {
+        let (from, out) = (at("a.ies"), at(line[0]));
+        let exit = run(&arguments(&[&[from.as_str(), "--convert", out.as_str()], &line[1..]].concat()), Trust::Own);
+        (exit.unwrap(), photometry::read_file(Path::new(&out)).unwrap())
+    };
+    let (exit, old) = converted(&["old.ies", "--edition", "1995", "--deny", "warnings"]);
+    assert_eq!((exit, old.format.as_str()), (Exit::Passed, "LM-63-1995"));
+    let (exit, kept) = converted(&["kept.ldt", "--deny", "warnings"]);
+    assert_eq!((exit, kept.distribution), (Exit::Failed, pendant().distribution));
+    let (_, turned) = converted(&["turned.ldt", "--forward", "keep-forward"]);
+    assert_eq!(turned.opening, LuminousOpening::Box { x_m: 0.1, y_m: 1.2, height_m: 0.0 });
+    assert_eq!(turned.distribution.plane(0), pendant().distribution.plane(1));
+    let (exit, xml) = converted(&["a.xml", "--deny", "warnings"]);
+    assert_eq!((exit, xml.format.as_str(), xml.distribution), (Exit::Passed, "TM-33-23", pendant().distribution));
+    assert!(Line::try_parse_from(["photometry", "a.ies", "--edition", "1995"]).is_err());
+}
+
+#[test]
+fn damage_is_refused_or_forgiven_as_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let damaged = folder.path().join("a.ies").display().to_string();
+    std::fs::write(&damaged, lm63::write_2002(&pendant()).text.replace("1 1 10\r\n", "1 1 -1\r\n")).unwrap();
+    let exit = |line: &[&str]| run(&arguments(&[&[damaged.as_str()], line].concat()), Trust::Own).unwrap();
+    assert_eq!(exit(&[]), Exit::Usage);
+    assert_eq!(exit(&["--tolerant"]), Exit::Passed);
+    assert_eq!(exit(&["--tolerant", "--deny", "warnings"]), Exit::Failed);
 }

@@ -199,7 +199,7 @@ impl Builder<'_> {
         if self.mended.touches(at) {
             return None;
         }
-        self.take_in(at, path)?;
+        self.take_in(at, &photometry::file_and_part(path).0)?;
         match photometry::read_by(path, &|path| self.read(path)) {
             Ok(read) => Some(Arc::new(read)),
             Err(error) => {

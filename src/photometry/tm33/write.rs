@@ -1,0 +1,76 @@
+//! Writer of TM-33-23 files: one emitter, type C, the multiplier one.
+//!
+//! What the header has no element for is a comment, `[KEYWORD] text`, which the reader takes for that keyword again.
+
+use std::fmt::Write as _;
+
+use super::header::{COMMENTS, KEYWORDS};
+use super::parse;
+use crate::photometry::text::harmless;
+use crate::photometry::write::number;
+use crate::photometry::{FileFormat, Photometry, Symmetry, Written};
+
+/// Writes ANSI/IES TM-33-23.
+pub fn write(photometry: &Photometry) -> Written {
+    let mut text =
+        String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\r\n<IESTM33-22>\r\n<Version>1.1</Version>\r\n");
+    header(photometry, &mut text);
+    text.push_str("<Emitter>\r\n<Quantity>1</Quantity>\r\n");
+    let mut element = |name: &str, value: String| text.push_str(&format!("<{name}>{value}</{name}>\r\n"));
+    if let Some(lumens) = photometry.lamp_lumens {
+        element("RatedLumens", number(lumens));
+    }
+    if let Some(watts) = photometry.input_watts {
+        element("InputWattage", number(watts));
+    }
+    let distribution = &photometry.distribution;
+    text.push_str("<LuminousData>\r\n<PhotometryType>CIE-C</PhotometryType>\r\n<Metric>Luminous</Metric>\r\n");
+    let symmetry = match distribution.symmetry() {
+        Symmetry::Axial => "Symm_Full",
+        Symmetry::Quadrant => "Symm_Quad",
+        Symmetry::BilateralC0 => "Symm_Bi0",
+        Symmetry::BilateralC90 => "Symm_Bi90",
+        Symmetry::None => "Symm_None",
+    };
+    text.push_str(&format!("<SymmType>{symmetry}</SymmType>\r\n<LuminousIntensity>\r\n"));
+    let mut element = |name: &str, value: String| text.push_str(&format!("<{name}>{value}</{name}>\r\n"));
+    element("AbsolutePhotometry", photometry.lamp_lumens.is_none().to_string());
+    element("Multiplier", number(1.0));
+    element("NumberHorz", distribution.c_deg().len().to_string());
+    element("NumberVert", distribution.gamma_deg().len().to_string());
+    for (plane, c) in distribution.c_deg().iter().enumerate() {
+        let c = number(*c);
+        for (gamma, candela) in distribution.gamma_deg().iter().zip(distribution.plane(plane)) {
+            // Writing to a string cannot fail.
+            write!(text, "<IntData h=\"{c}\" v=\"{}\">{}</IntData>\r\n", number(*gamma), number(*candela)).ok();
+        }
+    }
+    text.push_str("</LuminousIntensity>\r\n</LuminousData>\r\n</Emitter>\r\n</IESTM33-22>\r\n");
+    Written::checked(photometry, text, FileFormat::Tm33, parse)
+}
+
+/// The header's own elements in their order, then everything else as comments.
+fn header(photometry: &Photometry, text: &mut String) {
+    let mut rest: Vec<&(String, String)> = photometry.keywords.iter().collect();
+    text.push_str("<Header>\r\n");
+    for (element, keyword) in KEYWORDS {
+        if let Some(k) = rest.iter().position(|(key, value)| key == keyword && !value.trim().is_empty()) {
+            let (_, value) = rest.remove(k);
+            text.push_str(&format!("<{element}>{}</{element}>\r\n", escaped(value)));
+        }
+    }
+    for (key, value) in rest {
+        let comment = if key == COMMENTS { value.clone() } else { format!("[{key}] {value}") };
+        text.push_str(&format!("<Comments>{}</Comments>\r\n", escaped(comment.trim())));
+    }
+    text.push_str("</Header>\r\n");
+}
+
+/// A text for XML, without characters that it cannot hold.
+fn escaped(text: &str) -> String {
+    let text = harmless(text);
+    let legal =
+        text.chars().map(|c| if matches!(c, '\u{fffe}' | '\u{ffff}') { char::REPLACEMENT_CHARACTER } else { c });
+    let legal: String = legal.collect();
+    legal.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
