@@ -2,6 +2,7 @@
 //!
 //! `scene.scn` holds surfaces and luminaires, `render.cfg` how it is rendered; `job.json` holds the meters, which are no part of either.
 
+use std::borrow::Cow;
 use std::fmt::Write;
 
 use glam::{DMat3, DVec3};
@@ -31,6 +32,7 @@ const CORNERS: usize = 64;
 pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.coordinates);
     let job = &*recess::behind_points(job, super::PACKAGE.apart);
+    let job = &*shining(job);
     let tables = Tables::of(job);
     let mapped = tables.distinct.iter().filter(|_| !settings.has_plain_tables());
     let maps: Vec<Map> = mapped.map(|d| Map::of(d)).collect();
@@ -48,6 +50,19 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
         files.extend(patches::plain_files(job, settings, &tables, ies_name));
     }
     Ok(files)
+}
+
+/// Without luminaires that are off beside others: LuxCore 2.11 crashes (SIGSEGV) where one whose material emits nothing is the last of several to be read.
+fn shining(job: &Job) -> Cow<'_, Job> {
+    let is_on = |l: &Luminaire| l.flux_scale > 0.0 && l.photometry.distribution.max_intensity().value() > 0.0;
+    let all = &job.scene.luminaires;
+    let on = all.iter().filter(|l| is_on(l)).count();
+    if on == 0 || on == all.len() {
+        return Cow::Borrowed(job);
+    }
+    let mut job = job.clone();
+    job.scene.luminaires.retain(is_on);
+    Cow::Owned(job)
 }
 
 fn map_name(k: usize) -> String {

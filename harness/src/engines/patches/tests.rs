@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 use glam::DVec3;
 use luminaire::photometry::LuminousOpening;
-use luminaire::scene::{LuminaireModel, Obstacle, Scene, Shape, Transport, orientation};
+use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport, orientation};
 
 use super::*;
 use crate::engines::Engine;
@@ -126,6 +126,12 @@ pub(in crate::engines) fn what_is_off_is_dark(read: fn(&Job) -> Measurement) {
     let opening = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
     job.scene.luminaires[0] = with_opening(job.scene.luminaires[0].clone(), opening);
     assert!(read(&job).estimates.iter().all(|e| e.value == 0.0));
+    // Beside one that is on.
+    let shining = Luminaire { id: "on".into(), flux_scale: 1.0, ..job.scene.luminaires[0].clone() };
+    job.scene.luminaires.insert(0, shining.clone());
+    let both = read(&job);
+    job.scene.luminaires = vec![shining];
+    assert!(both.estimates[0].value > 0.0 && both.estimates == read(&job).estimates);
 }
 
 pub(in crate::engines) fn one_seed_gives_the_same_readings_on_any_number_of_threads(engine: &dyn Engine) {
