@@ -108,7 +108,19 @@ impl<'a, 'l> Fields<'a, 'l> {
         self.error_here(Problem::OutOfRange { what: what.into(), found, expected })
     }
 
-    /// Numbers that are zero or more, and that no intensity depends on; blank counts as zero, and so may what is negative.
+    /// Numbers that are zero or more; blank counts as zero.
+    pub(super) fn not_negative<const N: usize>(&mut self, what: [&str; N]) -> Result<[f64; N], ReadError> {
+        let mut numbers = [0.0; N];
+        for (number, what) in numbers.iter_mut().zip(what) {
+            *number = self.number_or(what, 0.0)?;
+            if *number < 0.0 {
+                return Err(self.out_of_range(what, *number, "zero or more"));
+            }
+        }
+        Ok(numbers)
+    }
+
+    /// The same of numbers that neither light nor opening depends on; blank counts as zero, and so may what is negative.
     pub(super) fn zero_if_negative<const N: usize>(&mut self, what: [&str; N]) -> Result<[f64; N], ReadError> {
         let mut numbers = [0.0; N];
         for (number, what) in numbers.iter_mut().zip(what) {
@@ -153,11 +165,7 @@ impl<'a, 'l> Fields<'a, 'l> {
 
     /// The conversion factor for intensities; blank or zero counts as one.
     pub(super) fn conversion_factor(&mut self) -> Result<f64, ReadError> {
-        let what = "the conversion factor for luminous intensities";
-        let factor = self.number_or(what, 0.0)?;
-        if factor < 0.0 {
-            return Err(self.out_of_range(what, factor, "zero or more"));
-        }
+        let [factor] = self.not_negative(["the conversion factor for luminous intensities"])?;
         if factor == 0.0 {
             self.warn("ldt/conversion-factor", "the conversion factor is 0 or blank and was read as 1".into());
             return Ok(1.0);
@@ -237,8 +245,9 @@ impl<'a, 'l> Fields<'a, 'l> {
 
     /// Refuses further numbers, remarks on further text.
     ///
-    /// Fewer numbers than a plane has may be forgiven, and planes that repeat the only one, in candela, there is.
-    pub(super) fn finish(&mut self, gammas: usize, only: Option<&[f64]>, scale: f64) -> Result<(), ReadError> {
+    /// Fewer zeros than a plane has may be forgiven, and planes that repeat the only one, in candela, there is. Where a count of angles is
+    /// wrong, the table is out of step: then the last gamma is in the middle of nowhere.
+    pub(super) fn finish(&mut self, gamma_deg: &[f64], only: Option<&[f64]>, scale: f64) -> Result<(), ReadError> {
         let is_blank = |bytes: &[u8]| bytes.iter().all(|b| b.is_ascii_whitespace() || matches!(b, 0 | 0x1a));
         let Some(line) = self.lines.find(|line| !is_blank(line.bytes)) else { return Ok(()) };
         self.last = line;
@@ -247,6 +256,8 @@ impl<'a, 'l> Fields<'a, 'l> {
             let number = |line: Line| decode(unquoted(line.bytes)).parse::<f64>().ok();
             let rest = std::iter::once(line).chain(self.lines.by_ref().filter(|line| !is_blank(line.bytes)));
             let surplus: Vec<f64> = rest.map_while(number).collect();
+            let gammas = gamma_deg.len();
+            let is_in_step = [90.0, 180.0].contains(&gamma_deg[gammas - 1]);
             let repeats = |only: &[f64]| {
                 let planes = surplus.chunks(gammas);
                 surplus.len().is_multiple_of(gammas)
@@ -258,8 +269,8 @@ impl<'a, 'l> Fields<'a, 'l> {
                 Some(only) if repeats(only) => {
                     Some("planes behind the only one of Isym 1 repeat it; they were ignored".to_owned())
                 }
-                _ if surplus.len() < gammas => {
-                    Some(format!("surplus numbers behind the last intensity were ignored: {}", surplus.len()))
+                _ if is_in_step && surplus.len() < gammas && surplus.iter().all(|value| *value == 0.0) => {
+                    Some(format!("surplus zeros behind the last intensity were ignored: {}", surplus.len()))
                 }
                 _ => None,
             };

@@ -52,7 +52,7 @@ pub(super) fn read(bytes: &[u8], tolerance: Tolerance) -> Result<Photometry, Rea
     let scale = intensity_scale(&details);
     let distribution = read_table(&mut fields, &head, scale)?;
     let repeated = (head.symmetry == 1).then(|| distribution.plane(0));
-    fields.finish(head.gammas, repeated, scale)?;
+    fields.finish(distribution.gamma_deg(), repeated, scale)?;
     let set = &details.lamp_sets[0];
     let photometry = Photometry {
         format: "EULUMDAT".into(),
@@ -121,8 +121,8 @@ fn read_head(fields: &mut Fields) -> Result<(Head, EulumdatDetails), ReadError> 
         "the width of the luminaire",
         "the height of the luminaire",
     ])?;
-    let opening_mm = fields.zero_if_negative(["the length of the luminous area", "the width of the luminous area"])?;
-    let luminous_heights_mm = fields.zero_if_negative([
+    let opening_mm = fields.not_negative(["the length of the luminous area", "the width of the luminous area"])?;
+    let luminous_heights_mm = fields.not_negative([
         "the height of the luminous area at C0",
         "the height of the luminous area at C90",
         "the height of the luminous area at C180",

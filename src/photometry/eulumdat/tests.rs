@@ -225,11 +225,21 @@ fn harmless_damage_is_forgiven_where_that_is_asked_and_told() {
         assert!(strict(&with(rest)).is_err() && codes(&found).contains(&"forgiven/surplus"), "{:?}", found.lints);
         assert_eq!(found.distribution, sound.distribution);
     }
-    // Another plane than the one that there is, and a factor that multiplies everything.
+    // A gamma angle more than the head says: what was read is out of step, whatever is left.
+    let mut shifted = axial();
+    let at = shifted.len() - 4;
+    shifted.insert(at, "100".into());
+    for last in ["0", "180"] {
+        shifted.push(last.into());
+        assert!(tolerant(&shifted).is_err(), "{shifted:?}");
+    }
+    // Another plane than the one that there is; the opening's width and height, and a factor that multiplies everything.
     assert!(tolerant(&with(&["7", "2", "7"])).is_err());
-    let mut damaged = axial();
-    damaged[23] = "-1".into();
-    assert!(tolerant(&damaged).is_err());
+    for line in [16, 17, 23] {
+        let mut damaged = axial();
+        damaged[line] = "-1".into();
+        assert!(tolerant(&damaged).is_err(), "line {}", line + 1);
+    }
 }
 
 #[test]

@@ -256,7 +256,10 @@ fn read_table(mut numbers: Numbers, lamps: &Lamps) -> Result<Table, ReadError> {
             return Err(negative(numbers.text, least));
         }
     }
-    numbers.finish("candela values", expected, vertical)?;
+    // Where a count of angles is wrong, what follows begins in the middle of a line.
+    let first_candela_at = numbers.next_at(candela_at);
+    let is_in_step = [horizontal_at, first_candela_at].into_iter().all(|at| numbers.begins_line(at));
+    numbers.finish("candela values", expected, if is_in_step { vertical } else { 0 })?;
     Ok(Table { vertical_deg, vertical_at, horizontal_deg, horizontal_at, candela, candela_at })
 }
 

@@ -137,6 +137,18 @@ impl Numbers<'_, '_> {
         Ok((angles, first_at))
     }
 
+    /// Where the token begins that follows an offset.
+    pub(super) fn next_at(&self, at: usize) -> usize {
+        let rest = &self.text.bytes[at..];
+        at + rest.iter().position(|b| !is_separator(*b)).unwrap_or(rest.len())
+    }
+
+    /// Whether nothing but blanks stands before an offset in its line.
+    pub(super) fn begins_line(&self, at: usize) -> bool {
+        let before = self.text.bytes[..at].iter().rev().take_while(|b| !matches!(b, b'\n' | b'\r'));
+        before.copied().all(is_separator)
+    }
+
     /// Refuses further numbers, remarks on further text. Fewer than `tellable` numbers may be forgiven: counts that are wrong leave more.
     pub(super) fn finish(mut self, counted: &str, expected: usize, tellable: usize) -> Result<(), ReadError> {
         let text = self.text;

@@ -376,6 +376,9 @@ fn what_changes_light_or_cannot_be_told_is_not_forgiven() {
     for (ten, three, table, word) in [
         (ten, "1 1 0", "0 90 180\n0\n100 50 25 1 2 3", "more numbers"),
         (ten, "1 1 0", "0 90 180\n0\n100 50", "ends where"),
+        // The table has one angle more than the header says, or one plane: all of it is out of step.
+        (ten, "1 1 0", "0 45 90 180\n0\n100 70 50 25", "more numbers"),
+        ("1 -1 1 3 2 1 2 0 0 0", "1 1 0", "0 90 180\n0 45 90\n9 1 2\n9 3 2", "more numbers"),
         (ten, "1 1 0", "0 90 180\n0\n100 50 -5", "-5"),
         (ten, "0 1 0", AXIAL, "ballast factor"),
         ("1.5 -1 1 3 1 1 2 0 0 0", "1 1 0", AXIAL, "number of lamps"),
