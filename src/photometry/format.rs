@@ -22,4 +22,12 @@ impl FileFormat {
             Self::Tm33 => "TM-33-23",
         }
     }
+
+    /// The C plane that points forward, in degrees.
+    pub const fn forward_c_deg(self) -> f64 {
+        match self {
+            Self::Lm63(_) | Self::Tm33 => 0.0,
+            Self::Eulumdat => 90.0,
+        }
+    }
 }

@@ -4,10 +4,7 @@
 //! which takes over its coordinates, and C 90 in EULUMDAT (Stockmar 1990), whose C 0 looks at a luminaire's long side. A
 //! conversion can keep each C angle or the forward direction, and not both.
 
-use super::{
-    Details, FileFormat, HorizontalAxis, Lint, LuminousIntensityDistribution, LuminousOpening, Photometry, Severity,
-    Symmetry,
-};
+use super::{FileFormat, Lint, LuminousIntensityDistribution, Photometry, Severity};
 use crate::units::Lumen;
 
 /// What a conversion keeps where forward is another plane in the new format.
@@ -35,32 +32,15 @@ const SAME_LIGHT: f64 = 1e-9;
 /// Fluxes of zones that differ by less than this part of all flux are one.
 const SAME_ZONE: f64 = 1e-4;
 
-impl FileFormat {
-    /// The C plane that points forward, in degrees.
-    pub const fn forward_c_deg(self) -> f64 {
-        match self {
-            Self::Lm63(_) | Self::Tm33 => 0.0,
-            Self::Eulumdat => 90.0,
-        }
-    }
-}
-
 impl Photometry {
-    /// The C plane that points forward in the format that it was read from, in degrees.
-    pub fn forward_c_deg(&self) -> f64 {
-        match self.details {
-            Details::Eulumdat(_) => FileFormat::Eulumdat.forward_c_deg(),
-            Details::Lm63(_) | Details::None => 0.0,
-        }
-    }
-
     /// The photometry as a format is to have it by a policy, and in words what turns.
     pub fn aimed_for(&self, format: FileFormat, policy: ForwardPolicy) -> Aimed {
-        let (from_deg, to_deg) = (self.forward_c_deg(), format.forward_c_deg());
+        let (from_deg, to_deg) = (self.convention().forward_c_deg, format.forward_c_deg());
         if from_deg == to_deg {
             return Aimed { photometry: self.clone(), lint: None };
         }
-        let turned = self.quarter_turned(to_deg > from_deg);
+        // By quarters everything turns.
+        let (turned, _) = self.turned(to_deg - from_deg);
         let same_light = is_same_light(&self.distribution, &turned.distribution);
         let same_opening = self.opening == turned.opening;
         let turn_deg = to_deg - from_deg;
@@ -86,7 +66,7 @@ impl Photometry {
             let zones = self.distribution.classification_zones(forward_c_deg);
             [zones.forward, zones.back].map(|zones| zones.map(Lumen::value))
         };
-        let (before, after) = (zones(self.forward_c_deg()), zones(to_deg));
+        let (before, after) = (zones(self.convention().forward_c_deg), zones(to_deg));
         let allowed = SAME_ZONE * self.distribution.flux().value();
         let same = before.iter().flatten().zip(after.iter().flatten()).all(|(a, b)| (a - b).abs() <= allowed);
         let bug = if same {
@@ -100,48 +80,6 @@ impl Photometry {
             "C angles were kept, and what rests on forward turns by a quarter: {bug}, and who aims by the format's forward \
              washes another wall of the room. Where luminaires are placed by C angles nothing turns"
         )
-    }
-
-    /// The luminaire turned by a quarter about its vertical axis: C 0 becomes C 90 or, the other way round, C 90 becomes C 0.
-    fn quarter_turned(&self, onwards: bool) -> Self {
-        let distribution = self.distribution.quarter_turned(onwards);
-        Self { opening: crossed(self.opening), ..self.with_distribution(distribution) }
-    }
-}
-
-/// An opening turned by a quarter.
-fn crossed(opening: LuminousOpening) -> LuminousOpening {
-    match opening {
-        LuminousOpening::Point => LuminousOpening::Point,
-        LuminousOpening::Box { x_m, y_m, height_m } => LuminousOpening::Box { x_m: y_m, y_m: x_m, height_m },
-        LuminousOpening::Ellipse { x_m, y_m, height_m } => LuminousOpening::Ellipse { x_m: y_m, y_m: x_m, height_m },
-        LuminousOpening::Ellipsoid { x_m, y_m, z_m } => LuminousOpening::Ellipsoid { x_m: y_m, y_m: x_m, z_m },
-        LuminousOpening::LyingCylinder { axis, length_m, diameter_m } => {
-            let axis = if axis == HorizontalAxis::X { HorizontalAxis::Y } else { HorizontalAxis::X };
-            LuminousOpening::LyingCylinder { axis, length_m, diameter_m }
-        }
-    }
-}
-
-impl LuminousIntensityDistribution {
-    /// The same light a quarter further round, from C 0 to C 90, or back; a half or a quarter of the circle stays one.
-    fn quarter_turned(&self, onwards: bool) -> Self {
-        let planes = || 0..self.c_deg().len();
-        // Where the half that is stored turns into the one that is not, its mirror image takes its place.
-        let (image, backwards): (fn(f64) -> f64, bool) = match (self.symmetry(), onwards) {
-            (Symmetry::Axial, _) => (|c| c, false),
-            (Symmetry::Quadrant, _) => (|c| 90.0 - c, true),
-            (Symmetry::BilateralC0, true) => (|c| c + 90.0, false),
-            (Symmetry::BilateralC90, false) => (|c| c - 90.0, false),
-            (Symmetry::BilateralC0, false) | (Symmetry::BilateralC90, true) => (|c| 270.0 - c, true),
-            (Symmetry::None, _) => return self.turned(if onwards { 90.0 } else { -90.0 }),
-        };
-        let order: Vec<usize> = if backwards { planes().rev().collect() } else { planes().collect() };
-        let c_deg = order.iter().map(|c| image(self.c_deg()[*c])).collect();
-        let candela = order.iter().flat_map(|c| self.plane(*c).iter().copied()).collect();
-        // Planes over the range of a symmetry land on that of one.
-        Self::new(c_deg, self.gamma_deg().to_vec(), candela)
-            .unwrap_or_else(|_| self.turned(if onwards { 90.0 } else { -90.0 }))
     }
 }
 
@@ -158,7 +96,7 @@ fn is_same_light(a: &LuminousIntensityDistribution, b: &LuminousIntensityDistrib
 mod tests {
     use super::*;
     use crate::photometry::lm63::Edition;
-    use crate::photometry::{eulumdat, lm63};
+    use crate::photometry::{LuminousOpening, eulumdat, lm63};
 
     const IES: FileFormat = FileFormat::Lm63(Edition::Lm63_2019);
 
@@ -184,15 +122,18 @@ mod tests {
             &[90.0, 100.0, 190.0, 270.0],
             &[0.0, 90.0, 100.0, 180.0, 270.0, 300.0, 360.0],
         ] {
-            let before = table(c_deg);
-            let [on, back] = [true, false].map(|onwards| before.quarter_turned(onwards));
+            let before = ldt(table(c_deg), LuminousOpening::Point);
+            let turned = before.aimed_for(IES, ForwardPolicy::KeepForward).photometry;
+            let ies = lm63::parse(IES.write(&turned).text.as_bytes()).unwrap();
+            let back = ies.aimed_for(FileFormat::Eulumdat, ForwardPolicy::KeepForward).photometry;
+            let (c_count, planes) = (before.distribution.c_deg().len(), turned.distribution.c_deg().len());
+            assert!(planes <= c_count.max(3) + 1, "{c_deg:?} became {:?}", turned.distribution.c_deg());
             for k in 0..72 {
                 let c = 5.0 * f64::from(k);
-                let at = |table: &LuminousIntensityDistribution, c: f64| table.intensity(c, 60.0).value();
-                assert!((at(&before, c) - at(&on, c + 90.0)).abs() < 1e-10, "{c_deg:?} {c}");
-                assert!((at(&before, c) - at(&back, c - 90.0)).abs() < 1e-10, "{c_deg:?} {c}");
+                let at = |p: &Photometry, c: f64| p.distribution.intensity(c, 60.0).value();
+                assert!((at(&before, c) - at(&turned, c - 90.0)).abs() < 1e-10, "{c_deg:?} {c}");
+                assert!((at(&before, c) - at(&back, c)).abs() < 1e-10, "{c_deg:?} {c}");
             }
-            assert_eq!(on.quarter_turned(false), before, "{c_deg:?}");
         }
     }
 
@@ -200,7 +141,7 @@ mod tests {
     fn a_conversion_keeps_angles_or_forward_light_and_says_what_turns() {
         let opening = LuminousOpening::Box { x_m: 0.2, y_m: 0.6, height_m: 0.0 };
         let street = ldt(table(&[90.0, 135.0, 180.0, 225.0, 270.0]), opening);
-        let forward = |p: &Photometry| p.distribution.classification_zones(p.forward_c_deg()).forward;
+        let forward = |p: &Photometry| p.distribution.classification_zones(p.convention().forward_c_deg).forward;
         let written = |policy| {
             let aimed = street.aimed_for(IES, policy);
             let lint = aimed.lint.unwrap();

@@ -95,7 +95,7 @@ impl Summary {
 
 impl BugZones {
     fn of(photometry: &Photometry) -> Self {
-        let zones = photometry.distribution.classification_zones(photometry.forward_c_deg());
+        let zones = photometry.distribution.classification_zones(photometry.convention().forward_c_deg);
         let [back, forward] = [zones.back, zones.forward].map(|zones| zones.map(Lumen::value));
         Self { back, up: zones.up.map(Lumen::value), forward }
     }
