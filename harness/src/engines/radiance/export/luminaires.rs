@@ -36,7 +36,27 @@ const CLEAR: f64 = 1.5;
 const SIDES: usize = 32;
 /// What the side and the ends of such a prism send out, for a light's pattern: `prism_x`, `prism_y` and `prism_z` along each axis.
 const PRISM_CAL: &str = include_str!("prism.cal");
-const PRISM_NAME: &str = "prism.cal";
+
+/// By what a table becomes radiance: a function of a file of Radiance's.
+#[derive(Clone, Copy)]
+struct Correction {
+    function: &'static str,
+    file: &'static str,
+}
+
+impl Correction {
+    const NONE: Self = Self::of_radiance("corr");
+    const FLAT: Self = Self::of_radiance("flatcorr");
+    const BOX: Self = Self::of_radiance("boxcorr");
+
+    const fn of_radiance(function: &'static str) -> Self {
+        Self { function, file: "source.cal" }
+    }
+
+    const fn of_prism(function: &'static str) -> Self {
+        Self { function, file: "prism.cal" }
+    }
+}
 
 /// Why a luminaire's opening cannot be said to Radiance, if it cannot.
 pub(in crate::engines::radiance) fn unsupported(luminaire: &Luminaire, settings: &Settings) -> Option<String> {
@@ -144,10 +164,10 @@ fn largest_section_m2(luminaire: &Luminaire) -> f64 {
 /// Of the luminaires of a scene, given by their places in the job.
 pub(super) fn rad(job: &Job, settings: &Settings, scale: f64, scene: &[usize]) -> String {
     let mut text = String::new();
+    let is_sampled = Sources::of(job, settings) == Sources::Openings;
     for (k, l) in scene.iter().map(|k| (*k, &job.scene.luminaires[*k])) {
         text += &match route(l, settings) {
             Route::Point => {
-                let is_sampled = Sources::of(job, settings) == Sources::Openings;
                 let off = if is_sampled { recess::inwards(job, l) } else { DVec3::ZERO };
                 let radius = if off == DVec3::ZERO { point_radius(job, l, scale) } else { MIN_RADIUS };
                 point(k, l, radius, CLEAR * radius * off, scale)
@@ -178,7 +198,7 @@ pub(super) fn files(job: &Job, settings: &Settings) -> Vec<SceneFile> {
     let has_side = |l: &Luminaire| {
         route(l, settings) == Route::Opening && Cylinder::of(l.photometry.opening).is_some_and(|c| c.length_m > 0.0)
     };
-    let prism = job.scene.luminaires.iter().any(has_side).then(|| SceneFile::text(PRISM_NAME, PRISM_CAL.to_owned()));
+    let prism = job.scene.luminaires.iter().any(has_side).then(|| SceneFile::text("prism.cal", PRISM_CAL.to_owned()));
     job.scene.luminaires.iter().enumerate().map(file).chain(beside).chain(prism).collect()
 }
 
@@ -227,7 +247,7 @@ fn point(k: usize, luminaire: &Luminaire, radius: f64, off: DVec3, scale: f64) -
         "\n# Luminaire {}: a point, as a sphere of radius {radius}; its table is in candela.\n",
         Comment(&luminaire.id)
     );
-    text += &light(k, luminaire, Source::Solid, "corr", &[factor]);
+    text += &light(k, luminaire, Source::Solid, Correction::NONE, &[factor]);
     text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
     text
 }
@@ -239,7 +259,7 @@ fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
     let factor = luminaire.flux_scale / EFFICACY;
     match luminaire.photometry.opening {
         LuminousOpening::Box { x_m, y_m, height_m: 0.0 } => {
-            text += &light(k, luminaire, Source::SeenThrough, "flatcorr", &[factor / (x_m * y_m)]);
+            text += &light(k, luminaire, Source::SeenThrough, Correction::FLAT, &[factor / (x_m * y_m)]);
             let corner = |u: f64, v: f64, z: f64| DVec3::new(0.5 * u * x_m, 0.5 * v * y_m, z);
             for (z, turn) in body.lit_faces() {
                 let corners = [(-1.0, -turn), (1.0, -turn), (1.0, turn), (-1.0, turn)].map(|(u, v)| corner(u, v, z));
@@ -247,20 +267,20 @@ fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
             }
         }
         LuminousOpening::Box { x_m, y_m, height_m } => {
-            text += &light(k, luminaire, Source::SeenThrough, "boxcorr", &[factor, x_m, y_m, height_m]);
+            text += &light(k, luminaire, Source::SeenThrough, Correction::BOX, &[factor, x_m, y_m, height_m]);
             let half = 0.5 * DVec3::new(x_m, y_m, height_m);
             for (f, face) in box_faces(-half, half).iter().enumerate() {
                 text += &body.polygon(&f.to_string(), face);
             }
         }
         LuminousOpening::Ellipse { x_m, height_m: 0.0, .. } => {
-            text += &light(k, luminaire, Source::SeenThrough, "flatcorr", &[factor / (0.25 * PI * x_m * x_m)]);
+            text += &light(k, luminaire, Source::SeenThrough, Correction::FLAT, &[factor / (0.25 * PI * x_m * x_m)]);
             for (z, turn) in body.lit_faces() {
                 text += &body.disc(if turn > 0.0 { "up" } else { "down" }, z * DVec3::Z, turn * DVec3::Z, 0.5 * x_m);
             }
         }
         LuminousOpening::Ellipsoid { x_m, .. } => {
-            text += &light(k, luminaire, Source::SeenThrough, "corr", &[factor / (0.25 * PI * x_m * x_m)]);
+            text += &light(k, luminaire, Source::SeenThrough, Correction::NONE, &[factor / (0.25 * PI * x_m * x_m)]);
             let p = luminaire.position_m * scale;
             let radius = 0.5 * x_m * scale;
             text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
@@ -299,13 +319,12 @@ impl Cylinder {
         Some(Self { axis, across: [next(axis), next(next(axis))], radius_m: 0.5 * diameter_m, length_m })
     }
 
-    /// Which of the functions of `prism.cal` it goes by.
-    fn function(&self) -> &'static str {
-        match self.axis.to_array() {
+    fn correction(&self) -> Correction {
+        Correction::of_prism(match self.axis.to_array() {
             [1.0, _, _] => "prism_x",
             [_, 1.0, _] => "prism_y",
             _ => "prism_z",
-        }
+        })
     }
 
     /// The middle of the end that a meter sees, in the luminaire's own frame.
@@ -369,7 +388,7 @@ impl Body<'_> {
         let end_m = corner_m * (0.5 * step).cos();
         let factors = [factor, SIDES as f64, 2.0 * corner_m, cylinder.length_m, PI * end_m * end_m];
         let half = 0.5 * cylinder.length_m * cylinder.axis;
-        let mut text = light(self.k, self.luminaire, Source::SeenThrough, cylinder.function(), &factors);
+        let mut text = light(self.k, self.luminaire, Source::SeenThrough, cylinder.correction(), &factors);
         text += &self.disc("end-0", half, cylinder.axis, end_m);
         text += &self.disc("end-1", -half, -cylinder.axis, end_m);
         let corner = |k: usize| {
@@ -394,13 +413,13 @@ enum Source {
 }
 
 /// The material: the table as a pattern, turned as the luminaire is.
-fn light(k: usize, luminaire: &Luminaire, source: Source, correction: &str, factors: &[f64]) -> String {
+fn light(k: usize, luminaire: &Luminaire, source: Source, correction: Correction, factors: &[f64]) -> String {
     let coordinates = match luminaire.photometry.distribution.symmetry() {
         Symmetry::Axial => "src_theta",
         _ => "src_phi src_theta",
     };
-    let functions = if correction.starts_with("prism") { PRISM_NAME } else { "source.cal" };
-    let mut words = format!("{correction} {} {functions} {coordinates}", dat_name(k));
+    let Correction { function, file } = correction;
+    let mut words = format!("{function} {} {file} {coordinates}", dat_name(k));
     for (axis, angle_deg) in euler_deg(luminaire.orientation) {
         // Writing to a string cannot fail.
         write!(words, " -r{axis} {angle_deg}").ok();
