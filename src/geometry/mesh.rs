@@ -57,6 +57,15 @@ pub enum MeshError {
     },
 }
 
+/// The solid angle of a triangle seen from the origin, in steradians; negative where its back is seen.
+///
+/// A. van Oosterom, J. Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125, eq. 8.
+pub fn solid_angle_sr([a, b, c]: [DVec3; 3]) -> f64 {
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    2.0 * a.dot(b.cross(c)).atan2(below)
+}
+
 /// The farthest that a vertex may be off, so that a volume is a number.
 const FAR_M: f64 = 1e90;
 

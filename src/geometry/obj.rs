@@ -137,6 +137,14 @@ fn place_of(name: &str, known: &mut HashMap<String, usize>, names: &mut Vec<Stri
     names.len() - 1
 }
 
+/// A Wavefront OBJ file of vertices and triangles that reads back as the same numbers, with a line about it.
+pub fn write(about: &str, vertices: &[DVec3], triangles: &[[u32; 3]]) -> String {
+    let vertex = |v: &DVec3| format!("v {} {} {}\n", v.x, v.y, v.z);
+    let face = |[a, b, c]: &[u32; 3]| format!("f {} {} {}\n", a + 1, b + 1, c + 1);
+    let lines = vertices.iter().map(vertex).chain(triangles.iter().map(face));
+    std::iter::once(format!("# {about}\n")).chain(lines).collect()
+}
+
 /// Reads a line, and those that it goes on in after a `\`, without their ends; how many these are.
 fn logical(reader: &mut impl BufRead, bytes: &mut Vec<u8>) -> std::io::Result<usize> {
     bytes.clear();

@@ -119,6 +119,11 @@ fn twice(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     (b - a).perp_dot(c - a)
 }
 
+/// The area of a polygon, positive where it turns to the left.
+pub(crate) fn area(polygon: &[DVec2]) -> f64 {
+    0.5 * (2..polygon.len()).map(|k| twice(polygon[0], polygon[k - 1], polygon[k])).sum::<f64>()
+}
+
 /// The mean normal of a polygon, as long as twice its area (M. E. Newell).
 pub fn newell(corners: &[DVec3]) -> DVec3 {
     let Some(first) = corners.first() else { return DVec3::ZERO };

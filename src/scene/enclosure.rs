@@ -4,7 +4,8 @@
 use glam::{DVec2, DVec3};
 
 use super::{Obstacle, Shape};
-use crate::geometry::{Mesh, Reflectances, Room, Surface};
+use crate::geometry::polygon::area;
+use crate::geometry::{Mesh, Reflectances, Room, Surface, solid_angle_sr};
 
 /// Nearer to a plane of the box around it than this, in parts of its largest extent, a wall lies in it.
 const IN_PLANE: f64 = 1e-9;
@@ -101,12 +102,12 @@ impl Enclosure {
         let corners: Vec<DVec2> =
             floor_m.iter().map(|p| DVec2::new(snapped(p.x, high.x), snapped(p.y, high.y))).collect();
         crossing(&corners).map_or(Ok(()), Err)?;
-        let turned = area_m2(&corners) < 0.0;
+        let turned = area(&corners) < 0.0;
         let (outline, walls) = if turned { reversed(&corners, walls) } else { (corners, walls.to_vec()) };
         let mut faces = vec![];
         let edges: Vec<Edge> = edges(&outline).zip(&walls).map(|((a, b), rho)| Edge { a, b, rho: *rho }).collect();
         let size = high.truncate();
-        let reflectances = Reflectances { floor, ceiling, ..Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+        let reflectances = Reflectances::with_equal_walls(floor, 0.0, ceiling);
         let mut room = Room { size_m: high, reflectance: reflectances };
         let (within, bounding): (Vec<&Edge>, Vec<&Edge>) = edges.iter().partition(|e| e.plane(size).is_none());
         let alike = within.windows(2).all(|w| w[0].rho == w[1].rho);
@@ -147,6 +148,13 @@ impl Enclosure {
             }
             Outline::Mesh(faces) => (winding(faces, point_m).abs() - 1.0).abs() < CLOSED,
         }
+    }
+
+    /// Whether a point lies within its walls or on one, as far as rounding tells.
+    pub fn reaches(&self, point_m: DVec3) -> bool {
+        let step_m = BEFORE * self.room.size_m.max_element();
+        let around = (0..27).map(|k| DVec3::new(f64::from(k % 3), f64::from(k / 3 % 3), f64::from(k / 9)) - 1.0);
+        self.contains(point_m, 0.0) || around.map(|way| point_m + step_m * way).any(|near| self.contains(near, 0.0))
     }
 
     /// Triangles that each look at what [`Self::contains`] goes through.
@@ -198,10 +206,6 @@ impl Edge {
 
 fn edges(corners: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
     corners.iter().copied().zip(corners.iter().copied().cycle().skip(1))
-}
-
-fn area_m2(corners: &[DVec2]) -> f64 {
-    edges(corners).map(|(a, b)| 0.5 * a.perp_dot(b)).sum()
 }
 
 /// The same polygon the other way round, with its walls.
@@ -260,14 +264,7 @@ fn distance_m(p: DVec2, a: DVec2, b: DVec2) -> f64 {
 
 /// How often faces go round a point: their solid angles over that of a sphere.
 fn winding(faces: &[[DVec3; 3]], point_m: DVec3) -> f64 {
-    // A. van Oosterom, J. Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125.
-    let solid_angle = |corners: &[DVec3; 3]| {
-        let [a, b, c] = corners.map(|p| p - point_m);
-        let [la, lb, lc] = [a, b, c].map(DVec3::length);
-        let above = a.dot(b.cross(c));
-        2.0 * above.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
-    };
-    faces.iter().map(solid_angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+    faces.iter().map(|corners| solid_angle_sr(corners.map(|p| p - point_m))).sum::<f64>() / (4.0 * std::f64::consts::PI)
 }
 
 /// Boxes over all of a rectangle that a polygon of edges along x and y leaves out.
@@ -374,6 +371,13 @@ mod tests {
             assert_eq!(one.contains(DVec3::from(point), 1e-6), is_in, "{point:?}");
         }
         assert!(!one.contains(DVec3::new(2.999, 4.0, 1.0), 0.01));
+        // On its walls, those of the box and those within it.
+        for point in
+            [[6.0, 1.0, 2.0], [0.0, 1.0, 2.0], [5.0, 2.0, 2.0], [3.0, 4.0, 2.0], [1.0, 5.0, 2.0], [1.0, 1.0, 3.0]]
+        {
+            assert!(one.reaches(DVec3::from(point)), "{point:?}");
+        }
+        assert!(!one.reaches(DVec3::new(5.0, 2.001, 2.0)) && !one.reaches(DVec3::new(6.0, 5.0, 2.0)));
     }
 
     #[test]
@@ -432,7 +436,7 @@ mod tests {
             };
             let out: f64 = room.walls.iter().map(volume).sum();
             let whole = room.room.size_m.element_product();
-            assert!((whole - out - 2.0 * area_m2(&floor).abs()).abs() < 1e-9, "{out} of {whole}");
+            assert!((whole - out - 2.0 * area(&floor).abs()).abs() < 1e-9, "{out} of {whole}");
         }
     }
 
@@ -460,6 +464,9 @@ mod tests {
         faces[0].reflectance = 0.25;
         let room = Enclosure::of_faces(faces.clone()).unwrap();
         assert!(room.contains(DVec3::ONE, 0.0) && !room.contains(DVec3::splat(2.5), 0.0));
+        for on in [DVec3::new(2.0, 1.5, 2.0), DVec3::new(0.0, 1.0, 1.0), DVec3::new(4.0, 3.0, 2.0)] {
+            assert!(room.reaches(on), "{on}");
+        }
         // Half of one of its faces is a sheet before the box's.
         assert_eq!((room.walls.len(), room.room.reflectance.ceiling), (1, 0.5));
         faces.pop();

@@ -67,6 +67,18 @@ fn every_engine_has_the_direct_light_of_rooms_that_are_no_boxes() {
     }
 }
 
+#[test]
+fn luminaires_may_hang_on_the_walls_of_any_room() {
+    let lamps = "luminaires:\n  - {id: a, photometry: lamp.ies, at_m: [6, 1, 2]}\n  - {id: b, photometry: lamp.ies, at_m: [1, 1, 3]}\n  \
+        - {id: c, photometry: lamp.ies, at_m: [3, 4, 2]}\n";
+    let spec = [L, lamps, &REST[REST.find("meters:").unwrap()..]].concat();
+    let folder = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", LAMP)]);
+    folder.luxproof(&["check", "spec.yaml"]).exits(0);
+    folder.edit("spec.yaml", "at_m: [3, 4, 2]", "at_m: [3.01, 4, 2]");
+    let answer = folder.luxproof(&["check", "spec.yaml"]).exits(2);
+    assert_eq!(answer.stderr.matches("outside the room").count(), 1, "{}", answer.stderr);
+}
+
 /// Boxes are solved without chance, sheets by sampling: the same room either way.
 #[test]
 fn sheets_reflect_as_boxes_do() {

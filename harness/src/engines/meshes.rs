@@ -1,6 +1,7 @@
 //! Meshes among the obstacles, each as a file of its own.
 
 use glam::DVec3;
+use luminaire::geometry::obj;
 use luminaire::scene::Shape;
 
 use super::frame::Frame;
@@ -19,7 +20,7 @@ pub(super) fn files(job: &Job, frame: &Frame, format: Mesh) -> Vec<SceneFile> {
         Shape::Mesh { vertices_m, triangles } => {
             let vertices: Vec<DVec3> = vertices_m.iter().map(|v| frame.to_scene(*v)).collect();
             let text = match format {
-                Mesh::Obj => obj(&vertices, triangles),
+                Mesh::Obj => obj::write(ABOUT, &vertices, triangles),
                 Mesh::Ply => ply(&vertices, triangles),
             };
             Some(SceneFile::text(&name(k, format), text))
@@ -38,13 +39,6 @@ pub(super) fn name(k: usize, format: Mesh) -> String {
 }
 
 const ABOUT: &str = "an obstacle, in the coordinates of the scene";
-
-fn obj(vertices: &[DVec3], triangles: &[[u32; 3]]) -> String {
-    let vertex = |v: &DVec3| format!("v {} {} {}\n", v.x, v.y, v.z);
-    let face = |[a, b, c]: &[u32; 3]| format!("f {} {} {}\n", a + 1, b + 1, c + 1);
-    let lines = vertices.iter().map(vertex).chain(triangles.iter().map(face));
-    std::iter::once(format!("# {ABOUT}\n")).chain(lines).collect()
-}
 
 fn ply(vertices: &[DVec3], triangles: &[[u32; 3]]) -> String {
     let header = format!(

@@ -92,14 +92,8 @@ pub struct Part {
 impl Part {
     /// Its file: a Wavefront OBJ that reads back as the same numbers.
     pub fn obj(&self) -> String {
-        let mut text = format!("# luxproof import: metres, z up; reflectance {}\n", self.reflectance);
-        for [x, y, z] in self.mesh.vertices_m.iter().map(DVec3::to_array) {
-            text.push_str(&format!("v {x} {y} {z}\n"));
-        }
-        for [a, b, c] in self.mesh.triangles.iter().map(|t| t.map(|v| v + 1)) {
-            text.push_str(&format!("f {a} {b} {c}\n"));
-        }
-        text
+        let about = format!("luxproof import: metres, z up; reflectance {}", self.reflectance);
+        luminaire::geometry::obj::write(&about, &self.mesh.vertices_m, &self.mesh.triangles)
     }
 }
 

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use glam::DVec3;
+use luminaire::geometry::solid_angle_sr;
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Shape, Transport};
 
 use super::{Case, SpecError};
@@ -120,14 +121,9 @@ fn is_inside(shape: &Shape, point: DVec3, luminaires: usize) -> bool {
         Shape::Mesh { triangles, .. } if triangles.len().saturating_mul(luminaires) > MAX_LOOKS => false,
         Shape::Mesh { vertices_m, triangles } => {
             let corners = triangles.iter().map(|t| t.map(|k| vertices_m[k as usize] - point));
-            // All around there is a body where its faces fill the whole sphere (van Oosterom and Strackee 1983, eq. 8); what looks inwards
-            // is a room of its own, as imported scenes have it.
-            let solid_angle = |[a, b, c]: [DVec3; 3]| {
-                let (la, lb, lc) = (a.length(), b.length(), c.length());
-                let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-                2.0 * a.dot(b.cross(c)).atan2(below)
-            };
-            corners.map(solid_angle).sum::<f64>() > 2.0 * PI
+            // All around there is a body where its faces fill the whole sphere; what looks inwards is a room of its own, as imported scenes
+            // have it.
+            corners.map(solid_angle_sr).sum::<f64>() > 2.0 * PI
         }
     }
 }

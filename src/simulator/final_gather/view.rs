@@ -11,6 +11,7 @@ use glam::{DVec2, DVec3};
 use super::bicubic::{Bicubic, NODES, ORDER};
 use super::face::Face;
 use crate::geometry::configuration_factor::edge;
+use crate::geometry::polygon::area;
 use crate::scene::Meter;
 use crate::simulator::visibility::Occluder;
 
@@ -372,11 +373,6 @@ fn outside(piece: Polygon, sides: &[Side], left: &mut Vec<Polygon>) -> Option<Po
     Some(inside)
 }
 
-fn area_m2(polygon: &[DVec2]) -> f64 {
-    let triangle = |k: usize| (polygon[k - 1] - polygon[0]).perp_dot(polygon[k] - polygon[0]);
-    0.5 * (2..polygon.len()).map(triangle).sum::<f64>().abs()
-}
-
 fn middle(polygon: &[DVec2]) -> DVec2 {
     polygon.iter().sum::<DVec2>() / polygon.len() as f64
 }
@@ -405,7 +401,7 @@ impl<'a> Shown<'a> {
         let factor = if is_afar && is_whole {
             size_m.element_product() * stand.kernel(middle_m)
         } else if is_afar {
-            pieces.iter().map(|piece| area_m2(piece) * stand.kernel(middle(piece))).sum()
+            pieces.iter().map(|piece| area(piece).abs() * stand.kernel(middle(piece))).sum()
         } else if is_whole {
             stand.factor(&corners(corner_m, size_m))
         } else {

@@ -146,18 +146,17 @@ impl Builder<'_> {
             Some(_) => (at("array"), format!("`{}`: ", spec.id)),
             None => (at("at_m"), String::new()),
         };
-        let mut position_m = DVec3::from(at_m);
-        let room = enclosure.map(|e| &e.room);
-        if let Some(room) = room {
+        let (mut position_m, mut is_within) = (DVec3::from(at_m), false);
+        if let Some(enclosure) = enclosure {
+            let room = &enclosure.room;
             // What is nearly in the plane of a surface is meant to be recessed in it.
             position_m = flush::snapped(room, position_m);
-            let inside = position_m.is_finite() && room.contains(position_m, 0.0);
+            let is_in_box = position_m.is_finite() && room.contains(position_m, 0.0);
             let message = format!("{which}{position_m} lies outside the room");
-            self.check(inside, &place, message, within(room));
+            let beyond = format!("{message}'s walls");
+            is_within = self.check(is_in_box, &place, message, within(room))
+                && self.check(enclosure.reaches(position_m), &place, beyond, BEYOND);
         }
-        let is_within = enclosure.is_none_or(|e| e.contains(position_m, 0.0));
-        let message = format!("{which}{position_m} lies outside the room's walls");
-        self.check(is_within, &place, message, BEYOND);
         let is_factor = spec.flux_scale.is_finite() && spec.flux_scale >= 0.0;
         let message = format!("{} is no factor", spec.flux_scale);
         self.check(is_factor, &at("flux_scale"), message, "give a number from 0");
@@ -187,7 +186,7 @@ impl Builder<'_> {
         let message = format!("it gives the luminaire {brightest_cd:e} cd, and nothing is so bright");
         let help = "correct the factor, or the candela of the photometric file";
         self.check(!is_factor || brightest_cd <= BRIGHTEST_CD, &at("flux_scale"), message, help);
-        let room = room.filter(|room| finite && position_m.is_finite() && room.contains(position_m, 0.0))?;
+        let room = enclosure.map(|e| &e.room).filter(|_| finite && is_within)?;
         if let Some((message, help)) = unmountable(&luminaire, room) {
             self.check(false, &place, which + &message, help);
             return None;

@@ -31,13 +31,15 @@ impl Builder<'_> {
         let normals = self.normals(&at, set);
         let directions = set.around.map_or(1, |around| around.count.min(MAX_METERS));
         let (mut points, written) = self.points(&at, set, directions, scene)?;
+        let mut unseen = enclosure;
         if let (Some(grid), Some(enclosure)) = (set.surface, enclosure) {
             // Of the floor and ceiling of a room that is no box there is less than of the box's.
             let margin_m = grid.margin_m.max(SURFACE_MARGIN * enclosure.room.size_m.max_element());
             points.retain(|point| enclosure.contains(*point, margin_m));
+            unseen = None;
         }
         self.check(!points.is_empty(), &at, "the set holds no points", "give at least one");
-        self.places(name, &points, written, scene, enclosure);
+        self.places(name, &points, written, scene, unseen);
         let normals = normals?;
         let all = points.into_iter().flat_map(|position_m| normals.iter().map(move |n| (position_m, *n)));
         Some(all.map(|(position_m, normal)| Meter { position_m, normal }).collect())
