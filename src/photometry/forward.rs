@@ -126,6 +126,9 @@ fn crossed(opening: LuminousOpening) -> LuminousOpening {
 impl LuminousIntensityDistribution {
     /// The same light a quarter further round, from C 0 to C 90, or back; a half or a quarter of the circle stays one.
     fn quarter_turned(&self, onwards: bool) -> Self {
+        if self.is_native() {
+            return self.turned(if onwards { 90.0 } else { -90.0 });
+        }
         let planes = || 0..self.c_deg().len();
         // Where the half that is stored turns into the one that is not, its mirror image takes its place.
         let (image, backwards): (fn(f64) -> f64, bool) = match (self.symmetry(), onwards) {
@@ -148,9 +151,9 @@ impl LuminousIntensityDistribution {
 /// Whether two tables shine alike: they are bilinear, so that they differ most at an angle of one of them.
 fn is_same_light(a: &LuminousIntensityDistribution, b: &LuminousIntensityDistribution) -> bool {
     let allowed = SAME_LIGHT * a.max_intensity().value();
-    let mut c_deg = a.full_circle().c_deg().to_vec();
-    c_deg.extend(b.full_circle().c_deg());
-    let [a, b] = [a, b].map(|table| table.intensities(&c_deg, a.gamma_deg()));
+    let (own, other) = (a.full_circle(), b.full_circle());
+    let c_deg = [own.c_deg(), other.c_deg()].concat();
+    let [a, b] = [a, b].map(|table| table.intensities(&c_deg, own.gamma_deg()));
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= allowed)
 }
 
