@@ -73,7 +73,7 @@ impl LuminousIntensityDistribution {
             let lit = |(c, g): &(f64, f64)| self.intensity(*c, *g).value() > NOTHING * largest;
             let highest = self.nodes_deg().into_iter().filter(lit).map(|(_, gamma)| gamma).fold(0.0, f64::max);
             if self.edge_intensity().value() > NOTHING * largest {
-                return Err(NoBug::CutShort { gamma_deg: highest });
+                return Err(NoBug::CutShort { gamma_deg: (100.0 * highest).round() / 100.0 });
             }
         }
         let gamma_deg = self.gamma_deg()[self.gamma_deg().len() - 1];

@@ -110,7 +110,9 @@ fn furthest([a, b]: [&LuminousIntensityDistribution; 2]) -> (Departure, bool) {
             }
         }
     }
-    for (c_deg, gamma_deg) in [a, b].into_iter().filter(|table| table.is_native()).flat_map(|t| t.nodes_deg()) {
+    for (c_deg, gamma_deg) in
+        [a, b].into_iter().filter(|t| t.is_native()).flat_map(LuminousIntensityDistribution::nodes_deg)
+    {
         let [first_cd, second_cd] = [a, b].map(|d| d.intensity(c_deg, gamma_deg).value());
         let found = Departure { c_deg, gamma_deg, first_cd, second_cd };
         if worst.is_none_or(|w| found.change_cd().abs() > w.change_cd().abs()) {

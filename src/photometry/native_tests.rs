@@ -324,6 +324,10 @@ fn what_is_written_as_lm63_is_read_back_whole_and_eulumdat_keeps_to_twenty_times
             let written = lm63::write_2002(&read);
             assert_eq!(written.losses, Vec::<String>::new(), "{kind:?} {k}");
             assert!(written.text.len() <= 2 * text.len());
+            let written = super::tm33::write(&Photometry { details: super::Details::None, ..read.clone() });
+            assert_eq!(written.losses, Vec::<String>::new(), "{kind:?} {k}");
+            let again = super::tm33::parse(written.text.as_bytes()).unwrap();
+            assert_eq!(again.distribution, read.distribution);
             let source = vec![super::SourceFile { name: "a.ies".into(), bytes: text.as_bytes().into() }];
             let written = super::eulumdat::write(&Photometry { source, ..read.clone() });
             assert!(
