@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use crate::geometry::Room;
-use crate::photometry::Photometry;
+use crate::photometry::{Photometry, TypeCLimits};
 use crate::units::Candela;
 
 /// Everything that emits, blocks or reflects light.
@@ -157,6 +157,25 @@ impl Luminaire {
     /// [`LuminousIntensityDistribution::jump_towards`](crate::photometry::LuminousIntensityDistribution::jump_towards).
     pub fn jump_towards(&self, direction: DVec3) -> Candela {
         self.photometry.distribution.jump_towards(self.orientation.transpose() * direction) * self.flux_scale
+    }
+
+    /// The luminaire by a table of type C within limits, for whoever reads no other; itself where it has one.
+    ///
+    /// A point whose table is of type B is turned instead, so that the table's own axis is the one of type C: but for the ends of
+    /// the table nothing is lost. What has a body keeps its attitude and gets a stand-in.
+    #[must_use]
+    pub fn in_type_c(&self, limits: TypeCLimits) -> Self {
+        let table = &self.photometry.distribution;
+        if !table.is_native() {
+            return self.clone();
+        }
+        let (table, turn) = match self.model {
+            LuminaireModel::Point => (&table.upright(), table.own_frame()),
+            LuminaireModel::Area | LuminaireModel::Impostor => (table, DMat3::IDENTITY),
+        };
+        let distribution = table.in_type_c_within(limits).distribution;
+        let photometry = Arc::new(self.photometry.with_distribution(distribution));
+        Self { photometry, orientation: self.orientation * turn, ..self.clone() }
     }
 }
 

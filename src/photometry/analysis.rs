@@ -1,5 +1,7 @@
 //! What lighting designers ask of a luminous intensity distribution: angles, flux codes, spacing, hidden symmetry.
 
+use glam::DVec3;
+
 use super::{LuminousIntensityDistribution, Symmetry};
 use crate::units::{Candela, Lumen};
 
@@ -17,7 +19,7 @@ impl LuminousIntensityDistribution {
         let least = fraction * reference.value();
         let side = |c: f64| {
             let at = |theta: f64| self.intensity(c, if up { 180.0 - theta } else { theta }).value();
-            let nodes = self.gamma_deg().iter().map(|g| if up { 180.0 - g } else { *g });
+            let nodes = self.gammas_of_half_planes().into_iter().map(|g| if up { 180.0 - g } else { g });
             first_below(nodes.collect(), least, at)
         };
         Some(side(c_deg)? + side(c_deg + 180.0)?)
@@ -58,6 +60,9 @@ impl LuminousIntensityDistribution {
     /// which the rest follows to within `tolerance` (a fraction of the largest intensity).
     pub fn detected_symmetry(&self, tolerance: f64) -> Symmetry {
         let allowed = tolerance * self.max_intensity().value();
+        if self.is_native() {
+            return self.detected_at_nodes(allowed);
+        }
         let full = self.full_circle();
         let holds = |image: &dyn Fn(f64) -> f64| {
             let same = |c: f64, g: f64| (self.intensity(c, g) - self.intensity(image(c), g)).value().abs() <= allowed;
@@ -71,11 +76,33 @@ impl LuminousIntensityDistribution {
         }) {
             return Symmetry::Axial;
         }
+        Symmetry::of_mirrors(about_c0, about_c90)
+    }
+}
+
+impl LuminousIntensityDistribution {
+    /// The same of a table of type A or B, whose nodes are the images of one another.
+    fn detected_at_nodes(&self, allowed: f64) -> Symmetry {
+        let nodes: Vec<DVec3> = self.node_directions().collect();
+        let most = self.max_intensity().value();
+        let off = |d: DVec3, other: DVec3| (self.intensity_towards(d) - self.intensity_towards(other)).value().abs();
+        let holds = |image: DVec3| nodes.iter().all(|d| off(*d, image * *d) <= allowed);
+        let (about_c0, about_c90) = (holds(DVec3::new(1.0, -1.0, 1.0)), holds(DVec3::new(-1.0, 1.0, 1.0)));
+        let is_even = nodes.iter().all(|d| most - self.intensity_towards(*d).value() <= allowed);
+        if is_even && self.edge_intensity().value() <= allowed {
+            return Symmetry::Axial;
+        }
+        Symmetry::of_mirrors(about_c0, about_c90)
+    }
+}
+
+impl Symmetry {
+    const fn of_mirrors(about_c0: bool, about_c90: bool) -> Self {
         match (about_c0, about_c90) {
-            (true, true) => Symmetry::Quadrant,
-            (true, false) => Symmetry::BilateralC0,
-            (false, true) => Symmetry::BilateralC90,
-            (false, false) => Symmetry::None,
+            (true, true) => Self::Quadrant,
+            (true, false) => Self::BilateralC0,
+            (false, true) => Self::BilateralC90,
+            (false, false) => Self::None,
         }
     }
 }

@@ -126,6 +126,12 @@ impl LuminousIntensityDistribution {
 
     /// Nodes (C, gamma) of the full circle at which the intensity reaches `least`: by gamma, then by C; a pole is one.
     fn largest(&self, least: f64) -> Vec<(f64, f64)> {
+        if self.is_native() {
+            let is_lit = |(c, g): &(f64, f64)| self.intensity(*c, *g).value() >= least;
+            let mut tied: Vec<(f64, f64)> = self.nodes_deg().into_iter().filter(is_lit).collect();
+            tied.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));
+            return tied;
+        }
         let full = self.full_circle();
         // One plane stands for all: those that a mean direction needs.
         let around = if self.c_deg().len() == 1 { vec![0.0, 90.0, 180.0, 270.0] } else { full.c_deg().to_vec() };

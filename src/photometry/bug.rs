@@ -2,7 +2,7 @@
 //!
 //! IES TM-15-11, addendum A, tables: a rating is the lowest whose limits hold in every zone that it looks at.
 
-use super::{ClassificationZones, LuminousIntensityDistribution, Symmetry};
+use super::{ClassificationZones, Goniometer, LuminousIntensityDistribution, Symmetry};
 use crate::units::Lumen;
 
 /// Largest flux in lumens for ratings 0 to 4; beyond the last it is 5.
@@ -69,8 +69,19 @@ impl LuminousIntensityDistribution {
         if largest <= 0.0 {
             return Err(NoBug::Dark);
         }
+        if self.goniometer() == Goniometer::B {
+            let lit = |(c, g): &(f64, f64)| self.intensity(*c, *g).value() > NOTHING * largest;
+            let highest = self.nodes_deg().into_iter().filter(lit).map(|(_, gamma)| gamma).fold(0.0, f64::max);
+            if self.edge_intensity().value() > NOTHING * largest {
+                return Err(NoBug::CutShort { gamma_deg: (100.0 * highest).round() / 100.0 });
+            }
+        }
         let gamma_deg = self.gamma_deg()[self.gamma_deg().len() - 1];
-        if gamma_deg < 180.0 && self.c_deg().iter().any(|c| self.intensity(*c, gamma_deg).value() > NOTHING * largest) {
+        let is_of_gamma = self.goniometer() != Goniometer::B;
+        if is_of_gamma
+            && gamma_deg < 180.0
+            && self.c_deg().iter().any(|c| self.intensity(*c, gamma_deg).value() > NOTHING * largest)
+        {
             return Err(NoBug::CutShort { gamma_deg });
         }
         let zones = self.classification_zones(forward_c_deg);

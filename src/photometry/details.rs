@@ -19,7 +19,7 @@ pub enum Details {
 pub struct Lm63Details {
     /// The edition.
     pub edition: Edition,
-    /// How the luminaire was measured; the distribution is always type C.
+    /// How the luminaire was measured.
     pub goniometer: Goniometer,
     /// Number of lamps.
     pub lamps: u32,

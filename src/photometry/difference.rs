@@ -92,8 +92,10 @@ fn furthest([a, b]: [&LuminousIntensityDistribution; 2]) -> (Departure, bool) {
         all
     };
     let union = (merged(&own_a.0, &own_b.0), merged(&own_a.1, &own_b.1));
-    let is_exhaustive = union.0.len().saturating_mul(union.1.len()) <= MOST_DIRECTIONS;
-    let mut grids = if is_exhaustive { vec![union] } else { vec![own_a.clone(), own_b.clone()] };
+    let is_small = union.0.len().saturating_mul(union.1.len()) <= MOST_DIRECTIONS;
+    // Tables of types A and B bend elsewhere.
+    let is_exhaustive = is_small && !a.is_native() && !b.is_native();
+    let mut grids = if is_small { vec![union] } else { vec![own_a.clone(), own_b.clone()] };
     grids.push((middles(360), middles(180)));
     let mut worst: Option<Departure> = None;
     for (c_deg, gamma_deg) in &grids {
@@ -106,6 +108,15 @@ fn furthest([a, b]: [&LuminousIntensityDistribution; 2]) -> (Departure, bool) {
                     worst = Some(found);
                 }
             }
+        }
+    }
+    for (c_deg, gamma_deg) in
+        [a, b].into_iter().filter(|t| t.is_native()).flat_map(LuminousIntensityDistribution::nodes_deg)
+    {
+        let [first_cd, second_cd] = [a, b].map(|d| d.intensity(c_deg, gamma_deg).value());
+        let found = Departure { c_deg, gamma_deg, first_cd, second_cd };
+        if worst.is_none_or(|w| found.change_cd().abs() > w.change_cd().abs()) {
+            worst = Some(found);
         }
     }
     let nowhere = Departure { c_deg: 0.0, gamma_deg: 0.0, first_cd: 0.0, second_cd: 0.0 };

@@ -1,16 +1,27 @@
 //! The luminous intensity distribution: a table over (C, gamma), bilinear in degrees, zero outside its gamma range.
 //!
+//! Tables of types A and B stay what they are: planes about an axis of their own that cover a sector of the circle, see
+//! [`goniometer`](super::goniometer); what is said here of C and gamma goes for their own angles, too.
+//!
 //! Conventions (IES LM-63 Type C, CIE 121): gamma 0 is the nadir, -z, and 180 the zenith; C 0 is +x and C 90 is +y,
 //! counted from +x towards +y when seen from above. Bilinear interpolation in degrees *defines* the luminaire for
 //! every engine: one that interpolates otherwise differs, and the report says so.
 
+mod native;
+mod type_c;
+mod zones;
+
 use glam::DVec3;
 
+use super::goniometer::{Goniometer, SAME_DEG};
 use crate::units::{Candela, Lumen};
+
+pub use type_c::{TypeC, TypeCLimits};
 
 /// Intensity over all directions of one luminaire, in the luminaire's own frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LuminousIntensityDistribution {
+    goniometer: Goniometer,
     symmetry: Symmetry,
     c_deg: Vec<f64>,
     gamma_deg: Vec<f64>,
@@ -104,7 +115,7 @@ impl LuminousIntensityDistribution {
                 return Err(DistributionError::Intensity { c_deg, gamma_deg, value });
             }
         }
-        Ok(Self { symmetry, c_deg, gamma_deg, candela })
+        Ok(Self { goniometer: Goniometer::C, symmetry, c_deg, gamma_deg, candela })
     }
 
     /// A distribution with axial symmetry.
@@ -114,8 +125,19 @@ impl LuminousIntensityDistribution {
 
     /// Intensity at (C, gamma) in degrees, any real C; zero where the table says nothing of gamma.
     pub fn intensity(&self, c_deg: f64, gamma_deg: f64) -> Candela {
+        match self.goniometer {
+            Goniometer::A | Goniometer::C => self.at(c_deg, gamma_deg),
+            Goniometer::B if (0.0..=180.0).contains(&gamma_deg) => self.intensity_towards(direction(c_deg, gamma_deg)),
+            Goniometer::B => Candela(0.0),
+        }
+    }
+
+    /// Intensity at the table's own angles in degrees.
+    pub(super) fn at(&self, c_deg: f64, gamma_deg: f64) -> Candela {
         let last = self.gamma_deg.len() - 1;
-        if !(gamma_deg >= self.gamma_deg[0] && gamma_deg <= self.gamma_deg[last]) {
+        // What lies on the edge of a table of another axis is rounded to either side of it.
+        let slack = if self.is_native() { SAME_DEG } else { 0.0 };
+        if !(gamma_deg >= self.gamma_deg[0] - slack && gamma_deg <= self.gamma_deg[last] + slack) {
             return Candela(0.0);
         }
         let (g, t) = bracket(&self.gamma_deg, gamma_deg);
@@ -126,13 +148,18 @@ impl LuminousIntensityDistribution {
         if self.c_deg.len() == 1 {
             return Candela(along(0));
         }
-        let (c, s) = bracket(&self.c_deg, self.symmetry.fold(c_deg));
+        let Some(own_c_deg) = self.stored_c_deg(c_deg) else { return Candela(0.0) };
+        let (c, s) = bracket(&self.c_deg, own_c_deg);
         let (low, high) = (along(c), along(c + 1));
         Candela(lerp(low, high, s))
     }
 
     /// Intensities in cd at all pairs of these angles in degrees, gamma by gamma: as [`Self::intensity`] reads them, in less time.
     pub fn intensities(&self, c_deg: &[f64], gamma_deg: &[f64]) -> Vec<f64> {
+        if self.is_native() {
+            let along = |g: &f64| c_deg.iter().map(move |c| self.intensity(*c, *g).value()).collect::<Vec<_>>();
+            return gamma_deg.iter().flat_map(along).collect();
+        }
         let count = self.gamma_deg.len();
         let range = self.gamma_deg[0]..=self.gamma_deg[count - 1];
         let is_axial = self.c_deg.len() == 1;
@@ -157,14 +184,14 @@ impl LuminousIntensityDistribution {
     ///
     /// Angles come from `atan2`, which keeps full precision at both poles.
     pub fn intensity_towards(&self, direction: DVec3) -> Candela {
-        let (c, gamma) = angles_deg(direction);
-        self.intensity(c, gamma)
+        let (c, gamma) = self.own_angles_deg(direction);
+        self.at(c, gamma)
     }
 
     /// How far apart the intensities are between which rounding in `f64` decides towards `direction`, in the luminaire's own frame: where
     /// the table ends with light short of a pole, and at a pole that its planes do not agree on. Nothing elsewhere.
     pub fn jump_towards(&self, direction: DVec3) -> Candela {
-        let (c, gamma) = angles_deg(direction);
+        let (c, gamma) = self.own_angles_deg(direction);
         let (first, last) = (self.gamma_deg[0], self.gamma_deg[self.gamma_deg.len() - 1]);
         let is_at = |edge: f64| (gamma - edge).abs() <= ROUNDED_DEG;
         let jump = |edge: f64, pole: f64| {
@@ -172,26 +199,34 @@ impl LuminousIntensityDistribution {
                 return 0.0;
             }
             if edge != pole {
-                return self.intensity(c, edge).value();
+                return self.at(c, edge).value();
             }
-            let values = self.c_deg.iter().map(|c| self.intensity(*c, pole).value());
+            let values = self.c_deg.iter().map(|c| self.at(*c, pole).value());
             let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
             high - low
         };
-        Candela(jump(first, 0.0).max(jump(last, 180.0)))
+        Candela(jump(first, 0.0).max(jump(last, 180.0)).max(self.jump_of_sector(c, gamma)))
     }
 
     /// Total flux, exact for the bilinear interpolation (closed form per cell).
     pub fn flux(&self) -> Lumen {
-        self.flux_between(0.0, 180.0)
+        self.own_flux_between(0.0, 180.0)
     }
 
     /// Flux within `from_deg <= gamma <= to_deg`, exact for the bilinear interpolation.
+    pub fn flux_between(&self, from_deg: f64, to_deg: f64) -> Lumen {
+        match self.goniometer {
+            Goniometer::A | Goniometer::C => self.own_flux_between(from_deg, to_deg),
+            Goniometer::B => Lumen(self.flux_of_zone([from_deg, to_deg], [-180.0, 180.0], [0.0, 180.0])),
+        }
+    }
+
+    /// Flux between two of the table's own angles gamma.
     ///
     /// Per gamma interval from a to b, with its middle g and half its width w in radians, ∫ I sin g dg is
     /// (I(a) + I(b)) sin g sin w + (I(b) - I(a)) cos g (sin w / w - cos w), in which nothing cancels however near a is to b;
     /// over C the trapezoid rule is exact.
-    pub fn flux_between(&self, from_deg: f64, to_deg: f64) -> Lumen {
+    pub(super) fn own_flux_between(&self, from_deg: f64, to_deg: f64) -> Lumen {
         let average = self.azimuth_average();
         let mut sum = 0.0;
         for (g, i) in self.gamma_deg.windows(2).zip(average.windows(2)) {
@@ -206,13 +241,13 @@ impl LuminousIntensityDistribution {
         Lumen(std::f64::consts::TAU * sum)
     }
 
-    /// Mean intensity over C at each tabulated gamma, in candela.
+    /// Mean intensity over C at each tabulated gamma, in candela; of type B about its own axis.
     pub fn azimuth_average(&self) -> Vec<f64> {
         let gammas = self.gamma_deg.len();
         if self.c_deg.len() == 1 {
             return self.candela.clone();
         }
-        let span = self.c_deg[self.c_deg.len() - 1] - self.c_deg[0];
+        let span = if self.is_native() { 360.0 } else { self.c_deg[self.c_deg.len() - 1] - self.c_deg[0] };
         let mut average = vec![0.0; gammas];
         for (p, c) in self.c_deg.windows(2).enumerate() {
             let weight = 0.5 * (c[1] - c[0]) / span;
@@ -225,9 +260,13 @@ impl LuminousIntensityDistribution {
 
     /// The same distribution with its planes written out over the full circle, C 0 to 360.
     ///
-    /// Axial distributions keep one plane times two (0 and 360), so that every consumer can interpolate in C.
+    /// Axial distributions keep one plane times two (0 and 360), so that every consumer can interpolate in C. Of types A and B that is
+    /// their stand-in of type C, [`Self::in_type_c`].
     #[must_use]
     pub fn full_circle(&self) -> Self {
+        if self.is_native() {
+            return self.in_type_c().distribution.full_circle();
+        }
         let mut c_deg = match self.symmetry {
             Symmetry::Axial => vec![0.0, 360.0],
             Symmetry::None => self.c_deg.clone(),
@@ -245,14 +284,18 @@ impl LuminousIntensityDistribution {
         c_deg.dedup();
         let candela =
             c_deg.iter().flat_map(|&c| self.gamma_deg.iter().map(move |&g| self.intensity(c, g).value())).collect();
-        Self { symmetry: Symmetry::None, c_deg, gamma_deg: self.gamma_deg.clone(), candela }
+        Self::full_table(c_deg, self.gamma_deg.clone(), candela)
     }
 
     /// The same distribution with a table over the whole of gamma 0 to 180, for renderers that extrapolate.
     ///
-    /// Where the table ends short of a pole with light at its edge, it falls to zero within `step_deg`.
+    /// Where the table ends short of a pole with light at its edge, it falls to zero within `step_deg`. Of types A and B that is
+    /// their stand-in of type C, [`Self::in_type_c`].
     #[must_use]
     pub fn padded(&self, step_deg: f64) -> Self {
+        if self.is_native() {
+            return self.in_type_c().distribution.padded(step_deg);
+        }
         let gammas = self.gamma_deg.len();
         let (first, last) = (self.gamma_deg[0], self.gamma_deg[gammas - 1]);
         let mut below = vec![];
@@ -276,17 +319,17 @@ impl LuminousIntensityDistribution {
                 zeros(below.len()).chain(row.iter().copied()).chain(zeros(above.len())).collect::<Vec<_>>()
             })
             .collect();
-        Self { symmetry: self.symmetry, c_deg: self.c_deg.clone(), gamma_deg, candela }
+        Self { gamma_deg, candela, ..self.clone() }
     }
 
     /// A table over the full circle whose angles are known to be in order.
     pub(super) fn full_table(c_deg: Vec<f64>, gamma_deg: Vec<f64>, candela: Vec<f64>) -> Self {
-        Self { symmetry: Symmetry::None, c_deg, gamma_deg, candela }
+        Self { goniometer: Goniometer::C, symmetry: Symmetry::None, c_deg, gamma_deg, candela }
     }
 
     /// An axial table whose angles and values come from another table, and so are known to be in order.
     pub(super) fn of_average(gamma_deg: Vec<f64>, candela: Vec<f64>) -> Self {
-        Self { symmetry: Symmetry::Axial, c_deg: vec![0.0], gamma_deg, candela }
+        Self { goniometer: Goniometer::C, symmetry: Symmetry::Axial, c_deg: vec![0.0], gamma_deg, candela }
     }
 
     /// The same distribution with every intensity multiplied by `factor`.
@@ -296,17 +339,17 @@ impl LuminousIntensityDistribution {
         Self { candela, ..self.clone() }
     }
 
-    /// How the stored planes stand for the full circle.
+    /// How the stored planes stand for the full circle; of types A and B the mirrors of type C that hold for them, exactly.
     pub fn symmetry(&self) -> Symmetry {
         self.symmetry
     }
 
-    /// The stored C planes in degrees.
+    /// The stored planes in degrees about the table's own axis: C of type C, -H of type A, V of type B.
     pub fn c_deg(&self) -> &[f64] {
         &self.c_deg
     }
 
-    /// The gamma angles in degrees.
+    /// The angles along a plane in degrees from the table's own axis: gamma of type C, 90 + V of type A, 90 + H of type B.
     pub fn gamma_deg(&self) -> &[f64] {
         &self.gamma_deg
     }

@@ -86,9 +86,9 @@ impl Photometry {
 /// Whether two tables shine alike: they are bilinear, so that they differ most at an angle of one of them.
 fn is_same_light(a: &LuminousIntensityDistribution, b: &LuminousIntensityDistribution) -> bool {
     let allowed = SAME_LIGHT * a.max_intensity().value();
-    let mut c_deg = a.full_circle().c_deg().to_vec();
-    c_deg.extend(b.full_circle().c_deg());
-    let [a, b] = [a, b].map(|table| table.intensities(&c_deg, a.gamma_deg()));
+    let (own, other) = (a.full_circle(), b.full_circle());
+    let c_deg = [own.c_deg(), other.c_deg()].concat();
+    let [a, b] = [a, b].map(|table| table.intensities(&c_deg, own.gamma_deg()));
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= allowed)
 }
 

@@ -1,7 +1,7 @@
 //! What a written file does not give back, and why: each difference between what was written and what is read again.
 
 use super::details::{Details, Edition, EulumdatDetails, Lm63Details, ThirdNumber};
-use super::{FileFormat, Goniometer, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry};
+use super::{FileFormat, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry};
 
 /// Every difference between what was written and what was read back, a sentence each.
 pub(super) fn losses(original: &Photometry, again: &Photometry, format: FileFormat) -> Vec<String> {
@@ -34,6 +34,9 @@ fn distribution_losses(
     losses: &mut Vec<String>,
 ) {
     let name = format.name();
+    if before.is_native() || after.is_native() {
+        return native_losses(before, after, name, losses);
+    }
     let (planes, written) = (before.c_deg().len(), after.c_deg().len());
     let is_open = before.symmetry() == Symmetry::None && before.plane(0) != before.plane(planes - 1);
     let closed = largest_difference(before.plane(0), before.plane(planes - 1));
@@ -59,6 +62,26 @@ fn distribution_losses(
     if rounded > 0.0 {
         losses.push(format!("intensities changed by up to {rounded:e} cd, which is the rounding of {name}'s numbers"));
     }
+}
+
+/// What became of a table of type A or B.
+fn native_losses(
+    before: &LuminousIntensityDistribution,
+    after: &LuminousIntensityDistribution,
+    name: &str,
+    losses: &mut Vec<String>,
+) {
+    let (largest_cd, share) = before.difference_from(after);
+    let percent = 100.0 * largest_cd / before.max_intensity().value().max(f64::MIN_POSITIVE);
+    let (kind, planes, gammas) = (before.goniometer(), after.c_deg().len(), after.gamma_deg().len());
+    let became = if kind == after.goniometer() {
+        format!("the table of type {kind:?} was rounded in the numbers of {name}, and differs")
+    } else {
+        format!("the table of type {kind:?} became {planes} C planes of {gammas} angles, which differ")
+    };
+    losses.push(format!(
+        "{became} by up to {largest_cd:.2e} cd, {percent:.2} % of the largest intensity, and in {share:.1e} of the flux"
+    ));
 }
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
@@ -163,9 +186,6 @@ fn keyword_losses(original: &Photometry, again: &Photometry, format: FileFormat,
 fn lm63_losses(before: &Lm63Details, again: &Photometry, format: FileFormat, losses: &mut Vec<String>) {
     let name = format.name();
     let after = if let Details::Lm63(details) = &again.details { Some(details) } else { None };
-    if before.goniometer != Goniometer::C && after.is_none_or(|after| after.goniometer != before.goniometer) {
-        losses.push(format!("a table of type {:?} was written as type C", before.goniometer));
-    }
     match before.third_number {
         ThirdNumber::FileGeneration(value)
             if value != 1.0 && after.map(|a| a.third_number) != Some(before.third_number) =>

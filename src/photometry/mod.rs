@@ -8,6 +8,7 @@ mod difference;
 mod distribution;
 mod error;
 pub mod eulumdat;
+mod filed;
 mod format;
 mod forward;
 mod gldf;
@@ -31,6 +32,8 @@ mod xml;
 mod zonal;
 
 #[cfg(test)]
+mod native_tests;
+#[cfg(test)]
 mod round_trip_tests;
 
 use std::cell::RefCell;
@@ -44,7 +47,9 @@ pub use beam::{Beam, BeamPlane, BeamWidth, NoBeam, PeakShape};
 pub use bug::{BugRating, NoBug};
 pub use details::Details;
 pub use difference::{Departure, Difference, Likeness};
-pub use distribution::{DistributionError, LuminousIntensityDistribution, Symmetry, angles_deg, direction};
+pub use distribution::{
+    DistributionError, LuminousIntensityDistribution, Symmetry, TypeC, TypeCLimits, angles_deg, direction,
+};
 pub use error::{Problem, ReadError};
 pub use format::FileFormat;
 pub use forward::{Aimed, ForwardPolicy};

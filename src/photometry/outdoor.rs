@@ -3,7 +3,7 @@
 //! ANSI/IES TM-15-20: forward and back light in four zones of gamma each, uplight in two. C = 0 is taken to point across
 //! the street, away from the house side, as LM-63 has it for roadway luminaires.
 
-use super::LuminousIntensityDistribution;
+use super::{Goniometer, LuminousIntensityDistribution};
 use crate::units::Lumen;
 
 /// Limits of the four zones below the horizontal and the two above it, in degrees of gamma.
@@ -26,6 +26,11 @@ impl LuminousIntensityDistribution {
     /// 0 in LM-63, 90 in EULUMDAT, where C = 0 runs along it.
     pub fn classification_zones(&self, forward_c_deg: f64) -> ClassificationZones {
         let half = |from_c_deg: f64| {
+            if let Some([c, gamma]) = self.half_space(from_c_deg) {
+                return std::array::from_fn(|k| {
+                    Lumen(self.flux_of_zone([DOWNWARD_DEG[k], DOWNWARD_DEG[k + 1]], c, gamma))
+                });
+            }
             let half = self.sector_average(from_c_deg, from_c_deg + 180.0);
             std::array::from_fn(|k| 0.5 * half.flux_between(DOWNWARD_DEG[k], DOWNWARD_DEG[k + 1]))
         };
@@ -38,7 +43,26 @@ impl LuminousIntensityDistribution {
 
     /// Flux in the half of all directions around a plane, from 90 degrees before it to 90 after.
     pub(super) fn flux_of_half(&self, c_deg: f64) -> Lumen {
+        if let Some([c, gamma]) = self.half_space(c_deg - 90.0) {
+            return Lumen(self.flux_of_zone([0.0, 180.0], c, gamma));
+        }
         0.5 * self.sector_average(c_deg - 90.0, c_deg + 90.0).flux()
+    }
+
+    /// The table's own angles, of type B, of half of all directions from a plane of C on that is a multiple of 90 degrees.
+    fn half_space(&self, from_c_deg: f64) -> Option<[[f64; 2]; 2]> {
+        let (all_c, all_gamma) = ([-180.0, 180.0], [0.0, 180.0]);
+        if self.goniometer() != Goniometer::B {
+            return None;
+        }
+        // Along x lie positive V, along y negative H.
+        match from_c_deg.rem_euclid(360.0) {
+            270.0 => Some([[0.0, 180.0], all_gamma]),
+            90.0 => Some([[-180.0, 0.0], all_gamma]),
+            0.0 => Some([all_c, [0.0, 90.0]]),
+            180.0 => Some([all_c, [90.0, 180.0]]),
+            _ => None,
+        }
     }
 
     /// The axial distribution of the mean intensity between two C angles, exact for the bilinear interpolation.
@@ -58,8 +82,8 @@ impl LuminousIntensityDistribution {
             });
             parts.sum::<f64>() / (to_c_deg - from_c_deg)
         };
-        let candela = self.gamma_deg().iter().map(mean).collect();
-        Self::of_average(self.gamma_deg().to_vec(), candela)
+        let candela = full.gamma_deg().iter().map(mean).collect();
+        Self::of_average(full.gamma_deg().to_vec(), candela)
     }
 }
 

@@ -1,10 +1,13 @@
 //! From the angles of a measured table to the C planes of a distribution.
 
-use super::LuminousIntensityDistribution;
 use super::error::{Problem, ReadError};
-use super::goniometer::{self, Goniometer, Table};
+use super::goniometer::{Goniometer, Table};
 use super::lint::Lints;
 use super::text::Text;
+use super::{DistributionError, LuminousIntensityDistribution};
+
+/// A table of type A or B that ends with a larger part of its largest intensity is remarked on.
+const LIT_EDGE: f64 = 0.01;
 
 /// The distribution that a table means.
 pub(crate) fn distribution(
@@ -19,7 +22,7 @@ pub(crate) fn distribution(
     }
 }
 
-/// Angles from the horizon (A) or about a horizontal axis (B), resampled.
+/// Angles from the horizon (A) or about a horizontal axis (B), which stay what they are.
 fn type_a_or_b(
     text: &Text,
     goniometer: Goniometer,
@@ -38,20 +41,53 @@ fn type_a_or_b(
             return Err(text.error(at, Problem::AngleRange { axis, first, last, expected }));
         }
     }
-    let resampled = goniometer::to_type_c(goniometer, table)
-        .map_err(|error| text.error(table.candela_at, Problem::Distribution(error)))?;
-    let (found, distribution) = (&resampled, &resampled.distribution);
-    let message = format!(
-        "type {goniometer:?} photometry became {} C planes of {} angles, which differ from it by up to {:.2e} cd at the \
-         nodes of the file and {:.2e} cd in the middle of its cells; the largest intensity is {:.1} cd",
-        distribution.c_deg().len(),
-        distribution.gamma_deg().len(),
-        found.node_error_cd,
-        found.cell_error_cd,
-        distribution.max_intensity().value(),
-    );
-    lints.note("planes/resampled", text.line_of(table.horizontal_at), message);
-    Ok(resampled.distribution)
+    if let [only] = table.horizontal_deg[..] {
+        let line = text.line_of(table.horizontal_at);
+        lints.note("planes/single", line, format!("the only horizontal angle, {only}, was taken for every one"));
+    }
+    let distribution =
+        native(goniometer, table).map_err(|error| text.error(table.candela_at, Problem::Distribution(error)))?;
+    let edge = distribution.edge_intensity().value();
+    let peak = distribution.max_intensity().value();
+    if edge > LIT_EDGE * peak {
+        let message = format!(
+            "the table of type {goniometer:?} ends with up to {edge:.1} cd; beyond it the intensity counts as zero"
+        );
+        lints.note("planes/edge", text.line_of(table.horizontal_at), message);
+    }
+    Ok(distribution)
+}
+
+/// The distribution of a table of type A or B. Horizontal angles from 0 are those of one half, and a single one stands for all.
+fn native(goniometer: Goniometer, table: &Table) -> Result<LuminousIntensityDistribution, DistributionError> {
+    let rows: Vec<&[f64]> = table.candela.chunks(table.vertical_deg.len()).collect();
+    let (horizontal_deg, rows): (Vec<f64>, Vec<&[f64]>) = match table.horizontal_deg[..] {
+        [_] if goniometer == Goniometer::B => (vec![-90.0, 90.0], vec![rows[0]; 2]),
+        // The same in all planes about the vertical is of type C as well.
+        [_] => {
+            let gamma_deg = table.vertical_deg.iter().map(|v| v + 90.0).collect();
+            return LuminousIntensityDistribution::axial(gamma_deg, rows[0].to_vec());
+        }
+        [0.0, ..] => {
+            let halves =
+                table.horizontal_deg.iter().skip(1).rev().map(|h| -h).chain(table.horizontal_deg.iter().copied());
+            (halves.collect(), rows.iter().skip(1).rev().chain(&rows).copied().collect())
+        }
+        _ => (table.horizontal_deg.clone(), rows),
+    };
+    if goniometer == Goniometer::A {
+        let c_deg = horizontal_deg.iter().rev().map(|h| -h).collect();
+        let gamma_deg = table.vertical_deg.iter().map(|v| 90.0 + v).collect();
+        return LuminousIntensityDistribution::native(
+            goniometer,
+            c_deg,
+            gamma_deg,
+            rows.into_iter().rev().flatten().copied().collect(),
+        );
+    }
+    let candela = (0..table.vertical_deg.len()).flat_map(|v| rows.iter().map(move |row| row[v])).collect();
+    let gamma_deg = horizontal_deg.iter().map(|h| 90.0 + h).collect();
+    LuminousIntensityDistribution::native(goniometer, table.vertical_deg.clone(), gamma_deg, candela)
 }
 
 fn type_c(text: &Text, mut table: Table, lints: &mut Lints) -> Result<LuminousIntensityDistribution, ReadError> {

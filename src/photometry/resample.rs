@@ -17,12 +17,13 @@ impl LuminousIntensityDistribution {
     /// The same table on other planes and angles, with the exact bound of the difference.
     ///
     /// The difference of two bilinear tables is bilinear between the angles of both together, so that it is largest at
-    /// one of those. Where the new table ends before the old one, what it leaves out counts too.
+    /// one of those. Where the new table ends before the old one, what it leaves out counts too. A table of type A or B stays one:
+    /// its angles are its own.
     pub fn resampled(&self, c_deg: Vec<f64>, gamma_deg: Vec<f64>) -> Result<Resampled, DistributionError> {
-        let at = |c: f64, g: f64| self.intensity(c, g).value();
+        let at = |c: f64, g: f64| self.at(c, g).value();
         let candela = c_deg.iter().flat_map(|&c| gamma_deg.iter().map(move |&g| at(c, g))).collect();
-        let distribution = Self::new(c_deg, gamma_deg, candela)?;
-        let circles = [self.full_circle(), distribution.full_circle()];
+        let distribution = self.with_table(c_deg, gamma_deg, candela)?;
+        let circles = [self.own_planes(), distribution.own_planes()];
         let mut union_c: Vec<f64> = circles.iter().flat_map(|full| full.c_deg().to_vec()).collect();
         let mut union_gamma: Vec<f64> = [self, &distribution].iter().flat_map(|d| d.gamma_deg().to_vec()).collect();
         // A table jumps to zero at its ends: look at both sides of them.
@@ -34,13 +35,14 @@ impl LuminousIntensityDistribution {
             angles.sort_by(f64::total_cmp);
             angles.dedup();
         }
-        let difference = |c: f64, g: f64| (at(c, g) - distribution.intensity(c, g).value()).abs();
+        let difference = |c: f64, g: f64| (at(c, g) - distribution.at(c, g).value()).abs();
         let largest_error_cd =
             union_c.iter().flat_map(|&c| union_gamma.iter().map(move |&g| difference(c, g))).fold(0.0, f64::max);
         Ok(Resampled { distribution, largest_error_cd })
     }
 
-    /// The luminaire turned by `turn_deg` about its vertical axis, from +x towards +y: the same function, exactly.
+    /// The luminaire turned by `turn_deg` about its vertical axis, from +x towards +y: the same function, exactly, but for tables of
+    /// types A and B, of which the stand-in of type C is turned.
     #[must_use]
     pub fn turned(&self, turn_deg: f64) -> Self {
         let full = self.full_circle();
@@ -71,6 +73,7 @@ impl LuminousIntensityDistribution {
         let distribution = Self::full_table(c_deg, gamma_deg, candela);
         let mut largest_error_cd = 0.0_f64;
         let full = self.full_circle();
+        // Of another axis, the nodes of its stand-in are as good as any.
         for (table, turn) in [(&full, rotation), (&distribution, DMat3::IDENTITY)] {
             for (c, g) in table.nodes_and_centres() {
                 let towards = turn * direction(c, g);
@@ -81,8 +84,8 @@ impl LuminousIntensityDistribution {
         Resampled { distribution, largest_error_cd }
     }
 
-    /// (C, gamma) of every node and of the centre of every cell.
-    fn nodes_and_centres(&self) -> impl Iterator<Item = (f64, f64)> {
+    /// The table's own angles of every node and of the centre of every cell.
+    pub(super) fn nodes_and_centres(&self) -> impl Iterator<Item = (f64, f64)> + use<> {
         let with_centres = |angles: &[f64]| {
             let centres = angles.windows(2).map(|w| f64::midpoint(w[0], w[1]));
             angles.iter().copied().chain(centres).collect::<Vec<f64>>()

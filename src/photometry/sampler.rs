@@ -2,11 +2,11 @@
 //!
 //! The density over the sphere is I(C, gamma) / flux per steradian. Gamma is drawn from the azimuth average, whose
 //! flux up to any gamma has a closed form, by safeguarded Newton iteration; C from the piecewise linear intensities
-//! at that gamma, whose integral is inverted in closed form.
+//! at that gamma, whose integral is inverted in closed form. Tables of types A and B are sampled about their own axis.
 
 use glam::DVec3;
 
-use super::{LuminousIntensityDistribution, direction};
+use super::LuminousIntensityDistribution;
 use crate::units::Lumen;
 
 /// Draws directions of a distribution.
@@ -31,11 +31,11 @@ pub struct SampledDirection {
 impl DirectionSampler {
     /// Prepares sampling; `None` for a distribution without flux.
     pub fn new(distribution: &LuminousIntensityDistribution) -> Option<Self> {
-        let full = distribution.full_circle();
+        let full = distribution.own_planes();
         let average = full.azimuth_average();
         let mut below = vec![0.0];
         for zone in full.gamma_deg().windows(2) {
-            below.push(below[below.len() - 1] + full.flux_between(zone[0], zone[1]).value());
+            below.push(below[below.len() - 1] + full.own_flux_between(zone[0], zone[1]).value());
         }
         let flux = below[below.len() - 1];
         (flux > 0.0 && flux.is_finite()).then_some(Self { full, average, below })
@@ -50,8 +50,8 @@ impl DirectionSampler {
     pub fn sample(&self, u: [f64; 2]) -> SampledDirection {
         let gamma_deg = self.gamma_deg(u[0]);
         let c_deg = self.c_deg(gamma_deg, u[1]);
-        let density = self.full.intensity(c_deg, gamma_deg).value() / self.flux().value();
-        SampledDirection { direction: direction(c_deg, gamma_deg), density }
+        let density = self.full.at(c_deg, gamma_deg).value() / self.flux().value();
+        SampledDirection { direction: self.full.own_direction(c_deg, gamma_deg), density }
     }
 
     /// The gamma below which the fraction `u` of the flux lies.
@@ -89,7 +89,7 @@ impl DirectionSampler {
     /// The C below which the fraction `u` of the light at this gamma lies.
     fn c_deg(&self, gamma_deg: f64, u: f64) -> f64 {
         let c_deg = self.full.c_deg();
-        let at: Vec<f64> = c_deg.iter().map(|&c| self.full.intensity(c, gamma_deg).value()).collect();
+        let at: Vec<f64> = c_deg.iter().map(|&c| self.full.at(c, gamma_deg).value()).collect();
         let areas: Vec<f64> =
             c_deg.windows(2).zip(at.windows(2)).map(|(c, i)| 0.5 * (c[1] - c[0]) * (i[0] + i[1])).collect();
         let mut target = u.clamp(0.0, 1.0) * areas.iter().sum::<f64>();

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::losses::losses;
-use super::{FileFormat, Photometry, ReadError};
+use super::{FileFormat, LuminousIntensityDistribution, Photometry, ReadError, TypeCLimits};
 
 /// A photometric file as text, and what is lost in it.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +29,41 @@ impl Written {
             Err(error) => vec![format!("the written file cannot be read: {error}")],
         };
         Self { text, losses, notes: vec![] }
+    }
+}
+
+/// A file may be so many times as long as the one that it was made of.
+const MOST_GROWTH: f64 = 20.0;
+/// Digits of the largest intensity that a table made here has.
+const DIGITS: i32 = 6;
+/// Characters that a value takes in a file at least, and values of the smallest table that is tried.
+const VALUE_CHARACTERS: f64 = 7.0;
+const FEWEST_VALUES: usize = 30;
+
+/// The text of a format that holds type C alone, in numbers of so many candela: of other types a table that stands for theirs, as fine as
+/// the file may grow.
+pub(super) fn in_type_c(
+    photometry: &Photometry,
+    unit_cd: f64,
+    text: impl Fn(&LuminousIntensityDistribution) -> String,
+) -> String {
+    let table = &photometry.distribution;
+    if !table.is_native() {
+        return text(table);
+    }
+    // What no file says would be of so many characters.
+    let made = || VALUE_CHARACTERS as usize * table.c_deg().len() * table.gamma_deg().len();
+    let read = photometry.source.first().map_or_else(made, |s| s.bytes.len());
+    let most = MOST_GROWTH * read as f64;
+    let decimals = DIGITS - 1 - (table.max_intensity().value() / unit_cd).log10().floor().clamp(-300.0, 300.0) as i32;
+    let mut most_values = (most / VALUE_CHARACTERS) as usize;
+    loop {
+        let limits = TypeCLimits { most_planes: 361, most_values, ..TypeCLimits::default() };
+        let written = text(&table.in_type_c_within(limits).distribution.rounded(unit_cd, decimals));
+        if written.len() as f64 <= most || most_values <= FEWEST_VALUES {
+            return written;
+        }
+        most_values = (0.95 * most_values as f64 * most / written.len() as f64) as usize;
     }
 }
 

@@ -3,7 +3,7 @@
 //! IES LM-41-14 section 9 and the IES Lighting Handbook (9th ed., chapter 2): the mean intensity at the middle of a zone
 //! times its zonal constant 2 pi (cos a - cos b) is the zone's flux. Only angles that the table has are used.
 
-use super::LuminousIntensityDistribution;
+use super::{Goniometer, LuminousIntensityDistribution};
 use crate::units::Lumen;
 
 /// A table's angle counts as the middle of a zone within so many degrees.
@@ -42,6 +42,9 @@ impl LuminousIntensityDistribution {
     }
 
     fn in_zones_of(&self, width_deg: f64) -> Result<MidZoneFlux, NoMidZones> {
+        if self.goniometer() == Goniometer::B {
+            return Err(NoMidZones { missing_deg: 0.5 * width_deg });
+        }
         let (gamma_deg, average) = (self.gamma_deg(), self.azimuth_average());
         let (first, last) = (gamma_deg[0], gamma_deg[gamma_deg.len() - 1]);
         let flux = |zone: u32| {

@@ -146,10 +146,14 @@ pub fn shines_from(surface: Surface, luminaire: &Luminaire) -> bool {
     let grid = |end: f64| (0..=(end / STEP_DEG) as u32).map(|k| STEP_DEG * f64::from(k));
     let (gammas, planes): (Vec<f64>, Vec<f64>) =
         (table.gamma_deg().iter().copied().chain(grid(180.0)).collect(), grid(355.0).collect());
-    let lit = |c: f64, gamma: f64| {
-        let own = crate::photometry::direction(c, gamma);
-        (luminaire.orientation * own).dot(surface.inward_normal()) > IN_PLANE && table.intensity(c, gamma).value() > 0.0
+    let lit_towards = |own: DVec3| {
+        (luminaire.orientation * own).dot(surface.inward_normal()) > IN_PLANE
+            && table.intensity_towards(own).value() > 0.0
     };
+    if table.is_native() && table.node_directions().any(lit_towards) {
+        return true;
+    }
+    let lit = |c: f64, gamma: f64| lit_towards(crate::photometry::direction(c, gamma));
     gammas.iter().any(|gamma| planes.iter().any(|c| lit(*c, *gamma)))
 }
 

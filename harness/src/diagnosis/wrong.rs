@@ -4,6 +4,7 @@
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
+use luminaire::photometry::TypeCLimits;
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport};
 use luminaire::simulator::{self, Accuracy};
 
@@ -181,8 +182,11 @@ pub struct Model {
 }
 
 impl Model {
+    /// Engines get tables of type C, and so do faults.
     pub fn new(case: usize, task: &Task, right: Vec<f64>) -> Self {
-        Self { case, task: task.clone(), right, light: [OnceLock::new(), OnceLock::new()], rough: OnceLock::new() }
+        let mut task = task.clone();
+        task.scene.luminaires.iter_mut().for_each(|l| *l = l.in_type_c(TypeCLimits::default()));
+        Self { case, task, right, light: [OnceLock::new(), OnceLock::new()], rough: OnceLock::new() }
     }
 
     /// What is right, and by how much that is corrected.

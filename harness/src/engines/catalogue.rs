@@ -20,7 +20,7 @@ pub const ALL: &[&Entry] = &[
 ];
 
 pub fn all() -> Vec<Box<dyn Engine>> {
-    ALL.iter().map(|entry| (entry.make)()).collect()
+    ALL.iter().map(|entry| entry.engine()).collect()
 }
 
 /// What an engine is, or the one of which it is a release.

@@ -69,6 +69,11 @@ pub trait Engine: Send + Sync {
         Ok(vec![])
     }
 
+    /// Planes over the full circle that a table of its scenes holds at most; `None` where there is no limit.
+    fn most_planes(&self) -> Option<usize> {
+        None
+    }
+
     /// The command that runs an exported scene, as a person would type it in the scene's folder; it names the engine that is
     /// installed at the site, or else relies on one on PATH.
     fn command_by_hand(&self, _job: &Job, _site: &Site) -> Option<String> {

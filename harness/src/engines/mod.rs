@@ -41,6 +41,7 @@ mod shared_tests;
 pub(crate) mod simulator;
 mod site;
 mod tables;
+mod type_c;
 mod web;
 mod workbench;
 
@@ -100,5 +101,5 @@ pub fn external(
     settings: &BTreeMap<String, serde_json::Value>,
     folder: &Path,
 ) -> Result<Box<dyn Engine>, EngineError> {
-    Ok(Box::new(external::External::new(name, settings, folder)?))
+    Ok(type_c::InTypeC::program(Box::new(external::External::new(name, settings, folder)?)))
 }

@@ -103,6 +103,10 @@ impl Engine for PovRay {
         DirectCost { start: 0.06, a_point: 1e-4, an_opening: Some(6e-4) }.of(job)
     }
 
+    fn most_planes(&self) -> Option<usize> {
+        Some(pigment::MAX_ENTRIES)
+    }
+
     fn knobs(&self) -> &'static [Knob] {
         settings::KNOBS
     }

@@ -9,6 +9,7 @@ use super::Site;
 use super::catalogue::ALL;
 use super::contract::{Absent, Answer, Engine, Entry, Job, Knob, Measurement, Support, Version};
 use super::releases::{self, Cannot, Known};
+use super::type_c::InTypeC;
 use super::workbench::{EngineError, SceneFile, Workbench};
 use crate::record::{EngineName, Release, Role, family};
 use crate::spec::suggestion;
@@ -25,10 +26,10 @@ pub struct Unknown {
 pub fn built_in(name: &str) -> Result<Option<Box<dyn Engine>>, Unknown> {
     let Some(entry) = ALL.iter().find(|entry| entry.name == *family(name)) else { return Ok(None) };
     if entry.name == *name {
-        return Ok(Some((entry.make)()));
+        return Ok(Some(entry.engine()));
     }
     match releases::known(name) {
-        Some(known) => Ok(Some(Box::new(Released { known, inner: (entry.make)() }))),
+        Some(known) => Ok(Some(InTypeC::renderer(Box::new(Released { known, inner: (entry.make)() })))),
         None => Err(unknown(entry, name)),
     }
 }
@@ -167,6 +168,10 @@ impl Engine for Released {
 
     fn expected_s(&self, job: &Job) -> Option<f64> {
         self.inner.expected_s(job)
+    }
+
+    fn most_planes(&self) -> Option<usize> {
+        self.inner.most_planes()
     }
 
     fn memory_mib(&self, job: &Job, threads: usize) -> u64 {

@@ -3,9 +3,8 @@
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
-use itertools::Itertools;
 use luminaire::geometry::{Reflectances, Room, Surface};
-use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry};
+use luminaire::photometry::{Goniometer, LuminousOpening, Photometry};
 use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport};
 
 use super::{Against, Law, Light, Variant};
@@ -149,24 +148,10 @@ fn luminaire(luminaire: &Luminaire, position_m: DVec3, linear: DMat3, scale: f64
     let mut orientation = linear * luminaire.orientation;
     if linear.determinant() < 0.0 {
         // A mirror is no rotation: it goes into the table, and with another mirror into the orientation.
-        photometry.distribution = mirrored(&photometry.distribution);
+        photometry.distribution = photometry.distribution.mirrored();
         orientation *= DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
     }
     Luminaire { position_m, orientation, photometry: Arc::new(photometry), ..luminaire.clone() }
-}
-
-/// The table with C 0 and C 180 exchanged.
-fn mirrored(table: &LuminousIntensityDistribution) -> LuminousIntensityDistribution {
-    let full = table.full_circle();
-    let images = full.c_deg().iter().map(|c| (180.0 - c).rem_euclid(360.0)).chain([0.0, 360.0]);
-    let c_deg: Vec<f64> = images.sorted_by(f64::total_cmp).dedup().collect();
-    let rows = c_deg.iter().flat_map(|&c| {
-        let plane = 180.0 - c % 360.0;
-        full.gamma_deg().iter().map(move |g| (plane, *g))
-    });
-    let candela = rows.map(|(c, g)| full.intensity(c, g).value()).collect();
-    // A table of sound nodes and intensities stays one.
-    LuminousIntensityDistribution::new(c_deg, full.gamma_deg().to_vec(), candela).unwrap_or(full)
 }
 
 fn opening(mut opening: LuminousOpening, scale: f64) -> LuminousOpening {
@@ -236,7 +221,9 @@ fn translated_room(job: &Job, distance_m: f64) -> Option<Variant> {
 fn turned_luminaire(job: &Job, turn_deg: f64) -> Option<Variant> {
     let mut turned = job.clone();
     for luminaire in &mut turned.scene.luminaires {
-        if luminaire.model != LuminaireModel::Point {
+        // A table of type B, turned about the vertical, is none.
+        let has_axis = luminaire.photometry.distribution.goniometer() != Goniometer::B;
+        if luminaire.model != LuminaireModel::Point || !has_axis {
             return None;
         }
         let distribution = luminaire.photometry.distribution.turned(-turn_deg);

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use itertools::Itertools;
 use luminaire::photometry::direction;
 use luminaire::scene::{Luminaire, Meter, Scene, Transport};
 
@@ -106,9 +107,11 @@ impl Target {
 /// Meters on a sphere that face the photometric centre: I = E d² (IES LM-41, CIE 121: inverse-square goniophotometry).
 pub(super) fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
     let distribution = &luminaire.photometry.distribution;
-    let (c_deg, gamma_deg) = match &asked.angles {
-        Angles::Photometry => (distribution.c_deg(), distribution.gamma_deg()),
-        Angles::Listed(lists) => (lists.c_deg.as_slice(), lists.gamma_deg.as_slice()),
+    let angles: Vec<(f64, f64)> = match &asked.angles {
+        Angles::Photometry => distribution.nodes_deg(),
+        Angles::Listed(lists) => {
+            lists.c_deg.iter().copied().cartesian_product(lists.gamma_deg.iter().copied()).collect()
+        }
     };
     let target = |(k, (c_deg, gamma_deg)): (usize, (f64, f64))| {
         let outward = luminaire.orientation * direction(c_deg, gamma_deg);
@@ -117,8 +120,7 @@ pub(super) fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
         let target = Target::of_one(id, meter, asked.distance_m * asked.distance_m);
         Target { direction: Some(Direction { c_deg, gamma_deg }), ..target }
     };
-    let angles = c_deg.iter().flat_map(|&c| gamma_deg.iter().map(move |&g| (c, g)));
-    angles.enumerate().map(target).collect()
+    angles.into_iter().enumerate().map(target).collect()
 }
 
 /// The meters of named sets, each with what is added up there.

@@ -25,14 +25,14 @@ pub fn curves(case: &str, task: &Task) -> Vec<Curve> {
     let planes = directions.flat_map(|d| [d.c_deg, d.c_deg + 180.0]).map(|c| c.rem_euclid(360.0));
     let [luminaire] = &task.scene.luminaires[..] else { return vec![] };
     let distribution = &luminaire.photometry.distribution;
-    let gamma_deg = distribution.gamma_deg();
+    let gamma_deg = distribution.gammas_of_half_planes();
     let intensity_cd = |c, gamma| distribution.intensity(c, gamma).value() * luminaire.flux_scale;
     let of_plane = |c_deg: f64| Curve {
         case: case.to_owned(),
         procedure: task.procedure,
         luminaire: luminaire.id.clone(),
         c_deg,
-        gamma_deg: gamma_deg.to_vec(),
+        gamma_deg: gamma_deg.clone(),
         intensity_cd: gamma_deg.iter().map(|&gamma| intensity_cd(c_deg, gamma)).collect(),
     };
     planes.sorted_by(f64::total_cmp).dedup().map(of_plane).collect()

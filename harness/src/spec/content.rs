@@ -43,10 +43,18 @@ pub fn content(task: &Task) -> String {
         part(luminaire.model.name(), &flat(&[luminaire.position_m, x_axis, y_axis, z_axis]));
         part(&format!("{:?}", photometry.opening), &[luminaire.flux_scale]);
         let table = &photometry.distribution;
-        let along = |&c: &f64| table.gamma_deg().iter().map(move |&gamma| table.intensity(c, gamma).value());
+        let along = |(k, &c): (usize, &f64)| -> Vec<f64> {
+            if table.is_native() {
+                return table.plane(k).to_vec();
+            }
+            table.gamma_deg().iter().map(|&gamma| table.intensity(c, gamma).value()).collect()
+        };
+        if table.is_native() {
+            part(&format!("type {:?}", table.goniometer()), &[]);
+        }
         part("C", table.c_deg());
         part("gamma", table.gamma_deg());
-        part("candela", &table.c_deg().iter().flat_map(along).collect::<Vec<_>>());
+        part("candela", &table.c_deg().iter().enumerate().flat_map(along).collect::<Vec<_>>());
     }
     for target in &task.targets {
         part("target", &flat(&[target.meter.position_m, target.meter.normal]));

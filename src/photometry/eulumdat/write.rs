@@ -2,7 +2,7 @@
 
 use super::direct_ratios::direct_ratios;
 use super::{COMPANY, DATE, EulumdatDetails, FILE, LampSet, NAME, NUMBER, REPORT, intensity_scale, parse, planes};
-use crate::photometry::write::{inverse, number, one_line};
+use crate::photometry::write::{in_type_c, inverse, number, one_line};
 use crate::photometry::{
     Details, FileFormat, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, Written,
 };
@@ -14,7 +14,21 @@ use crate::photometry::{
 pub fn write(photometry: &Photometry) -> Written {
     let details = details(photometry);
     let scale = intensity_scale(&details);
-    let table = Table::of(&photometry.distribution);
+    let text = in_type_c(photometry, scale, |distribution| text(photometry, &details, scale, distribution));
+    let mut written = Written::checked(photometry, text, FileFormat::Eulumdat, parse);
+    if !matches!(photometry.details, Details::Eulumdat(_)) {
+        written.notes.extend(notes(photometry));
+    }
+    written
+}
+
+fn text(
+    photometry: &Photometry,
+    details: &EulumdatDetails,
+    scale: f64,
+    distribution: &LuminousIntensityDistribution,
+) -> String {
+    let table = Table::of(distribution);
     let gamma_deg = table.stored.gamma_deg();
     let mut lines: Vec<String> = vec![];
     let keyword = |name: &str| one_line(photometry.keyword(name).unwrap_or_default());
@@ -41,11 +55,7 @@ pub fn write(photometry: &Photometry) -> Written {
     }
     let mut text = lines.join("\r\n");
     text.push_str("\r\n");
-    let mut written = Written::checked(photometry, text, FileFormat::Eulumdat, parse);
-    if !matches!(photometry.details, Details::Eulumdat(_)) {
-        written.notes.extend(notes(photometry));
-    }
-    written
+    text
 }
 
 /// The planes as EULUMDAT stores them.

@@ -1,10 +1,11 @@
-//! Writer of LM-63 files of any edition: type C, metres, all multipliers one.
+//! Writer of LM-63 files of any edition: metres, all multipliers one, tables in the type that they are of.
 
 use super::header::missing_keywords;
 use super::opening::to_dimensions;
 use super::{Edition, Lm63Details, ThirdNumber, Tilt, is_edition_line, is_tilt_line, parse};
-use crate::photometry::write::{lines, number, one_line};
-use crate::photometry::{Details, FileFormat, Photometry, Written};
+use crate::photometry::filed::Filed;
+use crate::photometry::write::{in_type_c, lines, number, one_line};
+use crate::photometry::{Details, FileFormat, Goniometer, Photometry, Written};
 
 /// Writes ANSI/IESNA LM-63-02.
 pub fn write_2002(photometry: &Photometry) -> Written {
@@ -20,6 +21,18 @@ pub fn write_2019(photometry: &Photometry) -> Written {
 ///
 /// Of the ballast factor and what multiplies beside it nothing is left: every intensity has them in it.
 pub fn write(photometry: &Photometry, edition: Edition) -> Written {
+    let text = match Filed::of(&photometry.distribution) {
+        Some(table) => text(photometry, edition, &table.halved()),
+        None => in_type_c(photometry, 1.0, |distribution| text(photometry, edition, &Filed::of_type_c(distribution))),
+    };
+    let mut written = Written::checked(photometry, text, FileFormat::Lm63(edition), parse);
+    if let Some(missing) = missing_keywords(edition, &photometry.keywords) {
+        written.notes.push(format!("{missing}, of which nothing is known"));
+    }
+    written
+}
+
+fn text(photometry: &Photometry, edition: Edition, table: &Filed) -> String {
     let mut text = String::new();
     if let Some(first) = edition.first_line() {
         text.push_str(first);
@@ -31,28 +44,27 @@ pub fn write(photometry: &Photometry, edition: Edition) -> Written {
         None => text.push_str("TILT=NONE\r\n"),
         Some(tilt) => tilt_records(tilt, &mut text),
     }
-    let distribution = &photometry.distribution;
-    let (c_deg, gamma_deg) = (distribution.c_deg(), distribution.gamma_deg());
-    // A shape that the edition lacks becomes its bounding box; the check below says so.
+    // A shape that the edition lacks becomes its bounding box; the check of what is written says so.
     let [width, length, height] =
         to_dimensions(edition, &photometry.opening).unwrap_or_else(|| photometry.opening.bounding_box_m()).map(number);
     let (lamps, lumens) = (details.lamps.to_string(), number(details.lumens_per_lamp));
-    let (gammas, planes) = (gamma_deg.len().to_string(), c_deg.len().to_string());
-    // Multiplier, type C, metres.
-    let (multiplier, kind, units) = ("1".into(), "1".into(), "2".into());
-    text.push_str(&[lamps, lumens, multiplier, gammas, planes, kind, units, width, length, height].join(" "));
+    let (verticals, horizontals) = (table.vertical_deg.len().to_string(), table.horizontal_deg.len().to_string());
+    // Multiplier, metres.
+    let kind = match table.goniometer {
+        Goniometer::C => "1",
+        Goniometer::B => "2",
+        Goniometer::A => "3",
+    };
+    let (multiplier, kind, units) = ("1".into(), kind.into(), "2".into());
+    text.push_str(&[lamps, lumens, multiplier, verticals, horizontals, kind, units, width, length, height].join(" "));
     text.push_str("\r\n");
     text.push_str(&lines([1.0, details.third_number.value(), photometry.input_watts.unwrap_or(0.0)]));
-    text.push_str(&lines(gamma_deg.iter().copied()));
-    text.push_str(&lines(c_deg.iter().copied()));
-    for plane in 0..c_deg.len() {
-        text.push_str(&lines(distribution.plane(plane).iter().copied()));
+    text.push_str(&lines(table.vertical_deg.iter().copied()));
+    text.push_str(&lines(table.horizontal_deg.iter().copied()));
+    for row in &table.candela {
+        text.push_str(&lines(row.iter().copied()));
     }
-    let mut written = Written::checked(photometry, text, FileFormat::Lm63(edition), parse);
-    if let Some(missing) = missing_keywords(edition, &photometry.keywords) {
-        written.notes.push(format!("{missing}, of which nothing is known"));
-    }
-    written
+    text
 }
 
 fn keywords(photometry: &Photometry, edition: Edition, text: &mut String) {

@@ -1,4 +1,4 @@
-//! Writer of TM-33-23 files: one emitter, type C, the multiplier one.
+//! Writer of TM-33-23 files: one emitter, the multiplier one, a table in the type that it is of.
 //!
 //! What the header has no element for is a comment, `[KEYWORD] text`, which the reader takes for that keyword again.
 
@@ -6,12 +6,24 @@ use std::fmt::Write as _;
 
 use super::header::{COMMENTS, KEYWORDS};
 use super::parse;
+use crate::photometry::filed::Filed;
 use crate::photometry::text::harmless;
-use crate::photometry::write::number;
-use crate::photometry::{FileFormat, Photometry, Symmetry, Written};
+use crate::photometry::write::{in_type_c, number};
+use crate::photometry::{FileFormat, Goniometer, Photometry, Symmetry, Written};
 
 /// Writes ANSI/IES TM-33-23.
 pub fn write(photometry: &Photometry) -> Written {
+    let symmetry = photometry.distribution.symmetry();
+    let text = match Filed::of(&photometry.distribution) {
+        Some(table) => text(photometry, symmetry, &table),
+        None => in_type_c(photometry, 1.0, |distribution| {
+            text(photometry, distribution.symmetry(), &Filed::of_type_c(distribution))
+        }),
+    };
+    Written::checked(photometry, text, FileFormat::Tm33, parse)
+}
+
+fn text(photometry: &Photometry, symmetry: Symmetry, table: &Filed) -> String {
     let mut text =
         String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\r\n<IESTM33-22>\r\n<Version>1.1</Version>\r\n");
     header(photometry, &mut text);
@@ -23,9 +35,13 @@ pub fn write(photometry: &Photometry) -> Written {
     if let Some(watts) = photometry.input_watts {
         element("InputWattage", number(watts));
     }
-    let distribution = &photometry.distribution;
-    text.push_str("<LuminousData>\r\n<PhotometryType>CIE-C</PhotometryType>\r\n<Metric>Luminous</Metric>\r\n");
-    let symmetry = match distribution.symmetry() {
+    let (kind, is_native) = (table.goniometer, table.goniometer != Goniometer::C);
+    text.push_str(&format!(
+        "<LuminousData>\r\n<PhotometryType>CIE-{kind:?}</PhotometryType>\r\n<Metric>Luminous</Metric>\r\n"
+    ));
+    let symmetry = match symmetry {
+        // The planes of other types are all there.
+        _ if is_native => "Symm_None",
         Symmetry::Axial => "Symm_Full",
         Symmetry::Quadrant => "Symm_Quad",
         Symmetry::BilateralC0 => "Symm_Bi0",
@@ -36,17 +52,17 @@ pub fn write(photometry: &Photometry) -> Written {
     let mut element = |name: &str, value: String| text.push_str(&format!("<{name}>{value}</{name}>\r\n"));
     element("AbsolutePhotometry", photometry.lamp_lumens.is_none().to_string());
     element("Multiplier", number(1.0));
-    element("NumberHorz", distribution.c_deg().len().to_string());
-    element("NumberVert", distribution.gamma_deg().len().to_string());
-    for (plane, c) in distribution.c_deg().iter().enumerate() {
-        let c = number(*c);
-        for (gamma, candela) in distribution.gamma_deg().iter().zip(distribution.plane(plane)) {
+    element("NumberHorz", table.horizontal_deg.len().to_string());
+    element("NumberVert", table.vertical_deg.len().to_string());
+    for (h, row) in table.horizontal_deg.iter().zip(&table.candela) {
+        let h = number(*h);
+        for (v, candela) in table.vertical_deg.iter().zip(row) {
             // Writing to a string cannot fail.
-            write!(text, "<IntData h=\"{c}\" v=\"{}\">{}</IntData>\r\n", number(*gamma), number(*candela)).ok();
+            write!(text, "<IntData h=\"{h}\" v=\"{}\">{}</IntData>\r\n", number(*v), number(*candela)).ok();
         }
     }
     text.push_str("</LuminousIntensity>\r\n</LuminousData>\r\n</Emitter>\r\n</IESTM33-22>\r\n");
-    Written::checked(photometry, text, FileFormat::Tm33, parse)
+    text
 }
 
 /// The header's own elements in their order, then everything else as comments.

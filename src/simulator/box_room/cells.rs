@@ -4,12 +4,13 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DMat3, DVec3};
 
+use crate::photometry::LuminousIntensityDistribution;
 use crate::scene::Luminaire;
 
 /// Angles closer than this are one, in radians.
 const SAME_ANGLE: f64 = 1e-12;
 
-/// A luminaire's frame and table in radians, written out over the full circle.
+/// The frame of a luminaire's table, upright but for type B, and its planes in radians, written out over all that they cover.
 #[derive(Clone, Debug)]
 pub(super) struct LuminaireFrame {
     pub(super) position_m: DVec3,
@@ -105,19 +106,23 @@ impl Cell {
 
 impl LuminaireFrame {
     pub(super) fn new(luminaire: &Luminaire) -> Self {
-        let full = luminaire.photometry.distribution.full_circle();
+        let full = luminaire.photometry.distribution.own_planes();
+        let full = if full.is_native() { quartered(full) } else { full };
         let candela: Vec<f64> =
             (0..full.c_deg().len()).flat_map(|c| full.plane(c)).map(|i| i * luminaire.flux_scale).collect();
-        let radians = |angles: &[f64]| angles.iter().map(|a| a.to_radians()).collect::<Vec<_>>();
-        let (mut c_rad, gamma_rad) = (radians(full.c_deg()), radians(full.gamma_deg()));
+        // A sector of planes is counted from its first.
+        let first_deg = full.c_deg()[0];
+        let radians = |angles: &[f64], from: f64| angles.iter().map(|a| (a - from).to_radians()).collect::<Vec<_>>();
+        let (mut c_rad, gamma_rad) = (radians(full.c_deg(), first_deg), radians(full.gamma_deg(), 0.0));
         let mut planes: Vec<&[f64]> = candela.chunks(gamma_rad.len()).collect();
-        if c_rad.len() == 2 {
+        if c_rad.len() == 2 && !full.is_native() {
             // An axial table has one plane: quarter turns keep its cells from wrapping round a pole.
             c_rad = (0..=4).map(|k| f64::from(k) * FRAC_PI_2).collect();
             planes = vec![planes[0]; 5];
         }
         let candela = planes.concat();
-        let (position_m, orientation) = (luminaire.position_m, luminaire.orientation);
+        let own_frame = full.own_frame() * DMat3::from_rotation_z(first_deg.to_radians());
+        let (position_m, orientation) = (luminaire.position_m, luminaire.orientation * own_frame);
         Self { position_m, orientation, c_rad, gamma_rad, candela }
     }
 
@@ -176,6 +181,19 @@ impl LuminaireFrame {
         let gammas = self.gamma_rad.len();
         [i, i + 1].iter().all(|i| self.candela[i * gammas + j..=i * gammas + j + 1].iter().all(|v| *v == 0.0))
     }
+}
+
+/// The same table with no more than a quarter turn between its planes, which keeps its cells from wrapping round a pole.
+fn quartered(table: LuminousIntensityDistribution) -> LuminousIntensityDistribution {
+    let between = |c: &[f64]| {
+        let (from, to) = (c[0], c[1]);
+        let parts = ((to - from) / 90.0 - SAME_ANGLE).ceil().max(1.0);
+        (0..parts as usize).map(move |k| from + (to - from) * k as f64 / parts)
+    };
+    let planes = table.c_deg();
+    let c_deg: Vec<f64> = planes.windows(2).flat_map(between).chain(planes.last().copied()).collect();
+    // Planes between those of a table change nothing in it.
+    table.resampled(c_deg, table.gamma_deg().to_vec()).map_or(table, |same| same.distribution)
 }
 
 /// A convex polygon seen from a luminaire: great circles in the luminaire's frame, normals pointing inwards.

@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 use super::Effort;
 use super::grid::{Face, Grid};
 use crate::geometry::{Room, Surface};
-use crate::photometry::{Symmetry, direction};
+use crate::photometry::Symmetry;
 use crate::scene::Luminaire;
 
 /// A symmetry of a box: mirrors, then perhaps axes exchanged.
@@ -128,14 +128,14 @@ fn is_image(op: Operation, luminaire: &Luminaire, other: &Luminaire) -> bool {
 
 /// World directions to every interior point of a table that its bilinear pieces are known by.
 fn probes(luminaire: &Luminaire) -> Vec<DVec3> {
-    let full = luminaire.photometry.distribution.full_circle();
+    let full = luminaire.photometry.distribution.own_planes();
     let fill = |angles: &[f64]| -> Vec<f64> {
         // A little off the nodes, where a table that starts with a step is not at the mercy of rounding.
         angles.windows(2).flat_map(|w| [0.001, 0.35, 0.5, 0.8, 0.999].map(|t| w[0] + t * (w[1] - w[0]))).collect()
     };
     let (cs, gammas) = (fill(full.c_deg()), fill(full.gamma_deg()));
-    let at = |c: &f64, g: &f64| luminaire.orientation * direction(*c, *g);
-    cs.iter().flat_map(|c| gammas.iter().map(move |g| at(c, g))).collect()
+    let at = |c: &f64, g: &f64| luminaire.orientation * full.own_direction(*c, *g);
+    cs.iter().flat_map(|c| gammas.iter().map(|g| at(c, g)).collect::<Vec<_>>()).collect()
 }
 
 /// Node images under a group, and which nodes stand for their orbits.

@@ -50,14 +50,8 @@ pub(super) struct Emitter {
     peak_cd: f64,
     opening: Opening,
     lambertian: Option<Lambertian>,
-    cut_off: Option<CutOff>,
-}
-
-/// The angles from the nadir at which a table ends in light, and how much at most: beyond them there is none.
-#[derive(Clone, Copy, Debug)]
-struct CutOff {
-    gamma_deg: [f64; 2],
-    brightest_cd: f64,
+    /// The light in which the table ends, at most: beyond it there is none.
+    cut_off_cd: Option<f64>,
 }
 
 /// What an integrand does at a place: whether it is within what it jumps at, and by how much at most; nothing where it jumps nowhere.
@@ -100,7 +94,9 @@ impl Emitter {
         let flat_m2 = opening.flat_m2().filter(|_| horizontal);
         let lambertian = flat_m2.and_then(|area_m2| lambertian(luminaire, area_m2));
         let peak_cd = luminaire.photometry.distribution.max_intensity().value() * luminaire.flux_scale;
-        Self { luminaire: luminaire.clone(), peak_cd, opening, lambertian, cut_off: cut_off(luminaire) }
+        let edge_cd = luminaire.photometry.distribution.edge_intensity().value() * luminaire.flux_scale;
+        let cut_off_cd = (edge_cd > 0.0).then_some(edge_cd);
+        Self { luminaire: luminaire.clone(), peak_cd, opening, lambertian, cut_off_cd }
     }
 
     /// Whether it has no extent.
@@ -299,9 +295,10 @@ impl Emitter {
 
     /// What a part's light does where the table ends in light, `weight` times.
     fn jump(&self, meter: &Own, part: &Part, weight: f64) -> Jump {
-        let cut_off = self.cut_off?;
+        let cut_off_cd = self.cut_off_cd?;
         let lux_per_cd = self.path(meter, part).map_or(0.0, |(_, lux_per_cd)| lux_per_cd);
-        Some((cut_off.holds(meter.position_m - part.at_m), weight * cut_off.brightest_cd * lux_per_cd))
+        let is_within = self.luminaire.photometry.distribution.covers(meter.position_m - part.at_m);
+        Some((is_within, weight * cut_off_cd * lux_per_cd))
     }
 
     /// The direction from a part of the opening to a meter above whose horizon it is, and the illuminance in lux that it gives for every
@@ -355,10 +352,11 @@ impl Emitter {
         };
         let light = |p: DVec3| direct::point(&self.luminaire, &Meter { position_m: p, normal }).value * seen(p);
         let jump = |p: DVec3| {
-            let (cut_off, away) = (self.cut_off?, p - from);
+            let (cut_off_cd, away) = (self.cut_off_cd?, p - from);
             let cosine = -away.normalize_or_zero().dot(normal);
-            let lux = cut_off.brightest_cd * cosine.max(0.0) / away.length_squared();
-            Some((cut_off.holds(self.luminaire.orientation.transpose() * away), lux * seen(p)))
+            let lux = cut_off_cd * cosine.max(0.0) / away.length_squared();
+            let own = self.luminaire.orientation.transpose() * away;
+            Some((self.luminaire.photometry.distribution.covers(own), lux * seen(p)))
         };
         let mut sum = Bounded::default();
         for lit in visible_pieces(from, &above, &candidates(from, &above, occluders)) {
@@ -397,32 +395,10 @@ fn lambertian(luminaire: &Luminaire, area_m2: f64) -> Option<Lambertian> {
     Some(Lambertian { exitance, interpolation: widest * widest / 8.0 + rounding })
 }
 
-impl CutOff {
-    /// Whether a direction in the luminaire's own frame, of any length, is within the table.
-    fn holds(&self, away: DVec3) -> bool {
-        let gamma_deg = away.truncate().length().atan2(-away.z).to_degrees();
-        (self.gamma_deg[0]..=self.gamma_deg[1]).contains(&gamma_deg)
-    }
-}
-
 /// Whether a table has no light above its horizon: it is zero at every node there and at the last one before.
 fn is_dark_above(luminaire: &Luminaire) -> bool {
     let table = &luminaire.photometry.distribution;
-    let (gamma_deg, nothing_cd) = (table.gamma_deg(), NO_LIGHT * table.max_intensity().value());
-    let rises = |k: &usize| gamma_deg[(k + 1).min(gamma_deg.len() - 1)] > 90.0;
-    let is_dark = |k: usize| (0..table.c_deg().len()).all(|c| table.plane(c)[k] <= nothing_cd);
-    (0..gamma_deg.len()).filter(rises).all(is_dark)
-}
-
-fn cut_off(luminaire: &Luminaire) -> Option<CutOff> {
-    let table = &luminaire.photometry.distribution;
-    let (gamma_deg, planes) = (table.gamma_deg(), 0..table.c_deg().len());
-    let [first, last] = [gamma_deg[0], gamma_deg[gamma_deg.len() - 1]];
-    let brightest = |k: usize| planes.clone().map(|c| table.plane(c)[k]).fold(0.0, f64::max);
-    let at_first = if first > 0.0 { brightest(0) } else { 0.0 };
-    let at_last = if last < 180.0 { brightest(gamma_deg.len() - 1) } else { 0.0 };
-    let brightest_cd = luminaire.flux_scale * at_first.max(at_last);
-    (brightest_cd > 0.0).then_some(CutOff { gamma_deg: [first, last], brightest_cd })
+    table.is_dark_above(table.max_intensity() * NO_LIGHT)
 }
 
 /// Integral over a convex flat polygon, by triangles that are quartered until two rules agree.

@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec3};
 
-use crate::photometry::{HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Symmetry};
+use crate::photometry::{Goniometer, HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Symmetry};
 use crate::scene::{Luminaire, LuminaireModel};
 
 /// A luminaire in its place.
@@ -129,6 +129,9 @@ impl<'a> Emitter<'a> {
     }
 
     fn intensity(&self, own: DVec3, gamma_deg: f64) -> f64 {
+        if self.distribution.goniometer() == Goniometer::B {
+            return self.distribution.intensity_towards(own).value() * self.flux_scale;
+        }
         let c_deg = if self.axial { 0.0 } else { own.y.atan2(own.x).to_degrees() };
         self.distribution.intensity(c_deg, gamma_deg).value() * self.flux_scale
     }
@@ -286,7 +289,10 @@ struct Bands {
 
 impl Bands {
     fn new(distribution: &LuminousIntensityDistribution) -> Option<Self> {
-        let gamma_deg = distribution.gamma_deg().to_vec();
+        // About another axis than the vertical: bands as narrow as any beam is wide.
+        let own = |table: &LuminousIntensityDistribution| table.gamma_deg().to_vec();
+        let even = || (0..=360).map(|k| 0.5 * f64::from(k)).collect();
+        let gamma_deg = if distribution.goniometer() == Goniometer::B { even() } else { own(distribution) };
         let mut below = vec![0.0];
         let mut total = 0.0;
         for g in gamma_deg.windows(2) {

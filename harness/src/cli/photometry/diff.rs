@@ -158,7 +158,7 @@ impl Record {
         if !self.is_exhaustive {
             row(
                 "note",
-                "the tables are too large to look at each angle of one with every angle of the other".to_owned(),
+                "the tables are too large, or of types A or B, to look at each angle of one with every angle of the other".to_owned(),
             );
         }
         text

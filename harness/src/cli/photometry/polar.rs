@@ -20,7 +20,7 @@ pub(super) fn diagram(file: &str, photometry: &Photometry) -> String {
         Some(lumens) if lumens > 0.0 => ("cd/klm", 1000.0 / lumens),
         _ => ("cd", 1.0),
     };
-    let gamma_deg = distribution.gamma_deg();
+    let gamma_deg = &distribution.gammas_of_half_planes()[..];
     let curve = |c: f64| gamma_deg.iter().map(|g| factor * distribution.intensity(c, *g).value()).collect::<Vec<_>>();
     let is_lit = |c: f64| gamma_deg.iter().any(|g| *g > 90.0 && distribution.intensity(c, *g).value() > 0.0);
     // A downlight is drawn to just above the horizon.

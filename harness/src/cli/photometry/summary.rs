@@ -20,6 +20,9 @@ pub(super) struct Summary {
     symmetry: &'static str,
     /// Of the values themselves.
     detected_symmetry: &'static str,
+    /// Of types A and B the two below are the file's horizontal and vertical angles.
+    #[serde(rename = "type")]
+    goniometer: String,
     c_planes: Angles,
     gamma: Angles,
     lamp_lumens: Option<f64>,
@@ -64,6 +67,7 @@ impl Summary {
         let (flux, max) = (distribution.flux(), distribution.max_intensity());
         let within = |fraction: f64| [0.0, 90.0].map(|c| distribution.angle_within(c, fraction, max));
         let lit = max > Candela(0.0);
+        let [horizontal, vertical] = distribution.file_angles_deg();
         let record = |l: &Lint| json!({"code": l.code, "line": l.line, "message": l.message});
         Self {
             file: file.display().to_string(),
@@ -75,8 +79,9 @@ impl Summary {
             max_cd: max.value(),
             symmetry: name(distribution.symmetry()),
             detected_symmetry: name(distribution.detected_symmetry(1e-9)),
-            c_planes: Angles::of(distribution.c_deg()),
-            gamma: Angles::of(distribution.gamma_deg()),
+            goniometer: format!("{:?}", distribution.goniometer()),
+            c_planes: Angles::of(&horizontal),
+            gamma: Angles::of(&vertical),
             lamp_lumens: photometry.lamp_lumens,
             output_ratio: photometry.lamp_lumens.map(|lumens| flux.value() / lumens),
             input_watts: photometry.input_watts,
@@ -125,7 +130,8 @@ impl fmt::Display for Angles {
         }
         write!(f, "{} from {} to {}°", self.count, self.first_deg, self.last_deg)?;
         match self.step_deg {
-            Some(step) => write!(f, " every {step}°"),
+            // As files have them, not as their differences are rounded.
+            Some(step) => write!(f, " every {}°", (step * 1e9).round() / 1e9),
             None => f.write_str(", unevenly spaced"),
         }
     }
@@ -146,8 +152,12 @@ impl fmt::Display for Summary {
         let (symmetry, detected) = (self.symmetry, self.detected_symmetry);
         let hidden = if symmetry == detected { String::new() } else { format!(" (the values are {detected})") };
         row("symmetry", format!("{symmetry}{hidden}"))?;
-        row("C planes", self.c_planes.to_string())?;
-        row("gamma angles", self.gamma.to_string())?;
+        let [horizontal, vertical] = match self.goniometer.as_str() {
+            "C" => ["C planes", "gamma angles"].map(str::to_owned),
+            kind => ["horizontal", "vertical"].map(|axis| format!("{axis}, type {kind}")),
+        };
+        row(&horizontal, self.c_planes.to_string())?;
+        row(&vertical, self.gamma.to_string())?;
         row("luminous opening", self.opening.clone())?;
         let lamps = match (self.lamp_lumens, self.output_ratio) {
             (Some(lumens), Some(ratio)) => format!("{lumens} lm, light output ratio {:.1} %", 100.0 * ratio),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use luminaire::geometry::Surface;
-use luminaire::photometry::{HorizontalAxis, LuminousOpening};
+use luminaire::photometry::{HorizontalAxis, LuminousOpening, TypeCLimits};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -206,13 +206,16 @@ fn obstacle(obstacle: &Obstacle) -> ObstacleForm {
 }
 
 fn luminaire(luminaire: &Luminaire) -> LuminaireForm {
+    // Programs get tables of type C alone; this is what our own solvers' jobs of other types are known by.
+    let model = luminaire.model;
+    let luminaire = &Luminaire { model: LuminaireModel::Point, ..luminaire.clone() }.in_type_c(TypeCLimits::default());
     let table = luminaire.photometry.distribution.full_circle().scaled(luminaire.flux_scale);
     LuminaireForm {
         id: luminaire.id.clone(),
-        model: luminaire.model.name(),
+        model: model.name(),
         position_m: luminaire.position_m.to_array(),
         axes: luminaire.orientation.to_cols_array_2d(),
-        opening: (luminaire.model != LuminaireModel::Point).then(|| opening(luminaire.photometry.opening)),
+        opening: (model != LuminaireModel::Point).then(|| opening(luminaire.photometry.opening)),
         c_deg: table.c_deg().to_vec(),
         gamma_deg: table.gamma_deg().to_vec(),
         candela: (0..table.c_deg().len()).map(|c| table.plane(c).to_vec()).collect(),

@@ -253,7 +253,8 @@ fn of_table(photometry: &Photometry, add: Add<'_>) {
     let values: Vec<f64> = (0..c_deg.len()).flat_map(|c| table.plane(c).to_vec()).collect();
     let brightest = table.max_intensity().value();
     let of_hemisphere = |c: usize| gamma_deg.iter().zip(table.plane(c)).any(|(g, i)| *g > 90.0 && *i > 0.0);
-    add(Feature::Uplight, (0..c_deg.len()).any(of_hemisphere));
+    let goes_up = || table.flux_between(90.0, 180.0).value() > 0.0;
+    add(Feature::Uplight, if table.is_native() { goes_up() } else { (0..c_deg.len()).any(of_hemisphere) });
     add(Feature::DarkPart, values.contains(&0.0));
     add(Feature::BrightTable, brightest > 1e5);
     add(Feature::FaintTable, brightest > 0.0 && brightest < 1.0);

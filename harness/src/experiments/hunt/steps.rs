@@ -404,7 +404,7 @@ fn fewer_planes(draft: &Draft) -> Vec<Draft> {
         let made = |c: &[usize]| {
             let values = c.iter().flat_map(|k| table.plane(*k).to_vec()).collect();
             let angles = if let [_] = c { vec![0.0] } else { c.iter().map(|k| c_deg[*k]).collect() };
-            LuminousIntensityDistribution::new(angles, gamma.to_vec(), values).ok()
+            table.with_table(angles, gamma.to_vec(), values).ok()
         };
         let planes: Vec<usize> = (0..c_deg.len()).collect();
         let singles = planes.iter().map(|k| vec![*k]);
@@ -428,8 +428,7 @@ fn fewer_gammas(draft: &Draft) -> Vec<Draft> {
         let made = |kept: &[usize]| {
             let row = |c: usize| kept.iter().map(move |g| table.plane(c)[*g]);
             let values = (0..table.c_deg().len()).flat_map(row).collect();
-            LuminousIntensityDistribution::new(table.c_deg().to_vec(), kept.iter().map(|g| gamma[*g]).collect(), values)
-                .ok()
+            table.with_table(table.c_deg().to_vec(), kept.iter().map(|g| gamma[*g]).collect(), values).ok()
         };
         let angles: Vec<usize> = (0..gamma.len()).collect();
         let ends = vec![0, gamma.len() - 1];
@@ -444,9 +443,7 @@ fn rounder_values(draft: &Draft) -> Vec<Draft> {
     for (name, old) in tables(draft) {
         let table = &old.distribution;
         let values: Vec<f64> = (0..table.c_deg().len()).flat_map(|c| table.plane(c).to_vec()).collect();
-        let made = |values: Vec<f64>| {
-            LuminousIntensityDistribution::new(table.c_deg().to_vec(), table.gamma_deg().to_vec(), values).ok()
-        };
+        let made = |values: Vec<f64>| table.with_table(table.c_deg().to_vec(), table.gamma_deg().to_vec(), values).ok();
         let mut lists: Vec<Vec<f64>> = [1, 2].map(|n| values.iter().map(|x| to_digits(*x, n)).collect()).to_vec();
         // A hundred times as bright or dark is another hundred candela.
         let scale = 100.0 / to_digits(table.max_intensity().value(), 1).max(f64::MIN_POSITIVE);
@@ -459,8 +456,7 @@ fn rounder_values(draft: &Draft) -> Vec<Draft> {
         }
         all.extend(lists.into_iter().filter_map(|values| retabled(draft, &name, &old, made(values))));
         let angles = rounder_list(table.gamma_deg()).into_iter();
-        let turned =
-            |gamma: Vec<f64>| LuminousIntensityDistribution::new(table.c_deg().to_vec(), gamma, values.clone()).ok();
+        let turned = |gamma: Vec<f64>| table.with_table(table.c_deg().to_vec(), gamma, values.clone()).ok();
         all.extend(angles.filter_map(|gamma| retabled(draft, &name, &old, turned(gamma))));
     }
     all

@@ -96,6 +96,9 @@ pub fn key(engine: &dyn Engine, version: &Version, job: &Job) -> Result<Key, Eng
     part(version.fingerprint.as_bytes());
     part(&ExternalJob::of(&job).to_json().map_err(unwritable)?);
     part(&serde_json::to_vec(&job.settings).map_err(unwritable)?);
+    for luminaire in job.scene.luminaires.iter().filter(|l| l.photometry.distribution.is_native()) {
+        part(format!("{}: type {:?}", luminaire.id, luminaire.photometry.distribution.goniometer()).as_bytes());
+    }
     for file in engine.export(&job)? {
         part(file.name.as_bytes());
         part(&file.bytes);

@@ -1,7 +1,7 @@
 //! Meters that no luminaire sends light to: their direct illuminance is 0 without a ray; pure.
 
 use glam::DVec3;
-use luminaire::photometry::angles_deg;
+use luminaire::photometry::{Goniometer, angles_deg};
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Transport};
 
 use super::{Fill, Shortcut};
@@ -46,6 +46,8 @@ impl<'a> Lit<'a> {
         let band = |(first, last): (usize, usize)| {
             (gamma[first.saturating_sub(1)] - MARGIN_DEG, gamma[(last + 1).min(gamma.len() - 1)] + MARGIN_DEG)
         };
+        // Bands about another axis are none about the vertical.
+        let band = |rows| if table.goniometer() == Goniometer::B { (0.0, 180.0) } else { band(rows) };
         let gamma_deg = first.zip(last).filter(|_| luminaire.flux_scale > 0.0).map(band);
         Self { luminaire, corners_m: corners(luminaire), gamma_deg }
     }

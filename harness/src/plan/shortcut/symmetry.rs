@@ -179,16 +179,20 @@ fn same_light(a: &Luminaire, b: &Luminaire, matrix: DMat3) -> bool {
 
 /// Directions between the nodes of a luminaire's table and on either side of them, in its own frame.
 fn directions(luminaire: &Luminaire) -> impl Iterator<Item = DVec3> + use<> {
-    let table = luminaire.photometry.distribution.full_circle();
+    let table = luminaire.photometry.distribution.own_planes();
     let middles = |nodes: &[f64]| nodes.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect::<Vec<f64>>();
     let mut gamma = middles(table.gamma_deg());
     gamma.extend(
         table.gamma_deg().iter().flat_map(|g| [g - BESIDE_DEG, g + BESIDE_DEG]).filter(|g| (0.0..=180.0).contains(g)),
     );
     let mut c = middles(table.c_deg());
+    if table.is_native() {
+        c.extend(table.c_deg().iter().flat_map(|c| [c - BESIDE_DEG, c + BESIDE_DEG]));
+    }
     // An axial table may have a single plane: then any will do.
     c.extend(table.c_deg().iter().copied().chain([0.0, 33.0, 90.0, 180.0, 270.0]));
-    c.into_iter().flat_map(move |c| gamma.clone().into_iter().map(move |g| direction(c, g)))
+    let frame = table.own_frame();
+    c.into_iter().flat_map(move |c| gamma.clone().into_iter().map(move |g| frame * direction(c, g)))
 }
 
 /// Whether an opening, turned from one luminaire's frame to the other's, is the other's.
