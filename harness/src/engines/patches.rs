@@ -120,7 +120,7 @@ impl Package {
         let run = self.libraries.beside(workbench.invoke(python), &workbench.site);
         let run = run.args(["-I", "-B", self.driver, "job.json", "--serve", "--threads", &threads]);
         let frame = Frame::of(job, settings.coordinates);
-        let side = patch(job, &frame);
+        let side = patch(job, &frame, settings.preset);
         let side_m = side / frame.scale;
         let spaces = Space::of(&recess::behind_points(job, self.apart), side_m);
         let seat = |space: &Space| if *space == Space::Tight { side } else { self.seat * side };
@@ -298,7 +298,7 @@ pub(super) fn job_json(
     tables: Vec<String>,
 ) -> Result<SceneFile, EngineError> {
     let (blocks, side) = settings.by_itself();
-    let patch = patch(job, frame);
+    let patch = patch(job, frame, settings.preset);
     let spaces = Space::of(job, patch / frame.scale);
     let driver_job = DriverJob {
         case: &job.case,

@@ -97,7 +97,7 @@ fn render_cfg(job: &Job, settings: Settings, frame: &Frame) -> String {
         return text;
     }
     // A path's length counts its first leg, from the camera to the meter, and its last, to the luminaire: read with limits of 1, 2 and 7.
-    let (clear, reflections) = (CLEAR * patches::seats::patch(job, frame), reflections(job));
+    let (clear, reflections) = (CLEAR * patches::seats::patch(job, frame, settings.preset), reflections(job));
     let depth = reflections + 2;
     write!(
         text,

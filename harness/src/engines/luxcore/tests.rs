@@ -64,6 +64,9 @@ fn the_stock_scene_shows_what_luxcore_makes_of_an_ies_file() {
     let axial = read(&with_preset(s1(Transport::Direct), "default"));
     let of_them = relative_deviations(&axial, &S1_DIRECT_LX.map(|lx| 0.25 / PI * lx));
     assert!(of_them[..3].iter().all(|d| d.abs() < 0.01) && (of_them[3] + 0.5).abs() < 0.01, "{of_them:?}");
+    // A patch as narrow as where rays begin by LuxCore's own settings was looked through now and then (found by a hunt).
+    let small = read(&with_preset(goniometer(&lamp, 0.3, &[30.0], &[20.0, 60.0]), "default"));
+    assert!(small.estimates.iter().all(|e| e.value > 0.0), "{small:?}");
 }
 
 #[test]

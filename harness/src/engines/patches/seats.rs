@@ -8,9 +8,13 @@ use luminaire::scene::{LuminaireModel, Shape};
 use crate::engines::Job;
 use crate::engines::float_error::EPSILON;
 use crate::engines::frame::Frame;
+use crate::engines::settings::Preset;
 
 /// Side of a meter's patch, in parts of the largest coordinate: forty times what 32-bit floats resolve there at least.
 const PATCH: f64 = 5e-6;
+/// And where a renderer's own settings say how far off a surface rays begin, 1e-5 in LuxCore, so many units of the scene at least: a camera
+/// stands a side before its patch, and looks through it where it begins to see farther off.
+const STOCK_PATCH: f64 = 5e-5;
 /// A surface so many sides from a meter is beside it.
 const BESIDE: f64 = 4.0;
 /// So many times as wide a patch may be that has more space about it, as in `luxcore_read.py`: what its corners are rounded by tilts it less.
@@ -51,12 +55,13 @@ impl Space {
 }
 
 /// Side of a meter's patch in scene units.
-pub(in crate::engines) fn patch(job: &Job, frame: &Frame) -> f64 {
+pub(in crate::engines) fn patch(job: &Job, frame: &Frame, preset: Preset) -> f64 {
     let room = job.scene.room.iter().flat_map(|r| [DVec3::ZERO, r.size_m]);
     let points = room.chain(job.scene.luminaires.iter().map(|l| l.position_m));
     let points = points.chain(job.stations.iter().map(|s| s.meter.position_m));
     let largest = points.map(|p| frame.to_scene(p).abs().max_element()).fold(0.0, f64::max);
-    PATCH * if largest > 0.0 { largest } else { 1.0 }
+    let side = PATCH * if largest > 0.0 { largest } else { 1.0 };
+    if preset == Preset::Default { side.max(STOCK_PATCH) } else { side }
 }
 
 /// Along which directions the sides of a patch lie, as in `Patches` of `cycles_read.py`.
