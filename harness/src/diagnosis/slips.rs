@@ -10,7 +10,7 @@ use luminaire::scene::{Luminaire, LuminaireModel, Scene, Transport, orientation}
 
 use super::fault::Fault;
 use super::faults::{FACTOR, each_reflectance, in_room};
-use super::tables::{even_angles, in_radians, is_axial, rounded_off};
+use super::tables::{Beyond, by_cubics, dark_at_last_gamma, even_angles, in_radians, is_axial, rounded_off};
 use super::wrong::{Law, Wrong};
 use crate::procedures::Task;
 
@@ -152,7 +152,14 @@ fn of_tables() -> Vec<Fault> {
         lookup("the table's C angles are taken to be evenly spaced", |l| !is_axial(l) && even_angles(l, true, false)),
         lookup("the table's C and gamma angles are taken to be evenly spaced", |l| even_angles(l, true, true)),
         lookup("directions in radians are looked up in a table in degrees", in_radians),
+        lookup("the table is dark at its last gamma itself", dark_at_last_gamma),
     ];
+    let cubics = [("goes round", Beyond::Closed), ("is dark", Beyond::Dark), ("is as at its end", Beyond::Nearest)];
+    all.extend(cubics.map(|(goes_on, beyond)| {
+        let what = "between the table's angles a cubic through four neighbours, by their numbers, is drawn, not a straight line";
+        let change = move |l: &mut Luminaire| by_cubics(l, beyond);
+        Fault::new("lookup", format!("{what}; beyond its ends it {goes_on}"), move |wrong, _| wrong.luminaires(change))
+    }));
     let curves: [(&str, Curve); 2] = [
         ("half a wave of a cosine", |v| 0.5 - 0.5 * (std::f64::consts::PI * v).cos()),
         ("a smoothstep", |v| v * v * (3.0 - 2.0 * v)),

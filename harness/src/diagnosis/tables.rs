@@ -10,6 +10,11 @@ const MANY_NODES: usize = 400;
 /// What is left of it, each way.
 const NODES_LEFT: usize = 13;
 
+/// Its table as one of type C, whose angles any other reader takes for C and gamma.
+fn in_type_c(luminaire: &Luminaire) -> LuminousIntensityDistribution {
+    luminaire.photometry.distribution.in_type_c().distribution
+}
+
 /// Leaves the luminaire as it is, and says so, where a table's angles allow no other.
 pub(super) fn replace(luminaire: &mut Luminaire, distribution: Option<LuminousIntensityDistribution>) -> bool {
     let Some(distribution) = distribution else { return false };
@@ -44,13 +49,13 @@ pub(super) fn isotropic(luminaire: &mut Luminaire) -> bool {
 }
 
 pub(super) fn averaged(luminaire: &mut Luminaire) -> bool {
-    let table = &luminaire.photometry.distribution;
+    let table = &in_type_c(luminaire);
     let axial = LuminousIntensityDistribution::axial(table.gamma_deg().to_vec(), table.azimuth_average());
     replace(luminaire, axial.ok())
 }
 
 pub(super) fn extrapolated(luminaire: &mut Luminaire) -> bool {
-    let table = &luminaire.photometry.distribution;
+    let table = &in_type_c(luminaire);
     let gamma = table.gamma_deg();
     let (first, last) = (gamma[0], gamma[gamma.len() - 1]);
     if first == 0.0 && last == 180.0 {
@@ -72,7 +77,7 @@ pub(super) fn first_plane(luminaire: &mut Luminaire) -> bool {
 
 /// The candela of every node to a power, each as a part of the largest.
 pub(super) fn raised(luminaire: &mut Luminaire, power: f64) -> bool {
-    let table = &luminaire.photometry.distribution;
+    let table = &in_type_c(luminaire);
     let peak = table.max_intensity().value();
     let at_nodes = nodes(table, table.gamma_deg(), |c, g| peak * (table.intensity(c, g).value() / peak).powf(power));
     let is_even = at_nodes.iter().all(|candela| *candela == peak);
@@ -83,7 +88,7 @@ pub(super) fn raised(luminaire: &mut Luminaire, power: f64) -> bool {
 /// What should be read at a gamma is read so many degrees farther from the nadir, as from a texture whose texels' edges are taken for their
 /// centres: half a texel off, so that its last texel ends a whole one before the table.
 pub(super) fn shifted(luminaire: &mut Luminaire, by_deg: f64) -> bool {
-    let table = &luminaire.photometry.distribution;
+    let table = &in_type_c(luminaire);
     let gamma = table.gamma_deg();
     let (first, last) = (gamma[0], gamma[gamma.len() - 1]);
     let (low, high) = (first - 2.0 * by_deg.min(0.0), last - 2.0 * by_deg.max(0.0));
@@ -156,6 +161,73 @@ pub(super) fn rounded_off(luminaire: &mut Luminaire, [in_c, in_gamma]: [bool; 2]
     replace(luminaire, LuminousIntensityDistribution::new(nodes(&c), nodes(&gamma), candela).ok())
 }
 
+/// What a cubic takes for the value beyond a row's end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Beyond {
+    /// Where the row closes, its own: the image of a pole, the next plane round. Else none.
+    Closed,
+    Dark,
+    Nearest,
+}
+
+/// The values before and behind two neighbours, and these, in a row that goes on at its ends with others of its own.
+fn four(row: &[f64], k: usize, [before, behind]: [Option<usize>; 2], beyond: Beyond) -> [f64; 4] {
+    let end = |goes_on: Option<usize>, nearest: f64| match beyond {
+        Beyond::Closed => goes_on.map_or(0.0, |of| row[of]),
+        Beyond::Dark => 0.0,
+        Beyond::Nearest => nearest,
+    };
+    let first = if k > 0 { row[k - 1] } else { end(before, row[k]) };
+    let last = row.get(k + 2).copied().unwrap_or_else(|| end(behind, row[k + 1]));
+    [first, row[k], row[k + 1], last]
+}
+
+/// Catmull and Rom's cubic from the second of four values, at 0, to the third, at 1.
+fn cubic([a, b, c, d]: [f64; 4], x: f64) -> f64 {
+    b + 0.5 * x * (c - a + x * (2.0 * a - 5.0 * b + 4.0 * c - d + x * (3.0 * (b - c) + d - a)))
+}
+
+/// Between the table's angles cubics through four neighbours, by their numbers, whatever the angles between them.
+pub(super) fn by_cubics(luminaire: &mut Luminaire, beyond: Beyond) -> bool {
+    let table = luminaire.photometry.distribution.full_circle();
+    let (c, gamma) = (table.c_deg(), table.gamma_deg());
+    let last = gamma.len() - 1;
+    // A pole mirrors the row, and a circle goes on with its second plane.
+    let poles = [(gamma[0] == 0.0).then_some(1), (gamma[last] == 180.0).then(|| last - 1)];
+    let round = [Some(c.len() - 2), Some(1)];
+    let curve = |row: &[f64], closes: [Option<usize>; 2]| -> Vec<f64> {
+        let between = |k: usize| {
+            let values = four(row, k, closes, beyond);
+            (0..BETWEEN).map(move |v| cubic(values, f64::from(v) / f64::from(BETWEEN)))
+        };
+        (0..row.len() - 1).flat_map(between).chain(row.last().copied()).collect()
+    };
+    let angles = |of: &[f64]| -> Vec<f64> {
+        let between = |pair: &[f64]| {
+            let (from, step) = (pair[0], (pair[1] - pair[0]) / f64::from(BETWEEN));
+            (0..BETWEEN).map(move |v| from + step * f64::from(v))
+        };
+        of.windows(2).flat_map(between).chain(of.last().copied()).collect()
+    };
+    let (c_deg, gamma_deg) = (angles(c), angles(gamma));
+    let along: Vec<Vec<f64>> = (0..c.len()).map(|k| curve(table.plane(k), poles)).collect();
+    let across = (0..gamma_deg.len()).map(|g| curve(&along.iter().map(|plane| plane[g]).collect::<Vec<_>>(), round));
+    let across: Vec<Vec<f64>> = across.collect();
+    let candela = (0..c_deg.len()).flat_map(|k| across.iter().map(move |row| row[k].max(0.0))).collect();
+    replace(luminaire, LuminousIntensityDistribution::new(c_deg, gamma_deg, candela).ok())
+}
+
+/// The table is dark at its last gamma itself, as where `<` was meant to be `<=`.
+pub(super) fn dark_at_last_gamma(luminaire: &mut Luminaire) -> bool {
+    let table = &in_type_c(luminaire);
+    let gamma = table.gamma_deg();
+    let (before, last) = (gamma[gamma.len() - 2], gamma[gamma.len() - 1]);
+    let edge = last - 1e-6 * (last - before);
+    let gamma_deg = [&gamma[..gamma.len() - 1], &[edge, last]].concat();
+    let at_nodes = nodes(table, &gamma_deg, |c, g| if g < last { table.intensity(c, g).value() } else { 0.0 });
+    replace(luminaire, LuminousIntensityDistribution::new(table.c_deg().to_vec(), gamma_deg, at_nodes).ok())
+}
+
 /// What is found by angles in radians among those in degrees.
 pub(super) fn in_radians(luminaire: &mut Luminaire) -> bool {
     let table = luminaire.photometry.distribution.full_circle();
@@ -176,7 +248,7 @@ fn sorted(mut angles: Vec<f64>) -> Vec<f64> {
 
 /// The candela of every node squared, the table's own unit a candela.
 pub(super) fn squared(luminaire: &mut Luminaire) -> bool {
-    let table = &luminaire.photometry.distribution;
+    let table = &in_type_c(luminaire);
     let at_nodes = nodes(table, table.gamma_deg(), |c, g| table.intensity(c, g).value().powi(2));
     let (c_deg, gamma_deg) = (table.c_deg().to_vec(), table.gamma_deg().to_vec());
     luminaire.flux_scale *= luminaire.flux_scale;
@@ -185,7 +257,7 @@ pub(super) fn squared(luminaire: &mut Luminaire) -> bool {
 
 /// A table that reflected light is soon solved for: every so many nodes of a long one, and whether that changes it.
 pub(super) fn thinned(luminaire: &mut Luminaire) -> bool {
-    let table = &luminaire.photometry.distribution;
+    let table = &in_type_c(luminaire);
     if table.c_deg().len() * table.gamma_deg().len() <= MANY_NODES {
         return false;
     }
