@@ -127,6 +127,20 @@ fn within_a_closed_cube_of_panels_every_meter_reads_their_exitance() {
     });
 }
 
+#[test]
+fn a_body_in_a_furnace_is_as_bright_all_over_as_it_reflects() {
+    let exitance = closed_form::lambertian_exitance(1000.0 / 4.0).value();
+    let axes = [(DVec3::X, DVec3::Y), (DVec3::Y, DVec3::Z), (DVec3::Z, DVec3::X)];
+    check("furnace-body.yaml", 7, |meter| {
+        let sides = axes.iter().flat_map(|&(u, v)| {
+            let out = u.cross(v);
+            [out, -out].map(|out| square(DVec3::splat(2.0) + out, u, v))
+        });
+        let factor: f64 = sides.map(|side| element_to_polygon(meter.position_m, meter.normal, &side)).sum();
+        0.3 * exitance * factor / PI
+    });
+}
+
 fn scene(room_m: DVec3, rho: f64, name: &str, position_m: DVec3) -> Scene {
     let luminaire = Luminaire {
         id: name.into(),

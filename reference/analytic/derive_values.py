@@ -51,6 +51,12 @@ def main():
     rows = [(p, n, 250 * math.pi) for p, n in places]
     write("furnace", "Furnace of luminous panels", "closed_form", 3, {"direct_illuminance": ("area", rows)})
 
+    # A convex body that nothing but the panels lights: E = M on all of it, L = rho M / pi, rho .3 times their 250 cd/m2.
+    rows = [((x, y, z), n, .3 * 250) for (x, y, z), n in (
+        ((1.8, 1.9, 2.401), up), ((2.3, 2.2, 2.401), up), ((1.8, 1.9, 1.499), down), ((2.3, 2.2, 1.499), down),
+        ((1.599, 1.9, 1.7), (-1, 0, 0)), ((1.599, 2.2, 2.2), (-1, 0, 0)), ((2.1, 2.301, 1.7), (0, 1, 0)))]
+    write("furnace-body", "Body in a furnace", "closed_form", 3, {"luminance": ("area", rows)})
+
     ceiling = zip(((2, 2, 17), (2, 10, 17), (10, 2, 17), (10, 10, 17)),
                   (.852757463, 2.230931615, 2.230931615, 13.559183673))
     plane = zip(((2, 2, 2), (2, 10, 2), (10, 2, 2), (10, 10, 2)), (.94314714, 1.15551735, 1.15551735, 1.42062868))
@@ -134,7 +140,8 @@ def write(name, title, basis, digits, tables, units=1):
     meaning = "Derived, no program's output" if basis == "closed_form" else "Exact methods, see the title"
     for procedure, (model, rows) in tables.items():
         column = f'{{reference: true, engine: {basis}, model: {model}, meaning: "{meaning}"}}'
-        lines += [f"  {procedure}:", f"    name: {name}", "    quantity: illuminance_lx", "    columns:",
+        quantity = "luminance_cd_m2" if procedure == "luminance" else "illuminance_lx"
+        lines += [f"  {procedure}:", f"    name: {name}", f"    quantity: {quantity}", "    columns:",
                   f"      value: {column}", "    rows:"]
         for point, normal, value in rows:
             at, facing = (f"[{', '.join(f'{v:.9g}' for v in vector)}]" for vector in (point, normal))

@@ -20,6 +20,7 @@ mod guide;
 mod hunt;
 mod import;
 mod long_report;
+mod luminance;
 mod main_job;
 mod measuring;
 mod mesh_files;

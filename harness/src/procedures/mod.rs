@@ -11,5 +11,5 @@ mod task;
 
 pub use asked::Procedures;
 pub use form::{AngleLists, Angles, AnyLight, Asked, AtAngles, AtMeters, Form, Names};
-pub use table::{Procedure, Reference};
-pub use task::{Aspect, Direction, Target, Task};
+pub use table::{Procedure, Reads, Reference};
+pub use task::{Aspect, Direction, Sets, Target, Task};

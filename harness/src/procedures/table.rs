@@ -1,6 +1,5 @@
 //! The table of procedures: what each is called, asks of a spec, reads and is judged by. A new procedure is a row here.
 
-use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use glam::DVec3;
@@ -9,7 +8,7 @@ use luminaire::scene::{LuminaireModel, Meter, Scene, Transport};
 
 use super::form::{AnyLight, Asked, AtMeters, Form};
 use super::known;
-use super::task::{Aspect, Target, Task, around, of_sets};
+use super::task::{Aspect, Sets, Target, Task, around, of_sets};
 use crate::record::{Basis, EngineName, ProcedureId, Quantity};
 
 /// One procedure.
@@ -26,10 +25,21 @@ pub struct Procedure {
     pub form: Option<Form>,
     /// Which light counts.
     pub transport: fn(&AtMeters) -> Transport,
-    /// What is added up at a meter of the spec, and how far off that sum may be, relative.
-    pub aspects: fn(Meter) -> (Vec<Aspect>, f64),
+    /// What of the light at a meter of the spec makes a reading.
+    pub reads: Reads,
     /// What others are judged by.
     pub reference: fn(&Task) -> Reference,
+}
+
+/// What of the light at a meter makes a reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reads {
+    /// The illuminance on the side that the meter looks to.
+    Illuminance,
+    /// Its mean over all vertical directions.
+    AllAround,
+    /// The luminance of the diffuse surface on which the meter lies, L = rho E / pi.
+    Luminance,
 }
 
 /// What the readings of a task are judged by.
@@ -60,7 +70,7 @@ impl Reference {
 }
 
 /// Every procedure, in the order of reports, and the scenes of the calibration. Tolerances stand under the same name in `reference/tolerances.yaml`.
-pub static ALL: [Procedure; 11] = [
+pub static ALL: [Procedure; 12] = [
     Procedure {
         id: ProcedureId::LuminousIntensity,
         title: "Luminous intensity",
@@ -69,7 +79,7 @@ pub static ALL: [Procedure; 11] = [
         quantity: Quantity::LuminousIntensity,
         form: Some(Form::Angles),
         transport: |_| Transport::Direct,
-        aspects: as_it_looks,
+        reads: Reads::Illuminance,
         reference: |task| closed_form(task, "photometric file, bilinear in (C, gamma)"),
     },
     Procedure {
@@ -80,7 +90,7 @@ pub static ALL: [Procedure; 11] = [
         quantity: Quantity::Illuminance,
         form: Some(Form::Meters),
         transport: |_| Transport::Direct,
-        aspects: as_it_looks,
+        reads: Reads::Illuminance,
         reference: |task| closed_form(task, "inverse square"),
     },
     Procedure {
@@ -91,7 +101,7 @@ pub static ALL: [Procedure; 11] = [
         quantity: Quantity::Illuminance,
         form: Some(Form::MetersAndBounces),
         transport: |asked| Transport::Indirect(asked.bounces),
-        aspects: as_it_looks,
+        reads: Reads::Illuminance,
         reference: |_| EXACT,
     },
     Procedure {
@@ -102,7 +112,7 @@ pub static ALL: [Procedure; 11] = [
         quantity: Quantity::Illuminance,
         form: Some(Form::MetersAndBounces),
         transport: |asked| Transport::Total(asked.bounces),
-        aspects: as_it_looks,
+        reads: Reads::Illuminance,
         reference: |_| EXACT,
     },
     Procedure {
@@ -117,7 +127,7 @@ pub static ALL: [Procedure; 11] = [
             AnyLight::Direct => Transport::Direct,
             AnyLight::Indirect => Transport::Indirect(asked.bounces),
         },
-        aspects: all_around,
+        reads: Reads::AllAround,
         reference: |task| match task.transport {
             Transport::Direct if is_inverse_square(&task.scene) => Reference::Formula {
                 of: |scene, target| inverse_square::cylindrical_illuminance(scene, target.meter.position_m).value(),
@@ -125,6 +135,17 @@ pub static ALL: [Procedure; 11] = [
             },
             _ => EXACT,
         },
+    },
+    Procedure {
+        id: ProcedureId::Luminance,
+        title: "Luminance",
+        short: "Luminance",
+        meaning: "Luminance of the diffuse surface on which each meter lies, L = rho E / pi, E being all light, direct and reflected.",
+        quantity: Quantity::Luminance,
+        form: Some(Form::MetersAndBounces),
+        transport: |asked| Transport::Total(asked.bounces),
+        reads: Reads::Luminance,
+        reference: |_| EXACT,
     },
     known(ProcedureId::Point, "Calibration: point", "the inverse-square law from .5 to 10 m", |_| STRAIGHT),
     known(ProcedureId::Asymmetric, "Calibration: asymmetric", "a table without symmetry, turned, all around", |_| {
@@ -156,7 +177,7 @@ const fn known(
         quantity: Quantity::Illuminance,
         form: None,
         transport: |_| Transport::Direct,
-        aspects: as_it_looks,
+        reads: Reads::Illuminance,
         reference,
     }
 }
@@ -164,9 +185,17 @@ const fn known(
 const STRAIGHT: Reference = Reference::Formula { of: known::straight, source: "inverse square" };
 const EVEN: Reference = Reference::Formula { of: known::even, source: "rho / (1 - rho) x flux / area" };
 
-/// One illuminance, on the side that the meter looks to.
-fn as_it_looks(meter: Meter) -> (Vec<Aspect>, f64) {
-    (vec![Aspect { meter, weight: 1.0 }], 0.0)
+impl Reads {
+    /// What is added up at a meter on a surface of this reflectance, and how far off that sum may be, relative; nothing where it
+    /// takes a surface and there is none.
+    pub(super) fn aspects(self, meter: Meter, reflectance: Option<f64>) -> Option<(Vec<Aspect>, f64)> {
+        let one = |weight: f64| (vec![Aspect { meter, weight }], 0.0);
+        match self {
+            Self::Illuminance => Some(one(1.0)),
+            Self::AllAround => Some(all_around(meter)),
+            Self::Luminance => reflectance.map(|rho| one(rho / PI)),
+        }
+    }
 }
 
 /// Directions of the mean all around: odd, so that its error is that of twice as many.
@@ -206,16 +235,14 @@ fn is_inverse_square(scene: &Scene) -> bool {
 
 impl Procedure {
     /// What it measures in a scene, as asked; `None` where the luminaire that is named is not there.
-    pub fn task(&self, asked: &Asked, scene: &Scene, meters: &BTreeMap<String, Vec<Meter>>) -> Option<Task> {
+    pub fn task(&self, asked: &Asked, scene: &Scene, sets: &Sets<'_>) -> Option<Task> {
         let (scene, transport, targets) = match asked {
             Asked::Angles(asked) => {
                 let luminaire = scene.luminaires.iter().find(|l| l.id == asked.luminaire)?;
                 let alone = Scene { room: None, obstacles: vec![], luminaires: vec![luminaire.clone()] };
                 (alone, Transport::Direct, around(luminaire, asked))
             }
-            Asked::Meters(asked) => {
-                (scene.clone(), (self.transport)(asked), of_sets(meters, &asked.meters, self.aspects))
-            }
+            Asked::Meters(asked) => (scene.clone(), (self.transport)(asked), of_sets(sets, &asked.meters, self.reads)),
         };
         Some(Task { procedure: self.id, scene, transport, quantity: self.quantity, targets })
     }

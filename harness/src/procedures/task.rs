@@ -7,6 +7,7 @@ use luminaire::photometry::direction;
 use luminaire::scene::{Luminaire, Meter, Scene, Transport};
 
 use super::form::{Angles, AtAngles, Names};
+use super::table::Reads;
 use crate::record::{Light, MeterId, ProcedureId, Quantity};
 
 /// What one procedure measures in one case.
@@ -123,19 +124,24 @@ pub(super) fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
     angles.into_iter().enumerate().map(target).collect()
 }
 
+/// The meter sets of a spec.
+#[derive(Clone, Copy, Debug)]
+pub struct Sets<'a> {
+    pub meters: &'a BTreeMap<String, Vec<Meter>>,
+    /// Diffuse reflectance of the surface on which each meter lies, of the sets whose meters lie on one.
+    pub reflectances: &'a BTreeMap<String, Vec<f64>>,
+}
+
 /// The meters of named sets, each with what is added up there.
-pub(super) fn of_sets(
-    meters: &BTreeMap<String, Vec<Meter>>,
-    names: &Names,
-    aspects: fn(Meter) -> (Vec<Aspect>, f64),
-) -> Vec<Target> {
+pub(super) fn of_sets(sets: &Sets<'_>, names: &Names, reads: Reads) -> Vec<Target> {
     let target = |name: &str, k: usize, meter: Meter| {
-        let (aspects, quadrature) = aspects(meter);
-        Target { id: MeterId::new(name, k), meter, direction: None, aspects, quadrature }
+        let reflectance = sets.reflectances.get(name).and_then(|set| set.get(k)).copied();
+        let (aspects, quadrature) = reads.aspects(meter, reflectance)?;
+        Some(Target { id: MeterId::new(name, k), meter, direction: None, aspects, quadrature })
     };
     let of_set = |name: &str| {
-        let meters = meters.get(name).into_iter().flatten().enumerate();
-        meters.map(|(k, meter)| target(name, k, *meter)).collect::<Vec<_>>()
+        let meters = sets.meters.get(name).into_iter().flatten().enumerate();
+        meters.filter_map(|(k, meter)| target(name, k, *meter)).collect::<Vec<_>>()
     };
     names.iter().flat_map(of_set).collect()
 }

@@ -36,6 +36,9 @@ pub enum Quantity {
     /// Luminous intensity in candela.
     #[serde(rename = "luminous_intensity_cd")]
     LuminousIntensity,
+    /// Luminance in candela per square metre.
+    #[serde(rename = "luminance_cd_m2")]
+    Luminance,
 }
 
 impl Quantity {
@@ -44,6 +47,7 @@ impl Quantity {
         match self {
             Self::Illuminance => "lx",
             Self::LuminousIntensity => "cd",
+            Self::Luminance => "cd/m²",
         }
     }
 }

@@ -277,11 +277,15 @@ fn of_sets(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<St
     if mine.is_empty() {
         return None;
     }
-    let figures: [(&str, Figure); 3] =
-        [("mean [lx]", |s| Some(s.mean)), ("minimum [lx]", |s| Some(s.minimum)), ("uniformity", |s| s.uniformity)];
+    let unit = procedure.row().quantity.unit();
+    let figures: [(String, Figure); 3] = [
+        (format!("mean [{unit}]"), |s| Some(s.mean)),
+        (format!("minimum [{unit}]"), |s| Some(s.minimum)),
+        ("uniformity".to_owned(), |s| s.uniformity),
+    ];
     let of_set = |(set, meters): &(&str, usize)| {
         let rows = |range: &Range<usize>| {
-            figures.map(|(name, figure)| {
+            figures.each_ref().map(|(name, figure)| {
                 let of = |engine: &&str| mine.iter().find(|s| s.set == *set && s.key.engine == **engine);
                 let cell = |e| of(e).and_then(|s| figure(s)).map_or("-".to_owned(), |x| estimate(&x));
                 let head = format!("  {name}");

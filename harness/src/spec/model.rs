@@ -507,4 +507,6 @@ pub struct ToleranceOverride {
     pub absolute_lx: f64,
     /// Absolute, in candela.
     pub absolute_cd: f64,
+    /// Absolute, in candela per square metre.
+    pub absolute_cd_m2: f64,
 }
