@@ -33,12 +33,12 @@ const REFLECTANCES: [(&str, f64); 5] =
 #[test]
 fn luminance_is_what_each_surface_reflects_of_all_light() {
     let folder = Folder::for_renderers(&[("spec.yaml", SURFACES), ("lamp.ies", LAMP)]);
-    let args = ["--engines", "simulator,radiance", "--no-calibration", "--sampling", "accurate", "--format", "json"];
+    let args = ["--engines", "simulator,radiance", "--sampling", "accurate", "--format", "json"];
     let (report, code) = folder.run(&args).report();
     assert!(matches!(code, Some(0 | 2)), "{}", report["summary"]);
     let of = |list: &str, engine: &str, procedure: &str, meter: &str| -> Value {
         let named = [("engine", engine), ("procedure", procedure), ("meter", meter)];
-        among(&report, list, &named).first().map(|v| (*v).clone()).unwrap_or_else(|| panic!("{engine} {meter}"))
+        among(&report, list, &named).first().map_or_else(|| panic!("{engine} {meter}"), |v| (*v).clone())
     };
     for engine in ["simulator", "radiance"] {
         for (meter, rho) in REFLECTANCES {
@@ -78,7 +78,10 @@ fn a_luminance_meter_off_its_surface_or_on_two_is_refused_at_its_place() {
         let folder = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", LAMP)]);
         let answer = folder.luxproof(&["check", "spec.yaml"]);
         let place = format!("spec.yaml:{line}:");
-        assert!(answer.stderr.contains(&place) && answer.stderr.contains(told), "{to}: {}", answer.stderr);
+        // As long lines are broken.
+        let bare = |text: &str| text.chars().filter(|c| !c.is_whitespace() && *c != '│').collect::<String>();
+        let is_told = bare(&answer.stderr).contains(&bare(told));
+        assert!(answer.stderr.contains(&place) && is_told, "{to}: {}", answer.stderr);
         assert_eq!(answer.code, Some(2), "{}", answer.stderr);
     }
 }

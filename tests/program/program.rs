@@ -16,6 +16,7 @@ mod cylindrical;
 mod external_adapter;
 mod faults;
 mod furnished_office;
+mod glare;
 mod guide;
 mod hunt;
 mod import;

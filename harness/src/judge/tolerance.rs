@@ -114,6 +114,9 @@ pub struct Rule {
     /// In candela per square metre.
     #[serde(default)]
     absolute_cd_m2: f64,
+    /// Of a glare rating.
+    #[serde(default)]
+    absolute_ugr: f64,
     /// A standard, a paper, a decision of the project.
     source: String,
     /// Whose rule it is, where not ours.
@@ -141,6 +144,7 @@ pub(super) fn faults(source: &Source, rules: &[Rule]) -> Vec<SpecError> {
             ("absolute_lx", rule.absolute_lx),
             ("absolute_cd", rule.absolute_cd),
             ("absolute_cd_m2", rule.absolute_cd_m2),
+            ("absolute_ugr", rule.absolute_ugr),
         ];
         let of_values = values.map(|(field, value)| {
             let sound = value.is_finite() && value >= 0.0;
@@ -164,6 +168,7 @@ impl Rule {
             Quantity::Illuminance => self.absolute_lx,
             Quantity::LuminousIntensity => self.absolute_cd,
             Quantity::Luminance => self.absolute_cd_m2,
+            Quantity::GlareRating => self.absolute_ugr,
         }
     }
 }
@@ -247,6 +252,7 @@ impl Tolerances {
                 Quantity::Illuminance => o.absolute_lx,
                 Quantity::LuminousIntensity => o.absolute_cd,
                 Quantity::Luminance => o.absolute_cd_m2,
+                Quantity::GlareRating => o.absolute_ugr,
             };
             return (Tolerance { relative: o.relative, absolute }, None);
         }

@@ -1,14 +1,12 @@
 //! The table of procedures: what each is called, asks of a spec, reads and is judged by. A new procedure is a row here.
 
-use std::f64::consts::PI;
-
-use glam::DVec3;
 use luminaire::calculators::inverse_square;
-use luminaire::scene::{LuminaireModel, Meter, Scene, Transport};
+use luminaire::scene::{LuminaireModel, Scene, Transport};
 
 use super::form::{AnyLight, Asked, AtMeters, Form};
 use super::known;
-use super::task::{Aspect, Sets, Target, Task, around, of_sets};
+use super::reads::Reads;
+use super::task::{Sets, Target, Task, around, of_sets};
 use crate::record::{Basis, EngineName, ProcedureId, Quantity};
 
 /// One procedure.
@@ -29,17 +27,6 @@ pub struct Procedure {
     pub reads: Reads,
     /// What others are judged by.
     pub reference: fn(&Task) -> Reference,
-}
-
-/// What of the light at a meter makes a reading.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reads {
-    /// The illuminance on the side that the meter looks to.
-    Illuminance,
-    /// Its mean over all vertical directions.
-    AllAround,
-    /// The luminance of the diffuse surface on which the meter lies, L = rho E / pi.
-    Luminance,
 }
 
 /// What the readings of a task are judged by.
@@ -70,7 +57,7 @@ impl Reference {
 }
 
 /// Every procedure, in the order of reports, and the scenes of the calibration. Tolerances stand under the same name in `reference/tolerances.yaml`.
-pub static ALL: [Procedure; 12] = [
+pub static ALL: [Procedure; 13] = [
     Procedure {
         id: ProcedureId::LuminousIntensity,
         title: "Luminous intensity",
@@ -147,6 +134,17 @@ pub static ALL: [Procedure; 12] = [
         reads: Reads::Luminance,
         reference: |_| EXACT,
     },
+    Procedure {
+        id: ProcedureId::UnifiedGlareRating,
+        title: "Unified glare rating",
+        short: "Glare",
+        meaning: "Unified glare rating (CIE 117) of observers who look as their meters do: 8 lg (.25 / Lb sum L² ω / p²) over the luminous openings in view, with Lb = E / pi of the indirect illuminance that is read at the eye.",
+        quantity: Quantity::GlareRating,
+        form: Some(Form::MetersAndBounces),
+        transport: |asked| Transport::Indirect(asked.bounces),
+        reads: Reads::GlareRating,
+        reference: |_| EXACT,
+    },
     known(ProcedureId::Point, "Calibration: point", "the inverse-square law from .5 to 10 m", |_| STRAIGHT),
     known(ProcedureId::Asymmetric, "Calibration: asymmetric", "a table without symmetry, turned, all around", |_| {
         STRAIGHT
@@ -184,38 +182,6 @@ const fn known(
 
 const STRAIGHT: Reference = Reference::Formula { of: known::straight, source: "inverse square" };
 const EVEN: Reference = Reference::Formula { of: known::even, source: "rho / (1 - rho) x flux / area" };
-
-impl Reads {
-    /// What is added up at a meter on a surface of this reflectance, and how far off that sum may be, relative; nothing where it
-    /// takes a surface and there is none.
-    pub(super) fn aspects(self, meter: Meter, reflectance: Option<f64>) -> Option<(Vec<Aspect>, f64)> {
-        let one = |weight: f64| (vec![Aspect { meter, weight }], 0.0);
-        match self {
-            Self::Illuminance => Some(one(1.0)),
-            Self::AllAround => Some(all_around(meter)),
-            Self::Luminance => reflectance.map(|rho| one(rho / PI)),
-        }
-    }
-}
-
-/// Directions of the mean all around: odd, so that its error is that of twice as many.
-const DIRECTIONS: u32 = 31;
-
-/// The mean over all vertical directions, by the rectangle rule.
-///
-/// A surface that turns once sees each bit of light as the positive part of a cosine, whose even harmonics 2k are
-/// 2 / (4 k^2 - 1) of its mean and whose odd ones but the first are none. An odd number N of directions takes the harmonics 2 N j for
-/// the mean: it is off by 2 / (4 N^2 j^2 - 1) of it, summed over j, at most, whatever the light, since all light is positive. The sum is
-/// 1 - x cot x with x = pi / 2N.
-fn all_around(meter: Meter) -> (Vec<Aspect>, f64) {
-    let facing = |k: u32| {
-        let azimuth = 2.0 * PI * f64::from(k) / f64::from(DIRECTIONS);
-        let normal = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
-        Aspect { meter: Meter { normal, ..meter }, weight: 1.0 / f64::from(DIRECTIONS) }
-    };
-    let x = PI / f64::from(2 * DIRECTIONS);
-    ((0..DIRECTIONS).map(facing).collect(), 1.0 - x / x.tan())
-}
 
 const EXACT: Reference =
     Reference::Witness { engine: EngineName::SIMULATOR, basis: Basis::Exact, source: "luminaire::simulator" };
@@ -278,19 +244,5 @@ mod tests {
             assert_eq!(procedure.id as usize, k);
             assert_eq!(procedure.id.is_known(), k >= ProcedureId::ALL.len());
         }
-    }
-
-    #[test]
-    fn the_mean_all_around_is_off_by_its_bound_at_most_and_nearly_reaches_it() {
-        let meter = Meter { position_m: DVec3::ZERO, normal: DVec3::Z };
-        let (aspects, bound) = all_around(meter);
-        let off = |azimuth: f64| {
-            let towards_light = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
-            let mean: f64 = aspects.iter().map(|a| a.weight * a.meter.normal.dot(towards_light).max(0.0)).sum();
-            (mean * PI - 1.0).abs()
-        };
-        let worst = (0..100_000).map(|k| off(f64::from(k) * 1e-4)).fold(0.0, f64::max);
-        assert!(worst <= bound && worst > 0.5 * bound, "{worst} {bound}");
-        assert!((8.5e-4..8.6e-4).contains(&bound), "{bound}");
     }
 }

@@ -39,6 +39,9 @@ pub enum Quantity {
     /// Luminance in candela per square metre.
     #[serde(rename = "luminance_cd_m2")]
     Luminance,
+    /// Unified glare rating, a logarithm.
+    #[serde(rename = "unified_glare_rating")]
+    GlareRating,
 }
 
 impl Quantity {
@@ -48,7 +51,13 @@ impl Quantity {
             Self::Illuminance => "lx",
             Self::LuminousIntensity => "cd",
             Self::Luminance => "cd/m²",
+            Self::GlareRating => "UGR",
         }
+    }
+
+    /// Whether zero of it is nothing, so that parts of it mean something; a rating is a logarithm, of any sign.
+    pub const fn has_zero(self) -> bool {
+        !matches!(self, Self::GlareRating)
     }
 }
 

@@ -24,6 +24,7 @@ use crate::system::printable;
 mod asked;
 mod bodies;
 mod meters;
+mod observers;
 mod room;
 mod surfaces;
 
@@ -54,6 +55,8 @@ pub struct Case {
     pub meters: BTreeMap<String, Vec<Meter>>,
     /// Diffuse reflectance of the surface on which each meter lies, of the sets that luminance is asked of.
     pub reflectances: BTreeMap<String, Vec<f64>>,
+    /// Sum of L² ω / p² over the luminous openings that each eye sees, of the sets that glare is asked of.
+    pub glares: BTreeMap<String, Vec<f64>>,
     pub procedures: Procedures,
     /// The engines that the spec names, with settings; `None` where it names none.
     pub engines: Option<BTreeMap<String, EngineSettings>>,
@@ -84,7 +87,7 @@ impl Case {
 
     /// What a procedure measures in it; `None` where the spec does not ask for it.
     pub fn task(&self, procedure: ProcedureId) -> Option<Task> {
-        let sets = Sets { meters: &self.meters, reflectances: &self.reflectances };
+        let sets = Sets { meters: &self.meters, reflectances: &self.reflectances, glares: &self.glares };
         procedure.row().task(self.procedures.0.get(&procedure)?, &self.scene, &sets)
     }
 
@@ -226,6 +229,7 @@ impl<'a> Builder<'a> {
         self.take("luminaires", "pairs of luminaires as meters see them", seen, |left| &mut left.sights);
         self.procedures(&spec);
         let reflectances = self.surfaces(&spec, &scene, &meters);
+        let glares = self.observers(&spec, &scene, &meters);
         self.budget(spec.budget);
         let tolerances = self.tolerances(&spec.tolerances);
         let published = spec.published.map(|file| self.beside(&file));
@@ -244,6 +248,7 @@ impl<'a> Builder<'a> {
             scene,
             meters,
             reflectances,
+            glares,
             procedures: spec.procedures,
             engines: spec.engines,
             only_engines: None,

@@ -83,7 +83,7 @@ impl Builder<'_> {
                 continue;
             };
             let t = tolerance;
-            let values = [t.relative, t.absolute_lx, t.absolute_cd, t.absolute_cd_m2];
+            let values = [t.relative, t.absolute_lx, t.absolute_cd, t.absolute_cd_m2, t.absolute_ugr];
             let sound = values.iter().all(|v| v.is_finite() && *v >= 0.0);
             self.check(sound, &at, "a tolerance is a number from 0", "give positive numbers");
             known.insert(procedure, *tolerance);
