@@ -2,6 +2,7 @@
 
 pub mod enclosure;
 pub mod flush;
+pub mod surface;
 
 use std::sync::Arc;
 

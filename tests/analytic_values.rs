@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
+use luminaire::calculators::ugr::observer;
 use luminaire::calculators::{closed_form, inverse_square};
 use luminaire::geometry::configuration_factor::element_to_polygon;
 use luminaire::geometry::{Reflectances, Room};
@@ -124,6 +125,33 @@ fn within_a_closed_cube_of_panels_every_meter_reads_their_exitance() {
             [out, -out].map(|out| square(DVec3::splat(2.0) + out, u, v))
         });
         exitance * sides.map(|side| element_to_polygon(meter.position_m, meter.normal, &side)).sum::<f64>()
+    });
+}
+
+#[test]
+fn a_body_in_a_furnace_is_as_bright_all_over_as_it_reflects() {
+    let exitance = closed_form::lambertian_exitance(1000.0 / 4.0).value();
+    let axes = [(DVec3::X, DVec3::Y), (DVec3::Y, DVec3::Z), (DVec3::Z, DVec3::X)];
+    check("lit-body.yaml", 7, |meter| {
+        let sides = axes.iter().flat_map(|&(u, v)| {
+            let out = u.cross(v);
+            [out, -out].map(|out| square(DVec3::splat(2.0) + out, u, v))
+        });
+        let factor: f64 = sides.map(|side| element_to_polygon(meter.position_m, meter.normal, &side)).sum();
+        0.3 * exitance * factor / PI
+    });
+}
+
+#[test]
+fn an_opening_before_an_evenly_lit_disc_glares_by_the_formula() {
+    let glare = Luminaire {
+        orientation: orientation(180.0, 90.0, 0.0),
+        ..scene(DVec3::ONE, 0.0, "glare-10cm.ies", DVec3::new(0.9, 2.0, 2.15)).luminaires.remove(0)
+    };
+    let scene = Scene { luminaires: vec![glare], ..Scene::default() };
+    check("glare.yaml", 2, |eye| {
+        let background = 800.0 * closed_form::disc_perpendicular(1.5, eye.position_m.z, eye.position_m.x - 2.0);
+        observer::rating(observer::Glare::seen(&scene, eye).unwrap().sum, Lux(background))
     });
 }
 

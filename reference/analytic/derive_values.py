@@ -51,6 +51,24 @@ def main():
     rows = [(p, n, 250 * math.pi) for p, n in places]
     write("furnace", "Furnace of luminous panels", "closed_form", 3, {"direct_illuminance": ("area", rows)})
 
+    # An opening of .01 m2 and 200 cd, its face upright, .3 and .5 times as high above the line of sight as it is far along it: 1.90 and
+    # 2.86 are entries of CIE 117's table 4.1. The background is the lit disc of case 5.6.
+    disc, rows = segment((2, 2), 1.5, -math.inf), []
+    for z, index in ((1.25, 1.9), (.65, 2.86)):
+        eye, source = (3.9, 2, z), (.9, 2, 2.15)
+        d2 = sum((a - b) ** 2 for a, b in zip(eye, source))
+        cosine = 3 / math.sqrt(d2)
+        luminance, solid = 200 / (.01 * cosine), .01 * cosine / d2
+        background = 800 * factor(eye, (-1, 0, 0), disc) / math.pi
+        rows.append((eye, (-1, 0, 0), 8 * math.log10(.25 / background * luminance ** 2 * solid / index ** 2)))
+    write("glare", "Glare before an evenly lit disc", "closed_form", 3, {"unified_glare_rating": ("point", rows)})
+
+    # A convex body that nothing but the panels lights: E = M on all of it, L = rho M / pi, rho .3 times their 250 cd/m2.
+    rows = [((x, y, z), n, .3 * 250) for (x, y, z), n in (
+        ((1.8, 1.9, 2.401), up), ((2.3, 2.2, 2.401), up), ((1.8, 1.9, 1.499), down), ((2.3, 2.2, 1.499), down),
+        ((1.599, 1.9, 1.7), (-1, 0, 0)), ((1.599, 2.2, 2.2), (-1, 0, 0)), ((2.1, 2.301, 1.7), (0, 1, 0)))]
+    write("lit-body", "Body in a furnace", "closed_form", 3, {"luminance": ("area", rows)})
+
     ceiling = zip(((2, 2, 17), (2, 10, 17), (10, 2, 17), (10, 10, 17)),
                   (.852757463, 2.230931615, 2.230931615, 13.559183673))
     plane = zip(((2, 2, 2), (2, 10, 2), (10, 2, 2), (10, 10, 2)), (.94314714, 1.15551735, 1.15551735, 1.42062868))
@@ -128,13 +146,17 @@ def isotropic(flux_lm, lamp, place, normal):
     return flux_lm / (4 * math.pi) * sum(a * b for a, b in zip(ray, normal)) / distance ** 3
 
 
+QUANTITIES = {"luminance": "luminance_cd_m2", "unified_glare_rating": "unified_glare_rating"}
+
+
 def write(name, title, basis, digits, tables, units=1):
     lines = [FORMAT + "luxproof_published: 1", "citation:", f'  title: "{title}"', f"  basis: {basis}",
              f"rounding: {{units_in_last_digit: {units}}}", "tables:"]
     meaning = "Derived, no program's output" if basis == "closed_form" else "Exact methods, see the title"
     for procedure, (model, rows) in tables.items():
         column = f'{{reference: true, engine: {basis}, model: {model}, meaning: "{meaning}"}}'
-        lines += [f"  {procedure}:", f"    name: {name}", "    quantity: illuminance_lx", "    columns:",
+        quantity = QUANTITIES.get(procedure, "illuminance_lx")
+        lines += [f"  {procedure}:", f"    name: {name}", f"    quantity: {quantity}", "    columns:",
                   f"      value: {column}", "    rows:"]
         for point, normal, value in rows:
             at, facing = (f"[{', '.join(f'{v:.9g}' for v in vector)}]" for vector in (point, normal))

@@ -1,4 +1,4 @@
-"""Writes the made-up luminaires of the analytic cases: Lambertian panels, an isotropic point, a spot that lights evenly.
+"""Writes the made-up luminaires of the analytic cases: Lambertian panels, an isotropic point, a spot that lights evenly, and one that glares.
 
 Tables are linear between their angles in every engine, so that each is given where a case reads it, and finely enough
 that between its angles it strays at most 4e-5 (1 degree of a cosine) or 2e-5 (0.25 degrees of the spot) from its law.
@@ -9,6 +9,7 @@ import math
 
 AXIAL_CD = 1000.0                       # of every Lambertian luminaire
 ISOTROPIC_LM = 10000.0
+GLARE_CD, GLARE_DEG = 200.0, 30.0
 SPOT_LUX, SPOT_HEIGHT_M = 1000.0, 2.5   # the spot lights the plane this far below it evenly
 SPOT_RADII_M = {"even-spot-1m.ies": 1.0, "even-spot-15dm.ies": 1.5}
 
@@ -25,6 +26,9 @@ def main():
         write(name, f"{what}, {AXIAL_CD:g} cd on axis, dark backwards", lambertian, side_m)
     candela = ISOTROPIC_LM / (4 * math.pi)
     write("isotropic.ies", f"Isotropic point, {ISOTROPIC_LM:g} lm", [(0.0, candela), (180.0, candela)], 0)
+    # It shines on an eye and on nothing that reflects.
+    glare = [(0.0, GLARE_CD), (GLARE_DEG, GLARE_CD), (GLARE_DEG + 1e-4, 0.0), (180.0, 0.0)]
+    write("glare-10cm.ies", f"Opening of 0.1 x 0.1 m, {GLARE_CD:g} cd within {GLARE_DEG:g} degrees, sharp edge", glare, 0.1)
     for name, radius_m in SPOT_RADII_M.items():
         edge = math.degrees(math.atan2(radius_m, SPOT_HEIGHT_M))
         gammas = [0.25 * k for k in range(int(edge / 0.25) + 1)] + [edge]

@@ -176,7 +176,7 @@ pub fn largest_dimension_m(opening: &LuminousOpening) -> f64 {
 }
 
 /// Whether an obstacle cuts the open segment between two points; an end that lies on its surface does not count.
-fn blocks(obstacle: &Obstacle, from_m: DVec3, to_m: DVec3) -> bool {
+pub(super) fn blocks(obstacle: &Obstacle, from_m: DVec3, to_m: DVec3) -> bool {
     let along = to_m - from_m;
     match &obstacle.shape {
         Shape::Box { min_m, max_m } => {

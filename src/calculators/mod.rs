@@ -5,7 +5,7 @@
 //! | [`inverse_square`] | direct illuminance of points | [`inverse_square::lambertian_twin`] |
 //! | [`zonal_cavity`] | coefficients of utilization and exitance | [`zonal_multiplier`], [`zonal_cavity::balance`] |
 //! | [`exitance_difference`] | indirect and total illuminance of points (IP-ED) | [`uniform_surfaces`] |
-//! | [`ugr`] | unified glare rating in standard rooms | a room placed luminaire by luminaire, in its tests |
+//! | [`ugr`] | unified glare rating in standard rooms, and of observers in any | a room placed luminaire by luminaire, in its tests |
 //! | [`closed_form`] | laws of rooms, spheres and planes | they are exact |
 //!
 //! Nothing here imports the simulator: each bears witness against the other.

@@ -36,6 +36,7 @@ use Mistake::{Added, Command, File, In};
 
 const MISTAKES: &[(&str, Mistake)] = &[
     ("a misspelt key", In("size_m", "sise_m")),
+    ("luminance in mid-air", Added("  luminance: {meters: plane}\n")),
     ("a key that is missing", In("  size_m: [6, 4, 3]\n", "")),
     ("reflectance beside the room", In("  reflectance:", "reflectance:")),
     (

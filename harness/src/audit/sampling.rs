@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::jobs::{Found, Outcome, Running};
 use super::sequential::{self, Ask};
 use crate::engines::{Job, Measurement, Station};
-use crate::judge::{Judge, Sampling};
+use crate::judge::{Judge, Sampling, Tolerance};
 use crate::measure::{Question, Source, Taken};
 use crate::plan::{Plan, Run};
 use crate::procedures::Task;
@@ -19,7 +19,7 @@ use crate::system::files::FileError;
 pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
     let tolerance = |run: &Run| {
         let engines = || plan.engines.iter().map(|e| &e.engine);
-        let relative = |engine: EngineName| judge.tolerance(&plan.tasks[run.task], engine.as_str()).relative;
+        let relative = |engine: EngineName| of_light(&plan.tasks[run.task], judge, engine.as_str());
         let subjects = engines().filter(|engine| !engine.is_witness()).map(|engine| relative(engine.name()));
         // Where nobody is judged, what would be.
         subjects.chain([relative(EngineName::from("subject"))]).fold(f64::INFINITY, f64::min)
@@ -40,11 +40,18 @@ pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
         let engine = &plan.engines[run.engine].engine;
         // A program of a user's is judged at the budget that the spec gives: who knows what it makes of another.
         if !engine.is_witness() && engine.is_vouched_for() {
-            let tolerance = judge.tolerance(&plan.tasks[run.task], engine.name().as_str());
-            run.job.budget = sequential::first_look(run.job.budget, tolerance.relative);
+            let tolerance = of_light(&plan.tasks[run.task], judge, engine.name().as_str());
+            run.job.budget = sequential::first_look(run.job.budget, tolerance);
             run.shortcut.job.budget = run.job.budget;
         }
     }
+}
+
+/// The tolerance of the light that an engine reads, relative: of a rating the part of the background that moves it so much,
+/// dUGR = 8 / ln 10 dE / E.
+fn of_light(task: &Task, judge: &Judge<'_>, engine: &str) -> f64 {
+    let Tolerance { relative, absolute } = judge.tolerance(task, engine);
+    if task.quantity.has_zero() { relative } else { absolute * std::f64::consts::LN_10 / 8.0 }
 }
 
 /// How much finer a sampled reference is asked again where its own error leaves a comparison undecided: to a tenth of the tolerance, after

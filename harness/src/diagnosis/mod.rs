@@ -133,7 +133,9 @@ fn explain_subject(cases: &mut [Examined<'_>], chosen: &[usize], subject: &Subje
     let (mut models, mut sheets, mut members) = (vec![], vec![], vec![]);
     for ((place, procedure, _), group) in groups {
         let case = &cases[chosen[place]];
-        let Some(task) = case.tasks.iter().find(|t| t.procedure == procedure) else { continue };
+        // Faults are told by sums of light; a rating is none.
+        let mut tasks = case.tasks.iter().filter(|t| t.quantity.has_zero());
+        let Some(task) = tasks.find(|t| t.procedure == procedure) else { continue };
         let readings: Vec<&Comparison> = group.iter().map(|(_, k)| &case.comparisons[*k]).collect();
         let right = readings.iter().filter_map(|c| Some(c.reference.as_ref()?.value)).collect();
         let model = Model::new(place, task, right);

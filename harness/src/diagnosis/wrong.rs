@@ -295,7 +295,8 @@ impl Model {
     fn evenly(&self) -> Vec<f64> {
         let of_target = |(target, right): (&Target, &f64)| {
             let weight: f64 = target.aspects.iter().map(|a| a.weight).sum();
-            vec![right / weight; target.aspects.len()]
+            // What weighs nothing, the luminance of a black surface, tells nothing of its light.
+            vec![if weight > 0.0 { right / weight } else { 0.0 }; target.aspects.len()]
         };
         self.task.targets.iter().zip(&self.right).flat_map(of_target).collect()
     }

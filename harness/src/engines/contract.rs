@@ -391,19 +391,18 @@ impl Measurement {
     /// The readings of targets, whose stations these are, target by target.
     pub fn readings<'a>(&self, targets: impl IntoIterator<Item = &'a Target>) -> Vec<Estimate> {
         let targets: Vec<&Target> = targets.into_iter().collect();
-        let reading = |(target, weights): (&&Target, Vec<(usize, f64)>)| {
-            let sum = self.weighted(&weights);
-            match target.quadrature {
-                0.0 => sum,
-                relative => Estimate { uncertainty: sum.uncertainty.within(relative * sum.value.abs()), ..sum },
-            }
-        };
+        let reading = |(target, weights): (&&Target, Vec<(usize, f64)>)| target.reading(self.weighted(&weights));
         targets.iter().zip(weights(&targets)).map(reading).collect()
     }
 
     /// Of each part that was sampled, block by block, how far the readings of targets are from their means, see [`Blocks::deviates`].
     pub fn deviates<'a>(&self, targets: impl IntoIterator<Item = &'a Target>) -> Vec<Vec<Vec<f64>>> {
-        let weights = weights(&targets.into_iter().collect::<Vec<_>>());
+        let targets: Vec<&Target> = targets.into_iter().collect();
+        let of_target = |(target, weights): (&&Target, Vec<(usize, f64)>)| {
+            let slope = target.made.slope(self.weighted(&weights).value);
+            weights.into_iter().map(|(k, weight)| (k, slope * weight)).collect()
+        };
+        let weights: Vec<Vec<(usize, f64)>> = targets.iter().zip(weights(&targets)).map(of_target).collect();
         self.samples.iter().map(|part| part.deviates(&weights)).collect()
     }
 

@@ -260,8 +260,10 @@ impl Judge<'_> {
         else {
             return comparison;
         };
-        comparison.relative_deviation = Some((value - reference.value) / reference.value).filter(|d| d.is_finite());
-        let deviation = if reference.value >= 0.0 { value - reference.value } else { f64::NAN };
+        let has_zero = task.quantity.has_zero();
+        comparison.relative_deviation =
+            Some((value - reference.value) / reference.value).filter(|d| d.is_finite() && has_zero);
+        let deviation = if reference.value >= 0.0 || !has_zero { value - reference.value } else { f64::NAN };
         let allowed = tolerance.around(reference.value);
         comparison.verdict = judge(deviation, budget.expanded, allowed);
         let p_value = budget.p_value(deviation, allowed);

@@ -111,6 +111,12 @@ pub struct Rule {
     /// In candela.
     #[serde(default)]
     absolute_cd: f64,
+    /// In candela per square metre.
+    #[serde(default)]
+    absolute_cd_m2: f64,
+    /// Of a glare rating.
+    #[serde(default)]
+    absolute_ugr: f64,
     /// A standard, a paper, a decision of the project.
     source: String,
     /// Whose rule it is, where not ours.
@@ -133,8 +139,13 @@ struct NotClaimed {
 pub(super) fn faults(source: &Source, rules: &[Rule]) -> Vec<SpecError> {
     let of_rule = |(k, rule): (usize, &Rule)| {
         let at = |field: &str| format!("tolerances[{k}].{field}");
-        let values =
-            [("relative", rule.relative), ("absolute_lx", rule.absolute_lx), ("absolute_cd", rule.absolute_cd)];
+        let values = [
+            ("relative", rule.relative),
+            ("absolute_lx", rule.absolute_lx),
+            ("absolute_cd", rule.absolute_cd),
+            ("absolute_cd_m2", rule.absolute_cd_m2),
+            ("absolute_ugr", rule.absolute_ugr),
+        ];
         let of_values = values.map(|(field, value)| {
             let sound = value.is_finite() && value >= 0.0;
             source.require(sound, &at(field), "a tolerance is a number from 0", "give a positive number")
@@ -150,6 +161,15 @@ pub(super) fn faults(source: &Source, rules: &[Rule]) -> Vec<SpecError> {
 impl Rule {
     pub(super) const fn engine(&self) -> Option<&EngineName> {
         self.engine.as_ref()
+    }
+
+    const fn absolute(&self, quantity: Quantity) -> f64 {
+        match quantity {
+            Quantity::Illuminance => self.absolute_lx,
+            Quantity::LuminousIntensity => self.absolute_cd,
+            Quantity::Luminance => self.absolute_cd_m2,
+            Quantity::GlareRating => self.absolute_ugr,
+        }
     }
 }
 
@@ -227,12 +247,14 @@ impl Tolerances {
         quantity: Quantity,
         overrides: &BTreeMap<ProcedureId, ToleranceOverride>,
     ) -> (Tolerance, Option<String>) {
-        let absolute = |lx: f64, cd: f64| match quantity {
-            Quantity::Illuminance => lx,
-            Quantity::LuminousIntensity => cd,
-        };
         if let Some(o) = overrides.get(&procedure) {
-            return (Tolerance { relative: o.relative, absolute: absolute(o.absolute_lx, o.absolute_cd) }, None);
+            let absolute = match quantity {
+                Quantity::Illuminance => o.absolute_lx,
+                Quantity::LuminousIntensity => o.absolute_cd,
+                Quantity::Luminance => o.absolute_cd_m2,
+                Quantity::GlareRating => o.absolute_ugr,
+            };
+            return (Tolerance { relative: o.relative, absolute }, None);
         }
         let applies = |rule: &&Rule| {
             rule.procedure == procedure
@@ -243,7 +265,7 @@ impl Tolerances {
         let Some(rule) = self.rules.iter().filter(applies).max_by_key(names) else { return Default::default() };
         let class = self.classes.get(&self.class).filter(|_| rule.file.is_none());
         let relative = rule.relative * class.map_or(1.0, |c| c.factor);
-        let tolerance = Tolerance { relative, absolute: absolute(rule.absolute_lx, rule.absolute_cd) };
+        let tolerance = Tolerance { relative, absolute: rule.absolute(quantity) };
         let of_class = class.filter(|_| self.class != ToleranceClass::default());
         let of_class = of_class.map(|c| format!("class {}, {}", self.class, c.purpose));
         (tolerance, rule.file.as_ref().map(|file| format!("{file}: {}", rule.source)).or(of_class))
@@ -264,7 +286,7 @@ mod tests {
         assert_eq!(table.of(INDIRECT, Basis::Exact, "iesna", UNIT, &none).0.relative, 0.10);
         assert_eq!(table.of(INDIRECT, Basis::Exact, "radiance", UNIT, &none).0.relative, 0.02);
         assert_eq!(table.of(INDIRECT, Basis::Published, "iesna", UNIT, &none).0.absolute, 0.03);
-        let strict = ToleranceOverride { relative: 1e-4, absolute_lx: 1e-3, absolute_cd: 0.0 };
+        let strict = ToleranceOverride { relative: 1e-4, absolute_lx: 1e-3, ..ToleranceOverride::default() };
         let found = table.of(DIRECT, Basis::ClosedForm, "povray", UNIT, &BTreeMap::from([(DIRECT, strict)]));
         assert_eq!(found, (Tolerance { relative: 1e-4, absolute: 1e-3 }, None));
         let design = table.clone().of_class(ToleranceClass::Design);

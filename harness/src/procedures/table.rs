@@ -1,15 +1,12 @@
 //! The table of procedures: what each is called, asks of a spec, reads and is judged by. A new procedure is a row here.
 
-use std::collections::BTreeMap;
-use std::f64::consts::PI;
-
-use glam::DVec3;
 use luminaire::calculators::inverse_square;
-use luminaire::scene::{LuminaireModel, Meter, Scene, Transport};
+use luminaire::scene::{LuminaireModel, Scene, Transport};
 
 use super::form::{AnyLight, Asked, AtMeters, Form};
 use super::known;
-use super::task::{Aspect, Target, Task, around, of_sets};
+use super::reads::Reads;
+use super::task::{Sets, Target, Task, around, of_sets};
 use crate::record::{Basis, EngineName, ProcedureId, Quantity};
 
 /// One procedure.
@@ -26,8 +23,8 @@ pub struct Procedure {
     pub form: Option<Form>,
     /// Which light counts.
     pub transport: fn(&AtMeters) -> Transport,
-    /// What is added up at a meter of the spec, and how far off that sum may be, relative.
-    pub aspects: fn(Meter) -> (Vec<Aspect>, f64),
+    /// What of the light at a meter of the spec makes a reading.
+    pub reads: Reads,
     /// What others are judged by.
     pub reference: fn(&Task) -> Reference,
 }
@@ -60,7 +57,7 @@ impl Reference {
 }
 
 /// Every procedure, in the order of reports, and the scenes of the calibration. Tolerances stand under the same name in `reference/tolerances.yaml`.
-pub static ALL: [Procedure; 11] = [
+pub static ALL: [Procedure; 13] = [
     Procedure {
         id: ProcedureId::LuminousIntensity,
         title: "Luminous intensity",
@@ -69,7 +66,7 @@ pub static ALL: [Procedure; 11] = [
         quantity: Quantity::LuminousIntensity,
         form: Some(Form::Angles),
         transport: |_| Transport::Direct,
-        aspects: as_it_looks,
+        reads: Reads::Illuminance,
         reference: |task| closed_form(task, "photometric file, bilinear in (C, gamma)"),
     },
     Procedure {
@@ -80,7 +77,7 @@ pub static ALL: [Procedure; 11] = [
         quantity: Quantity::Illuminance,
         form: Some(Form::Meters),
         transport: |_| Transport::Direct,
-        aspects: as_it_looks,
+        reads: Reads::Illuminance,
         reference: |task| closed_form(task, "inverse square"),
     },
     Procedure {
@@ -91,7 +88,7 @@ pub static ALL: [Procedure; 11] = [
         quantity: Quantity::Illuminance,
         form: Some(Form::MetersAndBounces),
         transport: |asked| Transport::Indirect(asked.bounces),
-        aspects: as_it_looks,
+        reads: Reads::Illuminance,
         reference: |_| EXACT,
     },
     Procedure {
@@ -102,7 +99,7 @@ pub static ALL: [Procedure; 11] = [
         quantity: Quantity::Illuminance,
         form: Some(Form::MetersAndBounces),
         transport: |asked| Transport::Total(asked.bounces),
-        aspects: as_it_looks,
+        reads: Reads::Illuminance,
         reference: |_| EXACT,
     },
     Procedure {
@@ -117,7 +114,7 @@ pub static ALL: [Procedure; 11] = [
             AnyLight::Direct => Transport::Direct,
             AnyLight::Indirect => Transport::Indirect(asked.bounces),
         },
-        aspects: all_around,
+        reads: Reads::AllAround,
         reference: |task| match task.transport {
             Transport::Direct if is_inverse_square(&task.scene) => Reference::Formula {
                 of: |scene, target| inverse_square::cylindrical_illuminance(scene, target.meter.position_m).value(),
@@ -125,6 +122,28 @@ pub static ALL: [Procedure; 11] = [
             },
             _ => EXACT,
         },
+    },
+    Procedure {
+        id: ProcedureId::Luminance,
+        title: "Luminance",
+        short: "Luminance",
+        meaning: "Luminance of the diffuse surface on which each meter lies, L = rho E / pi, E being all light, direct and reflected.",
+        quantity: Quantity::Luminance,
+        form: Some(Form::MetersAndBounces),
+        transport: |asked| Transport::Total(asked.bounces),
+        reads: Reads::Luminance,
+        reference: |_| EXACT,
+    },
+    Procedure {
+        id: ProcedureId::UnifiedGlareRating,
+        title: "Unified glare rating",
+        short: "Glare",
+        meaning: "Unified glare rating (CIE 117) of observers who look as their meters do: 8 lg (.25 / Lb sum L² ω / p²) over the luminous openings in view, with Lb = E / pi of the indirect illuminance that is read at the eye.",
+        quantity: Quantity::GlareRating,
+        form: Some(Form::MetersAndBounces),
+        transport: |asked| Transport::Indirect(asked.bounces),
+        reads: Reads::GlareRating,
+        reference: |_| EXACT,
     },
     known(ProcedureId::Point, "Calibration: point", "the inverse-square law from .5 to 10 m", |_| STRAIGHT),
     known(ProcedureId::Asymmetric, "Calibration: asymmetric", "a table without symmetry, turned, all around", |_| {
@@ -156,37 +175,13 @@ const fn known(
         quantity: Quantity::Illuminance,
         form: None,
         transport: |_| Transport::Direct,
-        aspects: as_it_looks,
+        reads: Reads::Illuminance,
         reference,
     }
 }
 
 const STRAIGHT: Reference = Reference::Formula { of: known::straight, source: "inverse square" };
 const EVEN: Reference = Reference::Formula { of: known::even, source: "rho / (1 - rho) x flux / area" };
-
-/// One illuminance, on the side that the meter looks to.
-fn as_it_looks(meter: Meter) -> (Vec<Aspect>, f64) {
-    (vec![Aspect { meter, weight: 1.0 }], 0.0)
-}
-
-/// Directions of the mean all around: odd, so that its error is that of twice as many.
-const DIRECTIONS: u32 = 31;
-
-/// The mean over all vertical directions, by the rectangle rule.
-///
-/// A surface that turns once sees each bit of light as the positive part of a cosine, whose even harmonics 2k are
-/// 2 / (4 k^2 - 1) of its mean and whose odd ones but the first are none. An odd number N of directions takes the harmonics 2 N j for
-/// the mean: it is off by 2 / (4 N^2 j^2 - 1) of it, summed over j, at most, whatever the light, since all light is positive. The sum is
-/// 1 - x cot x with x = pi / 2N.
-fn all_around(meter: Meter) -> (Vec<Aspect>, f64) {
-    let facing = |k: u32| {
-        let azimuth = 2.0 * PI * f64::from(k) / f64::from(DIRECTIONS);
-        let normal = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
-        Aspect { meter: Meter { normal, ..meter }, weight: 1.0 / f64::from(DIRECTIONS) }
-    };
-    let x = PI / f64::from(2 * DIRECTIONS);
-    ((0..DIRECTIONS).map(facing).collect(), 1.0 - x / x.tan())
-}
 
 const EXACT: Reference =
     Reference::Witness { engine: EngineName::SIMULATOR, basis: Basis::Exact, source: "luminaire::simulator" };
@@ -206,16 +201,14 @@ fn is_inverse_square(scene: &Scene) -> bool {
 
 impl Procedure {
     /// What it measures in a scene, as asked; `None` where the luminaire that is named is not there.
-    pub fn task(&self, asked: &Asked, scene: &Scene, meters: &BTreeMap<String, Vec<Meter>>) -> Option<Task> {
+    pub fn task(&self, asked: &Asked, scene: &Scene, sets: &Sets<'_>) -> Option<Task> {
         let (scene, transport, targets) = match asked {
             Asked::Angles(asked) => {
                 let luminaire = scene.luminaires.iter().find(|l| l.id == asked.luminaire)?;
                 let alone = Scene { room: None, obstacles: vec![], luminaires: vec![luminaire.clone()] };
                 (alone, Transport::Direct, around(luminaire, asked))
             }
-            Asked::Meters(asked) => {
-                (scene.clone(), (self.transport)(asked), of_sets(meters, &asked.meters, self.aspects))
-            }
+            Asked::Meters(asked) => (scene.clone(), (self.transport)(asked), of_sets(sets, &asked.meters, self.reads)),
         };
         Some(Task { procedure: self.id, scene, transport, quantity: self.quantity, targets })
     }
@@ -251,19 +244,5 @@ mod tests {
             assert_eq!(procedure.id as usize, k);
             assert_eq!(procedure.id.is_known(), k >= ProcedureId::ALL.len());
         }
-    }
-
-    #[test]
-    fn the_mean_all_around_is_off_by_its_bound_at_most_and_nearly_reaches_it() {
-        let meter = Meter { position_m: DVec3::ZERO, normal: DVec3::Z };
-        let (aspects, bound) = all_around(meter);
-        let off = |azimuth: f64| {
-            let towards_light = DVec3::new(azimuth.cos(), azimuth.sin(), 0.0);
-            let mean: f64 = aspects.iter().map(|a| a.weight * a.meter.normal.dot(towards_light).max(0.0)).sum();
-            (mean * PI - 1.0).abs()
-        };
-        let worst = (0..100_000).map(|k| off(f64::from(k) * 1e-4)).fold(0.0, f64::max);
-        assert!(worst <= bound && worst > 0.5 * bound, "{worst} {bound}");
-        assert!((8.5e-4..8.6e-4).contains(&bound), "{bound}");
     }
 }

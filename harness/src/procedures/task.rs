@@ -7,7 +7,8 @@ use luminaire::photometry::direction;
 use luminaire::scene::{Luminaire, Meter, Scene, Transport};
 
 use super::form::{Angles, AtAngles, Names};
-use crate::record::{Light, MeterId, ProcedureId, Quantity};
+use super::reads::{Aspect, Made, Parts, Reads, Seen};
+use crate::record::{Estimate, Light, MeterId, ProcedureId, Quantity};
 
 /// What one procedure measures in one case.
 #[derive(Clone, Debug)]
@@ -34,14 +35,8 @@ pub struct Target {
     pub aspects: Vec<Aspect>,
     /// How far off the weighted sum may be of what it stands for, relative: 0 but for a quadrature.
     pub quadrature: f64,
-}
-
-/// An illuminance that counts in a reading.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aspect {
-    pub meter: Meter,
-    /// The reading's unit a lux: 1, or distance squared for an intensity.
-    pub weight: f64,
+    /// What the sum becomes.
+    pub made: Made,
 }
 
 /// A direction in a luminaire's own frame, in degrees.
@@ -91,7 +86,15 @@ impl Task {
 impl Target {
     /// One illuminance, times a weight.
     pub fn of_one(id: MeterId, meter: Meter, weight: f64) -> Self {
-        Self { id, meter, direction: None, aspects: vec![Aspect { meter, weight }], quadrature: 0.0 }
+        Self { id, meter, direction: None, aspects: vec![Aspect { meter, weight }], quadrature: 0.0, made: Made::Sum }
+    }
+
+    /// What is read, of the weighted sum of illuminances.
+    pub fn reading(&self, sum: Estimate) -> Estimate {
+        self.made.of(match self.quadrature {
+            0.0 => sum,
+            relative => Estimate { uncertainty: sum.uncertainty.within(relative * sum.value.abs()), ..sum },
+        })
     }
 
     /// The illuminances that it needs, with their names: its own, or one a meter.
@@ -123,19 +126,27 @@ pub(super) fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
     angles.into_iter().enumerate().map(target).collect()
 }
 
+/// The meter sets of a spec.
+#[derive(Clone, Copy, Debug)]
+pub struct Sets<'a> {
+    pub meters: &'a BTreeMap<String, Vec<Meter>>,
+    /// Diffuse reflectance of the surface on which each meter lies, of the sets that luminance is asked of.
+    pub reflectances: &'a BTreeMap<String, Vec<f64>>,
+    /// Sum of L^2 w / p^2 over the openings that each meter's eye sees, of the sets that glare is asked of.
+    pub glares: &'a BTreeMap<String, Vec<f64>>,
+}
+
 /// The meters of named sets, each with what is added up there.
-pub(super) fn of_sets(
-    meters: &BTreeMap<String, Vec<Meter>>,
-    names: &Names,
-    aspects: fn(Meter) -> (Vec<Aspect>, f64),
-) -> Vec<Target> {
+pub(super) fn of_sets(sets: &Sets<'_>, names: &Names, reads: Reads) -> Vec<Target> {
     let target = |name: &str, k: usize, meter: Meter| {
-        let (aspects, quadrature) = aspects(meter);
-        Target { id: MeterId::new(name, k), meter, direction: None, aspects, quadrature }
+        let known = |of: &BTreeMap<String, Vec<f64>>| of.get(name).and_then(|set| set.get(k)).copied();
+        let seen = Seen { reflectance: known(sets.reflectances), glare: known(sets.glares) };
+        let Parts { aspects, quadrature, made } = reads.parts(meter, seen)?;
+        Some(Target { id: MeterId::new(name, k), meter, direction: None, aspects, quadrature, made })
     };
     let of_set = |name: &str| {
-        let meters = meters.get(name).into_iter().flatten().enumerate();
-        meters.map(|(k, meter)| target(name, k, *meter)).collect::<Vec<_>>()
+        let meters = sets.meters.get(name).into_iter().flatten().enumerate();
+        meters.filter_map(|(k, meter)| target(name, k, *meter)).collect::<Vec<_>>()
     };
     names.iter().flat_map(of_set).collect()
 }

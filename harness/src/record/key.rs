@@ -52,6 +52,10 @@ pub enum ProcedureId {
     TotalIlluminance,
     /// Mean over all vertical directions at a point (EN 12464-1).
     CylindricalIlluminance,
+    /// Of the diffuse surfaces on which meters lie.
+    Luminance,
+    /// Of observers (CIE 117).
+    UnifiedGlareRating,
     /// Calibration: the inverse-square law.
     Point,
     /// Calibration: a table without symmetry.
@@ -68,7 +72,7 @@ pub enum ProcedureId {
 
 impl ProcedureId {
     /// Those that a spec may ask for, in the order of reports.
-    pub const ALL: &[Self] = <Self as VariantArray>::VARIANTS.split_at(5).0;
+    pub const ALL: &[Self] = <Self as VariantArray>::VARIANTS.split_at(7).0;
 
     /// Their names, in the same order.
     pub const NAMES: &[&str] = <Self as VariantNames>::VARIANTS.split_at(Self::ALL.len()).0;

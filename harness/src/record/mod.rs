@@ -36,6 +36,12 @@ pub enum Quantity {
     /// Luminous intensity in candela.
     #[serde(rename = "luminous_intensity_cd")]
     LuminousIntensity,
+    /// Luminance in candela per square metre.
+    #[serde(rename = "luminance_cd_m2")]
+    Luminance,
+    /// Unified glare rating, a logarithm.
+    #[serde(rename = "unified_glare_rating")]
+    GlareRating,
 }
 
 impl Quantity {
@@ -44,7 +50,14 @@ impl Quantity {
         match self {
             Self::Illuminance => "lx",
             Self::LuminousIntensity => "cd",
+            Self::Luminance => "cd/m²",
+            Self::GlareRating => "UGR",
         }
+    }
+
+    /// Whether zero of it is nothing, so that parts of it mean something; a rating is a logarithm, of any sign.
+    pub const fn has_zero(self) -> bool {
+        !matches!(self, Self::GlareRating)
     }
 }
 

@@ -24,7 +24,7 @@ pub struct Claim {
     pub procedure: ProcedureId,
     /// How many readings were judged.
     pub readings: usize,
-    /// Those that pass lie within this of their references, relative, their intervals included; null where none does.
+    /// Those that pass lie within this of their references, relative but for ratings, their intervals included; null where none does.
     pub within: Option<f64>,
     pub failed: usize,
     pub undecided: usize,
@@ -45,11 +45,21 @@ impl Claim {
         if self.procedure == ProcedureId::IndirectIlluminance { "reflected".to_owned() } else { short }
     }
 
+    /// How near readings lie, as a person says it: in per cent, or in units of a rating.
+    pub(super) fn reach(&self, within: f64) -> String {
+        let quantity = self.procedure.row().quantity;
+        if quantity.has_zero() {
+            return upward(within);
+        }
+        let shown = upward(0.01 * within);
+        format!("{} {}", shown.trim_end_matches(" %"), quantity.unit())
+    }
+
     /// `direct within 0.01 %`.
     pub(super) fn trusted(&self) -> String {
         let name = self.name();
         let mut text = match self.within {
-            Some(within) => format!("{name} within {}", upward(within)),
+            Some(within) => format!("{name} within {}", self.reach(within)),
             None => format!("{name} only as is on record"),
         };
         let bias = self.bias.filter(|b| self.within.is_some_and(|w| b.abs() > WORTH_TELLING * w));

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::matrix::{Cell, matrix, worst};
 use super::notes::{Kind, biases, decision_rules, departures, lacking, notes, policies, splits, tables};
 use super::sentences::{HEADING, sentences};
-use super::words::{mark, percent, significant};
+use super::words::{mark, off, percent, significant};
 use super::{Report, papers};
 use crate::record::ProcedureId;
 use crate::system::printable::markdown as inert;
@@ -115,7 +115,7 @@ fn worst_deviations(report: &Report, line: &mut impl FnMut(String)) {
                 inert(&c.meter.0),
                 number(c.value),
                 number(c.reference.as_ref().map(|r| r.value)),
-                c.relative_deviation.map_or("-".to_owned(), percent),
+                off(c, percent).unwrap_or("-".to_owned()),
                 mark(c.verdict)
             ));
         }

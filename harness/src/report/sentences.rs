@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use itertools::Itertools;
 
 use super::Report;
-use super::claims::{Claim, Sentence, low_or_high, upward};
+use super::claims::{Claim, Sentence, low_or_high};
 use super::words::plural;
 use crate::judge::{Basis, Bias, Comparison, Verdict};
 use crate::record::{EngineName, EngineStatus, ProcedureId, Role, Status};
@@ -110,10 +110,13 @@ fn basis(c: &Comparison) -> Option<Basis> {
     c.reference.as_ref().map(|reference| reference.basis)
 }
 
-/// How far a reading may lie off its reference, relative: its deviation and the interval about it. Where a tolerance is one of
-/// lux, what is relative begins with the light of which that is as much.
+/// How far a reading may lie off its reference, relative but for ratings: its deviation and the interval about it. Where a tolerance is
+/// one of lux, what is relative begins with the light of which that is as much.
 fn reach(c: &Comparison) -> Option<f64> {
     let expanded = c.budget.as_ref().map_or(0.0, |b| b.expanded);
+    if !c.quantity.has_zero() {
+        return Some(c.deviation?.abs() + expanded);
+    }
     let governed = if c.tolerance.relative > 0.0 { c.tolerance.absolute / c.tolerance.relative } else { 0.0 };
     let scale = c.reference.as_ref()?.value.abs().max(governed);
     Some((c.deviation?.abs() + expanded) / scale).filter(|r| r.is_finite())
@@ -138,7 +141,7 @@ fn doubted(claim: &Claim, report: &Report, mine: &[&Comparison]) -> String {
         }
     }
     if let Some(within) = claim.within {
-        parts.push(format!("the rest within {}", upward(within)));
+        parts.push(format!("the rest within {}", claim.reach(within)));
     }
     format!("{}: {}", claim.name(), parts.join(", "))
 }

@@ -15,18 +15,20 @@ pub struct Statistics {
     /// The set of meters.
     pub set: String,
     pub meters: usize,
-    /// In lux.
+    /// In lux, of luminances in cd/m².
     pub mean: Estimate,
-    /// In lux.
+    /// In lux, of luminances in cd/m².
     pub minimum: Estimate,
     /// Minimum over mean; null where the mean is none.
     pub uniformity: Option<Estimate>,
 }
 
-/// Of every set of two meters and more of illuminances, in the order of readings.
+/// Of every set of two meters and more of illuminances or luminances, in the order of readings.
 pub(super) fn statistics(readings: &[ReadingRecord]) -> Vec<Statistics> {
     let lit = |r: &&ReadingRecord| {
-        r.reading.quantity == Quantity::Illuminance && !r.key.procedure.is_known() && r.reading.value.is_finite()
+        matches!(r.reading.quantity, Quantity::Illuminance | Quantity::Luminance)
+            && !r.key.procedure.is_known()
+            && r.reading.value.is_finite()
     };
     let of_set = |r: &&ReadingRecord| (r.key.clone(), set(&r.reading.meter.0).to_owned());
     let sets = readings.iter().filter(lit).chunk_by(of_set);

@@ -12,7 +12,7 @@ use super::matrix::{Cell, Row as MatrixRow, matrix, worst};
 use super::notes::{self, Kind, Note, biases, decision_rules, departures, diagnoses, lacking, notes, policies, splits};
 use super::sentences::{HEADING, sentences};
 use super::statistics::{Statistics, statistics};
-use super::words::{abridged, cut, estimate, mark, percent, plural, significant, value, wrapped};
+use super::words::{abridged, cut, estimate, mark, off, percent, plural, significant, value, wrapped};
 use super::{ReadingRecord, Report, papers};
 use crate::judge::{Comparison, Verdict};
 use crate::record::{EngineStatus, Estimate, MeterId, ProcedureId, Status};
@@ -277,11 +277,15 @@ fn of_sets(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<St
     if mine.is_empty() {
         return None;
     }
-    let figures: [(&str, Figure); 3] =
-        [("mean [lx]", |s| Some(s.mean)), ("minimum [lx]", |s| Some(s.minimum)), ("uniformity", |s| s.uniformity)];
+    let unit = procedure.row().quantity.unit();
+    let figures: [(String, Figure); 3] = [
+        (format!("mean [{unit}]"), |s| Some(s.mean)),
+        (format!("minimum [{unit}]"), |s| Some(s.minimum)),
+        ("uniformity".to_owned(), |s| s.uniformity),
+    ];
     let of_set = |(set, meters): &(&str, usize)| {
         let rows = |range: &Range<usize>| {
-            figures.map(|(name, figure)| {
+            figures.each_ref().map(|(name, figure)| {
                 let of = |engine: &&str| mine.iter().find(|s| s.set == *set && s.key.engine == **engine);
                 let cell = |e| of(e).and_then(|s| figure(s)).map_or("-".to_owned(), |x| estimate(&x));
                 let head = format!("  {name}");
@@ -335,7 +339,7 @@ fn deviation_line(c: &Comparison, screen: Screen) -> String {
     let against = c.reference.as_ref().map_or("no reference".to_owned(), |r| {
         format!("{} {} ({})", significant(r.value), c.quantity.unit(), r.basis.name())
     });
-    let deviation = c.relative_deviation.map(|d| format!(" {}", percent(d))).unwrap_or_default();
+    let deviation = off(c, percent).map(|d| format!(" {d}")).unwrap_or_default();
     let why = c.diagnosis.as_ref().map(|d| format!(": {d}")).unwrap_or_default();
     format!(
         "{:<15} {} {} {} {} against {against}{deviation}{why}",

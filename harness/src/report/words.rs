@@ -2,7 +2,7 @@
 
 use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
 
-use crate::judge::Verdict;
+use crate::judge::{Comparison, Verdict};
 use crate::record::{Estimate, Reading};
 
 pub(super) fn value(reading: &Reading) -> String {
@@ -131,6 +131,12 @@ pub(super) fn plural(count: usize, noun: &str) -> String {
 /// A verdict where only text tells it: what asks for attention is written large.
 pub(super) fn mark(verdict: Verdict) -> String {
     if verdict.is_bad() { verdict.name().to_uppercase() } else { verdict.name().to_owned() }
+}
+
+/// How far off its reference a reading is: in per cent, a rating in its own unit.
+pub(super) fn off(c: &Comparison, percent: fn(f64) -> String) -> Option<String> {
+    let of_rating = || c.deviation.filter(|_| !c.quantity.has_zero()).map(|d| format!("{d:+.3} {}", c.quantity.unit()));
+    c.relative_deviation.map(percent).or_else(of_rating)
 }
 
 /// The deviation of the largest magnitude.

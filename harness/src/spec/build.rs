@@ -16,7 +16,7 @@ use super::shape::{Mended, Shaped, Trials, shaped};
 use super::tree::tree;
 use super::trust::Limits;
 use super::{Faults, Source, SpecError, Trust};
-use crate::procedures::{Procedures, Task};
+use crate::procedures::{Procedures, Sets, Task};
 use crate::record::{ProcedureId, family};
 use crate::system::digest::hexadecimal;
 use crate::system::printable;
@@ -24,7 +24,9 @@ use crate::system::printable;
 mod asked;
 mod bodies;
 mod meters;
+mod observers;
 mod room;
+mod surfaces;
 
 /// More meters than this are a slip of the pen.
 const MAX_METERS: usize = 1_000_000;
@@ -51,6 +53,10 @@ pub struct Case {
     pub scene: Scene,
     /// Meters by set.
     pub meters: BTreeMap<String, Vec<Meter>>,
+    /// Diffuse reflectance of the surface on which each meter lies, of the sets that luminance is asked of.
+    pub reflectances: BTreeMap<String, Vec<f64>>,
+    /// Sum of L² ω / p² over the luminous openings that each eye sees, of the sets that glare is asked of.
+    pub glares: BTreeMap<String, Vec<f64>>,
     pub procedures: Procedures,
     /// The engines that the spec names, with settings; `None` where it names none.
     pub engines: Option<BTreeMap<String, EngineSettings>>,
@@ -81,7 +87,8 @@ impl Case {
 
     /// What a procedure measures in it; `None` where the spec does not ask for it.
     pub fn task(&self, procedure: ProcedureId) -> Option<Task> {
-        procedure.row().task(self.procedures.0.get(&procedure)?, &self.scene, &self.meters)
+        let sets = Sets { meters: &self.meters, reflectances: &self.reflectances, glares: &self.glares };
+        procedure.row().task(self.procedures.0.get(&procedure)?, &self.scene, &sets)
     }
 
     /// What all procedures measure in it, in the order of reports.
@@ -221,6 +228,8 @@ impl<'a> Builder<'a> {
         let seen = meters.values().map(Vec::len).sum::<usize>().saturating_mul(count.saturating_mul(count));
         self.take("luminaires", "pairs of luminaires as meters see them", seen, |left| &mut left.sights);
         self.procedures(&spec);
+        let reflectances = self.surfaces(&spec, &scene, &meters);
+        let glares = self.observers(&spec, &scene, &meters);
         self.budget(spec.budget);
         let tolerances = self.tolerances(&spec.tolerances);
         let published = spec.published.map(|file| self.beside(&file));
@@ -238,6 +247,8 @@ impl<'a> Builder<'a> {
             sha256: hexadecimal(&self.hash.finalize()),
             scene,
             meters,
+            reflectances,
+            glares,
             procedures: spec.procedures,
             engines: spec.engines,
             only_engines: None,

@@ -507,4 +507,8 @@ pub struct ToleranceOverride {
     pub absolute_lx: f64,
     /// Absolute, in candela.
     pub absolute_cd: f64,
+    /// Absolute, in candela per square metre.
+    pub absolute_cd_m2: f64,
+    /// Absolute, of a glare rating.
+    pub absolute_ugr: f64,
 }

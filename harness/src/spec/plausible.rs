@@ -5,11 +5,13 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use glam::DVec3;
+use luminaire::calculators::ugr::observer::{Glare, SOLID_ANGLES_SR};
 use luminaire::geometry::solid_angle_sr;
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Shape, Transport};
 
 use super::{Case, SpecError};
 use crate::procedures::{Asked, Task};
+use crate::record::ProcedureId;
 
 /// A room is higher than this in no building but a stadium, and longer in none.
 const HIGHEST_M: f64 = 60.0;
@@ -76,6 +78,7 @@ fn of_case(case: &Case) -> Vec<Doubt> {
     found.extend(wide_tolerances(case));
     found.extend(facing_out(case));
     found.extend(case.tasks().filter_map(|task| dark(case, &task)));
+    found.extend(case.task(ProcedureId::UnifiedGlareRating).and_then(|task| unrated(&task)));
     found
 }
 
@@ -186,6 +189,22 @@ fn dark(case: &Case, task: &Task) -> Option<Doubt> {
     let sets: Vec<&str> = asked.meters.iter().collect();
     let message = format!("no luminaire sends light to any meter of {}: every reading is 0", sets.join(", "));
     let help = "look at the normals of the meters, the rotation of the luminaires, and flux_scale";
+    Some(Doubt::new(format!("procedures.{}", task.procedure), message, help))
+}
+
+/// Glare of openings that the rating is not of: CIE 117 has others for them, or none.
+fn unrated(task: &Task) -> Option<Doubt> {
+    if task.targets.len().saturating_mul(task.scene.luminaires.len()) > MAX_LOOKS {
+        return None;
+    }
+    let seen = task.targets.iter().filter_map(|t| Some((&t.id, Glare::seen(&task.scene, &t.meter).ok()?)));
+    let mut others =
+        seen.filter(|(_, glare)| glare.solid_angles_sr.iter().any(|angle| !SOLID_ANGLES_SR.contains(angle)));
+    let (eye, Glare { solid_angles_sr: [least, most], .. }) = others.next()?;
+    let of = if least < most { format!("{least:.1e} to {most:.1e} sr") } else { format!("{most:.1e} sr") };
+    let (from, to) = (SOLID_ANGLES_SR.start(), SOLID_ANGLES_SR.end());
+    let message = format!("{eye} sees openings of {of}, and the rating is of {from} to {to} sr (CIE 117)");
+    let help = "take what is read for a number that renderers may agree on, and for no rating of this glare";
     Some(Doubt::new(format!("procedures.{}", task.procedure), message, help))
 }
 

@@ -6,6 +6,7 @@
 //! own flux, not of 1000 lm.
 
 mod background;
+pub mod observer;
 mod position;
 
 #[cfg(test)]

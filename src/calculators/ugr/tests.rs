@@ -1,13 +1,17 @@
 //! UGR against a room built luminaire by luminaire, and against what CIE 190 prints.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use approx::assert_relative_eq;
 use glam::{DMat3, DVec3};
 
 use super::background::{FirstFlux, transfer};
+use super::observer::{Glare, NoGlare, rating};
 use super::*;
 use crate::photometry::{LuminousIntensityDistribution, LuminousOpening};
+use crate::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, orientation};
+use crate::units::Lux;
 
 fn panel(x_m: f64, y_m: f64, of: impl Fn(f64, f64) -> f64) -> Photometry {
     let c: Vec<f64> = (0..=18).map(|k| 5.0 * f64::from(k)).collect();
@@ -237,4 +241,81 @@ fn there_is_a_reason_where_there_is_no_table() {
         LuminousIntensityDistribution::new(vec![0.0, 180.0], vec![0.0, 90.0], vec![9.0, 9.0, 9.0, 0.0]).unwrap();
     let table = UgrTable::of(&Photometry { distribution: lopsided, ..panel }, Spacing::Quarter);
     assert!(matches!(table, Err(NoUgr::Lopsided { .. })), "{table:?}");
+}
+
+fn hung(photometry: &Photometry, position_m: DVec3, azimuth_deg: f64) -> Luminaire {
+    Luminaire {
+        id: "panel".into(),
+        photometry: Arc::new(photometry.clone()),
+        position_m,
+        orientation: orientation(azimuth_deg, 0.0, 0.0),
+        flux_scale: 1.0,
+        model: LuminaireModel::Area,
+    }
+}
+
+/// Looks along +y from the origin.
+const EYE: Meter = Meter { position_m: DVec3::ZERO, normal: DVec3::Y };
+
+#[test]
+fn an_observer_in_a_standard_room_has_the_rating_of_the_table() {
+    for photometry in luminaires() {
+        let table = UgrTable::of(&photometry, Spacing::Whole).unwrap();
+        for row in &table.rows {
+            let built = Built::new(row.room, Spacing::Whole);
+            let first = FirstFlux::of(&photometry.distribution, row.room).unwrap();
+            let count = built.luminaires_m.len() as f64;
+            for (turned_deg, ratings) in [(0.0, row.crosswise), (90.0, row.endwise)] {
+                // The plane in which the eye lies is turned to where it is, at -y.
+                let azimuth_deg = -90.0 - table.crosswise_c_deg - turned_deg;
+                let of_place = |place: &DVec3| hung(&photometry, *place, azimuth_deg);
+                let luminaires = built.luminaires_m.iter().map(of_place).collect();
+                let seen = Glare::seen(&Scene { luminaires, ..Scene::default() }, &EYE).unwrap();
+                for (k, reflectances) in REFLECTANCES.iter().enumerate() {
+                    let behind = background::luminance(row.room, *reflectances, first, count, built.size_m.z);
+                    assert_relative_eq!(
+                        rating(seen.sum, Lux(PI * behind)),
+                        ratings[k].unwrap(),
+                        max_relative = 1e-9,
+                        epsilon = 1e-9
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_behind_below_hidden_or_edge_on_does_not_glare() {
+    let panel = panel(0.3, 0.1, |_, g| 900.0 * g.to_radians().cos());
+    let scene = |places: &[[f64; 3]]| Scene {
+        luminaires: places.iter().map(|p| hung(&panel, DVec3::from(*p), 0.0)).collect(),
+        ..Scene::default()
+    };
+    let one = Glare::seen(&scene(&[[0.5, 4.0, 1.5]]), &EYE).unwrap();
+    // L = 900 / .03; w = .03 cos / r^2, p by the table.
+    let r = DVec3::new(0.5, 4.0, 1.5).length();
+    let by_hand = (900.0 / 0.03 / position_index(0.125, 0.375).unwrap()).powi(2) * 0.03 * 1.5 / r.powi(3);
+    // Between angles a degree apart the table is straight.
+    assert_relative_eq!(one.sum, by_hand, max_relative = 2e-4);
+    assert_eq!(one.openings, 1);
+    let others =
+        [[0.5, 4.0, 1.5], [0.5, -4.0, 1.5], [0.5, 4.0, -1.5], [0.5, 0.7, 1.5], [20.0, 4.0, 1.5], [0.0, 4.0, 0.0]];
+    assert_eq!(Glare::seen(&scene(&others), &EYE), Ok(one));
+    let mut hidden = scene(&[[0.5, 4.0, 1.5]]);
+    let shape = Shape::Box { min_m: DVec3::new(-1.0, 2.0, 0.0), max_m: DVec3::new(1.0, 2.1, 2.0) };
+    hidden.obstacles.push(Obstacle { shape, reflectance: 0.5 });
+    assert_eq!(Glare::seen(&hidden, &EYE), Err(NoGlare::NothingSeen));
+    // A head that is raised by an angle sees the room turned down by it.
+    let (sin, cos) = 0.2_f64.sin_cos();
+    let raised = Meter { normal: DVec3::new(0.0, cos, sin), ..EYE };
+    let seen = Glare::seen(&scene(&[[0.0, 4.0, 1.5]]), &raised).unwrap();
+    let above = (1.5_f64.atan2(4.0) - 0.2).tan();
+    let level = Glare::seen(&scene(&[[0.0, 4.0, 1.5]]), &EYE).unwrap();
+    let indices = [0.375, above].map(|above| position_index(0.0, above).unwrap());
+    assert_relative_eq!(seen.sum / level.sum, (indices[0] / indices[1]).powi(2), max_relative = 1e-9);
+    assert_eq!(Glare::seen(&scene(&[[0.5, 4.0, 1.5]]), &Meter { normal: DVec3::Z, ..EYE }), Err(NoGlare::Upright));
+    let mut point = scene(&[[0.5, 4.0, 1.5]]);
+    point.luminaires[0].photometry = Arc::new(Photometry { opening: LuminousOpening::Point, ..panel.clone() });
+    assert_eq!(Glare::seen(&point, &EYE), Err(NoGlare::NoArea("panel".to_owned())));
 }

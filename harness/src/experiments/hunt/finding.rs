@@ -17,7 +17,7 @@ use super::oracle::{Oracle, Sighting, Symptom, Tribunal};
 use crate::engines::display_name;
 use crate::judge::Comparison;
 use crate::plan::{Export, Selection, plan};
-use crate::procedures::Task;
+use crate::procedures::{Made, Task};
 use crate::record::ProcedureId;
 use crate::spec::{Case, SpecError, from_yaml, yaml};
 use crate::system::files::FileError;
@@ -195,7 +195,7 @@ fn export(
 /// The inverse-square law where it holds, path tracing elsewhere: neither shares a kernel with the simulator's other solvers.
 fn second_witness(task: &Task, sighting: &Sighting, seed: u64) -> Option<SecondWitness> {
     let worst = sighting.comparison.as_ref()?;
-    let target = task.targets.iter().find(|t| t.id == worst.meter)?;
+    let target = task.targets.iter().find(|t| t.id == worst.meter && t.made == Made::Sum)?;
     if is_inverse_square(&task.scene, task.transport) {
         let parts = target.aspects.iter().map(|a| {
             Some(a.weight * inverse_square::direct_illuminance(&task.scene, &a.meter).ok()?.illuminance.value())

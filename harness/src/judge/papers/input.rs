@@ -7,7 +7,7 @@
 use luminaire::photometry::Photometry;
 use luminaire::scene::Transport;
 
-use crate::procedures::{Aspect, Target, Task};
+use crate::procedures::{Aspect, Made, Target, Task};
 
 /// Finer tables than this, in candela, are not written by photometers.
 const FINEST_DECIMALS: i32 = 6;
@@ -44,6 +44,8 @@ impl<'a> Input<'a> {
             return parts.sum();
         }
         let flux: f64 = luminaires().map(|(l, _)| l.flux_scale * l.photometry.distribution.flux().value()).sum();
+        // Of a rating intensities count twice and the background once: as if all that were of one sign.
+        let value = if target.made == Made::Sum { value } else { 3.0 * 8.0 / std::f64::consts::LN_10 };
         let off: f64 = self.half_digits_cd.iter().map(|half| 4.0 * std::f64::consts::PI * half).sum();
         if flux > 0.0 { value.abs() * off / flux } else { 0.0 }
     }

@@ -7,7 +7,7 @@ use maud::{Markup, html};
 
 use super::super::matrix::sort_worst_first;
 use super::super::notes::biases;
-use super::super::words::significant;
+use super::super::words::{off, significant};
 use super::super::{Report, papers};
 use super::palette::Palette;
 use super::plot::{self, Marks};
@@ -122,7 +122,7 @@ fn row(report: &Report, c: &Comparison, number: usize, hidden: bool, palette: &P
             td.number.c-v { (value(c.value)) " " span.unit { (unit) } }
             td.number.c-r { (value(c.reference.as_ref().map(|r| r.value))) " " span.unit { (unit) } }
             td.c-b { (c.basis_name()) }
-            td.number { (c.relative_deviation.map_or("–".to_owned(), percent)) }
+            td.number { (off(c, percent).unwrap_or("–".to_owned())) }
             td.c-s { (bar(c)) }
             td class={ "v-" (class(c.verdict)) } { span.glyph aria-hidden="true" { (glyph(c.verdict)) } " " span.word { (c.verdict.name()) }
                 @if c.verdict.is_bad() { details.repeat { summary { "repeat" } code { (repeat(report, c)) } } }

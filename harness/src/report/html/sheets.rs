@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::super::matrix::{Row, matrix};
-use super::super::words::significant;
+use super::super::words::{off, significant};
 use super::super::{PAGE, Report};
 use super::pages::{DIGITS, FOLDER, Layout, Pages, STYLE, matrices, readings};
 use super::palette::Palette;
@@ -147,7 +147,7 @@ fn row(c: &Comparison, number: usize, suite: bool) -> Markup {
             td { (number) } @if suite { td { (c.key.case) } } td { (c.key.procedure.row().short) } td { (c.key.engine) }
             td { (c.meter) " " span.place { (place(c)) } }
             td.number { (value(c.value)) } td.number { (value(c.reference.as_ref().map(|r| r.value))) } td { (c.basis_name()) }
-            td.number { (c.relative_deviation.map_or("–".to_owned(), percent)) }
+            td.number { (off(c, percent).unwrap_or("–".to_owned())) }
             td.number { (c.normalized_error().map_or("–".to_owned(), |e| minus(&format!("{:.0} %", 100.0 * e)))) }
             td class={ "v-" (class(c.verdict)) } {
                 span.glyph aria-hidden="true" { (glyph(c.verdict)) } " " (c.verdict.name())

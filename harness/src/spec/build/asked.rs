@@ -82,7 +82,8 @@ impl Builder<'_> {
                 self.fault(&at, |source| source.error_at_spot(Spot::Key, &at, message, help));
                 continue;
             };
-            let values = [tolerance.relative, tolerance.absolute_lx, tolerance.absolute_cd];
+            let t = tolerance;
+            let values = [t.relative, t.absolute_lx, t.absolute_cd, t.absolute_cd_m2, t.absolute_ugr];
             let sound = values.iter().all(|v| v.is_finite() && *v >= 0.0);
             self.check(sound, &at, "a tolerance is a number from 0", "give positive numbers");
             known.insert(procedure, *tolerance);

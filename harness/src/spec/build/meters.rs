@@ -152,11 +152,7 @@ impl Builder<'_> {
         let fault = |(k, point): (usize, &'_ DVec3)| Some((k, *point, misplaced(*point, scene, around(k))?));
         let mut wrong = points.iter().enumerate().filter_map(fault);
         let Some((k, point, (message, help))) = wrong.next() else { return };
-        let others = match wrong.count() {
-            0 => String::new(),
-            1 => ", and another is as wrong".to_owned(),
-            n => format!(", and {n} others are as wrong"),
-        };
+        let others = others(wrong.count());
         let at = format!("meters.{name}");
         let (at, whole) = match (written, points.first().zip(points.last())) {
             (Written::By(key), Some((first, last))) => {
@@ -185,6 +181,15 @@ impl Builder<'_> {
         let help = "give two directions that span a plane, or one count of 1 for a line";
         self.check(is_plane, &format!("{at}.grid.v_m"), "it runs along u_m: the grid is a line", help);
         count
+    }
+}
+
+/// How many meters besides one are wrong.
+pub(super) fn others(count: usize) -> String {
+    match count {
+        0 => String::new(),
+        1 => ", and another is as wrong".to_owned(),
+        n => format!(", and {n} others are as wrong"),
     }
 }
 

@@ -13,7 +13,7 @@ use super::{Group, Marks, WIDTH, colours, figure};
 use crate::judge::{Basis, Comparison};
 use crate::report::Report;
 use crate::report::svg::{label, line, number, text};
-use crate::report::words::{largest, round_step, rounded, significant as six_digits};
+use crate::report::words::{largest, off, round_step, rounded, significant as six_digits};
 
 const LEFT: f64 = 44.0;
 const RIGHT: f64 = 10.0;
@@ -225,7 +225,7 @@ fn map(title: &str, mine: &[&Comparison], lattice: &Lattice, alike: &Alike, coar
     let frame = lattice.frame();
     let in_percent = |k: usize| mine[k].relative_deviation.map(|d| 100.0 * d);
     let colour = |k: usize| in_percent(k).map_or("none".to_owned(), |p| colours::deviation(p / most));
-    let words = |k: usize| mine[k].relative_deviation.map_or("no reading".to_owned(), percent);
+    let words = |k: usize| off(mine[k], percent).unwrap_or("no reading".to_owned());
     let mean = inside.iter().sum::<f64>() / inside.len().max(1) as f64;
     let worst = largest(inside.iter().copied()).unwrap_or(0.0);
     let ends = [(0.0, format!("−{}", label(most))), (0.5, "0".to_owned()), (1.0, format!("+{}", label(most)))];
