@@ -1,8 +1,8 @@
-"""Writes values/cie-5.9*.yaml to cie-5.14.yaml, the daylight cases, by quadrature of the sky's own law over the opening.
+"""Writes values/cie-5.9*.yaml to cie-5.14*.yaml, the daylight cases, by quadrature of the sky's own law over openings.
 
-It is one of two derivations: tests/analytic_values.rs derives every value again, from closed forms where there are any
-and over the solid angle of the sky in place of the area of the opening. No value is taken from CIE 171. With `--tables`
-it tells instead how far the straight lines of the photometric files stray from the law at every meter.
+It is one of two derivations: tests/analytic_values/daylight.rs derives every value again, under the uniform sky in
+closed form and under all over the solid angle of the sky in place of the area of the opening. No value is taken from
+CIE 171. With `--tables` it tells instead how far the straight lines of the photometric files stray at every meter.
 
 Only Python's standard library is needed:  python3 derive_daylight.py   (in this folder)
 """
@@ -10,7 +10,7 @@ import math
 import sys
 
 from derive_values import gauss, write
-from make_openings import OPENINGS, SUN_ZENITH_DEG
+from make_openings import OPENINGS
 
 NODES = gauss(60)
 UP, DOWN, IN = (0, 0, 1), (0, 0, -1), (1, 0, 0)
@@ -47,7 +47,7 @@ def main():
     seen += [((4.5, 4, 4.5), DOWN), ((3, 5, 4.5), DOWN), ((4, 2, 3), (0, 1, 0))]
     masked("cie-5.13", "sky-below-overhang", (7.2, 4, 2), seen)
     # At (2, 4.5, 1.5) behind the same wall; 6 m before it stands a mask of 4.5 m, black like what lies between.
-    seen = [((2, 6.5, z), IN) for z in (1.75, 2.25, 2.75)]
+    seen = [((2, 6.5, z), IN) for z in (1.75, 2.25)]
     seen += [((4, 6.5, 1.5), UP), ((3, 6.5, 1.5), UP), ((3, 5.5, 1.5), UP), ((2.5, 4.5, 2.5), (0, 1, 0))]
     masked("cie-5.14", "sky-above-mask", (12.2, 6.5, 6.75), seen)
 
@@ -63,11 +63,12 @@ def roof(case, name, meters, turn_deg):
 
 def facade(case, name, meters):
     opening = OPENINGS["sky-facade-" + name]
-    table(case, name, opening, [rectangle(8, 4, opening.across, 2 - opening.along / 2, 2 + opening.along / 2)], meters, 0)
+    corners = rectangle(8, 4, opening.across, 2 - opening.along / 2, 2 + opening.along / 2)
+    table(case, name, opening, [corners], meters, 0)
 
 
 def masked(case, name, centre, meters):
-    """The luminaire stands at the mask's outer edge; a meter sees of it what shows through both faces of the wall's opening."""
+    """The luminaire stands at the mask's outer edge; of it shows what both faces of the wall's opening leave."""
     opening, (x, y, z), polygons = OPENINGS[name], centre, []
     for place, _ in meters:
         ends = [(y - opening.across / 2, y + opening.across / 2), (z - opening.along / 2, z + opening.along / 2)]
@@ -141,7 +142,7 @@ def sun_in(opening, place, part, turn):
 
 
 def nearest(opening, place, part):
-    """The foot of the meter's distance from the part's plane, if that is within it, else a corner or the middle of a side."""
+    """The foot of the perpendicular to the part's plane, if within it, else a corner or the middle of a side."""
     axis = 0 if opening.facade else 2
     foot = tuple(part[0][k] if k == axis else p for k, p in enumerate(place))
     if contains(part, foot, axis):

@@ -2,8 +2,8 @@
 
 The light of a sky at infinity depends on direction alone and is the same at every point of an opening of no thickness.
 Such an opening of area A is a luminaire flush with the room's surface, exactly: I(w) = L(-w) A cos(theta), w the
-direction in which light travels, theta its angle with the opening's normal; behind clear glass, times the share that the
-glass lets through at theta.
+direction in which light travels, theta its angle with the opening's normal; behind clear glass, times the share that
+the glass lets through at theta.
 
 A roof looks down. A facade on the side x+ of a room is turned by `tilt: 90`: its nadir points inwards and its C 0 down.
 Light of the sky travels within 90 degrees of C 0, light of the ground beyond, and planes a thousandth of a degree apart
@@ -14,11 +14,11 @@ Only Python's standard library is needed:  python3 make_openings.py   (in this f
 """
 import math
 
-from skies import SUN_ZENITH_DEG, Sky, glass, unglazed
+from skies import Sky, glass, unglazed
 
 
 class Opening:
-    """An opening of `across` by `along` metres (y and, x of a roof, z of a facade) under a sky, without glass or with it."""
+    """An opening under a sky, `across` metres along y and `along` metres along x of a roof or z of a facade."""
 
     def __init__(self, name, facade, across, along, sky, pane=unglazed, what=""):
         self.name, self.facade, self.across, self.along = name, facade, across, along
@@ -84,22 +84,22 @@ def wrap(words, per_line=16):
     return [" ".join(words[k:k + per_line]) for k in range(0, len(words), per_line)]
 
 
-# The clear sky's sun stands off the facade's normal, so that mirrored tables are noticed; over the roof the spec turns it.
+# The clear sky's sun stands off the facade's normal, so that mirrored tables are noticed; the spec turns the roof's.
 UNIFORM, OVERCAST, GRADUAL = Sky(5), Sky(16), Sky(1)
 OPENINGS = {o.name: o for o in (
-    Opening("sky-roof-uniform-4m", False, 4, 4, UNIFORM, unglazed, "Roof opening 4 x 4 m, uniform sky"),
-    Opening("sky-roof-overcast-1m", False, 1, 1, OVERCAST, unglazed, "Roof opening 1 x 1 m, traditional overcast sky"),
-    Opening("sky-roof-gradual-4m", False, 4, 4, GRADUAL, unglazed, "Roof opening 4 x 4 m, overcast sky"),
-    Opening("sky-roof-clear-1m", False, 1, 1, Sky(12), unglazed, "Roof opening 1 x 1 m, clear sky"),
-    Opening("sky-roof-overcast-1m-glass", False, 1, 1, OVERCAST, glass, "Roof glass 1 x 1 m, traditional overcast sky"),
-    Opening("sky-roof-clear-1m-glass", False, 1, 1, Sky(12), glass, "Roof glass 1 x 1 m, clear sky"),
-    Opening("sky-facade-uniform-4x3m", True, 4, 3, UNIFORM, unglazed, "Facade opening 4 x 3 m, uniform sky"),
-    Opening("sky-facade-overcast-2x1m", True, 2, 1, OVERCAST, unglazed, "Facade opening 2 x 1 m, traditional overcast sky"),
-    Opening("sky-facade-clear-2x1m", True, 2, 1, Sky(12, 45), unglazed, "Facade opening 2 x 1 m, clear sky"),
-    Opening("sky-facade-gradual-4x3m-glass", True, 4, 3, GRADUAL, glass, "Facade glass 4 x 3 m, overcast sky"),
-    Opening("sky-facade-clear-2x1m-glass", True, 2, 1, Sky(12, 45), glass, "Facade glass 2 x 1 m, clear sky"),
-    Opening("sky-below-overhang", True, 6, 3, OVERCAST, unglazed, "6 x 3 m below an overhang, traditional overcast sky"),
-    Opening("sky-above-mask", True, 12, 4.5, OVERCAST, unglazed, "12 x 4.5 m above a mask, traditional overcast sky"),
+    Opening("sky-roof-uniform-4m", False, 4, 4, UNIFORM, unglazed, "Roof opening 4 x 4 m, sky 5, uniform"),
+    Opening("sky-roof-overcast-1m", False, 1, 1, OVERCAST, unglazed, "Roof opening 1 x 1 m, sky 16, overcast"),
+    Opening("sky-roof-gradual-4m", False, 4, 4, GRADUAL, unglazed, "Roof opening 4 x 4 m, sky 1, overcast"),
+    Opening("sky-roof-clear-1m", False, 1, 1, Sky(12), unglazed, "Roof opening 1 x 1 m, sky 12, clear"),
+    Opening("sky-roof-overcast-1m-glass", False, 1, 1, OVERCAST, glass, "Roof glass 1 x 1 m, sky 16, overcast"),
+    Opening("sky-roof-clear-1m-glass", False, 1, 1, Sky(12), glass, "Roof glass 1 x 1 m, sky 12, clear"),
+    Opening("sky-facade-uniform-4x3m", True, 4, 3, UNIFORM, unglazed, "Facade opening 4 x 3 m, sky 5, uniform"),
+    Opening("sky-facade-overcast-2x1m", True, 2, 1, OVERCAST, unglazed, "Facade opening 2 x 1 m, sky 16, overcast"),
+    Opening("sky-facade-clear-2x1m", True, 2, 1, Sky(12, 45), unglazed, "Facade opening 2 x 1 m, sky 12, clear"),
+    Opening("sky-facade-gradual-4x3m-glass", True, 4, 3, GRADUAL, glass, "Facade glass 4 x 3 m, sky 1, overcast"),
+    Opening("sky-facade-clear-2x1m-glass", True, 2, 1, Sky(12, 45), glass, "Facade glass 2 x 1 m, sky 12, clear"),
+    Opening("sky-below-overhang", True, 6, 3, OVERCAST, unglazed, "6 x 3 m below an overhang, sky 16, overcast"),
+    Opening("sky-above-mask", True, 12, 4.5, OVERCAST, unglazed, "12 x 4.5 m above a mask, sky 16, overcast"),
 )}
 
 

@@ -40,7 +40,7 @@ class Sky:
         return self.scale * gradation * (indicatrix + e * (1 - chord * chord / 2) ** 2)
 
     def horizontal(self):
-        """The illuminance of an open plane: the sky's luminance over the unit disc below it, in polar coordinates about the sun."""
+        """The illuminance of an open plane: luminance over the unit disc below, in polar coordinates about the sun."""
         total, turns = 0.0, 512
         s2 = self.sun[0] ** 2 + self.sun[1] ** 2
         for k in range(turns):
@@ -56,7 +56,7 @@ class Sky:
 
 
 def glass(cosine):
-    """Share of unpolarised light that a clear pane lets through: Fresnel's two faces, all reflections between them, absorption."""
+    """What a clear pane lets through of unpolarised light: two faces (Fresnel), all reflections between, absorption."""
     if cosine <= 0.0:
         return 0.0
     inner = math.sqrt(1 - (1 - cosine * cosine) / REFRACTION ** 2)

@@ -88,8 +88,9 @@ fn glass(incidence: f64) -> f64 {
     faces.into_iter().map(of).sum::<f64>() / 2.0
 }
 
-/// The integral of L tau cos over the directions of each azimuth whose zenith angles lie between two bounds. Bounds are smooth
-/// between the azimuths `ends`; what the sky has besides, a cusp at its sun and a jump at the horizon, is cut at.
+/// The integral of L tau cos over the directions of each azimuth whose zenith angles lie between two bounds.
+///
+/// Bounds are smooth between the azimuths `ends`; a cusp at the sun and a jump at the horizon are cut at.
 fn over_directions(
     meter: &Meter,
     sky: &Sky,
@@ -245,10 +246,10 @@ fn masks_leave_what_shows_through_all_frames() {
     let wall = |y: f64| [6.0, 6.2].map(|x| upright(x, [y - 1.0, y + 1.0], [2.5, 3.5]));
     let seen = |m: &Meter, y: f64, sky: [DVec3; 4]| through(m, &[wall(y)[0], wall(y)[1], sky], &overcast, clear);
     check("cie-5.13-below-overhang.yaml", 8, |m| seen(m, 4.0, upright(7.2, [1.0, 7.0], [0.5, 3.5])));
-    check("cie-5.14-above-mask.yaml", 7, |m| seen(m, 6.5, upright(12.2, [0.5, 12.5], [4.5, 9.0])));
+    check("cie-5.14-above-mask.yaml", 6, |m| seen(m, 6.5, upright(12.2, [0.5, 12.5], [4.5, 9.0])));
     // No meter sees past the sides of the luminaires, nor below that under the overhang or above that over the mask.
     check("cie-5.13-below-overhang.yaml", 8, |m| seen(m, 4.0, upright(7.2, [-90.0, 99.0], [-90.0, 3.5])));
-    check("cie-5.14-above-mask.yaml", 7, |m| seen(m, 6.5, upright(12.2, [-90.0, 99.0], [4.5, 99.0])));
+    check("cie-5.14-above-mask.yaml", 6, |m| seen(m, 6.5, upright(12.2, [-90.0, 99.0], [4.5, 99.0])));
 }
 
 /// A file, the sky that it has, its opening's area and whether it is a facade, its glass.
