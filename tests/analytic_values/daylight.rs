@@ -1,13 +1,16 @@
 //! The daylight cases, 5.9 to 5.14: derived over the solid angle of the sky, in place of the area of the opening.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::Arc;
 
 use glam::DVec3;
 use luminaire::geometry::configuration_factor::element_to_polygon;
+use luminaire::geometry::{Reflectances, Room};
 use luminaire::photometry::Photometry;
-use luminaire::scene::{Meter, orientation};
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
+use luminaire::simulator::{self, Accuracy};
 
-use super::{GAUSS, check, photometry, rows};
+use super::{GAUSS, check, doubt, photometry, rows};
 
 const HORIZONTAL_LX: f64 = 10_000.0;
 const GROUND_CD_M2: f64 = 0.3 * HORIZONTAL_LX / PI;
@@ -250,6 +253,46 @@ fn masks_leave_what_shows_through_all_frames() {
     // No meter sees past the sides of the luminaires, nor below that under the overhang or above that over the mask.
     check("cie-5.13-below-overhang.yaml", 8, |m| seen(m, 4.0, upright(7.2, [-90.0, 99.0], [-90.0, 3.5])));
     check("cie-5.14-above-mask.yaml", 6, |m| seen(m, 6.5, upright(12.2, [-90.0, 99.0], [4.5, 99.0])));
+}
+
+#[test]
+fn the_simulators_bounds_hold_where_the_horizon_shows_through_a_hole() {
+    let sky = Sky::new(Kind::TraditionalOvercast, 0.0);
+    let frames = [6.0, 6.2].map(|x| upright(x, [3.0, 5.0], [2.5, 3.5]));
+    let frames = [frames[0], frames[1], upright(7.2, [1.0, 7.0], [0.5, 3.5])];
+    let wall = |[y, high_y]: [f64; 2], [z, high_z]: [f64; 2]| Obstacle {
+        shape: Shape::Box { min_m: DVec3::new(6.0, y, z), max_m: DVec3::new(6.2, high_y, high_z) },
+        reflectance: 0.0,
+    };
+    let (below, above) = (wall([0.0, 8.0], [0.0, 2.5]), wall([0.0, 8.0], [3.5, 5.0]));
+    let beside = [[0.0, 3.0], [5.0, 8.0]].map(|y| wall(y, [2.5, 3.5]));
+    let luminaire = Luminaire {
+        id: "sky".into(),
+        photometry: Arc::new(photometry("sky-below-overhang.ies")),
+        position_m: DVec3::new(7.2, 4.0, 2.0),
+        orientation: orientation(0.0, 90.0, 0.0),
+        flux_scale: 1.0,
+        model: LuminaireModel::Area,
+    };
+    let room = Room { size_m: DVec3::new(7.2, 8.0, 5.0), reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+    let obstacles = [below, above].into_iter().chain(beside).collect();
+    let scene = Scene { room: Some(room), obstacles, luminaires: vec![luminaire] };
+    let meter = |x: f64, y: f64, z: f64| {
+        let normal = if y < 4.0 { DVec3::Y } else { DVec3::NEG_Y };
+        Meter { position_m: DVec3::new(x, y, z), normal }
+    };
+    let meters: Vec<Meter> =
+        [2.6, 2.8, 3.0, 3.1].iter().flat_map(|z| [meter(4.0, 2.0, *z), meter(3.0, 5.5, *z)]).collect();
+    for relative_error in [1e-2, 3e-3, 1e-3] {
+        let accuracy = Accuracy { relative_error, seed: 1 };
+        let solution = simulator::illuminance(&scene, &meters, Transport::Direct, &accuracy).unwrap();
+        for (meter, found) in meters.iter().zip(&solution.estimates) {
+            let (law, value) = (through(meter, &frames, &sky, clear), found.illuminance.value());
+            // And what the table's straight lines leave out.
+            let allowed = doubt(found.uncertainty) + 1.5e-4 * law;
+            assert!((value - law).abs() <= allowed, "{relative_error} {meter:?}: {found:?} for {law}");
+        }
+    }
 }
 
 /// A file, the sky that it has, its opening's area and whether it is a facade, its glass.
