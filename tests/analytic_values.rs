@@ -18,6 +18,9 @@ use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transpo
 use luminaire::simulator::{self, Accuracy, Uncertainty};
 use luminaire::units::{Candela, Lumen, Lux};
 
+#[path = "analytic_values/daylight.rs"]
+mod daylight;
+
 fn reference(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("reference").join(path)
 }

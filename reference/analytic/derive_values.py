@@ -149,14 +149,14 @@ def isotropic(flux_lm, lamp, place, normal):
 QUANTITIES = {"luminance": "luminance_cd_m2", "unified_glare_rating": "unified_glare_rating"}
 
 
-def write(name, title, basis, digits, tables, units=1):
+def write(name, title, basis, digits, tables, units=1, table=None):
     lines = [FORMAT + "luxproof_published: 1", "citation:", f'  title: "{title}"', f"  basis: {basis}",
              f"rounding: {{units_in_last_digit: {units}}}", "tables:"]
     meaning = "Derived, no program's output" if basis == "closed_form" else "Exact methods, see the title"
     for procedure, (model, rows) in tables.items():
         column = f'{{reference: true, engine: {basis}, model: {model}, meaning: "{meaning}"}}'
         quantity = QUANTITIES.get(procedure, "illuminance_lx")
-        lines += [f"  {procedure}:", f"    name: {name}", f"    quantity: {quantity}", "    columns:",
+        lines += [f"  {procedure}:", f"    name: {table or name}", f"    quantity: {quantity}", "    columns:",
                   f"      value: {column}", "    rows:"]
         for point, normal, value in rows:
             at, facing = (f"[{', '.join(f'{v:.9g}' for v in vector)}]" for vector in (point, normal))

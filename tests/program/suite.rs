@@ -13,14 +13,30 @@ fn direct_light_of_the_analytic_suite_is_read_right_by_every_engine() {
     let (report, code) =
         run_reference(&["reference/analytic", "--procedures", "direct_illuminance", "--engines", &ENGINES.join(",")]);
     assert_eq!(code, Some(0), "{}", report["summary"]);
-    assert_eq!(names(&report), ["cie-5.2", "cie-5.3", "cie-5.4", "cie-5.6", "furnace", "s1", "s2/direct"]);
+    let daylight = [
+        "cie-5.10/clear-1m",
+        "cie-5.10/overcast-1m",
+        "cie-5.11/clear-2x1m",
+        "cie-5.11/overcast-2x1m",
+        "cie-5.11/uniform-4x3m",
+        "cie-5.12/clear-2x1m",
+        "cie-5.12/gradual-4x3m",
+        "cie-5.13/overcast-2x1m",
+        "cie-5.14/overcast-2x1m",
+    ];
+    let lamps = ["cie-5.2", "cie-5.3", "cie-5.4", "cie-5.6"];
+    let roofs = ["cie-5.9/clear-1m", "cie-5.9/gradual-4m", "cie-5.9/overcast-1m", "cie-5.9/uniform-4m"];
+    assert_eq!(names(&report), [&daylight[..], &lamps, &roofs, &["furnace", "s1", "s2/direct"]].concat());
     for case in names(&report) {
         for engine in ENGINES {
             let of = |list: &str| among(&report, list, &[("case", case), ("engine", engine)]);
             let ran = !of("recordings").is_empty();
             // Inverse square does not apply closer than five times an opening's size, and says so.
             let why = of("skips").first().map_or("", |s| s["reason"].as_str().unwrap());
-            assert!(ran || (engine == "iesna" && why.contains("five-times rule")), "{case} {engine}: {why}");
+            let is_far_from_points = engine == "iesna" && why.contains("five-times rule");
+            // POV-Ray's grid of points cannot tell how much of an opening shows through a hole.
+            let is_no_grid = engine == "povray" && ["cie-5.13", "cie-5.14"].iter().any(|spec| case.starts_with(spec));
+            assert!(ran || is_far_from_points || is_no_grid, "{case} {engine}: {why}");
         }
         // The known values stand in the report as references of their own, each with its uncertainty.
         let of_case = among(&report, "comparisons", &[("case", case)]);

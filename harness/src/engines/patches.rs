@@ -122,7 +122,7 @@ impl Package {
         let frame = Frame::of(job, settings.coordinates);
         let side = patch(job, &frame, settings.preset);
         let side_m = side / frame.scale;
-        let spaces = Space::of(&recess::behind_points(job, self.apart), side_m);
+        let spaces = Space::of(&recess::behind_luminaires(job, self.apart), side_m);
         let seat = |space: &Space| if *space == Space::Tight { side } else { self.seat * side };
         let seats = spaces.iter().map(seat).collect();
         let instrument = Instrument { edge_deg, seats, by_arc_cosine: true };

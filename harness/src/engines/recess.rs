@@ -14,6 +14,11 @@ pub(super) const APART: f64 = 5e-6;
 
 /// The job with its flush plates before their surfaces and recessed openings before their plates; the job itself without them.
 pub(super) fn apart(job: &Job) -> Cow<'_, Job> {
+    moved(job, 2.0, |_| 1.0)
+}
+
+/// The job with recessed openings and flush plates so many times `APART` into the room.
+fn moved(job: &Job, opening: f64, plate_on: impl Fn(Surface) -> f64) -> Cow<'_, Job> {
     let Some(room) =
         job.scene.room.filter(|room| job.scene.obstacles.iter().any(|o| flush::lies_on(room, o).is_some()))
     else {
@@ -21,7 +26,7 @@ pub(super) fn apart(job: &Job) -> Cow<'_, Job> {
     };
     let inwards = |surface: Surface| APART * room.size_m.max_element() * surface.inward_normal();
     let luminaire = |l: &Luminaire| {
-        let moved_m = flush::recess_of(&job.scene, l).map_or(DVec3::ZERO, |s| 2.0 * inwards(s));
+        let moved_m = flush::recess_of(&job.scene, l).map_or(DVec3::ZERO, |s| opening * inwards(s));
         Luminaire { position_m: l.position_m + moved_m, ..l.clone() }
     };
     let mut moved = job.clone();
@@ -30,17 +35,21 @@ pub(super) fn apart(job: &Job) -> Cow<'_, Job> {
         let surface = flush::lies_on(&room, obstacle);
         if let (Some(surface), Shape::Mesh { vertices_m, .. }) = (surface, &mut obstacle.shape) {
             for corner in vertices_m {
-                *corner += inwards(surface);
+                *corner += plate_on(surface) * inwards(surface);
             }
         }
     }
     Cow::Owned(moved)
 }
 
-/// The same for renderers whose shadow rays meet a face of a box and a point on it at once: faces step back from points, so many times
-/// as far as plates come forward.
-pub(super) fn behind_points(job: &Job, times: f64) -> Cow<'_, Job> {
-    let moved = apart(job);
+/// The same for renderers whose rays meet what shines and a surface close behind it at once: surfaces step back from points
+/// on them and from recessed openings, so many times as far as plates come forward elsewhere; plates stay `APART` before them.
+///
+/// Cycles goes on 256 units in the last place behind a surface, 3e-5 of its coordinate at most: an opening that is
+/// nearer than that to what lies behind it loses the light of rays that find it by chance, up to 2.5 %.
+pub(super) fn behind_luminaires(job: &Job, times: f64) -> Cow<'_, Job> {
+    let is_recessed = |s: Surface| job.scene.luminaires.iter().any(|l| flush::recess_of(&job.scene, l) == Some(s));
+    let moved = moved(job, 0.0, |surface| if is_recessed(surface) { 1.0 - times } else { 1.0 });
     if !job.scene.luminaires.iter().any(|l| surfaces_of(job, l).next().is_some()) {
         return moved;
     }
@@ -58,16 +67,18 @@ pub(super) fn behind_points(job: &Job, times: f64) -> Cow<'_, Job> {
     Cow::Owned(moved)
 }
 
-/// The corners of a surface of the room, whose surfaces step back from points in them likewise.
+/// The corners of a surface of the room, whose surfaces step back from luminaires in them likewise.
 pub(super) fn corners_m(job: &Job, room: &Room, surface: Surface, times: f64) -> [DVec3; 4] {
     let (mut low_m, mut high_m) = (DVec3::ZERO, room.size_m);
     for luminaire in &job.scene.luminaires {
-        for (face, inwards) in surfaces_of(job, luminaire) {
-            if face == Face::OfRoom {
-                let step_m = -times * back_m(job) * inwards;
-                low_m = low_m.min(step_m);
-                high_m = high_m.max(room.size_m + step_m);
-            }
+        let of_points =
+            surfaces_of(job, luminaire).filter(|(face, _)| *face == Face::OfRoom).map(|(_, inwards)| inwards);
+        let is_opening = luminaire.model != LuminaireModel::Point;
+        let of_opening = flush::surface_of(room, luminaire).filter(|_| is_opening).map(Surface::inward_normal);
+        for inwards in of_points.chain(of_opening) {
+            let step_m = -times * back_m(job) * inwards;
+            low_m = low_m.min(step_m);
+            high_m = high_m.max(room.size_m + step_m);
         }
     }
     room.corners(surface).map(|c| DVec3::select(c.cmpgt(DVec3::ZERO), high_m, low_m))
@@ -151,16 +162,37 @@ mod tests {
     }
 
     #[test]
+    fn an_opening_stays_where_its_plate_and_its_surface_step_back() {
+        let job = office();
+        let moved = behind_luminaires(&job, 10.0);
+        let Shape::Mesh { vertices_m, .. } = &moved.scene.obstacles[0].shape else { panic!("no plate") };
+        let ceiling = corners_m(&moved, &job.scene.room.unwrap(), Surface::Ceiling, 10.0)[0].z;
+        let behind = [moved.scene.luminaires[0].position_m.z, vertices_m[0].z, ceiling].map(|z| (z - 3.0) / 6.0);
+        for (found, times) in behind.into_iter().zip([0.0, 9.0, 10.0]) {
+            assert!((found - times * APART).abs() < 1e-12, "{behind:?}");
+        }
+        // Farther than 256 units in the last place of a 32-bit float, which are a part of 2^-15 at most.
+        assert!(behind[1] > 2_f64.powi(-15));
+        // A plate on a surface without an opening comes before it as elsewhere.
+        let mut other = job.clone();
+        other.scene.luminaires.remove(0);
+        let moved = behind_luminaires(&other, 10.0);
+        let Shape::Mesh { vertices_m, .. } = &moved.scene.obstacles[0].shape else { panic!("no plate") };
+        assert!((vertices_m[0].z - 2.99997).abs() < 1e-12, "{vertices_m:?}");
+    }
+
+    #[test]
     fn surfaces_step_back_from_points_on_them() {
         let mut job = office();
         job.scene.obstacles = vec![fixtures::cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 0.75], 0.5)];
+        job.scene.luminaires.remove(0);
         let room = job.scene.room.unwrap();
         let mut bounds_from = |at: [f64; 3]| {
-            job.scene.luminaires[1].position_m = DVec3::from(at);
+            job.scene.luminaires[0].position_m = DVec3::from(at);
             let ends = [Surface::Floor, Surface::Ceiling].map(|s| corners_m(&job, &room, s, 2.0));
             let low = ends.as_flattened().iter().copied().reduce(DVec3::min).unwrap();
             let high = ends.as_flattened().iter().copied().reduce(DVec3::max).unwrap();
-            let Shape::Box { min_m, max_m } = behind_points(&job, 2.0).scene.obstacles[0].shape else {
+            let Shape::Box { min_m, max_m } = behind_luminaires(&job, 2.0).scene.obstacles[0].shape else {
                 panic!("no box")
             };
             let back = 2.0 * APART * 6.0;
@@ -186,7 +218,7 @@ mod tests {
         let mut job = office();
         job.scene.obstacles = vec![fixtures::cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 0.75], 0.5)];
         let lamp = |x| fixtures::luminaire("on it", DVec3::new(x, 1.5, 0.75), fixtures::lambertian());
-        let top = |job: &Job| match behind_points(job, 2.0).scene.obstacles[0].shape {
+        let top = |job: &Job| match behind_luminaires(job, 2.0).scene.obstacles[0].shape {
             Shape::Box { max_m, .. } => max_m.z,
             Shape::Mesh { .. } => f64::NAN,
         };

@@ -6,6 +6,7 @@
 //! Lambert's polygon formula holds but for the interpolation, which counts as an error.
 
 mod opening;
+mod steps;
 
 use std::f64::consts::PI;
 use std::sync::LazyLock;
@@ -19,6 +20,7 @@ use crate::geometry::configuration_factor::element_to_polygon;
 use crate::photometry::{LuminousIntensityDistribution, Symmetry};
 use crate::scene::{Luminaire, LuminaireModel, Meter};
 use opening::{Opening, Part, Sheet};
+use steps::Steps;
 
 /// Relative deviation of a table from a cosine that passes for rounding of its figures; it counts as an error.
 const COSINE_ROUNDING: f64 = 1e-5;
@@ -52,6 +54,8 @@ pub(super) struct Emitter {
     lambertian: Option<Lambertian>,
     /// The light in which the table ends, at most: beyond it there is none.
     cut_off_cd: Option<f64>,
+    /// What else an opening's light jumps at.
+    steps: Steps,
 }
 
 /// What an integrand does at a place: whether it is within what it jumps at, and by how much at most; nothing where it jumps nowhere.
@@ -96,7 +100,8 @@ impl Emitter {
         let peak_cd = luminaire.photometry.distribution.max_intensity().value() * luminaire.flux_scale;
         let edge_cd = luminaire.photometry.distribution.edge_intensity().value() * luminaire.flux_scale;
         let cut_off_cd = (edge_cd > 0.0).then_some(edge_cd);
-        Self { luminaire: luminaire.clone(), peak_cd, opening, lambertian, cut_off_cd }
+        let steps = Steps::of(&luminaire.photometry.distribution);
+        Self { luminaire: luminaire.clone(), peak_cd, opening, lambertian, cut_off_cd, steps }
     }
 
     /// Whether it has no extent.
@@ -293,12 +298,18 @@ impl Emitter {
         table.intensity_towards(away).value() * self.luminaire.flux_scale * lux_per_cd
     }
 
-    /// What a part's light does where the table ends in light, `weight` times.
+    /// What a part's light does where the table ends in light or has a step, `weight` times.
     fn jump(&self, meter: &Own, part: &Part, weight: f64) -> Jump {
-        let cut_off_cd = self.cut_off_cd?;
+        let steps_cd = self.steps.largest_cd().map(|cd| cd * self.luminaire.flux_scale);
+        let largest_cd = match (self.cut_off_cd, steps_cd) {
+            (Some(a), Some(b)) => a.max(b),
+            (either, other) => either.or(other)?,
+        };
         let lux_per_cd = self.path(meter, part).map_or(0.0, |(_, lux_per_cd)| lux_per_cd);
-        let is_within = self.luminaire.photometry.distribution.covers(meter.position_m - part.at_m);
-        Some((is_within, weight * cut_off_cd * lux_per_cd))
+        let (table, away) = (&self.luminaire.photometry.distribution, meter.position_m - part.at_m);
+        let is_within = self.cut_off_cd.is_some() && table.covers(away);
+        let is_beyond = steps_cd.is_some() && self.steps.is_beyond(table.own_angles_deg(away));
+        Some((is_within != is_beyond, weight * largest_cd * lux_per_cd))
     }
 
     /// The direction from a part of the opening to a meter above whose horizon it is, and the illuminance in lux that it gives for every
@@ -571,6 +582,38 @@ mod tests {
                 }
                 let Bounded { value, bound } = found;
                 assert!((value - truth).abs() <= bound + 1e-2 * value, "{opening:?}, {below_m} m: {found:?}, {truth}");
+            }
+        }
+    }
+
+    /// Sky and ground seen through an opening in a wall: planes a thousandth of a degree apart disagree.
+    #[test]
+    fn the_bound_holds_where_planes_disagree() {
+        const SIDE: i32 = 600;
+        let (c_deg, gamma_deg) = (vec![0.0, 90.0, 90.001, 180.0], vec![0.0, 30.0, 60.0, 90.0]);
+        let of_plane = |cd: f64| [1.0, 0.9, 0.5, 0.0].map(|part| part * cd);
+        let candela = [100.0, 90.0, 30.0, 30.0].map(of_plane).concat();
+        let table = LuminousIntensityDistribution::new(c_deg, gamma_deg, candela).unwrap();
+        for (opening, x_m) in [
+            (LuminousOpening::Box { x_m: 0.07, y_m: 0.05, height_m: 0.0 }, [0.0, 0.011, -0.02, 0.03]),
+            (LuminousOpening::Ellipse { x_m: 0.07, y_m: 0.07, height_m: 0.0 }, [0.0, 0.011, -0.02, 0.03]),
+        ]
+        .into_iter()
+        .flat_map(|(opening, all)| all.map(|x| (opening, x)))
+        {
+            let emitter = upright(opening, &table);
+            let meter = Meter { position_m: DVec3::new(x_m, 0.05, -0.3), normal: DVec3::new(0.0, -0.6, 0.8) };
+            let own = emitter.own(&meter);
+            let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(SIDE);
+            let nodes = (0..SIDE * SIDE).map(|k| [middle(k / SIDE), middle(k % SIDE)]);
+            let of_sheet = |sheet: Sheet| nodes.clone().map(|uv| emitter.density(&own, &sheet.part(uv))).sum::<f64>();
+            let sheets = emitter.opening.facing(own.position_m);
+            let truth = sheets.into_iter().map(of_sheet).sum::<f64>() / f64::from(SIDE * SIDE);
+            for error in [1e-2, 3e-3, 1e-3] {
+                let Bounded { value, bound } = emitter.illuminance(&meter, &[], Precision::relative(error));
+                let blur = 6e-4 * truth;
+                assert!((value - truth).abs() <= bound + blur, "{opening:?}, {x_m}: {value} +- {bound}, {truth}");
+                assert!(bound <= 3.0 * error * value, "{opening:?}, {x_m}: {value} +- {bound} for {error}");
             }
         }
     }

@@ -26,7 +26,7 @@ const SCENE: &str = include_str!("../../../drivers/cycles_scene.py");
 
 pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.coordinates);
-    let job = &*recess::behind_points(job, super::PACKAGE.apart);
+    let job = &*recess::behind_luminaires(job, super::PACKAGE.apart);
     let tables = Tables::of(job);
     let names = (0..tables.distinct.len()).map(table).collect();
     let mut files = vec![

@@ -31,7 +31,7 @@ const CORNERS: usize = 64;
 
 pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, EngineError> {
     let frame = Frame::of(job, settings.coordinates);
-    let job = &*recess::behind_points(job, super::PACKAGE.apart);
+    let job = &*recess::behind_luminaires(job, super::PACKAGE.apart);
     let job = &*shining(job);
     let tables = Tables::of(job);
     let mapped = tables.distinct.iter().filter(|_| !settings.has_plain_tables());

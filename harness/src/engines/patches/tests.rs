@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 use glam::DVec3;
 use luminaire::photometry::LuminousOpening;
-use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport, orientation};
+use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport, flush, orientation};
 
 use super::*;
 use crate::engines::Engine;
@@ -17,6 +17,7 @@ macro_rules! hold_for_patches {
             flat_openings_send_out_their_table_on_both_sides
             meters_in_free_space_are_read_at_their_very_points
             points_on_surfaces_light_their_room
+            recessed_openings_lose_no_light_to_what_lies_behind_them
             what_is_off_is_dark
             grazing_light_is_not_lost
         );
@@ -36,6 +37,18 @@ macro_rules! hold_for_patches {
     };
 }
 pub(in crate::engines) use hold_for_patches;
+
+/// In a large room, far off: where surfaces behind an opening were a 200,000th of the room apart, Cycles read 1 to 2.5 % too little.
+pub(in crate::engines) fn recessed_openings_lose_no_light_to_what_lies_behind_them(read: fn(&Job) -> Measurement) {
+    let room = room(DVec3::splat(8.0), 0.0, 0.0, 0.0);
+    let opening = LuminousOpening::Box { x_m: 1.0, y_m: 1.0, height_m: 0.0 };
+    let panel = with_opening(luminaire("panel", DVec3::new(4.0, 4.0, 8.0), lambertian()), opening);
+    let obstacles = flush::plate(&room, &panel).into_iter().collect();
+    let scene = Scene { room: Some(room), obstacles, luminaires: vec![panel] };
+    let job = job(scene, stations(&[[5.25, 4.0, 4.0], [5.0, 5.0, 4.0], [3.25, 3.3, 6.5]], DVec3::Z), Transport::Direct);
+    let deviations = relative_deviations(&read(&job), &simulated_lx(&job, 1e-4));
+    assert!(worst(&deviations) < 1.5e-3, "{deviations:?}");
+}
 
 pub(in crate::engines) fn flat_openings_send_out_their_table_on_both_sides(read: fn(&Job) -> Measurement) {
     let (x_m, y_m) = (0.6, 0.3);

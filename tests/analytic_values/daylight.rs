@@ -1,0 +1,347 @@
+//! The daylight cases, 5.9 to 5.14: derived over the solid angle of the sky, in place of the area of the opening.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::sync::Arc;
+
+use glam::DVec3;
+use luminaire::geometry::configuration_factor::element_to_polygon;
+use luminaire::geometry::{Reflectances, Room};
+use luminaire::photometry::Photometry;
+use luminaire::scene::{Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
+use luminaire::simulator::{self, Accuracy};
+
+use super::{GAUSS, check, doubt, photometry, rows};
+
+const HORIZONTAL_LX: f64 = 10_000.0;
+const GROUND_CD_M2: f64 = 0.3 * HORIZONTAL_LX / PI;
+const SUN_ZENITH_DEG: f64 = 40.0;
+
+/// Skies of ISO 15469.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    Overcast,
+    Uniform,
+    Clear,
+    TraditionalOvercast,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sky {
+    kind: Kind,
+    sun_azimuth: f64,
+    scale: f64,
+}
+
+impl Sky {
+    /// One that gives an open horizontal plane 10 000 lx, in closed form where there is one.
+    fn new(kind: Kind, sun_deg: f64) -> Self {
+        let mut sky = Self { kind, sun_azimuth: sun_deg.to_radians(), scale: 1.0 };
+        let horizontal = match kind {
+            Kind::Uniform => PI,
+            Kind::TraditionalOvercast => 7.0 * PI / 9.0,
+            Kind::Overcast | Kind::Clear => {
+                let upwards = Meter { position_m: DVec3::ZERO, normal: DVec3::Z };
+                let half_turn = [0.0, FRAC_PI_2, PI, 1.5 * PI, TAU];
+                over_directions(&upwards, &sky, &half_turn, |_| Some([0.0, FRAC_PI_2]), |_| 1.0)
+            }
+        };
+        sky.scale = HORIZONTAL_LX / horizontal;
+        sky
+    }
+
+    fn sun(&self) -> DVec3 {
+        direction(SUN_ZENITH_DEG.to_radians(), self.sun_azimuth)
+    }
+
+    /// In cd/m² towards a direction, or of the ground.
+    fn luminance(&self, towards: DVec3) -> f64 {
+        let zenith = towards.z.acos();
+        if towards.z < 0.0 {
+            return GROUND_CD_M2;
+        }
+        let [a, b, c, d, e] = match self.kind {
+            Kind::TraditionalOvercast => return self.scale * (1.0 + 2.0 * zenith.cos()) / 3.0,
+            Kind::Overcast => [4.0, -0.7, 0.0, -1.0, 0.0],
+            Kind::Uniform => [0.0, -1.0, 0.0, -1.0, 0.0],
+            Kind::Clear => [-1.0, -0.32, 10.0, -3.0, 0.45],
+        };
+        let chi = towards.angle_between(self.sun());
+        let gradation = 1.0 + a * (b / zenith.cos()).exp();
+        let indicatrix = 1.0 + c * ((d * chi).exp() - (d * FRAC_PI_2).exp()) + e * chi.cos().powi(2);
+        self.scale * gradation * indicatrix
+    }
+}
+
+fn direction(zenith: f64, azimuth: f64) -> DVec3 {
+    DVec3::new(zenith.sin() * azimuth.cos(), zenith.sin() * azimuth.sin(), zenith.cos())
+}
+
+/// What a clear pane lets through at an angle of incidence, added up reflection by reflection.
+fn glass(incidence: f64) -> f64 {
+    let inner = (incidence.sin() / 1.52).asin();
+    let left = (-0.02 / inner.cos()).exp();
+    let (less, more) = (incidence - inner, incidence + inner);
+    let straight = (0.52_f64 / 2.52).powi(2);
+    let faces = if more < 1e-6 {
+        [straight; 2]
+    } else {
+        [(less.sin() / more.sin()).powi(2), (less.tan() / more.tan()).powi(2)]
+    };
+    let of = |r: f64| (0..200).map(|k| (1.0 - r).powi(2) * left * (r * left).powi(2 * k)).sum::<f64>();
+    faces.into_iter().map(of).sum::<f64>() / 2.0
+}
+
+/// The integral of L tau cos over the directions of each azimuth whose zenith angles lie between two bounds.
+///
+/// Bounds are smooth between the azimuths `ends`; a cusp at the sun and a jump at the horizon are cut at.
+fn over_directions(
+    meter: &Meter,
+    sky: &Sky,
+    ends: &[f64],
+    bounds: impl Fn(f64) -> Option<[f64; 2]>,
+    passed: impl Fn(DVec3) -> f64,
+) -> f64 {
+    let mut azimuths = ends.to_vec();
+    if matches!(sky.kind, Kind::Clear) {
+        azimuths.extend((-1..=1).map(|turn| sky.sun_azimuth + TAU * f64::from(turn)));
+    }
+    let (from, to) = (ends[0], ends[ends.len() - 1]);
+    azimuths.retain(|a| (from..=to).contains(a));
+    azimuths.sort_by(f64::total_cmp);
+    let zeniths = [0.0, SUN_ZENITH_DEG.to_radians(), FRAC_PI_2, PI];
+    let mut sum = 0.0;
+    for pair in azimuths.windows(2) {
+        for (azimuth, width) in nodes(pair[0], pair[1]) {
+            let Some([low, high]) = bounds(azimuth) else { continue };
+            for zone in zeniths.windows(2) {
+                let (low, high) = (low.max(zone[0]), high.min(zone[1]));
+                if low >= high {
+                    continue;
+                }
+                for (zenith, height) in nodes(low, high) {
+                    let towards = direction(zenith, azimuth);
+                    let received = towards.dot(meter.normal).max(0.0);
+                    sum += width * height * zenith.sin() * received * sky.luminance(towards) * passed(towards);
+                }
+            }
+        }
+    }
+    sum
+}
+
+/// Composite Gauss-Legendre quadrature.
+fn nodes(low: f64, high: f64) -> impl Iterator<Item = (f64, f64)> {
+    let panels = 10;
+    let step = (high - low) / f64::from(panels);
+    (0..panels).flat_map(move |k| GAUSS.map(|(x, w)| (low + (f64::from(k) + x) * step, w * step)))
+}
+
+/// The illuminance by what shows through all of some flat convex frames, the last of them the opening's own.
+fn through(meter: &Meter, frames: &[[DVec3; 4]], sky: &Sky, passed: impl Fn(DVec3) -> f64) -> f64 {
+    let frames: Vec<[DVec3; 4]> = frames.iter().map(|f| f.map(|c| c - meter.position_m)).collect();
+    // Azimuths count from the middle of the first frame, and all round where a frame is straight above.
+    let middle: DVec3 = frames[0].iter().sum();
+    let to_middle = middle.y.atan2(middle.x);
+    let corners = frames.iter().flatten().map(|c| {
+        let turned = c.y.atan2(c.x) - to_middle;
+        to_middle + turned - TAU * (turned / TAU).round()
+    });
+    let mut ends: Vec<f64> = corners.chain([to_middle - PI, to_middle + PI]).collect();
+    ends.sort_by(f64::total_cmp);
+    let bounds = |azimuth: f64| {
+        let shown = frames.iter().map(|f| zenith_angles(f, azimuth));
+        shown.reduce(|a, b| Some([a?[0].max(b?[0]), a?[1].min(b?[1])])).flatten()
+    };
+    over_directions(meter, sky, &ends, bounds, passed)
+}
+
+/// Between which zenith angles a frame, relative to the meter, is seen in one azimuth.
+fn zenith_angles(frame: &[DVec3; 4], azimuth: f64) -> Option<[f64; 2]> {
+    let (ahead, aside) = (direction(FRAC_PI_2, azimuth), direction(FRAC_PI_2, azimuth + FRAC_PI_2));
+    let mut found = vec![];
+    for (k, p) in frame.iter().enumerate() {
+        let q = frame[(k + 1) % 4];
+        let (a, b) = (p.dot(aside), q.dot(aside));
+        if (a < 0.0) != (b < 0.0) {
+            let at = p.lerp(q, a / (a - b));
+            if at.dot(ahead) >= 0.0 {
+                found.push(at.dot(ahead).atan2(at.z));
+            }
+        }
+    }
+    match found[..] {
+        [] => None,
+        [only] => Some([0.0, only]),
+        _ => Some([found.iter().copied().fold(PI, f64::min), found.iter().copied().fold(0.0, f64::max)]),
+    }
+}
+
+/// A roof opening of the cases of chapters 5.9 and 5.10, turned about its middle.
+fn roof(side_m: f64, turn_deg: f64) -> [DVec3; 4] {
+    let turn = orientation(turn_deg, 0.0, 0.0);
+    [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+        .map(|[x, y]| DVec3::new(4.0, 4.0, 3.5) + turn * DVec3::new(x, y, 0.0) * side_m / 2.0)
+}
+
+/// An upright frame in the plane of an x.
+fn upright(x: f64, [left, right]: [f64; 2], [low, high]: [f64; 2]) -> [DVec3; 4] {
+    [[left, low], [right, low], [right, high], [left, high]].map(|[y, z]| DVec3::new(x, y, z))
+}
+
+fn clear(_: DVec3) -> f64 {
+    1.0
+}
+
+fn of_roof(towards: DVec3) -> f64 {
+    glass(towards.z.acos())
+}
+
+fn of_facade(towards: DVec3) -> f64 {
+    glass(towards.x.acos())
+}
+
+#[test]
+fn a_roof_opening_lets_in_the_solid_angle_of_its_sky() {
+    let uniform = Sky::new(Kind::Uniform, 0.0);
+    check("cie-5.9-uniform-4m.yaml", 8, |m| {
+        HORIZONTAL_LX * element_to_polygon(m.position_m, m.normal, &roof(4.0, 0.0))
+    });
+    check("cie-5.9-uniform-4m.yaml", 8, |m| through(m, &[roof(4.0, 0.0)], &uniform, clear));
+    let overcast = Sky::new(Kind::TraditionalOvercast, 0.0);
+    check("cie-5.9-overcast-1m.yaml", 8, |m| through(m, &[roof(1.0, 0.0)], &overcast, clear));
+    let gradual = Sky::new(Kind::Overcast, 0.0);
+    check("cie-5.9-gradual-4m.yaml", 8, |m| through(m, &[roof(4.0, 0.0)], &gradual, clear));
+    let sunny = Sky::new(Kind::Clear, 30.0);
+    check("cie-5.9-clear-1m.yaml", 8, |m| through(m, &[roof(1.0, 30.0)], &sunny, clear));
+    check("cie-5.10-overcast-1m-glass.yaml", 8, |m| through(m, &[roof(1.0, 0.0)], &overcast, of_roof));
+    check("cie-5.10-clear-1m-glass.yaml", 8, |m| through(m, &[roof(1.0, 30.0)], &sunny, of_roof));
+}
+
+#[test]
+fn a_facade_opening_lets_in_sky_and_ground() {
+    let (large, small) = (upright(8.0, [2.0, 6.0], [0.5, 3.5]), upright(8.0, [3.0, 5.0], [1.5, 2.5]));
+    check("cie-5.11-uniform-4x3m.yaml", 9, |m| {
+        let horizon = m.position_m.z.clamp(0.5, 3.5);
+        let factor = |z: [f64; 2]| element_to_polygon(m.position_m, m.normal, &upright(8.0, [2.0, 6.0], z));
+        HORIZONTAL_LX * (factor([horizon, 3.5]) + 0.3 * factor([0.5, horizon]))
+    });
+    let overcast = Sky::new(Kind::TraditionalOvercast, 0.0);
+    check("cie-5.11-overcast-2x1m.yaml", 9, |m| through(m, &[small], &overcast, clear));
+    let gradual = Sky::new(Kind::Overcast, 0.0);
+    check("cie-5.12-gradual-4x3m-glass.yaml", 9, |m| through(m, &[large], &gradual, of_facade));
+    let sunny = Sky::new(Kind::Clear, 45.0);
+    check("cie-5.11-clear-2x1m.yaml", 8, |m| through(m, &[small], &sunny, clear));
+    check("cie-5.12-clear-2x1m-glass.yaml", 8, |m| through(m, &[small], &sunny, of_facade));
+    // A sun on the other side, or one degree off, is another table.
+    for sun_deg in [-45.0, 46.0] {
+        let other = Sky::new(Kind::Clear, sun_deg);
+        let misses = rows("cie-5.11-clear-2x1m.yaml")
+            .iter()
+            .filter(|r| (through(&r.meter, &[small], &other, clear) - r.value).abs() > r.unit)
+            .count();
+        assert!(misses >= 6, "{sun_deg}: {misses}");
+    }
+}
+
+#[test]
+fn masks_leave_what_shows_through_all_frames() {
+    let overcast = Sky::new(Kind::TraditionalOvercast, 0.0);
+    let wall = |y: f64| [6.0, 6.2].map(|x| upright(x, [y - 1.0, y + 1.0], [2.5, 3.5]));
+    let seen = |m: &Meter, y: f64, sky: [DVec3; 4]| through(m, &[wall(y)[0], wall(y)[1], sky], &overcast, clear);
+    check("cie-5.13-below-overhang.yaml", 8, |m| seen(m, 4.0, upright(7.2, [1.0, 7.0], [0.5, 3.5])));
+    check("cie-5.14-above-mask.yaml", 6, |m| seen(m, 6.5, upright(12.2, [0.5, 12.5], [4.5, 9.0])));
+    // No meter sees past the sides of the luminaires, nor below that under the overhang or above that over the mask.
+    check("cie-5.13-below-overhang.yaml", 8, |m| seen(m, 4.0, upright(7.2, [-90.0, 99.0], [-90.0, 3.5])));
+    check("cie-5.14-above-mask.yaml", 6, |m| seen(m, 6.5, upright(12.2, [-90.0, 99.0], [4.5, 99.0])));
+}
+
+#[test]
+fn the_simulators_bounds_hold_where_the_horizon_shows_through_a_hole() {
+    let sky = Sky::new(Kind::TraditionalOvercast, 0.0);
+    let frames = [6.0, 6.2].map(|x| upright(x, [3.0, 5.0], [2.5, 3.5]));
+    let frames = [frames[0], frames[1], upright(7.2, [1.0, 7.0], [0.5, 3.5])];
+    let wall = |[y, high_y]: [f64; 2], [z, high_z]: [f64; 2]| Obstacle {
+        shape: Shape::Box { min_m: DVec3::new(6.0, y, z), max_m: DVec3::new(6.2, high_y, high_z) },
+        reflectance: 0.0,
+    };
+    let (below, above) = (wall([0.0, 8.0], [0.0, 2.5]), wall([0.0, 8.0], [3.5, 5.0]));
+    let beside = [[0.0, 3.0], [5.0, 8.0]].map(|y| wall(y, [2.5, 3.5]));
+    let luminaire = Luminaire {
+        id: "sky".into(),
+        photometry: Arc::new(photometry("sky-below-overhang.ies")),
+        position_m: DVec3::new(7.2, 4.0, 2.0),
+        orientation: orientation(0.0, 90.0, 0.0),
+        flux_scale: 1.0,
+        model: LuminaireModel::Area,
+    };
+    let room = Room { size_m: DVec3::new(7.2, 8.0, 5.0), reflectance: Reflectances::with_equal_walls(0.0, 0.0, 0.0) };
+    let obstacles = [below, above].into_iter().chain(beside).collect();
+    let scene = Scene { room: Some(room), obstacles, luminaires: vec![luminaire] };
+    let meter = |x: f64, y: f64, z: f64| {
+        let normal = if y < 4.0 { DVec3::Y } else { DVec3::NEG_Y };
+        Meter { position_m: DVec3::new(x, y, z), normal }
+    };
+    let meters: Vec<Meter> =
+        [2.6, 2.8, 3.0, 3.1].iter().flat_map(|z| [meter(4.0, 2.0, *z), meter(3.0, 5.5, *z)]).collect();
+    for relative_error in [1e-2, 3e-3, 1e-3] {
+        let accuracy = Accuracy { relative_error, seed: 1 };
+        let solution = simulator::illuminance(&scene, &meters, Transport::Direct, &accuracy).unwrap();
+        for (meter, found) in meters.iter().zip(&solution.estimates) {
+            let (law, value) = (through(meter, &frames, &sky, clear), found.illuminance.value());
+            // And what the table's straight lines leave out.
+            let allowed = doubt(found.uncertainty) + 1.5e-4 * law;
+            assert!((value - law).abs() <= allowed, "{relative_error} {meter:?}: {found:?} for {law}");
+        }
+    }
+}
+
+/// A file, the sky that it has, its opening's area and whether it is a facade, its glass.
+fn openings() -> Vec<(&'static str, Sky, f64, bool, bool)> {
+    let [uniform, overcast, gradual] =
+        [Kind::Uniform, Kind::TraditionalOvercast, Kind::Overcast].map(|kind| Sky::new(kind, 0.0));
+    let sunny = |sun_deg| Sky::new(Kind::Clear, sun_deg);
+    vec![
+        ("sky-roof-uniform-4m.ies", uniform, 16.0, false, false),
+        ("sky-roof-overcast-1m.ies", overcast, 1.0, false, false),
+        ("sky-roof-gradual-4m.ies", gradual, 16.0, false, false),
+        ("sky-roof-clear-1m.ies", sunny(0.0), 1.0, false, false),
+        ("sky-roof-overcast-1m-glass.ies", overcast, 1.0, false, true),
+        ("sky-roof-clear-1m-glass.ies", sunny(0.0), 1.0, false, true),
+        ("sky-facade-uniform-4x3m.ies", uniform, 12.0, true, false),
+        ("sky-facade-overcast-2x1m.ies", overcast, 2.0, true, false),
+        ("sky-facade-clear-2x1m.ies", sunny(45.0), 2.0, true, false),
+        ("sky-facade-gradual-4x3m-glass.ies", gradual, 12.0, true, true),
+        ("sky-facade-clear-2x1m-glass.ies", sunny(45.0), 2.0, true, true),
+        ("sky-below-overhang.ies", overcast, 18.0, true, false),
+        ("sky-above-mask.ies", overcast, 54.0, true, false),
+    ]
+}
+
+#[test]
+fn the_openings_send_in_the_light_of_their_skies() {
+    for (name, sky, area_m2, is_facade, has_glass) in openings() {
+        let Photometry { distribution, .. } = photometry(name);
+        let turned = orientation(0.0, if is_facade { 90.0 } else { 0.0 }, 0.0);
+        let outwards = if is_facade { DVec3::X } else { DVec3::Z };
+        let largest = distribution.max_intensity().value();
+        let mut off = 0.0_f64;
+        // Directions that lie on no angle of a table, and none nearer to the horizon of a facade than its planes.
+        for (i, j) in (0..40).flat_map(|i| (0..40).map(move |j| (i, j))) {
+            let towards = direction((0.5 + f64::from(i)) * PI / 40.0, (0.37 + f64::from(j)) * TAU / 40.0);
+            let cosine = towards.dot(outwards);
+            if cosine <= 0.0 {
+                continue;
+            }
+            let pane = if has_glass { glass(cosine.acos()) } else { 1.0 };
+            let law = sky.luminance(towards) * area_m2 * cosine * pane;
+            off = off.max((distribution.intensity_towards(turned.transpose() * -towards).value() - law).abs());
+        }
+        let allowed = if matches!(sky.kind, Kind::Clear) { 4e-3 } else { 1e-3 };
+        assert!(off < allowed * largest, "{name}: {off} of {largest}");
+        // Through a bare roof comes the illuminance of an open plane.
+        let flux = distribution.flux().value();
+        if !is_facade && !has_glass {
+            assert!((flux / (HORIZONTAL_LX * area_m2) - 1.0).abs() < 3e-4, "{name}: {flux}");
+        }
+    }
+}
