@@ -36,6 +36,7 @@ mod releases;
 mod repeatability;
 mod repetitions;
 mod rooms;
+mod sets_of_meters;
 mod stated_errors;
 mod stops;
 mod suite;

@@ -3,12 +3,14 @@
 mod bias;
 mod comparison;
 mod consensus;
+mod extreme;
 mod family;
 mod known;
 mod papers;
 mod policy;
 mod spending;
 mod split;
+mod statistics;
 #[cfg(test)]
 pub(crate) mod tests;
 mod tolerance;
@@ -42,6 +44,7 @@ pub use papers::{PaperSplit, Share, Stages, shares};
 pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicyRecord, Profile, ProfileBudget, ProjectPolicy, Sampling};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
+pub use statistics::{FigureAgreement, Statistics, StatisticsAgreement};
 pub use tolerance::{Rule, Tolerance, ToleranceClass, Tolerances};
 pub use uncertainty::{Component, ErrorBudget, Shape, Source};
 pub use verdict::{Verdict, judge};

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{Kind, biases, decision_rules, departures, lacking, notes, policies, splits, tables};
+use super::notes::{Kind, agreements, biases, decision_rules, departures, lacking, notes, policies, splits, tables};
 use super::sentences::{HEADING, sentences};
 use super::words::{mark, off, percent, significant};
 use super::{Report, papers};
@@ -57,6 +57,13 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
     if !biases.is_empty() {
         let summary = "Bias: mean deviation, its interval, p of none";
         line(format!("\n<details><summary>{summary}</summary>\n\n{}\n\n</details>", biases.join("\n")));
+    }
+    let agreement =
+        |p: ProcedureId| agreements(report, p).into_iter().map(move |line| format!("- {p}, {}", inert(&line)));
+    let agreements: Vec<String> = report.procedures().into_iter().flat_map(agreement).collect();
+    if !agreements.is_empty() {
+        let summary = "Sets of meters: what they come to, against the reference";
+        line(format!("\n<details><summary>{summary}</summary>\n\n{}\n\n</details>", agreements.join("\n")));
     }
     let splits = splits(report);
     if !splits.is_empty() {

@@ -13,6 +13,7 @@ mod procedure;
 mod provenance;
 mod rows;
 mod sheets;
+mod statistics;
 
 use itertools::Itertools;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
