@@ -83,6 +83,18 @@ class Report:
         return table(self.data.get("statistics", []), columns, units)
 
     @property
+    def ratios(self) -> pandas.DataFrame:
+        """What cases that a spec compares are to each other, a row a meter.
+
+        Columns: before, after (cases), procedure, engine, set, basis, meter; ratio.value, after over before (1), with
+        ratio.std_error and ratio.error_bound; agreement.deviation, .expanded, .allowed and .verdict; cancels. The means of sets
+        are in `data["ratios"]`.
+        """
+        own = ["before", "after", "procedure", "engine", "set", "basis"]
+        rows = [{**{key: of[key] for key in own}, **meter} for of in self.data.get("ratios", []) for meter in of["meters"]]
+        return table(rows, [*own, "meter", "ratio.value", "cancels"], {"ratio.value": "1"})
+
+    @property
     def bias(self) -> pandas.DataFrame:
         """Mean deviations: case, procedure, engine, basis, readings; mean, low and high relative (1); p_value (1)."""
         columns = [*_KEY, "basis", "readings", "mean", "low", "high", "p_value"]

@@ -11,6 +11,7 @@ mod by_hand;
 mod cache;
 mod calibration;
 mod command_line;
+mod compare;
 mod conformance;
 mod cylindrical;
 mod external_adapter;

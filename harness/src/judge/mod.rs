@@ -8,6 +8,7 @@ mod family;
 mod known;
 mod papers;
 mod policy;
+mod ratios;
 mod spending;
 mod split;
 mod statistics;
@@ -42,6 +43,7 @@ pub use papers::{
 };
 pub use papers::{PaperSplit, Share, Stages, shares};
 pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicyRecord, Profile, ProfileBudget, ProjectPolicy, Sampling};
+pub use ratios::{Measured, MeterRatio, Ratio, Ratios};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
 pub use statistics::{FigureAgreement, Statistics, StatisticsAgreement};

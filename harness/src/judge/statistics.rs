@@ -117,14 +117,15 @@ impl Judge<'_> {
                 agreement,
             });
         }
-        self.decide_figures(&mut found);
+        // Figures of all sets together.
+        let agreements = found.iter_mut().filter_map(|s| s.agreement.as_mut());
+        self.decide_together(agreements.flat_map(StatisticsAgreement::figures_mut));
         found
     }
 
-    /// Figures of all sets of one engine in one procedure fail together, as its meters do.
-    fn decide_figures(&self, found: &mut [Statistics]) {
-        let agreements = found.iter_mut().filter_map(|s| s.agreement.as_mut());
-        let mut figures = agreements.flat_map(StatisticsAgreement::figures_mut).collect_vec();
+    /// What is claimed of one engine in one procedure fails together, as its meters do.
+    pub(super) fn decide_together<'f>(&self, figures: impl Iterator<Item = &'f mut FigureAgreement>) {
+        let mut figures = figures.collect_vec();
         let p_values = figures.iter().map(|f| f.p_value).collect_vec();
         let rejected = family::rejected(&p_values, self.tolerances.family_wise_error());
         for (figure, rejected) in figures.iter_mut().zip(rejected) {
@@ -134,19 +135,25 @@ impl Judge<'_> {
         }
     }
 
-    /// `mine` has one comparison a meter; `share` is what of its error a decision may spend.
-    fn agreement(&self, recording: &Recording, mine: &[&Comparison], share: f64) -> Option<StatisticsAgreement> {
+    /// What all meters of an engine are held against, each once; `None` where some are not, or not by the same, or where that is in doubt or
+    /// the engine claims nothing of single meters.
+    pub(super) fn common_basis(&self, mine: &[&Comparison]) -> Option<Basis> {
         let first = mine.first()?;
-        let (basis, tolerance) = (first.basis()?, first.tolerance);
+        let basis = first.basis()?;
         let is_held = |c: &&Comparison| {
             let is_sound = c.reference.as_ref().is_some_and(|r| r.basis == basis && r.doubt.is_none());
             is_sound && c.verdict != Verdict::Missing && c.deviation.is_some()
         };
-        let ReadingKey { procedure, engine, .. } = &recording.key;
+        let ReadingKey { procedure, engine, .. } = &first.key;
+        let is_claimed = self.tolerances.not_claimed(*procedure, basis, engine).is_none();
         let is_once = mine.iter().map(|c| &c.meter).all_unique();
-        if !is_once || !mine.iter().all(is_held) || self.tolerances.not_claimed(*procedure, basis, engine).is_some() {
-            return None;
-        }
+        (is_claimed && is_once && mine.iter().all(is_held)).then_some(basis)
+    }
+
+    /// `mine` has one comparison a meter; `share` is what of its error a decision may spend.
+    fn agreement(&self, recording: &Recording, mine: &[&Comparison], share: f64) -> Option<StatisticsAgreement> {
+        let basis = self.common_basis(mine)?;
+        let tolerance = mine.first()?.tolerance;
         let tail = upper_tail_of_normal(self.tolerances.coverage_factor());
         let read = mine.iter().filter_map(|c| Some(Estimate { value: c.value?, uncertainty: c.uncertainty }));
         let (read, held) = (read.collect_vec(), mine.iter().filter_map(|c| reference(c)).collect_vec());
@@ -193,7 +200,7 @@ pub(super) const fn is_light(quantity: Quantity) -> bool {
 }
 
 /// The set of a meter.
-fn set(meter: &str) -> &str {
+pub(super) fn set(meter: &str) -> &str {
     meter.rsplit_once('[').map_or(meter, |(set, _)| set)
 }
 
@@ -235,7 +242,7 @@ fn quotient(part: &Estimate, whole: &Estimate) -> Option<Estimate> {
 }
 
 /// What a meter is held against, with all that is uncertain of it.
-fn reference(c: &Comparison) -> Option<Estimate> {
+pub(super) fn reference(c: &Comparison) -> Option<Estimate> {
     let (mut chance, mut bound, mut freedom) = (0.0_f64, 0.0, None);
     let of_reference = |part: &&Component| !matches!(part.source, Source::MonteCarlo | Source::Discretisation);
     for part in c.budget.iter().flat_map(|b| &b.components).filter(of_reference) {
@@ -256,8 +263,8 @@ fn reference(c: &Comparison) -> Option<Estimate> {
 }
 
 /// What figures of meters can be at most decided to be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Limit {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Limit {
     /// Anything.
     None,
     /// Some meter's interval is not one at a distance: nothing fails yet.
@@ -267,7 +274,7 @@ enum Limit {
 }
 
 /// What fails no meter, or has no error there, fails no figure of its set.
-fn limit(recording: &Recording, mine: &[&Comparison]) -> Limit {
+pub(super) fn limit(recording: &Recording, mine: &[&Comparison]) -> Limit {
     let waits = |c: &&Comparison| {
         let is_heavy = || is_heavy_tailed(recording, c, c.deviation.unwrap_or(0.0), c.p_value.unwrap_or(1.0));
         c.p_value.is_none() || is_heavy()
@@ -281,14 +288,19 @@ fn limit(recording: &Recording, mine: &[&Comparison]) -> Limit {
 
 /// The equivalence test that meters have, of a figure.
 #[derive(Clone, Copy, Debug)]
-struct Test {
-    tail: f64,
-    share: f64,
-    limit: Limit,
+pub(super) struct Test {
+    pub(super) tail: f64,
+    pub(super) share: f64,
+    pub(super) limit: Limit,
 }
 
 impl Test {
-    fn of(&self, own: &Estimate, theirs: &Estimate, allowed: impl Fn(&Estimate) -> f64) -> Option<FigureAgreement> {
+    pub(super) fn of(
+        &self,
+        own: &Estimate,
+        theirs: &Estimate,
+        allowed: impl Fn(&Estimate) -> f64,
+    ) -> Option<FigureAgreement> {
         let (deviation, allowed) = (own.value - theirs.value, allowed(theirs));
         let of_reference = of_reading(&theirs.uncertainty).into_iter();
         let of_reference = of_reference.map(|part| Component { source: Source::Reference, ..part });

@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{Kind, agreements, biases, decision_rules, departures, lacking, notes, policies, splits, tables};
+use super::notes::{
+    Kind, agreements, biases, decision_rules, departures, lacking, notes, policies, ratios, splits, tables,
+};
 use super::sentences::{HEADING, sentences};
 use super::words::{mark, off, percent, significant};
 use super::{Report, papers};
@@ -64,6 +66,12 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
     if !agreements.is_empty() {
         let summary = "Sets of meters: what they come to, against the reference";
         line(format!("\n<details><summary>{summary}</summary>\n\n{}\n\n</details>", agreements.join("\n")));
+    }
+    let ratios = ratios(report);
+    if !ratios.is_empty() {
+        let summary = "Means of sets of meters, after over before";
+        let lines = ratios.iter().map(|ratio| format!("- {}", inert(ratio))).collect::<Vec<_>>().join("\n");
+        line(format!("\n<details><summary>{summary}</summary>\n\n{lines}\n\n</details>"));
     }
     let splits = splits(report);
     if !splits.is_empty() {

@@ -30,7 +30,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::judge::{
-    Bias, Comparison, Consensus, OnRecord, PaperSplit, Policy, PolicyRecord, PublishedTable, Split, Statistics, Verdict,
+    Bias, Comparison, Consensus, OnRecord, PaperSplit, Policy, PolicyRecord, PublishedTable, Ratios, Split, Statistics,
+    Verdict,
 };
 use crate::plan::Skip;
 use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Role, Status};
@@ -89,6 +90,9 @@ pub struct Report {
     /// What sets of meters come to, engine by engine, and how that agrees with their references.
     #[serde(default)]
     pub statistics: Vec<Statistics>,
+    /// What cases that a spec compares are to each other, engine by engine.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ratios: Vec<Ratios>,
     /// How each engine was run on each procedure.
     pub recordings: Vec<Recording>,
     /// What was not run, and why.

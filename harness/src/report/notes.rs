@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use itertools::Itertools as _;
 
 use super::Report;
-use super::words::{interval_in_percent, plural, significant};
-use crate::judge::{Bias, FigureAgreement, Misfit, OnRecord, PolicyRecord, Split, State, Statistics, Verdict};
+use super::words::{estimate, interval_in_percent, plural, significant};
+use crate::judge::{Bias, FigureAgreement, Misfit, OnRecord, PolicyRecord, Ratios, Split, State, Statistics, Verdict};
 use crate::plan::{EVERYONE, Skip};
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 
@@ -122,6 +122,25 @@ pub(super) fn agreements(report: &Report, procedure: ProcedureId) -> Vec<String>
         Some(format!("{place}, {}", agreement(s)?))
     };
     large_sets(report, procedure).filter_map(line).collect()
+}
+
+/// A line for each pair of cases that is compared, procedure, set and engine: the ratio of means, how it agrees, and the meters' verdicts.
+pub(super) fn ratios(report: &Report) -> Vec<String> {
+    let line = |r: &Ratios| {
+        let mean = r.mean.ratio.as_ref().map_or("-".to_owned(), estimate);
+        let one = r.meters.iter().filter(|m| m.of.cancels).count();
+        let of = if one < r.meters.len() { format!(" at {one} of {} meters", r.meters.len()) } else { String::new() };
+        let cancels = if one > 0 { format!(" (flux alone was changed: errors cancel{of})") } else { String::new() };
+        let against = r.basis.map(|basis| format!(" against {}", basis.name())).unwrap_or_default();
+        let judged = r.mean.agreement.as_ref().map(|a| format!("{against} {}", deviation(a))).unwrap_or_default();
+        let verdicts = r.meters.iter().filter_map(|m| Some(m.of.agreement.as_ref()?.verdict)).counts();
+        let counts =
+            verdicts.into_iter().sorted().map(|(verdict, count)| format!("{count} {}", verdict.name())).join(", ");
+        let counts = if counts.is_empty() { plural(r.meters.len(), "meter") } else { format!("meters: {counts}") };
+        let place = format!("{} / {} {} {}", r.after, r.before, r.procedure, r.set);
+        format!("{place}, {}: {mean}{judged}{cancels}; {counts}", r.engine)
+    };
+    report.ratios.iter().map(line).collect()
 }
 
 /// What verdicts are for and how often they are wrong.

@@ -11,7 +11,7 @@ use unicode_width::UnicodeWidthStr as _;
 use super::matrix::{Cell, Row as MatrixRow, matrix, worst};
 use super::notes::{
     self, Kind, LISTED_METERS, Note, agreement, agreements, biases, decision_rules, departures, diagnoses, lacking,
-    large_sets, notes, policies, splits,
+    large_sets, notes, policies, ratios, splits,
 };
 use super::sentences::{HEADING, sentences};
 use super::words::{abridged, cut, estimate, mark, off, percent, plural, significant, value, wrapped};
@@ -114,6 +114,11 @@ pub fn terminal(report: &Report, screen: Screen, folder: Option<&str>) -> String
         section(&mut text, &heading, agreements(report, procedure).into_iter().map(indented));
     }
     let most = if screen.detail == Detail::All { usize::MAX } else { BRIEF };
+    let compared = ratios(report);
+    let left = compared.len().saturating_sub(most.saturating_mul(2));
+    let more = (left > 0).then(|| format!("{left} more: --all"));
+    let compared = compared.into_iter().take(most.saturating_mul(2)).chain(more);
+    section(&mut text, "Means of sets of meters, after over before", compared.map(indented));
     // In full: without who is independent of whom a claim says nothing.
     let departures = departures(report).into_iter().take(most);
     section(&mut text, "Who departs from the other witnesses, the reference included", departures.map(indented));

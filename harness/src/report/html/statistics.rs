@@ -51,16 +51,19 @@ fn figures(s: &Statistics) -> [Figure<'_>; 4] {
 }
 
 fn cell((figure, agreement): Figure<'_>) -> Markup {
-    let off = |a: &FigureAgreement| {
-        let relative = a.relative().map(|d| interval_in_percent(d, a.expanded / a.reference.value.abs()));
-        minus(&relative.unwrap_or_else(|| significant(a.deviation)))
-    };
     html! {
         td.number {
             (figure.as_ref().map_or("–".to_owned(), estimate))
-            @if let Some(a) = agreement {
-                div class={ "most v-" (class(a.verdict)) } { (off(a)) " " span.glyph aria-hidden="true" { (glyph(a.verdict)) } " " span.word { (a.verdict.name()) } }
-            }
+            @if let Some(agreement) = agreement { (agreed(agreement)) }
         }
+    }
+}
+
+/// How far a figure is off, and what that comes to.
+pub(super) fn agreed(a: &FigureAgreement) -> Markup {
+    let relative = a.relative().map(|d| interval_in_percent(d, a.expanded / a.reference.value.abs()));
+    let off = minus(&relative.unwrap_or_else(|| significant(a.deviation)));
+    html! {
+        div class={ "most v-" (class(a.verdict)) } { (off) " " span.glyph aria-hidden="true" { (glyph(a.verdict)) } " " span.word { (a.verdict.name()) } }
     }
 }
