@@ -311,7 +311,8 @@ impl Test {
             (_, Limit::Open) | (Verdict::Fail, Limit::NoFailure) => Verdict::Inconclusive,
             (verdict, _) => verdict,
         };
-        let p_value = budget.p_value(deviation, allowed);
+        // What is no number cannot be written.
+        let p_value = Some(budget.p_value(deviation, allowed)).filter(|p| p.is_finite())?;
         Some(FigureAgreement { reference: *theirs, deviation, expanded: budget.expanded, allowed, verdict, p_value })
     }
 }
