@@ -17,9 +17,7 @@ use super::statistics::{FigureAgreement, Limit, Test, is_light, limit, reference
 use super::uncertainty::upper_tail_of_normal;
 use super::{Basis, Comparison, Judge, MAX_RELATIVE_ERROR, Tolerance};
 use crate::procedures::{Target, Task};
-use crate::record::{
-    EngineName, Estimate, MeterId, ProcedureId, Reading, ReadingKey, Recording, Uncertainty,
-};
+use crate::record::{EngineName, Estimate, MeterId, ProcedureId, Reading, ReadingKey, Recording, Uncertainty};
 use crate::spec::content;
 
 /// Readings are in a ratio where they are so to this, relative: rounding of sums, and no chance of samples.
