@@ -73,13 +73,26 @@ class Report:
     def statistics(self) -> pandas.DataFrame:
         """What sets of meters come to, engine by engine.
 
-        Columns: case, procedure, engine, set, meters (how many); mean.value and minimum.value in lux; uniformity.value, minimum
-        over mean (1); each with std_error and error_bound likewise.
+        Columns: case, procedure, engine, set, meters (how many); mean.value, minimum.value and maximum.value in lux;
+        uniformity.value, minimum over mean, and diversity.value, minimum over maximum (1); each with std_error and error_bound
+        likewise. Where they are judged, agreement.mean.deviation, .expanded, .allowed and .verdict, and so of the others.
         """
-        parts = ["mean", "minimum", "uniformity"]
+        parts = ["mean", "minimum", "maximum", "uniformity", "diversity"]
         columns = [*_KEY, "set", "meters", *(f"{part}.value" for part in parts)]
-        units = {f"{part}.{of}": "1" if part == "uniformity" else "lx" for part in parts for of in ("value", "std_error", "error_bound")}
+        units = {f"{part}.{of}": "1" if part in ("uniformity", "diversity") else "lx" for part in parts for of in ("value", "std_error", "error_bound")}
         return table(self.data.get("statistics", []), columns, units)
+
+    @property
+    def ratios(self) -> pandas.DataFrame:
+        """What cases that a spec compares are to each other, a row a meter.
+
+        Columns: before, after (cases), procedure, engine, set, basis, meter; ratio.value, after over before (1), with
+        ratio.std_error and ratio.error_bound; agreement.deviation, .expanded, .allowed and .verdict; cancels. The means of sets
+        are in `data["ratios"]`.
+        """
+        own = ["before", "after", "procedure", "engine", "set", "basis"]
+        rows = [{**{key: of[key] for key in own}, **meter} for of in self.data.get("ratios", []) for meter in of["meters"]]
+        return table(rows, [*own, "meter", "ratio.value", "cancels"], {"ratio.value": "1"})
 
     @property
     def bias(self) -> pandas.DataFrame:

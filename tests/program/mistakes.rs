@@ -98,6 +98,11 @@ const MISTAKES: &[(&str, Mistake)] = &[
     ("a typo in a case", Added("cases:\n  - {name: bright}\n  - {name: dark, room: {reflectance: {wals: 0.1}}}\n")),
     ("a case without a name", Added("cases:\n  - {room: {reflectance: {walls: 0.1}}}\n")),
     ("an override of what is not there", Added("cases:\n  - {name: bright, luminaires: {lmap: {flux_scale: 2}}}\n")),
+    (
+        "a comparison of no such case, and of none",
+        Added("cases: [{name: before}, {name: after}]\ncompare:\n  - [before, aftr]\n  - [before]\n"),
+    ),
+    ("a comparison without cases", Added("compare: [before, after]\n")),
     ("an unknown engine", Added("engines: {radianse: {}}\n")),
     ("settings of engines", Added("engines:\n  povray: {cuont: 3, preset: best}\n  radiance: {preset: quick}\n")),
     ("a tolerance for no procedure", Added("tolerances: {direct: {relative: 0.01}}\n")),

@@ -67,6 +67,7 @@ impl Audit<'_> {
             engines: outcome.engines,
             known_deviations: known,
             bias: judge.bias(&comparisons, &outcome.recordings),
+            statistics: judge.statistics(&comparisons, &outcome.recordings),
             splits: tasks().flat_map(|task| judge.split(task, &of(task))).collect(),
             consensus: tasks()
                 .filter(|task| !task.procedure.is_known())

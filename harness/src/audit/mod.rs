@@ -36,7 +36,7 @@ use sha2::{Digest, Sha256};
 
 use crate::diagnosis::{self, Examined};
 use crate::engines::Site;
-use crate::judge::{Policy, PolicyChoice, ProfileBudget, Published, PublishedError};
+use crate::judge::{Measured, Policy, PolicyChoice, ProfileBudget, Published, PublishedError, Ratios};
 use crate::measure::cache::Cache;
 use crate::measure::{Asked, Asking, Machine, Reader};
 use crate::plan::{EVERYONE, Plan, Planner, Run, Scope, Selection, Skip, Skipping};
@@ -354,7 +354,9 @@ impl Prepared {
                 report.keep_again(&folder, Care::Usual)?;
             }
         }
+        let ratios = ratios(&cases, &plans, &policies, &reports, options.observer);
         let mut report = Report::joined(spec, reports);
+        report.ratios = ratios;
         report.request = Some(options.request());
         report.published_findings = published_findings(&cases, &plans, &published);
         // Cases ran side by side: their seconds do not add up.
@@ -444,6 +446,35 @@ fn diagnose_together(plans: &[Plan], reports: &mut [Report]) {
         });
     }
     diagnosis::diagnose(&mut cases);
+}
+
+/// What the cases that a spec compares are to each other, engine by engine.
+fn ratios(
+    cases: &[Case],
+    plans: &[Plan],
+    policies: &[Arc<Policy>],
+    reports: &[Report],
+    observer: &dyn Observer,
+) -> Vec<Ratios> {
+    let measured = |k: usize| Measured {
+        case: &cases[k].name,
+        tasks: &plans[k].tasks,
+        readings: reports[k].readings.iter().map(|r| (&r.key, &r.reading)).collect(),
+        comparisons: &reports[k].comparisons,
+        recordings: &reports[k].recordings,
+    };
+    let mut found = vec![];
+    for (k, case) in cases.iter().enumerate() {
+        for name in &case.before {
+            match cases.iter().position(|other| other.name == *name) {
+                Some(before) => {
+                    found.extend(policies[k].judge(case, None).ratios(&measured(before), &measured(k)));
+                }
+                None => observer.remarked(case, &format!("it is not compared with {name}, which was not run")),
+            }
+        }
+    }
+    found
 }
 
 /// The published tables of each case, or all that is wrong with them.

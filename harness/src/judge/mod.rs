@@ -3,12 +3,15 @@
 mod bias;
 mod comparison;
 mod consensus;
+mod extreme;
 mod family;
 mod known;
 mod papers;
 mod policy;
+mod ratios;
 mod spending;
 mod split;
+mod statistics;
 #[cfg(test)]
 pub(crate) mod tests;
 mod tolerance;
@@ -40,8 +43,10 @@ pub use papers::{
 };
 pub use papers::{PaperSplit, Share, Stages, shares};
 pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicyRecord, Profile, ProfileBudget, ProjectPolicy, Sampling};
+pub use ratios::{Measured, MeterRatio, Ratio, Ratios};
 pub use spending::{LOOKS, share_of_error};
 pub use split::Split;
+pub use statistics::{FigureAgreement, Statistics, StatisticsAgreement};
 pub use tolerance::{Rule, Tolerance, ToleranceClass, Tolerances};
 pub use uncertainty::{Component, ErrorBudget, Shape, Source};
 pub use verdict::{Verdict, judge};

@@ -354,7 +354,7 @@ impl StatedErrors {
                 Uncertainty::StandardError { value: by * value, degrees_of_freedom, bound }
             }
             (stated, None, Some(relative)) => Uncertainty::StandardError {
-                value: relative * estimate.value,
+                value: relative * estimate.value.abs(),
                 degrees_of_freedom: Some(freedom),
                 bound: stated.bound(),
             },
@@ -911,6 +911,9 @@ mod tests {
         let corrected = found.correct(claimed(20.0)).uncertainty;
         assert!((corrected.standard_error().unwrap() - 20.0 * 0.01 * 2f64.sqrt()).abs() < 1e-12, "{corrected:?}");
         assert_eq!(corrected.degrees_of_freedom(), Some(1.0));
+        // Negative light errs as much, and no report holds a negative error.
+        let negative = StatedErrors::corrected(std::slice::from_ref(&found), &MeterId::new("m", 0), claimed(-5.0));
+        assert!(negative.uncertainty.is_sound() && negative.uncertainty.standard() > 0.0, "{negative:?}");
         assert!(StatedErrors::of_claims(&[vec![claimed(10.0); 4]]).is_none());
     }
 }

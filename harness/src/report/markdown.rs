@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use super::matrix::{Cell, matrix, worst};
-use super::notes::{Kind, biases, decision_rules, departures, lacking, notes, policies, splits, tables};
+use super::notes::{
+    Kind, agreements, biases, decision_rules, departures, lacking, notes, policies, ratios, splits, tables,
+};
 use super::sentences::{HEADING, sentences};
 use super::words::{mark, off, percent, significant};
 use super::{Report, papers};
@@ -57,6 +59,19 @@ pub fn markdown(report: &Report, link: Option<&str>) -> String {
     if !biases.is_empty() {
         let summary = "Bias: mean deviation, its interval, p of none";
         line(format!("\n<details><summary>{summary}</summary>\n\n{}\n\n</details>", biases.join("\n")));
+    }
+    let agreement =
+        |p: ProcedureId| agreements(report, p).into_iter().map(move |line| format!("- {p}, {}", inert(&line)));
+    let agreements: Vec<String> = report.procedures().into_iter().flat_map(agreement).collect();
+    if !agreements.is_empty() {
+        let summary = "Sets of meters: what they come to, against the reference";
+        line(format!("\n<details><summary>{summary}</summary>\n\n{}\n\n</details>", agreements.join("\n")));
+    }
+    let ratios = ratios(report);
+    if !ratios.is_empty() {
+        let summary = "Means of sets of meters, after over before";
+        let lines = ratios.iter().map(|ratio| format!("- {}", inert(ratio))).collect::<Vec<_>>().join("\n");
+        line(format!("\n<details><summary>{summary}</summary>\n\n{lines}\n\n</details>"));
     }
     let splits = splits(report);
     if !splits.is_empty() {

@@ -17,7 +17,6 @@ mod papers;
 mod read;
 mod request;
 mod sentences;
-mod statistics;
 pub(crate) mod svg;
 mod terminal;
 pub(crate) mod words;
@@ -31,7 +30,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::judge::{
-    Bias, Comparison, Consensus, OnRecord, PaperSplit, Policy, PolicyRecord, PublishedTable, Split, Verdict,
+    Bias, Comparison, Consensus, OnRecord, PaperSplit, Policy, PolicyRecord, PublishedTable, Ratios, Split, Statistics,
+    Verdict,
 };
 use crate::plan::Skip;
 use crate::record::{EngineName, EngineStatus, ProcedureId, Reading, ReadingKey, Recording, Role, Status};
@@ -52,7 +52,6 @@ pub use markdown::markdown;
 pub use papers::{Cell, Standing, cells};
 pub use read::{ReadError, ReadReport, ReportError};
 pub use request::Request;
-pub use statistics::Statistics;
 pub use terminal::{Detail, Screen, Style, terminal};
 
 /// A report of more comparisons than this is laid out in rows, and has them line by line and page by page beside it: a page of all would take seconds
@@ -88,9 +87,12 @@ pub struct Report {
     pub comparisons: Vec<Comparison>,
     /// Every reading of every engine, once.
     pub readings: Vec<ReadingRecord>,
-    /// What sets of meters come to, engine by engine.
+    /// What sets of meters come to, engine by engine, and how that agrees with their references.
     #[serde(default)]
     pub statistics: Vec<Statistics>,
+    /// What cases that a spec compares are to each other, engine by engine.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ratios: Vec<Ratios>,
     /// How each engine was run on each procedure.
     pub recordings: Vec<Recording>,
     /// What was not run, and why.
@@ -233,6 +235,7 @@ impl Report {
             all.skips.extend(one.skips);
             all.splits.extend(one.splits);
             all.bias.extend(one.bias);
+            all.statistics.extend(one.statistics);
             all.known_deviations.extend(one.known_deviations);
             all.consensus.extend(one.consensus);
             all.curves.extend(one.curves);
@@ -286,7 +289,6 @@ impl Report {
     fn keep_with(&mut self, care: Care, path: &Path) -> Result<(), FileError> {
         let fail = |e| FileError::of(path, e);
         self.sentences = sentences::sentences(self);
-        self.statistics = statistics::statistics(&self.readings);
         self.seal().map_err(fail)?;
         let kept =
             if self.is_long() { files::replace_rows(path, self, care) } else { files::replace_json(path, self, care) };

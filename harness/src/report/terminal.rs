@@ -9,16 +9,16 @@ use itertools::Itertools;
 use unicode_width::UnicodeWidthStr as _;
 
 use super::matrix::{Cell, Row as MatrixRow, matrix, worst};
-use super::notes::{self, Kind, Note, biases, decision_rules, departures, diagnoses, lacking, notes, policies, splits};
+use super::notes::{
+    self, Kind, LISTED_METERS, Note, agreement, agreements, biases, decision_rules, departures, diagnoses, lacking,
+    large_sets, notes, policies, ratios, splits,
+};
 use super::sentences::{HEADING, sentences};
-use super::statistics::{Statistics, statistics};
 use super::words::{abridged, cut, estimate, mark, off, percent, plural, significant, value, wrapped};
 use super::{ReadingRecord, Report, papers};
-use crate::judge::{Comparison, Verdict};
+use crate::judge::{Comparison, Statistics, Verdict};
 use crate::record::{EngineStatus, Estimate, MeterId, ProcedureId, Status};
 
-/// More meters than this are summarised instead of listed.
-const LISTED_METERS: usize = 8;
 /// Lines of each kind that a brief report spends.
 const BRIEF: usize = 4;
 /// The narrowest and the widest screen that is laid out for, in letters.
@@ -108,7 +108,17 @@ pub fn terminal(report: &Report, screen: Screen, folder: Option<&str>) -> String
         let heading = format!("Bias of {procedure}: mean deviation, its interval, p of none");
         section(&mut text, &heading, biases(report, procedure).into_iter().map(indented));
     }
+    // A single case has them below its tables.
+    for procedure in report.procedures().into_iter().filter(|_| screen.detail == Detail::All && report.is_suite()) {
+        let heading = format!("What sets of meters come to in {procedure}");
+        section(&mut text, &heading, agreements(report, procedure).into_iter().map(indented));
+    }
     let most = if screen.detail == Detail::All { usize::MAX } else { BRIEF };
+    let compared = ratios(report);
+    let left = compared.len().saturating_sub(most.saturating_mul(2));
+    let more = (left > 0).then(|| format!("{left} more: --all"));
+    let compared = compared.into_iter().take(most.saturating_mul(2)).chain(more);
+    section(&mut text, "Means of sets of meters, after over before", compared.map(indented));
     // In full: without who is independent of whom a claim says nothing.
     let departures = departures(report).into_iter().take(most);
     section(&mut text, "Who departs from the other witnesses, the reference included", departures.map(indented));
@@ -268,9 +278,7 @@ type Figure = fn(&Statistics) -> Option<Estimate>;
 
 /// What large sets of meters come to, engines side by side; `None` where none is.
 fn of_sets(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<String> {
-    let all = statistics(&report.readings);
-    let large = |s: &&Statistics| s.key.procedure == procedure && s.meters > LISTED_METERS;
-    let mine: Vec<&Statistics> = all.iter().filter(large).collect();
+    let mine: Vec<&Statistics> = large_sets(report, procedure).collect();
     let sets = mine.iter().map(|s| (s.set.as_str(), s.meters)).unique().collect_vec();
     let has = |e: &&str| mine.iter().any(|s| s.key.engine == **e);
     let engines: Vec<&str> = report.engines.iter().map(|e| e.id.as_str()).filter(has).collect();
@@ -278,10 +286,11 @@ fn of_sets(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<St
         return None;
     }
     let unit = procedure.row().quantity.unit();
-    let figures: [(String, Figure); 3] = [
+    let figures: [(String, Figure); 4] = [
         (format!("mean [{unit}]"), |s| Some(s.mean)),
         (format!("minimum [{unit}]"), |s| Some(s.minimum)),
         ("uniformity".to_owned(), |s| s.uniformity),
+        ("diversity".to_owned(), |s| s.diversity),
     ];
     let of_set = |(set, meters): &(&str, usize)| {
         let rows = |range: &Range<usize>| {
@@ -296,7 +305,11 @@ fn of_sets(report: &Report, procedure: ProcedureId, screen: Screen) -> Option<St
             let heads = std::iter::once("").chain(engines[range.clone()].iter().copied());
             drawn(heads, rows(&range), 1..usize::MAX, style)
         });
-        format!(" {}\n{table}", wrapped(&format!("{procedure}, {set} ({meters} meters)"), screen.width - 1, "  "))
+        let agreements = mine.iter().filter(|s| s.set == *set).filter_map(|s| agreement(s));
+        let agreements =
+            agreements.map(|line| format!("\n   {}", wrapped(&line, screen.width - 3, "       "))).join("");
+        let heading = wrapped(&format!("{procedure}, {set} ({meters} meters)"), screen.width - 1, "  ");
+        format!(" {heading}\n{table}{agreements}")
     };
     Some(sets.iter().map(of_set).join("\n\n"))
 }

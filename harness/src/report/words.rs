@@ -86,6 +86,17 @@ pub(crate) fn interval(value: f64, half_width: f64) -> String {
     }
 }
 
+/// A relative deviation with the half width of its interval in two digits, `+0.12 +- 0.31 %`.
+pub(super) fn interval_in_percent(deviation: f64, half_width: f64) -> String {
+    let percents = [100.0 * deviation, 100.0 * half_width];
+    if percents.iter().all(|p| p.abs() < 5e-8) {
+        return "0 %".to_owned();
+    }
+    let scale = if percents[1] > 1e-6 { percents[1] } else { percents[0].abs() };
+    let decimals = (1.0 - scale.log10().floor()).clamp(0.0, 7.0) as usize;
+    format!("{:+.decimals$} +- {:.decimals$} %", percents[0], percents[1])
+}
+
 /// Six significant digits.
 pub(crate) fn significant(value: f64) -> String {
     if value == 0.0 {

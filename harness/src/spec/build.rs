@@ -43,6 +43,8 @@ const MAX_TITLE: usize = 1000;
 pub struct Case {
     /// The spec's file stem, and behind a slash the name of one of its cases.
     pub name: String,
+    /// The cases of the same spec that it is compared with, as what was before it.
+    pub before: Vec<String>,
     /// The spec's title, or its name.
     pub title: String,
     /// The spec's path as given.
@@ -124,9 +126,12 @@ impl Loaded {
             Ok(source) => source,
             Err(fault) => return Self { cases: vec![], faults: vec![fault] },
         };
-        let tree = tree(&source.text).ok();
-        let Shaped { read, mut faults, mended } = shaped::<Spec>(&source, tree.as_ref());
-        let Variants { all, faults: of_cases } = tree.map(|tree| variants(&source, &tree, &faults)).unwrap_or_default();
+        let tree = tree(&source.text);
+        let Shaped { read, mut faults, mended } = shaped::<Spec>(&source, tree.as_ref().ok());
+        let variants = tree.map(|tree| variants(&source, &tree, &faults));
+        let variants = variants.or_else(|error| unread(&source, read.as_ref(), &error));
+        let Variants { all, pairs, faults: of_cases } =
+            variants.unwrap_or_else(|fault| Variants { faults: vec![fault], ..Variants::default() });
         let has_cases = !all.is_empty() || !of_cases.is_empty();
         faults.extend(of_cases);
         let (mut left, mut cases) = (trust.limits(), vec![]);
@@ -139,7 +144,9 @@ impl Loaded {
             let mut builder = Builder::new(&v.source, &v.mended, &mut left);
             builder.hash.update(&v.name);
             let Built { case, faults: of_case } = builder.build(v.spec);
-            cases.push(Case { name: format!("{}/{}", case.name, v.name), only_engines: v.engines, ..case });
+            let full = |name: &str| format!("{}/{name}", case.name);
+            let before = pairs.iter().filter(|pair| pair.after == v.name).map(|pair| full(&pair.before)).collect();
+            cases.push(Case { name: full(&v.name), before, only_engines: v.engines, ..case });
             faults.extend(of_case);
             // Another case would say the same, or what nobody waits for.
             if faults.len() >= Trials::of(&source.text).faults() {
@@ -149,6 +156,14 @@ impl Loaded {
         faults.truncate(MAX_FAULTS);
         Self { cases, faults }
     }
+}
+
+/// Cases that are no tree (an alias of what it stands in, a tag) must not be passed over for the spec that lies below them.
+pub(super) fn unread(source: &Source, spec: Option<&Spec>, error: &serde_yaml::Error) -> Result<Variants, SpecError> {
+    let has_cases = spec.is_some_and(|spec| spec.cases.is_some() || spec.compare.is_some());
+    let help = "write cases and comparisons without tags, and without an alias of what it stands in".to_owned();
+    let fault = || SpecError { help: Some(help), ..source.misread(error) };
+    if has_cases { Err(fault()) } else { Ok(Variants::default()) }
 }
 
 /// A case as far as it could be made, and why it is not whole.
@@ -241,6 +256,7 @@ impl<'a> Builder<'a> {
         let help = format!("give a line of at most {MAX_TITLE} printable characters");
         self.check(is_line(title, MAX_TITLE), "title", "this is no title", help);
         let case = Case {
+            before: vec![],
             title: title.to_owned(),
             name,
             path: self.source.path.clone(),

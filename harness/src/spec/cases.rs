@@ -7,6 +7,7 @@ use std::collections::HashSet;
 
 use serde_yaml::{Mapping, Value};
 
+use super::compare::{Pair, pairs};
 use super::model::{EngineSettings, Spec};
 use super::shape::{self, Mended, Shaped, Trials};
 use super::tree::Tree;
@@ -30,6 +31,8 @@ pub(super) struct Variant {
 #[derive(Debug, Default)]
 pub(super) struct Variants {
     pub(super) all: Vec<Variant>,
+    /// Those of them that are compared.
+    pub(super) pairs: Vec<Pair>,
     pub(super) faults: Vec<SpecError>,
 }
 
@@ -44,8 +47,13 @@ struct Override {
 /// `of_base` is what is wrong with the spec itself, which is not told of every case again.
 pub(super) fn variants(source: &Source, tree: &Tree, of_base: &[SpecError]) -> Variants {
     let Value::Mapping(mut base) = tree.value.clone() else { return Variants::default() };
-    let Some(cases) = base.remove("cases") else { return Variants::default() };
+    let (cases, compare) = (base.remove("cases"), base.remove("compare"));
     let mut found = Variants::default();
+    let Some(cases) = cases else {
+        let lacking = |_| source.error_at("compare", "there are no cases to compare", "give them as `cases`");
+        found.faults.extend(compare.map(lacking));
+        return found;
+    };
     let combinations = match cases {
         Value::Sequence(list) => Ok(listed(source, list, &mut found.faults).into_iter().map(|o| vec![o]).collect()),
         Value::Mapping(axes) => matrix(source, axes),
@@ -83,6 +91,14 @@ pub(super) fn variants(source: &Source, tree: &Tree, of_base: &[SpecError]) -> V
         }
         if found.faults.len() >= most_faults {
             break;
+        }
+    }
+    // Where a case has a fault, its name may be what is missing here.
+    if let Some(compare) = compare.filter(|_| found.faults.is_empty()) {
+        let names: Vec<&str> = found.all.iter().map(|v| v.name.as_str()).collect();
+        match pairs(source, &compare, &names) {
+            Ok(pairs) => found.pairs = pairs,
+            Err(faults) => found.faults.extend(faults),
         }
     }
     found
@@ -168,8 +184,9 @@ fn combined(
     let mut text = Value::Mapping(base.clone());
     let mut engines: Option<Vec<String>> = None;
     for o in overrides {
-        let sound = !o.says.contains_key("cases") && !o.says.contains_key("luxproof");
-        source.require(sound, &o.place, "a case has neither cases nor a format version of its own", FORM)?;
+        let sound = ["cases", "compare", "luxproof"].iter().all(|key| !o.says.contains_key(*key));
+        let message = "a case has neither cases nor comparisons nor a format version of its own";
+        source.require(sound, &o.place, message, FORM)?;
         lay(&mut text, &Value::Mapping(o.says.clone())).map_err(|missing| {
             let message = format!("there is no `{missing}` to override");
             source.error_at(&o.place, message, "name an item by its `id`")
@@ -227,7 +244,7 @@ mod tests {
         let second = "  - {id: b, photometry: a.ies, at_m: [2, 2, 2]}\nmeters:\n";
         let base = MINIMAL.replace("meters:\n", second) + "  indirect_illuminance: {meters: plane}\n";
         let source = Source::new("spec.yaml".into(), base + cases);
-        let Variants { all, faults } = variants(&source, &crate::spec::tree::tree(&source.text).unwrap(), &[]);
+        let Variants { all, faults, .. } = variants(&source, &crate::spec::tree::tree(&source.text).unwrap(), &[]);
         faults.into_iter().next().map_or(Ok(all), Err)
     }
 
@@ -258,6 +275,18 @@ mod tests {
         assert!(cases[2].spec.procedures.0.contains_key(&ProcedureId::DirectIlluminance));
         assert!(!cases[3].spec.procedures.0.contains_key(&ProcedureId::DirectIlluminance));
         assert_eq!(cases[3].spec.luminaires[0].model, ModelSpec::Area);
+    }
+
+    #[test]
+    fn cases_that_cannot_be_followed_are_refused_and_not_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("spec.yaml");
+        for cases in ["cases: [!odd {name: one}]", "cases: [{name: a}, {name: b}]\ncompare: &x [*x, *x]"] {
+            std::fs::write(&path, format!("{MINIMAL}{cases}\n")).unwrap();
+            let faults = crate::spec::Case::load_all(&path, crate::spec::Trust::Own).unwrap_err();
+            assert!(faults.all().iter().any(|f| f.line >= Some(11)), "{cases}: {faults:?}");
+            assert!(crate::spec::specs(&path).is_err(), "{cases}");
+        }
     }
 
     #[test]

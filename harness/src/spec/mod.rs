@@ -5,6 +5,7 @@
 mod bounds;
 mod build;
 mod cases;
+mod compare;
 mod content;
 mod faults;
 mod homes;

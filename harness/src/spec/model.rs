@@ -57,6 +57,21 @@ pub struct Spec {
     #[serde(default, skip_serializing)]
     #[schemars(with = "Option<CasesSchema>")]
     pub cases: Option<IgnoredAny>,
+    /// Cases that are held against each other by their ratios: `[before, after]`, or a list of such pairs.
+    #[serde(default, skip_serializing)]
+    #[schemars(with = "Option<CompareSchema>")]
+    pub compare: Option<IgnoredAny>,
+}
+
+/// The shape of `compare`; it is read and checked beside the cases that it names.
+#[derive(JsonSchema)]
+#[schemars(rename = "Compare", untagged)]
+#[allow(dead_code, reason = "the shape of pairs in the schema")]
+enum CompareSchema {
+    /// Before and after.
+    Pair([String; 2]),
+    /// Several pairs.
+    Pairs(Vec<[String; 2]>),
 }
 
 /// The shape of `cases`; they are read and checked where they are laid over the spec.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::build::{Loaded, name_of};
+use super::build::{Loaded, name_of, unread};
 use super::cases::{Variants, variants};
 use super::tree::tree;
 use super::{Case, Faults, Source, Spec, SpecError, Trust};
@@ -70,7 +70,8 @@ pub fn specs(path: &Path) -> Result<Vec<(String, Spec)>, SpecError> {
     let source = Source::read(path, Trust::Own)?;
     let spec: Spec = source.parse()?;
     let stem = name_of(path);
-    let Variants { all, faults } = tree(&source.text).map(|tree| variants(&source, &tree, &[])).unwrap_or_default();
+    let variants = tree(&source.text).map(|tree| variants(&source, &tree, &[]));
+    let Variants { all, faults, .. } = variants.or_else(|error| unread(&source, Some(&spec), &error))?;
     if let Some(fault) = faults.into_iter().next() {
         return Err(fault);
     }

@@ -144,6 +144,7 @@ impl One<'_> {
             published: None,
             tolerances: BTreeMap::new(),
             cases: None,
+            compare: None,
         };
         Draft { spec, files: self.files }.tidied()
     }

@@ -11,8 +11,10 @@ mod palette;
 mod plot;
 mod procedure;
 mod provenance;
+mod ratios;
 mod rows;
 mod sheets;
+mod statistics;
 
 use itertools::Itertools;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -117,6 +119,9 @@ fn sections(
     for name in report.procedures() {
         let section = procedure::section(report, name, palette, rows, pages);
         sections.push((name.to_string(), name.row().short.to_owned(), section));
+    }
+    if let Some(section) = ratios::section(report, palette, pages) {
+        sections.push(("ratios".to_owned(), "Before and after".to_owned(), section));
     }
     if let Some(pages) = pages {
         sections.push(("pages".to_owned(), "All readings".to_owned(), pages.section()));

@@ -12,7 +12,7 @@ use super::super::{Report, papers};
 use super::palette::Palette;
 use super::plot::{self, Marks};
 use super::rows::{Rows, place};
-use super::{Pages, class, glyph, minus, percent, rest, shown};
+use super::{Pages, class, glyph, minus, percent, rest, shown, statistics};
 use crate::judge::{Comparison, Verdict};
 use crate::record::{EngineName, ProcedureId};
 use crate::system::process::quoted;
@@ -58,6 +58,7 @@ pub(super) fn section(
                 (rest(&biases, pages, "bias"))
             }
         }
+        @if let Some(sets) = statistics::table(report, procedure, palette, pages) { (sets) }
         @if all == 0 {
             p { "Nothing was compared." }
         } @else {

@@ -30,11 +30,8 @@ pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette, mark
         group.comparisons.iter().copied().filter(|c| c.gamma_deg.is_none() && c.basis() == Some(basis)).collect();
     let mut panels = vec![];
     for name in firm.iter().map(|c| set(c)).collect::<BTreeSet<&str>>() {
-        let of_set = |engine: &str| {
-            let mine = firm.iter().copied().filter(|c| set(c) == name && c.key.engine == engine);
-            mine.sorted_by_key(|c| index(c)).collect_vec()
-        };
         let engines = group.engines(palette);
+        let of_set = |engine: &str| of_set(&firm, name, engine);
         let Some((first, lattice)) = engines.iter().find_map(|e| Some((of_set(e), Lattice::of(&of_set(e))?))) else {
             continue;
         };
@@ -49,6 +46,48 @@ pub(super) fn panels(report: &Report, group: &Group<'_>, palette: &Palette, mark
         }
     }
     panels
+}
+
+/// The comparisons of one engine at a set, in the order of its meters.
+fn of_set<'a>(firm: &[&'a Comparison], name: &str, engine: &str) -> Vec<&'a Comparison> {
+    let mine = firm.iter().copied().filter(|c| set(c) == name && c.key.engine == engine);
+    mine.sorted_by_key(|c| index(c)).collect_vec()
+}
+
+/// What the references of two cases are at one set, on one colour scale; nothing where that is no grid in both, or they are of two kinds.
+pub(in super::super) fn side_by_side(
+    cases: &[Group<'_>; 2],
+    (basis, name): (Basis, &str),
+    palette: &Palette,
+    marks: Marks,
+) -> Vec<Markup> {
+    let maps = cases.iter().map(|group| of_reference(group, basis, name, palette));
+    let maps: Vec<(Vec<&Comparison>, Lattice)> = maps.collect::<Option<_>>().unwrap_or_default();
+    let lit = maps.iter().flat_map(|(mine, _)| mine).filter_map(|c| Some(c.reference.as_ref()?.value));
+    let (low, high) = lit.fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
+    let alike = Alike { low, high, most: 0.0, whose: "one scale for both cases" };
+    let draw = |(group, (mine, lattice)): (&Group<'_>, &(Vec<&Comparison>, Lattice))| {
+        let coarse = if marks == Marks::Seen { lattice.coarseness() } else { 1 };
+        let title = format!("{}: {name}, reference ({})", group.case, basis.name());
+        isolux(&title, mine, lattice, &alike, coarse)
+    };
+    cases.iter().zip(&maps).map(draw).collect()
+}
+
+/// A grid with its references, by whichever engine was held against all of them.
+fn of_reference<'a>(
+    group: &Group<'a>,
+    basis: Basis,
+    name: &str,
+    palette: &Palette,
+) -> Option<(Vec<&'a Comparison>, Lattice)> {
+    let is_firm = |c: &&Comparison| c.gamma_deg.is_none() && c.basis() == Some(basis);
+    let firm = group.comparisons.iter().copied().filter(is_firm).collect_vec();
+    let of_engine = |engine: &&str| {
+        let mine = of_set(&firm, name, engine);
+        Lattice::of(&mine).map(|lattice| (mine, lattice))
+    };
+    group.engines(palette).iter().find_map(of_engine)
 }
 
 /// The scales that maps of one set have in common: of all engines, and of all cases of one spec, which are there to be compared.

@@ -3,7 +3,7 @@
 mod axis;
 mod colours;
 mod contour;
-mod grid;
+pub(super) mod grid;
 mod polar;
 mod strip;
 pub(super) mod times;
