@@ -5,6 +5,7 @@
 //! paths go straight through it and only connections to the light are dimmed.
 
 use glam::DVec3;
+use itertools::Itertools;
 use luminaire::photometry::{LuminousIntensityDistribution, Symmetry};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 
@@ -27,6 +28,11 @@ const RADIUS: f64 = 7e-3;
 const MIN_RADIUS: f64 = 1.8e-3;
 /// Radius of a meter's patch in parts of the scene's size.
 const PATCH: f64 = 3e-4;
+/// Nearer to one another than so many of these radii patches, and what looks at them from two off, hide each other.
+const NEAR: f64 = 4.0;
+/// Two patches are in one plane that are no farther off it, in parts of their radius, and whose normals have this cosine between them.
+const IN_PLANE: f64 = 1e-3;
+const PARALLEL: f64 = 1.0 - 1e-9;
 /// Rows of an opacity image: a quarter of a degree.
 const ROWS: usize = 721;
 /// Its columns, if the luminaire is not axially symmetric: a degree.
@@ -44,9 +50,24 @@ pub(in crate::engines::mitsuba) fn obstacle_to_stock(job: &Job) -> Option<String
         return Some(format!("a stock Mitsuba scene reads {MAX_METERS} meters at most"));
     }
     let size_m = size_m(job);
+    let patch_m = PATCH * size_m;
+    if let Some([a, b]) = job.stations.iter().array_combinations().find(|[a, b]| hide_each_other(a, b, patch_m)) {
+        return Some(format!(
+            "the patches on which a stock Mitsuba scene reads `{}` and `{}` would hide each other",
+            a.id.0, b.id.0
+        ));
+    }
     job.scene.luminaires.iter().find(|l| radius_m(job, l) < MIN_RADIUS * size_m).map(|l| {
         format!("`{}` is so close to something else that the sphere which shapes its light would be lost", l.id)
     })
+}
+
+/// Whether of the patches of two meters one stands before the other; those that lie in one plane do not.
+fn hide_each_other(a: &Station, b: &Station, patch_m: f64) -> bool {
+    let apart = b.meter.position_m - a.meter.position_m;
+    let is_in_plane =
+        apart.dot(a.meter.normal).abs() < IN_PLANE * patch_m && a.meter.normal.dot(b.meter.normal) > PARALLEL;
+    apart.length() < NEAR * patch_m && !is_in_plane
 }
 
 /// The scene and its images; nothing where it cannot be had.
@@ -261,4 +282,29 @@ fn opacity_pfm(distribution: &LuminousIntensityDistribution) -> Vec<u8> {
         }
     }
     bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engines::fixtures::s1;
+
+    #[test]
+    fn patches_that_hide_each_other_make_no_stock_scene_and_those_in_one_plane_do() {
+        let at = |off: DVec3, normal: DVec3| {
+            let mut job = s1(Transport::Direct);
+            let mut other = job.stations[0].clone();
+            (other.meter.position_m, other.meter.normal) = (other.meter.position_m + off, normal.normalize());
+            job.stations.push(other);
+            obstacle_to_stock(&job)
+        };
+        // A mean over directions is read of meters all about one point.
+        for (off, normal) in [(DVec3::ZERO, DVec3::X), (DVec3::ZERO, DVec3::NEG_Z), (0.005 * DVec3::Z, DVec3::Z)] {
+            assert!(at(off, normal).is_some_and(|why| why.contains("hide each other")), "{off} {normal}");
+        }
+        // Planes of a table meet at the nadir.
+        for (off, normal) in [(DVec3::ZERO, DVec3::Z), (0.005 * DVec3::X, DVec3::Z), (0.2 * DVec3::X, DVec3::X)] {
+            assert_eq!(at(off, normal), None, "{off} {normal}");
+        }
+    }
 }
