@@ -298,12 +298,13 @@ mod tests {
             job.stations.push(other);
             obstacle_to_stock(&job)
         };
+        let up = s1(Transport::Direct).stations[0].meter.normal;
         // A mean over directions is read of meters all about one point.
-        for (off, normal) in [(DVec3::ZERO, DVec3::X), (DVec3::ZERO, DVec3::NEG_Z), (0.005 * DVec3::Z, DVec3::Z)] {
+        for (off, normal) in [(DVec3::ZERO, DVec3::X), (DVec3::ZERO, -up), (0.005 * up, up)] {
             assert!(at(off, normal).is_some_and(|why| why.contains("hide each other")), "{off} {normal}");
         }
         // Planes of a table meet at the nadir.
-        for (off, normal) in [(DVec3::ZERO, DVec3::Z), (0.005 * DVec3::X, DVec3::Z), (0.2 * DVec3::X, DVec3::X)] {
+        for (off, normal) in [(DVec3::ZERO, up), (0.005 * DVec3::X, up), (0.2 * DVec3::X, DVec3::X)] {
             assert_eq!(at(off, normal), None, "{off} {normal}");
         }
     }
