@@ -146,7 +146,8 @@ fn what_is_no_room_no_row_and_no_grid_is_told_with_its_place() {
         ),
         (spec("size_m: [6, 5, 3], height_m: 3", array, desk), "`height_m` does not go with this shape"),
         (spec(room, "at_m: [5, 4, 2]", desk), "lies outside the room's walls"),
-        (spec(room, "array: {counts: [4, 1], origin_m: [1, 3, 2], step_m: [1, 1]}", desk), "`a[2,0]`"),
+        // That before it hangs on a wall.
+        (spec(room, "array: {counts: [4, 1], origin_m: [1, 3, 2], step_m: [1, 1]}", desk), "`a[3,0]`"),
         (spec(room, "array: {counts: [2, 0], origin_m: [1, 1, 2], step_m: [1, 1]}", desk), "2 x 0 luminaires"),
         (spec(room, "array: {counts: [2, 2], origin_m: [1, 1, 2], step_m: [1, 0]}", desk), "no step"),
         (spec(room, "rotate_deg: {tilt: 3}", desk), "missing field `at_m`"),
