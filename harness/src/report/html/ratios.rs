@@ -42,14 +42,16 @@ pub(super) fn section(report: &Report, palette: &Palette, pages: Option<&Pages<'
         td { (r.procedure.row().short) }
         td { (r.set) " " span.place { "(" (r.meters.len()) " meters)" } }
         td { (palette.label(&r.engine)) }
-        (cell(&r.mean))
-        @for end in ends(r) { @if let Some(end) = end { (cell(end)) } @else { td.number { "–" } } }
+        (cell("ratio of means", &r.mean))
+        @for (name, end) in ["lowest", "highest"].into_iter().zip(ends(r)) {
+            @if let Some(end) = end { (cell(name, end)) } @else { td.number data-head=(name) { "–" } }
+        }
     } } };
     Some(html! {
         h2 id="ratios-title" { "Before and after" }
         p.lead { "Illuminance of one case over that of another at the same meters. Below each ratio: how far it is off that of the references, with its interval, and whether that is within the tolerance." }
         @if !maps.is_empty() { div.panels { @for map in maps { (map) } } }
-        (super::table("Before and after", &heads, &rows))
+        div.figures { (super::table("Before and after", &heads, &rows)) }
         (rest(&report.ratios, pages, "ratios"))
     })
 }
@@ -67,9 +69,9 @@ fn ends(r: &Ratios) -> [Option<&Ratio>; 2] {
     [low, high]
 }
 
-fn cell(of: &Ratio) -> Markup {
+fn cell(name: &str, of: &Ratio) -> Markup {
     html! {
-        td.number {
+        td.number data-head=(name) {
             (of.ratio.as_ref().map_or("–".to_owned(), estimate))
             @if let Some(agreement) = &of.agreement { (agreed(agreement)) }
         }

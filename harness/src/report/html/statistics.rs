@@ -20,18 +20,20 @@ pub(super) fn table(
     let mine = report.statistics.iter().filter(|s| s.key.procedure == procedure).collect_vec();
     let suite = report.is_suite();
     let unit = procedure.row().quantity.unit();
-    let [mean, minimum] = ["mean", "minimum"].map(|figure| format!("number {figure} [{unit}]"));
-    let heads = ["set of meters", "engine", &mean, &minimum, "number uniformity", "number diversity"];
+    let names = [format!("mean [{unit}]"), format!("minimum [{unit}]"), "uniformity".into(), "diversity".into()];
+    let numbers = names.each_ref().map(|name| format!("number {name}"));
+    let heads = ["set of meters", "engine"].into_iter().chain(numbers.iter().map(String::as_str)).collect_vec();
     let rows = html! { @for s in shown(&mine, pages) { tr {
         td { @if suite { (s.key.case) " " } (s.set) " " span.place { "(" (s.meters) " meters)" } }
         td { (palette.label(&s.key.engine)) }
-        @for figure in figures(s) { (cell(figure)) }
+        @for (name, figure) in names.iter().zip(figures(s)) { (cell(name, figure)) }
     } } };
     (!mine.is_empty()).then(|| {
         html! {
             h3 { "Sets of meters" }
             p.quiet { "Uniformity is minimum over mean, diversity minimum over maximum. Below each figure: how far it is off that of the reference, with its interval, and whether that is within the tolerance." }
-            (super::table("Sets of meters", &heads, &rows))
+            @let label = format!("Sets of meters, {}", procedure.row().title);
+            div.figures { (super::table(&label, &heads, &rows)) }
             (rest(&mine, pages, "statistics"))
         }
     })
@@ -50,9 +52,10 @@ fn figures(s: &Statistics) -> [Figure<'_>; 4] {
     ]
 }
 
-fn cell((figure, agreement): Figure<'_>) -> Markup {
+/// `name` is told beside it where a screen is too narrow for a heading.
+fn cell(name: &str, (figure, agreement): Figure<'_>) -> Markup {
     html! {
-        td.number {
+        td.number data-head=(name) {
             (figure.as_ref().map_or("–".to_owned(), estimate))
             @if let Some(agreement) = agreement { (agreed(agreement)) }
         }
