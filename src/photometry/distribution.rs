@@ -202,7 +202,9 @@ impl LuminousIntensityDistribution {
                 return self.at(c, edge).value();
             }
             let values = self.c_deg.iter().map(|c| self.at(*c, pole).value());
-            let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
+            // About a pole it is dark beyond a sector.
+            let darkest = if self.is_sector() { 0.0 } else { f64::INFINITY };
+            let (low, high) = values.fold((darkest, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
             high - low
         };
         Candela(jump(first, 0.0).max(jump(last, 180.0)).max(self.jump_of_sector(c, gamma)))

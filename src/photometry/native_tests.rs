@@ -348,3 +348,12 @@ fn what_is_written_as_lm63_is_read_back_whole_and_eulumdat_keeps_to_twenty_times
         }
     }
 }
+
+#[test]
+fn at_the_pole_of_a_sector_rounding_decides_between_its_light_and_darkness() {
+    let (_, read) = file(Goniometer::A, &[0.0, 90.0], &[-90.0, 90.0], |_, _| 100.0);
+    for pole in [DVec3::NEG_Z, DVec3::Z] {
+        assert_eq!(read.distribution.jump_towards(pole).value(), 100.0, "{pole}");
+    }
+    assert_eq!(read.distribution.jump_towards(DVec3::X).value(), 0.0);
+}

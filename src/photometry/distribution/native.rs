@@ -57,6 +57,11 @@ impl LuminousIntensityDistribution {
         self.goniometer != Goniometer::C
     }
 
+    /// Whether its planes cover a part of the circle alone.
+    pub(super) fn is_sector(&self) -> bool {
+        self.is_native() && self.c_deg[self.c_deg.len() - 1] - self.c_deg[0] < 360.0
+    }
+
     /// The table's own angles of a direction in the luminaire's frame, as [`angles_deg`] gives those of type C.
     pub fn own_angles_deg(&self, direction: DVec3) -> (f64, f64) {
         angles_deg(if self.goniometer == Goniometer::B { goniometer::to_own(direction) } else { direction })
@@ -102,7 +107,7 @@ impl LuminousIntensityDistribution {
         if self.gamma_deg[gammas - 1] < 180.0 {
             edge = edge.max(row(gammas - 1));
         }
-        if self.is_native() && self.c_deg[planes - 1] - self.c_deg[0] < 360.0 {
+        if self.is_sector() {
             edge = edge.max(brightest(&mut [0, planes - 1].iter().flat_map(|c| self.plane(*c).iter().copied())));
         }
         Candela(edge)
