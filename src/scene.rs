@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use crate::geometry::Room;
+use crate::geometry::{Room, Surface};
 use crate::photometry::{Photometry, TypeCLimits};
 use crate::units::Candela;
 
@@ -21,6 +21,14 @@ pub struct Scene {
     pub obstacles: Vec<Obstacle>,
     /// The luminaires, each with its own photometry.
     pub luminaires: Vec<Luminaire>,
+}
+
+impl Scene {
+    /// That of the brightest surface, of the room or of a body; 0 where nothing reflects.
+    pub fn largest_reflectance(&self) -> f64 {
+        let room = self.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
+        room.chain(self.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
+    }
 }
 
 /// An opaque diffuse body.
@@ -52,6 +60,14 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// Triangles that its surface is made of.
+    pub fn triangles(&self) -> usize {
+        match self {
+            Self::Box { .. } => 12,
+            Self::Mesh { triangles, .. } => triangles.len(),
+        }
+    }
+
     /// The area of its surface in square metres, of a mesh counted on one side.
     pub fn area_m2(&self) -> f64 {
         match self {

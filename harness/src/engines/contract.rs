@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use glam::DVec3;
-use luminaire::geometry::Surface;
-use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
+use luminaire::scene::{Bounces, LuminaireModel, Meter, Scene, Shape, Transport};
 use serde::{Deserialize, Serialize};
 
 use super::blocks::{Blocks, Sampled};
@@ -132,6 +131,52 @@ pub trait Engine: Send + Sync {
     }
 }
 
+/// What one engine that stands before another leaves to it.
+macro_rules! left_to_inner {
+    () => {
+        fn role(&self) -> Role {
+            self.inner.role()
+        }
+
+        fn samples(&self, job: &Job) -> bool {
+            self.inner.samples(job)
+        }
+
+        fn is_vouched_for(&self) -> bool {
+            self.inner.is_vouched_for()
+        }
+
+        fn reads_files(&self, job: &Job) -> bool {
+            self.inner.reads_files(job)
+        }
+
+        fn most_planes(&self) -> Option<usize> {
+            self.inner.most_planes()
+        }
+
+        fn knobs(&self) -> &'static [Knob] {
+            self.inner.knobs()
+        }
+
+        fn cache_identity(&self, job: &Job) -> Job {
+            self.inner.cache_identity(job)
+        }
+
+        fn takes_batches(&self) -> bool {
+            self.inner.takes_batches()
+        }
+
+        fn max_threads(&self) -> usize {
+            self.inner.max_threads()
+        }
+
+        fn start_s(&self) -> f64 {
+            self.inner.start_s()
+        }
+    };
+}
+pub(super) use left_to_inner;
+
 /// What is known of an engine of our own before it is asked anything; `super::catalogue` lists them.
 pub struct Entry {
     pub name: EngineName,
@@ -204,11 +249,7 @@ pub fn share(engine: &dyn Engine, job: &Job, slots: &Slots) -> Share {
 
 /// What meshes take in a renderer, about 1 KiB a triangle with its hierarchy, and meters in their read-out.
 pub(super) fn geometry_mib(job: &Job) -> u64 {
-    let triangles = |o: &Obstacle| match &o.shape {
-        Shape::Box { .. } => 12,
-        Shape::Mesh { triangles, .. } => triangles.len(),
-    };
-    let triangles: usize = job.scene.obstacles.iter().map(triangles).sum();
+    let triangles: usize = job.scene.obstacles.iter().map(|o| o.shape.triangles()).sum();
     ((triangles + job.stations.len()) / 1024) as u64
 }
 
@@ -285,11 +326,6 @@ impl Job {
             Shape::Mesh { .. } => None,
         });
         stations.chain(room).chain(boxes)
-    }
-
-    pub(super) fn largest_reflectance(&self) -> f64 {
-        let room = self.scene.room.iter().flat_map(|r| Surface::ALL.map(|s| r.reflectance.of(s)));
-        room.chain(self.scene.obstacles.iter().map(|o| o.reflectance)).fold(0.0, f64::max)
     }
 }
 

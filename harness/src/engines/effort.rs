@@ -4,7 +4,7 @@
 //! clock a job takes what the machine makes of them.
 
 use luminaire::geometry::{Room, Surface};
-use luminaire::scene::{Bounces, LuminaireModel, Shape};
+use luminaire::scene::{Bounces, LuminaireModel};
 
 use super::Job;
 
@@ -15,7 +15,7 @@ const ROOM: f64 = 12.0;
 
 /// Reflections that a path is followed for, in the mean and at most.
 pub(super) fn path_length(job: &Job) -> f64 {
-    let all = (1.0 - job.largest_reflectance()).recip().min(LONGEST);
+    let all = (1.0 - job.scene.largest_reflectance()).recip().min(LONGEST);
     match job.reflections() {
         None => 0.0,
         Some(Bounces::AtMost(n)) => all.min(f64::from(n)),
@@ -40,12 +40,8 @@ fn by_area(room: &Room, of: impl Fn(Surface) -> f64) -> f64 {
 
 /// What a ray takes against one in an empty room: as many more steps as the tree of triangles is deeper.
 pub(super) fn a_ray(job: &Job) -> f64 {
-    let triangles = |shape: &Shape| match shape {
-        Shape::Box { .. } => ROOM,
-        Shape::Mesh { triangles, .. } => triangles.len() as f64,
-    };
-    let all: f64 = job.scene.obstacles.iter().map(|o| triangles(&o.shape)).sum();
-    (ROOM + all).log2() / ROOM.log2()
+    let all: usize = job.scene.obstacles.iter().map(|o| o.shape.triangles()).sum();
+    (ROOM + all as f64).log2() / ROOM.log2()
 }
 
 /// Shadow rays to all luminaires, so many of them to an opening.

@@ -239,7 +239,7 @@ pub(super) fn reflections(job: &Job) -> i64 {
         None => 0,
         Some(Bounces::AtMost(n)) => i64::from(n).min(MOST_REFLECTIONS),
         Some(Bounces::Converged) => {
-            let highest = job.largest_reflectance();
+            let highest = job.scene.largest_reflectance();
             effort::reflections_until(highest, 0.1 * job.budget.relative_error).clamp(8, MOST_REFLECTIONS)
         }
     }

@@ -7,7 +7,7 @@ use luminaire::scene::{LuminaireModel, Transport};
 
 use super::Site;
 use super::catalogue::ALL;
-use super::contract::{Absent, Answer, Engine, Entry, Job, Knob, Measurement, Support, Version};
+use super::contract::{Absent, Answer, Engine, Entry, Job, Knob, Measurement, Support, Version, left_to_inner};
 use super::releases::{self, Cannot, Known};
 use super::type_c::InTypeC;
 use super::workbench::{EngineError, SceneFile, Workbench};
@@ -99,24 +99,10 @@ fn is_sampled(job: &Job) -> bool {
 }
 
 impl Engine for Released {
+    left_to_inner!();
+
     fn name(&self) -> EngineName {
         EngineName::new(self.known.name)
-    }
-
-    fn role(&self) -> Role {
-        self.inner.role()
-    }
-
-    fn samples(&self, job: &Job) -> bool {
-        self.inner.samples(job)
-    }
-
-    fn is_vouched_for(&self) -> bool {
-        self.inner.is_vouched_for()
-    }
-
-    fn reads_files(&self, job: &Job) -> bool {
-        self.inner.reads_files(job)
     }
 
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
@@ -158,10 +144,6 @@ impl Engine for Released {
         self.inner.command_by_hand(job, &self.known.site(site))
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        self.inner.knobs()
-    }
-
     fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
         self.inner.check_settings(job).map_err(|error| self.own(error))
     }
@@ -170,16 +152,8 @@ impl Engine for Released {
         self.inner.expected_s(job)
     }
 
-    fn most_planes(&self) -> Option<usize> {
-        self.inner.most_planes()
-    }
-
     fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
         self.inner.memory_mib(job, threads)
-    }
-
-    fn cache_identity(&self, job: &Job) -> Job {
-        self.inner.cache_identity(job)
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
@@ -191,23 +165,11 @@ impl Engine for Released {
         Ok(measurement)
     }
 
-    fn takes_batches(&self) -> bool {
-        self.inner.takes_batches()
-    }
-
     fn read_all(&self, jobs: &[(&Job, &Workbench)], together: &Workbench) -> Result<Vec<Answer>, EngineError> {
         let benches: Vec<Workbench> = jobs.iter().map(|(_, bench)| self.bench(bench)).collect();
         let jobs: Vec<(&Job, &Workbench)> = jobs.iter().map(|(job, _)| *job).zip(&benches).collect();
         let answers = self.inner.read_all(&jobs, &self.bench(together)).map_err(|error| self.own(error))?;
         Ok(answers.into_iter().map(|answer| answer.map_err(|error| self.own(error))).collect())
-    }
-
-    fn max_threads(&self) -> usize {
-        self.inner.max_threads()
-    }
-
-    fn start_s(&self) -> f64 {
-        self.inner.start_s()
     }
 }
 

@@ -6,11 +6,12 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use glam::{DMat3, DVec3};
 use luminaire::photometry::{Photometry, TypeCLimits};
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Transport};
 
 use super::Site;
-use super::contract::{Absent, Answer, Engine, Entry, Job, Knob, Measurement, Support, Version};
+use super::contract::{Absent, Answer, Engine, Entry, Job, Knob, Measurement, Support, Version, left_to_inner};
 use super::openings::places_m;
 use super::workbench::{EngineError, SceneFile, Workbench};
 use crate::record::{EngineName, Estimate, Role};
@@ -30,11 +31,30 @@ pub(super) struct InTypeC {
     inner: Box<dyn Engine>,
     limits: TypeCLimits,
     keeps_attitude: bool,
-    /// Stand-ins by what they stand for, of points or of bodies.
-    known: Mutex<Vec<(Known, Luminaire)>>,
+    known: Mutex<Vec<Arc<StandIn>>>,
 }
 
-type Known = (Arc<Photometry>, bool);
+/// What stands for a table of type A or B, and how far it is off.
+struct StandIn {
+    of: Arc<Photometry>,
+    /// Whether its axis is the table's own, where a point is turned for it.
+    is_turned: bool,
+    photometry: Arc<Photometry>,
+    /// From its frame to that of the luminaire.
+    turn: DMat3,
+    /// Over the full circle.
+    planes: usize,
+    /// Flux in lumens that it sends elsewhere, adds or loses, at a flux scale of 1.
+    misled_lm: f64,
+    /// Whether nothing is lost, but where rounding decides at the table's ends.
+    is_kept: bool,
+}
+
+/// A job with tables of type C, and of each luminaire what stands for its table, if anything does.
+struct Made {
+    job: Job,
+    stand_ins: Vec<Option<Arc<StandIn>>>,
+}
 
 impl InTypeC {
     /// A renderer that gets scenes of its own; a witness of ours as it is.
@@ -57,51 +77,93 @@ impl InTypeC {
     }
 
     /// The job with tables of type C; `None` where it has no others, or the engine's own reader gets the user's files.
-    fn made(&self, job: &Job) -> Option<Job> {
+    fn made(&self, job: &Job) -> Option<Made> {
         let is_native = |l: &Luminaire| l.photometry.distribution.is_native();
         if !job.scene.luminaires.iter().any(is_native) || self.inner.reads_files(job) && !self.keeps_attitude {
             return None;
         }
-        let mut made = job.clone();
-        made.scene.luminaires.iter_mut().filter(|l| is_native(l)).for_each(|l| *l = self.luminaire(l));
-        Some(made)
+        let stand_ins = job.scene.luminaires.iter().map(|l| is_native(l).then(|| self.stand_in(l)));
+        let stand_ins: Vec<Option<Arc<StandIn>>> = stand_ins.collect();
+        let mut job = job.clone();
+        for (luminaire, stand_in) in job.scene.luminaires.iter_mut().zip(&stand_ins) {
+            if let Some(stand_in) = stand_in {
+                *luminaire = stand_in.in_place_of(luminaire);
+            }
+        }
+        Some(Made { job, stand_ins })
     }
 
-    fn luminaire(&self, luminaire: &Luminaire) -> Luminaire {
+    fn stand_in(&self, luminaire: &Luminaire) -> Arc<StandIn> {
         let is_turned = luminaire.model == LuminaireModel::Point && !self.keeps_attitude;
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_it =
-            |((of, turned), _): &&(Known, Luminaire)| Arc::ptr_eq(of, &luminaire.photometry) && *turned == is_turned;
-        let made = known.iter().find(is_it).map(|(_, made)| made.clone());
-        let made = made.unwrap_or_else(|| {
-            let model = if is_turned { LuminaireModel::Point } else { LuminaireModel::Area };
-            let mut made =
-                Luminaire { model, orientation: glam::DMat3::IDENTITY, ..luminaire.clone() }.in_type_c(self.limits);
-            if self.keeps_attitude {
-                let distribution = made.photometry.distribution.clone();
-                made.photometry = Arc::new(Photometry { distribution, ..Photometry::clone(&luminaire.photometry) });
-            }
-            if known.len() == MOST {
-                known.remove(0);
-            }
-            known.push(((Arc::clone(&luminaire.photometry), is_turned), made.clone()));
-            made
-        });
-        let orientation = luminaire.orientation * made.orientation;
-        Luminaire { photometry: made.photometry, orientation, ..luminaire.clone() }
+        let is_it = |s: &&Arc<StandIn>| Arc::ptr_eq(&s.of, &luminaire.photometry) && s.is_turned == is_turned;
+        if let Some(known) = known.iter().find(is_it) {
+            return Arc::clone(known);
+        }
+        let made = Arc::new(StandIn::new(luminaire, is_turned, self.limits, self.keeps_attitude));
+        if known.len() == MOST {
+            known.remove(0);
+        }
+        known.push(Arc::clone(&made));
+        made
+    }
+}
+
+impl StandIn {
+    fn new(luminaire: &Luminaire, is_turned: bool, limits: TypeCLimits, keeps_files: bool) -> Self {
+        let of = &luminaire.photometry;
+        let model = if is_turned { LuminaireModel::Point } else { LuminaireModel::Area };
+        let upright = Luminaire { model, orientation: DMat3::IDENTITY, ..luminaire.clone() };
+        let Luminaire { photometry, orientation: turn, .. } = upright.in_type_c(limits);
+        let photometry = if keeps_files {
+            let distribution = photometry.distribution.clone();
+            Arc::new(Photometry { distribution, ..Photometry::clone(of) })
+        } else {
+            photometry
+        };
+        let (table, stand_in, back) = (&of.distribution, &photometry.distribution, turn.transpose());
+        let nothing = 1e-9 * table.max_intensity().value();
+        let off = |own: &DVec3| (table.intensity_towards(*own) - stand_in.intensity_towards(back * *own)).value();
+        let mut sure = table.node_directions().filter(|own| table.jump_towards(*own).value() == 0.0);
+        let is_kept = sure.all(|own| off(&own).abs() <= nothing);
+        let misled_lm = table.misled_by(stand_in, back);
+        let planes = stand_in.full_circle().c_deg().len();
+        Self { of: Arc::clone(of), is_turned, photometry, turn, planes, misled_lm, is_kept }
     }
 
-    /// The same reading with what the tables may have put it off, and with words on it.
-    fn judged(job: &Job, made: &Job, measurement: Measurement) -> Measurement {
-        let pairs: Vec<(&Luminaire, &Luminaire)> = job.scene.luminaires.iter().zip(&made.scene.luminaires).collect();
+    fn in_place_of(&self, luminaire: &Luminaire) -> Luminaire {
+        let (photometry, orientation) = (Arc::clone(&self.photometry), luminaire.orientation * self.turn);
+        Luminaire { photometry, orientation, ..luminaire.clone() }
+    }
+
+    /// What a reader of the report is told of a table that is not the file's own.
+    fn note(&self, id: &str) -> String {
+        let (table, stand_in) = (&self.of.distribution, &self.photometry.distribution);
+        let (kind, planes, gammas) = (table.goniometer(), self.planes, stand_in.gamma_deg().len());
+        let begins =
+            format!("{id}: its table of type {kind:?} was given as one of type C, {planes} planes of {gammas} angles");
+        if self.is_kept {
+            return begins + " about its own axis: nothing is lost but beside ends in light";
+        }
+        let share = self.misled_lm / table.flux().value().max(f64::MIN_POSITIVE);
+        format!("{begins}, which mislead {share:.1e} of its flux: that is in the bound")
+    }
+}
+
+impl Made {
+    /// What was read of it, with what the tables may have put it off, and with words on them.
+    fn judged(&self, asked: &Job, measurement: Measurement) -> Measurement {
+        let luminaires = || asked.scene.luminaires.iter().zip(&self.job.scene.luminaires).zip(&self.stand_ins);
+        let others = luminaires().filter_map(|((asked, made), stand_in)| Some((asked, made, stand_in.as_ref()?)));
+        let others: Vec<(&Luminaire, &Luminaire, &Arc<StandIn>)> = others.collect();
+        let misled: f64 = others.iter().map(|(asked, _, stand_in)| asked.flux_scale * stand_in.misled_lm).sum();
         let flux = |l: &Luminaire| l.photometry.distribution.flux().value() * l.flux_scale;
-        let misled: f64 = pairs.iter().map(|(asked, made)| misled_lm(asked, made)).sum();
-        let all: f64 = pairs.iter().map(|(asked, _)| flux(asked)).sum();
-        let share = if all > 0.0 && job.transport != Transport::Direct { misled / all } else { 0.0 };
+        let all: f64 = asked.scene.luminaires.iter().map(flux).sum();
+        let share = if all > 0.0 && asked.transport != Transport::Direct { misled / all } else { 0.0 };
         let bound = |meter: &Meter, value: f64| {
-            let direct = match job.transport {
+            let direct = match asked.transport {
                 Transport::Indirect(_) => 0.0,
-                Transport::Direct | Transport::Total(_) => pairs.iter().map(|(a, b)| off_lx(a, b, meter)).sum::<f64>(),
+                Transport::Direct | Transport::Total(_) => others.iter().map(|(a, b, _)| off_lx(a, b, meter)).sum(),
             };
             direct + share * value.abs()
         };
@@ -109,21 +171,23 @@ impl InTypeC {
             uncertainty: estimate.uncertainty.within(bound(&station.meter, estimate.value)),
             ..*estimate
         };
-        let estimates = measurement.estimates.iter().zip(&job.stations).map(widened).collect();
+        let estimates = measurement.estimates.iter().zip(&asked.stations).map(widened).collect();
         let mut notes = measurement.notes;
-        notes.extend(pairs.iter().filter_map(|(asked, made)| note(asked, made)));
+        notes.extend(others.iter().map(|(asked, _, stand_in)| stand_in.note(&asked.id)));
         notes.dedup();
         Measurement { estimates, notes, ..measurement }
     }
 }
 
+/// The job as it is handed on.
+fn given<'a>(asked: &'a Job, made: Option<&'a Made>) -> &'a Job {
+    made.map_or(asked, |made| &made.job)
+}
+
 /// How far a stand-in leaves the direct illuminance of a meter off, in lux: exactly for a point, of a body by the places that its light comes from.
 fn off_lx(asked: &Luminaire, made: &Luminaire, meter: &Meter) -> f64 {
-    if Arc::ptr_eq(&asked.photometry, &made.photometry) {
-        return 0.0;
-    }
     let places = places_m(asked);
-    let of_place = |place_m: &glam::DVec3| {
+    let of_place = |place_m: &DVec3| {
         let ray_m = meter.position_m - *place_m;
         let cosine = -ray_m.normalize_or_zero().dot(meter.normal);
         let off = asked.intensity_towards(ray_m).value() - made.intensity_towards(ray_m).value();
@@ -135,62 +199,11 @@ fn off_lx(asked: &Luminaire, made: &Luminaire, meter: &Meter) -> f64 {
     places.iter().map(of_place).sum::<f64>() / places.len() as f64
 }
 
-/// Flux in lumens that a stand-in sends elsewhere, adds or loses.
-fn misled_lm(asked: &Luminaire, made: &Luminaire) -> f64 {
-    if Arc::ptr_eq(&asked.photometry, &made.photometry) {
-        return 0.0;
-    }
-    let turn = made.orientation.transpose() * asked.orientation;
-    asked.flux_scale * asked.photometry.distribution.misled_by(&made.photometry.distribution, turn)
-}
-
-/// What a reader of the report is told of a table that is not the file's own.
-fn note(asked: &Luminaire, made: &Luminaire) -> Option<String> {
-    let (table, stand_in) = (&asked.photometry.distribution, &made.photometry.distribution);
-    if Arc::ptr_eq(&asked.photometry, &made.photometry) {
-        return None;
-    }
-    let (kind, planes, gammas) = (table.goniometer(), stand_in.full_circle().c_deg().len(), stand_in.gamma_deg().len());
-    let begins = format!(
-        "{}: its table of type {kind:?} was given as one of type C, {planes} planes of {gammas} angles",
-        asked.id
-    );
-    if is_kept(asked, made) {
-        return Some(begins + " about its own axis: nothing is lost but beside ends in light");
-    }
-    let share = misled_lm(asked, made) / (table.flux().value() * asked.flux_scale).max(f64::MIN_POSITIVE);
-    Some(format!("{begins}, which mislead {share:.1e} of its flux: that is in the bound"))
-}
-
-/// Whether a stand-in is the same at every node of a table and in every cell, but where rounding decides at its ends.
-fn is_kept(asked: &Luminaire, made: &Luminaire) -> bool {
-    let table = &asked.photometry.distribution;
-    let nothing = 1e-9 * table.max_intensity().value() * asked.flux_scale;
-    table.node_directions().filter(|own| table.jump_towards(*own).value() == 0.0).all(|own| {
-        let towards = asked.orientation * own;
-        (asked.intensity_towards(towards) - made.intensity_towards(towards)).value().abs() <= nothing
-    })
-}
-
 impl Engine for InTypeC {
+    left_to_inner!();
+
     fn name(&self) -> EngineName {
         self.inner.name()
-    }
-
-    fn role(&self) -> Role {
-        self.inner.role()
-    }
-
-    fn samples(&self, job: &Job) -> bool {
-        self.inner.samples(job)
-    }
-
-    fn is_vouched_for(&self) -> bool {
-        self.inner.is_vouched_for()
-    }
-
-    fn reads_files(&self, job: &Job) -> bool {
-        self.inner.reads_files(job)
     }
 
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
@@ -198,7 +211,7 @@ impl Engine for InTypeC {
     }
 
     fn supports(&self, job: &Job) -> Support {
-        self.inner.supports(self.made(job).as_ref().unwrap_or(job))
+        self.inner.supports(given(job, self.made(job).as_ref()))
     }
 
     fn components(&self, job: &Job) -> Vec<String> {
@@ -206,15 +219,11 @@ impl Engine for InTypeC {
     }
 
     fn export(&self, job: &Job) -> Result<Vec<SceneFile>, EngineError> {
-        self.inner.export(self.made(job).as_ref().unwrap_or(job))
+        self.inner.export(given(job, self.made(job).as_ref()))
     }
 
     fn command_by_hand(&self, job: &Job, site: &Site) -> Option<String> {
-        self.inner.command_by_hand(self.made(job).as_ref().unwrap_or(job), site)
-    }
-
-    fn knobs(&self) -> &'static [Knob] {
-        self.inner.knobs()
+        self.inner.command_by_hand(given(job, self.made(job).as_ref()), site)
     }
 
     fn check_settings(&self, job: &Job) -> Result<(), EngineError> {
@@ -222,56 +231,35 @@ impl Engine for InTypeC {
     }
 
     fn expected_s(&self, job: &Job) -> Option<f64> {
-        self.inner.expected_s(self.made(job).as_ref().unwrap_or(job))
-    }
-
-    fn most_planes(&self) -> Option<usize> {
-        self.inner.most_planes()
+        self.inner.expected_s(given(job, self.made(job).as_ref()))
     }
 
     fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
-        self.inner.memory_mib(self.made(job).as_ref().unwrap_or(job), threads)
-    }
-
-    fn cache_identity(&self, job: &Job) -> Job {
-        self.inner.cache_identity(job)
+        self.inner.memory_mib(given(job, self.made(job).as_ref()), threads)
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
         match self.made(job) {
-            Some(made) => self.inner.read(&made, workbench).map(|read| Self::judged(job, &made, read)),
+            Some(made) => self.inner.read(&made.job, workbench).map(|read| made.judged(job, read)),
             None => self.inner.read(job, workbench),
         }
     }
 
-    fn takes_batches(&self) -> bool {
-        self.inner.takes_batches()
-    }
-
     fn read_all(&self, jobs: &[(&Job, &Workbench)], together: &Workbench) -> Result<Vec<Answer>, EngineError> {
-        let made: Vec<Option<Job>> = jobs.iter().map(|(job, _)| self.made(job)).collect();
-        let given: Vec<(&Job, &Workbench)> =
-            jobs.iter().zip(&made).map(|((job, bench), made)| (made.as_ref().unwrap_or(job), *bench)).collect();
-        let answers = self.inner.read_all(&given, together)?;
-        let judged = |((answer, (job, _)), made): ((Answer, &(&Job, &Workbench)), &Option<Job>)| match made {
-            Some(made) => answer.map(|read| Self::judged(job, made, read)),
+        let made: Vec<Option<Made>> = jobs.iter().map(|(job, _)| self.made(job)).collect();
+        let handed_on = jobs.iter().zip(&made).map(|((job, bench), made)| (given(job, made.as_ref()), *bench));
+        let handed_on: Vec<(&Job, &Workbench)> = handed_on.collect();
+        let answers = self.inner.read_all(&handed_on, together)?;
+        let judged = |((answer, (job, _)), made): ((Answer, &(&Job, &Workbench)), &Option<Made>)| match made {
+            Some(made) => answer.map(|read| made.judged(job, read)),
             None => answer,
         };
         Ok(answers.into_iter().zip(jobs).zip(&made).map(judged).collect())
-    }
-
-    fn max_threads(&self) -> usize {
-        self.inner.max_threads()
-    }
-
-    fn start_s(&self) -> f64 {
-        self.inner.start_s()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
     use luminaire::photometry::{Goniometer, LuminousIntensityDistribution, LuminousOpening, lm63};
     use luminaire::scene::orientation;
 
@@ -400,11 +388,11 @@ mod tests {
             keeps_attitude: true,
             known: Mutex::default(),
         };
-        let made = program.made(&asked).unwrap();
+        let made = program.made(&asked).unwrap().job;
         let (before, after) = (&asked.scene.luminaires[0], &made.scene.luminaires[0]);
         assert!((before.orientation.z_axis - after.orientation.z_axis).length() < 1e-12);
         assert_eq!(before.photometry.source, after.photometry.source);
         assert_eq!(after.photometry.distribution.goniometer(), Goniometer::C);
-        assert!(Arc::ptr_eq(&program.made(&asked).unwrap().scene.luminaires[0].photometry, &after.photometry));
+        assert!(Arc::ptr_eq(&program.made(&asked).unwrap().job.scene.luminaires[0].photometry, &after.photometry));
     }
 }

@@ -586,6 +586,16 @@ mod tests {
         }
     }
 
+    /// What a fine grid of midpoints over an opening makes of its light, so many along a side.
+    fn by_midpoints(emitter: &Emitter, meter: &Meter, side: i32) -> f64 {
+        let own = emitter.own(meter);
+        let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(side);
+        let nodes = (0..side * side).map(|k| [middle(k / side), middle(k % side)]);
+        let of_sheet = |sheet: Sheet| nodes.clone().map(|uv| emitter.density(&own, &sheet.part(uv))).sum::<f64>();
+        let sheets = emitter.opening.facing(own.position_m);
+        sheets.into_iter().map(of_sheet).sum::<f64>() / f64::from(side * side)
+    }
+
     /// Sky and ground seen through an opening in a wall: planes a thousandth of a degree apart disagree.
     #[test]
     fn the_bound_holds_where_planes_disagree() {
@@ -603,12 +613,7 @@ mod tests {
         {
             let emitter = upright(opening, &table);
             let meter = Meter { position_m: DVec3::new(x_m, 0.05, -0.3), normal: DVec3::new(0.0, -0.6, 0.8) };
-            let own = emitter.own(&meter);
-            let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(SIDE);
-            let nodes = (0..SIDE * SIDE).map(|k| [middle(k / SIDE), middle(k % SIDE)]);
-            let of_sheet = |sheet: Sheet| nodes.clone().map(|uv| emitter.density(&own, &sheet.part(uv))).sum::<f64>();
-            let sheets = emitter.opening.facing(own.position_m);
-            let truth = sheets.into_iter().map(of_sheet).sum::<f64>() / f64::from(SIDE * SIDE);
+            let truth = by_midpoints(&emitter, &meter, SIDE);
             for error in [1e-2, 3e-3, 1e-3] {
                 let Bounded { value, bound } = emitter.illuminance(&meter, &[], Precision::relative(error));
                 let blur = 6e-4 * truth;
@@ -635,12 +640,7 @@ mod tests {
             let emitter = upright(opening, &table);
             let (sin, cos) = f64::to_radians(gamma_deg).sin_cos();
             let meter = Meter { position_m: 0.8 * DVec3::new(0.8 * sin, 0.6 * sin, -cos), normal: DVec3::Z };
-            let own = emitter.own(&meter);
-            let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(SIDE);
-            let nodes = (0..SIDE * SIDE).map(|k| [middle(k / SIDE), middle(k % SIDE)]);
-            let of_sheet = |sheet: Sheet| nodes.clone().map(|uv| emitter.density(&own, &sheet.part(uv))).sum::<f64>();
-            let sheets = emitter.opening.facing(own.position_m);
-            let truth = sheets.into_iter().map(of_sheet).sum::<f64>() / f64::from(SIDE * SIDE);
+            let truth = by_midpoints(&emitter, &meter, SIDE);
             // What midpoints make of an edge.
             let blur = 100.0 / f64::from(SIDE);
             for error in [1e-2, 1e-3] {

@@ -151,7 +151,7 @@ fn header(job: &Job, what: &str) -> String {
 ///
 /// Mitsuba's depth counts the segments of a path from the meter to the luminaire: N reflections are depth N + 1.
 fn integrator(job: &Job, kind: &str) -> String {
-    let highest = job.largest_reflectance();
+    let highest = job.scene.largest_reflectance();
     let (max_depth, rr_depth, why) = match job.reflections() {
         None => (1, 5, "direct light only".to_owned()),
         Some(Bounces::AtMost(n)) => (i64::from(n) + 1, 5, format!("{n} diffuse reflections")),

@@ -115,7 +115,7 @@ pub(super) fn bounces(job: &Job) -> u32 {
         None => 0,
         Some(Bounces::AtMost(n)) => n,
         Some(Bounces::Converged) => {
-            let rho = job.largest_reflectance();
+            let rho = job.scene.largest_reflectance();
             let enough = if rho < 1.0 { (REMAINDER.ln() / rho.ln()).ceil() } else { f64::INFINITY };
             (enough.min(f64::from(MAX_BOUNCES)) as u32).max(1)
         }
@@ -125,7 +125,7 @@ pub(super) fn bounces(job: &Job) -> u32 {
 /// The largest part of the light that a converged run can miss for the limit on bounces.
 pub(super) fn remainder(job: &Job) -> f64 {
     match job.reflections() {
-        Some(Bounces::Converged) => job.largest_reflectance().powi(bounces(job) as i32),
+        Some(Bounces::Converged) => job.scene.largest_reflectance().powi(bounces(job) as i32),
         _ => 0.0,
     }
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use luminaire::calculators::ugr::observer::{Glare, NoGlare};
-use luminaire::geometry::Surface;
 use luminaire::scene::{Meter, Obstacle, Scene, Shape};
 
 use super::super::model::Spec;
@@ -20,11 +19,6 @@ fn bodies(scene: &Scene) -> usize {
     scene.obstacles.iter().map(faces).sum::<usize>().max(1)
 }
 
-fn reflects(scene: &Scene) -> bool {
-    let room = scene.room.iter().flat_map(|room| Surface::ALL.map(|s| room.reflectance.of(s)));
-    room.chain(scene.obstacles.iter().map(|o| o.reflectance)).any(|rho| rho > 0.0)
-}
-
 impl Builder<'_> {
     /// Sum of L² ω / p² that each eye sees, of the sets that glare is asked of.
     pub(super) fn observers(
@@ -39,7 +33,7 @@ impl Builder<'_> {
         }
         let at = "procedures.unified_glare_rating";
         let message = "no surface reflects: there is no background, and no rating by it";
-        let is_bright = self.check(reflects(scene), at, message, "give the room reflectances");
+        let is_bright = self.check(scene.largest_reflectance() > 0.0, at, message, "give the room reflectances");
         let eyes = sets.iter().map(|(_, set)| set.len()).sum::<usize>();
         let sights = eyes.saturating_mul(scene.luminaires.len()).saturating_mul(bodies(scene));
         let message = format!("{sights} lines of sight past faces of bodies");
