@@ -78,11 +78,6 @@ fn list_anew(bundle: &Path) {
     fs::write(bundle.join("SHA256SUMS"), lines.into_iter().map(|(_, line)| line).collect::<String>()).unwrap();
 }
 
-/// One line, however it was broken.
-fn line(answer: &Answer) -> String {
-    answer.stderr.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ")
-}
-
 #[test]
 fn a_run_is_made_again_from_its_bundle_alone_and_comes_out_to_the_byte() {
     for out in ["bundle", "bundle.zip"] {
@@ -130,7 +125,7 @@ fn a_byte_that_is_flipped_missing_or_added_is_found_and_its_file_named() {
     let folder = made.path("bundle");
     let verify = || made.luxproof(&["reproduce", "bundle"]).exits(2);
     let told = |what: &str| {
-        let told = line(&verify());
+        let told = verify().said();
         assert!(told.contains(what), "no `{what}` in {told}");
     };
     for path in files(&folder) {
@@ -185,14 +180,14 @@ fn a_zip_leaves_nothing_beside_its_own_place() {
         archive.start_file(name, stored).unwrap();
         archive.write_all(b"evil").unwrap();
         archive.finish().unwrap();
-        let told = line(&folder.luxproof(&["reproduce", "evil.zip"]).exits(2));
+        let told = folder.luxproof(&["reproduce", "evil.zip"]).exits(2).said();
         assert!(told.contains("outside of the bundle") || told.contains("no SHA256SUMS"), "{name}: {told}");
         assert!(!folder.path("outside").exists(), "{name}");
     }
     let mut archive = ZipWriter::new(File::create(folder.path("evil.zip")).unwrap());
     archive.add_symlink("link", "/etc/passwd", stored).unwrap();
     archive.finish().unwrap();
-    assert!(line(&folder.luxproof(&["reproduce", "evil.zip"]).exits(2)).contains("no regular file"));
+    assert!(folder.luxproof(&["reproduce", "evil.zip"]).exits(2).said().contains("no regular file"));
     fs::write(folder.path("none.zip"), "PK").unwrap();
     folder.luxproof(&["reproduce", "none.zip"]).exits(2);
 }
@@ -208,7 +203,7 @@ fn a_strangers_bundle_names_no_file_out_of_it_and_another_input_is_another_run()
         let made = bundled(OWN, "bundle");
         made.edit("bundle/inputs/specs/spec.yaml", "../lamps/tilted lamp.ies", &to);
         list_anew(&made.path("bundle"));
-        let told = line(&made.luxproof(&["reproduce", "bundle"]).exits(2));
+        let told = made.luxproof(&["reproduce", "bundle"]).exits(2).said();
         assert!(told.contains(says), "{told}");
     }
     let made = bundled(OWN, "bundle");
@@ -223,7 +218,7 @@ fn a_program_of_a_bundle_is_packed_and_runs_only_for_who_trusts_it() {
     let made = Folder::new(&[("spec.yaml", &text), ("lamp.ies", LAMP), ("adapter.py", &adapter())]);
     made.run(&["--engines", "mine"]).exits(0);
     made.luxproof(&["bundle", "out", "--out", "bundle"]).exits(0);
-    let told = line(&made.luxproof(&["reproduce", "bundle"]).exits(2));
+    let told = made.luxproof(&["reproduce", "bundle"]).exits(2).said();
     assert!(told.contains("engines.mine.command: it would run a program") && told.contains("--trusted"), "{told}");
     fs::remove_file(made.path("adapter.py")).unwrap();
     made.luxproof(&["reproduce", "bundle", "--trusted"]).exits(0).prints("reproduced");
@@ -246,7 +241,7 @@ fn what_is_no_longer_what_was_run_is_not_bundled() {
     // A file that is named from the root would lie elsewhere.
     folder.edit("spec.yaml", "lamp.ies", &folder.path("lamp.ies").display().to_string());
     folder.run(&["--engines", OWN]).exits(0);
-    let told = line(&folder.luxproof(&["bundle", "out"]).exits(2));
+    let told = folder.luxproof(&["bundle", "out"]).exits(2).said();
     assert!(told.contains("relative to the spec"), "{told}");
 }
 

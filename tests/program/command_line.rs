@@ -24,11 +24,6 @@ fn own_run(room: &Folder) -> Answer {
     room.run(&["--engines", OWN, "--format", "json"])
 }
 
-/// An error as a line: line breaks of the drawn message carry no meaning.
-fn told(answer: &Answer) -> String {
-    answer.stderr.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ")
-}
-
 /// The spec with one replacement must be refused with exit 2, name the place and leave no run behind.
 #[track_caller]
 fn refused(from: &str, to: &str, place: &str, says: &str) {
@@ -39,7 +34,7 @@ fn refused(from: &str, to: &str, place: &str, says: &str) {
 #[track_caller]
 fn refused_files(spec: &str, lamp: &str, place: &str, says: &str) {
     let room = Folder::new(&[("spec.yaml", spec), ("lamp.ies", lamp)]);
-    let error = told(&own_run(&room).exits(2));
+    let error = own_run(&room).exits(2).said();
     assert!(error.contains(place), "no place `{place}` in: {error}");
     assert!(error.contains(says), "no `{says}` in: {error}");
     assert!(!room.path("out").exists(), "a run was begun");
@@ -140,7 +135,7 @@ fn what_never_ends_is_not_opened() {
         let made = std::process::Command::new("mkfifo").arg(room.path("pipe")).status();
         assert!(made.is_ok_and(|status| status.success()));
         for spec in ["spec.yaml", "pipe", "/dev/zero"] {
-            let refused = told(&room.luxproof(&["check", spec]).exits(2));
+            let refused = room.luxproof(&["check", spec]).exits(2).said();
             assert!(refused.contains("no regular file"), "{refused}");
         }
         for photometry in ["pipe", "/dev/zero"] {

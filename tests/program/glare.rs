@@ -2,9 +2,7 @@
 
 use std::f64::consts::{LN_10, PI};
 
-use serde_json::Value;
-
-use crate::support::{Folder, among};
+use crate::support::{Folder, at_meter};
 
 /// A panel of .6 x .6 m and 1000 cd in a room of several reflectances, seen by two.
 const SPEC: &str = "luxproof: 1
@@ -39,10 +37,7 @@ fn a_rating_is_the_formula_of_the_indirect_light_that_each_engine_reads() {
     let args = ["--engines", "simulator,radiance", "--sampling", "accurate", "--format", "json"];
     let (report, code) = folder.run(&args).report();
     assert!(matches!(code, Some(0 | 2)), "{}", report["summary"]);
-    let of = |list: &str, engine: &str, procedure: &str, meter: &str| -> Value {
-        let named = [("engine", engine), ("procedure", procedure), ("meter", meter)];
-        among(&report, list, &named).first().map_or_else(|| panic!("{engine} {meter}"), |v| (*v).clone())
-    };
+    let of = |list, engine, procedure, meter| at_meter(&report, list, engine, procedure, meter);
     // Above and beside over along: (.5, 0) and (.4, .2), entries 2.86 and 2.20 of CIE 117's table.
     for (meter, [ahead, aside, above], index) in
         [("eyes[0]", [3.5, 0.0, 1.75], 2.86), ("eyes[1]", [3.5, 0.7, 1.4], 2.20)]
@@ -83,9 +78,7 @@ fn an_eye_that_sees_no_glare_is_refused_and_a_glare_that_is_not_rated_a_warning(
         assert_ne!(spec, SPEC);
         let folder = Folder::new(&[("spec.yaml", &spec), ("panel.ies", &panel(side_m))]);
         let answer = folder.luxproof(&["check", "spec.yaml"]);
-        let told_words: String = told.split_whitespace().collect();
-        let said: String = answer.stderr.chars().filter(|c| !c.is_whitespace() && *c != '│').collect();
-        assert!(said.contains(&told_words) && answer.code == Some(2), "{told}: {}", answer.stderr);
+        assert!(answer.said().contains(told) && answer.code == Some(2), "{told}: {}", answer.stderr);
     }
     let folder = Folder::new(&[("spec.yaml", SPEC), ("panel.ies", &panel(0.02))]);
     let answer = folder.luxproof(&["check", "spec.yaml"]);

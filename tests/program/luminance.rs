@@ -2,9 +2,7 @@
 
 use std::f64::consts::PI;
 
-use serde_json::Value;
-
-use crate::support::{Folder, LAMP, among};
+use crate::support::{Folder, LAMP, at_meter};
 
 /// A desk in a room of three reflectances; on its top, its side, the floor, a wall and the ceiling lies a meter each.
 const SURFACES: &str = "luxproof: 1
@@ -36,10 +34,7 @@ fn luminance_is_what_each_surface_reflects_of_all_light() {
     let args = ["--engines", "simulator,radiance", "--sampling", "accurate", "--format", "json"];
     let (report, code) = folder.run(&args).report();
     assert!(matches!(code, Some(0 | 2)), "{}", report["summary"]);
-    let of = |list: &str, engine: &str, procedure: &str, meter: &str| -> Value {
-        let named = [("engine", engine), ("procedure", procedure), ("meter", meter)];
-        among(&report, list, &named).first().map_or_else(|| panic!("{engine} {meter}"), |v| (*v).clone())
-    };
+    let of = |list, engine, procedure, meter| at_meter(&report, list, engine, procedure, meter);
     for engine in ["simulator", "radiance"] {
         for (meter, rho) in REFLECTANCES {
             let luminance = of("readings", engine, "luminance", meter);
@@ -78,10 +73,7 @@ fn a_luminance_meter_off_its_surface_or_on_two_is_refused_at_its_place() {
         let folder = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", LAMP)]);
         let answer = folder.luxproof(&["check", "spec.yaml"]);
         let place = format!("spec.yaml:{line}:");
-        // As long lines are broken.
-        let bare = |text: &str| text.chars().filter(|c| !c.is_whitespace() && *c != '│').collect::<String>();
-        let is_told = bare(&answer.stderr).contains(&bare(told));
-        assert!(answer.stderr.contains(&place) && is_told, "{to}: {}", answer.stderr);
+        assert!(answer.stderr.contains(&place) && answer.said().contains(told), "{to}: {}", answer.stderr);
         assert_eq!(answer.code, Some(2), "{}", answer.stderr);
     }
 }

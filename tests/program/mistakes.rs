@@ -252,7 +252,7 @@ fn what_is_hardly_meant_is_a_warning_at_its_place_and_no_error() {
     ] {
         let answer = said(&mistake);
         assert_ne!(answer.code, Some(2), "{}", answer.stderr);
-        let told = answer.stderr.split_whitespace().filter(|w| *w != "│").join(" ");
+        let told = answer.said();
         assert!(told.contains(&format!("spec.yaml:{place}")) || place.is_empty(), "{place} {says}: {}", answer.stderr);
         assert!(told.contains(says) && (place.is_empty() == told.is_empty()), "{says}: {}", answer.stderr);
     }

@@ -98,9 +98,7 @@ fn what_cannot_be_mounted_is_refused_with_its_place_and_a_remedy() {
     ] {
         let folder = office_with(panel);
         folder.edit("spec.yaml", "at_m: [1.5, 1, 3]", to);
-        let said = folder.luxproof(&["check", "spec.yaml"]).exits(2).stderr;
-        let words: Vec<&str> = said.split_whitespace().filter(|w| *w != "│").collect();
-        let said = words.join(" ");
+        let said = folder.luxproof(&["check", "spec.yaml"]).exits(2).said();
         assert!(said.contains("spec.yaml:6:") && said.contains(says), "no `{says}` in {said}");
     }
     let overlapping = office_with(&flat);

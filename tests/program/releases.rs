@@ -130,7 +130,7 @@ fn names_of_releases_that_lead_anywhere_are_refused_where_they_stand_and_nothing
         let room = Folder::new(&[("spec.yaml", &[ROOM, TWO_METERS, DIRECT, &engines].concat()), ("lamp.ies", LAMP)]);
         for more in [&[][..], &["--untrusted"]] {
             let answer = room.luxproof(&[&["check", "spec.yaml"][..], more].concat()).exits(2);
-            let told: String = answer.stderr.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
+            let told = answer.said();
             assert!(told.contains(says) && told.contains("spec.yaml:13"), "{told}");
         }
         assert!(!room.path("engines/releases").exists());

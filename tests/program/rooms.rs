@@ -163,7 +163,7 @@ fn what_is_no_room_no_row_and_no_grid_is_told_with_its_place() {
     ] {
         let folder = Folder::new(&[("spec.yaml", &spec), ("lamp.ies", LAMP)]);
         let done = folder.luxproof(&["check", "spec.yaml"]);
-        let said = done.stderr.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
+        let said = done.said();
         assert!(done.code == Some(2) && said.contains(told), "{told}: {said}");
         assert!(said.contains("spec.yaml:"), "{said}");
     }

@@ -141,6 +141,11 @@ impl Answer {
         self
     }
 
+    /// The words of standard error, without the frames of messages and however long lines were broken.
+    pub(crate) fn said(&self) -> String {
+        self.stderr.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+    }
+
     /// The report on standard output, or another document.
     #[track_caller]
     pub(crate) fn json(&self) -> Value {
@@ -160,6 +165,13 @@ impl From<std::process::Output> for Answer {
         let stdout = String::from_utf8(output.stdout).unwrap();
         Self { code: output.status.code(), stdout, stderr: String::from_utf8_lossy(&output.stderr).into_owned() }
     }
+}
+
+/// Of a list in a report what an engine says of one meter in a procedure.
+#[track_caller]
+pub(crate) fn at_meter<'a>(report: &'a Value, list: &str, engine: &str, procedure: &str, meter: &str) -> &'a Value {
+    let found = among(report, list, &[("engine", engine), ("procedure", procedure), ("meter", meter)]);
+    found.first().unwrap_or_else(|| panic!("{list}: nothing of {engine}, {procedure}, {meter}"))
 }
 
 /// Audits specs of this repository with the user's renderers, from its root.

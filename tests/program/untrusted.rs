@@ -25,7 +25,7 @@ fn refused(from: &str, to: &str, says: &str) -> String {
 #[track_caller]
 fn said(room: &Folder, says: &str) -> String {
     let answer = room.luxproof(&["check", "--untrusted", "spec.yaml", "--engines", "simulator"]).exits(2);
-    let line = answer.stderr.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
+    let line = answer.said();
     assert!(line.contains(says), "no `{says}` in {line}");
     line
 }
@@ -137,10 +137,7 @@ fn aliases_attributes_and_cases_multiply_nothing() {
         said(&room, says);
         // Whosever it is.
         let own = room.luxproof(&["check", "spec.yaml", "--engines", "simulator"]).exits(2);
-        assert!(
-            own.stderr.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ").contains(says),
-            "{own:?}"
-        );
+        assert!(own.said().contains(says), "{own:?}");
     }
     // A spec of many values has few cases.
     let cases = (0..50).map(|k| format!("  - {{name: c{k}}}\n")).collect::<Vec<_>>().concat();
