@@ -32,6 +32,8 @@ pub(super) fn scale(value_lx: f64, brightest_lx: f64) -> f64 {
 pub(super) fn compare(read: &[Estimate], right: &[Estimate], brightest_lx: f64) -> Compared {
     let brightest = right.iter().map(|r| r.value).fold(0.0, f64::max);
     let least = if brightest > 0.0 { FAINT * brightest } else { brightest_lx.max(f64::MIN_POSITIVE) };
+    // Of nothing no noise is a part.
+    let is_dark = brightest.max(brightest_lx) == 0.0;
     let mut found = Compared { beyond: 0.0, noise: 0.0, is_lost: false, is_exact: true };
     for (a, b) in read.iter().zip(right) {
         let scale = b.value.max(least);
@@ -41,7 +43,7 @@ pub(super) fn compare(read: &[Estimate], right: &[Estimate], brightest_lx: f64) 
         let beyond = (a.value - b.value).abs() - noise;
         let beyond = if beyond.is_nan() { f64::INFINITY } else { beyond.max(0.0) };
         found.beyond = found.beyond.max(beyond / scale);
-        found.noise = found.noise.max(noise / scale);
+        found.noise = found.noise.max(if is_dark { 0.0 } else { noise / scale });
         found.is_lost |= beyond > 0.0 && b.value >= least && a.value < LOST * b.value;
         found.is_exact &= !apart.is_sampled();
     }
@@ -74,5 +76,8 @@ mod tests {
     #[test]
     fn darkness_is_held_against_the_scene_as_it_was() {
         assert!((compare(&[noisy(0.1, 0.0)], &[noisy(0.0, 0.0)], 10.0).beyond - 0.01).abs() < 1e-9);
+        // And of a scene that was dark noise is no part.
+        let dark = compare(&[noisy(0.0, 1e-3)], &[noisy(0.0, 0.0)], 0.0);
+        assert_eq!((dark.beyond, dark.noise), (0.0, 0.0));
     }
 }

@@ -7,7 +7,8 @@ use itertools::Itertools;
 use luminaire::photometry::{LuminousIntensityDistribution, Photometry, direction};
 use luminaire::scene::{Luminaire, LuminaireModel, Meter, Transport};
 
-use super::surfaces::{furnace, known_direct};
+use super::furnace::furnace;
+use super::surfaces::known_direct;
 use super::{Against, Law, Light, Variant};
 use crate::engines::{Job, Station};
 use crate::record::MeterId;

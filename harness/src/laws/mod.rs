@@ -2,6 +2,7 @@
 //!
 //! A law needs no second opinion: the same engine reads the scene before and after, or a closed form holds for any room.
 
+mod furnace;
 mod light;
 mod meters;
 mod similarity;

@@ -2,13 +2,12 @@
 
 use glam::DVec3;
 use luminaire::calculators::inverse_square;
-use luminaire::geometry::{Reflectances, Room, Surface};
-use luminaire::scene::{Bounces, LuminaireModel, Meter, Obstacle, Shape, Transport};
-use luminaire::simulator::quadrature::Gauss;
+use luminaire::geometry::Surface;
+use luminaire::scene::{LuminaireModel, Obstacle, Shape, Transport};
 
+use super::furnace::furnace;
 use super::{Against, Law, Light, Variant};
 use crate::engines::{Job, Station};
-use crate::record::MeterId;
 
 /// In the order of reports.
 pub(super) const LAWS: &[Law] = &[
@@ -93,53 +92,6 @@ fn covered(job: &Job, n: usize, part: f64, thickness: f64) -> Option<Variant> {
         job.scene.obstacles.push(Obstacle { shape: Shape::Box { min_m, max_m }, reflectance });
     }
     matches!(job.transport, Transport::Indirect(_)).then_some(Variant { job, against: Against::Base(1.0) })
-}
-
-/// How far off the surfaces a furnace is read, in parts of the room.
-const OFF: f64 = 1e-4;
-/// How far off the mean over those nodes may be, relative, in parts of 1 - rho: reflected light is the more even the brighter
-/// the room. Measured by the simulator in case S1: 1.1e-3 as it is, 3.7e-3 with all light in a cone.
-const QUADRATURE: f64 = 4.5e-3;
-
-/// The job in its room painted alike all over, read on all six surfaces.
-///
-/// All that is emitted is absorbed in the end: the mean over the area of reflected light is flux x rho / (area x (1 - rho)), of n reflections
-/// the first n terms of that series.
-pub(super) fn furnace(mut job: Job, rho: f64) -> Option<Variant> {
-    let size_m = job.scene.room?.size_m;
-    let room = Room { size_m, reflectance: Reflectances::with_equal_walls(rho, rho, rho) };
-    job.scene.room = Some(room);
-    let Transport::Indirect(bounces) = job.transport else { return None };
-    // Of all reflections, so much by those that count.
-    let counted = match bounces {
-        Bounces::Converged => 1.0,
-        Bounces::AtMost(n) => 1.0 - rho.powf(f64::from(n)),
-    };
-    let area_m2: f64 = Surface::ALL.iter().map(|s| room.area_m2(*s)).sum();
-    let (rule, mut stations, mut weights) = (Gauss::new(6), vec![], vec![]);
-    for surface in Surface::ALL {
-        let (corners, normal) = (room.corners(surface), surface.inward_normal());
-        let (u, v) = (corners[1] - corners[0], corners[3] - corners[0]);
-        for (x, wx) in rule.points().map(crowded) {
-            for (y, wy) in rule.points().map(crowded) {
-                let at = corners[0] + x * u + y * v;
-                let meter = Meter { position_m: at + OFF * size_m.min_element() * normal, normal };
-                stations.push(Station { id: MeterId::new(surface.name(), stations.len()), meter });
-                weights.push(wx * wy * room.area_m2(surface) / area_m2);
-            }
-        }
-    }
-    let flux = |l: &luminaire::scene::Luminaire| l.photometry.distribution.flux().value() * l.flux_scale;
-    let flux_lm: f64 = job.scene.luminaires.iter().map(flux).sum();
-    job.stations = stations;
-    let value_lx = flux_lm * rho / (area_m2 * (1.0 - rho)) * counted;
-    let quadrature = if counted > 0.0 { QUADRATURE * (1.0 - rho) / counted } else { 0.0 };
-    Some(Variant { job, against: Against::Mean { weights, value_lx, quadrature } })
-}
-
-/// A node moved towards the nearer edge, where reflected light is least smooth: x becomes 3 x^2 - 2 x^3.
-fn crowded((x, weight): (f64, f64)) -> (f64, f64) {
-    (x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) * weight)
 }
 
 /// Direct light of point luminaires in an empty room: the inverse-square law.

@@ -1,4 +1,5 @@
-use luminaire::scene::{Bounces, Transport};
+use glam::DVec3;
+use luminaire::scene::{Bounces, Transport, orientation};
 
 use super::{Against, all, find};
 use crate::engines::Job;
@@ -89,6 +90,27 @@ fn a_furnace_gives_back_all_light_to_the_quadrature_stated() {
         let mean: f64 = exact(&variant.job).iter().zip(&weights).map(|(x, w)| x * w).sum();
         println!("{law} {magnitude} {transport:?}: {:e}", mean / value_lx - 1.0);
         assert!((mean / value_lx - 1.0).abs() < quadrature, "{law} {magnitude}: {mean} for {value_lx}");
+    }
+}
+
+/// Rooms as hunts draw them: long, flat, with light of any table near any surface.
+#[test]
+fn the_quadrature_of_a_furnace_is_what_is_stated_in_rooms_of_all_kinds() {
+    let mut rng = fastrand::Rng::with_seed(4711);
+    let mut within = |low: f64, high: f64| low + (high - low) * rng.f64();
+    for k in 0..6 {
+        let mut job = s1(Transport::Indirect(if k % 2 == 0 { Bounces::AtMost(1) } else { Bounces::Converged }));
+        let size_m = DVec3::new(within(2.5, 12.0), within(2.5, 9.0), within(1.0, 5.0));
+        job.scene.room.as_mut().unwrap().size_m = size_m;
+        let luminaire = &mut job.scene.luminaires[0];
+        luminaire.position_m = size_m * DVec3::new(within(0.1, 0.9), within(0.1, 0.9), within(0.3, 0.95));
+        luminaire.orientation = orientation(within(0.0, 360.0), within(0.0, 180.0), 0.0);
+        let variant = (find("reflectance").unwrap().variant)(&job, [0.5, 0.9, 0.98][k / 2 % 3]).unwrap();
+        let Against::Mean { weights, value_lx, quadrature } = variant.against else { panic!() };
+        let mean: f64 = simulated_lx(&variant.job, 1e-3).iter().zip(&weights).map(|(x, w)| x * w).sum();
+        let off = (mean / value_lx - 1.0).abs();
+        println!("{size_m} {}: {off:.2e} of {quadrature:.2e}", variant.job.scene.luminaires[0].position_m);
+        assert!(off < quadrature, "{size_m}: {off:e} {quadrature:e}");
     }
 }
 
