@@ -15,7 +15,7 @@ use luminaire::geometry::configuration_factor::element_to_polygon;
 use luminaire::geometry::{Reflectances, Room};
 use luminaire::photometry::{Photometry, read_file};
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
-use luminaire::simulator::{self, Accuracy, Uncertainty};
+use luminaire::simulator::{self, Accuracy, Sight, Uncertainty};
 use luminaire::units::{Candela, Lumen, Lux};
 
 #[path = "analytic_values/daylight.rs"]
@@ -155,6 +155,22 @@ fn an_opening_before_an_evenly_lit_disc_glares_by_the_formula() {
     check("glare.yaml", 2, |eye| {
         let background = 800.0 * closed_form::disc_perpendicular(1.5, eye.position_m.z, eye.position_m.x - 2.0);
         observer::rating(observer::Glare::seen(&scene, eye).unwrap().sum, Lux(background))
+    });
+}
+
+#[test]
+fn a_lambertian_panel_has_one_luminance_from_wherever_it_is_seen() {
+    let panel = Luminaire {
+        orientation: orientation(0.0, 25.0, 0.0),
+        model: LuminaireModel::Area,
+        ..scene(DVec3::ONE, 0.0, "lambertian-06m.ies", DVec3::new(2.0, 2.0, 2.7)).luminaires.remove(0)
+    };
+    // What it gives an eye, by its corners, over the solid angle that it fills there.
+    let side = square(DVec3::ZERO, 0.3 * DVec3::X, 0.3 * DVec3::Y).map(|p| panel.position_m + panel.orientation * p);
+    check("opening.yaml", 4, |eye| {
+        let exitance = closed_form::lambertian_exitance(1000.0 / 0.36).value();
+        let lux = exitance * element_to_polygon(eye.position_m, eye.normal, &side);
+        lux / Sight::of(&panel, eye).unwrap().projected_sr
     });
 }
 

@@ -69,6 +69,13 @@ def main():
         ((1.599, 1.9, 1.7), (-1, 0, 0)), ((1.599, 2.2, 2.2), (-1, 0, 0)), ((2.1, 2.301, 1.7), (0, 1, 0)))]
     write("lit-body", "Body in a furnace", "closed_form", 3, {"luminance": ("area", rows)})
 
+    # One luminance from wherever it is seen: the panel's 1000 cd over .36 m2. Eyes are aimed at its centre.
+    rows = []
+    for eye in ((2, 2, 1), (3.5, 2.9, 1.2), (2.1, .4, 2.1), (1.9, 2.1, 2.3)):
+        away = [c - p for c, p in zip((2, 2, 2.7), eye)]
+        rows.append((eye, [a / math.hypot(*away) for a in away], 1000 / .36))
+    write("opening", "A Lambertian panel, seen", "closed_form", 3, {"opening_luminance": ("area", rows)})
+
     ceiling = zip(((2, 2, 17), (2, 10, 17), (10, 2, 17), (10, 10, 17)),
                   (.852757463, 2.230931615, 2.230931615, 13.559183673))
     plane = zip(((2, 2, 2), (2, 10, 2), (10, 2, 2), (10, 10, 2)), (.94314714, 1.15551735, 1.15551735, 1.42062868))
@@ -146,7 +153,8 @@ def isotropic(flux_lm, lamp, place, normal):
     return flux_lm / (4 * math.pi) * sum(a * b for a, b in zip(ray, normal)) / distance ** 3
 
 
-QUANTITIES = {"luminance": "luminance_cd_m2", "unified_glare_rating": "unified_glare_rating"}
+LUMINANCE = "luminance_cd_m2"
+QUANTITIES = {"luminance": LUMINANCE, "opening_luminance": LUMINANCE, "unified_glare_rating": "unified_glare_rating"}
 
 
 def write(name, title, basis, digits, tables, units=1, table=None):

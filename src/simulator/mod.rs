@@ -22,6 +22,7 @@ mod visibility;
 
 use crate::scene::{Meter, Scene, Transport};
 use crate::units::Lux;
+pub use emission::sight::Sight;
 pub use prepared::{Prepared, Way};
 pub use stop::Stop;
 

@@ -28,6 +28,7 @@ mod measuring;
 mod mesh_files;
 mod mistakes;
 mod negative_controls;
+mod opening;
 mod photometric_figures;
 mod planning;
 mod policy;

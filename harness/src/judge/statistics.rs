@@ -12,7 +12,7 @@ use super::uncertainty::{Component, ErrorBudget, Shape, Source, upper_tail_of_no
 use super::{
     Basis, Comparison, Judge, Tolerance, Verdict, family, is_heavy_tailed, judge, of_reading, share_of_reading,
 };
-use crate::record::{Estimate, Quantity, ReadingKey, Recording, Uncertainty};
+use crate::record::{Estimate, ProcedureId, Quantity, ReadingKey, Recording, Uncertainty};
 
 /// Of one set of meters, as one engine read it. Errors of meters add up, since they may share what makes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -95,7 +95,7 @@ impl Judge<'_> {
     ) -> Vec<Statistics> {
         let tail = upper_tail_of_normal(self.tolerances.coverage_factor());
         let lit = recording.readings.iter().enumerate();
-        let lit = lit.filter(|(_, r)| is_light(r.quantity) && r.value.is_finite());
+        let lit = lit.filter(|(_, r)| is_of_places(recording.key.procedure, r.quantity) && r.value.is_finite());
         let mut found = vec![];
         for (set, readings) in &lit.chunk_by(|(_, r)| set(&r.meter.0)) {
             let (places, readings): (Vec<usize>, Vec<_>) = readings.unzip();
@@ -194,9 +194,14 @@ impl StatisticsAgreement {
     }
 }
 
-/// Whether it is proportional to light, and of a place.
+/// Whether it is proportional to light.
 pub(super) const fn is_light(quantity: Quantity) -> bool {
     matches!(quantity, Quantity::Illuminance | Quantity::Luminance)
+}
+
+/// Whether a reading is proportional to light and tells of the meter's place, not of what is seen from there.
+fn is_of_places(procedure: ProcedureId, quantity: Quantity) -> bool {
+    is_light(quantity) && procedure != ProcedureId::OpeningLuminance
 }
 
 /// The set of a meter.

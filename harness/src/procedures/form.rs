@@ -12,6 +12,8 @@ use super::shapes::{Found, Shapes};
 pub enum Form {
     /// `luminaire`, `distance_m`, `angles`.
     Angles,
+    /// `luminaire`, `meters`.
+    Opening,
     /// `meters`.
     Meters,
     /// `meters`, `bounces`.
@@ -24,6 +26,7 @@ pub enum Form {
 #[derive(Clone, Debug)]
 pub enum Asked {
     Angles(AtAngles),
+    Opening(AtOpening),
     Meters(AtMeters),
 }
 
@@ -32,6 +35,7 @@ pub enum Asked {
 #[serde(untagged)]
 pub(super) enum Written<'a> {
     Angles(&'a AtAngles),
+    Opening(&'a AtOpening),
     Meters {
         meters: &'a Names,
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -42,10 +46,29 @@ pub(super) enum Written<'a> {
 }
 
 impl Asked {
+    /// The luminaire that alone is lit, and the meter sets, where it names them.
+    pub fn named(&self) -> (Option<&str>, Option<&Names>) {
+        match self {
+            Self::Angles(asked) => (Some(&asked.luminaire), None),
+            Self::Opening(asked) => (Some(&asked.luminaire), Some(&asked.meters)),
+            Self::Meters(asked) => (None, Some(&asked.meters)),
+        }
+    }
+
+    /// The meter sets, to change them.
+    pub fn meters_mut(&mut self) -> Option<&mut Names> {
+        match self {
+            Self::Angles(_) => None,
+            Self::Opening(asked) => Some(&mut asked.meters),
+            Self::Meters(asked) => Some(&mut asked.meters),
+        }
+    }
+
     /// As it stands in a spec of this form; what the form takes for granted is left out.
     pub(super) fn written(&self, form: Option<Form>) -> Written<'_> {
         match self {
             Self::Angles(asked) => Written::Angles(asked),
+            Self::Opening(asked) => Written::Opening(asked),
             Self::Meters(AtMeters { meters, bounces, light }) => {
                 let counts = matches!(form, Some(Form::MetersAndBounces | Form::MetersAndLight));
                 let bounces = match bounces {
@@ -94,6 +117,17 @@ pub struct AtAngles {
     pub angles: Angles,
 }
 
+/// Mean luminance of a luminous opening, the luminaire alone in free field.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "OpeningLuminance")]
+pub struct AtOpening {
+    /// Which luminaire.
+    pub luminaire: String,
+    /// A meter set or a list of sets: where the observers are.
+    pub meters: Names,
+}
+
 /// Light of a fixed number of reflections at meters.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -131,6 +165,7 @@ impl Form {
     pub(super) fn schema(self, generator: &mut SchemaGenerator) -> Schema {
         match self {
             Self::Angles => generator.subschema_for::<AtAngles>(),
+            Self::Opening => generator.subschema_for::<AtOpening>(),
             Self::Meters => generator.subschema_for::<Meters>(),
             Self::MetersAndBounces => generator.subschema_for::<MetersAndBounces>(),
             Self::MetersAndLight => generator.subschema_for::<MetersAndLight>(),
@@ -143,6 +178,7 @@ impl Form {
             |meters, bounces: BouncesSpec, light| Asked::Meters(AtMeters { meters, bounces: bounces.into(), light });
         Ok(match self {
             Self::Angles => map.next_value::<Option<AtAngles>>()?.map(Asked::Angles),
+            Self::Opening => map.next_value::<Option<AtOpening>>()?.map(Asked::Opening),
             Self::Meters => map
                 .next_value::<Option<Meters>>()?
                 .map(|Meters { meters }| at(meters, BouncesSpec::default(), AnyLight::Total)),

@@ -11,7 +11,7 @@ pub mod table;
 mod task;
 
 pub use asked::Procedures;
-pub use form::{AngleLists, Angles, AnyLight, Asked, AtAngles, AtMeters, Form, Names};
+pub use form::{AngleLists, Angles, AnyLight, Asked, AtAngles, AtMeters, AtOpening, Form, Names};
 pub use reads::{Aspect, Made, Reads};
 pub use table::{Procedure, Reference};
-pub use task::{Direction, Sets, Target, Task};
+pub use task::{Direction, Sets, Target, Task, sight};

@@ -1,12 +1,12 @@
 //! The table of procedures: what each is called, asks of a spec, reads and is judged by. A new procedure is a row here.
 
 use luminaire::calculators::inverse_square;
-use luminaire::scene::{LuminaireModel, Scene, Transport};
+use luminaire::scene::{Luminaire, LuminaireModel, Scene, Transport};
 
 use super::form::{AnyLight, Asked, AtMeters, Form};
 use super::known;
 use super::reads::Reads;
-use super::task::{Sets, Target, Task, around, of_sets};
+use super::task::{Sets, Target, Task, around, of_opening, of_sets};
 use crate::record::{Basis, EngineName, ProcedureId, Quantity};
 
 /// One procedure.
@@ -57,7 +57,7 @@ impl Reference {
 }
 
 /// Every procedure, in the order of reports, and the scenes of the calibration. Tolerances stand under the same name in `reference/tolerances.yaml`.
-pub static ALL: [Procedure; 13] = [
+pub static ALL: [Procedure; 14] = [
     Procedure {
         id: ProcedureId::LuminousIntensity,
         title: "Luminous intensity",
@@ -135,6 +135,19 @@ pub static ALL: [Procedure; 13] = [
         reference: |_| EXACT,
     },
     Procedure {
+        id: ProcedureId::OpeningLuminance,
+        title: "Luminance of an opening",
+        short: "Opening",
+        meaning: "Mean luminance of a luminaire's luminous opening towards observers, alone in free field: the illuminance of an eye that is aimed at its centre over the opening's projected solid angle.",
+        quantity: Quantity::Luminance,
+        form: Some(Form::Opening),
+        transport: |_| Transport::Direct,
+        reads: Reads::Illuminance,
+        reference: |task| {
+            closed_form(task, "photometric file, bilinear in (C, gamma), over the projected luminous area")
+        },
+    },
+    Procedure {
         id: ProcedureId::UnifiedGlareRating,
         title: "Unified glare rating",
         short: "Glare",
@@ -202,11 +215,16 @@ fn is_inverse_square(scene: &Scene) -> bool {
 impl Procedure {
     /// What it measures in a scene, as asked; `None` where the luminaire that is named is not there.
     pub fn task(&self, asked: &Asked, scene: &Scene, sets: &Sets<'_>) -> Option<Task> {
+        let find = |id: &str| scene.luminaires.iter().find(|l| l.id == id);
+        let alone = |l: &Luminaire| Scene { room: None, obstacles: vec![], luminaires: vec![l.clone()] };
         let (scene, transport, targets) = match asked {
             Asked::Angles(asked) => {
-                let luminaire = scene.luminaires.iter().find(|l| l.id == asked.luminaire)?;
-                let alone = Scene { room: None, obstacles: vec![], luminaires: vec![luminaire.clone()] };
-                (alone, Transport::Direct, around(luminaire, asked))
+                let luminaire = find(&asked.luminaire)?;
+                (alone(luminaire), Transport::Direct, around(luminaire, asked))
+            }
+            Asked::Opening(asked) => {
+                let luminaire = find(&asked.luminaire)?;
+                (alone(luminaire), Transport::Direct, of_opening(luminaire, sets, &asked.meters))
             }
             Asked::Meters(asked) => (scene.clone(), (self.transport)(asked), of_sets(sets, &asked.meters, self.reads)),
         };

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use itertools::Itertools;
 use luminaire::photometry::direction;
 use luminaire::scene::{Luminaire, Meter, Scene, Transport};
+use luminaire::simulator::Sight;
 
 use super::form::{Angles, AtAngles, Names};
 use super::reads::{Aspect, Made, Parts, Reads, Seen};
@@ -124,6 +125,28 @@ pub(super) fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
         Target { direction: Some(Direction { c_deg, gamma_deg }), ..target }
     };
     angles.into_iter().enumerate().map(target).collect()
+}
+
+/// An eye at a meter's place that is aimed at a luminaire's photometric centre, with the projected solid angle that its opening fills;
+/// `None` where it sees none.
+pub fn sight(luminaire: &Luminaire, meter: &Meter) -> Option<(Meter, Sight)> {
+    let normal = (luminaire.position_m - meter.position_m).try_normalize()?;
+    let eye = Meter { normal, ..*meter };
+    Some((eye, Sight::of(luminaire, &eye)?))
+}
+
+/// The mean luminance of an opening at the meters of named sets, wherever those look: L = E / projected solid angle.
+pub(super) fn of_opening(luminaire: &Luminaire, sets: &Sets<'_>, names: &Names) -> Vec<Target> {
+    let target = |name: &str, k: usize, meter: &Meter| {
+        let (eye, Sight { projected_sr, relative_error }) = sight(luminaire, meter)?;
+        let target = Target::of_one(MeterId::new(name, k), eye, 1.0 / projected_sr);
+        Some(Target { quadrature: relative_error, ..target })
+    };
+    let of_set = |name: &str| {
+        let meters = sets.meters.get(name).into_iter().flatten().enumerate();
+        meters.filter_map(|(k, meter)| target(name, k, meter)).collect::<Vec<_>>()
+    };
+    names.iter().flat_map(of_set).collect()
 }
 
 /// The meter sets of a spec.

@@ -54,6 +54,8 @@ pub enum ProcedureId {
     CylindricalIlluminance,
     /// Of the diffuse surfaces on which meters lie.
     Luminance,
+    /// Of a luminous opening, mean, towards observers.
+    OpeningLuminance,
     /// Of observers (CIE 117).
     UnifiedGlareRating,
     /// Calibration: the inverse-square law.
@@ -72,7 +74,7 @@ pub enum ProcedureId {
 
 impl ProcedureId {
     /// Those that a spec may ask for, in the order of reports.
-    pub const ALL: &[Self] = <Self as VariantArray>::VARIANTS.split_at(7).0;
+    pub const ALL: &[Self] = <Self as VariantArray>::VARIANTS.split_at(8).0;
 
     /// Their names, in the same order.
     pub const NAMES: &[&str] = <Self as VariantNames>::VARIANTS.split_at(Self::ALL.len()).0;

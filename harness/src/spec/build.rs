@@ -245,6 +245,7 @@ impl<'a> Builder<'a> {
         self.procedures(&spec);
         let reflectances = self.surfaces(&spec, &scene, &meters);
         let glares = self.observers(&spec, &scene, &meters);
+        self.sights(&spec, &scene, &meters);
         self.budget(spec.budget);
         let tolerances = self.tolerances(&spec.tolerances);
         let published = spec.published.map(|file| self.beside(&file));

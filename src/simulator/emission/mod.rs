@@ -6,6 +6,7 @@
 //! Lambert's polygon formula holds but for the interpolation, which counts as an error.
 
 mod opening;
+pub(super) mod sight;
 mod steps;
 
 use std::f64::consts::PI;
@@ -88,6 +89,18 @@ struct Own {
     normal: DVec3,
 }
 
+impl Sheet {
+    /// Integral of what its parts give, whose jumps are told for the weight that they have there.
+    fn integral(&self, precision: Precision, f: &impl Fn(&Part) -> f64, jump: &impl Fn(&Part, f64) -> Jump) -> Bounded {
+        if self.is_disc() {
+            // Its radius goes with the root of its area.
+            let part = |[s, v]: [f64; 2]| self.part([s * s, v]);
+            return integrate_square(precision, &|at| 2.0 * at[0] * f(&part(at)), &|at| jump(&part(at), 2.0 * at[0]));
+        }
+        integrate_square(precision, &|uv| f(&self.part(uv)), &|uv| jump(&self.part(uv), 1.0))
+    }
+}
+
 impl Emitter {
     pub(super) fn new(luminaire: &Luminaire) -> Self {
         let opening = match luminaire.model {
@@ -161,14 +174,8 @@ impl Emitter {
                 Sheet::Face { corner_m, edges_m } => {
                     self.face_illuminance(&sheet, corner_m, edges_m, meter, occluders, precision)
                 }
-                // A disc's radius goes with the root of its area.
-                _ if sheet.is_disc() => integrate_square(
-                    precision,
-                    &|[s, v]| 2.0 * s * self.density(&own, &sheet.part([s * s, v])),
-                    &|[s, v]| self.jump(&own, &sheet.part([s * s, v]), 2.0 * s),
-                ),
-                _ => integrate_square(precision, &|uv| self.density(&own, &sheet.part(uv)), &|uv| {
-                    self.jump(&own, &sheet.part(uv), 1.0)
+                _ => sheet.integral(precision, &|part| self.density(&own, part), &|part, weight| {
+                    self.jump(&own, part, weight)
                 }),
             };
             let edges = [

@@ -23,6 +23,8 @@ pub enum Feature {
     TinyRoom,
     HugeRoom,
     FlatRoom,
+    PolygonRoom,
+    SlantedWall,
     Reflecting,
     BrightRoom,
     UnequalWalls,
@@ -89,6 +91,9 @@ pub enum Feature {
     Indirect,
     Total,
     Cylindrical,
+    Luminance,
+    OpeningLuminance,
+    Glare,
     FewBounces,
     Preset,
 }
@@ -109,6 +114,9 @@ impl Feature {
                 | Self::Indirect
                 | Self::Total
                 | Self::Cylindrical
+                | Self::Luminance
+                | Self::OpeningLuminance
+                | Self::Glare
                 | Self::Uplight
         )
     }
@@ -128,6 +136,7 @@ pub(super) fn features(draft: &Draft, case: &Case) -> BTreeSet<Feature> {
         }
     };
     of_room(&case.scene, &mut add);
+    of_floor(draft, &mut add);
     of_bodies(&case.scene, &mut add);
     of_luminaires(draft, case, &mut add);
     for photometry in draft.tables() {
@@ -140,7 +149,11 @@ pub(super) fn features(draft: &Draft, case: &Case) -> BTreeSet<Feature> {
         add(Feature::Indirect, *procedure == ProcedureId::IndirectIlluminance);
         add(Feature::Total, *procedure == ProcedureId::TotalIlluminance);
         add(Feature::Cylindrical, *procedure == ProcedureId::CylindricalIlluminance);
+        add(Feature::Luminance, *procedure == ProcedureId::Luminance);
+        add(Feature::OpeningLuminance, *procedure == ProcedureId::OpeningLuminance);
+        add(Feature::Glare, *procedure == ProcedureId::UnifiedGlareRating);
         match asked {
+            Asked::Opening(_) => {}
             Asked::Angles(asked) => add(Feature::ListedAngles, matches!(asked.angles, Angles::Listed(_))),
             Asked::Meters(asked) => {
                 add(Feature::FewBounces, asked.bounces != luminaire::scene::Bounces::Converged);
@@ -153,6 +166,13 @@ pub(super) fn features(draft: &Draft, case: &Case) -> BTreeSet<Feature> {
 }
 
 type Add<'a> = &'a mut dyn FnMut(Feature, bool);
+
+fn of_floor(draft: &Draft, add: Add<'_>) {
+    let Some(floor) = &draft.spec.room.floor_m else { return };
+    add(Feature::PolygonRoom, true);
+    let sides = floor.iter().zip(floor.iter().cycle().skip(1));
+    add(Feature::SlantedWall, sides.into_iter().any(|(a, b)| a[0] != b[0] && a[1] != b[1]));
+}
 
 fn of_room(scene: &Scene, add: Add<'_>) {
     let Some(room) = scene.room else { return };

@@ -19,7 +19,7 @@ use super::feature::{Feature, features};
 use super::table;
 use crate::engines;
 use crate::experiments::draw::Draw;
-use crate::procedures::{AngleLists, Angles, AnyLight, Asked, AtAngles, AtMeters, Names, Procedures};
+use crate::procedures::{AngleLists, Angles, AnyLight, Asked, AtAngles, AtMeters, AtOpening, Names, Procedures};
 use crate::record::{EngineName, ProcedureId};
 use crate::spec::model::{
     BoxSpec, FourWalls, Fraction, GridSpec, LuminaireSpec, MeshSpec, MeterSet, ModelSpec, ObstacleSpec,
@@ -37,6 +37,10 @@ const ATTEMPTS: u64 = 40;
 /// Marks of independent sequences of random numbers.
 const OF_ROUNDS: u64 = 0x1001;
 const OF_SPECS: u64 = 0x1002;
+
+/// The sets of meters that luminance and glare are asked of.
+const ON_FLOOR: &str = "floor";
+const EYES: &str = "eyes";
 
 /// The shapes of luminous openings.
 const OPENINGS: [Feature; 6] = [
@@ -87,12 +91,12 @@ impl Grammar<'_> {
         let mut allowed: BTreeSet<Feature> = Feature::VARIANTS.iter().copied().filter(|_| rng.bool()).collect();
         // Every other round has points and boxes alone, which every engine reads, and quickly.
         if round.is_multiple_of(2) {
-            for costly in OPENINGS.iter().chain(&[Feature::MeshBody]) {
+            for costly in OPENINGS.iter().chain(&[Feature::MeshBody, Feature::SlantedWall]) {
                 allowed.remove(costly);
             }
         }
         if !REFLECTED.contains(&(round % 8)) {
-            for reflected in [Feature::Indirect, Feature::Total] {
+            for reflected in [Feature::Indirect, Feature::Total, Feature::Luminance, Feature::Glare] {
                 allowed.remove(&reflected);
             }
         }
@@ -171,6 +175,13 @@ impl One<'_> {
             Fraction(if reflects { (rho * 100.0).round() / 100.0 } else { 0.0 })
         };
         let (floor, ceiling, all) = (rho(&mut self.draw), rho(&mut self.draw), rho(&mut self.draw));
+        if let Some(corners) = self.floor() {
+            let each = self.has(Feature::UnequalWalls, 2);
+            let listed = |draw: &mut Draw| Walls::Listed(corners.iter().map(|_| rho(draw)).collect());
+            let walls = if each { listed(&mut self.draw) } else { Walls::All(all) };
+            let reflectance = Some(ReflectanceSpec { floor, walls, ceiling });
+            return RoomSpec { floor_m: Some(corners), height_m: Some(size[2]), reflectance, ..RoomSpec::default() };
+        }
         let walls = if self.has(Feature::UnequalWalls, 2) {
             let [x_min, x_max, y_min, y_max] = [(); 4].map(|()| rho(&mut self.draw));
             Walls::Each(FourWalls { x_min, x_max, y_min, y_max })
@@ -178,6 +189,21 @@ impl One<'_> {
             Walls::All(all)
         };
         RoomSpec::cuboid(size, ReflectanceSpec { floor, walls, ceiling })
+    }
+
+    /// Corners of an L within the size, turned any way, or of a box of which a corner is cut off.
+    fn floor(&mut self) -> Option<Vec<[f64; 2]>> {
+        if !self.has(Feature::PolygonRoom, 3) {
+            return None;
+        }
+        let [x, y] = [self.size_m.x, self.size_m.y];
+        let [a, b] = [x, y].map(|size| rounded(size * self.draw.within(0.3, 0.8)));
+        let corner =
+            if self.has(Feature::SlantedWall, 2) { vec![[x, b], [a, y]] } else { vec![[x, b], [a, b], [a, y]] };
+        let floor = [[0.0, 0.0], [x, 0.0]].into_iter().chain(corner).chain([[0.0, y]]);
+        let [over_x, over_y] = [(); 2].map(|()| self.draw.one_in(2));
+        let turned = floor.map(|[p, q]| [if over_x { x - p } else { p }, if over_y { y - q } else { q }].map(rounded));
+        Some(turned.collect())
     }
 
     fn obstacles(&mut self) -> Vec<ObstacleSpec> {
@@ -318,6 +344,7 @@ impl One<'_> {
             }
         }
         let distribution = table::distribution(&mut self.draw, self.allowed);
+        let opening = if opening == LuminousOpening::Point { self.size_alone() } else { opening };
         let photometry = Photometry { opening, ..Photometry::of(distribution) };
         let is_even =
             |angles: &[f64]| angles.windows(2).all(|w| ((w[1] - w[0]) - (angles[1] - angles[0])).abs() < 1e-9);
@@ -337,15 +364,27 @@ impl One<'_> {
         name.into()
     }
 
+    /// The size of a luminaire that shines from a point, for the glare and the luminance that its file gives it.
+    fn size_alone(&mut self) -> LuminousOpening {
+        let is_looked_at = [Feature::OpeningLuminance, Feature::Glare].iter().any(|f| self.allowed.contains(f));
+        if !is_looked_at || !self.draw.one_in(2) {
+            return LuminousOpening::Point;
+        }
+        LuminousOpening::Box { x_m: self.extent(), y_m: self.extent(), height_m: 0.0 }
+    }
+
+    /// Of a luminous opening.
+    fn extent(&mut self) -> f64 {
+        rounded(0.1 * self.size_m.min_element() * self.draw.magnitude(0.2, 2.5))
+    }
+
     fn opening(&mut self) -> LuminousOpening {
-        let unit_m = 0.1 * self.size_m.min_element();
-        let size = |draw: &mut Draw| rounded(unit_m * draw.magnitude(0.2, 2.5));
         let allowed: Vec<Feature> = OPENINGS.into_iter().filter(|f| self.allowed.contains(f)).collect();
         if allowed.is_empty() || !self.draw.one_in(3) {
             return LuminousOpening::Point;
         }
+        let (x_m, y_m, z_m) = (self.extent(), self.extent(), self.extent());
         let draw = &mut self.draw;
-        let (x_m, y_m, z_m) = (size(draw), size(draw), size(draw));
         match draw.one_of(&allowed) {
             Feature::FlatOpening => LuminousOpening::Box { x_m, y_m, height_m: 0.0 },
             Feature::BoxOpening => LuminousOpening::Box { x_m, y_m, height_m: z_m },
@@ -371,6 +410,23 @@ impl One<'_> {
                 format!("m{k}"),
                 MeterSet { points_m: Some(points), normal: Some(normal), ..MeterSet::default() },
             );
+        }
+        if self.allowed.contains(&Feature::Luminance) {
+            // A millimetre over the floor, or less in a small room.
+            let [x, y, _] = self.point(0.05, 0.95);
+            let points_m = Some(vec![[x, y, 0.001_f64.min(1e-3 * self.size_m.z)]]);
+            sets.insert(
+                ON_FLOOR.to_owned(),
+                MeterSet { points_m, normal: Some([0.0, 0.0, 1.0]), ..MeterSet::default() },
+            );
+        }
+        if self.allowed.contains(&Feature::Glare) {
+            let at = DVec3::from(luminaires[0].at_m.unwrap_or_default());
+            let mut eye = self.point(0.05, 0.95);
+            eye[2] = rounded(0.4 * self.size_m.z);
+            let ahead = (at - DVec3::from(eye)).truncate().normalize_or(glam::DVec2::X).extend(0.0);
+            let normal = Some(ahead.to_array().map(|x| (x * 1e4).round() / 1e4 + 0.0));
+            sets.insert(EYES.to_owned(), MeterSet { points_m: Some(vec![eye]), normal, ..MeterSet::default() });
         }
         sets
     }
@@ -508,6 +564,19 @@ impl One<'_> {
         }
         if self.has(Feature::Total, 2) {
             all.insert(ProcedureId::TotalIlluminance, at(bounces, AnyLight::Total));
+        }
+        let has_size = |l: &LuminaireSpec| {
+            let photometry = self.files.get(&l.photometry).and_then(|file| file.photometry.as_ref());
+            photometry.is_some_and(|p| p.opening != LuminousOpening::Point)
+        };
+        let [has_first, has_each] = [has_size(&luminaires[0]), luminaires.iter().all(has_size)];
+        let of = |set: &str| meters.contains_key(set).then(|| Names::One(set.to_owned()));
+        let on = |meters| Asked::Meters(AtMeters { meters, bounces, light: AnyLight::Total });
+        all.extend(of(ON_FLOOR).map(|set| (ProcedureId::Luminance, on(set))));
+        all.extend(of(EYES).filter(|_| has_each).map(|set| (ProcedureId::UnifiedGlareRating, on(set))));
+        if has_first && self.has(Feature::OpeningLuminance, 2) {
+            let asked = AtOpening { luminaire: luminaires[0].id.clone(), meters: names.clone() };
+            all.insert(ProcedureId::OpeningLuminance, Asked::Opening(asked));
         }
         Procedures(all)
     }

@@ -1,6 +1,5 @@
 //! How a spec gets smaller: each step gives candidates, from what saves most to what saves a digit; which of them fails still is for others.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -14,7 +13,9 @@ use super::oracle::Sighting;
 use super::table::{is_single_valued, smallest, smallest_of_type, to_digits};
 use crate::engines;
 use crate::procedures::{AngleLists, Angles, Asked, Names};
-use crate::spec::model::{Fraction, LuminaireSpec, MeterSet, ModelSpec, ReflectanceSpec, RotationSpec, Walls};
+use crate::spec::model::{
+    Fraction, LuminaireSpec, MeterSet, ModelSpec, ReflectanceSpec, RoomSpec, RotationSpec, Walls,
+};
 
 pub(super) type Step = fn(&Draft) -> Vec<Draft>;
 
@@ -26,6 +27,7 @@ pub(super) const ALL: &[Step] = &[
     plainer_files,
     fewer_planes,
     fewer_gammas,
+    straighter_room,
     plainer_room,
     plainer_luminaires,
     rounder_values,
@@ -56,22 +58,18 @@ pub(super) fn focused(draft: &Draft, sighting: &Sighting) -> Vec<Draft> {
     let Some(worst) = &sighting.comparison else { return vec![alone] };
     let at_worst = with(&alone, |d| {
         let Some(asked) = d.spec.procedures.0.get_mut(&symptom.procedure) else { return };
-        match asked {
-            Asked::Meters(asked) => {
-                asked.meters = Names::One("m".to_owned());
-                let set =
-                    MeterSet { points_m: Some(vec![worst.at_m]), normal: Some(worst.normal), ..MeterSet::default() };
-                d.spec.meters = BTreeMap::from([("m".to_owned(), set)]);
-            }
-            Asked::Angles(asked) => {
-                if let Some((gamma, c)) = worst.gamma_deg.zip(worst.c_deg) {
-                    asked.angles = Angles::Listed(AngleLists { gamma_deg: vec![gamma], c_deg: vec![c] });
-                }
-                let id = asked.luminaire.clone();
-                d.spec.luminaires.retain(|l| l.id == id);
-                d.spec.obstacles.clear();
-                d.spec.meters.clear();
-            }
+        d.spec.meters.clear();
+        if let Some(names) = asked.meters_mut() {
+            *names = Names::One("m".to_owned());
+            let set = MeterSet { points_m: Some(vec![worst.at_m]), normal: Some(worst.normal), ..MeterSet::default() };
+            d.spec.meters.insert("m".to_owned(), set);
+        }
+        if let (Asked::Angles(asked), Some((gamma, c))) = (&mut *asked, worst.gamma_deg.zip(worst.c_deg)) {
+            asked.angles = Angles::Listed(AngleLists { gamma_deg: vec![gamma], c_deg: vec![c] });
+        }
+        if let Some(id) = asked.named().0 {
+            d.spec.luminaires.retain(|l| l.id == id);
+            d.spec.obstacles.clear();
         }
     });
     vec![at_worst, alone]
@@ -140,10 +138,10 @@ fn fewer_meters(draft: &Draft) -> Vec<Draft> {
         all.push(with(draft, |d| {
             d.spec.meters.retain(|name, _| left.contains(name));
             for asked in d.spec.procedures.0.values_mut() {
-                if let Asked::Meters(asked) = asked {
+                if let Some(names) = asked.meters_mut() {
                     let named: Vec<String> =
-                        asked.meters.iter().filter(|n| left.iter().any(|l| l == n)).map(str::to_owned).collect();
-                    asked.meters = match &named[..] {
+                        names.iter().filter(|n| left.iter().any(|l| l == n)).map(str::to_owned).collect();
+                    *names = match &named[..] {
                         [one] => Names::One(one.clone()),
                         _ => Names::Many(named),
                     };
@@ -244,6 +242,35 @@ fn rounder_points(point: [f64; 3]) -> Vec<[f64; 3]> {
         }));
     }
     all
+}
+
+/// Of a room over a polygon: the box around it, or a corner less.
+fn straighter_room(draft: &Draft) -> Vec<Draft> {
+    let Some((floor, height)) = draft.spec.room.floor_m.as_ref().zip(draft.spec.room.height_m) else { return vec![] };
+    let farthest = |k: usize| floor.iter().map(|corner| corner[k]).fold(0.0, f64::max);
+    let one_of = |walls: &Walls| match walls {
+        Walls::Listed(walls) => walls.first().copied().unwrap_or(Fraction(0.0)),
+        Walls::All(_) | Walls::Each(_) => Fraction(0.0),
+    };
+    let alike = |room: &mut RoomSpec| {
+        if let Some(reflectance) = room.reflectance.as_mut().filter(|r| !matches!(r.walls, Walls::All(_))) {
+            reflectance.walls = Walls::All(one_of(&reflectance.walls));
+        }
+    };
+    let as_box = with(draft, |d| {
+        alike(&mut d.spec.room);
+        let size_m = Some([farthest(0), farthest(1), height]);
+        d.spec.room = RoomSpec { size_m, floor_m: None, height_m: None, ..std::mem::take(&mut d.spec.room) };
+    });
+    let without = |k: usize| {
+        with(draft, |d| {
+            alike(&mut d.spec.room);
+            let left = floor.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, corner)| *corner);
+            d.spec.room.floor_m = Some(left.collect());
+        })
+    };
+    let corners = if floor.len() > 3 { floor.len() } else { 0 };
+    std::iter::once(as_box).chain((0..corners).map(without)).collect()
 }
 
 /// Of a room that is a box.

@@ -112,8 +112,8 @@ fn points(case: &Case, subjects: &[Instrument], options: &Options<'_>) -> Vec<Po
     let chosen = |law: &&'static Law| options.laws.is_empty() || options.laws.iter().any(|l| l == law.id);
     for subject in 0..subjects.len() {
         for law in laws::all().filter(chosen) {
-            // Intensities are direct light in free field, whose laws direct illuminance keeps as well.
-            let tasks = case.tasks().filter(|task| task.procedure != ProcedureId::LuminousIntensity);
+            // What is read in free field, an intensity say, is direct light, whose laws direct illuminance keeps as well.
+            let tasks = case.tasks().filter(|task| task.scene.room.is_some());
             for task in tasks.filter(|t| law.light.concerns(t.transport)) {
                 let mut base = Job::of_task(case, &task);
                 // Where rounding decides between two values, a changed scene may read the other.

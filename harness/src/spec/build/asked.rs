@@ -23,6 +23,10 @@ impl Builder<'_> {
             match asked {
                 Asked::Meters(asked) => self.meter_sets(*procedure, &asked.meters, spec),
                 Asked::Angles(asked) => self.angles(*procedure, asked, spec),
+                Asked::Opening(asked) => {
+                    self.meter_sets(*procedure, &asked.meters, spec);
+                    self.luminaire_of(*procedure, &asked.luminaire, spec);
+                }
             }
         }
     }
@@ -38,15 +42,18 @@ impl Builder<'_> {
         }
     }
 
-    fn angles(&mut self, procedure: ProcedureId, intensity: &AtAngles, spec: &Spec) {
-        let at = |field: &str| format!("procedures.{procedure}.{field}");
+    fn luminaire_of(&mut self, procedure: ProcedureId, luminaire: &str, spec: &Spec) {
         let all: Vec<String> = spec.luminaires.iter().flat_map(ids_of).collect();
         let ids = || all.iter().map(String::as_str);
-        let message = format!("there is no luminaire `{}`", intensity.luminaire);
-        let help = suggestion(&intensity.luminaire, ids());
-        let is_there = ids().any(|id| id == intensity.luminaire) || self.mended.holds("luminaires");
+        let is_there = ids().any(|id| id == luminaire) || self.mended.holds("luminaires");
         let is_mended = (0..spec.luminaires.len()).any(|k| self.mended.holds(&format!("luminaires[{k}].id")));
-        self.check(is_there || is_mended, &at("luminaire"), message, help);
+        let (at, help) = (format!("procedures.{procedure}.luminaire"), suggestion(luminaire, ids()));
+        self.check(is_there || is_mended, &at, format!("there is no luminaire `{luminaire}`"), help);
+    }
+
+    fn angles(&mut self, procedure: ProcedureId, intensity: &AtAngles, spec: &Spec) {
+        let at = |field: &str| format!("procedures.{procedure}.{field}");
+        self.luminaire_of(procedure, &intensity.luminaire, spec);
         let is_distance = intensity.distance_m.is_finite() && intensity.distance_m > 0.0;
         let message = format!("{} m is no distance", intensity.distance_m);
         self.check(is_distance, &at("distance_m"), message, "give a positive number of metres");

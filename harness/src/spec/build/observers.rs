@@ -8,7 +8,7 @@ use luminaire::scene::{Meter, Obstacle, Scene, Shape};
 use super::super::model::Spec;
 use super::Builder;
 use super::surfaces::{MAX_LOOKS, sets_of};
-use crate::procedures::Reads;
+use crate::procedures::{Asked, Reads, sight};
 
 /// What a sight of a luminaire may be hidden by is looked at one by one.
 fn bodies(scene: &Scene) -> usize {
@@ -19,7 +19,32 @@ fn bodies(scene: &Scene) -> usize {
     scene.obstacles.iter().map(faces).sum::<usize>().max(1)
 }
 
+/// Why an opening has no luminance for an eye.
+#[derive(Debug, thiserror::Error)]
+#[error("sees no luminous area of `{0}`: it is a point by its file, edge on from here, or around the eye")]
+struct NotSeen(String);
+
 impl Builder<'_> {
+    /// Refuses observers of an opening that they do not see.
+    pub(super) fn sights(&mut self, spec: &Spec, scene: &Scene, meters: &BTreeMap<String, Vec<Meter>>) {
+        if !self.faults.is_empty() {
+            return;
+        }
+        let openings = spec.procedures.0.values().filter_map(|asked| match asked {
+            Asked::Opening(asked) => Some(asked),
+            Asked::Angles(_) | Asked::Meters(_) => None,
+        });
+        for asked in openings {
+            let Some(luminaire) = scene.luminaires.iter().find(|l| l.id == asked.luminaire) else { continue };
+            let seen = |meter: &Meter| sight(luminaire, meter).ok_or_else(|| NotSeen(asked.luminaire.clone()));
+            let sets = asked.meters.iter().filter_map(|name| Some((name, &meters.get(name)?[..])));
+            let found = sets.map(|(name, set)| (name, set, set.iter().map(seen).collect())).collect();
+            self.at_each(spec, found, "an observer sees the luminous opening", |_| {
+                "move it to where the opening shows, or take a photometric file whose opening has a size".to_owned()
+            });
+        }
+    }
+
     /// Sum of L² ω / p² that each eye sees, of the sets that glare is asked of.
     pub(super) fn observers(
         &mut self,

@@ -8,7 +8,7 @@ use luminaire::scene::{Meter, Scene};
 use super::super::model::Spec;
 use super::Builder;
 use super::meters::others;
-use crate::procedures::{Asked, Reads};
+use crate::procedures::{Names, Reads};
 
 /// As many pairs of a meter and what is looked at for it are looked at.
 pub(super) const MAX_LOOKS: usize = 20_000_000;
@@ -23,11 +23,7 @@ pub(super) fn sets_of<'m>(
     reads: Reads,
 ) -> Vec<(&'m str, &'m [Meter])> {
     let asked = spec.procedures.0.iter().filter(|(id, _)| id.row().reads == reads).map(|(_, asked)| asked);
-    let names = asked.flat_map(|asked| match asked {
-        Asked::Meters(asked) => asked.meters.iter().collect(),
-        Asked::Angles(_) => vec![],
-    });
-    let names: BTreeSet<&str> = names.collect();
+    let names: BTreeSet<&str> = asked.filter_map(|asked| asked.named().1).flat_map(Names::iter).collect();
     names.into_iter().filter_map(|name| Some((name, &meters.get(name)?[..]))).collect()
 }
 
