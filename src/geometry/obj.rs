@@ -139,10 +139,27 @@ fn place_of(name: &str, known: &mut HashMap<String, usize>, names: &mut Vec<Stri
 
 /// A Wavefront OBJ file of vertices and triangles that reads back as the same numbers, with a line about it.
 pub fn write(about: &str, vertices: &[DVec3], triangles: &[[u32; 3]]) -> String {
-    let vertex = |v: &DVec3| format!("v {} {} {}\n", v.x, v.y, v.z);
-    let face = |[a, b, c]: &[u32; 3]| format!("f {} {} {}\n", a + 1, b + 1, c + 1);
-    let lines = vertices.iter().map(vertex).chain(triangles.iter().map(face));
-    std::iter::once(format!("# {about}\n")).chain(lines).collect()
+    format!("# {about}\n{}{}", lines_of_vertices(vertices), lines_of_faces(triangles))
+}
+
+/// The same with triangles in groups, by name.
+pub fn write_groups<'a>(
+    about: &str,
+    vertices: &[DVec3],
+    groups: impl Iterator<Item = (&'a str, &'a [[u32; 3]])>,
+) -> String {
+    let group = |(name, triangles): (&str, &[[u32; 3]])| format!("g {name}\n{}", lines_of_faces(triangles));
+    format!("# {about}\n{}{}", lines_of_vertices(vertices), groups.map(group).collect::<String>())
+}
+
+fn lines_of_vertices(vertices: &[DVec3]) -> String {
+    let line = |v: &DVec3| format!("v {} {} {}\n", v.x, v.y, v.z);
+    vertices.iter().map(line).collect()
+}
+
+fn lines_of_faces(triangles: &[[u32; 3]]) -> String {
+    let line = |[a, b, c]: &[u32; 3]| format!("f {} {} {}\n", a + 1, b + 1, c + 1);
+    triangles.iter().map(line).collect()
 }
 
 /// Reads a line, and those that it goes on in after a `\`, without their ends; how many these are.

@@ -1,6 +1,8 @@
 //! Rooms that are no boxes: a box around them, and bodies or sheets where their walls stand within it. What lies beyond the walls is dark,
 //! and nobody looks at it.
 
+use std::collections::BTreeMap;
+
 use glam::{DVec2, DVec3};
 
 use super::{Obstacle, Shape};
@@ -337,8 +339,12 @@ fn sheets(faces: Vec<Face>, room: &mut Room) -> Vec<Obstacle> {
 
 /// The reflectance that most of the area has.
 fn most_of(faces: &[Face]) -> Option<f64> {
-    let area = |f: &Face| (f.corners_m[1] - f.corners_m[0]).cross(f.corners_m[2] - f.corners_m[0]).length();
-    let with = |rho: f64| faces.iter().filter(|f| f.reflectance == rho).map(area).sum::<f64>();
+    let mut areas: BTreeMap<u64, f64> = BTreeMap::new();
+    for face in faces {
+        let [a, b, c] = face.corners_m;
+        *areas.entry(face.reflectance.to_bits()).or_default() += (b - a).cross(c - a).length();
+    }
+    let with = |rho: f64| areas.get(&rho.to_bits()).copied().unwrap_or_default();
     faces.iter().map(|f| f.reflectance).max_by(|a, b| with(*a).total_cmp(&with(*b)))
 }
 

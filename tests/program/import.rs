@@ -188,8 +188,31 @@ fn a_room_in_three_formats_is_one_spec() {
         std::fs::remove_dir_all(folder.path("other")).unwrap();
     }
     let told = folder.luxproof(&["import", "room.rad", "--out", "json", "--format", "json"]).exits(0).json();
-    assert_eq!((&told["triangles"], &told["room"]["is_of_scene"]), (&28.into(), &true.into()), "{told}");
+    assert_eq!((&told["triangles"], &told["room"]["kind"]), (&28.into(), &"box".into()), "{told}");
     assert_eq!(told["materials"][4]["area_m2"].as_f64().map(|area| (area * 1e6).round()), Some(1.44e6));
+}
+
+#[test]
+fn a_room_that_is_no_box_is_a_mesh_and_a_spec_as_it_is() {
+    let folder = Folder::new(&[]);
+    let corners = [[0.0, 0.0], [6.1, 0.0], [6.1, 2.0], [3.0, 2.0], [3.0, 5.2], [0.0, 5.2]];
+    let corner = |k: usize, z: f64| [corners[k % 6][0] - 2.5, corners[k % 6][1] + 4.25, z];
+    let mut all = vec![(0, (0..6).map(|k| corner(k, 1.0)).collect()), (2, (0..6).map(|k| corner(k, 4.0)).collect())];
+    all.extend((0..6).map(|k| (1, vec![corner(k, 1.0), corner(k + 1, 1.0), corner(k + 1, 4.0), corner(k, 4.0)])));
+    all.extend(faces([-2.0, 5.0, 1.0], [-1.0, 6.0, 2.0]).map(|face| (3, face.to_vec())));
+    folder.write("l.rad", &radiance(&all));
+    let answer = folder.luxproof(&["import", "l.rad"]).exits(0).prints("32 triangles taken");
+    answer
+        .prints("room: room.obj in [6.1, 5.2, 3] m, the scene's outermost surfaces, which close; no box: the wall at");
+    answer.prints("  group walls, reflectance 0.5, 12 triangles");
+    let spec = folder.read("l/spec.yaml");
+    assert!(spec.contains("  mesh: room.obj ") && spec.contains("\n    \"ceiling\": 0.7\n"), "{spec}");
+    assert!(spec.contains("{file: reflectance-0.6.obj, at_m: [2.5, -4.25, -1], reflectance: 0.6}"), "{spec}");
+    let checked = folder.luxproof(&["check", "l/spec.yaml"]).exits(0);
+    assert!(checked.stderr.is_empty(), "{}", checked.stderr);
+    // The names are the user's to find, and to change.
+    folder.write("l/spec.yaml", &spec.replace("\"ceiling\"", "\"ceilin\""));
+    folder.luxproof(&["check", "l/spec.yaml"]).exits(2).complains("did you mean `ceiling`?");
 }
 
 const MEASURED: &str = "luminaires:
@@ -248,9 +271,9 @@ fn an_imported_room_reads_what_the_same_room_reads_by_hand() {
     let mut with_speck = polygons(off);
     with_speck.push((0, [[0.0, 10.0, 0.0], [0.1, 10.0, 0.0], [0.0, 10.1, 0.0]].to_vec()));
     folder.write("open.rad", &radiance(&with_speck));
-    for (name, is_box) in [("boxed", true), ("open", false)] {
+    for (name, kind) in [("boxed", "box"), ("open", "black")] {
         let told = folder.luxproof(&["import", &format!("{name}.rad"), "--format", "json"]).exits(0).json();
-        assert_eq!(told["room"]["is_of_scene"], is_box, "{told}");
+        assert_eq!(told["room"]["kind"], kind, "{told}");
         let spec = folder.read(&format!("{name}/spec.yaml"));
         let (geometry, _) = spec.split_once("luminaires:").unwrap();
         // Where the room's corner lies in the spec.

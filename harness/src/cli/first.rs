@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use glam::DVec3;
-
+use crate::import::{Desk, Place};
 use crate::report::words::trimmed;
 
 /// The spec, its values in braces.
@@ -18,48 +17,34 @@ pub(super) struct First<'a> {
     pub(super) about: &'a str,
     pub(super) file: &'a Path,
     pub(super) title: &'a str,
-    pub(super) size: [String; 3],
-    /// Of floor, walls and ceiling.
-    pub(super) reflectance: [String; 3],
+    /// Lines of YAML below `room`.
+    pub(super) room: &'a str,
     /// Lines of YAML, or a comment on them.
     pub(super) obstacles: &'a str,
     pub(super) photometry: &'a Path,
-    pub(super) lamp_m: DVec3,
-    /// What meters are to lie in: the room, or its scene.
-    pub(super) low_m: DVec3,
-    pub(super) high_m: DVec3,
+    pub(super) place: Place,
 }
 
 impl First<'_> {
-    /// The spec's text: desks of half a metre and more to a step.
     pub(super) fn text(&self) -> String {
-        let extent = self.high_m - self.low_m;
-        let counts = [extent.x, extent.y].map(|extent| extent.floor().clamp(3.0, 20.0));
-        let step = [extent.x / counts[0], extent.y / counts[1]];
+        let Place { lamp_m, low_m, high_m } = self.place;
+        let Desk { origin_m, step_m, counts } = Desk::within(low_m, high_m);
         let number = |value: f64| trimmed(value, 4);
-        let desk = self.low_m.z + 0.75_f64.min(0.4 * extent.z);
         let quoted = |text: &str| serde_json::to_string(text).unwrap_or_default();
         let file = self.file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let [x, y, z] = self.size.clone();
-        let [floor, walls, ceiling] = self.reflectance.clone();
         let values = [
             ("about", self.about.to_owned()),
-            ("x", x),
-            ("y", y),
-            ("z", z),
-            ("floor", floor),
-            ("walls", walls),
-            ("ceiling", ceiling),
-            ("cx", number(self.lamp_m.x)),
-            ("cy", number(self.lamp_m.y)),
-            ("cz", number(self.lamp_m.z)),
-            ("ox", number(self.low_m.x + step[0] / 2.0)),
-            ("oy", number(self.low_m.y + step[1] / 2.0)),
-            ("dx", number(step[0])),
-            ("dy", number(step[1])),
-            ("nx", number(counts[0])),
-            ("ny", number(counts[1])),
-            ("desk", number(desk)),
+            ("room", self.room.to_owned()),
+            ("cx", number(lamp_m.x)),
+            ("cy", number(lamp_m.y)),
+            ("cz", number(lamp_m.z)),
+            ("ox", number(origin_m.x)),
+            ("oy", number(origin_m.y)),
+            ("dx", number(step_m[0])),
+            ("dy", number(step_m[1])),
+            ("nx", counts[0].to_string()),
+            ("ny", counts[1].to_string()),
+            ("desk", number(origin_m.z)),
             ("distance", "10".to_owned()),
             ("obstacles", self.obstacles.to_owned()),
             ("file", file),
@@ -69,6 +54,26 @@ impl First<'_> {
         ];
         values.iter().fold(SPEC.to_owned(), |text, (name, value)| text.replace(&format!("{{{name}}}"), value))
     }
+}
+
+/// The lines of a box: its size, and the reflectances of floor, walls and ceiling.
+pub(super) fn box_room([x, y, z]: [String; 3], [floor, walls, ceiling]: [String; 3]) -> String {
+    format!(
+        "  size_m: [{x}, {y}, {z}]                    # length along x, width along y, height\n  \
+           reflectance: {{floor: {floor}, walls: {walls}, ceiling: {ceiling}}}    \
+         # diffuse, 0 to 1; walls also {{x-: 0.5, x+: 0.5, y-: 0.5, y+: 0.5}}"
+    )
+}
+
+/// The lines of a room that a mesh is: its file, and its groups with their reflectances.
+pub(super) fn mesh_room<'a>(file: &str, groups: impl Iterator<Item = (&'a str, f64)>) -> String {
+    let quoted = |text: &str| serde_json::to_string(text).unwrap_or_default();
+    let group = |(name, rho): (&str, f64)| format!("\n    {}: {rho}", quoted(name));
+    format!(
+        "  mesh: {file}                             # faces that close it, in groups\n  \
+           groups:                                    # the reflectance of each: diffuse, 0 to 1{}",
+        groups.map(group).collect::<String>()
+    )
 }
 
 /// The reflectances of walls at x-, x+, y- and y+ as a spec has them: one number where they are alike.

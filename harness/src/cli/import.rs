@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
+use luminaire::geometry::Room;
 use miette::{IntoDiagnostic, Report as Diagnostic};
 
 use super::diagnostic::{diagnose, warn};
-use super::first::{DOWNLIGHT, First, downlight, walls};
+use super::first::{self, DOWNLIGHT, First, downlight};
 use super::{TextOrJson, complain, json, print};
-use crate::import::{Imported, Options, Up, import};
+use crate::import::{Imported, Options, RoomMesh, Up, Walls, import};
 use crate::report::Exit;
 use crate::spec::{Case, Trust, doubts, suite};
 use crate::system::files::keep_shared;
@@ -86,6 +87,9 @@ pub(super) fn run(args: &ImportArgs, trust: Trust) -> Result<Exit, Diagnostic> {
         ));
     }
     let write = |name: &str, text: &str| keep_shared(&folder.join(name), text.as_bytes()).into_diagnostic();
+    if let Walls::Mesh(mesh) = &imported.walls {
+        write(RoomMesh::FILE, &mesh.obj())?;
+    }
     for part in &imported.meshes {
         write(&part.file, &part.obj())?;
     }
@@ -106,8 +110,6 @@ fn text(scene: &Path, spec: &Path, imported: &Imported) -> String {
     let name = scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let name = printable::line(&name, 80);
     let shown = |value: f64| value.to_string();
-    let rho = imported.room.reflectance;
-    let each_wall = [rho.wall_x_min, rho.wall_x_max, rho.wall_y_min, rho.wall_y_max];
     let at = imported.origin_m.to_array().map(shown).join(", ");
     let at = if imported.origin_m == glam::DVec3::ZERO { String::new() } else { format!(" at_m: [{at}],") };
     let mesh = |part: &crate::import::Part| {
@@ -121,13 +123,26 @@ fn text(scene: &Path, spec: &Path, imported: &Imported) -> String {
         ),
         file: spec,
         title: &name,
-        size: imported.room.size_m.to_array().map(shown),
-        reflectance: [shown(rho.floor), walls(each_wall, shown), shown(rho.ceiling)],
+        room: &room(&imported.walls),
         obstacles: &obstacles,
         photometry: Path::new(DOWNLIGHT),
-        lamp_m: imported.lamp_m(),
-        low_m: imported.low_m,
-        high_m: imported.high_m,
+        place: imported.place,
     };
     first.text()
+}
+
+/// The lines of the room, numbers as they are.
+fn room(walls: &Walls) -> String {
+    let shown = |value: f64| value.to_string();
+    match walls {
+        Walls::Box(Room { size_m, reflectance: rho }) => {
+            let each_wall = [rho.wall_x_min, rho.wall_x_max, rho.wall_y_min, rho.wall_y_max];
+            let reflectance = [shown(rho.floor), first::walls(each_wall, shown), shown(rho.ceiling)];
+            first::box_room(size_m.to_array().map(shown), reflectance)
+        }
+        Walls::Mesh(mesh) => {
+            let groups = mesh.groups.iter().map(|group| (group.name.as_str(), group.reflectance));
+            first::mesh_room(RoomMesh::FILE, groups)
+        }
+    }
 }

@@ -10,9 +10,10 @@ use luminaire::photometry;
 use miette::{IntoDiagnostic, Report as Diagnostic, WrapErr};
 
 use super::diagnostic::{diagnose, warn};
-use super::first::{First, downlight, walls};
+use super::first::{First, box_room, downlight, walls};
 use super::photometry::spec_error;
 use super::{complain, print};
+use crate::import::Place;
 use crate::report::Exit;
 use crate::report::words::trimmed;
 use crate::spec::{Case, Trust, doubts, suite};
@@ -158,17 +159,19 @@ fn spec(
         return Err(miette::miette!("a room has an extent along every axis, and reflectances lie between 0 and 1"));
     }
     let size_m = DVec3::new(x, y, z);
+    let room = box_room(
+        size_m.to_array().map(|extent| trimmed(extent, 4)),
+        [trimmed(floor, 4), walls([each_wall; 4], |rho| trimmed(rho, 4)), trimmed(ceiling, 4)],
+    );
+    let lamp_m = DVec3::new(x / 2.0, y / 2.0, z - (0.2 * z).min(0.3));
     let first = First {
         about: ABOUT,
         file: path,
         title,
-        size: size_m.to_array().map(|extent| trimmed(extent, 4)),
-        reflectance: [trimmed(floor, 4), walls([each_wall; 4], |rho| trimmed(rho, 4)), trimmed(ceiling, 4)],
+        room: &room,
         obstacles: OBSTACLES,
         photometry: lamp,
-        lamp_m: DVec3::new(x / 2.0, y / 2.0, z - (0.2 * z).min(0.3)),
-        low_m: DVec3::ZERO,
-        high_m: size_m,
+        place: Place { lamp_m, low_m: DVec3::ZERO, high_m: size_m },
     };
     Ok(first.text())
 }

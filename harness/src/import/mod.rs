@@ -1,9 +1,13 @@
-//! Scenes of other programs -> the geometry of a spec: a box room and a mesh a reflectance.
+//! Scenes of other programs -> the geometry of a spec: a room and a mesh a reflectance.
 //!
 //! Surfaces are opaque and diffuse in a spec; what is not is refused or left out, and told. Luminaires are the spec's
 //! own.
 
+mod around;
+mod closed;
 mod gltf;
+mod hull;
+mod net;
 mod obj;
 mod place;
 mod radiance;
@@ -16,16 +20,15 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
-use luminaire::geometry::{Mesh, Reflectances, Room};
 
-pub use told::{LeftOut, MeshTold, RoomTold, Taken, Told};
+pub use around::{Group, Part, RoomMesh, Walls};
+pub use place::{Desk, Place};
+pub use told::{GroupTold, LeftOut, MeshTold, RoomKind, RoomTold, Taken, Told};
 
 use crate::spec::{Faults, SpecError, Trust, suggestion};
+use around::{Around, around};
 use raw::{Kind, Raw, Scene, luminous};
 use soup::{Corners, Soup};
-
-/// The black box stands so far off everything, as a part of the largest extent: farther than any renderer's rounding.
-const MARGIN: f64 = 0.05;
 
 /// The farthest that a corner may be off the scene's origin, in metres.
 const FAR_M: f64 = 1e6;
@@ -62,39 +65,14 @@ impl Default for Options {
 /// A scene's geometry as a spec has it.
 #[derive(Debug)]
 pub struct Imported {
-    pub room: Room,
+    pub walls: Walls,
     /// Where the scene's origin is in the room.
     pub origin_m: DVec3,
     /// Those that the room is not, in the scene's place; files by name.
     pub meshes: Vec<Part>,
-    /// The box around everything that was taken, in the room.
-    pub low_m: DVec3,
-    pub high_m: DVec3,
+    /// Where a luminaire and meters may be.
+    pub place: Place,
     pub told: Told,
-}
-
-impl Imported {
-    /// Where a luminaire may hang: below the highest surface that has room below it, near the middle, in the room.
-    pub fn lamp_m(&self) -> DVec3 {
-        place::lamp(self)
-    }
-}
-
-/// The triangles of one reflectance.
-#[derive(Debug)]
-pub struct Part {
-    /// The name of its file.
-    pub file: String,
-    pub reflectance: f64,
-    pub mesh: Mesh,
-}
-
-impl Part {
-    /// Its file: a Wavefront OBJ that reads back as the same numbers.
-    pub fn obj(&self) -> String {
-        let about = format!("luxproof import: metres, z up; reflectance {}", self.reflectance);
-        luminaire::geometry::obj::write(&about, &self.mesh.vertices_m, &self.mesh.triangles)
-    }
 }
 
 /// Formats by the ends of file names.
@@ -152,21 +130,8 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
     }
     doubtful(&mut raw, &soup);
     let (low, high) = soup.extent();
-    let shell = shell::shell(&soup, low, high);
-    let off = DVec3::splat(margin(low, high));
-    let around = ((low - off).map(short), (high + off).map(short));
-    let (room_low, room_high) = if shell.is_ok() { (low, high) } else { around };
-    // Of the room that is the scene's own this is what its farthest corner is at.
-    let size_m = if shell.is_ok() { room_high - room_low } else { (room_high - room_low).map(short) };
-    let black = Reflectances::with_equal_walls(0.0, 0.0, 0.0);
-    let reflectance = shell.as_ref().map_or(black, |shell| shell.reflectances);
-    let is_part = shell.as_ref().map_or_else(|_| vec![false; soup.facets.len()], |shell| shell.is_part.clone());
-    if let Some(loose) = shell.as_ref().ok().map(|shell| shell.loose).filter(|loose| *loose > 0) {
-        raw.note(format!(
-            "{loose} triangles lie free in the plane of a surface of the room: renderers differ in which of both they see; lift them"
-        ));
-    }
-    let meshes = parts(&soup, &is_part);
+    let around = around(&soup, |material| &raw.materials[material as usize].name, low, high);
+    around.notes.iter().for_each(|note| raw.note(note));
     let told = Told {
         scene: path.display().to_string(),
         format: format.name(),
@@ -176,44 +141,13 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
         materials: taken(&raw, &chosen, &soup, options),
         min_m: low.to_array(),
         max_m: high.to_array(),
-        room: RoomTold {
-            size_m: size_m.to_array(),
-            is_of_scene: shell.is_ok(),
-            margin_m: if shell.is_ok() { 0.0 } else { margin(low, high) },
-            why: shell.err(),
-        },
-        meshes: meshes
-            .iter()
-            .map(|part| MeshTold {
-                file: part.file.clone(),
-                reflectance: part.reflectance,
-                triangles: part.mesh.triangles.len(),
-                vertices: part.mesh.vertices_m.len(),
-            })
-            .collect(),
+        room: around.told,
+        meshes: around.meshes.iter().map(MeshTold::of).collect(),
         left_out: left_out(&raw, &chosen),
         notes: raw.notes,
     };
-    Ok(Imported {
-        room: Room { size_m, reflectance },
-        origin_m: DVec3::ZERO - room_low,
-        meshes,
-        low_m: low - room_low,
-        high_m: high - room_low,
-        told,
-    })
-}
-
-/// To a nanometre: the box stands wherever it likes.
-fn short(length_m: f64) -> f64 {
-    (length_m * 1e9).round() / 1e9
-}
-
-fn margin(low: DVec3, high: DVec3) -> f64 {
-    let margin = MARGIN * (high - low).max_element();
-    // Two digits: nobody reads more.
-    let digits = 10_f64.powf(1.0 - margin.log10().floor());
-    (margin * digits).round() / digits
+    let Around { walls, origin_m, meshes, place, .. } = around;
+    Ok(Imported { walls, origin_m, meshes, place, told })
 }
 
 /// The reflectance of each material that is taken; all that is wrong with the others at once.
@@ -301,28 +235,6 @@ fn doubtful(raw: &mut Raw<'_>, soup: &Soup) {
     }
 }
 
-/// A mesh a reflectance, the least first, of what is no part of the room.
-fn parts(soup: &Soup, is_of_room: &[bool]) -> Vec<Part> {
-    let mut meshes: BTreeMap<u64, (f64, Vec<[u32; 3]>)> = BTreeMap::new();
-    for (facet, _) in soup.facets.iter().zip(is_of_room).filter(|(_, is_of_room)| !**is_of_room) {
-        // Bits of numbers from 0 are in the order of the numbers.
-        let of = meshes.entry(facet.reflectance.to_bits()).or_insert((facet.reflectance, vec![]));
-        of.1.push(facet.vertices);
-    }
-    let part = |(reflectance, mut triangles): (f64, Vec<[u32; 3]>)| {
-        let mut places = BTreeMap::new();
-        let mut vertices_m = vec![];
-        for v in triangles.iter_mut().flatten() {
-            *v = *places.entry(*v).or_insert_with(|| {
-                vertices_m.push(soup.vertices[*v as usize]);
-                vertices_m.len() as u32 - 1
-            });
-        }
-        Part { file: format!("reflectance-{reflectance}.obj"), reflectance, mesh: Mesh { vertices_m, triangles } }
-    };
-    meshes.into_values().map(part).collect()
-}
-
 fn taken(raw: &Raw<'_>, chosen: &[Option<f64>], soup: &Soup, options: &Options) -> Vec<Taken> {
     let mut sums = vec![(0, 0.0); raw.materials.len()];
     for facet in &soup.facets {
@@ -366,5 +278,7 @@ fn left_out(raw: &Raw<'_>, chosen: &[Option<f64>]) -> Vec<LeftOut> {
     of_material.chain(others).collect()
 }
 
+#[cfg(test)]
+mod closed_tests;
 #[cfg(test)]
 mod tests;

@@ -55,7 +55,7 @@ pub(super) fn shell(soup: &Soup, low: DVec3, high: DVec3) -> Result<Shell, Strin
         }
     }
     beside.retain(|k| !is_part[*k]);
-    let loose = loose(soup, &is_part, &beside);
+    let loose = loose(soup, &is_part, &beside).len();
     let [[wall_x_min, wall_x_max], [wall_y_min, wall_y_max], [floor, ceiling]] = rho;
     let reflectances = Reflectances { floor, ceiling, wall_x_min, wall_x_max, wall_y_min, wall_y_max };
     Ok(Shell { reflectances, is_part, loose })
@@ -139,7 +139,7 @@ impl Face {
 }
 
 /// Whether two triangles have more than an edge in common, by the theorem of separating axes.
-fn overlap(a: &[DVec2; 3], b: &[DVec2; 3], off: f64) -> bool {
+pub(super) fn overlap(a: &[DVec2; 3], b: &[DVec2; 3], off: f64) -> bool {
     let is_apart_along_an_edge = |of: &[DVec2; 3], other: &[DVec2; 3]| {
         (0..3).any(|k| {
             let edge = (of[(k + 1) % 3] - of[k]).normalize_or_zero();
@@ -149,10 +149,18 @@ fn overlap(a: &[DVec2; 3], b: &[DVec2; 3], off: f64) -> bool {
     !is_apart_along_an_edge(a, b) && !is_apart_along_an_edge(b, a)
 }
 
-/// How many of some triangles have an edge that no other triangle has, the box left out.
-fn loose(soup: &Soup, is_part: &[bool], among: &[usize]) -> usize {
+/// What is told of sheets that lie on the room's surfaces.
+pub(super) fn on_walls(triangles: usize) -> Option<String> {
+    let told = format!(
+        "{triangles} triangles lie free in the plane of a surface of the room: renderers differ in which of both they see; lift them"
+    );
+    (triangles > 0).then_some(told)
+}
+
+/// Which of some triangles have an edge that no other triangle has, the room left out.
+pub(super) fn loose(soup: &Soup, is_part: &[bool], among: &[usize]) -> Vec<usize> {
     if among.is_empty() {
-        return 0;
+        return vec![];
     }
     let edges = |facet: &Facet| {
         let [a, b, c] = facet.vertices;
@@ -164,5 +172,6 @@ fn loose(soup: &Soup, is_part: &[bool], among: &[usize]) -> usize {
             *count.entry(edge).or_default() += 1;
         }
     }
-    among.iter().filter(|k| edges(&soup.facets[**k]).iter().any(|edge| count.get(edge) == Some(&1))).count()
+    let is_loose = |k: &usize| edges(&soup.facets[*k]).iter().any(|edge| count.get(edge) == Some(&1));
+    among.iter().copied().filter(is_loose).collect()
 }

@@ -17,6 +17,8 @@ pub(super) struct Facet {
 pub(super) struct Soup {
     pub(super) vertices: Vec<DVec3>,
     pub(super) facets: Vec<Facet>,
+    /// What coordinates are rounded to, in metres.
+    pub(super) step_m: f64,
     /// Triangles of no area.
     pub(super) flat: usize,
     /// Triangles of the same corners and reflectance as another.
@@ -33,7 +35,7 @@ impl Soup {
     pub(super) fn of(triangles: &[Corners], precision: f64) -> Self {
         let (low, high) = extent(triangles.iter().flat_map(|(corners, ..)| corners));
         let grid = grid((high - low).max_element().max(low.abs().max(high.abs()).max_element()), precision);
-        let mut soup = Self::default();
+        let mut soup = Self { step_m: 1.0 / grid, ..Self::default() };
         let mut places = HashMap::new();
         let mut known: HashMap<[u32; 3], f64> = HashMap::new();
         for (corners, material, reflectance) in triangles {

@@ -2,11 +2,12 @@ use std::fs;
 use std::path::Path;
 
 use base64::Engine;
+use luminaire::geometry::{Mesh, Reflectances, Room};
 
 use super::*;
 
 /// Six polygons of a material a face, looking inwards: x-, x+, y-, y+, floor, ceiling.
-const BOX: [[[f64; 3]; 4]; 6] = [
+pub(super) const BOX: [[[f64; 3]; 4]; 6] = [
     [[0.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 4.0, 3.0], [0.0, 0.0, 3.0]],
     [[6.0, 0.0, 0.0], [6.0, 0.0, 3.0], [6.0, 4.0, 3.0], [6.0, 4.0, 0.0]],
     [[0.0, 0.0, 0.0], [0.0, 0.0, 3.0], [6.0, 0.0, 3.0], [6.0, 0.0, 0.0]],
@@ -15,7 +16,7 @@ const BOX: [[[f64; 3]; 4]; 6] = [
     [[0.0, 0.0, 3.0], [0.0, 4.0, 3.0], [6.0, 4.0, 3.0], [6.0, 0.0, 3.0]],
 ];
 
-fn read_with(files: &[(&str, &[u8])], options: &Options) -> Result<Imported, String> {
+pub(super) fn read_with(files: &[(&str, &[u8])], options: &Options) -> Result<Imported, String> {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes) in files {
         fs::write(folder.path().join(name), bytes).unwrap();
@@ -24,19 +25,26 @@ fn read_with(files: &[(&str, &[u8])], options: &Options) -> Result<Imported, Str
     import(&path, options).map_err(|faults| faults.to_string().replace(&format!("{}/", folder.path().display()), ""))
 }
 
-fn read(files: &[(&str, &[u8])]) -> Result<Imported, String> {
+pub(super) fn read(files: &[(&str, &[u8])]) -> Result<Imported, String> {
     read_with(files, &Options::default())
 }
 
-fn polygon(of: &str, corners: &[[f64; 3]]) -> String {
+pub(super) fn polygon(of: &str, corners: &[[f64; 3]]) -> String {
     let numbers: Vec<String> = corners.iter().flatten().map(f64::to_string).collect();
     format!("{of} polygon p 0 0 {} {}\n", numbers.len(), numbers.join(" "))
 }
 
 /// A room of six reflectances, each wall another.
-fn room() -> String {
+pub(super) fn room() -> String {
     let material = |k: usize| format!("void plastic m{k} 0 0 5 .{k} .{k} .{k} 0 0\n");
     (0..6).map(|k| material(k + 1) + &polygon(&format!("m{}", k + 1), &BOX[k])).collect()
+}
+
+fn cuboid(imported: &Imported) -> Room {
+    match &imported.walls {
+        Walls::Box(room) => *room,
+        Walls::Mesh(mesh) => panic!("{mesh:?}"),
+    }
 }
 
 fn notes(imported: &Imported) -> String {
@@ -47,8 +55,8 @@ fn notes(imported: &Imported) -> String {
 fn a_box_of_outermost_surfaces_is_the_room_with_what_stands_in_it() {
     let crate_on_floor = "!genbox m1 crate 1 1 1\n";
     let read = read(&[("a.rad", (room() + crate_on_floor).as_bytes())]).unwrap();
-    assert_eq!((read.room.size_m, read.origin_m), (DVec3::new(6.0, 4.0, 3.0), DVec3::ZERO));
-    let rho = &read.room.reflectance;
+    let Room { size_m, reflectance: rho } = cuboid(&read);
+    assert_eq!((size_m, read.origin_m), (DVec3::new(6.0, 4.0, 3.0), DVec3::ZERO));
     let walls = [rho.wall_x_min, rho.wall_x_max, rho.wall_y_min, rho.wall_y_max];
     assert_eq!((walls, rho.floor, rho.ceiling), ([0.1, 0.2, 0.3, 0.4], 0.5, 0.6));
     // The crate stands in a corner: its bottom and two sides lie in planes of the room, and are its own.
@@ -61,35 +69,33 @@ fn a_box_of_outermost_surfaces_is_the_room_with_what_stands_in_it() {
     // A rug in the plane of the floor belongs to no body.
     let rug = polygon("m1", &[[2.0, 2.0, 0.0], [3.0, 2.0, 0.0], [3.0, 3.0, 0.0]]);
     let rug = super::tests::read(&[("a.rad", (room() + &rug).as_bytes())]).unwrap();
-    assert!(rug.told.room.is_of_scene && notes(&rug).contains("1 triangles lie free"), "{}", notes(&rug));
+    assert!(rug.told.room.kind == RoomKind::Box && notes(&rug).contains("1 triangles lie free"), "{}", notes(&rug));
 }
 
 #[test]
-fn what_is_no_box_lies_in_a_black_one_that_touches_nothing() {
-    let two_floors = room().replace(&polygon("m5", &BOX[4]), "")
-        + &polygon("m5", &[[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 4.0, 0.0], [0.0, 4.0, 0.0]])
-        + &polygon("m6", &[[3.0, 0.0, 0.0], [6.0, 0.0, 0.0], [6.0, 4.0, 0.0], [3.0, 4.0, 0.0]]);
+fn what_does_not_close_lies_in_a_black_box_that_touches_nothing() {
     let no_floor = room().replace(&polygon("m5", &BOX[4]), "");
     let half = room().replace(&polygon("m5", &BOX[4]), &polygon("m5", &BOX[4][..3]));
     // As large in sum, but not covering.
     let doubled = half.clone() + &polygon("m5", &[[0.5, 0.0, 0.0], [6.0, 0.0, 0.0], [6.0, 4.0, 0.0], [5.0, 4.0, 0.0]]);
     let plane = "void plastic m 0 0 5 .5 .5 .5 0 0\n".to_owned() + &polygon("m", &BOX[4]);
-    for (text, why) in [
-        (two_floors, "the floor has several reflectances, from 0.5 to 0.6"),
-        (no_floor, "the floor is not covered"),
-        (half, "the floor is not covered"),
-        (doubled, "the floor is not covered"),
-        (plane, "one plane"),
+    for (text, why, why_not_closed) in [
+        (no_floor, "the floor is not covered", "4 of their edges are open, the first from [0, 0, 0] to "),
+        (half, "the floor is not covered", "3 of their edges are open, the first from [0, 0, 0] to "),
+        (doubled, "the floor is not covered", "edges are open"),
+        (plane, "one plane", "edges are open"),
     ] {
         let read = read(&[("a.rad", text.as_bytes())]).unwrap();
         let told = &read.told.room;
-        assert!(!told.is_of_scene && told.why.as_ref().unwrap().contains(why), "{told:?}");
-        assert!(read.room.reflectance == Reflectances::with_equal_walls(0.0, 0.0, 0.0));
+        assert!(told.kind == RoomKind::Black && told.why.as_ref().unwrap().contains(why), "{told:?}");
+        assert!(told.why_not_closed.as_ref().unwrap().contains(why_not_closed), "{told:?}");
+        let room = cuboid(&read);
+        assert!(room.reflectance == Reflectances::with_equal_walls(0.0, 0.0, 0.0));
         assert_eq!(told.margin_m, 0.3);
-        assert!((read.low_m - 0.3).abs().max_element() < 1e-12);
+        assert!((read.place.low_m - 0.3).abs().max_element() < 1e-12);
         for v in read.meshes.iter().flat_map(|part| &part.mesh.vertices_m) {
             let at = *v + read.origin_m;
-            assert!(at.min_element() > 0.29 && (read.room.size_m - at).min_element() > 0.29, "{at}");
+            assert!(at.min_element() > 0.29 && (room.size_m - at).min_element() > 0.29, "{at}");
         }
     }
 }
@@ -104,7 +110,7 @@ fn a_finely_cut_floor_under_coarse_bodies_is_a_floor() {
         }
     }
     let read = read(&[("a.rad", (text + "!genbox m5 crate 2 2 1\n").as_bytes())]).unwrap();
-    assert!(read.told.room.is_of_scene, "{:?}", read.told.room);
+    assert_eq!(read.told.room.kind, RoomKind::Box, "{:?}", read.told.room);
     assert_eq!(read.meshes[0].mesh.triangles.len(), 12);
 }
 

@@ -2,7 +2,10 @@
 
 use std::fmt;
 
+use glam::DVec3;
 use serde::Serialize;
+
+use super::around::{Group, Part};
 
 /// All that is told.
 #[derive(Debug, Serialize)]
@@ -39,16 +42,55 @@ pub struct Taken {
     pub is_given: bool,
 }
 
+/// What the room is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RoomKind {
+    /// The scene's own surfaces, an axis-aligned box.
+    Box,
+    /// The scene's own surfaces, which close.
+    Mesh,
+    /// A black box around the scene.
+    Black,
+}
+
 /// The room.
 #[derive(Debug, Serialize)]
 pub struct RoomTold {
+    pub kind: RoomKind,
+    /// Of the box around it.
     pub size_m: [f64; 3],
-    /// Whether it is the scene's own surfaces; else it is black and lies around them.
-    pub is_of_scene: bool,
-    /// Why it is not.
+    /// Of its mesh, and the groups in that.
+    pub file: Option<&'static str>,
+    pub groups: Vec<GroupTold>,
+    /// Why it is not the scene's own box.
     pub why: Option<String>,
-    /// How far it stands off them, in metres.
+    /// Why no other surfaces of the scene are it.
+    pub why_not_closed: Option<String>,
+    /// How far it stands off the scene's surfaces, in metres.
     pub margin_m: f64,
+}
+
+impl RoomTold {
+    pub(super) fn of(kind: RoomKind, size_m: DVec3) -> Self {
+        let (size_m, groups) = (size_m.to_array(), vec![]);
+        Self { kind, size_m, file: None, groups, why: None, why_not_closed: None, margin_m: 0.0 }
+    }
+}
+
+/// The triangles of a room of one material.
+#[derive(Debug, Serialize)]
+pub struct GroupTold {
+    pub name: String,
+    pub reflectance: f64,
+    pub triangles: usize,
+}
+
+impl GroupTold {
+    pub(super) fn of(group: &Group) -> Self {
+        let Group { name, reflectance, triangles } = group;
+        Self { name: name.clone(), reflectance: *reflectance, triangles: triangles.len() }
+    }
 }
 
 /// A file of triangles.
@@ -58,6 +100,17 @@ pub struct MeshTold {
     pub reflectance: f64,
     pub triangles: usize,
     pub vertices: usize,
+}
+
+impl MeshTold {
+    pub(super) fn of(part: &Part) -> Self {
+        Self {
+            file: part.file.clone(),
+            reflectance: part.reflectance,
+            triangles: part.mesh.triangles.len(),
+            vertices: part.mesh.vertices_m.len(),
+        }
+    }
 }
 
 /// Surfaces or other things that were not taken.
@@ -89,13 +142,8 @@ impl fmt::Display for Told {
             writeln!(f, "  {:width$} {:>9} {:>10.4} {:>11}{from}", m.name, m.triangles, m.area_m2, m.reflectance)?;
         }
         more(f, self.materials.len())?;
-        let box_of = |[x, y, z]: [f64; 3]| format!("[{x}, {y}, {z}]");
         writeln!(f, "bounding box: {} to {} m in the scene", box_of(self.min_m), box_of(self.max_m))?;
-        let size = box_of(self.room.size_m);
-        match &self.room.why {
-            None => writeln!(f, "room: {size} m, the scene's outermost surfaces, which are a box")?,
-            Some(why) => writeln!(f, "room: {size} m, black, {} m around everything: {why}", self.room.margin_m)?,
-        }
+        write!(f, "{}", self.room)?;
         for m in self.meshes.iter().take(MAX_LINES) {
             let MeshTold { file, reflectance, triangles, vertices } = m;
             writeln!(f, "mesh: {file}, reflectance {reflectance}, {triangles} triangles, {vertices} vertices")?;
@@ -108,6 +156,36 @@ impl fmt::Display for Told {
         more(f, self.left_out.len())?;
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
     }
+}
+
+impl fmt::Display for RoomTold {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = box_of(self.size_m);
+        let no_box = self.why.as_deref().unwrap_or_default();
+        match self.kind {
+            RoomKind::Box => writeln!(f, "room: {size} m, the scene's outermost surfaces, which are a box"),
+            RoomKind::Mesh => {
+                let file = self.file.unwrap_or_default();
+                writeln!(f, "room: {file} in {size} m, the scene's outermost surfaces, which close; no box: {no_box}")?;
+                for g in self.groups.iter().take(MAX_LINES) {
+                    let GroupTold { name, reflectance, triangles } = g;
+                    writeln!(f, "  group {name}, reflectance {reflectance}, {triangles} triangles")?;
+                }
+                more(f, self.groups.len())
+            }
+            RoomKind::Black => {
+                let not_closed = self.why_not_closed.as_deref().unwrap_or_default();
+                let margin_m = self.margin_m;
+                writeln!(f, "room: {size} m, black, {margin_m} m around everything")?;
+                writeln!(f, "  the outermost surfaces are no box: {no_box}")?;
+                writeln!(f, "  and no surfaces close around the others: {not_closed}")
+            }
+        }
+    }
+}
+
+fn box_of([x, y, z]: [f64; 3]) -> String {
+    format!("[{x}, {y}, {z}]")
 }
 
 fn more(f: &mut fmt::Formatter<'_>, count: usize) -> fmt::Result {
