@@ -176,8 +176,9 @@ fn scene(name: &str, bytes: &[u8]) {
     let options = Options { leaves_out: true, trust: Trust::Stranger, ..Options::default() };
     match kept(name, bytes, |path| import(path, &options)) {
         Ok(imported) => {
-            let inside = |at: DVec3| at.cmpge(DVec3::ZERO).all() && at.cmple(imported.room.size_m).all();
-            assert!(imported.room.size_m.is_finite() && inside(imported.lamp_m()));
+            let size_m = DVec3::from(imported.told.room.size_m);
+            let inside = |at: DVec3| at.cmpge(DVec3::ZERO).all() && at.cmple(size_m).all();
+            assert!(size_m.is_finite() && inside(imported.place.lamp_m));
             for part in &imported.meshes {
                 assert!((0.0..=1.0).contains(&part.reflectance) && !part.mesh.triangles.is_empty());
                 assert!(part.mesh.vertices_m.iter().all(|v| inside(*v + imported.origin_m)));

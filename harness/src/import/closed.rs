@@ -83,8 +83,7 @@ fn around(soup: &Soup, net: &Net, low: DVec3, high: DVec3) -> Result<Closed, Str
 fn openings(net: &Net) -> Option<String> {
     let walk = Hull::whole(net).walk().ok()??;
     let [a, b] = net.ends(*walk.open.first()?);
-    let count = walk.open.len();
-    Some(format!("{count} of their edges are open, the first from {a} to {b} m"))
+    Some(format!("open edges: {}, the first from {a} to {b} m", walk.open.len()))
 }
 
 /// Each edge is gone along as often one way as the other, and the outside is at one side of each triangle.

@@ -171,8 +171,8 @@ impl<'a> Hull<'a> {
         let normal = if normal.dot(at - 0.5 * (low + high)) < 0.0 { -normal } else { normal };
         // Off the normal, since what is built of right angles has edges there.
         let tilts = (1..9).map(|k| 0.07 * f64::from(k) * DVec3::new(0.36, 0.48, 0.8));
-        let away = tilts.map(|tilt| (normal + tilt).normalize());
-        away.filter_map(|away| self.met(at + 4.0 * (high - low).length() * away, -away)).next()
+        let mut ways = tilts.map(|tilt| (normal + tilt).normalize());
+        ways.find_map(|away| self.met(at + 4.0 * (high - low).length() * away, -away))
     }
 
     /// What a ray meets first, and whether from its back; `None` where it meets nothing, or passes beside an edge.

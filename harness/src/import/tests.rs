@@ -80,10 +80,10 @@ fn what_does_not_close_lies_in_a_black_box_that_touches_nothing() {
     let doubled = half.clone() + &polygon("m5", &[[0.5, 0.0, 0.0], [6.0, 0.0, 0.0], [6.0, 4.0, 0.0], [5.0, 4.0, 0.0]]);
     let plane = "void plastic m 0 0 5 .5 .5 .5 0 0\n".to_owned() + &polygon("m", &BOX[4]);
     for (text, why, why_not_closed) in [
-        (no_floor, "the floor is not covered", "4 of their edges are open, the first from [0, 0, 0] to "),
-        (half, "the floor is not covered", "3 of their edges are open, the first from [0, 0, 0] to "),
-        (doubled, "the floor is not covered", "edges are open"),
-        (plane, "one plane", "edges are open"),
+        (no_floor, "the floor is not covered", "open edges: 4, the first from [0, 0, 0] to "),
+        (half, "the floor is not covered", "open edges: 3, the first from [0, 0, 0] to "),
+        (doubled, "the floor is not covered", "open edges: "),
+        (plane, "one plane", "open edges: "),
     ] {
         let read = read(&[("a.rad", text.as_bytes())]).unwrap();
         let told = &read.told.room;
