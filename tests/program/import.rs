@@ -203,8 +203,8 @@ fn a_room_that_is_no_box_is_a_mesh_and_a_spec_as_it_is() {
     folder.write("l.rad", &radiance(&all));
     let answer = folder.luxproof(&["import", "l.rad"]).exits(0).prints("32 triangles taken");
     answer
-        .prints("room: room.obj in [6.1, 5.2, 3] m, the scene's outermost surfaces, which close; no box: the wall at");
-    answer.prints("  group walls, reflectance 0.5, 12 triangles");
+        .prints("room: room.obj in [6.1, 5.2, 3] m, the scene's outermost surfaces, which close; no box: the wall at")
+        .prints("  group walls, reflectance 0.5, 12 triangles");
     let spec = folder.read("l/spec.yaml");
     assert!(spec.contains("  mesh: room.obj ") && spec.contains("\n    \"ceiling\": 0.7\n"), "{spec}");
     assert!(spec.contains("{file: reflectance-0.6.obj, at_m: [2.5, -4.25, -1], reflectance: 0.6}"), "{spec}");
