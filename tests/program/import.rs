@@ -195,7 +195,7 @@ fn a_room_in_three_formats_is_one_spec() {
 #[test]
 fn a_room_that_is_no_box_is_a_mesh_and_a_spec_as_it_is() {
     let folder = Folder::new(&[]);
-    let corners = [[0.0, 0.0], [6.1, 0.0], [6.1, 2.0], [3.0, 2.0], [3.0, 5.2], [0.0, 5.2]];
+    let corners = [[0.0, 0.0], [6.1, 0.0], [6.1, 2.0], [3.0, 2.0], [3.0, 5.0], [0.0, 5.0]];
     let corner = |k: usize, z: f64| [corners[k % 6][0] - 2.5, corners[k % 6][1] + 4.25, z];
     let mut all = vec![(0, (0..6).map(|k| corner(k, 1.0)).collect()), (2, (0..6).map(|k| corner(k, 4.0)).collect())];
     all.extend((0..6).map(|k| (1, vec![corner(k, 1.0), corner(k + 1, 1.0), corner(k + 1, 4.0), corner(k, 4.0)])));
@@ -203,7 +203,7 @@ fn a_room_that_is_no_box_is_a_mesh_and_a_spec_as_it_is() {
     folder.write("l.rad", &radiance(&all));
     let answer = folder.luxproof(&["import", "l.rad"]).exits(0).prints("32 triangles taken");
     answer
-        .prints("room: room.obj in [6.1, 5.2, 3] m, the scene's outermost surfaces, which close; no box: the wall at")
+        .prints("room: room.obj in [6.1, 5, 3] m, the scene's outermost surfaces, which close; no box: the wall at")
         .prints("  group walls, reflectance 0.5, 12 triangles");
     let spec = folder.read("l/spec.yaml");
     assert!(spec.contains("  mesh: room.obj ") && spec.contains("\n    \"ceiling\": 0.7\n"), "{spec}");
