@@ -9,7 +9,7 @@ use super::closed::{Closed, closed};
 use super::place::{Place, Space};
 use super::shell::{Shell, on_walls, shell};
 use super::soup::{Facet, Soup};
-use super::told::{GroupTold, RoomKind, RoomTold};
+use super::told::{GroupTold, MeshTold, RoomKind, RoomTold};
 
 /// The black box stands so far off everything, as a part of the largest extent: farther than any renderer's rounding.
 const MARGIN: f64 = 0.05;
@@ -42,6 +42,12 @@ pub struct Group {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl Group {
+    fn told(&self) -> GroupTold {
+        GroupTold { name: self.name.clone(), reflectance: self.reflectance, triangles: self.triangles.len() }
+    }
+}
+
 impl RoomMesh {
     /// The name of its file.
     pub const FILE: &str = "room.obj";
@@ -63,6 +69,15 @@ pub struct Part {
 }
 
 impl Part {
+    pub(super) fn told(&self) -> MeshTold {
+        MeshTold {
+            file: self.file.clone(),
+            reflectance: self.reflectance,
+            triangles: self.mesh.triangles.len(),
+            vertices: self.mesh.vertices_m.len(),
+        }
+    }
+
     /// Its file: a Wavefront OBJ that reads back as the same numbers.
     pub fn obj(&self) -> String {
         let about = format!("luxproof import: metres, z up; reflectance {}", self.reflectance);
@@ -164,7 +179,7 @@ fn mesh<'a>(soup: &Soup, name: impl Fn(u32) -> &'a str, closed: Closed, place: P
     let size_m = closed.high + origin_m;
     let told = RoomTold {
         file: Some(RoomMesh::FILE),
-        groups: groups.iter().map(GroupTold::of).collect(),
+        groups: groups.iter().map(Group::told).collect(),
         why: Some(no_box),
         ..RoomTold::of(RoomKind::Mesh, size_m)
     };

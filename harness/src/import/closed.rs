@@ -112,7 +112,7 @@ fn inwards(net: &Net, piece: u32, turned: bool) -> ([u32; 3], u32) {
     (if turned { [a, b, c] } else { [a, c, b] }, of.facet)
 }
 
-/// What the walls are not: whole triangles, or parts of those that are walls in part; and how many have no area any more.
+/// What the walls are not: whole triangles, or parts of those that are walls in part; and how many have no area left.
 fn rest(soup: &Soup, net: &Net, walk: &Walk) -> (Vec<Facet>, usize) {
     let mut is_wall = vec![false; net.pieces.len()];
     let mut is_part = vec![false; soup.facets.len()];

@@ -142,7 +142,7 @@ pub fn import(path: &Path, options: &Options) -> Result<Imported, Faults> {
         min_m: low.to_array(),
         max_m: high.to_array(),
         room: around.told,
-        meshes: around.meshes.iter().map(MeshTold::of).collect(),
+        meshes: around.meshes.iter().map(Part::told).collect(),
         left_out: left_out(&raw, &chosen),
         notes: raw.notes,
     };

@@ -5,8 +5,6 @@ use std::fmt;
 use glam::DVec3;
 use serde::Serialize;
 
-use super::around::{Group, Part};
-
 /// All that is told.
 #[derive(Debug, Serialize)]
 pub struct Told {
@@ -86,13 +84,6 @@ pub struct GroupTold {
     pub triangles: usize,
 }
 
-impl GroupTold {
-    pub(super) fn of(group: &Group) -> Self {
-        let Group { name, reflectance, triangles } = group;
-        Self { name: name.clone(), reflectance: *reflectance, triangles: triangles.len() }
-    }
-}
-
 /// A file of triangles.
 #[derive(Debug, Serialize)]
 pub struct MeshTold {
@@ -100,17 +91,6 @@ pub struct MeshTold {
     pub reflectance: f64,
     pub triangles: usize,
     pub vertices: usize,
-}
-
-impl MeshTold {
-    pub(super) fn of(part: &Part) -> Self {
-        Self {
-            file: part.file.clone(),
-            reflectance: part.reflectance,
-            triangles: part.mesh.triangles.len(),
-            vertices: part.mesh.vertices_m.len(),
-        }
-    }
 }
 
 /// Surfaces or other things that were not taken.
