@@ -187,8 +187,8 @@ impl Luminaire {
             return self.clone();
         }
         let (table, turn) = match self.model {
-            LuminaireModel::Point => (&table.upright(), table.own_frame()),
-            LuminaireModel::Area | LuminaireModel::Impostor => (table, DMat3::IDENTITY),
+            LuminaireModel::Point => table.about_the_vertical(),
+            LuminaireModel::Area | LuminaireModel::Impostor => (table.clone(), DMat3::IDENTITY),
         };
         let distribution = table.in_type_c_within(limits).distribution;
         let photometry = Arc::new(self.photometry.with_distribution(distribution));

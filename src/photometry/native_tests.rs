@@ -287,6 +287,27 @@ fn a_turned_luminaire_shines_as_its_upright_table() {
 }
 
 #[test]
+fn a_sector_that_begins_at_c_0_is_dark_there_once_it_is_turned() {
+    let of = |h: f64, v: f64| 300.0 + h + 2.0 * v;
+    // Planes are those of a horizontal angle in type A, of a vertical one in type B.
+    for (kind, h, v) in [
+        (Goniometer::A, [-90.0, -30.0, 0.0], [-20.0, 0.0, 60.0]),
+        (Goniometer::B, [-60.0, 0.0, 90.0], [0.0, 30.0, 90.0]),
+    ] {
+        let table = file(kind, &h, &v, &of).1.distribution;
+        let (turned, frame) = table.about_the_vertical();
+        let made = turned.in_type_c().distribution;
+        assert_eq!(made.intensity(0.0, 90.0).value(), 0.0);
+        for d in [(-1.0, 3.0), (-44.0, 50.0), (-25.0, 0.5), (3.0, 20.0), (-80.0, -10.0), (80.0, 85.0)] {
+            let d = direction_of(kind, d.0, d.1);
+            let (own, found) =
+                (table.intensity_towards(d).value(), made.intensity_towards(frame.transpose() * d).value());
+            assert!((own - found).abs() < 1e-9, "{kind:?} {d}: {own} {found}");
+        }
+    }
+}
+
+#[test]
 fn a_stand_in_of_type_c_keeps_to_its_limits_and_says_how_far_it_is_off() {
     for (k, ((h, v), of)) in tables().into_iter().enumerate() {
         let table = file(Goniometer::B, &h, &v, &of).1.distribution;

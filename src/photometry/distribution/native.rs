@@ -140,6 +140,19 @@ impl LuminousIntensityDistribution {
         Self { goniometer: Goniometer::A, symmetry, ..self.clone() }
     }
 
+    /// The same planes about the vertical, and the frame in which they stand so; a sector lies about C 180 in it, so that what closes the circle
+    /// at C 0 is dark, and the ends of the sector are none of the table's.
+    pub fn about_the_vertical(&self) -> (Self, DMat3) {
+        let (table, frame) = (self.upright(), self.own_frame());
+        if !table.is_sector() || table.symmetry != Symmetry::None {
+            return (table, frame);
+        }
+        let middle = 0.5 * (table.c_deg[0] + table.c_deg[table.c_deg.len() - 1]);
+        let turn = (180.0 - middle).round();
+        let c_deg = table.c_deg.iter().map(|c| c + turn).collect();
+        (Self { c_deg, ..table }, frame * DMat3::from_rotation_z(-turn.to_radians()))
+    }
+
     /// The mirror image in the plane of C 90 and C 270: what went along x goes along -x.
     #[must_use]
     pub fn mirrored(&self) -> Self {
