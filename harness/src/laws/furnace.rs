@@ -76,7 +76,7 @@ fn crowded((x, weight): (f64, f64)) -> (f64, f64) {
 /// How far off the weighted mean over the stations is for light that was reflected once, relative: every patch of the room is as bright as
 /// the luminaires make it on the mean, and what stations see of patches is exact.
 fn error_of_once_reflected(room: &Room, luminaires: &[Luminaire], stations: &[Station], weights: &[f64]) -> f64 {
-    let mut flux_lm = [[[0.0; PATCHES]; PATCHES]; 6];
+    let mut flux_lm = vec![[[0.0; PATCHES]; PATCHES]; Surface::ALL.len()];
     for luminaire in luminaires {
         for (way, lm) in rays(luminaire) {
             let (surface, [u, v]) = landing(room, luminaire.position_m, way);

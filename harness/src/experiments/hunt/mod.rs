@@ -252,7 +252,11 @@ impl Hunter<'_> {
     fn count(&mut self, report: &Report, specs: usize) {
         let hunted = |c: &&crate::judge::Comparison| self.options.engines.contains_key(&c.key.engine);
         let undecided = report.comparisons.iter().filter(hunted).filter(|c| c.verdict == Verdict::Inconclusive);
-        self.hunt.undecided += undecided.count();
+        for c in undecided {
+            self.hunt.undecided += 1;
+            let (key, meter, why) = (&c.key, &c.meter, c.diagnosis.as_deref().unwrap_or("no reason is told"));
+            tracing::info!("{key} at {meter}: {why}");
+        }
         self.hunt.comparisons += report.comparisons.iter().filter(hunted).count();
         self.hunt.specs += specs;
     }
