@@ -37,6 +37,7 @@ fn read(engine: &str, procedure: ProcedureId, budget: Budget, settings: &[(&str,
         scene_dir,
         log,
         jobs: 2,
+        patience: Duration::from_secs(300),
         limit: Duration::from_secs(300),
         peak: luxproof::system::process::PeakMemory::default(),
     };

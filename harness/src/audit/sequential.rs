@@ -43,6 +43,8 @@ pub struct Ask {
     pub targets: Vec<usize>,
     /// The slice of the budget.
     pub budget: Budget,
+    /// Seconds by the clock that the budget has left.
+    pub patience_s: f64,
 }
 
 /// One estimate for each station of the targets asked for, and what it took; the error says why there is none.
@@ -81,8 +83,8 @@ pub fn refine(
         if targets.is_empty() {
             break;
         }
-        let left_s = budget.seconds - subject.work_s();
-        if left_s <= 0.0 {
+        let (left_s, patience_s) = (budget.seconds - subject.work_s(), budget.seconds - subject.wall_s);
+        if left_s.min(patience_s) <= 0.0 {
             break;
         }
         let mut affordable = left_s / first_s;
@@ -95,7 +97,12 @@ pub fn refine(
             break;
         }
         let relative_error = first.relative_error / weight.sqrt();
-        let ask = Ask { look, targets, budget: Budget { relative_error, seconds: (weight * first_s).min(left_s) } };
+        let ask = Ask {
+            look,
+            targets,
+            budget: Budget { relative_error, seconds: (weight * first_s).min(left_s) },
+            patience_s,
+        };
         let (measurement, cost) = match sample(&ask) {
             Ok(taken) => taken,
             Err(why) => {

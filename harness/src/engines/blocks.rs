@@ -4,7 +4,7 @@
 //! blocks is the standard error of their mean, and, since stations are sampled together, of any weighted sum of stations.
 
 use std::ops::Range;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
@@ -127,8 +127,17 @@ impl Blocks {
     }
 }
 
+/// The part of a budget's seconds that engines plan with, as they count them: the rest is for their start, and for a machine that is
+/// slower than is counted on. Only where that is not enough a clock has a say.
+const COUNTED: f64 = 0.6;
+
+/// A budget as it is counted, of a part of the light that has this share of it.
+pub(super) fn counted(budget: Budget, share: f64) -> Budget {
+    Budget { seconds: COUNTED * share * budget.seconds, ..budget }
+}
+
 /// When to stop, and how many blocks come at a time: by their error, and by seconds that are counted at a fixed rate. No clock
-/// says how much is sampled, so that one seed makes the same blocks on any machine under any load.
+/// says how much is sampled as long as the machine keeps up, so that one seed makes the same blocks there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sampling<'a> {
     /// The largest standard error relative to a reading that is small enough.
@@ -143,18 +152,13 @@ pub(super) struct Sampling<'a> {
     /// Before there are so many, an error that is small enough is not believed.
     pub(super) enough_blocks: usize,
     pub(super) max_blocks: usize,
-    /// The one thing that a clock decides: past this none is begun, on a machine that is slower by far than is counted on.
+    /// The one thing that a clock decides: none is begun that would last longer than this, as those before it did.
     pub(super) until: Instant,
 }
 
-/// Seconds by the clock for each second of a budget, before sampling is cut short.
-const PATIENCE: f64 = 5.0;
-
 impl Sampling<'static> {
-    /// As many blocks as a budget asks for, of so many seconds each.
-    pub(super) fn within(budget: Budget, block_s: f64) -> Self {
-        // A budget of more than a century has no end.
-        let patience = Duration::from_secs_f64((PATIENCE * budget.seconds).clamp(0.0, 3e9));
+    /// As many blocks as a budget asks for, [`counted`], of so many seconds each.
+    pub(super) fn within(budget: Budget, block_s: f64, until: Instant) -> Self {
         Self {
             relative_error: budget.relative_error,
             known_lx: &[],
@@ -163,14 +167,14 @@ impl Sampling<'static> {
             min_blocks: MIN_BLOCKS,
             enough_blocks: MIN_BLOCKS,
             max_blocks: usize::MAX,
-            until: Instant::now() + patience,
+            until,
         }
     }
 
     /// A fixed number of blocks, whatever their error.
-    pub(super) fn fixed(blocks: usize, budget: Budget, block_s: f64) -> Self {
+    pub(super) fn fixed(blocks: usize, budget: Budget, block_s: f64, until: Instant) -> Self {
         let (relative_error, min_blocks) = (f64::INFINITY, MIN_BLOCKS.min(blocks));
-        let within = Self::within(budget, block_s);
+        let within = Self::within(budget, block_s, until);
         Self { relative_error, min_blocks, enough_blocks: blocks, max_blocks: blocks, ..within }
     }
 }
@@ -182,23 +186,34 @@ impl Sampling<'_> {
         mut wave: impl FnMut(Range<usize>) -> Result<Vec<Vec<f64>>, EngineError>,
     ) -> Result<Sampled, EngineError> {
         let mut blocks = Blocks::default();
+        let begun = Instant::now();
         loop {
-            let (have, count) = (blocks.count(), self.next(&blocks));
-            let is_late = count > 0 && have >= self.min_blocks && Instant::now() >= self.until;
-            if count == 0 || is_late {
-                let remark = self.remark(&blocks, is_late);
+            let (have, wanted) = (blocks.count(), self.next(&blocks));
+            let count = wanted.min(self.in_time(have, begun));
+            if count == 0 {
+                let remark = self.remark(&blocks, wanted > 0);
                 return Ok(Sampled { work_s: have as f64 * self.block_s, blocks, remark });
             }
             blocks.0.extend(wave(have..have + count)?);
         }
     }
 
+    /// How many blocks more there is time for by the clock, if they take as long as those before them; at first as few as must be.
+    fn in_time(&self, have: usize, begun: Instant) -> usize {
+        if have < self.min_blocks {
+            return self.min_blocks - have;
+        }
+        let (left, spent) = (self.until.saturating_duration_since(Instant::now()), begun.elapsed());
+        // A time that is too short to be one is no rate.
+        (have as f64 * left.as_secs_f64() / spent.as_secs_f64().max(1e-6)) as usize
+    }
+
     fn remark(&self, blocks: &Blocks, is_late: bool) -> Option<String> {
         let worst = blocks.worst_error(self.known_lx);
         if is_late {
             return Some(format!(
-                "cut short by the clock at a relative standard error of {worst:.1e}: the machine is {PATIENCE} times slower than is \
-                 counted on, and another run may read otherwise"
+                "cut short by the clock at a relative standard error of {worst:.1e}: the machine is slower than is counted on, and \
+                 another run may read otherwise"
             ));
         }
         (worst > self.relative_error).then(|| format!("out of time at a relative standard error of {worst:.1e}"))
@@ -250,13 +265,18 @@ mod tests {
         (found, waves)
     }
 
+    /// Later than any test ends.
+    fn later() -> Instant {
+        Instant::now() + std::time::Duration::from_secs(3600)
+    }
+
     fn budget(relative_error: f64, seconds: f64) -> Budget {
         Budget { relative_error, seconds }
     }
 
     #[test]
     fn blocks_are_made_until_the_error_asked_for_and_not_many_more() {
-        let (found, waves) = sampled(&Sampling::within(budget(1e-3, 60.0), 0.01), 0.02);
+        let (found, waves) = sampled(&Sampling::within(budget(1e-3, 60.0), 0.01, later()), 0.02);
         assert!(found.blocks.worst_error(&[]) <= 1e-3 && found.remark.is_none());
         // (20 / 1)^2 = 400 blocks, as far as 8 blocks can tell.
         assert!((300..700).contains(&found.blocks.count()), "{waves:?}");
@@ -268,7 +288,7 @@ mod tests {
 
     #[test]
     fn without_time_there_are_the_fewest_blocks_and_a_remark() {
-        let rule = Sampling { enough_blocks: 32, ..Sampling::within(budget(1e-6, 0.0), 1.0) };
+        let rule = Sampling { enough_blocks: 32, ..Sampling::within(budget(1e-6, 0.0), 1.0, later()) };
         let found = sampled(&rule, 0.02).0;
         assert_eq!(found.blocks.count(), MIN_BLOCKS);
         assert!(found.remark.unwrap().starts_with("out of time"));
@@ -279,7 +299,7 @@ mod tests {
 
     #[test]
     fn a_clock_that_ran_out_is_told_and_changes_nothing_else() {
-        let rule = Sampling::within(budget(1e-3, 60.0), 0.01);
+        let rule = Sampling::within(budget(1e-3, 60.0), 0.01, later());
         let (late, _) = sampled(&Sampling { until: Instant::now(), ..rule }, 0.02);
         let (whole, _) = sampled(&rule, 0.02);
         assert!(late.remark.unwrap().starts_with("cut short by the clock"));
@@ -287,8 +307,22 @@ mod tests {
     }
 
     #[test]
+    fn no_wave_is_begun_that_would_end_too_late() {
+        let (begun, limit) = (Instant::now(), std::time::Duration::from_millis(400));
+        let rule = Sampling::within(budget(1e-6, 60.0), 1e-3, begun + limit);
+        let wave = |numbers: Range<usize>| {
+            std::thread::sleep(std::time::Duration::from_millis(10 * numbers.len() as u64));
+            Ok(numbers.map(|k| block(k, 0.02)).collect())
+        };
+        let found = rule.run(wave).unwrap();
+        // It is counted on ten times as many; sleeping late costs blocks, not time.
+        assert!((MIN_BLOCKS..=40).contains(&found.blocks.count()), "{}", found.blocks.count());
+        assert!(found.remark.unwrap().starts_with("cut short by the clock"));
+    }
+
+    #[test]
     fn a_fixed_number_of_blocks_is_just_that() {
-        assert_eq!(sampled(&Sampling::fixed(8, budget(1e-6, 60.0), 0.1), 0.5).0.blocks.count(), 8);
+        assert_eq!(sampled(&Sampling::fixed(8, budget(1e-6, 60.0), 0.1, later()), 0.5).0.blocks.count(), 8);
     }
 
     #[test]

@@ -1,17 +1,19 @@
 //! Talks with a driver in a renderer's own interpreter: how large a block is, which blocks, and what their readings are.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
 use luminaire::scene::Transport;
 
-use super::blocks::{Blocks, Sampling};
+use super::blocks::{Blocks, Sampling, counted};
 use super::contract::same_meters;
 use super::effort;
 use super::frame::Frame;
 use super::{EngineError, Job, Measurement};
 use crate::record::{EngineName, Estimate, Uncertainty};
+use crate::spec::Budget;
 use crate::system::process::Conversation;
 
 /// What drivers share, beside theirs.
@@ -109,6 +111,8 @@ pub(super) struct Dialogue<'a> {
     pub(super) conversation: Conversation,
     /// How many blocks of how many samples along a side, whatever the budget.
     pub(super) fixed: Option<(usize, usize)>,
+    /// When no more samples are begun.
+    pub(super) until: Instant,
     /// What a ray of a variant costs.
     pub(super) cost: &'a dyn Fn(&str) -> Cost,
     /// Bound of direct light at a station whose unit normal is so far off.
@@ -158,11 +162,12 @@ impl Dialogue<'_> {
         found: &mut Measurement,
     ) -> Result<Vec<Estimate>, EngineError> {
         let stream = if part.name == "direct" { Stream::Direct } else { Stream::Reflected };
+        let budget = counted(self.job.budget, share(part, greeting));
         let (side, rule) = match self.fixed {
-            None => self.plan(part, greeting)?,
+            None => self.plan(part, greeting, budget)?,
             Some((blocks, side)) => {
                 let block_s = self.sample_s(part, greeting) * (side * side) as f64;
-                (side, Sampling::fixed(blocks, self.job.budget, block_s))
+                (side, Sampling::fixed(blocks, budget, block_s, self.until))
             }
         };
         let mut read = rule.run(|numbers| self.blocks(part, side, stream, numbers))?;
@@ -184,17 +189,22 @@ impl Dialogue<'_> {
 
     /// Samples along a side of a block so that a block fills the rays in flight at most, and enough blocks about reach the
     /// error and fit in the time.
-    fn plan(&mut self, part: &Part, greeting: &Greeting) -> Result<(usize, Sampling<'static>), EngineError> {
+    fn plan(
+        &mut self,
+        part: &Part,
+        greeting: &Greeting,
+        budget: Budget,
+    ) -> Result<(usize, Sampling<'static>), EngineError> {
         let full = (greeting.lanes / part.rays.max(1)).isqrt().clamp(2, MAX_SIDE);
         let trial_side = (self.cost)(&greeting.variant).trial_side.unwrap_or(full);
         let trials = self.blocks(part, trial_side, Stream::Trial, 0..2)?;
-        let (sample_s, budget) = (self.sample_s(part, greeting), self.job.budget);
+        let sample_s = self.sample_s(part, greeting);
         let affordable = ((budget.seconds / ENOUGH_BLOCKS as f64 / sample_s) as usize).isqrt();
         // The error is that of the mean of two; m x m samples are at least as good as m x m independent ones.
         let excess = Blocks::new(trials).worst_error(&[]) / budget.relative_error;
         let needed = trial_side as f64 * PLAN_MARGIN * excess * (2.0 / ENOUGH_BLOCKS as f64).sqrt();
         let side = (needed.ceil() as usize).max(MIN_SIDE).min(full).min(affordable).max(2);
-        let within = Sampling::within(budget, sample_s * (side * side) as f64);
+        let within = Sampling::within(budget, sample_s * (side * side) as f64, self.until);
         Ok((side, Sampling { enough_blocks: ENOUGH_BLOCKS, ..within }))
     }
 
@@ -231,6 +241,18 @@ impl Dialogue<'_> {
             }
             None => Ok(blocks),
         }
+    }
+}
+
+/// Of the seconds where both parts of the light are sampled: what is reflected takes longer.
+const DIRECT_SHARE: f64 = 0.3;
+
+fn share(part: &Part, greeting: &Greeting) -> f64 {
+    let is_alone = greeting.parts.iter().filter(|part| part.sampled).count() < 2;
+    match (is_alone, part.name.as_str()) {
+        (true, _) => 1.0,
+        (false, "direct") => DIRECT_SHARE,
+        (false, _) => 1.0 - DIRECT_SHARE,
     }
 }
 

@@ -291,6 +291,7 @@ pub(super) fn workbench(site: Site, folder: &Path) -> Workbench {
         scene_dir: folder.to_owned(),
         log: folder.join("log"),
         jobs: 2,
+        patience: Duration::from_secs(120),
         limit: Duration::from_secs(120),
         peak: PeakMemory::default(),
     }

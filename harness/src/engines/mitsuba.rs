@@ -133,6 +133,7 @@ impl Mitsuba {
             job,
             conversation: run.converse()?,
             fixed: (settings.preset != Preset::Audit).then_some((settings::FIXED_BLOCKS, settings::FIXED_SIDE)),
+            until: workbench.until(),
             cost: &cost,
             bound_lx: &|k, _| error.at_lx(k),
             relative_bound: 0.0,

@@ -159,6 +159,7 @@ impl Package {
             job,
             conversation: run.converse()?,
             fixed: settings.fixed(),
+            until: workbench.until(),
             cost: &|_| Cost { ray_s: self.ray_s, trial_side: None },
             bound_lx: &bound_lx,
             relative_bound: FILM,

@@ -151,7 +151,8 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
     let scenes = superposition::scenes(job, &settings).len();
     tools.compile(workbench, scenes)?;
     let rows = export::rows(job, export::scale(job, settings.coordinates));
-    let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows, scenes };
+    let until = workbench.until();
+    let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows, scenes, until };
     let options = printed_options(job, &settings);
     let mut measurement = Measurement::default();
     measurement.effort.insert("seed".into(), job.seed.to_string());

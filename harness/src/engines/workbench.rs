@@ -1,7 +1,7 @@
 //! Where an engine works: folders, logs and limits of a job; what its files are and why they may give no reading.
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::Site;
 use crate::record::{Effort, EngineName, Estimate, MeterId, Method, Uncertainty};
@@ -38,6 +38,8 @@ pub struct Workbench {
     pub log: PathBuf,
     /// Threads or processes at a time.
     pub jobs: usize,
+    /// By the clock, how long sampling may go on from when the engine begins.
+    pub patience: Duration,
     /// Past this the job is killed.
     pub limit: Duration,
     pub peak: PeakMemory,
@@ -46,6 +48,11 @@ pub struct Workbench {
 impl Workbench {
     pub fn invoke(&self, program: impl Into<PathBuf>) -> Invocation {
         Invocation { peak: self.peak.clone(), ..Invocation::new(program, &self.scene_dir, self.limit, &self.log) }
+    }
+
+    /// When no more samples are begun, of a job that begins now.
+    pub(super) fn until(&self) -> Instant {
+        Instant::now() + self.patience
     }
 
     pub fn write(&self, files: &[SceneFile]) -> Result<(), EngineError> {

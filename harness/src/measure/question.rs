@@ -21,6 +21,8 @@ pub struct Question<'a> {
     pub job: &'a Job,
     /// Where scene files and log go: the procedure's name, or a folder below it.
     pub folder: &'a str,
+    /// By the clock, how long it may sample.
+    pub patience: Duration,
     /// Past this it is killed.
     pub limit: Duration,
     pub trial: Option<&'a Trial<'a>>,
@@ -42,8 +44,8 @@ impl<'a> Question<'a> {
     pub fn new(instrument: &'a Instrument, job: &'a Job, folder: &'a str) -> Self {
         let beyond = if instrument.engine.is_vouched_for() { 10.0 } else { 2.0 };
         let limit_s = beyond * job.budget.seconds + instrument.engine.start_s();
-        let limit = Duration::from_secs_f64(limit_s.clamp(0.0, 1e9));
-        Self { instrument, job, folder, limit, trial: None }
+        let [patience, limit] = [job.budget.seconds, limit_s].map(|s| Duration::from_secs_f64(s.clamp(0.0, 1e9)));
+        Self { instrument, job, folder, patience, limit, trial: None }
     }
 
     /// Of a trial, time and failure depend on threads and limit as well.

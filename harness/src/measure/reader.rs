@@ -316,6 +316,7 @@ impl Reader {
             scene_dir: fresh(&out.join("scenes").join(engine.as_str()).join(folder))?,
             log,
             jobs: 1,
+            patience: question.patience,
             limit: question.limit,
             peak: PeakMemory::default(),
         };

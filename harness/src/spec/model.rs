@@ -491,7 +491,8 @@ pub struct GridSpec {
 pub struct Budget {
     /// Standard error relative to the reading.
     pub relative_error: f64,
-    /// Seconds an engine and procedure, as the engine counts them; a program of the user's keeps to its clock.
+    /// Seconds an engine and procedure: engines plan with three fifths of them, as they count, and begin no sample when they are over by the
+    /// clock; a program of the user's keeps to its clock.
     pub seconds: f64,
 }
 

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 use std::path::PathBuf;
+use std::time::Instant;
 
 use luminaire::scene::{Bounces, Transport};
 
-use crate::engines::blocks::{MIN_BLOCKS, Sampling};
+use crate::engines::blocks::{MIN_BLOCKS, Sampling, counted};
 use crate::engines::image::read_rgb;
 use crate::engines::libraries::with_unpacked;
 use crate::engines::settings::Preset;
@@ -54,6 +55,8 @@ pub(super) struct Bench<'a> {
     /// Point lights along each side of an opening.
     points: usize,
     program: PathBuf,
+    /// When no more samples are begun.
+    until: Instant,
 }
 
 pub(super) fn program(site: &Site) -> Result<PathBuf, EngineError> {
@@ -122,7 +125,7 @@ impl<'a> Bench<'a> {
         settings: &'a Settings,
         points: usize,
     ) -> Result<Self, EngineError> {
-        Ok(Self { job, workbench, settings, points, program: program(&workbench.site)? })
+        Ok(Self { job, workbench, settings, points, program: program(&workbench.site)?, until: workbench.until() })
     }
 
     /// Direct light: deterministic, read at rising magnification until the read-out no longer matters.
@@ -166,7 +169,7 @@ impl<'a> Bench<'a> {
         let count = self.settings.count;
         let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, reflections: Reflections::All };
         let pilot = self.pilot(run)?;
-        let (budget, mut block_s) = (self.job.budget, FIRST_REFLECTION * pilot.work_s);
+        let (budget, mut block_s) = (counted(self.job.budget, 1.0), FIRST_REFLECTION * pilot.work_s);
         // Time grows a little faster than rays.
         let share = (FIRST_BLOCKS * budget.seconds / (MIN_BLOCKS as f64 * block_s)).max(1e-3).powf(0.8);
         let mut measurement = Measurement { method: self.method(), ..Measurement::default() };
@@ -177,7 +180,7 @@ impl<'a> Bench<'a> {
             measurement.notes.push(few);
         }
         self.keep_readouts(&pilot.readouts)?;
-        let blocks = Sampling::within(budget, block_s).run(|numbers| self.wave(run, numbers, &pilot))?;
+        let blocks = Sampling::within(budget, block_s, self.until).run(|numbers| self.wave(run, numbers, &pilot))?;
         let made = blocks.blocks.count();
         measurement.estimates = measurement.take(blocks);
         let mut effort = Effort::from([

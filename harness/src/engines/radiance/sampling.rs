@@ -4,13 +4,14 @@
 //! seed of its own.
 
 use std::ops::Range;
+use std::time::Instant;
 
 use super::export;
 use super::grazing;
 use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options, ROULETTE, Sources, bounces};
 use super::settings::Settings;
 use super::tools::Tools;
-use crate::engines::blocks::{Blocks, MIN_BLOCKS, Sampled, Sampling};
+use crate::engines::blocks::{Blocks, MIN_BLOCKS, Sampled, Sampling, counted};
 use crate::engines::effort;
 use crate::engines::settings::Preset;
 use crate::engines::{Budget, EngineError, Job, Workbench};
@@ -54,6 +55,8 @@ pub(super) struct Sampler<'a> {
     pub(super) rows: Vec<[f64; 6]>,
     /// How many scenes there are, whose light adds up.
     pub(super) scenes: usize,
+    /// When no more samples are begun.
+    pub(super) until: Instant,
 }
 
 /// Direct light that is subtracted should add little to the error.
@@ -65,11 +68,11 @@ impl Sampler<'_> {
     /// Direct light of openings, whose samples are jittered, each meter's with the division of the sources that is its own; in one process a
     /// wave and a division.
     pub(super) fn direct(&self, ratios: &[f64]) -> Result<Sampled, EngineError> {
-        let Budget { relative_error, seconds } = self.job.budget;
         let (error, share) = if self.job.reflections().is_none() { (1.0, 1.0) } else { (DIRECT_ERROR, DIRECT_SHARE) };
-        let budget = Budget { relative_error: error * relative_error, seconds: share * seconds };
+        let budget = counted(self.job.budget, share);
+        let budget = Budget { relative_error: error * budget.relative_error, ..budget };
         let rays = self.rows.len() as f64 * effort::shadow_rays(self.job, MAX_PARTS);
-        let rule = Sampling::within(budget, SHADOW_RAY_S * rays * effort::a_ray(self.job));
+        let rule = Sampling::within(budget, SHADOW_RAY_S * rays * effort::a_ray(self.job), self.until);
         rule.run(|numbers| {
             let mut blocks = vec![vec![0.0; self.rows.len()]; numbers.len()];
             for ratio in grazing::RATIOS {
@@ -88,7 +91,7 @@ impl Sampler<'_> {
     /// Blocks of all light as the preset asks for; `known_lx` is direct light that does not count for the error asked.
     pub(super) fn total(&self, known_lx: &[f64]) -> Result<(Sampled, u32), EngineError> {
         let given = self.settings.ambient_divisions;
-        let fixed = |block_s| Sampling::fixed(MIN_BLOCKS, self.job.budget, block_s);
+        let fixed = |block_s| Sampling::fixed(MIN_BLOCKS, self.budget(), block_s, self.until);
         let (divisions, rule) = match self.settings.preset {
             // Of rtrace's own cache a few blocks do where time is short.
             Preset::Default => {
@@ -110,17 +113,22 @@ impl Sampler<'_> {
         let trial = self.side_by_side(&self.options(TRIAL_DIVISIONS), Stream::Trial, 0..MIN_BLOCKS)?;
         let excess = Blocks::new(trial).worst_error(known_lx) / self.job.budget.relative_error;
         let divisions = self.settings.ambient_divisions.unwrap_or_else(|| self.divisions(excess));
-        let within = Sampling::within(self.job.budget, self.block_s(divisions));
+        let within = Sampling::within(self.budget(), self.block_s(divisions), self.until);
         Ok((divisions, Sampling { known_lx, enough_blocks: PLANNED_BLOCKS, ..within }))
     }
 
     /// Divisions a block so that the fewest blocks about meet the budget.
     fn divisions(&self, excess: f64) -> u32 {
         let needed = f64::from(TRIAL_DIVISIONS) * PLAN_MARGIN * excess * excess / 2.0;
-        let affordable = 0.5 * self.job.budget.seconds / (PLANNED_BLOCKS as f64 * self.block_s(1));
+        let affordable = 0.5 * self.budget().seconds / (PLANNED_BLOCKS as f64 * self.block_s(1));
         let divisions = needed.min(affordable).clamp(f64::from(TRIAL_DIVISIONS), f64::from(AUDIT_DIVISIONS));
         // rtrace takes a square number of them.
         (divisions.sqrt().ceil() as u32).pow(2)
+    }
+
+    /// What direct light leaves of the budget.
+    fn budget(&self) -> Budget {
+        counted(self.job.budget, 1.0 - DIRECT_SHARE)
     }
 
     fn block_s(&self, divisions: u32) -> f64 {
