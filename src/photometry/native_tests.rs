@@ -294,7 +294,7 @@ fn a_sector_that_begins_at_c_0_is_dark_there_once_it_is_turned() {
         (Goniometer::A, [-90.0, -30.0, 0.0], [-20.0, 0.0, 60.0]),
         (Goniometer::B, [-60.0, 0.0, 90.0], [0.0, 30.0, 90.0]),
     ] {
-        let table = file(kind, &h, &v, &of).1.distribution;
+        let table = file(kind, &h, &v, of).1.distribution;
         let (turned, frame) = table.about_the_vertical();
         let made = turned.in_type_c().distribution;
         assert_eq!(made.intensity(0.0, 90.0).value(), 0.0);
