@@ -135,7 +135,7 @@ fn finer(
     let mut targets = sequential::undecided_by_reference(judge, task, recordings);
     targets.retain(|target| is_new(*target));
     let budget = Budget { relative_error: FINER * budget.relative_error, ..budget };
-    (!targets.is_empty()).then_some(Ask { look: 2, targets, budget, patience_s: budget.seconds })
+    (!targets.is_empty()).then_some(Ask { look: 2, targets, budget, patience_s: budget.patience_s() })
 }
 
 /// Readings become what was read more finely, where that says less uncertainty of itself.

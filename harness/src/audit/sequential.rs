@@ -83,7 +83,7 @@ pub fn refine(
         if targets.is_empty() {
             break;
         }
-        let (left_s, patience_s) = (budget.seconds - subject.work_s(), budget.seconds - subject.wall_s);
+        let (left_s, patience_s) = (budget.seconds - subject.work_s(), budget.patience_s() - subject.wall_s);
         if left_s.min(patience_s) <= 0.0 {
             break;
         }

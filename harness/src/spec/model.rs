@@ -496,6 +496,16 @@ pub struct Budget {
     pub seconds: f64,
 }
 
+/// No engine is cut short before: starting one takes some seconds whatever is asked of it, more on a busy machine.
+const SHORTEST_PATIENCE_S: f64 = 15.0;
+
+impl Budget {
+    /// Seconds by the clock after which no samples are begun.
+    pub fn patience_s(&self) -> f64 {
+        self.seconds.max(SHORTEST_PATIENCE_S)
+    }
+}
+
 impl Default for Budget {
     fn default() -> Self {
         Self { relative_error: 0.002, seconds: 60.0 }
