@@ -140,6 +140,11 @@ impl Room {
         corners
     }
 
+    /// Area of all six surfaces in square metres.
+    pub fn whole_area_m2(&self) -> f64 {
+        Surface::ALL.iter().map(|s| self.area_m2(*s)).sum()
+    }
+
     /// Area of one surface in square metres.
     pub fn area_m2(&self, surface: Surface) -> f64 {
         let axis = surface.axis();

@@ -19,7 +19,7 @@ use super::visibility::{Occluder, candidates, clip, visible_pieces};
 use super::{Bounded, direct};
 use crate::geometry::configuration_factor::element_to_polygon;
 use crate::photometry::{LuminousIntensityDistribution, Symmetry};
-use crate::scene::{Luminaire, LuminaireModel, Meter};
+use crate::scene::{Luminaire, Meter};
 use opening::{Opening, Part, Sheet};
 use steps::Steps;
 
@@ -89,6 +89,13 @@ struct Own {
     normal: DVec3,
 }
 
+impl Own {
+    fn of(luminaire: &Luminaire, meter: &Meter) -> Self {
+        let turn = luminaire.orientation.transpose();
+        Self { position_m: turn * (meter.position_m - luminaire.position_m), normal: turn * meter.normal }
+    }
+}
+
 impl Sheet {
     /// Integral of what its parts give, whose jumps are told for the weight that they have there.
     fn integral(&self, precision: Precision, f: &impl Fn(&Part) -> f64, jump: &impl Fn(&Part, f64) -> Jump) -> Bounded {
@@ -103,10 +110,7 @@ impl Sheet {
 
 impl Emitter {
     pub(super) fn new(luminaire: &Luminaire) -> Self {
-        let opening = match luminaire.model {
-            LuminaireModel::Point => Opening::Point,
-            LuminaireModel::Area | LuminaireModel::Impostor => Opening::of(luminaire.photometry.opening),
-        };
+        let opening = Opening::of_luminaire(luminaire);
         let horizontal = matches!(opening, Opening::Box(half) if half.z == 0.0);
         let flat_m2 = opening.flat_m2().filter(|_| horizontal);
         let lambertian = flat_m2.and_then(|area_m2| lambertian(luminaire, area_m2));
@@ -167,7 +171,7 @@ impl Emitter {
             let hidden = occluders.iter().any(|o| o.blocks(meter.position_m, self.luminaire.position_m));
             return if hidden { Bounded::default() } else { direct::point(&self.luminaire, meter) };
         }
-        let own = self.own(meter);
+        let own = Own::of(&self.luminaire, meter);
         let mut sum = Bounded::default();
         for sheet in self.opening.facing(own.position_m) {
             let found = match sheet {
@@ -253,7 +257,7 @@ impl Emitter {
             let value = lambertian.exitance * element_to_polygon(meter.position_m, meter.normal, piece);
             return Bounded { value, bound: value * (lambertian.interpolation + 1e-13) };
         }
-        let own = self.own(meter);
+        let own = Own::of(&self.luminaire, meter);
         let unit_m2 = face_m2.normalize_or_zero();
         let part = |from: DVec3| {
             let at_m = self.luminaire.orientation.transpose() * (from - self.luminaire.position_m);
@@ -277,7 +281,7 @@ impl Emitter {
         if self.is_point() {
             return (direct::point(&self.luminaire, meter).value, self.luminaire.position_m);
         }
-        let own = self.own(meter);
+        let own = Own::of(&self.luminaire, meter);
         let sheets = self.opening.facing(own.position_m);
         // Each sheet is drawn as often as its area shows from here.
         let shows = |s: &Sheet| {
@@ -336,11 +340,6 @@ impl Emitter {
             (None, opening) => part.area_m2.dot(away).max(0.0) / opening.shadow_m2(away),
         };
         Some((away, share * cosine / square))
-    }
-
-    fn own(&self, meter: &Meter) -> Own {
-        let turn = self.luminaire.orientation.transpose();
-        Own { position_m: turn * (meter.position_m - self.luminaire.position_m), normal: turn * meter.normal }
     }
 
     fn to_world(&self, own_m: DVec3) -> DVec3 {
@@ -539,6 +538,7 @@ mod tests {
 
     use super::*;
     use crate::photometry::{LuminousOpening, Photometry};
+    use crate::scene::LuminaireModel;
 
     const SIDE_M: f64 = 0.2;
 
@@ -572,7 +572,7 @@ mod tests {
                 let meter = Meter { position_m, normal: DVec3::NEG_X };
                 let found = emitter.illuminance(&meter, &[], Precision::relative(1e-4));
                 // All that is seen, so finely that the sliver is met.
-                let own = emitter.own(&meter);
+                let own = Own::of(&emitter.luminaire, &meter);
                 let mut truth = 0.0;
                 for sheet in emitter.opening.facing(own.position_m) {
                     let n = 3000;
@@ -595,7 +595,7 @@ mod tests {
 
     /// What a fine grid of midpoints over an opening makes of its light, so many along a side.
     fn by_midpoints(emitter: &Emitter, meter: &Meter, side: i32) -> f64 {
-        let own = emitter.own(meter);
+        let own = Own::of(&emitter.luminaire, meter);
         let middle = |k: i32| (f64::from(k) + 0.5) / f64::from(side);
         let nodes = (0..side * side).map(|k| [middle(k / side), middle(k % side)]);
         let of_sheet = |sheet: Sheet| nodes.clone().map(|uv| emitter.density(&own, &sheet.part(uv))).sum::<f64>();

@@ -8,6 +8,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use crate::photometry::{HorizontalAxis, LuminousOpening};
+use crate::scene::{Luminaire, LuminaireModel};
 
 /// A luminous opening in the luminaire's own frame, half extents in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +56,14 @@ pub(super) struct Part {
 }
 
 impl Opening {
+    /// What a luminaire shines from, by its model.
+    pub(super) fn of_luminaire(luminaire: &Luminaire) -> Self {
+        match luminaire.model {
+            LuminaireModel::Point => Self::Point,
+            LuminaireModel::Area | LuminaireModel::Impostor => Self::of(luminaire.photometry.opening),
+        }
+    }
+
     pub(super) fn of(opening: LuminousOpening) -> Self {
         let half = |x: f64, y: f64, z: f64| 0.5 * DVec3::new(x, y, z).abs();
         let own = match opening {

@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::opening::{Part, Sheet};
-use super::{Emitter, IN_PLANE_M, Precision};
+use super::opening::{Opening, Part, Sheet};
+use super::{IN_PLANE_M, Own, Precision};
 use crate::geometry::configuration_factor::element_to_polygon;
 use crate::photometry::angles_deg;
 use crate::scene::{Luminaire, Meter};
@@ -29,23 +29,19 @@ impl Sight {
     ///
     /// That of a point is its luminous area's as seen from afar, which is at its centre.
     pub fn of(luminaire: &Luminaire, meter: &Meter) -> Option<Self> {
-        let emitter = Emitter::new(luminaire);
-        let found = if emitter.is_point() {
-            let away = meter.position_m - luminaire.position_m;
-            let (c_deg, gamma_deg) = angles_deg(luminaire.orientation.transpose() * away);
+        let (opening, own) = (Opening::of_luminaire(luminaire), Own::of(luminaire, meter));
+        let found = if opening == Opening::Point {
+            let (c_deg, gamma_deg) = angles_deg(own.position_m);
             let area_m2 = luminaire.photometry.projected_area_m2(c_deg, gamma_deg);
-            let cosine = -away.normalize_or_zero().dot(meter.normal);
-            Self { projected_sr: area_m2 * cosine.max(0.0) / away.length_squared(), relative_error: 0.0 }
+            let cosine = -own.position_m.normalize_or_zero().dot(own.normal);
+            Self { projected_sr: area_m2 * cosine.max(0.0) / own.position_m.length_squared(), relative_error: 0.0 }
         } else {
-            emitter.sight(meter)
+            Self::of_extended(&opening, &own)
         };
         (found.projected_sr.is_finite() && found.projected_sr > EDGE_ON_SR).then_some(found)
     }
-}
 
-impl Emitter {
-    fn sight(&self, meter: &Meter) -> Sight {
-        let own = self.own(meter);
+    fn of_extended(opening: &Opening, own: &Own) -> Self {
         let fills = |part: &Part| {
             let path = own.position_m - part.at_m;
             let cosines = part.area_m2.dot(path).abs() * (-path.dot(own.normal)).max(0.0);
@@ -53,7 +49,7 @@ impl Emitter {
             if cosines > 0.0 { cosines / path.length_squared().powi(2) } else { 0.0 }
         };
         let (mut value, mut bound) = (0.0, 0.0);
-        for sheet in self.opening.facing(own.position_m) {
+        for sheet in opening.facing(own.position_m) {
             match sheet {
                 Sheet::Line(_) => {}
                 // In its plane it is edge on, or the meter lies on it.
@@ -68,7 +64,7 @@ impl Emitter {
                 }
             }
         }
-        Sight { projected_sr: value, relative_error: bound / value }
+        Self { projected_sr: value, relative_error: bound / value }
     }
 }
 
@@ -85,6 +81,7 @@ mod tests {
     use super::*;
     use crate::photometry::{HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Photometry};
     use crate::scene::{LuminaireModel, orientation};
+    use crate::simulator::emission::Emitter;
 
     fn luminaire(opening: LuminousOpening, model: LuminaireModel, candela: impl Fn(f64) -> f64) -> Luminaire {
         let gamma: Vec<f64> = (0..=180).map(f64::from).collect();

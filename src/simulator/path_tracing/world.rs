@@ -136,7 +136,7 @@ impl World {
     /// Area of the room's surfaces or, in free field, of a cube that holds everything, in square metres.
     pub(super) fn area_m2(&self) -> f64 {
         let cube = 6.0 * self.extent_m * self.extent_m;
-        self.room.map_or(cube, |room| Surface::ALL.iter().map(|s| room.area_m2(*s)).sum())
+        self.room.map_or(cube, |room| room.whole_area_m2())
     }
 
     /// How far points are lifted off surfaces, in metres.

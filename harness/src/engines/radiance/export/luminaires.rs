@@ -7,7 +7,6 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 
 use glam::{DMat3, DVec3};
-use luminaire::geometry::Surface;
 use luminaire::photometry::{
     Details, HorizontalAxis, LuminousIntensityDistribution, LuminousOpening, Photometry, Symmetry, lm63,
 };
@@ -142,9 +141,8 @@ pub(in crate::engines::radiance) fn swallowed(job: &Job, settings: &Settings) ->
     }
     let seen = |meter: &Meter| extended.iter().map(|l| factor(l, meter)).sum::<f64>();
     let most = job.stations.iter().map(|s| seen(&s.meter)).fold(0.0, f64::max);
-    let surface: f64 = Surface::ALL.iter().map(|s| room.area_m2(*s)).sum();
     let sections: f64 = extended.iter().map(|l| largest_section_m2(l)).sum();
-    Some((most + sections / surface).min(1.0))
+    Some((most + sections / room.whole_area_m2()).min(1.0))
 }
 
 /// Configuration factor of an opening in one piece, far off; one with height is taken face on.
