@@ -46,7 +46,7 @@ pub(super) fn furnace(mut job: Job, rho: f64) -> Option<Variant> {
         Bounces::Converged => 1.0,
         Bounces::AtMost(n) => 1.0 - rho.powf(f64::from(n)),
     };
-    let area_m2: f64 = Surface::ALL.iter().map(|s| room.area_m2(*s)).sum();
+    let area_m2 = room.whole_area_m2();
     let (rule, mut stations, mut weights) = (Gauss::new(NODES), vec![], vec![]);
     for surface in Surface::ALL {
         let (corners, normal) = (room.corners(surface), surface.inward_normal());
@@ -62,10 +62,15 @@ pub(super) fn furnace(mut job: Job, rho: f64) -> Option<Variant> {
     }
     let flux = |l: &Luminaire| l.photometry.distribution.flux().value() * l.flux_scale;
     let flux_lm: f64 = job.scene.luminaires.iter().map(flux).sum();
-    let quadrature = FACTOR * error_of_once_reflected(&room, &job.scene.luminaires, &stations, &weights) + LEAST;
     job.stations = stations;
     let value_lx = flux_lm * rho / (area_m2 * (1.0 - rho)) * counted;
-    Some(Variant { job, against: Against::Mean { weights, value_lx, quadrature } })
+    Some(Variant { job, against: Against::Mean { weights, value_lx } })
+}
+
+/// How far off the weighted mean over a furnace's stations may be of the mean over its surfaces, relative.
+pub fn error_of_mean(job: &Job, weights: &[f64]) -> f64 {
+    let once = job.scene.room.map(|room| error_of_once_reflected(&room, &job.scene.luminaires, &job.stations, weights));
+    FACTOR * once.unwrap_or(0.0) + LEAST
 }
 
 /// A node moved towards the nearer edge, where reflected light is least smooth: x becomes 3 x^2 - 2 x^3.
@@ -110,8 +115,7 @@ fn error_of_once_reflected(room: &Room, luminaires: &[Luminaire], stations: &[St
             mean += weight * exitance * element_to_polygon(station.meter.position_m, station.meter.normal, patch);
         }
     }
-    let area_m2: f64 = Surface::ALL.iter().map(|s| room.area_m2(*s)).sum();
-    (mean * area_m2 / total_lm - 1.0).abs()
+    (mean * room.whole_area_m2() / total_lm - 1.0).abs()
 }
 
 /// Directions in the room and the flux in lumens that a luminaire sends about each.

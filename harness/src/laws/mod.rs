@@ -10,6 +10,7 @@ mod surfaces;
 #[cfg(test)]
 mod tests;
 
+pub use furnace::error_of_mean;
 use luminaire::scene::Transport;
 use serde::{Deserialize, Serialize};
 
@@ -71,13 +72,11 @@ pub enum Against {
     Sum(Vec<Job>),
     /// At each station a closed form, in lux.
     Known(Vec<f64>),
-    /// A closed form for the weighted mean over all stations.
+    /// A closed form for the weighted mean over all stations, which is off by its quadrature besides: [`error_of_mean`].
     Mean {
         /// One a station; they add up to 1.
         weights: Vec<f64>,
         value_lx: f64,
-        /// How far off the weights' quadrature may be, relative.
-        quadrature: f64,
     },
     /// At each station what the exact simulation reads at a finer accuracy; to itself that is a test of its own bounds.
     Witness,

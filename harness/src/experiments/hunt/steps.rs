@@ -244,17 +244,22 @@ fn rounder_points(point: [f64; 3]) -> Vec<[f64; 3]> {
     all
 }
 
+/// The reflectance of the first wall.
+fn one_wall(walls: &Walls) -> Fraction {
+    match walls {
+        Walls::All(rho) => *rho,
+        Walls::Each(walls) => walls.x_min,
+        Walls::Listed(walls) => walls.first().copied().unwrap_or(Fraction(0.0)),
+    }
+}
+
 /// Of a room over a polygon: the box around it, or a corner less.
 fn straighter_room(draft: &Draft) -> Vec<Draft> {
     let Some((floor, height)) = draft.spec.room.floor_m.as_ref().zip(draft.spec.room.height_m) else { return vec![] };
     let farthest = |k: usize| floor.iter().map(|corner| corner[k]).fold(0.0, f64::max);
-    let one_of = |walls: &Walls| match walls {
-        Walls::Listed(walls) => walls.first().copied().unwrap_or(Fraction(0.0)),
-        Walls::All(_) | Walls::Each(_) => Fraction(0.0),
-    };
     let alike = |room: &mut RoomSpec| {
-        if let Some(reflectance) = room.reflectance.as_mut().filter(|r| !matches!(r.walls, Walls::All(_))) {
-            reflectance.walls = Walls::All(one_of(&reflectance.walls));
+        if let Some(reflectance) = &mut room.reflectance {
+            reflectance.walls = Walls::All(one_wall(&reflectance.walls));
         }
     };
     let as_box = with(draft, |d| {
@@ -283,11 +288,7 @@ fn plainer_room(draft: &Draft) -> Vec<Draft> {
         change(&mut reflectance);
         with(draft, |d| d.spec.room.reflectance = Some(reflectance))
     };
-    let wall = match &now.walls {
-        Walls::All(rho) => *rho,
-        Walls::Each(walls) => walls.x_min,
-        Walls::Listed(walls) => walls.first().copied().unwrap_or(Fraction(0.0)),
-    };
+    let wall = one_wall(&now.walls);
     all.push(part(&|r| r.walls = Walls::All(Fraction(0.0))));
     all.push(part(&|r| r.walls = Walls::All(wall)));
     all.extend(rounder(wall.0).into_iter().map(|x| part(&|r| r.walls = Walls::All(Fraction(x)))));

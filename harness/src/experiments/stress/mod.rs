@@ -202,7 +202,8 @@ impl Bench<'_> {
                 Ok(sum)
             }
             Against::Known(values) => Ok(values.iter().map(|v| Estimate::exact(*v)).collect()),
-            Against::Mean { weights, value_lx, quadrature } => {
+            Against::Mean { weights, value_lx } => {
+                let quadrature = laws::error_of_mean(&variant.job, weights);
                 let right = Estimate { value: *value_lx, uncertainty: Uncertainty::Bound(quadrature * value_lx) };
                 let found = deviation::compare(&[Estimate::of_one_run(weights, &read)], &[right], brightest_lx);
                 return Some(Finding::of(&found));
