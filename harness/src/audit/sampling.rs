@@ -1,7 +1,6 @@
 //! Sampling until comparisons are decided: which budget first looks get, and further looks through the run's reader.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
 
 use super::jobs::{Found, Outcome, Running};
 use super::sequential::{self, Ask};
@@ -135,7 +134,7 @@ fn finer(
     let mut targets = sequential::undecided_by_reference(judge, task, recordings);
     targets.retain(|target| is_new(*target));
     let budget = Budget { relative_error: FINER * budget.relative_error, ..budget };
-    (!targets.is_empty()).then_some(Ask { look: 2, targets, budget, patience_s: budget.patience_s() })
+    (!targets.is_empty()).then_some(Ask { look: 2, targets, budget, patience: budget.patience() })
 }
 
 /// Readings become what was read more finely, where that says less uncertainty of itself.
@@ -214,8 +213,7 @@ fn look(running: &Running<'_>, run: &Run, ask: &Ask) -> Result<Taken, String> {
     };
     let instrument = planned.instrument().ok_or("the engine is not there")?;
     let place = format!("{procedure}/look-{}", ask.look);
-    let patience = Duration::from_secs_f64(ask.patience_s.clamp(0.0, 1e9));
-    let question = Question { patience, ..Question::new(&instrument, &further, &place) };
+    let question = Question { patience: ask.patience, ..Question::new(&instrument, &further, &place) };
     running.reader.read(&question).map_err(|e| e.to_string())
 }
 

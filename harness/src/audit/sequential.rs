@@ -7,6 +7,7 @@
 //! ([`crate::judge::share_of_error`]).
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use crate::engines::Measurement;
 use crate::judge::{Basis, Comparison, Judge, LOOKS, Source, Verdict};
@@ -43,8 +44,8 @@ pub struct Ask {
     pub targets: Vec<usize>,
     /// The slice of the budget.
     pub budget: Budget,
-    /// Seconds by the clock that the budget has left.
-    pub patience_s: f64,
+    /// What the budget has left by the clock.
+    pub patience: Duration,
 }
 
 /// One estimate for each station of the targets asked for, and what it took; the error says why there is none.
@@ -83,8 +84,10 @@ pub fn refine(
         if targets.is_empty() {
             break;
         }
-        let (left_s, patience_s) = (budget.seconds - subject.work_s(), budget.patience_s() - subject.wall_s);
-        if left_s.min(patience_s) <= 0.0 {
+        let left_s = budget.seconds - subject.work_s();
+        let patience =
+            budget.patience().saturating_sub(Duration::try_from_secs_f64(subject.wall_s).unwrap_or_default());
+        if left_s <= 0.0 || patience.is_zero() {
             break;
         }
         let mut affordable = left_s / first_s;
@@ -97,12 +100,8 @@ pub fn refine(
             break;
         }
         let relative_error = first.relative_error / weight.sqrt();
-        let ask = Ask {
-            look,
-            targets,
-            budget: Budget { relative_error, seconds: (weight * first_s).min(left_s) },
-            patience_s,
-        };
+        let ask =
+            Ask { look, targets, budget: Budget { relative_error, seconds: (weight * first_s).min(left_s) }, patience };
         let (measurement, cost) = match sample(&ask) {
             Ok(taken) => taken,
             Err(why) => {

@@ -131,6 +131,9 @@ impl Blocks {
 /// slower than is counted on. Only where that is not enough a clock has a say.
 const COUNTED: f64 = 0.6;
 
+/// Of the seconds where both parts of the light are sampled: what is reflected takes longer.
+pub(super) const DIRECT_SHARE: f64 = 0.3;
+
 /// A budget as it is counted, of a part of the light that has this share of it.
 pub(super) fn counted(budget: Budget, share: f64) -> Budget {
     Budget { seconds: COUNTED * share * budget.seconds, ..budget }

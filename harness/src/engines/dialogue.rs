@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use luminaire::scene::Transport;
 
-use super::blocks::{Blocks, Sampling, counted};
+use super::blocks::{Blocks, DIRECT_SHARE, Sampling, counted};
 use super::contract::same_meters;
 use super::effort;
 use super::frame::Frame;
@@ -243,9 +243,6 @@ impl Dialogue<'_> {
         }
     }
 }
-
-/// Of the seconds where both parts of the light are sampled: what is reflected takes longer.
-const DIRECT_SHARE: f64 = 0.3;
 
 fn share(part: &Part, greeting: &Greeting) -> f64 {
     let is_alone = greeting.parts.iter().filter(|part| part.sampled).count() < 2;

@@ -44,8 +44,8 @@ impl<'a> Question<'a> {
     pub fn new(instrument: &'a Instrument, job: &'a Job, folder: &'a str) -> Self {
         let beyond = if instrument.engine.is_vouched_for() { 10.0 } else { 2.0 };
         let limit_s = beyond * job.budget.seconds + instrument.engine.start_s();
-        let [patience, limit] = [job.budget.patience_s(), limit_s].map(|s| Duration::from_secs_f64(s.clamp(0.0, 1e9)));
-        Self { instrument, job, folder, patience, limit, trial: None }
+        let limit = Duration::from_secs_f64(limit_s.clamp(0.0, 1e9));
+        Self { instrument, job, folder, patience: job.budget.patience(), limit, trial: None }
     }
 
     /// Of a trial, time and failure depend on threads and limit as well.

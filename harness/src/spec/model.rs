@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use luminaire::geometry::{Reflectances, Surface};
 use schemars::JsonSchema;
@@ -500,9 +501,10 @@ pub struct Budget {
 const SHORTEST_PATIENCE_S: f64 = 15.0;
 
 impl Budget {
-    /// Seconds by the clock after which no samples are begun.
-    pub fn patience_s(&self) -> f64 {
-        self.seconds.max(SHORTEST_PATIENCE_S)
+    /// By the clock, how long an engine may sample.
+    pub fn patience(&self) -> Duration {
+        // A budget of more than a century has no end.
+        Duration::from_secs_f64(self.seconds.clamp(SHORTEST_PATIENCE_S, 3e9))
     }
 }
 

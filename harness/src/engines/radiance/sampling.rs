@@ -6,12 +6,14 @@
 use std::ops::Range;
 use std::time::Instant;
 
+use luminaire::scene::Transport;
+
 use super::export;
 use super::grazing;
 use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options, ROULETTE, Sources, bounces};
 use super::settings::Settings;
 use super::tools::Tools;
-use crate::engines::blocks::{Blocks, MIN_BLOCKS, Sampled, Sampling, counted};
+use crate::engines::blocks::{Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampled, Sampling, counted};
 use crate::engines::effort;
 use crate::engines::settings::Preset;
 use crate::engines::{Budget, EngineError, Job, Workbench};
@@ -61,8 +63,6 @@ pub(super) struct Sampler<'a> {
 
 /// Direct light that is subtracted should add little to the error.
 const DIRECT_ERROR: f64 = 0.3;
-/// Share of the time after which it is no longer sampled, whether or not its error is small enough.
-const DIRECT_SHARE: f64 = 0.3;
 
 impl Sampler<'_> {
     /// Direct light of openings, whose samples are jittered, each meter's with the division of the sources that is its own; in one process a
@@ -126,9 +126,10 @@ impl Sampler<'_> {
         (divisions.sqrt().ceil() as u32).pow(2)
     }
 
-    /// What direct light leaves of the budget.
+    /// What direct light leaves of the budget, where that is sampled, too.
     fn budget(&self) -> Budget {
-        counted(self.job.budget, 1.0 - DIRECT_SHARE)
+        let share = if matches!(self.job.transport, Transport::Total(_)) { 1.0 - DIRECT_SHARE } else { 1.0 };
+        counted(self.job.budget, share)
     }
 
     fn block_s(&self, divisions: u32) -> f64 {
