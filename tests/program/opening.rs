@@ -55,6 +55,12 @@ fn an_eye_to_which_no_opening_shows_is_refused() {
             "eyes[0] at [2.15, 2, 1.5] sees no luminous area of `ball`",
         ),
         ("model: area", "model: point", "0 0 0", "a point by its file"),
+        (
+            "points_m: [[2.15, 2, 1.5], [0.5, 3.5, 0.4]]",
+            "grid: {origin_m: [0.1, 0.1, 0.1], u_m: [0.01, 0, 0], v_m: [0, 0.01, 0], counts: [201, 100]}",
+            "-0.2 -0.2 -0.2",
+            "20100 observers",
+        ),
     ] {
         let spec = SPEC.replacen(from, to, 1);
         assert_ne!(spec, SPEC);

@@ -12,6 +12,6 @@ mod task;
 
 pub use asked::Procedures;
 pub use form::{AngleLists, Angles, AnyLight, Asked, AtAngles, AtMeters, AtOpening, Form, Names};
-pub use reads::{Aspect, Made, Reads};
+pub use reads::{Aimed, Aspect, Made, Reads};
 pub use table::{Procedure, Reference};
-pub use task::{Direction, Sets, Target, Task, sight};
+pub use task::{Direction, Sets, Target, Task};

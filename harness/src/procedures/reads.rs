@@ -4,7 +4,8 @@ use std::f64::consts::{LN_10, PI};
 
 use glam::DVec3;
 use luminaire::calculators::ugr::observer;
-use luminaire::scene::Meter;
+use luminaire::scene::{Luminaire, Meter};
+use luminaire::simulator::Sight;
 use luminaire::units::Lux;
 
 use crate::record::Estimate;
@@ -18,6 +19,9 @@ pub enum Reads {
     AllAround,
     /// The luminance of the diffuse surface on which the meter lies, L = rho E / pi.
     Luminance,
+    /// The mean luminance of the luminous opening of the luminaire that alone is lit, L = E over its projected solid angle, E being the
+    /// illuminance of an eye that is aimed at its centre, wherever the meter looks.
+    OpeningLuminance,
     /// The unified glare rating of an observer who looks as the meter does, by the openings in view and the indirect illuminance.
     GlareRating,
 }
@@ -61,6 +65,23 @@ impl Made {
 pub(super) struct Seen {
     pub(super) reflectance: Option<f64>,
     pub(super) glare: Option<f64>,
+    pub(super) opening: Option<Aimed>,
+}
+
+/// An eye that is aimed at a luminaire's photometric centre, and what of its view the luminous opening fills.
+#[derive(Clone, Copy, Debug)]
+pub struct Aimed {
+    pub eye: Meter,
+    pub sight: Sight,
+}
+
+impl Aimed {
+    /// At a meter's place; `None` where no area of the opening shows.
+    pub fn at(luminaire: &Luminaire, meter: &Meter) -> Option<Self> {
+        let normal = (luminaire.position_m - meter.position_m).try_normalize()?;
+        let eye = Meter { normal, ..*meter };
+        Some(Self { eye, sight: Sight::of(luminaire, &eye)? })
+    }
 }
 
 /// What a reading is made of, as [`super::Target`] holds it.
@@ -81,6 +102,11 @@ impl Reads {
                 Some(Parts { aspects, quadrature, made: Made::Sum })
             }
             Self::Luminance => Some(one(seen.reflectance? / PI)),
+            Self::OpeningLuminance => {
+                let Aimed { eye, sight } = seen.opening?;
+                let aspects = vec![Aspect { meter: eye, weight: 1.0 / sight.projected_sr }];
+                Some(Parts { aspects, quadrature: sight.relative_error, made: Made::Sum })
+            }
             Self::GlareRating => Some(Parts { made: Made::Rating { glare: seen.glare? }, ..one(1.0) }),
         }
     }

@@ -6,7 +6,7 @@ use luminaire::scene::{Luminaire, LuminaireModel, Scene, Transport};
 use super::form::{AnyLight, Asked, AtMeters, Form};
 use super::known;
 use super::reads::Reads;
-use super::task::{Sets, Target, Task, around, of_opening, of_sets};
+use super::task::{Sets, Target, Task, around, of_sets};
 use crate::record::{Basis, EngineName, ProcedureId, Quantity};
 
 /// One procedure.
@@ -142,7 +142,7 @@ pub static ALL: [Procedure; 14] = [
         quantity: Quantity::Luminance,
         form: Some(Form::Opening),
         transport: |_| Transport::Direct,
-        reads: Reads::Illuminance,
+        reads: Reads::OpeningLuminance,
         reference: |task| {
             closed_form(task, "photometric file, bilinear in (C, gamma), over the projected luminous area")
         },
@@ -224,7 +224,7 @@ impl Procedure {
             }
             Asked::Opening(asked) => {
                 let luminaire = find(&asked.luminaire)?;
-                (alone(luminaire), Transport::Direct, of_opening(luminaire, sets, &asked.meters))
+                (alone(luminaire), Transport::Direct, of_sets(sets, &asked.meters, self.reads))
             }
             Asked::Meters(asked) => (scene.clone(), (self.transport)(asked), of_sets(sets, &asked.meters, self.reads)),
         };

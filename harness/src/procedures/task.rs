@@ -5,10 +5,9 @@ use std::collections::BTreeMap;
 use itertools::Itertools;
 use luminaire::photometry::direction;
 use luminaire::scene::{Luminaire, Meter, Scene, Transport};
-use luminaire::simulator::Sight;
 
 use super::form::{Angles, AtAngles, Names};
-use super::reads::{Aspect, Made, Parts, Reads, Seen};
+use super::reads::{Aimed, Aspect, Made, Parts, Reads, Seen};
 use crate::record::{Estimate, Light, MeterId, ProcedureId, Quantity};
 
 /// What one procedure measures in one case.
@@ -127,28 +126,6 @@ pub(super) fn around(luminaire: &Luminaire, asked: &AtAngles) -> Vec<Target> {
     angles.into_iter().enumerate().map(target).collect()
 }
 
-/// An eye at a meter's place that is aimed at a luminaire's photometric centre, with the projected solid angle that its opening fills;
-/// `None` where it sees none.
-pub fn sight(luminaire: &Luminaire, meter: &Meter) -> Option<(Meter, Sight)> {
-    let normal = (luminaire.position_m - meter.position_m).try_normalize()?;
-    let eye = Meter { normal, ..*meter };
-    Some((eye, Sight::of(luminaire, &eye)?))
-}
-
-/// The mean luminance of an opening at the meters of named sets, wherever those look: L = E / projected solid angle.
-pub(super) fn of_opening(luminaire: &Luminaire, sets: &Sets<'_>, names: &Names) -> Vec<Target> {
-    let target = |name: &str, k: usize, meter: &Meter| {
-        let (eye, Sight { projected_sr, relative_error }) = sight(luminaire, meter)?;
-        let target = Target::of_one(MeterId::new(name, k), eye, 1.0 / projected_sr);
-        Some(Target { quadrature: relative_error, ..target })
-    };
-    let of_set = |name: &str| {
-        let meters = sets.meters.get(name).into_iter().flatten().enumerate();
-        meters.filter_map(|(k, meter)| target(name, k, meter)).collect::<Vec<_>>()
-    };
-    names.iter().flat_map(of_set).collect()
-}
-
 /// The meter sets of a spec.
 #[derive(Clone, Copy, Debug)]
 pub struct Sets<'a> {
@@ -157,14 +134,22 @@ pub struct Sets<'a> {
     pub reflectances: &'a BTreeMap<String, Vec<f64>>,
     /// Sum of L^2 w / p^2 over the openings that each meter's eye sees, of the sets that glare is asked of.
     pub glares: &'a BTreeMap<String, Vec<f64>>,
+    /// What each meter's eye sees of the luminous opening whose luminance is asked for, of the sets where that is.
+    pub openings: &'a BTreeMap<String, Vec<Aimed>>,
+}
+
+fn known<T: Copy>(of: &BTreeMap<String, Vec<T>>, name: &str, k: usize) -> Option<T> {
+    of.get(name).and_then(|set| set.get(k)).copied()
 }
 
 /// The meters of named sets, each with what is added up there.
 pub(super) fn of_sets(sets: &Sets<'_>, names: &Names, reads: Reads) -> Vec<Target> {
     let target = |name: &str, k: usize, meter: Meter| {
-        let known = |of: &BTreeMap<String, Vec<f64>>| of.get(name).and_then(|set| set.get(k)).copied();
-        let seen = Seen { reflectance: known(sets.reflectances), glare: known(sets.glares) };
-        let Parts { aspects, quadrature, made } = reads.parts(meter, seen)?;
+        let reflectance = known(sets.reflectances, name, k);
+        let (glare, opening) = (known(sets.glares, name, k), known(sets.openings, name, k));
+        let Parts { aspects, quadrature, made } = reads.parts(meter, Seen { reflectance, glare, opening })?;
+        // Of one illuminance alone it is the place and the direction of that.
+        let meter = if let [aspect] = aspects[..] { aspect.meter } else { meter };
         Some(Target { id: MeterId::new(name, k), meter, direction: None, aspects, quadrature, made })
     };
     let of_set = |name: &str| {

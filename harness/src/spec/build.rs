@@ -16,7 +16,7 @@ use super::shape::{Mended, Shaped, Trials, shaped};
 use super::tree::tree;
 use super::trust::Limits;
 use super::{Faults, Source, SpecError, Trust};
-use crate::procedures::{Procedures, Sets, Task};
+use crate::procedures::{Aimed, Procedures, Sets, Task};
 use crate::record::{ProcedureId, family};
 use crate::system::digest::hexadecimal;
 use crate::system::printable;
@@ -59,6 +59,8 @@ pub struct Case {
     pub reflectances: BTreeMap<String, Vec<f64>>,
     /// Sum of L² ω / p² over the luminous openings that each eye sees, of the sets that glare is asked of.
     pub glares: BTreeMap<String, Vec<f64>>,
+    /// What each eye sees of the luminous opening whose luminance is asked for, of the sets where that is.
+    pub openings: BTreeMap<String, Vec<Aimed>>,
     pub procedures: Procedures,
     /// The engines that the spec names, with settings; `None` where it names none.
     pub engines: Option<BTreeMap<String, EngineSettings>>,
@@ -89,7 +91,8 @@ impl Case {
 
     /// What a procedure measures in it; `None` where the spec does not ask for it.
     pub fn task(&self, procedure: ProcedureId) -> Option<Task> {
-        let sets = Sets { meters: &self.meters, reflectances: &self.reflectances, glares: &self.glares };
+        let Self { meters, reflectances, glares, openings, .. } = self;
+        let sets = Sets { meters, reflectances, glares, openings };
         procedure.row().task(self.procedures.0.get(&procedure)?, &self.scene, &sets)
     }
 
@@ -245,7 +248,7 @@ impl<'a> Builder<'a> {
         self.procedures(&spec);
         let reflectances = self.surfaces(&spec, &scene, &meters);
         let glares = self.observers(&spec, &scene, &meters);
-        self.sights(&spec, &scene, &meters);
+        let openings = self.openings(&spec, &scene, &meters);
         self.budget(spec.budget);
         let tolerances = self.tolerances(&spec.tolerances);
         let published = spec.published.map(|file| self.beside(&file));
@@ -266,6 +269,7 @@ impl<'a> Builder<'a> {
             meters,
             reflectances,
             glares,
+            openings,
             procedures: spec.procedures,
             engines: spec.engines,
             only_engines: None,

@@ -8,7 +8,8 @@ use luminaire::scene::{Meter, Obstacle, Scene, Shape};
 use super::super::model::Spec;
 use super::Builder;
 use super::surfaces::{MAX_LOOKS, sets_of};
-use crate::procedures::{Asked, Reads, sight};
+use crate::procedures::{Aimed, Reads};
+use crate::record::ProcedureId;
 
 /// What a sight of a luminaire may be hidden by is looked at one by one.
 fn bodies(scene: &Scene) -> usize {
@@ -19,30 +20,36 @@ fn bodies(scene: &Scene) -> usize {
     scene.obstacles.iter().map(faces).sum::<usize>().max(1)
 }
 
+/// A round opening is integrated for each.
+const MAX_EYES: usize = 20_000;
+
 /// Why an opening has no luminance for an eye.
 #[derive(Debug, thiserror::Error)]
 #[error("sees no luminous area of `{0}`: it is a point by its file, edge on from here, or around the eye")]
 struct NotSeen(String);
 
 impl Builder<'_> {
-    /// Refuses observers of an opening that they do not see.
-    pub(super) fn sights(&mut self, spec: &Spec, scene: &Scene, meters: &BTreeMap<String, Vec<Meter>>) {
-        if !self.faults.is_empty() {
-            return;
+    /// What each eye sees of the luminous opening whose luminance is asked for; refuses one that sees none of it.
+    pub(super) fn openings(
+        &mut self,
+        spec: &Spec,
+        scene: &Scene,
+        meters: &BTreeMap<String, Vec<Meter>>,
+    ) -> BTreeMap<String, Vec<Aimed>> {
+        let id = spec.procedures.0.get(&ProcedureId::OpeningLuminance).and_then(|asked| asked.named().0);
+        let luminaire = id.and_then(|id| scene.luminaires.iter().find(|l| l.id == id));
+        let Some(luminaire) = luminaire.filter(|_| self.faults.is_empty()) else { return BTreeMap::new() };
+        let sets = sets_of(spec, meters, Reads::OpeningLuminance);
+        let eyes = sets.iter().map(|(_, set)| set.len()).sum::<usize>();
+        let help = format!("read it at fewer meters: {MAX_EYES} are looked from");
+        if !self.check(eyes <= MAX_EYES, "procedures.opening_luminance", format!("{eyes} observers"), help) {
+            return BTreeMap::new();
         }
-        let openings = spec.procedures.0.values().filter_map(|asked| match asked {
-            Asked::Opening(asked) => Some(asked),
-            Asked::Angles(_) | Asked::Meters(_) => None,
-        });
-        for asked in openings {
-            let Some(luminaire) = scene.luminaires.iter().find(|l| l.id == asked.luminaire) else { continue };
-            let seen = |meter: &Meter| sight(luminaire, meter).ok_or_else(|| NotSeen(asked.luminaire.clone()));
-            let sets = asked.meters.iter().filter_map(|name| Some((name, &meters.get(name)?[..])));
-            let found = sets.map(|(name, set)| (name, set, set.iter().map(seen).collect())).collect();
-            self.at_each(spec, found, "an observer sees the luminous opening", |_| {
-                "move it to where the opening shows, or take a photometric file whose opening has a size".to_owned()
-            });
-        }
+        let seen = |meter: &Meter| Aimed::at(luminaire, meter).ok_or_else(|| NotSeen(luminaire.id.clone()));
+        let found = sets.into_iter().map(|(name, set)| (name, set, set.iter().map(seen).collect())).collect();
+        self.at_each(spec, found, "an observer sees the luminous opening", |_| {
+            "move it to where the opening shows, or take a photometric file whose opening has a size".to_owned()
+        })
     }
 
     /// Sum of L² ω / p² that each eye sees, of the sets that glare is asked of.
