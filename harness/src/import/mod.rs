@@ -213,7 +213,7 @@ fn placed(raw: &Raw<'_>, chosen: &[Option<f64>], up: Up, unit_m: f64) -> Result<
         Some(far) => {
             let [x, y, z] = far.to_array();
             let message = format!("a corner is at [{x:e}, {y:e}, {z:e}] m, and none lies beyond {FAR_M:e} m");
-            Err(raw.scene.fault(None, message, "correct the scene, or give its unit by --unit 0.001"))
+            Err(raw.scene.fault(None, message, "move the scene to its origin, or give its unit by --unit 0.001"))
         }
         None => Ok(taken),
     }

@@ -19,7 +19,7 @@ pub(super) enum Opening {
     Box(DVec3),
     /// An upright elliptical cylinder or, with `z` 0, a flat ellipse.
     Cylinder(DVec3),
-    /// A circular cylinder lying along an axis: half extents of it standing upright.
+    /// A cylinder lying along an axis or, with `z` 0, a flat ellipse that faces along it: half extents of it standing upright.
     Lying(HorizontalAxis, DVec3),
     Ellipsoid(DVec3),
 }
@@ -70,7 +70,7 @@ impl Opening {
             LuminousOpening::Point => Self::Point,
             LuminousOpening::Box { x_m, y_m, height_m } => Self::Box(half(x_m, y_m, height_m)),
             LuminousOpening::Ellipse { x_m, y_m, height_m } => Self::Cylinder(half(x_m, y_m, height_m)),
-            LuminousOpening::Ellipsoid { x_m, y_m, z_m } => Self::Ellipsoid(half(x_m, y_m, z_m)),
+            LuminousOpening::Ellipsoid { x_m, y_m, z_m } => Self::ellipsoid(half(x_m, y_m, z_m)),
             LuminousOpening::LyingCylinder { axis, length_m, diameter_m } => {
                 Self::Lying(axis, half(diameter_m, diameter_m, length_m))
             }
@@ -82,6 +82,16 @@ impl Opening {
             Self::Point | Self::Line(_) => DVec3::ZERO,
         };
         if longest == DVec3::ZERO { Self::Point } else { Self::Line(longest) }
+    }
+
+    /// Without extent along one axis it is a flat ellipse, which faces along that.
+    fn ellipsoid(half: DVec3) -> Self {
+        match half.to_array() {
+            [.., 0.0] => Self::Cylinder(half),
+            [0.0, ..] => Self::Lying(HorizontalAxis::X, lay(HorizontalAxis::X, half)),
+            [_, 0.0, _] => Self::Lying(HorizontalAxis::Y, lay(HorizontalAxis::Y, half)),
+            _ => Self::Ellipsoid(half),
+        }
     }
 
     /// Projected area along a vector, times its length; of a flat opening, which shines on both sides, of either.
@@ -109,7 +119,7 @@ impl Opening {
     pub(super) fn flat_m2(&self) -> Option<f64> {
         match *self {
             Self::Box(h) if h.min_element() == 0.0 => Some(4.0 * (h.x * h.y).max(h.y * h.z).max(h.x * h.z)),
-            Self::Cylinder(h) if h.z == 0.0 => Some(PI * h.x * h.y),
+            Self::Cylinder(h) | Self::Lying(_, h) if h.z == 0.0 => Some(PI * h.x * h.y),
             _ => None,
         }
     }

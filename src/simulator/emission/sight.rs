@@ -11,7 +11,7 @@ use crate::photometry::angles_deg;
 use crate::scene::{Luminaire, Meter};
 
 /// To so much of itself it is integrated where it has no closed form.
-const PRECISION: Precision = Precision::relative(1e-10);
+const PRECISION: Precision = Precision::relative(1e-9);
 /// Less of the sphere than this is edge on.
 const EDGE_ON_SR: f64 = 1e-12;
 
@@ -117,6 +117,8 @@ mod tests {
             LuminousOpening::Box { x_m: 0.2, y_m: 0.3, height_m: 0.0 },
             LuminousOpening::Ellipse { x_m: 0.2, y_m: 0.3, height_m: 0.1 },
             LuminousOpening::Ellipse { x_m: 0.2, y_m: 0.3, height_m: 0.0 },
+            LuminousOpening::Ellipsoid { x_m: 0.0, y_m: 0.3, z_m: 0.1 },
+            LuminousOpening::Ellipsoid { x_m: 0.2, y_m: 0.0, z_m: 0.1 },
             LuminousOpening::LyingCylinder { axis: HorizontalAxis::X, length_m: 0.3, diameter_m: 0.2 },
         ] {
             let away = DVec3::new(300.0, -500.0, -400.0);

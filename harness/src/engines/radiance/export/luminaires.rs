@@ -63,6 +63,8 @@ pub(in crate::engines::radiance) fn unsupported(luminaire: &Luminaire, settings:
     let what = match luminaire.photometry.opening {
         LuminousOpening::Ellipse { x_m, y_m, .. } if x_m != y_m => "an elliptic opening",
         LuminousOpening::Ellipsoid { x_m, y_m, z_m } if x_m != y_m || y_m != z_m => "an ellipsoid",
+        LuminousOpening::Box { x_m, y_m, height_m } if height_m > 0.0 && x_m * y_m == 0.0 => "an upright plate",
+        LuminousOpening::LyingCylinder { length_m: 0.0, .. } => "an upright disc",
         _ => return None,
     };
     exported.then(|| format!("`{}` has {what}, which Radiance's source.cal does not know", luminaire.id))
