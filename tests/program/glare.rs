@@ -51,8 +51,13 @@ fn a_rating_is_the_formula_of_the_indirect_light_that_each_engine_reads() {
             let (luminance, solid) = (1000.0 / 0.36, 0.36 * cosine / square);
             let right = 8.0 * (0.25 * PI / lux * luminance * luminance * solid / (index * index)).log10();
             let value = rating["value"].as_f64().unwrap();
-            // A table of 5 degrees is straight where a cosine bends: 1e-3 of the intensity, which counts twice.
-            assert!((value - right).abs() < 8.0 / LN_10 * 2e-3, "{engine} {meter}: {value} {right}");
+            // A table of 5 degrees is straight where a cosine bends: 1e-3 of the intensity, which counts twice; and further looks are each
+            // procedure's own.
+            let noise = rating["std_error"].as_f64().unwrap_or(0.0);
+            assert!(
+                (value - right).abs() < 8.0 / LN_10 * 2e-3 + 4.0 * noise,
+                "{engine} {meter}: {value} {right} {noise}"
+            );
             let compared = of("comparisons", "radiance", "unified_glare_rating", meter);
             assert!(compared["verdict"] != "fail" && compared["relative_deviation"].is_null(), "{compared}");
             assert_eq!(compared["tolerance"], serde_json::json!({"relative": 0.0, "absolute": 0.1}), "{compared}");

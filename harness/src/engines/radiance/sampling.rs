@@ -20,10 +20,13 @@ use crate::engines::{Budget, EngineError, Job, Workbench};
 use crate::system::random::seed;
 use crate::system::slots::side_by_side;
 
-/// Ambient divisions of the trial from which effort is planned.
-const TRIAL_DIVISIONS: u32 = 64;
-/// Planned beyond what the trial's own, uncertain, error suggests.
-const PLAN_MARGIN: f64 = 1.5;
+/// Ambient divisions of the trials from which effort is planned, and the power of them by which the variance falls from there on:
+/// strata gain more while they are few (benchmarks/engines-remarks.md).
+const TRIALS: [(u32, f64); 2] = [(64, 1.25), (256, 1.05)];
+/// The worst of several variances that eight blocks tell is so much larger than what sixteen blocks will tell of it.
+const WORST_OF_FEW: f64 = 1.3;
+/// A finer trial is made where so many times its divisions are planned by the one before.
+const FINER_TRIAL: f64 = 8.0;
 /// Blocks that effort is planned for.
 const PLANNED_BLOCKS: usize = 2 * MIN_BLOCKS;
 const MAX_PARALLEL: usize = 8;
@@ -108,22 +111,32 @@ impl Sampler<'_> {
         Ok((rule.run(|numbers| self.side_by_side(&options, Stream::Total, numbers))?, divisions))
     }
 
-    /// Divisions a block, from a trial, and how many blocks.
+    /// Divisions a block, from trials, and how many blocks.
     fn planned<'k>(&self, known_lx: &'k [f64]) -> Result<(u32, Sampling<'k>), EngineError> {
-        let trial = self.side_by_side(&self.options(TRIAL_DIVISIONS), Stream::Trial, 0..MIN_BLOCKS)?;
-        let excess = Blocks::new(trial).worst_error(known_lx) / self.job.budget.relative_error;
-        let divisions = self.settings.ambient_divisions.unwrap_or_else(|| self.divisions(excess));
+        let divisions = match self.settings.ambient_divisions {
+            Some(given) => given,
+            None => self.divisions(known_lx)?,
+        };
         let within = Sampling::within(self.budget(), self.block_s(divisions), self.until);
         Ok((divisions, Sampling { known_lx, enough_blocks: PLANNED_BLOCKS, ..within }))
     }
 
     /// Divisions a block so that the fewest blocks about meet the budget.
-    fn divisions(&self, excess: f64) -> u32 {
-        let needed = f64::from(TRIAL_DIVISIONS) * PLAN_MARGIN * excess * excess / 2.0;
+    fn divisions(&self, known_lx: &[f64]) -> Result<u32, EngineError> {
         let affordable = 0.5 * self.budget().seconds / (PLANNED_BLOCKS as f64 * self.block_s(1));
-        let divisions = needed.min(affordable).clamp(f64::from(TRIAL_DIVISIONS), f64::from(AUDIT_DIVISIONS));
+        let mut planned = f64::INFINITY;
+        for (divisions, power) in TRIALS {
+            if planned.is_finite() && planned.min(affordable) < FINER_TRIAL * f64::from(divisions) {
+                break;
+            }
+            let trial = self.side_by_side(&self.options(divisions), Stream::Trial, 0..MIN_BLOCKS)?;
+            let excess = Blocks::new(trial).worst_error(known_lx) / self.job.budget.relative_error;
+            let blocks = MIN_BLOCKS as f64 / PLANNED_BLOCKS as f64;
+            planned = f64::from(divisions) * (blocks * excess * excess / WORST_OF_FEW).powf(power.recip());
+        }
+        let divisions = planned.min(affordable).clamp(f64::from(TRIALS[0].0), f64::from(AUDIT_DIVISIONS));
         // rtrace takes a square number of them.
-        (divisions.sqrt().ceil() as u32).pow(2)
+        Ok((divisions.sqrt().ceil() as u32).pow(2))
     }
 
     /// What direct light leaves of the budget, where that is sampled, too.
