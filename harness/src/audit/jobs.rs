@@ -29,6 +29,9 @@ pub struct Running<'a> {
     pub observer: &'a dyn Observer,
 }
 
+/// Jobs that sleep side by side at most, beside those that compute.
+const MAX_SLEEPING: usize = 8;
+
 /// What is found of what an engine states of its errors in a procedure.
 pub(super) type Found = BTreeMap<(EngineName, ProcedureId), Vec<StatedErrors>>;
 
@@ -55,7 +58,9 @@ enum Done {
 impl Running<'_> {
     /// Runs every job of the plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
     pub fn run(&self) -> Result<Outcome, FileError> {
-        let threads = self.reader.machine.slots.threads();
+        let sleeping =
+            self.plan.runs.iter().filter(|run| self.plan.engines[run.engine].engine.mostly_waits(&run.job)).count();
+        let threads = self.reader.machine.slots.threads() + sleeping.min(MAX_SLEEPING);
         // By place in the plan.
         let kept: Mutex<BTreeMap<usize, Recording>> = Mutex::default();
         let one = |places: &Vec<usize>| -> Result<Vec<(usize, Done)>, FileError> {

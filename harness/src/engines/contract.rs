@@ -95,6 +95,11 @@ pub trait Engine: Send + Sync {
         None
     }
 
+    /// Whether a job mostly sleeps, so that others may have its thread.
+    fn mostly_waits(&self, _job: &Job) -> bool {
+        false
+    }
+
     /// Memory that a job takes on so many threads or processes, in MiB; an estimate on the safe side, of which as much runs side
     /// by side as there is room for. Twice what case S2 took and more, a process each.
     fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
@@ -160,6 +165,10 @@ macro_rules! left_to_inner {
 
         fn cache_identity(&self, job: &Job) -> Job {
             self.inner.cache_identity(job)
+        }
+
+        fn mostly_waits(&self, job: &Job) -> bool {
+            self.inner.mostly_waits(job)
         }
 
         fn takes_batches(&self) -> bool {
@@ -239,12 +248,15 @@ pub struct Knob {
     pub values: &'static [&'static str],
 }
 
-/// What of the machine an engine is given for a job: one thread for what is determined or quick, many for reflected light, whose
-/// readings are as good as the seconds of the budget allow.
+/// What of the machine an engine is given for a job: none for what sleeps, one thread for what is determined or quick, many for reflected
+/// light, whose readings are as good as the seconds of the budget allow.
 pub fn share(engine: &dyn Engine, job: &Job, slots: &Slots) -> Share {
-    let threads = if job.transport == Transport::Direct { 1 } else { slots.threads_a_reading() };
-    let threads = threads.min(engine.max_threads());
-    Share { threads, memory_mib: engine.memory_mib(job, threads) }
+    let threads = match job.transport {
+        _ if engine.mostly_waits(job) => 0,
+        Transport::Direct => 1,
+        Transport::Indirect(_) | Transport::Total(_) => slots.threads_a_reading().min(engine.max_threads()),
+    };
+    Share { threads, memory_mib: engine.memory_mib(job, threads.max(1)) }
 }
 
 /// What meshes take in a renderer, about 1 KiB a triangle with its hierarchy, and meters in their read-out.

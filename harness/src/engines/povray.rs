@@ -115,6 +115,10 @@ impl Engine for PovRay {
         Settings::of(job).map(drop)
     }
 
+    fn mostly_waits(&self, job: &Job) -> bool {
+        self.expected_s(job).is_some_and(|seconds| seconds < bench::SLEEP_S)
+    }
+
     fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
         (threads * bench::side_by_side_at_most(job)) as u64 * bench::process_mib(job)
     }

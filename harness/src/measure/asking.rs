@@ -132,7 +132,7 @@ impl Node {
             cases: BTreeSet::new(),
             part: question.folder.to_owned(),
             meters: job.stations.len(),
-            threads: share.threads,
+            threads: share.threads.max(1),
             memory_mib: share.memory_mib,
             seconds: expected.unwrap_or(job.budget.seconds),
             is_at_most: expected.is_none(),

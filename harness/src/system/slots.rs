@@ -1,8 +1,8 @@
 //! Slots: how much of the machine runs at a time, so that engines side by side do not starve each other.
 //!
 //! An engine that is given k threads or processes holds k slots as long as it works, so that one that keeps its budget by the clock has the
-//! processors that it counts on. Memory is handed out likewise, by estimate. Whoever comes first is served first: a job that
-//! needs every slot is not passed by small ones for ever.
+//! processors that it counts on; one that sleeps holds none. Memory is handed out likewise, by estimate. Whoever comes first is served
+//! first: a job that needs every slot is not passed by small ones for ever.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -64,12 +64,18 @@ impl Slots {
         self.all.threads.min(MAX_A_READING)
     }
 
-    /// Waits for a share. What asks for more than there is gets all that there is.
+    /// Waits for a share. What asks for more than there is gets all that there is; what asks for no thread waits for no turn.
     pub fn take(&self, share: Share) -> Held<'_> {
         let Share { threads, memory_mib } = share;
-        let share =
-            Share { threads: threads.clamp(1, self.all.threads), memory_mib: memory_mib.min(self.all.memory_mib) };
+        let share = Share { threads: threads.min(self.all.threads), memory_mib: memory_mib.min(self.all.memory_mib) };
         let mut state = self.state.lock();
+        if share.threads == 0 {
+            while state.free.memory_mib < share.memory_mib {
+                self.changed.wait(&mut state);
+            }
+            state.free.memory_mib -= share.memory_mib;
+            return Held { slots: self, share };
+        }
         let ticket = state.next_ticket;
         state.next_ticket += 1;
         let fits = |s: &State| s.free.threads >= share.threads && s.free.memory_mib >= share.memory_mib;
@@ -85,8 +91,9 @@ impl Slots {
 }
 
 impl Held<'_> {
+    /// One at least, if only to wait on.
     pub fn threads(&self) -> usize {
-        self.share.threads
+        self.share.threads.max(1)
     }
 }
 
@@ -173,6 +180,19 @@ mod tests {
             drop(first);
         });
         assert_eq!(order.into_inner(), [0, 1]);
+    }
+
+    #[test]
+    fn what_sleeps_waits_for_nobody_and_holds_nobody_up() {
+        let slots = Slots::with_memory(1, 100);
+        let one = Share { threads: 1, memory_mib: 1 };
+        let working = slots.take(one);
+        let sleeping = slots.take(Share { threads: 0, memory_mib: 90 });
+        assert_eq!((sleeping.threads(), slots.state.lock().free), (1, Share { threads: 0, memory_mib: 9 }));
+        drop(working);
+        drop(slots.take(one));
+        drop(sleeping);
+        assert_eq!(slots.state.lock().free, Share { threads: 1, memory_mib: 100 });
     }
 
     #[test]

@@ -39,7 +39,7 @@ const LARGE_SIDE_BY_SIDE: u64 = 3;
 /// Of some 60 MiB without bodies.
 const PROCESS_MIB: u64 = 86;
 /// What a process sleeps, and what it computes before its rays, in seconds.
-const SLEEP_S: f64 = 0.6;
+pub(super) const SLEEP_S: f64 = 0.6;
 const START_S: f64 = 0.05;
 /// So many times as many processes as would compute on the mean: runs of a block are of three lengths, and the last ones of a wave run alone.
 const SPARE: f64 = 2.0;
