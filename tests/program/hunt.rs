@@ -36,7 +36,7 @@ fn hunt(folder: &Folder, more: &[&str]) -> (Value, Option<i32>) {
 fn planted_bugs_are_found_made_small_and_handed_over() {
     // `ci/benchmarks/hunt` hunts all that are written.
     let bugs = [("gamma_nearest", "verdict"), ("nan_axis", "failure"), ("abs_cosine", "too_much")];
-    for (bug, says) in bugs.into_iter().take(if is_night() { 3 } else { 2 }) {
+    for (bug, says) in bugs.into_iter().take(if is_night() { 3 } else { 1 }) {
         let folder = planted(bug);
         let (found, code) = hunt(&folder, &["--findings", "1", "--specs", "160", "--minutes", "5", "--seed", "2"]);
         assert_eq!(code, Some(1), "{bug}: {found}");

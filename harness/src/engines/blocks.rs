@@ -201,14 +201,15 @@ impl Sampling<'_> {
         }
     }
 
-    /// How many blocks more there is time for by the clock, if they take as long as those before them; at first as few as must be.
+    /// Half as many blocks more as there is time for by the clock, if they take as long as those before them, since others may come to use
+    /// the machine; at first as few as must be.
     fn in_time(&self, have: usize, begun: Instant) -> usize {
         if have < self.min_blocks {
             return self.min_blocks - have;
         }
         let (left, spent) = (self.until.saturating_duration_since(Instant::now()), begun.elapsed());
         // A time that is too short to be one is no rate.
-        (have as f64 * left.as_secs_f64() / spent.as_secs_f64().max(1e-6)) as usize
+        ((have as f64 * left.as_secs_f64() / spent.as_secs_f64().max(1e-6)) as usize).div_ceil(2)
     }
 
     fn remark(&self, blocks: &Blocks, is_late: bool) -> Option<String> {
