@@ -195,13 +195,15 @@ impl Again<'_> {
     /// How the engine's readings of the task compare, were this found of what it states; `None`: as they are.
     fn compared(&self, judge: &Judge<'_>, outcome: &Outcome, found: Option<&[StatedErrors]>) -> Vec<Comparison> {
         let of_task = outcome.recordings.iter().filter(|r| r.key.procedure == self.task.procedure);
-        let mut of_task: Vec<Recording> = of_task.cloned().collect();
-        if let Some(found) = found {
-            of_task.iter_mut().filter(|r| r.key.engine == self.engine).for_each(|mine| correct(mine, found));
-        }
-        let mut compared = judge.compare(self.task, &of_task.iter().collect::<Vec<_>>());
-        compared.retain(|c| c.key.engine == self.engine);
-        compared
+        let (mine, others): (Vec<_>, Vec<_>) = of_task.partition(|r| r.key.engine == self.engine);
+        let compared = mine.into_iter().map(|mine| {
+            let mut mine = mine.clone();
+            if let Some(found) = found {
+                correct(&mut mine, found);
+            }
+            judge.compare_one(self.task, &mine, &others)
+        });
+        compared.flatten().collect()
     }
 }
 

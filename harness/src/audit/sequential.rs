@@ -139,10 +139,8 @@ fn combine(reading: &mut Reading, before: f64, look: &Estimate, weight: f64) {
 
 /// The targets at which more samples would decide something.
 fn undecided(judge: &Judge<'_>, task: &Task, witnesses: &[&Recording], subject: &Recording) -> Vec<usize> {
-    let all: Vec<&Recording> = witnesses.iter().copied().chain([subject]).collect();
-    let compared = judge.compare(task, &all);
-    let is_open = |c: &&Comparison| c.key.engine == subject.key.engine && effort(c).is_some_and(f64::is_finite);
-    targets_of(task, compared.iter().filter(is_open))
+    let compared = judge.compare_one(task, subject, witnesses);
+    targets_of(task, compared.iter().filter(|c| effort(c).is_some_and(f64::is_finite)))
 }
 
 /// The places in a task of the targets that comparisons are of.

@@ -151,10 +151,19 @@ impl Judge<'_> {
     /// `recordings` are those of this task, one an engine. An engine that failed is `missing` at every meter. What fails, fails
     /// at the family-wise level of all comparisons of its engine here.
     pub fn compare(&self, task: &Task, recordings: &[&Recording]) -> Vec<Comparison> {
+        self.compare_those(task, recordings, recordings)
+    }
+
+    /// The same of one recording alone: of many engines, asked for one after the other, all would be compared as often as there are engines.
+    pub fn compare_one(&self, task: &Task, recording: &Recording, others: &[&Recording]) -> Vec<Comparison> {
+        self.compare_those(task, &[recording], others)
+    }
+
+    fn compare_those(&self, task: &Task, those: &[&Recording], recordings: &[&Recording]) -> Vec<Comparison> {
         let input = self.published.map(|_| Input::of(task));
         let misfits = self.published.map_or_else(Vec::new, |p| p.misfits(task));
         let mut comparisons = vec![];
-        for recording in recordings {
+        for recording in those {
             // In place: a million comparisons are not moved about.
             let family = comparisons.len();
             let largest = largest_portion(recording);

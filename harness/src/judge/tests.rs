@@ -164,3 +164,16 @@ fn at_the_edge_of_a_jump_both_values_stand_and_nothing_between_fails() {
     assert_eq!(verdicts(25.0), [Verdict::Inconclusive, Verdict::Fail]);
     assert_eq!(verdicts(110.0), [Verdict::Fail, Verdict::Fail]);
 }
+
+#[test]
+fn one_recording_alone_comes_to_what_it_comes_to_among_all() {
+    let (task, judge) = (task(3), built_in());
+    let estimates = |off: f64| [1.0, 2.0, 3.0].map(|lx| sampled(lx + off, 0.01, 7.0));
+    let all = [("simulator", 0.0), ("radiance", 0.001), ("mitsuba", 0.3)].map(|(e, off)| recording(e, &estimates(off)));
+    let all: Vec<&Recording> = all.iter().collect();
+    let one_by_one: Vec<Comparison> = all.iter().flat_map(|one| judge.compare_one(&task, one, &all)).collect();
+    assert_eq!(one_by_one, judge.compare(&task, &all));
+    assert!(one_by_one.iter().any(|c| c.verdict == Verdict::Fail));
+    // Without what it is judged by there is nothing to hold it against.
+    assert!(judge.compare_one(&task, all[1], &all[1..]).iter().all(|c| c.reference.is_none()));
+}
