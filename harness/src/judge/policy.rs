@@ -191,7 +191,7 @@ impl PolicyChoice {
             profile,
             record: Some(PolicyRecord {
                 file: shown,
-                sha256: hexadecimal(&Sha256::digest(&source.text)),
+                sha256: hexadecimal(&Sha256::digest(source.text.as_bytes())),
                 profile: self.profile.clone(),
                 required_engines: project.required_engines,
             }),

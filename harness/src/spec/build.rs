@@ -222,7 +222,7 @@ impl<'a> Builder<'a> {
     }
 
     fn build(mut self, spec: Spec) -> Built {
-        self.hash.update(&self.source.text);
+        self.hash.update(self.source.text.as_bytes());
         self.programs(&spec);
         let count = spec.luminaires.iter().map(LuminaireSpec::len).fold(0, usize::saturating_add);
         let is_few = self.take("luminaires", "luminaires", count, |left| &mut left.luminaires);

@@ -21,6 +21,7 @@ mod trust;
 mod write;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 
@@ -72,7 +73,8 @@ const DEPTH: &str = "close what is open: a spec is a few brackets deep";
 #[derive(Clone, Debug, Default)]
 pub struct Source {
     pub path: PathBuf,
-    pub text: String,
+    /// Of all cases of a suite the same one.
+    pub text: Arc<str>,
     /// Whose it is.
     pub trust: Trust,
     /// How many it has, its aliases followed, at most.
@@ -101,7 +103,7 @@ impl Source {
     }
 
     pub fn new(path: PathBuf, text: String) -> Self {
-        Self { path, text, trust: Trust::Own, values: 0, overrides: vec![] }
+        Self { path, text: text.into(), trust: Trust::Own, values: 0, overrides: vec![] }
     }
 
     /// Parses the text as a spec or a policy; unknown keys are errors with the nearest known key.
