@@ -88,6 +88,31 @@ fn a_repeated_run_starts_no_engine_and_says_the_same_to_the_byte() {
 }
 
 #[test]
+fn one_meter_more_only_adds_work() {
+    let lab = Lab::new();
+    let run = |out: &str, more: &[&str]| {
+        lab.run(out, &[&["--engines", "simulator", "--procedures", "direct_illuminance"], more].concat());
+        let recordings: Value = lab.0.json(&format!("{out}/readings/simulator.json"));
+        let values: Vec<f64> =
+            recordings[0]["readings"].as_array().unwrap().iter().map(|r| r["value"].as_f64().unwrap()).collect();
+        (values, recordings[0]["effort"]["meters_read_before"].as_str().map(str::to_owned))
+    };
+    let (first, none) = run("first", &[]);
+    let spec = lab.0.read("spec.yaml").replace("[[1, 1, 0.8], ", "[[2, 1, 0.8], [1, 1, 0.8], ");
+    fs::write(lab.0.path("spec.yaml"), spec).unwrap();
+    let (more, added) = run("more", &[]);
+    assert_eq!((none, added.as_deref()), (None, Some("3 of 4; with a seed of their own plane[0]")));
+    assert_eq!(first, more[1..]);
+    assert_eq!(run("again", &[]), (more.clone(), added));
+    assert!(lab.said("more") == lab.said("again"), "a repeated run says something else");
+    // What is rendered anew knows nothing of it, and neither does another seed.
+    assert_eq!(run("anew", &["--no-cache"]), (more, None));
+    assert_eq!(run("seeded", &["--seed", "2"]).1, None);
+    lab.0.luxproof(&["cache", "prune", "--unused", "0"]).exits(0);
+    assert!(lab.0.path("cache/simulator").read_dir().unwrap().next().is_none(), "something stays for good");
+}
+
+#[test]
 fn damaged_entries_are_named_and_read_anew() {
     let lab = Lab::new();
     lab.run("first", &[]);

@@ -229,7 +229,8 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
     let rendered = if shortcut.job.stations.is_empty() {
         Taken { measurement: Measurement::default(), cost: Cost::default(), source: Source::Nobody }
     } else {
-        let read = reader.read(&Question::new(&instrument, &shortcut.job, folder));
+        let question = Question { may_join: true, ..Question::new(&instrument, &shortcut.job, folder) };
+        let read = reader.read(&question);
         if let (Err(Failure { kind: FailureKind::Unread, .. }), Some(job)) = (&read, run.spot_check_job()) {
             // Whoever takes the one may take the other beside it.
             reader.read(&Question::new(&instrument, &job, &spot_check)).ok();

@@ -108,6 +108,27 @@ impl Blocks {
         all
     }
 
+    pub(super) fn is_of(&self, stations: usize) -> bool {
+        self.0.iter().all(|block| block.len() == stations)
+    }
+
+    /// So many blocks instead, each the mean of those of an equal part of these, or of one more: then their spread makes the standard error no
+    /// smaller. No more than there are.
+    pub(super) fn in_groups(&self, groups: usize) -> Self {
+        let group = |g: usize| {
+            let blocks = &self.0[g * self.count() / groups..(g + 1) * self.count() / groups];
+            self.stations().map(|k| blocks.iter().map(|b| b[k]).sum::<f64>() / blocks.len() as f64).collect()
+        };
+        Self((0..groups).map(group).collect())
+    }
+
+    /// Blocks of stations that lie each in one of several sets of as many blocks, or vary in none.
+    pub(super) fn side_by_side(sets: &[Option<Self>], stations: &[(usize, usize)]) -> Self {
+        let count = sets.iter().flatten().map(Self::count).min().unwrap_or(0);
+        let at = |block: usize, (set, k): (usize, usize)| sets[set].as_ref().map_or(0.0, |blocks| blocks.0[block][k]);
+        Self((0..count).map(|block| stations.iter().map(|place| at(block, *place)).collect()).collect())
+    }
+
     /// Blocks of other stations, each a factor times one of these, or dark.
     #[must_use]
     pub fn rearranged(&self, stations: &[Option<(usize, f64)>]) -> Self {

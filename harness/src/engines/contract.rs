@@ -52,6 +52,12 @@ pub trait Engine: Send + Sync {
         false
     }
 
+    /// Whether what it reads of a job may be put together of jobs for some of its meters each, with seeds of their own: every reading and its
+    /// error hold whichever other meters are asked. Of a user's program nobody knows that, and what it reads is what is audited.
+    fn reads_meters_apart(&self) -> bool {
+        false
+    }
+
     fn probe(&self, site: &Site) -> Result<Version, Absent>;
 
     /// Whether it can do this job, exactly or nearly; decided from the job alone, before anything starts.
@@ -153,6 +159,10 @@ macro_rules! left_to_inner {
 
         fn reads_files(&self, job: &Job) -> bool {
             self.inner.reads_files(job)
+        }
+
+        fn reads_meters_apart(&self) -> bool {
+            self.inner.reads_meters_apart()
         }
 
         fn most_planes(&self) -> Option<usize> {

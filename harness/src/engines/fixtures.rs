@@ -318,18 +318,23 @@ pub(crate) struct Fake<R> {
     pub(crate) name: &'static str,
     pub(crate) supports: fn(&Job) -> Support,
     pub(crate) knobs: &'static [Knob],
+    pub(crate) reads_meters_apart: bool,
     pub(crate) read: R,
 }
 
 impl<R: Fn(&Job) -> Result<Measurement, EngineError> + Send + Sync> Fake<R> {
     pub(crate) fn new(name: &'static str, read: R) -> Self {
-        Self { name, supports: |_| Support::Yes, knobs: &[], read }
+        Self { name, supports: |_| Support::Yes, knobs: &[], reads_meters_apart: false, read }
     }
 }
 
 impl<R: Fn(&Job) -> Result<Measurement, EngineError> + Send + Sync> Engine for Fake<R> {
     fn name(&self) -> EngineName {
         EngineName::new(self.name)
+    }
+
+    fn reads_meters_apart(&self) -> bool {
+        self.reads_meters_apart
     }
 
     fn probe(&self, _site: &Site) -> Result<Version, Absent> {

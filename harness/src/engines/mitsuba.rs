@@ -64,6 +64,10 @@ impl Engine for Mitsuba {
         ID
     }
 
+    fn reads_meters_apart(&self) -> bool {
+        true
+    }
+
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         self.backend(site).map(|backend| backend.version(site))
     }

@@ -22,6 +22,7 @@ mod frame;
 mod iesna;
 mod image;
 mod install;
+mod joined;
 mod libraries;
 mod luxcore;
 mod meshes;

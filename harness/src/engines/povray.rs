@@ -58,6 +58,10 @@ impl Engine for PovRay {
         ID
     }
 
+    fn reads_meters_apart(&self) -> bool {
+        true
+    }
+
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         let remedy = || "run `luxproof engines install`, or install the Debian package povray".to_owned();
         let absent = |reason| Absent { reason, remedy: remedy() };

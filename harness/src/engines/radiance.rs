@@ -60,6 +60,10 @@ impl Engine for Radiance {
         Settings::of(job).is_ok_and(|settings| settings.is_native())
     }
 
+    fn reads_meters_apart(&self) -> bool {
+        true
+    }
+
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
         Tools::find(site)?.version(site)
     }

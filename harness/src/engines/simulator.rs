@@ -68,6 +68,10 @@ impl Engine for Simulator {
         Role::Witness
     }
 
+    fn reads_meters_apart(&self) -> bool {
+        true
+    }
+
     fn probe(&self, _site: &Site) -> Result<Version, Absent> {
         Ok(Version::own())
     }

@@ -1,11 +1,12 @@
 //! What all cases of a run share: the machine's slots, and what engines have answered so far.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::cache::{Entry, Key};
+use super::cache::{Cache, Entry, Key};
 use parking_lot::Mutex;
 
+use crate::engines::Station;
 use crate::system::slots::Slots;
 
 #[derive(Debug)]
@@ -13,6 +14,16 @@ pub struct Machine {
     pub slots: Slots,
     /// `None`: equal jobs are rendered as often as they are asked.
     answers: Option<Mutex<BTreeMap<Key, Arc<Answered>>>>,
+    before: Mutex<Before>,
+}
+
+/// What was there before this run: what is put together of earlier answers must not depend on which case of a run comes first.
+#[derive(Debug, Default)]
+struct Before {
+    /// Meters of earlier answers, by question.
+    listed: BTreeMap<Key, Arc<Vec<Vec<Station>>>>,
+    /// Answers of this run.
+    new: BTreeSet<Key>,
 }
 
 /// An answer of this run, locked while it is being found.
@@ -20,17 +31,35 @@ pub(super) type Answered = Mutex<Option<Entry>>;
 
 impl Machine {
     pub fn new(threads: usize) -> Arc<Self> {
-        Arc::new(Self { slots: Slots::new(threads), answers: Some(Mutex::default()) })
+        Arc::new(Self { slots: Slots::new(threads), answers: Some(Mutex::default()), before: Mutex::default() })
     }
 
     /// The same, where every job is rendered as often as it is asked.
     pub fn rendering_everything(threads: usize) -> Arc<Self> {
-        Arc::new(Self { slots: Slots::new(threads), answers: None })
+        Arc::new(Self { slots: Slots::new(threads), answers: None, before: Mutex::default() })
     }
 
     /// Where the answer to an equal job of this run is, or will be.
     pub(super) fn answered(&self, key: &Key) -> Option<Arc<Answered>> {
         let mut all = self.answers.as_ref()?.lock();
         Some(Arc::clone(all.entry(key.clone()).or_default()))
+    }
+    /// The meters of each answer to a question that was there before this run asked for the first; none where equal jobs are rendered
+    /// as often as they are asked.
+    pub(super) fn listed(&self, cache: &Cache, question: &Key) -> Arc<Vec<Vec<Station>>> {
+        if self.answers.is_none() {
+            return Arc::default();
+        }
+        let mut before = self.before.lock();
+        let listed = before.listed.entry(question.clone());
+        Arc::clone(listed.or_insert_with(|| Arc::new(cache.listed(question))))
+    }
+
+    pub(super) fn note_new(&self, key: &Key) {
+        self.before.lock().new.insert(key.clone());
+    }
+
+    pub(super) fn is_new(&self, key: &Key) -> bool {
+        self.before.lock().new.contains(key)
     }
 }

@@ -3,6 +3,7 @@
 mod answer;
 mod asking;
 pub mod cache;
+mod joining;
 mod machine;
 mod outcome;
 mod question;

@@ -16,6 +16,15 @@ pub struct Cost {
     pub peak_mib: Option<f64>,
 }
 
+impl Cost {
+    /// That of both, one after the other.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        let peak_mib = [self.peak_mib, other.peak_mib].into_iter().flatten().reduce(f64::max);
+        Self { wall_s: self.wall_s + other.wall_s, cpu_s: self.cpu_s + other.cpu_s, peak_mib }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Taken {
     pub measurement: Measurement,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::cache::{Entry, Key, key};
+use super::cache::{Entry, Key, key, key_without_meters};
 use crate::engines::{Engine, EngineError, Job, Version};
 use crate::laws::Place;
 use crate::record::FailureKind;
@@ -26,6 +26,8 @@ pub struct Question<'a> {
     /// Past this it is killed.
     pub limit: Duration,
     pub trial: Option<&'a Trial<'a>>,
+    /// Whether what is kept of some of its meters may be a part of the answer.
+    pub may_join: bool,
 }
 
 /// What makes a reading one of an experiment: its time and its failure are results too.
@@ -45,7 +47,7 @@ impl<'a> Question<'a> {
         let beyond = if instrument.engine.is_vouched_for() { 10.0 } else { 2.0 };
         let limit_s = beyond * job.budget.seconds + instrument.engine.start_s();
         let limit = Duration::from_secs_f64(limit_s.clamp(0.0, 1e9));
-        Self { instrument, job, folder, patience: job.budget.patience(), limit, trial: None }
+        Self { instrument, job, folder, patience: job.budget.patience(), limit, trial: None, may_join: false }
     }
 
     /// Of a trial, time and failure depend on threads and limit as well.
@@ -53,6 +55,13 @@ impl<'a> Question<'a> {
         let key = key(self.instrument.engine.as_ref(), &self.instrument.version, self.job)?;
         let Some(trial) = self.trial else { return Ok(key) };
         Ok(key.under(&format!("{} threads, {:?}, {}", trial.threads, self.limit, trial.repetition)))
+    }
+
+    /// What names it whatever its meters, where answers for some of these may be parts of an answer.
+    pub(super) fn key_without_meters(&self) -> Option<Key> {
+        let engine = self.instrument.engine.as_ref();
+        let may_join = self.may_join && self.trial.is_none() && engine.reads_meters_apart();
+        may_join.then(|| key_without_meters(engine, &self.instrument.version, self.job).ok()).flatten()
     }
 
     /// What answers the key as well another time. A failure is tried again, but that of a trial is what it found.

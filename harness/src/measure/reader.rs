@@ -71,15 +71,25 @@ impl Reader {
         let found = known.or(found).or_else(|| self.find(key));
         let is_open = found.is_none() && !self.asking.admits(key);
         self.note(key, question, !is_open);
-        let (entry, source) = match found {
+        let (entry, source, is_new) = match found {
             Some(entry) => {
                 self.lay_out(question, &entry)?;
-                (entry, Source::Cache)
+                (entry, Source::Cache, false)
             }
             None if is_open => return Err(Failure::new(FailureKind::Unread, "nobody has read it yet")),
-            None => (self.ask(question)?, Source::Engine),
+            None => {
+                // What others plan or take by its key is theirs to read.
+                let unlisted = question.key_without_meters().filter(|_| !self.asking.is_shared());
+                match unlisted.and_then(|unlisted| self.joined(question, key, &unlisted)) {
+                    Some((entry, source)) => {
+                        self.lay_out(question, &entry)?;
+                        (entry, source, true)
+                    }
+                    None => (self.ask(question)?, Source::Engine, true),
+                }
+            }
         };
-        self.settle(key, question, entry, source, answered.as_deref_mut())
+        self.settle(key, question, entry, (source, is_new), answered.as_deref_mut())
     }
 
     /// For whoever plans what others read.
@@ -95,16 +105,16 @@ impl Reader {
         key: &Key,
         question: &Question<'_>,
         entry: Entry,
-        source: Source,
+        (source, is_new): (Source, bool),
         answered: Option<&mut Option<Entry>>,
     ) -> Result<Taken, Failure> {
-        let is_new = source == Source::Engine;
         if is_new && process::is_interrupted() {
             // What nobody waited for is what was known by then, and no answer for another time.
             self.note(key, question, false);
         } else if question.is_final(&entry) {
             if is_new {
                 self.keep(key, &entry);
+                self.list(key, question, &entry);
             }
             if let Some(answered) = answered {
                 *answered = Some(entry.clone());
@@ -147,7 +157,7 @@ impl Reader {
                     self.note(&key, question, true);
                     let answered = self.machine.answered(&key);
                     let mut answered = answered.as_ref().map(|a| a.lock());
-                    self.settle(&key, question, entry?, Source::Engine, answered.as_deref_mut())
+                    self.settle(&key, question, entry?, (Source::Engine, true), answered.as_deref_mut())
                 }
             }
         };
@@ -248,7 +258,7 @@ impl Reader {
         self.look_up(key).or_else(failed)
     }
 
-    fn look_up(&self, key: &Key) -> Option<Entry> {
+    pub(super) fn look_up(&self, key: &Key) -> Option<Entry> {
         match self.cache.as_ref()?.find(key) {
             Lookup::Found(entry) => Some(*entry),
             Lookup::Unknown => None,
@@ -267,6 +277,16 @@ impl Reader {
         {
             let (engine, path, remedy) = (&entry.key.engine, cache.path(key), remedy(&error));
             tracing::warn!("{engine}: a reading could not be kept in {}: {error}{remedy}", path.display());
+        }
+    }
+
+    /// Lists what was kept, so that it can be a part of another answer.
+    fn list(&self, key: &Key, question: &Question<'_>, entry: &Entry) {
+        let Some(cache) = self.cache.as_ref().filter(|_| entry.answer.is_ok()) else { return };
+        let Some(unlisted) = question.key_without_meters() else { return };
+        self.machine.note_new(key);
+        if let Err(error) = cache.list(&unlisted, &question.job.stations) {
+            tracing::debug!(%error, "what is kept is not listed, and no part of other answers");
         }
     }
 

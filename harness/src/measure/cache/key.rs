@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::engines::{Engine, EngineError, ExternalJob, Job, Version};
+use crate::engines::{Engine, EngineError, ExternalJob, Job, SceneFile, Version};
 use crate::system::digest::hexadecimal;
 
 /// As text it is `engine/digits`.
@@ -81,8 +81,23 @@ impl FromStr for Key {
 /// the job; and this program's read-out. The names of case and procedure do not (see [`Engine::cache_identity`]): equal jobs of
 /// different cases share an entry. Nor does the number of threads: a reading is as good on any number.
 pub fn key(engine: &dyn Engine, version: &Version, job: &Job) -> Result<Key, EngineError> {
-    let id = engine.name();
     let job = engine.cache_identity(job);
+    let files = engine.export(&job)?;
+    hashed(engine, version, &job, &files)
+}
+
+/// What names a job whatever meters it has: less than all that its readings depend on, so that nothing may be kept under it but where to look.
+pub(in crate::measure) fn key_without_meters(
+    engine: &dyn Engine,
+    version: &Version,
+    job: &Job,
+) -> Result<Key, EngineError> {
+    let job = Job { stations: vec![], ..engine.cache_identity(job) };
+    Ok(hashed(engine, version, &job, &[])?.under("any meters"))
+}
+
+fn hashed(engine: &dyn Engine, version: &Version, job: &Job, files: &[SceneFile]) -> Result<Key, EngineError> {
+    let id = engine.name();
     let unwritable = |e: serde_json::Error| EngineError::Solver { engine: id.clone(), what: format!("its job: {e}") };
     let mut hash = Sha256::new();
     let mut part = |bytes: &[u8]| {
@@ -94,12 +109,12 @@ pub fn key(engine: &dyn Engine, version: &Version, job: &Job) -> Result<Key, Eng
     part(id.as_str().as_bytes());
     part(version.text.as_bytes());
     part(version.fingerprint.as_bytes());
-    part(&ExternalJob::of(&job).to_json().map_err(unwritable)?);
+    part(&ExternalJob::of(job).to_json().map_err(unwritable)?);
     part(&serde_json::to_vec(&job.settings).map_err(unwritable)?);
     for luminaire in job.scene.luminaires.iter().filter(|l| l.photometry.distribution.is_native()) {
         part(format!("{}: type {:?}", luminaire.id, luminaire.photometry.distribution.goniometer()).as_bytes());
     }
-    for file in engine.export(&job)? {
+    for file in files {
         part(file.name.as_bytes());
         part(&file.bytes);
     }

@@ -5,6 +5,7 @@
 
 mod entry;
 mod key;
+mod listed;
 mod upkeep;
 
 #[cfg(test)]
@@ -16,7 +17,9 @@ use super::outcome::{Cost, Failure};
 use crate::system::files;
 
 pub use entry::Entry;
+pub(super) use key::key_without_meters;
 pub use key::{Key, key};
+pub(super) use listed::bits;
 pub use upkeep::{Contents, Pruned};
 
 #[derive(Clone, Debug)]

@@ -94,6 +94,40 @@ fn pruning_takes_damaged_and_unused_entries_and_leaves_a_live_writers_file() {
     assert_eq!((pruned.unused, pruned.damaged, pruned.unfinished), (0, 1, 1));
     assert_eq!(cache.find(&a_key('a')), Lookup::Found(Box::new(sample())));
     assert!(folder.path().join(live).exists());
+    // A list of meters is neither an entry nor damaged, and goes like an entry.
+    cache.list(&a_key('c'), &[]).unwrap();
+    assert!(cache.contents().unwrap().damaged.is_empty() && cache.listed(&a_key('c')) == [vec![]]);
+    assert_eq!(cache.prune(Duration::from_secs(86_400)).unwrap(), Pruned::default());
     assert_eq!(cache.prune(Duration::ZERO).unwrap().unused, 1);
+    assert!(cache.listed(&a_key('c')).is_empty());
     assert_eq!(cache.find(&a_key('a')), Lookup::Unknown);
+}
+
+#[test]
+fn lists_of_meters_are_bounded_and_the_latest_is_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = Cache::at(folder.path());
+    let job = crate::engines::fixtures::s1(luminaire::scene::Transport::Direct);
+    let some = |n: usize| -> Vec<_> {
+        let station = |k: usize| {
+            let mut station = job.stations[k].clone();
+            station.meter.position_m.x += n as f64;
+            station
+        };
+        (0..2).map(station).collect()
+    };
+    for n in 0..20 {
+        cache.list(&a_key('a'), &some(n)).unwrap();
+    }
+    let listed = cache.listed(&a_key('a'));
+    assert_eq!(listed, (12..20).rev().map(some).collect::<Vec<_>>());
+    // What is all among others tells nothing more.
+    cache.list(&a_key('a'), &[some(18), some(19), some(17)].concat()).unwrap();
+    assert_eq!(cache.listed(&a_key('a')).len(), 6);
+    // Of many meters the latest alone, of more than anybody looks through nothing.
+    let many = |count: usize| vec![job.stations[0].clone(); count];
+    cache.list(&a_key('a'), &many(50_001)).unwrap();
+    assert_eq!(cache.listed(&a_key('a')).len(), 6);
+    cache.list(&a_key('a'), &many(49_999)).unwrap();
+    assert_eq!(cache.listed(&a_key('a')), [many(49_999)]);
 }

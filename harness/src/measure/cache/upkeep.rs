@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use super::{Cache, entry};
+use super::{Cache, entry, listed};
 use crate::system::files::{MAX_BYTES, UNFINISHED, read_bounded};
 
 /// A file that was begun longer ago than this has no writer any more.
@@ -31,6 +31,8 @@ pub struct Pruned {
 
 enum Kind {
     Entry,
+    /// A list of what entries hold, which goes when nobody asked for it as long.
+    List,
     Damaged(String),
     Unfinished,
 }
@@ -49,6 +51,7 @@ impl Cache {
                 }
                 Kind::Damaged(why) => contents.damaged.push(format!("{} {why}", file.display())),
                 Kind::Unfinished => contents.unfinished += 1,
+                Kind::List => {}
             }
         }
         Ok(contents)
@@ -60,11 +63,13 @@ impl Cache {
         for file in self.files()? {
             let Ok(metadata) = file.metadata() else { continue };
             let idle = metadata.modified().ok().and_then(|then| now.duration_since(then).ok()).unwrap_or_default();
-            let count = match kind(&file) {
+            let (mut lists, kind) = (0, kind(&file));
+            let count = match kind {
                 Kind::Entry if idle >= unused_for => &mut pruned.unused,
+                Kind::List if idle >= unused_for => &mut lists,
                 Kind::Damaged(_) => &mut pruned.damaged,
                 Kind::Unfinished if idle >= WRITERS_LIVE => &mut pruned.unfinished,
-                Kind::Entry | Kind::Unfinished => continue,
+                Kind::Entry | Kind::List | Kind::Unfinished => continue,
             };
             match std::fs::remove_file(&file) {
                 Ok(()) => {
@@ -102,6 +107,9 @@ fn kind(file: &Path) -> Kind {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     if name.starts_with(UNFINISHED) {
         return Kind::Unfinished;
+    }
+    if file.extension().is_some_and(|extension| extension == listed::EXTENSION) {
+        return Kind::List;
     }
     let key = name.trim_end_matches(".json");
     let checked = read_bounded(file, MAX_BYTES).map_err(|e| format!("cannot be read: {e}"));
