@@ -71,6 +71,24 @@ impl Prepared {
         !scene.obstacles.is_empty() || scene.luminaires.iter().any(|l| l.model != LuminaireModel::Point)
     }
 
+    /// What takes long of a scene and depends neither on meters nor on how often light is reflected, as numbers; nothing where that is little,
+    /// not known yet or not known as well as asked.
+    pub fn groundwork(&self) -> Option<Vec<f64>> {
+        match &self.solver {
+            Solver::Enclosed(enclosure, _) => enclosure.groundwork(),
+            Solver::Empty(_) => None,
+        }
+    }
+
+    /// Takes the numbers that [`Self::groundwork`] gave of the same scene and relative error, and is as good as if it had found them itself.
+    /// Numbers that cannot be those are left alone.
+    pub fn lay(&mut self, groundwork: &[f64]) -> bool {
+        match &mut self.solver {
+            Solver::Enclosed(enclosure, _) => enclosure.lay(groundwork, self.accuracy.relative_error),
+            Solver::Empty(_) => false,
+        }
+    }
+
     /// Which solver serves.
     pub fn way(&self) -> Way {
         match (&self.solver, self.transport) {

@@ -40,6 +40,7 @@ fn read(engine: &str, procedure: ProcedureId, budget: Budget, settings: &[(&str,
         patience: Duration::from_secs(300),
         limit: Duration::from_secs(300),
         peak: luxproof::system::process::PeakMemory::default(),
+        groundwork: luxproof::engines::Groundwork::default(),
     };
     (engine.read(&job, &bench).unwrap().estimates, declared)
 }

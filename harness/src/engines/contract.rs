@@ -118,6 +118,11 @@ pub trait Engine: Send + Sync {
         job.without_names()
     }
 
+    /// The job without what makes no difference to what is found of its scene before any meter is read, where that is most of the work.
+    fn groundwork(&self, _job: &Job) -> Option<Job> {
+        None
+    }
+
     /// Runs the job in `workbench` and gives one estimate a station, in the stations' order.
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError>;
 

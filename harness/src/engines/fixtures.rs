@@ -12,7 +12,9 @@ use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, Phot
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport, orientation};
 use luminaire::simulator::{self, Accuracy};
 
-use super::{Absent, Budget, Engine, EngineError, Job, Knob, Measurement, Site, Station, Support, Version, Workbench};
+use super::{
+    Absent, Budget, Engine, EngineError, Groundwork, Job, Knob, Measurement, Site, Station, Support, Version, Workbench,
+};
 use crate::record::{EngineName, Estimate, MeterId, ProcedureId};
 use crate::system::process::PeakMemory;
 
@@ -294,6 +296,7 @@ pub(super) fn workbench(site: Site, folder: &Path) -> Workbench {
         patience: Duration::from_secs(120),
         limit: Duration::from_secs(120),
         peak: PeakMemory::default(),
+        groundwork: Groundwork::default(),
     }
 }
 

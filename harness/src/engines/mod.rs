@@ -65,7 +65,7 @@ pub use released::{Unknown, all_built_in, built_in};
 pub use releases::{Known, releases_of};
 pub use settings::Coordinates;
 pub use site::{Site, SiteError};
-pub use workbench::{EngineError, Rest, SceneFile, Workbench};
+pub use workbench::{EngineError, Groundwork, Rest, SceneFile, Workbench};
 
 /// The engine that everybody has by this name, or else a program of the user's.
 pub fn named(

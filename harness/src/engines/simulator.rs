@@ -1,12 +1,15 @@
 //! The engine `simulator`: our own exact solutions, read like any renderer.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
-use luminaire::scene::LuminaireModel;
+use luminaire::scene::{Bounces, LuminaireModel, Transport};
 use luminaire::simulator::{self, Accuracy, Prepared, Stop, Way};
 
 use super::settings::Given;
-use super::{Absent, Engine, EngineError, Entry, Job, Knob, Measurement, Site, Support, Version, Workbench, checked};
+use super::{
+    Absent, Budget, Engine, EngineError, Entry, Job, Knob, Measurement, Site, Support, Version, Workbench, checked,
+};
 use crate::record::{EngineName, Estimate, Role};
 use crate::system::process;
 
@@ -113,6 +116,14 @@ impl Engine for Simulator {
         job
     }
 
+    /// Light straight from luminaires on what reflects: the same however often it is reflected, and whatever chance does after it.
+    fn groundwork(&self, job: &Job) -> Option<Job> {
+        let reflects = job.reflections().is_some() && Prepared::is_sampled(&job.scene);
+        let budget = Budget { relative_error: relative_error(job).ok()?, seconds: 0.0 };
+        let (transport, settings) = (Transport::Indirect(Bounces::Converged), BTreeMap::new());
+        reflects.then(|| Job { stations: vec![], seed: 0, transport, settings, budget, ..job.clone() })
+    }
+
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
         let relative_error = relative_error(job)?;
         let meters: Vec<_> = job.stations.iter().map(|s| s.meter).collect();
@@ -127,7 +138,15 @@ impl Engine for Simulator {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(workbench.jobs.max(1)).build();
         let solution = threads
             .map_err(|e| failed(e.to_string()))?
-            .install(|| Prepared::new(&job.scene, job.transport, &accuracy)?.illuminance_until(&meters, &stop))
+            .install(|| {
+                let mut prepared = Prepared::new(&job.scene, job.transport, &accuracy)?;
+                if let Some(earlier) = &workbench.groundwork.earlier {
+                    prepared.lay(earlier);
+                }
+                let solution = prepared.illuminance_until(&meters, &stop);
+                *workbench.groundwork.laid.lock() = prepared.groundwork();
+                solution
+            })
             .map_err(|e| failed(e.to_string()))?;
         let method = [("solver", solution.solver)].into();
         let effort = [("relative_error", relative_error.to_string()), ("seed", job.seed.to_string())].into();

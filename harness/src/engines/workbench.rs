@@ -1,7 +1,10 @@
 //! Where an engine works: folders, logs and limits of a job; what its files are and why they may give no reading.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+use parking_lot::Mutex;
 
 use super::Site;
 use crate::record::{Effort, EngineName, Estimate, MeterId, Method, Uncertainty};
@@ -43,6 +46,14 @@ pub struct Workbench {
     /// Past this the job is killed.
     pub limit: Duration,
     pub peak: PeakMemory,
+    pub groundwork: Groundwork,
+}
+
+/// What an engine finds of a scene before it reads any meter, in numbers that it alone understands: of an earlier job, and of this one.
+#[derive(Clone, Debug, Default)]
+pub struct Groundwork {
+    pub earlier: Option<Arc<Vec<f64>>>,
+    pub laid: Arc<Mutex<Option<Vec<f64>>>>,
 }
 
 impl Workbench {

@@ -106,14 +106,17 @@ fn seed_of(asked: u64, stations: &[Station]) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+    use std::path::Path;
     use std::sync::Arc;
 
-    use luminaire::scene::Transport;
+    use luminaire::photometry::LuminousOpening;
+    use luminaire::scene::{Bounces, Transport};
     use parking_lot::Mutex;
 
     use super::*;
-    use crate::engines::fixtures::{Fake, s1};
-    use crate::engines::{EngineError, Site, Version};
+    use crate::engines::fixtures::{Fake, s1, with_opening};
+    use crate::engines::{Budget, EngineError, Site, Version};
     use crate::measure::cache::Cache;
     use crate::measure::{Instrument, Machine, Taken};
     use crate::record::{Estimate, MeterId, Uncertainty};
@@ -306,5 +309,50 @@ mod tests {
         let (taken, asked) = lab.read(&of(&[0, 1, 2]));
         assert!(asked.len() == 1 && asked[0].1 == "m[2]", "{asked:?}");
         assert_eq!(values(&taken)[..2], [1.0, 1.0]);
+    }
+
+    #[test]
+    fn what_is_found_of_a_scene_is_found_once_and_changes_no_reading() {
+        let panel = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+        let whole = s1(crate::engines::fixtures::CONVERGED);
+        let mut whole = Job { budget: Budget { relative_error: 0.02, ..whole.budget }, ..whole };
+        whole.scene.luminaires = vec![with_opening(whole.scene.luminaires[0].clone(), panel)];
+        let at = |k: usize| Job { stations: vec![whole.stations[k].clone()], ..whole.clone() };
+        let engine = Arc::from(crate::engines::named("simulator", &BTreeMap::new(), Path::new(".")).unwrap());
+        let lab = Lab { instrument: Instrument { engine, version: Version::own() }, ..Lab::new(true, |_| true) };
+        let files = || {
+            let all = lab.folder.path().join("cache/simulator").read_dir().unwrap().map(|f| f.unwrap().path());
+            all.filter(|f| f.extension().is_some_and(|e| e == "groundwork")).collect::<Vec<_>>()
+        };
+        let read = |job: &Job| lab.reader().read(&lab.question(job)).unwrap().measurement.estimates;
+        let bare = Reader { cache: None, ..lab.reader() };
+        let anew = |job: &Job| bare.read(&lab.question(job)).unwrap().measurement.estimates;
+        read(&at(0));
+        let seven = Job { transport: Transport::Indirect(Bounces::AtMost(7)), seed: 9, ..at(1) };
+        assert_eq!(read(&seven), anew(&seven));
+        // One of both jobs, which is what is read with: were it other light, it would read otherwise.
+        let [file] = &files()[..] else { panic!("{:?}", files()) };
+        let key = lab.question(&at(0)).key_of_groundwork().unwrap();
+        let cache = lab.reader().cache.unwrap();
+        let numbers = cache.groundwork(&key).unwrap();
+        cache
+            .keep_groundwork(
+                &key,
+                &numbers.iter().map(|n| if *n > 3.0 && n.fract() != 0.0 { 1.01 * n } else { *n }).collect::<Vec<_>>(),
+            )
+            .unwrap();
+        assert_ne!(read(&at(2)), anew(&at(2)));
+        // What is damaged is found anew, and so is that of another error or another scene.
+        std::fs::write(file, &std::fs::read(file).unwrap()[..5000]).unwrap();
+        assert_eq!(read(&at(3)), anew(&at(3)));
+        assert_eq!(cache.groundwork(&key), Some(numbers));
+        let mut finer = at(0);
+        finer.budget.relative_error = 0.018;
+        let mut darker = at(0);
+        darker.scene.luminaires[0].flux_scale = 0.5;
+        for other in [finer, darker] {
+            assert_ne!(lab.question(&other).key_of_groundwork().unwrap(), key);
+        }
+        assert_eq!(lab.question(&Job { transport: Transport::Direct, ..at(0) }).key_of_groundwork(), None);
     }
 }

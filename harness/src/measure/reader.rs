@@ -11,7 +11,7 @@ use super::machine::Machine;
 use super::outcome::{Cost, Failure, Source, Taken};
 use super::question::Question;
 use super::subprocess::{self, Isolation, Request};
-use crate::engines::{Engine, EngineError, Job, Measurement, Site, Support, Workbench, checked, share};
+use crate::engines::{Engine, EngineError, Groundwork, Job, Measurement, Site, Support, Workbench, checked, share};
 use crate::record::{EngineName, FailureKind, ReadingKey};
 use crate::system::files::{ignore_absence, remedy};
 use crate::system::process::{self, PeakMemory, ProcessError};
@@ -232,6 +232,8 @@ impl Reader {
             None => share(engine, job, slots),
         });
         place.bench.jobs = held.threads();
+        let kept = self.cache.as_ref().and_then(|cache| Some((cache, question.key_of_groundwork()?)));
+        place.bench.groundwork.earlier = kept.as_ref().and_then(|(cache, key)| cache.groundwork(key)).map(Arc::new);
         // Its seconds count from when it has what it needs.
         let clock = Instant::now();
         let answer = match (&self.isolation, trial) {
@@ -240,6 +242,11 @@ impl Reader {
             }
             _ => in_process(engine, job, &place.bench),
         };
+        if let (Some((cache, key)), Some(laid)) = (&kept, place.bench.groundwork.laid.lock().take())
+            && let Err(error) = cache.keep_groundwork(key, &laid)
+        {
+            tracing::debug!(%error, "what was found of the scene is not kept, and found again");
+        }
         let (answer, cost) = match answer {
             Ok((measurement, cost)) => (Ok(measurement), cost),
             Err(failure) => (
@@ -339,6 +346,7 @@ impl Reader {
             patience: question.patience,
             limit: question.limit,
             peak: PeakMemory::default(),
+            groundwork: Groundwork::default(),
         };
         Ok(WorkPlace { bench, _temporary: temporary })
     }

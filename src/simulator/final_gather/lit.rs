@@ -2,6 +2,8 @@
 //! it. What boxes hide is cut out of luminaires of some extent; luminaires without any have polynomials of their own, as if
 //! nothing hid them, and their shadows are cut out of what is seen. Those that cannot be cut are asked at every place anew.
 
+mod numbers;
+
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
@@ -224,12 +226,7 @@ impl Lit {
         let mean: f64 = mean_lux(lights, relative_error);
         let surroundings = lights.surroundings;
         let occluders = cut_out(lights);
-        let casts = |face: &Face| -> Vec<Option<Cast>> {
-            let solid = occluders.as_deref().unwrap_or_default();
-            let cast = |emitter: &Emitter| emitter.is_point().then(|| Cast::new(emitter.centre_m(), face, solid))?;
-            lights.emitters.iter().filter(|_| occluders.is_some()).map(cast).collect()
-        };
-        let casts: Vec<Vec<Option<Cast>>> = surroundings.faces.iter().map(casts).collect();
+        let casts = casts(lights, occluders.as_deref());
         let finer = Gauss::new(FINER);
         let one = |(face, casts): (&Face, &Vec<Option<Cast>>)| {
             let floor_lux = DIM * mean;
@@ -254,15 +251,21 @@ impl Lit {
                 let first = build.leaf(corner_m, size_m);
                 parts.push(Part { corner_m, size_m, kind: Kind::Quartered(0, corner_m), joined: None });
                 build.grow(&mut parts, 0, first, 0);
-                if occluders.is_some() {
-                    join(&bicubic, &mut parts);
-                }
             }
             parts
         };
+        let faces: Vec<Vec<Part>> = surroundings.faces.par_iter().zip(&casts).map(one).collect();
+        Self::of_parts(lights, occluders.is_some(), casts, faces)
+    }
+
+    /// What follows from the rectangles of all faces.
+    fn of_parts(lights: &Lights, cuts: bool, casts: Vec<Vec<Option<Cast>>>, mut faces: Vec<Vec<Part>>) -> Self {
+        let bicubic = Bicubic::new();
+        if cuts {
+            faces.par_iter_mut().for_each(|parts| join(&bicubic, parts));
+        }
         let all = &lights.surroundings.faces;
-        let faces: Vec<Vec<Part>> = all.par_iter().zip(&casts).map(one).collect();
-        let (mut bright, mut reflected_lm, mut peak, mut is_whole) = (vec![], 0.0, 0.0_f64, occluders.is_some());
+        let (mut bright, mut reflected_lm, mut peak, mut is_whole) = (vec![], 0.0, 0.0_f64, cuts);
         for (face, parts) in faces.iter().enumerate() {
             for part in parts {
                 let Kind::Leaf(leaf) = &part.kind else { continue };
@@ -412,6 +415,16 @@ impl Lit {
             }
         }
     }
+}
+
+/// Shadows of luminaires without extent on each face, where bodies are cut out.
+fn casts(lights: &Lights, occluders: Option<&[Occluder]>) -> Vec<Vec<Option<Cast>>> {
+    let of = |face: &Face| {
+        let Some(solid) = occluders else { return vec![] };
+        let cast = |emitter: &Emitter| emitter.is_point().then(|| Cast::new(emitter.centre_m(), face, solid))?;
+        lights.emitters.iter().map(cast).collect()
+    };
+    lights.surroundings.faces.iter().map(of).collect()
 }
 
 /// The bodies that are cut out of luminaires, perhaps none; nothing where that cannot be or takes too long, so that luminaires must be asked.

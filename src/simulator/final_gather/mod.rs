@@ -83,6 +83,8 @@ pub(super) struct Enclosure {
     occluders: Option<Vec<Occluder>>,
     emitters: Vec<Emitter>,
     lit: Option<(f64, Lit)>,
+    /// Whether light on the faces was found here, and nothing stopped it.
+    found_light: bool,
     solved: Option<Solved>,
     /// Of how many reflections, how well, and how often rectangles were made smaller for it.
     balance: Option<(Bounces, f64, Balance)>,
@@ -143,12 +145,25 @@ impl Enclosure {
         let emitters = scene.luminaires.iter().map(Emitter::new).filter(Emitter::shines).collect();
         let solid = surroundings.bodies().map(|[min_m, max_m]| Occluder { min_m: *min_m, max_m: *max_m });
         let occluders = surroundings.cuts_exactly.then(|| solid.collect());
-        Ok(Self { surroundings, occluders, emitters, lit: None, solved: None, balance: None })
+        Ok(Self { surroundings, occluders, emitters, lit: None, found_light: false, solved: None, balance: None })
     }
 
     /// Whether reflected light is solved for without chance, before rays read what that leaves open.
     pub(super) fn is_balanced(&self) -> bool {
         lit::cut_out(&Lights { surroundings: &self.surroundings, emitters: &self.emitters }).is_some()
+    }
+
+    /// Light on the faces as numbers, where it was found here as well as asked.
+    pub(super) fn groundwork(&self) -> Option<Vec<f64>> {
+        self.lit.as_ref().filter(|_| self.found_light).map(|(_, lit)| lit.numbers())
+    }
+
+    /// Takes light on the faces that was found before; whether it can be that of this scene.
+    pub(super) fn lay(&mut self, numbers: &[f64], relative_error: f64) -> bool {
+        let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
+        let lit = Lit::of_numbers(&lights, numbers);
+        self.lit = lit.map(|lit| (relative_error, lit));
+        self.lit.is_some()
     }
 
     /// Direct illuminance at the meters, each within a bound, as far as it comes before it is stopped.
@@ -259,6 +274,7 @@ impl Enclosure {
         let error = accuracy.relative_error;
         if self.lit.as_ref().is_none_or(|(known, _)| *known > error) {
             self.lit = Some((error, Lit::new(&lights, LIT * error, stop)));
+            self.found_light = !stop.is_due();
             self.solved = None;
             self.balance = None;
         }

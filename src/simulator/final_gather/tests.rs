@@ -17,7 +17,7 @@ use crate::simulator::once_reflected::OnceReflected;
 use crate::simulator::path_tracing::test_scenes::{S2_VALUES, luminaire, s1, s1_meters, s2, s2_meters, up};
 use crate::simulator::sampler::{mix, unit};
 use crate::simulator::stop::Stop;
-use crate::simulator::{Accuracy, Bounded, Uncertainty, certified, illuminance};
+use crate::simulator::{Accuracy, Bounded, Prepared, Uncertainty, certified, illuminance};
 
 fn bound(uncertainty: Uncertainty) -> f64 {
     match uncertainty {
@@ -353,4 +353,52 @@ fn what_polynomials_leave_out_of_kinks_has_a_mean_that_is_told() {
         }
     }
     assert!(told > all / 4, "what is told is fifty times too much at {} of {all}", all - told);
+}
+
+/// A panel, two points and two boxes, one of which stands on the floor: leaves of every kind.
+fn furnished() -> Scene {
+    let reflectance = Reflectances::with_equal_walls(0.2, 0.5, 0.7);
+    let panel = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+    let table = || LuminousIntensityDistribution::axial(vec![0.0, 90.0, 180.0], vec![500.0, 100.0, 300.0]).unwrap();
+    let lamp = |x: f64, opening| luminaire(table(), opening, DVec3::new(x, 2.0, 1.5));
+    let luminaires = vec![lamp(1.0, panel), lamp(2.5, LuminousOpening::Point), lamp(4.0, LuminousOpening::Point)];
+    let obstacles = vec![cuboid([1.5, 1.0, 0.0], [2.2, 2.5, 0.7], 0.4), cuboid([3.0, 1.0, 1.8], [3.6, 3.0, 2.0], 0.0)];
+    Scene { room: Some(Room { size_m: DVec3::new(5.0, 4.0, 3.0), reflectance }), obstacles, luminaires }
+}
+
+#[test]
+fn light_that_was_found_before_is_as_good_as_found_again() {
+    let scene = furnished();
+    let meters =
+        [[0.5, 0.5, 0.8], [3.3, 2.0, 0.1]].map(|at_m| Meter { position_m: DVec3::from(at_m), normal: DVec3::Z });
+    let accuracy = accuracy(2e-2);
+    let prepared = |bounces| Prepared::new(&scene, Transport::Total(bounces), &accuracy).unwrap();
+    let read = |mut prepared: Prepared| {
+        let found = prepared.illuminance(&meters).unwrap().estimates;
+        found.iter().map(|e| (e.illuminance.value(), bound(e.uncertainty))).collect::<Vec<_>>()
+    };
+    let mut first = prepared(Bounces::Converged);
+    assert_eq!(first.groundwork(), None);
+    first.illuminance(&meters).unwrap();
+    let numbers = first.groundwork().unwrap();
+    for bounces in [Bounces::Converged, Bounces::AtMost(2)] {
+        let mut laid = prepared(bounces);
+        assert!(laid.lay(&numbers) && laid.groundwork().is_none());
+        assert_eq!(read(laid), read(prepared(bounces)));
+    }
+    // What is cut, goes on or says what cannot be is refused, and nothing that is taken ends or hangs a reading.
+    let mut other = prepared(Bounces::Converged);
+    assert!(!other.lay(&[]) && !other.lay(&[&numbers[..], &[0.0]].concat()));
+    for k in 0..2000 {
+        let at = mix(k) as usize % numbers.len();
+        assert!(!other.lay(&numbers[..at]));
+        let mut wrong = numbers.clone();
+        wrong[at] = [f64::NAN, -1.0, 0.0, 1.0, 4.0, 0.5, 1e300][k as usize % 7];
+        assert!(wrong[at].is_finite() || !other.lay(&wrong), "{at}");
+        other.lay(&wrong);
+    }
+    let stopped = Stop { deadline: Some(std::time::Instant::now()), ..Stop::NEVER };
+    let mut cut = prepared(Bounces::Converged);
+    cut.illuminance_until(&meters, &stopped).ok();
+    assert_eq!(cut.groundwork(), None, "light that was cut short is not light as asked");
 }

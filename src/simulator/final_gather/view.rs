@@ -222,6 +222,10 @@ pub(super) struct Cast {
 }
 
 impl Cast {
+    pub(super) fn shadows(&self) -> usize {
+        self.shadows.len()
+    }
+
     /// Nothing where the point lies behind the face.
     pub(super) fn new(from_m: DVec3, face: &Face, occluders: &[Occluder]) -> Option<Self> {
         let stand = Stand::new(&Meter { position_m: from_m, normal: -face.normal }, face)?;

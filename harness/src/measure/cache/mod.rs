@@ -4,6 +4,7 @@
 //! of it or nothing whenever the writer is killed, and lies in an envelope, so that what was damaged since is found out and read anew. Any number of runs may share a cache: whoever comes last replaces an entry by an equally good one.
 
 mod entry;
+mod groundwork;
 mod key;
 mod listed;
 mod upkeep;

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use super::{Cache, entry, listed};
+use super::{Cache, entry, groundwork, listed};
 use crate::system::files::{MAX_BYTES, UNFINISHED, read_bounded};
 
 /// A file that was begun longer ago than this has no writer any more.
@@ -31,8 +31,8 @@ pub struct Pruned {
 
 enum Kind {
     Entry,
-    /// A list of what entries hold, which goes when nobody asked for it as long.
-    List,
+    /// What is kept beside entries, and goes when nobody asked for it as long.
+    Beside,
     Damaged(String),
     Unfinished,
 }
@@ -51,7 +51,7 @@ impl Cache {
                 }
                 Kind::Damaged(why) => contents.damaged.push(format!("{} {why}", file.display())),
                 Kind::Unfinished => contents.unfinished += 1,
-                Kind::List => {}
+                Kind::Beside => {}
             }
         }
         Ok(contents)
@@ -63,13 +63,13 @@ impl Cache {
         for file in self.files()? {
             let Ok(metadata) = file.metadata() else { continue };
             let idle = metadata.modified().ok().and_then(|then| now.duration_since(then).ok()).unwrap_or_default();
-            let (mut lists, kind) = (0, kind(&file));
+            let (mut beside, kind) = (0, kind(&file));
             let count = match kind {
                 Kind::Entry if idle >= unused_for => &mut pruned.unused,
-                Kind::List if idle >= unused_for => &mut lists,
+                Kind::Beside if idle >= unused_for => &mut beside,
                 Kind::Damaged(_) => &mut pruned.damaged,
                 Kind::Unfinished if idle >= WRITERS_LIVE => &mut pruned.unfinished,
-                Kind::Entry | Kind::List | Kind::Unfinished => continue,
+                Kind::Entry | Kind::Beside | Kind::Unfinished => continue,
             };
             match std::fs::remove_file(&file) {
                 Ok(()) => {
@@ -108,8 +108,11 @@ fn kind(file: &Path) -> Kind {
     if name.starts_with(UNFINISHED) {
         return Kind::Unfinished;
     }
-    if file.extension().is_some_and(|extension| extension == listed::EXTENSION) {
-        return Kind::List;
+    if file
+        .extension()
+        .is_some_and(|extension| [listed::EXTENSION, groundwork::EXTENSION].iter().any(|known| extension == *known))
+    {
+        return Kind::Beside;
     }
     let key = name.trim_end_matches(".json");
     let checked = read_bounded(file, MAX_BYTES).map_err(|e| format!("cannot be read: {e}"));

@@ -1,0 +1,34 @@
+//! What an engine found of a scene before it read any meter: kept beside its readings, so that another meter need not find it again.
+
+use std::time::SystemTime;
+
+use super::{Cache, Key};
+use crate::system::envelope::{self, Schema};
+use crate::system::files;
+
+const SCHEMA: Schema = Schema { of: "cache groundwork", version: 1 };
+
+/// How the names of such files end.
+pub(super) const EXTENSION: &str = "groundwork";
+
+/// Fewer numbers are found again in no time, and more take too much room.
+const NUMBERS: std::ops::Range<usize> = 10_000..1_000_000;
+
+impl Cache {
+    pub fn groundwork(&self, key: &Key) -> Option<Vec<f64>> {
+        let path = self.path(key).with_extension(EXTENSION);
+        let text = files::read_bounded(&path, files::MAX_BYTES).ok()?;
+        let numbers = envelope::open::<Vec<f64>>(SCHEMA, &text).and_then(|sealed| sealed.about(&key.digits)).ok()?;
+        // As for entries: only pruning asks.
+        std::fs::File::open(&path).and_then(|f| f.set_modified(SystemTime::now())).ok();
+        Some(numbers)
+    }
+
+    pub fn keep_groundwork(&self, key: &Key, numbers: &[f64]) -> std::io::Result<()> {
+        if !NUMBERS.contains(&numbers.len()) || !numbers.iter().all(|number| number.is_finite()) {
+            return Ok(());
+        }
+        let text = envelope::seal(SCHEMA, &key.digits, numbers)? + "\n";
+        files::replace(&self.path(key).with_extension(EXTENSION), text.as_bytes())
+    }
+}
