@@ -213,7 +213,7 @@ fn look(running: &Running<'_>, run: &Run, ask: &Ask) -> Result<Taken, String> {
     };
     let instrument = planned.instrument().ok_or("the engine is not there")?;
     let place = format!("{procedure}/look-{}", ask.look);
-    let question = Question { patience: ask.patience, ..Question::new(&instrument, &further, &place) };
+    let question = Question { patience: ask.patience, may_join: true, ..Question::new(&instrument, &further, &place) };
     running.reader.read(&question).map_err(|e| e.to_string())
 }
 

@@ -10,7 +10,8 @@ impl Measurement {
     }
 
     /// The readings of stations that lie each in one of several parts, which have seeds of their own and are independent of one another: by
-    /// part, and by place in it. Work adds up, and methods that differ are all told.
+    /// part, and by place in it. Methods that differ are all told. By what the longest part took further looks
+    /// are reckoned, so that those at meters that were read before are the ones that were taken then.
     pub fn side_by_side(parts: &[Self], stations: &[(usize, usize)]) -> Self {
         let [first, others @ ..] = parts else { return Self::default() };
         let mut all = Self { estimates: vec![], samples: samples(parts, stations), ..first.clone() };
@@ -26,7 +27,7 @@ impl Measurement {
             }
             let new: Vec<String> = part.notes.iter().filter(|note| !all.notes.contains(note)).cloned().collect();
             all.notes.extend(new);
-            all.work_s = [all.work_s, part.work_s].into_iter().flatten().reduce(|a, b| a + b);
+            all.work_s = [all.work_s, part.work_s].into_iter().flatten().reduce(f64::max);
         }
         all.estimates = stations.iter().map(|(part, k)| parts[*part].estimates[*k]).collect();
         // What met nothing may have had nobody beside it that did.
@@ -79,14 +80,14 @@ mod tests {
     const BOTH: [(usize, usize); 2] = [(0, 0), (1, 0)];
 
     #[test]
-    fn readings_stay_what_they_are_and_work_adds_up() {
+    fn readings_stay_what_they_are_and_all_that_was_done_is_told() {
         let mut random = fastrand::Rng::with_seed(1);
         let [a, mut b, c] = [16, 8, 8].map(|count| blocks(count, &mut random));
-        b.method = [("solver", "another")].into();
+        (b.method, b.work_s) = ([("solver", "another")].into(), Some(0.5));
         let ab = Measurement::side_by_side(&[a.clone(), b.clone()], &[(1, 0), (0, 0), (1, 0)]);
         assert_eq!(ab.estimates, [&b, &a, &b].map(|m| m.estimates[0]));
         assert!(ab.is_of(3) && !ab.is_of(2));
-        assert_eq!((ab.work_s, ab.method["solver"].as_str(), ab.notes.len()), (Some(2.0), "one; another", 1));
+        assert_eq!((ab.work_s, ab.method["solver"].as_str(), ab.notes.len()), (Some(1.0), "one; another", 1));
         let abc = Measurement::side_by_side(&[ab, c], &BOTH);
         let effort = ["blocks", "part2_blocks", "part3_blocks"].map(|key| abc.effort[key].as_str());
         assert_eq!((effort, abc.method["solver"].as_str()), (["16", "8", "8"], "one; another"));
