@@ -315,7 +315,7 @@ mod tests {
     fn what_is_found_of_a_scene_is_found_once_and_changes_no_reading() {
         let panel = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
         let whole = s1(crate::engines::fixtures::CONVERGED);
-        let mut whole = Job { budget: Budget { relative_error: 0.02, ..whole.budget }, ..whole };
+        let mut whole = Job { budget: Budget { relative_error: 0.05, ..whole.budget }, ..whole };
         whole.scene.luminaires = vec![with_opening(whole.scene.luminaires[0].clone(), panel)];
         let at = |k: usize| Job { stations: vec![whole.stations[k].clone()], ..whole.clone() };
         let engine = Arc::from(crate::engines::named("simulator", &BTreeMap::new(), Path::new(".")).unwrap());
@@ -347,7 +347,7 @@ mod tests {
         assert_eq!(read(&at(3)), anew(&at(3)));
         assert_eq!(cache.groundwork(&key), Some(numbers));
         let mut finer = at(0);
-        finer.budget.relative_error = 0.018;
+        finer.budget.relative_error = 0.045;
         let mut darker = at(0);
         darker.scene.luminaires[0].flux_scale = 0.5;
         for other in [finer, darker] {
