@@ -12,8 +12,14 @@ use super::EngineError;
 use crate::record::{Estimate, Uncertainty, design_effect};
 use crate::spec::Budget;
 
-/// Fewer blocks make no honest standard error.
+/// Fewer blocks make no good standard error.
 pub(super) const MIN_BLOCKS: usize = 8;
+/// So many are made whatever the clock says: fewer make none.
+const LEAST_BLOCKS: usize = 4;
+/// Of the time that is left, what a wave may take by those before it, and the first one as its engine counts: others may come to use the
+/// machine, and may use it already.
+const SHARE_OF_A_WAVE: f64 = 0.5;
+const SHARE_OF_THE_FIRST: f64 = 0.25;
 /// Blocks asked for at a time at most, in parts of those that are there: their error is itself an estimate.
 const MAX_GROWTH: usize = 3;
 
@@ -171,7 +177,7 @@ pub(super) struct Sampling<'a> {
     /// Seconds that all blocks may take, and that one takes, as its engine counts them.
     pub(super) seconds: f64,
     pub(super) block_s: f64,
-    /// Blocks that are made whatever they take.
+    /// Blocks that are made whatever they take, as their engine counts.
     pub(super) min_blocks: usize,
     /// Before there are so many, an error that is small enough is not believed.
     pub(super) enough_blocks: usize,
@@ -222,15 +228,17 @@ impl Sampling<'_> {
         }
     }
 
-    /// Half as many blocks more as there is time for by the clock, if they take as long as those before them, since others may come to use
-    /// the machine; at first as few as must be.
+    /// How many blocks more there is time for by the clock, for now.
     fn in_time(&self, have: usize, begun: Instant) -> usize {
-        if have < self.min_blocks {
-            return self.min_blocks - have;
-        }
-        let (left, spent) = (self.until.saturating_duration_since(Instant::now()), begun.elapsed());
-        // A time that is too short to be one is no rate.
-        ((have as f64 * left.as_secs_f64() / spent.as_secs_f64().max(1e-6)) as usize).div_ceil(2)
+        let left = self.until.saturating_duration_since(Instant::now()).as_secs_f64();
+        let (share, block_s) = match have {
+            0 => (SHARE_OF_THE_FIRST, self.block_s),
+            _ => (SHARE_OF_A_WAVE, begun.elapsed().as_secs_f64() / have as f64),
+        };
+        // A time that is too short to be one is no rate; one block may take all that is left.
+        let blocks = left / block_s.max(1e-6);
+        let some = if blocks < 1.0 { 0 } else { (share * blocks).ceil() as usize };
+        some.max(LEAST_BLOCKS.min(self.min_blocks).saturating_sub(have))
     }
 
     fn remark(&self, blocks: &Blocks, is_late: bool) -> Option<String> {
@@ -328,7 +336,7 @@ mod tests {
         let (late, _) = sampled(&Sampling { until: Instant::now(), ..rule }, 0.02);
         let (whole, _) = sampled(&rule, 0.02);
         assert!(late.remark.unwrap().starts_with("cut short by the clock"));
-        assert_eq!(late.blocks.0, whole.blocks.0[..MIN_BLOCKS]);
+        assert_eq!(late.blocks.0, whole.blocks.0[..LEAST_BLOCKS]);
     }
 
     #[test]
@@ -341,7 +349,23 @@ mod tests {
         };
         let found = rule.run(wave).unwrap();
         // It is counted on ten times as many; sleeping late costs blocks, not time.
-        assert!((MIN_BLOCKS..=40).contains(&found.blocks.count()), "{}", found.blocks.count());
+        assert!((LEAST_BLOCKS..=40).contains(&found.blocks.count()), "{}", found.blocks.count());
+        assert!(found.remark.unwrap().starts_with("cut short by the clock"));
+    }
+
+    #[test]
+    fn a_machine_that_is_four_times_slower_than_counted_on_costs_blocks_and_not_time() {
+        let begun = Instant::now();
+        let rule = Sampling::within(budget(1e-6, 60.0), 0.05, begun + std::time::Duration::from_millis(1000));
+        let mut waves = vec![];
+        let wave = |numbers: Range<usize>| {
+            waves.push(numbers.len());
+            std::thread::sleep(std::time::Duration::from_millis(200 * numbers.len() as u64));
+            Ok(numbers.map(|k| block(k, 0.02)).collect())
+        };
+        let found = rule.run(wave).unwrap();
+        // Eight at once would take 1.6 s.
+        assert!(waves[0] <= 5 && found.blocks.count() <= 5, "{waves:?}");
         assert!(found.remark.unwrap().starts_with("cut short by the clock"));
     }
 

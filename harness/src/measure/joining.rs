@@ -60,35 +60,27 @@ impl Reader {
         Some((entry(question, cost, measurement), source))
     }
 
-    /// Of answers that are kept those that have the most of what is still missing, one after the other; `None` where none has any.
+    /// Of answers that are kept the one that has the most meters, the latest of several; `None` where none has any. No second one: all were asked
+    /// with the same seed, and what shares random numbers is not independent.
     fn kept(&self, question: &Question<'_>, own: &Key, unlisted: &Key) -> Option<Kept> {
         let (instrument, job) = (question.instrument, question.job);
-        let listed = self.machine.listed(self.cache.as_ref()?, unlisted);
-        let places = |list: &Vec<Station>| list.iter().map(bits).zip(0..).collect::<HashMap<[u64; 6], usize>>();
-        let mut open: Vec<_> = listed.iter().map(|list| (list, places(list))).collect();
         let wanted: Vec<[u64; 6]> = job.stations.iter().map(bits).collect();
-        let mut kept = Kept { parts: vec![], places: vec![None; wanted.len()] };
-        loop {
-            let free = || wanted.iter().zip(&kept.places).filter(|(_, place)| place.is_none());
-            let has: Vec<usize> =
-                open.iter().map(|(_, has)| free().filter(|(meter, _)| has.contains_key(*meter)).count()).collect();
-            // The latest of several that have as many.
-            let Some(best) = (0..open.len()).rev().max_by_key(|n| has[*n]).filter(|n| has[*n] > 0) else { break };
-            let (list, has) = open.remove(best);
+        let places = |list: &Vec<Station>| -> Vec<Option<(usize, usize)>> {
+            let has: HashMap<[u64; 6], usize> = list.iter().map(bits).zip(0..).collect();
+            wanted.iter().map(|meter| Some((0, *has.get(meter)?))).collect()
+        };
+        let listed = self.machine.listed(self.cache.as_ref()?, unlisted);
+        let mut open: Vec<_> = listed.iter().map(|list| (list, places(list))).collect();
+        // Sorting keeps the order of those that have as many.
+        open.sort_by_key(|(_, places)| places.iter().filter(|place| place.is_none()).count());
+        open.into_iter().filter(|(_, places)| places.iter().any(Option::is_some)).find_map(|(list, places)| {
             let earlier = Job { stations: list.clone(), ..job.clone() };
-            let Ok(key) = key(instrument.engine.as_ref(), &instrument.version, &earlier) else { continue };
-            if key == *own || self.machine.is_new(&key) {
-                continue;
-            }
-            let Some(entry) = self.look_up(&key) else { continue };
-            if !entry.answer.as_ref().is_ok_and(|measurement| measurement.is_of(list.len())) {
-                continue;
-            }
-            let free = wanted.iter().zip(&mut kept.places).filter(|(_, place)| place.is_none());
-            free.for_each(|(meter, place)| *place = has.get(meter).map(|k| (kept.parts.len(), *k)));
-            kept.parts.push(entry);
-        }
-        (!kept.parts.is_empty()).then_some(kept)
+            let key = key(instrument.engine.as_ref(), &instrument.version, &earlier).ok()?;
+            let entry =
+                Some(key).filter(|key| key != own && !self.machine.is_new(key)).and_then(|key| self.look_up(&key))?;
+            let is_whole = entry.answer.as_ref().is_ok_and(|measurement| measurement.is_of(list.len()));
+            is_whole.then(|| Kept { parts: vec![entry], places })
+        })
     }
 }
 
@@ -213,12 +205,23 @@ mod tests {
         let lab = Lab::new(true, |_| true);
         lab.read(&of(&[0, 1]));
         lab.read(&of(&[1, 2]));
-        let mut job = of(&[0, 2, 0]);
+        let mut job = of(&[1, 2, 1]);
         job.case = "another".into();
         job.stations[0].id = MeterId::new("desk", 7);
         let (joined, asked) = lab.read(&job);
         assert_eq!((joined.source, asked.len(), values(&joined).len()), (Source::Cache, 0, 3));
         assert_eq!(joined.measurement.effort[READ_BEFORE], "all 3");
+    }
+
+    #[test]
+    fn what_was_asked_with_one_seed_is_not_put_side_by_side() {
+        let lab = Lab::new(true, |_| true);
+        lab.read(&of(&[0]));
+        lab.read(&of(&[1, 2]));
+        let (joined, asked) = lab.read(&of(&[0, 1, 2]));
+        let [(seed, meters)] = &asked[..] else { panic!("{asked:?}") };
+        assert!(meters == "m[0]" && *seed != 1, "{asked:?}");
+        assert_eq!(values(&joined), [*seed as f64, 1.0, 1.0]);
     }
 
     #[test]
