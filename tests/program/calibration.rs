@@ -137,12 +137,10 @@ fn a_fault_in_our_own_simulator_is_named_by_the_renderers() {
     let asked = ["--engines", "simulator,mitsuba,povray,radiance", "--format", "json"];
     let right = folder.run(&asked).exits(0).json();
     assert!(right["consensus"][0]["departs"].as_array().unwrap().is_empty(), "{}", right["consensus"]);
-    for kept in std::fs::read_dir(folder.path("cache/simulator")).unwrap() {
-        let name = format!("cache/simulator/{}", kept.unwrap().file_name().to_string_lossy());
-        // Beside answers lie lists of their meters.
-        if !name.ends_with(".json") {
-            continue;
-        }
+    let kept = std::fs::read_dir(folder.path("cache/simulator")).unwrap().map(|file| file.unwrap().path());
+    // Beside answers lie lists of their meters.
+    for kept in kept.filter(|path| path.extension().is_some_and(|e| e == "json")) {
+        let name = format!("cache/simulator/{}", kept.file_name().unwrap().to_string_lossy());
         let answer: Value = folder.json(&name)["body"]["answer"]["Ok"]["estimates"].clone();
         for estimate in answer.as_array().unwrap() {
             let value = estimate["value"].as_f64().unwrap();

@@ -356,7 +356,7 @@ mod tests {
     #[test]
     fn a_machine_that_is_four_times_slower_than_counted_on_costs_blocks_and_not_time() {
         let begun = Instant::now();
-        let rule = Sampling::within(budget(1e-6, 60.0), 0.05, begun + std::time::Duration::from_millis(1000));
+        let rule = Sampling::within(budget(1e-6, 60.0), 0.05, begun + std::time::Duration::from_secs(1));
         let mut waves = vec![];
         let wave = |numbers: Range<usize>| {
             waves.push(numbers.len());
