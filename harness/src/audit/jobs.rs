@@ -19,6 +19,9 @@ use crate::spec::{Case, content};
 use crate::system::files::{self, FileError};
 use crate::system::slots::side_by_side;
 
+/// Jobs that sleep side by side at most, beside those that compute.
+const MAX_SLEEPING: usize = 8;
+
 pub struct Running<'a> {
     pub case: &'a Case,
     pub plan: &'a Plan,
@@ -28,9 +31,6 @@ pub struct Running<'a> {
     pub reader: Reader,
     pub observer: &'a dyn Observer,
 }
-
-/// Jobs that sleep side by side at most, beside those that compute.
-const MAX_SLEEPING: usize = 8;
 
 /// What is found of what an engine states of its errors in a procedure.
 pub(super) type Found = BTreeMap<(EngineName, ProcedureId), Vec<StatedErrors>>;

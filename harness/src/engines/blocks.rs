@@ -14,7 +14,7 @@ use crate::spec::Budget;
 
 /// Fewer blocks make no good standard error.
 pub(super) const MIN_BLOCKS: usize = 8;
-/// So many are made whatever the clock says: fewer make none.
+/// So many are made whatever the clock says: fewer say next to nothing of their error.
 const LEAST_BLOCKS: usize = 4;
 /// Of the time that is left, what a wave may take by those before it, and the first one as its engine counts: others may come to use the
 /// machine, and may use it already.

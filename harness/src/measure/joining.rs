@@ -22,16 +22,16 @@ const READ_BEFORE: &str = "meters_read_before";
 
 /// What is kept of a question at some of its stations.
 struct Kept {
-    parts: Vec<Entry>,
-    /// By station of the question: which part has it, and where.
-    places: Vec<Option<(usize, usize)>>,
+    part: Entry,
+    /// Where it has each station of the question.
+    places: Vec<Option<usize>>,
 }
 
 impl Reader {
     /// The answer to a question of which others were kept before for some of its meters, and whether the engine had to be asked for the
     /// rest; `None` where nothing of it is kept, or the rest cannot be read by itself.
     pub(super) fn joined(&self, question: &Question<'_>, own: &Key, unlisted: &Key) -> Option<(Entry, Source)> {
-        let Kept { mut parts, mut places } = self.kept(question, own, unlisted)?;
+        let Kept { part, places } = self.kept(question, own, unlisted)?;
         let job = question.job;
         let missing: Vec<Station> =
             job.stations.iter().zip(&places).filter(|(_, place)| place.is_none()).map(|(s, _)| s.clone()).collect();
@@ -42,17 +42,18 @@ impl Reader {
             0 => format!("all {all}"),
             _ => format!("{} of {all}; with a seed of their own {}", all - added, names.join(", ")),
         };
+        let mut parts = vec![part];
         if added > 0 {
             let rest = Job { seed: seed_of(job.seed, &missing), stations: missing, ..job.clone() };
             let folder = format!("{}{ADDED}", question.folder);
             let asked = Question { job: &rest, folder: &folder, may_join: false, ..*question };
             // What fails by itself is asked as a whole, like anything else.
             let taken = self.read(&asked).ok()?;
-            let free = places.iter_mut().filter(|place| place.is_none());
-            free.enumerate().for_each(|(k, place)| *place = Some((parts.len(), k)));
             parts.push(entry(question, taken.cost, taken.measurement));
         }
-        let places: Vec<(usize, usize)> = places.into_iter().flatten().collect();
+        let mut new = 0..added;
+        let part_and_place = |kept: Option<usize>| kept.map(|k| (0, k)).or_else(|| Some((1, new.next()?)));
+        let places: Vec<(usize, usize)> = places.into_iter().filter_map(part_and_place).collect();
         let cost = parts.iter().map(|part| part.cost).reduce(Cost::plus)?;
         let readings: Vec<Measurement> = parts.into_iter().filter_map(|part| part.answer.ok()).collect();
         let mut measurement = Measurement::side_by_side(&readings, &places);
@@ -65,9 +66,9 @@ impl Reader {
     fn kept(&self, question: &Question<'_>, own: &Key, unlisted: &Key) -> Option<Kept> {
         let (instrument, job) = (question.instrument, question.job);
         let wanted: Vec<[u64; 6]> = job.stations.iter().map(bits).collect();
-        let places = |list: &Vec<Station>| -> Vec<Option<(usize, usize)>> {
+        let places = |list: &Vec<Station>| -> Vec<Option<usize>> {
             let has: HashMap<[u64; 6], usize> = list.iter().map(bits).zip(0..).collect();
-            wanted.iter().map(|meter| Some((0, *has.get(meter)?))).collect()
+            wanted.iter().map(|meter| has.get(meter).copied()).collect()
         };
         let listed = self.machine.listed(self.cache.as_ref()?, unlisted);
         let mut open: Vec<_> = listed.iter().map(|list| (list, places(list))).collect();
@@ -79,7 +80,7 @@ impl Reader {
             let entry =
                 Some(key).filter(|key| key != own && !self.machine.is_new(key)).and_then(|key| self.look_up(&key))?;
             let is_whole = entry.answer.as_ref().is_ok_and(|measurement| measurement.is_of(list.len()));
-            is_whole.then(|| Kept { parts: vec![entry], places })
+            is_whole.then_some(Kept { part: entry, places })
         })
     }
 }

@@ -44,6 +44,7 @@ impl Machine {
         let mut all = self.answers.as_ref()?.lock();
         Some(Arc::clone(all.entry(key.clone()).or_default()))
     }
+
     /// The meters of each answer to a question that was there before this run asked for the first; none where equal jobs are rendered
     /// as often as they are asked.
     pub(super) fn listed(&self, cache: &Cache, question: &Key) -> Arc<Vec<Vec<Station>>> {

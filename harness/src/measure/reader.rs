@@ -43,6 +43,15 @@ pub struct Reader {
 /// Of a question its key, and what the cache holds under it.
 type Keyed = Result<(Key, Option<Entry>), Failure>;
 
+/// An answer, and how it was come by.
+struct Found {
+    entry: Entry,
+    source: Source,
+    is_new: bool,
+    /// What names its question whatever the meters, where it may be a part of other answers.
+    unlisted: Option<Key>,
+}
+
 impl Reader {
     /// One that reads in this process, and keeps neither readings nor files.
     pub fn bare(site: &Site, machine: Arc<Machine>) -> Self {
@@ -71,25 +80,27 @@ impl Reader {
         let found = known.or(found).or_else(|| self.find(key));
         let is_open = found.is_none() && !self.asking.admits(key);
         self.note(key, question, !is_open);
-        let (entry, source, is_new) = match found {
+        let found = match found {
             Some(entry) => {
                 self.lay_out(question, &entry)?;
-                (entry, Source::Cache, false)
+                Found { entry, source: Source::Cache, is_new: false, unlisted: None }
             }
             None if is_open => return Err(Failure::new(FailureKind::Unread, "nobody has read it yet")),
             None => {
+                let unlisted = self.cache.as_ref().and_then(|_| question.key_without_meters());
                 // What others plan or take by its key is theirs to read.
-                let unlisted = question.key_without_meters().filter(|_| !self.asking.is_shared());
-                match unlisted.and_then(|unlisted| self.joined(question, key, &unlisted)) {
+                let unshared = unlisted.as_ref().filter(|_| !self.asking.is_shared());
+                let (entry, source) = match unshared.and_then(|unlisted| self.joined(question, key, unlisted)) {
                     Some((entry, source)) => {
                         self.lay_out(question, &entry)?;
-                        (entry, source, true)
+                        (entry, source)
                     }
-                    None => (self.ask(question)?, Source::Engine, true),
-                }
+                    None => (self.ask(question)?, Source::Engine),
+                };
+                Found { entry, source, is_new: true, unlisted }
             }
         };
-        self.settle(key, question, entry, (source, is_new), answered.as_deref_mut())
+        self.settle(key, question, found, answered.as_deref_mut())
     }
 
     /// For whoever plans what others read.
@@ -104,8 +115,7 @@ impl Reader {
         &self,
         key: &Key,
         question: &Question<'_>,
-        entry: Entry,
-        (source, is_new): (Source, bool),
+        Found { entry, source, is_new, unlisted }: Found,
         answered: Option<&mut Option<Entry>>,
     ) -> Result<Taken, Failure> {
         if is_new && process::is_interrupted() {
@@ -114,7 +124,9 @@ impl Reader {
         } else if question.is_final(&entry) {
             if is_new {
                 self.keep(key, &entry);
-                self.list(key, question, &entry);
+                if let Some(unlisted) = unlisted.filter(|_| entry.answer.is_ok()) {
+                    self.list(key, &unlisted, question);
+                }
             }
             if let Some(answered) = answered {
                 *answered = Some(entry.clone());
@@ -157,7 +169,8 @@ impl Reader {
                     self.note(&key, question, true);
                     let answered = self.machine.answered(&key);
                     let mut answered = answered.as_ref().map(|a| a.lock());
-                    self.settle(&key, question, entry?, (Source::Engine, true), answered.as_deref_mut())
+                    let found = Found { entry: entry?, source: Source::Engine, is_new: true, unlisted: None };
+                    self.settle(&key, question, found, answered.as_deref_mut())
                 }
             }
         };
@@ -288,11 +301,10 @@ impl Reader {
     }
 
     /// Lists what was kept, so that it can be a part of another answer.
-    fn list(&self, key: &Key, question: &Question<'_>, entry: &Entry) {
-        let Some(cache) = self.cache.as_ref().filter(|_| entry.answer.is_ok()) else { return };
-        let Some(unlisted) = question.key_without_meters() else { return };
+    fn list(&self, key: &Key, unlisted: &Key, question: &Question<'_>) {
+        let Some(cache) = &self.cache else { return };
         self.machine.note_new(key);
-        if let Err(error) = cache.list(&unlisted, &question.job.stations) {
+        if let Err(error) = cache.list(unlisted, &question.job.stations) {
             tracing::debug!(%error, "what is kept is not listed, and no part of other answers");
         }
     }
