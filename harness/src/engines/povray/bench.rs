@@ -1,10 +1,8 @@
 //! Runs POV-Ray: direct light in a few looks of rising magnification, reflected light in blocks until the budget is met.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-use luminaire::scene::{Bounces, Transport};
 
 use crate::engines::blocks::{MIN_BLOCKS, Sampling, counted};
 use crate::engines::image::read_rgb;
@@ -21,15 +19,20 @@ use super::direct_error::DirectError;
 use super::export::{self, Light};
 use super::frame::{self, Frame};
 use super::pixels::{self, Readout, Seen};
-use super::settings::{FIRST_REFLECTION_RAYS, LONG_POOL, POOL, Settings};
+use super::settings::{Settings, Term, pool};
 
 /// Rays a sample at least, where the budget is short.
 const MIN_RAYS: f64 = 25.0;
 /// Seconds that are counted for the test of a ray against a shape, and how many times what was measured on two cores of a usual server they are.
 const TEST_S: f64 = 1.1e-7;
 const COUNTED: f64 = 1.5;
-/// What a block takes with its runs of the first reflection, against one without.
-const FIRST_REFLECTION: f64 = 1.35;
+/// Rays a sample of the block that is looked at first, and the power of them by which work grows.
+const PILOT_RAYS: u32 = 25;
+const WORK_POWER: f64 = 1.3;
+/// What a block takes with its runs of the first two reflections, against one without.
+const WITH_FIRST_TWO: f64 = 1.7;
+/// Blocks that are made before an error is believed: the wider an interval is for want of blocks, the more it takes to decide anything.
+const PLANNED_BLOCKS: usize = 3 * MIN_BLOCKS / 2;
 /// The part of the time that the fewest blocks may take.
 const FIRST_BLOCKS: f64 = 0.9;
 /// Processes for each thread at most: one that is started alone sleeps most of .7 s, waiting for its own threads in steps of 50 ms. Of those that
@@ -38,10 +41,11 @@ const SIDE_BY_SIDE: u64 = 12;
 const LARGE_SIDE_BY_SIDE: u64 = 3;
 /// Of some 60 MiB without bodies.
 const PROCESS_MIB: u64 = 86;
-/// What a process sleeps, and what it computes before its rays, in seconds.
+/// What a process sleeps, once and for each further frame, and what it computes before its rays, in seconds.
 pub(super) const SLEEP_S: f64 = 0.6;
+const FRAME_SLEEP_S: f64 = 0.27;
 const START_S: f64 = 0.05;
-/// So many times as many processes as would compute on the mean: runs of a block are of three lengths, and the last ones of a wave run alone.
+/// So many times as many processes as would compute on the mean, since the last ones of a wave run alone.
 const SPARE: f64 = 2.0;
 /// Looks at direct light at most: each narrows a reading by 1e3 at least.
 const MAX_LOOKS: usize = 10;
@@ -54,6 +58,8 @@ pub(super) struct Bench<'a> {
     settings: &'a Settings,
     /// Point lights along each side of an opening.
     points: usize,
+    /// The terms of a block.
+    terms: Vec<Term>,
     program: PathBuf,
     /// When no more samples are begun.
     until: Instant,
@@ -84,36 +90,16 @@ struct Run {
     light: Light,
     seed: u32,
     count: u32,
-    reflections: Reflections,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Reflections {
-    All,
-    /// The first alone, which needs no cache.
-    First,
+    /// Whether it is all terms of a block, each a frame of an animation, or the scene as it is.
+    is_block: bool,
 }
 
 impl Run {
-    /// Its image's name, no other's that may be made at the same time.
-    fn image(self) -> String {
-        let Self { seed, count, reflections, .. } = self;
-        if reflections == Reflections::All {
-            format!("seed{seed}.ppm")
-        } else {
-            format!("seed{seed}-first-{count}.ppm")
-        }
-    }
-
-    fn pool(self) -> u32 {
-        if self.reflections == Reflections::First && self.count > POOL / 10 { LONG_POOL } else { POOL }
-    }
-
     fn blanks(self) -> usize {
         if self.light == Light::Direct || self.seed == 0 {
             0
         } else {
-            export::blanks(self.seed, self.pool() / self.count)
+            export::blanks(self.seed, pool(self.count) / self.count)
         }
     }
 }
@@ -125,12 +111,14 @@ impl<'a> Bench<'a> {
         settings: &'a Settings,
         points: usize,
     ) -> Result<Self, EngineError> {
-        Ok(Self { job, workbench, settings, points, program: program(&workbench.site)?, until: workbench.until() })
+        let (program, until) = (program(&workbench.site)?, workbench.until());
+        let terms = job.reflections().map_or_else(Vec::new, |bounces| settings.terms(bounces));
+        Ok(Self { job, workbench, settings, points, terms, program, until })
     }
 
     /// Direct light: deterministic, read at rising magnification until the read-out no longer matters.
     pub(super) fn direct(&self) -> Result<Measurement, EngineError> {
-        let run = Run { light: Light::Direct, seed: 0, count: self.settings.count, reflections: Reflections::All };
+        let run = Run { light: Light::Direct, seed: 0, count: self.settings.count, is_block: false };
         let first = export::first_readouts(self.job, Light::Direct);
         let mut looks: Vec<Look> = first.iter().map(|r| Look::Again(*r)).collect();
         let mut taken = 0;
@@ -141,7 +129,7 @@ impl<'a> Bench<'a> {
             }
             taken += 1;
             let readouts: Vec<Readout> = looks.iter().map(Look::readout).collect();
-            let seen = self.look(run, &readouts)?;
+            let seen = self.look(run, &readouts)?.frames.concat();
             for (k, look) in looks.iter_mut().enumerate() {
                 if let Look::Again(readout) = *look {
                     if seen[k] == Seen::Missed {
@@ -167,11 +155,12 @@ impl<'a> Bench<'a> {
 
     pub(super) fn indirect(&self) -> Result<Measurement, EngineError> {
         let count = self.settings.count;
-        let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, reflections: Reflections::All };
-        let pilot = self.pilot(run)?;
-        let (budget, mut block_s) = (counted(self.job.budget, 1.0), FIRST_REFLECTION * pilot.work_s);
-        // Time grows a little faster than rays.
-        let share = (FIRST_BLOCKS * budget.seconds / (MIN_BLOCKS as f64 * block_s)).max(1e-3).powf(0.8);
+        let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, is_block: false };
+        let few = count.min(PILOT_RAYS);
+        let mut pilot = self.pilot(Run { count: few, ..run })?;
+        pilot.work_s *= (f64::from(count) / f64::from(few)).powf(WORK_POWER);
+        let (budget, mut block_s) = (counted(self.job.budget, 1.0), WITH_FIRST_TWO * pilot.work_s);
+        let share = (FIRST_BLOCKS * budget.seconds / (MIN_BLOCKS as f64 * block_s)).max(1e-3).powf(WORK_POWER.recip());
         let mut measurement = Measurement { method: self.method(), ..Measurement::default() };
         if share < 1.0 && self.settings.preset == Preset::Audit {
             run.count = (f64::from(run.count) * share).max(MIN_RAYS) as u32;
@@ -180,17 +169,19 @@ impl<'a> Bench<'a> {
             measurement.notes.push(few);
         }
         self.keep_readouts(&pilot.readouts)?;
-        let blocks = Sampling::within(budget, block_s, self.until).run(|numbers| self.wave(run, numbers, &pilot))?;
+        let rule = Sampling { enough_blocks: PLANNED_BLOCKS, ..Sampling::within(budget, block_s, self.until) };
+        let blocks = rule.run(|numbers| self.wave(run, numbers, &pilot))?;
         let made = blocks.blocks.count();
         measurement.estimates = measurement.take(blocks);
         let mut effort = Effort::from([
-            ("arguments", self.printed_arguments(run)),
+            ("arguments", self.printed_arguments(Run { is_block: true, ..run })),
             ("blocks", made.to_string()),
             ("seeds", (1..=made).map(|block| self.seed(block).to_string()).collect::<Vec<_>>().join(" ")),
             ("count", run.count.to_string()),
         ]);
-        if self.settings.preset != Preset::Default {
-            effort.insert("count_first_reflection".into(), (FIRST_REFLECTION_RAYS * run.count).to_string());
+        if self.terms.len() > 1 {
+            let counts: Vec<String> = self.terms.iter().map(|term| (term.times * run.count).to_string()).collect();
+            effort.insert("counts_of_terms".into(), counts.join(" "));
         }
         measurement.effort = effort;
         let method = &mut measurement.method;
@@ -205,9 +196,9 @@ impl<'a> Bench<'a> {
         let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();
         for _ in 0..MAX_LOOKS {
             self.keep_readouts(&readouts)?;
-            let Rendered { seen, work_s } = self.render(run, &readouts)?;
+            let Rendered { frames, work_s } = self.render(run, &readouts)?;
             let (mut settled, mut brightest_lx) = (true, 0.0_f64);
-            for (k, seen) in seen.into_iter().enumerate() {
+            for (k, seen) in frames.into_iter().flatten().enumerate() {
                 let scale = match seen {
                     // The blue channel holds a 1.5 times larger reading yet.
                     Seen::Value { lx, .. } => {
@@ -237,41 +228,32 @@ impl<'a> Bench<'a> {
         Err(output(format!("reflected light was not read after {MAX_LOOKS} looks")))
     }
 
-    /// Blocks, each of some runs that add up; every run is a process of one thread.
+    /// Blocks, each a process of one thread.
     fn wave(&self, run: Run, numbers: Range<usize>, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
-        // The pilot is the first of the sequence of seeds.
-        let parts = |k| self.parts(Run { seed: self.seed(k + 1), ..run }).into_iter().map(move |part| (k, part));
-        let all: Vec<(usize, (f64, Run))> = numbers.clone().flat_map(parts).collect();
+        let run_s = WITH_FIRST_TWO * pilot.work_s / COUNTED;
+        let sleep_s = SLEEP_S + FRAME_SLEEP_S * (self.terms.len() - 1) as f64;
         // As many as compute while others sleep.
-        let run_s = FIRST_REFLECTION * pilot.work_s / COUNTED * numbers.len() as f64 / all.len() as f64;
-        let for_each_thread = (1.0 + SPARE * SLEEP_S / (START_S + run_s)).ceil() as usize;
+        let for_each_thread = (1.0 + SPARE * sleep_s / (START_S + run_s)).ceil() as usize;
         let side = for_each_thread.min(side_by_side_at_most(self.job)) * self.workbench.jobs.max(1);
-        let read = side_by_side(side, &all, |(_, (_, run))| self.values(*run, pilot));
-        let mut blocks = vec![vec![0.0; self.job.stations.len()]; numbers.len()];
-        for ((k, (sign, _)), values) in all.into_iter().zip(read) {
-            blocks[k - numbers.start].iter_mut().zip(values?).for_each(|(sum, lx)| *sum += sign * lx);
+        let numbers: Vec<usize> = numbers.collect();
+        // The pilot is the first of the sequence of seeds.
+        let block = |k: &usize| self.block(Run { seed: self.seed(k + 1), is_block: true, ..run }, pilot);
+        side_by_side(side, &numbers, block).into_iter().collect()
+    }
+
+    fn block(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
+        let frames = self.render(run, &pilot.readouts)?.frames;
+        let mut sum = vec![0.0; self.job.stations.len()];
+        for (term, seen) in self.terms.iter().zip(frames) {
+            for (k, (sum, seen)) in sum.iter_mut().zip(seen).enumerate() {
+                *sum += term.sign * self.value(k, seen, run)?;
+            }
         }
-        Ok(blocks)
+        Ok(sum)
     }
 
-    /// The runs of a block and their signs. The first reflection, most of the noise, is read once more with many rays and no cache, and
-    /// exchanged for the one of the same few rays: E = E(first, many rays) + E(all, few rays) - E(first, the same rays).
-    fn parts(&self, all: Run) -> Vec<(f64, Run)> {
-        if self.settings.preset == Preset::Default {
-            return vec![(1.0, all)];
-        }
-        let few = Run { reflections: Reflections::First, ..all };
-        let many = Run { count: FIRST_REFLECTION_RAYS * all.count, ..few };
-        if self.first_reflection_only() { vec![(1.0, many)] } else { vec![(1.0, many), (1.0, all), (-1.0, few)] }
-    }
-
-    fn first_reflection_only(&self) -> bool {
-        matches!(self.job.transport, Transport::Indirect(Bounces::AtMost(1)) | Transport::Total(Bounces::AtMost(1)))
-    }
-
-    fn values(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
-        let seen = self.render(run, &pilot.readouts)?.seen;
-        let value = |(k, seen): (usize, Seen)| match seen {
+    fn value(&self, k: usize, seen: Seen, run: Run) -> Result<f64, EngineError> {
+        match seen {
             Seen::Value { lx, .. } => Ok(lx),
             // None of a block's few rays met what little light there is; the spread of the blocks tells.
             Seen::Below(_) => Ok(0.0),
@@ -280,13 +262,12 @@ impl<'a> Bench<'a> {
                 let id = &self.job.stations[k].id;
                 Err(output(format!("block {} reads {id} hundreds of times off the first block", run.seed)))
             }
-        };
-        seen.into_iter().enumerate().map(value).collect()
+        }
     }
 
-    fn look(&self, run: Run, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
+    fn look(&self, run: Run, readouts: &[Readout]) -> Result<Rendered, EngineError> {
         self.keep_readouts(readouts)?;
-        Ok(self.render(run, readouts)?.seen)
+        self.render(run, readouts)
     }
 
     fn keep_readouts(&self, readouts: &[Readout]) -> Result<(), EngineError> {
@@ -295,26 +276,38 @@ impl<'a> Bench<'a> {
     }
 
     fn render(&self, run: Run, readouts: &[Readout]) -> Result<Rendered, EngineError> {
-        let image = run.image();
-        let path = self.workbench.scene_dir.join(&image);
+        let frames = if run.is_block { self.terms.len() } else { 1 };
+        // Frames get their numbers before the ending.
+        let (image, images) = match (run.seed, frames) {
+            (seed, 1) => (format!("seed{seed}.ppm"), vec![format!("seed{seed}.ppm")]),
+            (seed, _) => (format!("seed{seed}-.ppm"), (1..=frames).map(|k| format!("seed{seed}-{k}.ppm")).collect()),
+        };
         let invocation = self.workbench.invoke(&self.program).args(self.arguments(run, &image));
         let finished = hermetic(invocation, &self.workbench.site).run()?;
-        let pixels = read_rgb(&ID, &path)?;
-        std::fs::remove_file(&path).map_err(|e| EngineError::io(&path, e))?;
+        let seen = |image: &String| Self::seen(run, &self.workbench.scene_dir.join(image), readouts);
+        let frames = images.iter().map(seen).collect::<Result<_, _>>()?;
+        Ok(Rendered { frames, work_s: TEST_S * intersection_tests(&finished.stderr) })
+    }
+
+    fn seen(run: Run, image: &Path, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
+        let pixels = read_rgb(&ID, image)?;
+        std::fs::remove_file(image).map_err(|e| EngineError::io(image, e))?;
         let blanks = run.blanks();
         if pixels.len() != blanks + readouts.len() {
             let (found, wanted) = (pixels.len(), readouts.len());
             return Err(output(format!("gave {found} pixels for {wanted} meters and {blanks} blanks")));
         }
-        let seen = readouts.iter().zip(pixels.into_iter().skip(blanks)).map(|(r, p)| pixels::decode(*r, p)).collect();
-        Ok(Rendered { seen, work_s: TEST_S * intersection_tests(&finished.stderr) })
+        Ok(readouts.iter().zip(pixels.into_iter().skip(blanks)).map(|(r, p)| pixels::decode(*r, p)).collect())
     }
 
     fn arguments(&self, run: Run, image: &str) -> Vec<String> {
         let mut arguments = export::arguments(self.job, run.light, run.seed, run.blanks(), image);
         arguments.extend([format!("Declare=Count={}", run.count), "Declare=Readouts=1".to_owned()]);
-        if run.reflections == Reflections::First {
-            arguments.extend([format!("Declare=Pool={}", run.pool()), "Declare=Limit=1".to_owned()]);
+        if run.is_block {
+            arguments.push("Declare=Block=1".to_owned());
+        }
+        if run.is_block && self.terms.len() > 1 {
+            arguments.extend(["+KFI1".to_owned(), format!("+KFF{}", self.terms.len())]);
         }
         arguments
     }
@@ -361,8 +354,9 @@ struct Pilot {
 }
 
 struct Rendered {
-    seen: Vec<Seen>,
-    /// Seconds that are counted for it.
+    /// What each frame shows of the meters.
+    frames: Vec<Vec<Seen>>,
+    /// Seconds that are counted for all.
     work_s: f64,
 }
 

@@ -7,6 +7,7 @@
 use std::fmt::Write;
 
 use glam::DVec3;
+use itertools::Itertools;
 use luminaire::geometry::Surface;
 use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Shape, Transport};
@@ -19,7 +20,7 @@ use super::frame::{Frame, candela, seats};
 use super::opening::{self, FILTER_RADIUS, Part};
 use super::pigment;
 use super::pixels::Readout;
-use super::settings::{POOL, Settings};
+use super::settings::{self, MAX_BLANKS, Settings, Term};
 
 pub(super) const SCENE: &str = "scene.pov";
 
@@ -63,9 +64,6 @@ pub(super) fn blanks(seed: u32, parts: u32) -> usize {
     let spread = f64::from(seed.wrapping_mul(2_654_435_769)) / 2_f64.powi(32);
     1 + (spread * f64::from(parts.clamp(1, MAX_BLANKS))) as usize
 }
-
-/// The tube of blanks is this long at most, so that POV-Ray's least cell stays shorter than their spacing.
-const MAX_BLANKS: u32 = 200;
 
 /// What a scene's discs show where no other read-out is given to them.
 pub(super) fn first_readouts(job: &Job, part: Light) -> Vec<Readout> {
@@ -119,10 +117,10 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
     };
     let (limit, radiosity) = job.reflections().map_or(Default::default(), |bounces| {
         let limit = settings.recursion_limit(bounces);
-        let limit = format!("#ifndef (Limit) #declare Limit = {limit}; #end\n");
+        let limit = format!("#ifndef (Limit) #declare Limit = {limit}; #end\n{}", block(&settings.terms(bounces)));
         (limit, format!("  #if (Indirect) {} #end\n", settings.radiosity(bounces)))
     });
-    let (rays, brightness) = (settings.count, settings.brightness);
+    let (rays, brightness, pool) = (settings.count, settings.brightness, settings::declared_pool());
     // A ray to one of many discs at one point passes the transparent backs of half of the others.
     format!(
         "// {case}, {procedure}: illuminance at {count} meters, {what}.\n// Run: povray {arguments}\n\
@@ -135,11 +133,31 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
          #ifndef (Seed) #declare Seed = 0; #end\n#ifndef (Blanks) #declare Blanks = 0; #end\n\n\
          // Reflectances divided and lights multiplied by Brightness carry the same light, and keep the weight of rays above\n\
          // .25, below which POV-Ray would loosen error_bound by up to .25.\n\
-         // Rays a sample, the length of the pool that they come from, and reflections; Limit=1 reads the first reflection alone.\n\
-         #ifndef (Count) #declare Count = {rays}; #end\n#ifndef (Pool) #declare Pool = {POOL}; #end\n\
-         {limit}#declare Brightness = #if (Indirect) {brightness}; #else 1; #end\n\
+         // Rays a sample, reflections, and the length of the pool that rays come from; Limit=1 reads the first reflection alone.\n\
+         #ifndef (Count) #declare Count = {rays}; #end\n\
+         {limit}{pool}#declare Brightness = #if (Indirect) {brightness}; #else 1; #end\n\
          global_settings {{\n  assumed_gamma 1.0 max_trace_level 100 adc_bailout 1e-9\n{radiosity}}}\n\n{TURN}"
     )
+}
+
+/// The terms of a block: one as it is, or several as frames of an animation.
+fn block(terms: &[Term]) -> String {
+    let declared = |term: &Term| {
+        let limit = term.limit.map(|limit| format!(" #declare Limit = {limit};")).unwrap_or_default();
+        format!("#declare Count = {}*Count;{limit}", term.times)
+    };
+    let signs: String = terms.iter().map(|term| if term.sign < 0.0 { " -" } else { " +" }).collect();
+    let case = |(term, k)| format!("  #case ({k}) {} #break\n", declared(term));
+    let cases = terms.iter().zip(1..).map(case).join("");
+    match terms {
+        [Term { limit: None, .. }] | [] => String::new(),
+        [one] => format!("// With Block=1 there are the rays of a block.\n#ifdef (Block) {} #end\n", declared(one)),
+        [_, ..] => format!(
+            "// With Block=1 +KFI1 +KFF{} the frames, added with the signs{signs}, are all light, of which what is reflected once and\n\
+             // twice has more rays.\n#ifdef (Block) #switch (frame_number)\n{cases}#end #end\n",
+            terms.len()
+        ),
+    }
 }
 
 const TURN: &str = "#declare S = seed(Seed);

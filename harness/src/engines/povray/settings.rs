@@ -9,17 +9,18 @@ use crate::engines::{EngineError, Job, Knob};
 /// The deepest recursion that POV-Ray 3.7 accepts (`RadiosityFunction::DEPTH_MAX`).
 pub(super) const MAX_RECURSION: u32 = 20;
 
-/// Rays a sample of the audit preset, in full.
-const AUDIT_RAYS: f64 = 200.0;
-/// Relative standard error that the fewest blocks of so many rays about reach (.22 % in case S1).
+/// Rays a sample of the audit preset for a relative standard error, which some twelve blocks about reach (case S1). Blocks of fewer rays take as
+/// much work for their variance, and the error of many is known better.
+const AUDIT_RAYS: f64 = 70.0;
 const AUDIT_ERROR: f64 = 0.002;
-/// Rays a sample at least where less is asked for: the bias of the cache was measured with as few.
-const MIN_AUDIT_RAYS: f64 = 50.0;
+/// Rays a sample at least and at most, whatever error is asked for: the bias of the cache was measured with as few, and is no smaller with more.
+const FEWEST_RAYS: f64 = 35.0;
+const MOST_RAYS: f64 = 140.0;
 
 pub(super) const KNOBS: &[Knob] = &[
     Preset::KNOB,
-    Knob { key: "count", values: &["200", "50"] },
-    Knob { key: "error_bound", values: &["0.1", "0.5"] },
+    Knob { key: "count", values: &["70", "35"] },
+    Knob { key: "error_bound", values: &["0.05", "0.5"] },
     Knob { key: "recursion_limit", values: &["20", "4"] },
     Knob { key: "recentre", values: &["true", "false"] },
 ];
@@ -42,7 +43,7 @@ impl Settings {
         let given = Given::of(job, ID, KNOBS)?;
         let preset = given.preset()?;
         let (count, error_bound, brightness, recursion_limit) = match preset {
-            Preset::Audit => (audit_rays(job.budget.relative_error), 0.1, 8.0, MAX_RECURSION),
+            Preset::Audit => (audit_rays(job.budget.relative_error), 0.05, 8.0, MAX_RECURSION),
             Preset::Fast => (100, 0.5, 1.0, 6),
             // The numbers of POV-Ray 3.7's own `radiosity {}`, which is what is written.
             Preset::Default => (35, 1.8, 1.0, 2),
@@ -72,6 +73,25 @@ impl Settings {
         )
     }
 
+    /// The terms that a block adds up: light that is reflected n times and n - 1 times at most, read with the same rays, tells the nth reflection
+    /// apart. The first, most of the noise and next to no work, is read with many rays, the second with some, and the rest with few.
+    pub(super) fn terms(&self, bounces: Bounces) -> Vec<Term> {
+        let all = Term { sign: 1.0, times: 1, limit: None };
+        if self.preset == Preset::Default {
+            return vec![all];
+        }
+        let term = |sign, times, limit| Term { sign, times, limit: Some(limit) };
+        let mut terms = vec![term(1.0, FIRST_REFLECTION_RAYS, 1)];
+        let most = self.recursion_limit(bounces);
+        if most > 1 {
+            terms.extend([term(1.0, SECOND_REFLECTION_RAYS, 2), term(-1.0, SECOND_REFLECTION_RAYS, 1)]);
+        }
+        if most > 2 {
+            terms.extend([all, term(-1.0, 1, 2)]);
+        }
+        terms
+    }
+
     pub(super) fn recursion_limit(&self, bounces: Bounces) -> u32 {
         match bounces {
             Bounces::Converged => self.recursion_limit.clamp(1, MAX_RECURSION),
@@ -80,14 +100,39 @@ impl Settings {
     }
 }
 
-/// Length of the pool of sample directions, a prime; every level of recursion copies the pool, which takes its time.
-pub(super) const POOL: u32 = 20_011;
-/// The same for the first reflection alone, which has one level.
-pub(super) const LONG_POOL: u32 = 200_003;
-/// How many times as many rays the first reflection alone gets: at 16 its share of the spread is below a fifth.
-pub(super) const FIRST_REFLECTION_RAYS: u32 = 16;
-
-/// Rays a sample that the fewest blocks need for an error; the noise falls with their square root, and the bias with their number.
+/// Rays a sample for an error, which falls with their square root.
 fn audit_rays(relative_error: f64) -> u32 {
-    (AUDIT_RAYS * AUDIT_ERROR / relative_error).clamp(MIN_AUDIT_RAYS, AUDIT_RAYS) as u32
+    (AUDIT_RAYS * (AUDIT_ERROR / relative_error).powi(2)).clamp(FEWEST_RAYS, MOST_RAYS) as u32
+}
+
+/// The length of the pool of directions, from which samples take as many as they have rays, one part after the other, and a block begins with one
+/// of its first [`MAX_BLANKS`] parts. A pool of more parts has directions that none begins with, which was a bias of .5 % with 35 rays; one
+/// of whole parts would give samples the same directions again. Every reflection copies it, which takes its time, but where only the first two are followed.
+pub(super) fn pool(rays: u32) -> u32 {
+    let parts = MAX_BLANKS * rays + 1;
+    if rays <= MANY_RAYS { parts.min(POOL) } else { LONG_POOL }
+}
+
+/// How to say that in a scene.
+pub(super) fn declared_pool() -> String {
+    format!("#declare Pool = #if (Count > {MANY_RAYS}) {LONG_POOL}; #else min({MAX_BLANKS}*Count + 1, {POOL}); #end\n")
+}
+
+/// Blank pixels before the meters' at most, so that POV-Ray's least cell stays shorter than their spacing.
+pub(super) const MAX_BLANKS: u32 = 200;
+/// Primes.
+const POOL: u32 = 20_011;
+const LONG_POOL: u32 = 200_003;
+const MANY_RAYS: u32 = POOL / 10;
+
+/// How many times as many rays the first two reflections get: with so many, each has less of the spread than all further ones.
+const FIRST_REFLECTION_RAYS: u32 = 48;
+const SECOND_REFLECTION_RAYS: u32 = 3;
+
+/// A term of a block: what has so many times the rays of the block, and so many reflections at most where not all that are asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Term {
+    pub(super) sign: f64,
+    pub(super) times: u32,
+    pub(super) limit: Option<u32>,
 }
