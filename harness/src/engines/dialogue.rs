@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use luminaire::scene::Transport;
 
-use super::blocks::{Blocks, DIRECT_SHARE, Sampling, counted};
+use super::blocks::{Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampling, counted};
 use super::contract::same_meters;
 use super::effort;
 use super::frame::Frame;
@@ -21,10 +21,12 @@ pub(super) const BLOCKS: &str = include_str!("../../drivers/blocks.py");
 /// For a standard error that is itself good to 13 %.
 const ENOUGH_BLOCKS: usize = 32;
 /// Strata along a side at least, so that blocks are many strata and their errors near normal; at most, to check often.
-const MIN_SIDE: usize = 64;
+const MIN_SIDE: usize = 32;
 const MAX_SIDE: usize = 256;
-/// The spread of two blocks is a rough guess of the error of one.
-const PLAN_MARGIN: f64 = 2.0;
+/// Blocks of a trial, and strata along a side of each at most: their error is that of the worst meter, and too large rather than too small.
+/// Where it is too small all the same, further blocks make up for it.
+const TRIAL_BLOCKS: usize = MIN_BLOCKS;
+const TRIAL_SIDE: usize = 64;
 
 /// What a ray takes, as its engine counts.
 #[derive(Clone, Copy, Debug)]
@@ -196,13 +198,13 @@ impl Dialogue<'_> {
         budget: Budget,
     ) -> Result<(usize, Sampling<'static>), EngineError> {
         let full = (greeting.lanes / part.rays.max(1)).isqrt().clamp(2, MAX_SIDE);
-        let trial_side = (self.cost)(&greeting.variant).trial_side.unwrap_or(full);
-        let trials = self.blocks(part, trial_side, Stream::Trial, 0..2)?;
+        let trial_side = (self.cost)(&greeting.variant).trial_side.unwrap_or(TRIAL_SIDE).min(full / 2).max(2);
+        let trials = self.blocks(part, trial_side, Stream::Trial, 0..TRIAL_BLOCKS)?;
         let sample_s = self.sample_s(part, greeting);
         let affordable = ((budget.seconds / ENOUGH_BLOCKS as f64 / sample_s) as usize).isqrt();
-        // The error is that of the mean of two; m x m samples are at least as good as m x m independent ones.
+        // The error is that of their mean; m x m samples are at least as good as m x m independent ones.
         let excess = Blocks::new(trials).worst_error(&[]) / budget.relative_error;
-        let needed = trial_side as f64 * PLAN_MARGIN * excess * (2.0 / ENOUGH_BLOCKS as f64).sqrt();
+        let needed = trial_side as f64 * excess * (TRIAL_BLOCKS as f64 / ENOUGH_BLOCKS as f64).sqrt();
         let side = (needed.ceil() as usize).max(MIN_SIDE).min(full).min(affordable).max(2);
         let within = Sampling::within(budget, sample_s * (side * side) as f64, self.until);
         Ok((side, Sampling { enough_blocks: ENOUGH_BLOCKS, ..within }))
