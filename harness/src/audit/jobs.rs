@@ -15,7 +15,7 @@ use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
 use crate::record::{
     EngineName, EngineStatus, FailureKind, ProcedureId, Reading, ReadingKey, Recording, StatedErrors, Status,
 };
-use crate::spec::{Case, content};
+use crate::spec::{Case, SHORTEST_PATIENCE, content};
 use crate::system::files::{self, FileError};
 use crate::system::slots::side_by_side;
 
@@ -244,8 +244,11 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
         if let Err(contradiction) = run.hold(&taken.measurement, &seen.measurement) {
             let name = planned.engine.name();
             tracing::warn!("{name}: {contradiction}");
-            let mut whole = reader.read(&Question::new(&instrument, &run.job, folder))?;
-            whole.cost.wall_s += taken.cost.wall_s + seen.cost.wall_s;
+            let spent_s = taken.cost.wall_s + seen.cost.wall_s;
+            let question = Question::new(&instrument, &run.job, folder);
+            let patience = question.patience.saturating_sub(Duration::try_from_secs_f64(spent_s).unwrap_or_default());
+            let mut whole = reader.read(&Question { patience: patience.max(SHORTEST_PATIENCE), ..question })?;
+            whole.cost.wall_s += spent_s;
             whole.measurement.notes.push(contradiction);
             return Ok(Answer { taken: whole, was_contradicted: true });
         }

@@ -29,8 +29,7 @@ pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
         let engine = &plan.engines[run.engine].engine;
         if engine.is_witness() && engine.samples(&run.job) {
             let relative_error = run.job.budget.relative_error.max(tolerance);
-            run.job.budget.relative_error = relative_error;
-            run.shortcut.job.budget.relative_error = relative_error;
+            run.grant(Budget { relative_error, ..run.job.budget });
         }
     }
     if sampling == Sampling::Accurate {
@@ -41,8 +40,7 @@ pub(super) fn grant(sampling: Sampling, judge: &Judge<'_>, plan: &mut Plan) {
         // A program of a user's is judged at the budget that the spec gives: who knows what it makes of another.
         if !engine.is_witness() && engine.is_vouched_for() {
             let tolerance = of_light(&plan.tasks[run.task], judge, engine.name().as_str());
-            run.job.budget = sequential::first_look(run.job.budget, tolerance);
-            run.shortcut.job.budget = run.job.budget;
+            run.grant(sequential::first_look(run.job.budget, tolerance));
         }
     }
 }

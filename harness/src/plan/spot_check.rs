@@ -3,9 +3,12 @@
 use super::Run;
 use crate::engines::{Job, Measurement};
 use crate::record::Uncertainty;
+use crate::spec::Budget;
 
 /// The part of what a run does not render that is looked at, one reading at least.
 const PART: f64 = 0.05;
+/// Of a run's seconds: a renderer hardly reads few meters sooner than many.
+const SHARE_OF_SECONDS: f64 = 0.25;
 /// Standard errors that two readings of one quantity may be apart.
 const COVERAGE: f64 = 5.0;
 /// What renderers' single-precision coordinates make of two meters that mirror each other, relative to the brightest reading.
@@ -21,14 +24,33 @@ pub(super) fn draw(runs: &mut [Run], is_witness: impl Fn(&Run) -> bool, seed: u6
         drawn.truncate((PART * drawn.len() as f64).ceil() as usize);
         drawn.sort_unstable();
         run.spot_check = drawn;
+        run.grant(run.job.budget);
     }
 }
 
 impl Run {
+    /// Gives the run a budget, whose seconds what is rendered and the spot check share.
+    pub fn grant(&mut self, budget: Budget) {
+        self.job.budget = budget;
+        let seconds = budget.seconds * (1.0 - self.share_of_spot_check());
+        self.shortcut.job.budget = Budget { seconds, ..budget };
+    }
+
+    /// The part of its seconds that the spot check has.
+    fn share_of_spot_check(&self) -> f64 {
+        match (self.spot_check.is_empty(), self.shortcut.job.stations.is_empty()) {
+            (true, _) => 0.0,
+            (false, false) => SHARE_OF_SECONDS,
+            (false, true) => 1.0,
+        }
+    }
+
     /// The job of the spot check: what was asked, at the stations drawn; `None` where none was.
     pub fn spot_check_job(&self) -> Option<Job> {
         let stations: Vec<_> = self.spot_check.iter().map(|&s| self.job.stations[s].clone()).collect();
-        (!stations.is_empty()).then(|| Job { stations, ..self.job.clone() })
+        let seconds = self.share_of_spot_check() * self.job.budget.seconds;
+        let budget = Budget { seconds, ..self.job.budget };
+        (!stations.is_empty()).then(|| Job { stations, budget, ..self.job.clone() })
     }
 
     /// Holds what a spot check read against what a shortcut says; the error names the first reading that is another.
@@ -105,6 +127,20 @@ mod tests {
         };
         assert_eq!(drawn(1), drawn(1));
         assert_ne!(drawn(1), drawn(2));
+    }
+
+    #[test]
+    fn a_run_and_its_spot_check_take_no_more_seconds_than_the_run_was_given() {
+        let budget = Budget { relative_error: 0.01, seconds: 60.0 };
+        let seconds = |run: &Run| (run.shortcut.job.budget.seconds, run.spot_check_job().map(|j| j.budget.seconds));
+        let mut runs = [run(1), run(21), run(21)];
+        runs[2].shortcut.job.stations.clear();
+        draw(&mut runs, |_| false, 1);
+        for run in &mut runs {
+            run.grant(budget);
+            assert_eq!((run.job.budget, run.shortcut.job.budget.relative_error), (budget, 0.01));
+        }
+        assert_eq!(runs.each_ref().map(seconds), [(60.0, None), (45.0, Some(15.0)), (0.0, Some(60.0))]);
     }
 
     #[test]

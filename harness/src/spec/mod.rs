@@ -29,7 +29,7 @@ pub use build::Case;
 pub use content::content;
 pub use faults::Faults;
 pub(crate) use locate::Spot;
-pub use model::{Budget, EngineSettings, Spec, ToleranceOverride};
+pub use model::{Budget, EngineSettings, SHORTEST_PATIENCE, Spec, ToleranceOverride};
 pub use plausible::doubts;
 pub use suite::{Suite, filtered, specs, suite};
 pub use trust::{BUNDLE_FILE, Trust};

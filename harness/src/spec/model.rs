@@ -498,13 +498,13 @@ pub struct Budget {
 }
 
 /// No engine is cut short before: starting one takes some seconds whatever is asked of it, more on a busy machine.
-const SHORTEST_PATIENCE_S: f64 = 15.0;
+pub const SHORTEST_PATIENCE: Duration = Duration::from_secs(15);
 
 impl Budget {
     /// By the clock, how long an engine may sample.
     pub fn patience(&self) -> Duration {
         // A budget of more than a century has no end.
-        Duration::from_secs_f64(self.seconds.clamp(SHORTEST_PATIENCE_S, 3e9))
+        Duration::from_secs_f64(self.seconds.clamp(0.0, 3e9)).max(SHORTEST_PATIENCE)
     }
 }
 
