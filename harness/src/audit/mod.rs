@@ -221,6 +221,12 @@ impl From<SpecError> for AuditError {
 /// More cases at a time would only wait for the machine's slots, each on threads of its own.
 const MAX_CASES_AT_A_TIME: usize = 8;
 
+/// One more than threads, so that some case waits for the machine while others take further looks, one after the other.
+fn cases_at_a_time(options: &Options<'_>) -> usize {
+    let waiting = usize::from(options.jobs > 1);
+    options.jobs.clamp(1, MAX_CASES_AT_A_TIME) + waiting
+}
+
 /// Runs every case of specs, folders and patterns and judges what engines read; files are written below [`Options::out`] alone, by one
 /// run at a time.
 pub fn run(specs: &[PathBuf], options: &Options<'_>) -> Result<Report, AuditError> {
@@ -251,7 +257,7 @@ pub fn survey(specs: &[PathBuf], options: &Options<'_>) -> Result<Vec<EngineStat
         let judge = policies[k].judge(&cases[k], published[k].as_ref());
         Ok(audit.readings(&cases[k], &plans[k], &judge, None)?.engines)
     };
-    let side = options.jobs.clamp(1, MAX_CASES_AT_A_TIME);
+    let side = cases_at_a_time(options);
     side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one).into_iter().flatten_ok().collect()
 }
 
@@ -341,8 +347,7 @@ impl Prepared {
             Ok(report)
         };
         // What comes after a failure must not have begun before it.
-        let side =
-            if options.after_failure == AfterFailure::Stop { 1 } else { options.jobs.clamp(1, MAX_CASES_AT_A_TIME) };
+        let side = if options.after_failure == AfterFailure::Stop { 1 } else { cases_at_a_time(options) };
         let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
         let mut reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
         if options.diagnosis == Diagnosis::Sought {

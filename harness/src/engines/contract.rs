@@ -274,6 +274,14 @@ pub fn share(engine: &dyn Engine, job: &Job, slots: &Slots) -> Share {
     Share { threads, memory_mib: engine.memory_mib(job, threads.max(1)) }
 }
 
+/// What it holds of its share: renderers wait for much of their time, at their start and for the last of their processes, so that two readings
+/// of reflected light work with the same threads. They count their seconds with room for that; a program of a user's, which goes by the clock,
+/// has its share for itself.
+pub fn held(engine: &dyn Engine, share: Share) -> Share {
+    let threads = if engine.is_vouched_for() { share.threads.div_ceil(2) } else { share.threads };
+    Share { threads, ..share }
+}
+
 /// What meshes take in a renderer, about 1 KiB a triangle with its hierarchy, and meters in their read-out.
 pub(super) fn geometry_mib(job: &Job) -> u64 {
     let triangles: usize = job.scene.obstacles.iter().map(|o| o.shape.triangles()).sum();

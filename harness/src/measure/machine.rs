@@ -1,6 +1,6 @@
 //! What all cases of a run share: the machine's slots, and what engines have answered so far.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use super::cache::{Cache, Entry, Key};
@@ -15,7 +15,12 @@ pub struct Machine {
     /// `None`: equal jobs are rendered as often as they are asked.
     answers: Option<Mutex<BTreeMap<Key, Arc<Answered>>>>,
     before: Mutex<Before>,
+    /// What engines found of the scenes that were asked for last, before they read any meter.
+    grounds: Mutex<VecDeque<(Key, Arc<Ground>)>>,
 }
+
+/// So many scenes' are kept: cases that share one follow each other.
+const GROUNDS: usize = 16;
 
 /// What was there before this run: what is put together of earlier answers must not depend on which case of a run comes first.
 #[derive(Debug, Default)]
@@ -29,14 +34,38 @@ struct Before {
 /// An answer of this run, locked while it is being found.
 pub(super) type Answered = Mutex<Option<Entry>>;
 
+/// What is found of a scene in this run, locked while it is being found.
+pub(super) type Ground = Mutex<Option<Arc<Vec<f64>>>>;
+
 impl Machine {
     pub fn new(threads: usize) -> Arc<Self> {
-        Arc::new(Self { slots: Slots::new(threads), answers: Some(Mutex::default()), before: Mutex::default() })
+        Arc::new(Self::of(threads, Some(Mutex::default())))
     }
 
     /// The same, where every job is rendered as often as it is asked.
     pub fn rendering_everything(threads: usize) -> Arc<Self> {
-        Arc::new(Self { slots: Slots::new(threads), answers: None, before: Mutex::default() })
+        Arc::new(Self::of(threads, None))
+    }
+
+    fn of(threads: usize, answers: Option<Mutex<BTreeMap<Key, Arc<Answered>>>>) -> Self {
+        Self { slots: Slots::new(threads), answers, before: Mutex::default(), grounds: Mutex::default() }
+    }
+
+    /// Where what is found of a scene is, or will be; of its own where everything is rendered as often as it is asked.
+    pub(super) fn ground(&self, key: &Key) -> Arc<Ground> {
+        if self.answers.is_none() {
+            return Arc::default();
+        }
+        let mut all = self.grounds.lock();
+        if let Some((_, ground)) = all.iter().find(|(other, _)| other == key) {
+            return Arc::clone(ground);
+        }
+        if all.len() == GROUNDS {
+            all.pop_front();
+        }
+        let ground = Arc::<Ground>::default();
+        all.push_back((key.clone(), Arc::clone(&ground)));
+        ground
     }
 
     /// Where the answer to an equal job of this run is, or will be.

@@ -6,12 +6,14 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::asking::{Asked, Asking};
-use super::cache::{Cache, Entry, Key, Lookup};
+use super::cache::{Cache, Entry, Key, Lookup, is_worth_keeping};
 use super::machine::Machine;
 use super::outcome::{Cost, Failure, Source, Taken};
-use super::question::Question;
+use super::question::{Question, Trial};
 use super::subprocess::{self, Isolation, Request};
-use crate::engines::{Engine, EngineError, Groundwork, Job, Measurement, Site, Support, Workbench, checked, share};
+use crate::engines::{
+    Engine, EngineError, Groundwork, Job, Measurement, Site, Support, Workbench, checked, held, share,
+};
 use crate::record::{EngineName, FailureKind, ReadingKey};
 use crate::system::files::{ignore_absence, remedy};
 use crate::system::process::{self, PeakMemory, ProcessError};
@@ -239,14 +241,21 @@ impl Reader {
         let name = engine.name();
         self.hindrance(&name)?;
         let mut place = self.place(question)?;
+        let ground = question.key_of_groundwork().map(|key| (self.machine.ground(&key), key));
+        // Whoever needs the same waits until it is found, and holds nothing meanwhile.
+        let mut found = ground.as_ref().map(|(found, _)| found.lock());
         let slots = &self.machine.slots;
-        let held = slots.take(match trial {
-            Some(trial) => Share { threads: trial.threads, memory_mib: engine.memory_mib(job, trial.threads) },
-            None => share(engine, job, slots),
-        });
-        place.bench.jobs = held.threads();
-        let kept = self.cache.as_ref().and_then(|cache| Some((cache, question.key_of_groundwork()?)));
-        place.bench.groundwork.earlier = kept.as_ref().and_then(|(cache, key)| cache.groundwork(key)).map(Arc::new);
+        let (used, taken) = if let Some(Trial { threads, .. }) = trial {
+            let share = Share { threads: *threads, memory_mib: engine.memory_mib(job, *threads) };
+            (share, share)
+        } else {
+            let share = share(engine, job, slots);
+            (share, held(engine, share))
+        };
+        let _held = slots.take(taken);
+        place.bench.jobs = used.threads.clamp(1, slots.threads());
+        let kept = || Arc::new(self.cache.as_ref()?.groundwork(&ground.as_ref()?.1)?).into();
+        place.bench.groundwork.earlier = found.as_ref().and_then(|found| (**found).clone()).or_else(kept);
         // Its seconds count from when it has what it needs.
         let clock = Instant::now();
         let answer = match (&self.isolation, trial) {
@@ -255,10 +264,16 @@ impl Reader {
             }
             _ => in_process(engine, job, &place.bench),
         };
-        if let (Some((cache, key)), Some(laid)) = (&kept, place.bench.groundwork.laid.lock().take())
-            && let Err(error) = cache.keep_groundwork(key, &laid)
+        let laid = place.bench.groundwork.laid.lock().take().map(Arc::new);
+        if let (Some(cache), Some((_, key)), Some(laid)) = (&self.cache, &ground, &laid)
+            && let Err(error) = cache.keep_groundwork(key, laid)
         {
             tracing::debug!(%error, "what was found of the scene is not kept, and found again");
+        }
+        if let Some(found) = &mut found
+            && let Some(known) = laid.or(place.bench.groundwork.earlier.take()).filter(|known| is_worth_keeping(known))
+        {
+            **found = Some(known);
         }
         let (answer, cost) = match answer {
             Ok((measurement, cost)) => (Ok(measurement), cost),

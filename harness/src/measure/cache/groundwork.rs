@@ -14,6 +14,10 @@ pub(super) const EXTENSION: &str = "groundwork";
 /// Fewer numbers are found again in no time, and more take too much room.
 const NUMBERS: std::ops::Range<usize> = 10_000..1_000_000;
 
+pub fn is_worth_keeping(numbers: &[f64]) -> bool {
+    NUMBERS.contains(&numbers.len()) && numbers.iter().all(|number| number.is_finite())
+}
+
 impl Cache {
     pub fn groundwork(&self, key: &Key) -> Option<Vec<f64>> {
         let path = self.path(key).with_extension(EXTENSION);
@@ -25,7 +29,7 @@ impl Cache {
     }
 
     pub fn keep_groundwork(&self, key: &Key, numbers: &[f64]) -> std::io::Result<()> {
-        if !NUMBERS.contains(&numbers.len()) || !numbers.iter().all(|number| number.is_finite()) {
+        if !is_worth_keeping(numbers) {
             return Ok(());
         }
         let text = envelope::seal(SCHEMA, &key.digits, numbers)? + "\n";

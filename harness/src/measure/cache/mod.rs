@@ -18,6 +18,7 @@ use super::outcome::{Cost, Failure};
 use crate::system::files;
 
 pub use entry::Entry;
+pub use groundwork::is_worth_keeping;
 pub(super) use key::key_without_meters;
 pub use key::{Key, key};
 pub(super) use listed::bits;
