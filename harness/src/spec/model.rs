@@ -500,11 +500,14 @@ pub struct Budget {
 /// No engine is cut short before: starting one takes some seconds whatever is asked of it, more on a busy machine.
 pub const SHORTEST_PATIENCE: Duration = Duration::from_secs(15);
 
+/// Of the seconds, what an engine may begin to sample within: the last block may take longer than those before it did.
+const BEGUN_WITHIN: f64 = 0.95;
+
 impl Budget {
     /// By the clock, how long an engine may sample.
     pub fn patience(&self) -> Duration {
         // A budget of more than a century has no end.
-        Duration::from_secs_f64(self.seconds.clamp(0.0, 3e9)).max(SHORTEST_PATIENCE)
+        Duration::from_secs_f64(BEGUN_WITHIN * self.seconds.clamp(0.0, 3e9)).max(SHORTEST_PATIENCE)
     }
 }
 

@@ -30,6 +30,9 @@ const FINER_TRIAL: f64 = 8.0;
 /// Blocks that effort is planned for.
 const PLANNED_BLOCKS: usize = 2 * MIN_BLOCKS;
 const MAX_PARALLEL: usize = 8;
+/// Seconds, as they are counted, that a process of several blocks may take, and how many of them at most, so that all threads have some.
+const SHORT_S: f64 = 0.1;
+const MOST_TOGETHER: usize = 4;
 
 /// Seconds that are counted for a ray to a surface or a luminaire, and for a row where rtrace keeps its cache: on two cores of a
 /// usual server, half as much again as was measured there (2.6e-6 s of one core a ray, from 1.9 to 3.6 over the cases of reference/).
@@ -107,8 +110,7 @@ impl Sampler<'_> {
             }
             Preset::Audit => self.planned(known_lx)?,
         };
-        let options = self.options(divisions);
-        Ok((rule.run(|numbers| self.side_by_side(&options, Stream::Total, numbers))?, divisions))
+        Ok((rule.run(|numbers| self.side_by_side(divisions, Stream::Total, numbers))?, divisions))
     }
 
     /// Divisions a block, from trials, and how many blocks.
@@ -129,7 +131,7 @@ impl Sampler<'_> {
             if planned.is_finite() && planned.min(affordable) < FINER_TRIAL * f64::from(divisions) {
                 break;
             }
-            let trial = self.side_by_side(&self.options(divisions), Stream::Trial, 0..MIN_BLOCKS)?;
+            let trial = self.side_by_side(divisions, Stream::Trial, 0..MIN_BLOCKS)?;
             let excess = Blocks::new(trial).worst_error(known_lx) / self.job.budget.relative_error;
             let blocks = MIN_BLOCKS as f64 / PLANNED_BLOCKS as f64;
             planned = f64::from(divisions) * (blocks * excess * excess / WORST_OF_FEW).powf(power.recip());
@@ -168,16 +170,22 @@ impl Sampler<'_> {
         (hits, share * hits)
     }
 
-    /// A process a block: of the one, or where rtrace keeps its cache, the blocks would be alike.
+    /// A process for a few blocks that take less than its start, else one a block; where rtrace keeps its cache, blocks of one process would be alike.
     fn side_by_side(
         &self,
-        options: &[String],
+        divisions: u32,
         stream: Stream,
         numbers: Range<usize>,
     ) -> Result<Vec<Vec<f64>>, EngineError> {
-        let blocks: Vec<usize> = numbers.collect();
-        let one = |k: &usize| self.process(options, stream, &(*k..k + 1), &self.rows);
-        let read = side_by_side(self.workbench.jobs.clamp(1, MAX_PARALLEL), &blocks, one);
+        let options = self.options(divisions);
+        let together = match self.settings.preset {
+            Preset::Default => 1,
+            Preset::Fast | Preset::Audit => ((SHORT_S / self.block_s(divisions)) as usize).clamp(1, MOST_TOGETHER),
+        };
+        let ends = numbers.clone().step_by(together).map(|start| start..(start + together).min(numbers.end));
+        let processes: Vec<Range<usize>> = ends.collect();
+        let one = |numbers: &Range<usize>| self.process(&options, stream, numbers, &self.rows);
+        let read = side_by_side(self.workbench.jobs.clamp(1, MAX_PARALLEL), &processes, one);
         Ok(read.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
     }
 
