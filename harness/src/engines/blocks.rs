@@ -14,6 +14,8 @@ use crate::spec::Budget;
 
 /// Fewer blocks make no good standard error.
 pub(super) const MIN_BLOCKS: usize = 8;
+/// The worst of several meters' variances that so many blocks tell is so much larger than what more blocks will tell of it.
+pub(super) const WORST_OF_FEW: f64 = 1.3;
 /// So many are made whatever the clock says: fewer say next to nothing of their error.
 const LEAST_BLOCKS: usize = 4;
 /// Of the time that is left, what a wave may take by those before it, and the first one as its engine counts: others may come to use the

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use luminaire::scene::Transport;
 
-use super::blocks::{Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampling, counted};
+use super::blocks::{Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampling, WORST_OF_FEW, counted};
 use super::contract::same_meters;
 use super::effort;
 use super::frame::Frame;
@@ -23,8 +23,7 @@ const ENOUGH_BLOCKS: usize = 32;
 /// Strata along a side at least, so that blocks are many strata and their errors near normal; at most, to check often.
 const MIN_SIDE: usize = 32;
 const MAX_SIDE: usize = 256;
-/// Blocks of a trial, and strata along a side of each at most: their error is that of the worst meter, and too large rather than too small.
-/// Where it is too small all the same, further blocks make up for it.
+/// Blocks of a trial, and strata along a side of each at most. Where they promise too much, further blocks make up for it.
 const TRIAL_BLOCKS: usize = MIN_BLOCKS;
 const TRIAL_SIDE: usize = 64;
 
@@ -204,7 +203,8 @@ impl Dialogue<'_> {
         let affordable = ((budget.seconds / ENOUGH_BLOCKS as f64 / sample_s) as usize).isqrt();
         // The error is that of their mean; m x m samples are at least as good as m x m independent ones.
         let excess = Blocks::new(trials).worst_error(&[]) / budget.relative_error;
-        let needed = trial_side as f64 * excess * (TRIAL_BLOCKS as f64 / ENOUGH_BLOCKS as f64).sqrt();
+        let fewer = TRIAL_BLOCKS as f64 / ENOUGH_BLOCKS as f64;
+        let needed = trial_side as f64 * excess * (fewer / WORST_OF_FEW).sqrt();
         let side = (needed.ceil() as usize).max(MIN_SIDE).min(full).min(affordable).max(2);
         let within = Sampling::within(budget, sample_s * (side * side) as f64, self.until);
         Ok((side, Sampling { enough_blocks: ENOUGH_BLOCKS, ..within }))

@@ -13,7 +13,7 @@ use super::grazing;
 use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options, ROULETTE, Sources, bounces};
 use super::settings::Settings;
 use super::tools::Tools;
-use crate::engines::blocks::{Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampled, Sampling, counted};
+use crate::engines::blocks::{Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampled, Sampling, WORST_OF_FEW, counted};
 use crate::engines::effort;
 use crate::engines::settings::Preset;
 use crate::engines::{Budget, EngineError, Job, Workbench};
@@ -23,8 +23,6 @@ use crate::system::slots::side_by_side;
 /// Ambient divisions of the trials from which effort is planned, and the power of them by which the variance falls from there on:
 /// strata gain more while they are few (benchmarks/engines-remarks.md).
 const TRIALS: [(u32, f64); 2] = [(64, 1.25), (256, 1.05)];
-/// The worst of several variances that eight blocks tell is so much larger than what sixteen blocks will tell of it.
-const WORST_OF_FEW: f64 = 1.3;
 /// A finer trial is made where so many times its divisions are planned by the one before.
 const FINER_TRIAL: f64 = 8.0;
 /// Blocks that effort is planned for.
