@@ -62,12 +62,12 @@ fn a_rating_is_the_formula_of_the_indirect_light_that_each_engine_reads() {
             assert!(compared["verdict"] != "fail" && compared["relative_deviation"].is_null(), "{compared}");
             assert_eq!(compared["tolerance"], serde_json::json!({"relative": 0.0, "absolute": 0.1}), "{compared}");
         }
-        // Its own error is that of the light, times 8 / ln 10 (further looks are each procedure's own).
+        // Its own error is that of the light, times 8 / ln 10 (further looks are each procedure's own, and eight times the samples).
         let read = |procedure| of("readings", "radiance", procedure, meter);
         let [rating, lux] = ["unified_glare_rating", "indirect_illuminance"].map(read);
         let relative = lux["std_error"].as_f64().unwrap() / lux["value"].as_f64().unwrap();
         let ratio = rating["std_error"].as_f64().unwrap() / (8.0 / LN_10 * relative);
-        assert!((0.5..2.0).contains(&ratio), "{meter}: {ratio}");
+        assert!((0.25..4.0).contains(&ratio), "{meter}: {ratio}");
     }
 }
 

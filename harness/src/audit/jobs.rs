@@ -226,10 +226,11 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
     let failed = |what: String| Failure::from(EngineError::Solver { engine: planned.engine.name(), what });
     let instrument = planned.instrument().ok_or_else(|| failed("it is not there".to_owned()))?;
     let (shortcut, spot_check) = (&run.shortcut, format!("{folder}-spot-check"));
+    let [patience, patience_of_spot_check] = run.patience();
     let rendered = if shortcut.job.stations.is_empty() {
         Taken { measurement: Measurement::default(), cost: Cost::default(), source: Source::Nobody }
     } else {
-        let question = Question { may_join: true, ..Question::new(&instrument, &shortcut.job, folder) };
+        let question = Question { may_join: true, patience, ..Question::new(&instrument, &shortcut.job, folder) };
         let read = reader.read(&question);
         if let (Err(Failure { kind: FailureKind::Unread, .. }), Some(job)) = (&read, run.spot_check_job()) {
             // Whoever takes the one may take the other beside it.
@@ -239,7 +240,8 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
     };
     let mut taken = Taken { measurement: shortcut.complete(rendered.measurement, &run.job), ..rendered };
     if let Some(job) = run.spot_check_job() {
-        let seen = reader.read(&Question::new(&instrument, &job, &spot_check));
+        let question = Question::new(&instrument, &job, &spot_check);
+        let seen = reader.read(&Question { patience: patience_of_spot_check, ..question });
         let seen = seen.map_err(|failure| failure.with_rest(|_| None))?;
         if let Err(contradiction) = run.hold(&taken.measurement, &seen.measurement) {
             let name = planned.engine.name();

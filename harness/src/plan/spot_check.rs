@@ -1,9 +1,13 @@
 //! Spot checks: a random part of what is not rendered is rendered all the same. Where it is not what the shortcut says, everything is.
 
+use std::time::Duration;
+
+use luminaire::scene::Transport;
+
 use super::Run;
 use crate::engines::{Job, Measurement};
 use crate::record::Uncertainty;
-use crate::spec::Budget;
+use crate::spec::{Budget, SHORTEST_PATIENCE};
 
 /// The part of what a run does not render that is looked at, one reading at least.
 const PART: f64 = 0.05;
@@ -29,11 +33,21 @@ pub(super) fn draw(runs: &mut [Run], is_witness: impl Fn(&Run) -> bool, seed: u6
 }
 
 impl Run {
-    /// Gives the run a budget, whose seconds what is rendered and the spot check share.
+    /// Gives the run a budget, whose seconds what is rendered and the spot check share, where light is reflected: direct light takes next to none, and
+    /// engines plan its detail by them.
     pub fn grant(&mut self, budget: Budget) {
         self.job.budget = budget;
-        let seconds = budget.seconds * (1.0 - self.share_of_spot_check());
-        self.shortcut.job.budget = Budget { seconds, ..budget };
+        self.shortcut.job.budget = Budget { seconds: self.seconds(1.0 - self.share_of_spot_check()), ..budget };
+    }
+
+    fn seconds(&self, share: f64) -> f64 {
+        if self.job.transport == Transport::Direct { self.job.budget.seconds } else { share * self.job.budget.seconds }
+    }
+
+    /// By the clock, how long what is rendered may be sampled, and the spot check.
+    pub fn patience(&self) -> [Duration; 2] {
+        let (all, share) = (self.job.budget.patience(), self.share_of_spot_check());
+        [1.0 - share, share].map(|share| all.mul_f64(share).max(SHORTEST_PATIENCE))
     }
 
     /// The part of its seconds that the spot check has.
@@ -48,8 +62,7 @@ impl Run {
     /// The job of the spot check: what was asked, at the stations drawn; `None` where none was.
     pub fn spot_check_job(&self) -> Option<Job> {
         let stations: Vec<_> = self.spot_check.iter().map(|&s| self.job.stations[s].clone()).collect();
-        let seconds = self.share_of_spot_check() * self.job.budget.seconds;
-        let budget = Budget { seconds, ..self.job.budget };
+        let budget = Budget { seconds: self.seconds(self.share_of_spot_check()), ..self.job.budget };
         (!stations.is_empty()).then(|| Job { stations, budget, ..self.job.clone() })
     }
 
@@ -139,6 +152,13 @@ mod tests {
         for run in &mut runs {
             run.grant(budget);
             assert_eq!((run.job.budget, run.shortcut.job.budget.relative_error), (budget, 0.01));
+        }
+        assert!(runs[1].patience().iter().sum::<Duration>().as_secs_f64() <= budget.seconds);
+        // Straight from the luminaires all is detail.
+        assert_eq!(runs.each_ref().map(seconds), [(60.0, None), (60.0, Some(60.0)), (60.0, Some(60.0))]);
+        for run in &mut runs {
+            run.job.transport = fixtures::CONVERGED;
+            run.grant(budget);
         }
         assert_eq!(runs.each_ref().map(seconds), [(60.0, None), (45.0, Some(15.0)), (0.0, Some(60.0))]);
     }

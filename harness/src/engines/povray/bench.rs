@@ -231,7 +231,7 @@ impl<'a> Bench<'a> {
     /// Blocks, each a process of one thread.
     fn wave(&self, run: Run, numbers: Range<usize>, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
         let run_s = WITH_FIRST_TWO * pilot.work_s / COUNTED;
-        let sleep_s = SLEEP_S + FRAME_SLEEP_S * (self.terms.len() - 1) as f64;
+        let sleep_s = SLEEP_S + FRAME_SLEEP_S * self.terms.len().saturating_sub(1) as f64;
         // As many as compute while others sleep.
         let for_each_thread = (1.0 + SPARE * sleep_s / (START_S + run_s)).ceil() as usize;
         let side = for_each_thread.min(side_by_side_at_most(self.job)) * self.workbench.jobs.max(1);
