@@ -16,7 +16,7 @@ meters:
 procedures:
   unified_glare_rating: {meters: eyes}
   indirect_illuminance: {meters: eyes}
-budget: {relative_error: 0.01, seconds: 10}
+budget: {relative_error: 0.004, seconds: 20}
 ";
 
 /// Lambertian but for the straight lines between its angles.
@@ -51,8 +51,8 @@ fn a_rating_is_the_formula_of_the_indirect_light_that_each_engine_reads() {
             let (luminance, solid) = (1000.0 / 0.36, 0.36 * cosine / square);
             let right = 8.0 * (0.25 * PI / lux * luminance * luminance * solid / (index * index)).log10();
             let value = rating["value"].as_f64().unwrap();
-            // A table of 5 degrees is straight where a cosine bends: 1e-3 of the intensity, which counts twice; and further looks are each
-            // procedure's own.
+            // A table of 5 degrees is straight where a cosine bends: 1e-3 of the intensity, which counts twice; and each procedure has samples
+            // of its own.
             let noise = rating["std_error"].as_f64().unwrap_or(0.0);
             assert!(
                 (value - right).abs() < 8.0 / LN_10 * 2e-3 + 4.0 * noise,
@@ -62,12 +62,12 @@ fn a_rating_is_the_formula_of_the_indirect_light_that_each_engine_reads() {
             assert!(compared["verdict"] != "fail" && compared["relative_deviation"].is_null(), "{compared}");
             assert_eq!(compared["tolerance"], serde_json::json!({"relative": 0.0, "absolute": 0.1}), "{compared}");
         }
-        // Its own error is that of the light, times 8 / ln 10 (further looks are each procedure's own, and eight times the samples).
+        // Its own error is that of the light, times 8 / ln 10, where first looks decide, as they do at a seventh of the tolerance.
         let read = |procedure| of("readings", "radiance", procedure, meter);
         let [rating, lux] = ["unified_glare_rating", "indirect_illuminance"].map(read);
         let relative = lux["std_error"].as_f64().unwrap() / lux["value"].as_f64().unwrap();
         let ratio = rating["std_error"].as_f64().unwrap() / (8.0 / LN_10 * relative);
-        assert!((0.25..4.0).contains(&ratio), "{meter}: {ratio}");
+        assert!((0.5..2.0).contains(&ratio), "{meter}: {ratio}");
     }
 }
 
