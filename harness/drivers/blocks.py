@@ -1,8 +1,9 @@
 """What drivers share: the readings of a job (JSON) as JSON on standard output, in blocks of samples.
 
 Every block has a seed of its own; the standard error is that of the mean of the blocks. By itself a driver reads as many blocks as the
-job says. With --serve it says what there is to read, and then answers each line of standard input, {"part": ..., "side": m,
-"seeds": [...]}, with one block of m x m samples a meter for every seed, so that luxproof can stop when the blocks' spread is small enough.
+job says. With --serve it is told lines on standard input, and answers each with one: {"job": PATH, "threads": N} with what there is to
+read, {"part": ..., "side": m, "seeds": [...]} with one block of m x m samples a meter for every seed, so that luxproof can stop when the
+blocks' spread is small enough. Jobs may follow one another.
 """
 
 import argparse
@@ -16,20 +17,37 @@ import numpy as np
 def main(description, instrument, more=None):
     """Answers the command line: `instrument` makes an Instrument of the job, its folder and the options, to which `more` adds."""
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("job", help="the job, a JSON file beside its scene")
-    parser.add_argument("--serve", action="store_true", help="read blocks as standard input asks for them")
+    parser.add_argument("job", nargs="?", help="the job, a JSON file beside its scene")
+    parser.add_argument("--serve", action="store_true", help="read what standard input asks for")
     parser.add_argument("--threads", type=int, default=os.cpu_count(), help="worker threads; no result depends on them")
     if more:
         more(parser)
     options = parser.parse_args()
+    if options.serve == bool(options.job):
+        parser.error("give a job, or --serve")
     # The renderer's messages must not mix with the answer.
     answer = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
+    for line in served(instrument, options) if options.serve else [begun(instrument, options).by_itself()]:
+        print(json.dumps(line, allow_nan=False), file=answer, flush=True)
+
+
+def begun(instrument, options):
     with open(options.job, encoding="utf-8") as file:
         job = json.load(file)
-    read = instrument(job, os.path.dirname(os.path.abspath(options.job)), options)
-    for line in read.served(sys.stdin) if options.serve else [read.by_itself()]:
-        print(json.dumps(line, allow_nan=False), file=answer, flush=True)
+    return instrument(job, os.path.dirname(os.path.abspath(options.job)), options)
+
+
+def served(instrument, options):
+    read = None
+    for request in map(json.loads, sys.stdin):
+        if "job" in request:
+            read = None  # before the next is made, so that there is memory for one alone
+            options.job, options.threads = request["job"], request["threads"]
+            read = begun(instrument, options)
+            yield read.about()
+        else:
+            yield read.blocks(request["part"], request["side"], request["seeds"]).tolist()
 
 
 def one_by_one(block):
@@ -58,12 +76,10 @@ class Instrument:
             raise RuntimeError(f"illuminance is not finite at {', '.join(bad)}")
         return found
 
-    def served(self, requests):
+    def about(self):
         parts = [{"name": p, "rays": self.parts[p][1], "sampled": self.is_sampled(p)} for p in self.parts]
         about = {"versions": self.versions, "variant": self.variant}
-        yield {**about, "lanes": self.lanes, "stations": self.stations, "normals_off": self.normals_off, "parts": parts}
-        for request in map(json.loads, requests):
-            yield self.blocks(request["part"], request["side"], request["seeds"]).tolist()
+        return {**about, "lanes": self.lanes, "stations": self.stations, "normals_off": self.normals_off, "parts": parts}
 
     def by_itself(self):
         value, variance = np.zeros(len(self.stations)), np.zeros(len(self.stations))

@@ -1,7 +1,7 @@
 """Reads illuminance in Blender Cycles: a job (JSON) in, readings (JSON) on standard output.
 
     python cycles_read.py job.json
-    python cycles_read.py job.json --serve
+    python cycles_read.py --serve
 
 A meter is a small white patch that no ray but its own meets; illuminance is pi times its baked diffuse light, direct or indirect. Every
 luminaire's direct light is baked by itself, so that none is drawn by chance and points give it exactly. Sums are in 64-bit floats.

@@ -1,7 +1,7 @@
 """Reads illuminance in LuxCore: a job (JSON) in, readings (JSON) on standard output.
 
     python luxcore_read.py job.json
-    python luxcore_read.py job.json --serve
+    python luxcore_read.py --serve
 
 A meter is a small white square, there only while it is read; illuminance is pi times its diffuse light, direct or indirect, seen by a
 camera close by. Every luminaire's direct light is read by itself, so that none is drawn by chance and points give it exactly. Sums are

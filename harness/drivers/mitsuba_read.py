@@ -1,7 +1,7 @@
 """Reads illuminance in Mitsuba 3: a job (JSON) in, readings (JSON) on standard output.
 
     python mitsuba_read.py job.json
-    python mitsuba_read.py job.json --serve
+    python mitsuba_read.py --serve
 
 Meters are no part of the scene, so nothing disturbs the light. Direct light is what `Scene.sample_emitter_direction`
 gives at a meter, which is exact for point sources. Indirect light is E = pi x the mean radiance that the scene's own
@@ -35,6 +35,7 @@ def instrument(job, folder, options):
     mi.set_variant(options.variant or job["variant"])
     if is_jit():
         dr.set_thread_count(options.threads)
+        dr.flush_malloc_cache()  # of an earlier job
     import mitsuba_goniometric  # registers the emitters, for the variant just set
 
     return Instrument(load(os.path.join(folder, job["scene"])), job)

@@ -41,6 +41,7 @@ fn read(engine: &str, procedure: ProcedureId, budget: Budget, settings: &[(&str,
         limit: Duration::from_secs(300),
         peak: luxproof::system::process::PeakMemory::default(),
         groundwork: luxproof::engines::Groundwork::default(),
+        idle: None,
     };
     (engine.read(&job, &bench).unwrap().estimates, declared)
 }

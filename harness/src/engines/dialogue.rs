@@ -1,8 +1,10 @@
 //! Talks with a driver in a renderer's own interpreter: how large a block is, which blocks, and what their readings are.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::time::Instant;
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use luminaire::scene::Transport;
@@ -11,13 +13,15 @@ use super::blocks::{Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampling, WORST_OF_FEW, co
 use super::contract::same_meters;
 use super::effort;
 use super::frame::Frame;
-use super::{EngineError, Job, Measurement};
+use super::{EngineError, Job, Measurement, Workbench};
 use crate::record::{EngineName, Estimate, Uncertainty};
 use crate::spec::Budget;
 use crate::system::process::Conversation;
 
 /// What drivers share, beside theirs.
 pub(super) const BLOCKS: &str = include_str!("../../drivers/blocks.py");
+/// What a driver reads of a scene's folder.
+pub(super) const JOB_FILE: &str = "job.json";
 /// For a standard error that is itself good to 13 %.
 const ENOUGH_BLOCKS: usize = 32;
 /// Strata along a side at least, so that blocks are many strata and their errors near normal; at most, to check often.
@@ -91,6 +95,13 @@ struct Part {
     sampled: bool,
 }
 
+/// A job, which requests follow.
+#[derive(Serialize)]
+struct Begin {
+    job: PathBuf,
+    threads: usize,
+}
+
 #[derive(Serialize)]
 struct Request<'a> {
     part: &'a str,
@@ -109,6 +120,7 @@ enum Stream {
 pub(super) struct Dialogue<'a> {
     pub(super) engine: EngineName,
     pub(super) job: &'a Job,
+    pub(super) workbench: &'a Workbench,
     pub(super) conversation: Conversation,
     /// How many blocks of how many samples along a side, whatever the budget.
     pub(super) fixed: Option<(usize, usize)>,
@@ -126,7 +138,8 @@ pub(super) struct Dialogue<'a> {
 
 impl Dialogue<'_> {
     pub(super) fn measurement(mut self) -> Result<Measurement, EngineError> {
-        let greeting: Greeting = parse(&self.engine, &self.conversation.listen()?)?;
+        let begin = Begin { job: self.workbench.scene_dir.join(JOB_FILE), threads: self.workbench.jobs.max(1) };
+        let greeting: Greeting = self.told(&begin)?;
         same_meters(&self.engine, self.job, greeting.stations.iter().map(String::as_str))?;
         let (found, wanted) = (greeting.normals_off.len(), greeting.stations.len());
         if found != 0 && found != wanted {
@@ -227,10 +240,15 @@ impl Dialogue<'_> {
         self.ask(&Request { part: &part.name, side, seeds })
     }
 
+    /// The answer to a line.
+    fn told<T: DeserializeOwned>(&mut self, line: &impl Serialize) -> Result<T, EngineError> {
+        let line = serde_json::to_string(line).map_err(|e| EngineError::output(self.engine.clone(), e.to_string()))?;
+        let answer = self.conversation.ask(&line)?;
+        serde_json::from_str(&answer).map_err(|e| EngineError::no_readings(self.engine.clone(), &answer, &e))
+    }
+
     fn ask(&mut self, request: &Request<'_>) -> Result<Vec<Vec<f64>>, EngineError> {
-        let line =
-            serde_json::to_string(request).map_err(|e| EngineError::output(self.engine.clone(), e.to_string()))?;
-        let blocks: Vec<Vec<f64>> = parse(&self.engine, &self.conversation.ask(&line)?)?;
+        let blocks: Vec<Vec<f64>> = self.told(request)?;
         let (found, wanted) = (blocks.len(), request.seeds.len());
         if found != wanted {
             return Err(EngineError::output(self.engine.clone(), format!("gave {found} blocks of {wanted}")));
@@ -253,8 +271,4 @@ fn share(part: &Part, greeting: &Greeting) -> f64 {
         (false, "direct") => DIRECT_SHARE,
         (false, _) => 1.0 - DIRECT_SHARE,
     }
-}
-
-fn parse<'de, T: Deserialize<'de>>(engine: &EngineName, line: &'de str) -> Result<T, EngineError> {
-    serde_json::from_str(line).map_err(|e| EngineError::no_readings(engine.clone(), line, &e))
 }

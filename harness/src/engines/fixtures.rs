@@ -297,6 +297,7 @@ pub(super) fn workbench(site: Site, folder: &Path) -> Workbench {
         limit: Duration::from_secs(120),
         peak: PeakMemory::default(),
         groundwork: Groundwork::default(),
+        idle: None,
     }
 }
 

@@ -135,9 +135,10 @@ impl Mitsuba {
         let dialogue = Dialogue {
             engine: ID,
             job,
-            conversation: run.converse()?,
-            fixed: (settings.preset != Preset::Audit).then_some((settings::FIXED_BLOCKS, settings::FIXED_SIDE)),
+            workbench,
+            conversation: run.converse(workbench.idle.as_ref())?,
             until: workbench.until(),
+            fixed: (settings.preset != Preset::Audit).then_some((settings::FIXED_BLOCKS, settings::FIXED_SIDE)),
             cost: &cost,
             bound_lx: &|k, _| error.at_lx(k),
             relative_bound: 0.0,

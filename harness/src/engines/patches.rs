@@ -20,7 +20,7 @@ use self::opening::Opening;
 use self::resampled::{Resampled, Spread};
 use self::seats::{Space, patch, sides};
 use self::settings::Settings;
-use super::dialogue::{self, Cost, Dialogue, Seat};
+use super::dialogue::{self, Cost, Dialogue, JOB_FILE, Seat};
 use super::float_error::{FloatError, Instrument};
 use super::frame::Frame;
 use super::libraries::Libraries;
@@ -98,7 +98,7 @@ impl Package {
 
     pub(super) fn command_by_hand(&self, site: &Site) -> String {
         let python = (self.site)(site).python().unwrap_or_else(|| self.python.into());
-        self.libraries.beside(by_hand(python), site).args([self.driver, "job.json"]).command_line_with_env()
+        self.libraries.beside(by_hand(python), site).args([self.driver, JOB_FILE]).command_line_with_env()
     }
 
     /// What it reads of a job's files; `tables` are those that it looks up in a way of its own, none where that is what one wants to know.
@@ -115,10 +115,9 @@ impl Package {
         let python = (self.site)(&workbench.site).python();
         let python = python
             .ok_or_else(|| EngineError::output(self.engine.clone(), format!("has no Python; {}", self.remedy)))?;
-        let threads = workbench.jobs.max(1).to_string();
         // Neither the user's Python nor its packages; scene folders stay as exported.
         let run = self.libraries.beside(workbench.invoke(python), &workbench.site);
-        let run = run.args(["-I", "-B", self.driver, "job.json", "--serve", "--threads", &threads]);
+        let run = run.args(["-I", "-B", self.driver, "--serve"]);
         let frame = Frame::of(job, settings.coordinates);
         let side = patch(job, &frame, settings.preset);
         let side_m = side / frame.scale;
@@ -157,9 +156,10 @@ impl Package {
         let dialogue = Dialogue {
             engine: self.engine.clone(),
             job,
-            conversation: run.converse()?,
-            fixed: settings.fixed(),
+            workbench,
+            conversation: run.converse(None)?,
             until: workbench.until(),
+            fixed: settings.fixed(),
             cost: &|_| Cost { ray_s: self.ray_s, trial_side: None },
             bound_lx: &bound_lx,
             relative_bound: FILM,
@@ -321,5 +321,5 @@ pub(super) fn job_json(
     };
     let text = serde_json::to_string_pretty(&driver_job)
         .map_err(|e| EngineError::output(engine, format!("the job cannot be written: {e}")))?;
-    Ok(SceneFile::text("job.json", text))
+    Ok(SceneFile::text(JOB_FILE, text))
 }

@@ -273,7 +273,7 @@ pub(super) fn driver(variant: &str, stations: &[usize], answer: &str) -> String 
         r#"{{"versions": {{}}, "variant": "{variant}", "lanes": 131072, "stations": [{}], "parts": [{part}]}}"#,
         stations.join(", ")
     );
-    format!("echo '{greeting}'; read request; echo '{answer}'; cat > /dev/null")
+    format!("read job; echo '{greeting}'; read request; echo '{answer}'; cat > /dev/null")
 }
 
 /// Six reflectances, a turned luminaire whose name would end a comment, a box and a mesh: everything that an export writes.

@@ -10,7 +10,7 @@ use super::Site;
 use crate::record::{Effort, EngineName, Estimate, MeterId, Method, Uncertainty};
 use crate::system::files::remedy;
 use crate::system::printable;
-use crate::system::process::{Invocation, PeakMemory, ProcessError};
+use crate::system::process::{Idle, Invocation, PeakMemory, ProcessError};
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
@@ -47,6 +47,8 @@ pub struct Workbench {
     pub limit: Duration,
     pub peak: PeakMemory,
     pub groundwork: Groundwork,
+    /// Where drivers wait for the next job; they end with theirs without it.
+    pub idle: Option<Idle>,
 }
 
 /// What an engine finds of a scene before it reads any meter, in numbers that it alone understands: of an earlier job, and of this one.

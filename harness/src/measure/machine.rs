@@ -7,6 +7,7 @@ use super::cache::{Cache, Entry, Key};
 use parking_lot::Mutex;
 
 use crate::engines::Station;
+use crate::system::process::Idle;
 use crate::system::slots::Slots;
 
 #[derive(Debug)]
@@ -17,6 +18,8 @@ pub struct Machine {
     before: Mutex<Before>,
     /// What engines found of the scenes that were asked for last, before they read any meter.
     grounds: Mutex<VecDeque<(Key, Arc<Ground>)>>,
+    /// Where drivers wait for the next job.
+    pub(super) idle: Idle,
 }
 
 /// So many scenes' are kept: cases that share one follow each other.
@@ -48,7 +51,8 @@ impl Machine {
     }
 
     fn of(threads: usize, answers: Option<Mutex<BTreeMap<Key, Arc<Answered>>>>) -> Self {
-        Self { slots: Slots::new(threads), answers, before: Mutex::default(), grounds: Mutex::default() }
+        let (slots, before, grounds, idle) = (Slots::new(threads), Mutex::default(), Mutex::default(), Idle::default());
+        Self { slots, answers, before, grounds, idle }
     }
 
     /// Where what is found of a scene is, or will be; of its own where everything is rendered as often as it is asked.

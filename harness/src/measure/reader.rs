@@ -374,6 +374,8 @@ impl Reader {
             limit: question.limit,
             peak: PeakMemory::default(),
             groundwork: Groundwork::default(),
+            // What is timed is timed with its start.
+            idle: question.trial.is_none().then(|| self.machine.idle.clone()),
         };
         Ok(WorkPlace { bench, _temporary: temporary })
     }

@@ -7,6 +7,7 @@ use serde::Deserialize;
 
 use super::ID;
 use super::settings::Settings;
+use crate::engines::dialogue::JOB_FILE;
 use crate::engines::libraries::ATOMIC;
 use crate::engines::workbench::by_hand;
 use crate::engines::{Absent, Site, Version, Workbench};
@@ -73,7 +74,7 @@ impl Backend {
     }
 
     pub(super) fn command_by_hand(&self, site: &Site) -> String {
-        let run = ATOMIC.beside(by_hand(&self.python), site).args(["mitsuba_read.py", "job.json"]);
+        let run = ATOMIC.beside(by_hand(&self.python), site).args(["mitsuba_read.py", JOB_FILE]);
         match &self.llvm {
             Some(library) if self.versions.variant == "llvm_ad_rgb" => {
                 run.args(["--variant", "llvm_ad_rgb"]).env("DRJIT_LIBLLVM_PATH", library)
@@ -84,12 +85,11 @@ impl Backend {
         .command_line_with_env()
     }
 
-    /// The command that reads an exported job, and a remark if it cannot use the variant asked for.
+    /// The command of a driver that waits for exported jobs, and a remark if it cannot use the variant asked for.
     pub(super) fn invocation(&self, workbench: &Workbench, settings: &Settings) -> (Invocation, Option<String>) {
-        let threads = workbench.jobs.max(1).to_string();
         // Neither the user's Python nor its packages; scene folders stay as exported.
         let isolated = workbench.invoke(&self.python).args(["-I", "-B"]);
-        let run = isolated.args(["mitsuba_read.py", "job.json", "--serve", "--threads", &threads]);
+        let run = isolated.args(["mitsuba_read.py", "--serve"]);
         let run = with_kernels(run, &workbench.site);
         match &self.llvm {
             Some(library) => {

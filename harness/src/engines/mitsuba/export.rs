@@ -16,7 +16,7 @@ pub(super) use self::stock::obstacle_to_stock;
 use super::ID;
 use super::settings::{FIXED_BLOCKS, FIXED_SIDE, Settings};
 use crate::engines::comment::Comment;
-use crate::engines::dialogue::{self, Seat};
+use crate::engines::dialogue::{self, JOB_FILE, Seat};
 use crate::engines::frame::Frame;
 use crate::engines::settings::Preset;
 use crate::engines::tables::Tables;
@@ -34,7 +34,7 @@ pub(super) fn files(job: &Job, settings: &Settings) -> Result<Vec<SceneFile>, En
     let tables = Tables::of(job);
     let mut files = vec![
         SceneFile::text("scene.xml", scene_xml(job, &frame, &tables)),
-        SceneFile::text("job.json", job_json(job, settings, &frame)?),
+        SceneFile::text(JOB_FILE, job_json(job, settings, &frame)?),
         SceneFile::text("mitsuba_read.py", READ),
         SceneFile::text("blocks.py", dialogue::BLOCKS),
         SceneFile::text("mitsuba_goniometric.py", GONIOMETRIC),

@@ -10,6 +10,7 @@ use super::*;
 use crate::engines::Budget;
 use crate::engines::fixtures::*;
 use crate::engines::shared_tests;
+use crate::system::process::Idle;
 
 mod failures;
 mod scenes;
@@ -39,4 +40,23 @@ fn a_wrong_export_is_seen() {
 fn exported_files_are_these() {
     let files = Mitsuba::default().export(&shared_tests::furnished()).unwrap();
     insta::assert_snapshot!(shared_tests::golden(&files, &["mitsuba_", "blocks.py", "opacity-"]));
+}
+
+#[test]
+fn one_process_that_takes_jobs_one_after_the_other_reads_as_many_do() {
+    let engine = Mitsuba::default();
+    let budget = Budget { relative_error: 0.02, seconds: 20.0 };
+    let of = |transport| Job { budget, ..s1(transport) };
+    let jobs = [of(CONVERGED), Job { budget, ..shared_tests::furnished() }, of(Transport::Direct), of(CONVERGED)];
+    let read = |job: &Job, idle: Option<&Idle>, threads| {
+        let folder = tempfile::tempdir().unwrap();
+        let bench = workbench(Site::of_user().unwrap(), folder.path());
+        let found = engine.read(job, &Workbench { idle: idle.cloned(), jobs: threads, ..bench }).unwrap();
+        assert!(!idle.is_some_and(|idle| idle.count() != 1));
+        found
+    };
+    let idle = Idle::default();
+    for (job, threads) in jobs.iter().zip([1, 2, 1, 2]) {
+        assert_eq!(read(job, Some(&idle), threads).estimates, read(job, None, 1).estimates);
+    }
 }

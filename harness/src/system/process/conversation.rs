@@ -1,9 +1,13 @@
 //! Programs that answer line by line.
 
+use std::ffi::OsString;
 use std::io::Write;
-use std::process::{ChildStdin, ExitStatus};
-use std::sync::mpsc;
+use std::path::PathBuf;
+use std::process::ChildStdin;
+use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
+
+use parking_lot::Mutex;
 
 use super::invocation::{Invocation, ProcessError};
 use super::output::{Messages, lines};
@@ -14,29 +18,90 @@ use super::running::Running;
 pub struct Conversation {
     invocation: Invocation,
     start: Instant,
+    /// Where the program waits afterwards.
+    idle: Option<Idle>,
+    /// Nobody, once it has ended.
+    partner: Option<Partner>,
+}
+
+/// A program, and what one hears of it.
+#[derive(Debug)]
+struct Partner {
     running: Running,
     stdin: Option<ChildStdin>,
     lines: mpsc::Receiver<String>,
-    /// Taken once they are in the log.
-    messages: Option<Messages>,
+    messages: Messages,
+}
+
+/// Programs that have answered what they were asked and wait to be asked more, by what tells them apart; with the last clone of this they
+/// are killed.
+#[derive(Clone, Debug, Default)]
+pub struct Idle(Arc<Mutex<Vec<(Words, Partner)>>>);
+
+#[derive(Clone, Debug, PartialEq)]
+struct Words {
+    program: PathBuf,
+    args: Vec<OsString>,
+    env: Vec<(OsString, OsString)>,
+}
+
+impl Words {
+    fn of(run: &Invocation) -> Self {
+        Self { program: run.program.clone(), args: run.args.clone(), env: run.env.clone() }
+    }
+}
+
+impl Idle {
+    #[cfg(test)]
+    pub(crate) fn count(&self) -> usize {
+        self.0.lock().len()
+    }
+
+    /// One that still lives.
+    fn take(&self, run: &Invocation) -> Option<Partner> {
+        let words = Words::of(run);
+        loop {
+            let mut waiting = self.0.lock();
+            let place = waiting.iter().position(|(of, _)| *of == words)?;
+            let (_, mut partner) = waiting.swap_remove(place);
+            drop(waiting);
+            if matches!(partner.running.ended(), Ok(None)) {
+                partner.running.go_on(run);
+                return Some(partner);
+            }
+        }
+    }
 }
 
 const LISTEN: Duration = Duration::from_millis(10);
 
 impl Invocation {
-    pub fn converse(&self) -> Result<Conversation, ProcessError> {
-        tracing::debug!(command = %self.command_line(), cwd = %self.cwd.display(), "converse");
-        let mut running = Running::start(self).map_err(|source| self.start_error(source))?;
-        let messages = Some(Messages::of(running.child.stderr.take()));
-        let lines = lines(running.child.stdout.take(), self.longest_answer);
+    /// Talks with a program that ends with the conversation; with `idle`, with one that waits there where the same has run before, and that
+    /// waits there again afterwards.
+    pub fn converse(&self, idle: Option<&Idle>) -> Result<Conversation, ProcessError> {
+        let partner = match idle.and_then(|idle| idle.take(self)) {
+            Some(partner) => partner,
+            None => Partner::of(self).map_err(|source| self.start_error(source))?,
+        };
+        let (invocation, start) = (self.clone(), Instant::now());
+        Ok(Conversation { invocation, start, idle: idle.cloned(), partner: Some(partner) })
+    }
+}
+
+impl Partner {
+    fn of(run: &Invocation) -> std::io::Result<Self> {
+        tracing::debug!(command = %run.command_line(), cwd = %run.cwd.display(), "converse");
+        let mut running = Running::start(run)?;
+        let messages = Messages::of(running.child.stderr.take());
+        let lines = lines(running.child.stdout.take(), run.longest_answer);
         let stdin = running.child.stdin.take();
-        Ok(Conversation { invocation: self.clone(), start: Instant::now(), running, stdin, lines, messages })
+        Ok(Self { running, stdin, lines, messages })
     }
 }
 
 impl Conversation {
     pub fn ask(&mut self, line: &str) -> Result<String, ProcessError> {
-        if let Some(stdin) = &mut self.stdin {
+        if let Some(stdin) = self.partner.as_mut().and_then(|partner| partner.stdin.as_mut()) {
             // A program that has ended has closed the pipe: its own status tells why.
             writeln!(stdin, "{line}").and_then(|()| stdin.flush()).ok();
         }
@@ -44,33 +109,31 @@ impl Conversation {
     }
 
     pub fn listen(&mut self) -> Result<String, ProcessError> {
-        loop {
-            let overrun = self.invocation.overrun(&mut self.running, self.start);
-            match self.lines.recv_timeout(LISTEN) {
+        while let Some(partner) = &mut self.partner {
+            let overrun = self.invocation.overrun(&mut partner.running, self.start);
+            match partner.lines.recv_timeout(LISTEN) {
                 Ok(line) => return Ok(line),
-                Err(mpsc::RecvTimeoutError::Timeout) => {}
-                Err(mpsc::RecvTimeoutError::Disconnected) => {
-                    self.end()?;
-                    let (program, log) = (self.invocation.name(), self.invocation.log_name());
-                    return Err(ProcessError::Silent { program, log });
-                }
-            }
-            if let Some(error) = overrun {
-                return Err(error);
+                Err(mpsc::RecvTimeoutError::Timeout) => overrun.map_or(Ok(()), Err)?,
+                Err(mpsc::RecvTimeoutError::Disconnected) => self.close()?,
             }
         }
+        Err(ProcessError::Silent { program: self.invocation.name(), log: self.invocation.log_name() })
     }
 
-    /// Says no more, and waits until the program has ended.
+    /// Says no more, and waits until the program has ended, or leaves it to wait.
     pub fn end(&mut self) -> Result<(), ProcessError> {
-        self.stdin = None;
-        let ended = self.invocation.wait(&mut self.running, self.start, || None);
-        self.close(ended)
+        let Some(idle) = self.idle.take() else { return self.close() };
+        let Some(partner) = self.partner.take() else { return Ok(()) };
+        self.invocation.keep_log(&partner.messages.so_far())?;
+        idle.0.lock().push((Words::of(&self.invocation), partner));
+        Ok(())
     }
 
-    fn close(&mut self, ended: Result<ExitStatus, ProcessError>) -> Result<(), ProcessError> {
-        let Some(messages) = self.messages.take() else { return Ok(()) };
-        self.invocation.conclude(&self.running, ended, &messages.said()).map(|_| ())
+    fn close(&mut self) -> Result<(), ProcessError> {
+        let Some(Partner { mut running, stdin, messages, .. }) = self.partner.take() else { return Ok(()) };
+        drop(stdin);
+        let ended = self.invocation.wait(&mut running, self.start, || None);
+        self.invocation.conclude(&running, ended, &messages.said()).map(|_| ())
     }
 
     #[cfg(test)]
@@ -81,10 +144,11 @@ impl Conversation {
 
 impl Drop for Conversation {
     fn drop(&mut self) {
-        if self.messages.is_some() {
-            self.running.stop();
+        if let Some(Partner { mut running, messages, .. }) = self.partner.take() {
+            running.stop();
+            let stopped = Err(ProcessError::Interrupted { program: self.invocation.name() });
             // Whoever drops it knows of an error already.
-            self.close(Err(ProcessError::Interrupted { program: self.invocation.name() })).ok();
+            self.invocation.conclude(&running, stopped, &messages.said()).ok();
         }
     }
 }

@@ -26,7 +26,7 @@ use std::process::ExitCode;
 use std::thread;
 use std::time::Duration;
 
-pub use conversation::Conversation;
+pub use conversation::{Conversation, Idle};
 pub use interrupt::{UnderWay, interrupt, interrupt_flag, is_interrupted};
 pub use invocation::{Finished, Freedom, Invocation, ProcessError, quoted};
 pub use memory::{PeakMemory, limit_mib};

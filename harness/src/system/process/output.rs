@@ -65,6 +65,11 @@ impl Messages {
     /// What was said, once the program has ended.
     pub(super) fn said(self) -> String {
         wait_for(&self.closed);
+        self.so_far()
+    }
+
+    /// What was said since this was asked last.
+    pub(super) fn so_far(&self) -> String {
         std::mem::take(&mut *self.ends.lock()).text()
     }
 }

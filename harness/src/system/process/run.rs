@@ -80,8 +80,7 @@ impl Invocation {
         ended: Result<ExitStatus, ProcessError>,
         stderr: &str,
     ) -> Result<String, ProcessError> {
-        let unkept = |source| ProcessError::Log { program: self.name(), log: self.log_name(), source };
-        self.keep_log(stderr).map_err(unkept)?;
+        self.keep_log(stderr)?;
         let status = ended?;
         if status.success() {
             return Ok(stderr.to_owned());
@@ -98,12 +97,11 @@ impl Invocation {
         Err(ProcessError::Failed { program: self.name(), status, tail: tail(stderr, LAST_WORDS), log: self.log_name() })
     }
 
-    fn keep_log(&self, stderr: &str) -> std::io::Result<()> {
-        if let Some(folder) = self.log.parent() {
-            fs::create_dir_all(folder)?;
-        }
-        let mut log = fs::OpenOptions::new().create(true).append(true).open(&self.log)?;
-        writeln!(log, "$ {}\n{stderr}", self.command_line())
+    pub(super) fn keep_log(&self, stderr: &str) -> Result<(), ProcessError> {
+        let above = self.log.parent().map_or(Ok(()), fs::create_dir_all);
+        let log = above.and_then(|()| fs::OpenOptions::new().create(true).append(true).open(&self.log));
+        let kept = log.and_then(|mut log| writeln!(log, "$ {}\n{stderr}", self.command_line()));
+        kept.map_err(|source| ProcessError::Log { program: self.name(), log: self.log_name(), source })
     }
 }
 

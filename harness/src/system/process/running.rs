@@ -63,6 +63,14 @@ impl Running {
         Ok(Self { child, is_supervised, has_ended: false, peak, start, next_look: start })
     }
 
+    /// Serves another run from now on: memory that it took before is not that one's.
+    pub(super) fn go_on(&mut self, invocation: &Invocation) {
+        self.processes().into_iter().for_each(tree::forget_peak);
+        self.peak = invocation.peak.clone();
+        self.start = Instant::now();
+        self.next_look = self.start;
+    }
+
     /// How it ended, if it has; what it left behind is ended, too.
     pub(super) fn ended(&mut self) -> io::Result<Option<ExitStatus>> {
         let status = self.child.try_wait()?;
@@ -96,11 +104,12 @@ impl Running {
         }
         // Many a program ends soon: at first it is looked at often.
         self.next_look = now + (self.start.elapsed() / 8).min(LOOK);
-        let mut processes = tree::descendants(self.child.id());
-        if !self.is_supervised {
-            processes.push(self.child.id());
-        }
-        self.peak.look_at(&processes)
+        self.peak.look_at(&self.processes())
+    }
+
+    fn processes(&self) -> Vec<u32> {
+        let itself = (!self.is_supervised).then(|| self.child.id());
+        tree::descendants(self.child.id()).into_iter().chain(itself).collect()
     }
 
     /// Ends it and all that it started.

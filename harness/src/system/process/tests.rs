@@ -52,7 +52,7 @@ fn what_a_program_leaves_behind_does_not_hold_its_answer() {
 
 fn conversation(script: &str, limit_s: f64, folder: &Path) -> Conversation {
     let limit = Duration::from_secs_f64(limit_s);
-    Invocation::new("sh", folder, limit, folder.join("log")).args(["-c", script]).converse().unwrap()
+    Invocation::new("sh", folder, limit, folder.join("log")).args(["-c", script]).converse(None).unwrap()
 }
 
 #[test]
@@ -76,6 +76,40 @@ fn a_conversation_with_no_answer_says_why() {
     assert!(matches!(error("(sleep 1; touch survivor) & sleep 30", 0.2), ProcessError::TimedOut { .. }));
     thread::sleep(Duration::from_millis(1300));
     assert!(!folder.path().join("survivor").exists());
+}
+
+#[test]
+fn a_program_that_waits_goes_on_with_the_next_of_its_words_and_their_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let idle = Idle::default();
+    let of = |script: &str, log: &str| {
+        let run = Invocation::new("sh", folder.path(), Duration::from_secs(10), folder.path().join(log));
+        run.args(["-c", script]).converse(Some(&idle)).unwrap()
+    };
+    let asked = |mut talk: Conversation, line: &str| {
+        let answer = talk.ask(line).unwrap();
+        assert!(talk.peak_mib().is_some());
+        talk.end().unwrap();
+        answer
+    };
+    let script = "while read x; do echo \"about $x\" >&2; echo \"$$ <$x>\"; done";
+    let one = asked(of(script, "one"), "1");
+    let process = one.split(' ').next().unwrap();
+    assert_eq!(asked(of(script, "two"), "2"), format!("{process} <2>"));
+    let log = |name| fs::read_to_string(folder.path().join(name)).unwrap();
+    assert!(log("one").ends_with("about 1\n\n") && log("two").ends_with("about 2\n\n"), "{} {}", log("one"), log("two"));
+    // Two at once are two, as are other words; what has ended meanwhile does not go on.
+    let (first, second) = (of(script, "first"), of(script, "second"));
+    assert!(asked(first, "1").starts_with(process) && !asked(second, "2").starts_with(process));
+    assert!(!asked(of(&format!("{script};"), "other"), "3").starts_with(process));
+    let once = "read x; echo \"$$ <$x>\"";
+    let ended = asked(of(once, "once"), "1");
+    thread::sleep(Duration::from_millis(200));
+    assert_ne!(asked(of(once, "once"), "1"), ended);
+    let is_there = || Path::new("/proc").join(process).exists();
+    assert!(is_there());
+    drop(idle);
+    assert!(!is_there());
 }
 
 #[test]
