@@ -7,9 +7,10 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use super::observer::Observer;
+use itertools::Itertools;
 use parking_lot::Mutex;
 
-use crate::engines::{EngineError, Measurement};
+use crate::engines::{EngineError, Measurement, Waits};
 use crate::measure::{Cost, Failure, Question, Reader, Source, Taken};
 use crate::plan::{Asked, Plan, Planned, Run, Scope, Skip};
 use crate::record::{
@@ -58,8 +59,7 @@ enum Done {
 impl Running<'_> {
     /// Runs every job of the plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
     pub fn run(&self) -> Result<Outcome, FileError> {
-        let sleeping =
-            self.plan.runs.iter().filter(|run| self.plan.engines[run.engine].engine.mostly_waits(&run.job)).count();
+        let sleeping = self.plan.runs.iter().filter(|run| self.waits(run) == Waits::Mostly).count();
         let threads = self.reader.machine.slots.threads() + sleeping.min(MAX_SLEEPING);
         // By place in the plan.
         let kept: Mutex<BTreeMap<usize, Recording>> = Mutex::default();
@@ -107,7 +107,11 @@ impl Running<'_> {
         files::keep_json(&folder.join("readings").join(format!("{engine}.json")), &mine)
     }
 
-    /// The runs of the plan by place: alone, or those of an engine that takes several at once.
+    fn waits(&self, run: &Run) -> Waits {
+        self.plan.engines[run.engine].engine.waits(&run.job)
+    }
+
+    /// The runs of the plan by place, as they are begun: alone, or those of an engine that takes several at once.
     fn together(&self) -> Vec<Vec<usize>> {
         let mut units: Vec<Vec<usize>> = vec![];
         for (k, run) in self.plan.runs.iter().enumerate() {
@@ -117,6 +121,7 @@ impl Running<'_> {
                 None => units.push(vec![k]),
             }
         }
+        units.sort_by_key(|unit| self.waits(&self.plan.runs[unit[0]]));
         units
     }
 
@@ -262,8 +267,12 @@ fn answer(planned: &Planned, run: &Run, reader: &Reader, folder: &str) -> Result
         for (&station, estimate) in run.spot_check.iter().zip(seen.measurement.estimates) {
             taken.measurement.estimates[station] = estimate;
         }
-        let names: Vec<String> = job.stations.iter().map(|s| s.id.to_string()).collect();
-        taken.measurement.effort.insert("spot_checked".to_owned(), names.join(", "));
+        let names = job.stations.iter().map(|s| s.id.to_string()).join(", ");
+        let Measurement { notes, effort, .. } = &mut taken.measurement;
+        let told: Vec<String> = seen.measurement.notes.into_iter().filter(|note| !notes.contains(note)).collect();
+        notes.extend(told.iter().map(|note| format!("spot check of {names}: {note}")));
+        effort.extend(seen.measurement.effort.iter().map(|(key, value)| (format!("spot_check_{key}"), value.clone())));
+        effort.insert("spot_checked".to_owned(), names);
         if taken.source == Source::Nobody {
             taken.source = seen.source;
         }
@@ -326,7 +335,14 @@ mod tests {
         let estimate = move |at_m: f64| Estimate { value: 1.0 + slope * at_m, uncertainty: Uncertainty::Bound(1e-9) };
         let read = move |job: &Job| {
             let estimates = job.stations.iter().map(|s| estimate(s.meter.position_m.x)).collect();
-            Ok(Measurement { estimates, work_s: Some(job.stations.len() as f64), ..Measurement::default() })
+            let is_cut = job.stations.len() == 1 && job.stations[0].id.to_string() == "m[2]";
+            Ok(Measurement {
+                estimates,
+                work_s: Some(job.stations.len() as f64),
+                effort: [("blocks", if is_cut { "4" } else { "8" })].into(),
+                notes: is_cut.then(|| "cut short".to_owned()).into_iter().collect(),
+                ..Measurement::default()
+            })
         };
         let job = s1(Transport::Direct);
         let mut shortcut = Shortcut::none(&job);
@@ -349,8 +365,9 @@ mod tests {
     #[test]
     fn what_a_spot_check_contradicts_is_rendered_whole_and_says_so() {
         let right = answered(0.0);
-        assert_eq!((values(&right), right.notes.len()), (vec![1.0; 4], 0));
-        assert_eq!(right.effort["spot_checked"], "m[2]");
+        assert_eq!((values(&right), right.notes), (vec![1.0; 4], vec!["spot check of m[2]: cut short".to_owned()]));
+        let effort = ["spot_checked", "blocks", "spot_check_blocks"].map(|key| right.effort[key].as_str());
+        assert_eq!(effort, ["m[2]", "8", "4"]);
         // Of the one that is rendered and the one that is looked at.
         assert_eq!(right.work_s, Some(2.0));
         let lopsided = answered(0.5);

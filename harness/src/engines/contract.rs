@@ -26,6 +26,15 @@ pub(super) const OWN_LOOKUP: &str = "luminaire's interpolation of candela tables
 /// What an engine answers to one of several jobs.
 pub type Answer = Result<Measurement, EngineError>;
 
+/// How much of its time a job sleeps: others compute while it does, and what sleeps most is begun first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Waits {
+    /// It holds no thread.
+    Mostly,
+    Often,
+    Little,
+}
+
 pub trait Engine: Send + Sync {
     fn name(&self) -> EngineName;
 
@@ -101,9 +110,9 @@ pub trait Engine: Send + Sync {
         None
     }
 
-    /// Whether a job mostly sleeps, so that others may have its thread.
-    fn mostly_waits(&self, _job: &Job) -> bool {
-        false
+    /// How much of its time a job sleeps.
+    fn waits(&self, _job: &Job) -> Waits {
+        Waits::Little
     }
 
     /// Memory that a job takes on so many threads or processes, in MiB; an estimate on the safe side, of which as much runs side
@@ -182,8 +191,8 @@ macro_rules! left_to_inner {
             self.inner.cache_identity(job)
         }
 
-        fn mostly_waits(&self, job: &Job) -> bool {
-            self.inner.mostly_waits(job)
+        fn waits(&self, job: &Job) -> crate::engines::Waits {
+            self.inner.waits(job)
         }
 
         fn takes_batches(&self) -> bool {
@@ -267,7 +276,7 @@ pub struct Knob {
 /// light, whose readings are as good as the seconds of the budget allow.
 pub fn share(engine: &dyn Engine, job: &Job, slots: &Slots) -> Share {
     let threads = match job.transport {
-        _ if engine.mostly_waits(job) => 0,
+        _ if engine.waits(job) == Waits::Mostly => 0,
         Transport::Direct => 1,
         Transport::Indirect(_) | Transport::Total(_) => slots.threads_a_reading().min(engine.max_threads()),
     };

@@ -22,6 +22,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 use itertools::Itertools;
+use luminaire::geometry::Room;
 use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Transport};
 use rayon::prelude::*;
 
@@ -31,7 +32,7 @@ use super::settings::{Coordinates, Preset};
 use super::workbench::by_hand;
 use super::{
     Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Station, Support, Version,
-    Workbench, checked,
+    Waits, Workbench, checked,
 };
 use crate::record::{EngineName, Estimate};
 use crate::system::process;
@@ -119,8 +120,9 @@ impl Engine for PovRay {
         Settings::of(job).map(drop)
     }
 
-    fn mostly_waits(&self, job: &Job) -> bool {
-        self.expected_s(job).is_some_and(|seconds| seconds < bench::SLEEP_S)
+    fn waits(&self, job: &Job) -> Waits {
+        let is_short = self.expected_s(job).is_some_and(|seconds| seconds < bench::SLEEP_S);
+        if is_short { Waits::Mostly } else { Waits::Often }
     }
 
     fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
@@ -174,13 +176,14 @@ fn support(job: &Job) -> Support {
         return Support::No("in free field nothing reflects: there is no room to gather light from".to_owned());
     };
     let preset = Settings::of(job).map_or(Preset::Audit, |s| s.preset);
-    cache_error(effort::mean_reflectance(&room), bounces, preset)
+    cache_error(&room, bounces, preset)
 }
 
 /// The bias of radiosity's cache, as measured against exact values, and what twenty reflections leave out.
-fn cache_error(mean_reflectance: f64, bounces: Bounces, preset: Preset) -> Support {
+fn cache_error(room: &Room, bounces: Bounces, preset: Preset) -> Support {
+    let mean_reflectance = effort::mean_reflectance(room);
     let interpolation = match preset {
-        Preset::Audit => audit_bias(mean_reflectance),
+        Preset::Audit => audit_bias(mean_reflectance, settings::slenderness(room)),
         Preset::Default => 0.27,
         Preset::Fast => 0.05,
     };
@@ -196,23 +199,21 @@ fn cache_error(mean_reflectance: f64, bounces: Bounces, preset: Preset) -> Suppo
     Support::Approximate { why, size: Some(interpolation + cut) }
 }
 
-/// Bias of the audit preset by mean reflectance, linear between what was measured: case S1 at .5; a closed 6 m room of .7
-/// everywhere, +1.0 to +3.0 % within .2 %, most where it is darkest (8 blocks of 102 rays); rooms of .9, up to +9 %.
-fn audit_bias(mean_reflectance: f64) -> f64 {
+/// Bias of the audit preset by mean reflectance, linear between what was measured, and by how slender the room is.
+fn audit_bias(mean_reflectance: f64, slenderness: f64) -> f64 {
     let between = |(x, y): (f64, f64), (a, b): (f64, f64)| y + (b - y) * (mean_reflectance - x) / (a - x);
-    let (usual, bright, white) = ((0.5, AUDIT_BIAS), (0.7, 0.03), (0.9, 0.09));
-    if mean_reflectance <= usual.0 {
-        usual.1
-    } else if mean_reflectance <= bright.0 {
-        between(usual, bright)
+    let of_reflectance = if mean_reflectance <= BIAS[0].0 {
+        BIAS[0].1
+    } else if mean_reflectance <= BIAS[1].0 {
+        between(BIAS[0], BIAS[1])
     } else {
-        between(bright, white).min(white.1)
-    }
+        between(BIAS[1], BIAS[2]).min(BIAS[2].1)
+    };
+    of_reflectance * (slenderness / settings::COMPACT).powf(1.3)
 }
 
-/// Bias of the audit preset, relative: 96 blocks of 35 rays a sample read -.11 to -.01 % off the exact values in `cachet/point-all` and +.18 to
-/// +.43 % in the calibration's room of three reflectances, each within .1 % (with 50 rays -.20 to +.18 %).
-const AUDIT_BIAS: f64 = 0.005;
+/// Mean reflectances and biases of compact rooms, relative.
+const BIAS: [(f64, f64); 3] = [(settings::USUAL, 0.005), (0.7, 0.02), (0.9, 0.05)];
 
 fn unsupported_luminaire(luminaire: &Luminaire) -> Option<String> {
     let id = &luminaire.id;

@@ -7,7 +7,7 @@ use luminaire::scene::Transport;
 use super::Run;
 use crate::engines::{Job, Measurement};
 use crate::record::Uncertainty;
-use crate::spec::{Budget, SHORTEST_PATIENCE};
+use crate::spec::Budget;
 
 /// The part of what a run does not render that is looked at, one reading at least.
 const PART: f64 = 0.05;
@@ -47,7 +47,7 @@ impl Run {
     /// By the clock, how long what is rendered may be sampled, and the spot check.
     pub fn patience(&self) -> [Duration; 2] {
         let (all, share) = (self.job.budget.patience(), self.share_of_spot_check());
-        [1.0 - share, share].map(|share| all.mul_f64(share).max(SHORTEST_PATIENCE))
+        [1.0 - share, share].map(|share| all.mul_f64(share))
     }
 
     /// The part of its seconds that the spot check has.
@@ -153,7 +153,15 @@ mod tests {
             run.grant(budget);
             assert_eq!((run.job.budget, run.shortcut.job.budget.relative_error), (budget, 0.01));
         }
-        assert!(runs[1].patience().iter().sum::<Duration>().as_secs_f64() <= budget.seconds);
+        for seconds in [5.0, 20.0, 30.0, 60.0, 600.0] {
+            runs[1].grant(Budget { seconds, ..budget });
+            let patience: Duration = runs[1].patience().iter().sum();
+            assert!(
+                patience <= runs[1].job.budget.patience() && patience.as_secs_f64() <= seconds.max(15.0),
+                "{patience:?}"
+            );
+        }
+        runs[1].grant(budget);
         // Straight from the luminaires all is detail.
         assert_eq!(runs.each_ref().map(seconds), [(60.0, None), (60.0, Some(60.0)), (60.0, Some(60.0))]);
         for run in &mut runs {

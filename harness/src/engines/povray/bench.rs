@@ -1,6 +1,6 @@
 //! Runs POV-Ray: direct light in a few looks of rising magnification, reflected light in blocks until the budget is met.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -29,8 +29,6 @@ const COUNTED: f64 = 1.5;
 /// Rays a sample of the block that is looked at first, and the power of them by which work grows.
 const PILOT_RAYS: u32 = 25;
 const WORK_POWER: f64 = 1.3;
-/// What a block takes with its runs of the first two reflections, against one without.
-const WITH_FIRST_TWO: f64 = 1.7;
 /// Blocks that are made before an error is believed: the wider an interval is for want of blocks, the more it takes to decide anything.
 const PLANNED_BLOCKS: usize = 3 * MIN_BLOCKS / 2;
 /// The part of the time that the fewest blocks may take.
@@ -90,8 +88,15 @@ struct Run {
     light: Light,
     seed: u32,
     count: u32,
-    /// Whether it is all terms of a block, each a frame of an animation, or the scene as it is.
-    is_block: bool,
+    what: What,
+}
+
+/// The scene as it is, or terms of a block, each a frame of an animation.
+#[derive(Clone, Copy, PartialEq)]
+enum What {
+    Scene,
+    Block,
+    Term(usize),
 }
 
 impl Run {
@@ -118,7 +123,7 @@ impl<'a> Bench<'a> {
 
     /// Direct light: deterministic, read at rising magnification until the read-out no longer matters.
     pub(super) fn direct(&self) -> Result<Measurement, EngineError> {
-        let run = Run { light: Light::Direct, seed: 0, count: self.settings.count, is_block: false };
+        let run = Run { light: Light::Direct, seed: 0, count: self.settings.count, what: What::Scene };
         let first = export::first_readouts(self.job, Light::Direct);
         let mut looks: Vec<Look> = first.iter().map(|r| Look::Again(*r)).collect();
         let mut taken = 0;
@@ -155,11 +160,11 @@ impl<'a> Bench<'a> {
 
     pub(super) fn indirect(&self) -> Result<Measurement, EngineError> {
         let count = self.settings.count;
-        let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, is_block: false };
+        let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, what: What::Block };
         let few = count.min(PILOT_RAYS);
         let mut pilot = self.pilot(Run { count: few, ..run })?;
         pilot.work_s *= (f64::from(count) / f64::from(few)).powf(WORK_POWER);
-        let (budget, mut block_s) = (counted(self.job.budget, 1.0), WITH_FIRST_TWO * pilot.work_s);
+        let (budget, mut block_s) = (counted(self.job.budget, 1.0), pilot.work_s);
         let share = (FIRST_BLOCKS * budget.seconds / (MIN_BLOCKS as f64 * block_s)).max(1e-3).powf(WORK_POWER.recip());
         let mut measurement = Measurement { method: self.method(), ..Measurement::default() };
         if share < 1.0 && self.settings.preset == Preset::Audit {
@@ -174,7 +179,7 @@ impl<'a> Bench<'a> {
         let made = blocks.blocks.count();
         measurement.estimates = measurement.take(blocks);
         let mut effort = Effort::from([
-            ("arguments", self.printed_arguments(Run { is_block: true, ..run })),
+            ("arguments", self.printed_arguments(run)),
             ("blocks", made.to_string()),
             ("seeds", (1..=made).map(|block| self.seed(block).to_string()).collect::<Vec<_>>().join(" ")),
             ("count", run.count.to_string()),
@@ -190,16 +195,16 @@ impl<'a> Bench<'a> {
         Ok(measurement)
     }
 
-    /// A first block, which finds each meter's scale and how much work a block is.
+    /// A first block of few rays, which finds each meter's scale and how much work a block is.
     fn pilot(&self, run: Run) -> Result<Pilot, EngineError> {
         let mut readouts = export::first_readouts(self.job, Light::Indirect);
         let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();
         for _ in 0..MAX_LOOKS {
             self.keep_readouts(&readouts)?;
-            let Rendered { frames, work_s } = self.render(run, &readouts)?;
+            let Rendered { frames, work_s } = self.terms_apart(run, &readouts)?;
             let (mut settled, mut brightest_lx) = (true, 0.0_f64);
-            for (k, seen) in frames.into_iter().flatten().enumerate() {
-                let scale = match seen {
+            for k in 0..readouts.len() {
+                let scale = match Seen::brightest(frames.iter().map(|frame| frame[k])) {
                     // The blue channel holds a 1.5 times larger reading yet.
                     Seen::Value { lx, .. } => {
                         brightest_lx = brightest_lx.max(lx);
@@ -230,14 +235,14 @@ impl<'a> Bench<'a> {
 
     /// Blocks, each a process of one thread.
     fn wave(&self, run: Run, numbers: Range<usize>, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
-        let run_s = WITH_FIRST_TWO * pilot.work_s / COUNTED;
+        let run_s = pilot.work_s / COUNTED;
         let sleep_s = SLEEP_S + FRAME_SLEEP_S * self.terms.len().saturating_sub(1) as f64;
         // As many as compute while others sleep.
         let for_each_thread = (1.0 + SPARE * sleep_s / (START_S + run_s)).ceil() as usize;
         let side = for_each_thread.min(side_by_side_at_most(self.job)) * self.workbench.jobs.max(1);
         let numbers: Vec<usize> = numbers.collect();
         // The pilot is the first of the sequence of seeds.
-        let block = |k: &usize| self.block(Run { seed: self.seed(k + 1), is_block: true, ..run }, pilot);
+        let block = |k: &usize| self.block(Run { seed: self.seed(k + 1), ..run }, pilot);
         side_by_side(side, &numbers, block).into_iter().collect()
     }
 
@@ -276,17 +281,43 @@ impl<'a> Bench<'a> {
     }
 
     fn render(&self, run: Run, readouts: &[Readout]) -> Result<Rendered, EngineError> {
-        let frames = if run.is_block { self.terms.len() } else { 1 };
         // Frames get their numbers before the ending.
-        let (image, images) = match (run.seed, frames) {
-            (seed, 1) => (format!("seed{seed}.ppm"), vec![format!("seed{seed}.ppm")]),
-            (seed, _) => (format!("seed{seed}-.ppm"), (1..=frames).map(|k| format!("seed{seed}-{k}.ppm")).collect()),
+        let seed = run.seed;
+        let (image, images) = match self.frames(run.what) {
+            Some(frames) => (format!("seed{seed}-.ppm"), frames.map(|k| format!("seed{seed}-{k}.ppm")).collect()),
+            None => (format!("seed{seed}.ppm"), vec![format!("seed{seed}.ppm")]),
         };
         let invocation = self.workbench.invoke(&self.program).args(self.arguments(run, &image));
         let finished = hermetic(invocation, &self.workbench.site).run()?;
         let seen = |image: &String| Self::seen(run, &self.workbench.scene_dir.join(image), readouts);
         let frames = images.iter().map(seen).collect::<Result<_, _>>()?;
         Ok(Rendered { frames, work_s: TEST_S * intersection_tests(&finished.stderr) })
+    }
+
+    /// The numbers of the frames of an animation, where there is one.
+    fn frames(&self, what: What) -> Option<RangeInclusive<usize>> {
+        match what {
+            What::Scene => None,
+            _ if self.terms.len() < 2 => None,
+            What::Block => Some(1..=self.terms.len()),
+            What::Term(k) => Some(k + 1..=k + 1),
+        }
+    }
+
+    /// The terms of a block in as many processes, since frames that follow each other sleep after each other.
+    fn terms_apart(&self, run: Run, readouts: &[Readout]) -> Result<Rendered, EngineError> {
+        let terms: Vec<usize> = (0..self.terms.len()).collect();
+        let side = side_by_side_at_most(self.job) * self.workbench.jobs.max(1);
+        let one = |k: &usize| self.render(Run { what: What::Term(*k), ..run }, readouts);
+        side_by_side(side, &terms, one).into_iter().try_fold(
+            Rendered { frames: vec![], work_s: 0.0 },
+            |mut all, one| {
+                let Rendered { frames, work_s } = one?;
+                all.frames.extend(frames);
+                all.work_s += work_s;
+                Ok(all)
+            },
+        )
     }
 
     fn seen(run: Run, image: &Path, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
@@ -303,11 +334,14 @@ impl<'a> Bench<'a> {
     fn arguments(&self, run: Run, image: &str) -> Vec<String> {
         let mut arguments = export::arguments(self.job, run.light, run.seed, run.blanks(), image);
         arguments.extend([format!("Declare=Count={}", run.count), "Declare=Readouts=1".to_owned()]);
-        if run.is_block {
+        if run.what != What::Scene {
             arguments.push("Declare=Block=1".to_owned());
         }
-        if run.is_block && self.terms.len() > 1 {
+        if let Some(frames) = self.frames(run.what) {
             arguments.extend(["+KFI1".to_owned(), format!("+KFF{}", self.terms.len())]);
+            if let What::Term(_) = run.what {
+                arguments.extend([format!("+SF{}", frames.start()), format!("+EF{}", frames.end())]);
+            }
         }
         arguments
     }

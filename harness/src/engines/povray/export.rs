@@ -117,7 +117,15 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
     };
     let (limit, radiosity) = job.reflections().map_or(Default::default(), |bounces| {
         let limit = settings.recursion_limit(bounces);
-        let limit = format!("#ifndef (Limit) #declare Limit = {limit}; #end\n{}", block(&settings.terms(bounces)));
+        let mut limit = format!("#ifndef (Limit) #declare Limit = {limit}; #end\n");
+        if settings.is_finer_for_rest() {
+            limit.push_str(&format!(
+                "// How far samples are used again; less of what is reflected more than twice, since POV-Ray doubles it with every reflection.\n\
+                 #declare ErrorBound = {};\n",
+                settings.error_bound
+            ));
+        }
+        limit.push_str(&block(&settings.terms(bounces), settings));
         (limit, format!("  #if (Indirect) {} #end\n", settings.radiosity(bounces)))
     });
     let (rays, brightness, pool) = (settings.count, settings.brightness, settings::declared_pool());
@@ -141,10 +149,13 @@ fn head(job: &Job, settings: &Settings, frame: Frame) -> String {
 }
 
 /// The terms of a block: one as it is, or several as frames of an animation.
-fn block(terms: &[Term]) -> String {
+fn block(terms: &[Term], settings: &Settings) -> String {
     let declared = |term: &Term| {
         let limit = term.limit.map(|limit| format!(" #declare Limit = {limit};")).unwrap_or_default();
-        format!("#declare Count = {}*Count;{limit}", term.times)
+        let finer = term.is_rest && settings.is_finer_for_rest();
+        let bound =
+            if finer { format!(" #declare ErrorBound = {};", settings.error_bound_of_rest) } else { String::new() };
+        format!("#declare Count = {}*Count;{limit}{bound}", term.times)
     };
     let signs: String = terms.iter().map(|term| if term.sign < 0.0 { " -" } else { " +" }).collect();
     let case = |(term, k)| format!("  #case ({k}) {} #break\n", declared(term));
@@ -206,9 +217,12 @@ const AIM: &str = "
 
 /// Discs that are lit by nothing and see nothing, far outside the room.
 const BLANKS: &str = "
-// Blanks: grey discs in a black tube, each of which uses up one sample's worth of radiosity's directions.
+// Blanks: grey discs in a black tube, each of which uses up one sample's worth of radiosity's directions; black ones use up none, where fewer
+// samples go round the pool.
+#declare Spent = mod(Blanks, max(1, floor(Pool/Count)));
 #for (K, 1, Blanks)
-  disc { BlankSeat(K), z, .001 pigment { rgb .5 } finish { ambient 0 diffuse 1 } no_shadow no_reflection no_radiosity }
+  disc { BlankSeat(K), z, .001 pigment { rgb .5 } finish { ambient 0 diffuse (K > Spent ? 0 : 1) }
+    no_shadow no_reflection no_radiosity }
 #end
 #if (Blanks > 0)
   difference {

@@ -4,6 +4,8 @@
 //! to a thousandth, it shows the deviation y = E / expected - 1 instead: red .75 + y/2, green .5 + 500 y, blue .25. The
 //! offsets are light that only a disc emits: a pixel without them has missed its disc and seen a wall.
 
+use std::cmp::Ordering;
+
 /// What a disc was told to show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Readout {
@@ -25,6 +27,19 @@ pub(super) enum Seen {
     /// Less than the finest channel resolves; at most this, in lux.
     Below(f64),
     Missed,
+}
+
+impl Seen {
+    /// What several pictures of one disc show at most.
+    pub(super) fn brightest(pictures: impl Iterator<Item = Self>) -> Self {
+        let rank = |seen: &Self| match *seen {
+            Self::Missed => (3, 0.0),
+            Self::Above => (2, 0.0),
+            Self::Value { lx, .. } => (1, lx),
+            Self::Below(lx) => (0, lx),
+        };
+        pictures.max_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal)).unwrap_or(Self::Missed)
+    }
 }
 
 pub(super) fn decode(readout: Readout, [red, green, blue]: [f64; 3]) -> Seen {

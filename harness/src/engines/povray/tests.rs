@@ -177,21 +177,38 @@ fn within_errors_and_named_bias(measured: &Measurement, exact: &[f64]) {
         let error = estimate.uncertainty.standard_error().unwrap();
         let off = (estimate.value - exact).abs();
         // Eight blocks: Student's t of seven degrees of freedom is 4.8 at two in a thousand.
-        assert!(off < 4.8 * error + AUDIT_BIAS * exact, "{estimate:?}, exact {exact}");
+        assert!(off < 4.8 * error + BIAS[0].1 * exact, "{estimate:?}, exact {exact}");
         assert!(error > 0.0 && error < 0.03 * exact, "{estimate:?}");
     }
     assert!(measured.effort["blocks"].parse::<usize>().unwrap() >= 8);
 }
 
 #[test]
-fn brighter_rooms_have_a_larger_named_bias() {
-    let named = |rho: f64| match super::cache_error(rho, Bounces::AtMost(7), Preset::Audit) {
-        Support::Approximate { size: Some(size), .. } => size,
-        other => panic!("{other:?}"),
+fn brighter_and_longer_rooms_have_a_larger_named_bias_and_finer_rests() {
+    let of = |rho, size_m: [f64; 3]| {
+        let mut job = s1(CONVERGED);
+        let room = room(DVec3::from(size_m), rho, rho, rho);
+        job.scene.room = Some(room);
+        let bias = match super::cache_error(&room, Bounces::AtMost(7), Preset::Audit) {
+            Support::Approximate { size: Some(size), .. } => size,
+            other => panic!("{other:?}"),
+        };
+        (bias, Settings::of(&job).unwrap().error_bound_of_rest)
     };
-    assert_eq!([0.3, 0.5].map(named), [0.005; 2]);
-    assert!((named(0.7) - 0.03).abs() < 1e-12 && (named(0.95) - 0.09).abs() < 1e-12);
-    assert!(named(0.6) > named(0.5) && named(0.8) > named(0.7));
+    let cube = |rho| of(rho, [6.0; 3]);
+    assert_eq!([0.3, 0.5].map(cube), [(0.005, 0.05); 2]);
+    assert!((cube(0.7).0 - 0.02).abs() < 1e-12 && (cube(0.95).0 - 0.05).abs() < 1e-12);
+    assert!(cube(0.6).0 > cube(0.5).0 && cube(0.8).0 > cube(0.7).0);
+    assert!(cube(0.6).1 < 0.03 && (cube(0.9).1 - 0.01).abs() < 1e-12);
+    let (bias, bound) = of(0.5, [12.0, 3.0, 2.7]);
+    assert!((0.015..0.025).contains(&bias) && (0.0099..0.011).contains(&bound), "{bias} {bound}");
+    // Whoever sets it sets all of it.
+    let mut job = s1(CONVERGED);
+    job.scene.room = Some(room(DVec3::new(12.0, 3.0, 2.7), 0.5, 0.5, 0.5));
+    let settings = |job: &Job| settings::Settings::of(job).unwrap();
+    assert!(settings(&job).is_finer_for_rest());
+    job.settings.insert("error_bound".to_owned(), 0.02.into());
+    assert!(!settings(&job).is_finer_for_rest() && settings(&job).error_bound_of_rest == 0.02);
 }
 
 /// The second number of POV-Ray's generator, by which a block tilts the scene.

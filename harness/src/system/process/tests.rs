@@ -97,7 +97,12 @@ fn a_program_that_waits_goes_on_with_the_next_of_its_words_and_their_log() {
     let process = one.split(' ').next().unwrap();
     assert_eq!(asked(of(script, "two"), "2"), format!("{process} <2>"));
     let log = |name| fs::read_to_string(folder.path().join(name)).unwrap();
-    assert!(log("one").ends_with("about 1\n\n") && log("two").ends_with("about 2\n\n"), "{} {}", log("one"), log("two"));
+    assert!(
+        log("one").ends_with("about 1\n\n") && log("two").ends_with("about 2\n\n"),
+        "{} {}",
+        log("one"),
+        log("two")
+    );
     // Two at once are two, as are other words; what has ended meanwhile does not go on.
     let (first, second) = (of(script, "first"), of(script, "second"));
     assert!(asked(first, "1").starts_with(process) && !asked(second, "2").starts_with(process));
