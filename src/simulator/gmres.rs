@@ -3,6 +3,10 @@
 //! Saad and Schultz, *GMRES: a generalized minimal residual algorithm*, SIAM J. Sci. Stat. Comput. 7 (1986). A Neumann
 //! series needs log(tolerance) / log(reflectance) steps instead and never ends at .999999.
 
+#![expect(clippy::inline_always, reason = "compiled for what the processor has")]
+
+use pulp::{Arch, Simd, WithSimd};
+
 /// Steps after which the basis is thrown away and the iteration starts again from where it stands.
 const STEPS: usize = 48;
 /// Restarts after which the residual has reached what rounding allows.
@@ -94,17 +98,28 @@ fn norm(v: &[f64]) -> f64 {
     dot(v, v).sqrt()
 }
 
-/// A dot product in eight lanes, whose order of summation never depends on the machine's load.
+/// A dot product in eight lanes, whose order of summation never depends on the machine or on its load.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; 8];
-    let whole = a.len() / 8 * 8;
-    for (x, y) in a[..whole].chunks_exact(8).zip(b[..whole].chunks_exact(8)) {
-        for k in 0..8 {
-            lanes[k] += x[k] * y[k];
+    Arch::new().dispatch(Dot(a, b))
+}
+
+struct Dot<'a>(&'a [f64], &'a [f64]);
+
+impl WithSimd for Dot<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let ((a, rest_a), (b, rest_b)) = (self.0.as_chunks::<8>(), self.1.as_chunks::<8>());
+        let mut lanes = [0.0; 8];
+        for (x, y) in a.iter().zip(b) {
+            for k in 0..8 {
+                lanes[k] += x[k] * y[k];
+            }
         }
+        let tail: f64 = rest_a.iter().zip(rest_b).map(|(x, y)| x * y).sum();
+        lanes.iter().sum::<f64>() + tail
     }
-    let tail: f64 = a[whole..].iter().zip(&b[whole..]).map(|(x, y)| x * y).sum();
-    lanes.iter().sum::<f64>() + tail
 }
 
 #[cfg(test)]

@@ -1,11 +1,14 @@
 //! Cells of a luminaire's directions: one bilinear piece of its table, within one convex polygon that it lights.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+#![expect(clippy::inline_always, reason = "compiled for what the processor has")]
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 use glam::{DMat3, DVec3};
 
 use crate::photometry::LuminousIntensityDistribution;
 use crate::scene::Luminaire;
+use crate::simulator::quadrature::Gauss;
 
 /// Angles closer than this are one, in radians.
 const SAME_ANGLE: f64 = 1e-12;
@@ -42,6 +45,22 @@ enum Curve {
 impl Curve {
     fn at(self, c: f64) -> f64 {
         self.at_turn(c.sin_cos())
+    }
+
+    /// At the C of each sine and cosine.
+    #[inline(always)]
+    fn at_turns<const N: usize>(self, sin_c: &[f64; N], cos_c: &[f64; N]) -> [f64; N] {
+        let mut gamma = [0.0; N];
+        match self {
+            Self::Constant(value) => gamma = [value; N],
+            Self::GreatCircle(m) => {
+                let m = if m.z >= 0.0 { m } else { -m };
+                for k in 0..N {
+                    gamma[k] = angle(m.z, m.x * cos_c[k] + m.y * sin_c[k]);
+                }
+            }
+        }
+        gamma
     }
 
     /// At the C of this sine and cosine.
@@ -86,6 +105,128 @@ impl Row {
         (sin_g * self.across - cos_g * self.axis, candela * sin_g * self.measure)
     }
 }
+
+/// A rule of no more than N points, made up to N by points of no weight; nodes from -1 to 1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Padded<const N: usize> {
+    pub(super) nodes: [f64; N],
+    pub(super) weights: [f64; N],
+}
+
+impl<const N: usize> Padded<N> {
+    pub(super) fn new(rule: &Gauss) -> Self {
+        let (mut nodes, mut weights) = ([0.0; N], [0.0; N]);
+        for (k, (x, weight)) in rule.points().enumerate() {
+            (nodes[k], weights[k]) = (2.0 * x - 1.0, weight);
+        }
+        Self { nodes, weights }
+    }
+}
+
+/// Lines of constant C through a cell at the nodes of a rule, of each the part that a patch has of it.
+///
+/// All that is computed for one is computed for several at once, without the system's library: the same on every machine.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rows<const N: usize> {
+    /// Half the angle along gamma, and sine and cosine of its middle.
+    half: [f64; N],
+    sin: [f64; N],
+    cos: [f64; N],
+    /// Sine and cosine of C.
+    sin_c: [f64; N],
+    cos_c: [f64; N],
+    /// Intensity in the middle and what it gains a radian, both by what a unit of both parameters weighs.
+    flux: [f64; N],
+    slope: [f64; N],
+    /// World directions at gamma 90 and C 0 or 90, and of the zenith.
+    orientation: DMat3,
+}
+
+/// Points of a rule along one of them: sines and cosines of gamma, and flux in lumens.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line<const N: usize> {
+    pub(super) sin: [f64; N],
+    pub(super) cos: [f64; N],
+    pub(super) flux: [f64; N],
+    pub(super) across: DVec3,
+    pub(super) axis: DVec3,
+}
+
+impl<const N: usize> Rows<N> {
+    #[inline(always)]
+    pub(super) fn line(&self, k: usize, rule: &Padded<N>) -> Line<N> {
+        let (sin, cos, half) = (self.sin[k], self.cos[k], self.half[k]);
+        let (flux, slope, weight) = (self.flux[k], self.slope[k], rule.weights[k]);
+        let mut line = Line {
+            sin: [0.0; N],
+            cos: [0.0; N],
+            flux: [0.0; N],
+            across: self.orientation.x_axis * self.cos_c[k] + self.orientation.y_axis * self.sin_c[k],
+            axis: self.orientation.z_axis,
+        };
+        for i in 0..N {
+            let x = half * rule.nodes[i];
+            let (sin_x, cos_x) = series(x);
+            line.sin[i] = sin * cos_x + cos * sin_x;
+            line.cos[i] = cos * cos_x - sin * sin_x;
+            line.flux[i] = weight * rule.weights[i] * (flux + x * slope) * line.sin[i];
+        }
+        line
+    }
+}
+
+/// Sine and cosine of an angle of a right angle at most.
+#[inline(always)]
+fn series(x: f64) -> (f64, f64) {
+    let z = x * x;
+    let (mut sin, mut cos) = (1.0, 1.0);
+    for [of_sin, of_cos] in SERIES {
+        sin = 1.0 - z * of_sin * sin;
+        cos = 1.0 - z * of_cos * cos;
+    }
+    (x * sin, cos)
+}
+
+/// Quotients of the terms of sine and cosine, the last first; further ones would be 2e-19 at a right angle.
+const SERIES: [[f64; 2]; 11] = {
+    let mut quotients = [[0.0; 2]; 11];
+    let mut k = 0;
+    while k < 11 {
+        let even = 2.0 * (11 - k) as f64;
+        quotients[k] = [1.0 / (even * (even + 1.0)), 1.0 / (even * (even - 1.0))];
+        k += 1;
+    }
+    quotients
+};
+
+/// The angle of a point above the x axis, from 0 to π.
+#[inline(always)]
+fn angle(y: f64, x: f64) -> f64 {
+    let (long, short) = (y.max(x.abs()), y.min(x.abs()));
+    // An eighth of a turn is taken off where that leaves less, so that the series converges.
+    let is_turned = short > 0.414 * long;
+    let (over, under) = if is_turned { (short - long, short + long) } else { (short, long) };
+    let t = over / under;
+    let z = -t * t;
+    let mut sum = 0.0;
+    for odd in ODD {
+        sum = sum * z + odd;
+    }
+    let angle = t * sum + if is_turned { FRAC_PI_4 } else { 0.0 };
+    let angle = if y > x.abs() { FRAC_PI_2 - angle } else { angle };
+    if x < 0.0 { PI - angle } else { angle }
+}
+
+/// Reciprocals of the odd numbers, the last first; a further term would be 1e-17 of the first.
+const ODD: [f64; 21] = {
+    let mut odd = [0.0; 21];
+    let mut k = 0;
+    while k < 21 {
+        odd[k] = 1.0 / (41 - 2 * k) as f64;
+        k += 1;
+    }
+    odd
+};
 
 impl Cell {
     /// The piece of the table that it belongs to.
@@ -143,6 +284,52 @@ impl LuminaireFrame {
         let measure = (cell.c.1 - cell.c.0) * (high - low);
         let across = self.orientation * DVec3::new(cos_c, sin_c, 0.0);
         Row { low, high, across, axis: self.orientation.z_axis, candela: candela[0], from: g0, slope, measure }
+    }
+
+    /// Lines through a cell at the nodes of a rule in two ranges of its parameters, each a start and a length.
+    #[inline(always)]
+    pub(super) fn rows<const N: usize>(&self, cell: &Cell, s: (f64, f64), t: (f64, f64), rule: &Padded<N>) -> Rows<N> {
+        let none = [0.0; N];
+        let mut rows = Rows {
+            half: none,
+            sin: none,
+            cos: none,
+            sin_c: none,
+            cos_c: none,
+            flux: none,
+            slope: none,
+            orientation: self.orientation,
+        };
+        let turn = cell.c.1 - cell.c.0;
+        let half_c = 0.5 * s.1 * turn;
+        let middle_c = cell.c.0 + s.0 * turn + half_c;
+        let (sin, cos) = middle_c.sin_cos();
+        for k in 0..N {
+            let (sin_x, cos_x) = series(half_c * rule.nodes[k]);
+            rows.sin_c[k] = sin * cos_x + cos * sin_x;
+            rows.cos_c[k] = cos * cos_x - sin * sin_x;
+        }
+        let [low, high] = [cell.lower, cell.upper].map(|curve| curve.at_turns(&rows.sin_c, &rows.cos_c));
+        let (i, j) = cell.piece;
+        let (c0, c1) = (self.c_rad[i], self.c_rad[i + 1]);
+        let (g0, g1) = (self.gamma_rad[j], self.gamma_rad[j + 1]);
+        let at = |di: usize, dj: usize| self.candela[(i + di) * self.gamma_rad.len() + j + dj];
+        let (from, gain) = ([at(0, 0), at(0, 1)], [at(1, 0) - at(0, 0), at(1, 1) - at(0, 1)]);
+        for k in 0..N {
+            let along_c = (middle_c - c0 + half_c * rule.nodes[k]) / (c1 - c0);
+            let candela = [from[0] + along_c * gain[0], from[1] + along_c * gain[1]];
+            let slope = (candela[1] - candela[0]) / (g1 - g0);
+            let length = high[k] - low[k];
+            let half = 0.5 * t.1 * length;
+            let middle = low[k] + t.0 * length + half;
+            let weight = turn * length * s.1 * t.1;
+            rows.half[k] = half;
+            rows.flux[k] = weight * (candela[0] + (middle - g0) * slope);
+            rows.slope[k] = weight * slope;
+            let (sin, cos) = series(middle - FRAC_PI_2);
+            (rows.sin[k], rows.cos[k]) = (cos, -sin);
+        }
+        rows
     }
 
     /// The pieces of the table that carry light.
@@ -272,4 +459,20 @@ impl Outline {
 fn wrap(c: f64) -> f64 {
     let c = c.rem_euclid(TAU);
     if c >= TAU { 0.0 } else { c }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn series_are_sine_cosine_and_arc_tangent_to_the_last_digits() {
+        for k in 0..=1000 {
+            let x = FRAC_PI_2 * (f64::from(k) / 500.0 - 1.0);
+            let (sin, cos) = series(x);
+            assert!((sin - x.sin()).abs() < 4e-16 && (cos - x.cos()).abs() < 4e-16, "{x}: {sin} {cos}");
+            let (y, x) = (PI * f64::from(k) / 1000.0).sin_cos();
+            assert!((angle(y, x) - y.atan2(x)).abs() < 1e-15, "{y} {x}: {}", angle(y, x));
+        }
+    }
 }

@@ -5,7 +5,6 @@
 //! luminaire's rotation. An edge or a horizon is a great circle there: `tan gamma = m_z / (m_x cos C + m_y sin C)` for
 //! the normal m of its plane.
 
-use std::f64::consts::PI;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -15,7 +14,7 @@ use rayon::prelude::*;
 use super::Effort;
 use super::cells::{Cell, LuminaireFrame};
 use super::grid::{Face, Grid};
-use super::kernel::Receiver;
+use super::kernel::{Receiver, View};
 use super::patch::{Ground, Patch, Points, Rules};
 use super::symmetry::reflectance;
 use crate::geometry::Room;
@@ -84,6 +83,7 @@ impl FirstBounce {
             }
             let mut on_face = vec![0.0; receivers.len()];
             let polygon = corners(&self.room, face);
+            let views: Vec<_> = receivers.iter().map(|r| View::new(self.room.size_m, r, face)).collect();
             let mut in_view = Numbers { numbers: vec![], start: 0 };
             for (k, receiver) in receivers.iter().enumerate().filter(|(_, r)| r.face != Some(face)) {
                 match above_horizon(receiver, &polygon, self.room.size_m.max_element()) {
@@ -95,11 +95,11 @@ impl FirstBounce {
             for source in self.sources.iter().take_while(|_| !stop.is_due()) {
                 let ground = self.ground(source, face);
                 for patch in &source.faces[face.0] {
-                    self.walk(patch, ground, receivers, &mut in_view, &mut on_face);
+                    self.walk(patch, ground, (receivers, &views), &mut in_view, &mut on_face);
                 }
             }
             for (sum, on_face) in sums.iter_mut().zip(on_face) {
-                *sum += rho / PI * on_face;
+                *sum += rho * on_face;
             }
         }
         sums
@@ -167,17 +167,19 @@ impl FirstBounce {
     /// Light from a face that the horizon of a receiver crosses: pieces of a table that it crosses are cut along it.
     fn partly_seen(&self, face: Face, lit: &[DVec3], receiver: &Receiver) -> f64 {
         let mut sum = [0.0];
-        let (receiver, mut only) = (std::slice::from_ref(receiver), Numbers { numbers: vec![0], start: 0 });
+        let view = View::new(self.room.size_m, receiver, face);
+        let (seen, mut only) =
+            ((std::slice::from_ref(receiver), std::slice::from_ref(&view)), Numbers { numbers: vec![0], start: 0 });
         let rounding = 1e-14 * self.room.size_m.max_element();
         for source in &self.sources {
             let ground = self.ground(source, face);
             let mut crossed = vec![];
             for piece in source.faces[face.0].chunk_by(|a, b| a.piece() == b.piece()) {
-                let heights = piece.iter().map(|patch| heights(patch, &receiver[0]));
+                let heights = piece.iter().map(|patch| heights(patch, receiver));
                 let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
                 if low >= -rounding {
                     for patch in piece {
-                        self.walk(patch, ground, receiver, &mut only, &mut sum);
+                        self.walk(patch, ground, seen, &mut only, &mut sum);
                     }
                 } else if high > rounding {
                     crossed.push(piece[0].piece());
@@ -185,7 +187,7 @@ impl FirstBounce {
             }
             if !crossed.is_empty() {
                 for patch in patches(ground, source.frame.cells(lit, &crossed)) {
-                    self.walk(&patch, ground, receiver, &mut only, &mut sum);
+                    self.walk(&patch, ground, seen, &mut only, &mut sum);
                 }
             }
         }
@@ -193,13 +195,13 @@ impl FirstBounce {
     }
 
     /// Adds what a patch gives the receivers whose numbers `list` holds from `start` on; leaves the list as it was.
-    fn walk(&self, patch: &Patch, ground: Ground, receivers: &[Receiver], list: &mut Numbers, sums: &mut [f64]) {
+    fn walk(&self, patch: &Patch, ground: Ground, seen: (&[Receiver], &[View]), list: &mut Numbers, sums: &mut [f64]) {
         let smallest = SMALLEST * self.room.size_m.max_element();
         let (start, end) = (list.start, list.numbers.len());
         let mut own = [const { None }; Patch::RULES];
         for k in start..end {
             let number = list.numbers[k];
-            let receiver = &receivers[number as usize];
+            let (receiver, view) = (&seen.0[number as usize], &seen.1[number as usize]);
             let gap = (receiver.position_m - patch.centre_m).abs() - patch.half_m;
             let rule = match patch.rule_at(gap.max(DVec3::ZERO).length_squared(), &self.rules) {
                 _ if patch.half_length_m <= smallest => Patch::NEAR,
@@ -210,13 +212,13 @@ impl FirstBounce {
                 }
             };
             let points = self.points(patch, rule, ground, &mut own[rule]);
-            sums[number as usize] += points.irradiance(receiver, ground.face);
+            sums[number as usize] += points.irradiance(view);
         }
         if list.numbers.len() > end {
             let mut own = None;
             list.start = end;
             for half in self.halves(patch, ground, &mut own) {
-                self.walk(half, ground, receivers, list, sums);
+                self.walk(half, ground, seen, list, sums);
             }
             list.start = start;
             list.numbers.truncate(end);
@@ -225,7 +227,7 @@ impl FirstBounce {
 
     /// A patch's points, which are kept as long as there is room, or made here: the result is the same.
     fn points<'a>(&self, patch: &'a Patch, rule: usize, ground: Ground, own: &'a mut Option<Points>) -> &'a Points {
-        self.kept(patch.kept_points(rule), 32 * patch.count(rule), || patch.sample(rule, ground), own)
+        self.kept(patch.kept_points(rule), 24 * patch.count(rule), || patch.sample(rule, ground), own)
     }
 
     fn halves<'a>(&self, patch: &'a Patch, ground: Ground, own: &'a mut Option<Box<[Patch; 2]>>) -> &'a [Patch; 2] {

@@ -11,6 +11,11 @@ use crate::simulator::quadrature::Gauss;
 /// Dyadic intervals whose interpolation matrices are kept.
 const KEPT_INTERVALS: usize = 128;
 
+/// What the element at an edge has of the two that were one before.
+///
+/// Light has its singularities at the edges: there, a smaller element brings more than halves do.
+const SHARE: f64 = 0.4;
+
 /// As many nodes or points along an element as any effort asks for.
 pub(super) const MOST: usize = 12;
 
@@ -113,7 +118,7 @@ pub(super) struct Grid {
 impl Grid {
     pub(super) fn new(size_m: DVec3, effort: &Effort) -> Self {
         let nodal = Gauss::new(effort.order);
-        let axes = [0, 1, 2].map(|k| Axis::new(size_m[k], elements(size_m, k, effort), &nodal));
+        let axes = [0, 1, 2].map(|k| Axis::new(size_m[k], halves(size_m, k), effort.at_edge, &nodal));
         let mut offsets = [0; 7];
         for face in Face::ALL {
             let (_, u, v) = face.axes();
@@ -134,7 +139,7 @@ impl Grid {
 
     /// How many nodes a grid would have.
     pub(super) fn count(size_m: DVec3, effort: &Effort) -> usize {
-        let nodes = |k| effort.order * elements(size_m, k, effort);
+        let nodes = |k| effort.order * elements(halves(size_m, k), effort.at_edge);
         2 * (nodes(0) * nodes(1) + nodes(1) * nodes(2) + nodes(2) * nodes(0))
     }
 
@@ -169,13 +174,13 @@ impl Grid {
     }
 
     /// Shares flux at a point of a face out among the nodes of the element there, as their polynomials weigh it.
-    pub(super) fn deposit(&self, face: Face, point_m: DVec3, flux: f64, at_nodes: &mut [f64]) {
+    pub(super) fn deposit(&self, face: Face, point_m: [f64; 2], flux: f64, at_nodes: &mut [f64]) {
         let (_, u, v) = face.axes();
         let mut values = [[0.0; MOST]; 2];
         let [first_u, first_v] = [0, 1].map(|k| {
             let axis = [u, v][k];
-            let number = self.axes[axis].element_at(point_m[axis]);
-            let s = self.axes[axis].elements[number].parameter(point_m[axis]);
+            let number = self.axes[axis].element_at(point_m[k]);
+            let s = self.axes[axis].elements[number].parameter(point_m[k]);
             self.basis(s, &mut values[k][..self.order]);
             number * self.order
         });
@@ -222,13 +227,30 @@ impl Grid {
 }
 
 impl Axis {
+    /// Nodes of an element and their weights, in metres.
+    pub(super) fn of(&self, element: usize) -> (&[f64], &[f64]) {
+        let order = self.nodes_m.len() / self.elements.len();
+        let own = element * order..(element + 1) * order;
+        (&self.nodes_m[own.clone()], &self.weights_m[own])
+    }
+
     /// The element at a coordinate.
     fn element_at(&self, x_m: f64) -> usize {
         self.elements.partition_point(|e| e.end_m < x_m).min(self.elements.len() - 1)
     }
 
-    fn new(length_m: f64, count: usize, nodal: &Gauss) -> Self {
-        let boundary = |k: usize| length_m * k as f64 / count as f64;
+    fn new(length_m: f64, halves: usize, at_edge: usize, nodal: &Gauss) -> Self {
+        let count = elements(halves, at_edge);
+        let boundary = |k: usize| {
+            let from_edge = k.min(count - k);
+            let steps = match (from_edge + 1).checked_sub(at_edge) {
+                _ if from_edge == 0 => 0.0,
+                Some(whole @ 1..) => whole as f64,
+                _ => SHARE.powi((at_edge - from_edge) as i32),
+            };
+            let from_edge_m = 0.5 * length_m * steps / halves as f64;
+            if 2 * k > count { length_m - from_edge_m } else { from_edge_m }
+        };
         let elements: Vec<_> = (0..count)
             .map(|k| {
                 let grading = match k {
@@ -249,10 +271,14 @@ impl Axis {
     }
 }
 
-/// Elements along an axis: about as long as half the shortest side, and evenly many, so that the grid has mirrors.
-fn elements(size_m: DVec3, axis: usize, effort: &Effort) -> usize {
-    let halves = (size_m[axis] / (2.0 * size_m.min_element())).round().clamp(1.0, 6.0) as usize;
-    2 * halves * effort.elements_per_half
+/// Elements along half an axis before those at the edge are divided: about as long as the shortest side, or half of it.
+fn halves(size_m: DVec3, axis: usize) -> usize {
+    (size_m[axis] / (2.0 * size_m.min_element())).round().clamp(1.0, 6.0) as usize
+}
+
+/// How many elements an axis has, evenly many, so that the grid has mirrors.
+fn elements(halves: usize, at_edge: usize) -> usize {
+    2 * (halves + at_edge - 1)
 }
 
 /// Start and length of a dyadic interval of 0..1 by its number in a heap that begins with 1.

@@ -4,9 +4,12 @@
 //! distance, and integrated in the graded parameter, where the integrand is smooth. Elements that the receiver's
 //! horizon crosses are cut along it, because a kink would cost every digit past the third.
 
-use glam::DVec3;
+#![expect(clippy::inline_always, reason = "compiled for what the processor has")]
 
-use super::grid::{Axis, Element, Face, Grid, MOST, dyadic};
+use glam::DVec3;
+use pulp::{Arch, Simd, WithSimd};
+
+use super::grid::{Element, Face, Grid, MOST, dyadic};
 
 /// Elements at least this many half-widths away are far.
 ///
@@ -36,8 +39,8 @@ struct Panel<'a> {
 }
 
 /// The kernel on the plane of one face: cos cos / (π r²) at offsets (u, v) from the foot of the receiver.
-#[derive(Clone, Copy)]
-struct View {
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
     foot_u: f64,
     foot_v: f64,
     /// Squared distance to the plane.
@@ -49,6 +52,9 @@ struct View {
     tilt_u: f64,
     tilt_v: f64,
 }
+
+/// Terms that are summed side by side, the same on every machine; points come in as many.
+pub(super) const LANES: usize = 4;
 
 enum Horizon {
     Above,
@@ -94,7 +100,7 @@ impl Grid {
             if receiver.face == Some(face) {
                 continue;
             }
-            let view = View::new(self, receiver, face);
+            let view = View::new(self.size_m, receiver, face);
             let (_, u, v) = face.axes();
             let (_, stride) = self.counts(face);
             for (eu, along_u) in self.axes[u].elements.iter().enumerate() {
@@ -105,7 +111,8 @@ impl Grid {
                         Horizon::Below => {}
                         Horizon::Crosses => panel.add_cut(block, stride),
                         Horizon::Above if panel.is_far() => {
-                            view.add_far(self.order, (&self.axes[u], eu), (&self.axes[v], ev), block, stride);
+                            let (u, v) = (self.axes[u].of(eu), self.axes[v].of(ev));
+                            Arch::new().dispatch(FarShare { view, u, v, block, stride });
                         }
                         Horizon::Above => panel.add_near(block, stride),
                     }
@@ -116,9 +123,9 @@ impl Grid {
 }
 
 impl View {
-    fn new(grid: &Grid, receiver: &Receiver, face: Face) -> Self {
+    pub(super) fn new(size_m: DVec3, receiver: &Receiver, face: Face) -> Self {
         let (n, u, v) = face.axes();
-        let depth = face.plane(grid.size_m) - receiver.position_m[n];
+        let depth = face.plane(size_m) - receiver.position_m[n];
         Self {
             foot_u: receiver.position_m[u],
             foot_v: receiver.position_m[v],
@@ -130,24 +137,98 @@ impl View {
         }
     }
 
-    fn add_far(&self, order: usize, u: (&Axis, usize), v: (&Axis, usize), block: &mut [f64], stride: usize) {
-        let span = |e: usize| e * order..(e + 1) * order;
-        let (us, wu) = (&u.0.nodes_m[span(u.1)], &u.0.weights_m[span(u.1)]);
-        let (vs, wv) = (&v.0.nodes_m[span(v.1)], &v.0.weights_m[span(v.1)]);
+    /// What points above the receiver's horizon send there: their places along u and v and the flux that each reflects, as many of each.
+    pub(super) fn irradiance(&self, points: &[f64]) -> f64 {
+        Arch::new().dispatch(Seen { view: *self, points })
+    }
+}
+
+/// A far element, for its share of a row.
+struct FarShare<'a> {
+    view: View,
+    u: (&'a [f64], &'a [f64]),
+    v: (&'a [f64], &'a [f64]),
+    block: &'a mut [f64],
+    stride: usize,
+}
+
+impl WithSimd for FarShare<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { view, u: (us, wu), v: (vs, wv), block, stride } = self;
+        let order = us.len();
         let (mut cosine, mut squared) = ([0.0; MOST], [0.0; MOST]);
         for b in 0..order {
-            let dv = vs[b] - self.foot_v;
-            cosine[b] = self.level + self.tilt_v * dv;
-            squared[b] = self.depth2 + dv * dv;
+            let dv = vs[b] - view.foot_v;
+            cosine[b] = wv[b] * (view.level + view.tilt_v * dv);
+            squared[b] = view.depth2 + dv * dv;
         }
         for a in 0..order {
-            let du = us[a] - self.foot_u;
-            let (w, u2, cu) = (wu[a] * self.scale, du * du, self.tilt_u * du);
+            let du = us[a] - view.foot_u;
+            let (w, u2, cu) = (wu[a] * view.scale, du * du, view.tilt_u * du);
             let out = &mut block[a * stride..][..order];
             for b in 0..order {
                 let r2 = u2 + squared[b];
-                out[b] += w * wv[b] * (cosine[b] + cu) / (r2 * r2);
+                out[b] += w * (cosine[b] + cu * wv[b]) / (r2 * r2);
             }
+        }
+    }
+}
+
+struct Seen<'a> {
+    view: View,
+    points: &'a [f64],
+}
+
+impl WithSimd for Seen<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let view = self.view;
+        let (us, rest) = self.points.split_at(self.points.len() / 3);
+        let (vs, fluxes) = rest.split_at(us.len());
+        let (us, vs, fluxes) = (us.as_chunks::<LANES>().0, vs.as_chunks::<LANES>().0, fluxes.as_chunks::<LANES>().0);
+        let mut lanes = [0.0; LANES];
+        for ((u, v), flux) in us.iter().zip(vs).zip(fluxes) {
+            for k in 0..LANES {
+                let (du, dv) = (u[k] - view.foot_u, v[k] - view.foot_v);
+                let r2 = du * du + dv * dv + view.depth2;
+                let height = view.level + view.tilt_u * du + view.tilt_v * dv;
+                lanes[k] += flux[k] * height.max(0.0) / (r2 * r2);
+            }
+        }
+        view.scale * ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3]))
+    }
+}
+
+/// A part of an element, for its share of a row.
+struct Share<'a> {
+    panel: &'a Panel<'a>,
+    u: &'a Span<'a>,
+    v: &'a Span<'a>,
+    block: &'a mut [f64],
+    stride: usize,
+}
+
+impl WithSimd for Share<'_> {
+    type Output = ();
+
+    /// The same code, compiled for the sizes of each effort: loops of known length take a third of the time.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { panel, u, v, block, stride } = self;
+        match (panel.grid.order, panel.grid.near.nodes.len()) {
+            (2, 4) => panel.add_part_of((2, 4), u, v, block, stride),
+            (4, 4) => panel.add_part_of((4, 4), u, v, block, stride),
+            (5, 6) => panel.add_part_of((5, 6), u, v, block, stride),
+            (6, 8) => panel.add_part_of((6, 8), u, v, block, stride),
+            (8, 8) => panel.add_part_of((8, 8), u, v, block, stride),
+            (10, 10) => panel.add_part_of((10, 10), u, v, block, stride),
+            (12, 12) => panel.add_part_of((12, 12), u, v, block, stride),
+            sizes => panel.add_part_of(sizes, u, v, block, stride),
         }
     }
 }
@@ -231,20 +312,9 @@ impl Panel<'_> {
     }
 
     fn add_part(&self, u: &Span, v: &Span, block: &mut [f64], stride: usize) {
-        // The same code, compiled for the sizes of each effort: loops of known length take a third of the time.
-        match (self.grid.order, self.grid.near.nodes.len()) {
-            (2, 4) => self.add_part_of((2, 4), u, v, block, stride),
-            (4, 4) => self.add_part_of((4, 4), u, v, block, stride),
-            (5, 6) => self.add_part_of((5, 6), u, v, block, stride),
-            (6, 8) => self.add_part_of((6, 8), u, v, block, stride),
-            (8, 8) => self.add_part_of((8, 8), u, v, block, stride),
-            (10, 10) => self.add_part_of((10, 10), u, v, block, stride),
-            (12, 12) => self.add_part_of((12, 12), u, v, block, stride),
-            sizes => self.add_part_of(sizes, u, v, block, stride),
-        }
+        Arch::new().dispatch(Share { panel: self, u, v, block, stride });
     }
 
-    #[expect(clippy::inline_always, reason = "the sizes are to become constants")]
     #[inline(always)]
     fn add_part_of(&self, (order, points): (usize, usize), u: &Span, v: &Span, block: &mut [f64], stride: usize) {
         let (view, rule) = (&self.view, &self.grid.near);

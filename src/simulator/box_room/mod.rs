@@ -10,6 +10,7 @@ mod error;
 mod first_bounce;
 mod grid;
 mod kernel;
+mod operator;
 mod patch;
 mod symmetry;
 #[cfg(test)]
@@ -28,6 +29,7 @@ use error::Reading;
 use first_bounce::FirstBounce;
 use grid::Grid;
 use kernel::Receiver;
+use operator::{Operator, balanced_row, receiver_at};
 use symmetry::{Orbits, Symmetries};
 
 /// How fine a solution is.
@@ -35,8 +37,8 @@ use symmetry::{Orbits, Symmetries};
 pub(super) struct Effort {
     /// Nodes along an element.
     pub(super) order: usize,
-    /// Elements along half the shortest side.
-    pub(super) elements_per_half: usize,
+    /// Elements at an edge for one that there would be, smaller and smaller towards it.
+    pub(super) at_edge: usize,
     /// Points of the rule on near elements.
     pub(super) near_points: usize,
     /// Points of the rule on a patch of the first bounce.
@@ -47,8 +49,8 @@ pub(super) struct Effort {
     pub(super) source_tolerance: f64,
 }
 
-/// Entries of the operator at most: 128 MiB.
-const MAX_ENTRIES: usize = 1 << 24;
+/// Entries of the operator at most: 256 MiB, which the finest effort needs in a cube whose light has no symmetry.
+const MAX_ENTRIES: usize = 1 << 25;
 /// Fewer meters than this are read sooner than another thread wakes.
 const FEW: usize = 8;
 /// Luminaires up to which each one's light is integrated for each node, where errors this small are asked for and where not.
@@ -58,70 +60,14 @@ const PROJECTION_REACHES: f64 = 1e-3;
 const FIRST_EFFORT: [f64; 6] = [f64::INFINITY, 2e-2, 2e-5, 5e-6, 3e-6, 2e-6];
 /// The ladder of efforts; the rules of the first bounce grow with the order, or neighbours would share their errors.
 pub(super) const EFFORTS: [Effort; 8] = [
-    Effort {
-        order: 2,
-        elements_per_half: 1,
-        near_points: 4,
-        source_points: 3,
-        source_reach: 0.7,
-        source_tolerance: 1e-3,
-    },
-    Effort {
-        order: 4,
-        elements_per_half: 1,
-        near_points: 4,
-        source_points: 3,
-        source_reach: 1.0,
-        source_tolerance: 1e-4,
-    },
-    Effort {
-        order: 5,
-        elements_per_half: 1,
-        near_points: 6,
-        source_points: 5,
-        source_reach: 1.0,
-        source_tolerance: 1e-6,
-    },
-    Effort {
-        order: 6,
-        elements_per_half: 1,
-        near_points: 8,
-        source_points: 6,
-        source_reach: 1.0,
-        source_tolerance: 1e-7,
-    },
-    Effort {
-        order: 8,
-        elements_per_half: 1,
-        near_points: 8,
-        source_points: 8,
-        source_reach: 1.2,
-        source_tolerance: 1e-8,
-    },
-    Effort {
-        order: 10,
-        elements_per_half: 1,
-        near_points: 10,
-        source_points: 9,
-        source_reach: 1.5,
-        source_tolerance: 1e-9,
-    },
-    Effort {
-        order: 12,
-        elements_per_half: 1,
-        near_points: 12,
-        source_points: 10,
-        source_reach: 1.5,
-        source_tolerance: 1e-10,
-    },
-    Effort {
-        order: 12,
-        elements_per_half: 2,
-        near_points: 12,
-        source_points: 12,
-        source_reach: 2.5,
-        source_tolerance: 1e-12,
-    },
+    Effort { order: 2, at_edge: 1, near_points: 4, source_points: 3, source_reach: 0.7, source_tolerance: 1e-3 },
+    Effort { order: 4, at_edge: 1, near_points: 4, source_points: 3, source_reach: 1.0, source_tolerance: 1e-4 },
+    Effort { order: 5, at_edge: 1, near_points: 6, source_points: 5, source_reach: 1.0, source_tolerance: 1e-6 },
+    Effort { order: 6, at_edge: 1, near_points: 8, source_points: 6, source_reach: 1.0, source_tolerance: 1e-7 },
+    Effort { order: 8, at_edge: 1, near_points: 8, source_points: 8, source_reach: 1.2, source_tolerance: 1e-8 },
+    Effort { order: 10, at_edge: 1, near_points: 10, source_points: 9, source_reach: 1.5, source_tolerance: 1e-9 },
+    Effort { order: 12, at_edge: 1, near_points: 12, source_points: 10, source_reach: 1.5, source_tolerance: 1e-10 },
+    Effort { order: 12, at_edge: 2, near_points: 12, source_points: 12, source_reach: 2.5, source_tolerance: 1e-12 },
 ];
 
 /// An empty room with point luminaires, solved as finely as anyone has asked so far.
@@ -200,18 +146,18 @@ impl EmptyRoom {
                     format!("its bound of {worst:.0e} meets the {relative_error:.0e} asked for")
                 }
                 None => format!("the finest there is, its bound is {worst:.0e}"),
-                Some(next) if symmetry::matrix_entries(room.size_m, next) > MAX_ENTRIES => {
+                Some(next) if symmetries.matrix_entries(room.size_m, next) > MAX_ENTRIES => {
                     format!("a finer matrix would not fit, its bound is {worst:.0e}")
                 }
                 Some(_) => continue,
             };
-            let Effort { order, elements_per_half, .. } = EFFORTS[level - 1];
+            let Effort { order, at_edge, .. } = EFFORTS[level - 1];
             let light = match &self.crowd {
                 Some(_) => format!("{} point luminaires projected on it", luminaires.len()),
                 None => "point luminaires".to_owned(),
             };
             let text = format!(
-                "hp collocation, order {order} with {elements_per_half} element(s) a half side: empty box, {light}; {why}"
+                "hp collocation, order {order} with {at_edge} element(s) at an edge: empty box, {light}; {why}"
             );
             return Ok((values, text));
         }
@@ -283,28 +229,13 @@ impl BoxField {
         }
         let orbits = Orbits::new(&grid, &symmetries.of_room);
         let light = orbits.under(&symmetries.of_light);
-        let operator = Operator::new(&grid, orbits, stop)?;
+        let operator = Operator::new(&grid, &orbits, &light, stop)?;
         let rho: Vec<f64> = (0..grid.len()).map(|node| symmetry::reflectance(room, grid.place(node).0)).collect();
+        let rho_of_light: Vec<f64> = light.representatives.iter().map(|node| rho[*node]).collect();
+        let reflected = |u: &[f64]| operator.apply(&exitance(u, &rho_of_light));
         let (known, imbalance) = match &first {
             First::Few(few) => known(&grid, few, &light, stop),
-            First::Many(many) => {
-                let lux = operator.apply(&exitance(&many.projected(&grid, effort, stop), &rho));
-                (light.representatives.iter().map(|node| lux[*node]).collect(), crowd::MISPLACED)
-            }
-        };
-        // Where the light is symmetrical enough, the matrix of its orbits is no larger.
-        let folded = (light.images.len().pow(2) >= operator.orbits.images.len()).then(|| operator.folded(&light));
-        let rho_of_light: Vec<f64> = light.representatives.iter().map(|node| rho[*node]).collect();
-        let reflected = |u: &[f64]| -> Vec<f64> {
-            let Some(rows) = &folded else {
-                let lux = operator.apply(&exitance(&light.unfold(u), &rho));
-                return light.representatives.iter().map(|node| lux[*node]).collect();
-            };
-            let exitance = exitance(u, &rho_of_light);
-            let lux = |row: &Vec<f64>| gmres::dot(row, &exitance);
-            // Sums that take microseconds are not worth a second thread.
-            let few = rows.len() < 500;
-            if few { rows.iter().map(lux).collect() } else { rows.par_iter().map(lux).collect() }
+            First::Many(many) => (reflected(&light.means(&many.projected(&grid, effort, stop))), crowd::MISPLACED),
         };
         let area_m2 = light.representatives.iter().zip(&light.sizes).map(|(node, n)| grid.node(*node).1 * n);
         let closed = Closed(area_m2.zip(rho_of_light.iter().copied()).collect());
@@ -429,70 +360,4 @@ fn known(grid: &Grid, first: &FirstBounce, orbits: &Orbits, stop: &Stop) -> (Vec
 
 fn exitance(irradiance: &[f64], rho: &[f64]) -> Vec<f64> {
     irradiance.iter().zip(rho).map(|(u, rho)| u * rho).collect()
-}
-
-fn receiver_at(grid: &Grid, node: usize) -> Receiver {
-    let face = grid.place(node).0;
-    Receiver { position_m: grid.node(node).0, normal: face.inward_normal(), face: Some(face) }
-}
-
-/// A row of the operator, scaled to sum to 1: a receiver in a closed room sees nothing but the room.
-///
-/// Without it, quadrature errors of 1e-7 would outweigh the absorption of a room with reflectance .9999999.
-fn balanced_row(grid: &Grid, receiver: &Receiver) -> Vec<f64> {
-    let mut row = vec![0.0; grid.len()];
-    grid.add_row(receiver, &mut row);
-    balance(&mut row);
-    row
-}
-
-fn balance(row: &mut [f64]) {
-    let sum: f64 = row.iter().sum();
-    for value in row {
-        *value /= sum;
-    }
-}
-
-/// Irradiance from exitance at the nodes; rows are stored once an orbit of the box's symmetries.
-struct Operator {
-    orbits: Orbits,
-    rows: Vec<Vec<f64>>,
-}
-
-impl Operator {
-    fn new(grid: &Grid, orbits: Orbits, stop: &Stop) -> Option<Self> {
-        let row = |&node: &usize| (!stop.is_due()).then(|| balanced_row(grid, &receiver_at(grid, node)));
-        let rows = orbits.representatives.par_iter().map(row).collect::<Option<_>>()?;
-        Some(Self { orbits, rows })
-    }
-
-    /// Irradiance at one node an orbit from exitance by orbit.
-    fn folded(&self, light: &Orbits) -> Vec<Vec<f64>> {
-        let Orbits { images, orbit, .. } = &self.orbits;
-        let row = |&node: &usize| {
-            let mut folded = vec![0.0; light.representatives.len()];
-            let kept = orbit[node] as usize;
-            let image = images.iter().find(|image| image[self.orbits.representatives[kept]] as usize == node);
-            for (value, j) in self.rows[kept].iter().zip(image.into_iter().flatten()) {
-                folded[light.orbit[*j as usize] as usize] += value;
-            }
-            folded
-        };
-        light.representatives.par_iter().map(row).collect()
-    }
-
-    fn apply(&self, exitance: &[f64]) -> Vec<f64> {
-        let images = &self.orbits.images;
-        let seen: Vec<Vec<f64>> =
-            images.iter().map(|image| image.iter().map(|j| exitance[*j as usize]).collect()).collect();
-        let sums: Vec<Vec<f64>> =
-            self.rows.par_iter().map(|row| seen.iter().map(|v| gmres::dot(row, v)).collect()).collect();
-        let mut out = vec![0.0; exitance.len()];
-        for (&node, sums) in self.orbits.representatives.iter().zip(&sums) {
-            for (image, sum) in images.iter().zip(sums) {
-                out[image[node] as usize] = *sum;
-            }
-        }
-        out
-    }
 }

@@ -4,13 +4,16 @@
 //! `(z + sqrt(z² - 1))^(-2n)` in its points n a direction (Trefethen, *Approximation Theory and Approximation Practice*
 //! (2013), theorem 19.3), so that patches far away need few points, and near ones are halved.
 
+#![expect(clippy::inline_always, reason = "compiled for what the processor has")]
+
 use std::sync::OnceLock;
 
 use glam::DVec3;
+use pulp::{Arch, Simd, WithSimd};
 
-use super::cells::{Cell, LuminaireFrame, Row};
-use super::grid::Face;
-use super::kernel::Receiver;
+use super::cells::{Cell, Line, LuminaireFrame, Padded, Row};
+use super::grid::{Face, MOST};
+use super::kernel::{LANES, View};
 use crate::geometry::Room;
 use crate::simulator::quadrature::Gauss;
 
@@ -70,7 +73,7 @@ pub(super) struct Ground<'a> {
     pub(super) rules: &'a Rules,
 }
 
-/// Points on a face and the flux that each reflects, over π: all x, all y, all z, all fluxes.
+/// Points on a face and the flux that falls there: all u, all v, all fluxes, some of which may be 0.
 #[derive(Clone, Debug)]
 pub(super) struct Points(Box<[f64]>);
 
@@ -215,20 +218,44 @@ impl Patch {
 
     pub(super) fn sample(&self, rule: usize, ground: Ground) -> Points {
         let gauss = &ground.rules.gauss[usize::from(self.sizes[rule]) - 1];
-        let count = self.count(rule);
-        let mut numbers = vec![0.0; 4 * count].into_boxed_slice();
-        let (ds, dt) = (self.s.1 - self.s.0, self.t.1 - self.t.0);
-        let mut k = 0;
-        for (a, wa) in gauss.nodes.iter().zip(&gauss.weights) {
-            let row = ground.frame.row(&self.cell, self.s.0 + ds * a);
-            for (b, wb) in gauss.nodes.iter().zip(&gauss.weights) {
-                let (direction, flux) = row.direction(self.t.0 + dt * b);
-                let p = ground.hit(direction);
-                let four = [p.x, p.y, p.z, flux * wa * wb * ds * dt];
-                for (part, value) in four.into_iter().enumerate() {
-                    numbers[part * count + k] = value;
-                }
-                k += 1;
+        Arch::new().dispatch(Sampling { patch: self, gauss, ground })
+    }
+}
+
+struct Sampling<'a> {
+    patch: &'a Patch,
+    gauss: &'a Gauss,
+    ground: Ground<'a>,
+}
+
+impl WithSimd for Sampling<'_> {
+    type Output = Points;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Points {
+        match self.gauss.nodes.len() {
+            ..=4 => self.points::<4>(),
+            5..=8 => self.points::<8>(),
+            _ => self.points::<MOST>(),
+        }
+    }
+}
+
+impl Sampling<'_> {
+    #[inline(always)]
+    fn points<const N: usize>(&self) -> Points {
+        let Self { patch, gauss, ground } = self;
+        let order = gauss.nodes.len();
+        let count = (order * order).next_multiple_of(LANES);
+        let mut numbers = vec![0.0; 3 * count].into_boxed_slice();
+        let (s, t) = ((patch.s.0, patch.s.1 - patch.s.0), (patch.t.0, patch.t.1 - patch.t.0));
+        let rule = Padded::<N>::new(gauss);
+        let rows = ground.frame.rows(&patch.cell, s, t, &rule);
+        for k in 0..order {
+            let line = rows.line(k, &rule);
+            let [u, v] = ground.places(&line);
+            for (part, values) in [u, v, line.flux].iter().enumerate() {
+                numbers[part * count + k * order..][..order].copy_from_slice(&values[..order]);
             }
         }
         Points(numbers)
@@ -236,6 +263,28 @@ impl Patch {
 }
 
 impl Ground<'_> {
+    /// Where the directions of a line meet the face, along u and along v, kept within it against rounding.
+    #[inline(always)]
+    fn places<const N: usize>(&self, line: &Line<N>) -> [[f64; N]; 2] {
+        let (n, u, v) = self.face.axes();
+        let from_m = self.frame.position_m;
+        let depth = self.face.plane(self.room.size_m) - from_m[n];
+        let mut distance = [0.0; N];
+        for (k, distance) in distance.iter_mut().enumerate() {
+            *distance = (depth / (line.sin[k] * line.across[n] - line.cos[k] * line.axis[n])).abs();
+        }
+        let mut places = [[0.0; N]; 2];
+        for (places, axis) in places.iter_mut().zip([u, v]) {
+            let (from, most) = (from_m[axis], self.room.size_m[axis]);
+            let (across, along) = (line.across[axis], line.axis[axis]);
+            for k in 0..N {
+                let place = from + (line.sin[k] * across - line.cos[k] * along) * distance[k];
+                places[k] = place.clamp(0.0, most);
+            }
+        }
+        places
+    }
+
     /// Where a direction from the luminaire meets the face, kept within the face against rounding.
     fn hit(&self, direction: DVec3) -> DVec3 {
         let n = self.face.axes().0;
@@ -250,39 +299,16 @@ impl Ground<'_> {
 impl Points {
     /// Flux at all points.
     pub(super) fn flux(&self) -> f64 {
-        self.0[self.0.len() / 4 * 3..].iter().sum()
+        self.0[self.0.len() / 3 * 2..].iter().sum()
     }
 
-    /// Each point and its flux.
-    pub(super) fn each(&self) -> impl Iterator<Item = (DVec3, f64)> {
-        let count = self.0.len() / 4;
-        (0..count).map(move |k| {
-            let [x, y, z, flux] = [0, 1, 2, 3].map(|part| self.0[part * count + k]);
-            (DVec3::new(x, y, z), flux)
-        })
+    /// Each point along u and v, and its flux.
+    pub(super) fn each(&self) -> impl Iterator<Item = ([f64; 2], f64)> {
+        let count = self.0.len() / 3;
+        (0..count).map(move |k| ([self.0[k], self.0[count + k]], self.0[2 * count + k]))
     }
 
-    pub(super) fn irradiance(&self, receiver: &Receiver, face: Face) -> f64 {
-        let (p, n, m) = (receiver.position_m, receiver.normal, face.inward_normal());
-        let count = self.0.len() / 4;
-        let ((x, y), (z, flux)) = {
-            let (xy, zf) = self.0.split_at(2 * count);
-            (xy.split_at(count), zf.split_at(count))
-        };
-        let mut lanes = [0.0; 4];
-        let term = |x: f64, y: f64, z: f64, flux: f64| {
-            let d = DVec3::new(x - p.x, y - p.y, z - p.z);
-            let r2 = d.length_squared();
-            flux * d.dot(n).max(0.0) * -d.dot(m) / (r2 * r2)
-        };
-        let quads = x.chunks_exact(4).zip(y.chunks_exact(4));
-        let quads = quads.zip(z.chunks_exact(4)).zip(flux.chunks_exact(4));
-        for (((x, y), z), flux) in quads {
-            for k in 0..4 {
-                lanes[k] += term(x[k], y[k], z[k], flux[k]);
-            }
-        }
-        let tail: f64 = (count / 4 * 4..count).map(|k| term(x[k], y[k], z[k], flux[k])).sum();
-        lanes[0] + lanes[1] + (lanes[2] + lanes[3]) + tail
+    pub(super) fn irradiance(&self, view: &View) -> f64 {
+        view.irradiance(&self.0)
     }
 }

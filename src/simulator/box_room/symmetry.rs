@@ -58,11 +58,6 @@ fn of_geometry(size_m: DVec3) -> Vec<Operation> {
     exchanges.flat_map(|axes| (0..8).map(move |mirrors| Operation { mirrors, axes })).collect()
 }
 
-/// How many numbers the operator of a grid stores, rows once an orbit of the box's symmetries.
-pub(super) fn matrix_entries(size_m: DVec3, effort: &Effort) -> usize {
-    Grid::count(size_m, effort).pow(2) / of_geometry(size_m).len()
-}
-
 /// The symmetries of a room's shape, and which of them its light shares.
 #[derive(Clone, Debug)]
 pub(super) struct Symmetries {
@@ -80,6 +75,12 @@ impl Symmetries {
         };
         let of_light = (0..of_room.len()).filter(is_shared).collect();
         Self { of_room, of_light }
+    }
+
+    /// About how many numbers the operator of a grid stores.
+    pub(super) fn matrix_entries(&self, size_m: DVec3, effort: &Effort) -> usize {
+        let shared = self.of_light.len();
+        Grid::count(size_m, effort).pow(2) / (shared * shared.max(8))
     }
 }
 
@@ -181,6 +182,15 @@ impl Orbits {
     /// The orbits under a part of the group.
     pub(super) fn under(&self, operations: &[usize]) -> Self {
         Self::of_images(self.orbit.len(), operations.iter().map(|k| self.images[*k].clone()).collect())
+    }
+
+    /// Means by orbit of values at all nodes.
+    pub(super) fn means(&self, values: &[f64]) -> Vec<f64> {
+        let mut means = vec![0.0; self.sizes.len()];
+        for (value, orbit) in values.iter().zip(&self.orbit) {
+            means[*orbit as usize] += value / self.sizes[*orbit as usize];
+        }
+        means
     }
 
     /// Values at all nodes from values by orbit.

@@ -272,11 +272,11 @@ fn interreflection_in_a_cube_is_phi_rho_over_area_times_absorption() {
     }
 }
 
-/// Corners lose light at any order; three elements a half side, which no effort has, know it ten times more closely.
+/// Corners lose light at any order; three elements at each edge, which no effort has, know it ten times more closely.
 #[test]
 fn light_lost_in_corners_is_given_back_where_it_belongs() {
     let (scene, meters) = s1();
-    let finer = Effort { elements_per_half: 3, ..EFFORTS[7] };
+    let finer = Effort { at_edge: 3, ..EFFORTS[7] };
     let [finest, finer] =
         [&EFFORTS[7], &finer].map(|effort| solve(&scene, effort).illuminance(&meters, &Stop::NEVER).unwrap());
     for (value, truth) in finest.iter().zip(&finer) {
