@@ -120,7 +120,8 @@ impl Conversation {
         Err(ProcessError::Silent { program: self.invocation.name(), log: self.invocation.log_name() })
     }
 
-    /// Says no more, and waits until the program has ended, or leaves it to wait.
+    /// Says no more, and waits until the program has ended, or leaves it to wait; messages that it still has on the way are then in the log of the
+    /// next.
     pub fn end(&mut self) -> Result<(), ProcessError> {
         let Some(idle) = self.idle.take() else { return self.close() };
         let Some(partner) = self.partner.take() else { return Ok(()) };

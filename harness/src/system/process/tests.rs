@@ -92,7 +92,8 @@ fn a_program_that_waits_goes_on_with_the_next_of_its_words_and_their_log() {
         talk.end().unwrap();
         answer
     };
-    let script = "while read x; do echo \"about $x\" >&2; echo \"$$ <$x>\"; done";
+    // What it says with its answer may be heard after it.
+    let script = "while read x; do echo \"about $x\" >&2; sleep 0.3; echo \"$$ <$x>\"; done";
     let one = asked(of(script, "one"), "1");
     let process = one.split(' ').next().unwrap();
     assert_eq!(asked(of(script, "two"), "2"), format!("{process} <2>"));
