@@ -110,7 +110,7 @@ fn a_program_that_waits_goes_on_with_the_next_of_its_words_and_their_log() {
     assert!(!asked(of(&format!("{script};"), "other"), "3").starts_with(process));
     let once = "read x; echo \"$$ <$x>\"";
     let ended = asked(of(once, "once"), "1");
-    thread::sleep(Duration::from_millis(200));
+    thread::sleep(Duration::from_secs(1));
     assert_ne!(asked(of(once, "once"), "1"), ended);
     let is_there = || Path::new("/proc").join(process).exists();
     assert!(is_there());
