@@ -26,9 +26,9 @@ const MIN_RAYS: f64 = 25.0;
 /// Seconds that are counted for the test of a ray against a shape, and how many times what was measured on two cores of a usual server they are.
 const TEST_S: f64 = 1.1e-7;
 const COUNTED: f64 = 1.5;
-/// Rays a sample of the block that is looked at first, and the power of them by which work grows.
+/// Rays a sample of the block that is looked at first, and the power of them by which work grows: most of it is the first reflection's.
 const PILOT_RAYS: u32 = 25;
-const WORK_POWER: f64 = 1.3;
+const WORK_POWER: f64 = 1.0;
 /// Blocks that are made before an error is believed: the wider an interval is for want of blocks, the more it takes to decide anything.
 const PLANNED_BLOCKS: usize = 3 * MIN_BLOCKS / 2;
 /// The part of the time that the fewest blocks may take.

@@ -63,9 +63,8 @@ impl Running {
         Ok(Self { child, is_supervised, has_ended: false, peak, start, next_look: start })
     }
 
-    /// Serves another run from now on: memory that it took before is not that one's.
+    /// Serves another run from now on, whose peak of memory is at least what it took before.
     pub(super) fn go_on(&mut self, invocation: &Invocation) {
-        self.processes().into_iter().for_each(tree::forget_peak);
         self.peak = invocation.peak.clone();
         self.start = Instant::now();
         self.next_look = self.start;

@@ -52,11 +52,6 @@ mod linux {
         Some(Memory { now_kib: kib(&status, "VmRSS")?, peak_kib: kib(&status, "VmHWM")? })
     }
 
-    /// From now on its peak is that of what follows; where the system keeps it, that of all.
-    pub(in super::super) fn forget_peak(process: u32) {
-        std::fs::write(format!("/proc/{process}/clear_refs"), "5").ok();
-    }
-
     /// What a process has by itself, and its part of what it shares.
     pub(in super::super) fn proportional_kib(process: u32) -> Option<u64> {
         kib(&format!("/proc/{process}/smaps_rollup"), "Pss")
@@ -86,8 +81,6 @@ mod elsewhere {
         None
     }
 
-    pub(in super::super) fn forget_peak(_process: u32) {}
-
     pub(in super::super) fn proportional_kib(_process: u32) -> Option<u64> {
         None
     }
@@ -98,6 +91,6 @@ mod elsewhere {
 }
 
 #[cfg(not(target_os = "linux"))]
-pub(super) use elsewhere::{children, descendants, forget_peak, memory, proportional_kib, total_mib};
+pub(super) use elsewhere::{children, descendants, memory, proportional_kib, total_mib};
 #[cfg(target_os = "linux")]
-pub(super) use linux::{children, descendants, forget_peak, memory, proportional_kib, total_mib};
+pub(super) use linux::{children, descendants, memory, proportional_kib, total_mib};
