@@ -16,6 +16,7 @@ use luminaire::scene::{Luminaire, LuminaireModel, Meter, Transport};
 use serde::{Deserialize, Serialize};
 
 use self::settings::Settings;
+use super::dialogue::JOB_FILE;
 use super::workbench::by_hand;
 use super::{
     Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Station, Support, Version,
@@ -49,7 +50,6 @@ pub(super) static BABYLON: Entry = Entry {
 };
 
 const DRIVER: (&str, &str) = ("web_read.mjs", include_str!("../../drivers/web_read.mjs"));
-const JOB_FILE: &str = "job.json";
 
 /// What sums of 32-bit floats in a fragment shader may be off, in parts of a reading: some ten operations, each rounded.
 const FLOATS: f64 = 1e-6;

@@ -1,8 +1,6 @@
 //! Programs that answer line by line.
 
-use std::ffi::OsString;
 use std::io::Write;
-use std::path::PathBuf;
 use std::process::ChildStdin;
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
@@ -33,23 +31,10 @@ struct Partner {
     messages: Messages,
 }
 
-/// Programs that have answered what they were asked and wait to be asked more, by what tells them apart; with the last clone of this they
+/// Programs that have answered what they were asked and wait to be asked more, with how they were run last; with the last clone of this they
 /// are killed.
 #[derive(Clone, Debug, Default)]
-pub struct Idle(Arc<Mutex<Vec<(Words, Partner)>>>);
-
-#[derive(Clone, Debug, PartialEq)]
-struct Words {
-    program: PathBuf,
-    args: Vec<OsString>,
-    env: Vec<(OsString, OsString)>,
-}
-
-impl Words {
-    fn of(run: &Invocation) -> Self {
-        Self { program: run.program.clone(), args: run.args.clone(), env: run.env.clone() }
-    }
-}
+pub struct Idle(Arc<Mutex<Vec<(Invocation, Partner)>>>);
 
 impl Idle {
     #[cfg(test)]
@@ -59,10 +44,12 @@ impl Idle {
 
     /// One that still lives.
     fn take(&self, run: &Invocation) -> Option<Partner> {
-        let words = Words::of(run);
+        let is_same = |(other, _): &(Invocation, Partner)| {
+            (&other.program, &other.args, &other.env) == (&run.program, &run.args, &run.env)
+        };
         loop {
             let mut waiting = self.0.lock();
-            let place = waiting.iter().position(|(of, _)| *of == words)?;
+            let place = waiting.iter().position(is_same)?;
             let (_, mut partner) = waiting.swap_remove(place);
             drop(waiting);
             if matches!(partner.running.ended(), Ok(None)) {
@@ -126,7 +113,7 @@ impl Conversation {
         let Some(idle) = self.idle.take() else { return self.close() };
         let Some(partner) = self.partner.take() else { return Ok(()) };
         self.invocation.keep_log(&partner.messages.so_far())?;
-        idle.0.lock().push((Words::of(&self.invocation), partner));
+        idle.0.lock().push((self.invocation.clone(), partner));
         Ok(())
     }
 
