@@ -26,9 +26,8 @@ const MIN_RAYS: f64 = 25.0;
 /// Seconds that are counted for the test of a ray against a shape, and how many times what was measured on two cores of a usual server they are.
 const TEST_S: f64 = 1.1e-7;
 const COUNTED: f64 = 1.5;
-/// Rays a sample of the block that is looked at first, and the power of them by which work grows: most of it is the first reflection's.
+/// Rays a sample of the block that is looked at first; work grows with them, since most of it is the first reflection's.
 const PILOT_RAYS: u32 = 25;
-const WORK_POWER: f64 = 1.0;
 /// Blocks that are made before an error is believed: the wider an interval is for want of blocks, the more it takes to decide anything.
 const PLANNED_BLOCKS: usize = 3 * MIN_BLOCKS / 2;
 /// The part of the time that the fewest blocks may take.
@@ -163,9 +162,9 @@ impl<'a> Bench<'a> {
         let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, what: What::Block };
         let few = count.min(PILOT_RAYS);
         let mut pilot = self.pilot(Run { count: few, ..run })?;
-        pilot.work_s *= (f64::from(count) / f64::from(few)).powf(WORK_POWER);
+        pilot.work_s *= f64::from(count) / f64::from(few);
         let (budget, mut block_s) = (counted(self.job.budget, 1.0), pilot.work_s);
-        let share = (FIRST_BLOCKS * budget.seconds / (MIN_BLOCKS as f64 * block_s)).max(1e-3).powf(WORK_POWER.recip());
+        let share = (FIRST_BLOCKS * budget.seconds / (MIN_BLOCKS as f64 * block_s)).max(1e-3);
         let mut measurement = Measurement { method: self.method(), ..Measurement::default() };
         if share < 1.0 && self.settings.preset == Preset::Audit {
             run.count = (f64::from(run.count) * share).max(MIN_RAYS) as u32;
@@ -309,15 +308,9 @@ impl<'a> Bench<'a> {
         let terms: Vec<usize> = (0..self.terms.len()).collect();
         let side = side_by_side_at_most(self.job) * self.workbench.jobs.max(1);
         let one = |k: &usize| self.render(Run { what: What::Term(*k), ..run }, readouts);
-        side_by_side(side, &terms, one).into_iter().try_fold(
-            Rendered { frames: vec![], work_s: 0.0 },
-            |mut all, one| {
-                let Rendered { frames, work_s } = one?;
-                all.frames.extend(frames);
-                all.work_s += work_s;
-                Ok(all)
-            },
-        )
+        let all: Vec<Rendered> = side_by_side(side, &terms, one).into_iter().collect::<Result<_, _>>()?;
+        let work_s = all.iter().map(|term| term.work_s).sum();
+        Ok(Rendered { frames: all.into_iter().flat_map(|term| term.frames).collect(), work_s })
     }
 
     fn seen(run: Run, image: &Path, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
