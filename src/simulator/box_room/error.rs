@@ -82,7 +82,7 @@ pub(super) fn bounded(readings: &[Reading], room: &Room, meters: &[Meter]) -> Op
 }
 
 /// How far away the nearest surface lies that a meter faces, along its normal, in shortest sides of the room.
-pub(super) fn ahead(room: &Room, meter: &Meter) -> f64 {
+fn ahead(room: &Room, meter: &Meter) -> f64 {
     let surfaces = (0..3).map(|k| {
         let (x, n) = (meter.position_m[k], meter.normal[k]);
         if n == 0.0 { f64::INFINITY } else { (if n > 0.0 { room.size_m[k] - x } else { x }) / n.abs() }
