@@ -190,6 +190,9 @@ impl<'a> Bench<'a> {
         measurement.effort = effort;
         let method = &mut measurement.method;
         method.insert("error_bound".into(), self.settings.error_bound.to_string());
+        if self.settings.is_finer_for_rest() {
+            method.insert("error_bound_of_rest".into(), self.settings.error_bound_of_rest.to_string());
+        }
         method.insert("recursion_limit".into(), self.settings.recursion_limit.to_string());
         Ok(measurement)
     }
