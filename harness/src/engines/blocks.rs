@@ -4,7 +4,7 @@
 //! blocks is the standard error of their mean, and, since stations are sampled together, of any weighted sum of stations.
 
 use std::ops::Range;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +22,8 @@ const LEAST_BLOCKS: usize = 4;
 /// machine, and may use it already.
 const SHARE_OF_A_WAVE: f64 = 0.5;
 const SHARE_OF_THE_FIRST: f64 = 0.25;
+/// What a trial may take besides what is counted: kernels that are compiled, processes that sleep.
+const UNCOUNTED_S: f64 = 2.0;
 /// Blocks asked for at a time at most, in parts of those that are there: their error is itself an estimate.
 const MAX_GROWTH: usize = 3;
 
@@ -168,6 +170,14 @@ pub(super) fn counted(budget: Budget, share: f64) -> Budget {
     Budget { seconds: COUNTED * share * budget.seconds, ..budget }
 }
 
+/// The longest block, in seconds as they are counted, of which the fewest end in time on a machine as slow as it was for a trial that was
+/// counted for so much. Infinite where the machine keeps up, so that no clock has a say there.
+pub(super) fn longest_block_s(trial: Duration, counted_s: f64, until: Instant) -> f64 {
+    let slowness = (trial.as_secs_f64() - UNCOUNTED_S).max(0.0) / counted_s.max(f64::MIN_POSITIVE);
+    let left = until.saturating_duration_since(Instant::now()).as_secs_f64();
+    if slowness <= 1.0 { f64::INFINITY } else { SHARE_OF_A_WAVE * left / (LEAST_BLOCKS as f64 * slowness) }
+}
+
 /// When to stop, and how many blocks come at a time: by their error, and by seconds that are counted at a fixed rate. No clock
 /// says how much is sampled as long as the machine keeps up, so that one seed makes the same blocks there.
 #[derive(Clone, Copy, Debug)]
@@ -218,28 +228,31 @@ impl Sampling<'_> {
         mut wave: impl FnMut(Range<usize>) -> Result<Vec<Vec<f64>>, EngineError>,
     ) -> Result<Sampled, EngineError> {
         let mut blocks = Blocks::default();
-        let begun = Instant::now();
+        let mut waves = Waves::default();
         loop {
             let (have, wanted) = (blocks.count(), self.next(&blocks));
-            let count = wanted.min(self.in_time(have, begun));
+            let count = wanted.min(self.in_time(have, waves));
             if count == 0 {
                 let remark = self.remark(&blocks, wanted > 0);
                 return Ok(Sampled { work_s: have as f64 * self.block_s, blocks, remark });
             }
+            let begun = Instant::now();
             blocks.0.extend(wave(have..have + count)?);
+            waves.add(begun.elapsed().as_secs_f64());
         }
     }
 
     /// How many blocks more there is time for by the clock, for now.
-    fn in_time(&self, have: usize, begun: Instant) -> usize {
+    fn in_time(&self, have: usize, waves: Waves) -> usize {
         let left = self.until.saturating_duration_since(Instant::now()).as_secs_f64();
         let (share, block_s) = match have {
             0 => (SHARE_OF_THE_FIRST, self.block_s),
-            _ => (SHARE_OF_A_WAVE, begun.elapsed().as_secs_f64() / have as f64),
+            _ => (SHARE_OF_A_WAVE, waves.all_s / have as f64),
         };
-        // A time that is too short to be one is no rate; one block may take all that is left.
+        // A time that is too short to be one is no rate; one block may take all that is left, and as long as a wave.
         let blocks = left / block_s.max(1e-6);
-        let some = if blocks < 1.0 { 0 } else { (share * blocks).ceil() as usize };
+        let is_late = blocks < 1.0 || left < waves.shortest_s;
+        let some = if is_late { 0 } else { (share * blocks).ceil() as usize };
         some.max(LEAST_BLOCKS.min(self.min_blocks).saturating_sub(have))
     }
 
@@ -265,6 +278,20 @@ impl Sampling<'_> {
         };
         let affordable = ((self.seconds / self.block_s) as usize).min(self.max_blocks).max(self.min_blocks);
         missing.min(affordable.saturating_sub(have))
+    }
+}
+
+/// What waves took by the clock, all and the shortest: blocks that are read side by side take as long when they are fewer.
+#[derive(Clone, Copy, Default)]
+struct Waves {
+    all_s: f64,
+    shortest_s: f64,
+}
+
+impl Waves {
+    fn add(&mut self, wave_s: f64) {
+        self.shortest_s = if self.all_s == 0.0 { wave_s } else { self.shortest_s.min(wave_s) };
+        self.all_s += wave_s;
     }
 }
 
@@ -339,6 +366,29 @@ mod tests {
         let (whole, _) = sampled(&rule, 0.02);
         assert!(late.remark.unwrap().starts_with("cut short by the clock"));
         assert_eq!(late.blocks.0, whole.blocks.0[..LEAST_BLOCKS]);
+    }
+
+    #[test]
+    fn fewer_blocks_are_not_begun_where_they_may_take_as_long_as_those_before() {
+        let rule = Sampling::within(budget(1e-3, 60.0), 0.01, Instant::now() + Duration::from_millis(300));
+        let rule = Sampling { min_blocks: LEAST_BLOCKS, ..rule };
+        let mut waves = vec![];
+        // Side by side: 200 ms, however many.
+        let found = rule.run(|numbers| {
+            waves.push(numbers.len());
+            std::thread::sleep(Duration::from_millis(200));
+            Ok(numbers.map(|k| block(k, 0.02)).collect())
+        });
+        assert!(found.unwrap().remark.unwrap().starts_with("cut short by the clock"));
+        assert_eq!(waves.len(), 1, "{waves:?}");
+    }
+
+    #[test]
+    fn a_machine_that_was_slow_for_a_trial_gets_blocks_of_which_the_fewest_end_in_time() {
+        let longest = |trial_s| longest_block_s(Duration::from_secs_f64(trial_s), 1.0, later());
+        assert_eq!(longest(2.9), f64::INFINITY);
+        // Ten times slower than is counted: four blocks take half of an hour.
+        assert!((longest(12.0) - 45.0).abs() < 0.1, "{}", longest(12.0));
     }
 
     #[test]

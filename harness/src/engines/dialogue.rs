@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use luminaire::scene::Transport;
 
-use super::blocks::{Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampling, WORST_OF_FEW, counted};
+use super::blocks::{Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampling, WORST_OF_FEW, counted, longest_block_s};
 use super::contract::same_meters;
 use super::effort;
 use super::frame::Frame;
@@ -211,9 +211,12 @@ impl Dialogue<'_> {
     ) -> Result<(usize, Sampling<'static>), EngineError> {
         let full = (greeting.lanes / part.rays.max(1)).isqrt().clamp(2, MAX_SIDE);
         let trial_side = (self.cost)(&greeting.variant).trial_side.unwrap_or(TRIAL_SIDE).min(full / 2).max(2);
+        let begun = Instant::now();
         let trials = self.blocks(part, trial_side, Stream::Trial, 0..TRIAL_BLOCKS)?;
         let sample_s = self.sample_s(part, greeting);
-        let affordable = ((budget.seconds / ENOUGH_BLOCKS as f64 / sample_s) as usize).isqrt();
+        let counted_s = sample_s * (TRIAL_BLOCKS * trial_side * trial_side) as f64;
+        let longest_s = longest_block_s(begun.elapsed(), counted_s, self.until);
+        let affordable = (((budget.seconds / ENOUGH_BLOCKS as f64).min(longest_s) / sample_s) as usize).isqrt();
         // The error is that of their mean; m x m samples are at least as good as m x m independent ones.
         let excess = Blocks::new(trials).worst_error(&[]) / budget.relative_error;
         let fewer = TRIAL_BLOCKS as f64 / ENOUGH_BLOCKS as f64;

@@ -2,9 +2,9 @@
 
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use crate::engines::blocks::{MIN_BLOCKS, Sampling, counted};
+use crate::engines::blocks::{MIN_BLOCKS, Sampling, counted, longest_block_s};
 use crate::engines::image::read_rgb;
 use crate::engines::libraries::with_unpacked;
 use crate::engines::settings::Preset;
@@ -162,9 +162,10 @@ impl<'a> Bench<'a> {
         let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, what: What::Block };
         let few = count.min(PILOT_RAYS);
         let mut pilot = self.pilot(Run { count: few, ..run })?;
+        let longest_s = longest_block_s(pilot.wall, pilot.work_s, self.until);
         pilot.work_s *= f64::from(count) / f64::from(few);
         let (budget, mut block_s) = (counted(self.job.budget, 1.0), pilot.work_s);
-        let share = (FIRST_BLOCKS * budget.seconds / (MIN_BLOCKS as f64 * block_s)).max(1e-3);
+        let share = ((FIRST_BLOCKS * budget.seconds / MIN_BLOCKS as f64).min(longest_s) / block_s).max(1e-3);
         let mut measurement = Measurement { method: self.method(), ..Measurement::default() };
         if share < 1.0 && self.settings.preset == Preset::Audit {
             run.count = (f64::from(run.count) * share).max(MIN_RAYS) as u32;
@@ -203,7 +204,9 @@ impl<'a> Bench<'a> {
         let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();
         for _ in 0..MAX_LOOKS {
             self.keep_readouts(&readouts)?;
+            let begun = Instant::now();
             let Rendered { frames, work_s } = self.terms_apart(run, &readouts)?;
+            let wall = begun.elapsed();
             let (mut settled, mut brightest_lx) = (true, 0.0_f64);
             for k in 0..readouts.len() {
                 let scale = match Seen::brightest(frames.iter().map(|frame| frame[k])) {
@@ -229,7 +232,7 @@ impl<'a> Bench<'a> {
                 // A meter that one block sees in near darkness may be brighter by far in the next.
                 let least = 0.4 * brightest_lx;
                 let readouts = readouts.iter().map(|r| Readout::Coarse(scale_of(*r).max(least))).collect();
-                return Ok(Pilot { readouts, work_s });
+                return Ok(Pilot { readouts, work_s, wall });
             }
         }
         Err(output(format!("reflected light was not read after {MAX_LOOKS} looks")))
@@ -381,6 +384,7 @@ fn output(what: String) -> EngineError {
 struct Pilot {
     readouts: Vec<Readout>,
     work_s: f64,
+    wall: Duration,
 }
 
 struct Rendered {

@@ -13,7 +13,9 @@ use super::grazing;
 use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options, ROULETTE, Sources, bounces};
 use super::settings::Settings;
 use super::tools::Tools;
-use crate::engines::blocks::{Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampled, Sampling, WORST_OF_FEW, counted};
+use crate::engines::blocks::{
+    Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampled, Sampling, WORST_OF_FEW, counted, longest_block_s,
+};
 use crate::engines::effort;
 use crate::engines::settings::Preset;
 use crate::engines::{Budget, EngineError, Job, Workbench};
@@ -123,13 +125,17 @@ impl Sampler<'_> {
 
     /// Divisions a block so that the fewest blocks about meet the budget.
     fn divisions(&self, known_lx: &[f64]) -> Result<u32, EngineError> {
-        let affordable = 0.5 * self.budget().seconds / (PLANNED_BLOCKS as f64 * self.block_s(1));
+        let mut affordable = 0.5 * self.budget().seconds / (PLANNED_BLOCKS as f64 * self.block_s(1));
         let mut planned = f64::INFINITY;
         for (divisions, power) in TRIALS {
             if planned.is_finite() && planned.min(affordable) < FINER_TRIAL * f64::from(divisions) {
                 break;
             }
+            let begun = Instant::now();
             let trial = self.side_by_side(divisions, Stream::Trial, 0..MIN_BLOCKS)?;
+            let counted_s = MIN_BLOCKS as f64 * self.block_s(divisions);
+            let longest_s = longest_block_s(begun.elapsed(), counted_s, self.until);
+            affordable = affordable.min(longest_s / self.block_s(1));
             let excess = Blocks::new(trial).worst_error(known_lx) / self.job.budget.relative_error;
             let blocks = MIN_BLOCKS as f64 / PLANNED_BLOCKS as f64;
             planned = f64::from(divisions) * (blocks * excess * excess / WORST_OF_FEW).powf(power.recip());
