@@ -156,7 +156,11 @@ impl Prepared {
             return Ok(vec![]);
         }
         let coarse = Accuracy { relative_error: FIRST_LOOK, seed };
-        match Self::new(&self.scene, self.transport, &coarse)?.solve(meters, stop) {
+        let mut first = Self::new(&self.scene, self.transport, &coarse)?;
+        if let (Solver::Enclosed(first, _), Solver::Enclosed(enclosure, _)) = (&mut first.solver, &self.solver) {
+            first.share_light(enclosure);
+        }
+        match first.solve(meters, stop) {
             Err(SimulatorError::Stopped) => Ok(vec![]),
             found => Ok(found?.0),
         }

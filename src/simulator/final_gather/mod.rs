@@ -166,6 +166,13 @@ impl Enclosure {
         self.lit.is_some()
     }
 
+    /// Takes light on the faces as the same scene has it already, which is as good as asked or better.
+    pub(super) fn share_light(&mut self, other: &Self) {
+        if let Some((error, lit)) = &other.lit {
+            self.lay(&lit.numbers(), *error);
+        }
+    }
+
     /// Direct illuminance at the meters, each within a bound, as far as it comes before it is stopped.
     pub(super) fn direct(&self, meters: &[Meter], relative_error: f64, seed: u64, stop: &Stop) -> Vec<Bounded> {
         let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
