@@ -5,7 +5,7 @@ use std::io::Write;
 use std::os::unix::process::ExitStatusExt;
 use std::process::ExitStatus;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::interrupt::is_interrupted;
 use super::invocation::{Finished, Invocation, ProcessError};
@@ -42,7 +42,6 @@ impl Invocation {
         start: Instant,
         objects: impl Fn() -> Option<ProcessError>,
     ) -> Result<ExitStatus, ProcessError> {
-        let mut pause = Duration::from_micros(200);
         loop {
             let overrun = self.overrun(running, start).or_else(&objects);
             if let Some(status) = running.ended().map_err(|source| self.start_error(source))? {
@@ -52,8 +51,7 @@ impl Invocation {
                 running.stop();
                 return Err(error);
             }
-            thread::sleep(pause);
-            pause = (pause * 2).min(Duration::from_millis(10));
+            running.pause();
         }
     }
 

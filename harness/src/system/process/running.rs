@@ -10,7 +10,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use parking_lot::Mutex;
-use rustix::process::{Pid, Signal, WaitOptions, kill_process, kill_process_group, waitpid};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fd::OwnedFd;
+use rustix::process::{Pid, PidfdFlags, Signal, WaitOptions, kill_process, kill_process_group, pidfd_open, waitpid};
 
 use super::charge::{Charge, FAILED};
 use super::invocation::{Freedom, Invocation};
@@ -28,6 +30,7 @@ static STARTED: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
 const TOLD: [&str; 8] = ["PATH", "HOME", "USER", "LOGNAME", "LANG", "TMPDIR", "TZ", "CUDA_VISIBLE_DEVICES"];
 /// How long a supervisor may take to end what it supervises.
 const PATIENCE: Duration = Duration::from_secs(5);
+const SHORTEST_PAUSE: Duration = Duration::from_millis(1);
 /// How often memory is looked at in the long run.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -40,6 +43,8 @@ pub(super) struct Running {
     pub(super) child: Child,
     is_supervised: bool,
     has_ended: bool,
+    /// Readable once it has ended.
+    end: Option<OwnedFd>,
     peak: PeakMemory,
     start: Instant,
     next_look: Instant,
@@ -59,8 +64,9 @@ impl Running {
         let mut started = STARTED.lock();
         let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
         started.insert(child.id());
+        let end = Pid::from_raw(child.id().cast_signed()).and_then(|pid| pidfd_open(pid, PidfdFlags::empty()).ok());
         let (peak, start) = (invocation.peak.clone(), Instant::now());
-        Ok(Self { child, is_supervised, has_ended: false, peak, start, next_look: start })
+        Ok(Self { child, is_supervised, has_ended: false, end, peak, start, next_look: start })
     }
 
     /// Serves another run from now on, whose peak of memory is at least what it took before.
@@ -68,6 +74,16 @@ impl Running {
         self.peak = invocation.peak.clone();
         self.start = Instant::now();
         self.next_look = self.start;
+    }
+
+    /// Waits until it has ended or its memory is to be looked at, a tenth of a second at most.
+    pub(super) fn pause(&self) {
+        let wait = self.next_look.saturating_duration_since(Instant::now()).clamp(SHORTEST_PAUSE, LOOK);
+        let timeout = Timespec { tv_sec: 0, tv_nsec: wait.subsec_nanos().into() };
+        let end = self.end.as_ref().map(|end| PollFd::new(end, PollFlags::IN));
+        if end.is_none_or(|end| poll(&mut [end], Some(&timeout)).is_err()) {
+            thread::sleep(SHORTEST_PAUSE);
+        }
     }
 
     /// How it ended, if it has; what it left behind is ended, too.
