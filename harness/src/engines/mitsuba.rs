@@ -69,7 +69,7 @@ impl Engine for Mitsuba {
     }
 
     fn probe(&self, site: &Site) -> Result<Version, Absent> {
-        self.backend(site).map(|backend| backend.version(site))
+        self.backend(site).map(|backend| backend.version())
     }
 
     fn supports(&self, job: &Job) -> Support {

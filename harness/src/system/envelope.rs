@@ -66,7 +66,7 @@ impl<T> Sealed<T> {
     }
 
     /// The body, which must be about what it says itself.
-    pub(crate) fn about_what(self, key: impl Fn(&T) -> String) -> Result<T, Refusal> {
+    pub(crate) fn about_what(self, key: impl FnOnce(&T) -> String) -> Result<T, Refusal> {
         let wanted = key(&self.body);
         if self.key == wanted { Ok(self.body) } else { Err(Refusal::Key { found: self.key, wanted }) }
     }

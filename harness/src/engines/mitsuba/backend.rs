@@ -3,14 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use super::ID;
 use super::settings::Settings;
 use crate::engines::dialogue::JOB_FILE;
 use crate::engines::libraries::ATOMIC;
 use crate::engines::workbench::by_hand;
-use crate::engines::{Absent, Site, Version, Workbench};
+use crate::engines::{Absent, Site, Version, Workbench, fingerprint};
+use crate::system::digest::hexadecimal;
+use crate::system::envelope::{self, Schema};
+use crate::system::files;
 use crate::system::process::Invocation;
 
 const PROBE: &str = include_str!("../../../drivers/mitsuba_probe.py");
@@ -27,9 +31,20 @@ pub(super) struct Backend {
     /// The libLLVM that works; `None` leaves the scalar variants.
     llvm: Option<PathBuf>,
     versions: Versions,
+    fingerprint: String,
 }
 
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+/// What was found once, kept with the engines; it holds for the same files and the same libraries to try.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct Kept {
+    tried: Vec<PathBuf>,
+    llvm: Option<PathBuf>,
+    versions: Versions,
+}
+
+const SCHEMA: Schema = Schema { of: "probe of Mitsuba", version: 1 };
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Versions {
     mitsuba: String,
     drjit: String,
@@ -39,21 +54,63 @@ struct Versions {
 }
 
 impl Backend {
-    /// Tries the libraries in order of preference until one traces paths.
+    /// What is known of these files, or else tries the libraries in order of preference until one traces paths.
     pub(super) fn find(site: &Site) -> Result<Self, Absent> {
         let absent = |reason: String| Absent { reason, remedy: REMEDY.into() };
         let python = site.python().ok_or_else(|| absent("there is no Python environment".into()))?;
         if site.python_package("mitsuba").is_none() {
             return Err(absent("the Python package `mitsuba` is missing".into()));
         }
-        let backend = |llvm, versions| Self { root: site.root().to_owned(), python: python.clone(), llvm, versions };
-        for library in site.llvms() {
-            match probe(site, &python, COMPILED, Some(&library)) {
-                Ok(versions) => return Ok(backend(Some(library), versions)),
+        let libraries = site.llvms();
+        if let Some(backend) = Self::kept(site, &python, &libraries) {
+            return Ok(backend);
+        }
+        for library in &libraries {
+            match probe(site, &python, COMPILED, Some(library)) {
+                Ok(versions) => {
+                    return Ok(Self::new(site, python, Some(library.clone()), versions).keep(site, libraries));
+                }
                 Err(reason) => tracing::debug!(library = %library.display(), reason, "unusable libLLVM"),
             }
         }
-        probe(site, &python, "scalar_rgb", None).map(|versions| backend(None, versions)).map_err(absent)
+        let versions = probe(site, &python, "scalar_rgb", None).map_err(absent)?;
+        Ok(Self::new(site, python, None, versions))
+    }
+
+    fn new(site: &Site, python: PathBuf, llvm: Option<PathBuf>, versions: Versions) -> Self {
+        let packages = ["mitsuba", "drjit", "numpy"].iter().filter_map(|name| site.python_package(name));
+        let files = packages.chain(llvm.clone()).chain(python.canonicalize());
+        let fingerprint = fingerprint::of(&ID, site, files);
+        Self { root: site.root().to_owned(), python, llvm, versions, fingerprint }
+    }
+
+    fn kept(site: &Site, python: &Path, libraries: &[PathBuf]) -> Option<Self> {
+        let sealed = envelope::open::<Kept>(SCHEMA, &std::fs::read(Self::place(site)).ok()?).ok()?;
+        let mut found = None;
+        let of_now = |kept: &Kept| {
+            let backend = Self::new(site, python.to_owned(), kept.llvm.clone(), kept.versions.clone());
+            found.insert(backend).key()
+        };
+        let kept = sealed.about_what(of_now).ok()?;
+        found.filter(|_| kept.tried == libraries)
+    }
+
+    /// Where it cannot be kept, it is probed again next time.
+    fn keep(self, site: &Site, tried: Vec<PathBuf>) -> Self {
+        let kept = Kept { tried, llvm: self.llvm.clone(), versions: self.versions.clone() };
+        let text = envelope::seal(SCHEMA, &self.key(), &kept).map_err(std::io::Error::from);
+        text.and_then(|text| files::replace(&Self::place(site), text.as_bytes())).ok();
+        self
+    }
+
+    fn place(site: &Site) -> PathBuf {
+        site.root().join("probes").join("mitsuba.json")
+    }
+
+    /// Which files, and how they were tried.
+    fn key(&self) -> String {
+        let how = hexadecimal(&Sha256::digest(PROBE));
+        format!("{} {}", self.fingerprint, &how[..16])
     }
 
     pub(super) fn is_of(&self, site: &Site) -> bool {
@@ -65,12 +122,11 @@ impl Backend {
         Self { llvm: None, ..self }
     }
 
-    pub(super) fn version(&self, site: &Site) -> Version {
+    pub(super) fn version(&self) -> Version {
         let Versions { mitsuba, drjit, llvm, .. } = &self.versions;
         let llvm = llvm.as_ref().map_or("no usable LLVM".to_owned(), |v| format!("LLVM {v}"));
-        let packages = ["mitsuba", "drjit", "numpy"].iter().filter_map(|name| site.python_package(name));
-        let files = packages.chain(self.llvm.clone()).chain(self.python.canonicalize());
-        Version::of(&ID, format!("{mitsuba} (Dr.Jit {drjit}, {llvm})"), site, files)
+        let text = format!("{mitsuba} (Dr.Jit {drjit}, {llvm})");
+        Version { text, fingerprint: self.fingerprint.clone() }
     }
 
     pub(super) fn command_by_hand(&self, site: &Site) -> String {
@@ -148,5 +204,26 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let absent = Backend::find(&Site::at(folder.path())).unwrap_err();
         assert!(absent.to_string().contains("luxproof engines install"), "{absent}");
+    }
+
+    #[test]
+    fn what_a_probe_found_is_kept_and_holds_for_the_same_files_and_libraries_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let (site, python, library) =
+            (Site::at(folder.path()), folder.path().join("python"), folder.path().join("llvm"));
+        std::fs::write(&python, "one").unwrap();
+        std::fs::write(&library, "one").unwrap();
+        let told = |text: &str| text.to_owned();
+        let versions =
+            Versions { mitsuba: told("3.9"), drjit: told("1.5"), llvm: Some(told("19")), variant: told("scalar_rgb") };
+        let found = Backend::new(&site, python.clone(), Some(library.clone()), versions);
+        let tried = vec![library.clone()];
+        let kept = |tried: &[PathBuf]| Backend::kept(&site, &python, tried);
+        assert_eq!(kept(&tried), None);
+        let found = found.keep(&site, tried.clone());
+        assert_eq!(kept(&tried), Some(found));
+        assert_eq!(kept(&[folder.path().join("better"), library.clone()]), None);
+        std::fs::write(&library, "two").unwrap();
+        assert_eq!(kept(&tried), None, "another library in its place");
     }
 }
