@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::EngineError;
 use crate::record::{Estimate, Uncertainty, design_effect};
@@ -36,6 +37,15 @@ fn degrees_of_freedom(blocks: usize) -> f64 {
     let n = blocks as f64;
     2.0 / (2.0 / (n - 1.0) + EXCESS_KURTOSIS / n)
 }
+
+/// How many times wider an interval that leaves a thousandth out on each side is for want of blocks, by Student's t.
+fn widening(blocks: usize) -> f64 {
+    let quantile = StudentsT::new(0.0, 1.0, degrees_of_freedom(blocks)).map(|t| t.inverse_cdf(0.999));
+    quantile.map_or(f64::INFINITY, |quantile| quantile / NORMAL_QUANTILE)
+}
+
+/// Of the standard normal distribution.
+const NORMAL_QUANTILE: f64 = 3.0902;
 
 /// Blocks of one part of the light: `blocks[block][station]` in lux.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -191,7 +201,7 @@ pub(super) struct Sampling<'a> {
     pub(super) block_s: f64,
     /// Blocks that are made whatever they take, as their engine counts.
     pub(super) min_blocks: usize,
-    /// Before there are so many, an error that is small enough is not believed.
+    /// Before there are so many, an error is not believed to be small enough, but where it were so with an interval as wide as few blocks make it.
     pub(super) enough_blocks: usize,
     pub(super) max_blocks: usize,
     /// The one thing that a clock decides: none is begun that would last longer than this, as those before it did.
@@ -269,12 +279,16 @@ impl Sampling<'_> {
 
     /// How many blocks come next; 0 for no more.
     fn next(&self, blocks: &Blocks) -> usize {
-        let have = blocks.count();
-        let missing = if have < self.enough_blocks {
-            self.enough_blocks - have
-        } else {
-            let excess = blocks.worst_error(self.known_lx) / self.relative_error;
-            ((have as f64 * (excess * excess - 1.0)).ceil() as usize).min(MAX_GROWTH * have)
+        let (have, at_first) = (blocks.count(), self.min_blocks.min(self.enough_blocks));
+        if have < at_first {
+            return at_first - have;
+        }
+        let excess = blocks.worst_error(self.known_lx) / self.relative_error;
+        // Where nothing varied, nothing may have been met.
+        let few_do = excess > 0.0 && excess * widening(have) <= 1.0;
+        let missing = match self.enough_blocks.saturating_sub(have) {
+            missing if missing > 0 && !few_do => missing,
+            _ => ((have as f64 * (excess * excess - 1.0)).ceil() as usize).min(MAX_GROWTH * have),
         };
         let affordable = ((self.seconds / self.block_s) as usize).min(self.max_blocks).max(self.min_blocks);
         missing.min(affordable.saturating_sub(have))
@@ -357,6 +371,18 @@ mod tests {
         for (seconds, blocks) in [(20.5, 20), (9e9, 32)] {
             assert_eq!(sampled(&Sampling { seconds, ..rule }, 0.0).0.blocks.count(), blocks);
         }
+    }
+
+    #[test]
+    fn few_blocks_do_where_even_their_wide_interval_is_narrow_enough() {
+        let count = |error| {
+            let rule = Sampling { enough_blocks: 16, ..Sampling::within(budget(error, 60.0), 0.01, later()) };
+            sampled(&rule, 0.02).0.blocks.count()
+        };
+        // 2 % / sqrt(8), and 2.5 times that.
+        assert!((2.4..2.6).contains(&widening(8)) && widening(16) < 1.6, "{} {}", widening(8), widening(16));
+        assert_eq!([count(0.1), count(0.012)], [8, 16]);
+        assert!(count(0.002) > 50);
     }
 
     #[test]
