@@ -21,12 +21,13 @@ def start():
     bpy.context.scene.render.engine = "CYCLES"
 
 
-def accurate(reflections):
-    """No short cut that costs light: no clamping, no skipped lights, nothing adaptive, so many reflections."""
+def accurate(reflections, light_tree):
+    """No short cut that costs light: no clamping, no skipped lights, nothing adaptive, so many reflections; a tree to pick among several lights."""
     cycles = bpy.context.scene.cycles
     cycles.max_bounces = cycles.diffuse_bounces = reflections
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
     cycles.light_sampling_threshold = 0
+    cycles.use_light_tree = light_tree
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.sampling_pattern = "TABULATED_SOBOL"
 

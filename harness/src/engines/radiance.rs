@@ -20,7 +20,7 @@ mod tools;
 
 use luminaire::scene::{LuminaireModel, Transport};
 
-use self::options::{Options, Sources};
+use self::options::{Ambient, Options, Sources};
 use self::sampling::Sampler;
 use self::settings::{Photometrist, Settings};
 use self::tools::Tools;
@@ -142,7 +142,8 @@ fn printed_options(job: &Job, settings: &Settings) -> Options {
         Preset::Audit => options::AUDIT_DIVISIONS,
         Preset::Fast | Preset::Default => options::FAST_DIVISIONS,
     };
-    Options::of(job, settings, settings.ambient_divisions.unwrap_or(divisions))
+    let divisions = settings.ambient_divisions.unwrap_or(divisions);
+    Options::of(job, settings, Ambient { divisions, risk: Ambient::LOW_RISK })
 }
 
 fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
@@ -175,9 +176,9 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
     }
     let part_lx = sampler.determined(&options.part_of_total)?;
     let is_total = matches!(job.transport, Transport::Total(_));
-    let (total, divisions) = sampler.total(if is_total { &[] } else { &part_lx })?;
-    let options = sampler.options(divisions);
-    let (count, divisions) = (total.blocks.count().to_string(), divisions.to_string());
+    let (total, ambient) = sampler.total(if is_total { &[] } else { &part_lx })?;
+    let options = sampler.options(ambient);
+    let (count, divisions) = (total.blocks.count().to_string(), ambient.divisions.to_string());
     let settings = [("rtrace", options.join(" ")), ("blocks", count), ("ambient_divisions", divisions)];
     measurement.effort.extend(settings.map(|(key, value)| (key.to_owned(), value)));
     let total = measurement.take(total);

@@ -31,7 +31,7 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
     let names = (0..tables.distinct.len()).map(table).collect();
     let mut files = vec![
         SceneFile::text("scene.py", scene(job, settings, &frame, &tables)),
-        patches::job_json(ID, job, settings, &frame, job.scene.luminaires.iter().map(lights).sum(), names)?,
+        patches::job_json(ID, job, settings, &frame, all_lights(job), names)?,
         SceneFile::text("cycles_read.py", READ),
         SceneFile::text("blocks.py", dialogue::BLOCKS),
         SceneFile::text("cycles_scene.py", SCENE),
@@ -57,6 +57,10 @@ fn lights(luminaire: &Luminaire) -> usize {
         Opening::None => 1,
         Opening::Flat(..) | Opening::Solid => sides(luminaire).count(),
     }
+}
+
+fn all_lights(job: &Job) -> usize {
+    job.scene.luminaires.iter().map(lights).sum()
 }
 
 /// The sides of an opening that shine: whether upwards.
@@ -88,7 +92,8 @@ fn scene(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -> S
              sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))\n\
              import cycles_scene as cycles\n\ncycles.start()\n";
     if settings.preset != Preset::Default {
-        writeln!(text, "cycles.accurate(reflections={})", reflections(job)).ok();
+        let light_tree = if all_lights(job) > 1 { "True" } else { "False" };
+        writeln!(text, "cycles.accurate(reflections={}, light_tree={light_tree})", reflections(job)).ok();
     }
     text.push('\n');
     surfaces(&mut text, job, frame);

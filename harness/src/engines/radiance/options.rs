@@ -28,9 +28,21 @@ const MAX_BOUNCES: u32 = 10_000;
 /// seconds a meter with two (case S1), 20 with three.
 const DEFAULT_BOUNCES: u32 = 2;
 
-/// Weight below which rays are at risk, in units of the weight of one division's ray. The error at a given time is
-/// least near .1 to .2 (case S1: 8e-6 s against 11e-6 at .5 and 2e-5 at .01); at .8 rtrace would cut the divisions.
-pub(super) const ROULETTE: f64 = 0.15;
+/// What a block of reflected light is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ambient {
+    pub(super) divisions: u32,
+    /// Weight below which rays are at risk, in units of the weight of one division's ray.
+    pub(super) risk: f64,
+}
+
+impl Ambient {
+    /// The error at a given time is least near .1 to .2 where what divisions see first is even (case S1: 8e-6 s against 11e-6 at .5 and 2e-5
+    /// at .01); at .8 rtrace would cut the divisions.
+    pub(super) const LOW_RISK: f64 = 0.15;
+    /// Where it is uneven most of the noise is that of the divisions, and rays behind them are better spared (benchmarks/efficiency.md).
+    pub(super) const HIGH_RISK: f64 = 1.0;
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sources {
@@ -76,8 +88,8 @@ fn words(text: &str) -> Vec<String> {
 }
 
 impl Options {
-    pub(super) fn of(job: &Job, settings: &Settings, divisions: u32) -> Self {
-        let total = Self::total(job, settings, divisions);
+    pub(super) fn of(job: &Job, settings: &Settings, ambient: Ambient) -> Self {
+        let total = Self::total(job, settings, ambient);
         // -I: irradiance at points.
         if settings.preset == Preset::Default {
             let direct = words("-I -ab 0");
@@ -92,7 +104,7 @@ impl Options {
     }
 
     /// Arguments for all light.
-    pub(super) fn total(job: &Job, settings: &Settings, divisions: u32) -> Vec<String> {
+    pub(super) fn total(job: &Job, settings: &Settings, ambient: Ambient) -> Vec<String> {
         if settings.preset == Preset::Default {
             let bounces = match job.reflections() {
                 Some(Bounces::AtMost(n)) => n,
@@ -104,7 +116,8 @@ impl Options {
         // -u+: random numbers proper, since the fixed sequence of -u- repeats a bias of .3 % in every block (case S1,
         // up to 7 standard errors of 120 blocks). -aa 0: no cache; -as 0: no supersampling, which is biased;
         // -lr 0: Russian roulette below weight -lw.
-        let ambient = format!("-u+ -aa 0 -ad {divisions} -as 0 -lr 0 -lw {:e}", ROULETTE / f64::from(divisions));
+        let Ambient { divisions, risk } = ambient;
+        let ambient = format!("-u+ -aa 0 -ad {divisions} -as 0 -lr 0 -lw {:e}", risk / f64::from(divisions));
         words(&format!("-I -ab {} {} {ambient}", bounces(job), Sources::of(job, settings).options(None)))
     }
 }

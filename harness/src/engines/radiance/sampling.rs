@@ -10,7 +10,7 @@ use luminaire::scene::Transport;
 
 use super::export;
 use super::grazing;
-use super::options::{AUDIT_DIVISIONS, FAST_DIVISIONS, Options, ROULETTE, Sources, bounces};
+use super::options::{AUDIT_DIVISIONS, Ambient, FAST_DIVISIONS, Options, Sources, bounces};
 use super::settings::Settings;
 use super::tools::Tools;
 use crate::engines::blocks::{
@@ -22,11 +22,16 @@ use crate::engines::{Budget, EngineError, Job, Workbench};
 use crate::system::random::seed;
 use crate::system::slots::side_by_side;
 
-/// Ambient divisions of the trials from which effort is planned, and the power of them by which the variance falls from there on:
-/// strata gain more while they are few (benchmarks/engines-remarks.md).
-const TRIALS: [(u32, f64); 2] = [(64, 1.25), (256, 1.05)];
-/// A finer trial is made where so many times its divisions are planned by the one before.
+/// Ambient divisions of a first trial from which effort is planned, which are the fewest, and of a second, made where so many times its
+/// divisions are planned by the first.
+const FEWEST_DIVISIONS: u32 = 64;
+const MORE_DIVISIONS: u32 = 256;
 const FINER_TRIAL: f64 = 8.0;
+/// The power of divisions by which the variance falls: strata gain more while they are few and what they see is even (benchmarks/engines-remarks.md).
+const POWER_OF_FEW: f64 = 1.25;
+const POWER: f64 = 1.05;
+/// A division sees uneven light where its relative standard deviation at the worst meter is larger than this.
+const UNEVEN: f64 = 0.7;
 /// Blocks that effort is planned for.
 const PLANNED_BLOCKS: usize = 2 * MIN_BLOCKS;
 const MAX_PARALLEL: usize = 8;
@@ -67,6 +72,13 @@ pub(super) struct Sampler<'a> {
     pub(super) until: Instant,
 }
 
+/// What a trial tells: the worst error of its mean, and how long a block may take, as they are counted, on a machine as slow as it was for it.
+#[derive(Clone, Copy)]
+struct Trial {
+    error: f64,
+    longest_s: f64,
+}
+
 /// Direct light that is subtracted should add little to the error.
 const DIRECT_ERROR: f64 = 0.3;
 
@@ -95,54 +107,75 @@ impl Sampler<'_> {
     }
 
     /// Blocks of all light as the preset asks for; `known_lx` is direct light that does not count for the error asked.
-    pub(super) fn total(&self, known_lx: &[f64]) -> Result<(Sampled, u32), EngineError> {
+    pub(super) fn total(&self, known_lx: &[f64]) -> Result<(Sampled, Ambient), EngineError> {
         let given = self.settings.ambient_divisions;
         let fixed = |block_s| Sampling::fixed(MIN_BLOCKS, self.budget(), block_s, self.until);
-        let (divisions, rule) = match self.settings.preset {
+        let ambient = |divisions| Ambient { divisions, risk: Ambient::LOW_RISK };
+        let (ambient, rule) = match self.settings.preset {
             // Of rtrace's own cache a few blocks do where time is short.
             Preset::Default => {
                 let rule = fixed(CACHED_ROW_S * self.rows.len() as f64);
-                (FAST_DIVISIONS, Sampling { min_blocks: 2, ..rule })
+                (ambient(FAST_DIVISIONS), Sampling { min_blocks: 2, ..rule })
             }
             Preset::Fast => {
-                let divisions = given.unwrap_or(FAST_DIVISIONS);
-                (divisions, fixed(self.block_s(divisions)))
+                let ambient = ambient(given.unwrap_or(FAST_DIVISIONS));
+                (ambient, fixed(self.block_s(ambient)))
             }
             Preset::Audit => self.planned(known_lx)?,
         };
-        Ok((rule.run(|numbers| self.side_by_side(divisions, Stream::Total, numbers))?, divisions))
+        Ok((rule.run(|numbers| self.side_by_side(ambient, Stream::Total, numbers))?, ambient))
     }
 
-    /// Divisions a block, from trials, and how many blocks.
-    fn planned<'k>(&self, known_lx: &'k [f64]) -> Result<(u32, Sampling<'k>), EngineError> {
-        let divisions = match self.settings.ambient_divisions {
-            Some(given) => given,
-            None => self.divisions(known_lx)?,
+    /// What a block is, from trials, and how many blocks.
+    fn planned<'k>(&self, known_lx: &'k [f64]) -> Result<(Ambient, Sampling<'k>), EngineError> {
+        let ambient = match self.settings.ambient_divisions {
+            Some(divisions) => Ambient { divisions, risk: self.least_risk() },
+            None => self.ambient(known_lx)?,
         };
-        let within = Sampling::within(self.budget(), self.block_s(divisions), self.until);
-        Ok((divisions, Sampling { known_lx, enough_blocks: PLANNED_BLOCKS, ..within }))
+        let within = Sampling::within(self.budget(), self.block_s(ambient), self.until);
+        Ok((ambient, Sampling { known_lx, enough_blocks: PLANNED_BLOCKS, ..within }))
+    }
+
+    /// Of several luminaires the light is uneven from the start.
+    fn least_risk(&self) -> f64 {
+        if self.job.scene.luminaires.len() > 1 { Ambient::HIGH_RISK } else { Ambient::LOW_RISK }
     }
 
     /// Divisions a block so that the fewest blocks about meet the budget.
-    fn divisions(&self, known_lx: &[f64]) -> Result<u32, EngineError> {
-        let mut affordable = 0.5 * self.budget().seconds / (PLANNED_BLOCKS as f64 * self.block_s(1));
-        let mut planned = f64::INFINITY;
-        for (divisions, power) in TRIALS {
-            if planned.is_finite() && planned.min(affordable) < FINER_TRIAL * f64::from(divisions) {
-                break;
-            }
-            let begun = Instant::now();
-            let trial = self.side_by_side(divisions, Stream::Trial, 0..MIN_BLOCKS)?;
-            let counted_s = MIN_BLOCKS as f64 * self.block_s(divisions);
-            let longest_s = longest_block_s(begun.elapsed(), counted_s, self.until);
-            affordable = affordable.min(longest_s / self.block_s(1));
-            let excess = Blocks::new(trial).worst_error(known_lx) / self.job.budget.relative_error;
-            let blocks = MIN_BLOCKS as f64 / PLANNED_BLOCKS as f64;
-            planned = f64::from(divisions) * (blocks * excess * excess / WORST_OF_FEW).powf(power.recip());
+    fn ambient(&self, known_lx: &[f64]) -> Result<Ambient, EngineError> {
+        let mut ambient = Ambient { divisions: FEWEST_DIVISIONS, risk: self.least_risk() };
+        let mut trial = self.trial(ambient, known_lx)?;
+        let of_a_division = trial.error * f64::from(MIN_BLOCKS as u32 * FEWEST_DIVISIONS).sqrt();
+        if ambient.risk < Ambient::HIGH_RISK && of_a_division > UNEVEN {
+            ambient.risk = Ambient::HIGH_RISK;
+            trial = self.trial(ambient, known_lx)?;
         }
-        let divisions = planned.min(affordable).clamp(f64::from(TRIALS[0].0), f64::from(AUDIT_DIVISIONS));
+        let power = if ambient.risk < Ambient::HIGH_RISK { POWER_OF_FEW } else { POWER };
+        let mut planned = self.needed(ambient, trial, power);
+        if planned >= FINER_TRIAL * f64::from(FEWEST_DIVISIONS) {
+            ambient.divisions = MORE_DIVISIONS;
+            planned = self.needed(ambient, self.trial(ambient, known_lx)?, POWER);
+        }
+        let divisions = planned.clamp(f64::from(FEWEST_DIVISIONS), f64::from(AUDIT_DIVISIONS));
         // rtrace takes a square number of them.
-        Ok((divisions.sqrt().ceil() as u32).pow(2))
+        Ok(Ambient { divisions: (divisions.sqrt().ceil() as u32).pow(2), ..ambient })
+    }
+
+    fn trial(&self, ambient: Ambient, known_lx: &[f64]) -> Result<Trial, EngineError> {
+        let begun = Instant::now();
+        let blocks = self.side_by_side(ambient, Stream::Trial, 0..MIN_BLOCKS)?;
+        let counted_s = MIN_BLOCKS as f64 * self.block_s(ambient);
+        let longest_s = longest_block_s(begun.elapsed(), counted_s, self.until);
+        Ok(Trial { error: Blocks::new(blocks).worst_error(known_lx), longest_s })
+    }
+
+    /// Divisions with which as many blocks as are planned reach the error, or take the time.
+    fn needed(&self, ambient: Ambient, trial: Trial, power: f64) -> f64 {
+        let excess = trial.error / self.job.budget.relative_error;
+        let blocks = MIN_BLOCKS as f64 / PLANNED_BLOCKS as f64;
+        let longest_s = (0.5 * self.budget().seconds / PLANNED_BLOCKS as f64).min(trial.longest_s);
+        let affordable = longest_s / self.block_s(Ambient { divisions: 1, ..ambient });
+        (f64::from(ambient.divisions) * (blocks * excess * excess / WORST_OF_FEW).powf(power.recip())).min(affordable)
     }
 
     /// What direct light leaves of the budget, where that is sampled, too.
@@ -151,25 +184,25 @@ impl Sampler<'_> {
         counted(self.job.budget, share)
     }
 
-    fn block_s(&self, divisions: u32) -> f64 {
-        let (hits, reflecting) = self.hits();
+    fn block_s(&self, ambient: Ambient) -> f64 {
+        let (hits, reflecting) = self.hits(ambient.risk);
         let rays = hits * self.scenes as f64 + reflecting * effort::shadow_rays(self.job, PARTS);
-        RAY_S * f64::from(divisions) * self.rows.len() as f64 * rays * effort::a_ray(self.job)
+        RAY_S * f64::from(ambient.divisions) * self.rows.len() as f64 * rays * effort::a_ray(self.job)
     }
 
     /// Surfaces that rays meet for each division in the mean, and those among them that are not black, which cast shadow rays: at
     /// each, rtrace parts a ray of so much weight that its parts pass the roulette in as many (`doambient` in its ambient.c).
-    fn hits(&self) -> (f64, f64) {
+    fn hits(&self, risk: f64) -> (f64, f64) {
         let Some(room) = self.job.scene.room else { return (1.0, 0.0) };
         let share = effort::reflecting_share(&room);
         let reflectance = effort::mean_reflectance(&room) / share.max(f64::MIN_POSITIVE);
         let (mut hits, mut rays, mut weight) = (0.0, 1.0, 1.0);
         for _ in 0..bounces(self.job) {
             hits += rays;
-            let parts = (KEPT_WEIGHT * reflectance * weight / ROULETTE).sqrt().round().max(1.0).powi(2);
+            let parts = (KEPT_WEIGHT * reflectance * weight / risk).sqrt().round().max(1.0).powi(2);
             let of_each = reflectance * weight / parts;
-            rays *= share * parts * (of_each / ROULETTE).min(1.0);
-            weight = of_each.max(ROULETTE);
+            rays *= share * parts * (of_each / risk).min(1.0);
+            weight = of_each.max(risk);
         }
         (hits, share * hits)
     }
@@ -177,14 +210,14 @@ impl Sampler<'_> {
     /// A process for a few blocks that take less than its start, else one a block; where rtrace keeps its cache, blocks of one process would be alike.
     fn side_by_side(
         &self,
-        divisions: u32,
+        ambient: Ambient,
         stream: Stream,
         numbers: Range<usize>,
     ) -> Result<Vec<Vec<f64>>, EngineError> {
-        let options = self.options(divisions);
+        let options = self.options(ambient);
         let together = match self.settings.preset {
             Preset::Default => 1,
-            Preset::Fast | Preset::Audit => ((SHORT_S / self.block_s(divisions)) as usize).clamp(1, MOST_TOGETHER),
+            Preset::Fast | Preset::Audit => ((SHORT_S / self.block_s(ambient)) as usize).clamp(1, MOST_TOGETHER),
         };
         let ends = numbers.clone().step_by(together).map(|start| start..(start + together).min(numbers.end));
         let processes: Vec<Range<usize>> = ends.collect();
@@ -228,7 +261,7 @@ impl Sampler<'_> {
         Ok(sum)
     }
 
-    pub(super) fn options(&self, divisions: u32) -> Vec<String> {
-        Options::total(self.job, self.settings, divisions)
+    pub(super) fn options(&self, ambient: Ambient) -> Vec<String> {
+        Options::total(self.job, self.settings, ambient)
     }
 }
