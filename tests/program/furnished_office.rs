@@ -74,7 +74,7 @@ fn mitsuba_reads_the_furnished_office() {
 }
 
 #[test]
-fn radiance_reads_the_furnished_office_but_for_what_panels_swallow() {
+fn radiance_reads_the_furnished_office() {
     direct_light_within_1_percent("radiance");
     reflected_light_within_2_percent("radiance", BUDGET, &[]);
 }

@@ -20,6 +20,7 @@ mod tools;
 
 use luminaire::scene::{LuminaireModel, Transport};
 
+use self::export::Light;
 use self::options::{Ambient, Options, Sources};
 use self::sampling::Sampler;
 use self::settings::{Photometrist, Settings};
@@ -82,7 +83,10 @@ impl Engine for Radiance {
                 export::disc_error(job, &settings),
                 "parts of a round opening count alike and are not as dense everywhere".into(),
             ),
-            (export::swallowed(job, &settings), "extended sources swallow the reflected light that meets them".into()),
+            (
+                export::swallowed(job, &settings),
+                "sources of ies2rad swallow the reflected light that meets them".into(),
+            ),
         ];
         let known: Vec<_> = known.into_iter().filter_map(|(size, why)| Some((size?, why))).collect();
         if known.is_empty() {
@@ -154,10 +158,12 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
         tools.ies2rad(workbench, k, luminaire, &settings)?;
     }
     let scenes = superposition::scenes(job, &settings).len();
-    tools.compile(workbench, scenes)?;
+    let lights = Light::of(job, &settings);
+    tools.compile(workbench, &lights, scenes)?;
     let rows = export::rows(job, export::scale(job, settings.coordinates));
     let until = workbench.until();
-    let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows, scenes, until };
+    let light = if lights.contains(&Light::Reflected) { Light::Reflected } else { Light::All };
+    let sampler = Sampler { job, settings: &settings, tools: &tools, workbench, rows, scenes, light, until };
     let options = printed_options(job, &settings);
     let mut measurement = Measurement::default();
     measurement.effort.insert("seed".into(), job.seed.to_string());
@@ -174,9 +180,16 @@ fn read_files(files: &[SceneFile], job: &Job, workbench: &Workbench) -> Result<M
         measurement.estimates = direct;
         return checked(&ID, job, measurement);
     }
-    let part_lx = sampler.determined(&options.part_of_total)?;
+    let part_lx = options.part_of_total.as_ref().map(|part| sampler.determined(part)).transpose()?;
     let is_total = matches!(job.transport, Transport::Total(_));
-    let (total, ambient) = sampler.total(if is_total { &[] } else { &part_lx })?;
+    // Where all light is asked for, its error is, whatever of it the blocks hold.
+    let known_lx = match &part_lx {
+        Some(part_lx) if !is_total => part_lx.clone(),
+        None if is_total => direct.iter().map(|direct| -direct.value).collect(),
+        _ => vec![],
+    };
+    let (total, ambient) = sampler.total(&known_lx)?;
+    let part_lx = part_lx.unwrap_or_else(|| vec![0.0; job.stations.len()]);
     let options = sampler.options(ambient);
     let (count, divisions) = (total.blocks.count().to_string(), ambient.divisions.to_string());
     let settings = [("rtrace", options.join(" ")), ("blocks", count), ("ambient_divisions", divisions)];

@@ -1,7 +1,8 @@
 //! A job as a folder of Radiance files that anyone can run by hand; pure.
 //!
 //! `scene.rad` holds surfaces and luminaires, `luminaire-<n>.dat` the candela tables, `meters.txt` the meters and
-//! `run.sh` the commands; luminaires that hide one another are in `luminaires-<n>.rad`, added up scene by scene. Formats: Ward and Shakespeare, *Rendering with Radiance* (1998); refman of Radiance 6.
+//! `run.sh` the commands; luminaires that hide one another are in `luminaires-<n>.rad`, added up scene by scene, and in
+//! `reflected-<n>.rad` as they are for reflected light where that is read apart. Formats: Ward and Shakespeare, *Rendering with Radiance* (1998); refman of Radiance 6.
 
 mod luminaires;
 
@@ -10,7 +11,7 @@ use luminaire::geometry::Surface;
 use luminaire::scene::{Obstacle, Shape, Transport};
 
 pub(super) use self::luminaires::{EDGE_DEG, disc_error, ies2rad_options, swallowed, unsupported};
-use super::options::Options;
+use super::options::{Options, Sources};
 use super::settings::Settings;
 use super::superposition;
 use crate::engines::comment::Comment;
@@ -28,36 +29,74 @@ const READ_AHEAD: f64 = 1e-4;
 pub(super) fn files(job: &Job, settings: &Settings, options: &Options) -> Vec<SceneFile> {
     let scale = scale(job, settings.coordinates);
     let job = &*recess::apart(job);
-    let scenes = superposition::scenes(job, settings);
-    let mut files = vec![
-        SceneFile::text("scene.rad", scene_rad(job, settings, scale, &scenes)),
+    let (scenes, lights) = (superposition::scenes(job, settings), Light::of(job, settings));
+    let mut scene = scene_rad(job, scale);
+    let mut files = vec![];
+    if let ([all], [light]) = (&scenes[..], &lights[..]) {
+        scene += &luminaires::rad(job, settings, scale, all, *light);
+    } else {
+        for light in &lights {
+            let rad = |(k, scene): (usize, &Vec<usize>)| {
+                let head = format!("# {}\n# Scene {} of {}.\n", title(job), k + 1, scenes.len());
+                let text = head + &luminaires::rad(job, settings, scale, scene, *light);
+                SceneFile::text(&light.luminaires(k), text)
+            };
+            files.extend(scenes.iter().enumerate().map(rad));
+        }
+    }
+    files.extend([
+        SceneFile::text("scene.rad", scene),
         SceneFile::text("meters.txt", meters_txt(job, scale)),
         SceneFile::text("run.sh", run_sh(job, settings, options, scenes.len())),
-    ];
-    if scenes.len() > 1 {
-        let rad = |(k, scene): (usize, &Vec<usize>)| {
-            let head = format!("# {}\n# Scene {} of {}.\n", title(job), k + 1, scenes.len());
-            SceneFile::text(&luminaires_name(k), head + &luminaires::rad(job, settings, scale, scene))
-        };
-        files.extend(scenes.iter().enumerate().map(rad));
-    }
+    ]);
     files.extend(luminaires::files(job, settings));
     files
 }
 
-/// The octree of a scene, one of so many.
-pub(super) fn octree(scene: usize, scenes: usize) -> String {
-    if scenes == 1 { "scene.oct".to_owned() } else { format!("scene-{}.oct", scene + 1) }
+/// What a scene is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Light {
+    All,
+    /// All that does not come straight from a source, where that is an opening.
+    Reflected,
 }
 
-/// The files that a scene, one of so many, is compiled from.
-pub(super) fn parts(scene: usize, scenes: usize) -> Vec<String> {
-    let luminaires = (scenes > 1).then(|| luminaires_name(scene));
-    std::iter::once("scene.rad".to_owned()).chain(luminaires).collect()
-}
+impl Light {
+    /// Those whose scenes differ in a job.
+    pub(super) fn of(job: &Job, settings: &Settings) -> Vec<Self> {
+        match job.transport {
+            Transport::Direct => vec![Self::All],
+            _ if Sources::of(job, settings) != Sources::Openings => vec![Self::All],
+            Transport::Indirect(_) => vec![Self::Reflected],
+            Transport::Total(_) => vec![Self::All, Self::Reflected],
+        }
+    }
 
-fn luminaires_name(scene: usize) -> String {
-    format!("luminaires-{}.rad", scene + 1)
+    fn name(self) -> &'static str {
+        match self {
+            Self::All => "scene",
+            Self::Reflected => "reflected",
+        }
+    }
+
+    /// The octree of a scene, one of so many.
+    pub(super) fn octree(self, scene: usize, scenes: usize) -> String {
+        if scenes == 1 { format!("{}.oct", self.name()) } else { format!("{}-{}.oct", self.name(), scene + 1) }
+    }
+
+    /// The luminaires of a scene.
+    fn luminaires(self, scene: usize) -> String {
+        match self {
+            Self::All => format!("luminaires-{}.rad", scene + 1),
+            Self::Reflected => format!("reflected-{}.rad", scene + 1),
+        }
+    }
+
+    /// The files that a scene is compiled from, one of so many for all light and reflected.
+    pub(super) fn parts(self, scene: usize, of: usize) -> Vec<String> {
+        let luminaires = (of > 1).then(|| self.luminaires(scene));
+        std::iter::once("scene.rad".to_owned()).chain(luminaires).collect()
+    }
 }
 
 /// Radiance's units a metre: 1 for ordinary rooms, a power of ten where its absolute tolerances (1e-6) come near.
@@ -96,30 +135,38 @@ fn run_sh(job: &Job, settings: &Settings, options: &Options, scenes: usize) -> S
     if scenes > 1 {
         text += "# Rays towards one illum end on the front of another: luminaires that hide one another are read apart and added up.\n";
     }
-    for scene in 0..scenes {
-        text += &format!("oconv -f {} > {}\n", parts(scene, scenes).join(" "), octree(scene, scenes));
+    let lights = Light::of(job, settings);
+    for (light, scene) in lights.iter().flat_map(|light| (0..scenes).map(move |scene| (light, scene))) {
+        let parts = light.parts(scene, scenes * lights.len()).join(" ");
+        text += &format!("oconv -f {parts} > {}\n", light.octree(scene, scenes));
     }
-    let rtrace = |args: &[String], scene: usize| {
-        format!("rtrace -h {} {} < meters.txt | {lux}", args.join(" "), octree(scene, scenes))
+    let rtrace = |args: &[String], light: Light, scene: usize| {
+        format!("rtrace -h {} {} < meters.txt | {lux}", args.join(" "), light.octree(scene, scenes))
     };
     // Prints the light of all scenes, or writes it into a file.
-    let read = |args: &[String], name: &str, into: &str| {
+    let read = |args: &[String], light: Light, name: &str, into: &str| {
         if scenes == 1 {
-            return format!("{}{into}\n", rtrace(args, 0));
+            return format!("{}{into}\n", rtrace(args, light, 0));
         }
         let files: Vec<String> = (1..=scenes).map(|scene| format!("{name}-{scene}.txt")).collect();
-        let each = files.iter().enumerate().map(|(scene, file)| format!("{} > {file}\n", rtrace(args, scene)));
+        let each = files.iter().enumerate().map(|(scene, file)| format!("{} > {file}\n", rtrace(args, light, scene)));
         let sum: Vec<String> = (1..=scenes).map(|scene| format!("${scene}")).collect();
         each.collect::<String>() + &format!("rlam {} | rcalc -e '$1={}'{into}\n", files.join(" "), sum.join("+"))
     };
-    match job.transport {
-        Transport::Direct => text += &read(&options.direct, "direct", ""),
-        Transport::Total(_) => text += &read(&options.total, "total", ""),
-        Transport::Indirect(_) => {
+    match (job.transport, &options.part_of_total) {
+        (Transport::Direct, _) => text += &read(&options.direct, Light::All, "direct", ""),
+        (Transport::Total(_), Some(_)) => text += &read(&options.total, Light::All, "total", ""),
+        (Transport::Indirect(_), Some(part)) => {
             text += "# Indirect light is all light less the direct.\n";
-            text += &read(&options.part_of_total, "direct", " > direct.txt");
-            text += &read(&options.total, "total", " > total.txt");
+            text += &read(part, Light::All, "direct", " > direct.txt");
+            text += &read(&options.total, Light::All, "total", " > total.txt");
             text += "rlam total.txt direct.txt | rcalc -e '$1=$1-$2'\n";
+        }
+        (Transport::Indirect(_), None) => text += &read(&options.total, Light::Reflected, "reflected", ""),
+        (Transport::Total(_), None) => {
+            text += &read(&options.direct, Light::All, "direct", " > direct.txt");
+            text += &read(&options.total, Light::Reflected, "reflected", " > reflected.txt");
+            text += "rlam direct.txt reflected.txt | rcalc -e '$1=$1+$2'\n";
         }
     }
     text
@@ -129,7 +176,7 @@ fn title(job: &Job) -> String {
     format!("luxproof: case {}, procedure {}", Comment(&job.case), job.procedure)
 }
 
-fn scene_rad(job: &Job, settings: &Settings, scale: f64, scenes: &[Vec<usize>]) -> String {
+fn scene_rad(job: &Job, scale: f64) -> String {
     let mut text = format!("# {}\n# Run by hand: sh run.sh. Units: ", title(job));
     text += &if scale == 1.0 { "metres.\n".to_owned() } else { format!("{scale} to the metre.\n") };
     if let Some(room) = &job.scene.room {
@@ -143,9 +190,6 @@ fn scene_rad(job: &Job, settings: &Settings, scale: f64, scenes: &[Vec<usize>]) 
     for (k, obstacle) in job.scene.obstacles.iter().enumerate() {
         text += &format!("\n# Obstacle {k}.\n");
         text += &obstacle_rad(k, obstacle, scale);
-    }
-    if let [all] = scenes {
-        text += &luminaires::rad(job, settings, scale, all);
     }
     text
 }

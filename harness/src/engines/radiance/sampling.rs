@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use luminaire::scene::Transport;
 
-use super::export;
+use super::export::Light;
 use super::grazing;
 use super::options::{AUDIT_DIVISIONS, Ambient, FAST_DIVISIONS, Options, Sources, bounces};
 use super::settings::Settings;
@@ -66,8 +66,9 @@ pub(super) struct Sampler<'a> {
     pub(super) tools: &'a Tools,
     pub(super) workbench: &'a Workbench,
     pub(super) rows: Vec<[f64; 6]>,
-    /// How many scenes there are, whose light adds up.
+    /// How many scenes there are, whose light adds up, and what is read of them but the direct light.
     pub(super) scenes: usize,
+    pub(super) light: Light,
     /// When no more samples are begun.
     pub(super) until: Instant,
 }
@@ -106,7 +107,8 @@ impl Sampler<'_> {
         })
     }
 
-    /// Blocks of all light as the preset asks for; `known_lx` is direct light that does not count for the error asked.
+    /// Blocks of all light or reflected, as the preset asks for; `known_lx` is direct light that does not count for the error asked, less what
+    /// is not in them and does.
     pub(super) fn total(&self, known_lx: &[f64]) -> Result<(Sampled, Ambient), EngineError> {
         let given = self.settings.ambient_divisions;
         let fixed = |block_s| Sampling::fixed(MIN_BLOCKS, self.budget(), block_s, self.until);
@@ -239,22 +241,32 @@ impl Sampler<'_> {
         // Rows that are read apart draw other numbers.
         let place = self.rows.iter().position(|row| row == first).unwrap_or(0);
         let own = (place > 0).then_some(place as u64);
+        let light = match stream {
+            Stream::Direct => Light::All,
+            Stream::Trial | Stream::Total => self.light,
+        };
         let stream: Vec<u64> = [self.job.seed, stream as u64, numbers.start as u64].into_iter().chain(own).collect();
-        let read = self.all_scenes(options, &stream, &all)?;
+        let read = self.all_scenes(options, light, &stream, &all)?;
         Ok(read.chunks(rows.len()).map(<[f64]>::to_vec).collect())
     }
 
     /// Light that rtrace finds anew each time to the last digit.
     pub(super) fn determined(&self, options: &[String]) -> Result<Vec<f64>, EngineError> {
-        self.all_scenes(options, &[self.job.seed], &self.rows)
+        self.all_scenes(options, Light::All, &[self.job.seed], &self.rows)
     }
 
     /// What all scenes give together, each with random numbers of its own.
-    fn all_scenes(&self, options: &[String], stream: &[u64], rows: &[[f64; 6]]) -> Result<Vec<f64>, EngineError> {
+    fn all_scenes(
+        &self,
+        options: &[String],
+        light: Light,
+        stream: &[u64],
+        rows: &[[f64; 6]],
+    ) -> Result<Vec<f64>, EngineError> {
         let mut sum = vec![0.0; rows.len()];
         for scene in 0..self.scenes {
             let own: Vec<u64> = stream.iter().copied().chain((scene > 0).then_some(u64::MAX - scene as u64)).collect();
-            let octree = export::octree(scene, self.scenes);
+            let octree = light.octree(scene, self.scenes);
             let read = self.tools.rtrace(self.workbench, options, &octree, seed(&own), rows)?;
             sum.iter_mut().zip(read).for_each(|(sum, lx)| *sum += lx);
         }

@@ -108,7 +108,7 @@ fn the_files_of_scenes_that_add_up_are_these() {
     let job = of(vec![panel(2.8), panel(2.0)], &[[2.0, 2.0, 0.5]], CONVERGED);
     let files = Radiance.export(&job).unwrap();
     let text = |name: &str| String::from_utf8_lossy(&files.iter().find(|f| f.name == name).unwrap().bytes).into_owned();
-    assert!(!text("scene.rad").contains("luminaire") && text("luminaires-2.rad").contains("luminaire-1 polygon"));
-    assert!(!text("luminaires-1.rad").contains("luminaire-1 "));
+    assert!(!text("scene.rad").contains("luminaire") && text("reflected-2.rad").contains("luminaire-1 polygon"));
+    assert!(!text("reflected-1.rad").contains("luminaire-1 "));
     insta::assert_snapshot!(text("run.sh"));
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use luminaire::scene::Luminaire;
 
+use super::export::Light;
 use super::route::{Route, route};
 use super::settings::Settings;
 use super::{ID, export};
@@ -49,11 +50,11 @@ impl Tools {
         Ok(Version::of(&ID, version, site, [self.package.clone(), self.clock.clone()]))
     }
 
-    pub(super) fn compile(&self, workbench: &Workbench, scenes: usize) -> Result<(), EngineError> {
-        for scene in 0..scenes {
+    pub(super) fn compile(&self, workbench: &Workbench, lights: &[Light], scenes: usize) -> Result<(), EngineError> {
+        for (light, scene) in lights.iter().flat_map(|light| (0..scenes).map(move |scene| (light, scene))) {
             let compiled = self.prepared(workbench.invoke(self.program("oconv"))).longest_answer(LARGEST_OCTREE);
-            let compiled = compiled.args(["-f".to_owned()]).args(export::parts(scene, scenes)).run()?;
-            workbench.write(&[SceneFile { name: export::octree(scene, scenes), bytes: compiled.stdout }])?;
+            let compiled = compiled.args(["-f".to_owned()]).args(light.parts(scene, scenes * lights.len())).run()?;
+            workbench.write(&[SceneFile { name: light.octree(scene, scenes), bytes: compiled.stdout }])?;
         }
         Ok(())
     }

@@ -12,7 +12,7 @@ use luminaire::photometry::{
 };
 use luminaire::scene::{Luminaire, Meter, Transport, flush};
 
-use super::{EFFICACY, box_faces, polygon};
+use super::{EFFICACY, Light, box_faces, polygon};
 use crate::engines::comment::Comment;
 use crate::engines::radiance::options::Sources;
 use crate::engines::radiance::route::{Route, route};
@@ -25,6 +25,8 @@ pub(in crate::engines::radiance) const EDGE_DEG: f64 = 1e-4;
 const IES2RAD_EDGE_DEG: f64 = 0.01;
 /// Distance of a flat opening's faces from its plane, in Radiance's units: a luminaire may be flush with a surface.
 const FACE_OFFSET: f64 = 1e-5;
+/// Distance of a veil from its face, in Radiance's units, which takes 1e-6 for none.
+const VEIL_OFFSET: f64 = 0.5 * FACE_OFFSET;
 /// Radius of the sphere that stands for a point luminaire, in Radiance's units; 1e-6 and less are refused by Radiance.
 const POINT_RADIUS: f64 = 1e-3;
 const MIN_RADIUS: f64 = 2e-6;
@@ -128,15 +130,16 @@ fn from_part(luminaire: &Luminaire, offset_m: DVec3, meter: &Meter) -> f64 {
     luminaire.intensity_towards(ray_m).value() * cosine / ray_m.length_squared()
 }
 
-/// Part of the reflected light that is lost at most because a ray that meets an extended source ends there, light and
-/// illum alike, while luminaires otherwise are no obstacles; `None` where nothing is reflected or all are points.
+/// Part of the reflected light that is lost at most because a ray that meets one of ies2rad's sources ends there, light and
+/// illum alike, while luminaires otherwise are no obstacles; `None` where nothing is reflected or there are none.
 ///
 /// The configuration factor of the sources for the meter that sees most of them, and their part of the room's surface.
 /// Measured: 1.5 % at a meter of case S2 where this says 3 %.
 pub(in crate::engines::radiance) fn swallowed(job: &Job, settings: &Settings) -> Option<f64> {
     let room = job.scene.room.filter(|_| job.transport != Transport::Direct)?;
     // What meets a recessed one ends on its black face in any case.
-    let has_extent = |l: &&Luminaire| route(l, settings) != Route::Point && flush::recess_of(&job.scene, l).is_none();
+    let of_ies2rad = |l: &&Luminaire| matches!(route(l, settings), Route::Ies2radLight | Route::Ies2radIllum);
+    let has_extent = |l: &&Luminaire| of_ies2rad(l) && flush::recess_of(&job.scene, l).is_none();
     let extended: Vec<&Luminaire> = job.scene.luminaires.iter().filter(has_extent).collect();
     if extended.is_empty() {
         return None;
@@ -162,18 +165,23 @@ fn largest_section_m2(luminaire: &Luminaire) -> f64 {
 }
 
 /// Of the luminaires of a scene, given by their places in the job.
-pub(super) fn rad(job: &Job, settings: &Settings, scale: f64, scene: &[usize]) -> String {
+pub(super) fn rad(job: &Job, settings: &Settings, scale: f64, scene: &[usize], light: Light) -> String {
     let mut text = String::new();
+    if light == Light::Reflected {
+        text += &format!(
+            "\n# No light where a meter sees a source itself.\nvoid brightfunc {SEEN}\n2 if(T-Ts-{NO_PATH},1,0) .\n0\n0\n"
+        );
+    }
     let is_sampled = Sources::of(job, settings) == Sources::Openings;
     for (k, l) in scene.iter().map(|k| (*k, &job.scene.luminaires[*k])) {
         text += &match route(l, settings) {
             Route::Point => {
                 let off = if is_sampled { recess::inwards(job, l) } else { DVec3::ZERO };
                 let radius = if off == DVec3::ZERO { point_radius(job, l, scale) } else { MIN_RADIUS };
-                point(k, l, radius, CLEAR * radius * off, scale)
+                point(k, l, radius, CLEAR * radius * off, scale, light)
             }
-            Route::Opening => opening(k, l, scale),
-            Route::Ies2radLight | Route::Ies2radIllum => by_ies2rad(k, l, scale),
+            Route::Opening => opening(k, l, scale, light),
+            Route::Ies2radLight | Route::Ies2radIllum => by_ies2rad(k, l, scale, light),
         };
     }
     text
@@ -229,37 +237,41 @@ pub(in crate::engines::radiance) fn ies2rad_options(
     options.map(str::to_owned).chain([ies_name(k)]).collect()
 }
 
-fn by_ies2rad(k: usize, luminaire: &Luminaire, scale: f64) -> String {
+fn by_ies2rad(k: usize, luminaire: &Luminaire, scale: f64, light: Light) -> String {
     let p = luminaire.position_m * scale;
     let turns: Vec<String> =
         euler_deg(luminaire.orientation).iter().map(|(axis, a)| format!(" -r{axis} {a}")).collect();
     let turns = turns.concat();
     let size = if scale == 1.0 { String::new() } else { format!(" -s {scale}") };
     let comment = format!("\n# Luminaire {}: by ies2rad, see run.sh.\n", Comment(&luminaire.id));
-    format!("{comment}!xform{size}{turns} -t {} {} {} luminaire-{k}.rad\n", p.x, p.y, p.z)
+    let seen = match light {
+        Light::All => String::new(),
+        Light::Reflected => format!(" | sed 's/^void brightdata/{SEEN} brightdata/'"),
+    };
+    format!("{comment}!xform{size}{turns} -t {} {} {} luminaire-{k}.rad{seen}\n", p.x, p.y, p.z)
 }
 
 /// A sphere so small that only its centre matters: radiance I / (179 pi r^2) towards each direction.
-fn point(k: usize, luminaire: &Luminaire, radius: f64, off: DVec3, scale: f64) -> String {
+fn point(k: usize, luminaire: &Luminaire, radius: f64, off: DVec3, scale: f64, of: Light) -> String {
     let factor = luminaire.flux_scale * scale * scale / (EFFICACY * PI * radius * radius);
     let p = luminaire.position_m * scale + off;
     let mut text = format!(
         "\n# Luminaire {}: a point, as a sphere of radius {radius}; its table is in candela.\n",
         Comment(&luminaire.id)
     );
-    text += &light(k, luminaire, Source::Solid, Correction::NONE, &[factor]);
+    text += &light(k, luminaire, Source::Solid, Correction::NONE, &[factor], of);
     text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
     text
 }
 
-fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
+fn opening(k: usize, luminaire: &Luminaire, scale: f64, of: Light) -> String {
     let mut text =
         format!("\n# Luminaire {}: its luminous opening; its table is in candela.\n", Comment(&luminaire.id));
-    let body = Body { k, luminaire, scale };
+    let body = Body { k, luminaire, scale, of };
     let factor = luminaire.flux_scale / EFFICACY;
     match luminaire.photometry.opening {
         LuminousOpening::Box { x_m, y_m, height_m: 0.0 } => {
-            text += &light(k, luminaire, Source::SeenThrough, Correction::FLAT, &[factor / (x_m * y_m)]);
+            text += &body.light(Correction::FLAT, &[factor / (x_m * y_m)]);
             let corner = |u: f64, v: f64, z: f64| DVec3::new(0.5 * u * x_m, 0.5 * v * y_m, z);
             for (z, turn) in body.lit_faces() {
                 let corners = [(-1.0, -turn), (1.0, -turn), (1.0, turn), (-1.0, turn)].map(|(u, v)| corner(u, v, z));
@@ -267,23 +279,21 @@ fn opening(k: usize, luminaire: &Luminaire, scale: f64) -> String {
             }
         }
         LuminousOpening::Box { x_m, y_m, height_m } => {
-            text += &light(k, luminaire, Source::SeenThrough, Correction::BOX, &[factor, x_m, y_m, height_m]);
+            text += &body.light(Correction::BOX, &[factor, x_m, y_m, height_m]);
             let half = 0.5 * DVec3::new(x_m, y_m, height_m);
             for (f, face) in box_faces(-half, half).iter().enumerate() {
                 text += &body.polygon(&f.to_string(), face);
             }
         }
         LuminousOpening::Ellipse { x_m, height_m: 0.0, .. } => {
-            text += &light(k, luminaire, Source::SeenThrough, Correction::FLAT, &[factor / (0.25 * PI * x_m * x_m)]);
+            text += &body.light(Correction::FLAT, &[factor / (0.25 * PI * x_m * x_m)]);
             for (z, turn) in body.lit_faces() {
                 text += &body.disc(if turn > 0.0 { "up" } else { "down" }, z * DVec3::Z, turn * DVec3::Z, 0.5 * x_m);
             }
         }
         LuminousOpening::Ellipsoid { x_m, .. } => {
-            text += &light(k, luminaire, Source::SeenThrough, Correction::NONE, &[factor / (0.25 * PI * x_m * x_m)]);
-            let p = luminaire.position_m * scale;
-            let radius = 0.5 * x_m * scale;
-            text += &format!("luminaire-{k} sphere luminaire-{k}-body\n0\n0\n4 {} {} {} {radius}\n", p.x, p.y, p.z);
+            text += &body.light(Correction::NONE, &[factor / (0.25 * PI * x_m * x_m)]);
+            text += &body.sphere(0.5 * x_m);
         }
         round @ (LuminousOpening::Ellipse { .. } | LuminousOpening::LyingCylinder { .. }) => {
             text += &Cylinder::of(round).map(|c| body.cylinder(&c, factor)).unwrap_or_default();
@@ -351,7 +361,11 @@ struct Body<'a> {
     k: usize,
     luminaire: &'a Luminaire,
     scale: f64,
+    of: Light,
 }
+
+/// What lies on a face: how far before it in veils' distances, of which modifier, and whether it looks inwards.
+type Layer = (f64, String, bool);
 
 impl Body<'_> {
     /// Height and direction (1 up, -1 down) of the faces of a flat opening that send out light.
@@ -366,19 +380,73 @@ impl Body<'_> {
         (self.luminaire.position_m + self.luminaire.orientation * own_m) * self.scale
     }
 
+    /// The material of what is not seen by chance: an illum in front of nothing, which the light of points passes as in photometry. One illum
+    /// hides another even so, see `superposition`. With the veils about it where reflected light is read.
+    fn light(&self, correction: Correction, factors: &[f64]) -> String {
+        let k = self.k;
+        let text = light(k, self.luminaire, Source::SeenThrough, correction, factors, self.of);
+        match self.of {
+            Light::All => text,
+            Light::Reflected => text + &veil(k),
+        }
+    }
+
+    /// A face and the veils before and behind it, from its outside inwards.
+    fn layers(&self) -> Vec<Layer> {
+        let (face, veil) = (format!("luminaire-{}", self.k), format!("luminaire-{}-veil", self.k));
+        match self.of {
+            Light::All => vec![(0.0, face, false)],
+            Light::Reflected => vec![
+                (2.0, "void".to_owned(), false),
+                (1.0, veil.clone(), false),
+                (0.0, face, false),
+                (-1.0, veil, true),
+            ],
+        }
+    }
+
+    /// How far a layer is before its face, in metres, and the name of its surface.
+    fn place(&self, part: &str, layer: f64) -> (f64, String) {
+        let name = format!("luminaire-{}-{part}", self.k);
+        (layer * VEIL_OFFSET / self.scale, if layer == 0.0 { name } else { format!("{name}-veil{layer:+}") })
+    }
+
+    /// A face, its corners counter-clockwise as seen from outside.
     fn polygon(&self, part: &str, corners_m: &[DVec3]) -> String {
-        let corners: Vec<DVec3> = corners_m.iter().map(|p| self.placed(*p)).collect();
-        let name = format!("luminaire-{}", self.k);
-        polygon(&name, &format!("{name}-{part}"), &corners)
+        let normal = (corners_m[1] - corners_m[0]).cross(corners_m[2] - corners_m[1]).normalize();
+        let one = |(layer, modifier, is_inward): Layer| {
+            let (before_m, name) = self.place(part, layer);
+            let mut corners: Vec<DVec3> = corners_m.iter().map(|p| self.placed(*p + before_m * normal)).collect();
+            if is_inward {
+                corners.reverse();
+            }
+            polygon(&modifier, &name, &corners)
+        };
+        self.layers().into_iter().map(one).collect()
     }
 
     fn disc(&self, part: &str, centre_m: DVec3, normal: DVec3, radius_m: f64) -> String {
-        let (p, n) = (self.placed(centre_m), self.luminaire.orientation * normal);
-        let (k, r) = (self.k, radius_m * self.scale);
-        format!(
-            "luminaire-{k} ring luminaire-{k}-{part}\n0\n0\n8\n    {} {} {}\n    {} {} {}\n    0 {r}\n",
-            p.x, p.y, p.z, n.x, n.y, n.z
-        )
+        let r = radius_m * self.scale;
+        let one = |(layer, modifier, is_inward): Layer| {
+            let (before_m, name) = self.place(part, layer);
+            let (p, n) = (self.placed(centre_m + before_m * normal), self.luminaire.orientation * normal);
+            let n = if is_inward { -n } else { n };
+            format!(
+                "{modifier} ring {name}\n0\n0\n8\n    {} {} {}\n    {} {} {}\n    0 {r}\n",
+                p.x, p.y, p.z, n.x, n.y, n.z
+            )
+        };
+        self.layers().into_iter().map(one).collect()
+    }
+
+    fn sphere(&self, radius_m: f64) -> String {
+        let p = self.placed(DVec3::ZERO);
+        let one = |(layer, modifier, is_inward): Layer| {
+            let (before_m, name) = self.place("body", layer);
+            let (kind, r) = (if is_inward { "bubble" } else { "sphere" }, (radius_m + before_m) * self.scale);
+            format!("{modifier} {kind} {name}\n0\n0\n4 {} {} {} {r}\n", p.x, p.y, p.z)
+        };
+        self.layers().into_iter().map(one).collect()
     }
 
     /// A prism whose mean silhouette is the cylinder's, and discs that it holds for its ends.
@@ -388,7 +456,7 @@ impl Body<'_> {
         let end_m = corner_m * (0.5 * step).cos();
         let factors = [factor, SIDES as f64, 2.0 * corner_m, cylinder.length_m, PI * end_m * end_m];
         let half = 0.5 * cylinder.length_m * cylinder.axis;
-        let mut text = light(self.k, self.luminaire, Source::SeenThrough, cylinder.correction(), &factors);
+        let mut text = self.light(cylinder.correction(), &factors);
         text += &self.disc("end-0", half, cylinder.axis, end_m);
         text += &self.disc("end-1", -half, -cylinder.axis, end_m);
         let corner = |k: usize| {
@@ -412,8 +480,30 @@ enum Source {
     SeenThrough,
 }
 
+/// The pattern by which reflected light alone is read, and how long the path before a ray towards a source is where that starts at a meter.
+const SEEN: &str = "unseen";
+const NO_PATH: f64 = 2e-5;
+
+/// What lets reflected light pass an opening: a ray that meets an illum's front by chance ends there (`badcomponent` of rtrace's source.c), yet goes on
+/// where antimatter has taken the illum away. The veil is antimatter to a ray whose last stop, a layer beside it, is as near as that, and
+/// nothing to one that comes from farther, as all do that are aimed at the source; the same veil behind the face ends it.
+fn veil(k: usize) -> String {
+    let near = 1.5 * VEIL_OFFSET;
+    format!(
+        "void antimatter luminaire-{k}-gone\n2 void luminaire-{k}\n0\n0\n\
+         void mixfunc luminaire-{k}-veil\n4 luminaire-{k}-gone void if({near}-Ts*abs(Rdot),1,0) .\n0\n0\n"
+    )
+}
+
 /// The material: the table as a pattern, turned as the luminaire is.
-fn light(k: usize, luminaire: &Luminaire, source: Source, correction: Correction, factors: &[f64]) -> String {
+fn light(
+    k: usize,
+    luminaire: &Luminaire,
+    source: Source,
+    correction: Correction,
+    factors: &[f64],
+    of: Light,
+) -> String {
     let coordinates = match luminaire.photometry.distribution.symmetry() {
         Symmetry::Axial => "src_theta",
         _ => "src_phi src_theta",
@@ -429,8 +519,9 @@ fn light(k: usize, luminaire: &Luminaire, source: Source, correction: Correction
         Source::Solid => ("light", "0"),
         Source::SeenThrough => ("illum", "1 void"),
     };
+    let pattern = if of == Light::Reflected { SEEN } else { "void" };
     format!(
-        "void brightdata luminaire-{k}-candela\n{} {words}\n0\n{} {}\n\
+        "{pattern} brightdata luminaire-{k}-candela\n{} {words}\n0\n{} {}\n\
          luminaire-{k}-candela {kind} luminaire-{k}\n{behind}\n0\n3 1 1 1\n",
         words.split(' ').count(),
         factors.len(),
