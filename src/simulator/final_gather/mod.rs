@@ -285,16 +285,20 @@ impl Enclosure {
             self.solved = None;
             self.balance = None;
         }
+        let taken_for_cosines = self.emitters.iter().map(Emitter::relative_error).fold(0.0, f64::max);
+        let left = error - taken_for_cosines;
+        let error = if left > 0.5 * error { left } else { error };
+        let accuracy = &Accuracy { relative_error: error, ..*accuracy };
         let (mut found, text) = self.balanced(meters, bounces, direct, accuracy, stop);
         let is_met = |k: &usize| {
             found.get(*k).is_some_and(|f| f.bound + direct[*k].bound <= error * (f.value + direct[*k].value))
         };
         let open: Vec<usize> = (0..meters.len()).filter(|k| !is_met(k)).collect();
-        match text {
-            Some(text) if open.is_empty() => Ok((found, text)),
+        let (mut found, text) = match text {
+            Some(text) if open.is_empty() => (found, text),
             text => match self.gathered(meters, &open, bounces, direct, accuracy, stop) {
-                Err(SimulatorError::Stopped) if !found.is_empty() => Ok((found, text.unwrap_or_default())),
-                Err(error) => Err(error),
+                Err(SimulatorError::Stopped) if !found.is_empty() => (found, text.unwrap_or_default()),
+                Err(error) => return Err(error),
                 Ok((sampled, how)) => {
                     found.resize(meters.len(), Bounded::UNREAD);
                     for (k, sampled) in open.iter().zip(sampled) {
@@ -302,10 +306,14 @@ impl Enclosure {
                             found[*k] = sampled;
                         }
                     }
-                    Ok((found, text.map_or(how.clone(), |text| format!("{text}; {how}"))))
+                    (found, text.map_or(how.clone(), |text| format!("{text}; {how}")))
                 }
             },
+        };
+        for one in &mut found {
+            one.bound += taken_for_cosines * one.value.abs();
         }
+        Ok((found, text))
     }
 
     /// Indirect illuminance at the meters without chance, for some perhaps not as well as asked, and how; nothing where that is not worth it

@@ -76,6 +76,30 @@ fn mean_direct_light_of_s2_over_all_meters_is_exact() {
 }
 
 #[test]
+fn a_coarse_table_that_is_taken_for_a_cosine_is_off_no_more_than_its_bound() {
+    let room = Room { size_m: DVec3::new(4.0, 3.0, 2.8), reflectance: Reflectances::with_equal_walls(0.3, 0.5, 0.7) };
+    let coarse: Vec<f64> = (0..=9).map(|k| 10.0 * f64::from(k)).chain([180.0]).collect();
+    let candela = |gamma_deg: f64| if gamma_deg < 89.9 { 100.0 * gamma_deg.to_radians().cos() } else { 0.0 };
+    let cosines = LuminousIntensityDistribution::axial(coarse.clone(), coarse.iter().map(|g| candela(*g)).collect());
+    // The same pieces, whose nodes between are no cosines.
+    let fine: Vec<f64> = (0..=18).map(|k| 5.0 * f64::from(k)).chain([180.0]).collect();
+    let of_pieces = |g: &f64| if g % 10.0 == 0.0 { candela(*g) } else { 0.5 * (candela(g - 5.0) + candela(g + 5.0)) };
+    let pieces = LuminousIntensityDistribution::axial(fine.clone(), fine.iter().map(of_pieces).collect());
+    let read = |table: LuminousIntensityDistribution| {
+        let panel = LuminousOpening::Box { x_m: 0.6, y_m: 0.6, height_m: 0.0 };
+        let lamp = luminaire(table, panel, DVec3::new(1.5, 1.2, 2.5));
+        let scene = Scene { room: Some(room), luminaires: vec![lamp], ..Scene::default() };
+        let indirect = Transport::Indirect(Bounces::Converged);
+        illuminance(&scene, &[up(1.0, 1.0, 0.8), up(3.0, 2.5, 0.8)], indirect, &accuracy(5e-3)).unwrap().estimates
+    };
+    for (a, b) in read(cosines.unwrap()).iter().zip(read(pieces.unwrap())) {
+        let off = a.illuminance.value() - b.illuminance.value();
+        assert!(off > 1e-3 * b.illuminance.value(), "{off}: both are cosines");
+        assert!(off <= bound(a.uncertainty), "{a:?} {b:?}");
+    }
+}
+
+#[test]
 fn indirect_light_of_s2_lies_within_its_bound() {
     let converged = Transport::Indirect(Bounces::Converged);
     let solution = illuminance(&s2(), &s2_meters(), converged, &accuracy(0.02)).unwrap();
