@@ -216,7 +216,9 @@ impl Dialogue<'_> {
         let sample_s = self.sample_s(part, greeting);
         let counted_s = sample_s * (TRIAL_BLOCKS * trial_side * trial_side) as f64;
         let longest_s = longest_block_s(begun.elapsed(), counted_s, self.until);
-        let affordable = (((budget.seconds / ENOUGH_BLOCKS as f64).min(longest_s) / sample_s) as usize).isqrt();
+        let side_of = |block_s: f64| ((block_s / sample_s) as usize).isqrt();
+        // A few blocks as large as those of the trial take no longer than that did, and smaller ones know nothing of their error.
+        let affordable = side_of(budget.seconds / ENOUGH_BLOCKS as f64).min(side_of(longest_s).max(trial_side));
         // The error is that of their mean; m x m samples are at least as good as m x m independent ones.
         let excess = Blocks::new(trials).worst_error(&[]) / budget.relative_error;
         let fewer = TRIAL_BLOCKS as f64 / ENOUGH_BLOCKS as f64;
