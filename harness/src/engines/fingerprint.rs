@@ -104,7 +104,7 @@ pub(super) fn of_files(engine: &EngineName, site: &Site, files: Vec<(PathBuf, Pa
 
 /// What an earlier run saw; a file that is not sound is told and replaced.
 fn kept(place: &Path, engine: &EngineName) -> Memo {
-    let Ok(text) = std::fs::read(place) else { return Memo::default() };
+    let Ok(text) = files::read_kept(place) else { return Memo::default() };
     envelope::open(SCHEMA, &text).and_then(|sealed| sealed.about(engine.as_str())).unwrap_or_else(|why| {
         tracing::warn!("{engine}: {} {why}; its files are hashed anew", place.display());
         Memo::default()

@@ -160,12 +160,12 @@ impl Emitter {
         self.peak_cd / apart_m.length_squared()
     }
 
-    /// Whether it sends light anywhere.
     /// What all its light may be off, relative, where its table is taken for a cosine.
     pub(super) fn relative_error(&self) -> f64 {
         self.lambertian.map_or(0.0, |lambertian| lambertian.interpolation)
     }
 
+    /// Whether it sends light anywhere.
     pub(super) fn shines(&self) -> bool {
         self.peak_cd > 0.0
     }

@@ -85,7 +85,7 @@ impl Backend {
     }
 
     fn kept(site: &Site, python: &Path, libraries: &[PathBuf]) -> Option<Self> {
-        let sealed = envelope::open::<Kept>(SCHEMA, &std::fs::read(Self::place(site)).ok()?).ok()?;
+        let sealed = envelope::open::<Kept>(SCHEMA, &files::read_kept(&Self::place(site)).ok()?).ok()?;
         let mut found = None;
         let of_now = |kept: &Kept| {
             let backend = Self::new(site, python.to_owned(), kept.llvm.clone(), kept.versions.clone());

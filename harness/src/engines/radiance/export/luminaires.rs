@@ -169,7 +169,9 @@ pub(super) fn rad(job: &Job, settings: &Settings, scale: f64, scene: &[usize], l
     let mut text = String::new();
     if light == Light::Reflected {
         text += &format!(
-            "\n# No light where a meter sees a source itself.\nvoid brightfunc {SEEN}\n2 if(T-Ts-{NO_PATH},1,0) .\n0\n0\n"
+            "\n# No light where a meter sees a source itself. Rays that meet a source by chance pass it: to them the veils about it,\n\
+             # a hair off its faces, are antimatter that takes it away, and nothing to rays that are aimed at it from afar.\n\
+             void brightfunc {SEEN}\n2 if(T-Ts-{NO_PATH},1,0) .\n0\n0\n"
         );
     }
     let is_sampled = Sources::of(job, settings) == Sources::Openings;
