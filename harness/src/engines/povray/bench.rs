@@ -26,8 +26,10 @@ const MIN_RAYS: f64 = 25.0;
 /// Seconds that are counted for the test of a ray against a shape, and how many times what was measured on two cores of a usual server they are.
 const TEST_S: f64 = 1.1e-7;
 const COUNTED: f64 = 1.5;
-/// Rays a sample of the block that is looked at first; work grows with them, since most of it is the first reflection's.
-const PILOT_RAYS: u32 = 25;
+/// Rays a sample of the block that is looked at first, at most: the fewest of the audit preset.
+const PILOT_RAYS: u32 = 35;
+/// What a pilot's frames resolve, relative, so that it is as good as any block.
+const RESOLVED: f64 = 5e-4;
 /// Blocks that are made before an error is believed: the wider an interval is for want of blocks, the more it takes to decide anything.
 const PLANNED_BLOCKS: usize = 3 * MIN_BLOCKS / 2;
 /// The part of the time that the fewest blocks may take.
@@ -160,28 +162,27 @@ impl<'a> Bench<'a> {
     pub(super) fn indirect(&self) -> Result<Measurement, EngineError> {
         let count = self.settings.count;
         let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, what: What::Block };
-        let few = count.min(PILOT_RAYS);
-        let mut pilot = self.pilot(Run { count: few, ..run })?;
-        let longest_s = longest_block_s(pilot.wall, pilot.work_s, self.until);
-        pilot.work_s *= f64::from(count) / f64::from(few);
-        let (budget, mut block_s) = (counted(self.job.budget, 1.0), pilot.work_s);
-        let share = ((FIRST_BLOCKS * budget.seconds / MIN_BLOCKS as f64).min(longest_s) / block_s).max(1e-3);
+        let mut pilot = self.pilot(Run { count: count.min(PILOT_RAYS), ..run })?;
+        let longest_s = longest_block_s(pilot.wall, pilot.work.seconds(1.0), self.until);
+        let budget = counted(self.job.budget, 1.0);
+        let affordable_s = (FIRST_BLOCKS * budget.seconds / MIN_BLOCKS as f64).min(longest_s);
+        let affordable = f64::from(pilot.rays) * pilot.work.times_in(affordable_s);
         let mut measurement = Measurement { method: self.method(), ..Measurement::default() };
-        if share < 1.0 && self.settings.preset == Preset::Audit {
-            run.count = (f64::from(run.count) * share).max(MIN_RAYS) as u32;
-            block_s *= f64::from(run.count) / f64::from(self.settings.count);
-            let few = format!("{} rays a sample instead of {}: the budget is short", run.count, self.settings.count);
-            measurement.notes.push(few);
+        if affordable < f64::from(count) && self.settings.preset == Preset::Audit {
+            run.count = affordable.max(MIN_RAYS) as u32;
+            measurement.notes.push(format!("{} rays a sample instead of {count}: the budget is short", run.count));
         }
+        let block_s = pilot.work.seconds(f64::from(run.count) / f64::from(pilot.rays));
+        pilot.block = pilot.block.filter(|_| run.count == pilot.rays);
         self.keep_readouts(&pilot.readouts)?;
         let rule = Sampling { enough_blocks: PLANNED_BLOCKS, ..Sampling::within(budget, block_s, self.until) };
-        let blocks = rule.run(|numbers| self.wave(run, numbers, &pilot))?;
+        let blocks = rule.run(|numbers| self.wave(run, numbers, &pilot, block_s))?;
         let made = blocks.blocks.count();
         measurement.estimates = measurement.take(blocks);
         let mut effort = Effort::from([
             ("arguments", self.printed_arguments(run)),
             ("blocks", made.to_string()),
-            ("seeds", (1..=made).map(|block| self.seed(block).to_string()).collect::<Vec<_>>().join(" ")),
+            ("seeds", (0..made).map(|k| self.seed(pilot.place(k)).to_string()).collect::<Vec<_>>().join(" ")),
             ("count", run.count.to_string()),
         ]);
         if self.terms.len() > 1 {
@@ -198,14 +199,14 @@ impl<'a> Bench<'a> {
         Ok(measurement)
     }
 
-    /// A first block of few rays, which finds each meter's scale and how much work a block is.
+    /// A block that finds each meter's scale and how much work blocks are; the first of them, where it has as many rays as they.
     fn pilot(&self, run: Run) -> Result<Pilot, EngineError> {
         let mut readouts = export::first_readouts(self.job, Light::Indirect);
         let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();
         for _ in 0..MAX_LOOKS {
             self.keep_readouts(&readouts)?;
             let begun = Instant::now();
-            let Rendered { frames, work_s } = self.terms_apart(run, &readouts)?;
+            let (frames, work) = self.terms_apart(run, &readouts)?;
             let wall = begun.elapsed();
             let (mut settled, mut brightest_lx) = (true, 0.0_f64);
             for k in 0..readouts.len() {
@@ -232,27 +233,37 @@ impl<'a> Bench<'a> {
                 // A meter that one block sees in near darkness may be brighter by far in the next.
                 let least = 0.4 * brightest_lx;
                 let readouts = readouts.iter().map(|r| Readout::Coarse(scale_of(*r).max(least))).collect();
-                return Ok(Pilot { readouts, work_s, wall });
+                let is_fine = |seen: &Seen| matches!(seen, Seen::Value { lx, resolution_lx } if resolution_lx <= &(RESOLVED * lx));
+                let is_block = frames.iter().flatten().all(is_fine);
+                let block = if is_block { Some(self.sum(run, frames)?) } else { None };
+                return Ok(Pilot { readouts, rays: run.count, work, wall, block });
             }
         }
         Err(output(format!("reflected light was not read after {MAX_LOOKS} looks")))
     }
 
     /// Blocks, each a process of one thread.
-    fn wave(&self, run: Run, numbers: Range<usize>, pilot: &Pilot) -> Result<Vec<Vec<f64>>, EngineError> {
-        let run_s = pilot.work_s / COUNTED;
+    fn wave(&self, run: Run, numbers: Range<usize>, pilot: &Pilot, block_s: f64) -> Result<Vec<Vec<f64>>, EngineError> {
+        let run_s = block_s / COUNTED;
         let sleep_s = SLEEP_S + FRAME_SLEEP_S * self.terms.len().saturating_sub(1) as f64;
         // As many as compute while others sleep.
         let for_each_thread = (1.0 + SPARE * sleep_s / (START_S + run_s)).ceil() as usize;
         let side = for_each_thread.min(side_by_side_at_most(self.job)) * self.workbench.jobs.max(1);
         let numbers: Vec<usize> = numbers.collect();
-        // The pilot is the first of the sequence of seeds.
-        let block = |k: &usize| self.block(Run { seed: self.seed(k + 1), ..run }, pilot);
+        let block = |k: &usize| match &pilot.block {
+            Some(first) if *k == 0 => Ok(first.clone()),
+            _ => self.block(Run { seed: self.seed(pilot.place(*k)), ..run }, pilot),
+        };
         side_by_side(side, &numbers, block).into_iter().collect()
     }
 
     fn block(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
         let frames = self.render(run, &pilot.readouts)?.frames;
+        self.sum(run, frames)
+    }
+
+    /// The terms of a block together.
+    fn sum(&self, run: Run, frames: Vec<Vec<Seen>>) -> Result<Vec<f64>, EngineError> {
         let mut sum = vec![0.0; self.job.stations.len()];
         for (term, seen) in self.terms.iter().zip(frames) {
             for (k, (sum, seen)) in sum.iter_mut().zip(seen).enumerate() {
@@ -310,13 +321,22 @@ impl<'a> Bench<'a> {
     }
 
     /// The terms of a block in as many processes, since frames that follow each other sleep after each other.
-    fn terms_apart(&self, run: Run, readouts: &[Readout]) -> Result<Rendered, EngineError> {
+    fn terms_apart(&self, run: Run, readouts: &[Readout]) -> Result<(Vec<Vec<Seen>>, Work), EngineError> {
         let terms: Vec<usize> = (0..self.terms.len()).collect();
         let side = side_by_side_at_most(self.job) * self.workbench.jobs.max(1);
         let one = |k: &usize| self.render(Run { what: What::Term(*k), ..run }, readouts);
         let all: Vec<Rendered> = side_by_side(side, &terms, one).into_iter().collect::<Result<_, _>>()?;
-        let work_s = all.iter().map(|term| term.work_s).sum();
-        Ok(Rendered { frames: all.into_iter().flat_map(|term| term.frames).collect(), work_s })
+        let mut work = Work::default();
+        for (term, rendered) in self.terms.iter().zip(&all) {
+            let is_of_one = self.reflections(term) == 1;
+            *if is_of_one { &mut work.first_s } else { &mut work.further_s } += rendered.work_s;
+        }
+        Ok((all.into_iter().flat_map(|term| term.frames).collect(), work))
+    }
+
+    fn reflections(&self, term: &Term) -> u32 {
+        let most = self.job.reflections().map_or(1, |bounces| self.settings.recursion_limit(bounces));
+        term.limit.map_or(most, |limit| limit.min(most))
     }
 
     fn seen(run: Run, image: &Path, readouts: &[Readout]) -> Result<Vec<Seen>, EngineError> {
@@ -383,8 +403,43 @@ fn output(what: String) -> EngineError {
 
 struct Pilot {
     readouts: Vec<Readout>,
-    work_s: f64,
+    rays: u32,
+    work: Work,
     wall: Duration,
+    /// What it reads at each meter, where that is one of the blocks.
+    block: Option<Vec<f64>>,
+}
+
+impl Pilot {
+    /// The place of a block in the sequence of seeds, of which the pilot's is the first.
+    fn place(&self, block: usize) -> usize {
+        block + usize::from(self.block.is_none())
+    }
+}
+
+/// Seconds that are counted for a block: of what follows one reflection, which grow with the rays a sample, and of what follows more, which grow with
+/// their square, as more samples shoot more rays each (11 rooms, 25 to 140 rays: powers of 1.00 and of 1.5 to 2.1).
+#[derive(Clone, Copy, Default)]
+struct Work {
+    first_s: f64,
+    further_s: f64,
+}
+
+impl Work {
+    /// With so many times the rays.
+    fn seconds(self, times: f64) -> f64 {
+        times * (self.first_s + times * self.further_s)
+    }
+
+    /// So many times the rays take so many seconds.
+    fn times_in(self, seconds: f64) -> f64 {
+        if seconds.is_infinite() {
+            return f64::INFINITY;
+        }
+        // The positive root of seconds(t) = seconds, in which nothing cancels.
+        let first = self.first_s;
+        2.0 * seconds / (first + (first * first + 4.0 * self.further_s * seconds).sqrt()).max(f64::MIN_POSITIVE)
+    }
 }
 
 struct Rendered {
