@@ -285,10 +285,17 @@ impl Sampling<'_> {
         }
         let excess = blocks.worst_error(self.known_lx) / self.relative_error;
         // Where nothing varied, nothing may have been met.
-        let few_do = excess > 0.0 && excess * widening(have) <= 1.0;
-        let missing = match self.enough_blocks.saturating_sub(have) {
-            missing if missing > 0 && !few_do => missing,
-            _ => ((have as f64 * (excess * excess - 1.0)).ceil() as usize).min(MAX_GROWTH * have),
+        let do_few = |n: &usize| excess > 0.0 && excess * (have as f64 / *n as f64).sqrt() * widening(*n) <= 1.0;
+        let missing = if have < self.enough_blocks {
+            let few = (have..self.enough_blocks).find(do_few);
+            match few {
+                Some(few) if few == have => 0,
+                // One more, since each wave waits for its last; what was told wrong once is not told again.
+                Some(few) if have == at_first => few + 1 - have,
+                _ => self.enough_blocks - have,
+            }
+        } else {
+            ((have as f64 * (excess * excess - 1.0)).ceil() as usize).min(MAX_GROWTH * have)
         };
         let affordable = ((self.seconds / self.block_s) as usize).min(self.max_blocks).max(self.min_blocks);
         missing.min(affordable.saturating_sub(have))
@@ -381,7 +388,9 @@ mod tests {
         };
         // 2 % / sqrt(8), and 2.5 times that.
         assert!((2.4..2.6).contains(&widening(8)) && widening(16) < 1.6, "{} {}", widening(8), widening(16));
-        assert_eq!([count(0.1), count(0.012)], [8, 16]);
+        assert_eq!([count(0.1), count(0.006)], [8, 16]);
+        // So many as have an interval that is narrow enough, and no more.
+        assert!((9..16).contains(&count(0.012)), "{}", count(0.012));
         assert!(count(0.002) > 50);
     }
 
