@@ -15,7 +15,7 @@ use super::{Site, fingerprint};
 use crate::procedures::{Target, Task};
 use crate::record::{Effort, EngineName, Estimate, Light, MeterId, Method, ProcedureId, Role, Uncertainty};
 use crate::spec::{Budget, Case};
-use crate::system::slots::{Share, Slots};
+use crate::system::slots::{Held, Share, Slots};
 
 /// The component of every engine that gets its candela table from our own reader of photometric files.
 pub const FILE_READER: &str = "luxproof's reader of photometric files";
@@ -31,6 +31,7 @@ pub type Answer = Result<Measurement, EngineError>;
 pub enum Waits {
     /// It holds no thread.
     Mostly,
+    /// It holds half of its threads.
     Often,
     Little,
 }
@@ -286,9 +287,10 @@ pub fn share(engine: &dyn Engine, job: &Job, slots: &Slots) -> Share {
 /// What it holds of its share: renderers wait for much of their time, at their start and for the last of their processes, so that two readings
 /// of reflected light work with the same threads. They count their seconds with room for that; a program of a user's, which goes by the clock,
 /// has its share for itself.
-pub fn held(engine: &dyn Engine, share: Share) -> Share {
+pub fn hold<'s>(engine: &dyn Engine, job: &Job, share: Share, slots: &'s Slots) -> Held<'s> {
     let threads = if engine.is_vouched_for() { share.threads.div_ceil(2) } else { share.threads };
-    Share { threads, ..share }
+    let share = Share { threads, ..share };
+    if engine.waits(job) == Waits::Often { slots.take_half(share) } else { slots.take(share) }
 }
 
 /// What meshes take in a renderer, about 1 KiB a triangle with its hierarchy, and meters in their read-out.

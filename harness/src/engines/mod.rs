@@ -54,7 +54,7 @@ pub use blocks::Blocks;
 pub use catalogue::{ALL, all, display_name, entry, is_chosen, is_on_request, place};
 pub use contract::{
     Absent, Answer, Component, Engine, Entry, FILE_READER, Forgotten, Job, Knob, Measurement, Station, Support,
-    Version, Waits, checked, held, share,
+    Version, Waits, checked, hold, share,
 };
 use contract::{OWN_LOOKUP, geometry_mib};
 pub use external::{ExternalAnswers, ExternalJob, ExternalProbe, ExternalReadings, ExternalRequest, Introduction};

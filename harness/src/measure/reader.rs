@@ -12,7 +12,7 @@ use super::outcome::{Cost, Failure, Source, Taken};
 use super::question::{Question, Trial};
 use super::subprocess::{self, Isolation, Request};
 use crate::engines::{
-    Engine, EngineError, Groundwork, Job, Measurement, Site, Support, Workbench, checked, held, share,
+    Engine, EngineError, Groundwork, Job, Measurement, Site, Support, Workbench, checked, hold, share,
 };
 use crate::record::{EngineName, FailureKind, ReadingKey};
 use crate::system::files::{ignore_absence, remedy};
@@ -245,14 +245,13 @@ impl Reader {
         // Whoever needs the same waits until it is found, and holds nothing meanwhile.
         let mut found = ground.as_ref().map(|(found, _)| found.lock());
         let slots = &self.machine.slots;
-        let (used, taken) = if let Some(Trial { threads, .. }) = trial {
+        let (used, _held) = if let Some(Trial { threads, .. }) = trial {
             let share = Share { threads: *threads, memory_mib: engine.memory_mib(job, *threads) };
-            (share, share)
+            (share, slots.take(share))
         } else {
             let share = share(engine, job, slots);
-            (share, held(engine, share))
+            (share, hold(engine, job, share, slots))
         };
-        let _held = slots.take(taken);
         place.bench.jobs = used.threads.clamp(1, slots.threads());
         let kept = || Arc::new(self.cache.as_ref()?.groundwork(&ground.as_ref()?.1)?).into();
         place.bench.groundwork.earlier = found.as_ref().and_then(|found| (**found).clone()).or_else(kept);

@@ -1,7 +1,7 @@
 //! Slots: how much of the machine runs at a time, so that engines side by side do not starve each other.
 //!
 //! An engine that is given k threads or processes holds k slots as long as it works, so that one that keeps its budget by the clock has the
-//! processors that it counts on; one that sleeps holds none. Memory is handed out likewise, by estimate. Whoever comes first is served
+//! processors that it counts on; one that sleeps holds none, and one that sleeps as long as it works half of them. Memory is handed out likewise, by estimate. Whoever comes first is served
 //! first: a job that needs every slot is not passed by small ones for ever.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -31,16 +31,24 @@ pub struct Share {
 
 #[derive(Debug)]
 struct State {
-    free: Share,
+    free: Part,
     next_ticket: u64,
     served: u64,
+}
+
+/// What is free or taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Part {
+    half_threads: usize,
+    memory_mib: u64,
 }
 
 /// Slots in use; they are free again when this is dropped.
 #[derive(Debug)]
 pub struct Held<'a> {
     slots: &'a Slots,
-    share: Share,
+    threads: usize,
+    part: Part,
 }
 
 impl Slots {
@@ -51,7 +59,8 @@ impl Slots {
 
     fn with_memory(threads: usize, memory_mib: u64) -> Self {
         let all = Share { threads: threads.max(1), memory_mib };
-        let state = State { free: all, next_ticket: 0, served: 0 };
+        let free = Part { half_threads: 2 * all.threads, memory_mib };
+        let state = State { free, next_ticket: 0, served: 0 };
         Self { all, state: Mutex::new(state), changed: Condvar::new() }
     }
 
@@ -66,42 +75,52 @@ impl Slots {
 
     /// Waits for a share. What asks for more than there is gets all that there is; what asks for no thread waits for no turn.
     pub fn take(&self, share: Share) -> Held<'_> {
-        let Share { threads, memory_mib } = share;
-        let share = Share { threads: threads.min(self.all.threads), memory_mib: memory_mib.min(self.all.memory_mib) };
+        self.take_halves(share, 2)
+    }
+
+    /// The same for what sleeps half of its time, and leaves half of its threads to others.
+    pub fn take_half(&self, share: Share) -> Held<'_> {
+        self.take_halves(share, 1)
+    }
+
+    fn take_halves(&self, share: Share, of_each: usize) -> Held<'_> {
+        let threads = share.threads.min(self.all.threads);
+        let part = Part { half_threads: of_each * threads, memory_mib: share.memory_mib.min(self.all.memory_mib) };
+        let held = Held { slots: self, threads, part };
         let mut state = self.state.lock();
-        if share.threads == 0 {
-            while state.free.memory_mib < share.memory_mib {
+        if threads == 0 {
+            while state.free.memory_mib < part.memory_mib {
                 self.changed.wait(&mut state);
             }
-            state.free.memory_mib -= share.memory_mib;
-            return Held { slots: self, share };
+            state.free.memory_mib -= part.memory_mib;
+            return held;
         }
         let ticket = state.next_ticket;
         state.next_ticket += 1;
-        let fits = |s: &State| s.free.threads >= share.threads && s.free.memory_mib >= share.memory_mib;
+        let fits = |s: &State| s.free.half_threads >= part.half_threads && s.free.memory_mib >= part.memory_mib;
         while !(state.served == ticket && fits(&state)) {
             self.changed.wait(&mut state);
         }
         state.served += 1;
-        state.free.threads -= share.threads;
-        state.free.memory_mib -= share.memory_mib;
+        state.free.half_threads -= part.half_threads;
+        state.free.memory_mib -= part.memory_mib;
         self.changed.notify_all();
-        Held { slots: self, share }
+        held
     }
 }
 
 impl Held<'_> {
     /// One at least, if only to wait on.
     pub fn threads(&self) -> usize {
-        self.share.threads.max(1)
+        self.threads.max(1)
     }
 }
 
 impl Drop for Held<'_> {
     fn drop(&mut self) {
         let mut state = self.slots.state.lock();
-        state.free.threads += self.share.threads;
-        state.free.memory_mib += self.share.memory_mib;
+        state.free.half_threads += self.part.half_threads;
+        state.free.memory_mib += self.part.memory_mib;
         self.slots.changed.notify_all();
     }
 }
@@ -188,11 +207,22 @@ mod tests {
         let one = Share { threads: 1, memory_mib: 1 };
         let working = slots.take(one);
         let sleeping = slots.take(Share { threads: 0, memory_mib: 90 });
-        assert_eq!((sleeping.threads(), slots.state.lock().free), (1, Share { threads: 0, memory_mib: 9 }));
+        assert_eq!((sleeping.threads(), slots.state.lock().free), (1, Part { half_threads: 0, memory_mib: 9 }));
         drop(working);
         drop(slots.take(one));
         drop(sleeping);
-        assert_eq!(slots.state.lock().free, Share { threads: 1, memory_mib: 100 });
+        assert_eq!(slots.state.lock().free, Part { half_threads: 2, memory_mib: 100 });
+    }
+
+    #[test]
+    fn two_that_sleep_half_of_their_time_take_the_place_of_one() {
+        let slots = Slots::with_memory(2, 100);
+        let share = Share { threads: 1, memory_mib: 10 };
+        let held = [slots.take_half(share), slots.take_half(share), slots.take(share)];
+        assert_eq!(slots.state.lock().free, Part { half_threads: 0, memory_mib: 70 });
+        assert!(held.iter().all(|held| held.threads() == 1));
+        drop(held);
+        assert_eq!(slots.take_half(Share { threads: 9, memory_mib: 1 }).threads(), 2);
     }
 
     #[test]
