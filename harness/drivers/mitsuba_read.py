@@ -21,6 +21,7 @@ import blocks
 
 CLEAR = 1e-6  # of coordinates: how far off a meter its shadow rays start
 SHADOW_EPSILON = 9e-4  # of distances: how far before an emitter they end, as Mitsuba's own do
+FEW_RAYS = 1 << 19  # some .2 s, for which more threads take a quarter more: they wait for kernels without sleeping
 
 
 def main():
@@ -38,7 +39,7 @@ def instrument(job, folder, options):
         dr.flush_malloc_cache()  # of an earlier job
     import mitsuba_goniometric  # registers the emitters, for the variant just set
 
-    return Instrument(load(os.path.join(folder, job["scene"])), job)
+    return Instrument(load(os.path.join(folder, job["scene"])), job, options.threads)
 
 
 def load(scene):
@@ -53,7 +54,8 @@ def load(scene):
 
 
 class Instrument(blocks.Instrument):
-    def __init__(self, scene, job):
+    def __init__(self, scene, job, threads):
+        self.threads = threads
         # Before a variant is set, older ones tell no version.
         super().__init__(job, {"mitsuba": mi.__version__, "drjit": dr.__version__}, mi.variant())
         meters = Meters(job["stations"])
@@ -69,6 +71,12 @@ class Instrument(blocks.Instrument):
             self.parts["direct"] = blocks.one_by_one(lambda m, seed: direct(scene, meters, emitters, m, seed)), rays
         if job["transport"] in ("indirect", "total") and emitters and scene.shapes():
             self.parts["indirect"] = blocks.one_by_one(lambda m, seed: indirect(scene, meters, m, seed)), meters.count
+
+    def blocks(self, part, m, seeds):
+        if is_jit():
+            is_short = not self.job["film"] and self.parts[part][1] * m * m * len(seeds) <= FEW_RAYS
+            dr.set_thread_count(1 if is_short else self.threads)
+        return super().blocks(part, m, seeds)
 
     def is_sampled(self, part):
         return bool(self.job["film"] or self.job["extended"] or part != "direct")

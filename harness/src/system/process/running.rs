@@ -118,7 +118,7 @@ impl Running {
             return None;
         }
         // Many a program ends soon: at first it is looked at often.
-        self.next_look = now + (self.start.elapsed() / 8).min(LOOK);
+        self.next_look = now + (self.start.elapsed() / 4).min(LOOK);
         self.peak.look_at(&self.processes())
     }
 

@@ -273,13 +273,11 @@ fn opacity_pfm(distribution: &LuminousIntensityDistribution) -> Vec<u8> {
     let columns = columns(distribution);
     let peak = distribution.max_intensity().value();
     let mut bytes = format!("Pf\n{columns} {ROWS}\n-1.0\n").into_bytes();
-    for row in 0..ROWS {
-        let gamma_deg = 180.0 * row as f64 / (ROWS - 1) as f64;
-        for column in 0..columns {
-            let intensity = distribution.intensity(360.0 * column as f64 / columns as f64, gamma_deg).value();
-            let transmitted = if peak > 0.0 { intensity / peak } else { 0.0 };
-            bytes.extend(((1.0 - transmitted) as f32).to_le_bytes());
-        }
+    let c_deg: Vec<f64> = (0..columns).map(|column| 360.0 * column as f64 / columns as f64).collect();
+    let gamma_deg: Vec<f64> = (0..ROWS).map(|row| 180.0 * row as f64 / (ROWS - 1) as f64).collect();
+    for intensity in distribution.intensities(&c_deg, &gamma_deg) {
+        let transmitted = if peak > 0.0 { intensity / peak } else { 0.0 };
+        bytes.extend(((1.0 - transmitted) as f32).to_le_bytes());
     }
     bytes
 }
