@@ -3,7 +3,7 @@
 //! The first look is the plan's own job. Each further look is one job for the stations that are still undecided, with a seed and a
 //! slice of the budget of its own, a few times as long as all before it: engines take seconds to start, so looks are few. Looks are
 //! combined with weights that are fixed before they are taken, in proportion to the effort granted, so that what was read
-//! does not choose its own weight. Seconds are those that engines count, so that no clock has a say; a user's program has none. Deciding early keeps its error rate by alpha spending over the planned looks
+//! does not choose its own weight; one that the clock cut short weighs as much less as it has fewer blocks. Seconds are those that engines count, so that no clock has a say; a user's program has none. Deciding early keeps its error rate by alpha spending over the planned looks
 //! ([`crate::judge::share_of_error`]).
 
 use std::collections::BTreeSet;
@@ -115,7 +115,7 @@ pub fn refine(
         subject.skewness = measurement.skewness().or(subject.skewness);
         subject.effort.extend(measurement.effort.iter().map(|(k, v)| (format!("look{look}_{k}"), v.clone())));
         let estimates = measurement.readings(ask.targets.iter().map(|k| &task.targets[*k]));
-        let counts = if is_deaf { 1.0 } else { weight };
+        let counts = if is_deaf { 1.0 } else { weight * measurement.cut_to.unwrap_or(1.0) };
         for (&k, estimate) in ask.targets.iter().zip(&estimates) {
             combine(&mut subject.readings[k], total_weight, estimate, counts);
             subject.looks[k] = look;
@@ -420,6 +420,27 @@ mod tests {
         combine(&mut reading, 1.0, &estimate(2.0, 0.1), 3.0);
         assert!((reading.value - 1.75).abs() < 1e-15);
         assert!((reading.uncertainty.standard_error().unwrap() - 0.3_f64.hypot(0.3) / 4.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_look_that_the_clock_cut_short_weighs_as_much_less() {
+        let exact = recording("simulator", &[Estimate::exact(1.0)]);
+        let budget = |seconds| Budget { relative_error: 0.004, seconds };
+        let value = |cut_to: Option<f64>| {
+            let mut subject = recording("radiance", &[estimate(1.019, 0.004)]);
+            subject.work_s = Some(1.0);
+            let mut sample = |ask: &Ask| {
+                let of_look = |look| if look == 2 { 1.5 } else { 1.0 };
+                let estimates = vec![estimate(of_look(ask.look), 0.004); ask.targets.len()];
+                Ok((Measurement { estimates, cut_to, work_s: Some(1e9), ..Measurement::default() }, Cost::default()))
+            };
+            refine(&built_in(), &task(1), &[&exact], &mut subject, (budget(1.0), budget(9.0)), &mut sample);
+            subject.readings[0].value
+        };
+        let weight = weight(2, 1.0);
+        let expected = |counts: f64| (1.019 + 1.5 * counts) / (1.0 + counts);
+        assert!((value(None) - expected(weight)).abs() < 1e-12, "{}", value(None));
+        assert!((value(Some(0.25)) - expected(0.25 * weight)).abs() < 1e-12, "{}", value(Some(0.25)));
     }
 
     fn estimate(value: f64, error: f64) -> Estimate {

@@ -244,7 +244,8 @@ impl Sampling<'_> {
             let count = wanted.min(self.in_time(have, waves));
             if count == 0 {
                 let remark = self.remark(&blocks, wanted > 0);
-                return Ok(Sampled { work_s: have as f64 * self.block_s, blocks, remark });
+                let cut_to = (wanted > 0).then(|| have as f64 / (have + wanted) as f64);
+                return Ok(Sampled { work_s: have as f64 * self.block_s, blocks, cut_to, remark });
             }
             let begun = Instant::now();
             blocks.0.extend(wave(have..have + count)?);
@@ -322,6 +323,8 @@ pub(super) struct Sampled {
     pub(super) blocks: Blocks,
     /// Seconds that they take, as their engine counts them.
     pub(super) work_s: f64,
+    /// The part of the blocks that were wanted next, and those before, which the clock left; `None` where it left all.
+    pub(super) cut_to: Option<f64>,
     /// Why there are no more of them, where their error is larger than was asked for.
     pub(super) remark: Option<String>,
 }
@@ -401,6 +404,7 @@ mod tests {
         let (whole, _) = sampled(&rule, 0.02);
         assert!(late.remark.unwrap().starts_with("cut short by the clock"));
         assert_eq!(late.blocks.0, whole.blocks.0[..LEAST_BLOCKS]);
+        assert!(late.cut_to.is_some_and(|part| part <= 0.5) && whole.cut_to.is_none());
     }
 
     #[test]

@@ -449,6 +449,9 @@ pub struct Measurement {
     /// Seconds that its sampling takes at the rate that the engine counts with; `None` for one that keeps to the clock.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub work_s: Option<f64>,
+    /// The part of the samples that the clock left of those that it took; `None` where it left all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cut_to: Option<f64>,
 }
 
 /// What is known of the noise of samples that are not kept.
@@ -492,6 +495,7 @@ impl Measurement {
     pub(super) fn take(&mut self, part: Sampled) -> Vec<Estimate> {
         let estimates = part.blocks.estimates();
         *self.work_s.get_or_insert(0.0) += part.work_s;
+        self.cut_to = [self.cut_to, part.cut_to].into_iter().flatten().reduce(f64::min);
         self.notes.extend(part.remark);
         self.samples.push(part.blocks);
         estimates

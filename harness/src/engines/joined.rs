@@ -28,6 +28,7 @@ impl Measurement {
             let new: Vec<String> = part.notes.iter().filter(|note| !all.notes.contains(note)).cloned().collect();
             all.notes.extend(new);
             all.work_s = [all.work_s, part.work_s].into_iter().flatten().reduce(f64::max);
+            all.cut_to = [all.cut_to, part.cut_to].into_iter().flatten().reduce(f64::min);
         }
         all.estimates = stations.iter().map(|(part, k)| parts[*part].estimates[*k]).collect();
         // What met nothing may have had nobody beside it that did.

@@ -18,6 +18,7 @@ fn sample() -> Entry {
         effort: [("seed", "1")].into(),
         notes: vec!["a note with \"quotes\" and µ".to_owned()],
         samples: vec![Blocks::new(vec![vec![1.0 / 3.0; 5], vec![0.1 + 0.2; 5]])],
+        cut_to: Some(0.5),
         work_s: Some(1.1),
         forgotten: Forgotten::default(),
     };
