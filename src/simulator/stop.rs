@@ -37,6 +37,15 @@ impl Stop {
         self.rays.map_or(u32::MAX, |rays| (rays / 3 / shares.max(1) as u64).max(1).ilog2())
     }
 
+    /// Half of the time that is left until the deadline, for what others wait for.
+    pub(super) fn halfway(&self) -> Self {
+        let half = |deadline: Instant| {
+            let now = Instant::now();
+            now + deadline.saturating_duration_since(now) / 2
+        };
+        Self { deadline: self.deadline.map(half), ..*self }
+    }
+
     /// Whether it may be time before the work is done.
     pub(super) fn may_come(&self) -> bool {
         #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Sampling until comparisons are decided: which budget first looks get, and further looks through the run's reader.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use super::jobs::{Found, Outcome, Running};
 use super::sequential::{self, Ask};
@@ -96,9 +97,19 @@ fn refine_references(
             outcome.recordings.iter().filter(|r| r.key.procedure == task.procedure).collect();
         let ask = finer(judge, task, &of_task, run.job.budget, |target| refined.insert((index, target)));
         let mine = outcome.recordings.iter().position(|r| r.key.engine == engine && r.key.procedure == task.procedure);
-        let Some((mine, ask)) = mine.zip(ask) else { continue };
+        let Some((mine, mut ask)) = mine.zip(ask) else { continue };
         let recording = &mut outcome.recordings[mine];
         if recording.failure.is_some() {
+            continue;
+        }
+        let taken = Duration::try_from_secs_f64(recording.wall_s).unwrap_or(Duration::MAX);
+        ask.patience = ask.patience.saturating_sub(taken);
+        // What is finer takes longer.
+        if ask.patience < taken {
+            let count = ask.targets.len();
+            recording.notes.push(format!(
+                "{count} meters that it leaves undecided were not read more finely: its seconds are over"
+            ));
             continue;
         }
         match look(running, run, &ask) {

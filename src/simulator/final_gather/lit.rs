@@ -220,8 +220,8 @@ impl Lights<'_> {
 }
 
 impl Lit {
-    /// To a relative error at each place, dim ones apart.
-    pub(super) fn new(lights: &Lights, relative_error: f64, stop: &Stop) -> Self {
+    /// To a relative error at each place, dim ones apart, or as well as it is known when it is time to go on; and whether it is known to that error.
+    pub(super) fn new(lights: &Lights, relative_error: f64, until: &Stop, stop: &Stop) -> (Self, bool) {
         let bicubic = Bicubic::new();
         let mean: f64 = mean_lux(lights, relative_error);
         let surroundings = lights.surroundings;
@@ -243,19 +243,14 @@ impl Lit {
                 occluders: &occluders,
                 casts,
                 finer: &finer,
+                until,
                 stop,
             };
-            let (corner_m, size_m) = (face.corners_m[0], face.size_m());
-            let mut parts = vec![];
-            if face.reflectance > 0.0 {
-                let first = build.leaf(corner_m, size_m);
-                parts.push(Part { corner_m, size_m, kind: Kind::Quartered(0, corner_m), joined: None });
-                build.grow(&mut parts, 0, first, 0);
-            }
-            parts
+            if face.reflectance > 0.0 { build.grow() } else { vec![] }
         };
         let faces: Vec<Vec<Part>> = surroundings.faces.par_iter().zip(&casts).map(one).collect();
-        Self::of_parts(lights, occluders.is_some(), casts, faces)
+        let is_done = !until.is_due();
+        (Self::of_parts(lights, occluders.is_some(), casts, faces), is_done)
     }
 
     /// What follows from the rectangles of all faces.
@@ -487,6 +482,12 @@ fn mean_lux(lights: &Lights, relative_error: f64) -> f64 {
     (0..PLACES).map(one).sum::<f64>() / PLACES as f64
 }
 
+/// What becomes of a rectangle: a leaf, or quarters with what they are at first, and where these meet.
+enum Grown {
+    Leaf(Leaf),
+    Quarters(DVec2, Vec<(DVec2, DVec2, Leaf)>),
+}
+
 struct Build<'a> {
     lights: &'a Lights<'a>,
     bicubic: Bicubic,
@@ -501,22 +502,59 @@ struct Build<'a> {
     /// Shadows on the face of luminaires without extent.
     casts: &'a [Option<Cast>],
     finer: &'a Gauss,
+    /// When no more is quartered.
+    until: &'a Stop,
     stop: &'a Stop,
 }
 
 impl Build<'_> {
-    /// Puts a leaf in its place, or its quarters where it is not good enough.
-    fn grow(&self, parts: &mut Vec<Part>, index: usize, mut leaf: Leaf, depth: u32) {
-        let is_clear = leaf.asked.is_empty() || depth >= DEEPEST_FOR_SHADOW;
-        let (at, is_last) = ([parts[index].corner_m, parts[index].size_m], depth >= DEEPEST || self.stop.is_due());
-        if is_last || is_clear && !leaf.is_covered && self.is_good(&leaf, at[1]) {
-            leaf = self.looked_into(leaf, at);
-            if is_last || self.is_good(&leaf, at[1]) {
-                parts[index].kind = Kind::Leaf(Box::new(leaf));
-                return;
+    /// A face in rectangles, each a leaf or quartered where that is not good enough, level by level, so that all of it is known about alike
+    /// whenever time is up.
+    fn grow(&self) -> Vec<Part> {
+        let (corner_m, size_m) = (self.face.corners_m[0], self.face.size_m());
+        let mut parts = vec![Self::part(corner_m, size_m)];
+        let mut open = vec![(0, self.leaf(corner_m, size_m))];
+        for depth in 0.. {
+            let grown: Vec<(usize, Grown)> = std::mem::take(&mut open)
+                .into_par_iter()
+                .map(|(index, leaf): (usize, Leaf)| {
+                    let part = &parts[index];
+                    (index, self.grown(leaf, part.corner_m, part.size_m, depth))
+                })
+                .collect();
+            for (index, grown) in grown {
+                parts[index].kind = match grown {
+                    Grown::Leaf(leaf) => Kind::Leaf(Box::new(leaf)),
+                    Grown::Quarters(middle_m, quarters) => {
+                        let first = parts.len();
+                        for (k, (corner_m, size_m, leaf)) in quarters.into_iter().enumerate() {
+                            parts.push(Self::part(corner_m, size_m));
+                            open.push((first + k, leaf));
+                        }
+                        Kind::Quartered(first, middle_m)
+                    }
+                };
+            }
+            if open.is_empty() {
+                break;
             }
         }
-        let (corner_m, size_m) = (parts[index].corner_m, parts[index].size_m);
+        parts
+    }
+
+    fn part(corner_m: DVec2, size_m: DVec2) -> Part {
+        Part { corner_m, size_m, kind: Kind::Quartered(0, corner_m), joined: None }
+    }
+
+    fn grown(&self, mut leaf: Leaf, corner_m: DVec2, size_m: DVec2, depth: u32) -> Grown {
+        let is_clear = leaf.asked.is_empty() || depth >= DEEPEST_FOR_SHADOW;
+        let is_last = depth >= DEEPEST || self.until.is_due();
+        if is_last || is_clear && !leaf.is_covered && self.is_good(&leaf, size_m) {
+            leaf = self.looked_into(leaf, [corner_m, size_m]);
+            if is_last || self.is_good(&leaf, size_m) {
+                return Grown::Leaf(leaf);
+            }
+        }
         let middle_m = self.middle_m(corner_m, size_m);
         let (near_m, far_m) = (middle_m - corner_m, corner_m + size_m - middle_m);
         let quarters = [
@@ -525,14 +563,8 @@ impl Build<'_> {
             (DVec2::new(corner_m.x, middle_m.y), DVec2::new(near_m.x, far_m.y)),
             (middle_m, far_m),
         ];
-        let first = parts.len();
-        parts[index].kind = Kind::Quartered(first, middle_m);
-        let leaves: Vec<Leaf> = quarters.par_iter().map(|(corner_m, size_m)| self.leaf(*corner_m, *size_m)).collect();
-        let part = |(corner_m, size_m)| Part { corner_m, size_m, kind: Kind::Quartered(0, corner_m), joined: None };
-        parts.extend(quarters.map(part));
-        for (k, leaf) in leaves.into_iter().enumerate() {
-            self.grow(parts, first + k, leaf, depth + 1);
-        }
+        let quarter = |(corner_m, size_m): &(DVec2, DVec2)| (*corner_m, *size_m, self.leaf(*corner_m, *size_m));
+        Grown::Quarters(middle_m, quarters.par_iter().map(quarter).collect())
     }
 
     /// Whether a leaf of so many metres is known as well as it has to be.

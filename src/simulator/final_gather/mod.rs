@@ -280,8 +280,10 @@ impl Enclosure {
         let lights = Lights { surroundings: &self.surroundings, emitters: &self.emitters };
         let error = accuracy.relative_error;
         if self.lit.as_ref().is_none_or(|(known, _)| *known > error) {
-            self.lit = Some((error, Lit::new(&lights, LIT * error, stop)));
-            self.found_light = !stop.is_due();
+            // Without it nothing else is read.
+            let (lit, is_done) = Lit::new(&lights, LIT * error, &stop.halfway(), stop);
+            self.lit = Some((error, lit));
+            self.found_light = is_done;
             self.solved = None;
             self.balance = None;
         }
