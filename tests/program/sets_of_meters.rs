@@ -8,7 +8,7 @@ const GRID: &str = "meters:
   desk: {surface: {of: floor, distance_m: 0.75, margin_m: 0.5, counts: [4, 3]}}
 procedures:
   total_illuminance: {meters: desk, bounces: converged}
-budget: {relative_error: 0.004, seconds: 30}
+budget: {relative_error: 0.002, seconds: 30}
 ";
 
 fn number(of: &Value) -> f64 {
@@ -18,7 +18,8 @@ fn number(of: &Value) -> f64 {
 #[test]
 fn mean_and_uniformity_of_a_room_agree_over_engines_within_their_uncertainty() {
     let folder = Folder::for_renderers(&[("spec.yaml", &format!("{ROOM}{GRID}")), ("lamp.ies", LAMP)]);
-    let answer = folder.run(&["--engines", "simulator,radiance"]).exits(0);
+    // As accurate as the spec asks, whatever decides: a minimum is as uncertain as the meters that may be the lowest.
+    let answer = folder.run(&["--engines", "simulator,radiance", "--sampling", "accurate"]).exits(0);
     answer.prints("  uniformity").prints("radiance against simulator: mean ");
     let report = folder.report();
     let of = |engine: &str| {

@@ -15,6 +15,9 @@ use crate::spec::Budget;
 
 /// Fewer blocks make no good standard error.
 pub(super) const MIN_BLOCKS: usize = 8;
+/// Blocks that are made before an error is believed, but where even their wide interval is narrow enough: the wider it is for want of blocks, the
+/// more it takes to decide anything.
+pub(super) const BELIEVED_BLOCKS: usize = 3 * MIN_BLOCKS / 2;
 /// The worst of several meters' variances that so many blocks tell is so much larger than what more blocks will tell of it.
 pub(super) const WORST_OF_FEW: f64 = 1.3;
 /// So many are made whatever the clock says: fewer say next to nothing of their error.

@@ -4,7 +4,7 @@ use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::engines::blocks::{MIN_BLOCKS, Sampling, counted, longest_block_s};
+use crate::engines::blocks::{BELIEVED_BLOCKS, MIN_BLOCKS, Sampling, counted, longest_block_s};
 use crate::engines::image::read_rgb;
 use crate::engines::libraries::with_unpacked;
 use crate::engines::settings::Preset;
@@ -30,8 +30,6 @@ const COUNTED: f64 = 1.5;
 const PILOT_RAYS: u32 = 35;
 /// What a pilot's frames resolve, relative, so that it is as good as any block.
 const RESOLVED: f64 = 5e-4;
-/// Blocks that are made before an error is believed: the wider an interval is for want of blocks, the more it takes to decide anything.
-const PLANNED_BLOCKS: usize = 3 * MIN_BLOCKS / 2;
 /// The part of the time that the fewest blocks may take.
 const FIRST_BLOCKS: f64 = 0.9;
 /// Processes for each thread at most: one that is started alone sleeps most of .7 s, waiting for its own threads in steps of 50 ms. Of those that
@@ -175,7 +173,7 @@ impl<'a> Bench<'a> {
         let block_s = pilot.work.seconds(f64::from(run.count) / f64::from(pilot.rays));
         pilot.block = pilot.block.filter(|_| run.count == pilot.rays);
         self.keep_readouts(&pilot.readouts)?;
-        let rule = Sampling { enough_blocks: PLANNED_BLOCKS, ..Sampling::within(budget, block_s, self.until) };
+        let rule = Sampling { enough_blocks: BELIEVED_BLOCKS, ..Sampling::within(budget, block_s, self.until) };
         let blocks = rule.run(|numbers| self.wave(run, numbers, &pilot, block_s))?;
         let made = blocks.blocks.count();
         measurement.estimates = measurement.take(blocks);

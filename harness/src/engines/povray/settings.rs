@@ -11,9 +11,9 @@ use crate::engines::{EngineError, Job, Knob};
 /// The deepest recursion that POV-Ray 3.7 accepts (`RadiosityFunction::DEPTH_MAX`).
 pub(super) const MAX_RECURSION: u32 = 20;
 
-/// Rays a sample of the audit preset for a relative standard error, which some twelve blocks about reach (case S1). Blocks of fewer rays take as
-/// much work for their variance, and the error of many is known better.
-const AUDIT_RAYS: f64 = 70.0;
+/// Rays a sample of the audit preset for a relative standard error, which some twelve blocks about reach (cachet's cases). The variance falls as fast as
+/// work grows, about with their square, so that blocks of fewer rays take as much work for it, and the error of many is known better.
+const AUDIT_RAYS: f64 = 50.0;
 const AUDIT_ERROR: f64 = 0.002;
 /// Rays a sample at least and at most, whatever error is asked for: the bias of the cache was measured with as few, and is no smaller with more.
 const FEWEST_RAYS: f64 = 35.0;
@@ -21,7 +21,7 @@ const MOST_RAYS: f64 = 140.0;
 
 pub(super) const KNOBS: &[Knob] = &[
     Preset::KNOB,
-    Knob { key: "count", values: &["70", "35"] },
+    Knob { key: "count", values: &["50", "35"] },
     Knob { key: "error_bound", values: &["0.05", "0.5"] },
     Knob { key: "recursion_limit", values: &["20", "4"] },
     Knob { key: "recentre", values: &["true", "false"] },
@@ -134,9 +134,8 @@ pub(super) const USUAL: f64 = 0.5;
 const FINER: f64 = 0.2;
 const FINEST: f64 = 0.1;
 
-/// Rays a sample for an error, which falls with their square root.
 fn audit_rays(relative_error: f64) -> u32 {
-    (AUDIT_RAYS * (AUDIT_ERROR / relative_error).powi(2)).clamp(FEWEST_RAYS, MOST_RAYS) as u32
+    (AUDIT_RAYS * AUDIT_ERROR / relative_error).clamp(FEWEST_RAYS, MOST_RAYS) as u32
 }
 
 /// The length of the pool of directions, from which samples take as many as they have rays, one part after the other, and a block begins with one

@@ -14,7 +14,7 @@ use super::options::{AUDIT_DIVISIONS, Ambient, FAST_DIVISIONS, Options, Sources,
 use super::settings::Settings;
 use super::tools::Tools;
 use crate::engines::blocks::{
-    Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampled, Sampling, WORST_OF_FEW, counted, longest_block_s,
+    BELIEVED_BLOCKS, Blocks, DIRECT_SHARE, MIN_BLOCKS, Sampled, Sampling, WORST_OF_FEW, counted, longest_block_s,
 };
 use crate::engines::effort;
 use crate::engines::settings::Preset;
@@ -32,8 +32,8 @@ const POWER_OF_FEW: f64 = 1.25;
 const POWER: f64 = 1.05;
 /// A division sees uneven light where its relative standard deviation at the worst meter is larger than this.
 const UNEVEN: f64 = 0.7;
-/// Blocks that effort is planned for.
-const PLANNED_BLOCKS: usize = 2 * MIN_BLOCKS;
+/// Blocks that effort is planned for: where a trial told twice the variance that there is, half of them are enough.
+const PLANNED_BLOCKS: usize = 2 * BELIEVED_BLOCKS;
 const MAX_PARALLEL: usize = 8;
 /// Seconds, as they are counted, that a process of several blocks may take, and how many of them at most, so that all threads have some.
 const SHORT_S: f64 = 0.1;
@@ -135,7 +135,10 @@ impl Sampler<'_> {
             None => self.ambient(known_lx)?,
         };
         let within = Sampling::within(self.budget(), self.block_s(ambient), self.until);
-        Ok((ambient, Sampling { known_lx, enough_blocks: PLANNED_BLOCKS, ..within }))
+        // Of the fewest divisions blocks cost little beside another look, which too few of them may cause.
+        let is_least = ambient.divisions == FEWEST_DIVISIONS;
+        let enough_blocks = if is_least { 2 * MIN_BLOCKS } else { BELIEVED_BLOCKS };
+        Ok((ambient, Sampling { known_lx, enough_blocks, ..within }))
     }
 
     /// Of several luminaires the light is uneven from the start.
