@@ -59,9 +59,9 @@ enum Done {
 impl Running<'_> {
     /// Runs every job of the plan, as many side by side as the machine has room for; what it gives is in the plan's order, whoever ends first.
     pub fn run(&self) -> Result<Outcome, FileError> {
-        let sleeping = |waits| self.plan.runs.iter().filter(|run| self.waits(run) == waits).count();
+        let count = |waits| self.plan.runs.iter().filter(|run| self.waits(run) == waits).count();
         let slots = self.reader.machine.slots.threads();
-        let sleeping = sleeping(Waits::Mostly).min(MAX_SLEEPING) + sleeping(Waits::Often).div_ceil(2).min(slots);
+        let sleeping = count(Waits::Mostly).min(MAX_SLEEPING) + count(Waits::Often).div_ceil(2).min(slots);
         let threads = slots + sleeping;
         // By place in the plan.
         let kept: Mutex<BTreeMap<usize, Recording>> = Mutex::default();

@@ -1,7 +1,6 @@
 //! Sampling until comparisons are decided: which budget first looks get, and further looks through the run's reader.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
 
 use super::jobs::{Found, Outcome, Running};
 use super::sequential::{self, Ask};
@@ -102,10 +101,9 @@ fn refine_references(
         if recording.failure.is_some() {
             continue;
         }
-        let taken = Duration::try_from_secs_f64(recording.wall_s).unwrap_or(Duration::MAX);
-        ask.patience = ask.patience.saturating_sub(taken);
+        ask.patience = sequential::patience_left(recording, ask.budget);
         // What is finer takes longer.
-        if ask.patience < taken {
+        if ask.patience.as_secs_f64() < recording.wall_s {
             let count = ask.targets.len();
             recording.notes.push(format!(
                 "{count} meters that it leaves undecided were not read more finely: its seconds are over"

@@ -85,8 +85,7 @@ pub fn refine(
             break;
         }
         let left_s = budget.seconds - subject.work_s();
-        let patience =
-            budget.patience().saturating_sub(Duration::try_from_secs_f64(subject.wall_s).unwrap_or_default());
+        let patience = patience_left(subject, budget);
         if left_s <= 0.0 || patience.is_zero() {
             break;
         }
@@ -122,6 +121,11 @@ pub fn refine(
         }
         total_weight += counts;
     }
+}
+
+/// What a recording leaves of its budget by the clock.
+pub fn patience_left(recording: &Recording, budget: Budget) -> Duration {
+    budget.patience().saturating_sub(Duration::try_from_secs_f64(recording.wall_s).unwrap_or_default())
 }
 
 /// The effort of a look against the first, whose error is so many times what is asked for: each makes the total the same factor larger.
