@@ -27,6 +27,8 @@ const ENOUGH_BLOCKS: usize = 2 * MIN_BLOCKS;
 /// Strata along a side at least, so that blocks are many strata and their errors near normal; at most, to check often.
 const MIN_SIDE: usize = 32;
 const MAX_SIDE: usize = 256;
+/// Seconds that a further look takes, whatever it samples: blocks that all take less are twice as fine, so that fewer meters need one.
+const LOOK_S: f64 = 0.2;
 /// Blocks of a trial, and strata along a side of each at most. Where they promise too much, further blocks make up for it.
 const TRIAL_BLOCKS: usize = MIN_BLOCKS;
 const TRIAL_SIDE: usize = 64;
@@ -223,7 +225,8 @@ impl Dialogue<'_> {
         let excess = Blocks::new(trials).worst_error(&[]) / budget.relative_error;
         let fewer = TRIAL_BLOCKS as f64 / ENOUGH_BLOCKS as f64;
         let needed = trial_side as f64 * excess * (fewer / WORST_OF_FEW).sqrt();
-        let side = (needed.ceil() as usize).max(MIN_SIDE).min(full).min(affordable).max(2);
+        let least = side_of(LOOK_S / ENOUGH_BLOCKS as f64).clamp(MIN_SIDE, 2 * MIN_SIDE);
+        let side = (needed.ceil() as usize).max(least).min(full).min(affordable).max(2);
         let within = Sampling::within(budget, sample_s * (side * side) as f64, self.until);
         Ok((side, Sampling { enough_blocks: ENOUGH_BLOCKS, ..within }))
     }
