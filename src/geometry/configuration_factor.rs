@@ -4,7 +4,7 @@
 //! *Photometria* (1760); Moon, *The Scientific Basis of Illuminating Engineering* (1936); Howell, *A Catalog of
 //! Radiation Heat Transfer Configuration Factors*, B-3, B-4, C-11 and C-14.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
 
@@ -53,7 +53,18 @@ pub(crate) fn edge(a: DVec3, b: DVec3, normal: DVec3) -> f64 {
     if length == 0.0 {
         return 0.0;
     }
-    length.atan2(a.dot(b)) * cross.dot(normal) / length
+    angle(length, a.dot(b)) * cross.dot(normal) / length
+}
+
+/// `sine.atan2(cosine)` of no negative sine, in half of the time: the quotient is at most 1.
+fn angle(sine: f64, cosine: f64) -> f64 {
+    if sine < cosine {
+        (sine / cosine).atan()
+    } else if sine < -cosine {
+        PI + (sine / cosine).atan()
+    } else {
+        FRAC_PI_2 - (cosine / sine).atan()
+    }
 }
 
 /// Factor from an element to a parallel rectangle `a_m` by `b_m` with one corner straight above it at `height_m`.
@@ -106,6 +117,19 @@ pub fn adjacent_rectangles(common_m: f64, from_depth_m: f64, to_height_m: f64) -
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+
+    #[test]
+    fn angles_are_those_of_atan2() {
+        for k in 0..=3600 {
+            let (sine, cosine) = (PI * f64::from(k) / 3600.0).sin_cos();
+            for scale in [1e-12, 1.0, 1e9] {
+                let (sine, cosine) = (scale * sine.abs(), scale * cosine);
+                assert!((angle(sine, cosine) - sine.atan2(cosine)).abs() <= 1e-15, "{sine} {cosine}");
+            }
+        }
+        // Of small angles all digits are kept.
+        assert_relative_eq!(angle(3e-200, 2.0), 1.5e-200, max_relative = 1e-15);
+    }
 
     #[test]
     fn polygon_formula_equals_both_rectangle_forms() {

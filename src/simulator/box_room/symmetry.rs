@@ -124,19 +124,19 @@ fn is_image(op: Operation, luminaire: &Luminaire, other: &Luminaire) -> bool {
         let columns = DVec3::AXES.map(|axis| op.of_direction(axis));
         DMat3::from_cols(columns[0], columns[1], columns[2]).transpose() * d
     };
-    probes(luminaire).into_iter().all(same) && probes(other).into_iter().all(|d| same(back(d)))
+    probes(luminaire).all(same) && probes(other).all(|d| same(back(d)))
 }
 
 /// World directions to every interior point of a table that its bilinear pieces are known by.
-fn probes(luminaire: &Luminaire) -> Vec<DVec3> {
+fn probes(luminaire: &Luminaire) -> impl Iterator<Item = DVec3> {
     let full = luminaire.photometry.distribution.own_planes();
     let fill = |angles: &[f64]| -> Vec<f64> {
         // A little off the nodes, where a table that starts with a step is not at the mercy of rounding.
         angles.windows(2).flat_map(|w| [0.001, 0.35, 0.5, 0.8, 0.999].map(|t| w[0] + t * (w[1] - w[0]))).collect()
     };
     let (cs, gammas) = (fill(full.c_deg()), fill(full.gamma_deg()));
-    let at = |c: &f64, g: &f64| luminaire.orientation * full.own_direction(*c, *g);
-    cs.iter().flat_map(|c| gammas.iter().map(|g| at(c, g)).collect::<Vec<_>>()).collect()
+    (0..cs.len() * gammas.len())
+        .map(move |k| luminaire.orientation * full.own_direction(cs[k / gammas.len()], gammas[k % gammas.len()]))
 }
 
 /// Node images under a group, and which nodes stand for their orbits.

@@ -33,6 +33,8 @@ pub(super) struct Bicubic {
     weights: [f64; ORDER],
     /// Reciprocals of the products of the distances to the other nodes.
     scale: [f64; ORDER],
+    /// Legendre's polynomials at each node, of a mean square of 1.
+    legendre: [[f64; ORDER]; ORDER],
 }
 
 impl Bicubic {
@@ -40,7 +42,12 @@ impl Bicubic {
         let rule = Gauss::new(ORDER);
         let [nodes, weights, scale] =
             [&rule.nodes, &rule.weights, &rule.barycentric].map(|values| std::array::from_fn(|k| values[k]));
-        Self { nodes, weights, scale }
+        let legendre = nodes.map(|t| {
+            let x = 2.0 * t - 1.0;
+            let all = [1.0, x, 1.5 * x * x - 0.5, 2.5 * x * x * x - 1.5 * x];
+            std::array::from_fn(|degree| ((2 * degree + 1) as f64).sqrt() * all[degree])
+        });
+        Self { nodes, weights, scale, legendre }
     }
 
     /// Where a node lies.
@@ -146,11 +153,7 @@ impl Bicubic {
     /// the weights' own terms of higher degree, which go on as those of degree 3, or as from degree 0 to 2. And the same of what
     /// leaves out nothing but the mean.
     pub(super) fn left_of(&self, weights: &[f64; NODES]) -> [f64; 2] {
-        let legendre = self.nodes.map(|t| {
-            let x = 2.0 * t - 1.0;
-            let all = [1.0, x, 1.5 * x * x - 0.5, 2.5 * x * x * x - 1.5 * x];
-            std::array::from_fn::<f64, ORDER, _>(|degree| ((2 * degree + 1) as f64).sqrt() * all[degree])
-        });
+        let legendre = &self.legendre;
         let mut squares = [0.0; ORDER];
         let rows: [[f64; ORDER]; ORDER] = std::array::from_fn(|i| {
             std::array::from_fn(|b| (0..ORDER).map(|j| weights[ORDER * i + j] * legendre[j][b]).sum())
@@ -171,16 +174,8 @@ impl Bicubic {
 
     /// Legendre's term of degree `i` and `j`, as its root mean square.
     fn term(&self, values: &[f64; NODES], i: usize, j: usize) -> f64 {
-        let legendre = |degree: usize, t: f64| {
-            let x = 2.0 * t - 1.0;
-            [1.0, x, 1.5 * x * x - 0.5, 2.5 * x * x * x - 1.5 * x][degree]
-        };
-        let norm = ((2 * i + 1) * (2 * j + 1)) as f64;
-        let at = |k: usize| {
-            let node = self.node(k);
-            self.weight(k) * legendre(i, node.x) * legendre(j, node.y) * values[k]
-        };
-        norm.sqrt() * (0..NODES).map(at).sum::<f64>()
+        let at = |k: usize| self.weight(k) * self.legendre[k / ORDER][i] * self.legendre[k % ORDER][j] * values[k];
+        (0..NODES).map(at).sum()
     }
 }
 

@@ -24,7 +24,8 @@ pub(super) struct Seen {
 impl Seen {
     fn new(patch: usize, weights: &[f64; NODES], missed: f64) -> Self {
         let most = weights.iter().fold(f64::MIN_POSITIVE, |most, w| most.max(w.abs()));
-        let steps = weights.map(|w| (w / most * STEPS).round() as i16);
+        // To the nearest step, as `round`, which is a call on processors of the first days.
+        let steps = weights.map(|w| (w / most * STEPS + 0.5_f64.copysign(w)) as i16);
         Self { patch: patch as u32, step: (most / STEPS) as f32, missed: missed as f32, weights: steps }
     }
 
@@ -61,7 +62,7 @@ pub(super) fn rows(given: &Given, patches: &[Patch]) -> Option<Vec<Vec<Seen>>> {
         if given.stop.is_due() {
             return vec![];
         }
-        let mut row = vec![];
+        let mut row = Vec::with_capacity(patches.len());
         for_all_shown(given, patches, meter, |k, _, shown| {
             let weights = shown.weights();
             row.push(Seen::new(k, &weights.of_nodes, weights.error));
@@ -89,13 +90,14 @@ pub(super) struct Together {
 }
 
 pub(super) fn together(bicubic: &Bicubic, rows: &[Vec<Seen>; NODES]) -> Vec<Together> {
-    let mut all: Vec<&Seen> = rows.iter().flatten().collect();
-    all.sort_by_key(|seen| seen.patch);
-    let of = |same: &[&Seen]| {
-        let part = 1.0 / NODES as f64;
+    let part = 1.0 / NODES as f64;
+    let mut rows = rows.each_ref().map(|row| row.iter().peekable());
+    let mut all = vec![];
+    // Each row sees rectangles in their order.
+    while let Some(patch) = rows.iter_mut().filter_map(|row| row.peek().map(|seen| seen.patch)).min() {
         let mut weights = [0.0; NODES];
         let (mut missed, mut squares) = (0.0, [0.0; 2]);
-        for seen in same {
+        for seen in rows.iter_mut().filter_map(|row| row.next_if(|seen| seen.patch == patch)) {
             let own = seen.weights();
             for (sum, own) in weights.iter_mut().zip(own) {
                 *sum += part * own;
@@ -108,7 +110,7 @@ pub(super) fn together(bicubic: &Bicubic, rows: &[Vec<Seen>; NODES]) -> Vec<Toge
         let [left, uneven] = bicubic.left_of(&weights);
         let [worst_left, worst_uneven] = squares.map(f64::sqrt);
         let factor = weights.iter().sum();
-        Together { patch: same[0].patch, factor, left, uneven, missed, worst_left, worst_uneven }
-    };
-    all.chunk_by(|a, b| a.patch == b.patch).map(of).collect()
+        all.push(Together { patch, factor, left, uneven, missed, worst_left, worst_uneven });
+    }
+    all
 }

@@ -275,10 +275,10 @@ fn opacity_pfm(distribution: &LuminousIntensityDistribution) -> Vec<u8> {
     let mut bytes = format!("Pf\n{columns} {ROWS}\n-1.0\n").into_bytes();
     let c_deg: Vec<f64> = (0..columns).map(|column| 360.0 * column as f64 / columns as f64).collect();
     let gamma_deg: Vec<f64> = (0..ROWS).map(|row| 180.0 * row as f64 / (ROWS - 1) as f64).collect();
-    for intensity in distribution.intensities(&c_deg, &gamma_deg) {
-        let transmitted = if peak > 0.0 { intensity / peak } else { 0.0 };
-        bytes.extend(((1.0 - transmitted) as f32).to_le_bytes());
-    }
+    let opacity = |intensity: f64| if peak > 0.0 { 1.0 - intensity / peak } else { 1.0 };
+    let intensities = distribution.intensities(&c_deg, &gamma_deg);
+    let pixels: Vec<[u8; 4]> = intensities.into_iter().map(|i| (opacity(i) as f32).to_le_bytes()).collect();
+    bytes.extend_from_slice(pixels.as_flattened());
     bytes
 }
 
