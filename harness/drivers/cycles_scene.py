@@ -21,13 +21,15 @@ def start():
     bpy.context.scene.render.engine = "CYCLES"
 
 
-def accurate(reflections, light_tree):
-    """No short cut that costs light: no clamping, no skipped lights, nothing adaptive, so many reflections; a tree to pick among several lights."""
+def accurate(reflections, light_tree, roulette_from):
+    """No short cut that costs light: no clamping, no skipped lights, nothing adaptive, so many reflections; a tree to pick among several lights,
+    and Russian roulette after so many reflections."""
     cycles = bpy.context.scene.cycles
     cycles.max_bounces = cycles.diffuse_bounces = reflections
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
     cycles.light_sampling_threshold = 0
     cycles.use_light_tree = light_tree
+    cycles.min_light_bounces = roulette_from
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.sampling_pattern = "TABULATED_SOBOL"
 

@@ -26,6 +26,8 @@ const LEAST_BLOCKS: usize = 4;
 /// machine, and may use it already.
 const SHARE_OF_A_WAVE: f64 = 0.5;
 const SHARE_OF_THE_FIRST: f64 = 0.25;
+/// So many times as long as those before it a wave may take on a busy machine: the last one begins only where there is time for that.
+const SLOWER: f64 = 1.5;
 /// What a trial may take besides what is counted: kernels that are compiled, processes that sleep.
 const UNCOUNTED_S: f64 = 2.0;
 /// Blocks asked for at a time at most, in parts of those that are there: their error is itself an estimate.
@@ -265,7 +267,7 @@ impl Sampling<'_> {
         };
         // A time that is too short to be one is no rate; one block may take all that is left, and as long as a wave.
         let blocks = left / block_s.max(1e-6);
-        let is_late = blocks < 1.0 || left < waves.shortest_s;
+        let is_late = blocks < SLOWER || left < SLOWER * waves.shortest_s;
         let some = if is_late { 0 } else { (share * blocks).ceil() as usize };
         some.max(LEAST_BLOCKS.min(self.min_blocks).saturating_sub(have))
     }

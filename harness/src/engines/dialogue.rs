@@ -225,7 +225,9 @@ impl Dialogue<'_> {
         let excess = Blocks::new(trials).worst_error(&[]) / budget.relative_error;
         let fewer = TRIAL_BLOCKS as f64 / ENOUGH_BLOCKS as f64;
         let needed = trial_side as f64 * excess * (fewer / WORST_OF_FEW).sqrt();
-        let least = side_of(LOOK_S / ENOUGH_BLOCKS as f64).clamp(MIN_SIDE, 2 * MIN_SIDE);
+        // A luminaire that is off is a ray more of direct light, and changes nothing.
+        let finest = if part.name == "direct" { MIN_SIDE } else { 2 * MIN_SIDE };
+        let least = side_of(LOOK_S / ENOUGH_BLOCKS as f64).clamp(MIN_SIDE, finest);
         let side = (needed.ceil() as usize).max(least).min(full).min(affordable).max(2);
         let within = Sampling::within(budget, sample_s * (side * side) as f64, self.until);
         Ok((side, Sampling { enough_blocks: ENOUGH_BLOCKS, ..within }))

@@ -93,7 +93,16 @@ fn scene(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -> S
              import cycles_scene as cycles\n\ncycles.start()\n";
     if settings.preset != Preset::Default {
         let light_tree = if all_lights(job) > 1 { "True" } else { "False" };
-        writeln!(text, "cycles.accurate(reflections={}, light_tree={light_tree})", reflections(job)).ok();
+        // Paths to one light vary by little but where they end (benchmarks/engines-remarks.md); what is off makes no difference.
+        let shines = |l: &&Luminaire| l.flux_scale > 0.0 && sides(l).next().is_some();
+        let shining: usize = job.scene.luminaires.iter().filter(shines).map(lights).sum();
+        let roulette_from = if shining > 1 { 0 } else { 4 };
+        let reflections = reflections(job);
+        writeln!(
+            text,
+            "cycles.accurate(reflections={reflections}, light_tree={light_tree}, roulette_from={roulette_from})"
+        )
+        .ok();
     }
     text.push('\n');
     surfaces(&mut text, job, frame);

@@ -178,7 +178,8 @@ impl Sampler<'_> {
     fn needed(&self, ambient: Ambient, trial: Trial, power: f64) -> f64 {
         let excess = trial.error / self.job.budget.relative_error;
         let blocks = MIN_BLOCKS as f64 / PLANNED_BLOCKS as f64;
-        let longest_s = (0.5 * self.budget().seconds / PLANNED_BLOCKS as f64).min(trial.longest_s);
+        // Where time is short, fewer and larger blocks tell more.
+        let longest_s = (0.5 * self.budget().seconds / BELIEVED_BLOCKS as f64).min(trial.longest_s);
         let affordable = longest_s / self.block_s(Ambient { divisions: 1, ..ambient });
         (f64::from(ambient.divisions) * (blocks * excess * excess / WORST_OF_FEW).powf(power.recip())).min(affordable)
     }
