@@ -99,16 +99,13 @@ fn render_cfg(job: &Job, settings: Settings, frame: &Frame) -> String {
     // A path's length counts its first leg, from the camera to the meter, and its last, to the luminaire: read with limits of 1, 2 and 7.
     let (clear, reflections) = (CLEAR * patches::seats::patch(job, frame, settings.preset), reflections(job));
     let depth = reflections + 2;
-    // Paths to one point vary by little but where they end (benchmarks/engines-remarks.md).
-    let is_one_point = matches!(&job.scene.luminaires[..], [one] if !matches!(Opening::of(one), Opening::Flat(..)));
-    let roulette_from = if is_one_point { 8 } else { 3 };
     write!(
         text,
         "# Where rays start: what 32-bit floats resolve here.\n\
          scene.epsilon.min = {clear}\nscene.epsilon.max = {clear}\n\
          # {reflections} reflections. Russian roulette by the reflectance alone loses nothing, clamping would.\n\
          path.pathdepth.total = {depth}\npath.pathdepth.diffuse = {depth}\n\
-         path.russianroulette.depth = {roulette_from}\npath.russianroulette.cap = 0.01\n\
+         path.russianroulette.depth = 3\npath.russianroulette.cap = 0.01\n\
          path.clamping.variance.maxvalue = 0\n\
          lightstrategy.type = POWER\n",
     )
