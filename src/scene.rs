@@ -170,6 +170,11 @@ impl Luminaire {
         self.photometry.distribution.intensity_towards(self.orientation.transpose() * direction) * self.flux_scale
     }
 
+    /// Whether it sends light anywhere.
+    pub fn is_on(&self) -> bool {
+        self.flux_scale > 0.0 && self.photometry.distribution.max_intensity().value() > 0.0
+    }
+
     /// How far apart the intensities are between which rounding decides towards a direction in the room:
     /// [`LuminousIntensityDistribution::jump_towards`](crate::photometry::LuminousIntensityDistribution::jump_towards).
     pub fn jump_towards(&self, direction: DVec3) -> Candela {

@@ -140,7 +140,7 @@ fn extent(vertices_m: &[DVec3]) -> [DVec3; 2] {
 /// Whether any light of a luminaire on a surface goes into the room, if it has any.
 pub fn shines_from(surface: Surface, luminaire: &Luminaire) -> bool {
     let table = &luminaire.photometry.distribution;
-    if table.max_intensity().value() * luminaire.flux_scale == 0.0 {
+    if !luminaire.is_on() {
         return true;
     }
     let grid = |end: f64| (0..=(end / STEP_DEG) as u32).map(|k| STEP_DEG * f64::from(k));

@@ -265,7 +265,7 @@ impl Sampling<'_> {
             0 => (SHARE_OF_THE_FIRST, self.block_s),
             _ => (SHARE_OF_A_WAVE, waves.all_s / have as f64),
         };
-        // A time that is too short to be one is no rate; one block may take all that is left, and as long as a wave.
+        // A time that is too short to be one is no rate, and a block may take as long as a wave.
         let blocks = left / block_s.max(1e-6);
         let is_late = blocks < SLOWER || left < SLOWER * waves.shortest_s;
         let some = if is_late { 0 } else { (share * blocks).ceil() as usize };

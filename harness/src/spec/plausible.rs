@@ -210,7 +210,7 @@ fn unrated(task: &Task) -> Option<Doubt> {
 
 fn may_light(luminaire: &Luminaire, meter: &Meter) -> bool {
     let way = meter.position_m - luminaire.position_m;
-    if luminaire.flux_scale == 0.0 || luminaire.photometry.distribution.max_intensity().value() == 0.0 {
+    if !luminaire.is_on() {
         return false;
     }
     match luminaire.model {

@@ -24,7 +24,7 @@ pub(super) struct Seen {
 impl Seen {
     fn new(patch: usize, weights: &[f64; NODES], missed: f64) -> Self {
         let most = weights.iter().fold(f64::MIN_POSITIVE, |most, w| most.max(w.abs()));
-        // To the nearest step, as `round`, which is a call on processors of the first days.
+        // To the nearest step: `round` is a call of the C library for each weight.
         let steps = weights.map(|w| (w / most * STEPS + 0.5_f64.copysign(w)) as i16);
         Self { patch: patch as u32, step: (most / STEPS) as f32, missed: missed as f32, weights: steps }
     }

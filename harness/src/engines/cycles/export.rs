@@ -94,8 +94,7 @@ fn scene(job: &Job, settings: Settings, frame: &Frame, tables: &Tables<'_>) -> S
     if settings.preset != Preset::Default {
         let light_tree = if all_lights(job) > 1 { "True" } else { "False" };
         // Paths to one light vary by little but where they end (benchmarks/engines-remarks.md); what is off makes no difference.
-        let shines = |l: &&Luminaire| l.flux_scale > 0.0 && sides(l).next().is_some();
-        let shining: usize = job.scene.luminaires.iter().filter(shines).map(lights).sum();
+        let shining: usize = job.scene.luminaires.iter().filter(|l| l.is_on()).map(lights).sum();
         let roulette_from = if shining > 1 { 0 } else { 4 };
         let reflections = reflections(job);
         writeln!(

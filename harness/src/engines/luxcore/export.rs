@@ -54,14 +54,13 @@ pub(super) fn files(job: &Job, settings: Settings) -> Result<Vec<SceneFile>, Eng
 
 /// Without luminaires that are off beside others: LuxCore 2.11 crashes (SIGSEGV) where one whose material emits nothing is the last of several to be read.
 fn shining(job: &Job) -> Cow<'_, Job> {
-    let is_on = |l: &Luminaire| l.flux_scale > 0.0 && l.photometry.distribution.max_intensity().value() > 0.0;
     let all = &job.scene.luminaires;
-    let on = all.iter().filter(|l| is_on(l)).count();
+    let on = all.iter().filter(|l| l.is_on()).count();
     if on == 0 || on == all.len() {
         return Cow::Borrowed(job);
     }
     let mut job = job.clone();
-    job.scene.luminaires.retain(is_on);
+    job.scene.luminaires.retain(Luminaire::is_on);
     Cow::Owned(job)
 }
 
