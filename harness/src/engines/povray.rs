@@ -176,11 +176,12 @@ fn support(job: &Job) -> Support {
         return Support::No("in free field nothing reflects: there is no room to gather light from".to_owned());
     };
     let preset = Settings::of(job).map_or(Preset::Audit, |s| s.preset);
-    cache_error(&room, bounces, preset)
+    let followed = settings::audit_recursion(&room, settings::brightest_body(job));
+    cache_error(&room, bounces, preset, followed)
 }
 
-/// The bias of radiosity's cache, as measured against exact values, and what twenty reflections leave out.
-fn cache_error(room: &Room, bounces: Bounces, preset: Preset) -> Support {
+/// The bias of radiosity's cache, as measured against exact values, and what so many reflections leave out.
+fn cache_error(room: &Room, bounces: Bounces, preset: Preset, followed: u32) -> Support {
     let mean_reflectance = effort::mean_reflectance(room);
     let interpolation = match preset {
         Preset::Audit => audit_bias(mean_reflectance, settings::slenderness(room)),
@@ -189,7 +190,7 @@ fn cache_error(room: &Room, bounces: Bounces, preset: Preset) -> Support {
     };
     let cut = match bounces {
         Bounces::AtMost(n) if n <= settings::MAX_RECURSION => 0.0,
-        _ => mean_reflectance.powi(settings::MAX_RECURSION as i32),
+        _ => mean_reflectance.powi(followed as i32),
     };
     let mut why =
         "radiosity interpolates a cache of irradiance (Ward et al. 1988), whose bias all blocks share".to_owned();

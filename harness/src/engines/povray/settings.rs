@@ -46,8 +46,9 @@ impl Settings {
     pub(super) fn of(job: &Job) -> Result<Self, EngineError> {
         let given = Given::of(job, ID, KNOBS)?;
         let preset = given.preset()?;
+        let recursion = job.scene.room.map_or(MAX_RECURSION, |room| audit_recursion(&room, brightest_body(job)));
         let (count, error_bound, brightness, recursion_limit) = match preset {
-            Preset::Audit => (audit_rays(job.budget.relative_error), 0.05, 8.0, MAX_RECURSION),
+            Preset::Audit => (audit_rays(job.budget.relative_error), 0.05, 8.0, recursion),
             Preset::Fast => (100, 0.5, 1.0, 6),
             // The numbers of POV-Ray 3.7's own `radiosity {}`, which is what is written.
             Preset::Default => (35, 1.8, 1.0, 2),
@@ -133,6 +134,23 @@ pub(super) const USUAL: f64 = 0.5;
 /// For one reason, and for both.
 const FINER: f64 = 0.2;
 const FINEST: f64 = 0.1;
+
+/// Reflections that the audit preset follows in a room where no body is brighter than so much.
+pub(super) fn audit_recursion(room: &Room, brightest_body: f64) -> u32 {
+    let reflectance = effort::mean_reflectance(room).max(brightest_body);
+    if reflectance.powi(SHARED_RECURSION as i32) <= LEFT_OUT { SHARED_RECURSION } else { MAX_RECURSION }
+}
+
+/// Of all bodies, 0 where there are none.
+pub(super) fn brightest_body(job: &Job) -> f64 {
+    job.scene.obstacles.iter().map(|o| o.reflectance).fold(0.0, f64::max)
+}
+
+/// Reflections whose samples serve for many rays. From there on every ray takes one of its own, of five rays, so that the twentieth reflection takes
+/// 12,500 to 15,000 rays a scene, as long as all that one meter takes else (35 to 140 rays a sample).
+const SHARED_RECURSION: u32 = 17;
+/// What is left out that is not worth that, relative.
+const LEFT_OUT: f64 = 2e-5;
 
 fn audit_rays(relative_error: f64) -> u32 {
     (AUDIT_RAYS * AUDIT_ERROR / relative_error).clamp(FEWEST_RAYS, MOST_RAYS) as u32

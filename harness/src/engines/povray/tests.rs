@@ -189,7 +189,7 @@ fn brighter_and_longer_rooms_have_a_larger_named_bias_and_finer_rests() {
         let mut job = s1(CONVERGED);
         let room = room(DVec3::from(size_m), rho, rho, rho);
         job.scene.room = Some(room);
-        let bias = match super::cache_error(&room, Bounces::AtMost(7), Preset::Audit) {
+        let bias = match super::cache_error(&room, Bounces::AtMost(7), Preset::Audit, settings::MAX_RECURSION) {
             Support::Approximate { size: Some(size), .. } => size,
             other => panic!("{other:?}"),
         };
@@ -209,6 +209,25 @@ fn brighter_and_longer_rooms_have_a_larger_named_bias_and_finer_rests() {
     assert!(settings(&job).is_finer_for_rest());
     job.settings.insert("error_bound".to_owned(), 0.02.into());
     assert!(!settings(&job).is_finer_for_rest() && settings(&job).error_bound_of_rest == 0.02);
+}
+
+#[test]
+fn reflections_are_followed_as_far_as_they_count() {
+    let of = |rho, body: Option<f64>| {
+        let mut job = s1(CONVERGED);
+        job.scene.room = Some(room(DVec3::splat(6.0), rho, rho, rho));
+        let at_m = |x| DVec3::splat(x);
+        let shape = Shape::Box { min_m: at_m(0.5), max_m: at_m(1.0) };
+        job.scene.obstacles = body.map(|reflectance| Obstacle { shape, reflectance }).into_iter().collect();
+        Settings::of(&job).unwrap().recursion_limit
+    };
+    assert_eq!([0.1, 0.5, 0.6, 0.9].map(|rho| of(rho, None)), [17, 17, 20, 20]);
+    assert_eq!([0.3, 0.8].map(|body| of(0.3, Some(body))), [17, 20]);
+    // Whoever says how many gets as many.
+    let mut job = s1(CONVERGED);
+    job.settings.insert("recursion_limit".to_owned(), 19.into());
+    assert_eq!(Settings::of(&job).unwrap().recursion_limit(Bounces::Converged), 19);
+    assert_eq!(Settings::of(&s1(CONVERGED)).unwrap().recursion_limit(Bounces::AtMost(19)), 19);
 }
 
 /// The second number of POV-Ray's generator, by which a block tilts the scene.
