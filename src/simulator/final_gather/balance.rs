@@ -10,7 +10,7 @@ use glam::DVec2;
 
 use super::given::{FINE, Given, Once};
 use super::patches::{Cover, Patch};
-use super::seen::for_all_shown;
+use super::seen::{Rows, for_all_shown};
 use super::solution::Solution;
 use super::trust::{self, Trust};
 use crate::scene::Meter;
@@ -50,6 +50,8 @@ pub(super) struct Balance {
     parents: Vec<usize>,
     /// How often shares were made smaller.
     grown: usize,
+    /// What nodes see of rectangles, as long as these may be halved again.
+    rows: Rows,
     solution: Solution,
 }
 
@@ -93,8 +95,8 @@ impl Balance {
         }
         let once = given.once(&patches)?;
         let tails = once.iter().map(|once| given.bicubic.left_out(&once.lux)).collect();
-        let solution = Solution::default();
-        Some(Self { cover, patches, once, tails, parents: vec![], grown: 0, solution })
+        let (rows, solution) = Default::default();
+        Some(Self { cover, patches, once, tails, parents: vec![], grown: 0, rows, solution })
     }
 
     /// Halves rectangles that leave out too much, and solves: at first where it is too much for any meter, then where it is for
@@ -108,7 +110,8 @@ impl Balance {
             self.grown = ROUNDS;
             return Some(());
         }
-        let solution = Solution::new(given, &self.patches, &self.once)?;
+        self.rows = Rows::of(given, &self.patches, std::mem::take(&mut self.rows))?;
+        let solution = Solution::new(given, &self.patches, &self.once, &self.rows)?;
         let before = std::mem::replace(&mut self.solution, solution);
         if self.is_solved() {
             let coarse = trust::Solved { patches: &coarse, lux: &before.lux, off: &before.left };
@@ -255,6 +258,11 @@ impl Balance {
                 self.tails[k] = amplified * given.bicubic.left_out(&once.lux);
             }
         }
+    }
+
+    /// Lets go of what only growing needs, which is the most of it.
+    pub(super) fn rest(&mut self) {
+        self.rows = Rows::default();
     }
 
     pub(super) fn is_solved(&self) -> bool {

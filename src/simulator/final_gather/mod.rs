@@ -359,6 +359,7 @@ impl Enclosure {
             }
             found = asked.par_iter().map(|asked| balance.at(&given, asked)).collect();
         }
+        balance.rest();
         (found, Some(balance.text()))
     }
 

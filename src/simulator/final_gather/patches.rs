@@ -17,7 +17,7 @@ const NEAR: f64 = 0.5;
 const APART: f64 = 0.05;
 
 /// A rectangle of a face.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Patch {
     pub(super) face: usize,
     pub(super) corner_m: DVec2,

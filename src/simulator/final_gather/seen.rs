@@ -13,7 +13,7 @@ use crate::scene::Meter;
 const STEPS: f64 = i16::MAX as f64;
 
 /// What a node sees of a rectangle: its weights in steps, since there are many of them.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Seen {
     pub(super) patch: u32,
     step: f32,
@@ -40,15 +40,21 @@ impl Seen {
 }
 
 /// Goes through what a meter sees of all rectangles.
-pub(super) fn for_all_shown(
+pub(super) fn for_all_shown(given: &Given, patches: &[Patch], meter: &Meter, each: impl FnMut(usize, &Face, &Shown)) {
+    for_some_shown(given, patches, meter, |_| true, each);
+}
+
+/// The same of some rectangles.
+fn for_some_shown(
     given: &Given,
     patches: &[Patch],
     meter: &Meter,
+    is_wanted: impl Fn(usize) -> bool,
     mut each: impl FnMut(usize, &Face, &Shown),
 ) {
     let view = given.view(meter);
     let before: Vec<Option<Before>> = given.faces().iter().map(|face| view.before(face)).collect();
-    for (k, patch) in patches.iter().enumerate() {
+    for (k, patch) in patches.iter().enumerate().filter(|(k, _)| is_wanted(*k)) {
         let shown = before[patch.face].as_ref().and_then(|before| before.of(patch.corner_m, patch.size_m));
         if let Some(shown) = shown {
             each(k, &given.faces()[patch.face], &shown);
@@ -56,23 +62,50 @@ pub(super) fn for_all_shown(
     }
 }
 
-/// What every node sees of all rectangles; `None` where it was stopped.
-pub(super) fn rows(given: &Given, patches: &[Patch]) -> Option<Vec<Vec<Seen>>> {
-    let row = |meter: &Meter| -> Vec<Seen> {
-        if given.stop.is_due() {
-            return vec![];
-        }
-        let mut row = Vec::with_capacity(patches.len());
-        for_all_shown(given, patches, meter, |k, _, shown| {
-            let weights = shown.weights();
-            row.push(Seen::new(k, &weights.of_nodes, weights.error));
-        });
-        row
-    };
-    let of_patch =
-        |patch: &Patch| patch.nodes(given.faces(), given.bicubic).iter().map(row).collect::<Vec<Vec<Seen>>>();
-    let rows: Vec<Vec<Vec<Seen>>> = patches.par_iter().map(of_patch).collect();
-    (!given.stop.is_due()).then(|| rows.into_iter().flatten().collect())
+/// What every node of some rectangles sees of them all.
+#[derive(Debug, Default)]
+pub(super) struct Rows {
+    patches: Vec<Patch>,
+    /// For each node in turn what it sees, in the order of rectangles.
+    pub(super) of_nodes: Vec<Vec<Seen>>,
+}
+
+impl Rows {
+    /// Of these rectangles: what those of before see of each other, in the same places, is not looked at again. `None` where it was stopped.
+    pub(super) fn of(given: &Given, patches: &[Patch], before: Self) -> Option<Self> {
+        let is_same: Vec<bool> = (0..patches.len()).map(|k| before.patches.get(k) == Some(&patches[k])).collect();
+        let row = |meter: &Meter, known: Option<Vec<Seen>>| -> Vec<Seen> {
+            if given.stop.is_due() {
+                return vec![];
+            }
+            let is_known = |k: usize| known.is_some() && is_same[k];
+            let mut new = Vec::with_capacity(patches.len());
+            for_some_shown(
+                given,
+                patches,
+                meter,
+                |k| !is_known(k),
+                |k, _, shown| {
+                    let weights = shown.weights();
+                    new.push(Seen::new(k, &weights.of_nodes, weights.error));
+                },
+            );
+            if let Some(known) = known {
+                new.extend(known.into_iter().filter(|seen| is_same[seen.patch as usize]));
+                new.sort_by_key(|seen| seen.patch);
+            }
+            new
+        };
+        let mut before: Vec<Option<Vec<Seen>>> = before.of_nodes.into_iter().map(Some).collect();
+        before.resize(patches.len() * NODES, None);
+        let of_patch = |(k, before): (usize, &mut [Option<Vec<Seen>>])| -> Vec<Vec<Seen>> {
+            let nodes = patches[k].nodes(given.faces(), given.bicubic);
+            nodes.iter().zip(before).map(|(node, before)| row(node, before.take().filter(|_| is_same[k]))).collect()
+        };
+        let rows: Vec<Vec<Vec<Seen>>> = before.par_chunks_mut(NODES).enumerate().map(of_patch).collect();
+        let of_nodes = rows.into_iter().flatten().collect();
+        (!given.stop.is_due()).then(|| Self { patches: patches.to_vec(), of_nodes })
+    }
 }
 
 /// What the nodes of a rectangle see of another.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::bicubic::NODES;
 use super::given::{Given, Once};
 use super::patches::Patch;
-use super::seen::{Seen, Together, rows, together};
+use super::seen::{Rows, Seen, Together, together};
 use super::trust::{Off, Trust};
 use super::view::Left;
 use crate::scene::Bounces;
@@ -48,8 +48,8 @@ impl Solution {
     }
 
     /// Between rectangles with light reflected once at their nodes; `None` where it was stopped.
-    pub(super) fn new(given: &Given, patches: &[Patch], once: &[Once]) -> Option<Self> {
-        let rows = rows(given, patches)?;
+    pub(super) fn new(given: &Given, patches: &[Patch], once: &[Once], rows: &Rows) -> Option<Self> {
+        let rows = &rows.of_nodes;
         let reflectance: Vec<f64> = patches.iter().map(|patch| given.faces()[patch.face].reflectance).collect();
         let known: Vec<f64> = once.iter().flat_map(|once| once.lux).collect();
         let apply = |u: &[f64]| -> Vec<f64> {

@@ -8,7 +8,10 @@ use glam::DVec3;
 
 use super::Enclosure;
 use super::bicubic::Bicubic;
+use super::given::Given;
 use super::lit::{Lights, Lit};
+use super::patches::Cover;
+use super::seen::Rows;
 use super::view::View;
 use crate::geometry::configuration_factor::element_to_polygon;
 use crate::geometry::{Mesh, Reflectances, Room};
@@ -434,4 +437,27 @@ fn light_that_was_found_before_is_as_good_as_found_again() {
     let mut cut = prepared(Bounces::Converged);
     cut.illuminance_until(&meters, &stopped).ok();
     assert_eq!(cut.groundwork(), None, "light that was cut short is not light as asked");
+}
+
+#[test]
+fn what_nodes_saw_of_rectangles_before_these_were_halved_is_as_good_as_seen_again() {
+    let Enclosure { surroundings, emitters, .. } = Enclosure::new(&furnished()).unwrap();
+    let lights = Lights { surroundings: &surroundings, emitters: &emitters };
+    let (accuracy, bicubic) = (accuracy(2e-2), Bicubic::new());
+    let (lit, _) = Lit::new(&lights, accuracy.relative_error, &Stop::NEVER, &Stop::NEVER);
+    let occluders = surroundings.hiding().unwrap();
+    let (bounces, stop) = (Bounces::Converged, &Stop::NEVER);
+    let given = Given { lights, lit: &lit, occluders, bounces, accuracy, stop, bicubic: &bicubic };
+    let cover = Cover::new(&surroundings);
+    let coarse = cover.patches(&surroundings);
+    let mut fine = coarse.clone();
+    for k in (1..coarse.len()).step_by(3) {
+        let [low, high] = cover.halves(&coarse[k], k % 2);
+        fine[k] = low;
+        fine.push(high);
+    }
+    let rows = |patches, before| Rows::of(&given, patches, before).unwrap();
+    let (seen, seen_again) = (rows(&fine, rows(&coarse, Rows::default())), rows(&fine, Rows::default()));
+    assert!(fine.len() > coarse.len() && seen.of_nodes.iter().any(|row| row.len() > 1));
+    assert_eq!(seen.of_nodes, seen_again.of_nodes);
 }
