@@ -23,7 +23,10 @@ mod linux {
 
     /// The KiB that a file of `/proc` states in the line that begins so.
     fn kib(file: &str, line: &str) -> Option<u64> {
-        let text = read_to_string(file).ok()?;
+        stated_kib(&read_to_string(file).ok()?, line)
+    }
+
+    fn stated_kib(text: &str, line: &str) -> Option<u64> {
         let rest = text.lines().find_map(|l| l.strip_prefix(line)?.strip_prefix(':'))?;
         rest.trim().strip_suffix(" kB")?.trim().parse().ok()
     }
@@ -48,8 +51,8 @@ mod linux {
     }
 
     pub(in super::super) fn memory(process: u32) -> Option<Memory> {
-        let status = format!("/proc/{process}/status");
-        Some(Memory { now_kib: kib(&status, "VmRSS")?, peak_kib: kib(&status, "VmHWM")? })
+        let status = read_to_string(format!("/proc/{process}/status")).ok()?;
+        Some(Memory { now_kib: stated_kib(&status, "VmRSS")?, peak_kib: stated_kib(&status, "VmHWM")? })
     }
 
     /// What a process has by itself, and its part of what it shares.
