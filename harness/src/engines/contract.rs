@@ -128,7 +128,8 @@ pub trait Engine: Send + Sync {
         job.without_names()
     }
 
-    /// The job without what makes no difference to what is found of its scene before any meter is read, where that is most of the work.
+    /// The job without what makes no difference to a part of the work that other jobs share: what is found of its scene before any meter is
+    /// read, or of its meters however often light is reflected. It is the same whoever finds it.
     fn groundwork(&self, _job: &Job) -> Option<Job> {
         None
     }
@@ -190,6 +191,10 @@ macro_rules! left_to_inner {
 
         fn cache_identity(&self, job: &Job) -> Job {
             self.inner.cache_identity(job)
+        }
+
+        fn groundwork(&self, job: &Job) -> Option<Job> {
+            self.inner.groundwork(job)
         }
 
         fn waits(&self, job: &Job) -> crate::engines::Waits {

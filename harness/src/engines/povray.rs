@@ -10,6 +10,7 @@ mod bench;
 mod direct_error;
 mod export;
 mod frame;
+mod ground;
 mod opening;
 mod pigment;
 mod pixels;
@@ -31,8 +32,8 @@ use super::effort;
 use super::settings::{Coordinates, Preset};
 use super::workbench::by_hand;
 use super::{
-    Absent, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Station, Support, Version,
-    Waits, Workbench, checked,
+    Absent, Budget, Component, Engine, EngineError, Entry, Job, Knob, Measurement, SceneFile, Site, Station, Support,
+    Version, Waits, Workbench, checked,
 };
 use crate::record::{EngineName, Estimate};
 use crate::system::process;
@@ -127,6 +128,13 @@ impl Engine for PovRay {
 
     fn memory_mib(&self, job: &Job, threads: usize) -> u64 {
         (threads * bench::side_by_side_at_most(job)) as u64 * bench::process_mib(job)
+    }
+
+    /// What is reflected once and twice, where more is read.
+    fn groundwork(&self, job: &Job) -> Option<Job> {
+        let terms = Settings::of(job).ok()?.terms(job.reflections()?);
+        let (transport, budget) = (Transport::Indirect(Bounces::Converged), Budget { seconds: 0.0, ..job.budget });
+        (terms.len() > settings::TERMS_OF_TWO).then(|| Job { transport, budget, ..job.clone() })
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {

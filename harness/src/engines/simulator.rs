@@ -34,6 +34,9 @@ const KNOBS: &[Knob] = &[Knob { key: "relative_error", values: &["0.001", "0.1",
 /// Where that leaves a comparison undecided the audit asks again, to a tenth.
 const MARGIN: f64 = 0.25;
 
+/// Fewer numbers of groundwork are found again in no time.
+const WORTH_KEEPING: usize = 10_000;
+
 /// Seconds that a ray of the final gather is counted as, on one of two cores.
 const RAY_S: f64 = 5e-7;
 
@@ -145,7 +148,8 @@ impl Engine for Simulator {
                     prepared.lay(earlier);
                 }
                 let solution = prepared.illuminance_until(&meters, &stop);
-                *workbench.groundwork.laid.lock() = prepared.groundwork();
+                *workbench.groundwork.laid.lock() =
+                    prepared.groundwork().filter(|numbers| numbers.len() >= WORTH_KEEPING);
                 solution
             })
             .map_err(|e| failed(e.to_string()))?;

@@ -51,7 +51,7 @@ pub struct Workbench {
     pub idle: Option<Idle>,
 }
 
-/// What an engine finds of a scene before it reads any meter, in numbers that it alone understands: of an earlier job, and of this one.
+/// What an engine finds that other jobs need, too, in numbers that it alone understands: of an earlier job, and of this one.
 #[derive(Clone, Debug, Default)]
 pub struct Groundwork {
     pub earlier: Option<Arc<Vec<f64>>>,

@@ -64,11 +64,11 @@ impl<'a> Question<'a> {
         may_join.then(|| key_without_meters(engine, &self.instrument.version, self.job).ok()).flatten()
     }
 
-    /// What names what its engine finds before it reads any meter; nothing in a trial, whose time is what is asked.
+    /// What names what its engine finds for other jobs, too; nothing in a trial, whose time is what is asked.
     pub(super) fn key_of_groundwork(&self) -> Option<Key> {
         let engine = self.instrument.engine.as_ref();
         let job = engine.groundwork(self.job).filter(|_| self.trial.is_none())?;
-        Some(key_without_meters(engine, &self.instrument.version, &job).ok()?.under("groundwork"))
+        Some(key(engine, &self.instrument.version, &job).ok()?.under("groundwork"))
     }
 
     /// What answers the key as well another time. A failure is tried again, but that of a trial is what it found.

@@ -1,8 +1,11 @@
 //! Runs POV-Ray: direct light in a few looks of rising magnification, reflected light in blocks until the budget is met.
 
+use std::collections::BTreeMap;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+
+use parking_lot::Mutex;
 
 use crate::engines::blocks::{BELIEVED_BLOCKS, MIN_BLOCKS, Sampling, counted, longest_block_s};
 use crate::engines::image::read_rgb;
@@ -18,6 +21,7 @@ use super::ID;
 use super::direct_error::DirectError;
 use super::export::{self, Light};
 use super::frame::{self, Frame};
+use super::ground::Ground;
 use super::pixels::{self, Readout, Seen};
 use super::settings::{Settings, Term, pool};
 
@@ -161,7 +165,7 @@ impl<'a> Bench<'a> {
         let count = self.settings.count;
         let mut run = Run { light: Light::Indirect, seed: self.seed(0), count, what: What::Block };
         let mut pilot = self.pilot(Run { count: count.min(PILOT_RAYS), ..run })?;
-        let longest_s = longest_block_s(pilot.wall, pilot.work.seconds(1.0), self.until);
+        let longest_s = longest_block_s(pilot.wall, pilot.rendered_s, self.until);
         let budget = counted(self.job.budget, 1.0);
         let affordable_s = (FIRST_BLOCKS * budget.seconds / MIN_BLOCKS as f64).min(longest_s);
         let affordable = f64::from(pilot.rays) * pilot.work.times_in(affordable_s);
@@ -172,6 +176,11 @@ impl<'a> Bench<'a> {
         }
         let block_s = pilot.work.seconds(f64::from(run.count) / f64::from(pilot.rays));
         pilot.block = pilot.block.filter(|_| run.count == pilot.rays);
+        if let Some(Apart { ground, .. }) = &mut pilot.apart
+            && ground.blocks.is_empty()
+        {
+            ground.rays = run.count;
+        }
         self.keep_readouts(&pilot.readouts)?;
         let rule = Sampling { enough_blocks: BELIEVED_BLOCKS, ..Sampling::within(budget, block_s, self.until) };
         let blocks = rule.run(|numbers| self.wave(run, numbers, &pilot, block_s))?;
@@ -194,21 +203,73 @@ impl<'a> Bench<'a> {
             method.insert("error_bound_of_rest".into(), self.settings.error_bound_of_rest.to_string());
         }
         method.insert("recursion_limit".into(), self.settings.recursion_limit.to_string());
+        *self.workbench.groundwork.laid.lock() = pilot.laid();
         Ok(measurement)
     }
 
     /// A block that finds each meter's scale and how much work blocks are; the first of them, where it has as many rays as they.
     fn pilot(&self, run: Run) -> Result<Pilot, EngineError> {
+        let terms: Vec<usize> = (0..self.terms.len()).collect();
+        // What follows all reflections, where there are several terms beside it.
+        let own = self.terms.iter().position(|term| term.limit.is_none()).filter(|_| terms.len() > 1);
+        if let Some(own) = own
+            && let Some(pilot) = self.pilot_apart(run, own)?
+        {
+            return Ok(pilot);
+        }
+        let First { frames, works, wall, scales, .. } = self.first(run, None)?;
+        let block = self.fine_sum(run, &terms, &frames)?;
+        let work = works.into_iter().fold(Work::default(), Work::plus);
+        let (readouts, rendered_s) = (coarse(&scales), work.seconds(1.0));
+        Ok(Pilot { readouts, rays: run.count, work, rendered_s, wall, block, apart: None })
+    }
+
+    /// The same with scales that are those of all other terms, which other numbers of reflections share; nothing where they do not do for
+    /// the term of its own. Whether the others are found here or were before makes no difference to what is read.
+    fn pilot_apart(&self, run: Run, own: usize) -> Result<Option<Pilot>, EngineError> {
+        let others: Vec<usize> = (0..self.terms.len()).filter(|k| *k != own).collect();
+        let earlier = self.workbench.groundwork.earlier.as_ref();
+        let earlier = earlier.and_then(|numbers| Ground::of_numbers(numbers, self.job.stations.len()));
+        let (ground, seen, own_work, rendered_s, wall) = if let Some(ground) = earlier {
+            let (begun, readouts) = (Instant::now(), coarse(&ground.first_scales));
+            self.keep_readouts(&readouts)?;
+            let (frames, works) = self.terms_apart(run, &readouts, &[own])?;
+            let work = works.into_iter().fold(Work::default(), Work::plus);
+            (ground, frames.concat(), work, work.seconds(1.0), begun.elapsed())
+        } else {
+            let First { mut frames, mut works, wall, first_scales, scales } = self.first(run, Some(own))?;
+            let (seen, own_work) = (frames.remove(own), works.remove(own));
+            let work = works.into_iter().fold(Work::default(), Work::plus);
+            let first = self.fine_sum(run, &others, &frames)?;
+            let ground = Ground { first_scales, scales, work, first, rays: run.count, blocks: vec![] };
+            (ground, seen, own_work, own_work.plus(work).seconds(1.0), wall)
+        };
+        if seen.contains(&Seen::Above) {
+            return Ok(None);
+        }
+        let block = match &ground.first {
+            Some(first) if seen.iter().all(is_fine) => Some(self.added(run, first.clone(), &[own], &[seen])?),
+            _ => None,
+        };
+        let (readouts, work) = (coarse(&ground.scales), ground.work.plus(own_work));
+        let apart = Some(Apart { own, own_work, ground, new: Mutex::default() });
+        Ok(Some(Pilot { readouts, rays: run.count, work, rendered_s, wall, block, apart }))
+    }
+
+    /// All terms at scales that do for all but the one of its own.
+    fn first(&self, run: Run, own: Option<usize>) -> Result<First, EngineError> {
         let mut readouts = export::first_readouts(self.job, Light::Indirect);
         let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();
+        let terms: Vec<usize> = (0..self.terms.len()).collect();
         for _ in 0..MAX_LOOKS {
             self.keep_readouts(&readouts)?;
-            let begun = Instant::now();
-            let (frames, work) = self.terms_apart(run, &readouts)?;
+            let (begun, first_scales) = (Instant::now(), readouts.iter().map(|r| scale_of(*r)).collect());
+            let (frames, works) = self.terms_apart(run, &readouts, &terms)?;
             let wall = begun.elapsed();
             let (mut settled, mut brightest_lx) = (true, 0.0_f64);
             for k in 0..readouts.len() {
-                let scale = match Seen::brightest(frames.iter().map(|frame| frame[k])) {
+                let deciding = frames.iter().enumerate().filter(|(term, _)| Some(*term) != own);
+                let scale = match Seen::brightest(deciding.map(|(_, frame)| frame[k])) {
                     // The blue channel holds a 1.5 times larger reading yet.
                     Seen::Value { lx, .. } => {
                         brightest_lx = brightest_lx.max(lx);
@@ -230,11 +291,8 @@ impl<'a> Bench<'a> {
             if settled {
                 // A meter that one block sees in near darkness may be brighter by far in the next.
                 let least = 0.4 * brightest_lx;
-                let readouts = readouts.iter().map(|r| Readout::Coarse(scale_of(*r).max(least))).collect();
-                let is_fine = |seen: &Seen| matches!(seen, Seen::Value { lx, resolution_lx } if resolution_lx <= &(RESOLVED * lx));
-                let is_block = frames.iter().flatten().all(is_fine);
-                let block = if is_block { Some(self.sum(run, frames)?) } else { None };
-                return Ok(Pilot { readouts, rays: run.count, work, wall, block });
+                let scales = readouts.iter().map(|r| scale_of(*r).max(least)).collect();
+                return Ok(First { frames, works, wall, first_scales, scales });
             }
         }
         Err(output(format!("reflected light was not read after {MAX_LOOKS} looks")))
@@ -242,33 +300,58 @@ impl<'a> Bench<'a> {
 
     /// Blocks, each a process of one thread.
     fn wave(&self, run: Run, numbers: Range<usize>, pilot: &Pilot, block_s: f64) -> Result<Vec<Vec<f64>>, EngineError> {
-        let run_s = block_s / COUNTED;
-        let sleep_s = SLEEP_S + FRAME_SLEEP_S * self.terms.len().saturating_sub(1) as f64;
+        let numbers: Vec<usize> = numbers.collect();
+        let is_begun = |k: &usize| *k == 0 || pilot.others(run, *k).is_some();
+        let (frames, part) =
+            if numbers.iter().all(is_begun) { (1, pilot.own_part(run)) } else { (self.terms.len(), 1.0) };
+        let run_s = part * block_s / COUNTED;
+        let sleep_s = SLEEP_S + FRAME_SLEEP_S * frames.saturating_sub(1) as f64;
         // As many as compute while others sleep.
         let for_each_thread = (1.0 + SPARE * sleep_s / (START_S + run_s)).ceil() as usize;
         let side = for_each_thread.min(side_by_side_at_most(self.job)) * self.workbench.jobs.max(1);
-        let numbers: Vec<usize> = numbers.collect();
         let block = |k: &usize| match &pilot.block {
             Some(first) if *k == 0 => Ok(first.clone()),
-            _ => self.block(Run { seed: self.seed(pilot.place(*k)), ..run }, pilot),
+            _ => self.block(Run { seed: self.seed(pilot.place(*k)), ..run }, *k, pilot),
         };
         side_by_side(side, &numbers, block).into_iter().collect()
     }
 
-    fn block(&self, run: Run, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
-        let frames = self.render(run, &pilot.readouts)?.frames;
-        self.sum(run, frames)
+    fn block(&self, run: Run, number: usize, pilot: &Pilot) -> Result<Vec<f64>, EngineError> {
+        let terms: Vec<usize> = (0..self.terms.len()).collect();
+        let render = |run| Ok::<_, EngineError>(self.render(run, &pilot.readouts)?.frames);
+        let dark = || vec![0.0; self.job.stations.len()];
+        let Some(Apart { own, ground, new, .. }) = &pilot.apart else {
+            return self.added(run, dark(), &terms, &render(run)?);
+        };
+        if let Some(others) = pilot.others(run, number) {
+            let run = Run { what: What::Term(*own), ..run };
+            return self.added(run, others.to_vec(), &[*own], &render(run)?);
+        }
+        let mut frames = render(run)?;
+        let seen = frames.remove(*own);
+        let rest: Vec<usize> = terms.into_iter().filter(|k| k != own).collect();
+        let others = self.added(run, dark(), &rest, &frames)?;
+        if ground.rays == run.count {
+            new.lock().insert(pilot.place(number), others.clone());
+        }
+        self.added(run, others, &[*own], &[seen])
     }
 
-    /// The terms of a block together.
-    fn sum(&self, run: Run, frames: Vec<Vec<Seen>>) -> Result<Vec<f64>, EngineError> {
-        let mut sum = vec![0.0; self.job.stations.len()];
-        for (term, seen) in self.terms.iter().zip(frames) {
+    /// What is known of a block, and further terms of it.
+    fn added(&self, run: Run, known: Vec<f64>, terms: &[usize], frames: &[Vec<Seen>]) -> Result<Vec<f64>, EngineError> {
+        let mut sum = known;
+        for (term, seen) in terms.iter().zip(frames) {
             for (k, (sum, seen)) in sum.iter_mut().zip(seen).enumerate() {
-                *sum += term.sign * self.value(k, seen, run)?;
+                *sum += self.terms[*term].sign * self.value(k, *seen, run)?;
             }
         }
         Ok(sum)
+    }
+
+    /// The sum of terms where all of it is resolved as well as that of any block.
+    fn fine_sum(&self, run: Run, terms: &[usize], frames: &[Vec<Seen>]) -> Result<Option<Vec<f64>>, EngineError> {
+        let dark = vec![0.0; self.job.stations.len()];
+        frames.iter().flatten().all(is_fine).then(|| self.added(run, dark, terms, frames)).transpose()
     }
 
     fn value(&self, k: usize, seen: Seen, run: Run) -> Result<f64, EngineError> {
@@ -318,18 +401,24 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// The terms of a block in as many processes, since frames that follow each other sleep after each other.
-    fn terms_apart(&self, run: Run, readouts: &[Readout]) -> Result<(Vec<Vec<Seen>>, Work), EngineError> {
-        let terms: Vec<usize> = (0..self.terms.len()).collect();
+    /// Terms of a block in as many processes, since frames that follow each other sleep after each other.
+    fn terms_apart(
+        &self,
+        run: Run,
+        readouts: &[Readout],
+        terms: &[usize],
+    ) -> Result<(Vec<Vec<Seen>>, Vec<Work>), EngineError> {
         let side = side_by_side_at_most(self.job) * self.workbench.jobs.max(1);
-        let one = |k: &usize| self.render(Run { what: What::Term(*k), ..run }, readouts);
-        let all: Vec<Rendered> = side_by_side(side, &terms, one).into_iter().collect::<Result<_, _>>()?;
-        let mut work = Work::default();
-        for (term, rendered) in self.terms.iter().zip(&all) {
-            let is_of_one = self.reflections(term) == 1;
-            *if is_of_one { &mut work.first_s } else { &mut work.further_s } += rendered.work_s;
-        }
-        Ok((all.into_iter().flat_map(|term| term.frames).collect(), work))
+        let what = |k: usize| if self.terms.len() < 2 { What::Block } else { What::Term(k) };
+        let one = |k: &usize| self.render(Run { what: what(*k), ..run }, readouts);
+        let all: Vec<Rendered> = side_by_side(side, terms, one).into_iter().collect::<Result<_, _>>()?;
+        let work = |(k, rendered): (&usize, &Rendered)| {
+            let is_of_one = self.reflections(&self.terms[*k]) == 1;
+            let [first_s, further_s] = if is_of_one { [rendered.work_s, 0.0] } else { [0.0, rendered.work_s] };
+            Work { first_s, further_s }
+        };
+        let works = terms.iter().zip(&all).map(work).collect();
+        Ok((all.into_iter().flat_map(|term| term.frames).collect(), works))
     }
 
     fn reflections(&self, term: &Term) -> u32 {
@@ -399,13 +488,36 @@ fn output(what: String) -> EngineError {
     EngineError::output(ID, what)
 }
 
+/// What a look at all terms shows.
+struct First {
+    frames: Vec<Vec<Seen>>,
+    works: Vec<Work>,
+    wall: Duration,
+    /// Of this look, by meter, and of all that follow.
+    first_scales: Vec<f64>,
+    scales: Vec<f64>,
+}
+
 struct Pilot {
     readouts: Vec<Readout>,
     rays: u32,
+    /// Of a block.
     work: Work,
+    /// Seconds that are counted for what was rendered, and how long that took.
+    rendered_s: f64,
     wall: Duration,
     /// What it reads at each meter, where that is one of the blocks.
     block: Option<Vec<f64>>,
+    apart: Option<Apart>,
+}
+
+/// A term that is read apart from all others, which jobs of other numbers of reflections need, too.
+struct Apart {
+    own: usize,
+    own_work: Work,
+    ground: Ground,
+    /// What is found of the others here, by a block's place in the sequence of seeds.
+    new: Mutex<BTreeMap<usize, Vec<f64>>>,
 }
 
 impl Pilot {
@@ -413,17 +525,45 @@ impl Pilot {
     fn place(&self, block: usize) -> usize {
         block + usize::from(self.block.is_none())
     }
+
+    /// What is known of a block.
+    fn others(&self, run: Run, block: usize) -> Option<&[f64]> {
+        let Apart { ground, .. } = self.apart.as_ref()?;
+        ground.block(self.place(block)).filter(|_| ground.rays == run.count)
+    }
+
+    /// The part of a block's work that is the term's own.
+    fn own_part(&self, run: Run) -> f64 {
+        let times = f64::from(run.count) / f64::from(self.rays);
+        let own_s = self.apart.as_ref().map_or(0.0, |apart| apart.own_work.seconds(times));
+        own_s / self.work.seconds(times).max(f64::MIN_POSITIVE)
+    }
+
+    /// What others need, too, where more of it is known than before.
+    fn laid(self) -> Option<Vec<f64>> {
+        let Apart { mut ground, new, .. } = self.apart?;
+        for (place, others) in new.into_inner() {
+            if place == ground.blocks.len() + 1 {
+                ground.blocks.push(others);
+            }
+        }
+        Some(ground.numbers())
+    }
 }
 
 /// Seconds that are counted for a block: of what follows one reflection, which grow with the rays a sample, and of what follows more, which grow with
 /// their square, as more samples shoot more rays each (11 rooms, 25 to 140 rays: powers of 1.00 and of 1.5 to 2.1).
-#[derive(Clone, Copy, Default)]
-struct Work {
-    first_s: f64,
-    further_s: f64,
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Work {
+    pub(super) first_s: f64,
+    pub(super) further_s: f64,
 }
 
 impl Work {
+    fn plus(self, other: Self) -> Self {
+        Self { first_s: self.first_s + other.first_s, further_s: self.further_s + other.further_s }
+    }
+
     /// With so many times the rays.
     fn seconds(self, times: f64) -> f64 {
         times * (self.first_s + times * self.further_s)
@@ -477,4 +617,12 @@ fn scale_of(readout: Readout) -> f64 {
     match readout {
         Readout::Coarse(scale) | Readout::Fine(scale) => scale,
     }
+}
+
+fn coarse(scales: &[f64]) -> Vec<Readout> {
+    scales.iter().map(|scale| Readout::Coarse(*scale)).collect()
+}
+
+fn is_fine(seen: &Seen) -> bool {
+    matches!(seen, Seen::Value { lx, resolution_lx } if *resolution_lx <= RESOLVED * lx)
 }

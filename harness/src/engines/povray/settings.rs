@@ -176,6 +176,9 @@ const POOL: u32 = 20_011;
 const LONG_POOL: u32 = 200_003;
 const MANY_RAYS: u32 = POOL / 10;
 
+/// Terms of light that is reflected twice at most.
+pub(super) const TERMS_OF_TWO: usize = 3;
+
 /// How many times as many rays the first two reflections get: with so many, each has less of the spread than all further ones.
 const FIRST_REFLECTION_RAYS: u32 = 48;
 const SECOND_REFLECTION_RAYS: u32 = 3;

@@ -1,5 +1,6 @@
 //! What POV-Ray must read, and what a wrong export would: these run the real renderer.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use glam::DVec3;
@@ -228,6 +229,51 @@ fn reflections_are_followed_as_far_as_they_count() {
     job.settings.insert("recursion_limit".to_owned(), 19.into());
     assert_eq!(Settings::of(&job).unwrap().recursion_limit(Bounces::Converged), 19);
     assert_eq!(Settings::of(&s1(CONVERGED)).unwrap().recursion_limit(Bounces::AtMost(19)), 19);
+}
+
+#[test]
+fn what_is_reflected_twice_is_found_once_for_any_number_of_reflections_and_changes_no_reading() {
+    // As many rays in the pilot as in its blocks, and more in these.
+    for rays in [35, 50] {
+        let of = |bounces| {
+            let transport = Transport::Indirect(bounces);
+            let budget = Budget { relative_error: 0.5, seconds: 1e6 };
+            let settings = [("count".to_owned(), rays.into())].into();
+            Job { transport, budget, settings, ..s1(INDIRECT) }
+        };
+        let read_on = |job: &Job, earlier: Option<Vec<f64>>| {
+            let folder = tempfile::tempdir().unwrap();
+            let mut bench = workbench(site(), folder.path());
+            bench.groundwork.earlier = earlier.map(Arc::new);
+            let Measurement { estimates, samples, effort, work_s, notes, .. } = PovRay.read(job, &bench).unwrap();
+            let log = std::fs::read_to_string(folder.path().join("log")).unwrap();
+            let whole = log.lines().filter(|l| l.contains("+KFF5") && !l.contains("+SF")).count();
+            let laid = bench.groundwork.laid.lock().take().unwrap();
+            ((estimates, samples, effort, work_s, notes), laid, whole)
+        };
+        let [four, all] = [Bounces::AtMost(4), Bounces::Converged].map(of);
+        let (of_four, laid_by_four, _) = read_on(&four, None);
+        let (of_all, laid_by_all, whole) = read_on(&all, None);
+        assert!(whole >= 7, "{whole} blocks were rendered as a whole");
+        let (read, _, whole) = read_on(&all, Some(laid_by_four.clone()));
+        assert!(read == of_all && whole <= 4, "{whole}");
+        if rays == 50 {
+            continue;
+        }
+        assert!(read_on(&four, Some(laid_by_all)).0 == of_four);
+        // What is cut short is found anew, and where it was less, the rest is.
+        let meters = all.stations.len();
+        assert!(read_on(&all, Some(laid_by_four[1..].to_vec())).0 == of_all);
+        let (read, laid, whole) = read_on(&all, Some(laid_by_four[..laid_by_four.len() - 3 * meters].to_vec()));
+        assert!(read == of_all && whole >= 3 && laid.len() >= laid_by_four.len(), "{whole}");
+    }
+    let of = |transport| PovRay.groundwork(&Job { transport, ..s1(INDIRECT) });
+    let [four, all] = [Bounces::AtMost(4), Bounces::Converged].map(|b| of(Transport::Indirect(b)).unwrap());
+    assert!(four.transport == all.transport && four.budget == all.budget && !all.stations.is_empty());
+    assert!(of(Transport::Total(Bounces::Converged)).is_some());
+    for others in [Transport::Direct, Transport::Indirect(Bounces::AtMost(2))] {
+        assert!(of(others).is_none(), "{others:?}");
+    }
 }
 
 /// The second number of POV-Ray's generator, by which a block tilts the scene.

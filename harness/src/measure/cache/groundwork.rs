@@ -1,4 +1,4 @@
-//! What an engine found of a scene before it read any meter: kept beside its readings, so that another meter need not find it again.
+//! What an engine found that other jobs need, too: kept beside its readings, so that another meter or number of reflections need not find it again.
 
 use std::time::SystemTime;
 
@@ -11,11 +11,11 @@ const SCHEMA: Schema = Schema { of: "cache groundwork", version: 1 };
 /// How the names of such files end.
 pub(super) const EXTENSION: &str = "groundwork";
 
-/// Fewer numbers are found again in no time, and more take too much room.
-const NUMBERS: std::ops::Range<usize> = 10_000..1_000_000;
+/// More take too much room.
+const MOST: usize = 1_000_000;
 
 pub fn is_worth_keeping(numbers: &[f64]) -> bool {
-    NUMBERS.contains(&numbers.len()) && numbers.iter().all(|number| number.is_finite())
+    numbers.len() < MOST && numbers.iter().all(|number| number.is_finite())
 }
 
 impl Cache {
