@@ -15,6 +15,7 @@ mod opening;
 mod pigment;
 mod pixels;
 mod settings;
+mod work;
 
 #[cfg(test)]
 pub(super) mod tests;

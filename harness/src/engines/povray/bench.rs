@@ -24,6 +24,7 @@ use super::frame::{self, Frame};
 use super::ground::Ground;
 use super::pixels::{self, Readout, Seen};
 use super::settings::{Settings, Term, pool};
+use super::work::Work;
 
 /// Rays a sample at least, where the budget is short.
 const MIN_RAYS: f64 = 25.0;
@@ -217,7 +218,7 @@ impl<'a> Bench<'a> {
         {
             return Ok(pilot);
         }
-        let First { frames, works, wall, scales, .. } = self.first(run, None)?;
+        let Survey { frames, works, wall, scales, .. } = self.survey(run, None)?;
         let block = self.fine_sum(run, &terms, &frames)?;
         let work = works.into_iter().fold(Work::default(), Work::plus);
         let (readouts, rendered_s) = (coarse(&scales), work.seconds(1.0));
@@ -237,7 +238,7 @@ impl<'a> Bench<'a> {
             let work = works.into_iter().fold(Work::default(), Work::plus);
             (ground, frames.concat(), work, work.seconds(1.0), begun.elapsed())
         } else {
-            let First { mut frames, mut works, wall, first_scales, scales } = self.first(run, Some(own))?;
+            let Survey { mut frames, mut works, wall, first_scales, scales } = self.survey(run, Some(own))?;
             let (seen, own_work) = (frames.remove(own), works.remove(own));
             let work = works.into_iter().fold(Work::default(), Work::plus);
             let first = self.fine_sum(run, &others, &frames)?;
@@ -257,7 +258,7 @@ impl<'a> Bench<'a> {
     }
 
     /// All terms at scales that do for all but the one of its own.
-    fn first(&self, run: Run, own: Option<usize>) -> Result<First, EngineError> {
+    fn survey(&self, run: Run, own: Option<usize>) -> Result<Survey, EngineError> {
         let mut readouts = export::first_readouts(self.job, Light::Indirect);
         let upper: Vec<f64> = readouts.iter().map(|r| scale_of(*r)).collect();
         let terms: Vec<usize> = (0..self.terms.len()).collect();
@@ -292,7 +293,7 @@ impl<'a> Bench<'a> {
                 // A meter that one block sees in near darkness may be brighter by far in the next.
                 let least = 0.4 * brightest_lx;
                 let scales = readouts.iter().map(|r| scale_of(*r).max(least)).collect();
-                return Ok(First { frames, works, wall, first_scales, scales });
+                return Ok(Survey { frames, works, wall, first_scales, scales });
             }
         }
         Err(output(format!("reflected light was not read after {MAX_LOOKS} looks")))
@@ -489,7 +490,7 @@ fn output(what: String) -> EngineError {
 }
 
 /// What a look at all terms shows.
-struct First {
+struct Survey {
     frames: Vec<Vec<Seen>>,
     works: Vec<Work>,
     wall: Duration,
@@ -548,35 +549,6 @@ impl Pilot {
             }
         }
         Some(ground.numbers())
-    }
-}
-
-/// Seconds that are counted for a block: of what follows one reflection, which grow with the rays a sample, and of what follows more, which grow with
-/// their square, as more samples shoot more rays each (11 rooms, 25 to 140 rays: powers of 1.00 and of 1.5 to 2.1).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Work {
-    pub(super) first_s: f64,
-    pub(super) further_s: f64,
-}
-
-impl Work {
-    fn plus(self, other: Self) -> Self {
-        Self { first_s: self.first_s + other.first_s, further_s: self.further_s + other.further_s }
-    }
-
-    /// With so many times the rays.
-    fn seconds(self, times: f64) -> f64 {
-        times * (self.first_s + times * self.further_s)
-    }
-
-    /// So many times the rays take so many seconds.
-    fn times_in(self, seconds: f64) -> f64 {
-        if seconds.is_infinite() {
-            return f64::INFINITY;
-        }
-        // The positive root of seconds(t) = seconds, in which nothing cancels.
-        let first = self.first_s;
-        2.0 * seconds / (first + (first * first + 4.0 * self.further_s * seconds).sqrt()).max(f64::MIN_POSITIVE)
     }
 }
 

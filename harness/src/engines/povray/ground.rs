@@ -2,7 +2,7 @@
 //!
 //! All of it follows from the scene, its meters, the seed and the rays a sample, so that whoever reads such a job first finds the same.
 
-use super::bench::Work;
+use super::work::Work;
 
 /// Terms of blocks but the one that follows all reflections, added up by meter.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,7 +43,7 @@ impl Ground {
         let [first_scales, scales] = [rows.next()?, rows.next()?];
         let is_scale = |lux: &f64| *lux > 0.0;
         let is_possible = first_scales.iter().chain(&scales).all(is_scale) && first_s >= 0.0 && further_s >= 0.0;
-        let first = if is_block != 0.0 { Some(rows.next()?) } else { None };
+        let first = if is_block == 0.0 { None } else { Some(rows.next()?) };
         let (work, rays, blocks) = (Work { first_s, further_s }, rays as u32, rows.collect());
         is_possible.then_some(Self { first_scales, scales, work, first, rays, blocks })
     }
