@@ -245,7 +245,7 @@ impl<'a> Bench<'a> {
             let ground = Ground { first_scales, scales, work, first, rays: run.count, blocks: vec![] };
             (ground, seen, own_work, own_work.plus(work).seconds(1.0), wall)
         };
-        if seen.contains(&Seen::Above) {
+        if !ground.has_room_for(&seen) {
             return Ok(None);
         }
         let block = match &ground.first {

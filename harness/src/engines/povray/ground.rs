@@ -2,7 +2,12 @@
 //!
 //! All of it follows from the scene, its meters, the seed and the rays a sample, so that whoever reads such a job first finds the same.
 
+use super::pixels::Seen;
 use super::work::Work;
+
+/// What all reflections may read of a scale, which is 400 times what the first two do: forty times as much. Where hardly any of these two comes,
+/// the next block may have a hundred times more.
+const MOST: f64 = 0.1;
 
 /// Terms of blocks but the one that follows all reflections, added up by meter.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +28,15 @@ impl Ground {
     /// The sum of a block by its place in the sequence of seeds, in which the first look's comes before all others.
     pub(super) fn block(&self, place: usize) -> Option<&[f64]> {
         self.blocks.get(place.checked_sub(1)?).map(Vec::as_slice)
+    }
+
+    /// Whether scales that follow from the first two reflections do for what all reflections show at first.
+    pub(super) fn has_room_for(&self, seen: &[Seen]) -> bool {
+        self.scales.iter().zip(seen).all(|(scale, seen)| match seen {
+            Seen::Value { lx, .. } => *lx <= MOST * scale,
+            Seen::Above => false,
+            Seen::Below(_) | Seen::Missed => true,
+        })
     }
 
     pub(super) fn numbers(&self) -> Vec<f64> {
@@ -73,5 +87,20 @@ mod tests {
             }
         }
         assert_eq!(Ground::of_numbers(&[], 2), None);
+    }
+    #[test]
+    fn light_that_hardly_comes_after_two_reflections_gets_scales_of_its_own() {
+        let (first_scales, scales, work) = (vec![1.0; 2], vec![100.0, 1.0], Work::default());
+        let ground = Ground { first_scales, scales, work, first: None, rays: 35, blocks: vec![] };
+        let value = |lx| Seen::Value { lx, resolution_lx: 1e-6 };
+        for (seen, fits) in [
+            ([value(9.0), value(0.09)], true),
+            ([value(9.0), value(0.11)], false),
+            ([value(11.0), value(0.01)], false),
+            ([Seen::Below(1e-6), value(0.01)], true),
+            ([Seen::Below(1e-6), Seen::Above], false),
+        ] {
+            assert_eq!(ground.has_room_for(&seen), fits, "{seen:?}");
+        }
     }
 }
