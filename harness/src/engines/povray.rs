@@ -133,9 +133,9 @@ impl Engine for PovRay {
 
     /// What is reflected once and twice, where more is read.
     fn groundwork(&self, job: &Job) -> Option<Job> {
-        let terms = Settings::of(job).ok()?.terms(job.reflections()?);
+        settings::own_term(&Settings::of(job).ok()?.terms(job.reflections()?))?;
         let (transport, budget) = (Transport::Indirect(Bounces::Converged), Budget { seconds: 0.0, ..job.budget });
-        (terms.len() > settings::TERMS_OF_TWO).then(|| Job { transport, budget, ..job.clone() })
+        Some(Job { transport, budget, ..job.clone() })
     }
 
     fn read(&self, job: &Job, workbench: &Workbench) -> Result<Measurement, EngineError> {
@@ -185,8 +185,7 @@ fn support(job: &Job) -> Support {
         return Support::No("in free field nothing reflects: there is no room to gather light from".to_owned());
     };
     let preset = Settings::of(job).map_or(Preset::Audit, |s| s.preset);
-    let followed = settings::audit_recursion(&room, settings::brightest_body(job));
-    cache_error(&room, bounces, preset, followed)
+    cache_error(&room, bounces, preset, settings::audit_recursion(job))
 }
 
 /// The bias of radiosity's cache, as measured against exact values, and what so many reflections leave out.

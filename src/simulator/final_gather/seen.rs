@@ -78,18 +78,12 @@ impl Rows {
             if given.stop.is_due() {
                 return vec![];
             }
-            let is_known = |k: usize| known.is_some() && is_same[k];
+            let is_new = |k: usize| known.is_none() || !is_same[k];
             let mut new = Vec::with_capacity(patches.len());
-            for_some_shown(
-                given,
-                patches,
-                meter,
-                |k| !is_known(k),
-                |k, _, shown| {
-                    let weights = shown.weights();
-                    new.push(Seen::new(k, &weights.of_nodes, weights.error));
-                },
-            );
+            for_some_shown(given, patches, meter, is_new, |k, _, shown| {
+                let weights = shown.weights();
+                new.push(Seen::new(k, &weights.of_nodes, weights.error));
+            });
             if let Some(known) = known {
                 new.extend(known.into_iter().filter(|seen| is_same[seen.patch as usize]));
                 new.sort_by_key(|seen| seen.patch);

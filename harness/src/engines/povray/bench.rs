@@ -23,7 +23,7 @@ use super::export::{self, Light};
 use super::frame::{self, Frame};
 use super::ground::Ground;
 use super::pixels::{self, Readout, Seen};
-use super::settings::{Settings, Term, pool};
+use super::settings::{Settings, Term, own_term, pool};
 use super::work::Work;
 
 /// Rays a sample at least, where the budget is short.
@@ -210,17 +210,14 @@ impl<'a> Bench<'a> {
 
     /// A block that finds each meter's scale and how much work blocks are; the first of them, where it has as many rays as they.
     fn pilot(&self, run: Run) -> Result<Pilot, EngineError> {
-        let terms: Vec<usize> = (0..self.terms.len()).collect();
-        // What follows all reflections, where there are several terms beside it.
-        let own = self.terms.iter().position(|term| term.limit.is_none()).filter(|_| terms.len() > 1);
-        if let Some(own) = own
+        if let Some(own) = own_term(&self.terms)
             && let Some(pilot) = self.pilot_apart(run, own)?
         {
             return Ok(pilot);
         }
         let Survey { frames, works, wall, scales, .. } = self.survey(run, None)?;
-        let block = self.fine_sum(run, &terms, &frames)?;
-        let work = works.into_iter().fold(Work::default(), Work::plus);
+        let terms: Vec<usize> = (0..self.terms.len()).collect();
+        let (block, work) = (self.fine_sum(run, &terms, &frames)?, works.into_iter().sum::<Work>());
         let (readouts, rendered_s) = (coarse(&scales), work.seconds(1.0));
         Ok(Pilot { readouts, rays: run.count, work, rendered_s, wall, block, apart: None })
     }
@@ -235,15 +232,15 @@ impl<'a> Bench<'a> {
             let (begun, readouts) = (Instant::now(), coarse(&ground.first_scales));
             self.keep_readouts(&readouts)?;
             let (frames, works) = self.terms_apart(run, &readouts, &[own])?;
-            let work = works.into_iter().fold(Work::default(), Work::plus);
+            let work: Work = works.into_iter().sum();
             (ground, frames.concat(), work, work.seconds(1.0), begun.elapsed())
         } else {
             let Survey { mut frames, mut works, wall, first_scales, scales } = self.survey(run, Some(own))?;
             let (seen, own_work) = (frames.remove(own), works.remove(own));
-            let work = works.into_iter().fold(Work::default(), Work::plus);
+            let work: Work = works.into_iter().sum();
             let first = self.fine_sum(run, &others, &frames)?;
             let ground = Ground { first_scales, scales, work, first, rays: run.count, blocks: vec![] };
-            (ground, seen, own_work, own_work.plus(work).seconds(1.0), wall)
+            (ground, seen, own_work, (own_work + work).seconds(1.0), wall)
         };
         if !ground.has_room_for(&seen) {
             return Ok(None);
@@ -252,7 +249,7 @@ impl<'a> Bench<'a> {
             Some(first) if seen.iter().all(is_fine) => Some(self.added(run, first.clone(), &[own], &[seen])?),
             _ => None,
         };
-        let (readouts, work) = (coarse(&ground.scales), ground.work.plus(own_work));
+        let (readouts, work) = (coarse(&ground.scales), ground.work + own_work);
         let apart = Some(Apart { own, own_work, ground, new: Mutex::default() });
         Ok(Some(Pilot { readouts, rays: run.count, work, rendered_s, wall, block, apart }))
     }
@@ -302,7 +299,7 @@ impl<'a> Bench<'a> {
     /// Blocks, each a process of one thread.
     fn wave(&self, run: Run, numbers: Range<usize>, pilot: &Pilot, block_s: f64) -> Result<Vec<Vec<f64>>, EngineError> {
         let numbers: Vec<usize> = numbers.collect();
-        let is_begun = |k: &usize| *k == 0 || pilot.others(run, *k).is_some();
+        let is_begun = |k: &usize| *k == 0 && pilot.block.is_some() || pilot.others(run, *k).is_some();
         let (frames, part) =
             if numbers.iter().all(is_begun) { (1, pilot.own_part(run)) } else { (self.terms.len(), 1.0) };
         let run_s = part * block_s / COUNTED;

@@ -46,9 +46,8 @@ impl Settings {
     pub(super) fn of(job: &Job) -> Result<Self, EngineError> {
         let given = Given::of(job, ID, KNOBS)?;
         let preset = given.preset()?;
-        let recursion = job.scene.room.map_or(MAX_RECURSION, |room| audit_recursion(&room, brightest_body(job)));
         let (count, error_bound, brightness, recursion_limit) = match preset {
-            Preset::Audit => (audit_rays(job.budget.relative_error), 0.05, 8.0, recursion),
+            Preset::Audit => (audit_rays(job.budget.relative_error), 0.05, 8.0, audit_recursion(job)),
             Preset::Fast => (100, 0.5, 1.0, 6),
             // The numbers of POV-Ray 3.7's own `radiosity {}`, which is what is written.
             Preset::Default => (35, 1.8, 1.0, 2),
@@ -135,15 +134,12 @@ pub(super) const USUAL: f64 = 0.5;
 const FINER: f64 = 0.2;
 const FINEST: f64 = 0.1;
 
-/// Reflections that the audit preset follows in a room where no body is brighter than so much.
-pub(super) fn audit_recursion(room: &Room, brightest_body: f64) -> u32 {
-    let reflectance = effort::mean_reflectance(room).max(brightest_body);
+/// Reflections that the audit preset follows, by how bright the room is on the mean, or the brightest body where that is brighter.
+pub(super) fn audit_recursion(job: &Job) -> u32 {
+    let Some(room) = &job.scene.room else { return MAX_RECURSION };
+    let bodies = job.scene.obstacles.iter().map(|o| o.reflectance);
+    let reflectance = bodies.fold(effort::mean_reflectance(room), f64::max);
     if reflectance.powi(SHARED_RECURSION as i32) <= LEFT_OUT { SHARED_RECURSION } else { MAX_RECURSION }
-}
-
-/// Of all bodies, 0 where there are none.
-pub(super) fn brightest_body(job: &Job) -> f64 {
-    job.scene.obstacles.iter().map(|o| o.reflectance).fold(0.0, f64::max)
 }
 
 /// Reflections whose samples serve for many rays. From there on every ray takes one of its own, of five rays, so that the twentieth reflection takes
@@ -176,8 +172,10 @@ const POOL: u32 = 20_011;
 const LONG_POOL: u32 = 200_003;
 const MANY_RAYS: u32 = POOL / 10;
 
-/// Terms of light that is reflected twice at most.
-pub(super) const TERMS_OF_TWO: usize = 3;
+/// The term that follows all reflections, where there are others beside it, which are the same however many these are.
+pub(super) fn own_term(terms: &[Term]) -> Option<usize> {
+    terms.iter().position(|term| term.limit.is_none()).filter(|_| terms.len() > 1)
+}
 
 /// How many times as many rays the first two reflections get: with so many, each has less of the spread than all further ones.
 const FIRST_REFLECTION_RAYS: u32 = 48;
