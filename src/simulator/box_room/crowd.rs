@@ -23,7 +23,7 @@ pub(super) const MISPLACED: f64 = 4e-4;
 const FOR_METERS: Effort = EFFORTS[4];
 /// Luminaires that are made together.
 const TOGETHER: usize = 8;
-/// Readings that are kept: of the probes, and of the meters last asked for.
+/// Readings that are kept: of the meters last asked for.
 const KEPT: usize = 4;
 
 /// Many luminaires in a room.

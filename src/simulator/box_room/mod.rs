@@ -25,7 +25,7 @@ use crate::scene::{Bounces, Luminaire, Meter};
 use crate::simulator::stop::Stop;
 use crate::simulator::{Bounded, SimulatorError, gmres};
 use crowd::ProjectedSources;
-use error::Reading;
+use error::History;
 use first_bounce::FirstBounce;
 use grid::Grid;
 use kernel::Receiver;
@@ -57,11 +57,11 @@ const FEW: usize = 8;
 const FEW_LUMINAIRES: [usize; 2] = [256, 32];
 const PROJECTION_REACHES: f64 = 1e-3;
 /// The largest relative error that each effort is the first choice for.
-const FIRST_EFFORT: [f64; 6] = [f64::INFINITY, 2e-2, 2e-5, 5e-6, 3e-6, 2e-6];
+const FIRST_EFFORT: [f64; 6] = [f64::INFINITY, 9e-3, 9e-4, 9e-5, 5e-7, 4e-7];
 /// The ladder of efforts; the rules of the first bounce grow with the order, or neighbours would share their errors.
 pub(super) const EFFORTS: [Effort; 8] = [
-    Effort { order: 2, at_edge: 1, near_points: 4, source_points: 3, source_reach: 0.7, source_tolerance: 1e-3 },
-    Effort { order: 4, at_edge: 1, near_points: 4, source_points: 3, source_reach: 1.0, source_tolerance: 1e-4 },
+    Effort { order: 3, at_edge: 1, near_points: 4, source_points: 3, source_reach: 0.8, source_tolerance: 3e-4 },
+    Effort { order: 4, at_edge: 1, near_points: 4, source_points: 4, source_reach: 1.0, source_tolerance: 1e-4 },
     Effort { order: 5, at_edge: 1, near_points: 6, source_points: 5, source_reach: 1.0, source_tolerance: 1e-6 },
     Effort { order: 6, at_edge: 1, near_points: 8, source_points: 6, source_reach: 1.0, source_tolerance: 1e-7 },
     Effort { order: 8, at_edge: 1, near_points: 8, source_points: 8, source_reach: 1.2, source_tolerance: 1e-8 },
@@ -112,41 +112,48 @@ impl EmptyRoom {
         relative_error: f64,
         stop: &Stop,
     ) -> Result<(Vec<Bounded>, String), SimulatorError> {
-        let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires));
         let few = FEW_LUMINAIRES[usize::from(relative_error >= PROJECTION_REACHES)];
         if luminaires.len() > few && self.crowd.is_none() {
             self.crowd = Some(Arc::new(ProjectedSources::new(room, luminaires)));
         }
+        let is_met = |v: &Bounded| v.bound <= relative_error * v.value.abs();
         let mut level = first_level(relative_error);
-        let mut readings = vec![];
+        let mirrors = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires)).mirrors_of_light();
+        let probes = error::probes(room.size_m, &mirrors);
+        let mut history = History::default();
+        let mut lux = vec![vec![]; meters.len()];
+        let mut found: Vec<Option<Bounded>> = vec![None; meters.len()];
         loop {
-            if self.fields.iter().all(|(at, _)| *at != level) {
-                let first = match &self.crowd {
-                    Some(crowd) => First::Many(Arc::clone(crowd)),
-                    None => First::Few(FirstBounce::new(room, luminaires, &EFFORTS[level])),
-                };
-                let field = BoxField::solve(room, first, symmetries, bounces, &EFFORTS[level], stop);
-                self.fields.extend(field.map(|field| (level, field)));
+            // A crowd is read once for all efforts, and so at all meters.
+            let is_open = |k: &usize| self.crowd.is_some() || !found[*k].as_ref().is_some_and(is_met);
+            let open: Vec<usize> = (0..meters.len()).filter(is_open).collect();
+            let asked: Vec<Meter> = open.iter().map(|k| meters[*k]).collect();
+            let read = self.solved(room, luminaires, bounces, level, stop).and_then(|field| {
+                history.add(field, &probes, stop)?;
+                field.illuminance(&asked, stop)
+            });
+            let is_stopped = read.is_none();
+            for (k, value) in open.into_iter().zip(read.into_iter().flatten()) {
+                lux[k].push(value);
+                found[k] = history.bounded(&lux[k], room, &meters[k]);
             }
-            let field = self.fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field);
-            let reading = field.and_then(|field| Reading::of(field, meters, stop));
-            let is_stopped = reading.is_none();
-            readings.extend(reading);
             level += usize::from(!is_stopped);
-            let values = match error::bounded(&readings, room, meters) {
+            let values = match found.iter().copied().collect::<Option<Vec<_>>>() {
                 Some(values) => values,
                 None if is_stopped => return Err(SimulatorError::Stopped),
                 None => continue,
             };
             let worst =
                 values.iter().map(|v| if v.bound == 0.0 { 0.0 } else { v.bound / v.value.abs() }).fold(0.0, f64::max);
+            let too_large =
+                |next| self.symmetries.as_ref().is_some_and(|s| s.matrix_entries(room.size_m, next) > MAX_ENTRIES);
             let why = match EFFORTS.get(level) {
                 _ if is_stopped => format!("stopped, its bound is {worst:.0e}"),
-                _ if worst <= relative_error => {
+                _ if values.iter().all(is_met) => {
                     format!("its bound of {worst:.0e} meets the {relative_error:.0e} asked for")
                 }
                 None => format!("the finest there is, its bound is {worst:.0e}"),
-                Some(next) if symmetries.matrix_entries(room.size_m, next) > MAX_ENTRIES => {
+                Some(next) if too_large(next) => {
                     format!("a finer matrix would not fit, its bound is {worst:.0e}")
                 }
                 Some(_) => continue,
@@ -161,6 +168,27 @@ impl EmptyRoom {
             );
             return Ok((values, text));
         }
+    }
+
+    /// The light at one effort, solved once; `None` where it was stopped.
+    fn solved(
+        &mut self,
+        room: &Room,
+        luminaires: &[Luminaire],
+        bounces: Bounces,
+        level: usize,
+        stop: &Stop,
+    ) -> Option<&BoxField> {
+        if self.fields.iter().all(|(at, _)| *at != level) {
+            let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires));
+            let first = match &self.crowd {
+                Some(crowd) => First::Many(Arc::clone(crowd)),
+                None => First::Few(FirstBounce::new(room, luminaires, &EFFORTS[level])),
+            };
+            let field = BoxField::solve(room, first, symmetries, bounces, &EFFORTS[level], stop)?;
+            self.fields.push((level, field));
+        }
+        self.fields.iter().find(|(at, _)| *at == level).map(|(_, field)| field)
     }
 }
 
@@ -245,9 +273,18 @@ impl BoxField {
         (!stop.is_due()).then_some(field)
     }
 
-    fn probes(&self, stop: &Stop) -> Option<&[f64]> {
+    /// Illuminances in lux at fixed places of the room, which are read once.
+    fn probes(&self, probes: &[Meter], stop: &Stop) -> Option<&[f64]> {
         if self.probes.get().is_none() {
-            let lux = self.illuminance(&error::probes(self.grid.size_m), stop)?;
+            let lux = match &self.first {
+                // Efforts do not differ in what is reflected once, which a crowd takes its time to tell: differences are larger without it.
+                First::Many(_) if self.gathers == Gathers::All => {
+                    let mut lux = vec![0.0; probes.len()];
+                    self.gather(&receivers(probes), &mut lux, stop);
+                    (!stop.is_due()).then_some(lux)?
+                }
+                _ => self.illuminance(probes, stop)?,
+            };
             // Whoever was first has found the same.
             let _ = self.probes.set(lux);
         }
@@ -266,24 +303,32 @@ impl BoxField {
         if self.gathers == Gathers::Nothing {
             return Some(vec![0.0; meters.len()]);
         }
-        let receiver = |m: &Meter| Receiver { position_m: m.position_m, normal: m.normal, face: None };
-        let receivers: Vec<_> = meters.iter().map(receiver).collect();
+        let receivers = receivers(meters);
         let mut lux = self.first.irradiance(&receivers, stop);
         if self.gathers == Gathers::All {
-            let gather = |(lux, receiver): (&mut f64, &Receiver)| {
-                if stop.is_due() {
-                    return;
-                }
-                *lux += gmres::dot(&balanced_row(&self.grid, receiver), &self.exitance);
-            };
-            if receivers.len() < FEW {
-                lux.iter_mut().zip(&receivers).for_each(gather);
-            } else {
-                lux.par_iter_mut().zip(&receivers).for_each(gather);
-            }
+            self.gather(&receivers, &mut lux, stop);
         }
         (!stop.is_due()).then_some(lux)
     }
+
+    /// Adds light that was reflected more than once, of what was done before it was stopped.
+    fn gather(&self, receivers: &[Receiver], lux: &mut [f64], stop: &Stop) {
+        let gather = |(lux, receiver): (&mut f64, &Receiver)| {
+            if stop.is_due() {
+                return;
+            }
+            *lux += gmres::dot(&balanced_row(&self.grid, receiver), &self.exitance);
+        };
+        if receivers.len() < FEW {
+            lux.iter_mut().zip(receivers).for_each(gather);
+        } else {
+            lux.par_iter_mut().zip(receivers).for_each(gather);
+        }
+    }
+}
+
+fn receivers(meters: &[Meter]) -> Vec<Receiver> {
+    meters.iter().map(|m| Receiver { position_m: m.position_m, normal: m.normal, face: None }).collect()
 }
 
 /// A room that loses no light: area in m² and reflectance by orbit.

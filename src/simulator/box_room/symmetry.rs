@@ -77,6 +77,12 @@ impl Symmetries {
         Self { of_room, of_light }
     }
 
+    /// The mirrors alone that light shares, the one that leaves all as it is among them: bit k turns axis k round.
+    pub(super) fn mirrors_of_light(&self) -> Vec<u8> {
+        let operations = self.of_light.iter().map(|k| self.of_room[*k]);
+        operations.filter(|op| op.axes == PERMUTATIONS[0]).map(|op| op.mirrors).collect()
+    }
+
     /// About how many numbers the operator of a grid stores.
     pub(super) fn matrix_entries(&self, size_m: DVec3, effort: &Effort) -> usize {
         let shared = self.of_light.len();
