@@ -423,11 +423,11 @@ pub fn direction(c_deg: f64, gamma_deg: f64) -> DVec3 {
 /// No way to reckon an angle in `f64` is further off, in degrees.
 const ROUNDED_DEG: f64 = 1e-9;
 
+/// So many nodes are compared all at once in less time than it takes to halve them.
 const FEW_NODES: usize = 48;
 
 /// The interval of `nodes` that holds `x` and the fraction of it that `x` lies along.
 fn bracket(nodes: &[f64], x: f64) -> (usize, f64) {
-    // Of few nodes all are compared at once, in less time than it takes to halve them.
     let below = if nodes.len() <= FEW_NODES {
         nodes.iter().map(|n| usize::from(*n <= x)).sum()
     } else {

@@ -57,7 +57,7 @@ const FEW: usize = 8;
 const FEW_LUMINAIRES: [usize; 2] = [256, 32];
 const PROJECTION_REACHES: f64 = 1e-3;
 /// The largest relative error that each effort is the first choice for.
-const FIRST_EFFORT: [f64; 6] = [f64::INFINITY, 9e-3, 9e-4, 9e-5, 5e-7, 4e-7];
+const FIRST_EFFORT: [f64; 5] = [f64::INFINITY, 9e-3, 9e-4, 9e-5, 5e-7];
 /// The ladder of efforts; the rules of the first bounce grow with the order, or neighbours would share their errors.
 pub(super) const EFFORTS: [Effort; 8] = [
     Effort { order: 3, at_edge: 1, near_points: 4, source_points: 3, source_reach: 0.8, source_tolerance: 3e-4 },
@@ -118,8 +118,8 @@ impl EmptyRoom {
         }
         let is_met = |v: &Bounded| v.bound <= relative_error * v.value.abs();
         let mut level = first_level(relative_error);
-        let mirrors = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires)).mirrors_of_light();
-        let probes = error::probes(room.size_m, &mirrors);
+        let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires)).clone();
+        let probes = error::probes(room.size_m, &symmetries.mirrors_of_light());
         let mut history = History::default();
         let mut lux = vec![vec![]; meters.len()];
         let mut found: Vec<Option<Bounded>> = vec![None; meters.len()];
@@ -128,7 +128,7 @@ impl EmptyRoom {
             let is_open = |k: &usize| self.crowd.is_some() || !found[*k].as_ref().is_some_and(is_met);
             let open: Vec<usize> = (0..meters.len()).filter(is_open).collect();
             let asked: Vec<Meter> = open.iter().map(|k| meters[*k]).collect();
-            let read = self.solved(room, luminaires, bounces, level, stop).and_then(|field| {
+            let read = self.solved(room, luminaires, &symmetries, bounces, level, stop).and_then(|field| {
                 history.add(field, &probes, stop)?;
                 field.illuminance(&asked, stop)
             });
@@ -145,15 +145,13 @@ impl EmptyRoom {
             };
             let worst =
                 values.iter().map(|v| if v.bound == 0.0 { 0.0 } else { v.bound / v.value.abs() }).fold(0.0, f64::max);
-            let too_large =
-                |next| self.symmetries.as_ref().is_some_and(|s| s.matrix_entries(room.size_m, next) > MAX_ENTRIES);
             let why = match EFFORTS.get(level) {
                 _ if is_stopped => format!("stopped, its bound is {worst:.0e}"),
                 _ if values.iter().all(is_met) => {
                     format!("its bound of {worst:.0e} meets the {relative_error:.0e} asked for")
                 }
                 None => format!("the finest there is, its bound is {worst:.0e}"),
-                Some(next) if too_large(next) => {
+                Some(next) if symmetries.matrix_entries(room.size_m, next) > MAX_ENTRIES => {
                     format!("a finer matrix would not fit, its bound is {worst:.0e}")
                 }
                 Some(_) => continue,
@@ -175,12 +173,12 @@ impl EmptyRoom {
         &mut self,
         room: &Room,
         luminaires: &[Luminaire],
+        symmetries: &Symmetries,
         bounces: Bounces,
         level: usize,
         stop: &Stop,
     ) -> Option<&BoxField> {
         if self.fields.iter().all(|(at, _)| *at != level) {
-            let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires));
             let first = match &self.crowd {
                 Some(crowd) => First::Many(Arc::clone(crowd)),
                 None => First::Few(FirstBounce::new(room, luminaires, &EFFORTS[level])),
