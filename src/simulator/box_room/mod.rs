@@ -8,6 +8,8 @@ mod cells;
 mod crowd;
 mod error;
 mod first_bounce;
+#[cfg(test)]
+mod fresh_tests;
 mod grid;
 mod kernel;
 mod operator;

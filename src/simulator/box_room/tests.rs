@@ -301,7 +301,7 @@ fn a_luminaire_turned_against_its_table_turned_back_reads_the_same() {
     assert_relative_eq!(plain[0].0, turned[0].0, max_relative = 1e-9);
 }
 
-fn solve(scene: &Scene, effort: &Effort) -> BoxField {
+pub(super) fn solve(scene: &Scene, effort: &Effort) -> BoxField {
     let (room, luminaires) = (scene.room.unwrap(), &scene.luminaires);
     let first = First::Few(FirstBounce::new(&room, luminaires, effort));
     BoxField::solve(&room, first, &Symmetries::of(&room, luminaires), Bounces::Converged, effort, &Stop::NEVER).unwrap()
