@@ -348,8 +348,10 @@ impl Prepared {
         };
         // What comes after a failure must not have begun before it.
         let side = if options.after_failure == AfterFailure::Stop { 1 } else { cases_at_a_time(options) };
-        let done = side_by_side(side, &(0..cases.len()).collect::<Vec<_>>(), one);
-        let mut reports = done.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let is_known: Vec<bool> = cases.iter().map(Case::is_known).collect();
+        let order = if side == 1 { (0..cases.len()).collect() } else { order_of(&is_known) };
+        let done = order.iter().zip(side_by_side(side, &order, one)).sorted_by_key(|(k, _)| **k);
+        let mut reports = done.map(|(_, report)| report).collect::<Result<Vec<_>, _>>()?;
         if options.diagnosis == Diagnosis::Sought {
             diagnose(&plans, &mut reports);
         }
@@ -369,6 +371,14 @@ impl Prepared {
         keep(&mut report, &options.out, Care::Lasting)?;
         Ok(report)
     }
+}
+
+/// Places of cases as they are begun, by whether they are scenes of known answer: the first that was asked for, since one waits for its verdicts;
+/// scenes of known answer, where renderers that sleep between their frames take longest and compute least; all others meanwhile.
+fn order_of(is_known: &[bool]) -> Vec<usize> {
+    let (known, asked): (Vec<usize>, Vec<usize>) = (0..is_known.len()).partition(|k| is_known[*k]);
+    let (first, others) = asked.split_at(asked.len().min(1));
+    [first, &known, others].concat()
 }
 
 /// Whose engines are examined besides ours.
@@ -534,4 +544,18 @@ pub fn subject(specs: &[PathBuf], cases: &[Case]) -> SpecRecord {
         _ => format!("{} cases of {}", cases.len(), paths.join(", ")),
     };
     SpecRecord { path: paths.join(" "), sha256: hexadecimal(&hash.finalize()), title }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scenes_of_known_answer_are_begun_after_the_first_case_and_before_all_others() {
+        assert_eq!(order_of(&[false, false, false, true, true]), [0, 3, 4, 1, 2]);
+        assert_eq!(order_of(&[true, false]), [1, 0]);
+        assert_eq!(order_of(&[true; 2]), [0, 1]);
+        assert_eq!(order_of(&[false; 2]), [0, 1]);
+        assert!(order_of(&[]).is_empty());
+    }
 }
