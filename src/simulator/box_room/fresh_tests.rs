@@ -4,11 +4,12 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
-use super::tests::{Random, bounded, point, random_scene, solve};
+use super::tests::{Random, bounded, downlight, point, random_scene, solve};
 use super::{EFFORTS, Effort, EmptyRoom};
 use crate::geometry::{Reflectances, Room};
 use crate::photometry::LuminousIntensityDistribution;
 use crate::scene::{Luminaire, Meter, Scene, orientation};
+use crate::simulator::path_tracing::test_scenes::uplight;
 use crate::simulator::stop::Stop;
 
 /// What a luminaire shines.
@@ -60,18 +61,10 @@ fn between(random: &mut Random, low: f64, high: f64) -> f64 {
 }
 
 fn table(light: Light, random: &mut Random) -> LuminousIntensityDistribution {
-    let gamma: Vec<f64> = (0..=36).map(|k| 5.0 * f64::from(k)).collect();
     let axial = |gamma: Vec<f64>, cd: Vec<f64>| LuminousIntensityDistribution::axial(gamma, cd).unwrap();
     match light {
-        Light::Down => {
-            let power = between(random, 1.0, 4.0);
-            let cd = gamma.iter().map(|g| 1e3 * g.to_radians().cos().max(0.0).powf(power)).collect();
-            axial(gamma, cd)
-        }
-        Light::Up => axial(
-            vec![0.0, 89.0, 90.0, 95.0, 115.0, 135.0, 155.0, 175.0, 180.0],
-            vec![0.0, 0.0, 4.5, 35.7, 218.3, 421.6, 576.4, 662.3, 664.4],
-        ),
+        Light::Down => downlight(between(random, 1.0, 4.0)),
+        Light::Up => uplight(),
         Light::Narrow => {
             let width = between(random, 5.0, 15.0);
             let gamma: Vec<f64> = (0..=180).map(f64::from).collect();
@@ -83,6 +76,7 @@ fn table(light: Light, random: &mut Random) -> LuminousIntensityDistribution {
             axial(vec![0.0, 0.5 * end, end, end + 0.1, 180.0], vec![800.0, 700.0, 500.0, 0.0, 0.0])
         }
         Light::Measured => {
+            let gamma: Vec<f64> = (0..=36).map(|k| 5.0 * f64::from(k)).collect();
             let [along, across] = [(); 2].map(|()| between(random, 1.0, 3.0));
             let (mut cd, mut first) = (vec![], vec![]);
             for c in 0..8 {

@@ -13,6 +13,7 @@ use crate::simulator::box_room::first_bounce::FirstBounce;
 use crate::simulator::box_room::grid::Grid;
 use crate::simulator::box_room::symmetry::Symmetries;
 use crate::simulator::box_room::{BoxField, EFFORTS, Effort, EmptyRoom, First, error};
+use crate::simulator::path_tracing::test_scenes;
 use crate::simulator::quadrature::Gauss;
 use crate::simulator::{Accuracy, Bounded, Estimate, Prepared, Stop, Uncertainty, illuminance};
 
@@ -28,16 +29,15 @@ pub(super) fn point(position_m: DVec3, distribution: LuminousIntensityDistributi
     }
 }
 
-/// Case S1: a 20 m cube with an axial uplight in its centre.
+/// 1000 cd on its axis and a power of the cosine downwards, every five degrees.
+pub(super) fn downlight(power: f64) -> LuminousIntensityDistribution {
+    let gamma: Vec<f64> = (0..=36).map(|k| 5.0 * f64::from(k)).collect();
+    let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0).powf(power)).collect();
+    LuminousIntensityDistribution::axial(gamma, candela).unwrap()
+}
+
 pub(super) fn s1() -> (Scene, Vec<Meter>) {
-    let gamma = vec![0.0, 89.0, 90.0, 95.0, 115.0, 135.0, 155.0, 175.0, 180.0];
-    let candela = vec![0.0, 0.0, 4.5, 35.7, 218.3, 421.6, 576.4, 662.3, 664.4];
-    let distribution = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
-    let room = Room { size_m: DVec3::splat(20.0), reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8) };
-    let luminaires = vec![point(DVec3::splat(10.0), distribution)];
-    let at = |(x, y)| Meter { position_m: DVec3::new(x, y, 2.0), normal: DVec3::Z };
-    let meters = [(2.0, 2.0), (2.0, 10.0), (10.0, 2.0), (10.0, 10.0)].map(at).to_vec();
-    (Scene { room: Some(room), obstacles: vec![], luminaires }, meters)
+    (test_scenes::s1(), test_scenes::s1_meters())
 }
 
 #[test]
@@ -159,11 +159,8 @@ fn bounds_hold_a_millimetre_from_edges_and_in_corners() {
     let mut random = Random(23);
     for case in 0..3 {
         let (mut scene, _) = random_scene(&mut random);
-        let gamma: Vec<f64> = (0..=36).map(|k| 5.0 * f64::from(k)).collect();
-        let candela = gamma.iter().map(|g| 1000.0 * g.to_radians().cos().max(0.0).powi(2)).collect();
         let size_m = scene.room.unwrap().size_m;
-        let table = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
-        scene.luminaires = vec![point(size_m * DVec3::new(0.3, 0.6, 0.9), table)];
+        scene.luminaires = vec![point(size_m * DVec3::new(0.3, 0.6, 0.9), downlight(2.0))];
         let normals = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE.normalize(), DVec3::NEG_X];
         let distances =
             [DVec3::splat(1e-3), DVec3::new(1e-3, 2e-3, 1.0), DVec3::new(0.01, 0.01, 1.4), DVec3::splat(0.03)];

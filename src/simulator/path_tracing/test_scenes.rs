@@ -23,15 +23,19 @@ pub(crate) fn luminaire(
     }
 }
 
-/// Case S1: a 20 m cube with an axial uplight in its centre.
-pub(crate) fn s1() -> Scene {
+/// Case S1's axial uplight.
+pub(crate) fn uplight() -> LuminousIntensityDistribution {
     let gamma = vec![0.0, 89.0, 90.0, 95.0, 115.0, 135.0, 155.0, 175.0, 180.0];
     let candela = vec![0.0, 0.0, 4.5, 35.7, 218.3, 421.6, 576.4, 662.3, 664.4];
-    let uplight = LuminousIntensityDistribution::axial(gamma, candela).unwrap();
+    LuminousIntensityDistribution::axial(gamma, candela).unwrap()
+}
+
+/// Case S1: a 20 m cube with an axial uplight in its centre.
+pub(crate) fn s1() -> Scene {
     Scene {
         room: Some(Room { size_m: DVec3::splat(20.0), reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8) }),
         obstacles: vec![],
-        luminaires: vec![luminaire(uplight, LuminousOpening::Point, DVec3::splat(10.0))],
+        luminaires: vec![luminaire(uplight(), LuminousOpening::Point, DVec3::splat(10.0))],
     }
 }
 
