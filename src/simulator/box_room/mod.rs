@@ -120,7 +120,8 @@ impl EmptyRoom {
         }
         let is_met = |v: &Bounded| v.bound <= relative_error * v.value.abs();
         let mut level = first_level(relative_error);
-        let symmetries = self.symmetries.get_or_insert_with(|| Symmetries::of(room, luminaires)).clone();
+        let symmetries = self.symmetries.take().or_else(|| Symmetries::of(room, luminaires, stop));
+        let symmetries = self.symmetries.insert(symmetries.ok_or(SimulatorError::Stopped)?).clone();
         let probes = error::probes(room.size_m, &symmetries.mirrors_of_light());
         let mut history = History::default();
         let mut lux = vec![vec![]; meters.len()];

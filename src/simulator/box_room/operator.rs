@@ -171,7 +171,7 @@ mod tests {
         half_turned.luminaires[1].position_m = DVec3::new(14.0, 13.0, 3.0);
         for (scene, symmetries) in [(random_scene(&mut Random(3)).0, 1), (s1().0, 8), (turned, 2), (half_turned, 2)] {
             let (room, effort) = (scene.room.unwrap(), &EFFORTS[3]);
-            let found = Symmetries::of(&room, &scene.luminaires);
+            let found = Symmetries::of(&room, &scene.luminaires, &Stop::NEVER).unwrap();
             assert_eq!(found.of_light.len(), symmetries);
             let grid = Grid::new(room.size_m, effort);
             let orbits = Orbits::new(&grid, &found.of_room);

@@ -4,6 +4,7 @@
 //! keeps all of them, whatever the light does; the first bounce and the whole light field keep those that also leave
 //! luminaires and reflectances as they are.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
@@ -13,6 +14,7 @@ use super::grid::{Face, Grid};
 use crate::geometry::{Room, Surface};
 use crate::photometry::Symmetry;
 use crate::scene::Luminaire;
+use crate::simulator::stop::Stop;
 
 /// A symmetry of a box: mirrors, then perhaps axes exchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,14 +69,15 @@ pub(super) struct Symmetries {
 }
 
 impl Symmetries {
-    pub(super) fn of(room: &Room, luminaires: &[Luminaire]) -> Self {
+    /// `None` where it was stopped.
+    pub(super) fn of(room: &Room, luminaires: &[Luminaire], stop: &Stop) -> Option<Self> {
         let of_room = of_geometry(room.size_m);
-        let is_shared = |k: &usize| {
-            let op = of_room[*k];
-            keeps_reflectances(op, room) && keeps_luminaires(op, room, luminaires)
+        let is_shared = |k: usize| {
+            let op = of_room[k];
+            keeps_reflectances(op, room) && keeps_luminaires(op, room, luminaires, stop)
         };
-        let of_light = (0..of_room.len()).filter(is_shared).collect();
-        Self { of_room, of_light }
+        let of_light = subgroup(&of_room, is_shared);
+        (!stop.is_due()).then_some(Self { of_room, of_light })
     }
 
     /// The mirrors alone that light shares, the one that leaves all as it is among them: bit k turns axis k round.
@@ -90,6 +93,37 @@ impl Symmetries {
     }
 }
 
+/// The places of those of a group of operations that are members of a subgroup. Few members are looked at, since products of members are members;
+/// products of a member and of one that is none are none.
+fn subgroup(group: &[Operation], is_member: impl Fn(usize) -> bool) -> Vec<usize> {
+    let uneven = DVec3::new(1.0, 2.0, 3.0);
+    let images: Vec<DVec3> = group.iter().map(|op| op.of_direction(uneven)).collect();
+    let product = |a: usize, b: usize| images.iter().position(|image| *image == group[a].of_direction(images[b]));
+    let mut members: Vec<usize> = vec![];
+    let mut others: BTreeSet<usize> = BTreeSet::new();
+    for k in 0..group.len() {
+        if members.contains(&k) || others.contains(&k) {
+            continue;
+        }
+        if is_member(k) {
+            members.push(k);
+            // Each product of two, those that this adds among them.
+            let mut next = 0;
+            while let Some(&a) = members.get(next) {
+                for b in members.clone() {
+                    let products = [product(a, b), product(b, a)].into_iter().flatten();
+                    members.extend(products.filter(|c| !members.contains(c)).collect::<BTreeSet<usize>>());
+                }
+                next += 1;
+            }
+        } else {
+            others.extend(members.iter().flat_map(|m| [product(k, *m), product(*m, k)]).flatten());
+        }
+    }
+    members.sort_unstable();
+    members
+}
+
 /// The reflectance of a face.
 pub(super) fn reflectance(room: &Room, face: Face) -> f64 {
     let is_it = |s: &Surface| s.axis() == face.0 / 2 && s.is_far() == (face.0 % 2 == 1);
@@ -100,12 +134,12 @@ fn keeps_reflectances(op: Operation, room: &Room) -> bool {
     Face::ALL.into_iter().all(|face| reflectance(room, face) == reflectance(room, op.of_face(face)))
 }
 
-fn keeps_luminaires(op: Operation, room: &Room, luminaires: &[Luminaire]) -> bool {
+fn keeps_luminaires(op: Operation, room: &Room, luminaires: &[Luminaire], stop: &Stop) -> bool {
     if op == Operation::IDENTITY {
         return true;
     }
     let mut free: Vec<_> = luminaires.iter().collect();
-    luminaires.iter().all(|luminaire| {
+    luminaires.iter().take_while(|_| !stop.is_due()).all(|luminaire| {
         let image = op.of_point(luminaire.position_m, room.size_m);
         let close = |other: &&Luminaire| (other.position_m - image).length() <= 1e-13 * room.size_m.max_element();
         let partner = free.iter().position(|other| close(other) && is_image(op, luminaire, other));
@@ -223,4 +257,46 @@ fn images(grid: &Grid, operation: Operation) -> Vec<u32> {
         }
     }
     images
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    #[test]
+    fn every_subgroup_of_a_cubes_symmetries_is_found_by_few_long_looks() {
+        let group = of_geometry(DVec3::ONE);
+        let image = |k: usize, d: DVec3| group[k].of_direction(d);
+        let uneven = DVec3::new(1.0, 2.0, 3.0);
+        let place = |d: DVec3| (0..group.len()).find(|k| image(*k, uneven) == d).unwrap();
+        for a in 0..group.len() {
+            for b in 0..group.len() {
+                // All words of the two.
+                let mut right = vec![0];
+                let mut next = 0;
+                while let Some(&word) = right.get(next) {
+                    for letter in [a, b] {
+                        let longer = place(image(letter, image(word, uneven)));
+                        if !right.contains(&longer) {
+                            right.push(longer);
+                        }
+                    }
+                    next += 1;
+                }
+                right.sort_unstable();
+                // A look at what is none ends at the first direction that differs.
+                let long = Cell::new(0);
+                let is_member = |k: usize| {
+                    let is_it = right.contains(&k);
+                    long.set(long.get() + u32::from(is_it));
+                    is_it
+                };
+                assert_eq!(subgroup(&group, is_member), right, "{a} {b}");
+                // The one that leaves all as it is, and each that is found at least doubles what is known.
+                assert!(long.get() <= 1 + right.len().ilog2(), "{a} {b}: {} long looks", long.get());
+            }
+        }
+    }
 }

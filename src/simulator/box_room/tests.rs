@@ -309,7 +309,15 @@ fn a_luminaire_turned_against_its_table_turned_back_reads_the_same() {
 pub(super) fn solve(scene: &Scene, effort: &Effort) -> BoxField {
     let (room, luminaires) = (scene.room.unwrap(), &scene.luminaires);
     let first = First::Few(FirstBounce::new(&room, luminaires, effort));
-    BoxField::solve(&room, first, &Symmetries::of(&room, luminaires), Bounces::Converged, effort, &Stop::NEVER).unwrap()
+    BoxField::solve(
+        &room,
+        first,
+        &Symmetries::of(&room, luminaires, &Stop::NEVER).unwrap(),
+        Bounces::Converged,
+        effort,
+        &Stop::NEVER,
+    )
+    .unwrap()
 }
 
 /// Area-mean indirect illuminance of a 4 m cube of one reflectance with 10 000 lm at its centre, from the nodes.
