@@ -9,7 +9,7 @@ fn examined(changes: &[(&str, &str)]) -> Answer {
         text.replace(from, to)
     });
     let folder = Folder::new(&[("adapter.py", &text)]);
-    folder.luxproof(&["engines", "doctor", "--adapter", "python3 adapter.py"])
+    folder.luxproof(&["engines", "doctor", "--adapter", "python3 -S adapter.py"])
 }
 
 /// The line of a topic and what is indented below it.

@@ -68,8 +68,9 @@ fn checkout() -> Folder {
     let bin = folder.path("bin");
     fs::create_dir(&bin).unwrap();
     symlink(env!("CARGO_BIN_EXE_luxproof"), bin.join("luxproof")).unwrap();
+    // Compiled it is already.
     let cargo = format!(
-        "#!/bin/sh\n[ \"$*\" = 'install --locked --path harness' ] || exit 2\ncd {1} && exec {0} build --locked --quiet --bin luxproof\n",
+        "#!/bin/sh\n[ \"$*\" = 'install --locked --path harness' ] || exit 2\nexec {} metadata --locked --no-deps --format-version 1 --manifest-path {}/harness/Cargo.toml > /dev/null\n",
         env!("CARGO"),
         root().display()
     );

@@ -20,7 +20,7 @@ meters:
   wall: {{grid: {{origin_m: [0.01, 0.5, 0.5], u_m: [0, 0.7, 0], v_m: [0, 0, 0.6], counts: [4, 3]}}, normal: [1, 0, 0]}}
 procedures:
   direct_illuminance: {{meters: [plane, wall]}}
-engines: {{mine: {{command: [python3, {}, {bug}]}}}}
+engines: {{mine: {{command: [python3, -S, {}, {bug}]}}}}
 ",
         adapter.display()
     );

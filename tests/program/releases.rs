@@ -21,10 +21,10 @@ fn planted() -> String {
 
 /// Sixteen releases, 1.1 to 1.16, whose readings are off by what `factor` says in Python; `crashing` give none.
 fn sixteen(factor: &str, crashing: &str) -> Folder {
-    let release = |k| format!("\"1.{k}\": python3 adapter.py {k} {crashing}");
+    let release = |k| format!("\"1.{k}\": python3 -S adapter.py {k} {crashing}");
     let releases: Vec<String> = (1..=16).map(release).collect();
     let engines = format!(
-        "engines:\n  mine:\n    command: [python3, adapter.py, \"1\"]\n    protocol: 1\n    releases: {{{}}}\n",
+        "engines:\n  mine:\n    command: [python3, -S, adapter.py, \"1\"]\n    protocol: 1\n    releases: {{{}}}\n",
         releases.join(", ")
     );
     Folder::new(&[

@@ -233,7 +233,7 @@ procedures:
 
 /// The adapter as an engine, `adapter.py`.
 pub(crate) const MINE: &str = "engines:
-  mine: {command: [python3, adapter.py]}
+  mine: {command: [python3, -S, adapter.py]}
 ";
 
 /// Lights downward, the same in every C plane.
@@ -275,5 +275,5 @@ pub(crate) fn adapter_of_version_one() -> String {
 
 /// That one as an engine, which is never probed.
 pub(crate) const MINE_OF_VERSION_ONE: &str = "engines:
-  mine: {command: [python3, adapter.py], protocol: 1}
+  mine: {command: [python3, -S, adapter.py], protocol: 1}
 ";

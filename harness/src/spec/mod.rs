@@ -98,7 +98,7 @@ impl Source {
         let error = |line| SpecError { line: Some(line), ..fail(TOO_DEEP.to_owned(), DEPTH) };
         bounds::too_deep(&text).map_or(Ok(()), |line| Err(error(line)))?;
         let source = Self { trust, ..Self::new(path.to_owned(), text) };
-        let values = bounds::values(&source.text).map_err(|error| source.misread(&error))?;
+        let values = bounds::values(&source.text).map_err(|error| source.fault(&error))?;
         Ok(Self { values, ..source })
     }
 
@@ -113,19 +113,27 @@ impl Source {
 
     /// What its parser refused, with the place.
     fn misread(&self, error: &serde_yaml::Error) -> SpecError {
+        let fault = self.fault(error);
+        if tree::tree(&self.text).is_ok() {
+            return SpecError { help: nearest_key(&fault.message), ..fault };
+        }
+        let fault = SpecError { help: Some(NO_YAML.to_owned()), ..fault };
+        self.tab().or_else(|| self.quote(&fault.message)).unwrap_or(fault)
+    }
+
+    /// What its parser says, with the place, and nothing that is found by reading it once more.
+    fn fault(&self, error: &serde_yaml::Error) -> SpecError {
         let message = error.to_string();
         // serde_yaml ends its message with the place, which the error carries already.
         let message = message.split(" at line ").next().unwrap_or(&message);
         let location = error.location();
-        let is_yaml = tree::tree(&self.text).is_ok();
-        let fault = SpecError {
+        SpecError {
             file: self.path.clone(),
             line: location.as_ref().map(serde_yaml::Location::line),
             column: location.as_ref().map(serde_yaml::Location::column),
             message: shape::plain(message),
-            help: nearest_key(message).or_else(|| (!is_yaml).then(|| NO_YAML.to_owned())),
-        };
-        if is_yaml { fault } else { self.tab().or_else(|| self.quote(message)).unwrap_or(fault) }
+            help: None,
+        }
     }
 
     /// A tab where YAML wants blanks, which its reader calls otherwise.
