@@ -10,6 +10,14 @@ pub mod stress;
 mod tables;
 mod trials;
 
+use itertools::Itertools;
+
+/// As many values are below it as above.
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let all = values.sorted_by(f64::total_cmp).collect_vec();
+    Some(0.5 * (all.get((all.len().checked_sub(1)?) / 2)? + all.get(all.len() / 2)?))
+}
+
 /// Who is told how far an experiment is.
 pub trait Progress: Sync {
     /// So many steps more are expected.

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::Truth;
 use super::fit;
-use crate::experiments::deviation;
+use crate::experiments::{deviation, median};
 use crate::measure::Taken;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
 
@@ -87,8 +87,8 @@ impl BenchPoint {
         let (low, high) = if is_random { fit::interval_of_rms(errors.len()) } else { (1.0, 1.0) };
         Self {
             effort,
-            wall_s: median(taken.iter().map(|t| t.cost.wall_s)),
-            cpu_s: median(taken.iter().map(|t| t.cost.cpu_s)),
+            wall_s: median(taken.iter().map(|t| t.cost.wall_s)).unwrap_or(0.0),
+            cpu_s: median(taken.iter().map(|t| t.cost.cpu_s)).unwrap_or(0.0),
             peak_mib: taken.iter().filter_map(|t| t.cost.peak_mib).reduce(f64::max),
             relative_error,
             relative_error_low: (low * relative_error - known).max(0.0),
@@ -98,11 +98,6 @@ impl BenchPoint {
             repetitions: errors.len(),
         }
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let all = values.sorted_by(f64::total_cmp).collect_vec();
-    if all.is_empty() { 0.0 } else { 0.5 * (all[(all.len() - 1) / 2] + all[all.len() / 2]) }
 }
 
 impl Curve {

@@ -13,7 +13,7 @@ use luminaire::simulator::{
 use serde::Serialize;
 use strum::IntoStaticStr;
 
-use super::super::tables;
+use super::super::{median, tables};
 use crate::system::process::{interrupt_flag, is_interrupted};
 
 /// Meters of a room.
@@ -51,6 +51,13 @@ pub struct Coverage {
     pub cleared: usize,
     /// How often an error lies within .03, .1, .3 and 1 of the bound and the certifier's error together, and beyond, by kind of meter.
     pub histogram: BTreeMap<Kind, [usize; BINS.len()]>,
+    /// Bound over error in the median; errors have the certifier's own in them, so that it is more rather than less.
+    pub bound_over_error: Option<f64>,
+    /// The same as if readings were exact, and the certifier alone were off.
+    pub bound_over_certifiers_error: Option<f64>,
+    /// Error and the certifier's own, as likely exceeded as not, over bound.
+    #[serde(skip)]
+    errors_over_bound: Vec<[f64; 2]>,
     /// How many rooms each solver answered, some meters perhaps by the last that is named.
     pub rooms_by_solver: BTreeMap<String, usize>,
     /// What could not be solved, with its reason.
@@ -90,6 +97,9 @@ pub fn coverage(rooms: usize, relative_error: f64, seed: u64) -> Coverage {
     }
     coverage
 }
+
+/// What a normal error of this standard deviation is below as often as above.
+const PROBABLE_ERROR: f64 = 0.6745;
 
 /// A room, what the simulator reads in it and what is certified.
 struct Room {
@@ -218,6 +228,10 @@ impl Coverage {
         for (k, truth) in truth.iter().enumerate() {
             self.readings += 1;
             let (value_lx, bound_lx) = room.reading_lx(k);
+            if bound_lx > 0.0 {
+                let errors_lx = [(value_lx - truth.lux).abs(), PROBABLE_ERROR * truth.std_error_lx];
+                self.errors_over_bound.push(errors_lx.map(|error_lx| error_lx / bound_lx));
+            }
             // Nothing is off where nothing is lit, though its bound is nothing, too.
             let may_be = (bound_lx + truth.allowed_lx).max(f64::MIN_POSITIVE);
             let error = (value_lx - truth.lux).abs() / may_be;
@@ -226,6 +240,8 @@ impl Coverage {
         }
         let misses = seeming.iter().filter(|k| room.is_beyond(**k, &truth[**k]));
         let misses: Vec<Miss> = misses.map(|k| room.miss(*k, &truth[*k])).collect();
+        let over_bound = |k: usize| median(self.errors_over_bound.iter().map(|e| e[k])).map(f64::recip);
+        (self.bound_over_error, self.bound_over_certifiers_error) = (over_bound(0), over_bound(1));
         self.cleared += seeming.len() - misses.len();
         self.beyond.extend(misses);
         Ok(())
@@ -251,6 +267,9 @@ impl fmt::Display for Coverage {
         writeln!(f, "{}", tables::terminal(head.map(str::to_owned).into(), self.histogram.iter().map(row).collect()))?;
         for (solver, rooms) in &self.rooms_by_solver {
             writeln!(f, "{rooms} rooms: {solver}")?;
+        }
+        if let (Some(own), Some(certifiers)) = (self.bound_over_error, self.bound_over_certifiers_error) {
+            writeln!(f, "bound over error: {own:.1} in the median, {certifiers:.1} if the certifier alone were off")?;
         }
         for miss in &self.beyond {
             writeln!(
@@ -290,6 +309,8 @@ mod tests {
         // The nightly has more of them.
         let mut found = coverage(2, 0.1, 20);
         assert!(found.is_good() && found.readings == 2 * METERS, "{found}");
+        let (own, certifiers) = (found.bound_over_error.unwrap(), found.bound_over_certifiers_error.unwrap());
+        assert!(1.0 < own && own < certifiers && found.to_string().contains("bound over error: "), "{found}");
         let mut room = Room::of(7, 1, 0.1).unwrap();
         // What is certified wrongly is cleared; a wrong reading is not.
         room.truth[5] = Certified::sampled(2.0 * room.truth[5].lux, 1e-9);
