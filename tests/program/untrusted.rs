@@ -154,6 +154,9 @@ fn aliases_attributes_and_cases_multiply_nothing() {
     said(&room(&many), "cases at most");
     let boxes = "  - {box: {min_m: [0, 0, 0], max_m: [1, 1, 0.1], reflectance: 0}}\n".repeat(4_500);
     said(&room(&spec().replace("meters:\n", &format!("obstacles:\n{boxes}meters:\n"))), "triangles are more than");
+    let engines = (0..6_000).map(|k| format!("  e{k}: {{}}\n")).collect::<Vec<_>>().concat();
+    let told = said(&room(&(spec() + "engines:\n" + &engines)), "50 faults, and no more are told");
+    assert!(told.contains("no engine `e0`") && told.len() < 20_000, "{told}");
     let attributes = (0..100_000).map(|k| format!(" a{k}=''")).collect::<Vec<_>>().concat();
     let room = room(&spec().replace("lamp.ies", "lamp.xml"));
     room.write("lamp.xml", &format!("<IESTM33-22{attributes}/>"));

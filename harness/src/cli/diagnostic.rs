@@ -6,7 +6,7 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode,
 
 use super::complain;
 use crate::audit::AuditError;
-use crate::spec::{Faults, SpecError};
+use crate::spec::{Faults, MAX_FAULTS, SpecError};
 use crate::system::files::{MAX_BYTES, read_bounded};
 use crate::system::printable::{self, is_unprintable};
 
@@ -52,7 +52,8 @@ struct Several(Vec<Fault>);
 
 impl fmt::Display for Several {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} faults", self.0.len())
+        let rest = if self.0.len() == MAX_FAULTS { ", and no more are told" } else { "" };
+        write!(f, "{} faults{rest}", self.0.len())
     }
 }
 

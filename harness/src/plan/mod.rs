@@ -16,7 +16,7 @@ use crate::engines::{Absent, Engine, EngineError, Job, SceneFile, Site, Support,
 use crate::measure::Instrument;
 use crate::procedures::Task;
 use crate::record::{EngineName, ProcedureId, ReadingKey};
-use crate::spec::{Case, SpecError};
+use crate::spec::{Case, MAX_FAULTS, SpecError};
 use luminaire::scene::Transport;
 
 pub use groups::{Group, groups};
@@ -189,10 +189,10 @@ pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, Spe
     Planner::new(selection, site, Skipping::Allowed).plan(case)
 }
 
-/// All that is wrong with what cases and a command line say of engines; nothing is started.
+/// What is wrong with what cases and a command line say of engines, as much as is told; nothing is started.
 pub fn faults(cases: &[Case], selection: &Selection) -> Vec<SpecError> {
     let mut roster = Roster::new();
-    cases.iter().flat_map(|case| roster.faults(case, selection)).collect()
+    cases.iter().flat_map(|case| roster.faults(case, selection)).take(MAX_FAULTS).collect()
 }
 
 /// Whether readings may be left out that follow from others.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::SpecError;
 
 /// More are not told of one file: whoever has made so many mends these first.
-pub(super) const MAX_FAULTS: usize = 50;
+pub const MAX_FAULTS: usize = 50;
 
 /// One fault or more.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,6 +17,9 @@ impl Faults {
     pub fn of(faults: impl IntoIterator<Item = SpecError>) -> Option<Self> {
         let mut told: Vec<SpecError> = vec![];
         for fault in faults {
+            if told.len() == MAX_FAULTS {
+                break;
+            }
             if !told.contains(&fault) {
                 told.push(fault);
             }
@@ -52,3 +55,26 @@ impl fmt::Display for Faults {
 }
 
 impl std::error::Error for Faults {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::Source;
+
+    #[test]
+    fn of_many_faults_the_first_are_told_and_their_places_looked_for_in_so_much_text() {
+        let lines: Vec<String> = (0..300).map(|k| format!("e{k}: {}\n", "x".repeat(10_000))).collect();
+        let source = Source::new("spec.yaml".into(), lines.concat());
+        let same_text = source.clone();
+        let sources = [&source, &same_text].into_iter().cycle();
+        let fault = |(k, source): (usize, &Source)| source.error_at(&format!("e{k}"), "strange", "");
+        let all: Vec<SpecError> = sources.enumerate().take(300).map(fault).collect();
+        let placed = all.iter().take_while(|fault| fault.line.is_some()).count();
+        // Three times three megabytes.
+        assert_eq!((placed, all.iter().filter(|fault| fault.line.is_some()).count()), (3, 3));
+        assert_eq!((all[2].line, all[3].message.as_str()), (Some(3), "e3: strange"));
+        let told = Faults::of(all.iter().chain(&all).cloned()).unwrap();
+        assert_eq!(told.all().len(), MAX_FAULTS);
+        assert!(told.all().contains(&all[3]) && !told.all().contains(&all[60]));
+    }
+}

@@ -22,12 +22,13 @@ mod write;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use schemars::JsonSchema;
 
 pub use build::Case;
 pub use content::content;
-pub use faults::Faults;
+pub use faults::{Faults, MAX_FAULTS};
 pub(crate) use locate::Spot;
 pub use model::{Budget, EngineSettings, SHORTEST_PATIENCE, Spec, ToleranceOverride};
 pub use plausible::doubts;
@@ -81,6 +82,8 @@ pub struct Source {
     values: usize,
     /// The places of the overrides that lie over it, such as `cases[1]`; none but in a case of a suite.
     overrides: Vec<String>,
+    /// Bytes that places of errors were looked for in, by all cases of a suite together.
+    looked_through: Arc<AtomicUsize>,
 }
 
 impl Source {
@@ -103,7 +106,7 @@ impl Source {
     }
 
     pub fn new(path: PathBuf, text: String) -> Self {
-        Self { path, text: text.into(), trust: Trust::Own, values: 0, overrides: vec![] }
+        Self { path, text: text.into(), ..Self::default() }
     }
 
     /// Parses the text as a spec or a policy; unknown keys are errors with the nearest known key.
@@ -185,7 +188,7 @@ impl Source {
         message: impl Into<String>,
         help: impl Into<String>,
     ) -> SpecError {
-        let place = self.overridden(path, spot).or_else(|| locate::locate(&self.text, path, spot));
+        let place = self.overridden(path, spot).or_else(|| self.locate(path, spot));
         let error = SpecError::of(&self.path, message, help);
         SpecError { line: place.map(|p| p.0), column: place.map(|p| p.1), ..error }
     }
@@ -204,12 +207,18 @@ impl Source {
     /// The place of a path in the override that sets it or something near it, if one does.
     fn overridden(&self, path: &str, spot: Spot) -> Option<(usize, usize)> {
         let first = path.split(['.', '[']).next().filter(|f| !f.is_empty())?;
-        let locate = |path: &str, spot| locate::locate(&self.text, path, spot);
         self.overrides.iter().rev().find_map(|place| {
-            let nearest = locate(&format!("{place}.{first}"), Spot::Value);
-            let found = nearest != locate(place, Spot::Value);
-            if found { locate(&format!("{place}.{path}"), spot) } else { None }
+            let nearest = self.locate(&format!("{place}.{first}"), Spot::Value);
+            let found = nearest != self.locate(place, Spot::Value);
+            if found { self.locate(&format!("{place}.{path}"), spot) } else { None }
         })
+    }
+
+    /// Line and column of a path, unless too many were looked for: each is found by a walk through the text, and a stranger's has as many
+    /// faults as it likes.
+    fn locate(&self, path: &str, spot: Spot) -> Option<(usize, usize)> {
+        let before = self.looked_through.fetch_add(self.text.len(), Ordering::Relaxed);
+        if before < shape::MAX_BYTES_READ_AGAIN { locate::locate(&self.text, path, spot) } else { None }
     }
 }
 

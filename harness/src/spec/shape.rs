@@ -46,7 +46,7 @@ fn is_within(path: &str, whole: &str) -> bool {
 /// How often a tree may still be read to find further faults: as often as some megabytes hold it, so that a long text is not read for ever.
 pub(super) struct Trials(Cell<usize>);
 
-const MAX_BYTES_READ_AGAIN: usize = 8 << 20;
+pub(super) const MAX_BYTES_READ_AGAIN: usize = 8 << 20;
 const MAX_TRIALS: usize = 2000;
 
 impl Trials {
