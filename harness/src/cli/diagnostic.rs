@@ -6,7 +6,7 @@ use miette::{Diagnostic, LabeledSpan, NamedSource, Report, Severity, SourceCode,
 
 use super::complain;
 use crate::audit::AuditError;
-use crate::spec::{Faults, MAX_FAULTS, SpecError};
+use crate::spec::{Faults, SpecError};
 use crate::system::files::{MAX_BYTES, read_bounded};
 use crate::system::printable::{self, is_unprintable};
 
@@ -48,12 +48,15 @@ impl Diagnostic for Fault {
 
 /// Several, each drawn by itself.
 #[derive(Debug)]
-struct Several(Vec<Fault>);
+struct Several {
+    drawn: Vec<Fault>,
+    may_be_more: bool,
+}
 
 impl fmt::Display for Several {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rest = if self.0.len() == MAX_FAULTS { ", and no more are told" } else { "" };
-        write!(f, "{} faults{rest}", self.0.len())
+        let rest = if self.may_be_more { ", and no more are told" } else { "" };
+        write!(f, "{} faults{rest}", self.drawn.len())
     }
 }
 
@@ -65,7 +68,7 @@ impl Diagnostic for Several {
     }
 
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
-        Some(Box::new(self.0.iter().map(|fault| fault as &dyn Diagnostic)))
+        Some(Box::new(self.drawn.iter().map(|fault| fault as &dyn Diagnostic)))
     }
 }
 
@@ -76,7 +79,7 @@ pub(crate) fn diagnose(faults: impl Into<Faults>) -> Report {
         Some(one) if drawn.is_empty() => Report::new(one),
         last => {
             drawn.extend(last);
-            Report::new(Several(drawn))
+            Report::new(Several { drawn, may_be_more: faults.may_be_more() })
         }
     }
 }

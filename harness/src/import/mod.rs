@@ -20,6 +20,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
+use itertools::Itertools;
 
 pub use around::{Group, Part, RoomMesh, Walls};
 pub use place::{Desk, Place};
@@ -181,19 +182,10 @@ fn chosen(raw: &Raw<'_>, options: &Options) -> Result<Vec<Option<f64>>, Faults> 
         let message = format!("`{name}` is {what}, and {} surfaces are of it{}", m.surfaces, first(raw, m));
         Err(SpecError { line: m.line, ..SpecError::of(&m.file, message, help) })
     };
-    let mut all = vec![];
-    for material in &raw.materials {
-        match reflectance(material) {
-            Ok(rho) => all.push(rho),
-            Err(fault) if faults.len() < MAX_FAULTS => faults.push(fault),
-            Err(_) => break,
-        }
-    }
+    let (all, wrong): (Vec<_>, Vec<_>) = raw.materials.iter().map(reflectance).partition_result();
+    faults.extend(wrong);
     Faults::of(faults).map_or(Ok(all), Err)
 }
-
-/// So many are told at once.
-const MAX_FAULTS: usize = 50;
 
 /// Where the first surface of a material stands.
 fn first(raw: &Raw<'_>, material: &raw::Material) -> String {

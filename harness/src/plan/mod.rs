@@ -189,10 +189,10 @@ pub fn plan(case: &Case, selection: &Selection, site: &Site) -> Result<Plan, Spe
     Planner::new(selection, site, Skipping::Allowed).plan(case)
 }
 
-/// What is wrong with what cases and a command line say of engines, as much as is told; nothing is started.
+/// What is wrong with what cases and a command line say of engines, of each case as much as is told; nothing is started.
 pub fn faults(cases: &[Case], selection: &Selection) -> Vec<SpecError> {
     let mut roster = Roster::new();
-    cases.iter().flat_map(|case| roster.faults(case, selection)).take(MAX_FAULTS).collect()
+    cases.iter().flat_map(|case| roster.faults(case, selection).into_iter().take(MAX_FAULTS)).collect()
 }
 
 /// Whether readings may be left out that follow from others.

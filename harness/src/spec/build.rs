@@ -10,7 +10,6 @@ use luminaire::scene::{Meter, Scene};
 use sha2::{Digest, Sha256};
 
 use super::cases::{Variants, variants};
-use super::faults::MAX_FAULTS;
 use super::model::{Budget, EngineSettings, LuminaireSpec, Spec, ToleranceOverride};
 use super::shape::{Mended, Shaped, Trials, shaped};
 use super::tree::tree;
@@ -156,7 +155,6 @@ impl Loaded {
                 break;
             }
         }
-        faults.truncate(MAX_FAULTS);
         Self { cases, faults }
     }
 }

@@ -1,12 +1,12 @@
 //! All that is wrong with specs, policies and options, told at once: who mends one fault wants to know of the next.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::SpecError;
 
 /// More are not told of one file: whoever has made so many mends these first.
-pub const MAX_FAULTS: usize = 50;
+pub(crate) const MAX_FAULTS: usize = 50;
 
 /// One fault or more.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,10 +17,7 @@ impl Faults {
     pub fn of(faults: impl IntoIterator<Item = SpecError>) -> Option<Self> {
         let mut told: Vec<SpecError> = vec![];
         for fault in faults {
-            if told.len() == MAX_FAULTS {
-                break;
-            }
-            if !told.contains(&fault) {
+            if of_file(&told, &fault.file) < MAX_FAULTS && !told.contains(&fault) {
                 told.push(fault);
             }
         }
@@ -34,11 +31,20 @@ impl Faults {
         &self.0
     }
 
+    /// Whether a file may have more than is told of it.
+    pub(crate) fn may_be_more(&self) -> bool {
+        self.0.iter().any(|fault| of_file(&self.0, &fault.file) == MAX_FAULTS)
+    }
+
     /// For who tells one alone.
     #[must_use]
     pub fn first(mut self) -> SpecError {
         self.0.swap_remove(0)
     }
+}
+
+fn of_file(faults: &[SpecError], file: &Path) -> usize {
+    faults.iter().filter(|fault| fault.file == file).count()
 }
 
 impl From<SpecError> for Faults {
@@ -73,8 +79,9 @@ mod tests {
         // Three times three megabytes.
         assert_eq!((placed, all.iter().filter(|fault| fault.line.is_some()).count()), (3, 3));
         assert_eq!((all[2].line, all[3].message.as_str()), (Some(3), "e3: strange"));
-        let told = Faults::of(all.iter().chain(&all).cloned()).unwrap();
-        assert_eq!(told.all().len(), MAX_FAULTS);
+        let other = SpecError::of(Path::new("other.yaml"), "strange", "");
+        let told = Faults::of(all.iter().chain(&all).chain([&other]).cloned()).unwrap();
+        assert!(told.all().len() == MAX_FAULTS + 1 && told.may_be_more() && !Faults::from(other).may_be_more());
         assert!(told.all().contains(&all[3]) && !told.all().contains(&all[60]));
     }
 }

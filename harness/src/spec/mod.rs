@@ -28,7 +28,8 @@ use schemars::JsonSchema;
 
 pub use build::Case;
 pub use content::content;
-pub use faults::{Faults, MAX_FAULTS};
+pub use faults::Faults;
+pub(crate) use faults::MAX_FAULTS;
 pub(crate) use locate::Spot;
 pub use model::{Budget, EngineSettings, SHORTEST_PATIENCE, Spec, ToleranceOverride};
 pub use plausible::doubts;
