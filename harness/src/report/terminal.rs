@@ -138,7 +138,10 @@ pub fn terminal(report: &Report, screen: Screen, folder: Option<&str>) -> String
     writeln!(text, "\n{}", screen.whole(&format!("{} in {:.1} s", report.summary, report.wall_s))).ok();
     if let Some(folder) = folder {
         let more = if report.is_long() { ", comparisons.jsonl, report-pages/" } else { "" };
-        let files = format!("files: {folder}/report.html, report.json{more}, readings/, scenes/<engine>/, logs/");
+        let of_case = report.of_suite("<case>", "/");
+        let files = format!(
+            "files: {folder}/report.html, report.json{more}, {of_case}readings/, {of_case}scenes/<engine>/, {of_case}logs/"
+        );
         writeln!(text, "{}", screen.whole(&files)).ok();
     }
     text
