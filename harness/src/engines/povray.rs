@@ -271,34 +271,53 @@ fn sorted_along(points: impl Iterator<Item = DVec3>) -> Vec<(f64, usize)> {
     points.map(|p| p.dot(ASKEW)).zip(0..).sorted_by(|a, b| a.0.total_cmp(&b.0)).collect()
 }
 
-/// Those before and after the `k`th in order that lie no further from it than so much.
-fn about(sorted: &[(f64, usize)], k: usize, within: f64) -> impl Iterator<Item = usize> {
-    let is_near = move |other: &&(f64, usize)| (other.0 - sorted[k].0).abs() <= within;
-    let after = sorted[k + 1..].iter().take_while(is_near);
-    sorted[..k].iter().rev().take_while(is_near).chain(after).map(|(_, number)| *number)
+/// Numbers of those that lie no further from a place along [`ASKEW`] than so much.
+fn about(sorted: &[(f64, usize)], along: f64, within: f64) -> impl Iterator<Item = usize> {
+    let first = sorted.partition_point(|(other, _)| *other < along - within);
+    sorted[first..].iter().take_while(move |(other, _)| *other <= along + within).map(|(_, number)| *number)
 }
 
 /// Two points that are nearer to each other than this.
 fn near_pair(points: &[DVec3], within_m: f64) -> Option<(usize, usize)> {
     let sorted = sorted_along(points.iter().copied());
-    let near = |(k, (_, a)): (usize, &(f64, usize))| {
-        let b = about(&sorted, k, within_m).find(|b| points[*a].distance(points[*b]) < within_m)?;
+    let near = |(along, a): &(f64, usize)| {
+        let is_near = |b: &usize| b != a && points[*a].distance(points[*b]) < within_m;
+        let b = about(&sorted, *along, within_m).find(is_near)?;
         Some((*a.min(&b), *a.max(&b)))
     };
-    sorted.iter().enumerate().find_map(near)
+    sorted.iter().find_map(near)
 }
 
-/// A light, and another one that its way to a place passes nearer than this, of lights twice as far from each other and from the place. Seen
-/// from there the two are nearly in one direction, so that only few are looked at.
+/// Lights as they are seen from a place.
+struct Ways<'a> {
+    lights_m: &'a [DVec3],
+    at_m: DVec3,
+    /// By their directions.
+    sorted: Vec<(f64, usize)>,
+}
+
+impl<'a> Ways<'a> {
+    fn of(lights_m: &'a [DVec3], at_m: DVec3) -> Self {
+        Self { lights_m, at_m, sorted: sorted_along(lights_m.iter().map(|p| (p - at_m).normalize_or_zero())) }
+    }
+
+    /// The lights whose way to the place passes nearer to a point than this. Seen from there they are nearly in its direction, so that only
+    /// few are looked at.
+    fn past(&self, point_m: DVec3, radius_m: f64) -> impl Iterator<Item = usize> {
+        let away_m = point_m - self.at_m;
+        // The directions are a chord apart whose angle has this sine at most, half of one; twice the sine is more than the chord. Of a point
+        // that is as near to the place as this, it is more than any chord.
+        let within = 2.0 * radius_m / away_m.length();
+        about(&self.sorted, away_m.normalize_or_zero().dot(ASKEW), within)
+            .filter(move |a| distance_to_segment(point_m, self.lights_m[*a], self.at_m) < radius_m)
+    }
+}
+
+/// A light, and another one that its way to a place passes nearer than this.
 fn in_the_way(lights_m: &[DVec3], at_m: DVec3, radius_m: f64) -> Option<(usize, usize)> {
-    let sorted = sorted_along(lights_m.iter().map(|p| (p - at_m).normalize_or_zero()));
-    let passes = |a: usize, b: usize| distance_to_segment(lights_m[b], lights_m[a], at_m) < radius_m;
-    let found = |(k, (_, b)): (usize, &(f64, usize))| {
-        // The directions are a chord apart whose angle has this sine at most, half of one; twice the sine is more than the chord.
-        let within = 2.0 * radius_m / lights_m[*b].distance(at_m);
-        Some((about(&sorted, k, within).find(|a| passes(*a, *b))?, *b))
-    };
-    sorted.iter().enumerate().find_map(found)
+    let ways = Ways::of(lights_m, at_m);
+    let found = |(b, light_m): (usize, &DVec3)| Some((ways.past(*light_m, radius_m).find(|a| *a != b)?, b));
+    lights_m.iter().enumerate().find_map(found)
 }
 
 /// A meter so near an opening that it tells the opening's point lights apart.
@@ -345,6 +364,19 @@ mod way_tests {
             let found = in_the_way(&lights_m, at_m, radius_m);
             assert_eq!(found.is_some(), expected, "{lights_m:?} {at_m}");
             assert!(found.is_none_or(passes));
+        }
+        // Of points anywhere, at a light and about the place itself, too.
+        for _ in 0..300 {
+            let mut place = || DVec3::new(random.f64(), random.f64(), random.f64() * 0.1);
+            let lights_m: Vec<DVec3> = (0..40).map(|_| place()).collect();
+            let (at_m, step) = (place(), 0.6 * place());
+            let ways = Ways::of(&lights_m, at_m);
+            for point_m in [place(), lights_m[3], at_m, at_m + radius_m * step, at_m - radius_m * step] {
+                let mut found: Vec<usize> = ways.past(point_m, radius_m).collect();
+                found.sort_unstable();
+                let passes = |k: &usize| distance_to_segment(point_m, lights_m[*k], at_m) < radius_m;
+                assert_eq!(found, (0..lights_m.len()).filter(passes).collect::<Vec<_>>(), "{point_m} {at_m}");
+            }
         }
         let pair = [DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y * 1e-3];
         assert_eq!(near_pair(&pair, 2e-3), Some((1, 2)));

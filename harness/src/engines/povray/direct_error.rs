@@ -11,7 +11,7 @@ use luminaire::scene::{Luminaire, Meter, Shape, Transport};
 use super::frame::{self, Frame};
 use super::opening::{self, Part};
 use super::pigment;
-use super::{ID, distance_to_segment};
+use super::{ID, Ways, distance_to_segment};
 use crate::engines::cells::{Cells, LookUp};
 use crate::engines::{EngineError, Job};
 
@@ -133,15 +133,20 @@ impl<'a> DirectError<'a> {
     fn of_filters_lx(&self, meter: &Meter) -> f64 {
         let radius_m = opening::FILTER_RADIUS * (1.0 + FILTER_MARGIN) / self.frame.scale;
         let of = |(luminaire, parts): &(&Luminaire, Vec<Part>)| {
-            let places_m: Vec<Vec<DVec3>> = self.exported.near(luminaire, meter, radius_m);
-            let table = &luminaire.photometry.distribution;
-            let is_filtered = |from_m: DVec3| {
-                let is_before =
-                    |p: &DVec3| *p != from_m && distance_to_segment(*p, meter.position_m, from_m) < radius_m;
-                places_m.iter().flatten().any(is_before)
-            };
+            let filters_m: Vec<Vec<DVec3>> = self.exported.near(luminaire, meter, radius_m);
+            if filters_m.is_empty() {
+                return 0.0;
+            }
+            let places_m: Vec<DVec3> = parts.iter().map(|part| place_m(luminaire, part)).collect();
+            let ways = Ways::of(&places_m, meter.position_m);
+            let mut is_filtered = vec![false; parts.len()];
+            for filter_m in filters_m.iter().flatten() {
+                let others = ways.past(*filter_m, radius_m).filter(|k| places_m[*k] != *filter_m);
+                others.for_each(|k| is_filtered[k] = true);
+            }
             let filtered: Vec<Part> =
-                parts.iter().filter(|part| is_filtered(place_m(luminaire, part))).copied().collect();
+                parts.iter().zip(is_filtered).filter(|(_, is)| *is).map(|(part, _)| *part).collect();
+            let table = &luminaire.photometry.distribution;
             self.exported.sum_lx(luminaire, &filtered, meter, |own| table.intensity_towards(own).value())
         };
         self.exported.luminaires.iter().map(of).sum()
