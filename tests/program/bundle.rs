@@ -113,7 +113,7 @@ fn a_run_is_made_again_from_its_bundle_alone_and_comes_out_to_the_byte() {
 fn the_bundle_is_an_ro_crate_by_its_own_reader() {
     let made = bundled(OWN, "bundle");
     let python = root().join("target/crate-tools/bin/python");
-    assert!(python.exists(), "run `ci/crate`");
+    assert!(python.exists(), "run `ci/pinned crate`");
     let mut check = Command::new(python);
     let answer = Answer::of(check.arg(root().join("tests/ro_crate.py")).arg(made.path("bundle")));
     answer.exits(0).prints("10 files");
