@@ -59,7 +59,7 @@ fn agree(report: &Value, procedure: &str, engine: &str, known: &[f64], tolerance
 #[test]
 fn case_s1_is_read_right_by_every_engine() {
     // As finely as the spec asks at night alone.
-    let sampled_to = if is_night() { 5e-4 } else { 1e-3 };
+    let sampled_to = if is_night() { 5e-4 } else { 2e-3 };
     let spec = std::fs::read_to_string(root().join("reference/specs/axial.yaml")).unwrap();
     let folder = Folder::for_renderers(&[("axial.yaml", &spec)]);
     folder.edit("axial.yaml", "../luminaires", root().join("reference/luminaires").to_str().unwrap());

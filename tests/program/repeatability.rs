@@ -18,7 +18,7 @@ meters:
 procedures:
   direct_illuminance: {meters: plane}
   indirect_illuminance: {meters: plane, bounces: 3}
-budget: {relative_error: 0.01, seconds: 60}
+budget: {relative_error: 0.02, seconds: 60}
 ";
 
 /// The report of a run without the times that it has of its own.

@@ -4,14 +4,12 @@
 //! `benchmarks/repetitions.md` has its figures.
 
 use super::cycles::Cycles;
-use super::fixtures::{CONVERGED, S1_INDIRECT_LX, s1, workbench};
+use super::fixtures::{CONVERGED, S1_INDIRECT_LX, by_night, s1, workbench};
 use super::luxcore::LuxCore;
 use super::mitsuba::Mitsuba;
 use super::povray::PovRay;
 use super::radiance::Radiance;
 use super::*;
-
-const REPETITIONS: u64 = 5;
 
 fn repetitions(engine: &dyn Engine, (key, value): (&str, serde_json::Value), budget: Budget) -> Vec<Measurement> {
     let site = Site::of_user().unwrap();
@@ -22,7 +20,7 @@ fn repetitions(engine: &dyn Engine, (key, value): (&str, serde_json::Value), bud
         let job = Job { budget, seed, settings, ..s1(CONVERGED) };
         engine.read(&job, &bench).unwrap()
     };
-    (1..=REPETITIONS).map(read).collect()
+    (1..=by_night(5, 3)).map(read).collect()
 }
 
 /// Each repetition rests on eight blocks, so that its deviation over its standard error is Student's t of 7 degrees of
@@ -34,7 +32,7 @@ fn unbiased_with_honest_errors(found: &[Measurement], bias: f64) {
         let error = |m: &Measurement| m.estimates[k].uncertainty.standard_error().unwrap();
         let mean = found.iter().map(off).sum::<f64>() / found.len() as f64;
         let pooled = found.iter().map(|m| error(m).powi(2)).sum::<f64>().sqrt() / found.len() as f64;
-        // 35 degrees of freedom: beyond 4.5 once in ten thousand.
+        // 21 degrees of freedom: beyond 4.5 once in five thousand; 35 by night.
         assert!(mean.abs() < 4.5 * pooled + bias * exact, "point {k}: {mean} lx off, {pooled} lx pooled: {found:?}");
         let beyond = |m: &Measurement| (off(m).abs() - bias * exact).max(0.0) / error(m);
         squares += found.iter().map(|m| beyond(m).powi(2)).sum::<f64>();

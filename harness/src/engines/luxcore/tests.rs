@@ -71,11 +71,11 @@ fn the_stock_scene_shows_what_luxcore_makes_of_an_ies_file() {
 
 #[test]
 fn bounds_of_direct_light_hold_in_random_rooms_and_are_each_meters_own() {
-    shared_tests::bounds_hold_and_decide(read, false, by_night(6, 3));
+    shared_tests::bounds_hold_and_decide(read, false, by_night(6, 2));
 }
 
 #[test]
 fn light_of_openings_past_a_box_is_within_its_error_in_random_rooms() {
     // A room with openings is a quarter of a minute.
-    shared_tests::bounds_hold_and_decide(read, true, by_night(6, 2));
+    shared_tests::bounds_hold_and_decide(read, true, by_night(6, 1));
 }

@@ -285,8 +285,9 @@ fn tilt(seed: u32) -> f64 {
 #[test]
 fn indirect_light_of_s1_is_exact_within_its_errors_and_the_named_bias_and_cut_where_it_is_asked_for() {
     let at_most = |n| Transport::Indirect(Bounces::AtMost(n));
+    let [few, more] = by_night([100, 200], [40, 80]);
     for (light, count, exact) in
-        [(INDIRECT, 100, S1_INDIRECT_LX), (at_most(7), 100, S1_SEVEN_LX), (at_most(1), 200, S1_FIRST_LX)]
+        [(INDIRECT, few, S1_INDIRECT_LX), (at_most(7), few, S1_SEVEN_LX), (at_most(1), more, S1_FIRST_LX)]
     {
         let measured = read(&in_eight_blocks(s1(light), count));
         within_errors_and_named_bias(&measured, &exact);
@@ -320,7 +321,7 @@ fn uneven(transport: Transport) -> Job {
 
 #[test]
 fn all_light_of_an_uneven_room_agrees_with_the_simulator() {
-    let job = in_eight_blocks(uneven(Transport::Total(Bounces::Converged)), by_night(200, 50));
+    let job = in_eight_blocks(uneven(Transport::Total(Bounces::Converged)), by_night(200, 30));
     within_errors_and_named_bias(&read(&job), &simulated_lx(&job, 1e-4));
 }
 

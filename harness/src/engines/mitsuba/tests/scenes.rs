@@ -7,7 +7,7 @@ use super::*;
 #[test]
 fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
     let (x_m, y_m, diameter_m, length_m) = (0.6, 0.3, 0.1, 1.2);
-    for opening in [
+    let openings = [
         LuminousOpening::Box { x_m, y_m, height_m: 0.0 },
         LuminousOpening::Box { x_m, y_m, height_m: 0.1 },
         LuminousOpening::Box { x_m, y_m: 0.0, height_m: 0.0 },
@@ -16,7 +16,8 @@ fn extended_openings_send_out_their_table_and_are_as_large_as_they_are() {
         LuminousOpening::Ellipsoid { x_m, y_m: 0.6, z_m: 0.2 },
         LuminousOpening::LyingCylinder { axis: HorizontalAxis::X, length_m, diameter_m },
         LuminousOpening::LyingCylinder { axis: HorizontalAxis::Y, length_m, diameter_m },
-    ] {
+    ];
+    for opening in openings.into_iter().skip(by_night(0, 1)).step_by(by_night(1, 2)) {
         let mut lamp = with_opening(luminaire("area", DVec3::new(1.0, 2.0, 3.0), lopsided()), opening);
         lamp.orientation = orientation(30.0, 20.0, 10.0);
         let angles = (&[10.0, 190.0], &[5.0, 85.0, 165.0]);
