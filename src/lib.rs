@@ -22,3 +22,9 @@ pub mod photometry;
 pub mod scene;
 pub mod simulator;
 pub mod units;
+
+/// What a study that takes long takes in every test run, and what it takes where `LUXPROOF_NIGHTLY` is set, as `ci/nightly` does.
+#[cfg(test)]
+fn by_night<T>(night: T, day: T) -> T {
+    if std::env::var_os("LUXPROOF_NIGHTLY").is_some() { night } else { day }
+}

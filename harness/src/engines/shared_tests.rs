@@ -105,7 +105,8 @@ fn asymmetric_and_turned_luminaires_read_their_own_table() {
         [MITSUBA, RADIANCE, POVRAY, CYCLES, LUXCORE].into_iter().flat_map(|r| [(r, lopsided()), (r, quadrant())])
     {
         let every = |step: u32, end: u32| (0..=end / step).map(|k| f64::from(k * step)).collect::<Vec<_>>();
-        let job = goniometer(&turned(distribution), 10.0, &every(15, 345), &every(5, 180));
+        let [c, gamma] = by_night([every(15, 345), every(5, 180)], [every(45, 315), every(15, 180)]);
+        let job = goniometer(&turned(distribution), 10.0, &c, &gamma);
         let (found, exact) = (read(&job), exact_direct_lx(&job));
         let scale = exact.iter().copied().fold(0.0, f64::max);
         for (estimate, exact) in found.estimates.iter().zip(exact) {

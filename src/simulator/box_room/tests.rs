@@ -6,6 +6,7 @@ use std::sync::Arc;
 use approx::assert_relative_eq;
 use glam::{DMat3, DVec3};
 
+use crate::by_night;
 use crate::geometry::{Reflectances, Room};
 use crate::photometry::{LuminousIntensityDistribution, Photometry};
 use crate::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
@@ -444,8 +445,7 @@ fn dimming_and_further_meters_solve_nothing_again() {
 fn a_crowd_of_luminaires_lights_like_its_parts_within_their_bounds() {
     let mut worst = 0.0_f64;
     // A room takes half a minute: the second is the nightly's.
-    let cases = if std::env::var_os("LUXPROOF_NIGHTLY").is_some() { 2 } else { 1 };
-    for case in 0..cases {
+    for case in 0..by_night(2, 1) {
         let mut random = Random(200 + case);
         let (mut scene, meters) = random_scene(&mut random);
         let size_m = scene.room.unwrap().size_m;

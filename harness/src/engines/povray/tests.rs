@@ -233,8 +233,8 @@ fn reflections_are_followed_as_far_as_they_count() {
 
 #[test]
 fn what_is_reflected_twice_is_found_once_for_any_number_of_reflections_and_changes_no_reading() {
-    // As many rays in the pilot as in its blocks, and more in these.
-    for rays in [35, 50] {
+    // As many rays in the pilot as in its blocks, and by night more in these.
+    for rays in by_night(vec![35, 50], vec![35]) {
         let of = |bounces| {
             let transport = Transport::Indirect(bounces);
             let budget = Budget { relative_error: 0.5, seconds: 1e6 };
