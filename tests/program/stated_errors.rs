@@ -51,7 +51,7 @@ fn errors_three_times_too_small_are_told_and_fail_nothing_that_is_right() {
         told += usize::from(doubts == ["too_small"]);
         failed += usize::from(fails > 0);
     }
-    assert!(10 * told >= 9 * all() && failed <= 1, "{told} told, {failed} failed");
+    assert!(10 * told >= 9 * all() && 10 * failed <= all(), "{told} told, {failed} failed");
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn right_errors_are_believed() {
         let report = run(&noise(0.0, 0.001, 0.001), SAMPLED, seed);
         assert_eq!(verdicts(&report).1, 0, "{report}");
     }
-    assert!(told <= 1 && 10 * failed >= 9 * all(), "{told} told, {failed} failed");
+    assert!(10 * told <= all() && 10 * failed >= 9 * all(), "{told} told, {failed} failed");
 }
 
 #[test]
@@ -159,7 +159,7 @@ fn nothing_hides_behind_a_single_degree_of_freedom_or_an_error_that_is_withdrawn
     // Two blocks have one, and are not doubted.
     let two = "blocks = [lux * (1 + .001 * chance.gauss(0, 1)) for _ in range(2)]; lux = sum(blocks) / 2; stated = abs(blocks[0] - lux)";
     let doubted = seeds().filter(|seed| !verdicts(&run(&format!("{RANDOM}{two}"), one, *seed)).2.is_empty()).count();
-    assert!(doubted <= 1, "{doubted}");
+    assert!(10 * doubted <= all(), "{doubted}");
     let withdrawn = "{} if job['budget']['relative_error'] > .003 else {\"std_error_lx\": stated}";
     let report = run(&noise(0.3, 0.0, 0.24), &format!("**({withdrawn})"), 1);
     let (_, fails, doubts) = verdicts(&report);

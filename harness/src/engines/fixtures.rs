@@ -188,7 +188,7 @@ pub(super) fn s2_with_panels(transport: Transport) -> Job {
     let mut job = s2(S2_PANELS_M.map(panel).to_vec(), transport);
     let room = job.scene.room.unwrap();
     job.scene.obstacles.extend(job.scene.luminaires.iter().map(|panel| flush::plate(&room, panel).unwrap()));
-    job.budget.relative_error = by_night(4e-3, 1.5e-2);
+    job.budget.relative_error = by_night(4e-3, 8e-3);
     job
 }
 
