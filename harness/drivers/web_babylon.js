@@ -61,5 +61,7 @@ window.illuminance = async (job) => {
     }
     scene.dispose();
   }
-  return { lux, version: Engine.Version, backend: `WebGL ${engine.webGLVersion}` };
+  const backend = `WebGL ${engine.webGLVersion}`;
+  engine.dispose();
+  return { lux, version: Engine.Version, backend };
 };

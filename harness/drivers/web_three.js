@@ -46,5 +46,7 @@ window.illuminance = async (job) => {
       target.dispose();
     }
   }
-  return { lux, version: THREE.REVISION, backend: renderer.backend.constructor.name };
+  const backend = renderer.backend.constructor.name;
+  renderer.dispose();
+  return { lux, version: THREE.REVISION, backend };
 };

@@ -263,22 +263,16 @@ impl Engine for Web {
         let site = &workbench.site;
         let (node, packages) = (site.node().ok_or_else(gone)?, site.web_packages().ok_or_else(gone)?);
         let chromium = site.chromium().ok_or_else(gone)?;
-        // What a browser keeps lies with the job: profiles, caches, locks.
-        let home = workbench.scene_dir.join(HOME);
-        std::fs::create_dir_all(&home).map_err(|e| EngineError::io(&home, e))?;
-        let run = workbench.invoke(node).args([DRIVER.0.into(), JOB_FILE.into(), packages, chromium]);
-        let run =
-            ["HOME", "TMPDIR", "XDG_CONFIG_HOME", "XDG_CACHE_HOME"].iter().fold(run, |run, key| run.env(key, &home));
-        let finished = run.run();
-        std::fs::remove_dir_all(&home).ok();
-        let mut measurement = self.parsed(&finished?.stdout, job)?;
+        let run = workbench.invoke(node).args([DRIVER.0.into(), "--serve".into(), packages, chromium]);
+        let mut driver = run.converse(workbench.idle.as_ref())?;
+        let asked = serde_json::json!({ "job": workbench.scene_dir.join(JOB_FILE) });
+        let answer = driver.ask(&asked.to_string())?;
+        driver.end()?;
+        let mut measurement = self.parsed(answer.as_bytes(), job)?;
         measurement.effort.insert("command".into(), run.command_line());
         checked(&self.name(), job, measurement)
     }
 }
-
-/// Where the browser keeps what it keeps while it runs.
-const HOME: &str = "browser";
 
 fn file_name(k: usize) -> String {
     format!("luminaire-{k}.ies")
