@@ -65,6 +65,8 @@ class Renderer {
 
   async answer(job, folder) {
     const number = this.jobs.push(folder) - 1;
+    // What a job that was answered complained of afterwards is in its log.
+    if (number > 0) this.troubles.length = 0;
     const lamps = job.lamps.map((lamp) => ({ ...lamp, file: `${number}/${lamp.file}` }));
     const answer = await this.page.evaluate((job) => window.illuminance(job), { ...job, lamps });
     return { ...answer, troubles: this.troubles.splice(0) };
