@@ -69,7 +69,7 @@ class Renderer {
     if (number > 0) this.troubles.length = 0;
     const lamps = job.lamps.map((lamp) => ({ ...lamp, file: `${number}/${lamp.file}` }));
     const answer = await this.page.evaluate((job) => window.illuminance(job), { ...job, lamps });
-    return { ...answer, troubles: this.troubles.splice(0) };
+    return { ...answer, troubles: this.troubles };
   }
 }
 
@@ -87,16 +87,14 @@ const renderers = new Map();
 try {
   for await (const jobFile of jobFiles()) {
     const job = JSON.parse(fs.readFileSync(jobFile, "utf8")), folder = path.dirname(path.resolve(jobFile));
-    if (renderers.get(job.package)?.jobs.length === JOBS_OF_A_PAGE) {
-      await renderers.get(job.package).page.close();
-      renderers.delete(job.package);
-    }
-    if (!renderers.has(job.package)) {
-      const renderer = new Renderer(path.join(folder, job.page), path.resolve(packages, "node_modules", job.package));
+    let renderer = renderers.get(job.package);
+    if (!renderer || renderer.jobs.length === JOBS_OF_A_PAGE) {
+      await renderer?.page.close();
+      renderer = new Renderer(path.join(folder, job.page), path.resolve(packages, "node_modules", job.package));
       await renderer.open(browser);
       renderers.set(job.package, renderer);
     }
-    const answer = await renderers.get(job.package).answer(job, folder);
+    const answer = await renderer.answer(job, folder);
     process.stdout.write(`${JSON.stringify(answer)}\n`);
   }
 } catch (error) {

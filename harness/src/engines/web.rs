@@ -267,10 +267,12 @@ impl Engine for Web {
         let mut driver = run.converse(workbench.idle.as_ref())?;
         let asked = serde_json::json!({ "job": workbench.scene_dir.join(JOB_FILE) });
         let answer = driver.ask(&asked.to_string())?;
-        driver.end()?;
         let mut measurement = self.parsed(answer.as_bytes(), job)?;
         measurement.effort.insert("command".into(), run.command_line());
-        checked(&self.name(), job, measurement)
+        let measurement = checked(&self.name(), job, measurement)?;
+        // Whatever fails ends the driver, too.
+        driver.end()?;
+        Ok(measurement)
     }
 }
 
