@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 use super::Effort;
 use super::grid::{Face, Grid};
 use crate::geometry::{Room, Surface};
-use crate::photometry::Symmetry;
+use crate::photometry::{LuminousIntensityDistribution, Symmetry};
 use crate::scene::Luminaire;
 use crate::simulator::stop::Stop;
 
@@ -40,6 +40,12 @@ impl Operation {
         let sign = |axis| if self.turns(axis) { -1.0 } else { 1.0 };
         let d = d * DVec3::new(sign(0), sign(1), sign(2));
         DVec3::from_array(self.axes.map(|axis| d[axis]))
+    }
+
+    /// The same as a matrix, whose transpose is its inverse.
+    fn matrix(self) -> DMat3 {
+        let [x, y, z] = DVec3::AXES.map(|axis| self.of_direction(axis));
+        DMat3::from_cols(x, y, z)
     }
 
     fn of_point(self, p: DVec3, size_m: DVec3) -> DVec3 {
@@ -142,39 +148,105 @@ fn keeps_luminaires(op: Operation, room: &Room, luminaires: &[Luminaire], stop: 
     luminaires.iter().take_while(|_| !stop.is_due()).all(|luminaire| {
         let image = op.of_point(luminaire.position_m, room.size_m);
         let close = |other: &&Luminaire| (other.position_m - image).length() <= 1e-13 * room.size_m.max_element();
-        let partner = free.iter().position(|other| close(other) && is_image(op, luminaire, other));
+        let partner = free.iter().position(|other| close(other) && is_image(op, luminaire, other, stop));
         partner.map(|k| free.swap_remove(k)).is_some()
     })
 }
 
 /// Whether `other` shines as the image of `luminaire` does: at every node and inside every cell of both tables.
-fn is_image(op: Operation, luminaire: &Luminaire, other: &Luminaire) -> bool {
+fn is_image(op: Operation, luminaire: &Luminaire, other: &Luminaire, stop: &Stop) -> bool {
     let table = &luminaire.photometry.distribution;
     if table.symmetry() == Symmetry::Axial && Arc::ptr_eq(&luminaire.photometry, &other.photometry) {
         let axis = op.of_direction(luminaire.orientation.z_axis);
         return luminaire.flux_scale == other.flux_scale && (axis - other.orientation.z_axis).length() <= 1e-13;
     }
-    let peak = table.max_intensity().value() * luminaire.flux_scale;
+    let tolerance = 1e-12 * table.max_intensity().value() * luminaire.flux_scale;
+    match Turn::of(op, luminaire, other) {
+        Some(turn) => turn.leads_both_ways(luminaire, other, tolerance, stop),
+        None => leads_both_ways(op, luminaire, other, tolerance),
+    }
+}
+
+/// The same by directions, whatever the axes of tables are.
+fn leads_both_ways(op: Operation, luminaire: &Luminaire, other: &Luminaire, tolerance: f64) -> bool {
     let same = |d: DVec3| {
         let (a, b) = (luminaire.intensity_towards(d).value(), other.intensity_towards(op.of_direction(d)).value());
-        (a - b).abs() <= 1e-12 * peak
+        (a - b).abs() <= tolerance
     };
-    let back = |d: DVec3| {
-        // The inverse of a signed permutation is its transpose.
-        let columns = DVec3::AXES.map(|axis| op.of_direction(axis));
-        DMat3::from_cols(columns[0], columns[1], columns[2]).transpose() * d
+    let back = op.matrix().transpose();
+    probes(luminaire).all(same) && probes(other).all(|d| same(back * d))
+}
+
+/// A symmetry that takes one luminaire's planes to planes of another, by their angles: C to `start_deg` more than C or less it, gamma to itself
+/// or up for down.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    start_deg: f64,
+    is_mirrored: bool,
+    is_upside_down: bool,
+}
+
+impl Turn {
+    /// `None` where the axes of the two tables are not one line, or planes are not those of type C.
+    fn of(op: Operation, luminaire: &Luminaire, other: &Luminaire) -> Option<Self> {
+        let is_native = |l: &Luminaire| l.photometry.distribution.is_native();
+        let own = other.orientation.transpose() * op.matrix() * luminaire.orientation;
+        let (x, y, z) = (own.x_axis, own.y_axis, own.z_axis);
+        let is_along = z.x.hypot(z.y) <= 1e-13 && !is_native(luminaire) && !is_native(other);
+        is_along.then(|| Self {
+            start_deg: x.y.atan2(x.x).to_degrees(),
+            is_mirrored: x.x * y.y - x.y * y.x < 0.0,
+            is_upside_down: z.z < 0.0,
+        })
+    }
+
+    fn inverse(self) -> Self {
+        Self { start_deg: if self.is_mirrored { self.start_deg } else { -self.start_deg }, ..self }
+    }
+
+    fn is_its_inverse(self) -> bool {
+        self.is_mirrored || self.start_deg.rem_euclid(180.0) == 0.0
+    }
+
+    fn leads_both_ways(self, luminaire: &Luminaire, other: &Luminaire, tolerance: f64, stop: &Stop) -> bool {
+        let is_one = Arc::ptr_eq(&luminaire.photometry, &other.photometry) && luminaire.flux_scale == other.flux_scale;
+        let is_known_back = is_one && self.is_its_inverse();
+        self.leads(luminaire, other, tolerance, stop)
+            && (is_known_back || self.inverse().leads(other, luminaire, tolerance, stop))
+    }
+
+    /// Whether light at each probe of one luminaire is that of the other where this leads from there.
+    fn leads(self, from: &Luminaire, to: &Luminaire, tolerance: f64, stop: &Stop) -> bool {
+        let [here, there] = [from, to].map(|luminaire| &luminaire.photometry.distribution);
+        let (cs, gammas) = probed_angles(&here.own_planes());
+        let image = |c: &f64| self.start_deg + if self.is_mirrored { -c } else { *c };
+        let images: Vec<f64> = cs.iter().map(image).collect();
+        let upright = |gamma: &f64| if self.is_upside_down { 180.0 - gamma } else { *gamma };
+        // Few at a time: what is none differs soon.
+        gammas.chunks(PROBES.len()).take_while(|_| !stop.is_due()).all(|gammas| {
+            let there = there.intensities(&images, &gammas.iter().map(upright).collect::<Vec<_>>());
+            let pairs = here.intensities(&cs, gammas).into_iter().zip(there);
+            pairs.map(|(a, b)| a * from.flux_scale - b * to.flux_scale).all(|d| d.abs() <= tolerance)
+        })
+    }
+}
+
+/// Where a bilinear piece of a table is looked at between two nodes: a little off them, too, where a table that starts with a step is not at the
+/// mercy of rounding.
+const PROBES: [f64; 5] = [0.001, 0.35, 0.5, 0.8, 0.999];
+
+/// The angles C and gamma at which a table's pieces are looked at, in degrees.
+fn probed_angles(full: &LuminousIntensityDistribution) -> (Vec<f64>, Vec<f64>) {
+    let fill = |angles: &[f64]| -> Vec<f64> {
+        angles.windows(2).flat_map(|w| PROBES.map(|t| w[0] + t * (w[1] - w[0]))).collect()
     };
-    probes(luminaire).all(same) && probes(other).all(|d| same(back(d)))
+    (fill(full.c_deg()), fill(full.gamma_deg()))
 }
 
 /// World directions to every interior point of a table that its bilinear pieces are known by.
 fn probes(luminaire: &Luminaire) -> impl Iterator<Item = DVec3> {
     let full = luminaire.photometry.distribution.own_planes();
-    let fill = |angles: &[f64]| -> Vec<f64> {
-        // A little off the nodes, where a table that starts with a step is not at the mercy of rounding.
-        angles.windows(2).flat_map(|w| [0.001, 0.35, 0.5, 0.8, 0.999].map(|t| w[0] + t * (w[1] - w[0]))).collect()
-    };
-    let (cs, gammas) = (fill(full.c_deg()), fill(full.gamma_deg()));
+    let (cs, gammas) = probed_angles(&full);
     (0..cs.len() * gammas.len())
         .map(move |k| luminaire.orientation * full.own_direction(cs[k / gammas.len()], gammas[k % gammas.len()]))
 }
@@ -264,6 +336,8 @@ mod tests {
     use std::cell::Cell;
 
     use super::*;
+    use crate::photometry::Photometry;
+    use crate::scene::LuminaireModel;
 
     #[test]
     fn every_subgroup_of_a_cubes_symmetries_is_found_by_few_long_looks() {
@@ -298,5 +372,58 @@ mod tests {
                 assert!(long.get() <= 1 + right.len().ilog2(), "{a} {b}: {} long looks", long.get());
             }
         }
+    }
+
+    #[test]
+    fn what_is_an_image_by_angles_is_one_by_directions() {
+        let ranges = [(0.0, 90.0), (0.0, 180.0), (90.0, 270.0), (0.0, 360.0)];
+        let gammas = [(0.0, 180.0), (20.0, 90.0)];
+        // Light of two lobes, of four, of one turned aside, and of none that a symmetry keeps.
+        let lobes: [fn(f64, f64) -> f64; 4] = [
+            |c, g| 3.0 + (2.0 * c).cos() * g.sin(),
+            |c, g| 3.0 + (4.0 * c).cos() * (2.0 * g).sin().powi(2),
+            |c, g| 3.0 + c.sin() * g.sin() + g.cos(),
+            |c, g| 3.0 + (c - 0.3).cos() * g.sin() + (3.0 * c).sin(),
+        ];
+        let mut tables = vec![];
+        let even = |first: f64, last: f64| (0..=6).map(move |k| first + (last - first) * f64::from(k) / 6.0);
+        for (first, last) in ranges {
+            for (low, high) in gammas {
+                for lobe in lobes {
+                    let at = |c: f64, gamma: f64| lobe((c % 360.0).to_radians(), gamma.to_radians());
+                    let candela =
+                        even(first, last).flat_map(|c| even(low, high).map(move |gamma| at(c, gamma))).collect();
+                    let (cs, gammas) = (even(first, last).collect(), even(low, high).collect());
+                    let table = LuminousIntensityDistribution::new(cs, gammas, candela).unwrap();
+                    tables.push(Arc::new(Photometry::of(table)));
+                }
+            }
+        }
+        let upside_down = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+        let turned = [0.0, 45.0, 90.0, 180.0, 30.0].map(|deg: f64| DMat3::from_rotation_z(deg.to_radians()));
+        let ways: Vec<DMat3> = turned.into_iter().flat_map(|way| [way, way * upside_down]).collect();
+        let luminaire = |photometry: &Arc<Photometry>, orientation: DMat3| Luminaire {
+            id: "l".into(),
+            photometry: photometry.clone(),
+            position_m: DVec3::splat(0.5),
+            orientation,
+            flux_scale: 1.0,
+            model: LuminaireModel::Point,
+        };
+        let (group, stop) = (of_geometry(DVec3::ONE), Stop::NEVER);
+        let (mut images, mut others) = (0, 0);
+        for table in &tables {
+            for (a, b) in ways.iter().flat_map(|a| ways.iter().map(move |b| (a, b))) {
+                let [one, other] = [a, b].map(|way| luminaire(table, *way));
+                for op in &group {
+                    let Some(turn) = Turn::of(*op, &one, &other) else { continue };
+                    let by_angles = turn.leads_both_ways(&one, &other, 1e-11, &stop);
+                    assert_eq!(by_angles, leads_both_ways(*op, &one, &other, 1e-11), "{op:?} {turn:?} {table:?}");
+                    let count = if by_angles { &mut images } else { &mut others };
+                    *count += 1;
+                }
+            }
+        }
+        assert!(images > 1000 && others > 1000, "{images} {others}");
     }
 }
