@@ -7,6 +7,7 @@ blocks' spread is small enough. Jobs may follow one another.
 """
 
 import argparse
+import gc
 import json
 import os
 import sys
@@ -43,6 +44,7 @@ def served(instrument, options):
     for request in map(json.loads, sys.stdin):
         if "job" in request:
             read = None  # before the next is made, so that there is memory for one alone
+            gc.collect()  # its parts lead back to it
             options.job, options.threads = request["job"], request["threads"]
             read = begun(instrument, options)
             yield read.about()

@@ -31,6 +31,8 @@ def main():
 def instrument(job, folder, options):
     for table in job["tables"]:
         check(os.path.join(folder, table))
+    os.chdir(folder)  # that of an earlier job may be gone
+    sys.modules.pop("cycles_scene", None)  # the one beside the scene knows where its files are
     runpy.run_path(os.path.join(folder, "scene.py"))
     return Instrument(job, options.threads)
 

@@ -26,6 +26,7 @@ AHEAD = 1 << 12  # pixels that the blocks of one seed have for themselves
 WIDE = 64  # times as wide a patch may be that has space about it: what its corners are rounded by tilts it less
 METER_ID = 7  # what the camera must see
 POLL_S = 5e-4
+lux = None  # the module, once a job is there
 
 
 def main():
@@ -33,13 +34,14 @@ def main():
 
 
 def instrument(job, folder, options):
-    # Here, since it prints a greeting, which must not mix with the answer.
-    import pyluxcore
-
     global lux
-    lux = pyluxcore
-    lux.Init()
-    lux.SetLogHandler(None)
+    if lux is None:
+        # Here, since it prints a greeting, which must not mix with the answer.
+        import pyluxcore
+
+        lux = pyluxcore
+        lux.Init()
+        lux.SetLogHandler(None)
     os.chdir(folder)  # scenes name their files from there
     return Instrument(job, options.threads)
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use glam::DVec3;
@@ -18,7 +18,7 @@ use super::{
     Absent, Budget, Engine, EngineError, Groundwork, Job, Knob, Measurement, Site, Station, Support, Version, Workbench,
 };
 use crate::record::{EngineName, Estimate, MeterId, ProcedureId};
-use crate::system::process::PeakMemory;
+use crate::system::process::{Idle, PeakMemory};
 
 pub(crate) const CONVERGED: Transport = Transport::Indirect(Bounces::Converged);
 pub(super) const S1_DIRECT_LX: [f64; 4] = [0.852757462813, 2.230931614869, 2.230931614869, 13.559183673469];
@@ -301,6 +301,12 @@ pub(super) fn workbench(site: Site, folder: &Path) -> Workbench {
         groundwork: Groundwork::default(),
         idle: None,
     }
+}
+
+/// The same with drivers that wait for the next job, of whichever test, as those of a run do.
+pub(super) fn warm(bench: Workbench) -> Workbench {
+    static WAITING: LazyLock<Idle> = LazyLock::new(Idle::default);
+    Workbench { idle: Some(WAITING.clone()), ..bench }
 }
 
 /// Puts a shell script in a program's place.

@@ -157,7 +157,7 @@ impl Package {
             engine: self.engine.clone(),
             job,
             workbench,
-            conversation: run.converse(None)?,
+            conversation: run.converse(workbench.idle.as_ref())?,
             until: workbench.until(),
             fixed: settings.fixed(),
             cost: &|_| Cost { ray_s: self.ray_s, trial_side: None },

@@ -4,7 +4,7 @@
 //! `benchmarks/repetitions.md` has its figures.
 
 use super::cycles::Cycles;
-use super::fixtures::{CONVERGED, S1_INDIRECT_LX, by_night, s1, workbench};
+use super::fixtures::{CONVERGED, S1_INDIRECT_LX, by_night, s1, warm, workbench};
 use super::luxcore::LuxCore;
 use super::mitsuba::Mitsuba;
 use super::povray::PovRay;
@@ -15,7 +15,7 @@ fn repetitions(engine: &dyn Engine, (key, value): (&str, serde_json::Value), bud
     let site = Site::of_user().unwrap();
     let read = |seed| {
         let folder = tempfile::tempdir().unwrap();
-        let bench = workbench(site.clone(), folder.path());
+        let bench = warm(workbench(site.clone(), folder.path()));
         let settings = BTreeMap::from([(key.to_owned(), value.clone())]);
         let job = Job { budget, seed, settings, ..s1(CONVERGED) };
         engine.read(&job, &bench).unwrap()

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use glam::{BVec3, DVec3};
+use itertools::Itertools;
 use luminaire::geometry::Reflectances;
 use luminaire::photometry::LuminousIntensityDistribution;
 use luminaire::scene::{Bounces, Meter, Obstacle, Shape, Transport, orientation};
@@ -16,7 +17,7 @@ use super::povray::tests as povray;
 use super::radiance::tests as radiance;
 use super::{Engine, EngineError, Job, Measurement, SceneFile, Site, Workbench};
 use crate::record::Estimate;
-use crate::system::process::ProcessError;
+use crate::system::process::{Idle, ProcessError};
 
 /// A renderer, and how near the exact values it reads.
 #[derive(Clone, Copy)]
@@ -198,6 +199,26 @@ fn closed(min_m: DVec3, max_m: DVec3) -> Shape {
     Shape::Mesh { vertices_m: (0..8).map(corner).collect(), triangles }
 }
 
+/// One process is asked for jobs in this order, on one thread and on two by turns, and reads each as one of its own does.
+pub(super) fn one_process_that_takes_jobs_one_after_the_other_reads_as_many_do(
+    engine: &dyn Engine,
+    jobs: &[Job],
+    order: impl IntoIterator<Item = usize>,
+) {
+    let read = |job: &Job, idle: Option<&Idle>, threads| {
+        let folder = tempfile::tempdir().unwrap();
+        let bench = workbench(Site::of_user().unwrap(), folder.path());
+        engine.read(job, &Workbench { idle: idle.cloned(), jobs: threads, ..bench }).unwrap().estimates
+    };
+    let alone: Vec<_> = jobs.iter().map(|job| read(job, None, 1)).collect();
+    assert!(alone.iter().array_combinations().all(|[a, b]| a != b));
+    let idle = Idle::default();
+    for (place, k) in order.into_iter().enumerate() {
+        assert_eq!(read(&jobs[k], Some(&idle), 1 + place % 2), alone[k], "job {k}, asked at place {place}");
+        assert_eq!(idle.count(), 1);
+    }
+}
+
 /// What an engine reads of its own files once they were tampered with.
 pub(super) fn read_tampered(
     engine: &dyn Engine,
@@ -206,7 +227,7 @@ pub(super) fn read_tampered(
     read: impl Fn(&[SceneFile], &Workbench) -> Result<Measurement, EngineError>,
 ) -> Measurement {
     let folder = tempfile::tempdir().unwrap();
-    let bench = workbench(Site::of_user().unwrap(), folder.path());
+    let bench = warm(workbench(Site::of_user().unwrap(), folder.path()));
     engine.probe(&bench.site).unwrap_or_else(|absent| panic!("{} is needed here: {absent}", engine.name()));
     let edited = |f: SceneFile| match String::from_utf8(f.bytes.clone()) {
         Ok(text) => SceneFile::text(&f.name, tamper(&f.name, text)),

@@ -10,7 +10,6 @@ use super::*;
 use crate::engines::Budget;
 use crate::engines::fixtures::*;
 use crate::engines::shared_tests;
-use crate::system::process::Idle;
 
 mod failures;
 mod scenes;
@@ -44,19 +43,12 @@ fn exported_files_are_these() {
 
 #[test]
 fn one_process_that_takes_jobs_one_after_the_other_reads_as_many_do() {
-    let engine = Mitsuba::default();
     let budget = Budget { relative_error: 0.02, seconds: 20.0 };
     let of = |transport| Job { budget, ..s1(transport) };
-    let jobs = [of(CONVERGED), Job { budget, ..shared_tests::furnished() }, of(Transport::Direct), of(CONVERGED)];
-    let read = |job: &Job, idle: Option<&Idle>, threads| {
-        let folder = tempfile::tempdir().unwrap();
-        let bench = workbench(Site::of_user().unwrap(), folder.path());
-        let found = engine.read(job, &Workbench { idle: idle.cloned(), jobs: threads, ..bench }).unwrap();
-        assert!(idle.is_none_or(|idle| idle.count() == 1));
-        found
-    };
-    let idle = Idle::default();
-    for (job, threads) in jobs.iter().zip([1, 2, 1, 2]) {
-        assert_eq!(read(job, Some(&idle), threads).estimates, read(job, None, 1).estimates);
-    }
+    let jobs = [of(CONVERGED), Job { budget, ..shared_tests::furnished() }, of(Transport::Direct)];
+    shared_tests::one_process_that_takes_jobs_one_after_the_other_reads_as_many_do(
+        &Mitsuba::default(),
+        &jobs,
+        [0, 1, 2, 0],
+    );
 }

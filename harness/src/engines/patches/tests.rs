@@ -6,9 +6,9 @@ use luminaire::photometry::LuminousOpening;
 use luminaire::scene::{Luminaire, LuminaireModel, Obstacle, Scene, Shape, Transport, flush, orientation};
 
 use super::*;
-use crate::engines::Engine;
 use crate::engines::fixtures::*;
 use crate::engines::shared_tests::{self, furnished};
+use crate::engines::{Budget, Engine};
 
 /// The tests of an engine that hold for both alike.
 macro_rules! hold_for_patches {
@@ -25,6 +25,7 @@ macro_rules! hold_for_patches {
             one_seed_gives_the_same_readings_on_any_number_of_threads
             what_cannot_be_read_well_is_said_beforehand
             its_own_reader_gets_the_users_bytes
+            one_process_that_takes_jobs_one_after_the_other_reads_as_many_do
         );
     };
     (@ $with:expr; $($test:ident)+) => {
@@ -37,6 +38,22 @@ macro_rules! hold_for_patches {
     };
 }
 pub(in crate::engines) use hold_for_patches;
+
+/// Rooms, bodies from files and tables that differ under the same names.
+pub(in crate::engines) fn one_process_that_takes_jobs_one_after_the_other_reads_as_many_do(engine: &dyn Engine) {
+    let budget = Budget { relative_error: 0.3, seconds: 20.0 };
+    let [mut one, mut other] = [Transport::Direct, CONVERGED].map(|transport| Job { budget, ..s1(transport) });
+    let furniture = furnished().scene.obstacles;
+    one.scene.obstacles = furniture.clone();
+    other.scene.room = Some(room(DVec3::new(9.0, 9.0, 4.0), 0.3, 0.6, 0.1));
+    other.scene.obstacles = furniture;
+    if let Some(Obstacle { shape: Shape::Mesh { vertices_m, .. }, .. }) = other.scene.obstacles.last_mut() {
+        vertices_m[2] = DVec3::new(3.0, 3.0, 2.0);
+    }
+    let photometry = &mut other.scene.luminaires[0].photometry;
+    *photometry = photometry.with_distribution(photometry.distribution.scaled(2.0)).into();
+    shared_tests::one_process_that_takes_jobs_one_after_the_other_reads_as_many_do(engine, &[one, other], [0, 1, 0]);
+}
 
 /// In a large room, far off: where surfaces behind an opening were a 200,000th of the room apart, Cycles read 1 to 2.5 % too little.
 pub(in crate::engines) fn recessed_openings_lose_no_light_to_what_lies_behind_them(read: fn(&Job) -> Measurement) {

@@ -1,8 +1,8 @@
 //! What is exported, what a page answers, and how it fails.
 
 use super::*;
-use crate::engines::fixtures::{self, lopsided, workbench};
-use crate::system::process::Idle;
+use crate::engines::fixtures::{self, lopsided};
+use crate::engines::shared_tests;
 
 fn job() -> Job {
     fixtures::s1(Transport::Direct)
@@ -53,22 +53,10 @@ fn reflected_light_bodies_and_openings_are_declined() {
 
 #[test]
 fn a_page_that_takes_jobs_one_after_the_other_reads_as_many_do() {
-    let engine = Web(Library::Three);
     let mut other = job();
     other.scene.luminaires[0].photometry = other.scene.luminaires[0].photometry.with_distribution(lopsided()).into();
-    let read = |job: &Job, idle: Option<&Idle>| {
-        let folder = tempfile::tempdir().unwrap();
-        let bench = workbench(Site::of_user().unwrap(), folder.path());
-        let found = engine.read(job, &Workbench { idle: idle.cloned(), ..bench }).unwrap();
-        assert!(idle.is_none_or(|idle| idle.count() == 1));
-        found.estimates
-    };
-    let jobs = [job(), other];
-    let alone = [read(&jobs[0], None), read(&jobs[1], None)];
-    assert_ne!(alone[0], alone[1]);
     // More of them than one page takes.
-    let idle = Idle::default();
-    for k in 0..10 {
-        assert_eq!(read(&jobs[k % 2], Some(&idle)), alone[k % 2], "job {k}");
-    }
+    let order = (0..10).map(|k| k % 2);
+    let engine = Web(Library::Three);
+    shared_tests::one_process_that_takes_jobs_one_after_the_other_reads_as_many_do(&engine, &[job(), other], order);
 }
