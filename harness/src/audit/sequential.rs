@@ -4,7 +4,7 @@
 //! slice of the budget of its own, a few times as long as all before it: engines take seconds to start, so looks are few. Looks are
 //! combined with weights that are fixed before they are taken, in proportion to the effort granted, so that what was read
 //! does not choose its own weight; one that the clock cut short weighs as much less as it has fewer blocks. Seconds are those that engines count, so that no clock has a say; a user's program has none. Deciding early keeps its error rate by alpha spending over the planned looks
-//! ([`crate::judge::share_of_error`]).
+//! ([`crate::judge::SHARE_OF_A_LOOK`]).
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -13,7 +13,7 @@ use crate::engines::Measurement;
 use crate::judge::{Basis, Comparison, Judge, LOOKS, Source, Verdict};
 use crate::measure::Cost;
 use crate::procedures::Task;
-use crate::record::{Estimate, MeterId, Reading, Recording, Spending, Uncertainty};
+use crate::record::{Estimate, MeterId, Reading, Recording, Uncertainty};
 use crate::report::words::rounded;
 use crate::spec::Budget;
 
@@ -26,8 +26,11 @@ const MIN_WEIGHT: f64 = 0.5;
 /// A first look counts as this long at least, in seconds: one that was mirrored or read off another case took none.
 const SHORTEST_S: f64 = 1.0;
 /// Standard errors of the first look within a tolerance, where sampling stops as soon as it is decided: it then decides
-/// whatever deviates by up to a quarter of the tolerance; what deviates by more is worth a further look.
-const FIRST_LOOK: f64 = 3.5;
+/// whatever deviates by up to a third of the tolerance; what deviates by more is worth a further look.
+const FIRST_LOOK: f64 = 3.75;
+/// The effort of all looks so far grows by the logarithm as this power of their number: little at first, since most of what the first look leaves
+/// open lies within the tolerance by its standard error, and most at last, for what is near the edge.
+const GROWTH: f64 = 1.25;
 /// The part of the seconds that the first look is granted, likewise.
 const FIRST_SHARE: f64 = 0.5;
 
@@ -74,8 +77,6 @@ pub fn refine(
         return;
     }
     subject.looks = vec![1; subject.readings.len()];
-    let is_coarse = first.relative_error > budget.relative_error;
-    subject.spending = if is_coarse { Spending::InTheEnd } else { Spending::AtOnce };
     let (first_s, mut total_weight) = (subject.work_s().max(SHORTEST_S), 1.0);
     let falls = subject.stated_errors.iter().filter_map(|s| s.falls_with_effort).reduce(f64::min);
     let is_deaf = falls.is_some_and(|falls| falls < DEAF);
@@ -128,10 +129,10 @@ pub fn patience_left(recording: &Recording, budget: Budget) -> Duration {
     budget.patience().saturating_sub(Duration::try_from_secs_f64(recording.wall_s).unwrap_or_default())
 }
 
-/// The effort of a look against the first, whose error is so many times what is asked for: each makes the total the same factor larger.
+/// The effort of a look against the first, whose error is so many times what is asked for.
 fn weight(look: u32, coarser: f64) -> f64 {
     let all = (BEYOND_SPEC * coarser * coarser).max(BEYOND_FIRST);
-    let total = |look: u32| all.powf(f64::from(look - 1) / f64::from(LOOKS - 1));
+    let total = |look: u32| all.powf((f64::from(look - 1) / f64::from(LOOKS - 1)).powf(GROWTH));
     total(look) - total(look - 1)
 }
 
@@ -454,7 +455,7 @@ mod tests {
     #[test]
     fn a_first_look_that_only_decides_is_coarser_than_the_spec_asks() {
         let whole = Budget { relative_error: 0.0005, seconds: 60.0 };
-        assert_eq!(first_look(whole, 0.035), Budget { relative_error: 0.01, seconds: 30.0 });
+        assert_eq!(first_look(whole, 0.0375), Budget { relative_error: 0.01, seconds: 30.0 });
         assert_eq!(first_look(whole, 0.0).relative_error, 0.0005);
     }
 }

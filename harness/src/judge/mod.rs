@@ -44,7 +44,7 @@ pub use papers::{
 pub use papers::{PaperSplit, Share, Stages, shares};
 pub use policy::{POLICY_FILE, Policy, PolicyChoice, PolicyRecord, Profile, ProfileBudget, ProjectPolicy, Sampling};
 pub use ratios::{Measured, MeterRatio, Ratio, Ratios};
-pub use spending::{LOOKS, share_of_error};
+pub use spending::{LOOKS, SHARE_OF_A_LOOK};
 pub use split::Split;
 pub use statistics::{FigureAgreement, Statistics, StatisticsAgreement};
 pub use tolerance::{Rule, Tolerance, ToleranceClass, Tolerances};
@@ -407,7 +407,7 @@ impl ScoredReference {
 /// The share of its error that a decision about a reading may spend: all of it where only one look was planned.
 fn share_of_reading(recording: &Recording, k: usize) -> f64 {
     let is_sampled = recording.readings.get(k).is_some_and(|r| r.uncertainty.is_sampled());
-    recording.looks.get(k).filter(|_| is_sampled).map_or(1.0, |look| share_of_error(recording.spending, *look))
+    recording.looks.get(k).filter(|_| is_sampled).map_or(1.0, |_| SHARE_OF_A_LOOK)
 }
 
 /// What is uncertain of a reading.

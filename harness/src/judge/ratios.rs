@@ -12,7 +12,7 @@ use luminaire::scene::Meter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::spending::share_of_error;
+use super::spending::SHARE_OF_A_LOOK;
 use super::statistics::{FigureAgreement, Limit, Test, is_light, limit, reference, set};
 use super::uncertainty::upper_tail_of_normal;
 use super::{Basis, Comparison, Judge, MAX_RELATIVE_ERROR, Tolerance};
@@ -224,7 +224,7 @@ impl<'a> Pair<'_, 'a> {
 
     fn test(&self, recordings: [&Recording; 2], held: &[[&Comparison; 2]]) -> Test {
         let limits = [0, 1].map(|k| limit(recordings[k], &held.iter().map(|pair| pair[k]).collect_vec()));
-        let share = |r: &&Recording| r.looks.iter().map(|look| share_of_error(r.spending, *look)).fold(1.0, f64::min);
+        let share = |r: &&Recording| if r.looks.is_empty() { 1.0 } else { SHARE_OF_A_LOOK };
         Test {
             tail: upper_tail_of_normal(self.judge.tolerances.coverage_factor()),
             share: recordings.iter().map(share).fold(1.0, f64::min),

@@ -145,17 +145,6 @@ pub struct Reading {
     pub uncertainty: Uncertainty,
 }
 
-/// At which of several planned looks a decision spends most of its error.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Spending {
-    /// At the first, which is as accurate as was asked.
-    #[default]
-    AtOnce,
-    /// At the last: the first is coarse, and decides what is far from any edge.
-    InTheEnd,
-}
-
 /// Everything one engine said of one procedure of one case, with what is needed to say it again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Recording {
@@ -202,9 +191,6 @@ pub struct Recording {
     /// At which of several planned looks each reading was last sampled, counted from 1; empty where one look was planned.
     #[serde(default)]
     pub looks: Vec<u32>,
-    /// At which of them most of a decision's error is spent.
-    #[serde(default)]
-    pub spending: Spending,
     /// How skewed the blocks of its samples are, in standard deviations of what normal blocks would be: a heavy tail.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skewness: Option<f64>,
@@ -254,7 +240,6 @@ impl Recording {
             work_s: None,
             components: vec![],
             looks: vec![],
-            spending: Spending::default(),
             skewness: None,
             design_effect: None,
             stated_errors: vec![],
