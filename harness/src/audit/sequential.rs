@@ -21,6 +21,9 @@ use crate::spec::Budget;
 /// times what the spec asks.
 const BEYOND_FIRST: f64 = 27.0;
 const BEYOND_SPEC: f64 = 2.0;
+/// The effort of all looks so far grows by the logarithm as this power of their number: little at first, since most of what the first look leaves
+/// open lies within the tolerance by its standard error, and most at last, for what is near the edge.
+const GROWTH: f64 = 1.25;
 /// A look that could be granted less than this share of the first one's effort is not worth an engine's start.
 const MIN_WEIGHT: f64 = 0.5;
 /// A first look counts as this long at least, in seconds: one that was mirrored or read off another case took none.
@@ -28,9 +31,6 @@ const SHORTEST_S: f64 = 1.0;
 /// Standard errors of the first look within a tolerance, where sampling stops as soon as it is decided: it then decides
 /// whatever deviates by up to a third of the tolerance; what deviates by more is worth a further look.
 const FIRST_LOOK: f64 = 3.75;
-/// The effort of all looks so far grows by the logarithm as this power of their number: little at first, since most of what the first look leaves
-/// open lies within the tolerance by its standard error, and most at last, for what is near the edge.
-const GROWTH: f64 = 1.25;
 /// The part of the seconds that the first look is granted, likewise.
 const FIRST_SHARE: f64 = 0.5;
 
