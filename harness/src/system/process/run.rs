@@ -98,7 +98,9 @@ impl Invocation {
     pub(super) fn keep_log(&self, stderr: &str) -> Result<(), ProcessError> {
         let above = self.log.parent().map_or(Ok(()), fs::create_dir_all);
         let log = above.and_then(|()| fs::OpenOptions::new().create(true).append(true).open(&self.log));
-        let kept = log.and_then(|mut log| writeln!(log, "$ {}\n{stderr}", self.command_line()));
+        // In one piece: programs side by side share a log.
+        let entry = format!("$ {}\n{stderr}\n", self.command_line());
+        let kept = log.and_then(|mut log| log.write_all(entry.as_bytes()));
         kept.map_err(|source| ProcessError::Log { program: self.name(), log: self.log_name(), source })
     }
 }

@@ -21,6 +21,23 @@ fn output_and_messages_are_kept_apart_and_stderr_is_logged() {
 }
 
 #[test]
+fn programs_side_by_side_share_a_log_and_no_line_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = "what it said ".repeat(9);
+    thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(|| {
+                let program = Invocation::new("sh", folder.path(), Duration::from_secs(10), folder.path().join("log"));
+                (0..200).for_each(|_| program.keep_log(&said).unwrap());
+            });
+        }
+    });
+    let log = fs::read_to_string(folder.path().join("log")).unwrap();
+    let entries: Vec<&str> = log.split_inclusive(&*format!("{said}\n")).collect();
+    assert!(entries.len() == 1600 && entries.iter().all(|entry| *entry == entries[0]), "{}", entries.len());
+}
+
+#[test]
 fn a_failing_program_is_an_error_with_its_last_words() {
     let folder = tempfile::tempdir().unwrap();
     let error = shell("echo no such lamp >&2; exit 3", 10.0, folder.path()).unwrap_err();
