@@ -1,6 +1,7 @@
 //! Exported scenes, run by hand: the printed command, typed into a shell, reads case S1 without this program's help.
 
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
@@ -45,6 +46,27 @@ fn agree(found: &[f64], known: &[f64], tolerance: f64) {
 
 fn numbers(text: &str) -> Vec<f64> {
     text.split_whitespace().map(|w| w.parse().unwrap_or_else(|e| panic!("`{w}`: {e}"))).collect()
+}
+
+/// Files in shared memory that are named after a process, and its number.
+fn of_processes() -> Vec<(String, String)> {
+    let names = fs::read_dir("/dev/shm").unwrap().map(|file| file.unwrap().file_name().into_string().unwrap());
+    let number = |name: &String| name.rsplit('_').next().filter(|n| n.parse::<u32>().is_ok()).map(str::to_owned);
+    names.filter_map(|name| number(&name).map(|number| (name, number))).collect()
+}
+
+#[test]
+fn radiance_by_hand_leaves_nothing_in_shared_memory() {
+    let before = of_processes();
+    by_hand("radiance", "indirect_illuminance");
+    // What others that run beside this use goes before they do.
+    let is_left = |(name, number): &(String, String)| {
+        !before.iter().any(|(known, _)| known == name)
+            && !Path::new("/proc").join(number).exists()
+            && Path::new("/dev/shm").join(name).exists()
+    };
+    let left: Vec<_> = of_processes().into_iter().filter(is_left).collect();
+    assert!(left.is_empty(), "{left:?}");
 }
 
 #[test]

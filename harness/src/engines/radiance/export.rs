@@ -127,7 +127,7 @@ fn run_sh(job: &Job, settings: &Settings, options: &Options, scenes: usize) -> S
     let lux = format!("rcalc -e '$1={r}*$1+{g}*$2+{b}*$3'");
     let mut text = format!(
         "#!/bin/sh\n# {}\n# Prints the illuminance in lux at each line of meters.txt.\n\
-         # RAYPATH must name Radiance's library (for source.cal).\nset -e\n\
+         # RAYPATH must name Radiance's library (for source.cal), CLOCK libfaketime, where rtrace is to start at a seed.\nset -e\n\
          export RAYPATH=.:${{RAYPATH:-/usr/local/lib/ray}}\n",
         title(job)
     );
@@ -141,7 +141,7 @@ fn run_sh(job: &Job, settings: &Settings, options: &Options, scenes: usize) -> S
         text += &format!("oconv -f {parts} > {}\n", light.octree(scene, scenes));
     }
     let rtrace = |args: &[String], light: Light, scene: usize| {
-        format!("rtrace -h {} {} < meters.txt | {lux}", args.join(" "), light.octree(scene, scenes))
+        format!("LD_PRELOAD=$CLOCK rtrace -h {} {} < meters.txt | {lux}", args.join(" "), light.octree(scene, scenes))
     };
     // Prints the light of all scenes, or writes it into a file.
     let read = |args: &[String], light: Light, name: &str, into: &str| {

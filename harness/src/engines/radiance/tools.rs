@@ -100,20 +100,24 @@ impl Tools {
         parse(&finished.stdout, rows.len())
     }
 
+    /// For rtrace alone in the script: in a shell, libfaketime leaves files behind.
     pub(super) fn command_by_hand(&self, seed: u32) -> String {
-        self.seeded(by_hand("sh"), seed).args(["run.sh"]).command_line_with_env()
+        self.held(by_hand("sh"), seed).env("CLOCK", &self.clock).args(["run.sh"]).command_line_with_env()
     }
 
     fn program(&self, name: &str) -> PathBuf {
         self.package.join("bin").join(name)
     }
 
-    /// rtrace calls `srandom(time(0))`: the seconds since 1970 stand still at the seed.
     fn seeded(&self, run: Invocation, seed: u32) -> Invocation {
+        self.held(run, seed).env("LD_PRELOAD", &self.clock)
+    }
+
+    /// rtrace calls `srandom(time(0))`: to whom [`Self::clock`] is loaded the seconds since 1970 stand still at the seed.
+    fn held(&self, run: Invocation, seed: u32) -> Invocation {
         let held =
             [("FAKETIME", seed.to_string()), ("FAKETIME_FMT", "%s".into()), ("FAKETIME_DISABLE_SHM", "1".into())];
-        let run = held.into_iter().fold(self.prepared(run), |run, (key, value)| run.env(key, value));
-        run.env("LD_PRELOAD", &self.clock)
+        held.into_iter().fold(self.prepared(run), |run, (key, value)| run.env(key, value))
     }
 
     /// With the search paths that the programs need: for their library and for one another.
