@@ -98,6 +98,22 @@ fn what_is_asked_finely_has_a_first_look_when_it_is_stopped() {
 }
 
 #[test]
+fn known_light_is_balanced_coarsely_first_so_that_it_needs_no_other_look() {
+    let scene = Scene { obstacles: vec![], ..s2() };
+    let accuracy = Accuracy { relative_error: 5e-4, seed: 5 };
+    let transport = Transport::Indirect(Bounces::Converged);
+    let mut known = Prepared::new(&scene, transport, &accuracy).unwrap();
+    known.illuminance(&s2_meters()[..1]).unwrap();
+    let left: &'static AtomicI64 = Box::leak(Box::new(AtomicI64::new(10_000)));
+    let stop = Stop { looks: Some(left), ..Stop::NEVER };
+    let mut again = Prepared::new(&scene, transport, &accuracy).unwrap();
+    assert!(again.lay(&known.groundwork().unwrap()));
+    let found = again.illuminance_until(&s2_meters()[..2], &stop).unwrap();
+    assert!(found.solver.contains("stopped"), "{found:?}");
+    assert!(bounds(&found).iter().all(|[value, bound]| *bound < 0.05 * value), "{found:?}");
+}
+
+#[test]
 fn a_raised_flag_leaves_what_luminaires_can_give_at_most() {
     static RAISED: AtomicBool = AtomicBool::new(true);
     let stop = Stop { flag: Some(&RAISED), ..Stop::NEVER };

@@ -153,6 +153,11 @@ impl Enclosure {
         lit::cut_out(&Lights { surroundings: &self.surroundings, emitters: &self.emitters }).is_some()
     }
 
+    /// Whether light on the faces is known as well as this, and what is left is to balance it.
+    pub(super) fn only_balances(&self, relative_error: f64) -> bool {
+        self.lit.as_ref().is_some_and(|(known, lit)| lit.is_whole && *known <= relative_error) && self.is_balanced()
+    }
+
     /// Light on the faces as numbers, where it was found here as well as asked.
     pub(super) fn groundwork(&self) -> Option<Vec<f64>> {
         self.lit.as_ref().filter(|_| self.found_light).map(|(_, lit)| lit.numbers())

@@ -36,7 +36,7 @@ const UNEVEN: f64 = 0.7;
 const PLANNED_BLOCKS: usize = 2 * BELIEVED_BLOCKS;
 const MAX_PARALLEL: usize = 8;
 /// Seconds, as they are counted, that a process of several blocks may take, and how many of them at most, so that all threads have some.
-const SHORT_S: f64 = 0.1;
+const SHORT_S: f64 = 0.25;
 const MOST_TOGETHER: usize = 16;
 
 /// Seconds that are counted for a ray to a surface or a luminaire, and for a row where rtrace keeps its cache: on two cores of a
