@@ -11,10 +11,8 @@ use crate::units::Lux;
 
 /// Meters that are read together where bodies or openings make each of them dear.
 const AT_ONCE: usize = 1024;
-/// Errors from which on a first look comes before, there where known light is only balanced, which itself begins coarsely, and that of this
-/// look.
+/// Errors from which on a first look comes before, and that of this look.
 const FINE: f64 = 1e-3;
-const FINE_BALANCE: f64 = 1e-4;
 const FIRST_LOOK: f64 = 2e-2;
 
 /// Bounds beyond this part of light reflected once tell that two rules have not come to agree, as where a surface is very near: what they
@@ -154,9 +152,7 @@ impl Prepared {
     fn first_look(&self, meters: &[Meter], stop: &Stop) -> Result<Vec<Bounded>, SimulatorError> {
         let Accuracy { relative_error, seed } = self.accuracy;
         let is_long = matches!(self.solver, Solver::Enclosed(..)) && self.transport != Transport::Direct;
-        let only_balances = matches!(&self.solver, Solver::Enclosed(e, _) if e.only_balances(relative_error));
-        let fine = if only_balances { FINE_BALANCE } else { FINE };
-        if !is_long || relative_error > fine || !stop.may_come() {
+        if !is_long || relative_error > FINE || !stop.may_come() {
             return Ok(vec![]);
         }
         let coarse = Accuracy { relative_error: FIRST_LOOK, seed };

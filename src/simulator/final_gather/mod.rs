@@ -153,11 +153,6 @@ impl Enclosure {
         lit::cut_out(&Lights { surroundings: &self.surroundings, emitters: &self.emitters }).is_some()
     }
 
-    /// Whether light on the faces is known as well as this, and what is left is to balance it.
-    pub(super) fn only_balances(&self, relative_error: f64) -> bool {
-        self.lit.as_ref().is_some_and(|(known, lit)| lit.is_whole && *known <= relative_error) && self.is_balanced()
-    }
-
     /// Light on the faces as numbers, where it was found here as well as asked.
     pub(super) fn groundwork(&self) -> Option<Vec<f64>> {
         self.lit.as_ref().filter(|_| self.found_light).map(|(_, lit)| lit.numbers())
@@ -524,9 +519,14 @@ impl<'a> Gather<'a> {
             for wary in WARY {
                 let here = self.limit(sums.bounded().value + direct.value, wary);
                 if here.error_lux < 0.5 * limit.error_lux || wary > 1.0 && needs_log2(&sums) > 0.0 {
+                    let again = self.replicates(index, meter, 0..1 << log2, here);
+                    if self.stop.is_due() {
+                        // Some were not shot, and the first stand.
+                        break;
+                    }
                     limit = here;
                     sums = Sums { brightest_lux, ..Sums::default() };
-                    sums.add(&self.replicates(index, meter, 0..1 << log2, limit), log2);
+                    sums.add(&again, log2);
                 }
             }
             sums.needs_log2 = first_needs_log2;
