@@ -503,10 +503,7 @@ impl<'a> Gather<'a> {
                 break;
             }
             let from = if log2 == FIRST_RAYS_LOG2 { 0 } else { 1 << (log2 - 1) };
-            let more = self.replicates(index, meter, from..1 << log2, limit);
-            if self.stop.is_due() {
-                break;
-            }
+            let Some(more) = self.replicates(index, meter, from..1 << log2, limit) else { break };
             sums.add(&more, log2);
             if sums.meets(self.accuracy.relative_error, direct) {
                 break;
@@ -519,11 +516,8 @@ impl<'a> Gather<'a> {
             for wary in WARY {
                 let here = self.limit(sums.bounded().value + direct.value, wary);
                 if here.error_lux < 0.5 * limit.error_lux || wary > 1.0 && needs_log2(&sums) > 0.0 {
-                    let again = self.replicates(index, meter, 0..1 << log2, here);
-                    if self.stop.is_due() {
-                        // Some were not shot, and the first stand.
-                        break;
-                    }
+                    // Where some were not shot the first stand.
+                    let Some(again) = self.replicates(index, meter, 0..1 << log2, here) else { break };
                     limit = here;
                     sums = Sums { brightest_lux, ..Sums::default() };
                     sums.add(&again, log2);
@@ -539,9 +533,11 @@ impl<'a> Gather<'a> {
         Limit { error_lux, noise_lux: error_lux / wary }
     }
 
-    fn replicates(&self, index: usize, meter: &Meter, rays: std::ops::Range<u32>, limit: Limit) -> Vec<More> {
+    /// What rays of each replicate bring; nothing where it was stopped, since some may not have been shot.
+    fn replicates(&self, index: usize, meter: &Meter, rays: std::ops::Range<u32>, limit: Limit) -> Option<Vec<More>> {
         let one = |replicate| self.replicate(index, meter, replicate, rays.clone(), limit);
-        (0..REPLICATES).into_par_iter().map(one).collect()
+        let all = (0..REPLICATES).into_par_iter().map(one).collect();
+        (!self.stop.is_due()).then_some(all)
     }
 
     fn replicate(
