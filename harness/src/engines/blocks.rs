@@ -32,6 +32,10 @@ const SLOWER: f64 = 1.5;
 const UNCOUNTED_S: f64 = 2.0;
 /// Blocks asked for at a time at most, in parts of those that are there: their error is itself an estimate.
 const MAX_GROWTH: usize = 3;
+/// The least of such a part where not all of the blocks that seem to be missing are asked for: each wave waits for its last.
+const MIN_GROWTH: f64 = 0.25;
+/// By how much of its own standard error a variance may be too large: what blocks miss by it is asked for, and then looked at again.
+const TOLD_TOO_LARGE: f64 = 0.5;
 
 /// Excess kurtosis that blocks are taken to have: light comes in portions, and a few blocks do not show how skewed that makes them.
 const EXCESS_KURTOSIS: f64 = 2.0;
@@ -301,11 +305,20 @@ impl Sampling<'_> {
                 _ => self.enough_blocks - have,
             }
         } else {
-            ((have as f64 * (excess * excess - 1.0)).ceil() as usize).min(MAX_GROWTH * have)
+            missing(have, excess)
         };
         let affordable = ((self.seconds / self.block_s) as usize).min(self.max_blocks).max(self.min_blocks);
         missing.min(affordable.saturating_sub(have))
     }
+}
+
+/// How many blocks more are asked for where there are so many, whose error is so much larger than what was asked for: a quarter more at
+/// least, and no more than what is missing by that error.
+fn missing(have: usize, excess: f64) -> usize {
+    let more = |excess: f64| (have as f64 * (excess - 1.0)).ceil() as usize;
+    let (variance, told) = (excess * excess, (2.0 / degrees_of_freedom(have)).sqrt());
+    let surely = more(variance * (1.0 - TOLD_TOO_LARGE * told)).max(more(1.0 + MIN_GROWTH));
+    surely.min(more(variance)).min(MAX_GROWTH * have)
 }
 
 /// What waves took by the clock, all and the shortest: blocks that are read side by side take as long when they are fewer.
@@ -375,6 +388,29 @@ mod tests {
         // Every block once and in order, so that its number can seed it.
         assert!(waves.windows(2).all(|w| w[0].end == w[1].start) && waves[0].start == 0);
         assert!((found.work_s - 0.01 * found.blocks.count() as f64).abs() < 1e-12);
+    }
+
+    #[test]
+    fn noise_in_the_error_of_few_blocks_costs_few_blocks_and_leaves_the_error_of_the_mean_as_it_is_told() {
+        let mut random = fastrand::Rng::with_seed(7);
+        let asked = 0.02 / 24f64.sqrt();
+        let (mut costly, mut blocks, mut deviates) = (0, 0, vec![]);
+        for _ in 0..3000 {
+            let rule =
+                Sampling { enough_blocks: BELIEVED_BLOCKS, ..Sampling::within(budget(asked, 60.0), 0.01, later()) };
+            let mut one = || (0..2).map(|_| 1.0 + 0.02 * crate::system::random::normal(&mut random)).collect();
+            let found = rule.run(|numbers| Ok(numbers.map(|_| one()).collect())).unwrap().blocks;
+            blocks += found.count();
+            costly += usize::from((asked / found.worst_error(&[])).powi(2) > 1.5);
+            let deviate = |e: Estimate| (e.value - 1.0) / e.uncertainty.standard_error().unwrap();
+            deviates.extend(found.estimates().into_iter().map(deviate));
+        }
+        // 353 and 32.0 where all that seems to be missing is asked for at once.
+        assert!(costly < 60 && (27.0..30.0).contains(&(blocks as f64 / 3000.0)), "{costly} {blocks}");
+        // No more than Student's t with the degrees of freedom that are told, whoever ends where the error is told too small.
+        let variance = deviates.iter().map(|z| z * z).sum::<f64>() / deviates.len() as f64;
+        let told = degrees_of_freedom(24);
+        assert!(variance > 1.0 && variance < told / (told - 2.0), "{variance}");
     }
 
     #[test]

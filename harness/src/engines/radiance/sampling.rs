@@ -32,8 +32,8 @@ const POWER_OF_FEW: f64 = 1.25;
 const POWER: f64 = 1.05;
 /// A division sees uneven light where its relative standard deviation at the worst meter is larger than this.
 const UNEVEN: f64 = 0.7;
-/// Blocks that effort is planned for: where a trial told twice the variance that there is, half of them are enough.
-const PLANNED_BLOCKS: usize = 2 * BELIEVED_BLOCKS;
+/// Blocks that effort is planned for: where a trial told more than twice the variance that there is, two fifths of them are enough.
+const PLANNED_BLOCKS: usize = 5 * BELIEVED_BLOCKS / 2;
 const MAX_PARALLEL: usize = 8;
 /// Seconds, as they are counted, that a process of several blocks may take, and how many of them at most, so that all threads have some.
 const SHORT_S: f64 = 0.25;
