@@ -32,9 +32,9 @@ const SLOWER: f64 = 1.5;
 const UNCOUNTED_S: f64 = 2.0;
 /// Blocks asked for at a time at most, in parts of those that are there: their error is itself an estimate.
 const MAX_GROWTH: usize = 3;
-/// The least of such a part where not all of the blocks that seem to be missing are asked for: each wave waits for its last.
+/// The least of such a part, where so many seem to be missing: each wave waits for its last.
 const MIN_GROWTH: f64 = 0.25;
-/// By how much of its own standard error a variance may be too large: what blocks miss by it is asked for, and then looked at again.
+/// A variance counts for smaller by so much of its own standard error: blocks that are missing all the same are asked for by a later look.
 const TOLD_TOO_LARGE: f64 = 0.5;
 
 /// Excess kurtosis that blocks are taken to have: light comes in portions, and a few blocks do not show how skewed that makes them.
@@ -316,8 +316,8 @@ impl Sampling<'_> {
 /// least, and no more than what is missing by that error.
 fn missing(have: usize, excess: f64) -> usize {
     let more = |excess: f64| (have as f64 * (excess - 1.0)).ceil() as usize;
-    let (variance, told) = (excess * excess, (2.0 / degrees_of_freedom(have)).sqrt());
-    let surely = more(variance * (1.0 - TOLD_TOO_LARGE * told)).max(more(1.0 + MIN_GROWTH));
+    let (variance, its_error) = (excess * excess, (2.0 / degrees_of_freedom(have)).sqrt());
+    let surely = more(variance * (1.0 - TOLD_TOO_LARGE * its_error)).max(more(1.0 + MIN_GROWTH));
     surely.min(more(variance)).min(MAX_GROWTH * have)
 }
 
