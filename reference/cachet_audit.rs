@@ -7,13 +7,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
-use luminaire::calculators::exitance_difference::{self, Layers};
-use luminaire::calculators::{inverse_square, uniform_surfaces};
-use luminaire::geometry::{Reflectances, Room};
-use luminaire::photometry::read_file;
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
-use luminaire::simulator::{self, Accuracy};
-use luminaire::units::Lux;
+use luxproof_calculators::exitance_difference::{self, Layers};
+use luxproof_calculators::{inverse_square, uniform_surfaces};
+use luxproof_photometry::read_file;
+use luxproof_photometry::units::Lux;
+use luxproof_scene::geometry::{Reflectances, Room};
+use luxproof_scene::{Bounces, Luminaire, LuminaireModel, Meter, Scene, Transport, orientation};
+use luxproof_simulator::Accuracy;
 
 /// What can go wrong: files and scenes.
 type Failure = Box<dyn std::error::Error>;
@@ -25,7 +25,7 @@ fn main() -> Result<(), Failure> {
 
 /// All computed tables, in the document's order.
 pub(crate) fn report() -> Result<String, Failure> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("reference");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../reference");
     let rows = published(&std::fs::read_to_string(folder.join("published/cachet.yaml"))?)?;
     let photometry = read_file(&folder.join("luminaires/cachet-reconstructed.ies"))?;
     let room = Room { size_m: DVec3::splat(20.0), reflectance: Reflectances::with_equal_walls(0.2, 0.5, 0.8) };
@@ -167,7 +167,7 @@ fn indirect(text: &mut String, rows: &[Row], scene: &Scene) -> Result<(), Failur
     let rows: Vec<&Row> = rows.iter().filter(|row| row.table == "Table 3").collect();
     let meters = rows.iter().map(|row| meter(row, DVec3::Z)).collect::<Result<Vec<_>, _>>()?;
     let accuracy = Accuracy { relative_error: 1e-5, seed: 1 };
-    let solve = |bounces| simulator::illuminance(scene, &meters, Transport::Indirect(bounces), &accuracy);
+    let solve = |bounces| luxproof_simulator::illuminance(scene, &meters, Transport::Indirect(bounces), &accuracy);
     let (seven, all) = (solve(Bounces::AtMost(7))?, solve(Bounces::Converged)?);
     let twin = uniform_surfaces::solve(scene)?;
     writeln!(

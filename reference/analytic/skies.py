@@ -10,9 +10,13 @@ from derive_values import gauss
 HORIZONTAL_LX = 10_000.0
 GROUND_CD_M2 = 0.3 * HORIZONTAL_LX / math.pi
 SUN_ZENITH_DEG = 40.0           # where the clear sky is brightest
-# a, b of the gradation and c, d, e of the indicatrix: types 1 (overcast), 5 (uniform) and 12 (clear) of Table 1 of the
-# standard. Its type 16, the traditional overcast sky, has a law of its own.
-TYPES = {1: (4, -.7, 0, -1, 0), 5: (0, -1, 0, -1, 0), 12: (-1, -.32, 10, -3, .45)}
+# Table 1 of the standard: a, b of the six gradations, and c, d, e of the six indicatrices.
+GRADATIONS = ((4, -.7), (1.1, -.8), (0, -1), (-1, -.55), (-1, -.32), (-1, -.15))
+INDICATRICES = ((0, -1, 0), (2, -1.5, .15), (5, -2.5, .3), (10, -3, .45), (16, -3, .3), (24, -2.8, .15))
+# The two of each type, from 0. Type 16, the traditional overcast sky, has another law.
+PAIRS = ((0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2), (2, 3), (3, 1), (3, 2), (3, 3), (4, 3), (4, 4), (5, 4),
+         (5, 5))
+TYPES = {k + 1: GRADATIONS[g] + INDICATRICES[i] for k, (g, i) in enumerate(PAIRS)}
 NODES = gauss(48)
 REFRACTION, DEPTH = 1.52, 0.02  # of the glass: index, and optical depth straight through
 
@@ -20,8 +24,8 @@ REFRACTION, DEPTH = 1.52, 0.02  # of the glass: index, and optical depth straigh
 class Sky:
     """A sky, its sun over the azimuth `sun_deg` (from x to y)."""
 
-    def __init__(self, kind, sun_deg=0.0):
-        zenith, azimuth = math.radians(SUN_ZENITH_DEG), math.radians(sun_deg)
+    def __init__(self, kind, sun_deg=0.0, zenith_deg=SUN_ZENITH_DEG):
+        zenith, azimuth = math.radians(zenith_deg), math.radians(sun_deg)
         self.sun = (math.sin(zenith) * math.cos(azimuth), math.sin(zenith) * math.sin(azimuth), math.cos(zenith))
         self.kind, self.scale = kind, 1.0
         self.scale = HORIZONTAL_LX / self.horizontal()
