@@ -3,7 +3,7 @@
 use divan::counter::ItemsCount;
 use divan::{AllocProfiler, Bencher};
 use glam::DVec3;
-use luminaire::geometry::bvh::{Ray, TriangleBvh};
+use luxproof_scene::geometry::bvh::{Ray, TriangleBvh};
 
 #[global_allocator]
 static ALLOCATIONS: AllocProfiler = AllocProfiler::system();

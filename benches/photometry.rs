@@ -2,7 +2,7 @@
 
 use divan::counter::BytesCount;
 use divan::{Bencher, black_box};
-use luminaire::photometry::{DirectionSampler, LuminousIntensityDistribution, Photometry, eulumdat, lm63, tm33};
+use luxproof_photometry::{DirectionSampler, LuminousIntensityDistribution, Photometry, eulumdat, lm63, tm33};
 
 /// C planes and gamma angles: an office luminaire, a street luminaire, a dense laboratory table.
 const SIZES: [(u32, u32); 3] = [(5, 37), (73, 73), (361, 361)];

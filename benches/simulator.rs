@@ -7,10 +7,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DMat3, DVec3};
-use luminaire::geometry::{Reflectances, Room};
-use luminaire::photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry};
-use luminaire::scene::{Bounces, Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
-use luminaire::simulator::{Accuracy, Prepared, SimulatorError, Solution, Uncertainty, certified, illuminance};
+use luxproof_photometry::{LuminousIntensityDistribution, LuminousOpening, Photometry};
+use luxproof_scene::geometry::{Reflectances, Room};
+use luxproof_scene::{Bounces, Luminaire, LuminaireModel, Meter, Obstacle, Scene, Shape, Transport};
+use luxproof_simulator::{Accuracy, Prepared, SimulatorError, Solution, Uncertainty, certified, illuminance};
 
 /// Converged indirect illuminance of S1's four meters: hp collocation of order 12 with three elements a half side, path tracing agrees.
 const S1_INDIRECT: [f64; 4] = [0.943147117, 1.155517316, 1.155517316, 1.420628646];
@@ -104,14 +104,14 @@ fn best(
     Ok((solution, least))
 }
 
-/// What takes less is timed by the clock: what a thread has had of a processor is told now and then alone.
+/// What takes less is timed by the clock: what a thread has had of a processor is updated only now and then.
 const TICK_MS: f64 = 10.0;
 
 /// What all threads of this process have had of the processors so far.
 fn processor_ms() -> Option<f64> {
     let of = |thread: std::io::Result<std::fs::DirEntry>| {
-        let told = std::fs::read_to_string(thread.ok()?.path().join("schedstat")).ok()?;
-        told.split(' ').next()?.parse::<f64>().ok()
+        let reported = std::fs::read_to_string(thread.ok()?.path().join("schedstat")).ok()?;
+        reported.split(' ').next()?.parse::<f64>().ok()
     };
     let all: Option<f64> = std::fs::read_dir("/proc/self/task").ok()?.map(of).sum();
     all.map(|ns| 1e-6 * ns)
